@@ -1,0 +1,13 @@
+//! The articulated template: skeleton, twists, skinning, shape, bone scales, displacements; the embedded body; importers.
+
+mod pose;
+mod shape;
+mod skeleton;
+mod skinning;
+mod template;
+
+pub use pose::{BoneTransforms, Pose};
+pub use shape::{BodyShape, RestBody, ShapeSpace};
+pub use skeleton::{Joint, JointMotion, Skeleton};
+pub use skinning::{SkinWeights, skin};
+pub use template::{BodyError, Template};

@@ -1,0 +1,105 @@
+//! What makes a template a person: shape coefficients, bone scales, surface displacements.
+
+use super::Template;
+use crate::math::{P3, V3};
+use crate::mesh::vertex_normals;
+use crate::par::Par;
+use nalgebra::{Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Linear directions of body shape.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ShapeSpace {
+    /// Name of each direction.
+    pub names: Vec<String>,
+    /// Vertex offsets per unit of each coefficient (one standard deviation), metres, shape `[directions][vertices]`.
+    pub vertices: Vec<Vec<V3>>,
+    /// Joint offsets per unit, metres, shape `[directions][joints]`.
+    pub joints: Vec<Vec<Vector3<f64>>>,
+}
+
+/// A person's shape relative to the template. Default: the template itself.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BodyShape {
+    /// Coefficients of [`ShapeSpace`], standard deviations; missing ones are zero.
+    pub coefficients: Vec<f64>,
+    /// Scale of the bone from each joint's parent to the joint, shape `[joints]`; empty means all one. Eq. 19.
+    pub bone_scales: Vec<f64>,
+    /// Displacement of each vertex along its rest normal, metres; empty means none. Eq. 13.
+    pub displacements: Vec<f32>,
+}
+
+/// The template personalised, still in the rest pose.
+#[derive(Clone, Debug, Default)]
+pub struct RestBody {
+    /// Vertices including displacements, metres, shape `[vertices]`.
+    pub vertices: Vec<P3>,
+    /// Vertices without displacements, shape `[vertices]`.
+    pub base: Vec<P3>,
+    /// Unit normals of `base` (displacements never feed back into them; paper, section 3.3).
+    pub normals: Vec<V3>,
+    /// Joint positions, shape `[joints]`.
+    pub joints: Vec<Point3<f64>>,
+}
+
+impl Template {
+    /// Applies shape coefficients, bone scales (differential bone coordinates, eq. 18–20, in the rest pose)
+    /// and displacements. Missing entries of `shape` count as neutral.
+    pub fn personalise(&self, shape: &BodyShape) -> RestBody {
+        let mut vertices = self.mesh().vertices().to_vec();
+        let mut joints: Vec<Point3<f64>> = self.skeleton().joints().iter().map(|j| j.rest).collect();
+        if let Some(space) = self.shape_space() {
+            for (d, &c) in shape.coefficients.iter().enumerate().take(space.vertices.len()) {
+                if c != 0.0 {
+                    let c32 = c as f32;
+                    vertices.iter_mut().zip(&space.vertices[d]).for_each(|(p, o)| *p += o * c32);
+                    joints.iter_mut().zip(&space.joints[d]).for_each(|(p, o)| *p += o * c);
+                }
+            }
+        }
+        if shape.bone_scales.iter().any(|s| *s != 1.0) {
+            self.scale_bones(&shape.bone_scales, &mut vertices, &mut joints);
+        }
+        let mut normals = Vec::new();
+        vertex_normals(Par::Rayon, &vertices, self.mesh().faces(), self.topology().vertex_faces(), &mut normals);
+        let base = vertices.clone();
+        for (p, (n, &d)) in vertices.iter_mut().zip(normals.iter().zip(&shape.displacements)) {
+            *p += n * d;
+        }
+        RestBody { vertices, base, normals, joints }
+    }
+
+    /// Stretches each bone along itself. A vertex moves with the foot of its perpendicular on each controlling
+    /// bone (γ of eq. 18), so that cross-sections keep their size.
+    fn scale_bones(&self, scales: &[f64], vertices: &mut [P3], joints: &mut [Point3<f64>]) {
+        let skeleton = self.skeleton();
+        let scale = |j: usize| scales.get(j).copied().unwrap_or(1.0);
+        let old = joints.to_vec();
+        for (j, joint) in skeleton.joints().iter().enumerate() {
+            if let Some(p) = joint.parent {
+                joints[j] = joints[p] + (old[j] - old[p]) * scale(j);
+            }
+        }
+        let w = self.weights();
+        for (i, v) in vertices.iter_mut().enumerate() {
+            let mut offset = Vector3::zeros();
+            for k in 0..4 {
+                let weight = f64::from(w.weights[i][k]);
+                if weight == 0.0 {
+                    continue;
+                }
+                let j = usize::from(w.joints[i][k]);
+                let mut foot = joints[j] - old[j];
+                if let Some(c) = skeleton.primary_child(j) {
+                    let d = old[c] - old[j];
+                    // Clamped: beyond its ends a bone carries its neighbourhood along rigidly.
+                    let t =
+                        ((v.cast::<f64>() - old[j]).dot(&d) / d.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+                    foot += d * (t * (scale(c) - 1.0));
+                }
+                offset += foot * weight;
+            }
+            *v += offset.cast::<f32>();
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! The template: mesh, skeleton, weights and shape space that belong together.
+
+use super::{ShapeSpace, Skeleton, SkinWeights};
+use crate::mesh::{MeshError, Topology, TriMesh};
+
+/// What is wrong with a body.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BodyError {
+    /// A joint at fault.
+    #[error("joint `{joint}`: {why}")]
+    Joint {
+        /// Joint name.
+        joint: String,
+        /// What is wrong.
+        why: String,
+    },
+    /// A vertex at fault.
+    #[error("vertex {vertex}: {why}")]
+    Vertex {
+        /// Vertex number.
+        vertex: usize,
+        /// What is wrong.
+        why: String,
+    },
+    /// An array of the wrong size or type.
+    #[error("array `{array}`: {why}")]
+    Array {
+        /// Array name as in the file.
+        array: String,
+        /// What is wrong.
+        why: String,
+    },
+    /// The surface is not a proper mesh.
+    #[error("body mesh: {0}")]
+    Mesh(#[from] MeshError),
+}
+
+/// A rigged body in its rest pose: y up, facing +z, metres. Immutable; share it by `Arc`.
+#[derive(Clone, Debug)]
+pub struct Template {
+    name: String,
+    mesh: TriMesh,
+    topology: Topology,
+    skeleton: Skeleton,
+    weights: SkinWeights,
+    shape_space: Option<ShapeSpace>,
+}
+
+impl Template {
+    /// Checks that the parts fit each other.
+    ///
+    /// # Errors
+    /// Names the vertex, joint or array that does not fit.
+    pub fn new(
+        name: impl Into<String>,
+        mesh: TriMesh,
+        skeleton: Skeleton,
+        weights: SkinWeights,
+        shape_space: Option<ShapeSpace>,
+    ) -> Result<Self, BodyError> {
+        let (n, j) = (mesh.vertices().len(), skeleton.len());
+        let array = |array: &str, why: String| BodyError::Array { array: array.into(), why };
+        if j == 0 {
+            return Err(array("joints", "a body needs at least a root joint".into()));
+        }
+        if weights.joints.len() != n || weights.weights.len() != n {
+            return Err(array("weights", format!("{} rows for {n} vertices", weights.joints.len())));
+        }
+        if let Some(vertex) = weights.joints.iter().position(|r| r.iter().any(|&k| usize::from(k) >= j)) {
+            return Err(BodyError::Vertex {
+                vertex,
+                why: format!("its skinning joint is out of range (0 to {})", j - 1),
+            });
+        }
+        if let Some(s) = &shape_space {
+            for (d, (v, q)) in s.vertices.iter().zip(&s.joints).enumerate() {
+                if v.len() != n || q.len() != j {
+                    return Err(array(
+                        "shapedirs",
+                        format!("direction {d} has {} vertices and {} joints", v.len(), q.len()),
+                    ));
+                }
+            }
+            if s.vertices.len() != s.joints.len() || s.names.len() != s.vertices.len() {
+                return Err(array(
+                    "shapedirs",
+                    "names, vertices and joints differ in their number of directions".into(),
+                ));
+            }
+        }
+        let topology = Topology::new(&mesh)?;
+        Ok(Self { name: name.into(), mesh, topology, skeleton, weights, shape_space })
+    }
+    /// What it is called.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+    /// Rest surface.
+    pub fn mesh(&self) -> &TriMesh {
+        &self.mesh
+    }
+    /// Connectivity of the surface.
+    pub fn topology(&self) -> &Topology {
+        &self.topology
+    }
+    /// Kinematic tree.
+    pub fn skeleton(&self) -> &Skeleton {
+        &self.skeleton
+    }
+    /// Skinning weights.
+    pub fn weights(&self) -> &SkinWeights {
+        &self.weights
+    }
+    /// Directions of body shape, if the template has any.
+    pub fn shape_space(&self) -> Option<&ShapeSpace> {
+        self.shape_space.as_ref()
+    }
+}

@@ -1,0 +1,41 @@
+//! Intrinsics, depth and colour images, projection, noise models, what a sensor saw and when.
+
+mod image;
+mod intrinsics;
+
+pub use image::{ColorImage, DepthImage, ImageError};
+pub use intrinsics::{Intrinsics, IntrinsicsError};
+
+use crate::math::{Camera, ColorCamera, Rigid};
+use serde::{Deserialize, Serialize};
+
+/// What stays the same while a camera runs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    /// Depth camera.
+    pub depth: Intrinsics,
+    /// Colour camera; `None` when there is no colour or it is registered to depth.
+    pub color: Option<Intrinsics>,
+    /// From depth camera to colour camera; identity when registered.
+    pub color_from_depth: Rigid<ColorCamera, Camera>,
+}
+
+impl Calibration {
+    /// Depth only, or colour registered pixel by pixel to depth.
+    pub fn registered(depth: Intrinsics) -> Self {
+        Self { depth, color: None, color_from_depth: Rigid::identity() }
+    }
+}
+
+/// One exposure: depth, maybe colour, and when.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RgbdFrame {
+    /// Number within the epoch, without gaps at the sensor.
+    pub sequence: u64,
+    /// Capture time, nanoseconds of the sensor's clock.
+    pub time_ns: u64,
+    /// Depth in millimetres, 0 = no reading.
+    pub depth: DepthImage,
+    /// Colour, if the camera has any.
+    pub color: Option<ColorImage>,
+}

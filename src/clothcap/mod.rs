@@ -1,0 +1,1 @@
+//! Garments from scans: alignment, segmentation, multi-part templates, undressing, retargeting.

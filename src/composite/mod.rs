@@ -1,0 +1,1 @@
+//! The captured image and the garments in one picture: visibility, shading, edges.

@@ -1,0 +1,1 @@
+//! A garment before it moves: panels, seams, materials, rest shape, sizes, anchors.

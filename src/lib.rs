@@ -1,0 +1,38 @@
+//! `tryon`: everything the try-on product *thinks*.
+//!
+//! Synchronous code without network, clock or global state. Services are thin
+//! shells around the `step` functions found here. Modules form layers; a module
+//! uses only modules of strictly lower layers, and `tests/tidy.rs` says so.
+//!
+//! Start at [`tracking`], [`cloth`] and [`composite`]: one step of each is the product.
+
+// Layer 0
+pub mod math;
+pub mod par;
+// Layer 1
+pub mod camera;
+pub mod linear;
+pub mod mesh;
+// Layer 2
+pub mod formats;
+pub mod raster;
+pub mod spatial;
+// Layer 3
+pub mod body;
+pub mod contact;
+pub mod garment;
+pub mod registration;
+pub mod segment;
+// Layer 4
+pub mod cloth;
+pub mod clothcap;
+pub mod composite;
+pub mod tracking;
+// Layer 5
+pub mod dressing;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+pub mod session;
+pub mod synth;
+// Layer 6
+pub mod evaluate;

@@ -1,0 +1,64 @@
+//! Symmetric matrices: nearest positive semi-definite matrix and principal axes.
+
+use nalgebra::{Matrix2, Matrix3, Point3, SymmetricEigen, Vector3};
+
+/// Nearest positive semi-definite matrix (negative eigenvalues become zero).
+pub fn project_psd_2(m: &Matrix2<f64>) -> Matrix2<f64> {
+    let e = SymmetricEigen::new(*m);
+    let d = Matrix2::from_diagonal(&e.eigenvalues.map(|v| v.max(0.0)));
+    e.eigenvectors * d * e.eigenvectors.transpose()
+}
+
+/// Nearest positive semi-definite matrix (negative eigenvalues become zero).
+pub fn project_psd_3(m: &Matrix3<f64>) -> Matrix3<f64> {
+    let e = SymmetricEigen::new(*m);
+    let d = Matrix3::from_diagonal(&e.eigenvalues.map(|v| v.max(0.0)));
+    e.eigenvectors * d * e.eigenvectors.transpose()
+}
+
+/// Centroid, orthonormal axes (columns) and variances of a cloud, largest variance first.
+/// `None` without points or with a non-finite one.
+pub fn principal_axes(points: &[Point3<f32>]) -> Option<(Point3<f64>, Matrix3<f64>, Vector3<f64>)> {
+    if points.is_empty() {
+        return None;
+    }
+    let n = points.len() as f64;
+    let mean = points.iter().fold(Vector3::zeros(), |a, p| a + p.coords.cast::<f64>()) / n;
+    let cov = points.iter().fold(Matrix3::zeros(), |a, p| {
+        let d = p.coords.cast::<f64>() - mean;
+        a + d * d.transpose()
+    }) / n;
+    if !cov.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let e = SymmetricEigen::new(cov);
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| e.eigenvalues[b].total_cmp(&e.eigenvalues[a]));
+    let axes = Matrix3::from_columns(&order.map(|i| e.eigenvectors.column(i).into_owned()));
+    let variances = Vector3::from_fn(|i, _| e.eigenvalues[order[i]].max(0.0));
+    Some((Point3::from(mean), axes, variances))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn projection_clears_negative_directions_only() {
+        let m = Matrix3::new(2.0, 0.5, 0.0, 0.5, -1.0, 0.3, 0.0, 0.3, 0.4);
+        let p = project_psd_3(&m);
+        assert!(p.symmetric_eigenvalues().iter().all(|v| *v > -1e-12));
+        let positive = Matrix3::new(2.0, 0.5, 0.0, 0.5, 1.0, 0.3, 0.0, 0.3, 0.4);
+        assert!((project_psd_3(&positive) - positive).norm() < 1e-12);
+        assert!(project_psd_2(&Matrix2::new(-1.0, 0.0, 0.0, -2.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn axes_of_a_stretched_cloud() {
+        let pts: Vec<_> = (0..100).map(|i| Point3::new(0.01 * (i % 3) as f32, i as f32 * 0.02, 0.0)).collect();
+        let (_, axes, var) = principal_axes(&pts).expect("points given");
+        assert!(axes.column(0).y.abs() > 0.999 && var[0] > var[1] && var[1] >= var[2]);
+        assert!(principal_axes(&[]).is_none());
+        assert!(principal_axes(&[Point3::new(f32::NAN, 0.0, 0.0)]).is_none());
+    }
+}

@@ -1,0 +1,184 @@
+//! Who touches whom: edges, hinges, neighbours, boundaries.
+
+use super::{Face, MeshError, TriMesh};
+use std::collections::BTreeMap;
+
+/// Compressed rows: for each vertex, a list of indices.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Csr {
+    offsets: Vec<u32>,
+    items: Vec<u32>,
+}
+
+impl Csr {
+    /// Groups `(row, item)` pairs; items of a row keep their order in `pairs`.
+    pub fn from_pairs(rows: usize, pairs: &[(u32, u32)]) -> Self {
+        let mut offsets = vec![0u32; rows + 1];
+        for &(r, _) in pairs {
+            offsets[r as usize + 1] += 1;
+        }
+        for i in 0..rows {
+            offsets[i + 1] += offsets[i];
+        }
+        let mut next = offsets.clone();
+        let mut items = vec![0; pairs.len()];
+        for &(r, item) in pairs {
+            items[next[r as usize] as usize] = item;
+            next[r as usize] += 1;
+        }
+        Self { offsets, items }
+    }
+    /// Items of one row.
+    pub fn row(&self, i: usize) -> &[u32] {
+        &self.items[self.offsets[i] as usize..self.offsets[i + 1] as usize]
+    }
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.offsets.len().saturating_sub(1)
+    }
+}
+
+/// An undirected edge with the one or two faces on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Edge {
+    /// End vertices, smaller first.
+    pub v: [u32; 2],
+    /// The face left of `v[0] → v[1]`, or the only one.
+    pub face: u32,
+    /// The other face; `None` on a boundary.
+    pub twin: Option<u32>,
+    /// Vertices opposite the edge in `face` and `twin`; with a twin this is a hinge.
+    pub opposite: [Option<u32>; 2],
+}
+
+/// Connectivity of an edge-manifold, consistently oriented mesh.
+#[derive(Clone, Debug)]
+pub struct Topology {
+    edges: Vec<Edge>,
+    vertex_faces: Csr,
+    vertex_neighbours: Csr,
+}
+
+fn opposite(f: &Face, a: u32, b: u32) -> Option<u32> {
+    f.iter().copied().find(|&v| v != a && v != b)
+}
+
+impl Topology {
+    /// Builds edges and neighbours; edges come sorted by their vertices.
+    ///
+    /// # Errors
+    /// An edge with more than two faces or with faces oriented against each other.
+    pub fn new(mesh: &TriMesh) -> Result<Self, MeshError> {
+        let mut edges: BTreeMap<(u32, u32), (bool, Edge)> = BTreeMap::new();
+        for (fi, f) in mesh.faces().iter().enumerate() {
+            for k in 0..3 {
+                let (a, b) = (f[k], f[(k + 1) % 3]);
+                let (key, forward) = if a < b { ((a, b), true) } else { ((b, a), false) };
+                match edges.get_mut(&key) {
+                    None => {
+                        let edge = Edge {
+                            v: [key.0, key.1],
+                            face: fi as u32,
+                            twin: None,
+                            opposite: [opposite(f, a, b), None],
+                        };
+                        edges.insert(key, (forward, edge));
+                    }
+                    Some((first_forward, e)) => {
+                        if e.twin.is_some() {
+                            return Err(MeshError::NonManifoldEdge(key.0, key.1));
+                        }
+                        if *first_forward == forward {
+                            return Err(MeshError::FlippedFace(key.0, key.1));
+                        }
+                        e.twin = Some(fi as u32);
+                        e.opposite[1] = opposite(f, a, b);
+                        if forward {
+                            // keep `face` on the left of v[0] → v[1]
+                            e.opposite.swap(0, 1);
+                            e.twin = Some(e.face);
+                            e.face = fi as u32;
+                            *first_forward = true;
+                        }
+                    }
+                }
+            }
+        }
+        let edges: Vec<Edge> = edges.into_values().map(|(_, e)| e).collect();
+        let n = mesh.vertices().len();
+        let vf: Vec<(u32, u32)> =
+            mesh.faces().iter().enumerate().flat_map(|(fi, f)| f.map(|v| (v, fi as u32))).collect();
+        let vn: Vec<(u32, u32)> = edges.iter().flat_map(|e| [(e.v[0], e.v[1]), (e.v[1], e.v[0])]).collect();
+        Ok(Self { edges, vertex_faces: Csr::from_pairs(n, &vf), vertex_neighbours: Csr::from_pairs(n, &vn) })
+    }
+    /// All edges.
+    pub fn edges(&self) -> &[Edge] {
+        &self.edges
+    }
+    /// Faces around each vertex.
+    pub fn vertex_faces(&self) -> &Csr {
+        &self.vertex_faces
+    }
+    /// Vertices sharing an edge with each vertex.
+    pub fn vertex_neighbours(&self) -> &Csr {
+        &self.vertex_neighbours
+    }
+    /// No edge has only one face.
+    pub fn is_closed(&self) -> bool {
+        self.edges.iter().all(|e| e.twin.is_some())
+    }
+    /// Which vertices lie on a boundary edge, shape `[vertices]`.
+    pub fn boundary_vertices(&self) -> Vec<bool> {
+        let mut on = vec![false; self.vertex_faces.rows()];
+        for e in self.edges.iter().filter(|e| e.twin.is_none()) {
+            on[e.v[0] as usize] = true;
+            on[e.v[1] as usize] = true;
+        }
+        on
+    }
+    /// Connected component of each vertex, numbered from 0 in order of first vertex, and their count.
+    pub fn components(&self) -> (Vec<u32>, usize) {
+        let n = self.vertex_faces.rows();
+        let mut label = vec![u32::MAX; n];
+        let mut count = 0;
+        let mut stack = Vec::new();
+        for seed in 0..n {
+            if label[seed] != u32::MAX {
+                continue;
+            }
+            label[seed] = count;
+            stack.push(seed as u32);
+            while let Some(v) = stack.pop() {
+                for &w in self.vertex_neighbours.row(v as usize) {
+                    if label[w as usize] == u32::MAX {
+                        label[w as usize] = count;
+                        stack.push(w);
+                    }
+                }
+            }
+            count += 1;
+        }
+        (label, count as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::P3;
+
+    #[test]
+    fn hinge_orientation_and_faults() {
+        let v = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]].map(P3::from).to_vec();
+        let m = TriMesh::new(v.clone(), vec![[0, 1, 2], [2, 1, 3]]).expect("valid");
+        let t = Topology::new(&m).expect("manifold");
+        let hinge = t.edges().iter().find(|e| e.twin.is_some()).expect("one hinge");
+        assert_eq!((hinge.v, hinge.face, hinge.twin), ([1, 2], 0, Some(1)));
+        assert_eq!(hinge.opposite, [Some(0), Some(3)]);
+        assert!(!t.is_closed() && t.boundary_vertices().iter().all(|b| *b));
+        let flipped = TriMesh::new(v.clone(), vec![[0, 1, 2], [1, 2, 3]]).expect("valid");
+        assert_eq!(Topology::new(&flipped).err(), Some(MeshError::FlippedFace(1, 2)));
+        let fan = TriMesh::new(v, vec![[0, 1, 2], [1, 0, 3], [0, 1, 3]]).expect("valid");
+        assert_eq!(Topology::new(&fan).err(), Some(MeshError::NonManifoldEdge(0, 1)));
+    }
+}

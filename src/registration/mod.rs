@@ -1,0 +1,1 @@
+//! Correspondences, robust kernels and Gauss–Newton that pull one surface onto another.
