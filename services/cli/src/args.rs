@@ -1,0 +1,238 @@
+//! Every word the command line understands.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Live virtual try-on: a depth camera sees a shopper, the mirror shows her in garments she is not wearing.
+#[derive(Debug, Parser)]
+#[command(name = "tryon", version, propagate_version = true, max_term_width = 110)]
+pub(crate) struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    /// Log filter, for example `info` or `tryon_tracking=debug`. Logs go to standard error.
+    #[arg(long, global = true, env = "TRYON_LOG", default_value = "warn")]
+    pub(crate) log: String,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Run the whole chain in this process on a synthetic shopper: nothing to install, no camera, no GPU.
+    ///
+    /// Opens the mirror on http://127.0.0.1:8080. With --headless it needs no browser and leaves pictures and
+    /// report.json in --out.
+    Demo(DemoArgs),
+    /// Run the services of one box from a configuration file, restarting any that dies.
+    Up(UpArgs),
+    /// Dress the person in a recording: composited PNGs and report.json.
+    Run(RunArgs),
+    /// Track the person in a recording: one JSON line a frame.
+    Track(TrackArgs),
+    /// Simulate cloth in a scene file: positions.npy and report.json.
+    Simulate(SimulateArgs),
+    /// Draw garment meshes (in the camera's frame) into one captured picture.
+    Composite(CompositeArgs),
+    /// Check a body, garment or recording made elsewhere and convert it to this product's own form.
+    Import(ImportArgs),
+    /// Write the embedded body or a garment to OBJ, glTF or JSON.
+    Export(ExportArgs),
+    /// Record a source (the synthetic shopper, a folder, or a running camera node) to MCAP or a folder.
+    Record(RecordArgs),
+    /// Publish a recording as if it were a live camera.
+    Replay(ReplayArgs),
+    /// Look at this machine: cores, memory, graphics adapter, ports, shared data; say what would go wrong.
+    Doctor(DoctorArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DemoArgs {
+    /// Stop after this many seconds; without it, run until Ctrl-C.
+    #[arg(long, value_name = "S")]
+    pub(crate) seconds: Option<f64>,
+    /// No browser needed: an internal client receives the pictures and keeps some of them.
+    #[arg(long)]
+    pub(crate) headless: bool,
+    /// Folder for pictures and report.json (with --headless).
+    #[arg(long, value_name = "DIR", default_value = "out/demo")]
+    pub(crate) out: PathBuf,
+    /// Garments to wear.
+    #[arg(long = "garment", value_name = "NAME", default_values_t = ["tshirt".to_owned(), "skirt".to_owned()])]
+    pub(crate) garments: Vec<String>,
+    /// Address of the mirror page.
+    #[arg(long, default_value = "127.0.0.1:8080", value_name = "ADDR")]
+    pub(crate) listen: std::net::SocketAddr,
+    /// Frames a second the synthetic camera delivers.
+    #[arg(long, default_value_t = 30.0, value_name = "HZ")]
+    pub(crate) fps: f64,
+    /// A recording instead of the synthetic shopper (looped).
+    #[arg(long, value_name = "REC")]
+    pub(crate) input: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct UpArgs {
+    /// TOML file; deploy/tryon.toml is the commented default. TRYON_* variables override it.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+    /// Read and check the configuration, print what it amounts to, and stop.
+    #[arg(long)]
+    pub(crate) check: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RunArgs {
+    /// An .mcap file, or a folder with camera.json, depth/ and maybe rgb/.
+    #[arg(long, value_name = "REC")]
+    pub(crate) input: PathBuf,
+    /// Garment names (see `tryon export --list`), worn in this order from inside to outside.
+    #[arg(long = "garment", value_name = "NAME", required = true)]
+    pub(crate) garments: Vec<String>,
+    /// Size for all garments; without it each is chosen from the tracked body.
+    #[arg(long, value_name = "SIZE")]
+    pub(crate) size: Option<String>,
+    /// Folder for frame pictures and report.json.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Body template in SMPL layout; the embedded body without it.
+    #[arg(long, value_name = "NPZ")]
+    pub(crate) body: Option<PathBuf>,
+    /// Stop after so many frames.
+    #[arg(long, value_name = "N")]
+    pub(crate) frames: Option<usize>,
+    /// Frames a still picture is repeated for, so that calibration and draping can settle.
+    #[arg(long, value_name = "N", default_value_t = 45)]
+    pub(crate) still_frames: usize,
+    /// Also draw the tracked body over the picture (frame_*_body.png).
+    #[arg(long)]
+    pub(crate) overlay: bool,
+    /// Worker threads; 0 means one per core.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub(crate) threads: usize,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct TrackArgs {
+    /// An .mcap file, or a folder with camera.json and depth/.
+    #[arg(long, value_name = "REC")]
+    pub(crate) input: PathBuf,
+    /// Body template in SMPL layout; the embedded body without it.
+    #[arg(long, value_name = "NPZ")]
+    pub(crate) body: Option<PathBuf>,
+    /// Rough start: {"root_position": [x, y, z], "facing_yaw_deg": d} in the camera frame.
+    #[arg(long, value_name = "JSON")]
+    pub(crate) init: Option<PathBuf>,
+    /// One line of JSON a frame.
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub(crate) out: PathBuf,
+    /// Also write the tracked surface of every frame as OBJ into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) meshes: Option<PathBuf>,
+    /// Worker threads; 0 means one per core.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub(crate) threads: usize,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum SolverArg {
+    /// The real-time solver.
+    Realtime,
+    /// The offline finite-element solver.
+    Offline,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SimulateArgs {
+    /// Scene file: mesh, pinned vertices, colliders, material, duration.
+    #[arg(long, value_name = "SCENE.json")]
+    pub(crate) scene: PathBuf,
+    /// Which solver.
+    #[arg(long, value_enum, default_value = "realtime")]
+    pub(crate) solver: SolverArg,
+    /// Folder for positions.npy (frames × vertices × 3, f32) and report.json.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CompositeArgs {
+    /// The captured colour picture (PNG or JPEG).
+    #[arg(long, value_name = "PNG")]
+    pub(crate) color: PathBuf,
+    /// Its depth (16-bit PNG, registered to the colour).
+    #[arg(long, value_name = "PNG")]
+    pub(crate) depth: PathBuf,
+    /// Intrinsics as in a recording's camera.json.
+    #[arg(long, value_name = "JSON")]
+    pub(crate) camera: PathBuf,
+    /// Garment meshes in the camera's frame, metres.
+    #[arg(long = "garment", value_name = "OBJ|GLB", required = true)]
+    pub(crate) garments: Vec<PathBuf>,
+    /// The picture to write.
+    #[arg(long, value_name = "PNG")]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ImportArgs {
+    /// A body (.npz in SMPL layout), a garment mesh (.obj, .glb), or a recording (.mcap or folder).
+    #[arg(value_name = "FILE")]
+    pub(crate) input: PathBuf,
+    /// Where to write the checked copy (.obj or .glb for bodies and garments, .mcap or a folder for recordings).
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ExportArgs {
+    /// `body`, or a garment name.
+    #[arg(value_name = "WHAT", required_unless_present = "list")]
+    pub(crate) what: Option<String>,
+    /// .obj or .glb for meshes; .json for a garment's sewing pattern.
+    #[arg(long, value_name = "FILE", required_unless_present = "list")]
+    pub(crate) out: Option<PathBuf>,
+    /// Garment size.
+    #[arg(long, default_value = "M", value_name = "SIZE")]
+    pub(crate) size: String,
+    /// List what can be exported.
+    #[arg(long)]
+    pub(crate) list: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RecordArgs {
+    /// Where frames come from: `synth`, or a recording to convert.
+    #[arg(long, default_value = "synth", value_name = "SOURCE")]
+    pub(crate) source: String,
+    /// An .mcap file, or a folder.
+    #[arg(long, value_name = "FILE|DIR")]
+    pub(crate) out: PathBuf,
+    /// How long, seconds.
+    #[arg(long, default_value_t = 10.0, value_name = "S")]
+    pub(crate) seconds: f64,
+    /// Confirms that the person in the picture agreed to being recorded. Body images are biometric data.
+    #[arg(long)]
+    pub(crate) consent: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ReplayArgs {
+    /// The recording.
+    #[arg(long, value_name = "REC")]
+    pub(crate) input: PathBuf,
+    /// Start again at the end.
+    #[arg(long)]
+    pub(crate) repeat: bool,
+    /// As fast as possible instead of at the recorded rate.
+    #[arg(long)]
+    pub(crate) fast: bool,
+    /// Configuration file with the bus endpoints (see `up`).
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DoctorArgs {
+    /// Print JSON instead of text.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
