@@ -1,1 +1,16 @@
-//! Under construction.
+//! The `tryon.v1` contracts: generated messages and services, and the only conversions between wire and domain.
+//!
+//! The protos in `proto/tryon/v1` are the reference; `src/gen` is made from them by
+//! `cargo run -p tryon-proto --example generate` and checked in.
+
+pub mod convert;
+pub mod keys;
+
+/// Messages, clients and servers of package `tryon.v1`.
+#[allow(missing_docs, unreachable_pub, clippy::all, clippy::unwrap_used, rustdoc::all)]
+pub mod v1 {
+    include!("gen/tryon.v1.rs");
+}
+
+/// The descriptor set of the package, for gRPC reflection.
+pub const DESCRIPTOR: &[u8] = include_bytes!("gen/descriptor.bin");
