@@ -1,7 +1,17 @@
 //! Meshes to depth, colour and id images on the CPU: the fast path without a GPU, and the judge of the GPU.
+//!
+//! Corners are snapped to 1/256 pixel, so coverage is integer arithmetic: exact, watertight along shared
+//! edges, and the same in [`rasterise`], in [`rasterise_reference`] and at any thread count.
 
+mod clip;
+mod fast;
+mod interpolate;
+mod kernel;
 mod reference;
+mod screen;
 mod view;
 
+pub use fast::{Cull, Options, rasterise, rasterise_with};
+pub use interpolate::{barycentrics, id_image, interpolate};
 pub use reference::rasterise_reference;
 pub use view::{View, VisibilityBuffer};

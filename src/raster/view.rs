@@ -1,5 +1,6 @@
 //! Where a picture is taken from, and what it holds.
 
+use super::fast::Scratch;
 use crate::camera::Intrinsics;
 use crate::math::P3;
 
@@ -51,7 +52,7 @@ impl View {
 }
 
 /// Nearest surface per pixel: depth and which triangle.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct VisibilityBuffer {
     /// Columns.
     pub width: u32,
@@ -61,6 +62,14 @@ pub struct VisibilityBuffer {
     pub depth: Vec<f32>,
     /// Face number; `u32::MAX` where nothing is.
     pub face: Vec<u32>,
+    /// The rasteriser's own; says nothing about the picture.
+    pub(super) scratch: Scratch,
+}
+
+impl PartialEq for VisibilityBuffer {
+    fn eq(&self, other: &Self) -> bool {
+        (self.width, self.height) == (other.width, other.height) && self.depth == other.depth && self.face == other.face
+    }
 }
 
 impl VisibilityBuffer {

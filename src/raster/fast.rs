@@ -1,0 +1,380 @@
+//! The fast rasteriser: corners snapped once, bands of rows in parallel.
+
+use super::kernel::Band;
+use super::screen::{Corner, Projector, SUB_BITS};
+use super::{View, VisibilityBuffer, clip};
+use crate::math::P3;
+use crate::mesh::Face;
+use crate::par::{self, Par};
+
+/// Which side of faces to leave out. Faces are counter-clockwise seen from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Cull {
+    /// Draw both sides (cloth).
+    #[default]
+    None,
+    /// Leave out faces turned away: a closed body in about half the time, with the same picture.
+    Back,
+    /// Leave out faces turned to the viewer: the far side of a body.
+    Front,
+}
+
+/// How to rasterise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Options {
+    /// Threads.
+    pub par: Par,
+    /// Sides drawn.
+    pub cull: Cull,
+}
+
+/// Bands of rows when threads are allowed: enough to balance a body between a few threads, few enough that
+/// reading two bytes a face in each band stays below a tenth of the work.
+const BANDS: usize = 8;
+/// Faces sorted into bands by one task.
+const FACE_CHUNK: usize = 4096;
+/// Range of bands of a face that is not drawn.
+const NOWHERE: [u8; 2] = [u8::MAX, 0];
+/// Vertices projected by one task.
+const VERTEX_CHUNK: usize = 2048;
+
+/// Snapped corners; kept in the buffer so that a second picture allocates nothing.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scratch {
+    corners: Vec<Corner>,
+    /// First and last band of every face.
+    ranges: Vec<[u8; 2]>,
+}
+
+/// Draws all faces, both sides, on the calling thread: the pixels of [`super::rasterise_reference`], faster.
+/// Points in the view's frame; faces out of range or with corners that are not finite are left out.
+pub fn rasterise(view: &View, vertices: &[P3], faces: &[Face], out: &mut VisibilityBuffer) {
+    rasterise_with(Options { par: Par::Seq, cull: Cull::None }, view, vertices, faces, out);
+}
+
+/// [`rasterise`] with threads and culling. The bits do not depend on the thread count.
+pub fn rasterise_with(options: Options, view: &View, vertices: &[P3], faces: &[Face], out: &mut VisibilityBuffer) {
+    out.reset(view);
+    let projector = Projector::new(view);
+    let mut corners = std::mem::take(&mut out.scratch.corners);
+    corners.resize(vertices.len(), Corner::OUTSIDE);
+    par::for_chunks(options.par, &mut corners, VERTEX_CHUNK, |start, chunk| {
+        project(&projector, &vertices[start..start + chunk.len()], chunk);
+    });
+
+    let (width, height) = (out.width as usize, out.height as usize);
+    let bands = if options.par == Par::Seq { 1 } else { BANDS };
+    let rows = height.div_ceil(bands).max(1);
+    let mut ranges = std::mem::take(&mut out.scratch.ranges);
+    ranges.clear();
+    if bands > 1 {
+        ranges.resize(faces.len(), NOWHERE);
+        par::for_chunks(options.par, &mut ranges, FACE_CHUNK, |start, chunk| {
+            for (range, f) in chunk.iter_mut().zip(&faces[start..]) {
+                *range = band_range(&corners, f, options.cull, rows as i32);
+            }
+        });
+    }
+    let job = Job { projector, cull: options.cull, vertices, corners: &corners, faces, ranges: &ranges };
+    let mut depth = out.depth.chunks_mut(rows * width.max(1));
+    let mut face = out.face.chunks_mut(rows * width.max(1));
+    let mut parts: [Band<'_>; BANDS] = std::array::from_fn(|k| {
+        let (depth, face) = (depth.next().unwrap_or_default(), face.next().unwrap_or_default());
+        Band {
+            width: width as i32,
+            top: (k * rows) as i32,
+            rows: (depth.len() / width.max(1)) as i32,
+            height: height as i32,
+            depth,
+            face,
+        }
+    });
+    par::for_chunks(options.par, &mut parts[..bands], 1, |number, parts| {
+        for band in parts.iter_mut().filter(|b| b.rows > 0) {
+            draw_band(&job, number as u8, band);
+        }
+    });
+    out.scratch.ranges = ranges;
+    out.scratch.corners = corners;
+}
+
+#[inline(always)]
+fn project_generic(projector: &Projector, vertices: &[P3], corners: &mut [Corner]) {
+    for (corner, p) in corners.iter_mut().zip(vertices) {
+        *corner = projector.corner(p);
+    }
+}
+
+/// What all bands read.
+struct Job<'a> {
+    projector: Projector,
+    cull: Cull,
+    vertices: &'a [P3],
+    corners: &'a [Corner],
+    faces: &'a [Face],
+    /// Empty when there is one band.
+    ranges: &'a [[u8; 2]],
+}
+
+/// First and last band a face may touch.
+fn band_range(corners: &[Corner], f: &Face, cull: Cull, rows: i32) -> [u8; 2] {
+    let [Some(a), Some(b), Some(c)] = f.map(|i| corners.get(i as usize)) else { return NOWHERE };
+    if a.is_outside() | b.is_outside() | c.is_outside() {
+        return [0, BANDS as u8 - 1];
+    }
+    // Rounding differs from the exact sign only near zero, where the exact test in the band decides.
+    let area = f64::from(b.x - a.x) * f64::from(c.y - a.y) - f64::from(b.y - a.y) * f64::from(c.x - a.x);
+    if (cull == Cull::Back && area > 0.0) || (cull == Cull::Front && area < 0.0) {
+        return NOWHERE;
+    }
+    let first = (a.y.min(b.y).min(c.y) >> SUB_BITS) / rows;
+    let last = (a.y.max(b.y).max(c.y) >> SUB_BITS) / rows;
+    if last < 0 || first >= BANDS as i32 { NOWHERE } else { [first.max(0) as u8, last.min(BANDS as i32 - 1) as u8] }
+}
+
+#[inline(always)]
+fn draw_generic(job: &Job<'_>, number: u8, band: &mut Band<'_>) {
+    if job.projector.perspective {
+        draw_faces::<true>(job, number, band);
+    } else {
+        draw_faces::<false>(job, number, band);
+    }
+}
+
+#[inline(always)]
+fn draw_faces<const PERSPECTIVE: bool>(job: &Job<'_>, number: u8, band: &mut Band<'_>) {
+    if job.ranges.is_empty() {
+        for (id, f) in job.faces.iter().enumerate() {
+            draw_face::<PERSPECTIVE>(job, id, f, band);
+        }
+    } else {
+        for (id, (f, range)) in job.faces.iter().zip(job.ranges).enumerate() {
+            if range[0] <= number && number <= range[1] {
+                draw_face::<PERSPECTIVE>(job, id, f, band);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn draw_face<const PERSPECTIVE: bool>(job: &Job<'_>, id: usize, f: &Face, band: &mut Band<'_>) {
+    let [Some(a), Some(b), Some(c)] = f.map(|i| job.corners.get(i as usize)) else { return };
+    if a.is_outside() | b.is_outside() | c.is_outside() {
+        let points = f.map(|i| job.vertices[i as usize]);
+        clip::clip(&job.projector, points, |piece| band.draw::<PERSPECTIVE>(piece, id as u32, job.cull));
+    } else {
+        band.draw::<PERSPECTIVE>([*a, *b, *c], id as u32, job.cull);
+    }
+}
+
+/// Compiles the loops a second time for AVX2 and picks at run time: the product ships one binary.
+/// No fused multiply-add is enabled, so both give the same bits.
+macro_rules! dispatch {
+    ($name:ident, $wide:ident, $generic:ident, ($($arg:ident: $ty:ty),*)) => {
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2")]
+        fn $wide($($arg: $ty),*) {
+            $generic($($arg),*);
+        }
+        fn $name($($arg: $ty),*) {
+            #[cfg(target_arch = "x86_64")]
+            if std::arch::is_x86_feature_detected!("avx2") {
+                // The feature was just detected, which is all the call asks for.
+                #[allow(unsafe_code)]
+                unsafe {
+                    return $wide($($arg),*);
+                }
+            }
+            $generic($($arg),*);
+        }
+    };
+}
+dispatch!(project, project_avx2, project_generic, (projector: &Projector, vertices: &[P3], corners: &mut [Corner]));
+dispatch!(draw_band, draw_band_avx2, draw_generic, (job: &Job<'_>, number: u8, band: &mut Band<'_>));
+
+#[cfg(test)]
+mod tests {
+    use super::super::{barycentrics, id_image, interpolate, rasterise_reference};
+    use super::*;
+    use crate::camera::Intrinsics;
+    use rand::{Rng, SeedableRng};
+
+    fn pinhole() -> View {
+        View::Perspective { camera: Intrinsics::KINECT_V1.resized(160, 120), near: 0.3 }
+    }
+    fn parallel() -> View {
+        View::Orthographic { width: 150, height: 130, left: -1.0, top: -0.9, pixels_per_metre: 70.0 }
+    }
+    /// Triangles of all sizes, some behind the camera, some crossing the near plane, some degenerate or huge.
+    fn soup(seed: u64, n: usize) -> (Vec<P3>, Vec<Face>) {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
+        let mut v = Vec::new();
+        for i in 0..n {
+            let size = [0.002, 0.02, 0.3, 3.0, 4e3][i % 5];
+            let centre = P3::new(rng.random_range(-1.5..1.5), rng.random_range(-1.0..1.0), rng.random_range(0.1..4.0));
+            for _ in 0..3 {
+                let mut r = || rng.random_range(-size..size);
+                v.push(centre + crate::math::V3::new(r(), r(), if size > 1.0 { r() * 0.3 } else { r() }));
+            }
+            let last = v.len() - 1;
+            match i % 23 {
+                7 => v[last] = v[last - 1],
+                11 => v[last] = v[last - 1] + (v[last - 1] - v[last - 2]) * 0.5,
+                13 => v[last].x = f32::NAN,
+                17 => v[last].z = -1e5,
+                19 => v[last].z = 0.0,
+                _ => {}
+            }
+        }
+        let mut f: Vec<Face> = (0..n as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        f.push([0, 1, 4_000_000]);
+        (v, f)
+    }
+    /// f32 depth against f64: rounding relative to the depth, and in a parallel view to the largest depth of the face.
+    fn close(view: &View, v: &[P3], face: &Face, a: f32, b: f32) -> bool {
+        let reach = match view {
+            View::Perspective { .. } => 0.0,
+            View::Orthographic { .. } => {
+                face.iter().fold(0f32, |m, &i| m.max(v.get(i as usize).map_or(0.0, |p| p.z.abs())))
+            }
+        };
+        a == b || (a - b).abs() < 2e-5 * a.abs() + 1e-6 * reach
+    }
+    fn drawn(options: Options, view: &View, v: &[P3], f: &[Face]) -> VisibilityBuffer {
+        let mut out = VisibilityBuffer::default();
+        rasterise_with(options, view, v, f, &mut out);
+        out
+    }
+
+    #[test]
+    fn the_pixels_of_the_reference() {
+        for view in [pinhole(), parallel()] {
+            for seed in 0..6 {
+                let (v, f) = soup(seed, 150);
+                // Face by face, so that nothing hides behind the nearest.
+                let mut slow = VisibilityBuffer::default();
+                for face in &f {
+                    rasterise_reference(&view, &v, std::slice::from_ref(face), &mut slow);
+                    let fast = drawn(Options { par: Par::Seq, cull: Cull::None }, &view, &v, &[*face]);
+                    assert_eq!(slow.face, fast.face, "coverage of {face:?}, seed {seed}");
+                    for (a, b) in slow.depth.iter().zip(&fast.depth) {
+                        assert!(close(&view, &v, face, *a, *b), "{a} {b} {face:?}");
+                    }
+                }
+                // And all together: only ties within rounding may fall differently.
+                rasterise_reference(&view, &v, &f, &mut slow);
+                let fast = drawn(Options { par: Par::Seq, cull: Cull::None }, &view, &v, &f);
+                assert!(slow.face.iter().any(|&id| id != VisibilityBuffer::NONE));
+                for i in 0..slow.face.len() {
+                    let (a, b) = (slow.depth[i], fast.depth[i]);
+                    let near = |id: u32| f.get(id as usize).is_some_and(|face| close(&view, &v, face, a, b));
+                    assert!(a == b || near(slow.face[i]) || near(fast.face[i]), "{a} {b}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn same_bits_at_any_thread_count() {
+        for view in [pinhole(), parallel()] {
+            let (v, f) = soup(9, 400);
+            for cull in [Cull::None, Cull::Back, Cull::Front] {
+                let seq = drawn(Options { par: Par::Seq, cull }, &view, &v, &f);
+                for threads in [1, 2, 5] {
+                    let got = par::with_threads(threads, || drawn(Options { par: Par::Rayon, cull }, &view, &v, &f))
+                        .expect("pool");
+                    assert!(seq == got, "{threads} threads, {cull:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_face_crossing_the_near_plane_is_cut_where_rays_say() {
+        let view = pinhole();
+        let View::Perspective { camera, near } = view else { unreachable!() };
+        // A floor from behind the camera to 6 m ahead, 1 m below.
+        let v = [[-9.0, 1.0, -3.0], [9.0, 1.0, -3.0], [0.0, 1.0, 6.0]].map(P3::from);
+        let out = drawn(Options::default(), &view, &v, &[[0, 1, 2]]);
+        let mut covered = 0;
+        for row in 0..camera.height {
+            for col in 0..camera.width {
+                let d = camera.unproject(col as f32, row as f32, 1.0);
+                let z = 1.0 / d.y;
+                let (x, inside_margin) = (d.x * z, 0.02);
+                let half = 9.0 * (6.0 - z) / 9.0;
+                let i = (row * camera.width + col) as usize;
+                if d.y > 0.0 && z > near + inside_margin && x.abs() < half - inside_margin {
+                    assert!((out.depth[i] - z).abs() < 2e-3 * z, "({col},{row}) {} {z}", out.depth[i]);
+                    covered += 1;
+                } else if d.y <= 0.0 || z < near - inside_margin || x.abs() > half + inside_margin {
+                    assert_eq!(out.face[i], VisibilityBuffer::NONE);
+                }
+            }
+        }
+        assert!(covered > 2000, "{covered}");
+    }
+
+    #[test]
+    fn shared_edges_leave_no_gap_even_when_cut() {
+        // A fan around a point in the picture, its rim behind the camera and far outside.
+        let mut v = vec![P3::new(0.05, 0.02, 2.0)];
+        let n = 37;
+        v.extend((0..n).map(|i| {
+            let t = std::f32::consts::TAU * i as f32 / n as f32;
+            P3::new(9e4 * t.cos(), 9e4 * t.sin(), 2.0 + 0.9 * (3.0 * t).sin())
+        }));
+        let f: Vec<Face> = (0..n).map(|i| [0, 1 + i, 1 + (i + 1) % n]).collect();
+        for view in [pinhole(), parallel()] {
+            let out = drawn(Options::default(), &view, &v, &f);
+            assert!(out.face.iter().all(|&id| id != VisibilityBuffer::NONE));
+        }
+    }
+
+    #[test]
+    fn culling_keeps_the_side_it_says() {
+        // Counter-clockwise seen from the camera, so turned to it.
+        let v = [[-0.5, 0.5, 2.0], [0.5, 0.5, 2.0], [0.0, -0.5, 2.0]].map(P3::from);
+        let count = |cull, f: Face| {
+            let b = drawn(Options { par: Par::Seq, cull }, &pinhole(), &v, &[f]);
+            b.face.iter().filter(|&&id| id == 0).count()
+        };
+        let front = [0, 1, 2];
+        assert!(crate::mesh::face_normal(&v, &front).z < 0.0, "towards the camera");
+        assert!(count(Cull::Back, front) > 100 && count(Cull::Front, front) == 0);
+        assert!(count(Cull::Front, [0, 2, 1]) > 100 && count(Cull::Back, [0, 2, 1]) == 0);
+        // Reuse at another size, empty mesh, empty picture.
+        let mut out = drawn(Options::default(), &pinhole(), &v, &[front]);
+        rasterise(&parallel(), &[], &[], &mut out);
+        assert_eq!((out.width, out.depth.len()), (150, 150 * 130));
+        let empty = View::Orthographic { width: 0, height: 0, left: 0.0, top: 0.0, pixels_per_metre: 1.0 };
+        rasterise_with(Options::default(), &empty, &v, &[front], &mut out);
+        assert!(out.face.is_empty());
+    }
+
+    #[test]
+    fn weights_rebuild_the_seen_point() {
+        for view in [pinhole(), parallel()] {
+            let v = [[-0.7, 0.6, 1.5], [0.6, 0.5, 2.8], [0.1, -0.6, 1.9]].map(P3::from);
+            let faces = [[0, 1, 2]];
+            let out = drawn(Options::default(), &view, &v, &faces);
+            let mut seen = 0;
+            for row in 0..out.height {
+                for col in 0..out.width {
+                    let Some((_, w)) = interpolate(&view, &v, &faces, &out, col, row) else { continue };
+                    let p = P3::from(v[0].coords * w[0] + v[1].coords * w[1] + v[2].coords * w[2]);
+                    let z = out.depth[(row * out.width + col) as usize];
+                    let q = view.project(&p).expect("in front");
+                    assert!((q[0] - col as f32).abs() < 0.02 && (q[1] - row as f32).abs() < 0.02);
+                    assert!((q[2] - z).abs() < 5e-3);
+                    seen += 1;
+                }
+            }
+            assert!(seen > 500);
+            let mut ids = Vec::new();
+            id_image(&out, -1i8, |f| f as i8, &mut ids);
+            assert_eq!(ids.iter().filter(|i| **i == 0).count(), seen);
+        }
+        assert_eq!(barycentrics(&pinhole(), [P3::origin(); 3], 3.0, 3.0), None);
+    }
+}
