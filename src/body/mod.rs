@@ -1,5 +1,6 @@
 //! The articulated template: skeleton, twists, skinning, shape, bone scales, displacements; the embedded body; importers.
 
+pub mod embedded;
 pub mod import;
 mod pose;
 mod shape;

@@ -1,0 +1,92 @@
+//! Arms and legs as lofts along their bones.
+
+use super::field::{Field, Frame, Loft, Solid, Station};
+use super::figure::{Figure, Joints};
+use crate::math::V3d;
+
+/// Sections: position along the bone (share), centre offset (u, w), radii (u, w), metres; then radius per unit of girth.
+type Sections<const N: usize> = [[f64; 6]; N];
+
+/// Upper arm; u lies in the plane of the arms (outside of the elbow's bend), w is forward.
+const UPPER_ARM: Sections<8> = [
+    [-0.08, 0.000, 0.000, 0.046, 0.050, 0.0035],
+    [0.06, 0.004, 0.002, 0.050, 0.055, 0.0040],
+    [0.20, 0.006, 0.002, 0.052, 0.056, 0.0045],
+    [0.38, 0.002, 0.002, 0.047, 0.051, 0.0045],
+    [0.55, 0.000, 0.003, 0.043, 0.049, 0.0045],
+    [0.72, 0.000, 0.002, 0.040, 0.045, 0.0040],
+    [0.88, 0.000, -0.001, 0.038, 0.039, 0.0030],
+    [1.02, 0.000, -0.003, 0.038, 0.037, 0.0020],
+];
+const FOREARM: Sections<8> = [
+    [-0.05, 0.000, -0.003, 0.037, 0.037, 0.0020],
+    [0.08, 0.001, 0.000, 0.039, 0.041, 0.0025],
+    [0.22, 0.002, 0.003, 0.040, 0.043, 0.0030],
+    [0.38, 0.001, 0.002, 0.037, 0.041, 0.0028],
+    [0.56, 0.000, 0.001, 0.031, 0.036, 0.0020],
+    [0.75, 0.000, 0.000, 0.025, 0.031, 0.0012],
+    [0.90, 0.000, 0.000, 0.021, 0.028, 0.0008],
+    [1.03, 0.000, 0.000, 0.020, 0.028, 0.0005],
+];
+/// Thigh; u outward, w forward.
+const THIGH: Sections<8> = [
+    [-0.05, 0.000, -0.004, 0.074, 0.074, 0.0070],
+    [0.07, 0.002, -0.004, 0.082, 0.087, 0.0085],
+    [0.18, 0.002, -0.003, 0.082, 0.090, 0.0085],
+    [0.34, 0.001, 0.001, 0.078, 0.085, 0.0078],
+    [0.55, -0.001, 0.005, 0.068, 0.075, 0.0060],
+    [0.75, -0.002, 0.005, 0.058, 0.064, 0.0042],
+    [0.90, -0.002, 0.003, 0.054, 0.058, 0.0032],
+    [1.02, 0.000, 0.002, 0.053, 0.056, 0.0028],
+];
+const SHANK: Sections<9> = [
+    [-0.04, 0.000, 0.002, 0.052, 0.055, 0.0028],
+    [0.07, 0.001, -0.003, 0.050, 0.053, 0.0030],
+    [0.18, 0.001, -0.010, 0.053, 0.057, 0.0035],
+    [0.30, 0.001, -0.013, 0.054, 0.059, 0.0038],
+    [0.44, 0.000, -0.011, 0.048, 0.053, 0.0034],
+    [0.60, 0.000, -0.006, 0.040, 0.043, 0.0025],
+    [0.76, 0.000, -0.003, 0.033, 0.036, 0.0018],
+    [0.90, 0.000, -0.003, 0.031, 0.036, 0.0012],
+    [1.03, 0.000, 0.000, 0.033, 0.042, 0.0010],
+];
+
+fn tube<const N: usize>(
+    frame: Frame,
+    length: f64,
+    sections: &Sections<N>,
+    fig: &Figure,
+    muscle: f64,
+    caps: [f64; 2],
+) -> Solid {
+    let stations = sections
+        .iter()
+        .map(|s| {
+            let grow = 1.0 + muscle * fig.sex;
+            let add = s[5] * fig.girth;
+            Station::ellipse(s[0] * length, s[1], s[2], s[3] * grow + add, s[4] * grow + add)
+        })
+        .collect();
+    Solid::Loft(Loft { frame, stations, caps })
+}
+
+pub(super) fn arm(f: &mut Field, fig: &Figure, j: &Joints) {
+    let upper = Frame::along(j.shoulder, j.elbow, V3d::z());
+    f.add(tube(upper, (j.elbow - j.shoulder).norm(), &UPPER_ARM, fig, 0.055, [0.03, 0.03]), 0.032);
+    let fore = Frame::along(j.elbow, j.wrist, V3d::z());
+    f.add(tube(fore, (j.wrist - j.elbow).norm(), &FOREARM, fig, 0.065, [0.03, 0.015]), 0.02);
+    // Olecranon: the point of the elbow, behind.
+    f.bump(j.elbow + V3d::new(0.006, 0.0, -0.036), [0.030, 0.030, 0.030], 0.005);
+}
+
+pub(super) fn leg(f: &mut Field, fig: &Figure, j: &Joints) {
+    let upper = Frame::along(j.hip, j.knee, V3d::z());
+    f.add(tube(upper, (j.knee - j.hip).norm(), &THIGH, fig, -0.012, [0.04, 0.03]), 0.04);
+    let lower = Frame::along(j.knee, j.ankle, V3d::z());
+    f.add(tube(lower, (j.ankle - j.knee).norm(), &SHANK, fig, 0.012, [0.03, 0.02]), 0.025);
+    // Kneecap and the hollow of the knee.
+    f.bump(j.knee + V3d::new(0.0, 0.012, 0.056), [0.034, 0.040, 0.035], 0.006);
+    f.bump(j.knee + V3d::new(0.0, 0.0, -0.058), [0.034, 0.055, 0.035], -0.005);
+    // Vastus medialis above the knee, inside.
+    f.bump(j.knee + V3d::new(-0.036, 0.070, 0.036), [0.035, 0.060, 0.045], 0.005);
+}

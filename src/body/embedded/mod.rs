@@ -1,0 +1,114 @@
+//! The embedded body: our own parametric human figure, made at run time by deterministic code.
+//!
+//! Anatomy tables describe an implicit surface; its left half is polygonised, remeshed with finer triangles in
+//! face, hands and feet, mirrored, rigged and given directions of shape.
+
+mod extremities;
+mod field;
+mod figure;
+mod head;
+mod limbs;
+mod polygonise;
+mod remesh;
+mod rig;
+mod torso;
+
+use super::{BodyError, Skeleton, SkinWeights, Template};
+use crate::math::{P3, P3d};
+use crate::mesh::{Face, TriMesh};
+use field::Field;
+use figure::{Figure, Joints, STATURE};
+use std::sync::{Arc, OnceLock};
+
+/// Rounds of remeshing; more change no angle by a degree.
+const ROUNDS: usize = 5;
+/// Target edge lengths, metres: trunk and limbs, head, face, hand, foot. Together they give 12,000 to 14,000 vertices.
+const EDGES: [f64; 5] = [0.0150, 0.0095, 0.0064, 0.0060, 0.0085];
+
+/// The implicit surface of a figure.
+fn carve(fig: &Figure, j: &Joints) -> Field {
+    let mut f = Field::default();
+    torso::trunk(&mut f, fig, j);
+    head::head(&mut f, fig);
+    limbs::arm(&mut f, fig, j);
+    extremities::hand(&mut f, fig, j);
+    limbs::leg(&mut f, fig, j);
+    extremities::foot(&mut f, fig, j);
+    f
+}
+
+/// Target edge length at a point: blends between the regions over a few centimetres.
+fn edge_length(j: &Joints, p: &P3d) -> f64 {
+    let ramp = |x: f64, a: f64, b: f64| ((x - a) / (b - a)).clamp(0.0, 1.0);
+    let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
+    let head = mix(EDGES[0], EDGES[1], ramp(p.y, 1.40, 1.48));
+    let face = mix(head, EDGES[2], ramp(p.z, 0.03, 0.07) * ramp(p.y, 1.44, 1.49) * (1.0 - ramp(p.y, 1.60, 1.64)));
+    let face = mix(face, EDGES[2], ramp(p.x, 0.066, 0.074) * ramp(p.y, 1.52, 1.54) * (1.0 - ramp(p.y, 1.61, 1.63)));
+    let along = (p - j.wrist).dot(&(j.hand_end - j.wrist).normalize());
+    let hand = if p.x > 0.3 { mix(face, EDGES[3], ramp(along, -0.05, 0.03)) } else { face };
+    mix(hand, EDGES[4], 1.0 - ramp(p.y, 0.06, 0.14))
+}
+
+/// Left half of the surface, mirrored to the whole: vertices, faces and for each vertex its mirror image.
+fn whole(half: &[P3d], faces: &[Face]) -> (Vec<P3d>, Vec<Face>, Vec<u32>) {
+    let mut points = half.to_vec();
+    let mut twin: Vec<u32> = (0..half.len() as u32).collect();
+    for (i, p) in half.iter().enumerate() {
+        if p.x != 0.0 {
+            twin[i] = points.len() as u32;
+            points.push(P3d::new(-p.x, p.y, p.z));
+        }
+    }
+    let mut all = faces.to_vec();
+    all.extend(faces.iter().map(|f| [twin[f[0] as usize], twin[f[2] as usize], twin[f[1] as usize]]));
+    let mut mirror = twin.clone();
+    mirror.resize(points.len(), 0);
+    for (i, &t) in twin.iter().enumerate() {
+        mirror[t as usize] = i as u32;
+    }
+    (points, all, mirror)
+}
+
+/// Builds the template anew. Deterministic: the same bits every time, on any number of threads.
+///
+/// # Errors
+/// None in a correct build; the parts check each other as for any template.
+pub fn generate() -> Result<Template, BodyError> {
+    let fig = Figure::default();
+    let j = fig.joints();
+    let field = carve(&fig, &j);
+    let (points, faces) =
+        polygonise::polygonise(&field, P3d::new(0.0, -0.03, -0.25), P3d::new(0.75, STATURE + 0.05, 0.30));
+    let target = |p: &P3d| edge_length(&j, p);
+    let (half, half_faces) = remesh::Remesher::new(&field, &target, points, faces).run(ROUNDS);
+    let (points, faces, _) = whole(&half, &half_faces);
+    let joints = rig::joints(&j);
+    let skeleton = Skeleton::new(joints)?;
+    let rows = (0..points.len()).map(|i| {
+        let p = points[i];
+        let left = P3d::new(p.x.abs(), p.y, p.z);
+        rig::weights(&j, &left)
+            .into_iter()
+            .filter_map(|(name, w)| {
+                let name = if p.x < 0.0 { name.replace("left_", "right_") } else { name.to_owned() };
+                skeleton.index(&name).map(|k| (k, w))
+            })
+            .collect()
+    });
+    let weights = SkinWeights::from_rows(rows)?;
+    let vertices = points.iter().map(|p| P3::new(p.x as f32, p.y as f32, p.z as f32)).collect();
+    Template::new("embedded", TriMesh::new(vertices, faces)?, skeleton, weights, None)
+}
+
+/// The embedded body, generated on first use and shared.
+///
+/// # Panics
+/// Never in a build that passes its tests: generation has no input.
+pub fn template() -> Arc<Template> {
+    static TEMPLATE: OnceLock<Arc<Template>> = OnceLock::new();
+    #[expect(clippy::expect_used, reason = "generation has no input; a test generates it")]
+    TEMPLATE.get_or_init(|| Arc::new(generate().expect("the embedded body fits together"))).clone()
+}
+
+#[cfg(test)]
+mod look;

@@ -1,0 +1,94 @@
+//! Trunk and neck.
+
+use super::field::{Field, Frame, Loft, Solid, Station};
+use super::figure::{Figure, Joints};
+use crate::math::{P3d, V3d};
+
+/// Outline of the trunk, metres: height, half width, front, back, squareness; then what one unit of sex (+ male)
+/// and of girth add to half width, front and back.
+const TRUNK: [[f64; 11]; 16] = [
+    [0.820, 0.100, 0.040, -0.070, 0.0, -0.002, 0.000, 0.000, 0.004, 0.002, -0.003],
+    [0.850, 0.140, 0.066, -0.092, 0.1, -0.006, 0.000, 0.001, 0.007, 0.004, -0.005],
+    [0.890, 0.166, 0.080, -0.105, 0.2, -0.009, 0.000, 0.003, 0.010, 0.008, -0.008],
+    [0.930, 0.170, 0.090, -0.106, 0.2, -0.009, 0.000, 0.002, 0.012, 0.013, -0.009],
+    [0.970, 0.162, 0.098, -0.094, 0.2, -0.005, 0.001, -0.001, 0.014, 0.018, -0.009],
+    [1.010, 0.150, 0.102, -0.080, 0.2, 0.001, 0.002, -0.002, 0.015, 0.021, -0.009],
+    [1.050, 0.141, 0.102, -0.074, 0.2, 0.005, 0.001, -0.003, 0.015, 0.021, -0.009],
+    [1.090, 0.137, 0.100, -0.076, 0.2, 0.008, 0.001, -0.003, 0.014, 0.019, -0.009],
+    [1.140, 0.140, 0.101, -0.085, 0.2, 0.009, 0.002, -0.003, 0.013, 0.016, -0.009],
+    [1.190, 0.148, 0.105, -0.096, 0.25, 0.009, 0.003, -0.003, 0.012, 0.013, -0.009],
+    [1.240, 0.156, 0.106, -0.106, 0.3, 0.009, 0.004, -0.004, 0.011, 0.011, -0.009],
+    [1.290, 0.160, 0.096, -0.111, 0.3, 0.009, 0.005, -0.004, 0.010, 0.009, -0.009],
+    [1.330, 0.152, 0.080, -0.109, 0.25, 0.008, 0.004, -0.004, 0.008, 0.006, -0.008],
+    [1.370, 0.118, 0.058, -0.099, 0.15, 0.007, 0.003, -0.003, 0.006, 0.004, -0.006],
+    [1.400, 0.086, 0.038, -0.087, 0.05, 0.004, 0.002, -0.003, 0.005, 0.003, -0.004],
+    [1.425, 0.064, 0.022, -0.076, 0.0, 0.003, 0.001, -0.002, 0.004, 0.003, -0.003],
+];
+
+/// A hump of reach `r` around `c`: 1 at c, 0 beyond.
+fn hump(y: f64, c: f64, r: f64) -> f64 {
+    let q = 1.0 - ((y - c) / r) * ((y - c) / r);
+    if q > 0.0 { q * q } else { 0.0 }
+}
+
+pub(super) fn trunk(f: &mut Field, fig: &Figure, j: &Joints) {
+    let (s, g) = (fig.sex, fig.girth);
+    let stations = TRUNK
+        .iter()
+        .map(|r| {
+            let y = r[0];
+            // Chest, waist and hip grow the outline around their own height.
+            let local = 0.008 * fig.chest * hump(y, 1.25, 0.16)
+                + 0.008 * fig.waist * hump(y, 1.05, 0.16)
+                + 0.008 * fig.hip * hump(y, 0.89, 0.16);
+            let hw = r[1] + s * r[5] + g * r[8] + local;
+            let zf = r[2] + s * r[6] + g * r[9] + local;
+            let zb = r[3] + s * r[7] + g * r[10] - local;
+            let (cz, rz) = (0.5 * (zf + zb), 0.5 * (zf - zb));
+            Station { t: y, c: [0.0, cz, hw, hw, rz, rz, r[4]] }
+        })
+        .collect();
+    let frame = Frame::upright(P3d::origin());
+    f.add(Solid::Loft(Loft { frame, stations, caps: [0.035, 0.03] }), 0.02);
+
+    // Neck: leans forward, from between the shoulders into the skull.
+    let base = P3d::new(0.0, 1.395, -0.042);
+    let axis = Frame::along(base, P3d::new(0.0, 1.560, -0.004), V3d::z());
+    let r = |r: f64| r + 0.0035 * s + 0.0027 * g;
+    let st = |t, u: f64, w: f64| Station::ellipse(t, 0.0, 0.0, r(u), r(w));
+    let stations = vec![st(0.0, 0.066, 0.056), st(0.04, 0.058, 0.056), st(0.08, 0.054, 0.057), st(0.15, 0.055, 0.060)];
+    f.add(Solid::Loft(Loft { frame: axis, stations, caps: [0.02, 0.02] }), 0.03);
+
+    // Trapezius and shoulder girdle: from the neck to the acromion.
+    let acromion = P3d::new(j.shoulder.x + 0.002, j.shoulder.y + 0.006, j.shoulder.z - 0.002);
+    f.cone(P3d::new(0.030, 1.418, -0.046), acromion, 0.050 + 0.002 * s, 0.044 + 0.002 * s, 0.035);
+    // Latissimus and the fold in front of the armpit.
+    f.cone(P3d::new(0.105, 1.300, 0.010), j.shoulder + V3d::new(-0.005, -0.012, 0.01), 0.062, 0.042, 0.03);
+    f.cone(P3d::new(0.105, 1.270, -0.050), j.shoulder + V3d::new(-0.005, -0.015, -0.015), 0.055, 0.042, 0.03);
+    // Buttock.
+    let seat = 0.006 * g - 0.003 * s + 0.006 * fig.hip;
+    f.ellipsoid([0.072, 0.885, -0.060], [0.078 + seat, 0.085 + seat, 0.066 + seat], 0.035);
+    relief(f, fig);
+}
+
+/// Muscle and fat under the skin.
+fn relief(f: &mut Field, fig: &Figure) {
+    let (s, g) = (fig.sex, fig.girth);
+    // Breast (fades with sex +1) and pectoral.
+    let breast = 0.0165 - 0.0165 * s + 0.002 * g + 0.003 * fig.chest * (0.5 - 0.5 * s);
+    f.bump([0.078, 1.228, 0.100], [0.075, 0.078, 0.085], breast);
+    f.bump([0.075, 1.262, 0.095], [0.095, 0.075, 0.080], 0.007 + 0.005 * s);
+    // Spine furrow, sternum, navel.
+    f.bump([0.0, 1.14, -0.085], [0.030, 0.24, 0.05], -0.008 + 0.002 * g);
+    f.bump([0.0, 1.255, 0.110], [0.026, 0.11, 0.05], -0.004);
+    f.bump([0.0, 1.022, 0.104], [0.012, 0.014, 0.03], -0.007);
+    // Shoulder blade.
+    f.bump([0.085, 1.295, -0.105], [0.065, 0.10, 0.05], 0.007);
+    // Collar bone.
+    f.bump([0.085, 1.392, 0.030], [0.080, 0.016, 0.035], 0.005 - 0.001 * g);
+    f.bump([0.0, 1.392, 0.040], [0.02, 0.02, 0.03], -0.006);
+    // Cleft between the buttocks.
+    f.bump([0.0, 0.865, -0.125], [0.024, 0.085, 0.055], -0.022);
+    // Crest of the hip bone, front.
+    f.bump([0.125, 0.975, 0.060], [0.04, 0.035, 0.05], 0.004);
+}
