@@ -1,1 +1,33 @@
 //! Sparse symmetric systems: assembly, factorisation, preconditioned iteration, with a report of how it went.
+
+mod cholesky;
+mod conjugate_gradient;
+mod pattern;
+
+pub use cholesky::{Factor, SymbolicFactor};
+pub use conjugate_gradient::{CgReport, conjugate_gradient};
+pub use pattern::SymmetricPattern;
+
+/// What can go wrong with a system.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LinearError {
+    /// A row or column beyond the size.
+    #[error("entry ({row}, {column}) lies outside a system of size {size}")]
+    OutOfRange {
+        /// Row.
+        row: usize,
+        /// Column.
+        column: usize,
+        /// Rows of the system.
+        size: usize,
+    },
+    /// A pivot that is not positive.
+    #[error("the matrix is not positive definite (pivot {pivot} in elimination order)")]
+    NotPositiveDefinite {
+        /// Position in elimination order.
+        pivot: usize,
+    },
+    /// Too large for 32-bit indices or for the memory.
+    #[error("the system is too large: {0}")]
+    TooLarge(String),
+}

@@ -1,0 +1,241 @@
+//! A sewing pattern: flat panels, what is sewn to what, what hangs on the body.
+
+use super::{GarmentError, Material, PanelEdge, Size};
+use serde::{Deserialize, Serialize};
+
+/// What kind of garment a pattern makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GarmentKind {
+    /// Covers the trunk, hangs from the shoulders.
+    Top,
+    /// Hangs from the waist, one tube.
+    Skirt,
+    /// Hangs from the waist, two tubes.
+    Trousers,
+}
+
+/// Which side of the wearer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// The wearer's left, +x.
+    Left,
+    /// The wearer's right, −x.
+    Right,
+}
+
+/// Where a panel goes. Panels are drawn as seen from outside the garment, y up along the grain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Placement {
+    /// Front of the trunk: panel x is the wearer's left, y = 0 at the high point of the shoulder.
+    TrunkFront,
+    /// Back of the trunk: panel x is the wearer's right, y = 0 at the high point of the shoulder.
+    TrunkBack,
+    /// Around an arm: x = 0 on top of the arm and positive to the back on the left arm (to the front on the
+    /// right), y = 0 at the shoulder, falling towards the hand.
+    Sleeve(Side),
+    /// Front of a skirt: panel x is the wearer's left, y = 0 at the waist.
+    SkirtFront,
+    /// Back of a skirt: panel x is the wearer's right, y = 0 at the waist.
+    SkirtBack,
+    /// Front of a trouser leg: y = 0 at the waist. For the left leg the outer side is +x; for the right, −x.
+    LegFront(Side),
+    /// Back of a trouser leg: y = 0 at the waist, mirrored against the front.
+    LegBack(Side),
+}
+
+/// One flat piece of cloth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Panel {
+    /// Name, unique in the pattern.
+    pub name: String,
+    /// Where it goes on the body.
+    pub placement: Placement,
+    /// Closed outline, counter-clockwise seen from outside.
+    pub edges: Vec<PanelEdge>,
+}
+
+impl Panel {
+    /// Corner where edge `i` ends.
+    pub fn end(&self, i: usize) -> [f64; 2] {
+        self.edges[(i + 1) % self.edges.len()].from
+    }
+    /// Index of an edge by name.
+    pub fn edge(&self, name: &str) -> Option<usize> {
+        self.edges.iter().position(|e| e.name == name)
+    }
+}
+
+/// Two edges sewn together from end to end.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Seam {
+    /// Panel and edge of one side.
+    pub a: [String; 2],
+    /// Panel and edge of the other side.
+    pub b: [String; 2],
+    /// The start of `a` meets the end of `b`, as it must between two outlines of the same turning sense.
+    #[serde(default = "yes")]
+    pub reversed: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// Edges that hang on the body and follow it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Anchor {
+    /// What it is called: `shoulders`, `waist`.
+    pub name: String,
+    /// Panel and edge names.
+    pub edges: Vec<[String; 2]>,
+    /// How firmly, 0 to 1; 1 holds a vertex at its place on the body.
+    pub strength: f64,
+}
+
+/// A garment on paper.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pattern {
+    /// Garment name, as in the library.
+    pub name: String,
+    /// What it makes.
+    pub kind: GarmentKind,
+    /// Letter size it was drawn for.
+    pub size: Size,
+    /// Pieces.
+    pub panels: Vec<Panel>,
+    /// Seams.
+    pub seams: Vec<Seam>,
+    /// Anchors.
+    pub anchors: Vec<Anchor>,
+    /// Fabric.
+    pub material: Material,
+    /// Order on the body, 0 innermost.
+    pub layer: u8,
+    /// Girth of the finished garment at chest, waist and hip, metres; 0 where it has none. For size advice.
+    pub finished: [f64; 3],
+}
+
+impl Pattern {
+    /// Reads our own JSON and checks it.
+    ///
+    /// # Errors
+    /// Syntax errors name line and column; faults name panel, edge or seam.
+    pub fn from_json(text: &str) -> Result<Self, GarmentError> {
+        let p: Self = serde_json::from_str(text)
+            .map_err(|e| GarmentError::Field { field: "pattern".into(), why: e.to_string() })?;
+        p.check()?;
+        Ok(p)
+    }
+    /// Our own JSON.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).unwrap_or_default()
+    }
+    /// Panel and edge numbers of a `[panel, edge]` reference.
+    pub(super) fn find(&self, reference: &[String; 2]) -> Option<(usize, usize)> {
+        let p = self.panels.iter().position(|p| p.name == reference[0])?;
+        Some((p, self.panels[p].edge(&reference[1])?))
+    }
+    /// Checks names, outlines, seams and anchors.
+    ///
+    /// # Errors
+    /// Names the panel, edge or seam at fault.
+    pub fn check(&self) -> Result<(), GarmentError> {
+        self.material.check()?;
+        if self.panels.is_empty() {
+            return Err(GarmentError::Field { field: "panels".into(), why: "a garment needs at least one".into() });
+        }
+        for (i, p) in self.panels.iter().enumerate() {
+            if self.panels[..i].iter().any(|o| o.name == p.name) {
+                return Err(GarmentError::Panel { panel: p.name.clone(), why: "the name is used twice".into() });
+            }
+            check_outline(p)?;
+        }
+        let mut sewn = std::collections::BTreeSet::new();
+        for (seam, s) in self.seams.iter().enumerate() {
+            for r in [&s.a, &s.b] {
+                let at = self.find(r).ok_or_else(|| GarmentError::Seam {
+                    seam,
+                    why: format!("there is no edge `{}` in a panel `{}`", r[1], r[0]),
+                })?;
+                if !sewn.insert(at) {
+                    return Err(GarmentError::Seam { seam, why: format!("edge `{}` of panel `{}` is sewn twice", r[1], r[0]) });
+                }
+            }
+        }
+        for a in &self.anchors {
+            for r in &a.edges {
+                if self.find(r).is_none() {
+                    return Err(GarmentError::Field {
+                        field: format!("anchor `{}`", a.name),
+                        why: format!("there is no edge `{}` in a panel `{}`", r[1], r[0]),
+                    });
+                }
+            }
+            if !(0.0..=1.0).contains(&a.strength) {
+                return Err(GarmentError::Field {
+                    field: format!("anchor `{}`.strength", a.name),
+                    why: format!("{} is not between 0 and 1", a.strength),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Shortest edge accepted, metres: below it two corners are the same stitch.
+const SHORTEST_EDGE: f64 = 1e-3;
+/// Longest coordinate accepted, metres: no panel of a garment is larger.
+const LARGEST_COORDINATE: f64 = 10.0;
+
+fn check_outline(p: &Panel) -> Result<(), GarmentError> {
+    let panel = |why: &str| GarmentError::Panel { panel: p.name.clone(), why: why.to_owned() };
+    let edge = |i: usize, why: String| GarmentError::Edge { panel: p.name.clone(), edge: p.edges[i].name.clone(), why };
+    if p.edges.len() < 3 {
+        return Err(panel("an outline needs at least three edges"));
+    }
+    let mut outline: Vec<(usize, [f64; 2])> = Vec::new();
+    for (i, e) in p.edges.iter().enumerate() {
+        if p.edges[..i].iter().any(|o| o.name == e.name) {
+            return Err(edge(i, "the name is used twice".into()));
+        }
+        let points = e.sample(p.end(i), if e.curve == super::Curve::Line { 1 } else { 24 });
+        if points.iter().flatten().any(|c| !(c.abs() <= LARGEST_COORDINATE)) {
+            return Err(edge(i, format!("a coordinate is not finite or beyond {LARGEST_COORDINATE} m")));
+        }
+        if e.length(p.end(i)) < SHORTEST_EDGE {
+            return Err(edge(i, format!("it is shorter than {SHORTEST_EDGE} m")));
+        }
+        outline.extend(points[..points.len() - 1].iter().map(|q| (i, *q)));
+    }
+    let n = outline.len();
+    let cross = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    for i in 0..n {
+        let ((ei, a), (_, b)) = (outline[i], outline[(i + 1) % n]);
+        for j in i + 2..n {
+            if i == 0 && j == n - 1 {
+                continue;
+            }
+            let ((ej, c), (_, d)) = (outline[j], outline[(j + 1) % n]);
+            if cross(a, b, c) * cross(a, b, d) <= 0.0 && cross(c, d, a) * cross(c, d, b) <= 0.0 {
+                return Err(edge(ei, format!("it crosses edge `{}`", p.edges[ej].name)));
+            }
+        }
+    }
+    let area: f64 = (0..n)
+        .map(|i| {
+            let (p, q) = (outline[i].1, outline[(i + 1) % n].1);
+            0.5 * (p[0] * q[1] - p[1] * q[0])
+        })
+        .sum();
+    if area <= 0.0 {
+        return Err(panel("the outline must run counter-clockwise"));
+    }
+    Ok(())
+}

@@ -1,0 +1,84 @@
+//! Preconditioned conjugate gradients on three-vectors, matrix-free, block-Jacobi.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// How an iteration went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CgReport {
+    /// Products with the matrix.
+    pub iterations: usize,
+    /// ‖b − A x‖ / ‖b‖ at the end.
+    pub relative_residual: f64,
+}
+
+/// Solves `A x = b` from `x` with the inverse diagonal blocks as preconditioner.
+/// Stops at `tolerance` (relative residual) or after `most` products. `A` must be positive definite on the
+/// directions met; a direction of no positive curvature ends the iteration at the best `x` so far.
+pub fn conjugate_gradient(
+    mut apply: impl FnMut(&[Vector3<f64>], &mut [Vector3<f64>]),
+    inverse_blocks: &[Matrix3<f64>],
+    b: &[Vector3<f64>],
+    x: &mut [Vector3<f64>],
+    tolerance: f64,
+    most: usize,
+) -> CgReport {
+    let n = b.len();
+    let dot = |p: &[Vector3<f64>], q: &[Vector3<f64>]| p.iter().zip(q).map(|(a, b)| a.dot(b)).sum::<f64>();
+    let mut ap = vec![Vector3::zeros(); n];
+    apply(x, &mut ap);
+    let mut r: Vec<_> = b.iter().zip(&ap).map(|(b, a)| b - a).collect();
+    let mut z: Vec<_> = r.iter().zip(inverse_blocks).map(|(r, m)| m * r).collect();
+    let mut p = z.clone();
+    let norm_b = dot(b, b).sqrt().max(f64::MIN_POSITIVE);
+    let mut rz = dot(&r, &z);
+    let mut iterations = 0;
+    while iterations < most && dot(&r, &r).sqrt() > tolerance * norm_b {
+        apply(&p, &mut ap);
+        iterations += 1;
+        let curvature = dot(&p, &ap);
+        if !(curvature > 0.0) {
+            break;
+        }
+        let alpha = rz / curvature;
+        for i in 0..n {
+            x[i] += p[i] * alpha;
+            r[i] -= ap[i] * alpha;
+            z[i] = inverse_blocks[i] * r[i];
+        }
+        let next = dot(&r, &z);
+        let beta = next / rz;
+        rz = next;
+        for i in 0..n {
+            p[i] = z[i] + p[i] * beta;
+        }
+    }
+    CgReport { iterations, relative_residual: dot(&r, &r).sqrt() / norm_b }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finite_termination_on_a_path() {
+        let n = 30;
+        let apply = |x: &[Vector3<f64>], y: &mut [Vector3<f64>]| {
+            for i in 0..n {
+                y[i] = x[i] * 2.5;
+                if i > 0 {
+                    y[i] -= x[i - 1];
+                }
+                if i + 1 < n {
+                    y[i] -= x[i + 1];
+                }
+            }
+        };
+        let b: Vec<_> = (0..n).map(|i| Vector3::new(1.0, i as f64, -0.5)).collect();
+        let mut x = vec![Vector3::zeros(); n];
+        let report = conjugate_gradient(apply, &vec![Matrix3::identity() / 2.5; n], &b, &mut x, 1e-12, 3 * n);
+        assert!(report.relative_residual < 1e-11 && report.iterations <= 3 * n, "{report:?}");
+        let mut back = vec![Vector3::zeros(); n];
+        apply(&x, &mut back);
+        assert!(b.iter().zip(&back).all(|(p, q)| (p - q).norm() < 1e-9));
+    }
+}
