@@ -7,17 +7,45 @@ use std::path::{Path, PathBuf};
 
 /// Layer, module, charter: the first `//!` line of `src/<module>/mod.rs`, word for word.
 const MODULES: &[(u8, &str, &str)] = &[
-    (0, "math", "Small fixed-size algebra that nalgebra lacks: so(3)/se(3) maps, twists, polar, PSD projection, stable roots."),
+    (
+        0,
+        "math",
+        "Small fixed-size algebra that nalgebra lacks: so(3)/se(3) maps, twists, polar, PSD projection, stable roots.",
+    ),
     (0, "par", "The only door to rayon: parallel loops and reductions whose bits do not depend on the thread count."),
     (1, "mesh", "Triangle meshes and their topology, checked once at construction; normals, boundaries, UVs."),
     (1, "camera", "Intrinsics, depth and colour images, projection, noise models, what a sensor saw and when."),
-    (1, "linear", "Sparse symmetric systems: assembly, factorisation, preconditioned iteration, with a report of how it went."),
-    (2, "spatial", "Neighbours fast: BVH, grids, kd-tree (the only file naming kiddo), each beside its brute-force oracle."),
-    (2, "raster", "Meshes to depth, colour and id images on the CPU: the fast path without a GPU, and the judge of the GPU."),
-    (2, "formats", "Files in and out: MCAP, RGBD folders, npz bodies, OBJ, glTF, patterns. Bytes to domain types, never a panic."),
-    (3, "body", "The articulated template: skeleton, twists, skinning, shape, bone scales, displacements; the embedded body; importers."),
+    (
+        1,
+        "linear",
+        "Sparse symmetric systems: assembly, factorisation, preconditioned iteration, with a report of how it went.",
+    ),
+    (
+        2,
+        "spatial",
+        "Neighbours fast: BVH, grids, kd-tree (the only file naming kiddo), each beside its brute-force oracle.",
+    ),
+    (
+        2,
+        "raster",
+        "Meshes to depth, colour and id images on the CPU: the fast path without a GPU, and the judge of the GPU.",
+    ),
+    (
+        2,
+        "formats",
+        "Files in and out: MCAP, RGBD folders, npz bodies, OBJ, glTF, patterns. Bytes to domain types, never a panic.",
+    ),
+    (
+        3,
+        "body",
+        "The articulated template: skeleton, twists, skinning, shape, bone scales, displacements; the embedded body; importers.",
+    ),
     (3, "garment", "A garment before it moves: panels, seams, materials, rest shape, sizes, anchors."),
-    (3, "contact", "Candidate pairs, continuous collision, distances and contact energies between moving triangles; it never steps time."),
+    (
+        3,
+        "contact",
+        "Candidate pairs, continuous collision, distances and contact energies between moving triangles; it never steps time.",
+    ),
     (3, "segment", "Which pixels are the person: floor, background, nearest body, edges."),
     (3, "registration", "Correspondences, robust kernels and Gauss–Newton that pull one surface onto another."),
     (4, "tracking", "One step from a frame and the last state to pose, displacements and a confidence report."),
@@ -26,9 +54,21 @@ const MODULES: &[(u8, &str, &str)] = &[
     (4, "composite", "The captured image and the garments in one picture: visibility, shading, edges."),
     (5, "gpu", "wgpu twins of `raster` and `composite`, same inputs and outputs; the only module naming wgpu."),
     (5, "dressing", "A garment onto a body: panel placement, sewing, size choice, first drape, fit map."),
-    (5, "synth", "Synthetic people, garments, cameras and sequences with known truth, for the demo, tests and benches."),
-    (5, "session", "The life of one try-on as a pure transition table: Opening → Calibrating → Live ⇄ Degraded(why) → Draining → Closed."),
-    (6, "evaluate", "Run time against error: standard scenes, methods side by side, tables and plots behind `tryon bench`."),
+    (
+        5,
+        "synth",
+        "Synthetic people, garments, cameras and sequences with known truth, for the demo, tests and benches.",
+    ),
+    (
+        5,
+        "session",
+        "The life of one try-on as a pure transition table: Opening → Calibrating → Live ⇄ Degraded(why) → Draining → Closed.",
+    ),
+    (
+        6,
+        "evaluate",
+        "Run time against error: standard scenes, methods side by side, tables and plots behind `tryon bench`.",
+    ),
 ];
 
 /// External crate, and the only path prefixes whose code may name it.

@@ -2,6 +2,7 @@
 
 pub mod embedded;
 pub mod import;
+pub mod measure;
 mod pose;
 mod shape;
 mod skeleton;

@@ -98,8 +98,8 @@ pub(super) fn hand(f: &mut Field, fig: &Figure, j: &Joints) {
 
 /// Foot sections: z from the ankle, half width, top, x offset, metres; the sole lies on y = 0.
 const FOOT: [[f64; 4]; 9] = [
-    [-0.040, 0.0270, 0.052, 0.000],
-    [-0.022, 0.0310, 0.080, 0.000],
+    [-0.032, 0.0290, 0.064, 0.000],
+    [-0.016, 0.0320, 0.084, 0.000],
     [0.005, 0.0330, 0.092, 0.001],
     [0.035, 0.0335, 0.086, 0.003],
     [0.065, 0.0360, 0.069, 0.006],
@@ -130,7 +130,7 @@ pub(super) fn foot(f: &mut Field, fig: &Figure, j: &Joints) {
         })
         .collect();
     let frame = Frame { origin: P3d::new(j.ankle.x, 0.0, j.ankle.z), u: V3d::x(), w: V3d::y(), a: V3d::z() };
-    f.add(Solid::Loft(Loft { frame, stations, caps: [0.022, 0.012] }), 0.022);
+    f.add(Solid::Loft(Loft { frame, stations, caps: [0.020, 0.012] }), 0.022);
     for t in TOES {
         let x = j.ankle.x + (0.011 + t[0]) * size;
         let r = t[2] * size;

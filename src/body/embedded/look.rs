@@ -101,6 +101,7 @@ fn pictures() {
         t.mesh().faces().len(),
         t.mesh().volume()
     );
+    eprintln!("generated {:#?}", crate::body::measure::measure(&t, &t.personalise(&BodyShape::default())));
     let full = |w: f32| (-w / 2.0, 1.75, 420.0, (w * 420.0) as u32, 760);
     let shape = BodyShape::default();
     for (name, set) in poses() {

@@ -13,9 +13,9 @@ mod remesh;
 mod rig;
 mod torso;
 
-use super::{BodyError, Skeleton, SkinWeights, Template};
+use super::{BodyError, Skeleton, Template};
 use crate::math::{P3, P3d};
-use crate::mesh::{Face, TriMesh};
+use crate::mesh::{Face, Topology, TriMesh};
 use field::Field;
 use figure::{Figure, Joints, STATURE};
 use std::sync::{Arc, OnceLock};
@@ -84,20 +84,10 @@ pub fn generate() -> Result<Template, BodyError> {
     let (points, faces, _) = whole(&half, &half_faces);
     let joints = rig::joints(&j);
     let skeleton = Skeleton::new(joints)?;
-    let rows = (0..points.len()).map(|i| {
-        let p = points[i];
-        let left = P3d::new(p.x.abs(), p.y, p.z);
-        rig::weights(&j, &left)
-            .into_iter()
-            .filter_map(|(name, w)| {
-                let name = if p.x < 0.0 { name.replace("left_", "right_") } else { name.to_owned() };
-                skeleton.index(&name).map(|k| (k, w))
-            })
-            .collect()
-    });
-    let weights = SkinWeights::from_rows(rows)?;
     let vertices = points.iter().map(|p| P3::new(p.x as f32, p.y as f32, p.z as f32)).collect();
-    Template::new("embedded", TriMesh::new(vertices, faces)?, skeleton, weights, None)
+    let mesh = TriMesh::new(vertices, faces)?;
+    let weights = rig::skin_weights(&j, &points, &Topology::new(&mesh)?, &skeleton)?;
+    Template::new("embedded", mesh, skeleton, weights, None)
 }
 
 /// The embedded body, generated on first use and shared.

@@ -1,8 +1,10 @@
 //! The skeleton of the figure and its skinning weights.
 
 use super::figure::Joints;
-use crate::body::{Joint, JointMotion};
+use crate::body::{BodyError, Joint, JointMotion, Skeleton, SkinWeights};
 use crate::math::{P3d, V3d};
+use crate::mesh::Topology;
+use crate::par::{self, Par};
 
 /// Joints without a side, then left; right is mirrored.
 fn mirrored(p: P3d) -> P3d {
@@ -96,16 +98,26 @@ fn distance_to_arm(j: &Joints, p: &P3d) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
+/// The chest under the armpits as an elliptic cylinder: half width, half depth and middle in z, metres.
+const CHEST: [f64; 3] = [0.165, 0.118, 0.0];
+/// Radius of the upper arm near the armpit, metres.
+const ARM: f64 = 0.050;
+
 /// Weights of a point of the left half (x ≥ 0) by joint name; shares of subtrees are multiplied down the tree.
 pub(super) fn weights(j: &Joints, p: &P3d) -> Vec<(&'static str, f64)> {
     let up = V3d::y();
     // Arm against trunk: a plane through the shoulder joint, tilted so that the armpit belongs to both.
     let arm_axis = (j.elbow - j.shoulder).normalize();
-    let shoulder = beyond(p, &(j.shoulder + V3d::new(-0.006, 0.0, 0.0)), V3d::new(0.93, -0.36, 0.0), 0.060);
+    let cut = beyond(p, &(j.shoulder + V3d::new(-0.010, 0.0, 0.0)), V3d::new(0.98, -0.12, 0.0), 0.070);
     let elbow = beyond(p, &j.elbow, arm_axis + (j.wrist - j.elbow).normalize(), 0.048);
     let wrist = beyond(p, &j.wrist, (j.hand_end - j.wrist).normalize() + (j.wrist - j.elbow).normalize(), 0.030);
-    // Only near the arm's bones: the plane alone would take the legs along.
-    let is_arm = shoulder * smooth((0.115 - distance_to_arm(j, p)) / 0.025);
+    // What is nearer to the chest than to the arm stays with the chest; far from the arm there is no arm at all.
+    let reach = distance_to_arm(j, p);
+    let (ex, ez) = (p.x / CHEST[0], (p.z - CHEST[2]) / CHEST[1]);
+    let from_chest = ((ex * ex + ez * ez).sqrt() - 1.0) * 0.5 * (CHEST[0] + CHEST[1]);
+    let below = smooth((j.shoulder.y - 0.02 - p.y) / 0.03);
+    let apart = 1.0 - below * (1.0 - smooth((from_chest - (reach - ARM)) / 0.035));
+    let is_arm = cut * apart * smooth((0.115 - reach) / 0.025);
     // Girdle: between the neck and the shoulder, chest upwards.
     let collar = beyond(p, &P3d::new(0.075, 1.36, 0.0), V3d::new(0.75, 0.66, 0.0), 0.075)
         * smooth((p.x - 0.055) / 0.05)
@@ -153,4 +165,50 @@ pub(super) fn weights(j: &Joints, p: &P3d) -> Vec<(&'static str, f64)> {
         ("left_elbow", elbow_share - wrist_share),
         ("left_wrist", wrist_share),
     ]
+}
+
+/// Rounds of averaging over neighbours: they take the kinks out of the products above, over about 4 cm on the trunk.
+const SMOOTHING: usize = 10;
+
+/// Weights of all vertices: evaluated on the left, mirrored, then smoothed along the surface.
+///
+/// # Errors
+/// Names a vertex without weight; none in a correct build.
+pub(super) fn skin_weights(
+    j: &Joints,
+    points: &[P3d],
+    topology: &Topology,
+    skeleton: &Skeleton,
+) -> Result<SkinWeights, BodyError> {
+    let names: Vec<&str> = weights(j, &j.pelvis).into_iter().map(|(n, _)| n).collect();
+    let left: Vec<Option<usize>> = names.iter().map(|n| skeleton.index(n)).collect();
+    let right: Vec<Option<usize>> = names.iter().map(|n| skeleton.index(&n.replace("left_", "right_"))).collect();
+    let joints = skeleton.len();
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    par::map_into(Par::Rayon, points.len(), 256, &mut rows, |i| {
+        let p = points[i];
+        let mut row = vec![0.0; joints];
+        for (k, (_, w)) in weights(j, &P3d::new(p.x.abs(), p.y, p.z)).into_iter().enumerate() {
+            // A vertex in the middle belongs to both sides alike.
+            let sides = if p.x == 0.0 { [left[k], right[k]] } else { [if p.x > 0.0 { left[k] } else { right[k] }; 2] };
+            sides.into_iter().flatten().for_each(|s| row[s] += 0.5 * w);
+        }
+        row
+    });
+    for _ in 0..SMOOTHING {
+        let mut next = Vec::new();
+        par::map_into(Par::Rayon, rows.len(), 256, &mut next, |i| {
+            let around = topology.vertex_neighbours().row(i);
+            let share = 0.5 / around.len().max(1) as f64;
+            let mut row: Vec<f64> = rows[i].iter().map(|w| 0.5 * w).collect();
+            for &n in around {
+                row.iter_mut().zip(&rows[n as usize]).for_each(|(r, w)| *r += share * w);
+            }
+            row
+        });
+        rows = next;
+    }
+    // What four joints cannot show, nobody sees: shares below one in a hundred.
+    let kept = rows.into_iter().map(|r| r.into_iter().enumerate().filter(|(_, w)| *w > 0.01).collect());
+    SkinWeights::from_rows(kept)
 }
