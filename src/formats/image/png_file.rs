@@ -3,7 +3,7 @@
 use super::check_size;
 use crate::camera::{ColorImage, DepthImage};
 use crate::formats::FormatError;
-use png::{BitDepth, ColorType, Compression, DecodingError, Decoder, Encoder, Limits, Reader, Transformations};
+use png::{BitDepth, ColorType, Compression, Decoder, DecodingError, Encoder, Limits, Reader, Transformations};
 use std::io::Cursor;
 use std::path::Path;
 
