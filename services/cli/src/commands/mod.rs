@@ -1,0 +1,13 @@
+//! One file a command.
+
+pub(crate) mod composite;
+pub(crate) mod demo;
+pub(crate) mod doctor;
+pub(crate) mod export;
+pub(crate) mod import;
+pub(crate) mod record;
+pub(crate) mod replay;
+pub(crate) mod run;
+pub(crate) mod simulate;
+pub(crate) mod track;
+pub(crate) mod up;
