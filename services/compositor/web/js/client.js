@@ -1,0 +1,25 @@
+// CompositorService as functions. The page talks to the origin that served it and to nobody else.
+
+import * as m from './messages.js';
+import { serverStream, unary } from './grpc_web.js';
+
+const method = (name) => `/tryon.v1.CompositorService/${name}`;
+
+/** @param {string} origin empty for the page's own origin; tests give another. */
+export function compositor(origin = '') {
+  const url = (name) => origin + method(name);
+  return {
+    openTryOn: (request, options) =>
+      unary(url('OpenTryOn'), m.OpenTryOnRequest, m.OpenTryOnResponse, request, options),
+    closeTryOn: (request, options) =>
+      unary(url('CloseTryOn'), m.CloseTryOnRequest, m.CloseTryOnResponse, request, options),
+    chooseGarments: (request, options) =>
+      unary(url('ChooseGarments'), m.ChooseGarmentsRequest, m.ChooseGarmentsResponse, request, options),
+    listGarmentChoices: (options) =>
+      unary(url('ListGarmentChoices'), m.ListGarmentChoicesRequest, m.ListGarmentChoicesResponse, {}, options),
+    takeSnapshot: (request, options) =>
+      unary(url('TakeSnapshot'), m.TakeSnapshotRequest, m.TakeSnapshotResponse, request, { timeoutMs: 10_000, ...options }),
+    streamFrames: (request, options) =>
+      serverStream(url('StreamFrames'), m.StreamFramesRequest, m.StreamFramesResponse, request, options),
+  };
+}

@@ -1,0 +1,76 @@
+// The details panel: rate, latency, drops, time by stage. Drawn only while it is open.
+
+import { byId, el, setText } from './elements.js';
+
+const whole = (x) => (Number.isFinite(x) ? String(Math.round(x)) : '–');
+
+/** "tracking.solve" → service "tracking", and words for people. */
+function stageName(stage) {
+  const dot = stage.indexOf('.');
+  return { part: dot < 0 ? stage : stage.slice(0, dot), words: stage.replace('.', ' · ').replaceAll('_', ' ') };
+}
+
+export class Details {
+  #rows = new Map();
+
+  constructor() {
+    this.panel = byId('details');
+    this.stages = byId('d-stages');
+    this.trace = byId('d-trace');
+  }
+
+  get open() {
+    return !this.panel.hidden;
+  }
+
+  show(open) {
+    this.panel.hidden = !open;
+  }
+
+  /** @param {ReturnType<import('./stats.js').Stats['summary']>} summary */
+  update(summary, picture) {
+    if (!this.open) return;
+    setText(byId('d-rate'), summary.rate ? summary.rate.toFixed(1) : '–');
+    setText(byId('d-p50'), whole(summary.p50));
+    setText(byId('d-p99'), whole(summary.p99));
+    setText(byId('d-dropped'), `${summary.dropped} + ${summary.missed}`);
+    this.#bars([...summary.stages, ['page.draw', summary.decode]].filter(([, ms]) => Number.isFinite(ms)));
+    this.#line(summary.recent);
+    const size = picture ? `${picture.width} × ${picture.height}` : '';
+    setText(byId('d-frame'), picture ? `Exposure ${picture.frame?.sequence ?? '?'}, ${size}, outfit ${picture.outfit_revision}` : '');
+  }
+
+  #bars(stages) {
+    const most = Math.max(1, ...stages.map(([, ms]) => ms));
+    const names = stages.map(([name]) => name);
+    if (names.join() !== [...this.#rows.keys()].join()) {
+      this.#rows = new Map(names.map((name) => {
+        const { part, words } = stageName(name);
+        const bar = el('span', { class: 'bar', 'data-part': part });
+        const ms = el('td');
+        return [name, { bar, ms, row: el('tr', {}, el('th', { scope: 'row' }, words), el('td', {}, bar), ms) }];
+      }));
+      this.stages.replaceChildren(...[...this.#rows.values()].map((r) => r.row));
+    }
+    for (const [name, ms] of stages) {
+      const { bar, ms: cell } = this.#rows.get(name);
+      bar.style.transform = `scaleX(${Math.max(0.01, ms / most).toFixed(3)})`;
+      setText(cell, `${ms.toFixed(1)} ms`);
+    }
+  }
+
+  /** Latency of the last seconds' pictures, oldest left, from zero. */
+  #line(values) {
+    const context = this.trace.getContext('2d');
+    const { width, height } = this.trace;
+    context.clearRect(0, 0, width, height);
+    if (values.length < 2) return;
+    const top = Math.max(100, ...values) * 1.05;
+    context.beginPath();
+    values.forEach((v, i) => context.lineTo((i / (values.length - 1)) * width, height - (v / top) * (height - 4) - 2));
+    context.strokeStyle = '#e8e2d6';
+    context.lineWidth = 3;
+    context.lineJoin = 'round';
+    context.stroke();
+  }
+}

@@ -1,0 +1,120 @@
+// The messages of tryon.v1 that the page uses, field by field as in proto/tryon/v1 (a test compares the two).
+
+const schema = (name, ...fields) => ({ name, fields });
+
+export const FrameId = schema('FrameId',
+  [1, 'epoch', 'uint64'],
+  [2, 'sequence', 'uint64'],
+  [3, 'capture_time_ns', 'uint64'],
+  [4, 'received_unix_ns', 'uint64']);
+
+export const StageTime = schema('StageTime',
+  [1, 'stage', 'string'],
+  [2, 'ms', 'float']);
+
+export const GarmentChoice = schema('GarmentChoice',
+  [1, 'garment', 'string'],
+  [2, 'size', 'string'],
+  [3, 'color_rgb', 'uint32?']);
+
+export const GarmentInfo = schema('GarmentInfo',
+  [1, 'name', 'string'],
+  [2, 'title', 'string'],
+  [3, 'category', 'string'],
+  [4, 'sizes', 'string[]'],
+  [5, 'color_rgb', 'uint32']);
+
+export const OpenTryOnRequest = schema('OpenTryOnRequest',
+  [1, 'try_on_id', 'string'],
+  [2, 'store', 'string'],
+  [3, 'camera', 'string'],
+  [4, 'garments', 'message[]', GarmentChoice]);
+
+export const OpenTryOnResponse = schema('OpenTryOnResponse',
+  [1, 'try_on_id', 'string'],
+  [2, 'created', 'bool']);
+
+export const CloseTryOnRequest = schema('CloseTryOnRequest',
+  [1, 'try_on_id', 'string']);
+
+export const CloseTryOnResponse = schema('CloseTryOnResponse');
+
+export const ChooseGarmentsRequest = schema('ChooseGarmentsRequest',
+  [1, 'try_on_id', 'string'],
+  [2, 'garments', 'message[]', GarmentChoice]);
+
+export const ChooseGarmentsResponse = schema('ChooseGarmentsResponse',
+  [1, 'outfit_revision', 'uint64']);
+
+export const ListGarmentChoicesRequest = schema('ListGarmentChoicesRequest');
+
+export const ListGarmentChoicesResponse = schema('ListGarmentChoicesResponse',
+  [1, 'garments', 'message[]', GarmentInfo]);
+
+export const StreamFramesRequest = schema('StreamFramesRequest',
+  [1, 'try_on_id', 'string'],
+  [2, 'width', 'uint32'],
+  [3, 'height', 'uint32'],
+  [4, 'codec', 'enum'],
+  [5, 'quality', 'uint32'],
+  [6, 'max_rate', 'float']);
+
+export const Picture = schema('Picture',
+  [1, 'frame', 'message', FrameId],
+  [2, 'state', 'enum'],
+  [3, 'reason', 'enum'],
+  [4, 'degraded_age', 'float'],
+  [5, 'codec', 'enum'],
+  [6, 'width', 'uint32'],
+  [7, 'height', 'uint32'],
+  [8, 'image', 'bytes'],
+  [9, 'outfit_revision', 'uint64'],
+  [10, 'latency_ms', 'float'],
+  [11, 'stages', 'message[]', StageTime],
+  [12, 'dropped', 'uint64']);
+
+export const TryOnStatus = schema('TryOnStatus',
+  [1, 'state', 'enum'],
+  [2, 'reason', 'enum'],
+  [3, 'age', 'float'],
+  [4, 'service', 'string'],
+  [5, 'detail', 'string'],
+  [6, 'retry_after', 'float']);
+
+/** One of the two is set. */
+export const StreamFramesResponse = schema('StreamFramesResponse',
+  [1, 'picture', 'message', Picture],
+  [2, 'status', 'message', TryOnStatus]);
+
+export const TakeSnapshotRequest = schema('TakeSnapshotRequest',
+  [1, 'try_on_id', 'string'],
+  [2, 'codec', 'enum']);
+
+export const TakeSnapshotResponse = schema('TakeSnapshotResponse',
+  [1, 'picture', 'message', Picture]);
+
+/** `PICTURE_CODEC_*` */
+export const Codec = Object.freeze({ JPEG: 1, PNG: 2 });
+
+/** `TRY_ON_STATE_*` */
+export const State = Object.freeze({ OPENING: 1, CALIBRATING: 2, LIVE: 3, DEGRADED: 4, DRAINING: 5, CLOSED: 6 });
+
+/** `DEGRADED_REASON_*` */
+export const Reason = Object.freeze({
+  NO_PERSON: 1,
+  PERSON_LEFT: 2,
+  TRACKING_LOST: 3,
+  CAMERA_SILENT: 4,
+  TRACKING_UNAVAILABLE: 5,
+  CLOTH_UNAVAILABLE: 6,
+  GARMENTS_LATE: 7,
+  STEP_FAILED: 8,
+});
+
+// google.rpc, for the details of an error.
+export const Any = schema('Any', [1, 'type_url', 'string'], [2, 'value', 'bytes']);
+export const Status = schema('Status', [1, 'code', 'uint32'], [2, 'message', 'string'], [3, 'details', 'message[]', Any]);
+export const Duration = schema('Duration', [1, 'seconds', 'uint64'], [2, 'nanos', 'uint32']);
+export const RetryInfo = schema('RetryInfo', [1, 'retry_delay', 'message', Duration]);
+export const FieldViolation = schema('FieldViolation', [1, 'field', 'string'], [2, 'description', 'string']);
+export const BadRequest = schema('BadRequest', [1, 'field_violations', 'message[]', FieldViolation]);

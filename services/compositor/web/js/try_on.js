@@ -1,0 +1,136 @@
+// One try-on as the page sees it: open, stream, and when the line breaks, wait and open again. Draws nothing.
+
+import { Code, RpcError } from './grpc_web.js';
+import { State } from './messages.js';
+import { Backoff } from './backoff.js';
+
+/** The contract: no message for a second means that the compositor is gone. One more for a busy network, ms. */
+export const SILENCE_MS = 2000;
+
+/** Answers that another try cannot change. */
+const HOPELESS = new Set([Code.INVALID_ARGUMENT, Code.FAILED_PRECONDITION]);
+
+const sleep = (ms, signal) =>
+  new Promise((resolve) => {
+    const timer = setTimeout(done, ms);
+    function done() {
+      clearTimeout(timer);
+      signal.removeEventListener('abort', done);
+      resolve();
+    }
+    signal.addEventListener('abort', done);
+    if (signal.aborted) done();
+  });
+
+/** Random, unguessable, in the characters that an id may have. */
+export function drawId() {
+  const bytes = crypto.getRandomValues(new Uint8Array(12));
+  return `web-${Array.from(bytes, (b) => b.toString(16).padStart(2, '0')).join('')}`;
+}
+
+/**
+ * Calls `on(event)` with
+ *   { kind: 'link', link: 'opening' | 'streaming' | 'waiting' | 'refused' | 'closed', retryIn?, error?, tries? }
+ *   { kind: 'picture', picture } and { kind: 'status', status }, in the stream's order.
+ */
+export class TryOn {
+  #stop = new AbortController();
+  #wake = new AbortController();
+  #choice = 0;
+
+  constructor({ client, on, garments, camera = {}, backoff = new Backoff(), silenceMs = SILENCE_MS }) {
+    this.client = client;
+    this.on = on;
+    this.garments = garments;
+    this.camera = camera;
+    this.backoff = backoff;
+    this.silenceMs = silenceMs;
+    this.id = drawId();
+    this.finished = this.#run();
+  }
+
+  async #run() {
+    const stop = this.#stop.signal;
+    while (!stop.aborted) {
+      let error = null;
+      try {
+        this.on({ kind: 'link', link: 'opening', tries: this.backoff.tries });
+        await this.#openAndStream(stop);
+      } catch (caught) {
+        error = caught;
+      }
+      if (stop.aborted) break;
+      if (error instanceof RpcError && HOPELESS.has(error.code)) {
+        this.on({ kind: 'link', link: 'refused', error });
+        return;
+      }
+      const delay = this.backoff.next(error?.retryAfter ?? null);
+      this.on({ kind: 'link', link: 'waiting', retryIn: delay, error, tries: this.backoff.tries });
+      this.#wake = new AbortController();
+      await sleep(delay * 1000, AbortSignal.any([stop, this.#wake.signal]));
+    }
+    this.on({ kind: 'link', link: 'closed' });
+  }
+
+  async #openAndStream(stop) {
+    const { store = '', camera = '' } = this.camera;
+    const request = { try_on_id: this.id, store, camera, garments: this.garments() };
+    const opened = await this.client.openTryOn(request, { signal: stop });
+    // A try-on that outlived our connection still wears what it wore: say again what is wanted.
+    if (!opened.created) await this.#choose();
+
+    const line = new AbortController();
+    const signal = AbortSignal.any([stop, line.signal]);
+    let watchdog = null;
+    const heard = () => {
+      clearTimeout(watchdog);
+      watchdog = setTimeout(() => line.abort(), this.silenceMs);
+    };
+    heard();
+    try {
+      for await (const event of this.client.streamFrames({ try_on_id: this.id }, { signal })) {
+        heard();
+        this.backoff.reset();
+        if (event.picture) this.on({ kind: 'picture', picture: event.picture });
+        else if (event.status) this.on({ kind: 'status', status: event.status });
+        if (event.status?.state === State.DRAINING || event.status?.state === State.CLOSED) break;
+      }
+    } catch (error) {
+      if (line.signal.aborted && !stop.aborted) throw new RpcError(Code.UNAVAILABLE, 'nothing was heard from the mirror');
+      throw error;
+    } finally {
+      clearTimeout(watchdog);
+    }
+  }
+
+  /** Sends the wanted garments; of several quick choices only the last one's answer counts (null for the others). */
+  async #choose() {
+    this.#choice += 1;
+    const mine = this.#choice;
+    const request = { try_on_id: this.id, garments: this.garments() };
+    const answer = await this.client.chooseGarments(request, { signal: this.#stop.signal });
+    return mine === this.#choice ? answer.outfit_revision : null;
+  }
+
+  /** Revision that pictures will show, null when a later choice overtook this one. Throws RpcError. */
+  choose() {
+    return this.#choose();
+  }
+
+  snapshot(codec) {
+    return this.client.takeSnapshot({ try_on_id: this.id, codec }, { signal: this.#stop.signal });
+  }
+
+  /** Tries at once instead of at the end of the wait. */
+  retryNow() {
+    this.backoff.reset();
+    this.#wake.abort();
+  }
+
+  /** Ends it here and at the compositor. Never throws: a compositor that can't be told closes idle try-ons itself. */
+  async close({ keepalive = false } = {}) {
+    if (this.#stop.signal.aborted) return;
+    this.#stop.abort();
+    await this.client.closeTryOn({ try_on_id: this.id }, { keepalive }).catch(() => {});
+  }
+}

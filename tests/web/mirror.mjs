@@ -1,0 +1,211 @@
+// The page in a real browser, as a shopper uses it.
+//
+//   node mirror.mjs URL [--out DIR] [--break URL --mend URL] [--stdio] [--timeout SECONDS]
+//   node mirror.mjs --mock [--out DIR]
+//
+// Opens the page, starts a try-on, sees 30 different pictures, changes a garment, takes a photo, sees «Degraded» when
+// the chain is broken and «Live» when it is mended, finishes. Nothing may be asked of another host and nothing but the
+// broken connections themselves may be logged as an error.
+// Who breaks the chain: a POST to the --break and --mend addresses; or with --stdio whoever started this, asked by a
+// line "BREAK" or "MEND" on standard output and answering with any line on standard input; without either that part is
+// not judged. Ends with 0 and "PASSED", or says what was missing.
+
+import { mkdirSync, readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { createInterface } from 'node:readline';
+import { parseArgs } from 'node:util';
+import { chromium } from 'playwright-core';
+
+const { values: options, positionals } = parseArgs({
+  allowPositionals: true,
+  options: {
+    out: { type: 'string', default: 'target/browser' },
+    break: { type: 'string' },
+    mend: { type: 'string' },
+    stdio: { type: 'boolean', default: false },
+    mock: { type: 'boolean', default: false },
+    // Seconds for each thing waited for; software rendering of a debug build on two busy cores is slow.
+    timeout: { type: 'string', default: '60' },
+    chromium: { type: 'string', default: process.env.CHROMIUM ?? '/usr/bin/chromium' },
+  },
+});
+
+const PICTURES = 30;
+const TIMEOUT_MS = Number(options.timeout) * 1000;
+
+let mock = null;
+let url = positionals[0];
+if (options.mock) {
+  const { startMock } = await import('./mock.mjs');
+  mock = await startMock({});
+  url = mock.url;
+}
+if (!url) {
+  console.error('usage: node mirror.mjs URL [--out DIR] [--break URL --mend URL | --stdio]   or   --mock');
+  process.exit(64);
+}
+const origin = new URL(url).origin;
+mkdirSync(options.out, { recursive: true });
+
+const answers = options.stdio ? createInterface({ input: process.stdin })[Symbol.asyncIterator]() : null;
+const canBreak = options.stdio || mock || (options.break && options.mend);
+
+async function tell(what) {
+  if (mock) mock.control(what);
+  else if (options.stdio) {
+    console.log(what.toUpperCase());
+    await answers.next();
+  } else await fetch(options[what], { method: 'POST' });
+}
+
+function must(condition, what) {
+  if (!condition) throw new Error(what);
+  console.log(`ok  ${what}`);
+}
+
+const browser = await chromium.launch({
+  executablePath: options.chromium,
+  args: ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync'],
+});
+let page = null;
+let failed = null;
+try {
+  const context = await browser.newContext({ viewport: { width: 1080, height: 1920 }, acceptDownloads: true, reducedMotion: 'reduce' });
+  page = await context.newPage();
+  page.setDefaultTimeout(TIMEOUT_MS);
+  const foreign = [];
+  const errors = [];
+  const requests = new Map();
+  let broken = false;
+  page.on('request', (request) => {
+    const target = new URL(request.url());
+    if (target.protocol !== 'blob:' && target.origin !== origin) foreign.push(request.url());
+    requests.set(target.pathname, (requests.get(target.pathname) ?? 0) + 1);
+  });
+  page.on('pageerror', (error) => errors.push(`uncaught: ${error.message}`));
+  page.on('console', (message) => {
+    // A browser logs each failed request itself; while we break the chain that is what should happen.
+    const expected = broken && /Failed to load resource/.test(message.text());
+    if (message.type() === 'error' && !expected) errors.push(`${message.text()} (${message.location().url})`);
+  });
+  const shot = (name) => page.screenshot({ path: join(options.out, `${name}.png`) });
+  const waitTone = (tone) => page.waitForSelector(`#stage[data-tone="${tone}"]`);
+
+  await page.goto(url);
+  await page.waitForSelector('[data-garment]', { state: 'attached' });
+  await shot('1-welcome');
+  must(/nothing is stored/i.test(await page.textContent('#consent')), 'the page asks for consent before it shows anything');
+  must((requests.get('/tryon.v1.CompositorService/OpenTryOn') ?? 0) === 0, 'no try-on is opened before consent');
+  must(await page.getByRole('button', { name: 'Start' }).isVisible(), 'Start can be reached by role and name');
+
+  await page.click('#start');
+  await waitTone('live');
+  must(true, 'a try-on reaches Live');
+
+  await page.evaluate((wanted) => {
+    // Pictures are told apart by their pixels, not by what the page says of them.
+    const glass = document.getElementById('glass');
+    const seen = new Set();
+    window.distinct = { seen, done: false };
+    const small = new OffscreenCanvas(64, 48);
+    const context = small.getContext('2d', { willReadFrequently: true });
+    const look = () => {
+      context.drawImage(glass, 0, 0, 64, 48);
+      const { data } = context.getImageData(0, 0, 64, 48);
+      let hash = 2166136261;
+      for (let i = 0; i < data.length; i += 1) hash = Math.imul(hash ^ data[i], 16777619);
+      seen.add(hash);
+      if (seen.size >= wanted) window.distinct.done = true;
+      else requestAnimationFrame(look);
+    };
+    look();
+  }, PICTURES);
+  await page.waitForFunction(() => window.distinct.done);
+  must(true, `${PICTURES} different pictures`);
+
+  const cards = await page.$$eval('[data-garment]', (all) => all.map((c) => c.dataset.garment));
+  const first = cards.includes('tshirt') ? 'tshirt' : cards[0];
+  const worn = () => page.waitForFunction(() => !document.querySelector('[data-fitting]'));
+  await page.click(`[data-garment="${first}"]`);
+  await page.waitForSelector(`[data-garment="${first}"][aria-pressed="true"]`);
+  await worn();
+  must(true, `${first} is put on and pictures say so`);
+  const other = cards.find((c) => c !== first) ?? first;
+  await page.click(`[data-garment="${other}"]`);
+  await worn();
+  must((requests.get('/tryon.v1.CompositorService/ChooseGarments') ?? 0) >= 2, `the garment is changed: ${other}`);
+  await waitTone('live');
+  await shot('2-live');
+  const sizes = page.getByRole('radiogroup', { name: /size/ }).first().getByRole('radio');
+  if ((await sizes.count()) > 1) {
+    await sizes.nth(1).check();
+    await worn();
+    must(true, 'a size is chosen');
+  }
+
+  await page.keyboard.press('d');
+  await page.waitForFunction(() => Number(document.getElementById('d-rate').textContent) > 0);
+  const stages = await page.$$eval('#d-stages th', (all) => all.map((t) => t.textContent));
+  must(stages.length >= 3, `latency by stage: ${stages.join(', ')}`);
+  console.log(`    ${await page.textContent('#d-rate')} pictures a second, ${await page.textContent('#d-p50')} ms at the half, ${await page.textContent('#d-p99')} ms at 99 %`);
+  await shot('3-details');
+  await page.keyboard.press('d');
+
+  await page.click('#shutter');
+  await page.waitForSelector('#photo[open]');
+  const [download] = await Promise.all([page.waitForEvent('download'), page.click('#photo-save')]);
+  const saved = join(options.out, download.suggestedFilename());
+  await download.saveAs(saved);
+  const head = readFileSync(saved).subarray(0, 4).toString('hex');
+  must(head === '89504e47' || head.startsWith('ffd8ff'), `a photo is saved as ${download.suggestedFilename()}`);
+  await shot('4-photo');
+  await page.click('#photo-close');
+  must((await page.getAttribute('#photo-image', 'src')) === null, 'a closed photo is forgotten');
+
+  if (canBreak) {
+    broken = true;
+    await tell('break');
+    const at = Date.now();
+    await page.waitForSelector('#stage[data-tone="down"], #stage[data-tone="degraded"]');
+    must(true, `the page says so ${Date.now() - at} ms after the chain broke`);
+    const title = await page.textContent('#notice-title');
+    must(title.startsWith('Degraded: ') && (await page.isVisible('#notice')), `«${title}»`);
+    must((await page.textContent('#announce')).startsWith('Degraded: '), 'a screen reader is told');
+    must((await page.getAttribute('#stage', 'data-dim')) !== null, 'what is left of the picture is dimmed');
+    await page.waitForTimeout(1500);
+    await shot('5-degraded');
+    await tell('mend');
+    const mended = Date.now();
+    await waitTone('live');
+    must(true, `live again ${Date.now() - mended} ms after it was mended, with what was worn: ${await page.$$eval('[aria-pressed="true"][data-garment]', (all) => all.map((c) => c.dataset.garment).join(', '))}`);
+    broken = false;
+  } else {
+    console.log('--  nobody to break the chain: that part is not judged');
+  }
+
+  await page.click('#finish');
+  await page.waitForSelector('#welcome:not([hidden])');
+  await page.waitForTimeout(300);
+  must((requests.get('/tryon.v1.CompositorService/CloseTryOn') ?? 0) === 1, 'finishing closes the try-on');
+  const stored = await page.evaluate(() => [localStorage.length, sessionStorage.length, document.cookie.length]);
+  must(stored.every((n) => n === 0), 'nothing is stored in the browser');
+  const left = await page.evaluate(() => {
+    const glass = document.getElementById('glass');
+    return glass.getContext('2d').getImageData(0, 0, glass.width, glass.height).data.some((v, i) => i % 4 !== 3 && v !== 0);
+  });
+  must(!left, 'the glass is wiped');
+  must(foreign.length === 0, `nothing is asked of another host${foreign.map((f) => ` ${f}`)}`);
+  must(errors.length === 0, `no errors in the console${errors.map((e) => `\n      ${e}`).join('')}`);
+} catch (error) {
+  failed = error;
+  await page?.screenshot({ path: join(options.out, 'failed.png') }).catch(() => {});
+} finally {
+  await browser.close();
+  mock?.close();
+}
+if (failed) {
+  console.error(`FAILED: ${failed.message}\n  the screen then: ${join(options.out, 'failed.png')}`);
+  process.exit(1);
+}
+console.log('PASSED');
+process.exit(0);

@@ -1,0 +1,248 @@
+// A compositor made of nothing: the page's files and CompositorService over gRPC-web, with a drawn shopper, for work on
+// the page without the chain. `node mock.mjs [PORT]`; POST /mock/{live,calibrate,degrade?reason=N,freeze,break,mend}.
+
+import { readFileSync } from 'node:fs';
+import { createServer } from 'node:http';
+import { extname, join, normalize } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { crc32, deflateSync } from 'node:zlib';
+
+import { frame } from '../../services/compositor/web/js/grpc_web.js';
+import * as m from '../../services/compositor/web/js/messages.js';
+import { decode, encode } from '../../services/compositor/web/js/wire.js';
+
+const WEB = fileURLToPath(new URL('../../services/compositor/web/', import.meta.url));
+const TYPES = { '.html': 'text/html; charset=utf-8', '.css': 'text/css; charset=utf-8', '.js': 'text/javascript; charset=utf-8', '.svg': 'image/svg+xml' };
+const CSP = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
+
+const LIBRARY = [
+  { name: 'longsleeve', title: 'Long-sleeved shirt', category: 'top', sizes: ['XS', 'S', 'M', 'L', 'XL'], color_rgb: 0x5d7a68 },
+  { name: 'skirt', title: 'Skirt', category: 'bottom', sizes: ['S', 'M', 'L'], color_rgb: 0x8c3f4a },
+  { name: 'trousers', title: 'Trousers', category: 'bottom', sizes: ['S', 'M', 'L', 'XL'], color_rgb: 0x3b4252 },
+  { name: 'tshirt', title: 'T-shirt', category: 'top', sizes: ['XS', 'S', 'M', 'L', 'XL'], color_rgb: 0xd9d2c3 },
+];
+
+// ── a shopper of capsules, shaded by distance ────────────────────────────────────────────────────────────────────
+
+const WIDTH = 480, HEIGHT = 360, LOOP = 40;
+
+/** [x0, y0, x1, y1, r0, r1, part] in units of the picture's height, from the middle. */
+function figure(phase) {
+  const s = Math.sin(phase), c = Math.cos(phase), lean = 0.012 * s;
+  const arm = (side, lift) => {
+    const sx = side * 0.078 + lean, ex = side * (0.135 + 0.03 * lift) + lean, hx = side * (0.165 + 0.07 * lift) + lean;
+    return [[sx, 0.245, ex, 0.36 - 0.05 * lift, 0.03, 0.024, 'sleeve'], [ex, 0.36 - 0.05 * lift, hx, 0.48 - 0.14 * lift, 0.024, 0.018, 'arm']];
+  };
+  const leg = (side) => [[side * 0.042 + lean * 0.5, 0.5, side * 0.055, 0.7, 0.05, 0.035, 'thigh'], [side * 0.055, 0.7, side * 0.058, 0.9, 0.035, 0.022, 'shin'],
+    [side * 0.058, 0.915, side * 0.072, 0.93, 0.024, 0.02, 'shoe']];
+  return [...leg(-1), ...leg(1), [lean, 0.24, lean * 0.6, 0.5, 0.078, 0.082, 'torso'], [lean, 0.25, lean, 0.25, 0.085, 0.085, 'torso'],
+    ...arm(-1, 0.5 + 0.5 * s), ...arm(1, 0.5 + 0.5 * c), [lean, 0.15, lean, 0.21, 0.03, 0.032, 'skin'], [lean * 1.2, 0.1, lean * 1.2, 0.125, 0.05, 0.042, 'skin']];
+}
+
+const SKIN = 0xc79a7b, OWN = { torso: 0x8d8f94, sleeve: 0x8d8f94, arm: SKIN, thigh: 0x4a5263, shin: 0x4a5263, shoe: 0x2a2826, skin: SKIN };
+
+function clothes(outfit) {
+  const colors = { ...OWN };
+  for (const { garment, color_rgb } of outfit) {
+    const color = color_rgb ?? LIBRARY.find((g) => g.name === garment)?.color_rgb ?? 0;
+    if (garment === 'tshirt' || garment === 'longsleeve') colors.torso = colors.sleeve = color;
+    if (garment === 'longsleeve') colors.arm = color;
+    if (garment === 'trousers') colors.thigh = colors.shin = color;
+    if (garment === 'skirt') colors.skirt = color;
+  }
+  return colors;
+}
+
+function paint(phase, outfit, person) {
+  const rows = Buffer.alloc(HEIGHT * (1 + WIDTH * 3));
+  const colors = clothes(outfit);
+  const parts = person ? figure(phase) : [];
+  if (colors.skirt !== undefined && person) parts.push([0, 0.47, 0.012 * Math.sin(phase * 2), 0.68, 0.08, 0.135, 'skirt']);
+  for (let y = 0; y < HEIGHT; y += 1) {
+    const v = (y + 0.5) / HEIGHT;
+    for (let x = 0; x < WIDTH; x += 1) {
+      const u = (x + 0.5 - WIDTH / 2) / HEIGHT;
+      const wall = v < 0.86;
+      const light = wall ? 1 - 0.35 * Math.hypot(u + 0.25, v - 0.3) : 0.86 - 0.5 * (v - 0.86);
+      let [r, g, b] = wall ? [203 * light, 196 * light, 184 * light] : [150 * light, 128 * light, 104 * light];
+      const shadow = Math.exp(-((u / 0.16) ** 2) - (((v - 0.935) / 0.018) ** 2));
+      if (person) [r, g, b] = [r, g, b].map((channel) => channel * (1 - 0.45 * shadow));
+      for (const [x0, y0, x1, y1, r0, r1, part] of parts) {
+        if (Math.abs(u - x0) > 0.3) continue;
+        const dx = x1 - x0, dy = y1 - y0, l = dx * dx + dy * dy || 1;
+        let t = ((u - x0) * dx + (v - y0) * dy) / l;
+        if (part === 'skirt' && (t < 0 || t > 1)) continue;
+        t = Math.min(1, Math.max(0, t));
+        const radius = r0 + (r1 - r0) * t, px = u - x0 - dx * t, d = Math.hypot(px, v - y0 - dy * t) / radius;
+        if (d > 1) continue;
+        const nz = Math.sqrt(1 - d * d), fold = part === 'skirt' ? 0.08 * Math.sin(px * 110) : 0;
+        const shade = 0.42 + 0.55 * nz - 0.28 * (px / radius) + fold;
+        const rgb = colors[part];
+        [r, g, b] = [(rgb >> 16) * shade, ((rgb >> 8) & 255) * shade, (rgb & 255) * shade];
+      }
+      const at = y * (1 + WIDTH * 3) + 1 + x * 3;
+      rows[at] = Math.min(255, r); rows[at + 1] = Math.min(255, g); rows[at + 2] = Math.min(255, b);
+    }
+  }
+  const chunk = (type, data) => {
+    const body = Buffer.concat([Buffer.from(type), data]);
+    const out = Buffer.alloc(body.length + 8);
+    out.writeUInt32BE(data.length);
+    body.copy(out, 4);
+    out.writeUInt32BE(crc32 ? crc32(body) : crc(body), body.length + 4);
+    return out;
+  };
+  const head = Buffer.alloc(13);
+  head.writeUInt32BE(WIDTH);
+  head.writeUInt32BE(HEIGHT, 4);
+  head.set([8, 2, 0, 0, 0], 8);
+  return Buffer.concat([Buffer.from('89504e470d0a1a0a', 'hex'), chunk('IHDR', head), chunk('IDAT', deflateSync(rows, { level: 1 })), chunk('IEND', Buffer.alloc(0))]);
+}
+
+/** For a Node whose zlib has no crc32 yet. */
+function crc(bytes) {
+  let c = 0xffffffff;
+  for (const byte of bytes) {
+    c ^= byte;
+    for (let k = 0; k < 8; k += 1) c = c & 1 ? (c >>> 1) ^ 0xedb88320 : c >>> 1;
+  }
+  return (c ^ 0xffffffff) >>> 0;
+}
+
+const painted = new Map();
+
+function picture(index, outfit, person) {
+  const key = JSON.stringify([index % LOOP, outfit.map((c) => [c.garment, c.color_rgb]), person]);
+  if (!painted.has(key)) painted.set(key, paint(((index % LOOP) / LOOP) * 2 * Math.PI, outfit, person));
+  return painted.get(key);
+}
+
+// ── the service ──────────────────────────────────────────────────────────────────────────────────────────────────
+
+export function startMock({ port = 0, rate = 20 } = {}) {
+  const tryOns = new Map();
+  const world = { state: m.State.LIVE, reason: 0, since: Date.now(), frozen: false, broken: false };
+  const sockets = new Set();
+  let sequence = 0n;
+
+  const trailers = (code, message = '') => {
+    const out = frame(new TextEncoder().encode(`grpc-status:${code}\r\ngrpc-message:${encodeURIComponent(message)}\r\n`));
+    out[0] = 0x80;
+    return out;
+  };
+  const stateOf = (tryOn) => (world.state === m.State.LIVE && Date.now() - tryOn.opened < 2500 ? m.State.CALIBRATING : world.state);
+  const stages = () => [['capture.encode', 7], ['tracking.segment', 5], ['tracking.solve', 23], ['cloth.step', 14], ['compositor.render', 11], ['compositor.encode', 4]]
+    .map(([stage, ms]) => ({ stage, ms: ms * (0.85 + 0.3 * Math.random()) }));
+
+  function nextPicture(tryOn, codec = m.Codec.PNG) {
+    const state = stateOf(tryOn);
+    const away = world.reason === m.Reason.NO_PERSON || world.reason === m.Reason.PERSON_LEFT;
+    const dressed = state === m.State.LIVE && Date.now() - tryOn.chosen > 700;
+    const image = picture(Number(sequence), dressed ? tryOn.garments : [], !away);
+    return {
+      frame: { epoch: 1n, sequence, capture_time_ns: sequence * 33_000_000n, received_unix_ns: BigInt(Date.now()) * 1_000_000n },
+      state, reason: state === m.State.DEGRADED ? world.reason : 0,
+      degraded_age: state === m.State.DEGRADED ? (Date.now() - world.since) / 1000 : 0,
+      codec, width: WIDTH, height: HEIGHT, image, outfit_revision: dressed ? tryOn.revision : 0n,
+      latency_ms: 78 + 18 * Math.random(), stages: stages(), dropped: 0n,
+    };
+  }
+  const nextStatus = (tryOn) => ({ state: stateOf(tryOn), reason: world.reason, age: (Date.now() - world.since) / 1000, service: '', detail: '', retry_after: 0 });
+
+  const unary = {
+    OpenTryOn: [m.OpenTryOnRequest, m.OpenTryOnResponse, ({ try_on_id: id, garments }) => {
+      const created = !tryOns.has(id);
+      if (created) tryOns.set(id, { garments, revision: 1n, opened: Date.now(), chosen: Date.now() });
+      return { try_on_id: id, created };
+    }],
+    CloseTryOn: [m.CloseTryOnRequest, m.CloseTryOnResponse, ({ try_on_id: id }) => { tryOns.delete(id); return {}; }],
+    ListGarmentChoices: [m.ListGarmentChoicesRequest, m.ListGarmentChoicesResponse, () => ({ garments: LIBRARY })],
+    ChooseGarments: [m.ChooseGarmentsRequest, m.ChooseGarmentsResponse, ({ try_on_id: id, garments }) => {
+      const tryOn = tryOns.get(id);
+      if (!tryOn) throw 5;
+      Object.assign(tryOn, { garments, revision: tryOn.revision + 1n, chosen: Date.now() });
+      return { outfit_revision: tryOn.revision };
+    }],
+    TakeSnapshot: [m.TakeSnapshotRequest, m.TakeSnapshotResponse, ({ try_on_id: id }) => {
+      if (!tryOns.has(id)) throw 5;
+      return { picture: nextPicture(tryOns.get(id)) };
+    }],
+  };
+
+  function stream(request, response) {
+    const tryOn = tryOns.get(decode(m.StreamFramesRequest, request).try_on_id);
+    if (!tryOn) return response.end(Buffer.from(trailers(5, 'no such try-on')));
+    const send = (message) => response.write(frame(encode(m.StreamFramesResponse, message)));
+    send({ status: nextStatus(tryOn) });
+    let quiet = 0;
+    const timer = setInterval(() => {
+      if (world.frozen) {
+        quiet += 1;
+        if (quiet % Math.round(rate / 3) === 0) send({ status: nextStatus(tryOn) });
+        return;
+      }
+      sequence += 1n;
+      if (response.writableLength < 1_000_000) send({ picture: nextPicture(tryOn) });
+    }, 1000 / rate);
+    response.on('close', () => clearInterval(timer));
+  }
+
+  function control(what, query) {
+    const set = (more) => Object.assign(world, { since: Date.now(), frozen: false, ...more });
+    if (what === 'live') set({ state: m.State.LIVE, reason: 0 });
+    if (what === 'calibrate') set({ state: m.State.CALIBRATING, reason: 0 });
+    if (what === 'degrade') set({ state: m.State.DEGRADED, reason: Number(query.get('reason') ?? 1) });
+    if (what === 'freeze') set({ state: m.State.DEGRADED, reason: m.Reason.CAMERA_SILENT, frozen: true });
+    if (what === 'break' || what === 'mend') world.broken = what === 'break';
+    if (what === 'break') {
+      tryOns.clear();
+      for (const socket of sockets) socket.destroy();
+    }
+  }
+
+  const server = createServer(async (request, response) => {
+    const { pathname, searchParams } = new URL(request.url, 'http://mock');
+    if (request.method === 'GET') {
+      const path = normalize(join(WEB, pathname === '/' ? 'index.html' : pathname));
+      try {
+        if (!path.startsWith(WEB)) throw new Error('outside');
+        const body = readFileSync(path);
+        response.writeHead(200, { 'content-type': TYPES[extname(path)] ?? 'application/octet-stream', 'content-security-policy': CSP }).end(body);
+      } catch {
+        response.writeHead(404).end();
+      }
+      return;
+    }
+    if (pathname.startsWith('/mock/')) {
+      response.end('ok\n', () => control(pathname.slice(6), searchParams));
+      return;
+    }
+    if (world.broken) return request.socket.destroy();
+    const chunks = [];
+    for await (const chunk of request) chunks.push(chunk);
+    const message = new Uint8Array(Buffer.concat(chunks)).subarray(5);
+    const name = pathname.split('/').at(-1);
+    response.writeHead(200, { 'content-type': 'application/grpc-web+proto' });
+    if (name === 'StreamFrames') return stream(message, response);
+    try {
+      const [ask, answer, act] = unary[name];
+      response.write(frame(encode(answer, act(decode(ask, message)))));
+      response.end(Buffer.from(trailers(0)));
+    } catch (code) {
+      response.end(Buffer.from(trailers(Number.isInteger(code) ? code : 13, String(code))));
+    }
+  });
+  server.on('connection', (socket) => {
+    sockets.add(socket);
+    socket.on('close', () => sockets.delete(socket));
+  });
+  return new Promise((done) => server.listen(port, '127.0.0.1', () => done({
+    url: `http://127.0.0.1:${server.address().port}/`, control: (what, query = '') => control(what, new URLSearchParams(query)),
+    close: () => { server.close(); server.closeAllConnections(); },
+  })));
+}
+
+if (process.argv[1] === fileURLToPath(import.meta.url)) {
+  const { url } = await startMock({ port: Number(process.argv[2] ?? 8090) });
+  console.log(url);
+}

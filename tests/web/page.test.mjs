@@ -1,0 +1,183 @@
+// The page's decisions without a page: what is said, when to try again, what is worn, which figures are shown.
+
+import assert from 'node:assert/strict';
+import test from 'node:test';
+
+import { Backoff, FIRST_DELAY, LONGEST_DELAY } from '../../services/compositor/web/js/backoff.js';
+import { Code, RpcError } from '../../services/compositor/web/js/grpc_web.js';
+import { Reason, State } from '../../services/compositor/web/js/messages.js';
+import { Outfit } from '../../services/compositor/web/js/outfit.js';
+import { BLANK_MS, STALE_MS, ageWords, present } from '../../services/compositor/web/js/presentation.js';
+import { Stats, percentile } from '../../services/compositor/web/js/stats.js';
+import { TryOn, drawId } from '../../services/compositor/web/js/try_on.js';
+
+const known = (more) => ({ link: 'streaming', retryAt: null, state: State.LIVE, reason: 0, degradedAge: 0, shownAt: 10_000, exposedAt: 10_000, error: null, ...more });
+
+test('only a fresh picture of a live state is called live', () => {
+  for (const link of ['opening', 'streaming', 'waiting', 'refused', 'closed']) {
+    for (const state of [0, ...Object.values(State)]) {
+      for (const age of [0, STALE_MS - 1, STALE_MS + 1, BLANK_MS + 1]) {
+        const said = present(known({ link, state, retryAt: link === 'waiting' ? 11_000 : null }), 10_000 + age);
+        const fresh = age <= STALE_MS && state === State.LIVE && !['waiting', 'refused'].includes(link);
+        assert.equal(said.tone === 'live', fresh, `${link} ${state} ${age}: ${said.title}`);
+        if (age > STALE_MS) assert.ok(said.dim === 'hard' && said.age !== '', `a stale picture is dimmed and dated: ${link} ${state}`);
+        assert.equal(said.blank, age > BLANK_MS);
+      }
+    }
+  }
+});
+
+test('a picture that arrives late is not called live', () => {
+  const said = present(known({ shownAt: 10_000, exposedAt: 8_000 }), 10_000);
+  assert.equal(said.title, 'Degraded: the picture is late');
+  assert.match(said.age, /2\.0 s ago/);
+});
+
+test('every reason has words, and an unknown one too', () => {
+  const titles = [...Object.values(Reason), 99].map((reason) => present(known({ state: State.DEGRADED, reason }), 10_000).title);
+  assert.equal(new Set(titles).size, titles.length);
+  assert.ok(titles.every((t) => t.startsWith('Degraded: ')));
+});
+
+test('a broken line says when it tries again', () => {
+  assert.match(present(known({ link: 'waiting', retryAt: 12_400 }), 10_000).hint, /again in 3 s/);
+  assert.match(present(known({ link: 'opening', retryAt: 9_000 }), 10_000).title, /does not answer/);
+});
+
+test('ages in words', () => {
+  assert.deepEqual([400, 9_940, 12_000, 89_000, 185_000].map(ageWords), ['0.4 s', '9.9 s', '12 s', '89 s', '3 min']);
+});
+
+test('backoff doubles to a ceiling below five seconds, keeps to RetryInfo, and starts again', () => {
+  const most = new Backoff(() => 1);
+  assert.deepEqual([0, 1, 2, 3, 4, 5].map(() => most.next()), [1, 2, 4, 8, 12, 12].map((f) => Math.min(f * FIRST_DELAY, LONGEST_DELAY)));
+  const least = new Backoff(() => 0);
+  assert.equal(least.next(), FIRST_DELAY / 2);
+  assert.equal(least.next(2), 2);
+  assert.ok(least.next(1e9) <= 4 * LONGEST_DELAY);
+  least.reset();
+  assert.equal(least.next(), FIRST_DELAY / 2);
+  assert.ok(LONGEST_DELAY < 5);
+});
+
+const library = [
+  { name: 'longsleeve', title: 'Long sleeve', category: 'top', sizes: ['S', 'M'], color_rgb: 1 },
+  { name: 'skirt', title: 'Skirt', category: 'bottom', sizes: ['M'], color_rgb: 2 },
+  { name: 'tshirt', title: 'T-shirt', category: 'top', sizes: ['S', 'M', 'L'], color_rgb: 3 },
+];
+
+test('an outfit has one garment of a category, inner layer first', () => {
+  const outfit = new Outfit();
+  outfit.setLibrary(library);
+  outfit.toggle('tshirt');
+  outfit.toggle('skirt');
+  assert.ok(outfit.setSize('tshirt', 'L'));
+  assert.ok(!outfit.setSize('tshirt', 'XXL') && !outfit.setSize('longsleeve', 'M') && !outfit.toggle('cape'));
+  outfit.setColor('skirt', 0);
+  assert.deepEqual(outfit.choices(), [{ garment: 'skirt', size: '', color_rgb: 0 }, { garment: 'tshirt', size: 'L' }]);
+  outfit.toggle('longsleeve');
+  assert.equal(outfit.worn('tshirt'), null);
+  outfit.toggle('longsleeve');
+  assert.deepEqual(outfit.choices(), [{ garment: 'skirt', size: '', color_rgb: 0 }]);
+  assert.ok(outfit.setLibrary(library.slice(0, 1)));
+  assert.deepEqual(outfit.choices(), []);
+});
+
+test('percentiles, rate, and stages that vanish', () => {
+  assert.equal(percentile([3, 1, 2], 50), 2);
+  assert.equal(percentile([5], 99), 5);
+  assert.ok(Number.isNaN(percentile([], 50)));
+  const stats = new Stats();
+  const picture = (stages) => ({ latency_ms: 80, dropped: 2n, stages });
+  for (let i = 0; i < 31; i += 1) stats.shown(picture([{ stage: 'a', ms: 4 }, { stage: 'b', ms: 1 }]), i * 50, 3);
+  stats.missed();
+  const summary = stats.summary(1500);
+  assert.equal(summary.rate, 20);
+  assert.equal(summary.p50, 80);
+  assert.deepEqual(summary.stages.map(([n]) => n), ['a', 'b']);
+  assert.deepEqual([summary.dropped, summary.missed], [2, 1]);
+  stats.shown(picture([{ stage: 'b', ms: 1 }]), 1550, 3);
+  assert.deepEqual(stats.summary(1600).stages.map(([n]) => n), ['b']);
+  assert.equal(stats.summary(60_000).rate, 0, 'an old rate is no rate');
+});
+
+// ── the try-on's life, against a client made of functions ────────────────────────────────────────────────────────
+
+const status = (state) => ({ picture: null, status: { state, reason: 0 } });
+const forever = (signal) => new Promise((_, fail) => signal.addEventListener('abort', () => fail(new RpcError(Code.CANCELLED, 'cancelled'))));
+
+function scripted({ streams, opens = [] }) {
+  const calls = { open: 0, choose: 0, close: 0 };
+  const client = {
+    openTryOn: async () => {
+      calls.open += 1;
+      const answer = opens.shift();
+      if (answer instanceof Error) throw answer;
+      return { try_on_id: 'x', created: answer ?? calls.open === 1 };
+    },
+    chooseGarments: async () => ({ outfit_revision: BigInt(++calls.choose) }),
+    closeTryOn: async () => { calls.close += 1; },
+    streamFrames: (request, { signal }) => streams.shift()(signal),
+  };
+  return { client, calls };
+}
+
+function follow(script, more = {}) {
+  const events = [];
+  let tell = () => {};
+  const tryOn = new TryOn({
+    client: script.client, garments: () => [], backoff: new Backoff(() => 0), silenceMs: 80, ...more,
+    on: (event) => { events.push(event); tell(); },
+  });
+  const until = async (condition) => { while (!condition(events)) await new Promise((done) => { tell = done; }); };
+  return { tryOn, events, until };
+}
+const links = (events) => events.filter((e) => e.kind === 'link').map((e) => e.link);
+
+test('a stream that breaks is opened again under the same id and says again what is worn', async () => {
+  const script = scripted({
+    streams: [
+      async function* () { yield status(State.LIVE); throw new RpcError(Code.UNAVAILABLE, 'cut'); },
+      async function* (signal) { yield status(State.LIVE); await forever(signal); },
+    ],
+  });
+  const { tryOn, events, until } = follow(script);
+  await until((e) => e.filter((x) => x.kind === 'status').length === 2);
+  assert.deepEqual(links(events), ['opening', 'waiting', 'opening']);
+  assert.deepEqual(script.calls, { open: 2, choose: 1, close: 0 });
+  await tryOn.close();
+  await tryOn.finished;
+  assert.equal(script.calls.close, 1);
+  assert.equal(links(events).at(-1), 'closed');
+});
+
+test('silence is a broken line', async () => {
+  const silent = async function* (signal) { yield status(State.LIVE); await forever(signal); };
+  const { tryOn, events, until } = follow(scripted({ streams: [silent, silent] }));
+  await until((e) => links(e).includes('waiting'));
+  assert.equal(events.find((e) => e.link === 'waiting').error.code, Code.UNAVAILABLE);
+  await tryOn.close();
+});
+
+test('the compositor may refuse or ask for patience', async () => {
+  const script = scripted({
+    opens: [new RpcError(Code.RESOURCE_EXHAUSTED, 'full', { retryAfter: 0.2 }), new RpcError(Code.INVALID_ARGUMENT, 'camera')],
+    streams: [],
+  });
+  const { tryOn, events } = follow(script);
+  await tryOn.finished;
+  assert.deepEqual(links(events), ['opening', 'waiting', 'opening', 'refused']);
+  assert.equal(events[1].retryIn, 0.2);
+});
+
+test('of two quick choices only the last one counts', async () => {
+  const { tryOn } = follow(scripted({ streams: [async function* (signal) { yield status(State.LIVE); await forever(signal); }] }));
+  const [first, second] = await Promise.all([tryOn.choose(), tryOn.choose()]);
+  assert.deepEqual([first, second], [null, 2n]);
+  await tryOn.close();
+});
+
+test('ids are in the contract’s alphabet and differ', () => {
+  assert.match(drawId(), /^[A-Za-z0-9_-]{1,64}$/);
+  assert.notEqual(drawId(), drawId());
+});
