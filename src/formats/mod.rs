@@ -3,5 +3,9 @@
 mod error;
 pub mod image;
 pub mod npz;
+mod recording;
+mod rgbd_folder;
 
 pub use error::FormatError;
+pub use recording::{RgbdSource, open_recording};
+pub use rgbd_folder::{RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};

@@ -1,0 +1,96 @@
+//! Writes an RGBD folder frame by frame.
+
+use super::camera_json::CameraFile;
+use crate::camera::{Calibration, RgbdFrame};
+use crate::formats::FormatError;
+use crate::formats::image::{encode_jpeg, write_png_depth, write_png_rgb};
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// How colour is stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum ColorFile {
+    /// Without loss.
+    #[default]
+    Png,
+    /// At this quality, 1 to 100.
+    Jpeg(u8),
+}
+
+/// An RGBD folder being written: each frame is on disk when [`RgbdFolderWriter::write`] returns.
+#[derive(Debug)]
+pub struct RgbdFolderWriter {
+    folder: PathBuf,
+    depth_list: File,
+    color_list: Option<File>,
+    color_file: ColorFile,
+    frames: usize,
+}
+
+impl RgbdFolderWriter {
+    /// Makes the folder and its `camera.json` (depth in millimetres). Colour is written as PNG.
+    ///
+    /// # Errors
+    /// When the folder already holds a recording, or cannot be written.
+    pub fn create(folder: &Path, calibration: &Calibration) -> Result<Self, FormatError> {
+        let camera = folder.join("camera.json");
+        if camera.exists() {
+            return Err(FormatError::field(&camera, "file", "exists already; choose an empty folder"));
+        }
+        let depth = folder.join("depth");
+        std::fs::create_dir_all(&depth).map_err(|e| FormatError::io(&depth, e))?;
+        let file = CameraFile { calibration: calibration.clone(), depth_scale: 1000.0 };
+        std::fs::write(&camera, file.to_json()).map_err(|e| FormatError::io(&camera, e))?;
+        let list = folder.join("depth.txt");
+        let depth_list = File::create(&list).map_err(|e| FormatError::io(&list, e))?;
+        Ok(Self { folder: folder.to_owned(), depth_list, color_list: None, color_file: ColorFile::Png, frames: 0 })
+    }
+    /// Writes colour as JPEG of this quality (1 to 100) instead of PNG.
+    #[must_use]
+    pub fn with_jpeg(mut self, quality: u8) -> Self {
+        self.color_file = ColorFile::Jpeg(quality);
+        self
+    }
+    /// Frames written so far.
+    pub fn frames(&self) -> usize {
+        self.frames
+    }
+    /// Appends a frame.
+    ///
+    /// # Errors
+    /// When a file cannot be written; names it.
+    pub fn write(&mut self, frame: &RgbdFrame) -> Result<(), FormatError> {
+        let name = format!("depth/{:06}.png", self.frames);
+        write_png_depth(&self.folder.join(&name), &frame.depth)?;
+        let time = format!("{}.{:09}", frame.time_ns / 1_000_000_000, frame.time_ns % 1_000_000_000);
+        let list = self.folder.join("depth.txt");
+        writeln!(self.depth_list, "{time} {name}").map_err(|e| FormatError::io(&list, e))?;
+        if let Some(color) = &frame.color {
+            let dir = self.folder.join("rgb");
+            let list = self.folder.join("rgb.txt");
+            if self.color_list.is_none() {
+                std::fs::create_dir_all(&dir).map_err(|e| FormatError::io(&dir, e))?;
+                self.color_list = Some(File::create(&list).map_err(|e| FormatError::io(&list, e))?);
+            }
+            let name = match self.color_file {
+                ColorFile::Png => {
+                    let name = format!("rgb/{:06}.png", self.frames);
+                    write_png_rgb(&self.folder.join(&name), color)?;
+                    name
+                }
+                ColorFile::Jpeg(quality) => {
+                    let name = format!("rgb/{:06}.jpg", self.frames);
+                    let path = self.folder.join(&name);
+                    std::fs::write(&path, encode_jpeg(color, quality)?).map_err(|e| FormatError::io(&path, e))?;
+                    name
+                }
+            };
+            if let Some(file) = &mut self.color_list {
+                writeln!(file, "{time} {name}").map_err(|e| FormatError::io(&list, e))?;
+            }
+        }
+        self.frames += 1;
+        Ok(())
+    }
+}
