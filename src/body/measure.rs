@@ -56,6 +56,9 @@ const ACROMION_LEAN: f64 = 0.577;
 /// Distance of slices where a maximum or an end is looked for, metres. Girths change by less than 1 mm in between.
 const SLICE: f64 = 0.006;
 
+/// Halvings of [`SLICE`] to find the crotch within a tenth of a millimetre.
+const HALVINGS: usize = 6;
+
 /// Closed outlines where a plane cuts the surface, in coordinates (u, v) of the plane around its `origin`.
 #[derive(Clone, Debug)]
 pub struct Section {
@@ -170,7 +173,15 @@ pub fn measure(template: &Template, body: &RestBody) -> Result<Measurements, Mea
     let missing = |what: &'static str| move || MeasureError::Section(what);
     let straddles =
         |s: &Section| s.central().is_some_and(|o| o.iter().any(|p| p.x < 0.0) && o.iter().any(|p| p.x > 0.0));
-    let crotch = steps(hip.y, knee.y).find(|&y| !straddles(&trunk(y))).ok_or_else(missing("crotch"))?;
+    let below = steps(hip.y, knee.y).find(|&y| !straddles(&trunk(y))).ok_or_else(missing("crotch"))?;
+    let crotch = (0..HALVINGS)
+        .fold([below, below + SLICE], |[l, h], _| {
+            let m = 0.5 * (l + h);
+            if straddles(&trunk(m)) { [l, m] } else { [m, h] }
+        })
+        .iter()
+        .sum::<f64>()
+        * 0.5;
     // Under the armpit the trunk is apart from the arms: its outline ends inside the shoulder joints' breadth.
     let apart = |s: &Section| s.central().is_some_and(|o| o.iter().all(|p| p.x.abs() < 1.25 * (shoulder.x - middle.x)));
     let lower_chest = middle.y + 0.55 * (neck.y - middle.y);

@@ -116,10 +116,8 @@ impl Material {
             ("damping", self.damping),
             ("thickness", self.thickness),
         ];
-        for (field, v, ok) in positive
-            .iter()
-            .map(|(f, v)| (f, v, *v > 0.0))
-            .chain(not_negative.iter().map(|(f, v)| (f, v, *v >= 0.0)))
+        for (field, v, ok) in
+            positive.iter().map(|(f, v)| (f, v, *v > 0.0)).chain(not_negative.iter().map(|(f, v)| (f, v, *v >= 0.0)))
         {
             if !ok || !v.is_finite() {
                 return Err(GarmentError::Field {

@@ -165,7 +165,10 @@ impl Pattern {
                     why: format!("there is no edge `{}` in a panel `{}`", r[1], r[0]),
                 })?;
                 if !sewn.insert(at) {
-                    return Err(GarmentError::Seam { seam, why: format!("edge `{}` of panel `{}` is sewn twice", r[1], r[0]) });
+                    return Err(GarmentError::Seam {
+                        seam,
+                        why: format!("edge `{}` of panel `{}` is sewn twice", r[1], r[0]),
+                    });
                 }
             }
         }

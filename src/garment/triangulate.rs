@@ -79,7 +79,9 @@ pub(super) fn triangulate(panel: &Panel, pieces: &[usize], length: f64) -> Resul
     let mut used = vec![false; points.len()];
     faces.iter().flatten().for_each(|&i| used[i as usize] = true);
     if let Some(vertex) = used.iter().position(|u| !u) {
-        return Err(fault(format!("point {vertex} of its triangulation has no triangle; the edge length is too coarse")));
+        return Err(fault(format!(
+            "point {vertex} of its triangulation has no triangle; the edge length is too coarse"
+        )));
     }
     Ok(PanelMesh { points, faces, edges, min_angle })
 }

@@ -20,16 +20,10 @@ impl SymbolicFactor {
     /// # Errors
     /// When the factor would not fit 32-bit indices or the memory.
     pub fn new(pattern: Arc<SymmetricPattern>) -> Result<Self, LinearError> {
-        let structure = SymbolicSparseColMatRef::new_checked(
-            pattern.size(),
-            pattern.size(),
-            &pattern.columns,
-            None,
-            &pattern.rows,
-        );
-        let symbolic =
-            factorize_symbolic_cholesky(structure, Side::Lower, SymmetricOrdering::Amd, Default::default())
-                .map_err(|e| LinearError::TooLarge(e.to_string()))?;
+        let structure =
+            SymbolicSparseColMatRef::new_checked(pattern.size(), pattern.size(), &pattern.columns, None, &pattern.rows);
+        let symbolic = factorize_symbolic_cholesky(structure, Side::Lower, SymmetricOrdering::Amd, Default::default())
+            .map_err(|e| LinearError::TooLarge(e.to_string()))?;
         Ok(Self { pattern, symbolic: Arc::new(symbolic) })
     }
     /// The pattern it was made for.
@@ -141,7 +135,8 @@ mod tests {
             factor.solve(&mut x);
             let mut back = Vec::new();
             pattern.multiply(&values, &x, &mut back);
-            let worst = b.iter().zip(&back).flat_map(|(p, q)| (0..3).map(move |d| (p[d] - q[d]).abs())).fold(0.0, f64::max);
+            let worst =
+                b.iter().zip(&back).flat_map(|(p, q)| (0..3).map(move |d| (p[d] - q[d]).abs())).fold(0.0, f64::max);
             assert!(worst < 1e-9, "{worst}");
         }
     }

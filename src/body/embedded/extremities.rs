@@ -48,7 +48,7 @@ const FINGERS: [Finger; 4] = [
 pub(super) fn hand(f: &mut Field, fig: &Figure, j: &Joints) {
     // a along the hand, w towards the thumb (forward), u to the back of the hand.
     let frame = Frame::along(j.wrist, j.hand_end, V3d::z());
-    let size = 1.0 + 0.03 * fig.sex;
+    let size = fig.hand();
     let at = |w: f64, u: f64, t: f64| frame.point(u * size, w * size, t * size);
     let palm = [
         Station { t: -0.005, c: [0.000, 0.000, 0.0195, 0.0195, 0.0275, 0.0275, 0.1] },
@@ -58,7 +58,7 @@ pub(super) fn hand(f: &mut Field, fig: &Figure, j: &Joints) {
         Station { t: 0.092, c: [0.000, -0.001, 0.0100, 0.0110, 0.0375, 0.0375, 0.4] },
     ]
     .map(|s| Station { t: s.t * size, c: std::array::from_fn(|k| if k < 6 { s.c[k] * size } else { s.c[k] }) });
-    f.add(Solid::Loft(Loft { frame, stations: palm.to_vec(), caps: [0.02, 0.012] }), 0.012);
+    f.add(Solid::Loft(Loft::new(frame, palm.to_vec(), [0.02, 0.012])), 0.012);
     for finger in &FINGERS {
         let mut p = at(finger.root[0] * 0.9, finger.root[1], finger.root[2] - 0.012);
         let mut dir = (frame.a + frame.w * finger.spread - frame.u * 0.05).normalize();
@@ -119,7 +119,7 @@ const TOES: [[f64; 3]; 5] = [
 ];
 
 pub(super) fn foot(f: &mut Field, fig: &Figure, j: &Joints) {
-    let size = 1.0 + 0.035 * fig.sex;
+    let size = fig.foot();
     let stations = FOOT[..8]
         .iter()
         .map(|r| {
@@ -130,7 +130,7 @@ pub(super) fn foot(f: &mut Field, fig: &Figure, j: &Joints) {
         })
         .collect();
     let frame = Frame { origin: P3d::new(j.ankle.x, 0.0, j.ankle.z), u: V3d::x(), w: V3d::y(), a: V3d::z() };
-    f.add(Solid::Loft(Loft { frame, stations, caps: [0.020, 0.012] }), 0.022);
+    f.add(Solid::Loft(Loft::new(frame, stations, [0.020, 0.012])), 0.022);
     for t in TOES {
         let x = j.ankle.x + (0.011 + t[0]) * size;
         let r = t[2] * size;

@@ -57,36 +57,42 @@ impl Frame {
 /// A tube with varying, asymmetric sections along a straight axis, closed by ellipsoidal caps.
 #[derive(Clone, Debug)]
 pub(super) struct Loft {
-    pub frame: Frame,
-    pub stations: Vec<Station>,
-    /// Height of the cap before the first and after the last station, metres.
-    pub caps: [f64; 2],
+    frame: Frame,
+    stations: Vec<Station>,
+    /// Change of the section per metre at each station.
+    slopes: Vec<[f64; CHANNELS]>,
+    caps: [f64; 2],
 }
 
 impl Loft {
-    /// Section at `t`, a cubic Hermite through the stations with Catmull–Rom slopes.
+    /// Stations in order along the axis, at least two; heights of the caps before the first and after the last, metres.
+    pub(super) fn new(frame: Frame, stations: Vec<Station>, caps: [f64; 2]) -> Self {
+        let n = stations.len();
+        let secant =
+            |i: usize, k: usize| (stations[i + 1].c[k] - stations[i].c[k]) / (stations[i + 1].t - stations[i].t);
+        // Inside, the parabola through three points; at the ends, the chord.
+        let slope = |i: usize, k: usize| match i {
+            0 => secant(0, k),
+            i if i + 1 == n => secant(i - 1, k),
+            i => {
+                let (l, r) = (stations[i].t - stations[i - 1].t, stations[i + 1].t - stations[i].t);
+                (secant(i - 1, k) * r + secant(i, k) * l) / (l + r)
+            }
+        };
+        let slopes = (0..n).map(|i| std::array::from_fn(|k| slope(i, k))).collect();
+        Self { frame, stations, slopes, caps }
+    }
+    /// Section at `t`: a cubic Hermite through the stations.
     fn section(&self, t: f64) -> [f64; CHANNELS] {
         let s = &self.stations;
-        let n = s.len();
-        let i = s[1..n - 1].iter().take_while(|q| q.t <= t).count();
+        let i = s[1..s.len() - 1].iter().take_while(|q| q.t <= t).count();
         let (p, q) = (&s[i], &s[i + 1]);
         let h = q.t - p.t;
         let x = (t - p.t) / h;
         let (x2, x3) = (x * x, x * x * x);
-        let (b0, b1, b2, b3) = (2.0 * x3 - 3.0 * x2 + 1.0, 3.0 * x2 - 2.0 * x3, x3 - 2.0 * x2 + x, x3 - x2);
-        let slope = |l: &Station, m: &Station, r: &Station, k: usize| {
-            // Weighted by the other interval: the parabola through three points.
-            let (hl, hr) = (m.t - l.t, r.t - m.t);
-            ((m.c[k] - l.c[k]) / hl * hr + (r.c[k] - m.c[k]) / hr * hl) / (hl + hr)
-        };
-        let mut out = [0.0; CHANNELS];
-        for (k, o) in out.iter_mut().enumerate() {
-            let secant = (q.c[k] - p.c[k]) / h;
-            let m0 = if i > 0 { slope(&s[i - 1], p, q, k) } else { secant };
-            let m1 = if i + 2 < n { slope(p, q, &s[i + 2], k) } else { secant };
-            *o = b0 * p.c[k] + b1 * q.c[k] + h * (b2 * m0 + b3 * m1);
-        }
-        out
+        let (b1, b2, b3) = (3.0 * x2 - 2.0 * x3, h * (x3 - 2.0 * x2 + x), h * (x3 - x2));
+        let (m, n) = (&self.slopes[i], &self.slopes[i + 1]);
+        std::array::from_fn(|k| p.c[k] + (q.c[k] - p.c[k]) * b1 + m[k] * b2 + n[k] * b3)
     }
     fn distance(&self, p: &P3d) -> f64 {
         let l = self.frame.local(p);
@@ -183,6 +189,8 @@ struct Bump {
     frame: Frame,
     radii: V3d,
     height: f64,
+    /// Square of the largest radius.
+    reach: f64,
 }
 
 /// The figure's left half (x ≥ 0), mirrored: negative inside.
@@ -213,11 +221,12 @@ impl Field {
     }
     /// Raises the surface by about `height` metres at `c`, fading out at the radii (x, y, z).
     pub(super) fn bump(&mut self, c: impl Into<P3d>, r: [f64; 3], height: f64) {
-        self.bumps.push(Bump { frame: Frame::upright(c.into()), radii: V3d::new(r[0], r[2], r[1]), height });
+        self.bump_in(Frame::upright(c.into()), [r[0], r[2], r[1]], height);
     }
     /// The same in a given frame, radii (u, w, along the axis).
     pub(super) fn bump_in(&mut self, frame: Frame, r: [f64; 3], height: f64) {
-        self.bumps.push(Bump { frame, radii: r.into(), height });
+        let radii = V3d::from(r);
+        self.bumps.push(Bump { frame, radii, height, reach: radii.max() * radii.max() });
     }
     /// Signed distance estimate, metres; near the surface its gradient is about one.
     pub(super) fn value(&self, at: &P3d) -> f64 {
@@ -235,6 +244,9 @@ impl Field {
             d = if d == f64::INFINITY { e } else { smooth_min(d, e, part.blend) };
         }
         for b in &self.bumps {
+            if (p - b.frame.origin).norm_squared() > b.reach {
+                continue;
+            }
             let l = b.frame.local(&p).component_div(&b.radii);
             let q = 1.0 - l.norm_squared();
             if q > 0.0 {
@@ -243,12 +255,12 @@ impl Field {
         }
         d
     }
-    /// Gradient by central differences.
-    pub(super) fn gradient(&self, p: &P3d) -> V3d {
+    /// Gradient by forward differences from `value` at `p`.
+    fn gradient(&self, p: &P3d, value: f64) -> V3d {
         /// Step, metres: far below the smallest feature (a fingertip), far above rounding.
-        const H: f64 = 2e-4;
-        let d = |v: V3d| self.value(&(p + v)) - self.value(&(p - v));
-        V3d::new(d(V3d::x() * H), d(V3d::y() * H), d(V3d::z() * H)) / (2.0 * H)
+        const H: f64 = 1e-4;
+        let d = |v: V3d| (self.value(&(p + v)) - value) / H;
+        V3d::new(d(V3d::x() * H), d(V3d::y() * H), d(V3d::z() * H))
     }
     /// Moves a point onto the surface along the gradient; a point on the plane x = 0 stays on it.
     pub(super) fn project(&self, p: &P3d, steps: usize) -> P3d {
@@ -258,7 +270,7 @@ impl Field {
             if v.abs() < ON_SURFACE {
                 break;
             }
-            let mut g = self.gradient(&q);
+            let mut g = self.gradient(&q, v);
             if p.x == 0.0 {
                 g.x = 0.0;
             }

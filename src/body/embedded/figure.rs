@@ -39,12 +39,20 @@ pub(super) struct Joints {
 pub(super) const STATURE: f64 = 1.692;
 
 impl Figure {
+    /// Size of the hands, relative (hand length of men and women at equal stature, ANSUR II: ±1.5 %; breadth ±4 %).
+    pub(super) fn hand(&self) -> f64 {
+        1.0 + 0.022 * self.sex
+    }
+    /// Size of the feet, relative.
+    pub(super) fn foot(&self) -> f64 {
+        1.0 + 0.015 * self.sex
+    }
     /// Joints in the A-pose: arms 45° down, legs 5° apart.
     pub(super) fn joints(&self) -> Joints {
         let p = P3d::new;
         // Biacromial breadth moves the whole arm; hip breadth the legs, half as much.
-        let out = 0.0055 * self.sex + 0.0080 * self.shoulder;
-        let leg = -0.004 * self.sex + 0.003 * self.girth + 0.002 * self.hip;
+        let out = 0.0048 * self.sex + 0.0080 * self.shoulder;
+        let leg = -0.003 * self.sex + 0.003 * self.girth + 0.003 * self.hip;
         let shoulder = p(0.170 + out, 1.348, -0.016);
         let elbow = shoulder + (p(0.205, -0.197, -0.004) - P3d::origin());
         let wrist = elbow + (p(0.1715, -0.173, 0.048) - P3d::origin());

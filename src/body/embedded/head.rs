@@ -5,7 +5,7 @@ use super::figure::Figure;
 use crate::math::{P3d, V3d};
 
 /// Face: height, half width, front, back, squareness; sex adds to the half width.
-const FACE: [[f64; 6]; 9] = [
+const FACE: [[f64; 6]; 10] = [
     [1.474, 0.022, 0.076, 0.020, 0.1, 0.0025],
     [1.486, 0.034, 0.084, 0.004, 0.15, 0.0030],
     [1.505, 0.045, 0.084, -0.012, 0.1, 0.0035],
@@ -14,7 +14,8 @@ const FACE: [[f64; 6]; 9] = [
     [1.570, 0.0655, 0.086, -0.045, 0.0, 0.0015],
     [1.592, 0.0680, 0.087, -0.050, 0.0, 0.0010],
     [1.615, 0.0680, 0.088, -0.050, 0.0, 0.0010],
-    [1.640, 0.0640, 0.078, -0.050, 0.0, 0.0010],
+    [1.635, 0.0640, 0.082, -0.050, 0.0, 0.0010],
+    [1.655, 0.0560, 0.069, -0.050, 0.0, 0.0010],
 ];
 
 pub(super) fn head(f: &mut Field, fig: &Figure) {
@@ -29,7 +30,7 @@ pub(super) fn head(f: &mut Field, fig: &Figure) {
             Station { t: r[0], c: [0.0, cz, hw, hw, rz, rz, r[4]] }
         })
         .collect();
-    f.add(Solid::Loft(Loft { frame: Frame::upright(P3d::origin()), stations, caps: [0.008, 0.02] }), 0.02);
+    f.add(Solid::Loft(Loft::new(Frame::upright(P3d::origin()), stations, [0.008, 0.02])), 0.02);
     // Nose: bridge, tip, wings.
     let p = P3d::new;
     f.cone(p(0.0, 1.592, 0.0800), p(0.0, 1.560, 0.0975), 0.0070, 0.0085, 0.016);

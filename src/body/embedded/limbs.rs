@@ -18,6 +18,7 @@ const UPPER_ARM: Sections<8> = [
     [0.88, 0.000, -0.001, 0.0403, 0.0413, 0.0030],
     [1.02, 0.000, -0.003, 0.0403, 0.0392, 0.0020],
 ];
+/// Elbow to wrist, as the upper arm.
 const FOREARM: Sections<8> = [
     [-0.05, 0.000, -0.003, 0.037, 0.037, 0.0020],
     [0.08, 0.001, 0.000, 0.039, 0.041, 0.0025],
@@ -29,16 +30,18 @@ const FOREARM: Sections<8> = [
     [1.03, 0.000, 0.000, 0.020, 0.028, 0.0005],
 ];
 /// Thigh; u outward, w forward.
-const THIGH: Sections<8> = [
-    [-0.05, 0.002, -0.004, 0.0811, 0.0811, 0.0070],
-    [0.07, 0.004, -0.005, 0.0915, 0.0967, 0.0085],
-    [0.18, 0.004, -0.004, 0.0946, 0.1019, 0.0085],
-    [0.34, 0.002, 0.001, 0.0894, 0.0967, 0.0078],
-    [0.55, -0.001, 0.004, 0.0770, 0.0842, 0.0060],
-    [0.75, -0.003, 0.004, 0.0634, 0.0686, 0.0042],
-    [0.90, -0.002, 0.001, 0.0541, 0.0582, 0.0032],
-    [1.02, 0.000, -0.001, 0.0489, 0.0530, 0.0028],
+const THIGH: Sections<9> = [
+    [-0.14, 0.004, -0.004, 0.0700, 0.0800, 0.0070],
+    [-0.04, 0.004, -0.005, 0.0815, 0.0920, 0.0080],
+    [0.07, 0.000, -0.005, 0.0890, 0.0990, 0.0085],
+    [0.18, -0.004, -0.003, 0.0920, 0.1040, 0.0085],
+    [0.34, -0.004, 0.002, 0.0880, 0.0995, 0.0078],
+    [0.55, -0.003, 0.004, 0.0765, 0.0850, 0.0060],
+    [0.75, -0.003, 0.004, 0.0630, 0.0685, 0.0042],
+    [0.90, -0.002, 0.001, 0.0535, 0.0580, 0.0032],
+    [1.02, 0.000, -0.001, 0.0480, 0.0530, 0.0028],
 ];
+/// Knee to ankle; u outward, w forward.
 const SHANK: Sections<9> = [
     [-0.04, 0.000, 0.000, 0.0469, 0.0510, 0.0028],
     [0.07, 0.001, -0.004, 0.0490, 0.0520, 0.0030],
@@ -57,35 +60,37 @@ fn tube<const N: usize>(
     sections: &Sections<N>,
     fig: &Figure,
     muscle: f64,
+    hip: f64,
     caps: [f64; 2],
 ) -> Solid {
     let stations = sections
         .iter()
         .map(|s| {
             let grow = 1.0 + muscle * fig.sex;
-            let add = s[5] * fig.girth;
+            // Hips reach down to the middle of the thigh.
+            let add = s[5] * fig.girth + hip * fig.hip * (1.0 - 2.0 * s[0].max(0.0)).max(0.0);
             Station::ellipse(s[0] * length, s[1], s[2], s[3] * grow + add, s[4] * grow + add)
         })
         .collect();
-    Solid::Loft(Loft { frame, stations, caps })
+    Solid::Loft(Loft::new(frame, stations, caps))
 }
 
 pub(super) fn arm(f: &mut Field, fig: &Figure, j: &Joints) {
     let upper = Frame::along(j.shoulder, j.elbow, V3d::z());
-    f.add(tube(upper, (j.elbow - j.shoulder).norm(), &UPPER_ARM, fig, 0.055, [0.03, 0.03]), 0.022);
+    f.add(tube(upper, (j.elbow - j.shoulder).norm(), &UPPER_ARM, fig, 0.055, 0.0, [0.03, 0.03]), 0.022);
     let fore = Frame::along(j.elbow, j.wrist, V3d::z());
-    f.add(tube(fore, (j.wrist - j.elbow).norm(), &FOREARM, fig, 0.065, [0.03, 0.015]), 0.02);
+    f.add(tube(fore, (j.wrist - j.elbow).norm(), &FOREARM, fig, 0.065, 0.0, [0.03, 0.015]), 0.02);
     // Olecranon: the point of the elbow, behind.
     f.bump(j.elbow + V3d::new(0.006, 0.0, -0.036), [0.030, 0.030, 0.030], 0.005);
 }
 
 pub(super) fn leg(f: &mut Field, fig: &Figure, j: &Joints) {
     let upper = Frame::along(j.hip, j.knee, V3d::z());
-    f.add(tube(upper, (j.knee - j.hip).norm(), &THIGH, fig, -0.012, [0.04, 0.03]), 0.04);
+    f.add(tube(upper, (j.knee - j.hip).norm(), &THIGH, fig, -0.012, 0.006, [0.04, 0.03]), 0.04);
     let lower = Frame::along(j.knee, j.ankle, V3d::z());
-    f.add(tube(lower, (j.ankle - j.knee).norm(), &SHANK, fig, 0.012, [0.03, 0.02]), 0.025);
+    f.add(tube(lower, (j.ankle - j.knee).norm(), &SHANK, fig, 0.012, 0.0, [0.03, 0.02]), 0.025);
     // Kneecap and the hollow of the knee.
-    f.bump(j.knee + V3d::new(0.0, 0.012, 0.056), [0.034, 0.040, 0.035], 0.006);
+    f.bump(j.knee + V3d::new(0.0, 0.012, 0.056), [0.032, 0.042, 0.035], 0.004);
     f.bump(j.knee + V3d::new(0.0, 0.0, -0.058), [0.034, 0.055, 0.035], -0.005);
     // Vastus medialis above the knee, inside.
     f.bump(j.knee + V3d::new(-0.036, 0.070, 0.036), [0.035, 0.060, 0.045], 0.005);

@@ -114,6 +114,41 @@ fn pictures() {
         let pics: Vec<_> = [0.0, 40.0, 90.0, 180.0].iter().map(|&y| shade(&t, &v, y, view)).collect();
         sheet(&dir, name, &pics, view.3, view.4);
     }
+    if only.is_empty() || only.contains("shapes") {
+        let view = full(1.25);
+        for (d, name) in DIRECTIONS.iter().enumerate() {
+            let mut pics = Vec::new();
+            for c in [-1.0, 1.0] {
+                let mut shape = BodyShape { coefficients: vec![0.0; DIRECTIONS.len()], ..BodyShape::default() };
+                shape.coefficients[d] = c * if matches!(d, 0 | 2) { 1.0 } else { 2.0 };
+                let v = posed(&t, &shape, &[]);
+                pics.push(shade(&t, &v, 0.0, view));
+                pics.push(shade(&t, &v, 60.0, view));
+                if d == 2 || d == 1 {
+                    pics.push(shade(&t, &v, 180.0, view));
+                }
+                shape.coefficients[d] = c;
+                let m = crate::body::measure::measure(&t, &t.personalise(&shape)).expect("measurable");
+                eprintln!(
+                    "generated {name} {c}: stature {:.3} chest {:.3} waist {:.3} hip {:.3} neck {:.3} thigh {:.3} calf {:.3} arm {:.3} wrist {:.3} shoulder {:.3} inseam {:.3} armlen {:.3} torso {:.3}",
+                    m.stature,
+                    m.chest,
+                    m.waist,
+                    m.hip,
+                    m.neck,
+                    m.thigh,
+                    m.calf,
+                    m.upper_arm,
+                    m.wrist,
+                    m.shoulder_width,
+                    m.inseam,
+                    m.arm_length,
+                    m.torso_length
+                );
+            }
+            sheet(&dir, &format!("shape_{name}"), &pics, view.3, view.4);
+        }
+    }
     if only.is_empty() || only.contains("close") {
         let v = posed(&t, &shape, &[]);
         let face = (-0.16, 1.72, 1900.0, 608, 608);

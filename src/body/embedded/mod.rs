@@ -3,6 +3,7 @@
 //! Anatomy tables describe an implicit surface; its left half is polygonised, remeshed with finer triangles in
 //! face, hands and feet, mirrored, rigged and given directions of shape.
 
+mod directions;
 mod extremities;
 mod field;
 mod figure;
@@ -11,6 +12,7 @@ mod limbs;
 mod polygonise;
 mod remesh;
 mod rig;
+pub mod statistics;
 mod torso;
 
 use super::{BodyError, Skeleton, Template};
@@ -20,6 +22,10 @@ use field::Field;
 use figure::{Figure, Joints, STATURE};
 use std::sync::{Arc, OnceLock};
 
+pub use directions::DIRECTIONS;
+
+/// Name of the template.
+const NAME: &str = "embedded";
 /// Rounds of remeshing; more change no angle by a degree.
 const ROUNDS: usize = 5;
 /// Target edge lengths, metres: trunk and limbs, head, face, hand, foot. Together they give 12,000 to 14,000 vertices.
@@ -81,13 +87,15 @@ pub fn generate() -> Result<Template, BodyError> {
         polygonise::polygonise(&field, P3d::new(0.0, -0.03, -0.25), P3d::new(0.75, STATURE + 0.05, 0.30));
     let target = |p: &P3d| edge_length(&j, p);
     let (half, half_faces) = remesh::Remesher::new(&field, &target, points, faces).run(ROUNDS);
-    let (points, faces, _) = whole(&half, &half_faces);
+    let (points, faces, mirror) = whole(&half, &half_faces);
     let joints = rig::joints(&j);
     let skeleton = Skeleton::new(joints)?;
     let vertices = points.iter().map(|p| P3::new(p.x as f32, p.y as f32, p.z as f32)).collect();
     let mesh = TriMesh::new(vertices, faces)?;
     let weights = rig::skin_weights(&j, &points, &Topology::new(&mesh)?, &skeleton)?;
-    Template::new("embedded", mesh, skeleton, weights, None)
+    let plain = Template::new(NAME, mesh, skeleton, weights, None)?;
+    let space = directions::shape_space(&directions::Source { template: &plain, points: &points, mirror: &mirror })?;
+    Template::new(NAME, plain.mesh().clone(), plain.skeleton().clone(), plain.weights().clone(), Some(space))
 }
 
 /// The embedded body, generated on first use and shared.

@@ -33,7 +33,10 @@ fn panel(name: &str, placement: Placement, edges: &[(&str, [f64; 2], Curve)]) ->
     Panel {
         name: name.to_owned(),
         placement,
-        edges: edges.iter().map(|(n, from, curve)| PanelEdge { name: (*n).to_owned(), from: *from, curve: *curve }).collect(),
+        edges: edges
+            .iter()
+            .map(|(n, from, curve)| PanelEdge { name: (*n).to_owned(), from: *from, curve: *curve })
+            .collect(),
     }
 }
 
@@ -69,14 +72,21 @@ mod tests {
         for name in names() {
             for size in Size::ALL {
                 let p = pattern(name, size).expect("pattern");
-                let m = GarmentMesh::sew(&p, &Triangulation::default()).unwrap_or_else(|e| panic!("{name} {size}: {e}"));
+                let m =
+                    GarmentMesh::sew(&p, &Triangulation::default()).unwrap_or_else(|e| panic!("{name} {size}: {e}"));
                 let rims = m.topology().expect("manifold").edges().iter().filter(|e| e.twin.is_none()).count();
-                println!("{name} {size}: {} vertices, {} faces, min angle {:.1}, rim edges {rims}", m.vertices, m.faces.len(), m.min_angle);
+                println!(
+                    "{name} {size}: {} vertices, {} faces, min angle {:.1}, rim edges {rims}",
+                    m.vertices,
+                    m.faces.len(),
+                    m.min_angle
+                );
                 assert!(m.min_angle > 15.0, "{name} {size}: {}", m.min_angle);
                 assert!(m.rest.iter().all(|t| crate::garment::mesh_area(t) > 0.0));
                 // Euler characteristic: tops are spheres with neck, hem and two sleeve openings; skirts tubes;
                 // trousers a sphere with three holes.
-                let chi = m.vertices as i64 - m.topology().expect("manifold").edges().len() as i64 + m.faces.len() as i64;
+                let chi =
+                    m.vertices as i64 - m.topology().expect("manifold").edges().len() as i64 + m.faces.len() as i64;
                 let holes = match *name {
                     "skirt" => 2,
                     "trousers" => 3,

@@ -92,10 +92,7 @@ pub(super) fn shirt(row: &SizeRow, long: bool) -> Result<Pattern, GarmentError> 
         ],
         anchors: vec![Anchor {
             name: "shoulders".into(),
-            edges: vec![
-                ["front".into(), "shoulder_right".into()],
-                ["front".into(), "shoulder_left".into()],
-            ],
+            edges: vec![["front".into(), "shoulder_right".into()], ["front".into(), "shoulder_left".into()]],
             strength: 0.5,
         }],
         material: Material::preset(if long { "cotton" } else { "jersey" })?,
