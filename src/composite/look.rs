@@ -150,8 +150,10 @@ mod tests {
         let look = Look { pattern: Print::Stripes { color: [255, 255, 255], period: 0.02 }, ..Look::default() };
         let fabric = Fabric::new(&look);
         let near = |v: f32| fabric.albedo([0.0, v], 1e-5);
-        assert_eq!(near(0.005), [1.0; 3]);
-        assert_eq!(near(0.015), look.base.map(linear));
+        for k in 0..3 {
+            assert!((near(0.005)[k] - 1.0).abs() < 1e-3);
+            assert!((near(0.015)[k] - linear(look.base[k])).abs() < 1e-3);
+        }
         // A pixel of many stripes sees the mean wherever it is.
         for v in [0.0, 0.0031, 0.0177] {
             let far = fabric.albedo([0.0, v], 0.4);
