@@ -3,6 +3,8 @@
 
 mod args;
 mod commands;
+mod input;
+mod report;
 
 use args::{Cli, Command};
 use clap::Parser;

@@ -1,0 +1,115 @@
+//! `tryon track`: a recording to joints, poses and residuals, one JSON line a frame.
+
+use crate::args::TrackArgs;
+use crate::input;
+use anyhow::{Context, Result};
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::io::{BufWriter, Write};
+use std::process::ExitCode;
+use std::sync::Arc;
+use tryon::body::{BoneTransforms, skin};
+use tryon::camera::RgbdFrame;
+use tryon::formats::{RgbdSource, open_recording};
+use tryon::math::P3;
+use tryon::par::{Par, with_threads};
+use tryon::tracking::{StepReport, TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, named; or results that cannot be written.
+pub(crate) fn run(args: &TrackArgs) -> Result<ExitCode> {
+    let mut source = open_recording(&args.input)?;
+    let template = input::template(args.body.as_deref())?;
+    let model = TrackerModel::new(template, source.calibration().clone(), TrackerConfig::default());
+    let mut state = TrackerState::new(&model);
+    if let Some(path) = &args.init {
+        let start = input::rough_start(path)?;
+        state.start_at(&model, start.root_position.into(), start.facing_yaw_deg.to_radians());
+    }
+    if let Some(dir) = &args.meshes {
+        input::create_dir(dir)?;
+    }
+    let file = std::fs::File::create(&args.out).with_context(|| format!("cannot write {}", args.out.display()))?;
+    let mut out = BufWriter::new(file);
+    with_threads(args.threads, || track_all(args, source.as_mut(), &model, state, &mut out))??;
+    out.flush().with_context(|| format!("cannot write {}", args.out.display()))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn track_all(
+    args: &TrackArgs,
+    source: &mut dyn RgbdSource,
+    model: &Arc<TrackerModel>,
+    mut state: TrackerState,
+    out: &mut impl Write,
+) -> Result<()> {
+    let bar = input::progress(source.len().map(|n| n as u64), "tracking");
+    let mut workspace = Workspace::default();
+    let mut live = 0u64;
+    let mut index = 0usize;
+    while let Some(frame) = source.next_frame()? {
+        let started = std::time::Instant::now();
+        let report = step(model, &mut state, &frame, &mut workspace).with_context(|| format!("frame {index}"))?;
+        let ms = started.elapsed().as_secs_f64() * 1e3;
+        live += u64::from(state.status.is_live());
+        serde_json::to_writer(&mut *out, &line(index, &frame, model, &state, &report, ms))?;
+        out.write_all(b"\n")?;
+        if let Some(dir) = &args.meshes {
+            write_surface(&dir.join(format!("{index:06}.obj")), model, &state)?;
+        }
+        bar.inc(1);
+        index += 1;
+    }
+    bar.finish_and_clear();
+    println!("{}: {live} of {index} frames with a live pose, in {}", args.input.display(), args.out.display());
+    Ok(())
+}
+
+/// One line of the output, in the form of `tryon track --help`'s documentation.
+fn line(
+    index: usize,
+    frame: &RgbdFrame,
+    model: &TrackerModel,
+    state: &TrackerState,
+    report: &StepReport,
+    ms: f64,
+) -> serde_json::Value {
+    let skeleton = model.template().skeleton();
+    let rest = model.template().personalise(&state.shape);
+    let mut bones = BoneTransforms::default();
+    state.pose.bones(skeleton, &rest, &mut bones);
+    let joints: BTreeMap<&str, [f64; 3]> =
+        skeleton.joints().iter().zip(&bones.joints).map(|(j, p)| (j.name.as_str(), [p.x, p.y, p.z])).collect();
+    let scales: BTreeMap<&str, f64> =
+        skeleton.joints().iter().zip(&state.shape.bone_scales).map(|(j, s)| (j.name.as_str(), *s)).collect();
+    json!({
+        "frame": index,
+        "time_ns": frame.time_ns,
+        "status": state.status,
+        "joints": joints,
+        "pose": state.pose,
+        "scales": scales,
+        "shape": state.shape.coefficients,
+        "residual_mm": report.residual_mm,
+        "visible_points": report.visible_points,
+        "iterations": report.iterations,
+        "converged": report.converged,
+        "pose_age": report.pose_age,
+        "skipped": report.skipped,
+        "ms": ms,
+        "stages_ms": report.stages_ms,
+    })
+}
+
+fn write_surface(path: &std::path::Path, model: &TrackerModel, state: &TrackerState) -> Result<()> {
+    let template = model.template();
+    let rest = template.personalise(&state.shape);
+    let mut bones = BoneTransforms::default();
+    state.pose.bones(template.skeleton(), &rest, &mut bones);
+    let mut vertices: Vec<P3> = Vec::new();
+    skin(Par::Rayon, &rest.vertices, template.weights(), &bones, &mut vertices);
+    tryon::formats::obj::write_obj(path, &vertices, template.mesh().faces(), None)?;
+    Ok(())
+}

@@ -1,0 +1,60 @@
+//! What several commands read: bodies, rough starts, recordings with a progress bar.
+
+use anyhow::{Context, Result};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Deserialize;
+use std::path::Path;
+use std::sync::Arc;
+use tryon::body::{Template, embedded, import::template_from_smpl};
+use tryon::formats::npz::read_smpl;
+
+/// The body to track: an SMPL-layout npz, or the embedded one.
+///
+/// # Errors
+/// Names the array, joint or vertex of the file that is at fault.
+pub(crate) fn template(path: Option<&Path>) -> Result<Arc<Template>> {
+    let Some(path) = path else { return Ok(embedded::template()) };
+    let name = path.file_stem().map_or_else(|| "body".to_owned(), |s| s.to_string_lossy().into_owned());
+    let arrays = read_smpl(path)?;
+    let template = template_from_smpl(&name, &arrays).with_context(|| format!("cannot use {}", path.display()))?;
+    Ok(Arc::new(template))
+}
+
+/// A rough start in the camera's frame, as recordings with truth carry it.
+#[derive(Debug, Deserialize)]
+pub(crate) struct RoughStart {
+    /// Position of the root joint, metres.
+    pub(crate) root_position: [f64; 3],
+    /// Turn about the vertical, degrees; 0 faces the camera.
+    pub(crate) facing_yaw_deg: f64,
+}
+
+/// Reads a rough start.
+///
+/// # Errors
+/// When the file cannot be read, is no JSON of this form, or holds a number that is not finite.
+pub(crate) fn rough_start(path: &Path) -> Result<RoughStart> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let start: RoughStart = serde_json::from_str(&text).with_context(|| format!("{} is no rough start", path.display()))?;
+    let finite = start.root_position.iter().chain([&start.facing_yaw_deg]).all(|v| v.is_finite());
+    anyhow::ensure!(finite, "{}: root_position and facing_yaw_deg must be finite", path.display());
+    Ok(start)
+}
+
+/// A progress bar over frames; silent when standard error is no terminal.
+pub(crate) fn progress(frames: Option<u64>, what: &'static str) -> ProgressBar {
+    let (bar, template) = match frames {
+        Some(n) => (ProgressBar::new(n), "{prefix} {bar:32} {pos}/{len} frames, {per_sec}, {eta} left {msg}"),
+        None => (ProgressBar::new_spinner(), "{prefix} {spinner} {pos} frames, {per_sec} {msg}"),
+    };
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    bar.with_style(style).with_prefix(what)
+}
+
+/// Makes a folder for results.
+///
+/// # Errors
+/// When the system refuses.
+pub(crate) fn create_dir(dir: &Path) -> Result<()> {
+    std::fs::create_dir_all(dir).with_context(|| format!("cannot create the folder {}", dir.display()))
+}
