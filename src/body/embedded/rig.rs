@@ -109,7 +109,7 @@ pub(super) fn weights(j: &Joints, p: &P3d) -> Vec<(&'static str, f64)> {
     // Arm against trunk: a plane through the shoulder joint, tilted so that the armpit belongs to both.
     let arm_axis = (j.elbow - j.shoulder).normalize();
     let cut = beyond(p, &(j.shoulder + V3d::new(-0.010, 0.0, 0.0)), V3d::new(0.98, -0.12, 0.0), 0.070);
-    let elbow = beyond(p, &j.elbow, arm_axis + (j.wrist - j.elbow).normalize(), 0.048);
+    let elbow = beyond(p, &j.elbow, arm_axis + (j.wrist - j.elbow).normalize(), 0.038);
     let wrist = beyond(p, &j.wrist, (j.hand_end - j.wrist).normalize() + (j.wrist - j.elbow).normalize(), 0.030);
     // What is nearer to the chest than to the arm stays with the chest; far from the arm there is no arm at all.
     let reach = distance_to_arm(j, p);
@@ -127,8 +127,8 @@ pub(super) fn weights(j: &Joints, p: &P3d) -> Vec<(&'static str, f64)> {
     let head = beyond(p, &(j.head + V3d::new(0.0, -0.01, 0.0)), V3d::new(0.0, 0.94, 0.34), 0.034);
     // Leg against pelvis: a plane that rises outward and forward (the groin).
     let hip = beyond(p, &(j.hip + V3d::new(0.0, -0.010, 0.0)), V3d::new(0.30, -0.95, 0.05), 0.085)
-        * smooth((p.x - 0.0) / 0.022 - 0.6);
-    let knee = beyond(p, &j.knee, (j.knee - j.hip).normalize() + (j.ankle - j.knee).normalize(), 0.060);
+        * smooth(p.x / 0.030 - 0.4);
+    let knee = beyond(p, &j.knee, (j.knee - j.hip).normalize() + (j.ankle - j.knee).normalize(), 0.050);
     let ankle = beyond(p, &j.ankle, V3d::new(0.0, -0.85, 0.5), 0.035);
     let low = 1.0 - smooth((p.y - 0.98) / 0.03);
     let hip = hip * low;
@@ -168,7 +168,7 @@ pub(super) fn weights(j: &Joints, p: &P3d) -> Vec<(&'static str, f64)> {
 }
 
 /// Rounds of averaging over neighbours: they take the kinks out of the products above, over about 4 cm on the trunk.
-const SMOOTHING: usize = 10;
+const SMOOTHING: usize = 16;
 
 /// Weights of all vertices: evaluated on the left, mirrored, then smoothed along the surface.
 ///
