@@ -1,1 +1,40 @@
-//! Under construction.
+//! The capture service: cameras and recordings onto the bus.
+//!
+//! One task owns one camera ([`camera`]); frames are made on the compute pool and handed to the bus, which keeps
+//! only the newest. The service itself only starts, stops and reports.
+
+mod camera;
+mod pattern;
+mod recorder;
+mod service;
+mod source;
+
+pub use source::{OpenSource, SourceError, open};
+
+use tryon_kit::config::Config;
+use tryon_kit::server::{self, Context, Running, Service, StartError};
+use tryon_proto::v1::capture_service_server::{CaptureServiceServer, SERVICE_NAME};
+
+/// Starts the service; cameras marked `autostart` begin to publish.
+///
+/// # Errors
+/// When an address cannot be bound. A camera that cannot be opened is no error: it is listed as failed.
+pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError> {
+    let c = &config.capture;
+    let service = service::Capture::new(c, &ctx);
+    for camera in c.cameras.iter().filter(|camera| camera.autostart) {
+        service.autostart(&camera.name).await;
+    }
+    let (mut routes, health) = server::routes()?;
+    routes.add_service(CaptureServiceServer::new(service).max_decoding_message_size(server::MAX_REQUEST_BYTES));
+    let service = Service {
+        name: "capture",
+        grpc_name: SERVICE_NAME,
+        address: c.address,
+        admin: c.admin,
+        routes: routes.routes(),
+        http1: false,
+        health,
+    };
+    server::start(service, &ctx).await
+}

@@ -1,1 +1,21 @@
-//! Under construction.
+//! What every process of the product shares: configuration, logs and metrics, the bus, queues with a policy,
+//! the compute pool, servers, clients that come back, and a shutdown with a deadline.
+
+pub mod admin;
+pub mod bus;
+pub mod client;
+pub mod compute;
+pub mod config;
+pub mod drain;
+pub mod frames;
+pub mod process;
+pub mod queue;
+pub mod server;
+pub mod sessions;
+pub mod status;
+pub mod telemetry;
+
+pub use compute::Pool;
+pub use config::Config;
+pub use frames::{Exposure, FrameBus, LocalBus};
+pub use server::{Context, Outcome, Running, StartError};

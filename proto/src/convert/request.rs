@@ -1,0 +1,116 @@
+//! Small fields of requests: names, ids, sizes, garment choices.
+
+use super::WireError;
+use super::garment::MAX_GARMENTS;
+use crate::keys::{CameraKey, is_name, is_session_id};
+use crate::v1;
+
+/// A session id, or a fault.
+///
+/// # Errors
+/// When it is empty, too long or has other characters than `[A-Za-z0-9_-]`.
+pub fn session_id(field: &str, id: &str) -> Result<String, WireError> {
+    if is_session_id(id) {
+        return Ok(id.into());
+    }
+    Err(WireError::new(field, "1 to 64 characters of [A-Za-z0-9_-] are needed"))
+}
+
+/// The bus keys of a camera.
+///
+/// # Errors
+/// Names the part at fault, `<message>.store` or `<message>.camera`.
+pub fn camera_key(message: &str, store: &str, camera: &str) -> Result<CameraKey, WireError> {
+    let why = "1 to 64 characters of [a-z0-9_-] are needed";
+    CameraKey::new(store, camera).ok_or_else(|| {
+        let field = if is_name(store) { "camera" } else { "store" };
+        WireError::new(format!("{message}.{field}"), why)
+    })
+}
+
+/// Garment choices that are few, named and coloured; whether the library has them is the cloth service's to say.
+///
+/// # Errors
+/// Names the choice at fault.
+pub fn choices(message: &str, garments: &[v1::GarmentChoice]) -> Result<Vec<v1::GarmentChoice>, WireError> {
+    if garments.len() > MAX_GARMENTS {
+        let why = format!("{} garments, at most {MAX_GARMENTS}", garments.len());
+        return Err(WireError::new(format!("{message}.garments"), why));
+    }
+    for (i, g) in garments.iter().enumerate() {
+        let fault = |f: &str, why: &str| Err(WireError::new(format!("{message}.garments[{i}].{f}"), why));
+        if !is_name(&g.garment) {
+            return fault("garment", "1 to 64 characters of [a-z0-9_-] are needed");
+        }
+        if g.size.len() > 16 || !g.size.bytes().all(|b| b.is_ascii_alphanumeric()) {
+            return fault("size", "at most 16 letters and digits");
+        }
+        if g.color_rgb.is_some_and(|c| c > 0xff_ff_ff) {
+            return fault("color_rgb", "0xRRGGBB, so at most 16777215");
+        }
+    }
+    Ok(garments.to_vec())
+}
+
+/// What a reader of pictures asked for, checked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PictureFormat {
+    /// Pixels; `None` means the camera's size.
+    pub size: Option<(u32, u32)>,
+    /// JPEG quality, 1 to 100.
+    pub quality: u8,
+    /// Most pictures a second; `None` means as many as there are.
+    pub max_rate: Option<f32>,
+}
+
+/// Size, codec, quality and rate of a picture stream.
+///
+/// # Errors
+/// Names the field out of range.
+pub fn picture_format(r: &v1::StreamFramesRequest) -> Result<PictureFormat, WireError> {
+    let fault = |f: &str, why: &str| Err(WireError::new(format!("stream_frames_request.{f}"), why));
+    let side = 16..=4096;
+    let size = match (r.width, r.height) {
+        (0, 0) => None,
+        (w, _) if !side.contains(&w) => return fault("width", "16 to 4096 pixels, or both 0"),
+        (_, h) if !side.contains(&h) => return fault("height", "16 to 4096 pixels, or both 0"),
+        s => Some(s),
+    };
+    match v1::PictureCodec::try_from(r.codec) {
+        Ok(v1::PictureCodec::Unspecified | v1::PictureCodec::Jpeg) => {}
+        _ => return fault("codec", "streams are JPEG"),
+    }
+    if r.quality > 100 {
+        return fault("quality", "1 to 100, or 0 for the default");
+    }
+    if !(r.max_rate.is_finite() && r.max_rate >= 0.0) {
+        return fault("max_rate", "zero or a positive number");
+    }
+    Ok(PictureFormat {
+        size,
+        quality: if r.quality == 0 { 80 } else { r.quality as u8 },
+        max_rate: (r.max_rate > 0.0).then_some(r.max_rate),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_are_named() {
+        assert_eq!(camera_key("m", "s", "*").expect_err("wild").field, "m.camera");
+        assert_eq!(camera_key("m", "", "c").expect_err("empty").field, "m.store");
+        assert_eq!(session_id("m.id", "a/b").expect_err("slash").field, "m.id");
+        let shirt = v1::GarmentChoice { garment: "tshirt".into(), size: "M".into(), color_rgb: None };
+        let bad = v1::GarmentChoice { color_rgb: Some(0x1_00_00_00), ..shirt.clone() };
+        assert_eq!(choices("m", &[shirt.clone(), bad]).expect_err("colour").field, "m.garments[1].color_rgb");
+        assert_eq!(choices("m", &vec![shirt; 9]).expect_err("nine").field, "m.garments");
+        let r = v1::StreamFramesRequest { width: 640, height: 480, max_rate: f32::NAN, ..Default::default() };
+        assert_eq!(picture_format(&r).expect_err("NaN").field, "stream_frames_request.max_rate");
+        let r = v1::StreamFramesRequest { width: 640, ..Default::default() };
+        assert_eq!(picture_format(&r).expect_err("0").field, "stream_frames_request.height");
+        let r = v1::StreamFramesRequest { width: 4_000_000_000, height: 480, ..Default::default() };
+        assert_eq!(picture_format(&r).expect_err("4 G").field, "stream_frames_request.width");
+    }
+}

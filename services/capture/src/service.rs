@@ -1,0 +1,105 @@
+//! The rpcs: find the camera, tell it, answer.
+
+use crate::camera::{self, Command, Handle};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use tokio::sync::oneshot;
+use tonic::{Request, Response, Status};
+use tryon_kit::config::CaptureConfig;
+use tryon_kit::frames::CameraKey;
+use tryon_kit::server::Context;
+use tryon_kit::status::{not_found, unavailable};
+use tryon_proto::convert::geometry::calibration_to_wire;
+use tryon_proto::v1::capture_service_server::CaptureService;
+use tryon_proto::v1::*;
+
+/// All cameras of the process.
+pub(crate) struct Capture {
+    cameras: BTreeMap<String, Handle>,
+    recordings: PathBuf,
+}
+
+impl Capture {
+    pub(crate) fn new(config: &CaptureConfig, ctx: &Context) -> Self {
+        let spawn = |c: &tryon_kit::config::CameraConfig| {
+            // Names were checked with the configuration.
+            let key = CameraKey::new(&config.store, &c.name)?;
+            Some((c.name.clone(), camera::spawn(c.clone(), key, ctx.clone())))
+        };
+        Self {
+            cameras: config.cameras.iter().filter_map(spawn).collect(),
+            recordings: config.recordings.clone(),
+        }
+    }
+
+    pub(crate) async fn autostart(&self, name: &str) {
+        // A camera that cannot be opened is listed as failed, and its task has said so.
+        let _ = self.tell(name, Command::Start).await;
+    }
+
+    fn find(&self, name: &str) -> Result<&Handle, Status> {
+        self.cameras.get(name).ok_or_else(|| not_found("camera", name))
+    }
+
+    async fn tell<T>(
+        &self,
+        name: &str,
+        command: impl FnOnce(oneshot::Sender<Result<T, Status>>) -> Command,
+    ) -> Result<T, Status> {
+        let (answer, heard) = oneshot::channel();
+        let gone = |_| unavailable("capture", "shutting down");
+        self.find(name)?.commands.send(command(answer)).await.map_err(|_| unavailable("capture", "shutting down"))?;
+        heard.await.map_err(gone)?
+    }
+}
+
+#[tonic::async_trait]
+impl CaptureService for Capture {
+    async fn list_cameras(&self, _: Request<ListCamerasRequest>) -> Result<Response<ListCamerasResponse>, Status> {
+        let cameras = self.cameras.values().map(|h| h.info.borrow().clone()).collect();
+        Ok(Response::new(ListCamerasResponse { cameras }))
+    }
+
+    async fn get_calibration(
+        &self,
+        r: Request<GetCalibrationRequest>,
+    ) -> Result<Response<GetCalibrationResponse>, Status> {
+        let c = self.tell(&r.get_ref().camera, Command::Calibration).await?;
+        Ok(Response::new(GetCalibrationResponse { calibration: Some(calibration_to_wire(&c)) }))
+    }
+
+    async fn start_camera(&self, r: Request<StartCameraRequest>) -> Result<Response<StartCameraResponse>, Status> {
+        let info = self.tell(&r.get_ref().camera, Command::Start).await?;
+        Ok(Response::new(StartCameraResponse { info: Some(info) }))
+    }
+
+    async fn stop_camera(&self, r: Request<StopCameraRequest>) -> Result<Response<StopCameraResponse>, Status> {
+        let info = self.tell(&r.get_ref().camera, Command::Stop).await?;
+        Ok(Response::new(StopCameraResponse { info: Some(info) }))
+    }
+
+    async fn start_recording(
+        &self,
+        r: Request<StartRecordingRequest>,
+    ) -> Result<Response<StartRecordingResponse>, Status> {
+        let r = r.get_ref();
+        self.find(&r.camera)?;
+        if !r.consent {
+            return Err(Status::failed_precondition("start_recording_request.consent: nobody is recorded without it"));
+        }
+        if self.recordings.as_os_str().is_empty() {
+            return Err(Status::failed_precondition("capture.recordings: no folder is configured"));
+        }
+        let folder = self.recordings.clone();
+        let file = self.tell(&r.camera, |answer| Command::Record { folder, answer }).await?;
+        Ok(Response::new(StartRecordingResponse { file }))
+    }
+
+    async fn stop_recording(
+        &self,
+        r: Request<StopRecordingRequest>,
+    ) -> Result<Response<StopRecordingResponse>, Status> {
+        let done = self.tell(&r.get_ref().camera, Command::EndRecording).await?;
+        Ok(Response::new(StopRecordingResponse { file: done.file, frames: done.frames, dropped: done.dropped }))
+    }
+}

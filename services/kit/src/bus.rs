@@ -1,0 +1,159 @@
+//! zenoh: the only file that names it. An embedded peer with explicit endpoints, no scouting, no router.
+//!
+//! Publishing uses `Block`, because transport-level dropping loses large messages silently (zenoh #2258); newest-wins
+//! is the subscriber's ring of one, which keeps `put` at 1.3 ms beside a subscriber that takes 100 ms a frame (the
+//! default FIFO: 101 ms). `low_latency` and shared memory stay off: the first delivers nothing of this size, the
+//! second lost frames of stalled subscribers (zenoh #2628).
+
+use crate::compute::Pool;
+use crate::frames::{BoxFuture, BusError, CameraKey, Exposure, FrameBus, FramePublisher, FrameSubscription, Packet};
+use crate::frames::exposure_to_wire;
+use crate::queue::latest;
+use bytes::Bytes;
+use prost::Message;
+use std::sync::Arc;
+use tokio::sync::watch;
+use tryon::camera::Calibration;
+use zenoh::Wait;
+use zenoh::handlers::RingChannel;
+use zenoh::qos::CongestionControl;
+use zenoh::sample::SampleKind;
+
+/// How a stalled peer (stopped, not dead) is treated: it may hold the others up for this long, microseconds, then its
+/// connection is closed and it comes back by itself. zenoh's default of 5 s would freeze every screen.
+const WAIT_BEFORE_CLOSE_US: u32 = 300_000;
+/// A connection that says nothing for this long is dead, milliseconds.
+const LEASE_MS: u32 = 2_000;
+/// First and longest pause between attempts to connect, milliseconds: a restarted peer is found within a second.
+const RETRY_MS: (u32, u32) = (100, 500);
+
+fn fault(e: impl std::fmt::Display) -> BusError {
+    BusError(e.to_string())
+}
+
+/// A peer on the bus between processes.
+pub struct ZenohBus {
+    session: zenoh::Session,
+    pool: Arc<Pool>,
+}
+
+impl ZenohBus {
+    /// Opens the peer. Endpoints are `tcp/ADDRESS:PORT` or `unixsock-stream/PATH`; those to connect to may come up
+    /// later. Needs a multi-threaded runtime.
+    ///
+    /// # Errors
+    /// Names the endpoint that is malformed or cannot be listened on.
+    pub async fn open(listen: &[String], connect: &[String], pool: Arc<Pool>) -> Result<Arc<Self>, BusError> {
+        let mut c = zenoh::Config::default();
+        let list = |l: &[String]| format!("{l:?}");
+        let settings = [
+            ("mode", "\"peer\"".to_owned()),
+            ("listen/endpoints", list(listen)),
+            ("connect/endpoints", list(connect)),
+            ("connect/timeout_ms", "-1".into()),
+            ("connect/exit_on_failure", "false".into()),
+            ("connect/retry/period_init_ms", RETRY_MS.0.to_string()),
+            ("connect/retry/period_max_ms", RETRY_MS.1.to_string()),
+            ("scouting/multicast/enabled", "false".into()),
+            ("scouting/gossip/enabled", "false".into()),
+            ("transport/link/tx/lease", LEASE_MS.to_string()),
+            ("transport/link/tx/queue/congestion_control/block/wait_before_close", WAIT_BEFORE_CLOSE_US.to_string()),
+        ];
+        for (key, value) in &settings {
+            c.insert_json5(key, value).map_err(|e| BusError(format!("{key} = {value}: {e}")))?;
+        }
+        let session = zenoh::open(c).await.map_err(fault)?;
+        Ok(Arc::new(Self { session, pool }))
+    }
+    /// Leaves the bus.
+    pub async fn close(&self) {
+        if let Err(e) = self.session.close().await {
+            tracing::debug!(error = %e, "closing the bus");
+        }
+    }
+}
+
+/// An endpoint `tcp/127.0.0.1:PORT` on a port that is free now; zenoh cannot tell which port it got for port 0.
+///
+/// # Errors
+/// When the system has no free port.
+pub fn free_tcp_endpoint() -> std::io::Result<String> {
+    let port = std::net::TcpListener::bind(("127.0.0.1", 0))?.local_addr()?.port();
+    Ok(format!("tcp/127.0.0.1:{port}"))
+}
+
+struct ZenohPublisher {
+    frames: Arc<zenoh::pubsub::Publisher<'static>>,
+    pool: Arc<Pool>,
+    _calibration: zenoh::query::Queryable<()>,
+    _alive: zenoh::liveliness::LivelinessToken,
+}
+
+impl FramePublisher for ZenohPublisher {
+    fn send(&mut self, exposure: Arc<Exposure>) -> BoxFuture<'_, Result<(), BusError>> {
+        Box::pin(async move {
+            let pack = move || exposure_to_wire(&exposure).map(|m| m.encode_to_vec());
+            let bytes = self.pool.run(pack).await.map_err(fault)?.map_err(fault)?;
+            let frames = self.frames.clone();
+            // `put` may wait for a stalled peer: not on an async worker.
+            tokio::task::spawn_blocking(move || frames.put(bytes).wait()).await.map_err(fault)?.map_err(fault)
+        })
+    }
+}
+
+impl FrameBus for ZenohBus {
+    fn publish(
+        &self,
+        key: &CameraKey,
+        calibration: &Calibration,
+    ) -> BoxFuture<'_, Result<Box<dyn FramePublisher>, BusError>> {
+        let key = key.clone();
+        let answer = tryon_proto::convert::geometry::calibration_to_wire(calibration).encode_to_vec();
+        Box::pin(async move {
+            let frames = self.session.declare_publisher(key.rgbd()).congestion_control(CongestionControl::Block);
+            let frames = Arc::new(frames.await.map_err(fault)?);
+            let name = key.calibration();
+            let reply = move |q: zenoh::query::Query| {
+                if let Err(e) = q.reply(q.key_expr().clone(), answer.clone()).wait() {
+                    tracing::debug!(error = %e, "a calibration query went unanswered");
+                }
+            };
+            let calibration = self.session.declare_queryable(name).callback(reply).await.map_err(fault)?;
+            let alive = self.session.liveliness().declare_token(key.alive()).await.map_err(fault)?;
+            let p = ZenohPublisher { frames, pool: self.pool.clone(), _calibration: calibration, _alive: alive };
+            Ok(Box::new(p) as Box<dyn FramePublisher>)
+        })
+    }
+
+    fn subscribe(&self, key: &CameraKey) -> BoxFuture<'_, Result<FrameSubscription, BusError>> {
+        let key = key.clone();
+        Box::pin(async move {
+            let ring = self.session.declare_subscriber(key.rgbd()).with(RingChannel::new(1)).await.map_err(fault)?;
+            let (tx, packets) = latest::channel();
+            let pump = tokio::spawn(async move {
+                while let Ok(sample) = ring.recv_async().await {
+                    let payload = Bytes::from(sample.payload().to_bytes().into_owned());
+                    if !tx.send(Packet::Packed(payload)) {
+                        return;
+                    }
+                }
+            });
+            let (tell, alive) = watch::channel(false);
+            let hear = move |s: zenoh::sample::Sample| {
+                tell.send_replace(s.kind() == SampleKind::Put);
+            };
+            let life = self.session.liveliness().declare_subscriber(key.alive()).history(true).callback(hear);
+            let life = life.await.map_err(fault)?;
+            let guard = Box::new((AbortOnDrop(pump), life));
+            Ok(FrameSubscription { packets, alive, pool: self.pool.clone(), last: None, skipped: 0, _guard: guard })
+        })
+    }
+}
+
+struct AbortOnDrop(tokio::task::JoinHandle<()>);
+
+impl Drop for AbortOnDrop {
+    fn drop(&mut self) {
+        self.0.abort();
+    }
+}

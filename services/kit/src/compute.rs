@@ -1,0 +1,79 @@
+//! The compute pool: threads for work that thinks, so that async workers only ever wait.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use tokio::sync::oneshot;
+
+type Job = Box<dyn FnOnce() + Send>;
+
+/// A fixed number of threads that run jobs in the order of their arrival.
+///
+/// The queue needs no bound of its own: every session has at most one job under way, and sessions are bounded.
+pub struct Pool {
+    jobs: Mutex<mpsc::Sender<Job>>,
+}
+
+/// A job that gave no answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ComputeError {
+    /// The job panicked; its state is gone, the pool goes on.
+    #[error("the computation panicked")]
+    Panicked,
+    /// The pool is shutting down.
+    #[error("the compute pool is gone")]
+    Gone,
+}
+
+impl Pool {
+    /// Starts `threads` threads; 0 means one for each core.
+    ///
+    /// # Errors
+    /// When the system refuses a thread.
+    pub fn new(threads: usize) -> std::io::Result<Arc<Self>> {
+        let n = if threads == 0 { std::thread::available_parallelism().map_or(2, usize::from) } else { threads };
+        let (tx, rx) = mpsc::channel::<Job>();
+        let rx = Arc::new(Mutex::new(rx));
+        for i in 0..n {
+            let rx = rx.clone();
+            std::thread::Builder::new().name(format!("compute-{i}")).spawn(move || {
+                loop {
+                    // The lock is held while waiting, which is fine: waiting threads have nothing else to do.
+                    let job = rx.lock().unwrap_or_else(PoisonError::into_inner).recv();
+                    match job {
+                        Ok(job) => job(),
+                        Err(mpsc::RecvError) => return,
+                    }
+                }
+            })?;
+        }
+        Ok(Arc::new(Self { jobs: Mutex::new(tx) }))
+    }
+
+    /// Runs `f` on the pool and waits for its answer. Dropping the future lets the job finish unheard.
+    ///
+    /// # Errors
+    /// [`ComputeError`] when the job panicked or the pool is gone.
+    pub async fn run<T: Send + 'static>(&self, f: impl FnOnce() -> T + Send + 'static) -> Result<T, ComputeError> {
+        let (tx, rx) = oneshot::channel();
+        let job: Job = Box::new(move || {
+            // A panic costs the job's own state, which moved in with it; nothing shared can be half changed.
+            let answer = catch_unwind(AssertUnwindSafe(f));
+            let _ = tx.send(answer);
+        });
+        self.jobs.lock().unwrap_or_else(PoisonError::into_inner).send(job).map_err(|_| ComputeError::Gone)?;
+        rx.await.map_err(|_| ComputeError::Gone)?.map_err(|_| ComputeError::Panicked)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn jobs_answer_and_a_panic_costs_only_itself() {
+        let pool = Pool::new(2).expect("threads");
+        assert_eq!(pool.run(|| 6 * 7).await, Ok(42));
+        assert_eq!(pool.run(|| -> i32 { panic!("on purpose") }).await, Err(ComputeError::Panicked));
+        assert_eq!(pool.run(|| 1).await, Ok(1));
+    }
+}

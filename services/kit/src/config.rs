@@ -1,0 +1,146 @@
+//! One configuration for the whole box: flag > `TRYON_*` > TOML file > default; unknown keys are refused.
+
+mod sections;
+
+pub use sections::*;
+
+use figment::Figment;
+use figment::providers::{Env, Format, Serialized, Toml};
+use figment::value::Value;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Everything that can be configured. `deploy/tryon.toml` shows each key with its default.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Logs.
+    pub log: LogConfig,
+    /// Threads and the end.
+    pub process: ProcessConfig,
+    /// Frames between processes.
+    pub bus: BusConfig,
+    /// The capture service.
+    pub capture: CaptureConfig,
+    /// The tracking service.
+    pub tracking: TrackingConfig,
+    /// The cloth service.
+    pub cloth: ClothConfig,
+    /// The compositor.
+    pub compositor: CompositorConfig,
+}
+
+/// A configuration that cannot be used: which key, and why.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct ConfigError(pub String);
+
+/// Variables of the environment that start like ours but are no keys: test switches and the file's own name.
+const NOT_KEYS: [&str; 3] = ["SHARED", "REQUIRE_ALL", "CONFIG"];
+
+impl Config {
+    /// Reads all layers. `flags` are `key=value` pairs such as `capture.address=127.0.0.1:0`.
+    ///
+    /// # Errors
+    /// Names the key that is unknown, of the wrong type or not usable, or the file that cannot be read.
+    pub fn load(file: Option<&Path>, flags: &[String]) -> Result<Self, ConfigError> {
+        let mut layers = Figment::from(Serialized::defaults(Self::default()));
+        if let Some(file) = file {
+            let text = std::fs::read_to_string(file).map_err(|e| ConfigError(format!("{}: {e}", file.display())))?;
+            layers = layers.merge(Toml::string(&text));
+        }
+        layers = layers.merge(Env::prefixed("TRYON_").ignore(&NOT_KEYS).split("__"));
+        for flag in flags {
+            let fault = || ConfigError(format!("--set {flag}: `key=value` is needed, such as capture.cameras.0.loop=true"));
+            let (key, value) = flag.split_once('=').ok_or_else(fault)?;
+            let Ok(value) = value.parse::<Value>();
+            layers = layers.merge(Serialized::default(key, value));
+        }
+        let config: Self = layers.extract().map_err(|e| ConfigError(e.to_string()))?;
+        config.validate()?;
+        Ok(config)
+    }
+
+    /// Checks what types cannot say.
+    ///
+    /// # Errors
+    /// Names the first key at fault.
+    pub fn validate(&self) -> Result<(), ConfigError> {
+        use tryon_proto::keys::is_name;
+        let fault = |key: &str, why: &str| Err(ConfigError(format!("{key}: {why}")));
+        let name = "1 to 64 characters of [a-z0-9_-] are needed";
+        if !is_name(&self.capture.store) {
+            return fault("capture.store", name);
+        }
+        for (i, c) in self.capture.cameras.iter().enumerate() {
+            if !is_name(&c.name) {
+                return fault(&format!("capture.cameras.{i}.name"), name);
+            }
+            if self.capture.cameras[..i].iter().any(|o| o.name == c.name) {
+                return fault(&format!("capture.cameras.{i}.name"), "is used twice");
+            }
+            if !(c.rate.is_finite() && (0.0..=1000.0).contains(&c.rate)) {
+                return fault(&format!("capture.cameras.{i}.rate"), "0 to 1000 frames a second");
+            }
+        }
+        for (key, ms) in [
+            ("compositor.camera_silence_ms", self.compositor.camera_silence_ms),
+            ("compositor.garments_late_ms", self.compositor.garments_late_ms),
+        ] {
+            if ms < 50 {
+                return fault(key, "at least 50 ms, or every hiccup is a fault");
+            }
+        }
+        for (key, url) in [
+            ("cloth.tracking", &self.cloth.tracking),
+            ("compositor.tracking", &self.compositor.tracking),
+            ("compositor.cloth", &self.compositor.cloth),
+        ] {
+            if !url.starts_with("http://") {
+                return fault(key, "a URL such as http://127.0.0.1:50052 is needed");
+            }
+        }
+        for (key, n) in [
+            ("tracking.max_sessions", self.tracking.max_sessions),
+            ("cloth.max_sessions", self.cloth.max_sessions),
+            ("compositor.max_try_ons", self.compositor.max_try_ons),
+        ] {
+            if n == 0 {
+                return fault(key, "at least 1");
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_commented_default_file_is_the_default() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy/tryon.toml");
+        let text = std::fs::read_to_string(file).expect("deploy/tryon.toml");
+        assert_eq!(toml::from_str::<Config>(&text).expect("parses"), Config::default());
+        // Every key is shown: taking the comments off must not add one, and no default may be missing.
+        let shown: toml::Table = toml::from_str(&text).expect("parses");
+        let all = toml::Table::try_from(Config::default()).expect("serialises");
+        assert_eq!(shown, all, "a key of Config::default() is missing from deploy/tryon.toml");
+    }
+
+    #[test]
+    fn flags_win_and_unknown_keys_are_refused() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let file = dir.path().join("c.toml");
+        std::fs::write(&file, "[tracking]\nmax_sessions = 3\naddress = \"127.0.0.1:1\"\n").expect("written");
+        let c = Config::load(Some(&file), &["tracking.address=127.0.0.1:7".into()]).expect("fine");
+        assert_eq!((c.tracking.max_sessions, c.tracking.address.port()), (3, 7));
+        std::fs::write(&file, "[tracking]\nmax_session = 3\n").expect("written");
+        let e = Config::load(Some(&file), &[]).expect_err("a typo").to_string();
+        assert!(e.contains("max_session"), "{e}");
+        let e = Config::load(None, &["tracking.adress=1".into()]).expect_err("a typo").to_string();
+        assert!(e.contains("adress"), "{e}");
+        let e = Config::load(None, &["capture.store=a/b".into()]).expect_err("a slash").to_string();
+        assert!(e.starts_with("capture.store"), "{e}");
+    }
+}

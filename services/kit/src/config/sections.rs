@@ -1,0 +1,225 @@
+//! The sections of the configuration with their defaults.
+
+use serde::{Deserialize, Serialize};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+
+const fn local(port: u16) -> SocketAddr {
+    SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), port)
+}
+
+/// How logs look.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LogFormat {
+    /// For people.
+    #[default]
+    Pretty,
+    /// One JSON object a line.
+    Json,
+}
+
+/// Logs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LogConfig {
+    /// pretty or json.
+    pub format: LogFormat,
+    /// Filter as of tracing: a level, or `module=level` pairs.
+    pub level: String,
+}
+
+impl Default for LogConfig {
+    fn default() -> Self {
+        Self { format: LogFormat::Pretty, level: "info,zenoh=warn".into() }
+    }
+}
+
+/// Threads and the end.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ProcessConfig {
+    /// Threads for computing; 0 means one for each core.
+    pub compute_threads: usize,
+    /// Milliseconds that open streams have to finish after a signal; then they are cut.
+    pub grace_ms: u64,
+}
+
+impl Default for ProcessConfig {
+    fn default() -> Self {
+        Self { compute_threads: 0, grace_ms: 3000 }
+    }
+}
+
+/// Frames between processes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BusConfig {
+    /// Endpoints on which the capture process listens: `tcp/ADDRESS:PORT` or `unixsock-stream/PATH`.
+    pub listen: Vec<String>,
+    /// Endpoints to which the other processes connect.
+    pub connect: Vec<String>,
+}
+
+impl Default for BusConfig {
+    fn default() -> Self {
+        let endpoint = vec!["tcp/127.0.0.1:7447".to_owned()];
+        Self { listen: endpoint.clone(), connect: endpoint }
+    }
+}
+
+/// The capture service.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CaptureConfig {
+    /// gRPC address.
+    pub address: SocketAddr,
+    /// Metrics and probes; port 0 in tests.
+    pub admin: SocketAddr,
+    /// Store part of the bus keys.
+    pub store: String,
+    /// Folder for recordings; empty means that nothing can be recorded.
+    pub recordings: PathBuf,
+    /// The cameras.
+    pub cameras: Vec<CameraConfig>,
+}
+
+impl Default for CaptureConfig {
+    fn default() -> Self {
+        Self {
+            address: local(50051),
+            admin: local(9101),
+            store: "store".into(),
+            recordings: PathBuf::new(),
+            cameras: vec![CameraConfig::default()],
+        }
+    }
+}
+
+/// One camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CameraConfig {
+    /// Camera part of the bus keys.
+    pub name: String,
+    /// `synth`, `synth:CLIP`, `pattern` (a test picture), or the path of a recording: an RGBD folder or an .mcap file.
+    pub source: String,
+    /// Frames a second; 0 means the source's own rate.
+    pub rate: f64,
+    /// Ignore all rates and go as fast as possible.
+    pub fast: bool,
+    /// Start again at the end of a recording.
+    #[serde(rename = "loop")]
+    pub looped: bool,
+    /// Start publishing with the process.
+    pub autostart: bool,
+}
+
+impl Default for CameraConfig {
+    fn default() -> Self {
+        Self {
+            name: "front".into(),
+            source: "synth".into(),
+            rate: 0.0,
+            fast: false,
+            looped: true,
+            autostart: true,
+        }
+    }
+}
+
+/// The tracking service.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TrackingConfig {
+    /// gRPC address.
+    pub address: SocketAddr,
+    /// Metrics and probes.
+    pub admin: SocketAddr,
+    /// SMPL-layout npz to use as template; empty means the embedded body.
+    pub body: PathBuf,
+    /// Most sessions at a time.
+    pub max_sessions: usize,
+    /// Seconds after which a session that nobody reads is closed.
+    pub idle_s: u64,
+}
+
+impl Default for TrackingConfig {
+    fn default() -> Self {
+        Self { address: local(50052), admin: local(9102), body: PathBuf::new(), max_sessions: 4, idle_s: 30 }
+    }
+}
+
+/// The cloth service.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ClothConfig {
+    /// gRPC address.
+    pub address: SocketAddr,
+    /// Metrics and probes.
+    pub admin: SocketAddr,
+    /// The tracking service to follow.
+    pub tracking: String,
+    /// Most sessions at a time.
+    pub max_sessions: usize,
+    /// Seconds after which a session that nobody streams is closed.
+    pub idle_s: u64,
+    /// Most simulations at a time.
+    pub max_simulations: usize,
+}
+
+impl Default for ClothConfig {
+    fn default() -> Self {
+        Self {
+            address: local(50053),
+            admin: local(9103),
+            tracking: "http://127.0.0.1:50052".into(),
+            max_sessions: 4,
+            idle_s: 30,
+            max_simulations: 1,
+        }
+    }
+}
+
+/// The compositor.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CompositorConfig {
+    /// gRPC, gRPC-web and page address.
+    pub address: SocketAddr,
+    /// Metrics and probes.
+    pub admin: SocketAddr,
+    /// The tracking service.
+    pub tracking: String,
+    /// The cloth service.
+    pub cloth: String,
+    /// Camera of a try-on that names none.
+    pub store: String,
+    /// Camera of a try-on that names none.
+    pub camera: String,
+    /// Most try-ons at a time.
+    pub max_try_ons: usize,
+    /// Seconds after which a try-on that nobody streams is closed.
+    pub idle_s: u64,
+    /// Milliseconds without a frame after which the camera counts as silent.
+    pub camera_silence_ms: u64,
+    /// Milliseconds after which garments are too old to be shown.
+    pub garments_late_ms: u64,
+}
+
+impl Default for CompositorConfig {
+    fn default() -> Self {
+        Self {
+            address: local(8080),
+            admin: local(9104),
+            tracking: "http://127.0.0.1:50052".into(),
+            cloth: "http://127.0.0.1:50053".into(),
+            store: "store".into(),
+            camera: "front".into(),
+            max_try_ons: 4,
+            idle_s: 30,
+            camera_silence_ms: 700,
+            garments_late_ms: 700,
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! The open sessions of a service: names to handles. What a session knows belongs to its own task; this is only the
+//! directory in which callers find it.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A directory with a limit. Clones share it.
+pub struct Sessions<H> {
+    open: Arc<Mutex<BTreeMap<String, Arc<H>>>>,
+    limit: usize,
+}
+
+impl<H> Clone for Sessions<H> {
+    fn clone(&self) -> Self {
+        Self { open: self.open.clone(), limit: self.limit }
+    }
+}
+
+/// What [`Sessions::open`] found.
+pub enum Opened<H> {
+    /// It was there.
+    Found(Arc<H>),
+    /// It is new.
+    Created(Arc<H>),
+    /// All places are taken.
+    Full,
+}
+
+impl<H> Sessions<H> {
+    /// An empty directory for at most `limit` sessions.
+    pub fn new(limit: usize) -> Self {
+        Self { open: Arc::default(), limit }
+    }
+    fn with<R>(&self, f: impl FnOnce(&mut BTreeMap<String, Arc<H>>) -> R) -> R {
+        f(&mut self.open.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+    /// The session of that id, made by `make` when there is none.
+    pub fn open(&self, id: &str, make: impl FnOnce() -> H) -> Opened<H> {
+        self.with(|m| {
+            if let Some(h) = m.get(id) {
+                return Opened::Found(h.clone());
+            }
+            if m.len() >= self.limit {
+                return Opened::Full;
+            }
+            let h = Arc::new(make());
+            m.insert(id.into(), h.clone());
+            Opened::Created(h)
+        })
+    }
+    /// The session of that id.
+    pub fn get(&self, id: &str) -> Option<Arc<H>> {
+        self.with(|m| m.get(id).cloned())
+    }
+    /// Takes a session out of the directory.
+    pub fn remove(&self, id: &str) -> Option<Arc<H>> {
+        self.with(|m| m.remove(id))
+    }
+    /// Most sessions at a time.
+    pub fn limit(&self) -> usize {
+        self.limit
+    }
+    /// How many are open.
+    pub fn len(&self) -> usize {
+        self.with(|m| m.len())
+    }
+    /// None is open.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// A random id: 128 bits, hexadecimal. `RandomState` draws from the system's generator.
+pub fn random_id() -> String {
+    format!("{:016x}{:016x}", random_u64(), random_u64())
+}
+
+/// A random number, never 0: the epoch of a camera's run.
+pub fn random_u64() -> u64 {
+    use std::hash::{BuildHasher, Hasher, RandomState};
+    let mut h = RandomState::new().build_hasher();
+    h.write_u128(std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |d| d.as_nanos()));
+    h.write_u32(std::process::id());
+    h.finish().max(1)
+}
+
+/// Unix time, nanoseconds.
+pub fn unix_ns() -> u64 {
+    let d = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(d.as_nanos()).unwrap_or(u64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn opening_twice_finds_the_same_and_the_limit_holds() {
+        let s = Sessions::new(2);
+        assert!(matches!(s.open("a", || 1), Opened::Created(_)));
+        assert!(matches!(s.open("a", || 2), Opened::Found(h) if *h == 1));
+        assert!(matches!(s.open("b", || 2), Opened::Created(_)));
+        assert!(matches!(s.open("c", || 3), Opened::Full));
+        s.remove("a");
+        assert!(matches!(s.open("c", || 3), Opened::Created(_)));
+        assert_ne!(random_id(), random_id());
+    }
+}

@@ -1,0 +1,39 @@
+//! Logs and metrics. Neither ever carries pixels or poses.
+
+use crate::config::{LogConfig, LogFormat};
+use metrics_exporter_prometheus::{PrometheusBuilder, PrometheusHandle};
+use std::sync::OnceLock;
+use tracing_subscriber::EnvFilter;
+
+/// Starts logging to standard error; later calls in the same process change nothing.
+///
+/// # Errors
+/// When `log.level` is no filter.
+pub fn init_logs(config: &LogConfig) -> Result<(), String> {
+    let filter = EnvFilter::try_new(&config.level).map_err(|e| format!("log.level: {e}"))?;
+    let builder = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    // A second subscriber is refused; the first one stays, which is what tests and `demo` want.
+    let _ = match config.format {
+        LogFormat::Json => builder.json().try_init(),
+        LogFormat::Pretty => builder.try_init(),
+    };
+    Ok(())
+}
+
+/// Upper bounds of the histograms of times, milliseconds: fine below a frame at 30/s, coarse above.
+const MS_BUCKETS: [f64; 14] =
+    [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 33.0, 66.0, 100.0, 150.0, 250.0, 500.0, 1000.0];
+
+/// The process's metrics; the first call installs the recorder.
+pub fn metrics() -> Option<&'static PrometheusHandle> {
+    static HANDLE: OnceLock<Option<PrometheusHandle>> = OnceLock::new();
+    let install = || PrometheusBuilder::new().set_buckets(&MS_BUCKETS).ok()?.install_recorder().ok();
+    HANDLE.get_or_init(install).as_ref()
+}
+
+/// Records stage times as `tryon_stage_ms{stage="…"}`, those whose name starts with `service.`.
+pub fn record_stages(service: &str, stages: &[tryon_proto::v1::StageTime]) {
+    for s in stages.iter().filter(|s| s.stage.split('.').next() == Some(service)) {
+        metrics::histogram!("tryon_stage_ms", "stage" => s.stage.clone()).record(f64::from(s.ms));
+    }
+}
