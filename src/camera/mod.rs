@@ -2,9 +2,11 @@
 
 mod image;
 mod intrinsics;
+mod noise;
 
 pub use image::{ColorImage, DepthImage, ImageError};
 pub use intrinsics::{Intrinsics, IntrinsicsError};
+pub use noise::{KINECT_V1_LATERAL_SIGMA, NoiseModel, kinect_v1_axial_sigma, time_of_flight_axial_sigma};
 
 use crate::math::{Camera, ColorCamera, Rigid};
 use serde::{Deserialize, Serialize};

@@ -1,1 +1,17 @@
 //! Synthetic people, garments, cameras and sequences with known truth, for the demo, tests and benches.
+//!
+//! A [`Sequence`] is a [`Shopper`] doing a [`Routine`] in a [`Room`] before a camera with a
+//! [`NoiseModel`](crate::camera::NoiseModel). Frames are functions of their number: any order, same bits.
+
+mod paint;
+mod room;
+mod routine;
+mod sequence;
+mod source;
+mod stance;
+
+pub use crate::camera::NoiseModel;
+pub use room::Room;
+pub use routine::Routine;
+pub use sequence::{Sequence, Setting, Shopper, Truth};
+pub use source::SynthSource;

@@ -1,0 +1,159 @@
+//! What a synthetic shopper wears and looks like: colours by place on the rest body.
+
+use crate::body::{RestBody, Skeleton, SkinWeights};
+use crate::math::{P3, V3};
+
+/// Colours of a shopper, sRGB.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Colors {
+    pub(super) skin: [u8; 3],
+    pub(super) hair: [u8; 3],
+    pub(super) shirt: [u8; 3],
+    pub(super) legs: [u8; 3],
+    pub(super) shoes: [u8; 3],
+}
+
+/// Skins, hair, shirts and leggings to choose from.
+const SKIN: [[u8; 3]; 4] = [[226, 180, 152], [198, 146, 112], [146, 98, 70], [104, 68, 48]];
+const HAIR: [[u8; 3]; 4] = [[58, 40, 30], [28, 24, 22], [120, 84, 48], [90, 60, 42]];
+const SHIRT: [[u8; 3]; 3] = [[150, 154, 160], [126, 140, 150], [168, 160, 150]];
+const LEGS: [[u8; 3]; 3] = [[46, 48, 56], [54, 58, 78], [62, 54, 50]];
+
+impl Colors {
+    /// One of the looks, the same for the same number.
+    pub(super) fn pick(seed: u64) -> Self {
+        let at = |n: u64, len: usize| (seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> n) as usize % len;
+        Self {
+            skin: SKIN[at(60, SKIN.len())],
+            hair: HAIR[at(50, HAIR.len())],
+            shirt: SHIRT[at(40, SHIRT.len())],
+            legs: LEGS[at(30, LEGS.len())],
+            shoes: [206, 204, 198],
+        }
+    }
+}
+
+/// Regions that are painted alike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Region {
+    Head,
+    Trunk,
+    UpperArm,
+    LowerArm,
+    Leg,
+    Foot,
+}
+
+/// A painted template: region of each vertex and the landmarks that borders are measured from.
+#[derive(Clone, Debug)]
+pub(super) struct Paint {
+    colors: Colors,
+    regions: Vec<Region>,
+    neck: V3,
+    head: V3,
+    /// Head size against the embedded body's.
+    size: f32,
+    /// Foremost point of the face.
+    nose: V3,
+    hips_y: f32,
+    ankle_y: f32,
+    shoulder: V3,
+    elbow: V3,
+}
+
+/// Length of the embedded body's head from the base of the skull to the crown, metres: unit of the face below.
+const HEAD_LENGTH: f32 = 0.162;
+
+impl Paint {
+    pub(super) fn new(skeleton: &Skeleton, weights: &SkinWeights, rest: &RestBody, colors: Colors) -> Self {
+        let joint = |name: &str| skeleton.index(name).map_or(V3::zeros(), |j| rest.joints[j].coords.cast::<f32>());
+        let region = |i: usize| {
+            let name = skeleton.joints()[weights.dominant(i)].name.as_str();
+            match name.trim_start_matches("left_").trim_start_matches("right_") {
+                "neck" | "head" | "head_end" | "jaw" => Region::Head,
+                "shoulder" => Region::UpperArm,
+                "elbow" | "wrist" | "hand" | "hand_end" => Region::LowerArm,
+                "hip" | "knee" => Region::Leg,
+                "ankle" | "foot" | "foot_end" => Region::Foot,
+                _ => Region::Trunk,
+            }
+        };
+        let regions: Vec<Region> = (0..rest.vertices.len()).map(region).collect();
+        let head = joint("head");
+        let of_head = || rest.vertices.iter().zip(&regions).filter(|(_, r)| **r == Region::Head).map(|(v, _)| v.coords);
+        let top = of_head().map(|v| v.y).fold(head.y, f32::max);
+        let front = |a: V3, b: V3| if b.z > a.z { b } else { a };
+        Self {
+            colors,
+            neck: joint("neck"),
+            size: ((top - head.y) / HEAD_LENGTH).max(f32::EPSILON),
+            nose: of_head().filter(|v| v.y > head.y - 0.02).fold(head, front),
+            head,
+            hips_y: joint("left_hip").y,
+            ankle_y: joint("left_ankle").y,
+            shoulder: joint("left_shoulder"),
+            elbow: joint("left_elbow"),
+            regions,
+        }
+    }
+
+    /// Colour at rest position `p`; `vertex` is one nearby.
+    pub(super) fn color(&self, vertex: u32, p: &P3) -> [u8; 3] {
+        let c = &self.colors;
+        match self.regions[vertex as usize] {
+            Region::Head => self.head_color(p),
+            Region::LowerArm => c.skin,
+            Region::Foot => c.shoes,
+            Region::Leg if p.y < self.ankle_y + 0.05 => c.shoes,
+            Region::Leg => c.legs,
+            Region::UpperArm => {
+                let d = self.elbow - self.shoulder;
+                let q = V3::new(p.x.abs(), p.y, p.z) - self.shoulder;
+                let along = q.dot(&d) / d.norm_squared();
+                if along < 0.55 { c.shirt } else { c.skin }
+            }
+            Region::Trunk => {
+                // A round neckline, deeper in front.
+                let (x, z) = (p.x - self.neck.x, p.z - self.neck.z);
+                let depth = if z > 0.0 { 0.055 } else { 0.01 };
+                let line = self.neck.y - depth + 0.9 * (x * x / 0.12);
+                if p.y > line && x.abs() < 0.09 {
+                    c.skin
+                } else if p.y < self.hips_y + 0.025 {
+                    c.legs
+                } else {
+                    c.shirt
+                }
+            }
+        }
+    }
+
+    fn head_color(&self, p: &P3) -> [u8; 3] {
+        let c = &self.colors;
+        // Face coordinates in units of the embedded head: x sideways, y up from the base of the skull, z from the nose.
+        let (x, y) = ((p.x - self.head.x).abs() / self.size, (p.y - self.head.y) / self.size);
+        let z = (p.z - self.nose.z) / self.size;
+        let hairline = if z > -0.085 { 0.118 - 0.35 * x } else { 0.118 - 0.35 * x - 1.9 * (-0.085 - z) };
+        if y > hairline.max(-0.035) {
+            return c.hair;
+        }
+        if z < -0.07 {
+            return c.skin;
+        }
+        let spot = |at: [f32; 2], r: [f32; 2]| ((x - at[0]) / r[0]).powi(2) + ((y - at[1]) / r[1]).powi(2) < 1.0;
+        let eye_y = (self.nose.y - self.head.y) / self.size + 0.030;
+        if spot([0.031, eye_y], [0.006, 0.006]) {
+            return [46, 34, 30];
+        }
+        if spot([0.031, eye_y], [0.014, 0.007]) {
+            return [232, 228, 222];
+        }
+        if spot([0.031, eye_y + 0.019], [0.018, 0.004]) {
+            return c.hair;
+        }
+        if spot([0.0, eye_y - 0.068], [0.024, 0.007]) {
+            return [c.skin[0] - c.skin[0] / 8, c.skin[1] / 2 + 12, c.skin[2] / 2 + 14];
+        }
+        c.skin
+    }
+}

@@ -1,0 +1,151 @@
+//! A room with a wooden floor and two walls, seen once and kept.
+
+use crate::camera::Intrinsics;
+use crate::math::{Camera, P3d, Rigid, V3d, World};
+
+/// Planes and colours of a room. World frame: floor at y = 0, the camera looks towards −z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Room {
+    /// Where the back wall stands, metres (negative: in front of the camera).
+    pub back_z: f64,
+    /// Where the left wall stands, metres; −∞ for none.
+    pub left_x: f64,
+    /// Colour of the walls, sRGB.
+    pub wall: [u8; 3],
+    /// Mean colour of the floor, sRGB.
+    pub floor: [u8; 3],
+}
+
+impl Default for Room {
+    fn default() -> Self {
+        Self { back_z: -3.9, left_x: -2.1, wall: [196, 194, 188], floor: [150, 112, 76] }
+    }
+}
+
+/// The empty room as the camera sees it.
+#[derive(Clone, Debug)]
+pub(super) struct Background {
+    /// Metres along the optical axis, row-major; infinity where nothing is.
+    pub(super) depth: Vec<f32>,
+    /// Interleaved sRGB.
+    pub(super) color: Vec<u8>,
+    /// Pixels that see the floor: index and world x, z.
+    pub(super) floor: Vec<(u32, [f32; 2])>,
+}
+
+/// Width of a floor board and height of the skirting, metres.
+const BOARD: f64 = 0.12;
+const SKIRTING: f64 = 0.09;
+/// A framed picture on the back wall: x from, to, y from, to, metres.
+const PICTURE: [f64; 4] = [0.75, 1.30, 1.15, 1.85];
+
+/// A number in [0, 1) that looks random, for boards and plaster.
+fn speckle(a: i64, b: i64) -> f64 {
+    let mut x = (a as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (b as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
+    x = (x ^ (x >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    ((x ^ (x >> 32)) & 0xffff) as f64 / 65_536.0
+}
+
+impl Room {
+    /// Draws the room, or emptiness without one.
+    pub(super) fn draw(
+        room: Option<&Self>,
+        camera: &Intrinsics,
+        world_from_camera: &Rigid<World, Camera>,
+    ) -> Background {
+        let n = camera.pixels();
+        let mut out = Background { depth: vec![f32::INFINITY; n], color: vec![24; 3 * n], floor: Vec::new() };
+        let Some(room) = room else { return out };
+        let eye = world_from_camera.point(&P3d::origin());
+        for i in 0..n {
+            let (u, v) = ((i % camera.width as usize) as f64, (i / camera.width as usize) as f64);
+            let ray = V3d::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
+            let d = world_from_camera.vector(&ray);
+            // The ray has z = 1 in the camera, so its parameter is the depth.
+            let hit = |distance: f64, speed: f64| {
+                let t = distance / speed;
+                if t.is_finite() && t > 0.0 { t } else { f64::INFINITY }
+            };
+            let (floor, back, left) = (hit(-eye.y, d.y), hit(room.back_z - eye.z, d.z), hit(room.left_x - eye.x, d.x));
+            let t = floor.min(back).min(left);
+            if !t.is_finite() {
+                continue;
+            }
+            let p = eye + d * t;
+            // Width of a pixel there: what is finer fades to its mean.
+            let pixel = t / camera.fx;
+            let (base, shade) = if t == floor {
+                out.floor.push((i as u32, [p.x as f32, p.z as f32]));
+                (room.floor, room.floor_shade(&p, pixel))
+            } else if t == back {
+                (room.wall_color(&p), wall_shade(p.x, p.y, p.x - room.left_x, pixel))
+            } else {
+                (room.wall, 0.86 * wall_shade(p.z, p.y, p.z - room.back_z, pixel))
+            };
+            out.depth[i] = t as f32;
+            for (c, b) in out.color[3 * i..3 * i + 3].iter_mut().zip(base) {
+                *c = (f64::from(b) * shade).clamp(0.0, 255.0) as u8;
+            }
+        }
+        out
+    }
+
+    fn wall_color(&self, p: &P3d) -> [u8; 3] {
+        let [x0, x1, y0, y1] = PICTURE;
+        let inside = |m: f64| (x0 + m..x1 - m).contains(&p.x) && (y0 + m..y1 - m).contains(&p.y);
+        if inside(0.05) {
+            let s = (p.y - y0) / (y1 - y0) + 0.12 * (9.0 * p.x).sin();
+            return if s > 0.55 { [170, 196, 210] } else { [92, 128, 104] };
+        }
+        if inside(0.025) {
+            return [236, 234, 228];
+        }
+        if inside(0.0) {
+            return [74, 56, 44];
+        }
+        self.wall
+    }
+
+    fn floor_shade(&self, p: &P3d, pixel: f64) -> f64 {
+        let row = (p.x / BOARD).floor();
+        let end = ((p.z + 1.7 * speckle(row as i64, 5)) / 1.1).floor();
+        let tint = 0.90 + 0.16 * speckle(row as i64, end as i64);
+        let grain = 0.04 * ((p.x * 310.0 + 3.0 * (p.z * 4.0).sin()).sin()) * (1.0 - pixel / 0.01).max(0.0);
+        let from_edge = (p.x / BOARD - row).min(row + 1.0 - p.x / BOARD) * BOARD;
+        let gap = 0.35 * (1.0 - from_edge / 0.004).max(0.0) * (1.0 - pixel / 0.012).max(0.0);
+        // Darker in the corners of the room, where less light comes from.
+        let corner = 0.25 * (-(p.z - self.back_z) / 0.35).exp() + 0.2 * (-(p.x - self.left_x) / 0.35).exp();
+        (tint + grain - gap) * (1.0 - corner) * 0.95
+    }
+}
+
+fn wall_shade(along: f64, y: f64, to_corner: f64, pixel: f64) -> f64 {
+    let plaster = 0.03 * (speckle((along / 0.012).floor() as i64, (y / 0.012).floor() as i64) - 0.5);
+    let plaster = plaster * (1.0 - pixel / 0.012).max(0.0);
+    let light = 0.80 + 0.12 * (y / 2.4).clamp(0.0, 1.0);
+    let corner = 0.18 * (-to_corner.max(0.0) / 0.4).exp() + 0.15 * (-y.max(0.0) / 0.25).exp();
+    if y < SKIRTING {
+        // A lighter board with a dark line above.
+        return if y > SKIRTING - 0.008 { 0.70 } else { 1.05 - corner };
+    }
+    light + plaster - corner
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn planes_are_where_they_are_said_to_be() {
+        let k = Intrinsics::KINECT_V1;
+        let world_from_camera = Rigid::<World, Camera>::level(1.0);
+        let room = Room { left_x: f64::NEG_INFINITY, ..Room::default() };
+        let b = Room::draw(Some(&room), &k, &world_from_camera);
+        assert!((b.depth[240 * 640 + 320] - 3.9).abs() < 1e-5);
+        // Row 479 looks down at (479 − 239.5)/525: the floor one metre below is at 525/239.5.
+        assert!((f64::from(b.depth[479 * 640 + 320]) - 525.0 / 239.5).abs() < 1e-4);
+        assert!(b.depth.iter().all(|d| d.is_finite()));
+        assert!(!b.floor.is_empty());
+        assert!(Room::draw(None, &k, &world_from_camera).depth.iter().all(|d| d.is_infinite()));
+    }
+}

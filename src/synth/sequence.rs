@@ -1,0 +1,265 @@
+//! Frames of a synthetic shopper, with the truth beside them.
+
+use super::paint::{Colors, Paint};
+use super::room::{Background, Room};
+use super::routine::Routine;
+use super::stance::Rig;
+use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
+use crate::camera::{Calibration, ColorImage, DepthImage, Intrinsics, NoiseModel, RgbdFrame};
+use crate::math::{Camera, P3, P3d, Rigid, V3, V3d, World};
+use crate::mesh::vertex_normals;
+use crate::par::Par;
+use crate::raster::{Cull, Options, View, VisibilityBuffer, barycentrics, rasterise_with};
+use nalgebra::UnitQuaternion;
+use std::sync::Arc;
+
+/// Who is in front of the camera.
+#[derive(Clone, Debug)]
+pub struct Shopper {
+    /// Body and joints.
+    pub template: Arc<Template>,
+    /// What makes the template this person.
+    pub shape: BodyShape,
+    /// Chooses skin, hair and clothes.
+    pub look: u64,
+}
+
+impl Default for Shopper {
+    /// The embedded body as it is.
+    fn default() -> Self {
+        Self { template: crate::body::embedded::template(), shape: BodyShape::default(), look: 0 }
+    }
+}
+
+/// Camera, room and what happens.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// Depth and (registered) colour camera.
+    pub camera: Intrinsics,
+    /// Where the camera is; the world's floor is y = 0.
+    pub world_from_camera: Rigid<World, Camera>,
+    /// Where the shopper starts, on the floor, world.
+    pub home: P3d,
+    /// Walls and floor; `None` for a person alone in the dark.
+    pub room: Option<Room>,
+    /// How depth is spoilt.
+    pub noise: NoiseModel,
+    /// What the shopper does.
+    pub routine: Routine,
+    /// Frames a second.
+    pub rate: f64,
+    /// Whether colour is rendered.
+    pub color: bool,
+    /// Chooses the noise.
+    pub seed: u64,
+}
+
+impl Default for Setting {
+    /// A Kinect v1 on a shelf, one metre high and tilted 3° down, 2.4 m from the shopper.
+    fn default() -> Self {
+        Self {
+            camera: Intrinsics::KINECT_V1,
+            world_from_camera: Self::tilted(1.0, 3.0, 0.0),
+            home: P3d::new(0.0, 0.0, -2.4),
+            room: Some(Room::default()),
+            noise: NoiseModel::KinectV1,
+            routine: Routine::TryOn,
+            rate: 30.0,
+            color: true,
+            seed: 1,
+        }
+    }
+}
+
+impl Setting {
+    /// A camera `height` metres above the floor looking along −z, tilted down and then rolled (clockwise as seen
+    /// from behind it), degrees.
+    pub fn tilted(height: f64, down: f64, roll: f64) -> Rigid<World, Camera> {
+        let tilt = UnitQuaternion::from_axis_angle(&V3d::x_axis(), -down.to_radians());
+        let roll = UnitQuaternion::from_axis_angle(&V3d::z_axis(), roll.to_radians());
+        let turn: Rigid<Camera, Camera> = Rigid::from_parts(V3d::zeros(), tilt * roll);
+        Rigid::<World, Camera>::level(height) * turn
+    }
+    /// The same scene with the camera mounted upright: columns and rows swapped, rolled by a quarter turn.
+    #[must_use]
+    pub fn portrait(self) -> Self {
+        let k = self.camera;
+        let camera = Intrinsics { width: k.height, height: k.width, fx: k.fy, fy: k.fx, cx: k.cy, cy: k.cx };
+        Self { camera, ..self }
+    }
+}
+
+/// What is true in a frame.
+#[derive(Clone, Debug)]
+pub struct Truth {
+    /// Somebody is in the room (perhaps outside the picture).
+    pub present: bool,
+    /// Pose of the template.
+    pub pose: Pose<Camera>,
+    /// Posed joints in the order of the skeleton, camera frame, metres.
+    pub joints: Vec<P3d>,
+    /// Posed vertices, camera frame, metres; empty when nobody is present.
+    pub vertices: Vec<P3>,
+}
+
+/// A shopper in a setting: any frame, any order, always the same.
+#[derive(Clone, Debug)]
+pub struct Sequence {
+    shopper: Shopper,
+    setting: Setting,
+    rest: RestBody,
+    rig: Rig,
+    paint: Paint,
+    background: Background,
+    calibration: Calibration,
+}
+
+/// Surfaces nearer than this are clipped, metres: no depth camera sees them.
+const NEAR: f32 = 0.2;
+/// Light from above, in front and a little from the left; and a weak one from the right. World frame.
+const KEY_LIGHT: [f64; 3] = [-0.45, 0.75, 0.55];
+const FILL_LIGHT: [f64; 3] = [0.8, 0.2, 0.5];
+/// Radius of the shadow under a foot and under the body, metres.
+const SHADOW: [f32; 2] = [0.16, 0.55];
+
+impl Sequence {
+    /// Prepares everything that does not change from frame to frame.
+    pub fn new(shopper: Shopper, setting: Setting) -> Self {
+        let t = &shopper.template;
+        let rest = t.personalise(&shopper.shape);
+        Self {
+            rig: Rig::new(t.skeleton(), &rest),
+            paint: Paint::new(t.skeleton(), t.weights(), &rest, Colors::pick(shopper.look)),
+            background: Room::draw(setting.room.as_ref(), &setting.camera, &setting.world_from_camera),
+            calibration: Calibration::registered(setting.camera),
+            rest,
+            shopper,
+            setting,
+        }
+    }
+    /// Camera, room and routine.
+    pub fn setting(&self) -> &Setting {
+        &self.setting
+    }
+    /// Who it is.
+    pub fn shopper(&self) -> &Shopper {
+        &self.shopper
+    }
+    /// The personalised rest body.
+    pub fn rest(&self) -> &RestBody {
+        &self.rest
+    }
+    /// Colour is registered to depth.
+    pub fn calibration(&self) -> &Calibration {
+        &self.calibration
+    }
+    /// Frames in one round of the routine.
+    pub fn round(&self) -> u64 {
+        (self.setting.routine.period() * self.setting.rate).round() as u64
+    }
+
+    /// Truth of frame `i`.
+    pub fn truth(&self, i: u64) -> Truth {
+        let t = &self.shopper.template;
+        let camera_from_world = self.setting.world_from_camera.inverse();
+        let stance = self.setting.routine.stance(&self.rig, self.setting.home, i as f64 / self.setting.rate);
+        let in_world = self.rig.pose(&stance);
+        let pose = Pose { root: camera_from_world * in_world.root, angles: in_world.angles };
+        let mut bones = BoneTransforms::default();
+        pose.bones(t.skeleton(), &self.rest, &mut bones);
+        let present = self.setting.routine.has_person();
+        let mut vertices = Vec::new();
+        if present {
+            skin(Par::Seq, &self.rest.vertices, t.weights(), &bones, &mut vertices);
+        }
+        Truth { present, pose, joints: bones.joints, vertices }
+    }
+
+    /// Frame `i` and its truth.
+    pub fn frame(&self, i: u64) -> (RgbdFrame, Truth) {
+        let truth = self.truth(i);
+        let camera = &self.setting.camera;
+        let mut depth = self.background.depth.clone();
+        let mut color = self.setting.color.then(|| self.background.color.clone());
+        if truth.present {
+            if let Some(color) = &mut color {
+                self.cast_shadow(&truth, color);
+            }
+            self.draw(&truth, &mut depth, color.as_deref_mut());
+        }
+        let depth: DepthImage = self.setting.noise.apply(camera, &depth, self.setting.seed, i);
+        // The buffer has the background's size, which is the camera's.
+        let color = color.and_then(|c| ColorImage::new(camera.width, camera.height, c).ok());
+        let time_ns = (i as f64 * 1e9 / self.setting.rate).round() as u64;
+        (RgbdFrame { sequence: i, time_ns, depth, color }, truth)
+    }
+
+    fn draw(&self, truth: &Truth, depth: &mut [f32], color: Option<&mut [u8]>) {
+        let t = &self.shopper.template;
+        let faces = t.mesh().faces();
+        let view = View::Perspective { camera: self.setting.camera, near: NEAR };
+        let mut buffer = VisibilityBuffer::default();
+        rasterise_with(Options { par: Par::Seq, cull: Cull::Back }, &view, &truth.vertices, faces, &mut buffer);
+        let mut normals = Vec::new();
+        if color.is_some() {
+            vertex_normals(Par::Seq, &truth.vertices, faces, t.topology().vertex_faces(), &mut normals);
+        }
+        let camera_from_world = self.setting.world_from_camera.inverse();
+        let light = |d: [f64; 3]| camera_from_world.vector(&V3d::from(d)).normalize().cast::<f32>();
+        let (key, fill, up) = (light(KEY_LIGHT), light(FILL_LIGHT), light([0.0, 1.0, 0.0]));
+        let mut color = color;
+        let width = buffer.width as usize;
+        for (i, (&id, &z)) in buffer.face.iter().zip(&buffer.depth).enumerate() {
+            if id == VisibilityBuffer::NONE || z >= depth[i] {
+                continue;
+            }
+            depth[i] = z;
+            let Some(color) = color.as_deref_mut() else { continue };
+            let f = faces[id as usize];
+            let corners = f.map(|k| truth.vertices[k as usize]);
+            let w = barycentrics(&view, corners, (i % width) as f32, (i / width) as f32).unwrap_or([1.0, 0.0, 0.0]);
+            let mix = |of: &dyn Fn(usize) -> V3| of(0) * w[0] + of(1) * w[1] + of(2) * w[2];
+            let n = mix(&|k| normals[f[k] as usize]);
+            let rest = mix(&|k| self.rest.base[f[k] as usize].coords);
+            let nearest = if w[0] >= w[1] && w[0] >= w[2] { 0 } else { 1 + usize::from(w[2] > w[1]) };
+            let base = self.paint.color(f[nearest], &P3::from(rest));
+            let n = n / n.norm().max(f32::EPSILON);
+            let shade = 0.42 + 0.10 * n.dot(&up) + 0.52 * n.dot(&key).max(0.0) + 0.14 * n.dot(&fill).max(0.0);
+            for (c, b) in color[3 * i..3 * i + 3].iter_mut().zip(base) {
+                *c = (f32::from(b) * shade).min(255.0) as u8;
+            }
+        }
+    }
+
+    /// Darkens the floor under feet and body.
+    fn cast_shadow(&self, truth: &Truth, color: &mut [u8]) {
+        let skeleton = self.shopper.template.skeleton();
+        let over = |name: &str| {
+            let p = self.setting.world_from_camera.point(&truth.joints[skeleton.index(name).unwrap_or(0)]);
+            [p.x as f32, p.z as f32]
+        };
+        let spots = [
+            (over("left_foot"), SHADOW[0], 0.45),
+            (over("right_foot"), SHADOW[0], 0.45),
+            (over("pelvis"), SHADOW[1], 0.30),
+        ];
+        for &(i, at) in &self.background.floor {
+            let mut light = 1.0f32;
+            for (c, radius, strength) in spots {
+                let r2 = ((at[0] - c[0]).powi(2) + (at[1] - c[1]).powi(2)) / (radius * radius);
+                if r2 < 1.0 {
+                    light *= 1.0 - strength * (1.0 - r2) * (1.0 - r2);
+                }
+            }
+            if light < 1.0 {
+                for c in &mut color[3 * i as usize..3 * i as usize + 3] {
+                    *c = (f32::from(*c) * light) as u8;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "sequence_tests.rs"]
+mod tests;

@@ -1,0 +1,63 @@
+//! A synthetic sequence as a recording.
+
+use super::Sequence;
+use crate::camera::{Calibration, RgbdFrame};
+use crate::formats::{FormatError, RgbdSource};
+
+/// Frames of a [`Sequence`] one after the other.
+#[derive(Clone, Debug)]
+pub struct SynthSource {
+    sequence: Sequence,
+    frames: Option<u64>,
+    next: u64,
+}
+
+impl SynthSource {
+    /// The first `frames` frames, or without end.
+    pub fn new(sequence: Sequence, frames: Option<u64>) -> Self {
+        Self { sequence, frames, next: 0 }
+    }
+    /// The sequence, for its truth.
+    pub fn sequence(&self) -> &Sequence {
+        &self.sequence
+    }
+}
+
+impl RgbdSource for SynthSource {
+    fn calibration(&self) -> &Calibration {
+        self.sequence.calibration()
+    }
+    fn len(&self) -> Option<usize> {
+        self.frames.and_then(|n| usize::try_from(n).ok())
+    }
+    fn next_frame(&mut self) -> Result<Option<RgbdFrame>, FormatError> {
+        if self.frames.is_some_and(|n| self.next >= n) {
+            return Ok(None);
+        }
+        let (frame, _) = self.sequence.frame(self.next);
+        self.next += 1;
+        Ok(Some(frame))
+    }
+    fn rewind(&mut self) -> Result<(), FormatError> {
+        self.next = 0;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::{Routine, Setting, Shopper};
+
+    #[test]
+    fn it_ends_and_starts_again() {
+        let setting = Setting { routine: Routine::Empty, color: false, ..Setting::default() };
+        let mut s = SynthSource::new(Sequence::new(Shopper::default(), setting), Some(2));
+        assert_eq!(s.len(), Some(2));
+        let first = s.next_frame().expect("frame").expect("frame");
+        assert_eq!(s.next_frame().expect("frame").map(|f| f.sequence), Some(1));
+        assert!(s.next_frame().expect("end").is_none());
+        s.rewind().expect("rewinds");
+        assert_eq!(s.next_frame().expect("frame"), Some(first));
+    }
+}
