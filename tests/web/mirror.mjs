@@ -1,6 +1,6 @@
 // The page in a real browser, as a shopper uses it.
 //
-//   node mirror.mjs URL [--out DIR] [--break URL --mend URL] [--stdio] [--timeout SECONDS]
+//   node mirror.mjs URL [--out DIR] [--break URL --mend URL | --stdio] [--rounds N] [--timeout SECONDS]
 //   node mirror.mjs --mock [--out DIR]
 //
 // Opens the page, starts a try-on, sees 30 different pictures, changes a garment, takes a photo, sees «Degraded» when
@@ -24,6 +24,7 @@ const { values: options, positionals } = parseArgs({
     mend: { type: 'string' },
     stdio: { type: 'boolean', default: false },
     mock: { type: 'boolean', default: false },
+    rounds: { type: 'string', default: '1' },
     // Seconds for each thing waited for; software rendering of a debug build on two busy cores is slow.
     timeout: { type: 'string', default: '60' },
     chromium: { type: 'string', default: process.env.CHROMIUM ?? '/usr/bin/chromium' },
@@ -162,26 +163,28 @@ try {
   await page.click('#photo-close');
   must((await page.getAttribute('#photo-image', 'src')) === null, 'a closed photo is forgotten');
 
-  if (canBreak) {
+  const wearing = () => page.$$eval('[aria-pressed="true"][data-garment]', (all) => all.map((c) => c.dataset.garment).join(', '));
+  const before = await wearing();
+  for (let round = 1; canBreak && round <= Number(options.rounds); round += 1) {
     broken = true;
     await tell('break');
     const at = Date.now();
     await page.waitForSelector('#stage[data-tone="down"], #stage[data-tone="degraded"]');
-    must(true, `the page says so ${Date.now() - at} ms after the chain broke`);
+    must(true, `round ${round}: the page says so ${Date.now() - at} ms after the chain broke`);
     const title = await page.textContent('#notice-title');
     must(title.startsWith('Degraded: ') && (await page.isVisible('#notice')), `«${title}»`);
     must((await page.textContent('#announce')).startsWith('Degraded: '), 'a screen reader is told');
     must((await page.getAttribute('#stage', 'data-dim')) !== null, 'what is left of the picture is dimmed');
     await page.waitForTimeout(1500);
-    await shot('5-degraded');
+    await shot(`5-degraded-${round}`);
     await tell('mend');
     const mended = Date.now();
     await waitTone('live');
-    must(true, `live again ${Date.now() - mended} ms after it was mended, with what was worn: ${await page.$$eval('[aria-pressed="true"][data-garment]', (all) => all.map((c) => c.dataset.garment).join(', '))}`);
+    await worn();
+    must((await wearing()) === before, `live again ${Date.now() - mended} ms after it was mended, wearing ${before}`);
     broken = false;
-  } else {
-    console.log('--  nobody to break the chain: that part is not judged');
   }
+  if (!canBreak) console.log('--  nobody to break the chain: that part is not judged');
 
   await page.click('#finish');
   await page.waitForSelector('#welcome:not([hidden])');

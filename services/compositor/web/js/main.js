@@ -42,7 +42,8 @@ const mirror = new Mirror(byId('glass'), {
     session.known.shownAt = now;
     // What the camera saw is older than the drawing of it by what the chain took.
     session.known.exposedAt = now - (Number.isFinite(picture.latency_ms) ? Math.max(0, picture.latency_ms) : 0);
-    if (session.fitting.size > 0 && session.revision !== null && picture.outfit_revision >= session.revision) {
+    const on = session.revision !== null && picture.state === State.LIVE && picture.outfit_revision >= session.revision;
+    if (on && session.fitting.size > 0) {
       session.fitting = new Set();
       wardrobe.update();
     }
@@ -90,7 +91,11 @@ function heard(event) {
   if (event.kind === 'link') {
     known.link = event.link;
     known.error = event.error ?? null;
-    if (event.link === 'waiting') known.retryAt = performance.now() + event.retryIn * 1000;
+    if (event.link === 'waiting') {
+      known.retryAt = performance.now() + event.retryIn * 1000;
+      // The next opening says what is worn and counts revisions anew.
+      if (session.revision !== null) session.revision = 0n;
+    }
   } else {
     known.link = 'streaming';
     known.retryAt = null;
