@@ -3,6 +3,7 @@
 mod error;
 pub mod image;
 pub mod npz;
+pub mod obj;
 mod recording;
 mod rgbd_folder;
 

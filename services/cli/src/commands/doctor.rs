@@ -1,0 +1,113 @@
+//! `tryon doctor`: what this machine can do, and what would go wrong.
+
+use crate::args::DoctorArgs;
+use anyhow::Result;
+use serde::Serialize;
+use std::net::TcpListener;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// How one look went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Verdict {
+    /// As it should be.
+    Good,
+    /// Works, but less than it could; the text says what to do.
+    Note,
+    /// Something will fail; the text says what to do.
+    Bad,
+}
+
+#[derive(Debug, Serialize)]
+struct Finding {
+    what: &'static str,
+    verdict: Verdict,
+    detail: String,
+}
+
+/// Runs the command. Exit code 1 when something will fail.
+///
+/// # Errors
+/// Only when the report cannot be printed.
+pub(crate) fn run(args: &DoctorArgs) -> Result<ExitCode> {
+    let findings = [cores(), memory(), body(), adapter(), port(8080), shared_data()];
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&findings)?);
+    } else {
+        for f in &findings {
+            let mark = match f.verdict {
+                Verdict::Good => "ok  ",
+                Verdict::Note => "note",
+                Verdict::Bad => "BAD ",
+            };
+            println!("{mark} {:14} {}", f.what, f.detail);
+        }
+    }
+    let bad = findings.iter().any(|f| f.verdict == Verdict::Bad);
+    Ok(if bad { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+fn cores() -> Finding {
+    let n = std::thread::available_parallelism().map_or(1, usize::from);
+    let verdict = if n >= 2 { Verdict::Good } else { Verdict::Note };
+    Finding { what: "cores", verdict, detail: format!("{n}; the chain is built for two") }
+}
+
+fn memory() -> Finding {
+    const WANTED_MIB: u64 = 1024;
+    let available = std::fs::read_to_string("/proc/meminfo").ok().and_then(|t| {
+        let line = t.lines().find(|l| l.starts_with("MemAvailable:"))?.to_owned();
+        line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib / 1024)
+    });
+    match available {
+        Some(mib) if mib >= WANTED_MIB => {
+            Finding { what: "memory", verdict: Verdict::Good, detail: format!("{mib} MiB available") }
+        }
+        Some(mib) => Finding {
+            what: "memory",
+            verdict: Verdict::Note,
+            detail: format!("{mib} MiB available; the chain of one box is measured against 500 MiB, leave it {WANTED_MIB}"),
+        },
+        None => Finding { what: "memory", verdict: Verdict::Note, detail: "this system does not tell".into() },
+    }
+}
+
+fn body() -> Finding {
+    let t = tryon::body::embedded::template();
+    let detail = format!("embedded body: {} vertices, {} joints", t.mesh().vertices().len(), t.skeleton().len());
+    Finding { what: "body", verdict: Verdict::Good, detail }
+}
+
+fn adapter() -> Finding {
+    match tryon::gpu::adapters() {
+        list if list.is_empty() => Finding {
+            what: "graphics",
+            verdict: Verdict::Note,
+            detail: "no wgpu adapter: pictures are drawn on the CPU, which needs nothing else".into(),
+        },
+        list => Finding { what: "graphics", verdict: Verdict::Good, detail: list.join("; ") },
+    }
+}
+
+fn port(number: u16) -> Finding {
+    match TcpListener::bind(("127.0.0.1", number)) {
+        Ok(_) => Finding { what: "port", verdict: Verdict::Good, detail: format!("{number} is free for the mirror page") },
+        Err(e) => Finding {
+            what: "port",
+            verdict: Verdict::Note,
+            detail: format!("{number}: {e}; start the demo with --listen 127.0.0.1:0 or another port"),
+        },
+    }
+}
+
+fn shared_data() -> Finding {
+    let root = std::env::var("TRYON_SHARED").unwrap_or_else(|_| "../shared".into());
+    let found = Path::new(&root).join("data").join("README.md").exists();
+    let detail = if found {
+        format!("{root}/data: tests on real recordings run")
+    } else {
+        format!("{root}/data is missing: tests on real recordings are skipped (set TRYON_SHARED)")
+    };
+    Finding { what: "shared data", verdict: if found { Verdict::Good } else { Verdict::Note }, detail }
+}

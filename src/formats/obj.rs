@@ -1,0 +1,224 @@
+//! Wavefront OBJ: positions, texture coordinates, polygons. Materials and groups are read over.
+
+use super::FormatError;
+use crate::math::P3;
+use crate::mesh::{Face, TriMesh};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Largest OBJ file that is read, bytes; a garment of 100,000 vertices takes about 12 MB.
+const MAX_BYTES: u64 = 512 << 20;
+
+/// A mesh as an OBJ file holds it: corners index positions and texture coordinates separately.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ObjMesh {
+    /// Positions and triangles (polygons are fanned), checked.
+    pub mesh: TriMesh,
+    /// Texture coordinates, in the order of the file.
+    pub uv: Vec<[f32; 2]>,
+    /// Texture coordinate of each corner, shape `[faces]`; empty when any corner has none.
+    pub face_uv: Vec<Face>,
+}
+
+impl ObjMesh {
+    /// One vertex for each pair of position and texture coordinate, for drawing: vertices, their uv (zero without),
+    /// faces, and the position under each vertex.
+    pub fn unwelded(&self) -> (Vec<P3>, Vec<[f32; 2]>, Vec<Face>, Vec<u32>) {
+        if self.face_uv.is_empty() {
+            let v = self.mesh.vertices().to_vec();
+            let (n, uv) = (v.len() as u32, vec![[0.0; 2]; v.len()]);
+            return (v, uv, self.mesh.faces().to_vec(), (0..n).collect());
+        }
+        let mut seen = std::collections::BTreeMap::new();
+        let (mut vertices, mut uv, mut under) = (Vec::new(), Vec::new(), Vec::new());
+        let faces = self
+            .mesh
+            .faces()
+            .iter()
+            .zip(&self.face_uv)
+            .map(|(f, t)| {
+                std::array::from_fn(|k| {
+                    *seen.entry((f[k], t[k])).or_insert_with(|| {
+                        vertices.push(self.mesh.vertices()[f[k] as usize]);
+                        uv.push(self.uv[t[k] as usize]);
+                        under.push(f[k]);
+                        (vertices.len() - 1) as u32
+                    })
+                })
+            })
+            .collect();
+        (vertices, uv, faces, under)
+    }
+}
+
+/// Reads an OBJ file.
+///
+/// # Errors
+/// Names the line and what is wrong on it: a number that is none, an index outside the file's vertices, a polygon
+/// with fewer than three corners or a repeated one.
+pub fn read_obj(path: &Path) -> Result<ObjMesh, FormatError> {
+    let size = std::fs::metadata(path).map_err(|e| FormatError::io(path, e))?.len();
+    if size > MAX_BYTES {
+        return Err(FormatError::field(path, "size", format!("{size} bytes; at most {MAX_BYTES} are read")));
+    }
+    let text = std::fs::read_to_string(path).map_err(|e| FormatError::io(path, e))?;
+    parse_obj(&text, path)
+}
+
+/// Reads OBJ text; `origin` is named in errors.
+///
+/// # Errors
+/// As [`read_obj`].
+pub fn parse_obj(text: &str, origin: &Path) -> Result<ObjMesh, FormatError> {
+    let (mut vertices, mut uv) = (Vec::<P3>::new(), Vec::<[f32; 2]>::new());
+    let (mut faces, mut face_uv) = (Vec::<Face>::new(), Vec::<Face>::new());
+    let mut all_textured = true;
+    for (number, line) in text.lines().enumerate() {
+        let at = |what: &str, why: String| FormatError::field(origin, format!("line {}: {what}", number + 1), why);
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => {
+                let [x, y, z] = numbers(words).map_err(|why| at("vertex", why))?;
+                vertices.push(P3::new(x, y, z));
+            }
+            Some("vt") => uv.push(numbers(words).map_err(|why| at("texture coordinate", why))?),
+            Some("f") => {
+                let name = format!("face {}", faces.len());
+                let (mut corner, mut texture) = (Vec::new(), Vec::new());
+                for word in words.take_while(|w| !w.starts_with('#')) {
+                    let mut parts = word.split('/');
+                    corner.push(index(parts.next(), vertices.len()).map_err(|why| at(&name, format!("vertex {why}")))?);
+                    match parts.next().filter(|p| !p.is_empty()) {
+                        None => all_textured = false,
+                        part => texture
+                            .push(index(part, uv.len()).map_err(|why| at(&name, format!("texture coordinate {why}")))?),
+                    }
+                }
+                if corner.len() < 3 {
+                    return Err(at(&name, format!("{} corners; a face needs at least 3", corner.len())));
+                }
+                for k in 1..corner.len() - 1 {
+                    let f = [corner[0], corner[k], corner[k + 1]];
+                    if f[0] == f[1] || f[1] == f[2] || f[0] == f[2] {
+                        return Err(at(&name, "a vertex is used twice".into()));
+                    }
+                    faces.push(f);
+                    if texture.len() == corner.len() {
+                        face_uv.push([texture[0], texture[k], texture[k + 1]]);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    if !all_textured {
+        face_uv.clear();
+    }
+    let mesh = TriMesh::new(vertices, faces).map_err(|e| FormatError::field(origin, "mesh", e.to_string()))?;
+    Ok(ObjMesh { mesh, uv, face_uv })
+}
+
+fn numbers<'a, const N: usize>(words: impl Iterator<Item = &'a str>) -> Result<[f32; N], String> {
+    let mut out = [0.0; N];
+    let mut words = words;
+    for (k, slot) in out.iter_mut().enumerate() {
+        let word = words.next().ok_or_else(|| format!("{k} numbers; {N} are needed"))?;
+        let value: f32 = word.parse().map_err(|_| format!("`{word}` is no number"))?;
+        if !value.is_finite() {
+            return Err(format!("`{word}` is not finite"));
+        }
+        *slot = value;
+    }
+    Ok(out)
+}
+
+/// OBJ counts from 1; negative numbers count back from the last element so far.
+fn index(word: Option<&str>, count: usize) -> Result<u32, String> {
+    let word = word.unwrap_or("");
+    let i: i64 = word.parse().map_err(|_| format!("index `{word}` is no whole number"))?;
+    let at = if i < 0 { count as i64 + i } else { i - 1 };
+    if i == 0 || at < 0 || at >= count as i64 {
+        return Err(format!("index {i} is out of range (the file has {count} so far, counted from 1)"));
+    }
+    u32::try_from(at).map_err(|_| format!("index {i} is too large"))
+}
+
+/// Writes positions, faces and, where given, one texture coordinate a vertex.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_obj(path: &Path, vertices: &[P3], faces: &[Face], uv: Option<&[[f32; 2]]>) -> Result<(), FormatError> {
+    let mut text = String::with_capacity(vertices.len() * 32 + faces.len() * 24);
+    for p in vertices {
+        let _ = writeln!(text, "v {} {} {}", p.x, p.y, p.z);
+    }
+    for t in uv.unwrap_or_default() {
+        let _ = writeln!(text, "vt {} {}", t[0], t[1]);
+    }
+    for f in faces {
+        let [a, b, c] = f.map(|i| i + 1);
+        let _ = match uv {
+            Some(_) => writeln!(text, "f {a}/{a} {b}/{b} {c}/{c}"),
+            None => writeln!(text, "f {a} {b} {c}"),
+        };
+    }
+    std::fs::write(path, text).map_err(|e| FormatError::io(path, e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn parse(text: &str) -> Result<ObjMesh, String> {
+        parse_obj(text, Path::new("t.obj")).map_err(|e| e.to_string())
+    }
+
+    const QUAD: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+    #[test]
+    fn polygons_are_fanned_and_negative_indices_count_back() {
+        let m = parse(&format!("{QUAD}f 1 2 3 4\nf -4 -3 -2")).expect("valid");
+        assert_eq!(m.mesh.faces(), [[0, 1, 2], [0, 2, 3], [0, 1, 2]]);
+        assert!(m.face_uv.is_empty());
+    }
+
+    #[test]
+    fn seams_in_texture_space_split_vertices() {
+        let m = parse(&format!("{QUAD}vt 0 0\nvt 1 0\nvt 1 1\nvt 5 5\nf 1/1 2/2 3/3\nf 1/4 3/3 4/1")).expect("valid");
+        let (v, uv, f, under) = m.unwelded();
+        assert_eq!((v.len(), f.len()), (5, 2));
+        assert_eq!(uv[f[1][0] as usize], [5.0, 5.0]);
+        assert_eq!(under[f[1][0] as usize], 0);
+    }
+
+    #[test]
+    fn faults_name_line_face_and_index() {
+        let e = parse(&format!("{QUAD}f 1 2 9")).expect_err("hole");
+        assert!(e.contains("line 5: face 0") && e.contains("index 9 is out of range"), "{e}");
+        assert!(parse("v 1 2").expect_err("short").contains("line 1: vertex"));
+        assert!(parse("v 1 2 nan").expect_err("nan").contains("not finite"));
+        assert!(parse(&format!("{QUAD}f 1 2")).expect_err("two corners").contains("2 corners"));
+        assert!(parse(&format!("{QUAD}f 1 2 0")).expect_err("zero").contains("index 0"));
+        assert!(parse(&format!("{QUAD}f 1 2 2")).expect_err("twice").contains("twice"));
+    }
+
+    #[test]
+    fn writing_and_reading_gives_the_same_mesh() {
+        let dir = tempfile::tempdir().expect("temporary folder");
+        let path = dir.path().join("m.obj");
+        let m = parse(&format!("{QUAD}f 1 2 3 4")).expect("valid");
+        let uv = [[0.0, 0.25], [0.5, 1.0], [0.1, 0.2], [0.3, 0.4]];
+        write_obj(&path, m.mesh.vertices(), m.mesh.faces(), Some(&uv)).expect("written");
+        let back = read_obj(&path).expect("read");
+        assert_eq!(back.mesh, m.mesh);
+        assert_eq!(back.uv, uv);
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read_or_refused(text in "[vft0-9 ./\\-e\n]{0,200}") {
+            let _ = parse(&text);
+        }
+    }
+}
