@@ -143,6 +143,32 @@ fn hull_length(points: &[Point2<f64>]) -> f64 {
     chain(&mut p.iter()) + chain(&mut p.iter().rev())
 }
 
+/// Faces by the height they span, so that a level cut looks at a few hundred of them.
+struct Levels<'a> {
+    vertices: &'a [P3],
+    low: f64,
+    /// Faces that reach into each slab of [`SLICE`] metres.
+    slabs: Vec<Vec<Face>>,
+}
+
+impl<'a> Levels<'a> {
+    fn new(vertices: &'a [P3], faces: &[Face], low: f64, high: f64) -> Self {
+        let slab = |y: f64| ((y - low) / SLICE).max(0.0) as usize;
+        let mut slabs = vec![Vec::new(); slab(high) + 1];
+        for f in faces {
+            let y = f.map(|i| f64::from(vertices[i as usize].y));
+            let (a, b) = (y[0].min(y[1]).min(y[2]), y[0].max(y[1]).max(y[2]));
+            slabs[slab(a)..=slab(b)].iter_mut().for_each(|s| s.push(*f));
+        }
+        Self { vertices, low, slabs }
+    }
+    fn cut(&self, origin: P3d) -> Section {
+        let k = ((origin.y - self.low) / SLICE).floor();
+        let faces = if k < 0.0 { None } else { self.slabs.get(k as usize) };
+        section(self.vertices, faces.map_or(&[], Vec::as_slice), &origin, &V3d::y(), &V3d::x())
+    }
+}
+
 /// Takes the measurements of `body`, a shape of `template`, in the rest pose (upright, arms away from the trunk).
 ///
 /// # Errors
@@ -156,7 +182,10 @@ pub fn measure(template: &Template, body: &RestBody) -> Result<Measurements, Mea
     let (neck, head) = (joint("neck")?, joint("head")?);
     let right_shoulder = joint("right_shoulder")?;
     let middle = nalgebra::center(&hip, &joint("right_hip")?);
-    let level = |p: P3d| section(v, faces, &p, &V3d::y(), &V3d::x());
+    let (low, high) =
+        v.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(f64::from(p.y)), h.max(f64::from(p.y))));
+    let levels = Levels::new(v, faces, low, high);
+    let level = |p: P3d| levels.cut(p);
     let across = |a: &P3d, b: &P3d, t: f64| {
         let n = (b - a).normalize();
         let u = n.cross(&V3d::z()).try_normalize(f64::EPSILON).unwrap_or_else(Vector3::x);
@@ -168,8 +197,6 @@ pub fn measure(template: &Template, body: &RestBody) -> Result<Measurements, Mea
         let n = ((to - from).abs() / SLICE).ceil().max(1.0) as usize;
         (0..=n).map(move |k| from + (to - from) * k as f64 / n as f64)
     };
-    let (low, high) =
-        v.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(f64::from(p.y)), h.max(f64::from(p.y))));
     let missing = |what: &'static str| move || MeasureError::Section(what);
     let straddles =
         |s: &Section| s.central().is_some_and(|o| o.iter().any(|p| p.x < 0.0) && o.iter().any(|p| p.x > 0.0));

@@ -151,6 +151,12 @@ fn pictures() {
     }
     if only.is_empty() || only.contains("close") {
         let v = posed(&t, &shape, &[]);
+        let trunk = (-0.34, 1.5, 720.0, 490, 560);
+        let pics: Vec<_> = [0.0, 40.0, 90.0, 180.0].iter().map(|&y| shade(&t, &v, y, trunk)).collect();
+        sheet(&dir, "close_trunk", &pics, 490, 560);
+        let legs = (-0.3, 0.95, 620.0, 372, 600);
+        let pics: Vec<_> = [0.0, 40.0, 90.0, 180.0].iter().map(|&y| shade(&t, &v, y, legs)).collect();
+        sheet(&dir, "close_legs", &pics, 372, 600);
         let face = (-0.16, 1.72, 1900.0, 608, 608);
         let pics: Vec<_> = [0.0, 40.0, 90.0].iter().map(|&y| shade(&t, &v, y, face)).collect();
         sheet(&dir, "close_head", &pics, 608, 608);

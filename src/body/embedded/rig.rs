@@ -108,7 +108,7 @@ pub(super) fn weights(j: &Joints, p: &P3d) -> Vec<(&'static str, f64)> {
     let up = V3d::y();
     // Arm against trunk: a plane through the shoulder joint, tilted so that the armpit belongs to both.
     let arm_axis = (j.elbow - j.shoulder).normalize();
-    let cut = beyond(p, &(j.shoulder + V3d::new(-0.010, 0.0, 0.0)), V3d::new(0.98, -0.12, 0.0), 0.070);
+    let cut = beyond(p, &(j.shoulder + V3d::new(-0.014, 0.0, 0.0)), V3d::new(0.98, -0.12, 0.0), 0.085);
     let elbow = beyond(p, &j.elbow, arm_axis + (j.wrist - j.elbow).normalize(), 0.038);
     let wrist = beyond(p, &j.wrist, (j.hand_end - j.wrist).normalize() + (j.wrist - j.elbow).normalize(), 0.030);
     // What is nearer to the chest than to the arm stays with the chest; far from the arm there is no arm at all.
