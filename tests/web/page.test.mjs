@@ -27,6 +27,11 @@ test('only a fresh picture of a live state is called live', () => {
   }
 });
 
+test('before the first picture nothing is live and nothing is wrong', () => {
+  const said = present(known({ shownAt: null, exposedAt: null }), 10_000);
+  assert.deepEqual([said.tone, said.blank, said.age], ['busy', true, '']);
+});
+
 test('a picture that arrives late is not called live', () => {
   const said = present(known({ shownAt: 10_000, exposedAt: 8_000 }), 10_000);
   assert.equal(said.title, 'Degraded: the picture is late');
@@ -98,6 +103,8 @@ test('percentiles, rate, and stages that vanish', () => {
   assert.deepEqual([summary.dropped, summary.missed], [2, 1]);
   stats.shown(picture([{ stage: 'b', ms: 1 }]), 1550, 3);
   assert.deepEqual(stats.summary(1600).stages.map(([n]) => n), ['b']);
+  stats.shown(picture([{ stage: 'x.total', ms: 3 }, { stage: 'x.solve', ms: 2 }, { stage: 'y.total', ms: 1 }]), 1600, 3);
+  assert.deepEqual(stats.summary(1600).stages.map(([n]) => n), ['x.solve', 'y.total'], 'a total beside its parts is left out');
   assert.equal(stats.summary(60_000).rate, 0, 'an old rate is no rate');
 });
 

@@ -19,6 +19,8 @@ const query = new URLSearchParams(location.search);
 /** Seconds without anybody in view before the mirror asks, and that it then waits for an answer. */
 const IDLE_S = Number(query.get('idle') ?? 30);
 const ANSWER_S = 15;
+/** Seconds that a shopper waits for a mirror that is not live, whatever the reason, before the mirror asks. */
+const ABANDONED_S = 180;
 /** Picture figures and ages are rewritten this often, ms. */
 const TICK_MS = 200;
 /** Several touches in a row become one request, ms. */
@@ -193,7 +195,7 @@ function show({ known, stats, picture, fitting }) {
   setText(byId('notice-hint'), said.hint);
   setText(byId('notice-age'), said.age);
   byId('retry').hidden = known.link !== 'waiting';
-  byId('shutter').disabled = said.tone !== 'live' && said.tone !== 'degraded';
+  byId('shutter').disabled = said.dim === 'hard' || known.shownAt === null;
   // Spoken once per change; ages and countdowns are for the eye.
   if (said.title !== announced) {
     announced = said.title;
@@ -203,7 +205,7 @@ function show({ known, stats, picture, fitting }) {
   const summary = stats.summary(now);
   setText(byId('figures'), summary.rate ? `${Math.round(summary.rate)} fps · ${Math.round(summary.p50)} ms` : '');
   details.update(summary, picture);
-  watchIdle(known, now);
+  watchIdle(known, said.tone, now);
 }
 
 function showScreen(name) {
@@ -216,22 +218,23 @@ function showScreen(name) {
   announced = '';
 }
 
-/** A mirror that nobody stands before asks, then clears itself for the next shopper. */
-function watchIdle(known, now) {
-  const away = known.link === 'streaming' && known.state === State.DEGRADED && AWAY.has(known.reason);
+/** A mirror that nobody stands before, or that has shown nothing for long, asks and then clears itself for the next. */
+function watchIdle(known, tone, now) {
   const still = byId('still');
-  if (!away || IDLE_S <= 0) {
+  if (tone === 'live' || IDLE_S <= 0) {
     session.awaySince = null;
     if (still.open) still.close();
     return;
   }
   session.awaySince ??= now;
-  const left = IDLE_S + ANSWER_S - (now - session.awaySince) / 1000;
+  const away = known.link === 'streaming' && known.state === State.DEGRADED && AWAY.has(known.reason);
+  const patience = away ? IDLE_S : Math.max(IDLE_S, ABANDONED_S);
+  const left = patience + ANSWER_S - (now - session.awaySince) / 1000;
   if (left <= 0) finish();
   else if (left <= ANSWER_S) {
     if (!still.open) still.showModal();
     setText(byId('still-count'), String(Math.ceil(left)));
-  }
+  } else if (still.open) still.close();
 }
 
 function goOn() {

@@ -60,6 +60,7 @@ export function present(known, now) {
     case State.CALIBRATING:
       return say('busy', 'Getting your measure', 'Stand facing the mirror, arms slightly away from your body.', { guide: true });
     case State.LIVE:
+      if (known.shownAt === null) return say('busy', 'Waking the mirror', 'This takes a moment.');
       if (stale) {
         const late = known.shownAt !== null && now - known.shownAt < STALE_MS;
         const title = late ? 'Degraded: the picture is late' : 'Degraded: no new picture';

@@ -24,6 +24,9 @@ export class Stats {
     // Smoothed, so that the bars can be read; a stage that is no longer reported disappears.
     const next = new Map();
     for (const { stage, ms } of picture.stages) {
+      // A service's total repeats its parts.
+      const part = stage.slice(0, stage.indexOf('.') + 1);
+      if (stage === `${part}total` && picture.stages.some((s) => s.stage !== stage && s.stage.startsWith(part))) continue;
       const before = this.#stages.get(stage);
       next.set(stage, (next.get(stage) ?? 0) + (before === undefined ? ms : before + 0.15 * (ms - before)));
     }
