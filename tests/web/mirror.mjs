@@ -99,7 +99,8 @@ try {
   must((requests.get('/tryon.v1.CompositorService/OpenTryOn') ?? 0) === 0, 'no try-on is opened before consent');
   must(await page.getByRole('button', { name: 'Start' }).isVisible(), 'Start can be reached by role and name');
 
-  await page.click('#start');
+  await page.focus('#start');
+  await page.keyboard.press('Enter');
   await waitTone('live');
   must(true, 'a try-on reaches Live');
 
@@ -185,6 +186,21 @@ try {
     broken = false;
   }
   if (!canBreak) console.log('--  nobody to break the chain: that part is not judged');
+
+  for (const [width, height] of [[1080, 1920], [1920, 1080], [390, 844]]) {
+    await page.setViewportSize({ width, height });
+    await page.waitForTimeout(300);
+    await shot(`6-${width}x${height}`);
+    const small = await page.$$eval('#fitting button, #fitting .chip', (all) => all
+      .map((e) => ({ name: e.id || e.textContent, box: e.getBoundingClientRect() }))
+      .filter(({ box }) => box.width > 0 && Math.min(box.width, box.height) < 44)
+      .map(({ name, box }) => `${name} ${Math.round(box.width)}×${Math.round(box.height)}`));
+    must(small.length === 0, `at ${width}×${height} a finger hits everything: 44 pixels or more ${small.join(', ')}`);
+    const glass = await page.locator('#stage').boundingBox();
+    const share = (glass.width * glass.height) / (width * height);
+    must(share > 0.4, `at ${width}×${height} the mirror has ${Math.round(100 * share)} % of the screen`);
+    must(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), `at ${width}×${height} nothing sticks out`);
+  }
 
   await page.click('#finish');
   await page.waitForSelector('#welcome:not([hidden])');
