@@ -1,0 +1,259 @@
+//! The person: the nearest connected thing of the size of a body that is neither floor nor wall.
+
+use super::planes::{BACKGROUND_TOLERANCE, tolerance};
+use super::{Plane, ScenePlanes};
+use crate::math::P3;
+use crate::spatial::{Label, OrganisedCloud};
+use nalgebra::Vector3;
+
+/// Neighbouring cells connect when their depths differ by less than this (metres) plus [`LINK_SLOPE`] × z.
+const LINK: f32 = 0.08;
+/// See [`LINK`].
+const LINK_SLOPE: f32 = 0.015;
+/// Smallest visible area of a body, m²: head and shoulders seen from the front.
+const LEAST_AREA: f32 = 0.08;
+/// Largest visible area of a body, m²; a big man in a T-pose shows 0.9.
+const MOST_AREA: f32 = 1.6;
+/// Tallest body with raised arms, and its least visible height, metres.
+const HEIGHT: [f32; 2] = [0.35, 2.6];
+/// Widest body, arms spread, metres.
+const MOST_WIDTH: f32 = 2.2;
+/// Parts cut off from the body by its own limbs lie within this depth of its median, metres.
+const LIMB_REACH: f32 = 0.9;
+/// A part this near in the image (cells) to the body may belong to it.
+const PART_GAP: i32 = 2;
+/// A candidate that hangs on a side of the image over this share of its rows is furniture or a wall.
+const SIDE_SHARE: f32 = 0.5;
+
+/// Where the person was a moment ago.
+#[derive(Clone, Copy, Debug)]
+pub struct Prior {
+    /// Middle of the body, camera frame, metres.
+    pub centre: P3,
+    /// How far it may have gone, metres.
+    pub reach: f32,
+}
+
+/// What was found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PersonSearch {
+    /// Row-major cells of the person, ascending; empty when nobody is there.
+    pub cells: Vec<u32>,
+    /// Part of the person may lie beyond the lower rim of the image.
+    pub cut_below: bool,
+    /// Cells that were neither floor nor background.
+    pub candidates: usize,
+    /// How many separate things were looked at.
+    pub components: usize,
+}
+
+/// Scratch of the search; holds nothing that matters.
+#[derive(Clone, Debug, Default)]
+pub struct SegmentScratch {
+    component: Vec<u32>,
+    stack: Vec<u32>,
+}
+
+/// One connected thing.
+struct Component {
+    id: u32,
+    cells: usize,
+    area: f32,
+    lo: P3,
+    hi: P3,
+    centre: P3,
+    side_rows: usize,
+    rows: usize,
+}
+
+/// Labels floor, background and the person in a sampled cloud. With a prior the component nearest to it wins;
+/// without one, the nearest body-sized thing.
+pub fn find_person(
+    cloud: &mut OrganisedCloud,
+    scene: &ScenePlanes,
+    prior: Option<Prior>,
+    scratch: &mut SegmentScratch,
+) -> PersonSearch {
+    let mut out = PersonSearch::default();
+    let (columns, rows) = cloud.size();
+    let up = scene.floor.map_or_else(|| Vector3::new(0.0, -1.0, 0.0), |f| f.normal).cast::<f32>();
+    for i in 0..columns * rows {
+        if cloud.depth[i] > 0.0 {
+            cloud.labels[i] = classify(&cloud.centre(i), scene);
+            out.candidates += usize::from(cloud.labels[i] == Label::Other);
+        }
+    }
+    if scene.floor.is_none() && scene.background.is_empty() {
+        // A picture without floor and wall is one whose background was taken out: nothing means empty.
+        let known = cloud.depth.iter().filter(|d| **d > 0.0).count();
+        if 2 * known < columns * rows {
+            for i in 0..columns * rows {
+                if cloud.depth[i] == 0.0 {
+                    cloud.labels[i] = Label::Background;
+                }
+            }
+        }
+    }
+    if out.candidates == 0 {
+        return out;
+    }
+    let components = connect(cloud, &up, scratch);
+    out.components = components.len();
+    let Some(main) = choose(&components, prior) else { return out };
+    // The main part, and what its own limbs cut off: parts beside it in the image and near it in depth.
+    let mut belongs = vec![false; components.len()];
+    belongs[main.id as usize] = true;
+    let depth = main.centre.z;
+    for _ in 0..2 {
+        for i in 0..columns * rows {
+            let id = scratch.component[i];
+            if id == u32::MAX || belongs[id as usize] {
+                continue;
+            }
+            let c = &components[id as usize];
+            let limb = (c.centre.z - depth).abs() < LIMB_REACH && c.area < 0.5 * main.area && c.side_rows == 0;
+            if limb && touches(cloud, scratch, &belongs, i) {
+                belongs[id as usize] = true;
+            }
+        }
+    }
+    for i in 0..columns * rows {
+        let id = scratch.component[i];
+        if id != u32::MAX && belongs[id as usize] {
+            cloud.labels[i] = Label::Person;
+            out.cells.push(i as u32);
+        }
+    }
+    let bottom = (rows - 1) * columns;
+    out.cut_below = out.cells.iter().filter(|&&c| c as usize >= bottom).count() >= 2;
+    out
+}
+
+fn classify(p: &P3, scene: &ScenePlanes) -> Label {
+    let near = |plane: &Plane, extra: f32| plane.distance(p) < tolerance(plane, p).max(extra);
+    if scene.floor.is_some_and(|f| near(&f, 0.0)) {
+        return Label::Floor;
+    }
+    if scene.background.iter().any(|b| near(b, BACKGROUND_TOLERANCE)) {
+        return Label::Background;
+    }
+    Label::Other
+}
+
+/// Connected components of [`Label::Other`] cells.
+fn connect(cloud: &OrganisedCloud, up: &Vector3<f32>, scratch: &mut SegmentScratch) -> Vec<Component> {
+    let (columns, rows) = cloud.size();
+    let focal = cloud.focal();
+    scratch.component.clear();
+    scratch.component.resize(columns * rows, u32::MAX);
+    let right = up.cross(&Vector3::z());
+    let mut components: Vec<Component> = Vec::new();
+    for seed in 0..columns * rows {
+        if cloud.labels[seed] != Label::Other || scratch.component[seed] != u32::MAX {
+            continue;
+        }
+        let id = components.len() as u32;
+        let mut c = Component {
+            id,
+            cells: 0,
+            area: 0.0,
+            lo: P3::new(f32::MAX, f32::MAX, f32::MAX),
+            hi: P3::new(f32::MIN, f32::MIN, f32::MIN),
+            centre: P3::origin(),
+            side_rows: 0,
+            rows: 0,
+        };
+        let (mut first_row, mut last_row) = (rows, 0);
+        scratch.component[seed] = id;
+        scratch.stack.push(seed as u32);
+        while let Some(i) = scratch.stack.pop() {
+            let i = i as usize;
+            let (u, v) = (i % columns, i / columns);
+            let (p, z) = (cloud.centre(i), cloud.depth[i]);
+            let q = P3::new(right.dot(&p.coords), up.dot(&p.coords), z);
+            (c.lo, c.hi) = (c.lo.inf(&q), c.hi.sup(&q));
+            c.centre += p.coords;
+            c.cells += 1;
+            c.area += z * z / (focal[0] * focal[1]);
+            c.side_rows += usize::from(u == 0 || u + 1 == columns);
+            (first_row, last_row) = (first_row.min(v), last_row.max(v));
+            let link = LINK + LINK_SLOPE * z;
+            for (du, dv) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
+                let Some(k) = cloud.cell(u as i32 + du, v as i32 + dv) else { continue };
+                let open = cloud.labels[k] == Label::Other && scratch.component[k] == u32::MAX;
+                if open && (cloud.depth[k] - z).abs() < link {
+                    scratch.component[k] = id;
+                    scratch.stack.push(k as u32);
+                }
+            }
+        }
+        c.centre = P3::from(c.centre.coords / c.cells as f32);
+        c.rows = last_row + 1 - first_row;
+        components.push(c);
+    }
+    components
+}
+
+fn choose(components: &[Component], prior: Option<Prior>) -> Option<&Component> {
+    let sized = |c: &&Component| {
+        let size = c.hi - c.lo;
+        (LEAST_AREA..MOST_AREA).contains(&c.area)
+            && (HEIGHT[0]..HEIGHT[1]).contains(&size.y)
+            && size.x < MOST_WIDTH
+            && (c.side_rows as f32) < SIDE_SHARE * c.rows as f32
+    };
+    if let Some(prior) = prior {
+        let off = |c: &Component| (c.centre - prior.centre).norm();
+        // Enough of it must be left to call it the person; half hidden is fine, a hand alone is not.
+        return components
+            .iter()
+            .filter(|c| c.area > 0.3 * LEAST_AREA && c.area < MOST_AREA && off(c) < prior.reach)
+            .max_by(|a, b| a.area.total_cmp(&b.area).then(b.id.cmp(&a.id)));
+    }
+    components.iter().filter(sized).min_by(|a, b| a.centre.z.total_cmp(&b.centre.z).then(a.id.cmp(&b.id)))
+}
+
+fn touches(cloud: &OrganisedCloud, scratch: &SegmentScratch, belongs: &[bool], cell: usize) -> bool {
+    let columns = cloud.size().0;
+    let (u, v) = ((cell % columns) as i32, (cell / columns) as i32);
+    (-PART_GAP..=PART_GAP).any(|dv| {
+        (-PART_GAP..=PART_GAP).any(|du| {
+            cloud.cell(u + du, v + dv).is_some_and(|k| {
+                let id = scratch.component[k];
+                id != u32::MAX && belongs[id as usize]
+            })
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::planes::tests::room;
+    use super::super::{ScenePlanes, find_planes};
+    use super::*;
+
+    #[test]
+    fn the_box_is_the_person_and_the_room_is_not() {
+        let (mut cloud, _) = room(0.1, true);
+        let scene = find_planes(&cloud);
+        let found = find_person(&mut cloud, &scene, None, &mut SegmentScratch::default());
+        // 0.4 × 1.7 m at 2.5 m with a focal length of 131 cells, less 20 mm of floor.
+        let expected = 0.4 * 1.68 * (131.25f32 / 2.5).powi(2);
+        assert!((found.cells.len() as f32 / expected - 1.0).abs() < 0.1, "{} of {expected}", found.cells.len());
+        assert!(!found.cut_below);
+        let prior = Prior { centre: P3::new(0.0, 0.2, 2.5), reach: 0.5 };
+        cloud.labels.fill(Label::Unknown);
+        let again = find_person(&mut cloud, &scene, Some(prior), &mut SegmentScratch::default());
+        assert_eq!(again.cells, found.cells);
+    }
+
+    #[test]
+    fn an_empty_room_and_an_empty_image_hold_nobody() {
+        let (mut cloud, _) = room(0.0, false);
+        let scene = find_planes(&cloud);
+        let mut scratch = SegmentScratch::default();
+        assert!(find_person(&mut cloud, &scene, None, &mut scratch).cells.is_empty());
+        cloud.depth.fill(0.0);
+        assert!(find_person(&mut cloud, &ScenePlanes::default(), None, &mut scratch).cells.is_empty());
+    }
+}

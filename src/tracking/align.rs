@@ -1,0 +1,317 @@
+//! The pose: pairs, normal equations, solve, until nothing moves (eq. 12).
+
+use super::kinematics::{apply, linearise};
+use super::model::TrackerModel;
+use crate::body::{BoneTransforms, JointMotion, Pose, RestBody};
+use crate::math::{P3, V3};
+use crate::registration::{
+    ArticulatedSums, Association, Dof, EdgePairs, GemanMcClure, Metric, ModelPoints, Pair, PairingConfig, PairingScratch,
+    PairingStats, pair_edges, pair_surfaces, solve_damped,
+};
+use crate::segment::Contour;
+use crate::spatial::{OrganisedCloud, PointTree};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+/// What the camera saw of the person.
+pub(super) struct Seen<'a> {
+    pub grid: &'a OrganisedCloud,
+    pub cells: &'a [u32],
+    pub contour: &'a Contour,
+    pub tree: Option<&'a PointTree>,
+}
+
+/// Samples of the personalised rest body.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SampleRest {
+    pub positions: Vec<P3>,
+    pub normals: Vec<V3>,
+}
+
+/// How one alignment goes about it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Schedule {
+    pub iterations: usize,
+    /// Width of the robust kernel at the first and from the fifth iteration on, metres.
+    pub sigma: [f64; 2],
+    /// Longest pair at the first and from the fifth iteration on, metres.
+    pub distance: [f32; 2],
+    pub pull: f32,
+}
+
+/// From frame to frame. The first reach is Table 1's 0.2 m less what prediction saves; the last is three times the
+/// residual of a wrong body.
+pub(super) const TRACK: Schedule = Schedule { iterations: 8, sigma: [0.08, 0.03], distance: [0.12, 0.06], pull: 0.35 };
+/// From a rough start.
+pub(super) const START: Schedule = Schedule { iterations: 20, sigma: [0.15, 0.04], distance: [0.20, 0.08], pull: 0.5 };
+
+/// Iterations over which kernel and reach shrink.
+const ANNEAL: f64 = 4.0;
+/// Damping per point (λᵣ of eq. 12 in units of one point): metres² for the root's translation, radians² for angles.
+const DAMPING: f64 = 1e-4;
+/// An update below this (metres, with a lever of [`LEVER`]) ends the iteration; the paper stops at 3 mm.
+const CONVERGED: f64 = 0.8e-3;
+/// Typical distance of skin from the joint that moves it, metres.
+const LEVER: f64 = 0.25;
+/// A reading without any model point near it, and a visible point without reading, count as this far off, metres.
+const UNEXPLAINED: f64 = 0.10;
+
+/// How an alignment ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Fit {
+    pub iterations: usize,
+    pub converged: bool,
+    /// Mean distance of pairs along the normal, metres, weighted by the kernel.
+    pub residual: f64,
+    /// Robust cost per point, m²; comparable between poses of one frame.
+    pub cost: f64,
+    /// Share of readings that the model explains, 0 to 1.
+    pub explained: f64,
+    /// Share of visible model points that found a reading, 0 to 1.
+    pub matched: f64,
+    pub pairs: PairingStats,
+}
+
+/// Scratch of the alignment.
+#[derive(Default)]
+pub(super) struct AlignScratch {
+    pub bones: BoneTransforms,
+    pub positions: Vec<P3>,
+    pub normals: Vec<V3>,
+    pub pairing: PairingScratch,
+    pub pairs: Vec<Pair>,
+    pub edges: EdgePairs,
+    pub dofs: Vec<Dof>,
+    sums: ArticulatedSums,
+    hessian: DMatrix<f64>,
+    gradient: DVector<f64>,
+    damping: Vec<f64>,
+}
+
+/// Poses the samples: positions by all weights, normals by the dominant bone.
+pub(super) fn skin_samples(model: &TrackerModel, rest: &SampleRest, scratch: &mut AlignScratch) {
+    let m: Vec<(Matrix3<f32>, V3)> = scratch
+        .bones
+        .bones
+        .iter()
+        .map(|b| (b.rotation.to_rotation_matrix().into_inner().cast::<f32>(), b.translation.vector.cast::<f32>()))
+        .collect();
+    scratch.positions.clear();
+    scratch.normals.clear();
+    for (i, p) in rest.positions.iter().enumerate() {
+        let (joints, weights) = (&model.weights.joints[i], &model.weights.weights[i]);
+        let mut sum = V3::zeros();
+        for k in 0..4 {
+            if weights[k] > 0.0 {
+                let (r, t) = &m[usize::from(joints[k])];
+                sum += (r * p.coords + t) * weights[k];
+            }
+        }
+        scratch.positions.push(P3::from(sum));
+        scratch.normals.push(m[usize::from(joints[0])].0 * rest.normals[i]);
+    }
+}
+
+/// Poses the samples and pairs them with what was seen.
+pub(super) fn pair(
+    model: &TrackerModel,
+    rest: (&RestBody, &SampleRest),
+    pose: &Pose,
+    seen: &Seen<'_>,
+    distance: f32,
+    pull: f32,
+    scratch: &mut AlignScratch,
+) -> PairingStats {
+    pose.bones(model.template.skeleton(), rest.0, &mut scratch.bones);
+    skin_samples(model, rest.1, scratch);
+    let points = ModelPoints {
+        positions: &scratch.positions,
+        normals: &scratch.normals,
+        bones: &model.bones,
+        parents: &model.parents,
+        spacing: model.spacing,
+    };
+    let config = PairingConfig {
+        association: model.config.association,
+        distance,
+        // Table 1: 60°.
+        cos_normal: 0.5,
+        pull: if model.config.pull { pull } else { 0.0 },
+        data_step: model.config.data_step,
+    };
+    let false_edges = &seen.contour.false_edges;
+    let stats = pair_surfaces(
+        &points, seen.grid, seen.cells, false_edges, seen.tree, &config, &mut scratch.pairing, &mut scratch.pairs,
+    );
+    if model.config.edge_weight > 0.0 {
+        let edges = &seen.contour.true_edges;
+        pair_edges(&points, seen.grid, edges, &scratch.pairing.image, 0.2, &mut scratch.edges);
+    } else {
+        scratch.edges.pairs.clear();
+    }
+    stats
+}
+
+/// One residual with its metric and weight.
+pub(super) struct Residual {
+    pub sample: usize,
+    pub bone: usize,
+    pub point: Vector3<f64>,
+    pub residual: Vector3<f64>,
+    pub metric: Metric,
+    pub weight: f64,
+}
+
+/// All residuals of the current pairs; returns (Σ weights, Σ weighted |normal residual|, Σ robust cost).
+pub(super) fn for_residuals(
+    model: &TrackerModel,
+    seen: &Seen<'_>,
+    scratch: &AlignScratch,
+    sigma: f64,
+    mut f: impl FnMut(&Residual),
+) -> (f64, f64, f64) {
+    let (mut total, mut off, mut cost) = (0.0, 0.0, 0.0);
+    let config = &model.config;
+    for pair in &scratch.pairs {
+        let i = pair.model as usize;
+        let p = scratch.positions[i].coords.cast::<f64>();
+        let r = seen.grid.points[pair.cell as usize].coords.cast::<f64>() - p;
+        let direction = scratch.normals[i].cast::<f64>();
+        let metric = Metric { isotropic: config.point_to_point, directional: config.point_to_plane, direction };
+        // A coarse pull is long by nature: the kernel widens with it so that it is not taken for an outlier.
+        let far = r.norm() > 0.12;
+        let kernel = GemanMcClure { sigma: if far { sigma.max(0.12) } else { sigma } };
+        let e2 = r.norm_squared();
+        let weight = kernel.weight(e2);
+        cost += kernel.value(e2).min(UNEXPLAINED * UNEXPLAINED);
+        total += weight;
+        off += weight * direction.dot(&r).abs();
+        f(&Residual { sample: i, bone: usize::from(model.bones[i]), point: p, residual: r, metric, weight });
+    }
+    for &(i, cell) in &scratch.edges.pairs {
+        let i = i as usize;
+        let p = scratch.positions[i].coords.cast::<f64>();
+        let ray = seen.grid.points[cell as usize].coords.cast::<f64>().normalize();
+        let r = ray * ray.dot(&p) - p;
+        let metric = Metric { isotropic: 1.0, directional: -1.0, direction: ray };
+        let weight = config.edge_weight * GemanMcClure { sigma }.weight(r.norm_squared());
+        f(&Residual { sample: i, bone: usize::from(model.bones[i]), point: p, residual: r, metric, weight });
+    }
+    (total, off, cost)
+}
+
+/// Cost of a pose as it is, for choosing between poses.
+pub(super) fn evaluate(
+    model: &TrackerModel,
+    rest: (&RestBody, &SampleRest),
+    pose: &Pose,
+    seen: &Seen<'_>,
+    distance: f32,
+    scratch: &mut AlignScratch,
+) -> Fit {
+    let stats = pair(model, rest, pose, seen, distance, 0.0, scratch);
+    let sums = for_residuals(model, seen, scratch, 0.05, |_| {});
+    summary(stats, sums, 0)
+}
+
+fn summary(stats: PairingStats, (total, off, cost): (f64, f64, f64), iterations: usize) -> Fit {
+    let missing = (stats.readings - stats.explained) + (stats.visible - stats.from_model);
+    let all = (stats.readings + stats.visible).max(1) as f64;
+    Fit {
+        iterations,
+        converged: false,
+        residual: if total > 0.0 { off / total } else { 0.0 },
+        cost: (cost + missing as f64 * UNEXPLAINED * UNEXPLAINED) / all,
+        explained: stats.explained as f64 / stats.readings.max(1) as f64,
+        matched: stats.from_model as f64 / stats.visible.max(1) as f64,
+        pairs: stats,
+    }
+}
+
+/// Gauss–Newton with damping, limits and a weak pull to the rest pose, from `pose` on.
+pub(super) fn align(
+    model: &TrackerModel,
+    rest: (&RestBody, &SampleRest),
+    pose: &mut Pose,
+    seen: &Seen<'_>,
+    schedule: &Schedule,
+    scratch: &mut AlignScratch,
+) -> Fit {
+    let mut fit = Fit::default();
+    for iteration in 0..schedule.iterations {
+        let t = (iteration as f64 / ANNEAL).min(1.0);
+        let sigma = schedule.sigma[0] + (schedule.sigma[1] - schedule.sigma[0]) * t;
+        let distance = schedule.distance[0] + (schedule.distance[1] - schedule.distance[0]) * t as f32;
+        let pull = if t < 1.0 { schedule.pull } else { 0.0 };
+        let stats = pair(model, rest, pose, seen, distance, pull, scratch);
+        let sums = assemble(model, pose, seen, sigma, scratch);
+        fit = summary(stats, sums, iteration + 1);
+        if sums.0 < 1.0 {
+            break;
+        }
+        let Some(x) = solve_damped(&scratch.hessian, &scratch.gradient, &scratch.damping) else { break };
+        let centre = scratch.bones.joints[0].coords;
+        apply(model.template.skeleton(), pose, &centre, &x);
+        let step = x.iter().enumerate().map(|(k, v)| if k < 3 { v.abs() } else { v.abs() * LEVER }).fold(0.0, f64::max);
+        if t >= 1.0 && step < CONVERGED {
+            fit.converged = true;
+            break;
+        }
+    }
+    fit
+}
+
+/// Fills the normal equations of the pose, per point, priors included.
+fn assemble(model: &TrackerModel, pose: &Pose, seen: &Seen<'_>, sigma: f64, scratch: &mut AlignScratch) -> (f64, f64, f64) {
+    let skeleton = model.template.skeleton();
+    let centre = scratch.bones.joints[0].coords;
+    let mut sums = std::mem::take(&mut scratch.sums);
+    sums.reset(model.parents.len());
+    let totals = for_residuals(model, seen, scratch, sigma, |r| {
+        sums.bones[r.bone].add(&(r.point - centre), &r.residual, &r.metric, r.weight);
+    });
+    let mut dofs = std::mem::take(&mut scratch.dofs);
+    linearise(skeleton, &scratch.bones, pose, &centre, &mut dofs);
+    sums.assemble(&model.parents, &dofs, &mut scratch.hessian, &mut scratch.gradient);
+    scratch.dofs = dofs;
+    scratch.sums = sums;
+    let scale = 1.0 / (scratch.pairs.len() + scratch.edges.pairs.len()).max(1) as f64;
+    scratch.hessian *= scale;
+    scratch.gradient *= scale;
+    scratch.damping.clear();
+    scratch.damping.resize(scratch.gradient.len(), DAMPING);
+    for (k, (&stiff, &angle)) in model.stiffness.iter().zip(&pose.angles).enumerate() {
+        scratch.hessian[(6 + k, 6 + k)] += stiff;
+        scratch.gradient[6 + k] -= stiff * angle;
+    }
+    totals
+}
+
+/// The normal equations that the last [`pair`] and [`assemble`] gave, undamped: (H, g), per point.
+pub(super) fn normal_equations(
+    model: &TrackerModel,
+    pose: &Pose,
+    seen: &Seen<'_>,
+    sigma: f64,
+    scratch: &mut AlignScratch,
+) -> (DMatrix<f64>, DVector<f64>) {
+    assemble(model, pose, seen, sigma, scratch);
+    (scratch.hessian.clone(), scratch.gradient.clone())
+}
+
+/// Turns a ball joint so that the bone to `child` points along `direction` (rest frame of its parent).
+pub(super) fn aim(model: &TrackerModel, pose: &mut Pose, joint: &str, child: &str, direction: Vector3<f64>) {
+    let skeleton = model.template.skeleton();
+    let (Some(j), Some(c)) = (skeleton.index(joint), skeleton.index(child)) else { return };
+    if !matches!(skeleton.joints()[j].motion, JointMotion::Ball { .. }) {
+        return;
+    }
+    let along = skeleton.joints()[c].rest - skeleton.joints()[j].rest;
+    if let Some(turn) = nalgebra::UnitQuaternion::rotation_between(&along, &direction) {
+        pose.set(skeleton, joint, crate::math::log_so3(&turn).as_slice());
+    }
+}
+
+/// Whether a tree over the readings is needed.
+pub(super) fn wants_tree(model: &TrackerModel) -> bool {
+    model.config.association == Association::KdTree
+}

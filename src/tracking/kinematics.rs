@@ -1,0 +1,148 @@
+//! The pose as unknowns: unit twists of every degree of freedom in the camera frame, and the update along them.
+
+use crate::body::{BoneTransforms, JointMotion, Pose, Skeleton};
+use crate::math::{Rigid, Twist, exp_se3, exp_so3, log_so3};
+use crate::registration::Dof;
+use nalgebra::{DVector, Vector3};
+
+/// Number of unknowns of a pose: six of the root, then the angles.
+pub(super) fn unknowns(skeleton: &Skeleton) -> usize {
+    6 + skeleton.dofs()
+}
+
+/// Unit twists (eq. 31) about the point `centre`, which becomes the origin of the twists' frame. An angle of a ball
+/// turns about an axis of its parent bone, so that the update is a rotation on the left.
+pub(super) fn linearise(skeleton: &Skeleton, bones: &BoneTransforms, pose: &Pose, centre: &Vector3<f64>, out: &mut Vec<Dof>) {
+    out.clear();
+    let axis = |k: usize| Vector3::from_fn(|r, _| if r == k { 1.0 } else { 0.0 });
+    for k in 0..3 {
+        out.push(Dof { bone: 0, twist: Twist { linear: axis(k), angular: Vector3::zeros() } });
+    }
+    for k in 0..3 {
+        out.push(Dof { bone: 0, twist: Twist { linear: Vector3::zeros(), angular: axis(k) } });
+    }
+    for (j, joint) in skeleton.joints().iter().enumerate() {
+        let rotation = joint.parent.map_or(pose.root.iso().rotation, |p| bones.bones[p].rotation);
+        let pivot = bones.joints[j].coords - centre;
+        let mut push = |a: Vector3<f64>| out.push(Dof { bone: j, twist: Twist::revolute(rotation * a, pivot) });
+        match &joint.motion {
+            JointMotion::Fixed => {}
+            JointMotion::Hinge { axis, .. } => push(Vector3::from(*axis)),
+            JointMotion::Ball { .. } => (0..3).for_each(|k| push(axis(k))),
+        }
+    }
+}
+
+/// Moves `pose` by the solution `x` of the normal equations and back into the joint limits.
+pub(super) fn apply(skeleton: &Skeleton, pose: &mut Pose, centre: &Vector3<f64>, x: &DVector<f64>) {
+    let xi = Twist { linear: Vector3::new(x[0], x[1], x[2]), angular: Vector3::new(x[3], x[4], x[5]) };
+    let shift = nalgebra::Translation3::from(*centre);
+    let mut root = shift * exp_se3(&xi) * shift.inverse() * pose.root.iso();
+    root.rotation.renormalize();
+    pose.root = Rigid::new(root);
+    for (j, joint) in skeleton.joints().iter().enumerate() {
+        let at = skeleton.dof_offset(j);
+        match &joint.motion {
+            JointMotion::Fixed => {}
+            JointMotion::Hinge { .. } => pose.angles[at] += x[6 + at],
+            JointMotion::Ball { .. } => {
+                let old = Vector3::new(pose.angles[at], pose.angles[at + 1], pose.angles[at + 2]);
+                let step = Vector3::new(x[6 + at], x[7 + at], x[8 + at]);
+                let new = log_so3(&(exp_so3(&step) * exp_so3(&old)));
+                pose.angles[at..at + 3].copy_from_slice(new.as_slice());
+            }
+        }
+    }
+    pose.clamp_to_limits(skeleton);
+}
+
+/// The pose that comes after `last` when the motion from `before` to `last` goes on for `ratio` of its time.
+pub(super) fn extrapolate(skeleton: &Skeleton, before: &Pose, last: &Pose, ratio: f64) -> Pose {
+    let mut next = last.clone();
+    let (a, b) = (before.root.iso(), last.root.iso());
+    let turn = log_so3(&(b.rotation * a.rotation.inverse())) * ratio;
+    let rotation = exp_so3(&turn) * b.rotation;
+    let translation = b.translation.vector + (b.translation.vector - a.translation.vector) * ratio;
+    next.root = Rigid::from_parts(translation, rotation);
+    for (j, joint) in skeleton.joints().iter().enumerate() {
+        let at = skeleton.dof_offset(j);
+        match &joint.motion {
+            JointMotion::Fixed => {}
+            JointMotion::Hinge { .. } => next.angles[at] += (last.angles[at] - before.angles[at]) * ratio,
+            JointMotion::Ball { .. } => {
+                let r = |p: &Pose| exp_so3(&Vector3::new(p.angles[at], p.angles[at + 1], p.angles[at + 2]));
+                let turn = log_so3(&(r(last) * r(before).inverse())) * ratio;
+                let new = log_so3(&(exp_so3(&turn) * r(last)));
+                next.angles[at..at + 3].copy_from_slice(new.as_slice());
+            }
+        }
+    }
+    next.clamp_to_limits(skeleton);
+    next
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::{Joint, RestBody};
+    use nalgebra::{Point3, UnitQuaternion};
+
+    fn arm() -> (Skeleton, RestBody, Pose) {
+        let ball = JointMotion::Ball { limits: [[-3.0, 3.0]; 3] };
+        let hinge = JointMotion::Hinge { axis: [0.0, 0.6, 0.8], limits: [-3.0, 3.0] };
+        let joint = |name: &str, parent, x: f64, motion| Joint { name: name.into(), parent, rest: Point3::new(x, 0.1 * x, 0.0), motion };
+        let skeleton = Skeleton::new(vec![
+            joint("pelvis", None, 0.0, JointMotion::Fixed),
+            joint("shoulder", Some(0), 0.2, ball),
+            joint("elbow", Some(1), 0.5, hinge),
+            joint("end", Some(2), 0.8, JointMotion::Fixed),
+        ])
+        .expect("valid");
+        let joints = skeleton.joints().iter().map(|j| j.rest).collect();
+        let mut pose = Pose::rest(&skeleton, Rigid::from_parts(Vector3::new(0.1, -0.2, 2.0), UnitQuaternion::from_euler_angles(0.3, 2.8, 0.1)));
+        pose.angles = vec![0.4, -0.7, 0.9, 0.5];
+        (skeleton, RestBody { joints, ..Default::default() }, pose)
+    }
+
+    #[test]
+    fn twists_are_the_derivative_of_the_update() {
+        let (skeleton, rest, pose) = arm();
+        let mut bones = BoneTransforms::default();
+        pose.bones(&skeleton, &rest, &mut bones);
+        let centre = bones.joints[0].coords;
+        let mut dofs = Vec::new();
+        linearise(&skeleton, &bones, &pose, &centre, &mut dofs);
+        assert_eq!(dofs.len(), unknowns(&skeleton));
+        let v = Point3::new(0.9, 0.05, 0.1);
+        let posed = |p: &Pose| {
+            let mut b = BoneTransforms::default();
+            p.bones(&skeleton, &rest, &mut b);
+            b.bones[2] * v
+        };
+        let here = posed(&pose);
+        for (k, dof) in dofs.iter().enumerate() {
+            let h = 1e-6;
+            let mut moved = pose.clone();
+            let mut x = DVector::zeros(dofs.len());
+            x[k] = h;
+            apply(&skeleton, &mut moved, &centre, &x);
+            let fd = (posed(&moved) - here) / h;
+            let ours = dof.twist.velocity_at(&(here.coords - centre));
+            assert!((fd - ours).norm() < 1e-5, "unknown {k}: {fd} against {ours}");
+        }
+    }
+
+    #[test]
+    fn a_steady_motion_is_predicted() {
+        let (skeleton, _, pose) = arm();
+        let x = DVector::from_fn(10, |i, _| 0.01 * (i as f64 - 4.0));
+        let c = Vector3::zeros();
+        let (mut one, mut two) = (pose.clone(), pose.clone());
+        apply(&skeleton, &mut one, &c, &x);
+        apply(&skeleton, &mut two, &c, &(&x * 2.0));
+        let guess = extrapolate(&skeleton, &pose, &one, 1.0);
+        let off = |a: &Pose, b: &Pose| a.angles.iter().zip(&b.angles).map(|(p, q)| (p - q).abs()).fold(0.0, f64::max);
+        assert!(off(&guess, &two) < 0.2 * off(&one, &two));
+        assert_eq!(extrapolate(&skeleton, &pose, &one, 0.0).angles, one.angles);
+    }
+}

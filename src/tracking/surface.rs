@@ -1,0 +1,205 @@
+//! Surface displacements along the rest normals (section 3.3, eq. 13 to 17), by warm-started conjugate gradients.
+
+use super::align::Seen;
+use super::model::TrackerModel;
+use crate::body::{BoneTransforms, RestBody, skin};
+use crate::math::{P3, V3};
+use crate::par::Par;
+use crate::registration::IndexImage;
+use crate::spatial::Label;
+use serde::{Deserialize, Serialize};
+
+/// Mean and variance of each displacement, updated online.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SurfaceStatistics {
+    /// Updates so far.
+    pub count: u32,
+    mean: Vec<f32>,
+    /// Sum of squared deviations.
+    spread: Vec<f32>,
+}
+
+/// Scratch of the fit.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SurfaceScratch {
+    posed: Vec<P3>,
+    target: Vec<f32>,
+    weight: Vec<f32>,
+    diagonal: Vec<f32>,
+    residual: Vec<f32>,
+    direction: Vec<f32>,
+    image: Vec<f32>,
+    preconditioned: Vec<f32>,
+    laplacian: Vec<V3>,
+}
+
+/// Weights of eq. 17 and the frame from which the temporal term acts (paper, section 3.3).
+const LAPLACIAN: f32 = 4.0;
+const TEMPORAL: f32 = 6.0;
+const SPATIAL: f32 = 2.0;
+const TEMPORAL_FROM: u32 = 20;
+/// Pull to zero where nothing was ever seen: displacements explain only what shape does not.
+const RIDGE: f32 = 0.05;
+/// Longest displacement towards a reading, metres (paper, section 3.3).
+const DISTANCE: f32 = 0.05;
+/// Deviation at which the temporal term weighs as much as a reading, metres; the paper leaves its unit open.
+const UNIT_DEVIATION: f32 = 0.005;
+/// Smallest deviation of a displacement, metres: averaged depth is no better.
+const LEAST_DEVIATION: f32 = 0.002;
+/// Conjugate gradient iterations, warm-started: the error left is carried to the next frame.
+const ITERATIONS: usize = 5;
+/// Points behind the drawn body by more than this (metres) are hidden.
+const HIDDEN: f32 = 0.04;
+/// Cosine between the surface normal and the ray below which readings say little about displacement.
+const GRAZING: f32 = 0.35;
+
+/// Updates displacements from one frame; `image` is the model drawn into the grid. Returns how many vertices had a
+/// reading.
+pub(super) fn fit(
+    model: &TrackerModel,
+    rest: &RestBody,
+    bones: &BoneTransforms,
+    seen: &Seen<'_>,
+    image: &IndexImage,
+    displacements: &mut Vec<f32>,
+    statistics: &mut SurfaceStatistics,
+    s: &mut SurfaceScratch,
+) -> usize {
+    let template = &model.template;
+    let n = rest.base.len();
+    displacements.resize(n, 0.0);
+    statistics.mean.resize(n, 0.0);
+    statistics.spread.resize(n, 0.0);
+    let weights = template.weights();
+    skin(Par::Rayon, &rest.base, weights, bones, &mut s.posed);
+    let rotations: Vec<_> =
+        bones.bones.iter().map(|b| b.rotation.to_rotation_matrix().into_inner().cast::<f32>()).collect();
+    s.target.clear();
+    s.target.resize(n, 0.0);
+    s.weight.clear();
+    s.weight.resize(n, 0.0);
+    let mut readings = 0;
+    for i in 0..n {
+        let p = s.posed[i];
+        let normal = rotations[weights.dominant(i)] * rest.normals[i];
+        if normal.dot(&p.coords) > -GRAZING * p.coords.norm() {
+            continue;
+        }
+        let Some(cell) = seen.grid.cell_of(&p).and_then(|(u, v)| seen.grid.cell(u, v)) else { continue };
+        let usable = seen.grid.labels[cell] == Label::Person && !seen.contour.false_edges[cell];
+        if !usable || p.z > image.depth[cell] + HIDDEN {
+            continue;
+        }
+        let facet = seen.grid.normals[cell];
+        let slope = facet.dot(&normal);
+        if slope < 0.5 {
+            continue;
+        }
+        // Where the vertex's normal meets the plane of the reading.
+        let d = facet.dot(&(seen.grid.points[cell] - p)) / slope;
+        if d.abs() < DISTANCE {
+            s.target[i] = d;
+            s.weight[i] = 1.0;
+            readings += 1;
+        }
+    }
+    solve(model, rest, displacements, statistics, s);
+    statistics.count += 1;
+    let count = statistics.count as f32;
+    for i in 0..n {
+        let off = displacements[i] - statistics.mean[i];
+        statistics.mean[i] += off / count;
+        statistics.spread[i] += off * (displacements[i] - statistics.mean[i]);
+    }
+    readings
+}
+
+/// Sum in f64, in order: the same bits every time.
+fn dot(a: &[f32], b: &[f32]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| f64::from(x * y)).sum()
+}
+
+fn solve(model: &TrackerModel, rest: &RestBody, d: &mut [f32], statistics: &SurfaceStatistics, s: &mut SurfaceScratch) {
+    let n = d.len();
+    let neighbours = model.template.topology().vertex_neighbours();
+    let temporal = |i: usize| {
+        if statistics.count < TEMPORAL_FROM {
+            return 0.0;
+        }
+        let variance = statistics.spread[i] / statistics.count as f32 + LEAST_DEVIATION * LEAST_DEVIATION;
+        TEMPORAL * UNIT_DEVIATION * UNIT_DEVIATION / variance
+    };
+    s.diagonal.clear();
+    for i in 0..n {
+        s.diagonal.push(s.weight[i] + temporal(i) + RIDGE);
+    }
+    // b = ω t + temporal μ; r = b − A d.
+    apply(neighbours, &rest.normals, &s.diagonal, d, &mut s.laplacian, &mut s.image);
+    s.residual.clear();
+    for i in 0..n {
+        let b = s.weight[i] * s.target[i] + temporal(i) * statistics.mean[i];
+        s.residual.push(b - s.image[i]);
+    }
+    // Jacobi: the Laplacian's own diagonal is about 1 + 1/deg, the spatial term's is deg.
+    let jacobi: Vec<f32> = (0..n)
+        .map(|i| 1.0 / (s.diagonal[i] + SPATIAL * neighbours.row(i).len() as f32 + LAPLACIAN * 1.17))
+        .collect();
+    s.preconditioned.clear();
+    s.preconditioned.extend(s.residual.iter().zip(&jacobi).map(|(r, m)| r * m));
+    s.direction.clone_from(&s.preconditioned);
+    let mut rz = dot(&s.residual, &s.preconditioned);
+    for _ in 0..ITERATIONS {
+        apply(neighbours, &rest.normals, &s.diagonal, &s.direction, &mut s.laplacian, &mut s.image);
+        let curvature = dot(&s.direction, &s.image);
+        if curvature <= 0.0 || rz <= 0.0 {
+            break;
+        }
+        let alpha = (rz / curvature) as f32;
+        for i in 0..n {
+            d[i] += alpha * s.direction[i];
+            s.residual[i] -= alpha * s.image[i];
+            s.preconditioned[i] = s.residual[i] * jacobi[i];
+        }
+        let next = dot(&s.residual, &s.preconditioned);
+        let beta = (next / rz) as f32;
+        rz = next;
+        for i in 0..n {
+            s.direction[i] = s.preconditioned[i] + beta * s.direction[i];
+        }
+    }
+}
+
+/// `out = (diagonal + SPATIAL · graph Laplacian + LAPLACIAN · LᵀL) x`, where (L x)ᵢ = nᵢ xᵢ − mean of the
+/// neighbours' nⱼ xⱼ (eq. 14 with the mean for the sum, so that flat parts cost nothing).
+fn apply(
+    neighbours: &crate::mesh::Csr,
+    normals: &[V3],
+    diagonal: &[f32],
+    x: &[f32],
+    laplacian: &mut Vec<V3>,
+    out: &mut Vec<f32>,
+) {
+    let n = x.len();
+    laplacian.clear();
+    out.clear();
+    for i in 0..n {
+        let row = neighbours.row(i);
+        let (mut sum, mut difference) = (V3::zeros(), 0.0);
+        for &j in row {
+            let j = j as usize;
+            sum += normals[j] * x[j];
+            difference += x[i] - x[j];
+        }
+        let degree = row.len().max(1) as f32;
+        laplacian.push(normals[i] * x[i] - sum / degree);
+        out.push(diagonal[i] * x[i] + SPATIAL * difference);
+    }
+    for i in 0..n {
+        let mut sum = laplacian[i];
+        for &j in neighbours.row(i) {
+            let j = j as usize;
+            sum -= laplacian[j] / neighbours.row(j).len().max(1) as f32;
+        }
+        out[i] += LAPLACIAN * normals[i].dot(&sum);
+    }
+}
