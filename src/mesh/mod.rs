@@ -4,7 +4,7 @@ mod normals;
 mod topology;
 
 pub use normals::{face_normal, vertex_normals};
-pub use topology::{Edge, Topology};
+pub use topology::{Csr, Edge, Topology};
 
 use crate::math::P3;
 use serde::{Deserialize, Serialize};

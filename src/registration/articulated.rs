@@ -51,7 +51,8 @@ impl BoneSums {
         let w = metric.isotropic * weight;
         self.mass += w;
         self.first += p * w;
-        for (slot, v) in self.second.iter_mut().zip([p.x * p.x, p.x * p.y, p.x * p.z, p.y * p.y, p.y * p.z, p.z * p.z]) {
+        for (slot, v) in self.second.iter_mut().zip([p.x * p.x, p.x * p.y, p.x * p.z, p.y * p.y, p.y * p.z, p.z * p.z])
+        {
             *slot += v * w;
         }
     }
@@ -173,7 +174,11 @@ mod tests {
         for i in 0..200 {
             let (bone, p, r) = (i % 6, v3() * 2.0, v3() * 0.1);
             let isotropic = 0.1 + 0.01 * (i % 5) as f64;
-            let metric = Metric { isotropic, directional: if i % 7 == 0 { -isotropic } else { 1.0 }, direction: v3().normalize() };
+            let metric = Metric {
+                isotropic,
+                directional: if i % 7 == 0 { -isotropic } else { 1.0 },
+                direction: v3().normalize(),
+            };
             let w = 0.5 + 0.1 * (i % 4) as f64;
             sums.bones[bone].add(&p, &r, &metric, w);
             let mut j = DMatrix::zeros(3, 13);

@@ -103,9 +103,8 @@ fn outward(grid: &OrganisedCloud, x: i32, y: i32) -> [f32; 2] {
     let mut sum = [0.0f32; 2];
     let z = grid.cell(x, y).map_or(0.0, |k| grid.depth[k]);
     for (du, dv) in [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)] {
-        let open = grid.cell(x + du, y + dv).is_none_or(|k| {
-            grid.labels[k] != Label::Person || grid.depth[k] > z + STEP
-        });
+        let open =
+            grid.cell(x + du, y + dv).is_none_or(|k| grid.labels[k] != Label::Person || grid.depth[k] > z + STEP);
         if open {
             sum[0] += du as f32;
             sum[1] += dv as f32;

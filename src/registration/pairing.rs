@@ -128,9 +128,10 @@ pub fn pair_surfaces(
         }
         stats.visible += 1;
         let best = match exact {
-            Some(tree) => tree.nearest(p, config.distance).map(|(k, _)| cells[k] as usize).filter(|&k| {
-                !false_edges[k] && grid.normals[k].dot(n) >= config.cos_normal
-            }),
+            Some(tree) => tree
+                .nearest(p, config.distance)
+                .map(|(k, _)| cells[k] as usize)
+                .filter(|&k| !false_edges[k] && grid.normals[k].dot(n) >= config.cos_normal),
             None => {
                 let r = window(p.z);
                 // Thin out wide windows: a step of two misses nothing that the next iteration would not find.
@@ -178,9 +179,10 @@ pub fn pair_surfaces(
         }
         stats.readings += 1;
         let best = match &model_tree {
-            Some(tree) => tree.nearest(&c, config.distance).map(|(i, _)| scratch.facing[i]).filter(|&i| {
-                model.normals[i as usize].dot(&n) >= config.cos_normal
-            }),
+            Some(tree) => tree
+                .nearest(&c, config.distance)
+                .map(|(i, _)| scratch.facing[i])
+                .filter(|&i| model.normals[i as usize].dot(&n) >= config.cos_normal),
             None => {
                 let (u, v) = ((k % columns) as i32, (k / columns) as i32);
                 let r = window(c.z).min(6);
@@ -276,14 +278,16 @@ mod tests {
         let shift = V3::new(0.03, -0.02, 0.02);
         let (cloud, cells, positions, normals) = sphere(shift);
         let bones = vec![0u8; positions.len()];
-        let model = ModelPoints { positions: &positions, normals: &normals, bones: &bones, parents: &[None], spacing: 0.028 };
+        let model =
+            ModelPoints { positions: &positions, normals: &normals, bones: &bones, parents: &[None], spacing: 0.028 };
         let points: Vec<P3> = cells.iter().map(|&c| cloud.points[c as usize]).collect();
         let tree = PointTree::new(&points);
         let no_edges = vec![false; cloud.depth.len()];
         for association in [Association::Projective, Association::KdTree] {
             let config = PairingConfig { association, distance: 0.1, cos_normal: 0.5, pull: 0.0, data_step: 1 };
             let (mut scratch, mut pairs) = (PairingScratch::default(), vec![]);
-            let stats = pair_surfaces(&model, &cloud, &cells, &no_edges, Some(&tree), &config, &mut scratch, &mut pairs);
+            let stats =
+                pair_surfaces(&model, &cloud, &cells, &no_edges, Some(&tree), &config, &mut scratch, &mut pairs);
             assert!(stats.visible > 500 && stats.from_model * 10 > stats.visible * 8, "{association:?} {stats:?}");
             assert!(stats.explained * 10 > stats.readings * 8, "{association:?} {stats:?}");
             for p in &pairs {
@@ -298,7 +302,8 @@ mod tests {
     fn windows_find_what_the_tree_finds() {
         let (cloud, cells, positions, normals) = sphere(V3::new(0.01, 0.0, 0.0));
         let bones = vec![0u8; positions.len()];
-        let model = ModelPoints { positions: &positions, normals: &normals, bones: &bones, parents: &[None], spacing: 0.028 };
+        let model =
+            ModelPoints { positions: &positions, normals: &normals, bones: &bones, parents: &[None], spacing: 0.028 };
         let points: Vec<P3> = cells.iter().map(|&c| cloud.points[c as usize]).collect();
         let tree = PointTree::new(&points);
         let no_edges = vec![false; cloud.depth.len()];
@@ -306,7 +311,8 @@ mod tests {
             let config = PairingConfig { association, distance: 0.05, cos_normal: 0.5, pull: 0.0, data_step: 1 };
             let (mut scratch, mut pairs) = (PairingScratch::default(), vec![]);
             pair_surfaces(&model, &cloud, &cells, &no_edges, Some(&tree), &config, &mut scratch, &mut pairs);
-            let d: f32 = pairs.iter().map(|p| (cloud.points[p.cell as usize] - positions[p.model as usize]).norm()).sum();
+            let d: f32 =
+                pairs.iter().map(|p| (cloud.points[p.cell as usize] - positions[p.model as usize]).norm()).sum();
             d / pairs.len() as f32
         };
         let (window, exact) = (mean(Association::Projective), mean(Association::KdTree));
@@ -317,8 +323,10 @@ mod tests {
     fn nothing_pairs_with_nothing() {
         let (cloud, _, positions, normals) = sphere(V3::zeros());
         let bones = vec![0u8; positions.len()];
-        let model = ModelPoints { positions: &positions, normals: &normals, bones: &bones, parents: &[None], spacing: 0.028 };
-        let config = PairingConfig { association: Association::KdTree, distance: 0.1, cos_normal: 0.5, pull: 0.3, data_step: 1 };
+        let model =
+            ModelPoints { positions: &positions, normals: &normals, bones: &bones, parents: &[None], spacing: 0.028 };
+        let config =
+            PairingConfig { association: Association::KdTree, distance: 0.1, cos_normal: 0.5, pull: 0.3, data_step: 1 };
         let (mut scratch, mut pairs) = (PairingScratch::default(), vec![]);
         let no_edges = vec![false; cloud.depth.len()];
         let tree = PointTree::new(&[]);

@@ -106,12 +106,7 @@ pub fn find_planes(cloud: &OrganisedCloud) -> ScenePlanes {
 }
 
 /// Best plane of random neighbouring triples, polished twice by least squares on its inliers.
-fn largest_plane(
-    cloud: &OrganisedCloud,
-    cells: &[usize],
-    points: &[P3],
-    rng: &mut rand_pcg::Pcg32,
-) -> Option<Plane> {
+fn largest_plane(cloud: &OrganisedCloud, cells: &[usize], points: &[P3], rng: &mut rand_pcg::Pcg32) -> Option<Plane> {
     let columns = cloud.size().0;
     let count = |plane: &Plane, step: usize| {
         points.iter().step_by(step).filter(|p| plane.distance(p).abs() < tolerance(plane, p)).count()
@@ -120,7 +115,8 @@ fn largest_plane(
     for _ in 0..TRIALS {
         let at = cells[rng.random_range(0..cells.len())];
         let mut near = || {
-            let (du, dv) = (rng.random_range(-TRIPLE_REACH..=TRIPLE_REACH), rng.random_range(-TRIPLE_REACH..=TRIPLE_REACH));
+            let (du, dv) =
+                (rng.random_range(-TRIPLE_REACH..=TRIPLE_REACH), rng.random_range(-TRIPLE_REACH..=TRIPLE_REACH));
             let cell = cloud.cell((at % columns) as i32 + du, (at / columns) as i32 + dv)?;
             (cloud.depth[cell] > 0.0).then(|| cloud.centre(cell).cast::<f64>())
         };
@@ -134,7 +130,8 @@ fn largest_plane(
     }
     let (_, mut plane) = best?;
     for _ in 0..2 {
-        let inliers: Vec<P3> = points.iter().filter(|p| plane.distance(p).abs() < tolerance(&plane, p)).copied().collect();
+        let inliers: Vec<P3> =
+            points.iter().filter(|p| plane.distance(p).abs() < tolerance(&plane, p)).copied().collect();
         let (centroid, axes, _) = principal_axes(&inliers)?;
         plane = through(&centroid, &axes.column(2).into_owned())?;
     }

@@ -17,12 +17,8 @@ impl PointTree {
     }
     /// Index and squared distance of the point nearest to `query`, if it is nearer than `radius`.
     pub fn nearest(&self, query: &P3, radius: f32) -> Option<(usize, f32)> {
-        let found = self
-            .tree
-            .as_ref()?
-            .query(&[query.x, query.y, query.z])
-            .nearest_one::<SquaredEuclidean<f32>>()
-            .execute();
+        let found =
+            self.tree.as_ref()?.query(&[query.x, query.y, query.z]).nearest_one::<SquaredEuclidean<f32>>().execute();
         (found.distance < radius * radius).then_some((found.item as usize, found.distance))
     }
 }

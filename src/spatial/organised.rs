@@ -58,23 +58,35 @@ pub struct OrganisedCloud {
 impl OrganisedCloud {
     /// An empty grid for a camera; `stride` in pixels, or `None` for the default.
     pub fn new(camera: &Intrinsics, stride: Option<u32>) -> Self {
-        let focal = camera.fx.min(camera.fy);
-        let automatic = (focal / CELLS_PER_FOCAL_LENGTH).round().clamp(1.0, 16.0) as u32;
-        let stride = stride.unwrap_or(automatic).clamp(1, camera.width.min(camera.height).max(1));
-        let (columns, rows) = (camera.width / stride, camera.height / stride);
-        let s = f64::from(stride);
+        let (stride, (f, c, (columns, rows))) = Self::layout(camera, stride);
         let n = columns as usize * rows as usize;
         Self {
             stride,
             columns,
             rows,
-            f: [(camera.fx / s) as f32, (camera.fy / s) as f32],
-            c: [((camera.cx + 0.5) / s - 0.5) as f32, ((camera.cy + 0.5) / s - 0.5) as f32],
+            f,
+            c,
             depth: vec![0.0; n],
             labels: vec![Label::Unknown; n],
             points: vec![P3::origin(); n],
             normals: vec![V3::zeros(); n],
         }
+    }
+    /// This grid was made for that camera and stride.
+    pub fn fits(&self, camera: &Intrinsics, stride: Option<u32>) -> bool {
+        let (s, focal) = Self::layout(camera, stride);
+        self.stride == s && self.f == focal.0 && self.c == focal.1 && (self.columns, self.rows) == focal.2
+    }
+    /// Stride, and focal lengths, centre and size in cells.
+    #[allow(clippy::type_complexity)] // three pairs of numbers, used twice below
+    fn layout(camera: &Intrinsics, stride: Option<u32>) -> (u32, ([f32; 2], [f32; 2], (u32, u32))) {
+        let focal = camera.fx.min(camera.fy);
+        let automatic = (focal / CELLS_PER_FOCAL_LENGTH).round().clamp(1.0, 16.0) as u32;
+        let stride = stride.unwrap_or(automatic).clamp(1, camera.width.min(camera.height).max(1));
+        let s = f64::from(stride);
+        let f = [(camera.fx / s) as f32, (camera.fy / s) as f32];
+        let c = [((camera.cx + 0.5) / s - 0.5) as f32, ((camera.cy + 0.5) / s - 0.5) as f32];
+        (stride, (f, c, (camera.width / stride, camera.height / stride)))
     }
     /// Columns and rows.
     pub fn size(&self) -> (usize, usize) {
@@ -155,7 +167,8 @@ impl OrganisedCloud {
             let (u0, v0) = ((cell % self.columns as usize) * s, (cell / self.columns as usize) * s);
             let mean_about = |reference: f32| {
                 let tolerance = SAME_SURFACE + SAME_SURFACE_SLOPE * reference;
-                let (lo, hi) = (((reference - tolerance) * 1e3).max(1.0) as u16, ((reference + tolerance) * 1e3) as u16);
+                let (lo, hi) =
+                    (((reference - tolerance) * 1e3).max(1.0) as u16, ((reference + tolerance) * 1e3) as u16);
                 let (mut n, mut sum, mut su, mut sv) = (0u32, 0u32, 0u32, 0u32);
                 for dv in 0..s {
                     let start = (v0 + dv) * w + u0;
@@ -210,7 +223,8 @@ impl OrganisedCloud {
         let (u, v) = ((cell % self.columns as usize) as i32, (cell / self.columns as usize) as i32);
         let at = |du: i32, dv: i32| {
             let k = self.cell(u + du, v + dv)?;
-            let same = self.labels[k] == Label::Person && self.depth[k] > 0.0 && (self.depth[k] - z).abs() < DISCONTINUITY;
+            let same =
+                self.labels[k] == Label::Person && self.depth[k] > 0.0 && (self.depth[k] - z).abs() < DISCONTINUITY;
             same.then(|| self.points[k])
         };
         let here = self.points[cell];
@@ -283,9 +297,10 @@ mod tests {
         clean.sample(&truth, 8.0);
         person_everywhere(&mut clean);
         clean.refine(&truth, &cells);
-        let off = cells.iter().filter(|&&c| cloud.depth[c as usize] > 0.0).map(|&c| {
-            (cloud.points[c as usize] - clean.points[c as usize]).norm()
-        });
+        let off = cells
+            .iter()
+            .filter(|&&c| cloud.depth[c as usize] > 0.0)
+            .map(|&c| (cloud.points[c as usize] - clean.points[c as usize]).norm());
         assert!(off.fold(0.0f32, f32::max) < 0.03);
     }
 

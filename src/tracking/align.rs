@@ -5,8 +5,8 @@ use super::model::TrackerModel;
 use crate::body::{BoneTransforms, JointMotion, Pose, RestBody};
 use crate::math::{P3, V3};
 use crate::registration::{
-    ArticulatedSums, Association, Dof, EdgePairs, GemanMcClure, Metric, ModelPoints, Pair, PairingConfig, PairingScratch,
-    PairingStats, pair_edges, pair_surfaces, solve_damped,
+    ArticulatedSums, Association, Dof, EdgePairs, GemanMcClure, Metric, ModelPoints, Pair, PairingConfig,
+    PairingScratch, PairingStats, pair_edges, pair_surfaces, solve_damped,
 };
 use crate::segment::Contour;
 use crate::spatial::{OrganisedCloud, PointTree};
@@ -140,7 +140,14 @@ pub(super) fn pair(
     };
     let false_edges = &seen.contour.false_edges;
     let stats = pair_surfaces(
-        &points, seen.grid, seen.cells, false_edges, seen.tree, &config, &mut scratch.pairing, &mut scratch.pairs,
+        &points,
+        seen.grid,
+        seen.cells,
+        false_edges,
+        seen.tree,
+        &config,
+        &mut scratch.pairing,
+        &mut scratch.pairs,
     );
     if model.config.edge_weight > 0.0 {
         let edges = &seen.contour.true_edges;
@@ -261,7 +268,13 @@ pub(super) fn align(
 }
 
 /// Fills the normal equations of the pose, per point, priors included.
-fn assemble(model: &TrackerModel, pose: &Pose, seen: &Seen<'_>, sigma: f64, scratch: &mut AlignScratch) -> (f64, f64, f64) {
+fn assemble(
+    model: &TrackerModel,
+    pose: &Pose,
+    seen: &Seen<'_>,
+    sigma: f64,
+    scratch: &mut AlignScratch,
+) -> (f64, f64, f64) {
     let skeleton = model.template.skeleton();
     let centre = scratch.bones.joints[0].coords;
     let mut sums = std::mem::take(&mut scratch.sums);

@@ -5,14 +5,15 @@ use crate::math::{Rigid, Twist, exp_se3, exp_so3, log_so3};
 use crate::registration::Dof;
 use nalgebra::{DVector, Vector3};
 
-/// Number of unknowns of a pose: six of the root, then the angles.
-pub(super) fn unknowns(skeleton: &Skeleton) -> usize {
-    6 + skeleton.dofs()
-}
-
 /// Unit twists (eq. 31) about the point `centre`, which becomes the origin of the twists' frame. An angle of a ball
 /// turns about an axis of its parent bone, so that the update is a rotation on the left.
-pub(super) fn linearise(skeleton: &Skeleton, bones: &BoneTransforms, pose: &Pose, centre: &Vector3<f64>, out: &mut Vec<Dof>) {
+pub(super) fn linearise(
+    skeleton: &Skeleton,
+    bones: &BoneTransforms,
+    pose: &Pose,
+    centre: &Vector3<f64>,
+    out: &mut Vec<Dof>,
+) {
     out.clear();
     let axis = |k: usize| Vector3::from_fn(|r, _| if r == k { 1.0 } else { 0.0 });
     for k in 0..3 {
@@ -90,7 +91,12 @@ mod tests {
     fn arm() -> (Skeleton, RestBody, Pose) {
         let ball = JointMotion::Ball { limits: [[-3.0, 3.0]; 3] };
         let hinge = JointMotion::Hinge { axis: [0.0, 0.6, 0.8], limits: [-3.0, 3.0] };
-        let joint = |name: &str, parent, x: f64, motion| Joint { name: name.into(), parent, rest: Point3::new(x, 0.1 * x, 0.0), motion };
+        let joint = |name: &str, parent, x: f64, motion| Joint {
+            name: name.into(),
+            parent,
+            rest: Point3::new(x, 0.1 * x, 0.0),
+            motion,
+        };
         let skeleton = Skeleton::new(vec![
             joint("pelvis", None, 0.0, JointMotion::Fixed),
             joint("shoulder", Some(0), 0.2, ball),
@@ -99,7 +105,10 @@ mod tests {
         ])
         .expect("valid");
         let joints = skeleton.joints().iter().map(|j| j.rest).collect();
-        let mut pose = Pose::rest(&skeleton, Rigid::from_parts(Vector3::new(0.1, -0.2, 2.0), UnitQuaternion::from_euler_angles(0.3, 2.8, 0.1)));
+        let mut pose = Pose::rest(
+            &skeleton,
+            Rigid::from_parts(Vector3::new(0.1, -0.2, 2.0), UnitQuaternion::from_euler_angles(0.3, 2.8, 0.1)),
+        );
         pose.angles = vec![0.4, -0.7, 0.9, 0.5];
         (skeleton, RestBody { joints, ..Default::default() }, pose)
     }
@@ -112,7 +121,7 @@ mod tests {
         let centre = bones.joints[0].coords;
         let mut dofs = Vec::new();
         linearise(&skeleton, &bones, &pose, &centre, &mut dofs);
-        assert_eq!(dofs.len(), unknowns(&skeleton));
+        assert_eq!(dofs.len(), 6 + skeleton.dofs());
         let v = Point3::new(0.9, 0.05, 0.1);
         let posed = |p: &Pose| {
             let mut b = BoneTransforms::default();

@@ -1,1 +1,22 @@
 //! One step from a frame and the last state to pose, displacements and a confidence report.
+
+mod align;
+mod config;
+mod kinematics;
+mod model;
+mod place;
+mod report;
+mod size;
+mod state;
+mod step;
+mod surface;
+mod workspace;
+
+pub use config::TrackerConfig;
+pub use model::TrackerModel;
+pub use report::{Skipped, StagesMs, StepError, StepReport};
+pub use size::SizeEstimate;
+pub use state::{LostReason, Status, TrackerState};
+pub use step::step;
+pub use surface::SurfaceStatistics;
+pub use workspace::Workspace;

@@ -117,9 +117,8 @@ fn bone_directions(template: &Template, samples: &[u32], weights: &SkinWeights) 
         // End points have no skin of their own; their bones follow by displacement and shape.
         let Some(parent) = joint.parent.filter(|_| joint.motion != JointMotion::Fixed) else { continue };
         let bone = rest[m] - rest[parent];
-        let moved: Vec<Vector3<f64>> = (0..joints.len())
-            .map(|j| if skeleton.is_ancestor(m, j) { bone } else { Vector3::zeros() })
-            .collect();
+        let moved: Vec<Vector3<f64>> =
+            (0..joints.len()).map(|j| if skeleton.is_ancestor(m, j) { bone } else { Vector3::zeros() }).collect();
         let offset = |s: usize| {
             let v = template.mesh().vertices()[samples[s] as usize].cast::<f64>();
             let mut sum = Vector3::zeros();
@@ -163,7 +162,13 @@ fn stiffness(template: &Template) -> Vec<f64> {
         let name = joint.name.as_str();
         let stiff = ["spine", "neck", "collar", "wrist", "foot", "hand"].iter().any(|s| name.contains(s));
         let ankle = name.contains("ankle") || name.contains("head");
-        let weight = if stiff { 2e-5 } else if ankle { 1e-5 } else { 2e-6 };
+        let weight = if stiff {
+            2e-5
+        } else if ankle {
+            1e-5
+        } else {
+            2e-6
+        };
         out.extend(std::iter::repeat_n(weight, joint.motion.dofs()));
     }
     out

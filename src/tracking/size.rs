@@ -70,11 +70,10 @@ impl SizeEstimate {
             self.information = total.as_slice().to_vec();
             self.evidence = sum.as_slice().to_vec();
         }
-        let change = store(model, &next, shape);
+        store(model, &next, shape);
         (0..n)
             .map(|d| (next[d] - now[d]).abs() * if model.directions[d].bone.is_some() { 10.0 } else { 1.0 })
             .fold(0.0, f64::max)
-            .min(change)
     }
 }
 
@@ -89,8 +88,8 @@ fn current(model: &TrackerModel, shape: &BodyShape) -> DVector<f64> {
     )
 }
 
-/// Writes a vector of [`current`]'s form into a shape, within bounds; returns infinity (a change may be anything).
-fn store(model: &TrackerModel, x: &DVector<f64>, shape: &mut BodyShape) -> f64 {
+/// Writes a vector of [`current`]'s form into a shape, within bounds.
+fn store(model: &TrackerModel, x: &DVector<f64>, shape: &mut BodyShape) {
     let coefficients = model.directions.iter().filter(|d| d.bone.is_none()).count();
     shape.coefficients.resize(coefficients, 0.0);
     shape.bone_scales.resize(model.parents.len(), 1.0);
@@ -100,7 +99,6 @@ fn store(model: &TrackerModel, x: &DVector<f64>, shape: &mut BodyShape) -> f64 {
             Some(j) => shape.bone_scales[j] = (1.0 + x[d]).clamp(SCALES[0], SCALES[1]),
         }
     }
-    f64::INFINITY
 }
 
 /// Data and prior: (Λ + P) x = η, with eq. 23 in P.
@@ -207,9 +205,12 @@ pub(super) fn from_stature(model: &TrackerModel, stature: f64) -> BodyShape {
     let wanted = stature.clamp(SCALES[0] * own, SCALES[1] * own);
     let mut shape = BodyShape::default();
     let vertices = template.mesh().vertices();
-    let extreme = |sign: f32| (0..vertices.len()).max_by(|&a, &b| (sign * vertices[a].y).total_cmp(&(sign * vertices[b].y)));
+    let extreme =
+        |sign: f32| (0..vertices.len()).max_by(|&a, &b| (sign * vertices[a].y).total_cmp(&(sign * vertices[b].y)));
     let gain: Vec<f64> = match (template.shape_space(), extreme(1.0), extreme(-1.0)) {
-        (Some(space), Some(top), Some(sole)) => space.vertices.iter().map(|v| f64::from(v[top].y - v[sole].y)).collect(),
+        (Some(space), Some(top), Some(sole)) => {
+            space.vertices.iter().map(|v| f64::from(v[top].y - v[sole].y)).collect()
+        }
         _ => Vec::new(),
     };
     let total: f64 = gain.iter().map(|g| g * g).sum();

@@ -4,7 +4,7 @@ use super::size::SizeEstimate;
 use super::surface::SurfaceStatistics;
 use super::{TrackerConfig, TrackerModel};
 use crate::body::{BodyShape, Pose};
-use crate::math::{Camera, Rigid, World};
+use crate::math::{Camera, P3, Rigid, World};
 use crate::segment::ScenePlanes;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -72,6 +72,8 @@ pub struct TrackerState {
     pub(super) size: SizeEstimate,
     pub(super) surface: SurfaceStatistics,
     pub(super) bad_frames: u32,
+    /// Middle of what was seen of the person, camera frame.
+    pub(super) centre: P3,
 }
 
 /// Height of a camera whose floor is not in view, metres; kiosks mount it at about this height.
@@ -100,6 +102,7 @@ impl TrackerState {
             size: SizeEstimate::default(),
             surface: SurfaceStatistics::default(),
             bad_frames: 0,
+            centre: P3::origin(),
         }
     }
     /// Forgets the person, keeps the room.

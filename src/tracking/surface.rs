@@ -141,9 +141,8 @@ fn solve(model: &TrackerModel, rest: &RestBody, d: &mut [f32], statistics: &Surf
         s.residual.push(b - s.image[i]);
     }
     // Jacobi: the Laplacian's own diagonal is about 1 + 1/deg, the spatial term's is deg.
-    let jacobi: Vec<f32> = (0..n)
-        .map(|i| 1.0 / (s.diagonal[i] + SPATIAL * neighbours.row(i).len() as f32 + LAPLACIAN * 1.17))
-        .collect();
+    let jacobi: Vec<f32> =
+        (0..n).map(|i| 1.0 / (s.diagonal[i] + SPATIAL * neighbours.row(i).len() as f32 + LAPLACIAN * 1.17)).collect();
     s.preconditioned.clear();
     s.preconditioned.extend(s.residual.iter().zip(&jacobi).map(|(r, m)| r * m));
     s.direction.clone_from(&s.preconditioned);

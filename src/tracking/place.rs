@@ -1,0 +1,187 @@
+//! The first pose: where the body is by its outline and principal axes, then a handful of poses tried.
+
+use super::align::{AlignScratch, Fit, START, SampleRest, Schedule, Seen, aim, align, evaluate};
+use super::model::TrackerModel;
+use crate::body::{Pose, RestBody};
+use crate::math::{P3, Rigid, principal_axes};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+/// What the outline says.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outline {
+    /// Middle of the torso's front, camera frame.
+    pub torso: P3,
+    /// Top of the head.
+    pub crown: P3,
+    /// Height from the lowest to the highest reading, metres; `None` when cut off below.
+    pub stature: Option<f64>,
+}
+
+/// Half the depth of a chest, metres: readings lie on the front, joints in the middle.
+const HALF_DEPTH: f64 = 0.11;
+/// The head is looked for this far to either side above the torso, metres.
+const HEAD_BESIDE: f32 = 0.22;
+/// Floor tolerance that segmentation takes from the soles, metres.
+const SOLES: f64 = 0.02;
+/// Turns about the vertical that are tried, radians; the paper asks for a frontal view.
+const YAWS: [f64; 3] = [0.0, 0.6, -0.6];
+/// How many of the best guesses are aligned in full.
+const FINALISTS: usize = 3;
+
+/// Reads torso, crown and stature off the person's cells. `up` is the unit direction against gravity.
+pub(super) fn outline(seen: &Seen<'_>, up: &Vector3<f32>, cut_below: bool) -> Option<Outline> {
+    let grid = seen.grid;
+    let (columns, rows) = grid.size();
+    // Chessboard distance to the nearest cell that is not the person; the torso is where it is largest.
+    let mut inner = vec![0u16; columns * rows];
+    for &c in seen.cells {
+        inner[c as usize] = u16::MAX;
+    }
+    let mut relax = |cell: usize, neighbours: [(i32, i32); 4]| {
+        if inner[cell] == 0 {
+            return;
+        }
+        let (u, v) = ((cell % columns) as i32, (cell / columns) as i32);
+        // Beyond the rim counts as outside, except below: a torso cut by the lower rim goes on.
+        let least = neighbours
+            .iter()
+            .map(|(du, dv)| match grid.cell(u + du, v + dv) {
+                Some(k) => inner[k],
+                None if v + dv >= rows as i32 => u16::MAX - 1,
+                None => 0,
+            })
+            .min();
+        inner[cell] = inner[cell].min(least.unwrap_or(0).saturating_add(1));
+    };
+    for c in 0..columns * rows {
+        relax(c, [(-1, 0), (0, -1), (-1, -1), (1, -1)]);
+    }
+    for c in (0..columns * rows).rev() {
+        relax(c, [(1, 0), (0, 1), (1, 1), (-1, 1)]);
+    }
+    let usable = |c: usize| grid.depth[c] > 0.0;
+    let widest = seen.cells.iter().map(|&c| c as usize).filter(|&c| usable(c)).map(|c| inner[c]).max()?;
+    let (mut sum, mut n) = (Vector3::zeros(), 0.0f32);
+    for &c in seen.cells {
+        let c = c as usize;
+        if usable(c) && u32::from(inner[c]) * 10 >= u32::from(widest) * 8 {
+            sum += grid.points[c].coords;
+            n += 1.0;
+        }
+    }
+    let torso = P3::from(sum / n.max(1.0));
+    let right = up.cross(&Vector3::z()).try_normalize(0.0)?;
+    let height = |p: &P3| up.dot(&p.coords);
+    let points = || seen.cells.iter().map(|&c| c as usize).filter(|&c| usable(c)).map(|c| grid.points[c]);
+    let crown = points()
+        .filter(|p| right.dot(&(p - torso)).abs() < HEAD_BESIDE)
+        .max_by(|a, b| height(a).total_cmp(&height(b)))?;
+    let lowest = points().map(|p| height(&p)).fold(f32::INFINITY, f32::min);
+    let stature = (!cut_below).then(|| f64::from(height(&crown) - lowest) + SOLES);
+    Some(Outline { torso, crown, stature })
+}
+
+/// Rotation of an upright body that faces the camera, turned by `yaw` about the vertical.
+fn upright(up: &Vector3<f64>, yaw: f64) -> UnitQuaternion<f64> {
+    let back = Vector3::z();
+    // The body's z points at the camera: camera −z, made level.
+    let z = (-(back - up * up.dot(&back))).try_normalize(f64::EPSILON).unwrap_or_else(|| -Vector3::z());
+    let x = up.cross(&z);
+    let m = Matrix3::from_columns(&[x, *up, z]);
+    let facing = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(m));
+    facing * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw)
+}
+
+/// Arm poses that are tried: directions of the upper arm (x outward) and the bend of the elbow, radians.
+const ARMS: [([f64; 3], f64); 6] = [
+    ([0.35, -0.93, 0.0], 0.0),
+    ([0.75, -0.65, 0.0], 0.0),
+    ([1.0, 0.0, 0.0], 0.0),
+    // Hand on the hip.
+    ([0.75, -0.65, -0.25], 1.4),
+    // Forearm raised or forward.
+    ([0.4, -0.9, 0.2], 1.5),
+    ([0.7, 0.7, 0.0], 0.3),
+];
+
+/// Finds the first pose. Returns the pose and its fit, or `None` when the outline says nothing.
+pub(super) fn place(
+    model: &TrackerModel,
+    rest: (&RestBody, &SampleRest),
+    seen: &Seen<'_>,
+    outline: &Outline,
+    up: &Vector3<f64>,
+    scratch: &mut AlignScratch,
+) -> Option<(Pose, Fit)> {
+    let skeleton = model.template.skeleton();
+    let crown = skeleton.index("head_end").or_else(|| skeleton.index("head")).unwrap_or(0);
+    // A lean seen in the principal axes: only a clear one counts, as arms and a cut body bend the axes too.
+    let mut best: Vec<(f64, Pose)> = Vec::new();
+    for lean in leans(seen, up, outline) {
+        for yaw in YAWS {
+            let rotation = upright(&lean, yaw);
+            // The crown fixes the height, the torso the place across, its front the depth.
+            let at = |j: usize| rest.0.joints[j].coords;
+            let chest = skeleton.index("spine3").unwrap_or(0);
+            let away = outline.torso.coords.cast::<f64>().try_normalize(0.0).unwrap_or_else(Vector3::z);
+            let torso = outline.torso.coords.cast::<f64>() + away * HALF_DEPTH;
+            let mut t = torso - rotation * at(chest);
+            let placed = rotation * at(crown) + t;
+            t += lean * (outline.crown.coords.cast::<f64>() - placed).dot(&lean);
+            let mut pose = Pose::rest(skeleton, Rigid::from_parts(t, rotation));
+            let rough = Schedule { iterations: 3, ..START };
+            align(model, rest, &mut pose, seen, &rough, scratch);
+            // Arms one side after the other: twelve tries instead of thirty-six.
+            for (side, sign) in [("left", 1.0), ("right", -1.0)] {
+                let mut chosen: Option<(f64, Pose)> = None;
+                for (direction, bend) in ARMS {
+                    let mut guess = pose.clone();
+                    let d = Vector3::new(direction[0] * sign, direction[1], direction[2]);
+                    aim(model, &mut guess, &format!("{side}_shoulder"), &format!("{side}_elbow"), d);
+                    guess.set(skeleton, &format!("{side}_elbow"), &[bend]);
+                    guess.clamp_to_limits(skeleton);
+                    let cost = evaluate(model, rest, &guess, seen, 0.15, scratch).cost;
+                    if chosen.as_ref().is_none_or(|(c, _)| cost < *c) {
+                        chosen = Some((cost, guess));
+                    }
+                }
+                if let Some((_, guess)) = chosen {
+                    pose = guess;
+                }
+            }
+            let cost = evaluate(model, rest, &pose, seen, 0.15, scratch).cost;
+            best.push((cost, pose));
+        }
+    }
+    best.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut winner: Option<(Pose, Fit)> = None;
+    for (_, mut pose) in best.into_iter().take(FINALISTS) {
+        align(model, rest, &mut pose, seen, &START, scratch);
+        let fit = evaluate(model, rest, &pose, seen, 0.10, scratch);
+        if winner.as_ref().is_none_or(|(_, w)| fit.cost < w.cost) {
+            winner = Some((pose, fit));
+        }
+    }
+    winner
+}
+
+/// Upright directions to try: gravity's, and the long principal axis when the whole body is seen leaning.
+fn leans(seen: &Seen<'_>, up: &Vector3<f64>, outline: &Outline) -> Vec<Vector3<f64>> {
+    let mut out = vec![*up];
+    let points: Vec<P3> = seen
+        .cells
+        .iter()
+        .map(|&c| c as usize)
+        .filter(|&c| seen.grid.depth[c] > 0.0)
+        .map(|c| seen.grid.points[c])
+        .collect();
+    if let (Some(_), Some((_, axes, variance))) = (outline.stature, principal_axes(&points)) {
+        let axis = axes.column(0).into_owned();
+        let axis = if axis.dot(up) < 0.0 { -axis } else { axis };
+        // Long and clearly tilted (15° to 60°).
+        if variance[0] > 4.0 * variance[1] && (0.5..0.966).contains(&axis.dot(up)) {
+            out.push(axis);
+        }
+    }
+    out
+}

@@ -1,0 +1,106 @@
+//! What a step says about itself, and how it can fail.
+
+use super::Status;
+use serde::Serialize;
+use std::time::Instant;
+
+/// Milliseconds of each stage of one step. Measured, never used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct StagesMs {
+    /// Sampling the depth image, floor, background, person, outline.
+    pub segment: f64,
+    /// First placement.
+    pub place: f64,
+    /// Prediction and pose.
+    pub pose: f64,
+    /// Body size and shape.
+    pub size: f64,
+    /// Displacements.
+    pub surface: f64,
+}
+
+impl StagesMs {
+    /// All stages.
+    pub fn total(&self) -> f64 {
+        self.segment + self.place + self.pose + self.size + self.surface
+    }
+}
+
+/// Work that the scene did not need.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Skipped {
+    /// Template samples that the camera cannot see, at the last iteration.
+    pub hidden_points: usize,
+    /// Iterations that convergence saved.
+    pub iterations: usize,
+    /// Vertices whose displacement was not updated at this frame.
+    pub displacements: usize,
+    /// Pairs dropped by relaxed bijective consistency (eq. 9), at the last iteration.
+    pub inconsistent_pairs: usize,
+    /// Cells of the grid that were not the person.
+    pub cells: usize,
+}
+
+/// How one step went.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StepReport {
+    /// Status after the step.
+    pub status: Status,
+    /// Iterations of the pose.
+    pub iterations: usize,
+    /// The pose stopped moving before the iterations ran out.
+    pub converged: bool,
+    /// Template samples that the camera sees.
+    pub visible_points: usize,
+    /// Cells of the person.
+    pub person_cells: usize,
+    /// Mean distance between surface and readings along the normal, millimetres.
+    pub residual_mm: f64,
+    /// Share of the person's readings that the body explains, 0 to 1.
+    pub explained: f64,
+    /// Share of the body's visible points that found a reading, 0 to 1.
+    pub matched: f64,
+    /// Frames since the pose was measured; 0 for a live pose.
+    pub pose_age: u32,
+    /// What was skipped.
+    pub skipped: Skipped,
+    /// Time per stage.
+    pub stages_ms: StagesMs,
+}
+
+/// A frame that cannot be used; the state is as before.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum StepError {
+    /// The image does not fit the calibration.
+    #[error("depth image is {got:?} pixels, the calibration says {expected:?}")]
+    ImageSize {
+        /// Columns and rows of the image.
+        got: (u32, u32),
+        /// Columns and rows of the calibration.
+        expected: (u32, u32),
+    },
+    /// The state belongs to another template.
+    #[error("the state has {got} joint angles, the template {expected}")]
+    ForeignState {
+        /// Angles in the state.
+        got: usize,
+        /// Angles of the template.
+        expected: usize,
+    },
+}
+
+/// A stopwatch for stages.
+pub(super) struct Stopwatch(Instant);
+
+impl Stopwatch {
+    pub(super) fn start() -> Self {
+        Self(Instant::now())
+    }
+    /// Milliseconds since the last lap.
+    pub(super) fn lap(&mut self) -> f64 {
+        let now = Instant::now();
+        let ms = now.duration_since(self.0).as_secs_f64() * 1e3;
+        self.0 = now;
+        ms
+    }
+}

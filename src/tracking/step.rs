@@ -1,0 +1,273 @@
+//! One frame (Algorithm 1): segment, place or predict, pose, size, displacements, and what it all means.
+
+use super::align::{START, Seen, TRACK, align, evaluate, wants_tree};
+use super::kinematics::extrapolate;
+use super::place::{outline, place};
+use super::report::Stopwatch;
+use super::size::from_stature;
+use super::{
+    LostReason, Skipped, StagesMs, Status, StepError, StepReport, TrackerModel, TrackerState, Workspace, surface,
+};
+use crate::camera::RgbdFrame;
+use crate::math::P3;
+use crate::segment::{PersonSearch, Prior, contour, find_person, find_planes};
+use crate::spatial::{OrganisedCloud, PointTree};
+use nalgebra::Vector3;
+
+/// The room is looked at again after this many frames without a person.
+const SCENE_INTERVAL: u32 = 60;
+/// A person moves by less than this between two frames, metres; six times a sprint.
+const REACH: f32 = 0.8;
+/// Fewer cells than this are no person.
+const LEAST_CELLS: usize = 60;
+/// Below this share of explained readings a frame is bad.
+const LEAST_EXPLAINED: f64 = 0.45;
+/// Below this share of visible points with a reading a frame is bad.
+const LEAST_MATCHED: f64 = 0.35;
+/// So many bad frames in a row lose the person.
+const PATIENCE: u32 = 8;
+/// After this many frames without the person, whoever comes is measured anew.
+const FORGET: u32 = 150;
+/// Rounds of pose and size at the start (Algorithm 1), and the change that ends them.
+const ROUNDS: usize = 8;
+const SETTLED: f64 = 0.05;
+/// Frames of calibration that must have gone by before the status says `Tracking`.
+const CALIBRATING: u32 = 15;
+/// Longest interval over which motion is extrapolated, in intervals between frames.
+const FARTHEST_AHEAD: f64 = 3.0;
+/// Extrapolated motion is damped: a limb that stops overshoots less.
+const AHEAD: f64 = 0.9;
+
+/// Tracks one frame. On success the state holds the newest pose and status; a frame without a usable person keeps the
+/// last good pose and says why.
+///
+/// # Errors
+/// When the image does not fit the calibration or the state the template; the state is unchanged.
+pub fn step(
+    model: &TrackerModel,
+    state: &mut TrackerState,
+    frame: &RgbdFrame,
+    workspace: &mut Workspace,
+) -> Result<StepReport, StepError> {
+    let camera = &model.calibration.depth;
+    let (got, expected) = ((frame.depth.width(), frame.depth.height()), (camera.width, camera.height));
+    if got != expected {
+        return Err(StepError::ImageSize { got, expected });
+    }
+    let dofs = model.template.skeleton().dofs();
+    if state.pose.angles.len() != dofs {
+        return Err(StepError::ForeignState { got: state.pose.angles.len(), expected: dofs });
+    }
+    let mut watch = Stopwatch::start();
+    let mut stages = StagesMs::default();
+    let fresh = workspace.grid.take().filter(|g| g.fits(camera, model.config.stride));
+    let mut grid = fresh.unwrap_or_else(|| OrganisedCloud::new(camera, model.config.stride));
+    state.frames += 1;
+    let person = segment(model, state, frame, &mut grid, workspace);
+    stages.segment = watch.lap();
+    let mut report = StepReport {
+        status: state.status,
+        iterations: 0,
+        converged: false,
+        visible_points: 0,
+        person_cells: person.cells.len(),
+        residual_mm: 0.0,
+        explained: 0.0,
+        matched: 0.0,
+        pose_age: 0,
+        skipped: Skipped { cells: grid.depth.len() - person.cells.len(), ..Skipped::default() },
+        stages_ms: stages,
+    };
+    if person.cells.len() < LEAST_CELLS {
+        lose(state, LostReason::NoPerson);
+    } else {
+        follow(model, state, frame, &grid, &person, workspace, &mut report, &mut watch);
+    }
+    workspace.grid = Some(grid);
+    report.status = state.status;
+    report.pose_age = state.pose_age;
+    Ok(report)
+}
+
+/// Depth image to the person's refined cells and outline.
+fn segment(
+    model: &TrackerModel,
+    state: &mut TrackerState,
+    frame: &RgbdFrame,
+    grid: &mut OrganisedCloud,
+    workspace: &mut Workspace,
+) -> PersonSearch {
+    if grid.sample(&frame.depth, model.config.farthest) == 0 {
+        return PersonSearch::default();
+    }
+    state.scene_age = state.scene_age.map(|a| a.saturating_add(1));
+    if !state.status.is_live() && state.scene_age.is_none_or(|a| a >= SCENE_INTERVAL) {
+        let scene = find_planes(grid);
+        // A plane once known is not given up because someone stands before it.
+        if scene.floor.is_some() || state.scene_age.is_none() || state.scene.floor.is_none() {
+            state.set_scene(scene);
+        }
+    }
+    let prior = state.status.is_live().then(|| Prior { centre: state.centre, reach: REACH });
+    let mut person = find_person(grid, &state.scene, prior, &mut workspace.segment);
+    if person.cells.len() >= LEAST_CELLS {
+        grid.refine(&frame.depth, &person.cells);
+        person.cells.retain(|&c| grid.depth[c as usize] > 0.0);
+        contour(grid, &person.cells, &mut workspace.contour);
+    }
+    person
+}
+
+fn lose(state: &mut TrackerState, reason: LostReason) {
+    state.pose_age = state.pose_age.saturating_add(1);
+    state.before = None;
+    if state.status != Status::Searching {
+        state.status = Status::Lost { reason };
+    }
+    state.bad_frames = 0;
+}
+
+/// A person is in view: find or follow the pose.
+#[allow(clippy::too_many_arguments)] // one caller, and each is a different thing
+fn follow(
+    model: &TrackerModel,
+    state: &mut TrackerState,
+    frame: &RgbdFrame,
+    grid: &OrganisedCloud,
+    person: &PersonSearch,
+    workspace: &mut Workspace,
+    report: &mut StepReport,
+    watch: &mut Stopwatch,
+) {
+    let skeleton = model.template.skeleton();
+    let points: Vec<P3> =
+        if wants_tree(model) { person.cells.iter().map(|&c| grid.points[c as usize]).collect() } else { Vec::new() };
+    let tree = wants_tree(model).then(|| PointTree::new(&points));
+    let outline_of_person = std::mem::take(&mut workspace.contour);
+    let seen = Seen { grid, cells: &person.cells, contour: &outline_of_person, tree: tree.as_ref() };
+    let up = state.world_from_camera.inverse().vector(&Vector3::y());
+    let searching = !state.status.is_live();
+    let mut pose = state.pose.clone();
+
+    if searching {
+        if state.pose_age > FORGET {
+            state.reset(model);
+        }
+        let first_look = outline(&seen, &up.cast(), person.cut_below);
+        if state.size.frames == 0 && model.config.adapt_size {
+            if let Some(stature) = first_look.and_then(|o| o.stature).filter(|s| (1.3..2.2).contains(s)) {
+                state.shape = from_stature(model, stature);
+            }
+        }
+        workspace.rest_body(model, &state.shape);
+        let rest = (&workspace.rest, &workspace.samples);
+        let placed = first_look.and_then(|o| place(model, rest, &seen, &o, &up, &mut workspace.align));
+        report.stages_ms.place = watch.lap();
+        match placed {
+            Some((p, fit)) if fit.explained >= LEAST_EXPLAINED => pose = p,
+            _ => {
+                workspace.contour = outline_of_person;
+                lose(state, LostReason::Residual);
+                return;
+            }
+        }
+        state.before = None;
+    } else {
+        workspace.rest_body(model, &state.shape);
+        let rest = (&workspace.rest, &workspace.samples);
+        // Constant velocity, but only where it explains the frame better than standing still.
+        if let Some(before) = state.before.as_ref().filter(|_| model.config.predict && state.interval_ns > 0) {
+            let ahead = frame.time_ns.saturating_sub(state.time_ns) as f64 / state.interval_ns as f64;
+            let guess = extrapolate(skeleton, before, &pose, AHEAD * ahead.min(FARTHEST_AHEAD));
+            let still = evaluate(model, rest, &pose, &seen, TRACK.distance[0], &mut workspace.align).cost;
+            let moved = evaluate(model, rest, &guess, &seen, TRACK.distance[0], &mut workspace.align).cost;
+            if moved < still {
+                pose = guess;
+            }
+        }
+    }
+
+    // Pose; at the start alternating with size until both have settled (Algorithm 1).
+    let mut schedule = TRACK;
+    schedule.iterations = model.config.iterations;
+    let rest = (&workspace.rest, &workspace.samples);
+    let mut fit =
+        align(model, rest, &mut pose, &seen, if searching { &START } else { &schedule }, &mut workspace.align);
+    report.stages_ms.pose = watch.lap();
+    let good = fit.explained >= LEAST_EXPLAINED && fit.matched >= LEAST_MATCHED && pose.is_finite();
+    if good && !state.calibrated(&model.config) {
+        if state.size.frames == 0 {
+            for _ in 0..ROUNDS {
+                let rest = (&workspace.rest, &workspace.samples);
+                let change =
+                    state.size.observe(model, rest, &pose, &seen, &mut state.shape, &mut workspace.align, false);
+                workspace.rest_body(model, &state.shape);
+                let rest = (&workspace.rest, &workspace.samples);
+                fit = align(model, rest, &mut pose, &seen, &schedule, &mut workspace.align);
+                if change < SETTLED {
+                    break;
+                }
+            }
+        }
+        let rest = (&workspace.rest, &workspace.samples);
+        state.size.observe(model, rest, &pose, &seen, &mut state.shape, &mut workspace.align, true);
+        workspace.rest_body(model, &state.shape);
+        report.stages_ms.size = watch.lap();
+    }
+    let good = good && pose.is_finite();
+
+    report.iterations = fit.iterations;
+    report.converged = fit.converged;
+    report.visible_points = fit.pairs.visible;
+    report.residual_mm = fit.residual * 1e3;
+    report.explained = fit.explained;
+    report.matched = fit.matched;
+    report.skipped.hidden_points = fit.pairs.hidden;
+    report.skipped.inconsistent_pairs = fit.pairs.inconsistent;
+    report.skipped.iterations = model.config.iterations.saturating_sub(fit.iterations);
+    report.skipped.displacements = state.shape.displacements.len();
+
+    if !pose.is_finite() {
+        workspace.contour = outline_of_person;
+        lose(state, LostReason::NotFinite);
+        return;
+    }
+    state.bad_frames = if good { 0 } else { state.bad_frames + 1 };
+    if state.bad_frames > PATIENCE {
+        workspace.contour = outline_of_person;
+        lose(state, LostReason::Residual);
+        return;
+    }
+    state.before = (!searching).then(|| std::mem::replace(&mut state.pose, pose.clone()));
+    state.pose = pose;
+    state.interval_ns = frame.time_ns.saturating_sub(state.time_ns);
+    state.time_ns = frame.time_ns;
+    state.pose_age = 0;
+    state.centre = centre_of(grid, &person.cells);
+    let calibrating = model.config.adapt_size && state.size.frames < CALIBRATING;
+    state.status = if calibrating { Status::Calibrating } else { Status::Tracking };
+
+    let due = state.frames.is_multiple_of(u64::from(model.config.displacement_interval.max(1)));
+    if good && model.config.displacements && !calibrating && due {
+        let rest = (&workspace.rest, &workspace.samples);
+        super::align::pair(model, rest, &state.pose, &seen, 0.05, 0.0, &mut workspace.align);
+        let updated = surface::fit(
+            model,
+            &workspace.rest,
+            &workspace.align.bones,
+            &seen,
+            &workspace.align.pairing.image,
+            &mut state.shape.displacements,
+            &mut state.surface,
+            &mut workspace.surface,
+        );
+        report.skipped.displacements = state.shape.displacements.len() - updated;
+        report.stages_ms.surface = watch.lap();
+    }
+    workspace.contour = outline_of_person;
+}
+
+fn centre_of(grid: &OrganisedCloud, cells: &[u32]) -> P3 {
+    let sum = cells.iter().fold(Vector3::zeros(), |s, &c| s + grid.points[c as usize].coords.cast::<f64>());
+    P3::from((sum / cells.len().max(1) as f64).cast::<f32>())
+}
