@@ -1,12 +1,15 @@
 //! Files in and out: MCAP, RGBD folders, npz bodies, OBJ, glTF, patterns. Bytes to domain types, never a panic.
 
 mod error;
+mod foxglove;
 pub mod image;
+mod mcap_file;
 pub mod npz;
 pub mod obj;
 mod recording;
 mod rgbd_folder;
 
 pub use error::FormatError;
+pub use mcap_file::{McapReader, McapWriter};
 pub use recording::{RgbdSource, open_recording};
 pub use rgbd_folder::{RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};

@@ -1,6 +1,6 @@
 //! What every recording offers: a calibration and frames in order.
 
-use super::{FormatError, RgbdFolder};
+use super::{FormatError, McapReader, RgbdFolder};
 use crate::camera::{Calibration, RgbdFrame};
 use std::path::Path;
 
@@ -34,6 +34,9 @@ pub fn open_recording(path: &Path) -> Result<Box<dyn RgbdSource>, FormatError> {
     let kind = std::fs::metadata(path).map_err(|e| FormatError::io(path, e))?;
     if kind.is_dir() {
         return Ok(Box::new(RgbdFolder::open(path)?));
+    }
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
+        return Ok(Box::new(McapReader::open(path)?));
     }
     Err(FormatError::field(path, "recording", "expected a folder with camera.json, or a file ending in .mcap"))
 }
