@@ -1,7 +1,7 @@
 //! Reads RGBD frames from an MCAP file as a stream: memory for one frame, whatever the file's length.
 
 use crate::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
-use crate::formats::foxglove::{CameraCalibration, CompressedImage, FrameTransform, FoxgloveMessage, RawImage, decode};
+use crate::formats::foxglove::{CameraCalibration, CompressedImage, FoxgloveMessage, FrameTransform, RawImage, decode};
 use crate::formats::image::{check_size, decode_color};
 use crate::formats::{FormatError, RgbdSource};
 use crate::math::{Camera, ColorCamera, Rigid};
@@ -164,9 +164,8 @@ impl McapReader {
                     self.records.notify_read(got);
                 }
                 Ok(LinearReadEvent::Record { opcode, data }) => {
-                    let record = mcap::parse_record(opcode, data).map_err(|e| {
-                        FormatError::field(&self.path, format!("record 0x{opcode:02x}"), e.to_string())
-                    })?;
+                    let record = mcap::parse_record(opcode, data)
+                        .map_err(|e| FormatError::field(&self.path, format!("record 0x{opcode:02x}"), e.to_string()))?;
                     match record {
                         Record::Schema { header, .. } => {
                             self.schemas.insert(header.id, header.name);
@@ -229,8 +228,8 @@ impl Place<'_> {
                     }
                     "rgb8" => {
                         let bytes = self.rows(&m, 3)?.flatten().copied().collect();
-                        let image = ColorImage::new(m.width, m.height, bytes)
-                            .map_err(|e| self.fault("data", e.to_string()))?;
+                        let image =
+                            ColorImage::new(m.width, m.height, bytes).map_err(|e| self.fault("data", e.to_string()))?;
                         Some(Item::Color { frame_id: m.frame_id.clone(), time_ns, image })
                     }
                     _ => None,
