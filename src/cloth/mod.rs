@@ -1,1 +1,10 @@
 //! One step of garment motion against a moving body: the real-time and the offline solvers.
+
+mod error;
+pub mod membrane;
+pub mod quasi_newton;
+pub mod realtime;
+mod sheet;
+
+pub use error::ClothError;
+pub use sheet::{Element, Hinge, Sheet};

@@ -1,0 +1,10 @@
+//! The real-time simulator: Ye et al. 2014, section 4, "Near Realtime simulation", with today's solver.
+
+mod carry;
+mod model;
+mod state;
+mod step;
+
+pub use model::{AnchorBinding, Config, Model, Outfit, body_parts};
+pub use state::{GarmentState, Input, State, StepReport, Workspace};
+pub use step::step;

@@ -1,0 +1,164 @@
+//! What changes from step to step, what goes in and what comes out.
+
+use super::Model;
+use crate::cloth::ClothError;
+use crate::cloth::quasi_newton::{Hold, QuasiNewton};
+use crate::contact::{DepthMaps, SurfaceFrame};
+use crate::math::{P3, V3, V3d};
+use serde::{Deserialize, Serialize};
+
+/// Where one garment is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GarmentState {
+    /// Positions of the simulation vertices, world, metres.
+    pub positions: Vec<P3>,
+    /// Velocities, m/s.
+    pub velocities: Vec<V3>,
+    /// Nearest body vertex of each vertex, among the parts it belongs to and among the others.
+    pub(super) nearest: Vec<[u32; 2]>,
+}
+
+/// Where an outfit is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// Garments, in the order of [`super::Outfit::garments`].
+    pub garments: Vec<GarmentState>,
+    /// Body of the last step, world, metres.
+    pub(super) body: Vec<P3>,
+    /// Body of the last step that was computed (not slept through).
+    pub(super) awake_body: Vec<P3>,
+    /// Steps so far.
+    pub frames: u64,
+    /// Steps in a row with body and cloth still.
+    pub(super) still: u32,
+    /// Steps since positions were last computed without a fault; positions are the last good ones.
+    pub stale: u32,
+}
+
+impl State {
+    /// Garments at rest at these positions (world, metres) on this body.
+    ///
+    /// # Errors
+    /// Wrong counts or values that are not finite.
+    pub fn new(model: &Model, positions: Vec<Vec<P3>>, body: &[P3]) -> Result<Self, ClothError> {
+        if positions.len() != model.outfit.garments.len() {
+            return Err(ClothError::Count {
+                what: "garments",
+                got: positions.len(),
+                expected: model.outfit.garments.len(),
+            });
+        }
+        check_body(model, body)?;
+        let frame = SurfaceFrame { vertices: body.to_vec(), normals: Vec::new() };
+        let mut garments = Vec::new();
+        for ((p, g), m) in positions.into_iter().zip(&model.outfit.garments).zip(&model.garments) {
+            if p.len() != g.vertices {
+                return Err(ClothError::Count { what: "garment vertices", got: p.len(), expected: g.vertices });
+            }
+            if let Some(index) = p.iter().position(|q| !q.iter().all(|c| c.is_finite())) {
+                return Err(ClothError::NotFinite { what: "garment vertex", index });
+            }
+            let mut nearest = vec![[0u32; 2]; p.len()];
+            crate::par::for_chunks(model.config.par, &mut nearest, 64, |start, c| {
+                for (k, n) in c.iter_mut().enumerate() {
+                    let i = start + k;
+                    *n = [m.own[i], m.other[i]].map(|mask| model.surface.nearest_vertex(&frame, &p[i], mask));
+                }
+            });
+            garments.push(GarmentState { velocities: vec![V3::zeros(); p.len()], positions: p, nearest });
+        }
+        Ok(Self { garments, body: body.to_vec(), awake_body: body.to_vec(), frames: 0, still: 0, stale: 0 })
+    }
+}
+
+pub(super) fn check_body(model: &Model, body: &[P3]) -> Result<(), ClothError> {
+    if body.len() != model.body_vertices() {
+        return Err(ClothError::Count { what: "body vertices", got: body.len(), expected: model.body_vertices() });
+    }
+    match body.iter().position(|q| !q.iter().all(|c| c.is_finite())) {
+        Some(index) => Err(ClothError::NotFinite { what: "body vertex", index }),
+        None => Ok(()),
+    }
+}
+
+/// What a step needs to know.
+#[derive(Clone, Copy, Debug)]
+pub struct Input<'a> {
+    /// Posed body, world (y up), metres; shape `[body vertices]`. Its speed follows from the previous call.
+    pub body: &'a [P3],
+    /// Time since the previous call, s.
+    pub dt: f64,
+}
+
+/// How a step went.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StepReport {
+    /// Quasi-Newton iterations, all garments and substeps.
+    pub iterations: usize,
+    /// Root mean square length of the last iteration's step, metres, worst garment: how converged it is.
+    pub residual: f64,
+    /// Largest stretch of an edge (length over rest length, minus one).
+    pub max_strain: f64,
+    /// 99th percentile of the stretch.
+    pub p99_strain: f64,
+    /// Deepest vertex under the skin before the last push-out, metres.
+    pub penetration: f64,
+    /// Deepest vertex under the skin in the result, metres.
+    pub penetration_left: f64,
+    /// Vertices in contact.
+    pub contacts: usize,
+    /// Vertices that were not simulated because cloth and body were still.
+    pub sleeping: usize,
+    /// Numeric factorisations saved because nothing in the matrix had changed.
+    pub factorisations_skipped: usize,
+    /// The body jumped and the cloth was carried along.
+    pub teleported: bool,
+    /// A fault was caught and the last good state kept: which.
+    pub kept_last_good: Option<String>,
+    /// Milliseconds by stage.
+    pub stages_ms: StagesMs,
+}
+
+/// Milliseconds of a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StagesMs {
+    /// Depth maps of the body.
+    pub maps: f64,
+    /// Finding contacts.
+    pub contact: f64,
+    /// Factorising.
+    pub factor: f64,
+    /// Iterating.
+    pub solve: f64,
+    /// Everything.
+    pub total: f64,
+}
+
+/// Scratch. Dropping it changes no result, only the time of the next step.
+#[derive(Debug, Default)]
+pub struct Workspace {
+    pub(super) garments: Vec<GarmentScratch>,
+    pub(super) frames: Vec<SurfaceFrame>,
+    pub(super) start: SurfaceFrame,
+    pub(super) maps: DepthMaps,
+}
+
+#[derive(Debug, Default)]
+pub(super) struct GarmentScratch {
+    pub(super) solver: Option<QuasiNewton>,
+    pub(super) x: Vec<V3d>,
+    pub(super) before: Vec<V3d>,
+    pub(super) velocity: Vec<V3d>,
+    pub(super) y: Vec<V3d>,
+    pub(super) holds: Vec<Hold>,
+    pub(super) stiffness: Vec<f64>,
+    pub(super) contacts: Vec<super::step::Contact>,
+    pub(super) nearest: Vec<[u32; 2]>,
+    pub(super) outcome: Outcome,
+}
+
+#[derive(Debug, Default, Clone)]
+pub(super) struct Outcome {
+    pub(super) report: StepReport,
+    pub(super) fault: Option<ClothError>,
+}

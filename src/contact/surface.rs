@@ -1,0 +1,244 @@
+//! Closest point on a moving closed surface, found by walking downhill from where it was last time.
+//!
+//! A body's topology never changes, so the nearest vertex of the last step is where the search starts. That costs a
+//! few neighbours instead of a tree, and a vertex that was outside an arm knows it even when the arm has moved past it.
+
+use crate::math::{P3, V3};
+use crate::mesh::{Face, Topology, vertex_normals};
+use crate::par::Par;
+
+/// Parts of a surface as bits.
+pub type Part = u8;
+
+/// What does not move: faces, neighbours, and which parts each vertex belongs to.
+#[derive(Clone, Debug)]
+pub struct SurfaceModel {
+    faces: Vec<Face>,
+    topology: Topology,
+    parts: Vec<Part>,
+}
+
+/// Where the surface is.
+#[derive(Clone, Debug, Default)]
+pub struct SurfaceFrame {
+    /// Vertices, metres, shape `[vertices]`.
+    pub vertices: Vec<P3>,
+    /// Unit normals, shape `[vertices]`.
+    pub normals: Vec<V3>,
+}
+
+/// The nearest point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Closest {
+    /// Nearest vertex: where to start next time.
+    pub vertex: u32,
+    /// Triangle of the point.
+    pub face: u32,
+    /// Barycentric weights in that triangle.
+    pub weights: [f32; 3],
+    /// The point, metres.
+    pub point: P3,
+    /// Unit normal there, outward.
+    pub normal: V3,
+    /// Distance along the normal's side: negative inside, metres.
+    pub signed: f32,
+    /// The search ended at the rim of the parts it was confined to: the distance says nothing.
+    pub rim: bool,
+}
+
+impl SurfaceModel {
+    /// Takes connectivity and parts; `grow` rings are added to every part, so that parts overlap where they meet.
+    pub fn new(faces: Vec<Face>, topology: Topology, mut parts: Vec<Part>, grow: usize) -> Self {
+        parts.resize(topology.vertex_neighbours().rows(), Part::MAX);
+        for _ in 0..grow {
+            let before = parts.clone();
+            for (i, p) in parts.iter_mut().enumerate() {
+                for &n in topology.vertex_neighbours().row(i) {
+                    *p |= before[n as usize];
+                }
+            }
+        }
+        Self { faces, topology, parts }
+    }
+    /// Number of vertices.
+    pub fn vertices(&self) -> usize {
+        self.parts.len()
+    }
+    /// Triangles.
+    pub fn faces(&self) -> &[Face] {
+        &self.faces
+    }
+    /// Parts of a vertex.
+    pub fn part(&self, vertex: u32) -> Part {
+        self.parts[vertex as usize]
+    }
+    /// Fills the normals of a frame from its vertices.
+    pub fn update_normals(&self, par: Par, frame: &mut SurfaceFrame) {
+        vertex_normals(par, &frame.vertices, &self.faces, self.topology.vertex_faces(), &mut frame.normals);
+    }
+    /// Nearest vertex among those of `mask`, by looking at all: the oracle of the walk, and the first start.
+    pub fn nearest_vertex(&self, frame: &SurfaceFrame, p: &P3, mask: Part) -> u32 {
+        let mut best = (f32::INFINITY, 0u32);
+        for (i, v) in frame.vertices.iter().enumerate() {
+            let d = (v - p).norm_squared();
+            if d < best.0 && self.parts[i] & mask != 0 {
+                best = (d, i as u32);
+            }
+        }
+        best.1
+    }
+    /// Walks from `start` to a vertex nearer to `p` than all its neighbours. At most [`MOST_STEPS`] steps.
+    pub fn walk(&self, frame: &SurfaceFrame, p: &P3, start: u32, mask: Part) -> u32 {
+        let mut at = start;
+        let mut best = (frame.vertices[at as usize] - p).norm_squared();
+        for _ in 0..MOST_STEPS {
+            let mut next = at;
+            for &n in self.topology.vertex_neighbours().row(at as usize) {
+                let d = (frame.vertices[n as usize] - p).norm_squared();
+                if d < best && self.parts[n as usize] & mask != 0 {
+                    best = d;
+                    next = n;
+                }
+            }
+            if next == at {
+                break;
+            }
+            at = next;
+        }
+        at
+    }
+    /// The nearest point on the faces around a vertex.
+    pub fn closest_around(&self, frame: &SurfaceFrame, p: &P3, vertex: u32, mask: Part) -> Closest {
+        let mut best: Option<(f32, u32, [f32; 3], P3)> = None;
+        let mut rim = false;
+        for &f in self.topology.vertex_faces().row(vertex as usize) {
+            let corners = self.faces[f as usize];
+            if corners.iter().any(|&c| self.parts[c as usize] & mask == 0) {
+                rim = true;
+            }
+            let [a, b, c] = corners.map(|i| frame.vertices[i as usize]);
+            let w = closest_on_triangle(p, &a, &b, &c);
+            let q = P3::from(a.coords * w[0] + b.coords * w[1] + c.coords * w[2]);
+            let d = (q - p).norm_squared();
+            if best.is_none_or(|o| d < o.0) {
+                best = Some((d, f, w, q));
+            }
+        }
+        let Some((d, face, weights, point)) = best else {
+            let point = frame.vertices[vertex as usize];
+            return Closest { vertex, face: 0, weights: [1.0, 0.0, 0.0], point, normal: V3::y(), signed: f32::MAX, rim: true };
+        };
+        let n = self.faces[face as usize];
+        let smooth = (0..3).fold(V3::zeros(), |s, k| s + frame.normals[n[k] as usize] * weights[k]);
+        let mut normal = smooth.try_normalize(0.0).unwrap_or_else(V3::y);
+        let outside = (p - point).dot(&normal) >= 0.0;
+        let distance = d.sqrt();
+        // Away from the surface the direction to it is the better normal: it is exact at edges and corners.
+        if distance > FAR_ENOUGH {
+            let along = (p - point) / distance * if outside { 1.0 } else { -1.0 };
+            if along.dot(&normal) > 0.5 {
+                normal = along;
+            }
+        }
+        Closest { vertex, face, weights, point, normal, signed: if outside { distance } else { -distance }, rim }
+    }
+    /// Walk and nearest point in one.
+    pub fn closest(&self, frame: &SurfaceFrame, p: &P3, start: u32, mask: Part) -> Closest {
+        let v = self.walk(frame, p, start, mask);
+        self.closest_around(frame, p, v, mask)
+    }
+}
+
+/// A walk covers at most this many edges (about 30 cm on a body of 13k vertices); more means the start was lost.
+pub const MOST_STEPS: usize = 40;
+/// Beyond this distance the offset direction is a better normal than the interpolated one, metres.
+const FAR_ENOUGH: f32 = 2e-3;
+
+/// Barycentric weights of the point of a triangle nearest to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
+pub fn closest_on_triangle(p: &P3, a: &P3, b: &P3, c: &P3) -> [f32; 3] {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    let bp = p - b;
+    let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return [0.0, 1.0, 0.0];
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        let v = if d1 == d3 { 0.0 } else { d1 / (d1 - d3) };
+        return [1.0 - v, v, 0.0];
+    }
+    let cp = p - c;
+    let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return [0.0, 0.0, 1.0];
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        let w = if d2 == d6 { 0.0 } else { d2 / (d2 - d6) };
+        return [1.0 - w, 0.0, w];
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        let s = (d4 - d3) + (d5 - d6);
+        let w = if s == 0.0 { 0.0 } else { (d4 - d3) / s };
+        return [0.0, 1.0 - w, w];
+    }
+    let sum = va + vb + vc;
+    if sum == 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    [va / sum, vb / sum, vc / sum]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriMesh;
+
+    /// A sphere from a subdivided octahedron.
+    fn sphere(levels: usize) -> TriMesh {
+        let mut v: Vec<P3> =
+            [[1., 0., 0.], [-1., 0., 0.], [0., 1., 0.], [0., -1., 0.], [0., 0., 1.], [0., 0., -1.]].map(P3::from).to_vec();
+        let mut f: Vec<Face> =
+            vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+        for _ in 0..levels {
+            let mut middle = std::collections::BTreeMap::new();
+            let mut next = Vec::new();
+            for t in &f {
+                let m: [u32; 3] = std::array::from_fn(|k| {
+                    let (a, b) = (t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3]));
+                    *middle.entry((a, b)).or_insert_with(|| {
+                        v.push(P3::from((v[a as usize].coords + v[b as usize].coords).normalize()));
+                        v.len() as u32 - 1
+                    })
+                });
+                next.extend([[t[0], m[0], m[2]], [m[0], t[1], m[1]], [m[2], m[1], t[2]], [m[0], m[1], m[2]]]);
+            }
+            f = next;
+        }
+        TriMesh::new(v, f).expect("sphere")
+    }
+
+    #[test]
+    fn distances_to_a_sphere_have_their_closed_form_and_the_walk_finds_the_nearest_vertex() {
+        let mesh = sphere(4);
+        let model = SurfaceModel::new(mesh.faces().to_vec(), Topology::new(&mesh).expect("topology"), vec![1; mesh.vertices().len()], 0);
+        let mut frame = SurfaceFrame { vertices: mesh.vertices().to_vec(), normals: Vec::new() };
+        model.update_normals(Par::Seq, &mut frame);
+        for i in 0..200 {
+            let t = i as f32 * 0.7;
+            let dir = V3::new(t.sin(), (t * 1.3).cos(), (t * 0.37).sin()).normalize();
+            let r = 0.8 + 0.4 * ((i * 37) % 100) as f32 / 100.0;
+            let p = P3::from(dir * r);
+            let walked = model.closest(&frame, &p, 0, 1);
+            let scan = model.nearest_vertex(&frame, &p, 1);
+            assert_eq!(walked.vertex, scan, "point {i}");
+            assert!((walked.signed - (r - 1.0)).abs() < 4e-3, "{} {}", walked.signed, r - 1.0);
+            assert!(walked.normal.dot(&dir) > 0.99 && !walked.rim);
+        }
+    }
+}
