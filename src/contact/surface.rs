@@ -87,7 +87,7 @@ impl SurfaceModel {
         }
         best.1
     }
-    /// Walks from `start` to a vertex nearer to `p` than all its neighbours. At most [`MOST_STEPS`] steps.
+    /// Walks from `start` to a vertex nearer to `p` than all its neighbours. At most 40 steps.
     pub fn walk(&self, frame: &SurfaceFrame, p: &P3, start: u32, mask: Part) -> u32 {
         let mut at = start;
         let mut best = (frame.vertices[at as usize] - p).norm_squared();
@@ -150,12 +150,12 @@ impl SurfaceModel {
 }
 
 /// A walk covers at most this many edges (about 30 cm on a body of 13k vertices); more means the start was lost.
-pub const MOST_STEPS: usize = 40;
+const MOST_STEPS: usize = 40;
 /// Beyond this distance the offset direction is a better normal than the interpolated one, metres.
 const FAR_ENOUGH: f32 = 2e-3;
 
 /// Barycentric weights of the point of a triangle nearest to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
-pub fn closest_on_triangle(p: &P3, a: &P3, b: &P3, c: &P3) -> [f32; 3] {
+fn closest_on_triangle(p: &P3, a: &P3, b: &P3, c: &P3) -> [f32; 3] {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
     if d1 <= 0.0 && d2 <= 0.0 {

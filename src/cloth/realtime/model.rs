@@ -8,7 +8,6 @@ use crate::garment::{GarmentMesh, Region};
 use crate::linear::SymbolicFactor;
 use crate::mesh::Topology;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// A garment vertex tied to a triangle of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -202,6 +201,3 @@ impl Model {
         self.garments[garment].offset
     }
 }
-
-/// Shareable model.
-pub type SharedModel = Arc<Model>;
