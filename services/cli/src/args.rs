@@ -200,7 +200,8 @@ pub(crate) struct ExportArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct RecordArgs {
-    /// Where frames come from: `synth`, or a recording to convert.
+    /// Where frames come from: `synth` (or `synth:leave`, `synth:still`, `synth:empty`), a recording to convert, or
+    /// `bus:STORE/CAMERA`, a camera that runs now.
     #[arg(long, default_value = "synth", value_name = "SOURCE")]
     pub(crate) source: String,
     /// An .mcap file, or a folder.
@@ -212,6 +213,9 @@ pub(crate) struct RecordArgs {
     /// Confirms that the person in the picture agreed to being recorded. Body images are biometric data.
     #[arg(long)]
     pub(crate) consent: bool,
+    /// Configuration file with the bus endpoints (see `up`).
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

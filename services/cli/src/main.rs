@@ -2,8 +2,11 @@
 #![allow(clippy::print_stdout, reason = "this is the one program whose standard output is for people and scripts")]
 
 mod args;
+mod chain;
 mod commands;
 mod input;
+mod mirror;
+mod onebox;
 mod report;
 
 use args::{Cli, Command};

@@ -1,0 +1,253 @@
+//! The whole chain in one thread of thought: a frame in, a picture out. What the services do over the wire, without it.
+
+use anyhow::{Context, Result};
+use std::sync::Arc;
+use tryon::body::{BoneTransforms, Pose, RestBody, Template, skin};
+use tryon::camera::{Calibration, ColorImage, RgbdFrame};
+use tryon::cloth::realtime;
+use tryon::composite::{self, BodyView, GarmentView, Look};
+use tryon::dressing::{DressOptions, dress, measure, suggest};
+use tryon::garment::{Pattern, Size, library};
+use tryon::math::{P3, World};
+use tryon::par::Par;
+use tryon::tracking::{self, Status, TrackerConfig, TrackerModel, TrackerState};
+
+/// A garment that was asked for.
+#[derive(Debug, Clone)]
+pub(crate) struct Choice {
+    /// Name in the library.
+    pub(crate) name: String,
+    /// Size; chosen from the tracked body when absent.
+    pub(crate) size: Option<Size>,
+}
+
+impl Choice {
+    /// Checks names and size at once, before any frame is read.
+    ///
+    /// # Errors
+    /// Names the unknown garment or size.
+    pub(crate) fn parse(names: &[String], size: Option<&str>) -> Result<Vec<Self>> {
+        let size = size.map(str::parse).transpose()?;
+        names
+            .iter()
+            .map(|name| {
+                library::pattern(name, size.unwrap_or_default())?;
+                Ok(Self { name: name.clone(), size })
+            })
+            .collect()
+    }
+}
+
+/// Time between frames when their clocks say nothing usable, s.
+const FRAME_TIME: f64 = 1.0 / 30.0;
+/// A longer gap than this is no time step for cloth: the camera paused, s.
+const LONGEST_STEP: f64 = 0.2;
+
+/// Garments on the body.
+struct Worn {
+    model: realtime::Model,
+    state: realtime::State,
+    work: realtime::Workspace,
+    looks: Vec<Look>,
+}
+
+/// What became of one frame.
+#[derive(Debug)]
+pub(crate) struct Outcome {
+    /// The picture; the captured one while nobody is dressed.
+    pub(crate) picture: ColorImage,
+    /// Tracking status after the frame.
+    pub(crate) status: Status,
+    /// Garments are in the picture.
+    pub(crate) dressed: bool,
+    /// Milliseconds by stage.
+    pub(crate) stages: Vec<(&'static str, f64)>,
+    /// Work left out, by kind.
+    pub(crate) skipped: Vec<(&'static str, f64)>,
+    /// Mean distance of the body to the readings, millimetres.
+    pub(crate) residual_mm: f64,
+    /// Deepest garment vertex under the skin, metres.
+    pub(crate) penetration: f64,
+}
+
+/// One session.
+pub(crate) struct Chain {
+    choices: Vec<Choice>,
+    tracker: Arc<TrackerModel>,
+    tracked: TrackerState,
+    tracking_work: tracking::Workspace,
+    worn: Option<Worn>,
+    compositor: composite::Model,
+    composite_work: composite::Workspace,
+    last_ns: Option<u64>,
+    /// What was said about sizes.
+    pub(crate) notes: Vec<String>,
+}
+
+impl Chain {
+    /// A session in front of this camera.
+    pub(crate) fn new(template: Arc<Template>, calibration: &Calibration, choices: Vec<Choice>) -> Self {
+        let tracker = TrackerModel::new(template, calibration.clone(), TrackerConfig::default());
+        let tracked = TrackerState::new(&tracker);
+        Self {
+            choices,
+            tracker: Arc::new(tracker),
+            tracked,
+            tracking_work: tracking::Workspace::default(),
+            worn: None,
+            compositor: composite::Model::default(),
+            composite_work: composite::Workspace::default(),
+            last_ns: None,
+            notes: Vec::new(),
+        }
+    }
+
+    /// Posed surface of the tracked body in the camera's frame.
+    pub(crate) fn body(&self) -> (Vec<P3>, &Template) {
+        let template = self.tracker.template();
+        let rest = template.personalise(&self.tracked.shape);
+        let mut vertices = Vec::new();
+        pose_surface(template, &rest, &self.tracked.pose, &mut vertices);
+        (vertices, template)
+    }
+
+    /// One frame through tracking, dressing, cloth and compositing.
+    ///
+    /// # Errors
+    /// A frame that does not fit the camera, or a garment that cannot be put on.
+    pub(crate) fn frame(&mut self, frame: &RgbdFrame) -> Result<Outcome> {
+        let mut clock = std::time::Instant::now();
+        let mut stages = Vec::new();
+        let mut lap = |name: &'static str, stages: &mut Vec<(&'static str, f64)>| {
+            let now = std::time::Instant::now();
+            stages.push((name, now.duration_since(clock).as_secs_f64() * 1e3));
+            clock = now;
+        };
+        let report = tracking::step(&self.tracker, &mut self.tracked, frame, &mut self.tracking_work)?;
+        lap("tracking", &mut stages);
+        let mut skipped = vec![("hidden template points", report.skipped.hidden_points as f64)];
+
+        let dt = self.time_step(frame.time_ns);
+        let template = Arc::clone(self.tracker.template());
+        let mut body_camera = Vec::new();
+        let mut penetration = 0.0;
+        if self.tracked.status == Status::Tracking {
+            let rest = template.personalise(&self.tracked.shape);
+            pose_surface(&template, &rest, &self.tracked.pose, &mut body_camera);
+            if self.worn.is_none() && !self.choices.is_empty() {
+                self.worn = Some(self.put_on(&template, &rest)?);
+                lap("dressing", &mut stages);
+            }
+            if let Some(worn) = &mut self.worn {
+                let mut body = Vec::new();
+                self.tracked.world_from_camera.points_f32(&body_camera, &mut body);
+                let input = realtime::Input { body: &body, dt };
+                let r = realtime::step(&worn.model, &mut worn.state, &input, &mut worn.work)?;
+                penetration = r.penetration_left;
+                skipped.push(("sleeping cloth vertices", r.sleeping as f64));
+                lap("cloth", &mut stages);
+            }
+        }
+        let live = self.tracked.status == Status::Tracking;
+        let picture = self.picture(frame, live.then_some(body_camera.as_slice()), &mut skipped)?;
+        lap("composite", &mut stages);
+        Ok(Outcome {
+            picture,
+            status: self.tracked.status,
+            dressed: live && self.worn.is_some(),
+            stages,
+            skipped,
+            residual_mm: report.residual_mm,
+            penetration,
+        })
+    }
+
+    fn time_step(&mut self, time_ns: u64) -> f64 {
+        let last = self.last_ns.replace(time_ns);
+        let dt = last.and_then(|l| time_ns.checked_sub(l)).map_or(FRAME_TIME, |ns| ns as f64 * 1e-9);
+        if dt > 0.0 && dt <= LONGEST_STEP { dt } else { FRAME_TIME }
+    }
+
+    fn put_on(&mut self, template: &Template, rest: &RestBody) -> Result<Worn> {
+        let measures = measure(template, rest);
+        let mut patterns: Vec<Pattern> = Vec::new();
+        for c in &self.choices {
+            let size = match c.size {
+                Some(size) => size,
+                None => {
+                    let s = suggest(&c.name, &measures)?;
+                    self.notes.push(format!("{}: {} ({})", c.name, s.size, s.reason));
+                    s.size
+                }
+            };
+            patterns.push(library::pattern(&c.name, size)?);
+        }
+        let pose: Pose<World> =
+            Pose { root: self.tracked.world_from_camera * self.tracked.pose.root, angles: self.tracked.pose.angles.clone() };
+        let dressed =
+            dress(template, rest, &pose, &patterns, &DressOptions::default()).context("the garments cannot be put on")?;
+        let looks = dressed.model.outfit.garments.iter().map(|g| look(&g.name)).collect();
+        Ok(Worn { model: dressed.model, state: dressed.state, work: realtime::Workspace::default(), looks })
+    }
+
+    fn picture(
+        &mut self,
+        frame: &RgbdFrame,
+        body: Option<&[P3]>,
+        skipped: &mut Vec<(&'static str, f64)>,
+    ) -> Result<ColorImage> {
+        let camera_from_world = self.tracked.world_from_camera.inverse();
+        let mut drawn: Vec<Vec<P3>> = Vec::new();
+        if let (Some(worn), Some(_)) = (&self.worn, body) {
+            for (mesh, state) in worn.model.outfit.garments.iter().zip(&worn.state.garments) {
+                let (mut world, mut camera) = (Vec::new(), Vec::new());
+                mesh.render_positions(&state.positions, &mut world);
+                camera_from_world.points_f32(&world, &mut camera);
+                drawn.push(camera);
+            }
+        }
+        let garments: Vec<GarmentView<'_>> = match &self.worn {
+            Some(worn) => drawn
+                .iter()
+                .zip(&worn.model.outfit.garments)
+                .zip(&worn.looks)
+                .map(|((vertices, mesh), look)| GarmentView {
+                    vertices,
+                    faces: &mesh.render.faces,
+                    uv: &mesh.render.uv,
+                    normals: &[],
+                    look,
+                })
+                .collect(),
+            None => Vec::new(),
+        };
+        let input = composite::Input {
+            frame,
+            calibration: self.tracker.calibration(),
+            garments: &garments,
+            body: body.map(|vertices| BodyView { vertices, faces: self.tracker.template().mesh().faces() }),
+            output: None,
+        };
+        let (picture, report) = composite::render(&self.compositor, &input, &mut self.composite_work)?;
+        skipped.push(("picture tiles without garment", report.tiles_skipped as f64));
+        Ok(picture)
+    }
+}
+
+fn pose_surface<F>(template: &Template, rest: &RestBody, pose: &Pose<F>, out: &mut Vec<P3>) {
+    let mut bones = BoneTransforms::default();
+    pose.bones(template.skeleton(), rest, &mut bones);
+    skin(Par::Rayon, &rest.vertices, template.weights(), &bones, out);
+}
+
+/// Colours of the library's garments.
+pub(crate) fn look(garment: &str) -> Look {
+    let base = match garment {
+        "tshirt" => [214, 205, 190],
+        "longsleeve" => [84, 112, 96],
+        "skirt" => [140, 58, 74],
+        "trousers" => [52, 60, 82],
+        _ => return Look::default(),
+    };
+    Look { base, ..Look::default() }
+}

@@ -1,0 +1,161 @@
+//! `tryon demo`: the whole chain in one process on a synthetic shopper.
+
+use crate::args::DemoArgs;
+use crate::mirror::{self, Received};
+use crate::onebox::OneBox;
+use crate::report::{Summary, peak_memory, write};
+use crate::{input, report};
+use anyhow::{Context, Result};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+use tryon::garment::{Size, library};
+use tryon_kit::config::{Config, LogConfig};
+use tryon_kit::drain;
+use tryon_kit::telemetry;
+
+/// Without --seconds a headless run ends after this long.
+const HEADLESS_SECONDS: f64 = 10.0;
+
+/// report.json of a headless demo.
+#[derive(Debug, Serialize)]
+struct Report {
+    /// Seconds from the first picture to the last.
+    seconds: f64,
+    /// Exposures that the camera published in that time, counted by sequence.
+    frames_in: u64,
+    /// Pictures received.
+    frames_out: usize,
+    /// Pictures that showed the garments on the person.
+    frames_live: usize,
+    /// Exposures that became no picture: newest wins at every queue.
+    drops: u64,
+    /// Pictures a second.
+    rate: f64,
+    /// Pictures a second while live.
+    live_rate: f64,
+    /// Seconds from opening the try-on to the first live picture: finding, calibrating, dressing.
+    first_live_seconds: Option<f64>,
+    /// From the exposure's arrival in the capture service to the picture's arrival at the client, milliseconds.
+    latency_ms: Summary,
+    /// The same while live.
+    live_latency_ms: Summary,
+    /// Milliseconds by stage, live pictures only.
+    stages_ms: BTreeMap<String, Summary>,
+    /// Counters of all services, skipped work among them.
+    counters: BTreeMap<String, f64>,
+    /// How often each state was seen.
+    states: BTreeMap<String, usize>,
+    garments: Vec<String>,
+    peak_memory_bytes: Option<u64>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When a service cannot start or a result cannot be written.
+pub(crate) fn run(args: &DemoArgs) -> Result<ExitCode> {
+    for name in &args.garments {
+        library::pattern(name, Size::default())?;
+    }
+    // The recorder must be there before the first counter is.
+    let _ = telemetry::metrics();
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().context("the runtime")?;
+    let outcome = runtime.block_on(demo(args));
+    runtime.shutdown_timeout(Duration::from_millis(200));
+    outcome
+}
+
+fn configuration(args: &DemoArgs) -> Result<Config> {
+    let any_port = std::net::SocketAddr::from(([127, 0, 0, 1], 0));
+    let mut c = Config { log: LogConfig { level: "warn".into(), ..LogConfig::default() }, ..Config::default() };
+    (c.capture.address, c.capture.admin) = (any_port, any_port);
+    (c.tracking.address, c.tracking.admin) = (any_port, any_port);
+    (c.cloth.address, c.cloth.admin) = (any_port, any_port);
+    c.compositor.admin = any_port;
+    c.compositor.address = if args.headless { any_port } else { args.listen };
+    for camera in &mut c.capture.cameras {
+        camera.rate = args.fps;
+        if let Some(recording) = &args.input {
+            camera.source = recording.to_str().context("--input: the path is not UTF-8")?.to_owned();
+        }
+    }
+    c.validate()?;
+    Ok(c)
+}
+
+async fn demo(args: &DemoArgs) -> Result<ExitCode> {
+    let services = OneBox::start(configuration(args)?, None).await?;
+    let address = services.address("compositor").context("the compositor has no address")?;
+    if args.headless {
+        let seconds = args.seconds.unwrap_or(HEADLESS_SECONDS);
+        input::create_dir(&args.out)?;
+        println!("headless: {seconds} s of {} into {}", args.garments.join(" and "), args.out.display());
+        let received = mirror::watch(address, &args.garments, Duration::from_secs_f64(seconds), &args.out).await;
+        services.stop().await;
+        return summarise(args, &received?);
+    }
+    println!("The mirror is open at http://{address} (Ctrl-C ends it)");
+    let started = Instant::now();
+    let limit = args.seconds.map_or(Duration::MAX, Duration::from_secs_f64);
+    tokio::select! {
+        signal = drain::signal() => println!("{}: draining", signal.context("signals")?),
+        () = tokio::time::sleep(limit) => println!("{:.1} s are over: draining", started.elapsed().as_secs_f64()),
+    }
+    services.stop().await;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn summarise(args: &DemoArgs, received: &Received) -> Result<ExitCode> {
+    let live: Vec<_> = received.pictures.iter().filter(|p| p.live).collect();
+    let all_ms: Vec<f64> = received.pictures.iter().map(|p| p.latency_ms).collect();
+    let live_ms: Vec<f64> = live.iter().map(|p| p.latency_ms).collect();
+    let mut stages = report::Samples::default();
+    live.iter().for_each(|p| stages.extend(p.stages.iter().map(|(n, ms)| (n.as_str(), *ms))));
+    let span = |v: &[&mirror::Seen]| match (v.first(), v.last()) {
+        (Some(a), Some(b)) => b.at - a.at,
+        _ => 0.0,
+    };
+    let rate = |v: &[&mirror::Seen]| if span(v) > 0.0 { (v.len() - 1) as f64 / span(v) } else { 0.0 };
+    let everything: Vec<_> = received.pictures.iter().collect();
+    let frames_in = match (everything.first(), everything.last()) {
+        (Some(a), Some(b)) => b.sequence.saturating_sub(a.sequence) + 1,
+        _ => 0,
+    };
+    let r = Report {
+        seconds: span(&everything),
+        frames_in,
+        frames_out: everything.len(),
+        frames_live: live.len(),
+        drops: frames_in.saturating_sub(everything.len() as u64),
+        rate: rate(&everything),
+        live_rate: rate(&live),
+        first_live_seconds: live.first().map(|p| p.at),
+        latency_ms: Summary::of(&all_ms),
+        live_latency_ms: Summary::of(&live_ms),
+        stages_ms: stages.summaries(),
+        counters: received.counters.clone(),
+        states: received.states.clone(),
+        garments: args.garments.clone(),
+        peak_memory_bytes: peak_memory(),
+    };
+    write(&args.out.join("report.json"), &r)?;
+    println!(
+        "{} frames in, {} pictures ({} live), {} dropped; live {:.1} a second, latency p50 {:.0} ms p99 {:.0} ms; {:.0} MiB",
+        r.frames_in,
+        r.frames_out,
+        r.frames_live,
+        r.drops,
+        r.live_rate,
+        r.live_latency_ms.p50,
+        r.live_latency_ms.p99,
+        r.peak_memory_bytes.unwrap_or(0) as f64 / (1024.0 * 1024.0)
+    );
+    println!("{} pictures and report.json in {}", received.kept, args.out.display());
+    if r.frames_live == 0 {
+        eprintln!("tryon: no live picture came; report.json says which states were seen");
+        return Ok(ExitCode::FAILURE);
+    }
+    Ok(ExitCode::SUCCESS)
+}

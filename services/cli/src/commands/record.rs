@@ -1,0 +1,127 @@
+//! `tryon record`: a source to MCAP or a folder.
+
+use crate::args::RecordArgs;
+use crate::input;
+use anyhow::{Context, Result, bail};
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
+use tryon::camera::{Calibration, RgbdFrame};
+use tryon::formats::{McapWriter, RgbdFolderWriter};
+use tryon_kit::bus::ZenohBus;
+use tryon_kit::compute::Pool;
+use tryon_kit::config::Config;
+use tryon_kit::frames::{CameraKey, FrameBus};
+
+/// How long a camera on the bus may stay silent before recording gives up.
+const SILENCE: Duration = Duration::from_secs(5);
+
+/// Where frames go.
+pub(crate) enum Sink {
+    /// An MCAP file.
+    Mcap(Box<McapWriter>),
+    /// An RGBD folder.
+    Folder(Box<RgbdFolderWriter>),
+}
+
+impl Sink {
+    /// A file ending in `.mcap`, or a folder.
+    ///
+    /// # Errors
+    /// When it cannot be created.
+    pub(crate) fn create(path: &Path, calibration: &Calibration) -> Result<Self> {
+        if path.extension().is_some_and(|e| e == "mcap") {
+            return Ok(Self::Mcap(Box::new(McapWriter::create(path, calibration)?)));
+        }
+        Ok(Self::Folder(Box::new(RgbdFolderWriter::create(path, calibration)?)))
+    }
+    /// Adds a frame.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(crate) fn write(&mut self, frame: &RgbdFrame) -> Result<()> {
+        match self {
+            Self::Mcap(w) => w.write(frame)?,
+            Self::Folder(w) => w.write(frame)?,
+        }
+        Ok(())
+    }
+    /// Ends the recording.
+    ///
+    /// # Errors
+    /// When its end cannot be written; what was written before stays readable.
+    pub(crate) fn finish(self) -> Result<()> {
+        if let Self::Mcap(w) = self {
+            w.finish()?;
+        }
+        Ok(())
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A source that cannot be opened, a missing consent, or a file that cannot be written.
+pub(crate) fn run(args: &RecordArgs) -> Result<ExitCode> {
+    let frames = match args.source.strip_prefix("bus:") {
+        Some(camera) => from_bus(args, camera)?,
+        None => from_source(args)?,
+    };
+    println!("{frames} frames in {}", args.out.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn from_source(args: &RecordArgs) -> Result<u64> {
+    let mut source = tryon_capture::open(&args.source)?;
+    let mut sink = Sink::create(&args.out, source.calibration())?;
+    let bar = input::progress(source.len().map(|n| n as u64), "recording");
+    let mut first = None;
+    while let Some(frame) = source.next_frame()? {
+        let start = *first.get_or_insert(frame.time_ns);
+        if frame.time_ns.saturating_sub(start) as f64 * 1e-9 >= args.seconds {
+            break;
+        }
+        sink.write(&frame)?;
+        bar.inc(1);
+    }
+    sink.finish()?;
+    bar.finish_and_clear();
+    Ok(bar.position())
+}
+
+/// A camera that runs now. People are in the picture: that needs their word.
+fn from_bus(args: &RecordArgs, camera: &str) -> Result<u64> {
+    if !args.consent {
+        bail!("a live camera shows people: record it only when they agreed, and say so with --consent");
+    }
+    let key = camera.split_once('/').and_then(|(store, camera)| CameraKey::new(store, camera));
+    let key = key.with_context(|| format!("--source bus:{camera}: STORE/CAMERA of [a-z0-9_-] is needed"))?;
+    let config = Config::load(args.config.as_deref(), &[])?;
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().context("the runtime")?;
+    runtime.block_on(async {
+        let bus = ZenohBus::open(&[], &config.bus.connect, Pool::new(1).context("threads")?).await?;
+        let bus: Arc<dyn FrameBus> = bus;
+        let mut frames = bus.subscribe(&key).await?;
+        let bar = input::progress(None, "recording");
+        let end = tokio::time::Instant::now() + Duration::from_secs_f64(args.seconds);
+        let mut sink: Option<Sink> = None;
+        while tokio::time::Instant::now() < end {
+            let next = tokio::time::timeout(SILENCE, frames.next()).await;
+            let Some(exposure) = next.with_context(|| format!("camera {camera} is silent"))? else { break };
+            // Disk work off the async workers; frames are small next to a disk's second.
+            tokio::task::block_in_place(|| {
+                if sink.is_none() {
+                    sink = Some(Sink::create(&args.out, &exposure.calibration)?);
+                }
+                sink.as_mut().map_or(Ok(()), |s| s.write(&exposure.rgbd))
+            })?;
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        if let Some(sink) = sink {
+            sink.finish()?;
+        }
+        Ok(bar.position())
+    })
+}

@@ -1,0 +1,27 @@
+//! `tryon simulate`: cloth in a scene file.
+
+use crate::args::{SimulateArgs, SolverArg};
+use crate::input;
+use crate::report::write;
+use anyhow::{Result, bail};
+use std::process::ExitCode;
+use tryon::cloth::scene;
+
+/// Runs the command.
+///
+/// # Errors
+/// A scene at fault, named by field, or results that cannot be written.
+pub(crate) fn run(args: &SimulateArgs) -> Result<ExitCode> {
+    if matches!(args.solver, SolverArg::Offline) {
+        bail!("the offline solver is not built yet; --solver realtime is");
+    }
+    let scene = scene::load(&args.scene)?;
+    input::create_dir(&args.out)?;
+    let bar = input::progress(Some(scene.frames() as u64), "simulating");
+    let result = scene::run(&scene, |_| bar.inc(1))?;
+    bar.finish_and_clear();
+    result.write_positions(&args.out.join("positions.npy"))?;
+    write(&args.out.join("report.json"), &result.report)?;
+    println!("{} frames in {}", scene.frames(), args.out.display());
+    Ok(ExitCode::SUCCESS)
+}

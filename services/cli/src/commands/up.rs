@@ -1,0 +1,53 @@
+//! `tryon up`: the services of one box from a configuration file.
+
+use crate::args::UpArgs;
+use crate::onebox::OneBox;
+use anyhow::{Context, Result};
+use std::process::ExitCode;
+use std::sync::Arc;
+use tryon_kit::bus::ZenohBus;
+use tryon_kit::compute::Pool;
+use tryon_kit::config::Config;
+use tryon_kit::drain;
+use tryon_kit::frames::FrameBus;
+use tryon_kit::process::EXIT_USAGE;
+
+/// Runs the command.
+///
+/// # Errors
+/// When a service cannot start.
+pub(crate) fn run(args: &UpArgs) -> Result<ExitCode> {
+    let config = match Config::load(args.config.as_deref(), &[]) {
+        Ok(c) => c,
+        Err(e) => {
+            eprintln!("tryon up: {e}");
+            return Ok(ExitCode::from(EXIT_USAGE));
+        }
+    };
+    if args.check {
+        println!("{}", toml_of(&config)?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().context("the runtime")?;
+    runtime.block_on(async {
+        // The bus listens, so that a camera node or `tryon replay` elsewhere can join.
+        let pool = Pool::new(1).context("the bus's threads")?;
+        let bus: Arc<dyn FrameBus> = ZenohBus::open(&config.bus.listen, &[], pool).await?;
+        let services = OneBox::start(config, Some(bus)).await?;
+        for (name, grpc, admin) in &services.addresses {
+            println!("{name}: grpc {grpc} admin {admin}");
+        }
+        if let Some(address) = services.address("compositor") {
+            println!("mirror: http://{address}");
+        }
+        let signal = drain::signal().await.context("signals")?;
+        println!("{signal}: draining");
+        services.stop().await;
+        println!("ended");
+        Ok(ExitCode::SUCCESS)
+    })
+}
+
+fn toml_of(config: &Config) -> Result<String> {
+    Ok(toml::to_string_pretty(config)?)
+}

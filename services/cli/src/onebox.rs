@@ -1,0 +1,115 @@
+//! The four services of one box in one process, each started again when it breaks.
+
+use anyhow::{Context as _, Result};
+use std::future::Future;
+use std::net::SocketAddr;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::task::JoinSet;
+use tokio_util::sync::CancellationToken;
+use tryon_kit::client::pauses;
+use tryon_kit::compute::Pool;
+use tryon_kit::config::Config;
+use tryon_kit::frames::{FrameBus, LocalBus};
+use tryon_kit::server::{Context, Running, StartError};
+
+type Starting = Pin<Box<dyn Future<Output = Result<Running, StartError>> + Send>>;
+type Start = fn(Arc<Config>, Context) -> Starting;
+
+/// Name and start of each service, upstream first.
+const SERVICES: [(&str, Start); 4] = [
+    ("capture", |c, x| Box::pin(async move { tryon_capture::start(&c, x).await })),
+    ("tracking", |c, x| Box::pin(async move { tryon_tracking::start(&c, x).await })),
+    ("cloth", |c, x| Box::pin(async move { tryon_cloth::start(&c, x).await })),
+    ("compositor", |c, x| Box::pin(async move { tryon_compositor::start(&c, x).await })),
+];
+
+/// A running box.
+pub(crate) struct OneBox {
+    /// Addresses by service name.
+    pub(crate) addresses: Vec<(&'static str, SocketAddr, SocketAddr)>,
+    shutdown: CancellationToken,
+    tasks: JoinSet<()>,
+}
+
+impl OneBox {
+    /// Starts all services. Frames stay in this process unless `bus` says otherwise. Ports may be 0 for services that
+    /// find each other by the configuration made here.
+    ///
+    /// # Errors
+    /// Names the service and the address or key at fault.
+    pub(crate) async fn start(mut config: Config, bus: Option<Arc<dyn FrameBus>>) -> Result<Self> {
+        let pool = Pool::new(config.process.compute_threads).context("the compute threads cannot be started")?;
+        let bus = bus.unwrap_or_else(|| LocalBus::new(Arc::clone(&pool)));
+        let shutdown = CancellationToken::new();
+        let grace = Duration::from_millis(config.process.grace_ms);
+        let ctx = Context { bus, pool, shutdown: shutdown.clone(), grace };
+        let mut addresses = Vec::new();
+        let mut tasks = JoinSet::new();
+        for (name, start) in SERVICES {
+            let running = start(Arc::new(config.clone()), ctx.clone()).await.with_context(|| name.to_owned())?;
+            addresses.push((name, running.address, running.admin));
+            pin_addresses(&mut config, name, &running);
+            tasks.spawn(supervise(name, start, Arc::new(config.clone()), ctx.clone(), running));
+        }
+        Ok(Self { addresses, shutdown, tasks })
+    }
+    /// gRPC address of a service.
+    pub(crate) fn address(&self, name: &str) -> Option<SocketAddr> {
+        self.addresses.iter().find(|a| a.0 == name).map(|a| a.1)
+    }
+    /// Drains all services; each has its own hard deadline.
+    pub(crate) async fn stop(mut self) {
+        self.shutdown.cancel();
+        while self.tasks.join_next().await.is_some() {}
+    }
+}
+
+/// Ports that were 0 become what they were bound to, so that the next services and any restart find them.
+fn pin_addresses(config: &mut Config, name: &str, running: &Running) {
+    let url = format!("http://{}", running.address);
+    match name {
+        "capture" => (config.capture.address, config.capture.admin) = (running.address, running.admin),
+        "tracking" => {
+            (config.tracking.address, config.tracking.admin) = (running.address, running.admin);
+            config.cloth.tracking = url.clone();
+            config.compositor.tracking = url;
+        }
+        "cloth" => {
+            (config.cloth.address, config.cloth.admin) = (running.address, running.admin);
+            config.compositor.cloth = url;
+        }
+        _ => (config.compositor.address, config.compositor.admin) = (running.address, running.admin),
+    }
+}
+
+/// Waits for the end of a service; one that broke is started again after a pause that grows with each failure.
+async fn supervise(name: &'static str, start: Start, config: Arc<Config>, ctx: Context, first: Running) {
+    let mut running = Some(first);
+    let mut waits = pauses();
+    loop {
+        if let Some(r) = running.take() {
+            match r.ended().await {
+                Ok(how) if ctx.shutdown.is_cancelled() => {
+                    tracing::info!(service = name, ?how, "ended");
+                    return;
+                }
+                Ok(_) => tracing::error!(service = name, "ended by itself; starting it again"),
+                Err(e) => tracing::error!(service = name, error = %e, "broke; starting it again"),
+            }
+        }
+        let pause = waits.next().unwrap_or(Duration::from_secs(1));
+        tokio::select! {
+            () = ctx.shutdown.cancelled() => return,
+            () = tokio::time::sleep(pause) => {}
+        }
+        match start(Arc::clone(&config), ctx.clone()).await {
+            Ok(r) => {
+                running = Some(r);
+                waits = pauses();
+            }
+            Err(e) => tracing::error!(service = name, error = %e, "cannot start"),
+        }
+    }
+}
