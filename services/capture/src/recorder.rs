@@ -1,11 +1,12 @@
 //! Recording: a thread that writes, beside a camera that does not wait for it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use tonic::Status;
 use tryon::camera::Calibration;
+use tryon::formats::McapWriter;
 use tryon_kit::frames::Exposure;
 
 /// Frames that may wait for the disk: half a second at 30 a second, 20 MB of shared images.
@@ -77,7 +78,12 @@ impl Recorder {
     }
 }
 
-fn write(path: &std::path::Path, calibration: &Calibration, inbox: &Receiver<Arc<Exposure>>) -> Result<u64, String> {
-    let _ = (path, calibration, inbox);
-    Err("not built yet".into())
+fn write(path: &Path, calibration: &Calibration, inbox: &Receiver<Arc<Exposure>>) -> Result<u64, String> {
+    let mut file = McapWriter::create(path, calibration).map_err(|e| e.to_string())?;
+    for e in inbox {
+        file.write(&e.rgbd).map_err(|e| e.to_string())?;
+    }
+    let frames = file.frames() as u64;
+    file.finish().map_err(|e| e.to_string())?;
+    Ok(frames)
 }

@@ -3,6 +3,7 @@
 use crate::pattern::Pattern;
 use std::path::Path;
 use tryon::formats::{RgbdSource, open_recording};
+use tryon::synth::{Routine, Sequence, Setting, Shopper, SynthSource};
 
 /// A source ready to be read.
 pub type OpenSource = Box<dyn RgbdSource>;
@@ -30,6 +31,31 @@ pub fn open(name: &str) -> Result<OpenSource, SourceError> {
     }
 }
 
-fn synth(_clip: &str) -> Result<OpenSource, String> {
-    Err("not built yet".into())
+/// `try-on` (the default), `leave`, `still` or `empty`, without end.
+fn synth(clip: &str) -> Result<OpenSource, String> {
+    let routine = match clip {
+        "" | "try-on" => Routine::TryOn,
+        "leave" => Routine::LeaveAndReturn,
+        "still" => Routine::Still,
+        "empty" => Routine::Empty,
+        other => return Err(format!("`{other}` is no routine; there are try-on, leave, still and empty")),
+    };
+    let sequence = Sequence::new(Shopper::default(), Setting { routine, ..Setting::default() });
+    Ok(Box::new(SynthSource::new(sequence, None)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sources_open_by_name_and_faults_are_named() {
+        let mut s = open("pattern").expect("always there");
+        let f = s.next_frame().expect("fine").expect("never ends");
+        assert_eq!(f.depth.width(), s.calibration().depth.width);
+        for bad in ["synth:handstand", "/nowhere/at/all"] {
+            let e = open(bad).err().expect("refused").to_string();
+            assert!(e.starts_with(bad), "{e}");
+        }
+    }
 }

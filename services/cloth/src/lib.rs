@@ -1,1 +1,40 @@
-//! Under construction.
+//! The cloth service: garments on the bodies that tracking reports.
+//!
+//! One task owns one session ([`session`]): it follows the session's body states, dresses the body when it is
+//! calibrated, steps the garments on the compute pool and hands each reader a keyframe and then positions.
+
+mod engine;
+mod library;
+mod service;
+mod session;
+mod simulation;
+
+use tryon_kit::config::Config;
+use tryon_kit::server::{self, Context, Running, Service, StartError};
+use tryon_proto::v1::cloth_service_server::{ClothServiceServer, SERVICE_NAME};
+
+/// A scene of a simulation, with room for its message.
+const MAX_REQUEST_BYTES: usize = 1024 * 1024 + 4096;
+
+/// Starts the service. The tracking service need not run yet.
+///
+/// # Errors
+/// When an address cannot be bound or the tracking URL is none.
+pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError> {
+    let c = &config.cloth;
+    let tracking = tryon_kit::client::channel(&c.tracking)
+        .map_err(|why| StartError::Config { key: "cloth.tracking".into(), why })?;
+    let service = service::Cloth::new(c, &ctx, tracking);
+    let (mut routes, health) = server::routes()?;
+    routes.add_service(ClothServiceServer::new(service).max_decoding_message_size(MAX_REQUEST_BYTES));
+    let service = Service {
+        name: "cloth",
+        grpc_name: SERVICE_NAME,
+        address: c.address,
+        admin: c.admin,
+        routes: routes.routes(),
+        http1: false,
+        health,
+    };
+    server::start(service, &ctx).await
+}

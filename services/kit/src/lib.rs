@@ -2,6 +2,7 @@
 //! the compute pool, servers, clients that come back, and a shutdown with a deadline.
 
 pub mod admin;
+pub mod bodies;
 pub mod bus;
 pub mod client;
 pub mod compute;

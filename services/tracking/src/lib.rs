@@ -1,1 +1,36 @@
-//! Under construction.
+//! The tracking service: body states from the frames of a camera.
+//!
+//! One task owns one session ([`session`]): it takes the newest frame, steps the tracker on the compute pool and
+//! leaves the state in a watch that any number of streams read.
+
+mod engine;
+mod service;
+mod session;
+
+use tryon_kit::config::Config;
+use tryon_kit::server::{self, Context, Running, Service, StartError};
+use tryon_proto::v1::tracking_service_server::{SERVICE_NAME, TrackingServiceServer};
+
+/// Starts the service.
+///
+/// # Errors
+/// When an address cannot be bound or the configured body cannot be read.
+pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError> {
+    let c = &config.tracking;
+    let body = c.body.clone();
+    let template = ctx.pool.run(move || engine::load_template(&body)).await.map_err(|e| e.to_string());
+    let template = template.and_then(|t| t).map_err(|why| StartError::Config { key: "tracking.body".into(), why })?;
+    let service = service::Tracking::new(c, &ctx, template);
+    let (mut routes, health) = server::routes()?;
+    routes.add_service(TrackingServiceServer::new(service).max_decoding_message_size(server::MAX_REQUEST_BYTES));
+    let service = Service {
+        name: "tracking",
+        grpc_name: SERVICE_NAME,
+        address: c.address,
+        admin: c.admin,
+        routes: routes.routes(),
+        http1: false,
+        health,
+    };
+    server::start(service, &ctx).await
+}

@@ -1,0 +1,148 @@
+//! Dressing and stepping: everything of a session that computes.
+
+use crate::library;
+use std::sync::Arc;
+use std::time::Instant;
+use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
+use tryon::cloth::realtime::{self, Input, Model, State, Workspace};
+use tryon::dressing::{self, DressOptions};
+use tryon::garment::library as patterns;
+use tryon::math::{Camera, P3, Rigid, World};
+use tryon::par::Par;
+use tryon_kit::frames::stage;
+use tryon_proto::convert::body::pose_from_wire;
+use tryon_proto::convert::frame::stages_from_wire;
+use tryon_proto::convert::garment::{WornGarment, positions_to_wire, topology_to_wire};
+use tryon_proto::convert::geometry::rigid_from_wire;
+use tryon_proto::convert::required;
+use tryon_proto::v1::{self, BodyState, GarmentChoice};
+
+/// Longest and shortest step of the garments, seconds: a gap in the stream must not become one huge step.
+const DT: (f64, f64) = (1.0 / 120.0, 1.0 / 10.0);
+
+/// A body as the garments need it.
+pub(crate) struct Body {
+    pub(crate) template: Arc<Template>,
+    pub(crate) shape: Arc<BodyShape>,
+    pose: Pose<World>,
+    pub(crate) state: BodyState,
+}
+
+impl Body {
+    /// The body of a state, in the world.
+    pub(crate) fn new(state: BodyState, shape: Arc<BodyShape>, template: Arc<Template>) -> Result<Self, String> {
+        let fault = |e: tryon_proto::convert::WireError| e.within("body_state").to_string();
+        let world = required(state.world_from_camera.as_ref(), "world_from_camera").map_err(fault)?;
+        let world: Rigid<World, Camera> = rigid_from_wire(world, "world_from_camera").map_err(fault)?;
+        let pose = required(state.pose.as_ref(), "pose").map_err(fault)?;
+        let pose = pose_from_wire(pose, template.skeleton().dofs()).map_err(fault)?;
+        stages_from_wire(&state.stages, "stages").map_err(fault)?;
+        let pose = Pose { root: world * pose.root, angles: pose.angles };
+        Ok(Self { template, shape, pose, state })
+    }
+    fn time_ns(&self) -> u64 {
+        self.state.frame.map_or(0, |f| f.capture_time_ns)
+    }
+}
+
+/// An outfit on a body.
+pub(crate) struct Worn {
+    model: Model,
+    state: State,
+    work: Workspace,
+    rest: RestBody,
+    rest_of: Arc<BodyShape>,
+    bones: BoneTransforms,
+    posed: Vec<P3>,
+    last_ns: u64,
+    topologies: Vec<v1::GarmentTopology>,
+}
+
+/// What a step gives: the message, all but session, status and counters.
+pub(crate) type Placed = v1::GarmentFrame;
+
+/// Puts garments on; takes about a second.
+pub(crate) fn dress(body: &Body, choices: &[GarmentChoice]) -> Result<Worn, String> {
+    let start = Instant::now();
+    let rest = body.template.personalise(&body.shape);
+    let measures = dressing::measure(&body.template, &rest);
+    let mut worn = Vec::with_capacity(choices.len());
+    for c in choices {
+        let size = match library::size(&c.size) {
+            Some(s) => s,
+            None => dressing::suggest(&c.garment, &measures).map_err(|e| e.to_string())?.size,
+        };
+        worn.push((patterns::pattern(&c.garment, size).map_err(|e| e.to_string())?, c));
+    }
+    // The outfit comes back in the order of its layers; choices must follow.
+    worn.sort_by_key(|(p, _)| p.layer);
+    let list: Vec<_> = worn.iter().map(|(p, _)| p.clone()).collect();
+    let dressed = dressing::dress(&body.template, &rest, &body.pose, &list, &DressOptions::default());
+    let dressed = dressed.map_err(|e| e.to_string())?;
+    let topologies = dressed.model.outfit.garments.iter().zip(&worn).map(|(g, (_, c))| {
+        let color = c.color_rgb.unwrap_or_else(|| library::own_color(&c.garment));
+        topology_to_wire(&WornGarment {
+            garment: c.garment.clone(),
+            size: g.size.to_string(),
+            vertices: g.vertices,
+            faces: g.faces.clone(),
+            uvs: g.uv.clone(),
+            look: v1::GarmentLook { color_rgb: color, accent_rgb: color, stripe_width: 0.0 },
+        })
+    });
+    metrics::histogram!("tryon_stage_ms", "stage" => "cloth.dress").record(start.elapsed().as_secs_f64() * 1e3);
+    Ok(Worn {
+        topologies: topologies.collect(),
+        model: dressed.model,
+        state: dressed.state,
+        work: Workspace::default(),
+        rest,
+        rest_of: body.shape.clone(),
+        bones: BoneTransforms::default(),
+        posed: Vec::new(),
+        last_ns: body.time_ns(),
+    })
+}
+
+impl Worn {
+    /// One step to the pose of `body`.
+    pub(crate) fn step(&mut self, body: &Body) -> Result<Placed, String> {
+        let start = Instant::now();
+        if !Arc::ptr_eq(&self.rest_of, &body.shape) {
+            self.rest = body.template.personalise(&body.shape);
+            self.rest_of = body.shape.clone();
+        }
+        body.pose.bones(body.template.skeleton(), &self.rest, &mut self.bones);
+        skin(Par::Rayon, &self.rest.vertices, body.template.weights(), &self.bones, &mut self.posed);
+        let skinned = stage("cloth.body", start);
+        let dt = body.time_ns().saturating_sub(self.last_ns) as f64 * 1e-9;
+        self.last_ns = body.time_ns();
+        let begun = Instant::now();
+        let input = Input { body: &self.posed, dt: dt.clamp(DT.0, DT.1) };
+        let report = realtime::step(&self.model, &mut self.state, &input, &mut self.work).map_err(|e| e.to_string())?;
+        let mut placed = self.placed(body);
+        if let Some(why) = report.kept_last_good {
+            placed.detail = why;
+        }
+        placed.stages.extend([skinned, stage("cloth.step", begun)]);
+        Ok(placed)
+    }
+
+    /// Topology of every garment, for keyframes.
+    pub(crate) fn topologies(&self) -> &[v1::GarmentTopology] {
+        &self.topologies
+    }
+
+    fn placed(&self, body: &Body) -> Placed {
+        let meshes = self.state.garments.iter();
+        v1::GarmentFrame {
+            frame: body.state.frame,
+            world_from_camera: body.state.world_from_camera,
+            garments: meshes
+                .map(|g| v1::GarmentMesh { topology: None, positions: positions_to_wire(&g.positions) })
+                .collect(),
+            stages: body.state.stages.clone(),
+            ..Default::default()
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! `tryon-cloth`: garment meshes from body states.
+
+use clap::Parser;
+use std::process::ExitCode;
+use tryon_kit::process::{self, Args, BusRole};
+
+fn main() -> ExitCode {
+    process::run("cloth", BusRole::Connect, Args::parse(), |config, ctx| async move {
+        tryon_cloth::start(&config, ctx).await
+    })
+}

@@ -1,0 +1,122 @@
+//! The rpcs: check, find the session, answer.
+
+use crate::library;
+use crate::session::{self, Command, Handle, Setup, reader};
+use crate::simulation::{Frames, Simulations};
+use futures::Stream;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::time::Duration;
+use tonic::transport::Channel;
+use tonic::{Request, Response, Status};
+use tryon_kit::config::ClothConfig;
+use tryon_kit::server::Context;
+use tryon_kit::sessions::{Opened, Sessions};
+use tryon_kit::status::{exhausted, not_found};
+use tryon_proto::convert::request;
+use tryon_proto::v1::cloth_service_server::ClothService;
+use tryon_proto::v1::*;
+
+/// The directory of sessions and what new ones need.
+pub(crate) struct Cloth {
+    sessions: Sessions<Handle>,
+    simulations: Simulations,
+    ctx: Context,
+    tracking: Channel,
+    idle: Duration,
+}
+
+impl Cloth {
+    pub(crate) fn new(config: &ClothConfig, ctx: &Context, tracking: Channel) -> Self {
+        Self {
+            sessions: Sessions::new(config.max_sessions),
+            simulations: Simulations::new(config.max_simulations),
+            ctx: ctx.clone(),
+            tracking,
+            idle: Duration::from_secs(config.idle_s),
+        }
+    }
+}
+
+#[tonic::async_trait]
+impl ClothService for Cloth {
+    async fn list_garments(&self, _: Request<ListGarmentsRequest>) -> Result<Response<ListGarmentsResponse>, Status> {
+        Ok(Response::new(ListGarmentsResponse { garments: library::garments() }))
+    }
+
+    async fn dress(&self, r: Request<DressRequest>) -> Result<Response<DressResponse>, Status> {
+        let r = r.get_ref();
+        let id = request::session_id("dress_request.session_id", &r.session_id)?;
+        let choices = request::choices("dress_request", &r.garments)?;
+        library::check(&choices)?;
+        if self.sessions.get(&id).is_some_and(|h| h.commands.is_closed()) {
+            self.sessions.remove(&id);
+        }
+        let setup = || Setup {
+            id: id.clone(),
+            ctx: self.ctx.clone(),
+            tracking: self.tracking.clone(),
+            idle: self.idle,
+            directory: self.sessions.clone(),
+        };
+        let handle = match self.sessions.open(&id, || session::spawn(setup())) {
+            Opened::Found(h) => h,
+            Opened::Created(h) => {
+                tracing::info!(session = id, "opened");
+                metrics::gauge!("tryon_cloth_sessions").set(self.sessions.len() as f64);
+                h
+            }
+            Opened::Full => return Err(exhausted("sessions", self.sessions.limit())),
+        };
+        handle.outfit.send_if_modified(|o| {
+            let changed = o.revision == 0 || o.choices != choices;
+            if changed {
+                o.revision += 1;
+                o.choices = choices;
+            }
+            changed
+        });
+        let outfit_revision = handle.outfit.borrow().revision;
+        Ok(Response::new(DressResponse { outfit_revision }))
+    }
+
+    async fn undress(&self, r: Request<UndressRequest>) -> Result<Response<UndressResponse>, Status> {
+        if let Some(h) = self.sessions.remove(&r.get_ref().session_id) {
+            let _ = h.commands.send(Command::Close).await;
+        }
+        Ok(Response::new(UndressResponse {}))
+    }
+
+    type StreamGarmentsStream = Pin<Box<dyn Stream<Item = Result<StreamGarmentsResponse, Status>> + Send>>;
+
+    async fn stream_garments(
+        &self,
+        r: Request<StreamGarmentsRequest>,
+    ) -> Result<Response<Self::StreamGarmentsStream>, Status> {
+        let id = &r.get_ref().session_id;
+        let handle: Arc<Handle> = self.sessions.get(id).ok_or_else(|| not_found("session", id))?;
+        let (tx, rx) = reader();
+        handle.commands.send(Command::Read(tx)).await.map_err(|_| not_found("session", id))?;
+        let frames = futures::stream::unfold(rx, |mut rx| async move {
+            let frame = rx.recv().await?;
+            Some((Ok(StreamGarmentsResponse { frame: Some(frame) }), rx))
+        });
+        Ok(Response::new(Box::pin(frames)))
+    }
+
+    async fn start_simulation(
+        &self,
+        r: Request<StartSimulationRequest>,
+    ) -> Result<Response<StartSimulationResponse>, Status> {
+        self.simulations.start(r.get_ref()).await.map(Response::new)
+    }
+
+    type FollowSimulationStream = Frames;
+
+    async fn follow_simulation(
+        &self,
+        r: Request<FollowSimulationRequest>,
+    ) -> Result<Response<Self::FollowSimulationStream>, Status> {
+        self.simulations.follow(&r.get_ref().simulation_id).map(Response::new)
+    }
+}

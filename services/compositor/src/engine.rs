@@ -1,0 +1,164 @@
+//! Rendering and encoding: everything of a try-on that computes.
+
+use crate::scene::Body;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+use tryon::body::{BodyShape, BoneTransforms, RestBody, skin};
+use tryon::camera::ColorImage;
+use tryon::composite::{BodyView, Config, Framing, GarmentView, Input, Look, Model, Print, Workspace, render};
+use tryon::formats::image::{encode_jpeg, encode_png_rgb};
+use tryon::math::{Camera, P3, Rigid, World};
+use tryon::par::Par;
+use tryon_kit::frames::{Exposure, stage};
+use tryon_proto::convert::body::pose_from_wire;
+use tryon_proto::convert::garment::{PlacedGarments, WornGarment};
+use tryon_proto::convert::request::PictureFormat;
+use tryon_proto::v1::{GarmentLook, StageTime};
+
+/// Garments that belong to one exposure.
+pub(crate) struct Placed {
+    pub(crate) garments: PlacedGarments,
+    pub(crate) world_from_camera: Rigid<World, Camera>,
+    pub(crate) stages: Vec<StageTime>,
+    /// Revision as this service counts.
+    pub(crate) revision: u64,
+}
+
+/// How a picture leaves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Encoding {
+    Jpeg(u8),
+    Png,
+}
+
+/// What to draw, and for whom.
+#[derive(Clone)]
+pub(crate) struct Job {
+    pub(crate) exposure: Arc<Exposure>,
+    /// Absent for the plain camera picture.
+    pub(crate) placed: Option<Arc<Placed>>,
+    pub(crate) body: Option<Body>,
+    pub(crate) formats: Vec<(Option<(u32, u32)>, Encoding)>,
+}
+
+/// One encoded picture.
+pub(crate) struct Encoded {
+    pub(crate) size: Option<(u32, u32)>,
+    pub(crate) encoding: Encoding,
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    pub(crate) bytes: bytes::Bytes,
+}
+
+/// What came of a job.
+pub(crate) struct Drawn {
+    pub(crate) pictures: Vec<Encoded>,
+    pub(crate) stages: Vec<StageTime>,
+}
+
+impl Job {
+    /// The format of a viewer, as jobs count them.
+    pub(crate) fn wants(f: &PictureFormat) -> (Option<(u32, u32)>, Encoding) {
+        (f.size, Encoding::Jpeg(f.quality))
+    }
+}
+
+/// The renderer of one try-on.
+#[derive(Default)]
+pub(crate) struct Engine {
+    model: Model,
+    work: Workspace,
+    rest: RestBody,
+    rest_of: Option<Arc<BodyShape>>,
+    bones: BoneTransforms,
+    posed: Vec<P3>,
+    garments: Vec<Vec<P3>>,
+}
+
+impl Engine {
+    pub(crate) fn new() -> Self {
+        // The contract says letterboxed.
+        let config = Config { framing: Framing::Contain, ..Config::default() };
+        Self { model: Model::new(config), ..Self::default() }
+    }
+
+    /// Draws each size once and encodes each format once.
+    pub(crate) fn draw(&mut self, job: &Job) -> Result<Drawn, String> {
+        let start = Instant::now();
+        let has_body = job.placed.is_some() && job.body.as_ref().is_some_and(|b| self.pose(b));
+        let mut stages = job.placed.as_ref().map_or_else(|| job.exposure.stages.clone(), |p| p.stages.clone());
+        let looks: Vec<Look> =
+            job.placed.iter().flat_map(|p| &p.garments).map(|(w, _)| look(&w.look)).collect();
+        let placed: &[(Arc<WornGarment>, Vec<P3>)] = job.placed.as_ref().map_or(&[], |p| &p.garments);
+        self.garments.resize_with(placed.len(), Vec::new);
+        if let Some(p) = &job.placed {
+            let camera_from_world = p.world_from_camera.inverse();
+            for ((_, world), out) in placed.iter().zip(&mut self.garments) {
+                camera_from_world.points_f32(world, out);
+            }
+        }
+        let views: Vec<GarmentView<'_>> = (placed.iter().zip(&self.garments).zip(&looks))
+            .map(|(((w, _), vertices), look)| GarmentView { vertices, faces: &w.faces, uv: &w.uvs, normals: &[], look })
+            .collect();
+        let faces = job.body.as_ref().map_or(&[][..], |b| b.template.mesh().faces());
+        let body = has_body.then_some(BodyView { vertices: &self.posed, faces });
+        let (mut pictures, mut drawn) = (Vec::new(), Vec::<(Option<(u32, u32)>, ColorImage)>::new());
+        for &(size, _) in &job.formats {
+            if drawn.iter().any(|(s, _)| *s == size) {
+                continue;
+            }
+            let input = Input {
+                frame: &job.exposure.rgbd,
+                calibration: &job.exposure.calibration,
+                garments: &views,
+                body,
+                output: size.map(|(w, h)| [w, h]),
+            };
+            let (image, _) = render(&self.model, &input, &mut self.work).map_err(|e| e.to_string())?;
+            drawn.push((size, image));
+        }
+        stages.push(stage("compositor.render", start));
+        let begun = Instant::now();
+        for &(size, encoding) in &job.formats {
+            let Some((_, image)) = drawn.iter().find(|(s, _)| *s == size) else { continue };
+            let bytes = match encoding {
+                Encoding::Jpeg(quality) => encode_jpeg(image, quality),
+                Encoding::Png => encode_png_rgb(image, Path::new("snapshot.png")),
+            };
+            let bytes = bytes.map_err(|e| e.to_string())?.into();
+            pictures.push(Encoded { size, encoding, width: image.width(), height: image.height(), bytes });
+        }
+        stages.push(stage("compositor.encode", begun));
+        Ok(Drawn { pictures, stages })
+    }
+
+    /// Poses the body; `false` when its numbers do not fit, which costs only the finer occlusion.
+    fn pose(&mut self, b: &Body) -> bool {
+        let Some(Ok(pose)) = b.state.pose.as_ref().map(|p| pose_from_wire(p, b.template.skeleton().dofs())) else {
+            return false;
+        };
+        if !self.rest_of.as_ref().is_some_and(|s| Arc::ptr_eq(s, &b.shape)) {
+            self.rest = b.template.personalise(&b.shape);
+            self.rest_of = Some(b.shape.clone());
+        }
+        pose.bones(b.template.skeleton(), &self.rest, &mut self.bones);
+        skin(Par::Rayon, &self.rest.vertices, b.template.weights(), &self.bones, &mut self.posed);
+        true
+    }
+}
+
+fn rgb(c: u32) -> [u8; 3] {
+    let [_, r, g, b] = c.to_be_bytes();
+    [r, g, b]
+}
+
+fn look(l: &GarmentLook) -> Look {
+    let stripes = l.stripe_width > 0.0 && l.accent_rgb != l.color_rgb;
+    let pattern = if stripes {
+        Print::Stripes { color: rgb(l.accent_rgb), period: 2.0 * l.stripe_width }
+    } else {
+        Print::Solid
+    };
+    Look { base: rgb(l.color_rgb), pattern, ..Look::default() }
+}

@@ -1,0 +1,11 @@
+//! `tryon-compositor`: rendered frames from frames and garments; the web page.
+
+use clap::Parser;
+use std::process::ExitCode;
+use tryon_kit::process::{self, Args, BusRole};
+
+fn main() -> ExitCode {
+    process::run("compositor", BusRole::Connect, Args::parse(), |config, ctx| async move {
+        tryon_compositor::start(&config, ctx).await
+    })
+}

@@ -1,0 +1,146 @@
+//! The cloth service behind a try-on, followed through losses and restarts.
+
+use crate::engine::Placed;
+use std::sync::Arc;
+use tokio::sync::watch;
+use tokio_stream::StreamExt;
+use tonic::Status;
+use tonic::transport::Channel;
+use tonic_types::{ErrorDetails, FieldViolation, StatusExt};
+use tryon_kit::client::{pauses, request};
+use tryon_kit::queue::latest;
+use tryon_proto::convert::frame::stages_from_wire;
+use tryon_proto::convert::garment::GarmentReader;
+use tryon_proto::convert::geometry::rigid_from_wire;
+use tryon_proto::convert::required;
+use tryon_proto::v1::cloth_service_client::ClothServiceClient;
+use tryon_proto::v1::{ClothStatus, DressRequest, GarmentChoice, GarmentFrame, StreamGarmentsRequest};
+
+/// Eight garments of 260,000 vertices would be 40 MB; ours take a few hundred kB.
+const MAX_GARMENT_BYTES: usize = 16 * 1024 * 1024;
+
+/// What the shopper wants to wear; `revision` as this service counts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Wanted {
+    pub(crate) revision: u64,
+    pub(crate) choices: Vec<GarmentChoice>,
+}
+
+/// What cloth says.
+pub(crate) enum News {
+    /// Garments for an exposure; `frame` without its bulk.
+    Placed(Box<GarmentFrame>, Arc<Placed>),
+    /// Nothing to show, and why.
+    Status(Box<GarmentFrame>),
+    /// It does not answer.
+    Gone(String),
+}
+
+pub(crate) fn client(channel: Channel) -> ClothServiceClient<Channel> {
+    ClothServiceClient::new(channel).max_decoding_message_size(MAX_GARMENT_BYTES)
+}
+
+/// Asks cloth for an outfit; its own revision of it.
+pub(crate) async fn dress(
+    client: &mut ClothServiceClient<Channel>,
+    session: &str,
+    choices: &[GarmentChoice],
+) -> Result<u64, Status> {
+    let message = DressRequest { session_id: session.into(), garments: choices.to_vec() };
+    Ok(client.dress(request(message)).await?.into_inner().outfit_revision)
+}
+
+/// A fault of our own request to cloth, told with the field path of the request that caused it.
+pub(crate) fn renamed(s: &Status, message: &str) -> Status {
+    let details = s.get_error_details();
+    let Some(bad) = details.bad_request() else { return s.clone() };
+    let rename = |text: &str| text.replacen("dress_request", message, 1);
+    let violations: Vec<FieldViolation> =
+        bad.field_violations.iter().map(|v| FieldViolation::new(rename(&v.field), v.description.clone())).collect();
+    Status::with_error_details(s.code(), rename(s.message()), ErrorDetails::with_bad_request(violations))
+}
+
+/// Follows the garments of `session` until the receiver of `news` is gone, dressing it in whatever is wanted.
+pub(crate) async fn follow(
+    channel: Channel,
+    session: String,
+    mut wanted: watch::Receiver<Wanted>,
+    news: latest::Sender<News>,
+) {
+    let mut client = client(channel);
+    let mut wait = pauses();
+    while !news.is_closed() {
+        let mut any = false;
+        let why = match one_stream(&mut client, &session, &mut wanted, &news, &mut any).await {
+            Ok(()) => "the session was closed".into(),
+            Err(why) => why,
+        };
+        if any {
+            wait = pauses();
+        }
+        news.send(News::Gone(why));
+        if let Some(pause) = wait.next() {
+            tokio::time::sleep(pause).await;
+        }
+    }
+}
+
+async fn one_stream(
+    client: &mut ClothServiceClient<Channel>,
+    session: &str,
+    wanted: &mut watch::Receiver<Wanted>,
+    news: &latest::Sender<News>,
+    any: &mut bool,
+) -> Result<(), String> {
+    let said = |s: Status| s.message().to_owned();
+    // Cloth counts anew after each restart: its revision to ours.
+    let mut ours: Vec<(u64, u64)> = Vec::new();
+    let w = wanted.borrow_and_update().clone();
+    ours.push((dress(client, session, &w.choices).await.map_err(said)?, w.revision));
+    let call = client.stream_garments(StreamGarmentsRequest { session_id: session.into() }).await;
+    let mut frames = call.map_err(said)?.into_inner();
+    let mut reader = GarmentReader::default();
+    loop {
+        let message = tokio::select! {
+            m = frames.next() => m,
+            changed = wanted.changed() => {
+                if changed.is_err() {
+                    return Ok(());
+                }
+                let w = wanted.borrow_and_update().clone();
+                let theirs = dress(client, session, &w.choices).await.map_err(said)?;
+                ours.retain(|(t, _)| *t != theirs);
+                ours.push((theirs, w.revision));
+                continue;
+            }
+        };
+        let Some(message) = message else { return Ok(()) };
+        let frame = required(message.map_err(said)?.frame, "stream_garments_response.frame");
+        let frame = frame.map_err(|e| e.to_string())?;
+        *any = true;
+        let revision = ours.iter().find(|(t, _)| *t == frame.outfit_revision).map_or(0, |(_, o)| *o);
+        if !news.send(read(&mut reader, frame, revision).map_err(|e| e.to_string())?) {
+            return Ok(());
+        }
+    }
+}
+
+fn read(
+    reader: &mut GarmentReader,
+    mut frame: GarmentFrame,
+    revision: u64,
+) -> Result<News, tryon_proto::convert::WireError> {
+    let garments = reader.read(&frame)?;
+    frame.garments.clear();
+    if frame.status() != ClothStatus::Live || frame.frame.is_none() {
+        return Ok(News::Status(Box::new(frame)));
+    }
+    let world = required(frame.world_from_camera.as_ref(), "garment_frame.world_from_camera")?;
+    let placed = Placed {
+        garments,
+        world_from_camera: rigid_from_wire(world, "garment_frame.world_from_camera")?,
+        stages: stages_from_wire(&frame.stages, "garment_frame.stages")?,
+        revision,
+    };
+    Ok(News::Placed(Box::new(frame), Arc::new(placed)))
+}

@@ -1,0 +1,96 @@
+//! One reader of pictures: its format, its rate, its queue.
+
+use futures::Stream;
+use tokio::sync::mpsc;
+use tokio::time::{Duration, Instant};
+use tonic::Status;
+use tryon_kit::queue::latest;
+use tryon_proto::convert::request::PictureFormat;
+use tryon_proto::v1::stream_frames_response::Event;
+use tryon_proto::v1::{Picture, StreamFramesResponse, TryOnStatus};
+
+/// Statuses that may wait for a slow reader. They are never dropped: a reader so slow that they fill this is cut off.
+const STATUSES: usize = 64;
+
+/// The writing end.
+pub(crate) struct Viewer {
+    pub(crate) format: PictureFormat,
+    pictures: latest::Sender<Picture>,
+    statuses: mpsc::Sender<TryOnStatus>,
+    next: Instant,
+}
+
+/// The reading end.
+pub(crate) struct Reader {
+    pictures: latest::Receiver<Picture>,
+    statuses: mpsc::Receiver<TryOnStatus>,
+}
+
+/// A viewer and its reader.
+pub(crate) fn viewer(format: PictureFormat) -> (Viewer, Reader) {
+    let (pictures, p) = latest::channel();
+    let (statuses, s) = mpsc::channel(STATUSES);
+    (Viewer { format, pictures, statuses, next: Instant::now() }, Reader { pictures: p, statuses: s })
+}
+
+impl Viewer {
+    /// Whether its rate allows a picture now.
+    pub(crate) fn wants(&self) -> bool {
+        self.next <= Instant::now()
+    }
+    /// A picture, replacing one that still waits.
+    pub(crate) fn picture(&mut self, p: Picture) {
+        if let Some(rate) = self.format.max_rate {
+            // Measured from when it was due, so that the rate is met on average, but without catching up.
+            let step = Duration::from_secs_f32(1.0 / rate);
+            let now = Instant::now();
+            self.next = (self.next + step).max(now.checked_sub(step).unwrap_or(now));
+        }
+        self.pictures.send(p);
+    }
+    /// A status; `false` when the reader is gone or hopeless.
+    pub(crate) fn status(&self, s: TryOnStatus) -> bool {
+        self.statuses.try_send(s).is_ok()
+    }
+    pub(crate) fn is_gone(&self) -> bool {
+        self.statuses.is_closed()
+    }
+}
+
+impl Reader {
+    /// Statuses in order and before pictures; ends when the viewer is dropped.
+    pub(crate) fn stream(self) -> impl Stream<Item = Result<StreamFramesResponse, Status>> {
+        futures::stream::unfold(self, |mut r| async move {
+            let event = tokio::select! {
+                biased;
+                s = r.statuses.recv() => Event::Status(s?),
+                p = r.pictures.recv() => match p {
+                    Some(p) => Event::Picture(Picture { dropped: r.pictures.dropped(), ..p }),
+                    None => Event::Status(r.statuses.recv().await?),
+                },
+            };
+            Some((Ok(StreamFramesResponse { event: Some(event) }), r))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tokio_stream::StreamExt;
+
+    #[tokio::test]
+    async fn a_slow_reader_gets_every_status_and_the_newest_picture() {
+        let (mut v, r) = viewer(PictureFormat { size: None, quality: 80, max_rate: None });
+        for i in 0..5 {
+            v.picture(Picture { width: i, ..Picture::default() });
+            assert!(v.status(TryOnStatus { age: i as f32, ..TryOnStatus::default() }));
+        }
+        drop(v);
+        let all: Vec<_> = r.stream().map(|m| m.expect("fine").event.expect("something")).collect().await;
+        let ages: Vec<f32> = all.iter().filter_map(|e| if let Event::Status(s) = e { Some(s.age) } else { None }).collect();
+        assert_eq!(ages, [0.0, 1.0, 2.0, 3.0, 4.0]);
+        let last = all.iter().find_map(|e| if let Event::Picture(p) = e { Some((p.width, p.dropped)) } else { None });
+        assert_eq!(last, Some((4, 4)));
+    }
+}

@@ -1,0 +1,102 @@
+//! Following a tracking session through losses and restarts: what cloth and compositor both do.
+
+use crate::client::{pauses, request};
+use crate::compute::Pool;
+use crate::frames::CameraKey;
+use crate::queue::latest;
+use std::sync::Arc;
+use tokio_stream::StreamExt;
+use tonic::transport::Channel;
+use tryon::body::{BodyShape, Template};
+use tryon_proto::convert::{body, required};
+use tryon_proto::v1::tracking_service_client::TrackingServiceClient;
+use tryon_proto::v1::{BodyState, GetBodyTemplateRequest, OpenSessionRequest, StreamBodyStatesRequest};
+
+/// A template of 13,000 vertices with ten shape directions takes 2 MB.
+const MAX_TEMPLATE_BYTES: usize = 16 * 1024 * 1024;
+
+/// What is known about a body.
+pub enum News {
+    /// A state with the shape that belongs to it, if there is one.
+    Body {
+        /// As it came, without its shape.
+        state: Box<BodyState>,
+        /// The shape of `state.shape_version`.
+        shape: Option<Arc<BodyShape>>,
+        /// What both speak about.
+        template: Arc<Template>,
+    },
+    /// Tracking does not answer, or does not know the session.
+    Gone(String),
+}
+
+/// Follows `session` until the receiver of `news` is gone; `open` opens it first, each time. The newest state wins;
+/// shapes are never lost, because they are put together before anything is dropped.
+pub async fn follow(
+    channel: Channel,
+    session: String,
+    open: Option<CameraKey>,
+    pool: Arc<Pool>,
+    news: latest::Sender<News>,
+) {
+    let mut client = TrackingServiceClient::new(channel).max_decoding_message_size(MAX_TEMPLATE_BYTES);
+    let mut wait = pauses();
+    while !news.is_closed() {
+        let mut any = false;
+        let why = match one_stream(&mut client, &session, open.as_ref(), &pool, &news, &mut any).await {
+            Ok(()) => "the session was closed".into(),
+            Err(why) => why,
+        };
+        if any {
+            wait = pauses();
+        }
+        news.send(News::Gone(why));
+        if let Some(pause) = wait.next() {
+            tokio::time::sleep(pause).await;
+        }
+    }
+}
+
+async fn one_stream(
+    client: &mut TrackingServiceClient<Channel>,
+    session: &str,
+    open: Option<&CameraKey>,
+    pool: &Pool,
+    news: &latest::Sender<News>,
+    any: &mut bool,
+) -> Result<(), String> {
+    let said = |s: tonic::Status| s.message().to_owned();
+    if let Some(key) = open {
+        let message = OpenSessionRequest {
+            session_id: session.into(),
+            store: key.store().into(),
+            camera: key.camera().into(),
+        };
+        client.open_session(request(message)).await.map_err(said)?;
+    }
+    let template = client.get_body_template(request(GetBodyTemplateRequest::default())).await;
+    let template = template.map_err(said)?.into_inner().template;
+    let unpack = move || {
+        let wire = required(template, "get_body_template_response.template")?;
+        body::template_from_wire(&wire)
+    };
+    let template = pool.run(unpack).await.map_err(|e| e.to_string())?.map_err(|e| e.to_string())?;
+    let template = Arc::new(template);
+    let call = client.stream_body_states(StreamBodyStatesRequest { session_id: session.into() }).await;
+    let mut states = call.map_err(said)?.into_inner();
+    let (mut shape, mut version) = (None, 0);
+    while let Some(message) = states.next().await {
+        let state = required(message.map_err(said)?.state, "stream_body_states_response.state");
+        let mut state = state.map_err(|e| e.to_string())?;
+        if let Some(s) = state.shape.take() {
+            shape = Some(Arc::new(body::shape_from_wire(&s, &template).map_err(|e| e.to_string())?));
+            version = state.shape_version;
+        }
+        *any = true;
+        let shape = shape.clone().filter(|_| version == state.shape_version);
+        if !news.send(News::Body { state: Box::new(state), shape, template: template.clone() }) {
+            break;
+        }
+    }
+    Ok(())
+}

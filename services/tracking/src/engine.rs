@@ -1,0 +1,115 @@
+//! The tracker and the words for what it says: everything of a session that computes.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+use tryon::body::{BodyShape, Template, embedded, import};
+use tryon::camera::Calibration;
+use tryon::formats::npz;
+use tryon::tracking::{LostReason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+use tryon_kit::frames::{Exposure, stage};
+use tryon_proto::convert::{body, geometry};
+use tryon_proto::v1::{self, DegradedReason, TrackingStatus};
+
+/// The configured template: an SMPL-layout npz, or the embedded body when the path is empty.
+pub(crate) fn load_template(path: &Path) -> Result<Arc<Template>, String> {
+    if path.as_os_str().is_empty() {
+        return Ok(embedded::template());
+    }
+    let arrays = npz::read_smpl(path).map_err(|e| e.to_string())?;
+    let name = path.file_stem().map_or_else(|| "body".into(), |n| n.to_string_lossy().into_owned());
+    let template = import::template_from_smpl(&name, &arrays).map_err(|e| format!("{}: {e}", path.display()))?;
+    Ok(Arc::new(template))
+}
+
+/// One session's tracker for one calibration.
+pub(crate) struct Engine {
+    model: TrackerModel,
+    state: TrackerState,
+    work: Workspace,
+    epoch: u64,
+    calibration: Arc<Calibration>,
+    shape: BodyShape,
+    wire_shape: v1::BodyShape,
+    shape_version: u64,
+}
+
+impl Engine {
+    /// A tracker that has seen nobody. `shape_version` goes on from an earlier engine of the session.
+    pub(crate) fn new(template: Arc<Template>, calibration: Arc<Calibration>, epoch: u64, shape_version: u64) -> Self {
+        let model = TrackerModel::new(template, calibration.as_ref().clone(), TrackerConfig::default());
+        let state = TrackerState::new(&model);
+        let (shape, wire_shape) = (BodyShape::default(), v1::BodyShape::default());
+        let work = Workspace::default();
+        Self { model, state, work, epoch, calibration, shape, wire_shape, shape_version }
+    }
+
+    /// Whether it can go on with this exposure: same run of the same camera.
+    pub(crate) fn fits(&self, e: &Exposure) -> bool {
+        self.epoch == e.id.epoch && (Arc::ptr_eq(&self.calibration, &e.calibration) || self.calibration == e.calibration)
+    }
+
+    pub(crate) fn shape_version(&self) -> u64 {
+        self.shape_version
+    }
+
+    /// Forgets body and pose.
+    pub(crate) fn reset(&mut self) {
+        self.state.reset(&self.model);
+    }
+
+    /// One step; what it found, as the wire says it.
+    pub(crate) fn step(&mut self, e: &Exposure) -> v1::BodyState {
+        let start = Instant::now();
+        let report = step(&self.model, &mut self.state, &e.rgbd, &mut self.work);
+        let mut stages = e.stages.clone();
+        let mut state = v1::BodyState { frame: Some(e.id), age_frames: self.state.pose_age, ..Default::default() };
+        match report {
+            Ok(r) => {
+                let of = |name: &str, ms: f64| v1::StageTime { stage: format!("tracking.{name}"), ms: ms as f32 };
+                let s = &r.stages_ms;
+                stages.extend([of("segment", s.segment), of("pose", s.place + s.pose), of("shape", s.size + s.surface)]);
+                (state.residual_mm, state.visible_points) = (r.residual_mm as f32, r.visible_points as u32);
+                state.iterations = r.iterations as u32;
+                let (status, reason) = words(self.state.status);
+                state.set_status(status);
+                state.set_reason(reason);
+            }
+            Err(why) => {
+                state.set_status(TrackingStatus::Lost);
+                state.set_reason(DegradedReason::StepFailed);
+                state.detail = why.to_string();
+            }
+        }
+        if state.status() != TrackingStatus::Searching {
+            if self.shape_version == 0 || self.shape != self.state.shape {
+                self.shape = self.state.shape.clone();
+                self.wire_shape = body::shape_to_wire(&self.shape);
+                self.shape_version += 1;
+            }
+            state.pose = Some(body::pose_to_wire(&self.state.pose));
+            state.shape = Some(self.wire_shape.clone());
+            state.shape_version = self.shape_version;
+        }
+        state.world_from_camera = Some(geometry::rigid_to_wire(&self.state.world_from_camera));
+        stages.push(stage("tracking.total", start));
+        state.stages = stages;
+        state
+    }
+}
+
+fn words(status: Status) -> (TrackingStatus, DegradedReason) {
+    match status {
+        Status::Searching => (TrackingStatus::Searching, DegradedReason::NoPerson),
+        Status::Calibrating => (TrackingStatus::Calibrating, DegradedReason::Unspecified),
+        Status::Tracking => (TrackingStatus::Tracking, DegradedReason::Unspecified),
+        Status::Lost { reason } => {
+            let why = match reason {
+                LostReason::NoPerson => DegradedReason::PersonLeft,
+                LostReason::Residual => DegradedReason::TrackingLost,
+                LostReason::NotFinite => DegradedReason::StepFailed,
+            };
+            (TrackingStatus::Lost, why)
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! The rpcs: check, find the session, answer.
+
+use crate::session::{self, Command, Handle, Setup};
+use futures::Stream;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio_stream::StreamExt;
+use tokio_stream::wrappers::WatchStream;
+use tonic::{Request, Response, Status};
+use tryon::body::Template;
+use tryon_kit::config::TrackingConfig;
+use tryon_kit::server::Context;
+use tryon_kit::sessions::{Opened, Sessions, random_id};
+use tryon_kit::status::{exhausted, not_found};
+use tryon_proto::convert::{body, request};
+use tryon_proto::v1::tracking_service_server::TrackingService;
+use tryon_proto::v1::*;
+
+/// The directory of sessions and what new ones need.
+pub(crate) struct Tracking {
+    sessions: Sessions<Handle>,
+    ctx: Context,
+    template: Arc<Template>,
+    wire_template: BodyTemplate,
+    idle: Duration,
+}
+
+impl Tracking {
+    pub(crate) fn new(config: &TrackingConfig, ctx: &Context, template: Arc<Template>) -> Self {
+        Self {
+            sessions: Sessions::new(config.max_sessions),
+            ctx: ctx.clone(),
+            wire_template: body::template_to_wire(&template),
+            template,
+            idle: Duration::from_secs(config.idle_s),
+        }
+    }
+    fn find(&self, id: &str) -> Result<Arc<Handle>, Status> {
+        self.sessions.get(id).ok_or_else(|| not_found("session", id))
+    }
+}
+
+#[tonic::async_trait]
+impl TrackingService for Tracking {
+    async fn open_session(&self, r: Request<OpenSessionRequest>) -> Result<Response<OpenSessionResponse>, Status> {
+        let r = r.get_ref();
+        let id = if r.session_id.is_empty() {
+            random_id()
+        } else {
+            request::session_id("open_session_request.session_id", &r.session_id)?
+        };
+        let key = request::camera_key("open_session_request", &r.store, &r.camera)?;
+        let setup = || Setup {
+            id: id.clone(),
+            key: key.clone(),
+            ctx: self.ctx.clone(),
+            template: self.template.clone(),
+            idle: self.idle,
+            directory: self.sessions.clone(),
+        };
+        if self.sessions.get(&id).is_some_and(|h| h.commands.is_closed()) {
+            self.sessions.remove(&id);
+        }
+        let created = match self.sessions.open(&id, || session::spawn(setup())) {
+            Opened::Created(_) => {
+                tracing::info!(session = id, camera = %key, "opened");
+                metrics::gauge!("tryon_tracking_sessions").set(self.sessions.len() as f64);
+                true
+            }
+            Opened::Found(h) if h.key != key => {
+                return Err(Status::failed_precondition(format!("session `{id}` is open with camera {}", h.key)));
+            }
+            Opened::Found(h) => {
+                let _ = h.commands.try_send(Command::Touch);
+                false
+            }
+            Opened::Full => return Err(exhausted("sessions", self.sessions.limit())),
+        };
+        Ok(Response::new(OpenSessionResponse { session_id: id, created, template_name: self.template.name().into() }))
+    }
+
+    async fn close_session(&self, r: Request<CloseSessionRequest>) -> Result<Response<CloseSessionResponse>, Status> {
+        if let Some(h) = self.sessions.remove(&r.get_ref().session_id) {
+            let _ = h.commands.send(Command::Close).await;
+        }
+        Ok(Response::new(CloseSessionResponse {}))
+    }
+
+    async fn reset_session(&self, r: Request<ResetSessionRequest>) -> Result<Response<ResetSessionResponse>, Status> {
+        let id = &r.get_ref().session_id;
+        self.find(id)?.commands.send(Command::Reset).await.map_err(|_| not_found("session", id))?;
+        Ok(Response::new(ResetSessionResponse {}))
+    }
+
+    async fn get_body_template(
+        &self,
+        r: Request<GetBodyTemplateRequest>,
+    ) -> Result<Response<GetBodyTemplateResponse>, Status> {
+        let name = &r.get_ref().template_name;
+        if !name.is_empty() && name != self.template.name() {
+            return Err(not_found("template", name));
+        }
+        Ok(Response::new(GetBodyTemplateResponse { template: Some(self.wire_template.clone()) }))
+    }
+
+    type StreamBodyStatesStream = Pin<Box<dyn Stream<Item = Result<StreamBodyStatesResponse, Status>> + Send>>;
+
+    async fn stream_body_states(
+        &self,
+        r: Request<StreamBodyStatesRequest>,
+    ) -> Result<Response<Self::StreamBodyStatesStream>, Status> {
+        let handle = self.find(&r.get_ref().session_id)?;
+        let mut sent = 0;
+        // The stream ends when the session's task, which holds the sender, ends.
+        let states = WatchStream::new(handle.states.clone()).map(move |state| {
+            let mut state = BodyState::clone(&state);
+            if state.shape_version == sent {
+                state.shape = None;
+            } else if state.shape.is_some() {
+                sent = state.shape_version;
+            }
+            Ok(StreamBodyStatesResponse { state: Some(state) })
+        });
+        Ok(Response::new(Box::pin(states)))
+    }
+}
