@@ -52,7 +52,7 @@ impl Figure {
         let p = P3d::new;
         // Biacromial breadth moves the whole arm; hip breadth the legs, half as much.
         let out = 0.0048 * self.sex + 0.0080 * self.shoulder;
-        let leg = -0.003 * self.sex + 0.003 * self.girth + 0.003 * self.hip;
+        let leg = -0.003 * self.sex + 0.005 * self.girth + 0.003 * self.hip;
         let shoulder = p(0.170 + out, 1.348, -0.016);
         let elbow = shoulder + (p(0.205, -0.197, -0.004) - P3d::origin());
         let wrist = elbow + (p(0.1715, -0.173, 0.048) - P3d::origin());

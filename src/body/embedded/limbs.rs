@@ -67,9 +67,10 @@ fn tube<const N: usize>(
         .iter()
         .map(|s| {
             let grow = 1.0 + muscle * fig.sex;
-            // Hips reach down to the middle of the thigh.
-            let add = s[5] * fig.girth + hip * fig.hip * (1.0 - 2.0 * s[0].max(0.0)).max(0.0);
-            Station::ellipse(s[0] * length, s[1], s[2], s[3] * grow + add, s[4] * grow + add)
+            // Hips reach down to the middle of the thigh; a woman's thigh starts farther out.
+            let high = hip * (1.0 - 2.0 * s[0].max(0.0)).max(0.0);
+            let add = s[5] * fig.girth + high * fig.hip;
+            Station::ellipse(s[0] * length, s[1] - 0.8 * high * fig.sex, s[2], s[3] * grow + add, s[4] * grow + add)
         })
         .collect();
     Solid::Loft(Loft::new(frame, stations, caps))

@@ -19,7 +19,7 @@ fn shade(t: &Template, vertices: &[P3], yaw: f32, view: (f32, f32, f32, u32, u32
     let v = View::Orthographic { width: w, height: h, left, top: -top, pixels_per_metre: scale };
     let mut buffer = VisibilityBuffer::default();
     rasterise_reference(&v, &seen, t.mesh().faces(), &mut buffer);
-    let light = V3::new(-0.4, -0.6, -0.7).normalize();
+    let light = V3::new(-0.45, -0.4, -0.8).normalize();
     let fill = V3::new(0.8, 0.1, -0.3).normalize();
     (0..(w * h) as usize)
         .map(|i| {
@@ -157,8 +157,15 @@ fn pictures() {
         let legs = (-0.3, 0.95, 620.0, 372, 600);
         let pics: Vec<_> = [0.0, 40.0, 90.0, 180.0].iter().map(|&y| shade(&t, &v, y, legs)).collect();
         sheet(&dir, "close_legs", &pics, 372, 600);
+        for (name, c) in [("man", 1.0), ("woman", -1.0)] {
+            let shape = BodyShape { coefficients: vec![0.0, 0.0, c], ..BodyShape::default() };
+            let v = posed(&t, &shape, &poses()[2].1);
+            let pics: Vec<_> =
+                [0.0, 40.0, 90.0, 180.0].iter().map(|&y| shade(&t, &v, y, (-0.42, 1.8, 500.0, 420, 920))).collect();
+            sheet(&dir, &format!("close_{name}"), &pics, 420, 920);
+        }
         let face = (-0.16, 1.72, 1900.0, 608, 608);
-        let pics: Vec<_> = [0.0, 40.0, 90.0].iter().map(|&y| shade(&t, &v, y, face)).collect();
+        let pics: Vec<_> = [0.0, 30.0, 60.0, 90.0].iter().map(|&y| shade(&t, &v, y, face)).collect();
         sheet(&dir, "close_head", &pics, 608, 608);
         let hand = (0.46, 1.05, 2000.0, 560, 600);
         let pics = vec![

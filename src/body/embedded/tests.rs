@@ -285,6 +285,21 @@ fn a_unit_is_a_standard_deviation() {
     }
 }
 
+/// Legs may touch, but a left vertex never passes the middle: within two deviations nothing intersects there.
+#[test]
+fn sides_stay_apart() {
+    let t = template();
+    for (d, name) in DIRECTIONS.iter().enumerate() {
+        for c in [-2.0, 2.0] {
+            let body = t.personalise(&shape(d, c));
+            for (i, p) in t.mesh().vertices().iter().enumerate() {
+                let q = body.vertices[i];
+                assert!(p.x <= 0.0 || q.x > 0.0, "{name} {c}: vertex {i} at {p} went to {q}");
+            }
+        }
+    }
+}
+
 /// The shape space is linear, the figure is not: how far apart they are at one standard deviation.
 #[test]
 fn linear_directions_stay_near_the_figure() {
