@@ -164,6 +164,23 @@ fn pictures() {
                 [0.0, 40.0, 90.0, 180.0].iter().map(|&y| shade(&t, &v, y, (-0.42, 1.8, 500.0, 420, 920))).collect();
             sheet(&dir, &format!("close_{name}"), &pics, 420, 920);
         }
+        let v = posed(
+            &t,
+            &shape,
+            &[
+                ("left_elbow", [2.1, 0.0, 0.0]),
+                ("left_knee", [2.1, 0.0, 0.0]),
+                ("left_hip", [-1.4, 0.0, 0.0]),
+                ("spine1", [0.3, 0.0, 0.0]),
+                ("spine2", [0.3, 0.0, 0.0]),
+                ("spine3", [0.3, 0.0, 0.0]),
+                ("neck", [0.3, 0.5, 0.0]),
+                ("right_shoulder", [0.0, 1.6, -0.9]),
+            ],
+        );
+        let pics: Vec<_> =
+            [20.0, 60.0, 90.0, 180.0].iter().map(|&y| shade(&t, &v, y, (-0.55, 1.65, 500.0, 560, 840))).collect();
+        sheet(&dir, "close_bend", &pics, 560, 840);
         let face = (-0.16, 1.72, 1900.0, 608, 608);
         let pics: Vec<_> = [0.0, 30.0, 60.0, 90.0].iter().map(|&y| shade(&t, &v, y, face)).collect();
         sheet(&dir, "close_head", &pics, 608, 608);
