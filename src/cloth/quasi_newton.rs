@@ -90,5 +90,7 @@ impl QuasiNewton {
 
 /// Typical diagonal of the sheet's matrix at each vertex, N/m: the natural unit of a hold's stiffness.
 pub fn hold_unit(sheet: &Sheet, h: f64) -> Vec<f64> {
-    (0..sheet.mass.len()).map(|i| sheet.mass[i] / (h * h) + sheet.stiffness[sheet.pattern.diagonal_slot(i)]).collect()
+    (0..sheet.mass.len())
+        .map(|i| sheet.mass[i] / (h * h) + sheet.stiffness[sheet.pattern.diagonal_slot(i)])
+        .collect()
 }

@@ -97,7 +97,8 @@ pub fn dress(
     }
     let mut order: Vec<&Pattern> = patterns.iter().collect();
     order.sort_by_key(|p| p.layer);
-    let meshes = order.iter().map(|p| GarmentMesh::sew(p, &options.triangulation)).collect::<Result<Vec<_>, _>>()?;
+    let meshes =
+        order.iter().map(|p| GarmentMesh::sew(p, &options.triangulation)).collect::<Result<Vec<_>, _>>()?;
     let figure = Figure::new(template, rest);
     let root = upright_root(rest, &pose.root);
     let start = Pose { root, angles: canonical_pose(template, rest).angles };

@@ -77,12 +77,10 @@ pub fn step(
         });
     }
     let config = &model.config;
-    let moved =
-        |from: &[P3]| from.iter().zip(input.body).map(|(a, b)| (a - b).norm_squared()).fold(0.0, f32::max).sqrt();
+    let moved = |from: &[P3]| from.iter().zip(input.body).map(|(a, b)| (a - b).norm_squared()).fold(0.0, f32::max).sqrt();
     state.frames += 1;
     if config.sleep && state.still >= STILL_FRAMES && moved(&state.awake_body) < STILL_BODY {
-        let mut report =
-            StepReport { sleeping: state.garments.iter().map(|g| g.positions.len()).sum(), ..StepReport::default() };
+        let mut report = StepReport { sleeping: state.garments.iter().map(|g| g.positions.len()).sum(), ..StepReport::default() };
         report.stages_ms.total = ms(started);
         return Ok(report);
     }
