@@ -6,6 +6,7 @@ use super::look::linear;
 use crate::camera::{ColorImage, DepthImage};
 use crate::math::{P3, V3};
 use crate::par::{self, Par};
+use std::borrow::Cow;
 
 /// Rows resized by one task.
 const ROWS: usize = 16;
@@ -84,14 +85,13 @@ fn grey_depth(depth: &DepthImage, stage: &Stage) -> ColorImage {
     out
 }
 
-/// Depth as the picture's camera sees it, millimetres: the sensor's own rows, or resampled into `scratch` when the
-/// colour camera stands elsewhere. A reading lands on the pixels its own footprint covers; the nearest wins.
-pub(crate) fn depth_from_picture<'a>(input: &'a Input<'_>, stage: &Stage, scratch: &'a mut Vec<u16>) -> &'a [u16] {
-    let Some(color) = &input.calibration.color else { return input.frame.depth.data() };
+/// Depth as the picture's camera sees it, millimetres: the sensor's own, or resampled when the colour camera
+/// stands elsewhere. A reading lands on the pixels its own footprint covers; the nearest wins.
+pub(crate) fn depth_from_picture<'a>(input: &Input<'a>, stage: &Stage) -> Cow<'a, [u16]> {
+    let Some(color) = &input.calibration.color else { return Cow::Borrowed(input.frame.depth.data()) };
     let target = stage.depth_camera(color);
     let [width, height] = stage.depth;
-    scratch.clear();
-    scratch.resize(width as usize * height as usize, 0);
+    let mut out = vec![0; width as usize * height as usize];
     let depth = &input.frame.depth;
     let source = input.calibration.depth.resized(depth.width(), depth.height());
     let iso: nalgebra::Isometry3<f32> = input.calibration.color_from_depth.iso().cast();
@@ -117,7 +117,7 @@ pub(crate) fn depth_from_picture<'a>(input: &'a Input<'_>, stage: &Stage, scratc
             };
             for y in range(q.y, height) {
                 for x in range(q.x, width) {
-                    let slot = &mut scratch[(y * width + x) as usize];
+                    let slot = &mut out[(y * width + x) as usize];
                     if *slot == 0 || mm < *slot {
                         *slot = mm;
                     }
@@ -125,11 +125,11 @@ pub(crate) fn depth_from_picture<'a>(input: &'a Input<'_>, stage: &Stage, scratc
             }
         }
     }
-    scratch
+    Cow::Owned(out)
 }
 
 /// A bright but not blown-out surface (skin, a light wall) in a well exposed room, linear light.
-const WELL_EXPOSED: f32 = 0.33;
+const WELL_EXPOSED: f32 = 0.26;
 /// Share of the measured pixels that are darker than the one compared with [`WELL_EXPOSED`].
 const BRIGHT_PERCENTILE: f32 = 0.85;
 /// However dark or bright the room, garments stay within these factors: black clothes on a black ground say little
@@ -231,8 +231,7 @@ mod tests {
         let input = Input { frame: &frame, calibration: &calibration, garments: &[], body: None, output: None };
         let stage = Stage::new(&input, Framing::Cover);
         assert_eq!(stage.depth, [160, 120]);
-        let mut scratch = Vec::new();
-        let seen = depth_from_picture(&input, &stage, &mut scratch);
+        let seen = depth_from_picture(&input, &stage);
         // 5 cm at 2 m are 3.3 of these pixels: the wall moves right, no gaps inside.
         let row = &seen[60 * 160..61 * 160];
         assert!(row[..2].iter().all(|d| *d == 0) && row[5..].iter().all(|d| *d == 2000), "{row:?}");

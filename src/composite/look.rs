@@ -74,11 +74,11 @@ impl ToSrgb {
 /// A look ready for the inner loop.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fabric {
-    base: [f32; 3],
-    other: [f32; 3],
-    print: Print,
+    pub(crate) base: [f32; 3],
+    pub(crate) other: [f32; 3],
+    pub(crate) print: Print,
     pub(crate) gloss: f32,
-    metres_per_uv: f32,
+    pub(crate) metres_per_uv: f32,
 }
 
 /// Share of a square wave (half on) seen by a pixel of `width` periods centred at `x` periods.

@@ -5,13 +5,16 @@
 //! in front of the chest. [`render`] is the whole; [`Input`] says what it takes.
 
 mod background;
-mod framing;
+#[cfg(test)]
+pub(crate) mod fixture;
+pub(crate) mod framing;
 mod input;
-mod look;
+pub(crate) mod look;
 mod occlusion;
-mod render;
-mod shade;
-mod surface;
+pub(crate) mod render;
+pub(crate) mod shade;
+pub(crate) mod shadow;
+pub(crate) mod surface;
 
 pub use framing::Framing;
 pub use input::{BodyView, Config, GarmentView, Input, Model, RenderError, RenderReport};

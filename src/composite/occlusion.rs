@@ -23,13 +23,15 @@ pub struct Margins {
     pub inner: f32,
     /// Somewhere a patch must be in front by this much more, else it is taken for bulging clothes.
     pub clear: f32,
+    /// An occluder's edge is a step of at least this in the captured depth, on top of the noise.
+    pub step: f32,
     /// Patches smaller than this are noise, square metres.
     pub patch: f32,
 }
 
 impl Default for Margins {
     fn default() -> Self {
-        Self { plain: 0.012, limb: 0.004, covered: 0.035, inner: 0.004, clear: 0.012, patch: 6e-4 }
+        Self { plain: 0.012, limb: 0.004, covered: 0.035, inner: 0.004, clear: 0.012, step: 0.012, patch: 6e-4 }
     }
 }
 
@@ -50,6 +52,8 @@ pub(crate) mod says {
     pub(crate) const FRONT: u8 = 3;
     /// Something is clearly in front of the garment.
     pub(crate) const CLEAR: u8 = 4;
+    /// The tracked body says so too: an arm.
+    pub(crate) const LIMB: u8 = 5;
 }
 
 /// One pixel of the drawn area, as the decision sees it.
@@ -79,7 +83,7 @@ pub(crate) fn evidence(m: &Margins, s: &Seen) -> u8 {
     }
     let limb = s.body < s.garment - LIMB_GAP;
     if s.captured <= 0.0 {
-        return if limb { says::FRONT } else { says::UNKNOWN };
+        return if limb { says::LIMB } else { says::UNKNOWN };
     }
     let margin = if s.inner {
         m.inner
@@ -93,10 +97,16 @@ pub(crate) fn evidence(m: &Margins, s: &Seen) -> u8 {
     let gap = s.garment - s.captured - margin - 2.0 * noise(s.captured);
     match () {
         () if gap <= 0.0 => says::GARMENT,
-        () if gap > m.clear || limb || s.inner => says::CLEAR,
+        () if limb || s.inner => says::LIMB,
+        () if gap > m.clear => says::CLEAR,
         () => says::FRONT,
     }
 }
+
+/// A patch with a smaller share of its edge (against the garment) on a step of depth belongs to the body below.
+const SMOOTH_SHARE: f32 = 0.35;
+/// Distance from a patch's edge at which depths are compared, depth pixels: flying pixels lie in between.
+const EDGE_STEP: f64 = 3.0;
 
 /// Scratch of [`Matte::decide`].
 #[derive(Clone, Debug, Default)]
@@ -127,15 +137,19 @@ impl Matte {
         area: &Area,
         distance: f32,
         guide: &ColorImage,
+        depth: &[f32],
     ) -> usize {
         let pixel = distance * distance / (stage.camera.fx * stage.camera.fy) as f32;
-        let dropped = self.drop_specks(area.width as usize, (margins.patch / pixel).ceil() as usize);
+        let step = (EDGE_STEP * stage.pixels_per_depth()).round().max(1.0) as usize;
+        let smallest = (margins.patch / pixel).ceil() as usize;
+        let dropped = self.drop_specks(area.width as usize, smallest, step, margins.step, depth);
         self.soften(par, stage, area, guide);
         dropped
     }
 
-    /// Removes connected patches of front pixels that are too small or nowhere clearly in front.
-    fn drop_specks(&mut self, width: usize, smallest: usize) -> usize {
+    /// Removes connected patches of front pixels that are too small, nowhere clearly in front, or that run smoothly
+    /// into what the garment covers: an arm ends in a step of depth, a bulging belly does not.
+    fn drop_specks(&mut self, width: usize, smallest: usize, step: usize, jump: f32, depth: &[f32]) -> usize {
         let n = self.says.len();
         self.visited.clear();
         self.visited.resize(n, false);
@@ -148,11 +162,13 @@ impl Matte {
             self.stack.clear();
             self.stack.push(seed as u32);
             self.visited[seed] = true;
-            let mut clear = false;
+            let (mut clear, mut limb) = (false, 0usize);
+            let (mut edges, mut steps) = (0usize, 0usize);
             while let Some(i) = self.stack.pop() {
                 self.patch.push(i);
                 let i = i as usize;
-                clear |= self.says[i] == says::CLEAR;
+                clear |= self.says[i] >= says::CLEAR;
+                limb += usize::from(self.says[i] == says::LIMB);
                 let x = i % width;
                 let beside = [
                     (x > 0).then(|| i - 1),
@@ -160,14 +176,29 @@ impl Matte {
                     i.checked_sub(width),
                     (i + width < n).then(|| i + width),
                 ];
-                for j in beside.into_iter().flatten() {
+                for (side, j) in beside.into_iter().enumerate().filter_map(|(s, j)| Some((s, j?))) {
+                    if self.says[j] == says::GARMENT {
+                        // Compare a little away from the edge on both sides: the sensor blurs it.
+                        let away = if side < 2 { step } else { step * width };
+                        let (out, inward) = if side % 2 == 0 {
+                            (j.checked_sub(away), i.checked_add(away))
+                        } else {
+                            (j.checked_add(away), i.checked_sub(away))
+                        };
+                        let at = |k: Option<usize>| k.and_then(|k| depth.get(k)).copied().unwrap_or(0.0);
+                        let (behind, front) = (at(out), at(inward));
+                        edges += 1;
+                        // No reading beside the edge is the shadow that a step throws.
+                        steps += usize::from(behind == 0.0 || (front > 0.0 && behind - front > jump + noise(behind)));
+                    }
                     if self.says[j] >= says::FRONT && !self.visited[j] {
                         self.visited[j] = true;
                         self.stack.push(j as u32);
                     }
                 }
             }
-            if !clear || self.patch.len() < smallest {
+            let smooth = (steps as f32) < SMOOTH_SHARE * edges as f32 && 3 * limb < self.patch.len();
+            if !clear || smooth || self.patch.len() < smallest {
                 dropped += self.patch.len();
                 for &i in &self.patch {
                     self.says[i as usize] = says::GARMENT;

@@ -5,45 +5,44 @@ use super::framing::Stage;
 use super::input::{Input, Model, RenderError, RenderReport};
 use super::occlusion::{Matte, Seen, evidence, says};
 use super::shade::{Cache, Shader};
+use super::shadow::Shadows;
 use super::surface::{Area, Surface, TILE, part_of};
 use crate::camera::ColorImage;
 use crate::par::{self, Par};
 use crate::raster::{Cull, Options, VisibilityBuffer, rasterise_with};
+use std::borrow::Cow;
 use std::time::Instant;
 
 /// Scratch of [`render`]; dropping it changes no picture.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
-    surface: Surface,
-    matte: Matte,
+    pub(crate) surface: Surface,
+    pub(crate) matte: Matte,
+    pub(crate) pixels: Vec<Pixel>,
+    pub(crate) shade: Shadows,
     body: VisibilityBuffer,
     body_vertices: Vec<crate::math::P3>,
-    depth: Vec<u16>,
-    pixels: Vec<Pixel>,
-    shade: Shadows,
 }
 
 /// What the samples of one picture pixel agree on.
-#[derive(Clone, Copy, Debug, Default)]
-struct Pixel {
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Pixel {
     /// Nearest garment depth; infinity where none.
-    depth: f32,
+    pub(crate) depth: f32,
     /// Its face.
-    face: u32,
+    pub(crate) face: u32,
     /// Samples on a garment.
-    covered: u8,
+    pub(crate) covered: u8,
     /// One surface, so that one shading will do.
-    simple: bool,
+    pub(crate) simple: bool,
 }
 
 /// Samples of one pixel farther apart than this (metres) lie on different folds and are shaded apart.
-const FOLD_GAP: f32 = 0.012;
+pub(crate) const FOLD_GAP: f32 = 0.012;
 /// Rows of the picture shaded by one task.
 const ROWS: usize = 8;
 /// How far a contact shadow reaches, metres.
 const SHADOW_REACH: f32 = 0.025;
-/// What lies this far behind a garment's edge still gets its shadow, metres.
-const SHADOW_DEPTH: f32 = 0.10;
 
 /// One picture: what the camera saw with the garments on.
 ///
@@ -54,57 +53,95 @@ pub fn render(
     input: &Input<'_>,
     work: &mut Workspace,
 ) -> Result<(ColorImage, RenderReport), RenderError> {
-    input.check()?;
     let config = &model.config;
-    let mut clock = Stopwatch::new();
-    let mut report = RenderReport::default();
-
-    let stage = Stage::new(input, config.framing);
-    let mut image = captured(config.par, input, &stage);
-    report.brightness = brightness(input);
-    let mut scratch = std::mem::take(&mut work.depth);
-    let depth = depth_from_picture(input, &stage, &mut scratch);
-    clock.lap("captured", &mut report);
-
-    work.surface.build(input, config);
-    let reach = SHADOW_REACH * stage.camera.fx as f32 / work.surface.distance;
-    let tiles = (stage.camera.width.div_ceil(TILE) * stage.camera.height.div_ceil(TILE)) as usize;
-    let Some(area) = work.surface.area(&stage, 2.0 * reach + 2.0) else {
-        report.tiles_skipped = tiles;
-        return Ok((image, report));
-    };
+    let mut scene = Scene::begin(model, input, work)?;
+    let Some(area) = scene.area else { return Ok(scene.end(work)) };
     let samples = config.samples.clamp(1, 4);
-    work.surface.rasterise(config, &stage, &area, samples);
+    work.surface.rasterise(config, &scene.stage, &area, samples);
     resolve(config.par, &work.surface, &area, samples, &mut work.pixels);
-    clock.lap("garments", &mut report);
+    scene.lap("garments");
 
-    let tracked = draw_body(config.par, input, &stage, &area, &mut work.body, &mut work.body_vertices);
-    let look_up = DepthLookUp::new(&stage, &area, depth);
-    collect_evidence(model, work, &area, &look_up, tracked);
-    report.specks_dropped =
-        work.matte.decide(config.par, &config.margins, &stage, &area, work.surface.distance, &image);
-    clock.lap("visibility", &mut report);
-
-    work.shade.cast(&work.pixels, &work.matte.alpha, &area, samples, reach);
-    clock.lap("shadows", &mut report);
-
-    let shader = Shader::new(&work.surface, stage.camera, &model.to_srgb, &config.lights, report.brightness);
-    blend(config.par, &shader, work, &area, samples, config.lights.contact, &look_up, &mut image);
-    count(work, &area, samples, tiles, &mut report);
-    work.depth = scratch;
-    clock.lap("shading", &mut report);
-    Ok((image, report))
+    let look_up = scene.judge(model, input, work, &area);
+    let shader =
+        Shader::new(&work.surface, scene.stage.camera, &model.to_srgb, &config.lights, scene.report.brightness);
+    blend(config.par, &shader, work, &area, samples, config.lights.contact, &look_up, &mut scene.image);
+    scene.lap("shading");
+    Ok(scene.end(work))
 }
 
-struct Stopwatch(Instant);
+/// What the processor's and the graphics card's renderer share: everything but drawing and shading.
+pub(crate) struct Scene<'a> {
+    pub(crate) stage: Stage,
+    /// The captured picture, then the result.
+    pub(crate) image: ColorImage,
+    pub(crate) report: RenderReport,
+    /// What garments can touch.
+    pub(crate) area: Option<Area>,
+    /// Reach of shadows, pixels.
+    reach: f32,
+    samples: u32,
+    depth: Cow<'a, [u16]>,
+    clock: Instant,
+}
 
-impl Stopwatch {
-    fn new() -> Self {
-        Self(Instant::now())
+impl<'a> Scene<'a> {
+    pub(crate) fn begin(model: &Model, input: &Input<'a>, work: &mut Workspace) -> Result<Self, RenderError> {
+        input.check()?;
+        let clock = Instant::now();
+        let config = &model.config;
+        let stage = Stage::new(input, config.framing);
+        let mut scene = Self {
+            image: captured(config.par, input, &stage),
+            depth: depth_from_picture(input, &stage),
+            report: RenderReport { brightness: brightness(input), ..RenderReport::default() },
+            area: None,
+            reach: 0.0,
+            samples: config.samples.clamp(1, 4),
+            stage,
+            clock,
+        };
+        scene.lap("captured");
+        work.surface.build(input, config);
+        scene.reach = SHADOW_REACH * stage.camera.fx as f32 / work.surface.distance;
+        scene.area = work.surface.area(&stage, 2.0 * scene.reach + 2.0);
+        Ok(scene)
     }
-    fn lap(&mut self, stage: &'static str, report: &mut RenderReport) {
-        report.stages_ms.push((stage, self.0.elapsed().as_secs_f32() * 1e3));
-        self.0 = Instant::now();
+
+    pub(crate) fn lap(&mut self, stage: &'static str) {
+        self.report.stages_ms.push((stage, self.clock.elapsed().as_secs_f32() * 1e3));
+        self.clock = Instant::now();
+    }
+
+    /// From `work.pixels` to what hides them and the shadows between.
+    pub(crate) fn judge(&mut self, model: &Model, input: &Input<'_>, work: &mut Workspace, area: &Area) -> DepthLookUp {
+        let config = &model.config;
+        let tracked = draw_body(config.par, input, &self.stage, area, &mut work.body, &mut work.body_vertices);
+        let look_up = DepthLookUp::new(&self.stage, area, &self.depth);
+        collect_evidence(model, work, area, &look_up, tracked);
+        self.report.specks_dropped = work.matte.decide(
+            config.par,
+            &config.margins,
+            &self.stage,
+            area,
+            work.surface.distance,
+            &self.image,
+            &look_up.metres,
+        );
+        self.lap("visibility");
+        let full = 1.0 / (self.samples * self.samples) as f32;
+        let covered = work.pixels.iter().map(|p| [f32::from(p.covered) * full, p.depth]);
+        work.shade.cast(covered, &work.matte.alpha, area, self.reach);
+        self.lap("shadows");
+        look_up
+    }
+
+    pub(crate) fn end(mut self, work: &Workspace) -> (ColorImage, RenderReport) {
+        let tiles = (self.stage.camera.width.div_ceil(TILE) * self.stage.camera.height.div_ceil(TILE)) as usize;
+        match &self.area {
+            Some(area) => count(work, area, self.samples, tiles, &mut self.report),
+            None => self.report.tiles_skipped = tiles,
+        }
+        (self.image, self.report)
     }
 }
 
@@ -119,6 +156,21 @@ fn resolve(par: Par, surface: &Surface, area: &Area, n: u32, out: &mut Vec<Pixel
             let y = start / width + k;
             for (x, pixel) in row.iter_mut().enumerate() {
                 let mut p = Pixel { depth: f32::INFINITY, face: u32::MAX, covered: 0, simple: true };
+                let first = y * n as usize * stride + x * n as usize;
+                let id = samples.face[first];
+                if (0..n as usize).all(|sy| samples.face[first + sy * stride..][..n as usize].iter().all(|f| *f == id))
+                {
+                    if id != VisibilityBuffer::NONE {
+                        (p.face, p.covered) = (id, (n * n) as u8);
+                        for sy in 0..n as usize {
+                            for d in &samples.depth[first + sy * stride..][..n as usize] {
+                                p.depth = p.depth.min(*d);
+                            }
+                        }
+                    }
+                    *pixel = p;
+                    continue;
+                }
                 let mut far = 0f32;
                 for sy in 0..n as usize {
                     let at = (y * n as usize + sy) * stride + x * n as usize;
@@ -170,35 +222,35 @@ fn draw_body(
     true
 }
 
-/// Captured depth by pixel of the drawn area.
-struct DepthLookUp<'a> {
-    depth: &'a [u16],
-    /// Depth column of each area column; `u32::MAX` = outside.
-    columns: Vec<u32>,
-    /// First index of each area row's depth row; `usize::MAX` = outside.
-    rows: Vec<usize>,
+/// Captured depth by pixel of the drawn area, metres, 0 = none.
+pub(crate) struct DepthLookUp {
+    pub(crate) metres: Vec<f32>,
+    width: usize,
 }
 
-impl<'a> DepthLookUp<'a> {
-    fn new(stage: &Stage, area: &Area, depth: &'a [u16]) -> Self {
+impl DepthLookUp {
+    fn new(stage: &Stage, area: &Area, depth: &[u16]) -> Self {
         let width = stage.depth[0] as usize;
-        Self {
-            depth,
-            columns: (0..area.width).map(|x| stage.depth_at(0, area.left + x).unwrap_or(u32::MAX)).collect(),
-            rows: (0..area.height)
-                .map(|y| stage.depth_at(1, area.top + y).map_or(usize::MAX, |v| v as usize * width))
-                .collect(),
+        let columns: Vec<Option<u32>> = (0..area.width).map(|x| stage.depth_at(0, area.left + x)).collect();
+        let mut metres = Vec::with_capacity(area.len());
+        for y in 0..area.height {
+            match stage.depth_at(1, area.top + y) {
+                Some(v) => {
+                    let row = &depth[v as usize * width..(v as usize + 1) * width];
+                    metres.extend(columns.iter().map(|c| c.map_or(0.0, |c| f32::from(row[c as usize]) * 1e-3)));
+                }
+                None => metres.resize(metres.len() + area.width as usize, 0.0),
+            }
         }
+        Self { metres, width: area.width as usize }
     }
-    /// Metres, 0 = none.
     #[inline]
     fn at(&self, x: usize, y: usize) -> f32 {
-        let (c, r) = (self.columns[x], self.rows[y]);
-        if c == u32::MAX || r == usize::MAX { 0.0 } else { f32::from(self.depth[r + c as usize]) * 1e-3 }
+        self.metres[y * self.width + x]
     }
 }
 
-fn collect_evidence(model: &Model, work: &mut Workspace, area: &Area, depth: &DepthLookUp<'_>, tracked: bool) {
+fn collect_evidence(model: &Model, work: &mut Workspace, area: &Area, depth: &DepthLookUp, tracked: bool) {
     let width = area.width as usize;
     let (pixels, surface, body) = (&work.pixels, &work.surface, &work.body);
     par::map_into(model.config.par, pixels.len(), width * ROWS, &mut work.matte.says, |i| {
@@ -214,74 +266,6 @@ fn collect_evidence(model: &Model, work: &mut Workspace, area: &Area, depth: &De
     });
 }
 
-/// Soft shadows between garments and what they touch, by blurred coverage.
-#[derive(Clone, Debug, Default)]
-struct Shadows {
-    /// How much garment is around, 0 to 1.
-    garment: Vec<f32>,
-    /// Its depth times that.
-    depth: Vec<f32>,
-    /// How much occluder is around, 0 to 1.
-    front: Vec<f32>,
-    scratch: Vec<f32>,
-}
-
-impl Shadows {
-    fn cast(&mut self, pixels: &[Pixel], alpha: &[f32], area: &Area, samples: u32, reach: f32) {
-        let full = 1.0 / (samples * samples) as f32;
-        let radius = (0.5 * reach).round().clamp(1.0, 24.0) as usize;
-        let fill = |out: &mut Vec<f32>, f: &dyn Fn(&Pixel, f32) -> f32| {
-            out.clear();
-            out.extend(pixels.iter().zip(alpha).map(|(p, a)| f(p, *a)));
-        };
-        fill(&mut self.garment, &|p, a| f32::from(p.covered) * full * (1.0 - a));
-        fill(&mut self.depth, &|p, a| {
-            if p.covered > 0 { f32::from(p.covered) * full * (1.0 - a) * p.depth } else { 0.0 }
-        });
-        fill(&mut self.front, &|p, a| if p.covered > 0 { a } else { 0.0 });
-        let any_front = alpha.iter().any(|a| *a > 0.0);
-        for _ in 0..2 {
-            blur(&mut self.garment, &mut self.scratch, area.width as usize, radius);
-            blur(&mut self.depth, &mut self.scratch, area.width as usize, radius);
-            if any_front {
-                blur(&mut self.front, &mut self.scratch, area.width as usize, radius);
-            }
-        }
-    }
-}
-
-/// Box blur of side 2·radius + 1, both ways; zero outside.
-fn blur(image: &mut [f32], scratch: &mut Vec<f32>, width: usize, radius: usize) {
-    let scale = 1.0 / (2 * radius + 1) as f32;
-    scratch.clear();
-    scratch.resize(image.len(), 0.0);
-    for (row, out) in image.chunks(width).zip(scratch.chunks_mut(width)) {
-        let mut sum: f32 = row.iter().take(radius).sum();
-        for x in 0..width {
-            sum += row.get(x + radius).copied().unwrap_or(0.0);
-            out[x] = sum * scale;
-            if x >= radius {
-                sum -= row[x - radius];
-            }
-        }
-    }
-    let height = image.len() / width;
-    let mut sums = vec![0f32; width];
-    let row = |y: usize| &scratch[y * width..(y + 1) * width];
-    for y in 0..radius.min(height) {
-        sums.iter_mut().zip(row(y)).for_each(|(s, v)| *s += v);
-    }
-    for y in 0..height {
-        if y + radius < height {
-            sums.iter_mut().zip(row(y + radius)).for_each(|(s, v)| *s += v);
-        }
-        image[y * width..(y + 1) * width].iter_mut().zip(&sums).for_each(|(o, s)| *o = s * scale);
-        if y >= radius {
-            sums.iter_mut().zip(row(y - radius)).for_each(|(s, v)| *s -= v);
-        }
-    }
-}
-
 /// Pass two: garments over the captured picture, by coverage and visibility.
 #[allow(clippy::too_many_arguments)] // one call, all of it read-only but the last
 fn blend(
@@ -291,7 +275,7 @@ fn blend(
     area: &Area,
     n: u32,
     contact: f32,
-    depth: &DepthLookUp<'_>,
+    depth: &DepthLookUp,
     image: &mut ColorImage,
 ) {
     let width = area.width as usize;
@@ -307,24 +291,19 @@ fn blend(
             for (x, out) in row.chunks_exact_mut(3).enumerate() {
                 let i = y * width + x;
                 let p = &work.pixels[i];
-                let near = work.shade.garment[i];
-                if p.covered == 0 && near < 1e-3 {
+                if p.covered == 0 && work.shade.is_far(x, y) {
                     continue;
                 }
+                let around = work.shade.at(x, y);
                 let cover = f32::from(p.covered) * full * (1.0 - work.matte.alpha[i]);
                 let mut behind = [f32::from(out[0]), f32::from(out[1]), f32::from(out[2])];
-                if cover < 1.0 && near > 1e-3 {
-                    let z = depth.at(x, y);
-                    let gap = z - work.shade.depth[i] / near;
-                    if z > 0.0 && gap > -SHADOW_DEPTH * 0.2 && gap < SHADOW_DEPTH {
-                        let fade = 1.0 - (gap / SHADOW_DEPTH).max(0.0);
-                        let dark = 1.0 - contact * near * fade * (1.0 - work.matte.alpha[i]);
-                        behind = behind.map(|c| c * dark);
-                    }
+                if cover < 1.0 {
+                    let dark = around.on_captured(contact, depth.at(x, y), work.matte.alpha[i]);
+                    behind = behind.map(|c| c * dark);
                 }
                 let mut color = [0.0; 3];
                 if cover > 0.0 {
-                    let shadow = contact * work.shade.front[i];
+                    let shadow = contact * around.front;
                     let (u, v) = ((area.left as usize + x) as f32, (area.top as usize + y) as f32);
                     color = garment_color(shader, &mut cache, p, [x, y], [u, v], n, width, shadow);
                 }
@@ -388,4 +367,127 @@ fn count(work: &Workspace, area: &Area, samples: u32, tiles: usize, report: &mut
     }
     report.tiles_drawn = touched.iter().filter(|t| **t).count();
     report.tiles_skipped = tiles - report.tiles_drawn;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::Scenery;
+    use super::*;
+    use crate::composite::{Config, Margins};
+
+    /// Shares of arm pixels painted over and of shirt pixels with a hole, away from outlines by `border` pixels.
+    fn mistakes(s: &Scenery, image: &ColorImage, border: i32) -> [f32; 2] {
+        let (w, h) = (image.width() as i32, image.height() as i32);
+        let inside = |mask: &dyn Fn(usize) -> bool, x: i32, y: i32| {
+            (-border..=border).all(|dy| {
+                (-border..=border).all(|dx| {
+                    let (u, v) = (x + dx, y + dy);
+                    u >= 0 && v >= 0 && u < w && v < h && mask((v * w + u) as usize)
+                })
+            })
+        };
+        let captured = s.frame.color.as_ref().expect("colour");
+        let (mut counts, mut wrong) = ([0f32; 2], [0f32; 2]);
+        for y in 0..h {
+            for x in 0..w {
+                let (a, b) = (image.at(x as u32, y as u32), captured.at(x as u32, y as u32));
+                let like_captured = (0..3).all(|k| a[k].abs_diff(b[k]) < 40);
+                if inside(&|i| s.arm[i] && s.shirt_seen[i], x, y) {
+                    counts[0] += 1.0;
+                    wrong[0] += f32::from(u8::from(!like_captured));
+                } else if inside(&|i| !s.arm[i] && s.shirt_seen[i], x, y) {
+                    counts[1] += 1.0;
+                    wrong[1] += f32::from(u8::from(like_captured));
+                }
+            }
+        }
+        assert!(counts[0] > 150.0 && counts[1] > 2000.0, "{counts:?}");
+        [wrong[0] / counts[0], wrong[1] / counts[1]]
+    }
+
+    #[test]
+    fn the_arm_hides_the_shirt_and_noise_does_not() {
+        for seed in [1, 2] {
+            let s = Scenery::new(640, 480, seed);
+            let garments = [s.garment()];
+            for body in [true, false] {
+                let mut input = s.input(&garments, None);
+                if !body {
+                    input.body = None;
+                }
+                let (image, report) = render(&Model::default(), &input, &mut Workspace::default()).expect("drawn");
+                let [arm, shirt] = mistakes(&s, &image, 3);
+                assert!(arm < 0.01 && shirt < 0.001, "body {body}: arm {arm}, shirt {shirt}, {report:?}");
+                // What the plain test makes of it: the oracle must see holes, or this test proves nothing.
+                let plain =
+                    Margins { plain: 0.0, limb: 0.0, covered: 0.0, inner: 0.0, clear: 0.0, step: 0.0, patch: 0.0 };
+                let naive = Model::new(Config { margins: plain, ..Config::default() });
+                let (image, _) = render(&naive, &input, &mut Workspace::default()).expect("drawn");
+                assert!(mistakes(&s, &image, 3)[1] > 0.01);
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_changes_outside_the_garments() {
+        let s = Scenery::new(320, 240, 3);
+        let captured = s.frame.color.as_ref().expect("colour");
+        let none = s.input(&[], None);
+        let (image, report) = render(&Model::default(), &none, &mut Workspace::default()).expect("drawn");
+        assert_eq!((&image, report.tiles_drawn, report.tiles_skipped), (captured, 0, 80));
+        let garments = [s.garment()];
+        let (image, report) =
+            render(&Model::default(), &s.input(&garments, None), &mut Workspace::default()).expect("drawn");
+        // The shirt spans about 87 columns; far from it every byte is the captured one.
+        for y in 0..240 {
+            for x in (0..60).chain(260..320) {
+                assert_eq!(image.at(x, y), captured.at(x, y));
+            }
+        }
+        assert!(report.tiles_drawn < 50 && report.tiles_drawn + report.tiles_skipped == 80, "{report:?}");
+        assert!(report.pixels_drawn > 3000 && report.pixels_occluded > 300, "{report:?}");
+    }
+
+    #[test]
+    fn same_picture_at_any_thread_count_and_from_a_used_workspace() {
+        let s = Scenery::new(320, 240, 4);
+        let garments = [s.garment(), s.garment()];
+        let input = s.input(&garments, Some([400, 300]));
+        let with = |par, work: &mut Workspace| {
+            render(&Model::new(Config { par, ..Config::default() }), &input, work).expect("drawn").0
+        };
+        let alone = with(Par::Seq, &mut Workspace::default());
+        let mut used = Workspace::default();
+        render(&Model::default(), &s.input(&garments[..1], None), &mut used).expect("drawn");
+        for threads in [1, 3] {
+            let got = par::with_threads(threads, || with(Par::Rayon, &mut used)).expect("pool");
+            assert!(got == alone, "{threads} threads");
+        }
+    }
+
+    #[test]
+    fn faults_are_named() {
+        let s = Scenery::new(160, 120, 5);
+        let draw = |g: super::super::GarmentView<'_>| {
+            render(&Model::default(), &s.input(&[g], None), &mut Workspace::default()).err()
+        };
+        let mut g = s.garment();
+        let uv = [[0.0; 2]; 3];
+        g.uv = &uv;
+        let what = "texture coordinates";
+        assert_eq!(draw(g), Some(RenderError::Length { garment: 0, what, got: 3, vertices: s.shirt.0.len() }));
+        let mut g = s.garment();
+        let faces = [[0, 1, 2], [0, 1, 99_999]];
+        g.faces = &faces;
+        assert_eq!(draw(g), Some(RenderError::Face { garment: 0, face: 1 }));
+        // Degenerate, behind the camera, beside the picture: nothing is drawn, nothing breaks.
+        for points in [[[0.0, 0.0, 2.0]; 3], [[0.1, 0.0, -1.0], [0.0, 0.1, -1.0], [0.0; 3]], [[9.0, 0.0, 1.0]; 3]] {
+            let points = points.map(crate::math::P3::from);
+            let mut g = s.garment();
+            (g.vertices, g.uv, g.faces) = (&points, &[], &[[0, 1, 2]]);
+            let garments = [g];
+            let (_, r) = render(&Model::default(), &s.input(&garments, None), &mut Workspace::default()).expect("fine");
+            assert_eq!(r.pixels_drawn, 0);
+        }
+    }
 }

@@ -29,10 +29,10 @@ impl Default for Lights {
     fn default() -> Self {
         Self {
             up: [0.0, -1.0, 0.0],
-            sky: 0.62,
-            ground: 0.30,
-            key_direction: [-0.45, -0.65, -0.62],
-            key: 0.55,
+            sky: 0.66,
+            ground: 0.36,
+            key_direction: [-0.35, -0.62, -0.70],
+            key: 0.52,
             inside: 0.42,
             contact: 0.4,
         }
@@ -41,6 +41,8 @@ impl Default for Lights {
 
 /// Light still reaches this far around the terminator (cosine): cloth scatters it.
 const WRAP: f32 = 0.25;
+/// A surface is taken to be seen at no flatter angle than this (cosine), or patterns would fade to nothing at edges.
+const GRAZING: f32 = 0.2;
 /// Exponent of the sheen of satin.
 const SHEEN_POWER: i32 = 16;
 /// Sheen of satin at its brightest.
@@ -51,10 +53,10 @@ pub(crate) struct Shader<'a> {
     pub(crate) surface: &'a Surface,
     pub(crate) camera: Intrinsics,
     pub(crate) to_srgb: &'a ToSrgb,
-    lights: Lights,
-    up: V3,
-    key: V3,
-    brightness: f32,
+    pub(crate) lights: Lights,
+    pub(crate) up: V3,
+    pub(crate) key: V3,
+    pub(crate) brightness: f32,
 }
 
 /// The last face, since neighbours mostly share it: corner weights are `ray · gradient`.
@@ -62,11 +64,12 @@ pub(crate) struct Shader<'a> {
 pub(crate) struct Cache {
     face: u32,
     gradient: [V3; 3],
+    corners: [[f32; 8]; 3],
 }
 
 impl Default for Cache {
     fn default() -> Self {
-        Self { face: u32::MAX, gradient: [V3::zeros(); 3] }
+        Self { face: u32::MAX, gradient: [V3::zeros(); 3], corners: [[0.0; 8]; 3] }
     }
 }
 
@@ -94,10 +97,11 @@ impl<'a> Shader<'a> {
     #[inline]
     pub(crate) fn color(&self, cache: &mut Cache, face: u32, u: f32, v: f32, shadow: f32) -> [f32; 3] {
         let s = self.surface;
-        let f = s.faces[face as usize].map(|i| i as usize);
         if cache.face != face {
+            let f = s.faces[face as usize].map(|i| i as usize);
             let [a, b, c] = f.map(|i| s.vertices[i].coords);
-            *cache = Cache { face, gradient: [b.cross(&c), c.cross(&a), a.cross(&b)] };
+            *cache =
+                Cache { face, gradient: [b.cross(&c), c.cross(&a), a.cross(&b)], corners: f.map(|i| s.attributes[i]) };
         }
         let ray = self.camera.unproject(u, v, 1.0).coords;
         let w = cache.gradient.map(|g| g.dot(&ray));
@@ -107,26 +111,27 @@ impl<'a> Shader<'a> {
         let sum = w[0] + w[1] + w[2];
         let w = if sum > 0.0 { w.map(|w| w / sum) } else { [1.0, 0.0, 0.0] };
 
-        let blend = |k: fn(&Surface, usize) -> f32| (0..3).map(|c| w[c] * k(s, f[c])).sum::<f32>();
-        let n = s.normals[f[0]] * w[0] + s.normals[f[1]] * w[1] + s.normals[f[2]] * w[2];
-        let n = n.try_normalize(0.0).unwrap_or_else(|| -ray.normalize());
+        let k = &cache.corners;
+        let mixed: [f32; 8] = std::array::from_fn(|i| k[0][i] * w[0] + k[1][i] * w[1] + k[2][i] * w[2]);
+        let [nx, ny, nz, open, tu, tv, z, _] = mixed;
+        let eye = ray * -ray.norm_squared().sqrt().recip();
+        let n = V3::new(nx, ny, nz);
+        let length = n.norm_squared().sqrt();
+        let n = if length > 0.0 { n * length.recip() } else { eye };
         let inner = s.inner[face as usize];
         let n = if inner { -n } else { n };
-        let eye = -ray.normalize();
-        let open = blend(|s, i| s.openness[i]);
 
-        let z = blend(|s, i| s.vertices[i].z);
-        let facing = n.dot(&eye).abs().max(0.2);
+        let facing = n.dot(&eye).abs().max(GRAZING);
         let footprint = z / (self.camera.fx as f32 * facing);
         let fabric = &s.fabrics[usize::from(s.garment[face as usize])];
-        let uv = [blend(|s, i| s.uv[i][0]), blend(|s, i| s.uv[i][1])];
-        let albedo = fabric.albedo(uv, footprint);
+        let albedo = fabric.albedo([tu, tv], footprint);
 
         let l = &self.lights;
         let hemi = l.ground + (l.sky - l.ground) * 0.5 * (1.0 + n.dot(&self.up));
         let key = ((n.dot(&self.key) + WRAP) / (1.0 + WRAP)).max(0.0) * l.key;
-        let half = (self.key + eye).normalize();
         let sheen = if fabric.gloss > 0.0 {
+            let half = self.key + eye;
+            let half = half * half.norm_squared().max(f32::MIN_POSITIVE).sqrt().recip();
             fabric.gloss * SHEEN * n.dot(&half).max(0.0).powi(SHEEN_POWER) * l.key
         } else {
             0.0

@@ -31,10 +31,12 @@ impl Area {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Surface {
     pub(crate) vertices: Vec<P3>,
-    pub(crate) normals: Vec<V3>,
-    /// Share of ambient light that reaches a vertex: less in the valley of a fold.
-    pub(crate) openness: Vec<f32>,
-    pub(crate) uv: Vec<[f32; 2]>,
+    normals: Vec<V3>,
+    /// What shading interpolates, shape `[vertices]`: normal, share of ambient light that reaches the vertex (less in
+    /// the valley of a fold), texture coordinate, depth, and one unused.
+    pub(crate) attributes: Vec<[f32; 8]>,
+    openness: Vec<f32>,
+    uv: Vec<[f32; 2]>,
     pub(crate) faces: Vec<Face>,
     /// Index into `fabrics`, shape `[faces]`.
     pub(crate) garment: Vec<u8>,
@@ -123,6 +125,15 @@ impl Surface {
         for (o, n) in self.openness.iter_mut().zip(count) {
             *o = (1.0 - FOLD_SHADE * *o / f32::from(n.max(1))).clamp(OPENNESS[0], OPENNESS[1]);
         }
+        self.attributes.clear();
+        self.attributes.extend(
+            self.vertices
+                .iter()
+                .zip(&self.normals)
+                .zip(&self.openness)
+                .zip(&self.uv)
+                .map(|(((p, n), open), uv)| [n.x, n.y, n.z, *open, uv[0], uv[1], p.z, 0.0]),
+        );
     }
 
     /// The part of the picture that garments can touch, `margin` pixels around included; `None` when there is none.

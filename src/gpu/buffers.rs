@@ -1,0 +1,90 @@
+//! What is uploaded for each picture. Layouts are those of `garments.wgsl`; padding has a name.
+
+use crate::composite::framing::Stage;
+use crate::composite::look::{Fabric, Print};
+use crate::composite::render::FOLD_GAP;
+use crate::composite::shade::Shader;
+use crate::composite::shadow::{NO_SHADOW, SHADOW_DEPTH, Shadows};
+use crate::composite::surface::{Area, NEAR, Surface, part_of};
+use crate::raster::View;
+use bytemuck::{Pod, Zeroable};
+
+/// `Scene` of the shader.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct SceneData {
+    lens: [f32; 4],
+    size: [f32; 4],
+    camera: [f32; 4],
+    area: [f32; 4],
+    up: [f32; 4],
+    key: [f32; 4],
+    light: [f32; 4],
+    limits: [f32; 4],
+}
+
+impl SceneData {
+    pub(super) fn new(stage: &Stage, area: &Area, samples: u32, shader: &Shader<'_>) -> Self {
+        let mut lens = [0.0; 4];
+        if let View::Perspective { camera: k, .. } = part_of(stage, area, samples) {
+            lens = [k.fx, k.fy, k.cx + 0.5, k.cy + 0.5].map(|v| v as f32);
+        }
+        let (k, l) = (&stage.camera, &shader.lights);
+        let around = [area.width.div_ceil(2), area.height.div_ceil(2)];
+        Self {
+            lens,
+            size: [(area.width * samples) as f32, (area.height * samples) as f32, NEAR, samples as f32],
+            camera: [k.fx, k.fy, k.cx, k.cy].map(|v| v as f32),
+            area: [area.left as f32, area.top as f32, around[0] as f32, around[1] as f32],
+            up: [shader.up.x, shader.up.y, shader.up.z, l.sky],
+            key: [shader.key.x, shader.key.y, shader.key.z, l.key],
+            light: [l.ground, l.inside, l.contact, shader.brightness],
+            limits: [FOLD_GAP, SHADOW_DEPTH, NO_SHADOW, 0.0],
+        }
+    }
+}
+
+/// `Fabric` of the shader.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct FabricData {
+    base: [f32; 4],
+    other: [f32; 4],
+    pattern: [f32; 4],
+}
+
+impl From<&Fabric> for FabricData {
+    fn from(f: &Fabric) -> Self {
+        let (kind, period) = match f.print {
+            Print::Solid => (0.0, 1.0),
+            Print::Stripes { period, .. } => (1.0, period),
+            Print::Check { period, .. } => (2.0, period),
+            Print::Knit { period } => (3.0, period),
+        };
+        Self {
+            base: [f.base[0], f.base[1], f.base[2], f.gloss],
+            other: [f.other[0], f.other[1], f.other[2], f.metres_per_uv],
+            pattern: [kind, period, 0.0, 0.0],
+        }
+    }
+}
+
+/// Bytes of the five storage buffers, in the order of their bindings.
+pub(super) fn geometry(surface: &Surface) -> [Vec<u8>; 5] {
+    let points: Vec<[f32; 4]> = surface.vertices.iter().map(|p| [p.x, p.y, p.z, 1.0]).collect();
+    let owners: Vec<u32> =
+        surface.garment.iter().zip(&surface.inner).map(|(g, i)| u32::from(*g) + if *i { 256 } else { 0 }).collect();
+    let fabrics: Vec<FabricData> = surface.fabrics.iter().map(FabricData::from).collect();
+    [
+        bytemuck::cast_slice(&points).to_vec(),
+        bytemuck::cast_slice(&surface.faces).to_vec(),
+        bytemuck::cast_slice(&owners).to_vec(),
+        bytemuck::cast_slice(&surface.attributes).to_vec(),
+        bytemuck::cast_slice(&fabrics).to_vec(),
+    ]
+}
+
+/// Bytes of the shadow image.
+pub(super) fn shadows(shadows: &Shadows) -> &[u8] {
+    bytemuck::cast_slice(&shadows.around)
+}

@@ -1,0 +1,238 @@
+// The garments on the graphics card: which face each sample sees, what a pixel's samples agree on, and the light.
+// The maths is that of composite::{render, shade, look, shadow}; a test holds both pictures against each other.
+
+struct Scene {
+    // Focal lengths and principal point in samples of the drawn area, the latter + 0.5 (framebuffer positions).
+    lens: vec4f,
+    // Columns and rows of samples, near plane (metres), samples along each side of a pixel.
+    size: vec4f,
+    // Focal lengths and principal point of the picture's camera, pixels.
+    camera: vec4f,
+    // First column and row of the drawn area, columns and rows of the shadow image.
+    area: vec4f,
+    // Direction of up; strength of the sky.
+    up: vec4f,
+    // Direction of the key lamp; its strength.
+    key: vec4f,
+    // Ground, inside, contact, brightness.
+    light: vec4f,
+    // Fold gap (metres), shadow depth (metres), least shadow, unused.
+    limits: vec4f,
+}
+
+struct Fabric {
+    // Linear reflectance; gloss.
+    base: vec4f,
+    // Second colour; metres per unit of texture coordinate.
+    other: vec4f,
+    // Kind (0 solid, 1 stripes, 2 check, 3 knit), period (metres), unused.
+    pattern: vec4f,
+}
+
+struct Attribute {
+    // Normal; openness.
+    normal: vec4f,
+    // Texture coordinate, depth, unused.
+    more: vec4f,
+}
+
+@group(0) @binding(0) var<uniform> scene: Scene;
+@group(0) @binding(1) var<storage, read> points: array<vec4f>;
+@group(0) @binding(2) var<storage, read> corners: array<u32>;
+// Garment number, + 256 when seen from inside.
+@group(0) @binding(3) var<storage, read> owners: array<u32>;
+@group(0) @binding(4) var<storage, read> attributes: array<Attribute>;
+@group(0) @binding(5) var<storage, read> fabrics: array<Fabric>;
+@group(1) @binding(0) var faces: texture_2d<u32>;
+@group(1) @binding(1) var depths: texture_depth_2d;
+@group(2) @binding(0) var pixels: texture_2d<u32>;
+@group(2) @binding(1) var marks: texture_2d<f32>;
+@group(2) @binding(2) var around: texture_2d<f32>;
+
+const NONE: u32 = 0xffffffffu;
+
+struct Seen {
+    @builtin(position) position: vec4f,
+    @location(0) @interpolate(flat, either) face: u32,
+}
+
+@vertex
+fn garment_vertex(@builtin(vertex_index) index: u32) -> Seen {
+    let p = points[corners[index]].xyz;
+    let u = scene.lens.x * p.x + scene.lens.z * p.z;
+    let v = scene.lens.y * p.y + scene.lens.w * p.z;
+    var out: Seen;
+    // Reversed depth: near / z, so that precision is spent evenly and z comes back exactly enough.
+    out.position = vec4f(2.0 * u / scene.size.x - p.z, p.z - 2.0 * v / scene.size.y, scene.size.z, p.z);
+    out.face = index / 3u;
+    return out;
+}
+
+@fragment
+fn garment_face(in: Seen) -> @location(0) u32 {
+    return in.face;
+}
+
+@vertex
+fn everywhere(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
+    let x = f32(i32(index & 1u) * 4 - 1);
+    let y = f32(i32(index >> 1u) * 4 - 1);
+    return vec4f(x, y, 0.0, 1.0);
+}
+
+// Nearest depth (bits), its face, samples covered, one surface only.
+@fragment
+fn resolve(@builtin(position) at: vec4f) -> @location(0) vec4u {
+    let n = i32(scene.size.w);
+    let corner = vec2i(at.xy) * n;
+    var nearest = 3.0e38;
+    var far = 0.0;
+    var face = NONE;
+    var covered = 0u;
+    var simple = 1u;
+    for (var i = 0; i < n * n; i++) {
+        let s = corner + vec2i(i % n, i / n);
+        let id = textureLoad(faces, s, 0).x;
+        if id == NONE {
+            continue;
+        }
+        let z = scene.size.z / textureLoad(depths, s, 0);
+        covered++;
+        far = max(far, z);
+        if face != NONE && (owners[face] & 255u) != (owners[id] & 255u) {
+            simple = 0u;
+        }
+        if z < nearest {
+            nearest = z;
+            face = id;
+        }
+    }
+    if far - nearest >= scene.limits.x {
+        simple = 0u;
+    }
+    return vec4u(bitcast<u32>(nearest), face, covered, simple);
+}
+
+fn wave_integral(x: f32) -> f32 {
+    return floor(x) * 0.5 + min(x - floor(x), 0.5);
+}
+
+fn square_wave(x: f32, width: f32) -> f32 {
+    let w = max(width, 1e-3);
+    return (wave_integral(x + 0.5 * w) - wave_integral(x - 0.5 * w)) / w;
+}
+
+fn albedo(f: Fabric, uv: vec2f, footprint: f32) -> vec3f {
+    let period = f.pattern.y;
+    let m = uv * f.other.w / period;
+    let w = footprint / period;
+    if f.pattern.x == 1.0 {
+        return mix(f.base.xyz, f.other.xyz, square_wave(m.y, w));
+    }
+    if f.pattern.x == 2.0 {
+        return mix(f.base.xyz, f.other.xyz, 0.5 * (square_wave(m.x, w) + square_wave(m.y, w)));
+    }
+    if f.pattern.x == 3.0 {
+        let seen = clamp(1.0 - 2.0 * w, 0.0, 1.0);
+        let slant = abs(fract(m.x) - 0.5);
+        let ridge = 1.0 - 2.0 * abs(fract(m.y / 0.7 + slant) - 0.5);
+        let edge = 2.0 * slant;
+        return f.base.xyz * (1.0 - 0.35 * seen * (1.0 - ridge) - 0.2 * seen * edge * edge * edge * edge);
+    }
+    return f.base.xyz;
+}
+
+fn to_srgb(light: vec3f) -> vec3f {
+    let c = clamp(light, vec3f(0.0), vec3f(1.0));
+    return select(1.055 * pow(c, vec3f(1.0 / 2.4)) - 0.055, 12.92 * c, c <= vec3f(0.0031308));
+}
+
+// sRGB of a face at a position of the picture.
+fn shaded(face: u32, at: vec2f, shadow: f32) -> vec3f {
+    let i = vec3u(corners[3u * face], corners[3u * face + 1u], corners[3u * face + 2u]);
+    let a = points[i.x].xyz;
+    let b = points[i.y].xyz;
+    let c = points[i.z].xyz;
+    let ray = vec3f((at - scene.camera.zw) / scene.camera.xy, 1.0);
+    var w = vec3f(dot(cross(b, c), ray), dot(cross(c, a), ray), dot(cross(a, b), ray));
+    w = max(w / (w.x + w.y + w.z), vec3f(0.0));
+    let sum = w.x + w.y + w.z;
+    if sum > 0.0 {
+        w = w / sum;
+    } else {
+        w = vec3f(1.0, 0.0, 0.0);
+    }
+    let low = attributes[i.x].normal * w.x + attributes[i.y].normal * w.y + attributes[i.z].normal * w.z;
+    let high = attributes[i.x].more * w.x + attributes[i.y].more * w.y + attributes[i.z].more * w.z;
+    let eye = -normalize(ray);
+    var n = eye;
+    if dot(low.xyz, low.xyz) > 0.0 {
+        n = normalize(low.xyz);
+    }
+    let owner = owners[face];
+    let inner = owner >= 256u;
+    if inner {
+        n = -n;
+    }
+    let facing = max(abs(dot(n, eye)), 0.2);
+    let f = fabrics[owner & 255u];
+    let color = albedo(f, high.xy, high.z / (scene.camera.x * facing));
+
+    let hemi = scene.light.x + (scene.up.w - scene.light.x) * 0.5 * (1.0 + dot(n, scene.up.xyz));
+    let key = max((dot(n, scene.key.xyz) + 0.25) / 1.25, 0.0) * scene.key.w;
+    var sheen = 0.0;
+    if f.base.w > 0.0 {
+        let half_way = max(dot(n, normalize(scene.key.xyz + eye)), 0.0);
+        sheen = f.base.w * 0.25 * pow(half_way, 16.0) * scene.key.w;
+    }
+    let gain = scene.light.w * select(1.0, scene.light.y, inner) * (1.0 - shadow);
+    return to_srgb(color * (hemi * low.w + key * min(low.w, 1.0)) * gain + sheen * gain);
+}
+
+fn shadow_at(p: vec2i) -> vec3f {
+    let last = vec2i(scene.area.zw) - 1;
+    let odd = p % 2;
+    let low = max(p / 2 + odd - 1, vec2i(0));
+    let high = min(low + 1, last);
+    let w = select(vec2f(0.75), vec2f(0.25), odd == vec2i(1));
+    let top = mix(textureLoad(around, low, 0), textureLoad(around, vec2i(high.x, low.y), 0), w.x);
+    let bottom = mix(textureLoad(around, vec2i(low.x, high.y), 0), textureLoad(around, high, 0), w.x);
+    return mix(top, bottom, w.y).xyz;
+}
+
+// Blended as: colour + target · alpha.
+@fragment
+fn compose(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    let p = vec2i(at.xy);
+    let pixel = textureLoad(pixels, p, 0);
+    let mark = textureLoad(marks, p, 0);
+    let near = shadow_at(p);
+    let n = i32(scene.size.w);
+    let hidden = mark.x;
+    let cover = f32(pixel.z) / f32(n * n) * (1.0 - hidden);
+    var dark = 1.0;
+    if cover < 1.0 && near.x >= scene.limits.z && mark.y > 0.0 {
+        let gap = mark.y - near.y / near.x;
+        if gap >= -0.2 * scene.limits.y && gap <= scene.limits.y {
+            dark = 1.0 - scene.light.z * near.x * (1.0 - max(gap / scene.limits.y, 0.0)) * (1.0 - hidden);
+        }
+    }
+    var color = vec3f(0.0);
+    if cover > 0.0 {
+        let shadow = scene.light.z * near.z;
+        let here = floor(at.xy) + scene.area.xy;
+        if pixel.w == 1u {
+            color = shaded(pixel.y, here, shadow);
+        } else {
+            for (var i = 0; i < n * n; i++) {
+                let s = vec2i(i % n, i / n);
+                let id = textureLoad(faces, p * n + s, 0).x;
+                if id != NONE {
+                    color += shaded(id, here + (vec2f(s) + 0.5) / f32(n) - 0.5, shadow);
+                }
+            }
+            color /= f32(pixel.z);
+        }
+    }
+    return vec4f(color * cover, dark * (1.0 - cover));
+}
