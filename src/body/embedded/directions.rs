@@ -16,10 +16,13 @@ use crate::par::{self, Par};
 pub const DIRECTIONS: [&str; 9] =
     ["stature", "girth", "sex", "limb_length", "torso_length", "shoulder_width", "chest", "waist", "hip"];
 
+/// Coefficients of this size span 98.8 % of a normally distributed population; within them the surface stays sound.
+pub const RANGE: f64 = 2.5;
+
 /// Projection steps onto the changed surface; a third moves no vertex by 0.1 mm.
 const STEPS: usize = 4;
 /// Rounds of smoothing of the offsets along the surface.
-const SMOOTHING: usize = 4;
+const SMOOTHING: usize = 8;
 /// Sections grow with stature by this share of the growth in length: at the same mass-for-height, r(stature, girths)
 /// is about 0.3, and the deviation of girths is some 1.5 times that of stature, relative to the mean.
 const SECTION_GROWTH: f64 = 0.45;

@@ -109,7 +109,7 @@ impl Loft {
         let r4 = (x2 * x2 + y2 * y2 + e2 * e2).sqrt().sqrt();
         let r = r2 + (r4 - r2) * c[6];
         let g = ((x2 / (ru * ru) + y2 / (rw * rw) + e2 / (cap * cap)) / (r2 * r2).max(f64::MIN_POSITIVE)).sqrt();
-        if r2 < 1e-9 {
+        if r2 < CENTRE {
             return -ru.min(rw);
         }
         (r - 1.0) / g
@@ -151,7 +151,7 @@ impl Solid {
                 let l = f.local(p).component_div(r);
                 let k0 = l.norm();
                 let k1 = l.component_div(r).norm();
-                if k0 < 1e-9 { -r.min() } else { k0 * (k0 - 1.0) / k1 }
+                if k0 < CENTRE { -r.min() } else { k0 * (k0 - 1.0) / k1 }
             }
             Self::Cone([a, b], [ra, rb]) => {
                 let d = b - a;
@@ -286,6 +286,8 @@ impl Field {
     }
 }
 
+/// Relative distance from the middle of a section under which a direction outward means nothing.
+const CENTRE: f64 = 1e-9;
 /// Close enough to the surface, metres.
 const ON_SURFACE: f64 = 2e-5;
 /// Longest projection step, metres.

@@ -22,7 +22,7 @@ use field::Field;
 use figure::{Figure, Joints, STATURE};
 use std::sync::{Arc, OnceLock};
 
-pub use directions::DIRECTIONS;
+pub use directions::{DIRECTIONS, RANGE};
 
 /// Name of the template.
 const NAME: &str = "embedded";

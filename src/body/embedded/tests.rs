@@ -285,6 +285,25 @@ fn a_unit_is_a_standard_deviation() {
     }
 }
 
+#[test]
+fn whole_range_of_shapes_is_sound() {
+    let t = template();
+    for (d, name) in DIRECTIONS.iter().enumerate() {
+        for c in [-RANGE, RANGE] {
+            let body = t.personalise(&shape(d, c));
+            let turned = t
+                .mesh()
+                .faces()
+                .iter()
+                .filter(|f| face_normal(t.mesh().vertices(), f).dot(&face_normal(&body.vertices, f)) <= 0.0)
+                .count();
+            assert_eq!(turned, 0, "{name} {c}");
+            assert!((0.045..0.115).contains(&volume(&t, &body.vertices)), "{name} {c}");
+            assert!(measure(&t, &body).is_ok(), "{name} {c}");
+        }
+    }
+}
+
 /// Legs may touch, but a left vertex never passes the middle: within two deviations nothing intersects there.
 #[test]
 fn sides_stay_apart() {
