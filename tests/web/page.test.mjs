@@ -11,7 +11,7 @@ import { BLANK_MS, STALE_MS, ageWords, present } from '../../services/compositor
 import { Stats, percentile } from '../../services/compositor/web/js/stats.js';
 import { TryOn, drawId } from '../../services/compositor/web/js/try_on.js';
 
-const known = (more) => ({ link: 'streaming', retryAt: null, state: State.LIVE, reason: 0, degradedAge: 0, shownAt: 10_000, exposedAt: 10_000, error: null, ...more });
+const known = (more) => ({ link: 'streaming', retryAt: null, state: State.LIVE, reason: 0, degradedAge: 0, shownAt: 10_000, exposedAt: 10_000, measured: false, error: null, ...more });
 
 test('only a fresh picture of a live state is called live', () => {
   for (const link of ['opening', 'streaming', 'waiting', 'refused', 'closed']) {
@@ -30,6 +30,11 @@ test('only a fresh picture of a live state is called live', () => {
 test('before the first picture nothing is live and nothing is wrong', () => {
   const said = present(known({ shownAt: null, exposedAt: null }), 10_000);
   assert.deepEqual([said.tone, said.blank, said.age], ['busy', true, '']);
+});
+
+test('somebody who was measured is dressed, not measured again', () => {
+  assert.ok(present(known({ state: State.CALIBRATING }), 10_000).guide);
+  assert.equal(present(known({ state: State.CALIBRATING, measured: true }), 10_000).title, 'Putting it on');
 });
 
 test('a picture that arrives late is not called live', () => {

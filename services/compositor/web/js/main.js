@@ -31,7 +31,7 @@ const outfit = new Outfit();
 const details = new Details();
 const wardrobe = new Wardrobe(outfit, choiceChanged);
 const stage = byId('stage');
-const NOTHING = { link: 'opening', retryAt: null, state: 0, reason: 0, degradedAge: 0, shownAt: null, exposedAt: null, error: null };
+const NOTHING = { link: 'opening', retryAt: null, state: 0, reason: 0, degradedAge: 0, shownAt: null, exposedAt: null, measured: false, error: null };
 
 let session = null; // { tryOn, known, stats, picture, revision, fitting, awaySince }
 let listing = new AbortController();
@@ -104,6 +104,8 @@ function heard(event) {
     const said = event.picture ?? event.status;
     known.state = said.state;
     known.reason = said.reason;
+    if (known.state === State.LIVE) known.measured = true;
+    else if (known.state === State.DEGRADED && AWAY.has(known.reason)) known.measured = false;
     known.degradedAge = event.picture ? said.degraded_age : said.state === State.DEGRADED ? said.age : 0;
     if (event.picture) mirror.offer(event.picture);
   }
@@ -190,7 +192,7 @@ function show({ known, stats, picture, fitting }) {
 
   const dressing = said.tone === 'live' && fitting.size > 0;
   setText(byId('pill-text'), dressing ? 'Putting it on' : said.tone === 'degraded' || said.tone === 'down' ? 'Degraded' : said.title);
-  byId('notice').hidden = said.tone === 'live';
+  byId('notice').hidden = said.tone === 'live' || (said.tone === 'busy' && said.hint === '');
   setText(byId('notice-title'), said.title);
   setText(byId('notice-hint'), said.hint);
   setText(byId('notice-age'), said.age);

@@ -36,8 +36,9 @@ export function ageWords(ms) {
 
 /**
  * @param {{link: string, retryAt: number|null, state: number, reason: number, degradedAge: number,
- *          shownAt: number|null, exposedAt: number|null, error: Error|null}} known
- *   times in ms of one clock: when the last picture was drawn, and when the camera saw what it shows
+ *          shownAt: number|null, exposedAt: number|null, measured: boolean, error: Error|null}} known
+ *   times in ms of one clock: when the last picture was drawn, and when the camera saw what it shows; `measured`: this
+ *   person has been live, so calibrating again is about the garments
  * @returns {{tone: 'idle'|'busy'|'live'|'degraded'|'down', title: string, hint: string, age: string,
  *            dim: ''|'soft'|'hard', blank: boolean, guide: boolean}}
  */
@@ -58,6 +59,7 @@ export function present(known, now) {
   }
   switch (known.state) {
     case State.CALIBRATING:
+      if (known.measured) return say('busy', 'Putting it on', '');
       return say('busy', 'Getting your measure', 'Stand facing the mirror, arms slightly away from your body.', { guide: true });
     case State.LIVE:
       if (known.shownAt === null) return say('busy', 'Waking the mirror', 'This takes a moment.');
