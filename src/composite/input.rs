@@ -53,7 +53,8 @@ pub struct Input<'a> {
 pub struct Config {
     /// Threads.
     pub par: Par,
-    /// Samples along each side of a pixel where a garment may have an edge, 1 to 4.
+    /// Samples along each side of a pixel, 1 to 4. Error of edges against 8×8 (grey levels) and time for 640×480 on one
+    /// thread: 1 23.4, 2.8 ms; 2 9.5, 3.6 ms; 3 5.1, 4.3 ms; 4 4.6, no longer within 5 ms.
     pub samples: u32,
     /// When a captured pixel is in front of a garment.
     pub margins: Margins,
@@ -70,7 +71,7 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             par: Par::Rayon,
-            samples: 2,
+            samples: 3,
             margins: Margins::default(),
             lights: Lights::default(),
             framing: Framing::Cover,
