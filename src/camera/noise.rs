@@ -21,8 +21,11 @@ pub enum NoiseModel {
 /// Axial standard deviation of the Kinect v1 at depth `z` metres and angle `theta` between the surface normal and
 /// the camera, radians: metres. Nguyen et al. 2012, eq. 3.
 pub fn kinect_v1_axial_sigma(z: f32, theta: f32) -> f32 {
-    let t = theta.min(MAX_ANGLE);
     let frontal = 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4);
+    if theta <= 0.0 {
+        return frontal;
+    }
+    let t = theta.min(MAX_ANGLE);
     frontal + 0.0001 / z.max(0.1).sqrt() * t * t / ((FRAC_PI_2 - t) * (FRAC_PI_2 - t))
 }
 
@@ -32,9 +35,12 @@ pub const KINECT_V1_LATERAL_SIGMA: f32 = 0.8;
 
 /// Axial standard deviation of the Kinect v2 at `z` metres and angle `theta`: metres. Fankhauser et al. 2015, eq. 6.
 pub fn time_of_flight_axial_sigma(z: f32, theta: f32) -> f32 {
+    let frontal = 1.5 - 0.5 * z + 0.3 * z * z;
+    if theta <= 0.0 {
+        return frontal * 1e-3;
+    }
     let t = theta.min(MAX_ANGLE);
-    let mm = 1.5 - 0.5 * z + 0.3 * z * z + 0.1 * z * z.sqrt() * t * t / ((FRAC_PI_2 - t) * (FRAC_PI_2 - t));
-    mm * 1e-3
+    (frontal + 0.1 * z * z.sqrt() * t * t / ((FRAC_PI_2 - t) * (FRAC_PI_2 - t))) * 1e-3
 }
 
 const FRAC_PI_2: f32 = std::f32::consts::FRAC_PI_2;

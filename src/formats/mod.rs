@@ -1,9 +1,13 @@
 //! Files in and out: MCAP, RGBD folders, npz bodies, OBJ, glTF, patterns. Bytes to domain types, never a panic.
 
+pub mod asf_amc;
+pub mod bvh;
 mod error;
 mod foxglove;
+pub mod gltf;
 pub mod image;
 mod mcap_file;
+mod motion;
 pub mod npz;
 pub mod obj;
 mod recording;
@@ -11,5 +15,6 @@ mod rgbd_folder;
 
 pub use error::FormatError;
 pub use mcap_file::{McapReader, McapWriter};
+pub use motion::{MotionClip, read_motion};
 pub use recording::{RgbdSource, open_recording};
 pub use rgbd_folder::{RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};

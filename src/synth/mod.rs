@@ -3,6 +3,7 @@
 //! A [`Sequence`] is a [`Shopper`] doing a [`Routine`] in a [`Room`] before a camera with a
 //! [`NoiseModel`](crate::camera::NoiseModel). Frames are functions of their number: any order, same bits.
 
+mod clip;
 mod paint;
 mod room;
 mod routine;
@@ -11,6 +12,7 @@ mod source;
 mod stance;
 
 pub use crate::camera::NoiseModel;
+pub use clip::ClipError;
 pub use room::Room;
 pub use routine::Routine;
 pub use sequence::{Sequence, Setting, Shopper, Truth};

@@ -61,6 +61,8 @@ pub(super) struct Paint {
     elbow: V3,
 }
 
+/// Half width of the skull at the ears, metres: what is farther out is ear.
+const EAR: f32 = 0.074;
 /// Length of the embedded body's head from the base of the skull to the crown, metres: unit of the face below.
 const HEAD_LENGTH: f32 = 0.162;
 
@@ -134,7 +136,8 @@ impl Paint {
         let (x, y) = ((p.x - self.head.x).abs() / self.size, (p.y - self.head.y) / self.size);
         let z = (p.z - self.nose.z) / self.size;
         let hairline = if z > -0.085 { 0.118 - 0.35 * x } else { 0.118 - 0.35 * x - 1.9 * (-0.085 - z) };
-        if y > hairline.max(-0.035) {
+        // Ears stand out of the hair.
+        if y > hairline.max(-0.035) && x < EAR {
             return c.hair;
         }
         if z < -0.07 {

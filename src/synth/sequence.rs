@@ -1,11 +1,13 @@
 //! Frames of a synthetic shopper, with the truth beside them.
 
+use super::clip::{ClipError, Performance};
 use super::paint::{Colors, Paint};
 use super::room::{Background, Room};
 use super::routine::Routine;
 use super::stance::Rig;
 use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use crate::camera::{Calibration, ColorImage, DepthImage, Intrinsics, NoiseModel, RgbdFrame};
+use crate::formats::MotionClip;
 use crate::math::{Camera, P3, P3d, Rigid, V3, V3d, World};
 use crate::mesh::vertex_normals;
 use crate::par::Par;
@@ -112,6 +114,7 @@ pub struct Sequence {
     paint: Paint,
     background: Background,
     calibration: Calibration,
+    performance: Option<Arc<Performance>>,
 }
 
 /// Surfaces nearer than this are clipped, metres: no depth camera sees them.
@@ -133,9 +136,19 @@ impl Sequence {
             background: Room::draw(setting.room.as_ref(), &setting.camera, &setting.world_from_camera),
             calibration: Calibration::registered(setting.camera),
             rest,
+            performance: None,
             shopper,
             setting,
         }
+    }
+    /// Plays a motion clip instead of the routine: the calibration pose for a second, a second of blending, the
+    /// clip; then it holds its last frame. Scaled by leg length, turned to face the camera at its start.
+    ///
+    /// # Errors
+    /// Names the joint that the clip lacks.
+    pub fn with_clip(mut self, clip: MotionClip) -> Result<Self, ClipError> {
+        self.performance = Some(Arc::new(Performance::new(clip)?));
+        Ok(self)
     }
     /// Camera, room and routine.
     pub fn setting(&self) -> &Setting {
@@ -153,21 +166,26 @@ impl Sequence {
     pub fn calibration(&self) -> &Calibration {
         &self.calibration
     }
-    /// Frames in one round of the routine.
+    /// Frames in one round of the routine, or in the clip.
     pub fn round(&self) -> u64 {
-        (self.setting.routine.period() * self.setting.rate).round() as u64
+        let seconds = self.performance.as_ref().map_or(self.setting.routine.period(), |p| p.seconds());
+        (seconds * self.setting.rate).round() as u64
     }
 
     /// Truth of frame `i`.
     pub fn truth(&self, i: u64) -> Truth {
         let t = &self.shopper.template;
         let camera_from_world = self.setting.world_from_camera.inverse();
-        let stance = self.setting.routine.stance(&self.rig, self.setting.home, i as f64 / self.setting.rate);
+        let (time, home) = (i as f64 / self.setting.rate, self.setting.home);
+        let stance = match &self.performance {
+            Some(p) => p.stance(&self.rig, home, time),
+            None => self.setting.routine.stance(&self.rig, home, time),
+        };
         let in_world = self.rig.pose(&stance);
         let pose = Pose { root: camera_from_world * in_world.root, angles: in_world.angles };
         let mut bones = BoneTransforms::default();
         pose.bones(t.skeleton(), &self.rest, &mut bones);
-        let present = self.setting.routine.has_person();
+        let present = self.performance.is_some() || self.setting.routine.has_person();
         let mut vertices = Vec::new();
         if present {
             skin(Par::Seq, &self.rest.vertices, t.weights(), &bones, &mut vertices);
@@ -218,9 +236,10 @@ impl Sequence {
             let f = faces[id as usize];
             let corners = f.map(|k| truth.vertices[k as usize]);
             let w = barycentrics(&view, corners, (i % width) as f32, (i / width) as f32).unwrap_or([1.0, 0.0, 0.0]);
-            let mix = |of: &dyn Fn(usize) -> V3| of(0) * w[0] + of(1) * w[1] + of(2) * w[2];
-            let n = mix(&|k| normals[f[k] as usize]);
-            let rest = mix(&|k| self.rest.base[f[k] as usize].coords);
+            let mix = |a: V3, b: V3, c: V3| a * w[0] + b * w[1] + c * w[2];
+            let [n0, n1, n2] = f.map(|k| normals[k as usize]);
+            let [r0, r1, r2] = f.map(|k| self.rest.base[k as usize].coords);
+            let (n, rest) = (mix(n0, n1, n2), mix(r0, r1, r2));
             let nearest = if w[0] >= w[1] && w[0] >= w[2] { 0 } else { 1 + usize::from(w[2] > w[1]) };
             let base = self.paint.color(f[nearest], &P3::from(rest));
             let n = n / n.norm().max(f32::EPSILON);

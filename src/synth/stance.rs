@@ -29,6 +29,28 @@ pub(super) struct Stance {
     pub(super) feet: [UnitQuaternion<f64>; 2],
 }
 
+impl Stance {
+    /// Part of the way to another stance, 0 to 1.
+    pub(super) fn blend(&self, to: &Self, s: f64) -> Self {
+        let turn = |a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>| a.try_slerp(b, s, f64::EPSILON).unwrap_or(*b);
+        let toward = |a: &V3d, b: &V3d| {
+            UnitQuaternion::rotation_between(a, b).map_or(*b, |q| UnitQuaternion::from_scaled_axis(log_so3(&q) * s) * a)
+        };
+        let limbs = |a: &[Limb; 2], b: &[Limb; 2]| {
+            std::array::from_fn(|k| std::array::from_fn(|i| toward(&a[k][i].normalize(), &b[k][i].normalize())))
+        };
+        Self {
+            pelvis: self.pelvis + (to.pelvis - self.pelvis) * s,
+            heading: turn(&self.heading, &to.heading),
+            chest: self.chest + (to.chest - self.chest) * s,
+            head: self.head + (to.head - self.head) * s,
+            arms: limbs(&self.arms, &to.arms),
+            legs: limbs(&self.legs, &to.legs),
+            feet: [turn(&self.feet[0], &to.feet[0]), turn(&self.feet[1], &to.feet[1])],
+        }
+    }
+}
+
 /// One limb of a template: root joint, hinge, end joint and their rest geometry.
 #[derive(Clone, Debug)]
 struct LimbRig {
@@ -100,6 +122,19 @@ impl Rig {
             ankle_height: ankles[0].map_or(0.0, |j| rest.joints[j].y - floor),
             skeleton: skeleton.clone(),
         }
+    }
+
+    /// Thigh and shank together, metres; one without legs.
+    pub(super) fn leg_length(&self) -> f64 {
+        self.legs[0].as_ref().map_or(1.0, |l| l.length[0] + l.length[1])
+    }
+    /// Height of the ankle above the sole, metres.
+    pub(super) fn ankle_height(&self) -> f64 {
+        self.ankle_height
+    }
+    /// From the pelvis joint to the middle between the hips at this heading.
+    pub(super) fn hip_center(&self, heading: &UnitQuaternion<f64>) -> V3d {
+        heading * ((self.hips[0] + self.hips[1]) * 0.5)
     }
 
     /// Pelvis height and leg directions for a pelvis over `x, z` with feet planted at `soles` (x, height, z of the

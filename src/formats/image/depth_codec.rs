@@ -13,7 +13,7 @@ const MAGIC: &[u8; 4] = b"TDZ1";
 const HEADER: usize = 12;
 /// What errors are said to come from.
 const BYTES: &str = "depth bytes";
-/// Zstd's fastest regular level; level 3 saves 4 % of the bytes and doubles the time.
+/// Zstd's fastest regular level; level 3 saves 0 to 7 % of the bytes for 1.2 to 2.5 times the time.
 const LEVEL: i32 = 1;
 /// A zstd block yields at most 128 KiB from at least 3 bytes (RFC 8878, 3.1.1.2): more is promised only by a lie.
 const ZSTD_LIMIT: u64 = (128 << 10) / 3 + 1;
@@ -27,7 +27,7 @@ fn unzigzag(z: u16) -> u16 {
     (z >> 1) ^ (z & 1).wrapping_neg()
 }
 
-/// Compresses a depth image without loss: about 90 kB and 2 ms for VGA.
+/// Compresses a depth image without loss: about 95 kB and 1 ms for VGA from a Kinect v1.
 pub fn encode_depth(image: &DepthImage) -> Vec<u8> {
     let n = image.data().len();
     let mut planes = vec![0u8; 2 * n];

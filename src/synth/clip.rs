@@ -1,0 +1,246 @@
+//! Recorded motion on any template: bone directions of a clip become stances.
+
+use super::routine::{Routine, ease};
+use super::stance::{Limb, Rig, Stance};
+use crate::formats::MotionClip;
+use crate::math::{P3d, V3d, log_so3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+
+/// The joints of a clip that a stance needs, `[left, right]` where there are two.
+#[derive(Clone, Debug)]
+struct Landmarks {
+    hip: [usize; 2],
+    knee: [usize; 2],
+    ankle: [usize; 2],
+    toe: [Option<usize>; 2],
+    shoulder: [usize; 2],
+    elbow: [usize; 2],
+    wrist: [usize; 2],
+    hand: [Option<usize>; 2],
+    neck: usize,
+    head: Option<[usize; 2]>,
+}
+
+/// A clip whose joints have been found.
+#[derive(Clone, Debug)]
+pub(super) struct Performance {
+    clip: MotionClip,
+    at: Landmarks,
+    /// Pelvis in the first frame, floor height, and turn that makes the first frame face +z.
+    start: P3d,
+    floor: f64,
+    facing: UnitQuaternion<f64>,
+    /// Length of thigh and shank, in the clip's unit.
+    leg: f64,
+}
+
+/// A clip that cannot be played on a body.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("motion clip: no joint for `{0}`; looked for names of the CMU, MakeHuman and Mixamo skeletons")]
+pub struct ClipError(
+    /// The landmark that was not found.
+    pub String,
+);
+
+/// Names a landmark goes by: CMU's ASF, two MakeHuman BVH rigs, Mixamo. `?` stands for the side.
+const NAMES: [(&str, &[&str]); 8] = [
+    ("hip", &["?femur", "?Thigh", "?hip", "*UpLeg"]),
+    ("knee", &["?tibia", "?Shin", "?knee", "*Leg"]),
+    ("ankle", &["?foot", "*Foot"]),
+    ("toe", &["?toes", "toe2-1.?", "?Foot_end", "*ToeBase"]),
+    ("shoulder", &["?humerus", "?Shldr", "?shoulder", "*Arm"]),
+    ("elbow", &["?radius", "?ForeArm", "?elbow", "*ForeArm"]),
+    ("wrist", &["?wrist", "?hand", "*Hand"]),
+    ("hand", &["?fingers", "?Mid1", "finger3-1.?", "*HandMiddle1"]),
+];
+
+/// Held at the start, then blended into the clip, seconds: time for a tracker to measure the body.
+const HOLD: f64 = 1.0;
+const BLEND: f64 = 1.0;
+
+/// Frame with x to the left of the body and y as near to `up` as can be.
+fn basis(left: V3d, up: V3d) -> Option<UnitQuaternion<f64>> {
+    let x = left.try_normalize(0.0)?;
+    let z = x.cross(&up).try_normalize(0.0)?;
+    let m = Matrix3::from_columns(&[x, z.cross(&x), z]);
+    Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(m)))
+}
+
+impl Performance {
+    /// Finds the joints.
+    pub(super) fn new(clip: MotionClip) -> Result<Self, ClipError> {
+        let find = |what: &str| -> [Option<usize>; 2] {
+            let names = NAMES.iter().find(|n| n.0 == what).map_or(&[][..], |n| n.1);
+            [["l", "Left"], ["r", "Right"]].map(|[short, long]| {
+                let names: Vec<String> = names.iter().map(|n| n.replace('?', short).replace('*', long)).collect();
+                clip.joint(&names.iter().map(String::as_str).collect::<Vec<_>>())
+            })
+        };
+        let both = |what: &str| match find(what) {
+            [Some(l), Some(r)] => Ok([l, r]),
+            [None, _] => Err(ClipError(format!("left {what}"))),
+            _ => Err(ClipError(format!("right {what}"))),
+        };
+        let neck = clip.joint(&["lowerneck", "neck"]).ok_or_else(|| ClipError("neck".into()))?;
+        let at = Landmarks {
+            hip: both("hip")?,
+            knee: both("knee")?,
+            ankle: both("ankle")?,
+            toe: find("toe"),
+            shoulder: both("shoulder")?,
+            elbow: both("elbow")?,
+            wrist: both("wrist")?,
+            hand: find("hand"),
+            neck,
+            head: clip.joint(&["head"]).zip(clip.joint(&["head_end"])).map(|(a, b)| [a, b]),
+        };
+        let first = clip.frames.first().ok_or_else(|| ClipError("frames".into()))?;
+        let middle = |f: &[P3d]| nalgebra::center(&f[at.hip[0]], &f[at.hip[1]]);
+        let start = middle(first);
+        let left = first[at.hip[0]] - first[at.hip[1]];
+        let ahead = V3d::new(left.x, 0.0, left.z).cross(&V3d::y());
+        let facing = UnitQuaternion::from_axis_angle(&V3d::y_axis(), -ahead.x.atan2(ahead.z));
+        let floor = clip.frames.iter().flat_map(|f| at.ankle.map(|a| f[a].y)).fold(f64::INFINITY, f64::min);
+        let leg = (first[at.hip[0]] - first[at.knee[0]]).norm() + (first[at.knee[0]] - first[at.ankle[0]]).norm();
+        if leg.is_nan() || leg <= 0.0 {
+            return Err(ClipError("a leg with a length".into()));
+        }
+        Ok(Self { start, floor, facing, leg, at, clip })
+    }
+
+    /// Length with the calibration pose before it, seconds.
+    pub(super) fn seconds(&self) -> f64 {
+        HOLD + BLEND + self.clip.seconds()
+    }
+
+    /// Stance at `t`: calibration pose, blend, then the clip.
+    pub(super) fn stance(&self, rig: &Rig, home: P3d, t: f64) -> Stance {
+        let still = || Routine::Still.stance(rig, home, t);
+        if t < HOLD {
+            return still();
+        }
+        let clip = self.clip_stance(rig, home, t - HOLD - BLEND);
+        let s = ease((t - HOLD) / BLEND);
+        if s < 1.0 { still().blend(&clip, s) } else { clip }
+    }
+
+    fn clip_stance(&self, rig: &Rig, home: P3d, t: f64) -> Stance {
+        let (n, at) = (self.clip.frames.len(), &self.at);
+        let place = (t / self.clip.period).clamp(0.0, (n - 1) as f64);
+        let (i, s) = (place as usize, place.fract());
+        let (a, b) = (&self.clip.frames[i], &self.clip.frames[(i + 1).min(n - 1)]);
+        let p = |j: usize| self.facing * (a[j] + (b[j] - a[j]) * s);
+        let toward = |from: usize, to: usize| (p(to) - p(from)).try_normalize(0.0).unwrap_or(-V3d::y());
+        let hips = nalgebra::center(&p(at.hip[0]), &p(at.hip[1]));
+        let up = p(at.neck) - hips;
+        let heading = basis(p(at.hip[0]) - p(at.hip[1]), up).unwrap_or_default();
+        let chest_at = basis(p(at.shoulder[0]) - p(at.shoulder[1]), up).unwrap_or(heading);
+        let (from_pelvis, from_chest) = (heading.inverse(), chest_at.inverse());
+        let head = at.head.map_or(V3d::zeros(), |[base, top]| {
+            let to = from_chest * toward(base, top);
+            UnitQuaternion::rotation_between(&V3d::y(), &to).map_or(V3d::zeros(), |q| log_so3(&q))
+        });
+        let arm = |side: usize| -> Limb {
+            let fore = toward(at.elbow[side], at.wrist[side]);
+            let hand = at.hand[side].map_or(fore, |h| toward(at.wrist[side], h));
+            [from_chest * toward(at.shoulder[side], at.elbow[side]), from_chest * fore, from_chest * hand]
+        };
+        let foot = |side: usize| {
+            let ahead = at.toe[side].map_or(heading * V3d::z(), |toe| toward(at.ankle[side], toe));
+            UnitQuaternion::from_axis_angle(&V3d::y_axis(), ahead.x.atan2(ahead.z))
+        };
+        let leg = |side: usize| -> Limb {
+            let (thigh, shank) = (toward(at.hip[side], at.knee[side]), toward(at.knee[side], at.ankle[side]));
+            [from_pelvis * thigh, from_pelvis * shank, from_pelvis * (foot(side) * V3d::z())]
+        };
+        let scale = rig.leg_length() / self.leg;
+        let moved = (hips - self.facing * self.start) * scale;
+        let mut stance = Stance {
+            pelvis: P3d::origin(),
+            heading,
+            chest: log_so3(&(from_pelvis * chest_at)),
+            head,
+            arms: [arm(0), arm(1)],
+            legs: [leg(0), leg(1)],
+            feet: [foot(0), foot(1)],
+        };
+        let height = (hips.y - self.floor) * scale + rig.ankle_height();
+        let hip_offset = rig.hip_center(&stance.heading);
+        stance.pelvis = P3d::new(home.x + moved.x, height, home.z + moved.z) - V3d::new(0.0, hip_offset.y, 0.0);
+        stance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::formats::{MotionClip, read_motion};
+    use crate::synth::{Sequence, Setting, Shopper};
+    use std::path::PathBuf;
+
+    fn shared(name: &str) -> Option<MotionClip> {
+        let root = std::env::var_os("TRYON_SHARED")
+            .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from)
+            .join("data/motion");
+        if !root.exists() {
+            assert!(std::env::var_os("TRYON_REQUIRE_ALL").is_none(), "{} is missing", root.display());
+            eprintln!("SKIPPED: {} is missing", root.display());
+            return None;
+        }
+        Some(read_motion(&root.join(name)).expect(name))
+    }
+
+    #[test]
+    fn a_clip_without_joints_is_refused() {
+        let clip = MotionClip { names: vec!["root".into()], frames: vec![], period: 0.01 };
+        let e = Sequence::new(Shopper::default(), Setting::default()).with_clip(clip).expect_err("no joints");
+        assert!(e.to_string().contains("neck"), "{e}");
+    }
+
+    #[test]
+    fn bones_point_where_the_clip_points() {
+        for (file, names) in [
+            ("cmu_asf_amc/02_07.amc", ["lhumerus", "lradius", "rfemur", "rtibia"]),
+            ("cmu_bvh/02_02_makehuman.bvh", ["lShldr", "lForeArm", "rThigh", "rShin"]),
+        ] {
+            let Some(clip) = shared(file) else { return };
+            let s = Sequence::new(Shopper::default(), Setting::default()).with_clip(clip.clone()).expect("plays");
+            let skeleton = s.shopper().template.skeleton().clone();
+            let ours = ["left_shoulder", "left_elbow", "right_hip", "right_knee"].map(|n| skeleton.index(n).expect(n));
+            let theirs = names.map(|n| clip.joint(&[n]).expect(n));
+            let mut worst = 0.0f64;
+            for i in (60..200).step_by(7) {
+                let truth = s.truth(i);
+                let t = i as f64 / 30.0 - 2.0;
+                let f = &clip.frames[((t / clip.period) as usize).min(clip.frames.len() - 1)];
+                // Angle between thigh and upper arm does not depend on where the clip or the camera looks.
+                let w = |k: usize| truth.joints[ours[k + 1]] - truth.joints[ours[k]];
+                let c = |k: usize| f[theirs[k + 1]] - f[theirs[k]];
+                worst = worst.max((w(0).angle(&w(2)) - c(0).angle(&c(2))).abs());
+            }
+            assert!(worst < 0.2, "{file}: {worst} rad");
+        }
+    }
+
+    /// Writes pictures for eyes into the folder named by `TRYON_LOOK`.
+    #[test]
+    fn look() {
+        let Some(dir) = std::env::var_os("TRYON_LOOK").map(PathBuf::from) else { return };
+        for (n, file) in
+            ["cmu_asf_amc/02_07.amc", "cmu_bvh/02_02_makehuman.bvh", "cmu_bvh/02_03.bvh", "cmu_asf_amc/13_29.amc"]
+                .into_iter()
+                .enumerate()
+        {
+            let Some(clip) = shared(file) else { return };
+            let s = Sequence::new(Shopper::default(), Setting::default()).with_clip(clip.at_cmu_rate()).expect("plays");
+            let mut sheet = crate::camera::ColorImage::filled(4 * 640, 480, [0; 3]);
+            for (k, i) in [50u64, 66, 80, 95].into_iter().enumerate() {
+                let color = s.frame(i).0.color.expect("colour");
+                for v in 0..480 {
+                    let at = 3 * (v * 4 * 640 + k * 640);
+                    sheet.data_mut()[at..at + 3 * 640].copy_from_slice(&color.data()[3 * v * 640..3 * (v + 1) * 640]);
+                }
+            }
+            crate::formats::image::write_png_rgb(&dir.join(format!("clip_{n}.png")), &sheet).expect("written");
+        }
+    }
+}
