@@ -184,7 +184,7 @@ fn small_atan(x: f32) -> f32 {
 /// Metres to whole millimetres; what 16 bits cannot hold is no reading.
 fn millimetres(z: f32) -> u16 {
     let mm = z * 1000.0 + 0.5;
-    if mm >= 1.0 && mm < 65_536.0 { mm as u16 } else { 0 }
+    if (1.0..65_536.0).contains(&mm) { mm as u16 } else { 0 }
 }
 
 #[cfg(test)]

@@ -91,7 +91,7 @@ fn parse_asf(text: &str, path: &Path) -> Result<Skeleton, FormatError> {
             ("units", "angle") => s.degrees = words.next() != Some("rad"),
             ("root", "order") => {
                 for word in words {
-                    let axis = axis_of(word.bytes().nth(1));
+                    let axis = axis_of(word.as_bytes().get(1).copied());
                     let axis = axis.ok_or_else(|| fault(path, n, format!("root: no channel `{word}`")))?;
                     s.root.push((word.starts_with(['T', 't']), axis));
                 }
@@ -124,7 +124,7 @@ fn parse_asf(text: &str, path: &Path) -> Result<Skeleton, FormatError> {
                     }
                     "dof" => {
                         for word in words {
-                            let axis = axis_of(word.bytes().nth(1)).filter(|_| word.starts_with('r'));
+                            let axis = axis_of(word.as_bytes().get(1).copied()).filter(|_| word.starts_with('r'));
                             let axis =
                                 axis.ok_or_else(|| fault(path, n, format!("bone `{}`: no dof `{word}`", b.name)))?;
                             b.dof.push(axis);

@@ -220,7 +220,7 @@ impl File<'_> {
             Some(a) => self.indices(&a).map_err(|why| fault("indices", why))?,
             None => (0..vertices.len() as u32).collect(),
         };
-        if corners.len() % 3 != 0 {
+        if !corners.len().is_multiple_of(3) {
             return Err(fault("indices", format!("{} do not make triangles", corners.len())));
         }
         let faces: Vec<Face> = corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
