@@ -12,9 +12,7 @@ pub fn is_name(s: &str) -> bool {
 
 /// A session id: 1 to 64 characters of `[A-Za-z0-9_-]`.
 pub fn is_session_id(s: &str) -> bool {
-    !s.is_empty()
-        && s.len() <= MAX_NAME
-        && s.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-')
+    !s.is_empty() && s.len() <= MAX_NAME && s.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-')
 }
 
 /// Which camera: the two variable parts of its bus keys. Holds checked names only.

@@ -3,7 +3,7 @@
 use super::{WireError, bulk, geometry, required};
 use crate::v1;
 use nalgebra::{Point3, Vector3};
-use tryon::body::{BodyShape, Joint, JointMotion, Pose, ShapeSpace, SkinWeights, Skeleton, Template};
+use tryon::body::{BodyShape, Joint, JointMotion, Pose, ShapeSpace, Skeleton, SkinWeights, Template};
 use tryon::math::{Camera, P3, V3};
 use tryon::mesh::TriMesh;
 
@@ -199,7 +199,8 @@ mod tests {
             Joint { name: "head".into(), parent: Some(1), rest: at(1.0), motion: hinge },
         ])
         .expect("a chain");
-        let weights = SkinWeights::from_rows((0..4).map(|i| vec![(i % 3, 0.75), ((i + 1) % 3, 0.25)])).expect("weights");
+        let weights =
+            SkinWeights::from_rows((0..4).map(|i| vec![(i % 3, 0.75), ((i + 1) % 3, 0.25)])).expect("weights");
         let space = ShapeSpace {
             names: vec!["stature".into()],
             vertices: vec![vec![V3::new(0.0, 0.1, 0.0); 4]],
@@ -246,7 +247,10 @@ mod tests {
         assert_eq!(fault(&|w| w.joints[2].parent = Some(9)), "body_template.joints");
         assert_eq!(fault(&|w| w.skin_joints = Bytes::from_static(&[9; 16])), "body_template");
         assert_eq!(fault(&|w| w.shape_directions[0].joints = Bytes::new()), "body_template.shape_directions[0].joints");
-        let pose = v1::BodyPose { camera_from_body: Some(geometry::rigid_to_wire(&tryon::math::Rigid::<Camera, Camera>::identity())), angles: bulk::write_flat(&[f64::NAN; 4]) };
+        let pose = v1::BodyPose {
+            camera_from_body: Some(geometry::rigid_to_wire(&tryon::math::Rigid::<Camera, Camera>::identity())),
+            angles: bulk::write_flat(&[f64::NAN; 4]),
+        };
         assert_eq!(pose_from_wire(&pose, 4).expect_err("NaN").field, "body_pose.angles[0]");
         assert_eq!(pose_from_wire(&pose, 5).expect_err("size").field, "body_pose.angles");
         let s = v1::BodyShape { displacements: Bytes::from_static(&[0; 6]), ..Default::default() };

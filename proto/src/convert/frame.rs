@@ -82,3 +82,78 @@ pub fn exposure_from_wire(m: &v1::RgbdFrame) -> Result<Exposure, WireError> {
         stages,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use prost::Message;
+    use tryon::camera::{ColorImage, DepthImage, Intrinsics};
+
+    fn exposure() -> Exposure {
+        let k = Intrinsics::KINECT_V1.resized(64, 48);
+        let depth = DepthImage::new(64, 48, (0..64 * 48).map(|i| 1000 + (i % 37) as u16).collect()).expect("fits");
+        let id = v1::FrameId { epoch: 7, sequence: 3, capture_time_ns: 5, received_unix_ns: 9 };
+        let color = Some(ColorImage::filled(64, 48, [10, 200, 90]));
+        Exposure {
+            id,
+            calibration: Arc::new(Calibration::registered(k)),
+            rgbd: RgbdFrame { sequence: 3, time_ns: 5, depth, color },
+            stages: vec![],
+        }
+    }
+
+    #[test]
+    fn exposures_round_trip_and_depth_is_lossless() {
+        let e = exposure();
+        let back = exposure_from_wire(&exposure_to_wire(&e).expect("packs")).expect("unpacks");
+        assert_eq!((back.id, &back.calibration), (e.id, &e.calibration));
+        assert_eq!(back.rgbd.depth, e.rgbd.depth);
+        let (a, b) = (back.rgbd.color.expect("colour"), e.rgbd.color.expect("colour"));
+        assert!(a.data().iter().zip(b.data()).all(|(a, b)| a.abs_diff(*b) < 8));
+        assert!(back.stages.iter().any(|s| s.stage == "capture.encode"));
+    }
+
+    #[test]
+    fn faults_are_named() {
+        let fault = |change: &dyn Fn(&mut v1::RgbdFrame)| {
+            let mut w = exposure_to_wire(&exposure()).expect("packs");
+            change(&mut w);
+            exposure_from_wire(&w).expect_err("must be refused").field
+        };
+        assert_eq!(fault(&|w| w.id = None), "rgbd_frame.id");
+        assert_eq!(fault(&|w| w.calibration = None), "rgbd_frame.calibration");
+        assert_eq!(fault(&|w| w.depth = w.depth.slice(..w.depth.len() / 2)), "rgbd_frame.depth");
+        assert_eq!(fault(&|w| w.color_jpeg = w.color_jpeg.slice(..20)), "rgbd_frame.color_jpeg");
+        let k = |w: &mut v1::RgbdFrame, f: &dyn Fn(&mut v1::Intrinsics)| {
+            f(w.calibration.as_mut().and_then(|c| c.depth.as_mut()).expect("there"));
+        };
+        assert_eq!(fault(&|w| k(w, &|k| k.fx = f64::NAN)), "rgbd_frame.calibration.depth.fx");
+        assert_eq!(fault(&|w| k(w, &|k| k.width = u32::MAX)), "rgbd_frame.calibration.depth.width");
+        // A size that is fine for a camera but not the size of the images.
+        assert_eq!(fault(&|w| k(w, &|k| k.width = 65)), "rgbd_frame.depth");
+        assert_eq!(fault(&|w| w.stages = vec![v1::StageTime::default(); 100]), "rgbd_frame.stages");
+    }
+
+    #[test]
+    fn whatever_arrives_is_an_error_and_never_a_panic() {
+        let good = exposure_to_wire(&exposure()).expect("packs").encode_to_vec();
+        let read = |b: &[u8]| {
+            let m = v1::RgbdFrame::decode(b).map_err(|e| WireError::new("rgbd_frame", e.to_string()))?;
+            exposure_from_wire(&m)
+        };
+        read(&good).expect("untouched, it is fine");
+        // Between two of the last fields a cut message is a whole one with less in it; anywhere else it is broken.
+        let whole = (0..good.len()).filter(|n| read(&good[..*n]).is_ok()).count();
+        assert!(whole <= 2, "{whole} cuts went unnoticed");
+        // A depth field that announces 4 GiB.
+        assert!(read(&[0x1a, 0xff, 0xff, 0xff, 0xff, 0x0f, 1, 2, 3]).is_err());
+        // Every byte turned over, by a fixed sequence of flips: refused or read, never a panic.
+        let mut x = 0x9e37_79b9_u32;
+        for i in 0..good.len() {
+            let mut bad = good.clone();
+            x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            bad[i] ^= (x >> 24) as u8 | 1;
+            let _ = read(&bad);
+        }
+    }
+}

@@ -26,10 +26,7 @@ impl Capture {
             let key = CameraKey::new(&config.store, &c.name)?;
             Some((c.name.clone(), camera::spawn(c.clone(), key, ctx.clone())))
         };
-        Self {
-            cameras: config.cameras.iter().filter_map(spawn).collect(),
-            recordings: config.recordings.clone(),
-        }
+        Self { cameras: config.cameras.iter().filter_map(spawn).collect(), recordings: config.recordings.clone() }
     }
 
     pub(crate) async fn autostart(&self, name: &str) {

@@ -50,7 +50,10 @@ pub(crate) fn check(choices: &[GarmentChoice]) -> Result<(), WireError> {
     for (i, c) in choices.iter().enumerate() {
         let fault = |f: &str, why: String| Err(WireError::new(format!("dress_request.garments[{i}].{f}"), why));
         if !library::names().contains(&c.garment.as_str()) {
-            return fault("garment", format!("`{}` is not known; there are {}", c.garment, library::names().join(", ")));
+            return fault(
+                "garment",
+                format!("`{}` is not known; there are {}", c.garment, library::names().join(", ")),
+            );
         }
         if !c.size.is_empty() && size(&c.size).is_none() {
             let all = Size::ALL.iter().map(Size::to_string).collect::<Vec<_>>().join(", ");

@@ -115,7 +115,12 @@ struct Task {
 }
 
 impl Task {
-    async fn run(mut self, mut inbox: mpsc::Receiver<Command>, mut news: latest::Receiver<News>, mut ready: mpsc::Receiver<Dressed>) -> &'static str {
+    async fn run(
+        mut self,
+        mut inbox: mpsc::Receiver<Command>,
+        mut news: latest::Receiver<News>,
+        mut ready: mpsc::Receiver<Dressed>,
+    ) -> &'static str {
         let shutdown = self.setup.ctx.shutdown.clone();
         let mut tick = tokio::time::interval(HEARTBEAT / 3);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);

@@ -88,8 +88,7 @@ impl Engine {
         let start = Instant::now();
         let has_body = job.placed.is_some() && job.body.as_ref().is_some_and(|b| self.pose(b));
         let mut stages = job.placed.as_ref().map_or_else(|| job.exposure.stages.clone(), |p| p.stages.clone());
-        let looks: Vec<Look> =
-            job.placed.iter().flat_map(|p| &p.garments).map(|(w, _)| look(&w.look)).collect();
+        let looks: Vec<Look> = job.placed.iter().flat_map(|p| &p.garments).map(|(w, _)| look(&w.look)).collect();
         let placed: &[(Arc<WornGarment>, Vec<P3>)] = job.placed.as_ref().map_or(&[], |p| &p.garments);
         self.garments.resize_with(placed.len(), Vec::new);
         if let Some(p) = &job.placed {
@@ -155,10 +154,7 @@ fn rgb(c: u32) -> [u8; 3] {
 
 fn look(l: &GarmentLook) -> Look {
     let stripes = l.stripe_width > 0.0 && l.accent_rgb != l.color_rgb;
-    let pattern = if stripes {
-        Print::Stripes { color: rgb(l.accent_rgb), period: 2.0 * l.stripe_width }
-    } else {
-        Print::Solid
-    };
+    let pattern =
+        if stripes { Print::Stripes { color: rgb(l.accent_rgb), period: 2.0 * l.stripe_width } } else { Print::Solid };
     Look { base: rgb(l.color_rgb), pattern, ..Look::default() }
 }

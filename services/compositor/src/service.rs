@@ -65,7 +65,8 @@ impl CompositorService for Compositor {
         } else {
             request::session_id("open_try_on_request.try_on_id", &r.try_on_id)?
         };
-        let or = |given: &str, configured: &str| if given.is_empty() { configured.to_owned() } else { given.to_owned() };
+        let or =
+            |given: &str, configured: &str| if given.is_empty() { configured.to_owned() } else { given.to_owned() };
         let (store, camera) = (or(&r.store, &self.config.store), or(&r.camera, &self.config.camera));
         let key = request::camera_key("open_try_on_request", &store, &camera)?;
         let choices = request::choices("open_try_on_request", &r.garments)?;
@@ -171,7 +172,8 @@ impl CompositorService for Compositor {
         let gone = || not_found("try-on", &r.try_on_id);
         handle.commands.send(Command::Snapshot(encoding, answer)).await.map_err(|_| gone())?;
         let late = |_| unavailable("compositor", "the picture took too long");
-        let picture = tokio::time::timeout(Duration::from_secs(2), heard).await.map_err(late)?.map_err(|_| gone())??;
+        let picture =
+            tokio::time::timeout(Duration::from_secs(2), heard).await.map_err(late)?.map_err(|_| gone())??;
         Ok(Response::new(TakeSnapshotResponse { picture: Some(picture) }))
     }
 }

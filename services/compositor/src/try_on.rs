@@ -314,7 +314,8 @@ impl Task {
         }
         if let Some(reason) = self.ages.overdue(self.now_ns(now), &self.limits) {
             self.fail(reason, "");
-        } else if self.ages.frame_ns.is_none() && self.born.elapsed().as_nanos() > u128::from(self.limits.camera_silence_ns)
+        } else if self.ages.frame_ns.is_none()
+            && self.born.elapsed().as_nanos() > u128::from(self.limits.camera_silence_ns)
         {
             self.fail(Reason::CameraSilent, "no frame has come yet");
         }

@@ -88,7 +88,8 @@ mod tests {
         }
         drop(v);
         let all: Vec<_> = r.stream().map(|m| m.expect("fine").event.expect("something")).collect().await;
-        let ages: Vec<f32> = all.iter().filter_map(|e| if let Event::Status(s) = e { Some(s.age) } else { None }).collect();
+        let ages: Vec<f32> =
+            all.iter().filter_map(|e| if let Event::Status(s) = e { Some(s.age) } else { None }).collect();
         assert_eq!(ages, [0.0, 1.0, 2.0, 3.0, 4.0]);
         let last = all.iter().find_map(|e| if let Event::Picture(p) = e { Some((p.width, p.dropped)) } else { None });
         assert_eq!(last, Some((4, 4)));

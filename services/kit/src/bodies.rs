@@ -67,11 +67,8 @@ async fn one_stream(
 ) -> Result<(), String> {
     let said = |s: tonic::Status| s.message().to_owned();
     if let Some(key) = open {
-        let message = OpenSessionRequest {
-            session_id: session.into(),
-            store: key.store().into(),
-            camera: key.camera().into(),
-        };
+        let message =
+            OpenSessionRequest { session_id: session.into(), store: key.store().into(), camera: key.camera().into() };
         client.open_session(request(message)).await.map_err(said)?;
     }
     let template = client.get_body_template(request(GetBodyTemplateRequest::default())).await;

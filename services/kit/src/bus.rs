@@ -6,8 +6,8 @@
 //! second lost frames of stalled subscribers (zenoh #2628).
 
 use crate::compute::Pool;
-use crate::frames::{BoxFuture, BusError, CameraKey, Exposure, FrameBus, FramePublisher, FrameSubscription, Packet};
 use crate::frames::exposure_to_wire;
+use crate::frames::{BoxFuture, BusError, CameraKey, Exposure, FrameBus, FramePublisher, FrameSubscription, Packet};
 use crate::queue::latest;
 use bytes::Bytes;
 use prost::Message;
@@ -46,14 +46,15 @@ impl ZenohBus {
     pub async fn open(listen: &[String], connect: &[String], pool: Arc<Pool>) -> Result<Arc<Self>, BusError> {
         let mut c = zenoh::Config::default();
         let list = |l: &[String]| format!("{l:?}");
+        let (init, max) = RETRY_MS;
+        let retry = format!("{{period_init_ms: {init}, period_max_ms: {max}, period_increase_factor: 2}}");
         let settings = [
             ("mode", "\"peer\"".to_owned()),
             ("listen/endpoints", list(listen)),
             ("connect/endpoints", list(connect)),
             ("connect/timeout_ms", "-1".into()),
             ("connect/exit_on_failure", "false".into()),
-            ("connect/retry/period_init_ms", RETRY_MS.0.to_string()),
-            ("connect/retry/period_max_ms", RETRY_MS.1.to_string()),
+            ("connect/retry", retry),
             ("scouting/multicast/enabled", "false".into()),
             ("scouting/gossip/enabled", "false".into()),
             ("transport/link/tx/lease", LEASE_MS.to_string()),
@@ -145,7 +146,7 @@ impl FrameBus for ZenohBus {
             let life = self.session.liveliness().declare_subscriber(key.alive()).history(true).callback(hear);
             let life = life.await.map_err(fault)?;
             let guard = Box::new((AbortOnDrop(pump), life));
-            Ok(FrameSubscription { packets, alive, pool: self.pool.clone(), last: None, skipped: 0, _guard: guard })
+            Ok(FrameSubscription::new(packets, alive, self.pool.clone(), guard))
         })
     }
 }
@@ -155,5 +156,21 @@ struct AbortOnDrop(tokio::task::JoinHandle<()>);
 impl Drop for AbortOnDrop {
     fn drop(&mut self) {
         self.0.abort();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+    async fn frames_cross_processes_even_when_the_listener_comes_last() {
+        let pool = Pool::new(1).expect("a thread");
+        let endpoint = [free_tcp_endpoint().expect("a port")];
+        let late = ZenohBus::open(&[], &endpoint, pool.clone()).await.expect("opens before its peer");
+        let camera = ZenohBus::open(&endpoint, &[], pool).await.expect("listens");
+        crate::frames::tests::carries(camera.as_ref(), late.as_ref()).await;
+        late.close().await;
+        camera.close().await;
     }
 }

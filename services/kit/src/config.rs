@@ -51,7 +51,8 @@ impl Config {
         }
         layers = layers.merge(Env::prefixed("TRYON_").ignore(&NOT_KEYS).split("__"));
         for flag in flags {
-            let fault = || ConfigError(format!("--set {flag}: `key=value` is needed, such as capture.cameras.0.loop=true"));
+            let fault =
+                || ConfigError(format!("--set {flag}: `key=value` is needed, such as capture.cameras.0.loop=true"));
             let (key, value) = flag.split_once('=').ok_or_else(fault)?;
             let Ok(value) = value.parse::<Value>();
             layers = layers.merge(Serialized::default(key, value));

@@ -1,6 +1,6 @@
 //! Frames between processes, whatever carries them: the trait, and the carrier inside one process.
 
-use crate::compute::Pool;
+use crate::compute::{ComputeError, Pool};
 use crate::queue::latest;
 use bytes::Bytes;
 use prost::Message;
@@ -25,8 +25,11 @@ pub struct BusError(pub String);
 /// Carries exposures from cameras to whoever subscribes; newest wins everywhere.
 pub trait FrameBus: Send + Sync {
     /// Announces a camera as alive and readies its keys. Dropping the publisher takes it off the bus.
-    fn publish(&self, key: &CameraKey, calibration: &Calibration)
-    -> BoxFuture<'_, Result<Box<dyn FramePublisher>, BusError>>;
+    fn publish(
+        &self,
+        key: &CameraKey,
+        calibration: &Calibration,
+    ) -> BoxFuture<'_, Result<Box<dyn FramePublisher>, BusError>>;
     /// Follows a camera, which need not exist yet.
     fn subscribe(&self, key: &CameraKey) -> BoxFuture<'_, Result<FrameSubscription, BusError>>;
 }
@@ -48,19 +51,32 @@ pub struct FrameSubscription {
     pub(crate) packets: latest::Receiver<Packet>,
     pub(crate) alive: watch::Receiver<bool>,
     pub(crate) pool: Arc<Pool>,
-    pub(crate) last: Option<(u64, u64)>,
-    pub(crate) skipped: u64,
+    /// A frame on its way through the pool: kept here, so that a dropped [`Self::next`] loses nothing.
+    unpacking: Option<BoxFuture<'static, Result<Result<Exposure, String>, ComputeError>>>,
+    last: Option<(u64, u64)>,
+    skipped: u64,
     /// Keeps the carrier's own subscription open.
-    pub(crate) _guard: Box<dyn Any + Send>,
+    _guard: Box<dyn Any + Send>,
 }
 
 impl FrameSubscription {
+    pub(crate) fn new(
+        packets: latest::Receiver<Packet>,
+        alive: watch::Receiver<bool>,
+        pool: Arc<Pool>,
+        guard: Box<dyn Any + Send>,
+    ) -> Self {
+        Self { packets, alive, pool, unpacking: None, last: None, skipped: 0, _guard: guard }
+    }
+
     /// The newest exposure, waiting for one; `None` when the bus is gone. Broken ones are logged and left out.
+    /// Cancel safe.
     pub async fn next(&mut self) -> Option<Arc<Exposure>> {
         loop {
-            let exposure = match self.packets.recv().await? {
-                Packet::Ready(e) => e,
-                Packet::Packed(b) => match self.pool.run(move || unpack(b)).await {
+            let exposure = if let Some(work) = &mut self.unpacking {
+                let unpacked = work.await;
+                self.unpacking = None;
+                match unpacked {
                     Ok(Ok(e)) => Arc::new(e),
                     Ok(Err(why)) => {
                         metrics::counter!("tryon_frames_broken").increment(1);
@@ -71,7 +87,16 @@ impl FrameSubscription {
                         tracing::error!(%why, "could not unpack a frame");
                         continue;
                     }
-                },
+                }
+            } else {
+                match self.packets.recv().await? {
+                    Packet::Ready(e) => e,
+                    Packet::Packed(b) => {
+                        let pool = self.pool.clone();
+                        self.unpacking = Some(Box::pin(async move { pool.run(move || unpack(b)).await }));
+                        continue;
+                    }
+                }
             };
             let (epoch, sequence) = (exposure.id.epoch, exposure.id.sequence);
             if let Some((e, s)) = self.last
@@ -148,8 +173,70 @@ impl FrameBus for LocalBus {
         let (tx, packets) = latest::channel();
         topic.subscribers.lock().unwrap_or_else(PoisonError::into_inner).push(tx);
         let alive = topic.alive.subscribe();
-        let pool = self.pool.clone();
-        let s = FrameSubscription { packets, alive, pool, last: None, skipped: 0, _guard: Box::new(topic) };
+        let s = FrameSubscription::new(packets, alive, self.pool.clone(), Box::new(topic));
         Box::pin(std::future::ready(Ok(s)))
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use std::time::Duration;
+    use tryon::camera::{ColorImage, DepthImage, Intrinsics, RgbdFrame};
+    use tryon_proto::v1::FrameId;
+
+    pub(crate) fn exposure(sequence: u64) -> Arc<Exposure> {
+        let k = Intrinsics::KINECT_V1.resized(320, 240);
+        let id = FrameId { epoch: 5, sequence, capture_time_ns: sequence, received_unix_ns: 1 };
+        let rgbd = RgbdFrame {
+            sequence,
+            time_ns: sequence,
+            depth: DepthImage::empty(320, 240),
+            color: Some(ColorImage::filled(320, 240, [9; 3])),
+        };
+        Arc::new(Exposure { id, calibration: Arc::new(Calibration::registered(k)), rgbd, stages: vec![] })
+    }
+
+    /// What every bus must do: the newest wins, losses are counted, life and death are seen.
+    pub(crate) async fn carries(publishing: &dyn FrameBus, subscribing: &dyn FrameBus) {
+        let key = CameraKey::new("store", "front").expect("names");
+        let mut s = subscribing.subscribe(&key).await.expect("subscribed");
+        assert!(!s.alive());
+        let mut p = publishing.publish(&key, &exposure(0).calibration).await.expect("published");
+        // A peer that connects later misses what came before: send until something arrives.
+        let mut sequence = 0;
+        let first = loop {
+            sequence += 1;
+            p.send(exposure(sequence)).await.expect("sent");
+            if let Ok(f) = tokio::time::timeout(Duration::from_millis(50), s.next()).await {
+                break f.expect("the bus lives");
+            }
+            assert!(sequence < 400, "nothing arrived");
+        };
+        for _ in 0..10 {
+            sequence += 1;
+            p.send(exposure(sequence)).await.expect("sent");
+        }
+        let mut last = first.id.sequence;
+        while last < sequence {
+            let f = s.next().await.expect("the bus lives");
+            assert!(f.id.sequence > last, "in order, none twice");
+            last = f.id.sequence;
+        }
+        assert!(s.alive());
+        drop(p);
+        for _ in 0..100 {
+            if !s.alive() {
+                return;
+            }
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+        panic!("the camera still counts as alive");
+    }
+
+    #[tokio::test]
+    async fn the_local_bus_carries() {
+        let bus = LocalBus::new(Pool::new(1).expect("a thread"));
+        carries(bus.as_ref(), bus.as_ref()).await;
     }
 }

@@ -143,9 +143,8 @@ pub struct Service {
 /// When an address cannot be bound.
 pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartError> {
     let Service { name, grpc_name, address, admin, routes, http1, health } = service;
-    let bind = |key: &'static str, address| {
-        move |source| StartError::Bind { key: format!("{name}.{key}"), address, source }
-    };
+    let bind =
+        |key: &'static str, address| move |source| StartError::Bind { key: format!("{name}.{key}"), address, source };
     let listener = TcpListener::bind(address).await.map_err(bind("address", address))?;
     let bound = listener.local_addr().map_err(bind("address", address))?;
     let (ready, is_ready) = watch::channel(true);

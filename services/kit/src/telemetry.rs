@@ -21,8 +21,7 @@ pub fn init_logs(config: &LogConfig) -> Result<(), String> {
 }
 
 /// Upper bounds of the histograms of times, milliseconds: fine below a frame at 30/s, coarse above.
-const MS_BUCKETS: [f64; 14] =
-    [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 33.0, 66.0, 100.0, 150.0, 250.0, 500.0, 1000.0];
+const MS_BUCKETS: [f64; 14] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 33.0, 66.0, 100.0, 150.0, 250.0, 500.0, 1000.0];
 
 /// The process's metrics; the first call installs the recorder.
 pub fn metrics() -> Option<&'static PrometheusHandle> {

@@ -46,7 +46,8 @@ impl Engine {
 
     /// Whether it can go on with this exposure: same run of the same camera.
     pub(crate) fn fits(&self, e: &Exposure) -> bool {
-        self.epoch == e.id.epoch && (Arc::ptr_eq(&self.calibration, &e.calibration) || self.calibration == e.calibration)
+        self.epoch == e.id.epoch
+            && (Arc::ptr_eq(&self.calibration, &e.calibration) || self.calibration == e.calibration)
     }
 
     pub(crate) fn shape_version(&self) -> u64 {
@@ -68,7 +69,11 @@ impl Engine {
             Ok(r) => {
                 let of = |name: &str, ms: f64| v1::StageTime { stage: format!("tracking.{name}"), ms: ms as f32 };
                 let s = &r.stages_ms;
-                stages.extend([of("segment", s.segment), of("pose", s.place + s.pose), of("shape", s.size + s.surface)]);
+                stages.extend([
+                    of("segment", s.segment),
+                    of("pose", s.place + s.pose),
+                    of("shape", s.size + s.surface),
+                ]);
                 (state.residual_mm, state.visible_points) = (r.residual_mm as f32, r.visible_points as u32);
                 state.iterations = r.iterations as u32;
                 let (status, reason) = words(self.state.status);

@@ -148,7 +148,8 @@ impl Task {
     }
 
     fn silent(&mut self, frames: &FrameSubscription) {
-        let why = if frames.alive() { "the camera is on the bus but sends nothing" } else { "the camera is not on the bus" };
+        let why =
+            if frames.alive() { "the camera is on the bus but sends nothing" } else { "the camera is not on the bus" };
         self.fault(DegradedReason::CameraSilent, why.into());
     }
 

@@ -117,14 +117,7 @@ pub struct CameraConfig {
 
 impl Default for CameraConfig {
     fn default() -> Self {
-        Self {
-            name: "front".into(),
-            source: "synth".into(),
-            rate: 0.0,
-            fast: false,
-            looped: true,
-            autostart: true,
-        }
+        Self { name: "front".into(), source: "synth".into(), rate: 0.0, fast: false, looped: true, autostart: true }
     }
 }
 

@@ -1,0 +1,257 @@
+//! A whole box in one process: each service on a runtime and a bus peer of its own, so that one can be killed.
+
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+use tokio::runtime::Runtime;
+use tokio_util::sync::CancellationToken;
+use tonic::Streaming;
+use tonic::transport::Channel;
+use tryon_kit::bus::{ZenohBus, free_tcp_endpoint};
+use tryon_kit::config::CameraConfig;
+use tryon_kit::server::{Context, Outcome, Running, StartError};
+use tryon_kit::{Config, Pool};
+use tryon_proto::v1::compositor_service_client::CompositorServiceClient;
+use tryon_proto::v1::stream_frames_response::Event;
+use tryon_proto::v1::*;
+
+/// The four services, upstream first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Part {
+    Capture,
+    Tracking,
+    Cloth,
+    Compositor,
+}
+
+pub const PARTS: [Part; 4] = [Part::Capture, Part::Tracking, Part::Cloth, Part::Compositor];
+
+struct Process {
+    runtime: Runtime,
+    running: Running,
+    shutdown: CancellationToken,
+}
+
+pub struct Kiosk {
+    pub config: Config,
+    processes: Vec<Option<Process>>,
+}
+
+impl Kiosk {
+    /// Starts all four, with a camera `front` on `source`, and `side` on the test picture.
+    pub fn start(source: &str, rate: f64) -> Self {
+        let mut config = Config::default();
+        let any: SocketAddr = "127.0.0.1:0".parse().expect("an address");
+        let endpoint = vec![free_tcp_endpoint().expect("a free port")];
+        (config.bus.listen, config.bus.connect) = (endpoint.clone(), endpoint);
+        config.process.grace_ms = 1000;
+        config.process.compute_threads = 2;
+        let camera = |name: &str, source: &str, rate| CameraConfig {
+            name: name.into(),
+            source: source.into(),
+            rate,
+            ..CameraConfig::default()
+        };
+        config.capture.cameras = vec![camera("front", source, rate), camera("side", "pattern", 10.0)];
+        for a in [
+            &mut config.capture.address,
+            &mut config.capture.admin,
+            &mut config.tracking.address,
+            &mut config.tracking.admin,
+            &mut config.cloth.address,
+            &mut config.cloth.admin,
+            &mut config.compositor.address,
+            &mut config.compositor.admin,
+        ] {
+            *a = any;
+        }
+        let mut kiosk = Self { config, processes: vec![None, None, None, None] };
+        PARTS.into_iter().for_each(|p| kiosk.restart(p));
+        kiosk
+    }
+
+    /// Starts a part where it was before, or for the first time.
+    pub fn restart(&mut self, part: Part) {
+        let config = self.config.clone();
+        let shutdown = CancellationToken::new();
+        // A thread of its own, because the caller may be inside a runtime already.
+        let begin = || {
+            let begun = Instant::now();
+            loop {
+                match Self::run(part, config.clone(), shutdown.clone()) {
+                    Ok(started) => return started,
+                    // The port of a part that was killed a moment ago.
+                    Err(StartError::Bind { .. }) if begun.elapsed() < Duration::from_secs(2) => {
+                        std::thread::sleep(Duration::from_millis(20));
+                    }
+                    Err(e) => panic!("{part:?}: {e}"),
+                }
+            }
+        };
+        let (runtime, running) = std::thread::scope(|s| s.spawn(begin).join()).expect("starts");
+        let url = format!("http://{}", running.address);
+        match part {
+            Part::Capture => self.config.capture.address = running.address,
+            Part::Tracking => {
+                self.config.tracking.address = running.address;
+                (self.config.cloth.tracking, self.config.compositor.tracking) = (url.clone(), url);
+            }
+            Part::Cloth => {
+                self.config.cloth.address = running.address;
+                self.config.compositor.cloth = url;
+            }
+            Part::Compositor => self.config.compositor.address = running.address,
+        }
+        self.processes[part as usize] = Some(Process { runtime, running, shutdown });
+    }
+
+    fn run(part: Part, config: Config, token: CancellationToken) -> Result<(Runtime, Running), StartError> {
+        let runtime =
+            tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().expect("a runtime");
+        let running = runtime.block_on(async move {
+            let pool = Pool::new(config.process.compute_threads).expect("threads");
+            let (listen, connect) = match part {
+                Part::Capture => (&config.bus.listen[..], &[][..]),
+                _ => (&[][..], &config.bus.connect[..]),
+            };
+            let bus = ZenohBus::open(listen, connect, pool.clone()).await.expect("a bus");
+            let ctx = Context { bus, pool, shutdown: token, grace: Duration::from_millis(config.process.grace_ms) };
+            match part {
+                Part::Capture => tryon_capture::start(&config, ctx).await,
+                Part::Tracking => tryon_tracking::start(&config, ctx).await,
+                Part::Cloth => tryon_cloth::start(&config, ctx).await,
+                Part::Compositor => tryon_compositor::start(&config, ctx).await,
+            }
+        });
+        match running {
+            Ok(r) => Ok((runtime, r)),
+            Err(e) => {
+                runtime.shutdown_background();
+                Err(e)
+            }
+        }
+    }
+
+    /// As by SIGKILL: every task and connection of the part is gone at once.
+    pub fn kill(&mut self, part: Part) {
+        if let Some(p) = self.processes[part as usize].take() {
+            p.runtime.shutdown_background();
+        }
+    }
+
+    /// As by SIGTERM; how it ended and how long that took.
+    pub fn stop(&mut self, part: Part) -> (Outcome, Duration) {
+        let p = self.processes[part as usize].take().expect("runs");
+        let end = move || {
+            let begun = Instant::now();
+            p.shutdown.cancel();
+            let outcome = p.runtime.block_on(p.running.ended()).expect("ends");
+            let took = begun.elapsed();
+            p.runtime.shutdown_timeout(Duration::from_millis(100));
+            (outcome, took)
+        };
+        std::thread::scope(|s| s.spawn(end).join()).expect("ends")
+    }
+
+    pub fn admin(&self, part: Part) -> SocketAddr {
+        self.processes[part as usize].as_ref().expect("runs").running.admin
+    }
+
+    pub fn channel(&self, part: Part) -> Channel {
+        let address = match part {
+            Part::Capture => self.config.capture.address,
+            Part::Tracking => self.config.tracking.address,
+            Part::Cloth => self.config.cloth.address,
+            Part::Compositor => self.config.compositor.address,
+        };
+        tryon_kit::client::channel(&format!("http://{address}")).expect("a URL")
+    }
+
+    pub fn compositor(&self) -> CompositorServiceClient<Channel> {
+        CompositorServiceClient::new(self.channel(Part::Compositor))
+    }
+}
+
+impl Drop for Kiosk {
+    fn drop(&mut self) {
+        PARTS.into_iter().for_each(|p| self.kill(p));
+    }
+}
+
+pub fn wear(garments: &[&str]) -> Vec<GarmentChoice> {
+    garments.iter().map(|g| GarmentChoice { garment: (*g).into(), size: "M".into(), color_rgb: None }).collect()
+}
+
+/// A viewer of one try-on.
+pub struct Watcher {
+    pub events: Streaming<StreamFramesResponse>,
+}
+
+/// How long anything may take here. Far beyond what is promised, because tests share their machine; what is promised
+/// is asserted where it is the point.
+pub const PATIENCE: Duration = Duration::from_secs(90);
+
+impl Watcher {
+    /// Opens the try-on and watches it, trying again while the compositor is away.
+    pub async fn open(kiosk: &Kiosk, id: &str, camera: &str, garments: &[&str]) -> Self {
+        let begun = Instant::now();
+        loop {
+            match Self::try_open(kiosk, id, camera, garments).await {
+                Ok(w) => return w,
+                Err(s) if begun.elapsed() < PATIENCE => {
+                    assert_eq!(s.code(), tonic::Code::Unavailable, "{s}");
+                    tokio::time::sleep(Duration::from_millis(50)).await;
+                }
+                Err(s) => panic!("{s}"),
+            }
+        }
+    }
+
+    async fn try_open(kiosk: &Kiosk, id: &str, camera: &str, garments: &[&str]) -> Result<Self, tonic::Status> {
+        let mut c = kiosk.compositor();
+        let r = OpenTryOnRequest {
+            try_on_id: id.into(),
+            store: String::new(),
+            camera: camera.into(),
+            garments: wear(garments),
+        };
+        c.open_try_on(r).await?;
+        let r = StreamFramesRequest { try_on_id: id.into(), width: 320, height: 240, ..Default::default() };
+        Ok(Self { events: c.stream_frames(r).await?.into_inner() })
+    }
+
+    /// The next event; `Err` carries the status with which the stream ended, OK for a regular end.
+    pub async fn next(&mut self) -> Result<Event, tonic::Status> {
+        let next = tokio::time::timeout(PATIENCE, self.events.message()).await.expect("the stream went silent");
+        let message = next?.ok_or_else(|| tonic::Status::ok("the end"))?;
+        Ok(message.event.expect("an event"))
+    }
+
+    /// Reads until `wanted` says yes, and answers what it said yes to.
+    pub async fn until(&mut self, what: &str, wanted: impl Fn(&Event) -> bool) -> Event {
+        let begun = Instant::now();
+        let mut last = String::new();
+        loop {
+            let e = self.next().await.unwrap_or_else(|s| panic!("the stream ended before {what}: {s}; last {last}"));
+            if wanted(&e) {
+                return e;
+            }
+            last = match &e {
+                Event::Picture(p) => format!("picture {:?} {:?}", p.state(), p.reason()),
+                Event::Status(s) => format!("status {:?} {:?} {}", s.state(), s.reason(), s.detail),
+            };
+            assert!(begun.elapsed() < PATIENCE, "waited too long for {what}; last {last}");
+        }
+    }
+
+    pub async fn picture(&mut self, state: TryOnState) -> Picture {
+        let e = self.until(state.as_str_name(), |e| matches!(e, Event::Picture(p) if p.state() == state)).await;
+        let Event::Picture(p) = e else { unreachable!("just matched") };
+        p
+    }
+
+    pub async fn degraded(&mut self, reason: DegradedReason) -> TryOnStatus {
+        let is = |e: &Event| matches!(e, Event::Status(s) if s.state() == TryOnState::Degraded && s.reason() == reason);
+        let Event::Status(s) = self.until(reason.as_str_name(), is).await else { unreachable!("just matched") };
+        s
+    }
+}
