@@ -35,8 +35,9 @@ pub struct Config {
 #[error("{0}")]
 pub struct ConfigError(pub String);
 
-/// Variables of the environment that start like ours but are no keys: test switches and the file's own name.
-const NOT_KEYS: [&str; 3] = ["SHARED", "REQUIRE_ALL", "CONFIG"];
+/// Variables of the environment that start like ours but are no keys: test switches, the file's own name, and the
+/// log filter of the command line (services have `TRYON_LOG__LEVEL`).
+const NOT_KEYS: [&str; 4] = ["SHARED", "REQUIRE_ALL", "CONFIG", "LOG"];
 
 impl Config {
     /// Reads all layers. `flags` are `key=value` pairs such as `capture.address=127.0.0.1:0`.
