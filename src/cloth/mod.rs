@@ -4,6 +4,7 @@ mod error;
 pub mod membrane;
 pub mod quasi_newton;
 pub mod realtime;
+pub mod scene;
 mod sheet;
 
 pub use error::ClothError;

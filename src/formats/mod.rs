@@ -8,6 +8,7 @@ pub mod gltf;
 pub mod image;
 mod mcap_file;
 mod motion;
+pub mod npy;
 pub mod npz;
 pub mod obj;
 mod recording;

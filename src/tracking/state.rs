@@ -105,6 +105,19 @@ impl TrackerState {
             centre: P3::origin(),
         }
     }
+    /// Starts from a rough placement instead of searching: the root joint at `root` (camera frame, metres), upright,
+    /// facing the camera turned by `yaw` radians about the vertical. Alignment takes it from there.
+    pub fn start_at(&mut self, model: &TrackerModel, root: Vector3<f64>, yaw: f64) {
+        let facing = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let turned = facing * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw);
+        let skeleton = model.template().skeleton();
+        let pelvis = skeleton.joints()[0].rest.coords;
+        self.pose = Pose::rest(skeleton, Rigid::from_parts(root - turned * pelvis, turned));
+        self.status = Status::Calibrating;
+        self.centre = P3::from(root.cast::<f32>());
+        self.before = None;
+        self.pose_age = 0;
+    }
     /// Forgets the person, keeps the room.
     pub fn reset(&mut self, model: &TrackerModel) {
         let fresh = Self::new(model);

@@ -86,7 +86,13 @@ fn adapter() -> Finding {
             verdict: Verdict::Note,
             detail: "no wgpu adapter: pictures are drawn on the CPU, which needs nothing else".into(),
         },
-        list => Finding { what: "graphics", verdict: Verdict::Good, detail: list.join("; ") },
+        list => {
+            let names = list.iter().map(|a| {
+                let kind = if a.software { "software: pictures are drawn on the CPU" } else { "hardware" };
+                format!("{} ({}, {kind})", a.name, a.backend)
+            });
+            Finding { what: "graphics", verdict: Verdict::Good, detail: names.collect::<Vec<_>>().join("; ") }
+        }
     }
 }
 

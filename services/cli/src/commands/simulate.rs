@@ -18,7 +18,7 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<ExitCode> {
     let scene = scene::load(&args.scene)?;
     input::create_dir(&args.out)?;
     let bar = input::progress(Some(scene.frames() as u64), "simulating");
-    let result = scene::run(&scene, |_| bar.inc(1))?;
+    let result = scene::run(&scene, &scene::RunConfig::default(), |_| bar.inc(1))?;
     bar.finish_and_clear();
     result.write_positions(&args.out.join("positions.npy"))?;
     write(&args.out.join("report.json"), &result.report)?;

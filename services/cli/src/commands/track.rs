@@ -7,7 +7,6 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
 use std::process::ExitCode;
-use std::sync::Arc;
 use tryon::body::{BoneTransforms, skin};
 use tryon::camera::RgbdFrame;
 use tryon::formats::{RgbdSource, open_recording};
@@ -41,7 +40,7 @@ pub(crate) fn run(args: &TrackArgs) -> Result<ExitCode> {
 fn track_all(
     args: &TrackArgs,
     source: &mut dyn RgbdSource,
-    model: &Arc<TrackerModel>,
+    model: &TrackerModel,
     mut state: TrackerState,
     out: &mut impl Write,
 ) -> Result<()> {

@@ -1,0 +1,222 @@
+//! A scene through the real-time integrator: implicit Euler, quasi-Newton with a kept factorisation.
+
+use super::{Scene, SceneError};
+use crate::cloth::ClothError;
+use crate::cloth::quasi_newton::{Hold, QuasiNewton, hold_unit};
+use crate::formats::FormatError;
+use crate::formats::npy::write_npy;
+use crate::linear::SymbolicFactor;
+use crate::math::{P3, V3d};
+use nalgebra::{Isometry3, Point3};
+use serde::Serialize;
+use std::path::Path;
+use std::time::Instant;
+
+/// How finely to compute.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RunConfig {
+    /// Implicit steps a frame of the output. Implicit Euler loses energy with the step: 1 step a frame halves a free
+    /// swing within two seconds (docs/benchmarks.md).
+    pub substeps: usize,
+    /// Quasi-Newton iterations a step.
+    pub iterations: usize,
+    /// Distance that cloth keeps from solids, metres: half a millimetre hides neither rounding nor a fabric's thickness.
+    pub offset: f64,
+}
+
+impl Default for RunConfig {
+    fn default() -> Self {
+        Self { substeps: 8, iterations: 10, offset: 5e-4 }
+    }
+}
+
+/// Stiffness of pins and contacts in units of the matrix diagonal: pins are exact to a thousandth of a step's motion,
+/// contacts leave sliding free (see the real-time solver).
+const PIN_STIFFNESS: f64 = 1e3;
+const CONTACT_STIFFNESS: f64 = 2.0;
+
+/// What a run says about itself.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RunReport {
+    /// Frames of the output, the start included.
+    pub frames: usize,
+    /// Vertices.
+    pub vertices: usize,
+    /// Implicit steps a frame.
+    pub substeps: usize,
+    /// Iterations a step.
+    pub iterations: usize,
+    /// Median, mean and longest computing time of a frame, milliseconds.
+    pub ms_median: f64,
+    /// Mean.
+    pub ms_mean: f64,
+    /// Longest.
+    pub ms_max: f64,
+    /// 99th percentile of the edges' stretch at the end.
+    pub p99_strain: f64,
+    /// Deepest vertex inside a solid over all frames, metres.
+    pub penetration: f64,
+    /// Kinetic plus elastic energy at the end, J.
+    pub energy_end: f64,
+    /// Numeric factorisations.
+    pub factorisations: u64,
+}
+
+/// Positions of all frames and the report.
+#[derive(Clone, Debug, Default)]
+pub struct Run {
+    /// Frames × vertices.
+    pub positions: Vec<Vec<P3>>,
+    /// How it went.
+    pub report: RunReport,
+}
+
+impl Run {
+    /// Writes positions as f32 (frames, vertices, 3).
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write_positions(&self, path: &Path) -> Result<(), FormatError> {
+        let n = self.positions.first().map_or(0, Vec::len);
+        let flat: Vec<f32> = self.positions.iter().flatten().flat_map(|p| [p.x, p.y, p.z]).collect();
+        write_npy(path, &[self.positions.len() as u64, n as u64, 3], flat.into_iter())
+    }
+}
+
+/// Simulates a scene; `progress` hears of each finished frame.
+///
+/// # Errors
+/// When a position is no longer finite: names the vertex.
+pub fn run(scene: &Scene, config: &RunConfig, mut progress: impl FnMut(usize)) -> Result<Run, SceneError> {
+    let sheet = &scene.sheet;
+    let n = scene.start.len();
+    let substeps = config.substeps.max(1);
+    let h = 1.0 / (scene.rate * substeps as f64);
+    let unit = hold_unit(sheet, h);
+    let mut solver = QuasiNewton::new(SymbolicFactor::new(sheet.pattern.clone()).map_err(ClothError::from)?);
+    let mut x: Vec<V3d> = scene.start.iter().map(|p| p.coords.cast()).collect();
+    let mut v = vec![V3d::zeros(); n];
+    let local: Vec<V3d> = match scene.pinned_to {
+        Some(c) => {
+            let back = scene.colliders[c].placement(0.0).inverse();
+            x.iter().map(|p| (back * Point3::from(*p)).coords).collect()
+        }
+        None => x.clone(),
+    };
+    let mut out = Run { positions: vec![scene.start.clone()], report: RunReport::default() };
+    let mut times = Vec::new();
+    let (mut y, mut holds, mut stiffness) = (Vec::new(), Vec::new(), Vec::new());
+    let mut penetration: f64 = 0.0;
+    for frame in 1..scene.frames() {
+        let started = Instant::now();
+        for s in 0..substeps {
+            let t = ((frame - 1) * substeps + s + 1) as f64 * h;
+            let solids: Vec<(Isometry3<f64>, Isometry3<f64>)> =
+                scene.colliders.iter().map(|c| (c.placement(t - h), c.placement(t))).collect();
+            let before = x.clone();
+            y.clear();
+            y.extend((0..n).map(|i| x[i] + v[i] * h + scene.gravity * (h * h)));
+            x.copy_from_slice(&y);
+            stiffness.clear();
+            stiffness.resize(n, 0.0);
+            for i in 0..n {
+                if touches(scene, &solids, config.offset, &y[i]) {
+                    stiffness[i] = CONTACT_STIFFNESS * unit[i];
+                }
+            }
+            for &p in &scene.pins {
+                stiffness[p as usize] = PIN_STIFFNESS * unit[p as usize];
+            }
+            solver.prepare(sheet, h, &stiffness)?;
+            for _ in 0..config.iterations.max(1) {
+                holds.clear();
+                holds.extend((0..n).map(|i| {
+                    let target = if stiffness[i] > 0.0 {
+                        outside(scene, &solids, config.offset, &before[i], &y[i], x[i])
+                    } else {
+                        x[i]
+                    };
+                    Hold { target, stiffness: stiffness[i] }
+                }));
+                for &p in &scene.pins {
+                    holds[p as usize].target = pin(scene, &solids, &local[p as usize]);
+                }
+                solver.iterate(sheet, &y, &holds, &mut x);
+            }
+            if let Some(index) = x.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+                return Err(ClothError::NotFinite { what: "cloth vertex", index }.into());
+            }
+            for i in 0..n {
+                x[i] = outside(scene, &solids, config.offset, &before[i], &y[i], x[i]);
+            }
+            for &p in &scene.pins {
+                x[p as usize] = pin(scene, &solids, &local[p as usize]);
+            }
+            v.iter_mut().zip(x.iter().zip(&before)).for_each(|(v, (x, b))| *v = (x - b) / h);
+        }
+        times.push(started.elapsed().as_secs_f64() * 1e3);
+        let t = frame as f64 / scene.rate;
+        for c in &scene.colliders {
+            let back = c.placement(t).inverse();
+            let deepest = x.iter().map(|p| -c.shape.distance(&(back * Point3::from(*p)).coords).0);
+            penetration = deepest.fold(penetration, f64::max);
+        }
+        out.positions.push(x.iter().map(|p| P3::from(p.cast::<f32>())).collect());
+        progress(frame);
+    }
+    times.sort_by(f64::total_cmp);
+    let kinetic: f64 = v.iter().zip(&sheet.mass).map(|(v, m)| 0.5 * m * v.norm_squared()).sum();
+    out.report = RunReport {
+        frames: out.positions.len(),
+        vertices: n,
+        substeps,
+        iterations: config.iterations,
+        ms_median: times.get(times.len() / 2).copied().unwrap_or(0.0),
+        ms_mean: times.iter().sum::<f64>() / times.len().max(1) as f64,
+        ms_max: times.last().copied().unwrap_or(0.0),
+        p99_strain: sheet.strain(&x).1,
+        penetration,
+        energy_end: kinetic + sheet.energy(&x),
+        factorisations: solver.factorisations,
+    };
+    Ok(out)
+}
+
+fn pin(scene: &Scene, solids: &[(Isometry3<f64>, Isometry3<f64>)], local: &V3d) -> V3d {
+    scene.pinned_to.map_or(*local, |c| (solids[c].1 * Point3::from(*local)).coords)
+}
+
+fn touches(scene: &Scene, solids: &[(Isometry3<f64>, Isometry3<f64>)], offset: f64, p: &V3d) -> bool {
+    scene.colliders.iter().zip(solids).any(|(c, (_, at))| {
+        c.shape.distance(&at.inverse_transform_point(&Point3::from(*p)).coords).0 < offset
+    })
+}
+
+/// `x` pushed out of every solid, with Coulomb friction against the solid's own motion since `before`; how far inertia
+/// alone (`y`) would sink stands for the normal force.
+fn outside(
+    scene: &Scene,
+    solids: &[(Isometry3<f64>, Isometry3<f64>)],
+    offset: f64,
+    before: &V3d,
+    y: &V3d,
+    mut x: V3d,
+) -> V3d {
+    for (c, (was, at)) in scene.colliders.iter().zip(solids) {
+        let (d, n) = c.shape.distance(&at.inverse_transform_point(&Point3::from(x)).coords);
+        if d >= offset {
+            continue;
+        }
+        let normal = at.rotation * n;
+        x += normal * (offset - d);
+        let load = (offset - c.shape.distance(&at.inverse_transform_point(&Point3::from(*y)).coords).0).max(0.0);
+        let carried = (at * was.inverse() * Point3::from(*before)).coords;
+        let slip = x - carried;
+        let slip = slip - normal * slip.dot(&normal);
+        let length = slip.norm();
+        if length > 0.0 {
+            x -= slip * (c.friction * load / length).min(1.0);
+        }
+    }
+    x
+}
