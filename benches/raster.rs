@@ -2,6 +2,8 @@
 //!
 //! `cargo bench --bench raster`
 
+#![allow(missing_docs)] // criterion_group! writes a public function without any
+
 use criterion::{Criterion, criterion_group, criterion_main};
 use tryon::camera::Intrinsics;
 use tryon::math::P3;
