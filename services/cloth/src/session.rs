@@ -175,11 +175,16 @@ impl Task {
         if frame.outfit_revision == 0 {
             frame.outfit_revision = self.on;
         }
-        let shows = frame.status() == ClothStatus::Live && frame.frame.is_some();
+        let topologies = self.worn.as_ref().map_or(&[][..], Worn::topologies);
+        let live = frame.status() == ClothStatus::Live;
+        if live && frame.garments.len() != topologies.len() {
+            // A repeated message without its positions: nothing that a reader could use.
+            return;
+        }
+        let shows = live && frame.frame.is_some();
         for r in &mut self.readers {
             if shows && r.has != Some(frame.outfit_revision) {
                 let mut key = frame.clone();
-                let topologies = self.worn.as_ref().map_or(&[][..], Worn::topologies);
                 for (g, t) in key.garments.iter_mut().zip(topologies) {
                     g.topology = Some(t.clone());
                 }

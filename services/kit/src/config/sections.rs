@@ -31,7 +31,7 @@ pub struct LogConfig {
 
 impl Default for LogConfig {
     fn default() -> Self {
-        Self { format: LogFormat::Pretty, level: "info,zenoh=warn".into() }
+        Self { format: LogFormat::Pretty, level: "info,zenoh=error".into() }
     }
 }
 
