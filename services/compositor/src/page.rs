@@ -7,7 +7,7 @@ use http::{HeaderMap, Response, StatusCode, header};
 
 /// Everything the page may do: its own scripts, styles, drawings and calls; pictures it made itself; nothing from
 /// another host, nothing inline, in no foreign frame.
-pub const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; \
+const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; \
      img-src 'self' blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
 
 /// Browsers ask for the camera of the visitor only where a page may have it: this one never does.
@@ -59,7 +59,7 @@ const FILES: &[File] = files! {
 };
 
 /// The page at `/` and its files beside it. Merge it with the gRPC routes, so that both have one origin.
-pub fn router<S: Clone + Send + Sync + 'static>() -> Router<S> {
+pub(crate) fn router<S: Clone + Send + Sync + 'static>() -> Router<S> {
     let mut router = Router::new();
     for file in FILES {
         let tag = entity_tag(file.bytes);

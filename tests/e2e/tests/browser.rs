@@ -1,5 +1,7 @@
 //! The page in a real browser, against the real services in this process: `tests/web/mirror.mjs` is the shopper.
 
+#![allow(clippy::print_stdout, reason = "a skipped test must be loud, and the script says what it saw")]
+
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
