@@ -1154,7 +1154,7 @@ pub struct BodyState {
     pub frame: ::core::option::Option<FrameId>,
     #[prost(enumeration = "TrackingStatus", tag = "3")]
     pub status: i32,
-    /// Set for every status but TRACKING.
+    /// Set for SEARCHING and LOST.
     #[prost(enumeration = "DegradedReason", tag = "4")]
     pub reason: i32,
     /// The reason in words, for logs; never shown to shoppers.
@@ -1978,7 +1978,7 @@ pub struct GarmentFrame {
     pub frame: ::core::option::Option<FrameId>,
     #[prost(enumeration = "ClothStatus", tag = "3")]
     pub status: i32,
-    /// Set for every status but LIVE.
+    /// Set for WAITING and HOLDING.
     #[prost(enumeration = "DegradedReason", tag = "4")]
     pub reason: i32,
     #[prost(string, tag = "5")]
@@ -2091,7 +2091,7 @@ pub enum ClothStatus {
     Dressing = 2,
     /// Positions belong to `frame`.
     Live = 3,
-    /// The body is lost: positions are the last good ones and belong to an earlier frame.
+    /// The body is lost or silent; `reason` says why. Messages carry no garments until it is back.
     Holding = 4,
     /// Dressing failed; `detail` says how. Choosing garments again may help.
     Failed = 5,
