@@ -6,6 +6,9 @@
 pub mod convert;
 pub mod keys;
 
+/// Encoding and decoding of messages; whoever carries bytes needs it, and prost stays behind this door.
+pub use prost::Message;
+
 /// Messages, clients and servers of package `tryon.v1`.
 #[allow(missing_docs, unreachable_pub, clippy::all, clippy::unwrap_used, rustdoc::all)]
 pub mod v1 {

@@ -10,7 +10,7 @@ use crate::frames::exposure_to_wire;
 use crate::frames::{BoxFuture, BusError, CameraKey, Exposure, FrameBus, FramePublisher, FrameSubscription, Packet};
 use crate::queue::latest;
 use bytes::Bytes;
-use prost::Message;
+use tryon_proto::Message;
 use std::sync::Arc;
 use tokio::sync::watch;
 use tryon::camera::Calibration;

@@ -3,7 +3,7 @@
 use crate::compute::{ComputeError, Pool};
 use crate::queue::latest;
 use bytes::Bytes;
-use prost::Message;
+use tryon_proto::Message;
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::future::Future;

@@ -7,7 +7,9 @@ use std::process::ExitCode;
 use tryon::camera::RgbdFrame;
 use tryon::composite::{GarmentView, Input, Look, Model, Workspace, render};
 use tryon::formats::image::{read_color, read_png_depth, write_png_rgb};
-use tryon::formats::{depth_to_mm, gltf::read_glb, obj::read_obj, read_camera};
+use tryon::formats::gltf::read_glb;
+use tryon::formats::obj::read_obj;
+use tryon::formats::{depth_to_mm, read_camera};
 use tryon::math::P3;
 use tryon::mesh::Face;
 
