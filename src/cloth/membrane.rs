@@ -67,7 +67,7 @@ impl Membrane {
         if convex {
             // 2μ·df + c·dR with c < 0: the turn has eigenvalue 2μ + 2c/tr S, the tilt 2μ + c/σ; keep what is positive.
             let t = (2.0 * self.mu + 2.0 * along_r / trace.max(SHORTEST)).max(0.0);
-            h += in_plane * (t - 2.0 * self.mu);
+            h += in_plane * (0.5 * trace * (t - 2.0 * self.mu)); // in_plane is 2/tr S of df's share along the turn
             let out = n * (n.transpose() * df);
             let c = Matrix2::identity() * (2.0 * self.mu) + inverse * along_r;
             h += n * (n.transpose() * df * crate::math::project_psd_2(&c)) - out * (2.0 * self.mu);

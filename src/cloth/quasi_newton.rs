@@ -94,3 +94,104 @@ pub fn hold_unit(sheet: &Sheet, h: f64) -> Vec<f64> {
         .map(|i| sheet.mass[i] / (h * h) + sheet.stiffness[sheet.pattern.diagonal_slot(i)])
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::garment::Material;
+
+    /// A flat square of `n` × `n` cells of `size` metres in the xz plane.
+    fn square(n: usize, size: f64) -> (Sheet, Vec<V3d>) {
+        let at = |i: usize, j: usize| (j * (n + 1) + i) as u32;
+        let flat = |v: u32| {
+            let (i, j) = (v as usize % (n + 1), v as usize / (n + 1));
+            [i as f64 * size, j as f64 * size]
+        };
+        let mut faces = Vec::new();
+        for j in 0..n {
+            for i in 0..n {
+                faces.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                faces.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+        }
+        let rest: Vec<[[f64; 2]; 3]> = faces.iter().map(|f| f.map(flat)).collect();
+        let sheet = Sheet::new((n + 1) * (n + 1), &faces, &rest, &Material { damping: 0.0, ..Material::preset("cotton").expect("preset") }, None)
+            .expect("sheet");
+        let x = (0..(n + 1) * (n + 1)).map(|v| flat(v as u32)).map(|p| V3d::new(p[0], 0.0, p[1])).collect();
+        (sheet, x)
+    }
+
+    fn wavy(x: &[V3d], a: f64) -> Vec<V3d> {
+        x.iter().map(|p| p + V3d::new((p.z * 31.0).sin(), (p.x * 17.0).cos(), (p.x * 23.0 + p.z * 9.0).sin()) * a).collect()
+    }
+
+    #[test]
+    fn the_gradient_is_the_derivative_of_the_energy_and_the_hessian_of_the_gradient() {
+        let (sheet, x) = square(4, 0.02);
+        let x = wavy(&x, 0.003);
+        let d = wavy(&vec![V3d::zeros(); x.len()], 1.0).iter().zip(&x).map(|(a, p)| a + V3d::new(p.z * 50.0, p.x * 40.0, 0.2)).collect::<Vec<_>>();
+        let h = 1e-7;
+        let moved = |s: f64| x.iter().zip(&d).map(|(p, d)| p + d * (s * h)).collect::<Vec<_>>();
+        let mut g = vec![V3d::zeros(); x.len()];
+        sheet.add_gradient(&x, &mut g);
+        let slope = (sheet.energy(&moved(1.0)) - sheet.energy(&moved(-1.0))) / (2.0 * h);
+        let exact: f64 = g.iter().zip(&d).map(|(g, d)| g.dot(d)).sum();
+        assert!((slope - exact).abs() < 1e-5 * exact.abs(), "{slope} {exact}");
+        // Internal forces move no centre of mass and turn nothing.
+        assert!(g.iter().sum::<V3d>().norm() < 1e-9);
+        assert!(x.iter().zip(&g).map(|(p, g)| p.cross(g)).sum::<V3d>().norm() < 1e-9);
+    }
+
+    #[test]
+    fn each_iteration_lowers_the_objective_of_a_large_crumpled_square() {
+        let (sheet, x0) = square(40, 0.02);
+        let h = 1.0 / 60.0;
+        let y = wavy(&x0, 0.02);
+        let mut x = wavy(&x0, 0.05);
+        let mut q = QuasiNewton::new(SymbolicFactor::new(sheet.pattern.clone()).expect("symbolic"));
+        let none = vec![0.0; x.len()];
+        q.prepare(&sheet, h, &none).expect("factor");
+        let holds = vec![Hold::default(); x.len()];
+        let objective = |x: &[V3d]| {
+            sheet.energy(x)
+                + (0..x.len()).map(|i| 0.5 * sheet.mass[i] / (h * h) * (x[i] - y[i]).norm_squared()).sum::<f64>()
+        };
+        let mut last = objective(&x);
+        for i in 0..20 {
+            q.iterate(&sheet, &y, &holds, &mut x);
+            let now = objective(&x);
+            assert!(now < last * (1.0 + 1e-12), "iteration {i}: {last} to {now}");
+            last = now;
+        }
+    }
+
+    #[test]
+    fn free_fall_is_exact_to_rounding() {
+        let (sheet, x0) = square(6, 0.02);
+        let h = 1.0 / 60.0;
+        let mut q = QuasiNewton::new(SymbolicFactor::new(sheet.pattern.clone()).expect("symbolic"));
+        q.prepare(&sheet, h, &vec![0.0; x0.len()]).expect("factor");
+        let holds = vec![Hold::default(); x0.len()];
+        let g = V3d::new(0.0, -9.81, 0.0);
+        let (mut x, mut v) = (x0.clone(), vec![V3d::zeros(); x0.len()]);
+        for _ in 0..60 {
+            let y: Vec<V3d> = x.iter().zip(&v).map(|(p, v)| p + v * h + g * (h * h)).collect();
+            let before = x.clone();
+            for _ in 0..3 {
+                q.iterate(&sheet, &y, &holds, &mut x);
+            }
+            v = x.iter().zip(&before).map(|(a, b)| (a - b) / h).collect();
+        }
+        // Implicit Euler falls g h² n(n+1)/2.
+        let fall = 9.81 * h * h * 60.0 * 61.0 / 2.0;
+        assert!(x.iter().zip(&x0).all(|(a, b)| (a - b + V3d::new(0.0, fall, 0.0)).norm() < 1e-9));
+    }
+
+    #[test]
+    fn a_triangle_without_area_is_refused_by_number() {
+        let faces = [[0, 1, 2], [0, 2, 3]];
+        let rest = [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], [[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]];
+        let e = Sheet::new(4, &faces, &rest, &Material::preset("silk").expect("preset"), None).expect_err("flat");
+        assert!(matches!(e, ClothError::ZeroArea { face: 1, .. }));
+    }
+}

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 /// Upper arms this far below the horizontal, radians: armpits open, shoulders not shrugged.
 const ARMS_DOWN: f64 = 0.60;
 /// Legs this far from the vertical, radians.
-const LEGS_OUT: f64 = 0.14;
+const LEGS_OUT: f64 = 0.10;
 
 /// Joint angles of the canonical pose, in the template's own frame (root identity).
 pub(super) fn canonical_pose(template: &Template, rest: &RestBody) -> Pose<Body> {

@@ -7,7 +7,7 @@ use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
 use crate::cloth::ClothError;
 use crate::cloth::realtime::{AnchorBinding, Config, Input, Model, Outfit, State, Workspace, step};
 use crate::contact::SurfaceFrame;
-use crate::garment::{BodyMeasures, GarmentError, GarmentMesh, Pattern, Triangulation};
+use crate::garment::{BodyMeasures, GarmentError, GarmentMesh, Pattern, Region, Triangulation};
 use crate::math::{P3, World};
 use crate::par::Par;
 
@@ -115,8 +115,8 @@ pub fn dress(
     let mut model = Model::new(template, outfit, config)?;
     let mut frame = SurfaceFrame { vertices: body.clone(), normals: Vec::new() };
     model.surface().update_normals(Par::Rayon, &mut frame);
-    // Waistbands are held from the start; shirts first fall onto the shoulders.
-    model.set_anchors(bind(&model, &frame, &positions, |strength| strength >= 1.0, true));
+    // Waistbands and shoulder seams are held from the start, at their layer's distance from the skin.
+    model.set_anchors(bind(&model, &frame, &positions, true));
     let mut state = State::new(&model, positions, &body)?;
     let mut work = Workspace::default();
     let mut report = DressReport { measures: figure.measures, ..DressReport::default() };
@@ -137,7 +137,7 @@ pub fn dress(
         }
     }
     let draped: Vec<Vec<P3>> = state.garments.iter().map(|g| g.positions.clone()).collect();
-    model.set_anchors(bind(&model, &frame, &draped, |_| true, false));
+    model.set_anchors(bind(&model, &frame, &draped, false));
     for i in 1..=FOLLOW_STEPS + SETTLE_STEPS {
         let t = (i as f64 / FOLLOW_STEPS as f64).min(1.0);
         let t = t * t * (3.0 - 2.0 * t);
@@ -156,13 +156,11 @@ fn pose_body(template: &Template, rest: &RestBody, pose: &Pose<World>, out: &mut
     skin(Par::Rayon, &rest.vertices, template.weights(), &bones, out);
 }
 
-/// Ties the anchors that `which` (by strength) selects to the body below them; `hug` puts them at the layer's distance
-/// instead of where they are.
+/// Ties the anchors to the body below them; `hug` puts them at the layer's distance instead of where they are.
 fn bind(
     model: &Model,
     frame: &SurfaceFrame,
     positions: &[Vec<P3>],
-    which: impl Fn(f64) -> bool,
     hug: bool,
 ) -> Vec<Vec<AnchorBinding>> {
     let surface = model.surface();
@@ -173,12 +171,11 @@ fn bind(
         .enumerate()
         .map(|(k, g)| {
             let mut out = Vec::new();
-            for set in g.anchors.iter().filter(|a| which(a.strength)) {
+            for set in &g.anchors {
                 for &vertex in &set.vertices {
                     let p = positions[k][vertex as usize];
-                    let mask = g.regions[vertex as usize].0;
-                    let near = surface.nearest_vertex(frame, &p, mask);
-                    let c = surface.closest_around(frame, &p, near, mask);
+                    let near = surface.nearest_vertex(frame, &p, Region::ALL.0);
+                    let c = surface.closest_around(frame, &p, near, Region::ALL.0);
                     let offset = model.offset(k) as f32;
                     out.push(AnchorBinding {
                         vertex,

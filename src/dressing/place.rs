@@ -146,7 +146,14 @@ impl<'a> Chart<'a> {
                 let t = (angle / half_angle).clamp(-1.0, 1.0) * FRAC_PI_2;
                 let down = r - apex;
                 let y = waist - down * 0.97;
-                let (c, [a, b]) = ellipse(&self.figure.lower.at(y), 4.0 * half_angle * r);
+                // Room to spare goes to the front and back first: a skirt hangs round, legs apart or not.
+                let mut slice = self.figure.lower.at(y);
+                let girth = 4.0 * half_angle * r;
+                let wide = (slice.x[1] - slice.x[0]) / 2.0;
+                let deep = (girth / std::f32::consts::PI - wide - 2.0 * ROOM).min(wide);
+                let grow = (deep - (slice.z[1] - slice.z[0]) / 2.0).max(0.0);
+                slice.z = [slice.z[0] - grow, slice.z[1] + grow];
+                let (c, [a, b]) = ellipse(&slice, girth);
                 let side = if front { 1.0 } else { -1.0 };
                 P3::new(c[0] + side * a * t.sin(), y, c[1] + side * b * t.cos())
             }

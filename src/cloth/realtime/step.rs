@@ -33,11 +33,14 @@ struct Plane {
 const REACH: f64 = 0.06;
 /// A vertex this much above its offset counts as touching, metres; less makes contacts flicker.
 const TOUCH: f64 = 1e-3;
+/// A contact plane says nothing about places further from its point than this, metres.
+const PLANE_SIZE: f64 = 0.08;
 /// Cloth nearer to the skin than this starts a substep moved along with it, metres.
 const CARRIED: f32 = 0.03;
-/// Stiffness of a contact in units of the matrix diagonal: at 1 half of a violation is left to the last push-out,
-/// at 10 sliding needs ten times the iterations.
-const CONTACT_STIFFNESS: f64 = 2.0;
+/// Stiffness of a contact in units of the matrix diagonal. The hold acts in all directions and follows the vertex, so
+/// it slows sliding. At 2 cloth sticks where it first touches (skirts hung in folds on the thighs); in units of inertia
+/// (8 m/h², a hundredth of this) the solve ignores contact, garments contract through the body and tangle.
+const CONTACT_STIFFNESS: f64 = 0.04;
 /// No fabric moves faster, m/s: keeps one bad frame from becoming many.
 const FASTEST: f64 = 12.0;
 /// Longest and shortest time step of a call, s.
@@ -195,7 +198,8 @@ impl Run<'_> {
             for i in 0..n {
                 let y = w.x[i] + w.velocity[i] * (h * drag) + gravity * (h * h);
                 w.y.push(y);
-                // Start along with the skin where close to it, else where inertia leads.
+                // Look for contact from where the skin would carry the vertex, so that a limb that moves past it still
+                // has it on the outside.
                 let v = w.nearest[i][0] as usize;
                 let near = (before.vertices[v].coords - w.x[i].cast::<f32>()).norm() < CARRIED;
                 w.x[i] = if near { w.x[i] + (frame.vertices[v] - before.vertices[v]).cast::<f64>() } else { y };
@@ -231,13 +235,8 @@ impl Run<'_> {
             let timer = Instant::now();
             for _ in 0..config.iterations {
                 for i in 0..n {
-                    let target = if w.stiffness[i] > 0.0 {
-                        self.outside(&w.contacts[i], &w.before[i], w.x[i])
-                    } else {
-                        w.x[i] = self.outside(&w.contacts[i], &w.before[i], w.x[i]);
-                        w.x[i]
-                    };
-                    w.holds[i] = Hold { target, stiffness: w.stiffness[i] };
+                    w.x[i] = self.outside(&w.contacts[i], &w.before[i], w.x[i]);
+                    w.holds[i] = Hold { target: w.x[i], stiffness: w.stiffness[i] };
                 }
                 for a in &self.model.outfit.anchors[self.index] {
                     if a.strength > 0.0 {
@@ -252,18 +251,23 @@ impl Run<'_> {
             if let Some(index) = w.x.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
                 return Err(ClothError::NotFinite { what: "cloth vertex", index });
             }
+            // Speed comes from the solve, not from the push-out: lifting a sunken vertex must not throw it.
             for i in 0..n {
+                let v = (w.x[i] - w.before[i]) / h;
+                let speed = v.norm();
+                w.velocity[i] = if speed > FASTEST { v * (FASTEST / speed) } else { v };
+                for p in w.contacts[i].planes.iter().rev() {
+                    if self.gap(p, &w.x[i]) < TOUCH {
+                        let into = p.normal.dot(&(w.velocity[i] - p.moved / h)).min(0.0);
+                        w.velocity[i] -= p.normal * into;
+                    }
+                }
                 w.x[i] = self.outside(&w.contacts[i], &w.before[i], w.x[i]);
             }
             let last = s + 1 == config.substeps;
             let (deepest, left) = self.push_out(frame, &mut w.x, &mut w.nearest, last);
             w.outcome.report.penetration = w.outcome.report.penetration.max(deepest);
             w.outcome.report.penetration_left = left;
-            for i in 0..n {
-                let v = (w.x[i] - w.before[i]) / h;
-                let speed = v.norm();
-                w.velocity[i] = if speed > FASTEST { v * (FASTEST / speed) } else { v };
-            }
             w.outcome.report.stages_ms.contact += ms(timer);
         }
         let (worst, p99) = sheet.strain(&w.x);
@@ -332,7 +336,8 @@ impl Run<'_> {
     }
 
     fn gap(&self, p: &Plane, x: &V3d) -> f64 {
-        if p.near { p.normal.dot(&(x - p.point)) - self.garment.offset } else { f64::INFINITY }
+        let d = x - p.point;
+        if p.near && d.norm_squared() < PLANE_SIZE * PLANE_SIZE { p.normal.dot(&d) - self.garment.offset } else { f64::INFINITY }
     }
 
     /// The nearest allowed place: outside both planes, tangential motion reduced by friction. The other parts first,
