@@ -23,11 +23,13 @@ fn main() {
     let mut args = std::env::args().skip(1);
     let shared = std::env::var("TRYON_SHARED").unwrap_or_else(|_| "../shared".into());
     let mut body = PathBuf::from(shared).join("data/body/makehuman_smpl_layout/template.npz");
+    let mut jsonl = None;
     let (mut config, mut overlay, mut folders, mut verbose) = (TrackerConfig::default(), None, vec![], false);
     while let Some(a) = args.next() {
         match a.as_str() {
             "--body" => body = args.next().expect("a file").into(),
             "--set" => config = serde_json::from_str(&args.next().expect("JSON")).expect("tracker settings"),
+            "--jsonl" => jsonl = Some(PathBuf::from(args.next().expect("a folder"))),
             "--overlay" => overlay = Some(PathBuf::from(args.next().expect("a folder"))),
             "-v" => verbose = true,
             _ => folders.push(PathBuf::from(a)),
@@ -39,7 +41,7 @@ fn main() {
         Arc::new(template_from_smpl("body", &read_smpl(&body).expect("body")).expect("body"))
     };
     for folder in folders {
-        run(&template, &config, &folder, overlay.as_deref(), verbose);
+        run(&template, &config, &folder, overlay.as_deref(), jsonl.as_deref(), verbose);
     }
 }
 
@@ -47,7 +49,14 @@ fn embedded() -> Arc<Template> {
     Arc::new(tryon::body::embedded::template().as_ref().clone())
 }
 
-fn run(template: &Arc<Template>, config: &TrackerConfig, folder: &Path, overlay: Option<&Path>, verbose: bool) {
+fn run(
+    template: &Arc<Template>,
+    config: &TrackerConfig,
+    folder: &Path,
+    overlay: Option<&Path>,
+    jsonl: Option<&Path>,
+    verbose: bool,
+) {
     let text = std::fs::read_to_string(folder.join("camera.json")).expect("camera.json");
     let camera: Intrinsics = serde_json::from_str(&text).expect("camera.json");
     let mut frames: Vec<PathBuf> =
@@ -60,6 +69,7 @@ fn run(template: &Arc<Template>, config: &TrackerConfig, folder: &Path, overlay:
     let mut workspace = Workspace::default();
     let (mut errors, mut lost, mut times, mut per_joint) = (vec![], 0, vec![], vec![0.0; 64]);
     let mut stages = [0.0; 5];
+    let mut lines = String::new();
     for (i, path) in frames.iter().enumerate() {
         let depth = read_png_depth(path).expect("depth");
         let frame = RgbdFrame { sequence: i as u64, time_ns: i as u64 * 33_333_333, depth, color: None };
@@ -72,6 +82,15 @@ fn run(template: &Arc<Template>, config: &TrackerConfig, folder: &Path, overlay:
         let mut bones = BoneTransforms::default();
         let rest = workspace.rest_body(&model, &state.shape).clone();
         state.pose.bones(template.skeleton(), &rest, &mut bones);
+        let joints: std::collections::BTreeMap<&str, [f64; 3]> = template
+            .skeleton()
+            .joints()
+            .iter()
+            .zip(&bones.joints)
+            .map(|(j, p)| (j.name.as_str(), p.coords.into()))
+            .collect();
+        lines += &serde_json::json!({ "frame": i, "status": state.status, "joints": joints }).to_string();
+        lines.push('\n');
         let mut mean = f64::NAN;
         if let Some(t) = &truth {
             let off: Vec<f64> = t
@@ -130,6 +149,11 @@ fn run(template: &Arc<Template>, config: &TrackerConfig, folder: &Path, overlay:
             }
             write_png_rgb(&dir.join(format!("{name}_{i:04}.png")), &image).expect("png");
         }
+    }
+    if let Some(dir) = jsonl {
+        std::fs::create_dir_all(dir).expect("jsonl folder");
+        let name = folder.file_name().expect("name").to_string_lossy().into_owned();
+        std::fs::write(dir.join(name + ".jsonl"), lines).expect("jsonl");
     }
     let n = errors.len().max(1) as f64;
     let steady: Vec<f64> = times.iter().skip(75.min(times.len() / 2)).copied().collect();

@@ -46,14 +46,18 @@ pub(super) const START: Schedule = Schedule { iterations: 20, sigma: [0.15, 0.04
 
 /// Iterations over which kernel and reach shrink.
 const ANNEAL: f64 = 4.0;
-/// Damping per point (λᵣ of eq. 12 in units of one point): metres² for the root's translation, radians² for angles.
-const DAMPING: f64 = 1e-4;
 /// An update below this (metres, with a lever of [`LEVER`]) ends the iteration; the paper stops at 3 mm.
 const CONVERGED: f64 = 0.8e-3;
 /// Typical distance of skin from the joint that moves it, metres.
 const LEVER: f64 = 0.25;
 /// A reading without any model point near it, and a visible point without reading, count as this far off, metres.
 const UNEXPLAINED: f64 = 0.10;
+
+/// A degree of freedom of a leg with less data than this (per point, m²/rad²) counts as hidden; a shank in view has
+/// 7·10⁻⁴. It is then pulled to the rest pose with [`HIDDEN_LEG_PULL`].
+const HIDDEN_LEG: f64 = 1e-5;
+/// See [`HIDDEN_LEG`].
+const HIDDEN_LEG_PULL: f64 = 2e-5;
 
 /// How an alignment ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -168,12 +172,18 @@ pub(super) struct Residual {
     pub weight: f64,
 }
 
+/// Point-to-point and edge weights of the pose.
+pub(super) fn weights(model: &TrackerModel) -> (f64, f64) {
+    (model.config.point_to_point, model.config.edge_weight)
+}
+
 /// All residuals of the current pairs; returns (Σ weights, Σ weighted |normal residual|, Σ robust cost).
 pub(super) fn for_residuals(
     model: &TrackerModel,
     seen: &Seen<'_>,
     scratch: &AlignScratch,
     sigma: f64,
+    (isotropic, edge_weight): (f64, f64),
     mut f: impl FnMut(&Residual),
 ) -> (f64, f64, f64) {
     let (mut total, mut off, mut cost) = (0.0, 0.0, 0.0);
@@ -183,7 +193,7 @@ pub(super) fn for_residuals(
         let p = scratch.positions[i].coords.cast::<f64>();
         let r = seen.grid.points[pair.cell as usize].coords.cast::<f64>() - p;
         let direction = scratch.normals[i].cast::<f64>();
-        let metric = Metric { isotropic: config.point_to_point, directional: config.point_to_plane, direction };
+        let metric = Metric { isotropic, directional: config.point_to_plane, direction };
         // A coarse pull is long by nature: the kernel widens with it so that it is not taken for an outlier.
         let far = r.norm() > 0.12;
         let kernel = GemanMcClure { sigma: if far { sigma.max(0.12) } else { sigma } };
@@ -200,7 +210,7 @@ pub(super) fn for_residuals(
         let ray = seen.grid.points[cell as usize].coords.cast::<f64>().normalize();
         let r = ray * ray.dot(&p) - p;
         let metric = Metric { isotropic: 1.0, directional: -1.0, direction: ray };
-        let weight = config.edge_weight * GemanMcClure { sigma }.weight(r.norm_squared());
+        let weight = edge_weight * GemanMcClure { sigma }.weight(r.norm_squared());
         f(&Residual { sample: i, bone: usize::from(model.bones[i]), point: p, residual: r, metric, weight });
     }
     (total, off, cost)
@@ -216,7 +226,7 @@ pub(super) fn evaluate(
     scratch: &mut AlignScratch,
 ) -> Fit {
     let stats = pair(model, rest, pose, seen, distance, 0.0, scratch);
-    let sums = for_residuals(model, seen, scratch, 0.05, |_| {});
+    let sums = for_residuals(model, seen, scratch, 0.05, weights(model), |_| {});
     summary(stats, sums, 0)
 }
 
@@ -250,7 +260,7 @@ pub(super) fn align(
         let distance = schedule.distance[0] + (schedule.distance[1] - schedule.distance[0]) * t as f32;
         let pull = if t < 1.0 { schedule.pull } else { 0.0 };
         let stats = pair(model, rest, pose, seen, distance, pull, scratch);
-        let sums = assemble(model, pose, seen, sigma, scratch);
+        let sums = assemble(model, pose, seen, sigma, weights(model), scratch);
         fit = summary(stats, sums, iteration + 1);
         if sums.0 < 1.0 {
             break;
@@ -273,13 +283,14 @@ fn assemble(
     pose: &Pose,
     seen: &Seen<'_>,
     sigma: f64,
+    weights: (f64, f64),
     scratch: &mut AlignScratch,
 ) -> (f64, f64, f64) {
     let skeleton = model.template.skeleton();
     let centre = scratch.bones.joints[0].coords;
     let mut sums = std::mem::take(&mut scratch.sums);
     sums.reset(model.parents.len());
-    let totals = for_residuals(model, seen, scratch, sigma, |r| {
+    let totals = for_residuals(model, seen, scratch, sigma, weights, |r| {
         sums.bones[r.bone].add(&(r.point - centre), &r.residual, &r.metric, r.weight);
     });
     let mut dofs = std::mem::take(&mut scratch.dofs);
@@ -291,8 +302,12 @@ fn assemble(
     scratch.hessian *= scale;
     scratch.gradient *= scale;
     scratch.damping.clear();
-    scratch.damping.resize(scratch.gradient.len(), DAMPING);
+    scratch.damping.resize(scratch.gradient.len(), model.config.damping);
     for (k, (&stiff, &angle)) in model.stiffness.iter().zip(&pose.angles).enumerate() {
+        // A hidden leg stands; whatever is seen of it outweighs this at once.
+        let unseen = HIDDEN_LEG / (HIDDEN_LEG + scratch.hessian[(6 + k, 6 + k)]);
+        let stiff =
+            stiff * model.config.rest_weight + if model.legs[k] { HIDDEN_LEG_PULL * unseen * unseen } else { 0.0 };
         scratch.hessian[(6 + k, 6 + k)] += stiff;
         scratch.gradient[6 + k] -= stiff * angle;
     }
@@ -305,9 +320,10 @@ pub(super) fn normal_equations(
     pose: &Pose,
     seen: &Seen<'_>,
     sigma: f64,
+    weights: (f64, f64),
     scratch: &mut AlignScratch,
 ) -> (DMatrix<f64>, DVector<f64>) {
-    assemble(model, pose, seen, sigma, scratch);
+    assemble(model, pose, seen, sigma, weights, scratch);
     (scratch.hessian.clone(), scratch.gradient.clone())
 }
 

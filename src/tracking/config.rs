@@ -35,6 +35,14 @@ pub struct TrackerConfig {
     pub predict: bool,
     /// Pull the model towards readings that nothing explains.
     pub pull: bool,
+    /// Prior of a shape coefficient (one standard deviation = 1), per point, m².
+    pub shape_prior: f64,
+    /// Standard deviation of a bone's scale, where the template has a shape space and where it has none.
+    pub scale_deviation: [f64; 2],
+    /// Multiplies the pull towards the rest pose.
+    pub rest_weight: f64,
+    /// Damping per point (λᵣ of eq. 12): metres² for the root's translation, radians² for angles.
+    pub damping: f64,
     /// Readings beyond this (metres) are ignored.
     pub farthest: f32,
 }
@@ -49,13 +57,17 @@ impl Default for TrackerConfig {
             iterations: 8,
             point_to_point: 0.1,
             point_to_plane: 1.0,
-            edge_weight: 0.3,
+            edge_weight: 0.1,
             adapt_size: true,
             calibration_frames: 60,
             displacements: true,
             displacement_interval: 3,
             predict: true,
             pull: true,
+            shape_prior: 5e-7,
+            scale_deviation: [0.05, 0.15],
+            rest_weight: 0.5,
+            damping: 1e-4,
             farthest: 8.0,
         }
     }

@@ -41,6 +41,8 @@ pub struct TrackerModel {
     pub(super) tied: Vec<(usize, usize, f64)>,
     /// Weight of the rest-pose prior of each angle.
     pub(super) stiffness: Vec<f64>,
+    /// Angles of knees, ankles and feet.
+    pub(super) legs: Vec<bool>,
 }
 
 impl TrackerModel {
@@ -68,7 +70,22 @@ impl TrackerModel {
         directions.extend(bone_directions(&template, &samples, &weights));
         let tied = tied_bones(&template, &directions, first);
         let stiffness = stiffness(&template);
-        Self { template, calibration, config, samples, weights, bones, parents, spacing, directions, tied, stiffness }
+        let leg = |name: &str| ["knee", "ankle", "foot"].iter().any(|s| name.contains(s));
+        let legs = skeleton.joints().iter().flat_map(|j| std::iter::repeat_n(leg(&j.name), j.motion.dofs())).collect();
+        Self {
+            template,
+            calibration,
+            config,
+            samples,
+            weights,
+            bones,
+            parents,
+            spacing,
+            directions,
+            tied,
+            stiffness,
+            legs,
+        }
     }
     /// The body that is tracked.
     pub fn template(&self) -> &Arc<Template> {

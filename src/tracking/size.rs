@@ -15,17 +15,14 @@ use serde::{Deserialize, Serialize};
 pub struct SizeEstimate {
     /// Frames that were used.
     pub frames: u32,
+    /// Sum of the faded weights of the frames.
+    weight: f64,
     /// Σ of Schur complements, per point, shape `[directions × directions]`; empty before the first frame.
     information: Vec<f64>,
     /// Σ of information × (estimate of the frame), shape `[directions]`.
     evidence: Vec<f64>,
 }
 
-/// Prior of a shape coefficient (one standard deviation = 1), per point, m²: a misfit of 5 mm that is independent on
-/// about a dozen parts of the body.
-const SHAPE_PRIOR: f64 = 2e-6;
-/// Standard deviation of a bone's scale where a shape space already explains proportions, and without one.
-const SCALE_DEVIATION: [f64; 2] = [0.05, 0.15];
 /// Weight λₛ of eq. 23, per point, m²: bones tied by symmetry differ by a tenth of what single ones do.
 const TIE: f64 = 5e-3;
 /// Largest coefficient, standard deviations.
@@ -35,6 +32,10 @@ const SCALES: [f64; 2] = [0.7, 1.4];
 /// Longest pair used for size, and kernel width, metres.
 const REACH: f32 = 0.08;
 const SIGMA: f64 = 0.04;
+/// Point-to-point weight: sizes must slide along limbs, so it is a fifth of the pose's.
+const POINT_TO_POINT: f64 = 0.02;
+/// What earlier frames said fades by this factor a frame: their pairs belonged to a body not yet adapted.
+const FADE: f64 = 0.95;
 
 impl SizeEstimate {
     /// Takes in one converged frame and updates `shape`. Returns the largest change of a coefficient or of ten times a
@@ -60,13 +61,14 @@ impl SizeEstimate {
         let mut total = information;
         let mut sum = evidence;
         if self.information.len() == n * n {
-            total += DMatrix::from_column_slice(n, n, &self.information);
-            sum += DVector::from_column_slice(&self.evidence);
+            total += DMatrix::from_column_slice(n, n, &self.information) * FADE;
+            sum += DVector::from_column_slice(&self.evidence) * FADE;
         }
-        let frames = f64::from(self.frames + 1);
+        let frames = 1.0 + FADE * self.weight;
         let Some(next) = solve(model, &total / frames, &sum / frames) else { return 0.0 };
         if keep {
             self.frames += 1;
+            self.weight = frames;
             self.information = total.as_slice().to_vec();
             self.evidence = sum.as_slice().to_vec();
         }
@@ -104,9 +106,10 @@ fn store(model: &TrackerModel, x: &DVector<f64>, shape: &mut BodyShape) {
 /// Data and prior: (Λ + P) x = η, with eq. 23 in P.
 fn solve(model: &TrackerModel, mut h: DMatrix<f64>, g: DVector<f64>) -> Option<DVector<f64>> {
     let has_space = model.directions.iter().any(|d| d.bone.is_none());
-    let deviation = SCALE_DEVIATION[usize::from(!has_space)];
+    let deviation = model.config.scale_deviation[usize::from(!has_space)];
+    let prior = model.config.shape_prior;
     for (d, direction) in model.directions.iter().enumerate() {
-        h[(d, d)] += if direction.bone.is_some() { SHAPE_PRIOR / (deviation * deviation) } else { SHAPE_PRIOR };
+        h[(d, d)] += if direction.bone.is_some() { prior / (deviation * deviation) } else { prior };
     }
     for &(a, b, weight) in &model.tied {
         let w = TIE * weight;
@@ -126,7 +129,7 @@ fn frame_information(
     seen: &Seen<'_>,
     scratch: &mut AlignScratch,
 ) -> Option<(DMatrix<f64>, DVector<f64>)> {
-    let (hpp, gp) = normal_equations(model, pose, seen, SIGMA, scratch);
+    let (hpp, gp) = normal_equations(model, pose, seen, SIGMA, (POINT_TO_POINT, model.config.edge_weight), scratch);
     let n = model.directions.len();
     let bones = &scratch.bones.bones;
     let centre = scratch.bones.joints[0].coords;
@@ -148,7 +151,7 @@ fn frame_information(
     let mut gs = DVector::<f64>::zeros(n);
     let mut hbs = vec![Vector6::zeros(); n * bones.len()];
     let (mut moves, mut weighed) = (vec![Vector3::zeros(); n], vec![Vector3::zeros(); n]);
-    for_residuals(model, seen, scratch, SIGMA, |r| {
+    for_residuals(model, seen, scratch, SIGMA, (POINT_TO_POINT, model.config.edge_weight), |r| {
         let p = r.point - centre;
         for d in 0..n {
             let offset = model.directions[d].samples[r.sample].cast::<f64>();

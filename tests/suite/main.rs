@@ -1,0 +1,5 @@
+//! One binary for the tests that cross modules or need real data.
+#![allow(clippy::unwrap_used, clippy::expect_used)] // tests stop at the first fault
+
+mod common;
+mod tracking;
