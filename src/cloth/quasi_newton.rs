@@ -90,9 +90,7 @@ impl QuasiNewton {
 
 /// Typical diagonal of the sheet's matrix at each vertex, N/m: the natural unit of a hold's stiffness.
 pub fn hold_unit(sheet: &Sheet, h: f64) -> Vec<f64> {
-    (0..sheet.mass.len())
-        .map(|i| sheet.mass[i] / (h * h) + sheet.stiffness[sheet.pattern.diagonal_slot(i)])
-        .collect()
+    (0..sheet.mass.len()).map(|i| sheet.mass[i] / (h * h) + sheet.stiffness[sheet.pattern.diagonal_slot(i)]).collect()
 }
 
 #[cfg(test)]
@@ -115,21 +113,33 @@ mod tests {
             }
         }
         let rest: Vec<[[f64; 2]; 3]> = faces.iter().map(|f| f.map(flat)).collect();
-        let sheet = Sheet::new((n + 1) * (n + 1), &faces, &rest, &Material { damping: 0.0, ..Material::preset("cotton").expect("preset") }, None)
-            .expect("sheet");
+        let sheet = Sheet::new(
+            (n + 1) * (n + 1),
+            &faces,
+            &rest,
+            &Material { damping: 0.0, ..Material::preset("cotton").expect("preset") },
+            None,
+        )
+        .expect("sheet");
         let x = (0..(n + 1) * (n + 1)).map(|v| flat(v as u32)).map(|p| V3d::new(p[0], 0.0, p[1])).collect();
         (sheet, x)
     }
 
     fn wavy(x: &[V3d], a: f64) -> Vec<V3d> {
-        x.iter().map(|p| p + V3d::new((p.z * 31.0).sin(), (p.x * 17.0).cos(), (p.x * 23.0 + p.z * 9.0).sin()) * a).collect()
+        x.iter()
+            .map(|p| p + V3d::new((p.z * 31.0).sin(), (p.x * 17.0).cos(), (p.x * 23.0 + p.z * 9.0).sin()) * a)
+            .collect()
     }
 
     #[test]
     fn the_gradient_is_the_derivative_of_the_energy_and_the_hessian_of_the_gradient() {
         let (sheet, x) = square(4, 0.02);
         let x = wavy(&x, 0.003);
-        let d = wavy(&vec![V3d::zeros(); x.len()], 1.0).iter().zip(&x).map(|(a, p)| a + V3d::new(p.z * 50.0, p.x * 40.0, 0.2)).collect::<Vec<_>>();
+        let d = wavy(&vec![V3d::zeros(); x.len()], 1.0)
+            .iter()
+            .zip(&x)
+            .map(|(a, p)| a + V3d::new(p.z * 50.0, p.x * 40.0, 0.2))
+            .collect::<Vec<_>>();
         let h = 1e-7;
         let moved = |s: f64| x.iter().zip(&d).map(|(p, d)| p + d * (s * h)).collect::<Vec<_>>();
         let mut g = vec![V3d::zeros(); x.len()];

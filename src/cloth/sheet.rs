@@ -105,7 +105,10 @@ impl Sheet {
             }
         }
         if let Some(index) = mass.iter().position(|m| *m <= 0.0) {
-            return Err(ClothError::Field { field: format!("vertex {index}"), why: "it belongs to no triangle".into() });
+            return Err(ClothError::Field {
+                field: format!("vertex {index}"),
+                why: "it belongs to no triangle".into(),
+            });
         }
         let length = |face: u32, a: u32, b: u32| {
             let (f, t) = (&faces[face as usize], &rest[face as usize]);

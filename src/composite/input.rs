@@ -75,7 +75,7 @@ impl Default for Config {
             margins: Margins::default(),
             lights: Lights::default(),
             framing: Framing::Cover,
-            layer_offset: 2e-3,
+            layer_offset: 15e-3,
         }
     }
 }

@@ -36,7 +36,7 @@ impl Around {
             return 1.0;
         }
         let gap = z - self.depth / self.garment;
-        if gap < -0.2 * SHADOW_DEPTH || gap > SHADOW_DEPTH {
+        if !(-0.2 * SHADOW_DEPTH..=SHADOW_DEPTH).contains(&gap) {
             return 1.0;
         }
         let fade = 1.0 - (gap / SHADOW_DEPTH).max(0.0);

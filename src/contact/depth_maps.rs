@@ -69,9 +69,10 @@ impl DepthMaps {
             m.axes = v.axes;
             m.points.clear();
             m.points.extend(vertices.iter().map(|p| turn(&v.axes, p)));
-            let (lo, hi) = m.points.iter().fold((P3::from([f32::MAX; 3]), P3::from([f32::MIN; 3])), |(lo, hi), p| {
-                (lo.inf(p), hi.sup(p))
-            });
+            let (lo, hi) = m
+                .points
+                .iter()
+                .fold((P3::from([f32::MAX; 3]), P3::from([f32::MIN; 3])), |(lo, hi), p| (lo.inf(p), hi.sup(p)));
             let side = |k: usize| ((hi[k] - lo[k] + 2.0 * BORDER) * v.pixels_per_metre).clamp(1.0, LARGEST) as u32;
             let view = View::Orthographic {
                 width: side(0),
@@ -105,13 +106,21 @@ mod tests {
     #[test]
     fn each_map_shows_the_side_it_looks_at() {
         // A box of 0.2 m: eight corners, twelve faces, two a side.
-        let v: Vec<P3> = (0..8).map(|i| P3::new((i & 1) as f32, ((i >> 1) & 1) as f32, ((i >> 2) & 1) as f32) * 0.2).collect();
+        let v: Vec<P3> =
+            (0..8).map(|i| P3::new((i & 1) as f32, ((i >> 1) & 1) as f32, ((i >> 2) & 1) as f32) * 0.2).collect();
         let f: Vec<Face> = vec![
-            [4, 5, 7], [4, 7, 6], // z = 0.2
-            [1, 0, 2], [1, 2, 3], // z = 0
-            [0, 4, 6], [0, 6, 2], // x = 0
-            [5, 1, 3], [5, 3, 7], // x = 0.2
-            [2, 6, 7], [2, 7, 3], [0, 1, 5], [0, 5, 4],
+            [4, 5, 7],
+            [4, 7, 6], // z = 0.2
+            [1, 0, 2],
+            [1, 2, 3], // z = 0
+            [0, 4, 6],
+            [0, 6, 2], // x = 0
+            [5, 1, 3],
+            [5, 3, 7], // x = 0.2
+            [2, 6, 7],
+            [2, 7, 3],
+            [0, 1, 5],
+            [0, 5, 4],
         ];
         let mut maps = DepthMaps::default();
         maps.render(Par::Seq, &MapView::around([0.0, -1.0]), &v, &f);

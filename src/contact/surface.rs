@@ -126,7 +126,15 @@ impl SurfaceModel {
         }
         let Some((d, face, weights, point)) = best else {
             let point = frame.vertices[vertex as usize];
-            return Closest { vertex, face: 0, weights: [1.0, 0.0, 0.0], point, normal: V3::y(), signed: f32::MAX, rim: true };
+            return Closest {
+                vertex,
+                face: 0,
+                weights: [1.0, 0.0, 0.0],
+                point,
+                normal: V3::y(),
+                signed: f32::MAX,
+                rim: true,
+            };
         };
         let n = self.faces[face as usize];
         let smooth = (0..3).fold(V3::zeros(), |s, k| s + frame.normals[n[k] as usize] * weights[k]);
@@ -201,8 +209,9 @@ mod tests {
 
     /// A sphere from a subdivided octahedron.
     fn sphere(levels: usize) -> TriMesh {
-        let mut v: Vec<P3> =
-            [[1., 0., 0.], [-1., 0., 0.], [0., 1., 0.], [0., -1., 0.], [0., 0., 1.], [0., 0., -1.]].map(P3::from).to_vec();
+        let mut v: Vec<P3> = [[1., 0., 0.], [-1., 0., 0.], [0., 1., 0.], [0., -1., 0.], [0., 0., 1.], [0., 0., -1.]]
+            .map(P3::from)
+            .to_vec();
         let mut f: Vec<Face> =
             vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
         for _ in 0..levels {
@@ -226,7 +235,12 @@ mod tests {
     #[test]
     fn distances_to_a_sphere_have_their_closed_form_and_the_walk_finds_the_nearest_vertex() {
         let mesh = sphere(4);
-        let model = SurfaceModel::new(mesh.faces().to_vec(), Topology::new(&mesh).expect("topology"), vec![1; mesh.vertices().len()], 0);
+        let model = SurfaceModel::new(
+            mesh.faces().to_vec(),
+            Topology::new(&mesh).expect("topology"),
+            vec![1; mesh.vertices().len()],
+            0,
+        );
         let mut frame = SurfaceFrame { vertices: mesh.vertices().to_vec(), normals: Vec::new() };
         model.update_normals(Par::Seq, &mut frame);
         for i in 0..200 {

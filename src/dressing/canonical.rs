@@ -40,7 +40,8 @@ pub(super) fn canonical_pose(template: &Template, rest: &RestBody) -> Pose<Body>
         }
         let leg = Vector3::new(s * LEGS_OUT.sin(), -LEGS_OUT.cos(), 0.0);
         aim(&format!("{side}_hip"), &format!("{side}_knee"), leg);
-        if let (Some(hi), Some(kn)) = (skeleton.index(&format!("{side}_hip")), skeleton.index(&format!("{side}_knee"))) {
+        if let (Some(hi), Some(kn)) = (skeleton.index(&format!("{side}_hip")), skeleton.index(&format!("{side}_knee")))
+        {
             aim(&format!("{side}_knee"), &format!("{side}_ankle"), rest.joints[kn] - rest.joints[hi]);
         }
     }
@@ -60,13 +61,7 @@ fn around(rest: Vector3<f64>, to: Vector3<f64>, q: UnitQuaternion<f64>) -> Rigid
 }
 
 /// Pose `t` of the way from `a` to `b`: rotations along the shortest arc joint by joint, the pelvis straight.
-pub(super) fn between(
-    template: &Template,
-    rest: &RestBody,
-    a: &Pose<World>,
-    b: &Pose<World>,
-    t: f64,
-) -> Pose<World> {
+pub(super) fn between(template: &Template, rest: &RestBody, a: &Pose<World>, b: &Pose<World>, t: f64) -> Pose<World> {
     use crate::math::exp_so3;
     let skeleton = template.skeleton();
     let pelvis = rest.joints[0];

@@ -97,8 +97,7 @@ pub fn dress(
     }
     let mut order: Vec<&Pattern> = patterns.iter().collect();
     order.sort_by_key(|p| p.layer);
-    let meshes =
-        order.iter().map(|p| GarmentMesh::sew(p, &options.triangulation)).collect::<Result<Vec<_>, _>>()?;
+    let meshes = order.iter().map(|p| GarmentMesh::sew(p, &options.triangulation)).collect::<Result<Vec<_>, _>>()?;
     let figure = Figure::new(template, rest);
     let root = upright_root(rest, &pose.root);
     let start = Pose { root, angles: canonical_pose(template, rest).angles };
@@ -157,12 +156,7 @@ fn pose_body(template: &Template, rest: &RestBody, pose: &Pose<World>, out: &mut
 }
 
 /// Ties the anchors to the body below them; `hug` puts them at the layer's distance instead of where they are.
-fn bind(
-    model: &Model,
-    frame: &SurfaceFrame,
-    positions: &[Vec<P3>],
-    hug: bool,
-) -> Vec<Vec<AnchorBinding>> {
+fn bind(model: &Model, frame: &SurfaceFrame, positions: &[Vec<P3>], hug: bool) -> Vec<Vec<AnchorBinding>> {
     let surface = model.surface();
     model
         .outfit

@@ -146,9 +146,8 @@ impl Figure {
         let trunk = Slices::cut(&vertices, faces, &parts, Region::TRUNK);
         let lower = Slices::cut(&vertices, faces, &parts, lower_mask);
         let legs = [Region::LEFT_LEG, Region::RIGHT_LEG].map(|m| Slices::cut(&vertices, faces, &parts, m));
-        let joint = |names: &[&str]| {
-            names.iter().find_map(|n| template.skeleton().index(n)).map(|j| bones.joints[j].y as f32)
-        };
+        let joint =
+            |names: &[&str]| names.iter().find_map(|n| template.skeleton().index(n)).map(|j| bones.joints[j].y as f32);
         let (lo, hi) = vertices.iter().fold((f32::MAX, f32::MIN), |(lo, hi), p| (lo.min(p.y), hi.max(p.y)));
         let stature = hi - lo;
         let pelvis = joint(&["left_hip", "pelvis"]).unwrap_or(lo + 0.52 * stature);

@@ -171,8 +171,7 @@ impl<'a> Chart<'a> {
                 let t = if outer_is_high { t } else { 1.0 - t };
                 let y = waist + p[1];
                 let (c, [a, b]) = ellipse(
-                    &self.figure.legs[usize::from(side == Side::Right)]
-                        .at(y.min(self.figure.levels.crotch - 0.04)),
+                    &self.figure.legs[usize::from(side == Side::Right)].at(y.min(self.figure.levels.crotch - 0.04)),
                     2.0 * (hi - lo).min(2.0 * garment_half),
                 );
                 let leg = [c[0] - left * a * (PI * t).cos(), c[1] + z_sign * b * (PI * t).sin()];
@@ -212,14 +211,7 @@ impl<'a> Chart<'a> {
 /// Distance between the places where an arm is measured, metres.
 const STATION: f32 = 0.01;
 
-fn sleeve<'a>(
-    template: &Template,
-    figure: &Figure,
-    pattern: &Pattern,
-    side: Side,
-    bicep: f32,
-    cap: f32,
-) -> Kind {
+fn sleeve(template: &Template, figure: &Figure, pattern: &Pattern, side: Side, bicep: f32, cap: f32) -> Kind {
     let name = if side == Side::Left { "left" } else { "right" };
     let joint = |n: &str| template.skeleton().index(&format!("{name}_{n}")).map(|j| figure.joints[j].cast::<f32>());
     let sign = if side == Side::Left { 1.0 } else { -1.0 };
@@ -228,11 +220,8 @@ fn sleeve<'a>(
     let wrist = joint("wrist").unwrap_or(elbow + (elbow - shoulder));
     let axis = vec![shoulder, elbow, wrist];
     // The shirt's shoulder tip, seen along the arm.
-    let tip = pattern
-        .panels
-        .iter()
-        .find_map(|p| p.edge("shoulder_right").map(|i| p.edges[i].from[0] as f32))
-        .unwrap_or(0.2);
+    let tip =
+        pattern.panels.iter().find_map(|p| p.edge("shoulder_right").map(|i| p.edges[i].from[0] as f32)).unwrap_or(0.2);
     let u = (elbow - shoulder).normalize();
     let start = (sign * tip - shoulder.x) * u.x;
     // Half sizes of the arm, up-down and front-back, at stations along it.
@@ -263,7 +252,9 @@ fn sleeve<'a>(
     // Close to the trunk the cut is open: the arm is as thick there as 7 cm further out.
     let (first, inner) = (radius.clone(), (0.07 / STATION) as usize);
     for (i, r) in radius.iter_mut().enumerate() {
-        let around = |k: usize| (i.max(inner).saturating_sub(2)..(i.max(inner) + 3).min(n)).map(|j| first[j][k]).fold(0.0, f32::max);
+        let around = |k: usize| {
+            (i.max(inner).saturating_sub(2)..(i.max(inner) + 3).min(n)).map(|j| first[j][k]).fold(0.0, f32::max)
+        };
         *r = [around(0), around(1)];
     }
     Kind::Sleeve { axis, start, bicep, cap, radius }

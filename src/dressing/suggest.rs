@@ -65,7 +65,8 @@ mod tests {
     fn a_fuller_body_gets_a_larger_size_with_the_reason_named() {
         let body = |g: f64| BodyMeasures { chest: 0.88 * g, waist: 0.72 * g, hip: 0.96 * g, stature: 1.7 };
         for garment in library::names() {
-            let sizes: Vec<Size> = [0.85, 1.0, 1.2, 2.0].iter().map(|g| suggest(garment, &body(*g)).expect("size").size).collect();
+            let sizes: Vec<Size> =
+                [0.85, 1.0, 1.2, 2.0].iter().map(|g| suggest(garment, &body(*g)).expect("size").size).collect();
             assert!(sizes.windows(2).all(|w| w[0] <= w[1]), "{garment} {sizes:?}");
             assert_eq!(sizes[3], Size::Xxl);
         }

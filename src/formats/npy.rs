@@ -17,8 +17,7 @@ pub fn write_npy(path: &Path, shape: &[u64], data: impl ExactSizeIterator<Item =
     }
     let io = |e| FormatError::io(path, e);
     let file = BufWriter::new(File::create(path).map_err(io)?);
-    let mut writer =
-        npyz::WriteOptions::new().default_dtype().shape(shape).writer(file).begin_nd().map_err(io)?;
+    let mut writer = npyz::WriteOptions::new().default_dtype().shape(shape).writer(file).begin_nd().map_err(io)?;
     writer.extend(data).map_err(io)?;
     writer.finish().map_err(io)
 }

@@ -216,10 +216,10 @@ pub fn pair_surfaces(
         } else if config.pull > 0.0 {
             // A coarse pull towards what nothing explains: every third such reading looks at all facing points.
             unexplained += 1;
-            if unexplained % 3 == 0 {
-                if let Some(i) = pull_target(model, scratch, &c, &n, config.pull) {
-                    pairs.push(Pair { model: i, cell, from_data: true });
-                }
+            if unexplained.is_multiple_of(3)
+                && let Some(i) = pull_target(model, scratch, &c, &n, config.pull)
+            {
+                pairs.push(Pair { model: i, cell, from_data: true });
             }
         }
     }

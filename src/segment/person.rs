@@ -111,7 +111,9 @@ pub fn find_person(
                 continue;
             }
             let c = &components[id as usize];
-            let limb = (c.centre.z - depth).abs() < LIMB_REACH && c.area <= main.area && (c.side_rows as f32) < SIDE_SHARE * c.rows as f32;
+            let limb = (c.centre.z - depth).abs() < LIMB_REACH
+                && c.area <= main.area
+                && (c.side_rows as f32) < SIDE_SHARE * c.rows as f32;
             if limb && touches(cloud, scratch, &belongs, i) {
                 belongs[id as usize] = true;
             }

@@ -205,7 +205,7 @@ pub(super) mod tests {
             assert!((floor.offset - 1.1).abs() < 0.01, "height {}", floor.offset);
             assert_eq!(scene.background.len(), 1, "the wall");
             let world = scene.world_from_camera(0.0);
-            let up = world.vector(&Vector3::new(0.0, -pitch.cos(), pitch.sin() * -1.0));
+            let up = world.vector(&Vector3::new(0.0, -pitch.cos(), -pitch.sin()));
             assert!((up - Vector3::y()).norm() < 0.02, "{up}");
             assert!((world.point(&Point3::origin()).y - 1.1).abs() < 0.01);
         }

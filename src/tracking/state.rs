@@ -72,6 +72,10 @@ pub struct TrackerState {
     pub(super) size: SizeEstimate,
     pub(super) surface: SurfaceStatistics,
     pub(super) bad_frames: u32,
+    /// Frames in a row in which the root hardly moved.
+    pub(super) steady: u32,
+    /// Frames since the person was found.
+    pub(super) calibration_age: u32,
     /// Middle of what was seen of the person, camera frame.
     pub(super) centre: P3,
 }
@@ -102,6 +106,8 @@ impl TrackerState {
             size: SizeEstimate::default(),
             surface: SurfaceStatistics::default(),
             bad_frames: 0,
+            steady: 0,
+            calibration_age: 0,
             centre: P3::origin(),
         }
     }

@@ -1,18 +1,20 @@
 //! One frame (Algorithm 1): segment, place or predict, pose, size, displacements, and what it all means.
 
-use super::align::{START, Seen, TRACK, align, evaluate, wants_tree};
+use super::align::{Fit, START, Schedule, Seen, TRACK, align, evaluate, wants_tree};
 use super::kinematics::extrapolate;
 use super::place::{outline, place};
 use super::report::Stopwatch;
 use super::size::from_stature;
 use super::{
-    LostReason, Skipped, StagesMs, Status, StepError, StepReport, TrackerModel, TrackerState, Workspace, surface,
+    LostReason, SizeEstimate, Skipped, StagesMs, Status, StepError, StepReport, TrackerModel, TrackerState, Workspace,
+    surface,
 };
+use crate::body::{BodyShape, Pose};
 use crate::camera::RgbdFrame;
-use crate::math::P3;
+use crate::math::{Camera, P3, Rigid};
 use crate::segment::{PersonSearch, Prior, contour, find_person, find_planes};
 use crate::spatial::{OrganisedCloud, PointTree};
-use nalgebra::Vector3;
+use nalgebra::{Translation3, Vector3};
 
 /// The room is looked at again after this many frames without a person.
 const SCENE_INTERVAL: u32 = 60;
@@ -31,8 +33,19 @@ const FORGET: u32 = 150;
 /// Rounds of pose and size at the start (Algorithm 1), and the change that ends them.
 const ROUNDS: usize = 8;
 const SETTLED: f64 = 0.05;
+/// A first fit with a larger residual (metres) is tried again from higher and lower by [`SHIFT`] (metres), and the best
+/// kept: along an upright body the surface hardly changes, so a fit a hand's width too high can settle there (6.6 mm of
+/// residual against 2.1 on the synthetic shopper, time-of-flight and Kinect noise lie between).
+const WELL_FITTED: f64 = 4e-3;
+const SHIFT: f64 = 0.15;
 /// Frames of calibration that must have gone by before the status says `Tracking`.
 const CALIBRATING: u32 = 15;
+/// The status also waits until the root joint has moved less than this from frame to frame, metres, for so many frames:
+/// a first fit that is off slides into place at about 1.2 cm a frame, and nobody should be dressed meanwhile.
+const STEADY_MOTION: f64 = 6e-3;
+const STEADY_FRAMES: u32 = 6;
+/// But not longer than this many frames of calibration: a shopper who walks is dressed walking.
+const LONGEST_CALIBRATION: u32 = 90;
 /// Longest interval over which motion is extrapolated, in intervals between frames.
 const FARTHEST_AHEAD: f64 = 3.0;
 /// Extrapolated motion is damped: a limb that stops overshoots less.
@@ -108,7 +121,7 @@ fn segment(
             state.set_scene(scene);
         }
     }
-    let prior = state.status.is_live().then(|| Prior { centre: state.centre, reach: REACH });
+    let prior = state.status.is_live().then_some(Prior { centre: state.centre, reach: REACH });
     let mut person = find_person(grid, &state.scene, prior, &mut workspace.segment);
     if person.cells.len() >= LEAST_CELLS {
         grid.refine(&frame.depth, &person.cells);
@@ -154,10 +167,9 @@ fn follow(
             state.reset(model);
         }
         let first_look = outline(&seen, &up.cast(), person.cut_below);
-        if state.size.frames == 0 && model.config.adapt_size {
-            if let Some(stature) = first_look.and_then(|o| o.stature).filter(|s| (1.3..2.2).contains(s)) {
-                state.shape = from_stature(model, stature);
-            }
+        let stature = first_look.and_then(|o| o.stature).filter(|s| (1.3..2.2).contains(s));
+        if let Some(stature) = stature.filter(|_| state.size.frames == 0 && model.config.adapt_size) {
+            state.shape = from_stature(model, stature);
         }
         workspace.rest_body(model, &state.shape);
         let rest = (&workspace.rest, &workspace.samples);
@@ -197,17 +209,20 @@ fn follow(
     let good = fit.explained >= LEAST_EXPLAINED && fit.matched >= LEAST_MATCHED && pose.is_finite();
     if good && !state.calibrated(&model.config) {
         if state.size.frames == 0 {
-            for _ in 0..ROUNDS {
-                let rest = (&workspace.rest, &workspace.samples);
-                let change =
-                    state.size.observe(model, rest, &pose, &seen, &mut state.shape, &mut workspace.align, false);
-                workspace.rest_body(model, &state.shape);
-                let rest = (&workspace.rest, &workspace.samples);
-                fit = align(model, rest, &mut pose, &seen, &schedule, &mut workspace.align);
-                if change < SETTLED {
-                    break;
+            let start = (state.size.clone(), state.shape.clone(), pose.clone());
+            let mut best = settle(model, start.clone(), &seen, &schedule, workspace);
+            if best.3.residual > WELL_FITTED {
+                for shift in [-SHIFT, SHIFT] {
+                    let mut other = start.clone();
+                    other.2.root = Rigid::new(Translation3::from(up * shift) * other.2.root.iso());
+                    let other = settle(model, other, &seen, &START, workspace);
+                    if other.3.explained >= best.3.explained - 0.05 && other.3.residual < best.3.residual {
+                        best = other;
+                    }
                 }
             }
+            (state.size, state.shape, pose, fit) = best;
+            workspace.rest_body(model, &state.shape);
         }
         let rest = (&workspace.rest, &workspace.samples);
         state.size.observe(model, rest, &pose, &seen, &mut state.shape, &mut workspace.align, true);
@@ -238,13 +253,19 @@ fn follow(
         lose(state, LostReason::Residual);
         return;
     }
+    let root = model.template.skeleton().joints()[0].rest;
+    let moved = (pose.root.point(&root) - state.pose.root.point(&root)).norm();
+    state.steady = if !searching && moved < STEADY_MOTION { state.steady.saturating_add(1) } else { 0 };
+    state.calibration_age = if searching { 0 } else { state.calibration_age.saturating_add(1) };
     state.before = (!searching).then(|| std::mem::replace(&mut state.pose, pose.clone()));
     state.pose = pose;
     state.interval_ns = frame.time_ns.saturating_sub(state.time_ns);
     state.time_ns = frame.time_ns;
     state.pose_age = 0;
     state.centre = centre_of(grid, &person.cells);
-    let calibrating = model.config.adapt_size && state.size.frames < CALIBRATING;
+    let settling =
+        state.status != Status::Tracking && state.steady < STEADY_FRAMES && state.calibration_age < LONGEST_CALIBRATION;
+    let calibrating = model.config.adapt_size && (state.size.frames < CALIBRATING || settling);
     state.status = if calibrating { Status::Calibrating } else { Status::Tracking };
 
     let due = state.frames.is_multiple_of(u64::from(model.config.displacement_interval.max(1)));
@@ -265,6 +286,30 @@ fn follow(
         report.stages_ms.surface = watch.lap();
     }
     workspace.contour = outline_of_person;
+}
+
+/// Size, shape and pose in turns until both have settled (Algorithm 1), from a given start.
+fn settle(
+    model: &TrackerModel,
+    (mut size, mut shape, mut pose): (SizeEstimate, BodyShape, Pose<Camera>),
+    seen: &Seen<'_>,
+    schedule: &Schedule,
+    workspace: &mut Workspace,
+) -> (SizeEstimate, BodyShape, Pose<Camera>, Fit) {
+    workspace.rest_body(model, &shape);
+    let rest = (&workspace.rest, &workspace.samples);
+    let mut fit = align(model, rest, &mut pose, seen, schedule, &mut workspace.align);
+    for _ in 0..ROUNDS {
+        let rest = (&workspace.rest, &workspace.samples);
+        let change = size.observe(model, rest, &pose, seen, &mut shape, &mut workspace.align, false);
+        workspace.rest_body(model, &shape);
+        let rest = (&workspace.rest, &workspace.samples);
+        fit = align(model, rest, &mut pose, seen, schedule, &mut workspace.align);
+        if change < SETTLED {
+            break;
+        }
+    }
+    (size, shape, pose, fit)
 }
 
 fn centre_of(grid: &OrganisedCloud, cells: &[u32]) -> P3 {

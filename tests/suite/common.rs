@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 /// A path below `../shared/data` (or `$TRYON_SHARED/data`). When it is missing the test says so loudly and skips;
 /// with `TRYON_REQUIRE_ALL=1` it fails.
-pub fn shared(path: &str) -> Option<PathBuf> {
+pub(crate) fn shared(path: &str) -> Option<PathBuf> {
     let root = std::env::var_os("TRYON_SHARED")
         .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
     let full = root.join("data").join(path);

@@ -97,7 +97,7 @@ fn sequences_are_followed_to_the_end() {
     for (path, frames, bar) in SEQUENCES {
         let Some(s) = Sequence::open(path) else { return };
         let mean = follow(&s, 0..frames, |_, _| {});
-        println!("{path}: mean joint error {mean:.1} mm");
+        eprintln!("{path}: mean joint error {mean:.1} mm");
         assert!(mean < bar, "{path}: {mean:.1} mm");
     }
 }
@@ -116,7 +116,7 @@ fn corrupt_pixels_and_dropped_frames_cost_little() {
         }
     });
     let every_second = follow(&s, (0..90).step_by(2), |_, _| {});
-    println!("clean {clean:.1}, a tenth corrupt {spoiled:.1}, every second frame {every_second:.1} mm");
+    eprintln!("clean {clean:.1}, a tenth corrupt {spoiled:.1}, every second frame {every_second:.1} mm");
     assert!(spoiled < 1.2 * clean + 2.0, "a tenth corrupt: {spoiled:.1} mm against {clean:.1}");
     assert!(every_second < 1.5 * clean + 3.0, "every second frame: {every_second:.1} mm against {clean:.1}");
 }
@@ -217,6 +217,6 @@ fn a_still_of_a_real_woman_fits() {
         last = Some(step(&model, &mut state, &frame(i, depth.clone()), &mut workspace).expect("step"));
     }
     let report = last.expect("ten steps");
-    println!("residual {:.1} mm, explained {:.2}", report.residual_mm, report.explained);
+    eprintln!("residual {:.1} mm, explained {:.2}", report.residual_mm, report.explained);
     assert!(state.status.is_live() && report.residual_mm < 12.0 && report.explained > 0.8, "{report:?}");
 }

@@ -56,8 +56,6 @@ struct Worn {
 pub(crate) struct Outcome {
     /// The picture; the captured one while nobody is dressed.
     pub(crate) picture: ColorImage,
-    /// Tracking status after the frame.
-    pub(crate) status: Status,
     /// Garments are in the picture.
     pub(crate) dressed: bool,
     /// Milliseconds by stage.
@@ -153,7 +151,6 @@ impl Chain {
         lap("composite", &mut stages);
         Ok(Outcome {
             picture,
-            status: self.tracked.status,
             dressed: live && self.worn.is_some(),
             stages,
             skipped,
@@ -182,10 +179,12 @@ impl Chain {
             };
             patterns.push(library::pattern(&c.name, size)?);
         }
-        let pose: Pose<World> =
-            Pose { root: self.tracked.world_from_camera * self.tracked.pose.root, angles: self.tracked.pose.angles.clone() };
-        let dressed =
-            dress(template, rest, &pose, &patterns, &DressOptions::default()).context("the garments cannot be put on")?;
+        let pose: Pose<World> = Pose {
+            root: self.tracked.world_from_camera * self.tracked.pose.root,
+            angles: self.tracked.pose.angles.clone(),
+        };
+        let dressed = dress(template, rest, &pose, &patterns, &DressOptions::default())
+            .context("the garments cannot be put on")?;
         let looks = dressed.model.outfit.garments.iter().map(|g| look(&g.name)).collect();
         Ok(Worn { model: dressed.model, state: dressed.state, work: realtime::Workspace::default(), looks })
     }
@@ -240,14 +239,7 @@ fn pose_surface<F>(template: &Template, rest: &RestBody, pose: &Pose<F>, out: &m
     skin(Par::Rayon, &rest.vertices, template.weights(), &bones, out);
 }
 
-/// Colours of the library's garments.
+/// How a garment of the library is drawn.
 pub(crate) fn look(garment: &str) -> Look {
-    let base = match garment {
-        "tshirt" => [214, 205, 190],
-        "longsleeve" => [84, 112, 96],
-        "skirt" => [140, 58, 74],
-        "trousers" => [52, 60, 82],
-        _ => return Look::default(),
-    };
-    Look { base, ..Look::default() }
+    Look { base: library::dye(garment), ..Look::default() }
 }

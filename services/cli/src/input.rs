@@ -35,7 +35,8 @@ pub(crate) struct RoughStart {
 /// When the file cannot be read, is no JSON of this form, or holds a number that is not finite.
 pub(crate) fn rough_start(path: &Path) -> Result<RoughStart> {
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let start: RoughStart = serde_json::from_str(&text).with_context(|| format!("{} is no rough start", path.display()))?;
+    let start: RoughStart =
+        serde_json::from_str(&text).with_context(|| format!("{} is no rough start", path.display()))?;
     let finite = start.root_position.iter().chain([&start.facing_yaw_deg]).all(|v| v.is_finite());
     anyhow::ensure!(finite, "{}: root_position and facing_yaw_deg must be finite", path.display());
     Ok(start)

@@ -4,9 +4,6 @@ use tryon::garment::{GarmentKind, Size, library};
 use tryon_proto::convert::WireError;
 use tryon_proto::v1::{GarmentChoice, GarmentInfo};
 
-/// Own colours, sRGB, in the order of the library; a choice may name another.
-const COLORS: [u32; 4] = [0x34_5c_96, 0x8a_2f_3c, 0x2f_6b_4f, 0x2b_2f_3a];
-
 /// For people.
 fn title(name: &str) -> String {
     match name {
@@ -18,7 +15,8 @@ fn title(name: &str) -> String {
 
 /// The colour a garment has unless another is chosen.
 pub(crate) fn own_color(garment: &str) -> u32 {
-    library::names().iter().position(|n| *n == garment).map_or(COLORS[0], |i| COLORS[i % COLORS.len()])
+    let [r, g, b] = library::dye(garment);
+    u32::from_be_bytes([0, r, g, b])
 }
 
 /// Every garment, sorted by name.

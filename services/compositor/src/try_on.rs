@@ -489,7 +489,8 @@ impl Task {
     }
 
     fn drawn(&mut self, d: Done) {
-        self.engine = Some(d.engine.unwrap_or_else(Engine::new));
+        // Not the default: a new engine letterboxes, as the contract says.
+        self.engine = d.engine.or_else(|| Some(Engine::new()));
         match d.outcome {
             Ok(drawn) => {
                 record_stages("compositor", &drawn.stages);

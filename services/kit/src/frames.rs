@@ -3,7 +3,6 @@
 use crate::compute::{ComputeError, Pool};
 use crate::queue::latest;
 use bytes::Bytes;
-use tryon_proto::Message;
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::future::Future;
@@ -11,6 +10,7 @@ use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
 use tokio::sync::watch;
 use tryon::camera::Calibration;
+use tryon_proto::Message;
 pub use tryon_proto::convert::frame::{Exposure, exposure_from_wire, exposure_to_wire, stage};
 pub use tryon_proto::keys::CameraKey;
 

@@ -148,14 +148,10 @@ impl Model {
         let body = template.mesh().vertices().len();
         let mut garments = Vec::new();
         for (order, (g, anchors)) in outfit.garments.iter().zip(&outfit.anchors).enumerate() {
-            if let Some(a) = anchors
-                .iter()
-                .find(|a| a.vertex as usize >= g.vertices || a.body.iter().any(|v| *v as usize >= body))
+            if let Some(a) =
+                anchors.iter().find(|a| a.vertex as usize >= g.vertices || a.body.iter().any(|v| *v as usize >= body))
             {
-                return Err(field(
-                    &format!("anchor of vertex {}", a.vertex),
-                    "it names a vertex that does not exist",
-                ));
+                return Err(field(&format!("anchor of vertex {}", a.vertex), "it names a vertex that does not exist"));
             }
             let sheet = Sheet::of_garment(g)?;
             let symbolic = SymbolicFactor::new(sheet.pattern.clone())?;

@@ -80,10 +80,12 @@ pub fn step(
         });
     }
     let config = &model.config;
-    let moved = |from: &[P3]| from.iter().zip(input.body).map(|(a, b)| (a - b).norm_squared()).fold(0.0, f32::max).sqrt();
+    let moved =
+        |from: &[P3]| from.iter().zip(input.body).map(|(a, b)| (a - b).norm_squared()).fold(0.0, f32::max).sqrt();
     state.frames += 1;
     if config.sleep && state.still >= STILL_FRAMES && moved(&state.awake_body) < STILL_BODY {
-        let mut report = StepReport { sleeping: state.garments.iter().map(|g| g.positions.len()).sum(), ..StepReport::default() };
+        let mut report =
+            StepReport { sleeping: state.garments.iter().map(|g| g.positions.len()).sum(), ..StepReport::default() };
         report.stages_ms.total = ms(started);
         return Ok(report);
     }
@@ -337,7 +339,11 @@ impl Run<'_> {
 
     fn gap(&self, p: &Plane, x: &V3d) -> f64 {
         let d = x - p.point;
-        if p.near && d.norm_squared() < PLANE_SIZE * PLANE_SIZE { p.normal.dot(&d) - self.garment.offset } else { f64::INFINITY }
+        if p.near && d.norm_squared() < PLANE_SIZE * PLANE_SIZE {
+            p.normal.dot(&d) - self.garment.offset
+        } else {
+            f64::INFINITY
+        }
     }
 
     /// The nearest allowed place: outside both planes, tangential motion reduced by friction. The other parts first,

@@ -76,14 +76,14 @@ impl Collider {
         }
         let shape = match c.kind.as_str() {
             "sphere" => Primitive::Sphere { radius: c.radius },
-            "capsule" if c.half_segment >= 0.0 => {
-                Primitive::Capsule { radius: c.radius, half_segment: c.half_segment }
-            }
+            "capsule" if c.half_segment >= 0.0 => Primitive::Capsule { radius: c.radius, half_segment: c.half_segment },
             "capsule" => return Err(format!("half_segment: {} is negative", c.half_segment)),
             other => return Err(format!("type: `{other}` is not known; there are sphere and capsule")),
         };
         let motion = match c.motion_csv.as_deref().and_then(|m| m.split_whitespace().next()) {
-            None => vec![(0.0, Isometry3::from_parts(Translation3::from(V3d::from(c.center)), UnitQuaternion::identity()))],
+            None => {
+                vec![(0.0, Isometry3::from_parts(Translation3::from(V3d::from(c.center)), UnitQuaternion::identity()))]
+            }
             Some(name) => read_motion(&folder.join(name))?,
         };
         Ok(Self { shape, friction: c.friction, motion })

@@ -7,8 +7,8 @@ pub use collider::{Collider, Primitive};
 pub use run::{Run, RunConfig, RunReport, run};
 
 use super::{ClothError, Sheet};
-use crate::formats::obj::read_obj;
 use crate::formats::FormatError;
+use crate::formats::obj::read_obj;
 use crate::garment::Material;
 use crate::math::{P3, V3d};
 use crate::mesh::Face;

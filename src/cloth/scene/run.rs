@@ -187,9 +187,11 @@ fn pin(scene: &Scene, solids: &[(Isometry3<f64>, Isometry3<f64>)], local: &V3d) 
 }
 
 fn touches(scene: &Scene, solids: &[(Isometry3<f64>, Isometry3<f64>)], offset: f64, p: &V3d) -> bool {
-    scene.colliders.iter().zip(solids).any(|(c, (_, at))| {
-        c.shape.distance(&at.inverse_transform_point(&Point3::from(*p)).coords).0 < offset
-    })
+    scene
+        .colliders
+        .iter()
+        .zip(solids)
+        .any(|(c, (_, at))| c.shape.distance(&at.inverse_transform_point(&Point3::from(*p)).coords).0 < offset)
 }
 
 /// `x` pushed out of every solid, with Coulomb friction against the solid's own motion since `before`; how far inertia

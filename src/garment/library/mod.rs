@@ -11,6 +11,12 @@ pub fn names() -> &'static [&'static str] {
     &["tshirt", "longsleeve", "skirt", "trousers"]
 }
 
+/// Colour a garment is shown in unless another is chosen, sRGB. Unknown names get the first.
+pub fn dye(name: &str) -> [u8; 3] {
+    const DYES: [[u8; 3]; 4] = [[0xd9, 0xd0, 0xbf], [0x5b, 0x75, 0x66], [0x8c, 0x3a, 0x4a], [0x34, 0x3c, 0x52]];
+    names().iter().position(|n| *n == name).map_or(DYES[0], |i| DYES[i])
+}
+
 /// Draws the pattern of a garment in a size.
 ///
 /// # Errors
@@ -75,7 +81,7 @@ mod tests {
                 let m =
                     GarmentMesh::sew(&p, &Triangulation::default()).unwrap_or_else(|e| panic!("{name} {size}: {e}"));
                 let rims = m.topology().expect("manifold").edges().iter().filter(|e| e.twin.is_none()).count();
-                println!(
+                eprintln!(
                     "{name} {size}: {} vertices, {} faces, min angle {:.1}, rim edges {rims}",
                     m.vertices,
                     m.faces.len(),

@@ -53,7 +53,7 @@ pub(super) fn flared(row: &SizeRow) -> Result<Pattern, GarmentError> {
             edges: vec![["front".into(), "waist".into()], ["back".into(), "waist".into()]],
             strength: 1.0,
         }],
-        material: Material::preset("cotton")?,
+        material: Material::preset("twill")?,
         layer: 0,
         finished: [0.0, waist * 2.0, (radius + HIP_DEPTH) * half_angle * 4.0],
     })

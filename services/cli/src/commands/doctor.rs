@@ -67,7 +67,9 @@ fn memory() -> Finding {
         Some(mib) => Finding {
             what: "memory",
             verdict: Verdict::Note,
-            detail: format!("{mib} MiB available; the chain of one box is measured against 500 MiB, leave it {WANTED_MIB}"),
+            detail: format!(
+                "{mib} MiB available; the chain of one box is measured against 500 MiB, leave it {WANTED_MIB}"
+            ),
         },
         None => Finding { what: "memory", verdict: Verdict::Note, detail: "this system does not tell".into() },
     }
@@ -98,7 +100,9 @@ fn adapter() -> Finding {
 
 fn port(number: u16) -> Finding {
     match TcpListener::bind(("127.0.0.1", number)) {
-        Ok(_) => Finding { what: "port", verdict: Verdict::Good, detail: format!("{number} is free for the mirror page") },
+        Ok(_) => {
+            Finding { what: "port", verdict: Verdict::Good, detail: format!("{number} is free for the mirror page") }
+        }
         Err(e) => Finding {
             what: "port",
             verdict: Verdict::Note,

@@ -45,7 +45,14 @@ pub(crate) fn run(args: &ExportArgs) -> Result<ExitCode> {
 ///
 /// # Errors
 /// An unknown ending, or a file that cannot be written.
-pub(crate) fn mesh(out: &Path, name: &str, vertices: &[P3], faces: &[Face], uv: &[[f32; 2]], rgb: [u8; 3]) -> Result<()> {
+pub(crate) fn mesh(
+    out: &Path,
+    name: &str,
+    vertices: &[P3],
+    faces: &[Face],
+    uv: &[[f32; 2]],
+    rgb: [u8; 3],
+) -> Result<()> {
     match out.extension().and_then(|e| e.to_str()) {
         Some("obj") => write_obj(out, vertices, faces, (!uv.is_empty()).then_some(uv))?,
         Some("glb") => write_glb(out, &[GlbMesh { name, vertices, faces, uv, color: rgb }])?,

@@ -25,7 +25,13 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
         "npz" => {
             let t = input::template(Some(path))?;
             let (m, s) = (t.mesh(), t.skeleton());
-            println!("body: {} vertices, {} faces, {} joints, {} angles", m.vertices().len(), m.faces().len(), s.len(), s.dofs());
+            println!(
+                "body: {} vertices, {} faces, {} joints, {} angles",
+                m.vertices().len(),
+                m.faces().len(),
+                s.len(),
+                s.dofs()
+            );
             println!("shape directions: {}", t.shape_space().map_or(0, |s| s.vertices.len()));
             println!("closed: {}, volume {:.4} m³", t.topology().is_closed(), m.volume());
             if let Some(out) = &args.out {
@@ -58,13 +64,21 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
             let text = std::fs::read_to_string(path)?;
             let pattern = Pattern::from_json(&text)?;
             let g = GarmentMesh::sew(&pattern, &Triangulation::default())?;
-            println!("garment: {} panels, {} seams, {} vertices", pattern.panels.len(), pattern.seams.len(), g.vertices);
+            println!(
+                "garment: {} panels, {} seams, {} vertices",
+                pattern.panels.len(),
+                pattern.seams.len(),
+                g.vertices
+            );
             if let Some(out) = &args.out {
                 std::fs::write(out, pattern.to_json())?;
             }
         }
         "mcap" | "" => recording(args)?,
-        other => bail!("{}: .{other} is not known; bodies are .npz, garments .obj, .glb or .json, recordings .mcap or a folder", path.display()),
+        other => bail!(
+            "{}: .{other} is not known; bodies are .npz, garments .obj, .glb or .json, recordings .mcap or a folder",
+            path.display()
+        ),
     }
     Ok(ExitCode::SUCCESS)
 }

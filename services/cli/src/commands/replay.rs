@@ -39,7 +39,12 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<ExitCode> {
         let ctx = ServiceContext { bus: bus.clone(), pool, shutdown: shutdown.clone(), grace };
         let key = format!("tryon/{}/{name}/rgbd", config.capture.store);
         let service = tryon_capture::start(&config, ctx).await?;
-        println!("{} on {key}, bus {}, grpc {}; Ctrl-C ends it", args.input.display(), config.bus.listen.join(" "), service.address);
+        println!(
+            "{} on {key}, bus {}, grpc {}; Ctrl-C ends it",
+            args.input.display(),
+            config.bus.listen.join(" "),
+            service.address
+        );
         println!("{}: draining", drain::signal().await.context("signals")?);
         shutdown.cancel();
         service.ended().await?;

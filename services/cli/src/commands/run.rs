@@ -86,7 +86,11 @@ fn dress_all(args: &RunArgs, mut source: Box<dyn RgbdSource>, mut chain: Chain) 
         let repeats = if still { args.still_frames.max(1) } else { 1 };
         let mut last = None;
         for k in 0..repeats as u64 {
-            let frame = RgbdFrame { time_ns: frame.time_ns + k * STILL_INTERVAL_NS, sequence: frame.sequence + k, ..frame.clone() };
+            let frame = RgbdFrame {
+                time_ns: frame.time_ns + k * STILL_INTERVAL_NS,
+                sequence: frame.sequence + k,
+                ..frame.clone()
+            };
             let outcome = chain.frame(&frame).with_context(|| format!("frame {index}"))?;
             stages.extend(outcome.stages.iter().copied());
             skipped.extend(outcome.skipped.iter().copied());

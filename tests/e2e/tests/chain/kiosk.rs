@@ -81,6 +81,7 @@ impl Kiosk {
                     Ok(started) => return started,
                     // The port of a part that was killed a moment ago.
                     Err(StartError::Bind { .. }) if begun.elapsed() < Duration::from_secs(2) => {
+                        #[allow(clippy::disallowed_methods, reason = "a plain thread of a test waits for a port")]
                         std::thread::sleep(Duration::from_millis(20));
                     }
                     Err(e) => panic!("{part:?}: {e}"),
