@@ -45,6 +45,8 @@ const CONTACT_STIFFNESS: f64 = 0.04;
 const FASTEST: f64 = 12.0;
 /// Longest and shortest time step of a call, s.
 const DT_RANGE: [f64; 2] = [1e-4, 0.1];
+/// Longer calls are cut into more substeps, s: a chain that drops frames must not sink limbs into cloth.
+const LONGEST_SUBSTEP: f64 = 1.0 / 45.0;
 /// Cloth slower than this on average is still, m/s.
 const STILL_SPEED: f64 = 0.02;
 /// A body that has moved less than this since the cloth was last computed is still, metres.
@@ -89,8 +91,9 @@ pub fn step(
         report.stages_ms.total = ms(started);
         return Ok(report);
     }
-    let jump = moved(&state.body);
-    let teleported = f64::from(jump) > config.teleport;
+    // The mean, not the farthest vertex: a waving hand is no teleport, and carrying cloth costs it its folds.
+    let sum: f64 = state.body.iter().zip(input.body).map(|(a, b)| f64::from((a - b).norm())).sum();
+    let teleported = sum / input.body.len().max(1) as f64 > config.teleport;
     if teleported {
         for (g, m) in state.garments.iter_mut().zip(&model.garments) {
             carry(model, &m.sheet.edges, &g.nearest, &state.body, input.body, &mut g.positions);
@@ -103,7 +106,7 @@ pub fn step(
     work.maps.render(config.par, &model.views, input.body, model.surface.faces());
     let maps_ms = ms(maps_started);
     // The body at every substep.
-    let n = config.substeps;
+    let n = config.substeps.max((dt / LONGEST_SUBSTEP).ceil() as usize);
     work.frames.resize_with(n, SurfaceFrame::default);
     work.start.vertices.clone_from(&state.body);
     for (s, frame) in work.frames.iter_mut().enumerate() {
@@ -120,7 +123,7 @@ pub fn step(
     par::for_chunks(config.par, &mut work.garments, 1, |k, scratch| {
         let scratch = &mut scratch[0];
         scratch.outcome = Outcome::default();
-        let run = Run { model, garment: &model.garments[k], index: k, frames, start, maps, dt };
+        let run = Run { model, garment: &model.garments[k], index: k, frames, start, maps, h: dt / n as f64 };
         if let Err(fault) = run.advance(&gs[k], scratch) {
             scratch.outcome.fault = Some(fault);
         }
@@ -174,14 +177,14 @@ struct Run<'a> {
     frames: &'a [SurfaceFrame],
     start: &'a SurfaceFrame,
     maps: &'a crate::contact::DepthMaps,
-    dt: f64,
+    h: f64,
 }
 
 impl Run<'_> {
     fn advance(&self, from: &GarmentState, w: &mut GarmentScratch) -> Result<(), ClothError> {
         let sheet = &self.garment.sheet;
         let config = &self.model.config;
-        let h = self.dt / config.substeps as f64;
+        let h = self.h;
         let n = from.positions.len();
         w.x.clear();
         w.x.extend(from.positions.iter().map(|p| p.coords.cast::<f64>()));
@@ -191,7 +194,7 @@ impl Run<'_> {
         let gravity = V3d::from(config.gravity);
         let drag = (-sheet.damping * h).exp();
         let solver = w.solver.get_or_insert_with(|| QuasiNewton::new(self.garment.symbolic.clone()));
-        for s in 0..config.substeps {
+        for s in 0..self.frames.len() {
             let frame = &self.frames[s];
             let before = if s == 0 { self.start } else { &self.frames[s - 1] };
             let timer = Instant::now();
@@ -266,7 +269,7 @@ impl Run<'_> {
                 }
                 w.x[i] = self.outside(&w.contacts[i], &w.before[i], w.x[i]);
             }
-            let last = s + 1 == config.substeps;
+            let last = s + 1 == self.frames.len();
             let (deepest, left) = self.push_out(frame, &mut w.x, &mut w.nearest, last);
             w.outcome.report.penetration = w.outcome.report.penetration.max(deepest);
             w.outcome.report.penetration_left = left;
