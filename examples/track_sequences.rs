@@ -68,14 +68,15 @@ fn run(
     let mut state = TrackerState::new(&model);
     let mut workspace = Workspace::default();
     let (mut errors, mut lost, mut times, mut per_joint) = (vec![], 0, vec![], vec![0.0; 64]);
-    let mut stages = [0.0; 5];
+    let (mut stages, mut cpus) = ([0.0; 5], vec![]);
     let mut lines = String::new();
     for (i, path) in frames.iter().enumerate() {
         let depth = read_png_depth(path).expect("depth");
         let frame = RgbdFrame { sequence: i as u64, time_ns: i as u64 * 33_333_333, depth, color: None };
-        let start = Instant::now();
+        let (start, cpu) = (Instant::now(), cpu_ms());
         let report: StepReport = step(&model, &mut state, &frame, &mut workspace).expect("step");
         times.push(start.elapsed().as_secs_f64() * 1e3);
+        cpus.push(cpu_ms() - cpu);
         let s = report.stages_ms;
         [s.segment, s.place, s.pose, s.size, s.surface].iter().zip(&mut stages).for_each(|(a, b)| *b += a);
         lost += usize::from(!state.status.is_live());
@@ -160,13 +161,14 @@ fn run(
     let mut sorted = errors.clone();
     sorted.sort_by(f64::total_cmp);
     println!(
-        "{}: mean {:.1} mm, p50 {:.1}, worst {:.1}, lost {lost}/{}, steady {:.2} ms/frame (first {:.0}), stages/frame seg {:.2} place {:.2} pose {:.2} size {:.2} surf {:.2}",
+        "{}: mean {:.1} mm, p50 {:.1}, worst {:.1}, lost {lost}/{}, steady {:.2} ms/frame, of it on the processor {:.2} (first {:.0}), stages/frame seg {:.2} place {:.2} pose {:.2} size {:.2} surf {:.2}",
         folder.file_name().expect("name").to_string_lossy(),
         errors.iter().sum::<f64>() / n,
         sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN),
         sorted.last().copied().unwrap_or(f64::NAN),
         frames.len(),
         steady.iter().sum::<f64>() / steady.len() as f64,
+        cpus.iter().skip(75.min(cpus.len() / 2)).sum::<f64>() / steady.len() as f64,
         times[0],
         stages[0] / times.len() as f64,
         stages[1] / times.len() as f64,
@@ -187,4 +189,10 @@ fn run(
 
 fn n_of(errors: &[f64]) -> f64 {
     errors.len().max(1) as f64
+}
+
+/// Time this thread has spent on a processor (Linux), milliseconds: what counts on a busy machine.
+fn cpu_ms() -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    text.split_whitespace().next().and_then(|n| n.parse::<f64>().ok()).unwrap_or(f64::NAN) * 1e-6
 }

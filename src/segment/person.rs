@@ -25,6 +25,13 @@ const PART_GAP: i32 = 2;
 /// A candidate that hangs on a side of the image over this share of its rows is furniture or a wall.
 const SIDE_SHARE: f32 = 0.5;
 
+/// So many cells on the rim make a thing hang on it.
+const HANGING: usize = 3;
+/// A thing on a side of the image ranks as if it were this much farther away, metres.
+const SIDE_COST: f32 = 4.0;
+/// The same for the upper rim; a person close by may reach it.
+const TOP_COST: f32 = 2.0;
+
 /// Where the person was a moment ago.
 #[derive(Clone, Copy, Debug)]
 pub struct Prior {
@@ -64,6 +71,7 @@ struct Component {
     centre: P3,
     side_rows: usize,
     rows: usize,
+    top_cells: usize,
 }
 
 /// Labels floor, background and the person in a sampled cloud. With a prior the component nearest to it wins;
@@ -164,6 +172,7 @@ fn connect(cloud: &OrganisedCloud, up: &Vector3<f32>, scratch: &mut SegmentScrat
             centre: P3::origin(),
             side_rows: 0,
             rows: 0,
+            top_cells: 0,
         };
         let (mut first_row, mut last_row) = (rows, 0);
         scratch.component[seed] = id;
@@ -178,6 +187,7 @@ fn connect(cloud: &OrganisedCloud, up: &Vector3<f32>, scratch: &mut SegmentScrat
             c.cells += 1;
             c.area += z * z / (focal[0] * focal[1]);
             c.side_rows += usize::from(u == 0 || u + 1 == columns);
+            c.top_cells += usize::from(v == 0);
             (first_row, last_row) = (first_row.min(v), last_row.max(v));
             let link = LINK + LINK_SLOPE * z;
             for (du, dv) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
@@ -212,7 +222,13 @@ fn choose(components: &[Component], prior: Option<Prior>) -> Option<&Component> 
             .filter(|c| c.area > 0.3 * LEAST_AREA && c.area < MOST_AREA && off(c) < prior.reach)
             .max_by(|a, b| a.area.total_cmp(&b.area).then(b.id.cmp(&a.id)));
     }
-    components.iter().filter(sized).min_by(|a, b| a.centre.z.total_cmp(&b.centre.z).then(a.id.cmp(&b.id)))
+    // What hangs on a side or on the top is more likely a wall, a door or a shelf, unless nothing else is there.
+    let rank = |c: &Component| {
+        let side = if c.side_rows > HANGING { SIDE_COST } else { 0.0 };
+        let top = if c.top_cells > HANGING { TOP_COST } else { 0.0 };
+        c.centre.z + side + top
+    };
+    components.iter().filter(sized).min_by(|a, b| rank(a).total_cmp(&rank(b)).then(a.id.cmp(&b.id)))
 }
 
 fn touches(cloud: &OrganisedCloud, scratch: &SegmentScratch, belongs: &[bool], cell: usize) -> bool {
