@@ -152,6 +152,7 @@ mod tests {
         let guess = extrapolate(&skeleton, &pose, &one, 1.0);
         let off = |a: &Pose, b: &Pose| a.angles.iter().zip(&b.angles).map(|(p, q)| (p - q).abs()).fold(0.0, f64::max);
         assert!(off(&guess, &two) < 0.2 * off(&one, &two));
-        assert_eq!(extrapolate(&skeleton, &pose, &one, 0.0).angles, one.angles);
+        // A rotation vector goes through a quaternion and back: equal to rounding, not to the bit.
+        assert!(off(&extrapolate(&skeleton, &pose, &one, 0.0), &one) < 1e-12);
     }
 }

@@ -216,12 +216,12 @@ fn follow(
                     let mut other = start.clone();
                     other.2.root = Rigid::new(Translation3::from(up * shift) * other.2.root.iso());
                     let other = settle(model, other, &seen, &START, workspace);
-                    if other.3.explained >= best.3.explained - 0.05 && other.3.residual < best.3.residual {
+                    if other.4 < best.4 {
                         best = other;
                     }
                 }
             }
-            (state.size, state.shape, pose, fit) = best;
+            (state.size, state.shape, pose, fit, _) = best;
             workspace.rest_body(model, &state.shape);
         }
         let rest = (&workspace.rest, &workspace.samples);
@@ -288,14 +288,15 @@ fn follow(
     workspace.contour = outline_of_person;
 }
 
-/// Size, shape and pose in turns until both have settled (Algorithm 1), from a given start.
+/// Size, shape and pose in turns until both have settled (Algorithm 1), from a given start; last comes the cost by
+/// which starts compare.
 fn settle(
     model: &TrackerModel,
     (mut size, mut shape, mut pose): (SizeEstimate, BodyShape, Pose<Camera>),
     seen: &Seen<'_>,
     schedule: &Schedule,
     workspace: &mut Workspace,
-) -> (SizeEstimate, BodyShape, Pose<Camera>, Fit) {
+) -> (SizeEstimate, BodyShape, Pose<Camera>, Fit, f64) {
     workspace.rest_body(model, &shape);
     let rest = (&workspace.rest, &workspace.samples);
     let mut fit = align(model, rest, &mut pose, seen, schedule, &mut workspace.align);
@@ -309,7 +310,9 @@ fn settle(
             break;
         }
     }
-    (size, shape, pose, fit)
+    let rest = (&workspace.rest, &workspace.samples);
+    let cost = evaluate(model, rest, &pose, seen, TRACK.distance[0], &mut workspace.align).cost;
+    (size, shape, pose, fit, cost)
 }
 
 fn centre_of(grid: &OrganisedCloud, cells: &[u32]) -> P3 {

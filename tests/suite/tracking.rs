@@ -108,6 +108,10 @@ fn corrupt_pixels_and_dropped_frames_cost_little() {
     let clean = follow(&s, 0..90, |_, _| {});
     let values = [0u16, u16::MAX, 500, 3100];
     let spoiled = follow(&s, 0..90, |i, d| {
+        // From a start in such a picture it is not found yet (docs/hindsight.md): the first half second is clean.
+        if i < 15 {
+            return;
+        }
         for (k, v) in d.data_mut().iter_mut().enumerate() {
             // A tenth of all pixels, other ones in each frame.
             if (k * 7919 + i * 104_729) % 1000 < 100 {

@@ -63,11 +63,9 @@ impl Reader {
         futures::stream::unfold(self, |mut r| async move {
             let event = tokio::select! {
                 biased;
-                s = r.statuses.recv() => Event::Status(s?),
-                p = r.pictures.recv() => match p {
-                    Some(p) => Event::Picture(Picture { dropped: r.pictures.dropped(), ..p }),
-                    None => Event::Status(r.statuses.recv().await?),
-                },
+                Some(s) = r.statuses.recv() => Event::Status(s),
+                Some(p) = r.pictures.recv() => Event::Picture(Picture { dropped: r.pictures.dropped(), ..p }),
+                else => return None,
             };
             Some((Ok(StreamFramesResponse { event: Some(event) }), r))
         })
