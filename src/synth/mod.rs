@@ -1,7 +1,7 @@
 //! Synthetic people, garments, cameras and sequences with known truth, for the demo, tests and benches.
 //!
 //! A [`Sequence`] is a [`Shopper`] doing a [`Routine`] in a [`Room`] before a camera with a
-//! [`NoiseModel`](crate::camera::NoiseModel). Frames are functions of their number: any order, same bits.
+//! [`NoiseModel`]. Frames are functions of their number: any order, same bits.
 
 mod clip;
 mod paint;

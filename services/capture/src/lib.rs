@@ -1,6 +1,6 @@
 //! The capture service: cameras and recordings onto the bus.
 //!
-//! One task owns one camera ([`camera`]); frames are made on the compute pool and handed to the bus, which keeps
+//! One task owns one camera (`camera`); frames are made on the compute pool and handed to the bus, which keeps
 //! only the newest. The service itself only starts, stops and reports.
 
 mod camera;

@@ -1,6 +1,6 @@
 //! The cloth service: garments on the bodies that tracking reports.
 //!
-//! One task owns one session ([`session`]): it follows the session's body states, dresses the body when it is
+//! One task owns one session (`session`): it follows the session's body states, dresses the body when it is
 //! calibrated, steps the garments on the compute pool and hands each reader a keyframe and then positions.
 
 mod engine;
