@@ -2043,9 +2043,11 @@ pub struct GarmentLook {
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StartSimulationRequest {
-    /// The scene, JSON as `tryon simulate --scene` reads it, UTF-8, at most 1 MiB.
+    /// The scene, JSON as `tryon simulate --scene` reads it, UTF-8, at most 1 MiB, complete in itself: `mesh_obj` holds
+    /// the text of the OBJ file that `mesh` would name, and a collider's `motion` the rows of `motion_csv`.
     #[prost(string, tag = "1")]
     pub scene_json: ::prost::alloc::string::String,
+    /// Unspecified is the real-time solver.
     #[prost(enumeration = "ClothSolver", tag = "2")]
     pub solver: i32,
 }
@@ -2350,6 +2352,7 @@ pub mod cloth_service_client {
             self.inner.server_streaming(req, path, codec).await
         }
         /// Starts a simulation of a scene that needs no camera; it runs until it is done or the service stops.
+        /// INVALID_ARGUMENT names the field of the scene at fault, also when its frames would take more than 256 MiB.
         /// RESOURCE_EXHAUSTED with RetryInfo when too many run.
         pub async fn start_simulation(
             &mut self,
@@ -2457,6 +2460,7 @@ pub mod cloth_service_server {
             tonic::Status,
         >;
         /// Starts a simulation of a scene that needs no camera; it runs until it is done or the service stops.
+        /// INVALID_ARGUMENT names the field of the scene at fault, also when its frames would take more than 256 MiB.
         /// RESOURCE_EXHAUSTED with RetryInfo when too many run.
         async fn start_simulation(
             &self,

@@ -117,6 +117,7 @@ impl ClothService for Cloth {
         &self,
         r: Request<FollowSimulationRequest>,
     ) -> Result<Response<Self::FollowSimulationStream>, Status> {
-        self.simulations.follow(&r.get_ref().simulation_id).map(Response::new)
+        let r = r.get_ref();
+        self.simulations.follow(&r.simulation_id, r.first_frame).map(Response::new)
     }
 }

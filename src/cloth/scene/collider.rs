@@ -64,10 +64,13 @@ pub(super) struct FileCollider {
     /// File name, maybe followed by words about its columns.
     #[serde(default)]
     motion_csv: Option<String>,
+    /// The same rows here: t, position, quaternion x y z w.
+    #[serde(default)]
+    motion: Vec<[f64; 8]>,
 }
 
 impl Collider {
-    pub(super) fn read(c: &FileCollider, folder: &Path) -> Result<Self, String> {
+    pub(super) fn read(c: &FileCollider, folder: Option<&Path>) -> Result<Self, String> {
         if !(c.radius > 0.0 && c.radius.is_finite()) {
             return Err(format!("radius: {} is no positive length", c.radius));
         }
@@ -80,11 +83,13 @@ impl Collider {
             "capsule" => return Err(format!("half_segment: {} is negative", c.half_segment)),
             other => return Err(format!("type: `{other}` is not known; there are sphere and capsule")),
         };
-        let motion = match c.motion_csv.as_deref().and_then(|m| m.split_whitespace().next()) {
-            None => {
+        let motion = match (c.motion_csv.as_deref().and_then(|m| m.split_whitespace().next()), folder) {
+            (None, _) if c.motion.is_empty() => {
                 vec![(0.0, Isometry3::from_parts(Translation3::from(V3d::from(c.center)), UnitQuaternion::identity()))]
             }
-            Some(name) => read_motion(&folder.join(name))?,
+            (None, _) => placements(&c.motion).map_err(|(row, why)| format!("motion[{row}]: {why}"))?,
+            (Some(name), Some(folder)) => read_motion(&folder.join(name))?,
+            (Some(_), None) => return Err("motion_csv: no files are read here: use motion".into()),
         };
         Ok(Self { shape, friction: c.friction, motion })
     }
@@ -105,21 +110,35 @@ impl Collider {
 /// t, position, quaternion x y z w; one header line.
 fn read_motion(path: &Path) -> Result<Vec<(f64, Isometry3<f64>)>, String> {
     let text = std::fs::read_to_string(path).map_err(|e| format!("motion_csv: {}: {e}", path.display()))?;
-    let mut out: Vec<(f64, Isometry3<f64>)> = Vec::new();
+    let mut rows = Vec::new();
+    let mut lines = Vec::new();
     for (i, line) in text.lines().enumerate().skip(1).filter(|(_, l)| !l.trim().is_empty()) {
         let fault = |why: &str| format!("motion_csv: {} line {}: {why}", path.display(), i + 1);
         let v: Vec<f64> = line
             .split(',')
             .map(|w| w.trim().parse().map_err(|_| fault(&format!("`{w}` is no number"))))
             .collect::<Result<_, _>>()?;
-        let [t, px, py, pz, qx, qy, qz, qw] = v[..] else { return Err(fault("8 numbers are needed")) };
-        let q = UnitQuaternion::try_new(Quaternion::new(qw, qx, qy, qz), 1e-6).ok_or_else(|| fault("no rotation"))?;
+        rows.push(v.try_into().map_err(|_| fault("8 numbers are needed"))?);
+        lines.push(i + 1);
+    }
+    if rows.is_empty() {
+        return Err(format!("motion_csv: {}: no samples", path.display()));
+    }
+    placements(&rows).map_err(|(row, why)| format!("motion_csv: {} line {}: {why}", path.display(), lines[row]))
+}
+
+/// Times and placements of rows, or the row at fault.
+fn placements(rows: &[[f64; 8]]) -> Result<Vec<(f64, Isometry3<f64>)>, (usize, &'static str)> {
+    let mut out: Vec<(f64, Isometry3<f64>)> = Vec::with_capacity(rows.len());
+    for (row, v) in rows.iter().enumerate() {
+        let [t, px, py, pz, qx, qy, qz, qw] = *v;
         if !v.iter().all(|x| x.is_finite()) || out.last().is_some_and(|(last, _)| *last >= t) {
-            return Err(fault("times must rise and all numbers be finite"));
+            return Err((row, "times must rise and all numbers be finite"));
         }
+        let q = UnitQuaternion::try_new(Quaternion::new(qw, qx, qy, qz), 1e-6).ok_or((row, "no rotation"))?;
         out.push((t, Isometry3::from_parts(Translation3::new(px, py, pz), q)));
     }
-    if out.is_empty() { Err(format!("motion_csv: {}: no samples", path.display())) } else { Ok(out) }
+    Ok(out)
 }
 
 #[cfg(test)]

@@ -4,11 +4,11 @@ mod collider;
 mod run;
 
 pub use collider::{Collider, Primitive};
-pub use run::{Run, RunConfig, RunReport, run};
+pub use run::{RunConfig, RunReport, run, write_positions};
 
 use super::{ClothError, Sheet};
 use crate::formats::FormatError;
-use crate::formats::obj::read_obj;
+use crate::formats::obj::{parse_obj, read_obj};
 use crate::garment::Material;
 use crate::math::{P3, V3d};
 use crate::mesh::Face;
@@ -68,7 +68,12 @@ impl Scene {
 
 #[derive(Deserialize)]
 struct File {
-    mesh: String,
+    /// OBJ file beside the scene.
+    #[serde(default)]
+    mesh: Option<String>,
+    /// OBJ text, instead of a file.
+    #[serde(default)]
+    mesh_obj: Option<String>,
     #[serde(default)]
     pinned_vertices: Vec<u32>,
     #[serde(default)]
@@ -107,12 +112,21 @@ const HIGHEST_RATE: f64 = 1000.0;
 /// Names the field, file, face or vertex at fault.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
     let text = std::fs::read_to_string(path).map_err(|e| FormatError::io(path, e))?;
+    parse(&text, path, Some(path.parent().unwrap_or(Path::new("."))))
+}
+
+/// Reads scene text; `origin` is named in errors. Without a folder the scene must be complete in itself: `mesh_obj`
+/// instead of `mesh`, `motion` instead of `motion_csv`.
+///
+/// # Errors
+/// As [`load`], and when a scene without a folder names a file.
+pub fn parse(text: &str, origin: &Path, folder: Option<&Path>) -> Result<Scene, SceneError> {
     let fault = |field: &str, why: String| SceneError::Field {
-        scene: path.display().to_string(),
+        scene: origin.display().to_string(),
         field: field.to_owned(),
         why,
     };
-    let file: File = serde_json::from_str(&text).map_err(|e| fault("json", e.to_string()))?;
+    let file: File = serde_json::from_str(text).map_err(|e| fault("json", e.to_string()))?;
     if !(file.duration_s > 0.0 && file.duration_s <= LONGEST) {
         return Err(fault("duration_s", format!("{} is not in 0 to {LONGEST} s", file.duration_s)));
     }
@@ -122,8 +136,12 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
     if !file.gravity.iter().all(|g| g.is_finite()) {
         return Err(fault("gravity", "must be finite".into()));
     }
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mesh = read_obj(&folder.join(&file.mesh))?.mesh;
+    let mesh = match (&file.mesh, &file.mesh_obj, folder) {
+        (Some(name), None, Some(folder)) => read_obj(&folder.join(name))?.mesh,
+        (None, Some(obj), _) => parse_obj(obj, &origin.join("mesh_obj"))?.mesh,
+        (Some(_), None, None) => return Err(fault("mesh", "no files are read here: use mesh_obj".into())),
+        _ => return Err(fault("mesh", "one of mesh and mesh_obj is needed".into())),
+    };
     if let Some(v) = file.pinned_vertices.iter().find(|v| **v as usize >= mesh.vertices().len()) {
         return Err(fault("pinned_vertices", format!("{v}: the mesh has {} vertices", mesh.vertices().len())));
     }

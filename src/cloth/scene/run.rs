@@ -9,6 +9,7 @@ use crate::linear::SymbolicFactor;
 use crate::math::{P3, V3d};
 use nalgebra::{Isometry3, Point3};
 use serde::Serialize;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
@@ -62,32 +63,26 @@ pub struct RunReport {
     pub factorisations: u64,
 }
 
-/// Positions of all frames and the report.
-#[derive(Clone, Debug, Default)]
-pub struct Run {
-    /// Frames × vertices.
-    pub positions: Vec<Vec<P3>>,
-    /// How it went.
-    pub report: RunReport,
+/// Writes positions, frames × vertices, as f32 (frames, vertices, 3).
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_positions(path: &Path, frames: &[Vec<P3>]) -> Result<(), FormatError> {
+    let n = frames.first().map_or(0, Vec::len);
+    let flat: Vec<f32> = frames.iter().flatten().flat_map(|p| [p.x, p.y, p.z]).collect();
+    write_npy(path, &[frames.len() as u64, n as u64, 3], flat.into_iter())
 }
 
-impl Run {
-    /// Writes positions as f32 (frames, vertices, 3).
-    ///
-    /// # Errors
-    /// When the file cannot be written.
-    pub fn write_positions(&self, path: &Path) -> Result<(), FormatError> {
-        let n = self.positions.first().map_or(0, Vec::len);
-        let flat: Vec<f32> = self.positions.iter().flatten().flat_map(|p| [p.x, p.y, p.z]).collect();
-        write_npy(path, &[self.positions.len() as u64, n as u64, 3], flat.into_iter())
-    }
-}
-
-/// Simulates a scene; `progress` hears of each finished frame.
+/// Simulates a scene. `frame` gets the positions of each frame as soon as they are known, the start as frame 0, and may
+/// break off; the report then tells of the frames so far.
 ///
 /// # Errors
 /// When a position is no longer finite: names the vertex.
-pub fn run(scene: &Scene, config: &RunConfig, mut progress: impl FnMut(usize)) -> Result<Run, SceneError> {
+pub fn run(
+    scene: &Scene,
+    config: &RunConfig,
+    mut frame: impl FnMut(usize, &[P3]) -> ControlFlow<()>,
+) -> Result<RunReport, SceneError> {
     let sheet = &scene.sheet;
     let n = scene.start.len();
     let substeps = config.substeps.max(1);
@@ -103,14 +98,19 @@ pub fn run(scene: &Scene, config: &RunConfig, mut progress: impl FnMut(usize)) -
         }
         None => x.clone(),
     };
-    let mut out = Run { positions: vec![scene.start.clone()], report: RunReport::default() };
+    let mut finished = 1;
+    let mut flow = frame(0, &scene.start);
+    let mut shown = Vec::with_capacity(n);
     let mut times = Vec::new();
     let (mut y, mut holds, mut stiffness) = (Vec::new(), Vec::new(), Vec::new());
     let mut penetration: f64 = 0.0;
-    for frame in 1..scene.frames() {
+    for index in 1..scene.frames() {
+        if flow.is_break() {
+            break;
+        }
         let started = Instant::now();
         for s in 0..substeps {
-            let t = ((frame - 1) * substeps + s + 1) as f64 * h;
+            let t = ((index - 1) * substeps + s + 1) as f64 * h;
             let solids: Vec<(Isometry3<f64>, Isometry3<f64>)> =
                 scene.colliders.iter().map(|c| (c.placement(t - h), c.placement(t))).collect();
             let before = x.clone();
@@ -155,19 +155,21 @@ pub fn run(scene: &Scene, config: &RunConfig, mut progress: impl FnMut(usize)) -
             v.iter_mut().zip(x.iter().zip(&before)).for_each(|(v, (x, b))| *v = (x - b) / h);
         }
         times.push(started.elapsed().as_secs_f64() * 1e3);
-        let t = frame as f64 / scene.rate;
+        let t = index as f64 / scene.rate;
         for c in &scene.colliders {
             let back = c.placement(t).inverse();
             let deepest = x.iter().map(|p| -c.shape.distance(&(back * Point3::from(*p)).coords).0);
             penetration = deepest.fold(penetration, f64::max);
         }
-        out.positions.push(x.iter().map(|p| P3::from(p.cast::<f32>())).collect());
-        progress(frame);
+        shown.clear();
+        shown.extend(x.iter().map(|p| P3::from(p.cast::<f32>())));
+        flow = frame(index, &shown);
+        finished += 1;
     }
     times.sort_by(f64::total_cmp);
     let kinetic: f64 = v.iter().zip(&sheet.mass).map(|(v, m)| 0.5 * m * v.norm_squared()).sum();
-    out.report = RunReport {
-        frames: out.positions.len(),
+    Ok(RunReport {
+        frames: finished,
         vertices: n,
         substeps,
         iterations: config.iterations,
@@ -178,8 +180,7 @@ pub fn run(scene: &Scene, config: &RunConfig, mut progress: impl FnMut(usize)) -
         penetration,
         energy_end: kinetic + sheet.energy(&x),
         factorisations: solver.factorisations,
-    };
-    Ok(out)
+    })
 }
 
 fn pin(scene: &Scene, solids: &[(Isometry3<f64>, Isometry3<f64>)], local: &V3d) -> V3d {

@@ -4,6 +4,7 @@ use crate::args::{SimulateArgs, SolverArg};
 use crate::input;
 use crate::report::write;
 use anyhow::{Result, bail};
+use std::ops::ControlFlow;
 use std::process::ExitCode;
 use tryon::cloth::scene;
 
@@ -18,10 +19,15 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<ExitCode> {
     let scene = scene::load(&args.scene)?;
     input::create_dir(&args.out)?;
     let bar = input::progress(Some(scene.frames() as u64), "simulating");
-    let result = scene::run(&scene, &scene::RunConfig::default(), |_| bar.inc(1))?;
+    let mut frames = Vec::with_capacity(scene.frames());
+    let report = scene::run(&scene, &scene::RunConfig::default(), |_, positions| {
+        frames.push(positions.to_vec());
+        bar.inc(1);
+        ControlFlow::Continue(())
+    })?;
     bar.finish_and_clear();
-    result.write_positions(&args.out.join("positions.npy"))?;
-    write(&args.out.join("report.json"), &result.report)?;
+    scene::write_positions(&args.out.join("positions.npy"), &frames)?;
+    write(&args.out.join("report.json"), &report)?;
     println!("{} frames in {}", scene.frames(), args.out.display());
     Ok(ExitCode::SUCCESS)
 }

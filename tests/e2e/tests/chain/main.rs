@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs, unreachable_pub, clippy::print_stdout)]
 
 mod kiosk;
+mod simulation;
 
 use kiosk::{Kiosk, PARTS, Part, Watcher, wear};
 use std::time::{Duration, Instant};
