@@ -1,12 +1,13 @@
 //! Rendering and encoding: everything of a try-on that computes.
 
+use crate::card::Card;
 use crate::scene::Body;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 use tryon::body::{BodyShape, BoneTransforms, RestBody, skin};
 use tryon::camera::ColorImage;
-use tryon::composite::{BodyView, Config, Framing, GarmentView, Input, Look, Model, Print, Workspace, render};
+use tryon::composite::{BodyView, Config, Framing, GarmentView, Input, Look, Model, Print, Workspace};
 use tryon::formats::image::{encode_jpeg, encode_png_rgb};
 use tryon::math::{Camera, P3, Rigid, World};
 use tryon::par::Par;
@@ -67,6 +68,7 @@ impl Job {
 /// The renderer of one try-on.
 #[derive(Default)]
 pub(crate) struct Engine {
+    card: Card,
     model: Model,
     work: Workspace,
     rest: RestBody,
@@ -77,10 +79,10 @@ pub(crate) struct Engine {
 }
 
 impl Engine {
-    pub(crate) fn new() -> Self {
+    pub(crate) fn new(card: Card) -> Self {
         // The contract says letterboxed.
         let config = Config { framing: Framing::Contain, ..Config::default() };
-        Self { model: Model::new(config), ..Self::default() }
+        Self { card, model: Model::new(config), ..Self::default() }
     }
 
     /// Draws each size once and encodes each format once.
@@ -114,7 +116,7 @@ impl Engine {
                 body,
                 output: size.map(|(w, h)| [w, h]),
             };
-            let (image, _) = render(&self.model, &input, &mut self.work).map_err(|e| e.to_string())?;
+            let (image, _) = self.card.draw(&self.model, &input, &mut self.work).map_err(|e| e.to_string())?;
             drawn.push((size, image));
         }
         stages.push(stage("compositor.render", start));

@@ -1,9 +1,10 @@
 //! The compositor: the one address a kiosk or page talks to.
 //!
 //! One task owns one try-on (`try_on`): it opens the sessions behind it, joins frames, bodies and garments by epoch
-//! and sequence (`scene`), renders on the compute pool (`engine`) and gives every viewer its own queue
+//! and sequence (`scene`), renders on the compute pool (`engine`, on a `card` where there is one) and gives every viewer its own queue
 //! (`viewer`). The life of a try-on is `tryon::session`'s table. gRPC, gRPC-web and the page share one port.
 
+mod card;
 mod engine;
 mod life;
 pub mod page;

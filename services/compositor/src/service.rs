@@ -1,5 +1,6 @@
 //! The rpcs: check, find the try-on, answer.
 
+use crate::card::Card;
 use crate::engine::Encoding;
 use crate::try_on::{self, Command, Handle, Setup};
 use crate::upstream::{self, renamed};
@@ -29,6 +30,7 @@ pub(crate) struct Compositor {
     config: CompositorConfig,
     ctx: Context,
     cloth: Channel,
+    card: Card,
 }
 
 impl Compositor {
@@ -39,7 +41,9 @@ impl Compositor {
         };
         channel(&config.tracking).map_err(fault("tracking"))?;
         let cloth = channel(&config.cloth).map_err(fault("cloth"))?;
-        Ok(Self { try_ons: Sessions::new(config.max_try_ons), config: config.clone(), ctx: ctx.clone(), cloth })
+        let card = Card::open(config.renderer)
+            .map_err(|e| StartError::Config { key: "compositor.renderer".into(), why: e.to_string() })?;
+        Ok(Self { try_ons: Sessions::new(config.max_try_ons), config: config.clone(), ctx: ctx.clone(), cloth, card })
     }
 
     fn find(&self, id: &str) -> Result<Arc<Handle>, Status> {
@@ -92,6 +96,7 @@ impl CompositorService for Compositor {
             choices: choices.clone(),
             ctx: self.ctx.clone(),
             config: self.config.clone(),
+            card: self.card.clone(),
             directory: self.try_ons.clone(),
         };
         let created = match self.try_ons.open(&id, || try_on::spawn(setup())) {

@@ -1,5 +1,6 @@
 //! One try-on: its task, its life, its pictures.
 
+use crate::card::Card;
 use crate::engine::{Drawn, Encoding, Engine, Job, Placed};
 use crate::life;
 use crate::scene::{Body, Scene, not_after};
@@ -59,6 +60,7 @@ pub(crate) struct Setup {
     pub(crate) choices: Vec<GarmentChoice>,
     pub(crate) ctx: Context,
     pub(crate) config: CompositorConfig,
+    pub(crate) card: Card,
     pub(crate) directory: Sessions<Handle>,
 }
 
@@ -98,7 +100,7 @@ async fn open(setup: Setup, inbox: mpsc::Receiver<Command>, outfit: watch::Recei
     let (tx, garments) = latest::channel();
     let b = tokio::spawn(upstream::follow(cloth.clone(), setup.id.clone(), outfit, tx));
     let (done, drawn) = mpsc::channel(1);
-    let (id, now) = (setup.id.clone(), Instant::now());
+    let (id, now, card) = (setup.id.clone(), Instant::now(), setup.card.clone());
     let limits = Limits {
         camera_silence_ns: setup.config.camera_silence_ms * 1_000_000,
         tracking_silence_ns: TRACKING_SILENCE.as_nanos() as u64,
@@ -123,7 +125,7 @@ async fn open(setup: Setup, inbox: mpsc::Receiver<Command>, outfit: watch::Recei
         scene: Scene::default(),
         last: None,
         viewers: Vec::new(),
-        engine: Some(Engine::new()),
+        engine: Some(Engine::new(card)),
         pending: None,
         done,
     };
@@ -490,7 +492,7 @@ impl Task {
 
     fn drawn(&mut self, d: Done) {
         // Not the default: a new engine letterboxes, as the contract says.
-        self.engine = d.engine.or_else(|| Some(Engine::new()));
+        self.engine = d.engine.or_else(|| Some(Engine::new(self.setup.card.clone())));
         match d.outcome {
             Ok(drawn) => {
                 record_stages("compositor", &drawn.stages);

@@ -198,6 +198,21 @@ pub struct CompositorConfig {
     pub camera_silence_ms: u64,
     /// Milliseconds after which garments are too old to be shown.
     pub garments_late_ms: u64,
+    /// auto, cpu or gpu.
+    pub renderer: RendererChoice,
+}
+
+/// Where pictures are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RendererChoice {
+    /// On a real graphics card if there is one, else on the processor.
+    #[default]
+    Auto,
+    /// On the processor.
+    Cpu,
+    /// On any adapter, software included; none is an error at the start.
+    Gpu,
 }
 
 impl Default for CompositorConfig {
@@ -213,6 +228,7 @@ impl Default for CompositorConfig {
             idle_s: 30,
             camera_silence_ms: 700,
             garments_late_ms: 700,
+            renderer: RendererChoice::Auto,
         }
     }
 }
