@@ -1,198 +1,272 @@
-//! Tracks depth folders and prints the joint error against `truth.json`, for development and benchmarks.
+//! Tracks depth folders and prints every measure of error against their truth, for development and benchmarks.
 //!
-//! `cargo run --release --example track_sequences -- [--body FILE] [--set JSON] [--overlay DIR] [--jsonl DIR] FOLDER…`
+//! `cargo run --release --example track_sequences -- [--body FILE]… [--set JSON]… [--synth] [--frames N] [--still N]
+//! [--corrupt SHARE] [--thin SHARE] [--nth N] [--cut SHARE] [--overlay DIR] [--every N] [--jsonl DIR] [--stages] [-v] FOLDER…`
+//!
+//! Each combination of body and settings is run on each folder and, with `--synth`, on the synthetic scenes.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 use tryon::body::{BoneTransforms, Template, import::template_from_smpl};
-use tryon::camera::{Calibration, ColorImage, Intrinsics, RgbdFrame};
-use tryon::formats::image::{read_png_depth, write_png_rgb};
+use tryon::camera::{ColorImage, RgbdFrame};
+use tryon::evaluate::tracking::{follow, mean, median};
+use tryon::evaluate::{Scene, scenes};
+use tryon::formats::image::write_png_rgb;
 use tryon::formats::npz::read_smpl;
+use tryon::mesh::face_normal;
 use tryon::raster::{View, VisibilityBuffer, rasterise};
-use tryon::tracking::{StepReport, TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace};
 
-#[derive(serde::Deserialize)]
-struct Truth {
-    joint_names: Vec<String>,
-    joints: Vec<Vec<[f64; 3]>>,
+#[derive(Default)]
+struct Args {
+    bodies: Vec<PathBuf>,
+    settings: Vec<String>,
+    folders: Vec<PathBuf>,
+    synth: bool,
+    frames: Option<usize>,
+    still: usize,
+    overlay: Option<PathBuf>,
+    every: usize,
+    jsonl: Option<PathBuf>,
+    stages: bool,
+    corrupt: f64,
+    thin: f64,
+    nth: usize,
+    cut: f64,
+    verbose: bool,
 }
 
 fn main() {
+    let shared = PathBuf::from(std::env::var("TRYON_SHARED").unwrap_or_else(|_| "../shared".into()));
+    let mut a = Args { still: 10, every: 15, nth: 1, cut: 1.0, ..Args::default() };
     let mut args = std::env::args().skip(1);
-    let shared = std::env::var("TRYON_SHARED").unwrap_or_else(|_| "../shared".into());
-    let mut body = PathBuf::from(shared).join("data/body/makehuman_smpl_layout/template.npz");
-    let mut jsonl = None;
-    let (mut config, mut overlay, mut folders, mut verbose) = (TrackerConfig::default(), None, vec![], false);
-    while let Some(a) = args.next() {
-        match a.as_str() {
-            "--body" => body = args.next().expect("a file").into(),
-            "--set" => config = serde_json::from_str(&args.next().expect("JSON")).expect("tracker settings"),
-            "--jsonl" => jsonl = Some(PathBuf::from(args.next().expect("a folder"))),
-            "--overlay" => overlay = Some(PathBuf::from(args.next().expect("a folder"))),
-            "-v" => verbose = true,
-            _ => folders.push(PathBuf::from(a)),
+    while let Some(word) = args.next() {
+        let mut next = || args.next().expect("a value");
+        match word.as_str() {
+            "--body" => a.bodies.push(next().into()),
+            "--set" => a.settings.push(next()),
+            "--frames" => a.frames = Some(next().parse().expect("a number")),
+            "--still" => a.still = next().parse().expect("a number"),
+            "--every" => a.every = next().parse().expect("a number"),
+            "--jsonl" => a.jsonl = Some(next().into()),
+            "--overlay" => a.overlay = Some(next().into()),
+            "--corrupt" => a.corrupt = next().parse().expect("a share"),
+            "--thin" => a.thin = next().parse().expect("a share"),
+            "--nth" => a.nth = next().parse().expect("a number"),
+            "--cut" => a.cut = next().parse().expect("a share"),
+            "--synth" => a.synth = true,
+            "--stages" => a.stages = true,
+            "-v" => a.verbose = true,
+            _ => a.folders.push(word.into()),
         }
     }
-    let template = if body.as_os_str() == "embedded" {
-        embedded()
-    } else {
-        Arc::new(template_from_smpl("body", &read_smpl(&body).expect("body")).expect("body"))
-    };
-    for folder in folders {
-        run(&template, &config, &folder, overlay.as_deref(), jsonl.as_deref(), verbose);
+    if a.bodies.is_empty() {
+        a.bodies.push(shared.join("data/body/makehuman_smpl_layout/template.npz"));
     }
-}
-
-fn embedded() -> Arc<Template> {
-    Arc::new(tryon::body::embedded::template().as_ref().clone())
-}
-
-fn run(
-    template: &Arc<Template>,
-    config: &TrackerConfig,
-    folder: &Path,
-    overlay: Option<&Path>,
-    jsonl: Option<&Path>,
-    verbose: bool,
-) {
-    let text = std::fs::read_to_string(folder.join("camera.json")).expect("camera.json");
-    let camera: Intrinsics = serde_json::from_str(&text).expect("camera.json");
-    let mut frames: Vec<PathBuf> =
-        std::fs::read_dir(folder.join("depth")).expect("depth").map(|e| e.expect("entry").path()).collect();
-    frames.sort();
-    let truth: Option<Truth> =
-        std::fs::read_to_string(folder.join("truth.json")).ok().map(|t| serde_json::from_str(&t).expect("truth.json"));
-    let model = TrackerModel::new(template.clone(), Calibration::registered(camera), config.clone());
-    let mut state = TrackerState::new(&model);
-    let mut workspace = Workspace::default();
-    let (mut errors, mut lost, mut times, mut per_joint) = (vec![], 0, vec![], vec![0.0; 64]);
-    let (mut stages, mut cpus) = ([0.0; 5], vec![]);
-    let mut lines = String::new();
-    for (i, path) in frames.iter().enumerate() {
-        let depth = read_png_depth(path).expect("depth");
-        let frame = RgbdFrame { sequence: i as u64, time_ns: i as u64 * 33_333_333, depth, color: None };
-        let (start, cpu) = (Instant::now(), cpu_ms());
-        let report: StepReport = step(&model, &mut state, &frame, &mut workspace).expect("step");
-        times.push(start.elapsed().as_secs_f64() * 1e3);
-        cpus.push(cpu_ms() - cpu);
-        let s = report.stages_ms;
-        [s.segment, s.place, s.pose, s.size, s.surface].iter().zip(&mut stages).for_each(|(a, b)| *b += a);
-        lost += usize::from(!state.status.is_live());
-        let mut bones = BoneTransforms::default();
-        let rest = workspace.rest_body(&model, &state.shape).clone();
-        state.pose.bones(template.skeleton(), &rest, &mut bones);
-        let joints: std::collections::BTreeMap<&str, [f64; 3]> = template
-            .skeleton()
-            .joints()
-            .iter()
-            .zip(&bones.joints)
-            .map(|(j, p)| (j.name.as_str(), p.coords.into()))
-            .collect();
-        lines += &serde_json::json!({ "frame": i, "status": state.status, "joints": joints }).to_string();
-        lines.push('\n');
-        let mut mean = f64::NAN;
-        if let Some(t) = &truth {
-            let off: Vec<f64> = t
-                .joint_names
-                .iter()
-                .zip(&t.joints[i])
-                .map(|(n, p)| {
-                    let j = template.skeleton().index(n).expect("joint");
-                    (bones.joints[j].coords - nalgebra::Vector3::from(*p)).norm() * 1e3
-                })
+    if a.settings.is_empty() {
+        a.settings.push("{}".into());
+    }
+    let bodies: Vec<Arc<Template>> = a.bodies.iter().map(|b| body(b)).collect();
+    let mut all: Vec<Box<dyn Fn() -> Scene>> = vec![];
+    for folder in &a.folders {
+        if folder.join("joints.json").exists() {
+            for (template, path) in bodies.iter().zip(&a.bodies) {
+                for settings in &a.settings {
+                    stills(&a, template, settings, folder, &path.file_stem().unwrap_or_default().to_string_lossy());
+                }
+            }
+            continue;
+        }
+        let folder = folder.clone();
+        all.push(Box::new(move || Scene::open(&folder).expect("a scene")));
+    }
+    if a.synth {
+        for name in scenes::unseen_names() {
+            let data = shared.join("data");
+            all.push(Box::new(move || scenes::unseen(&data, name).expect("a scene")));
+        }
+    }
+    for make in all {
+        let mut scene = make();
+        if scene.frames.len() == 1 {
+            // A still is shown over and over.
+            let one = scene.frames[0].clone();
+            scene.frames = (0..a.still as u64)
+                .map(|i| RgbdFrame { sequence: i, time_ns: i * 33_333_333, ..one.clone() })
                 .collect();
-            mean = off.iter().sum::<f64>() / off.len() as f64;
-            if i >= 30 {
-                errors.push(mean);
-                off.iter().zip(&mut per_joint).for_each(|(o, s)| *s += o);
+        }
+        scene.frames.truncate(a.frames.unwrap_or(usize::MAX));
+        if a.corrupt > 0.0 {
+            scene = scene.corrupted(a.corrupt);
+        }
+        if a.thin > 0.0 {
+            scene = scene.thinned(a.thin);
+        }
+        if a.nth > 1 {
+            scene = scene.every(a.nth);
+        }
+        if a.cut < 1.0 {
+            scene = scene.cut_below(a.cut);
+        }
+        for (template, path) in bodies.iter().zip(&a.bodies) {
+            for settings in &a.settings {
+                let config: TrackerConfig = serde_json::from_str(settings).expect("tracker settings");
+                let label = if a.settings.len() * bodies.len() > 1 {
+                    format!(" {} {settings}", path.file_stem().unwrap_or_default().to_string_lossy())
+                } else {
+                    String::new()
+                };
+                run(&a, template, &config, &scene, &label);
             }
         }
-        if verbose {
+    }
+}
+
+fn body(path: &Path) -> Arc<Template> {
+    if path.as_os_str() == "embedded" {
+        return tryon::body::embedded::template();
+    }
+    Arc::new(template_from_smpl("body", &read_smpl(path).expect("body")).expect("body"))
+}
+
+fn run(a: &Args, template: &Arc<Template>, config: &TrackerConfig, scene: &Scene, label: &str) {
+    let mut lines = String::new();
+    let out = follow(template, config, scene, |i, model, state, report, workspace| {
+        if a.jsonl.is_some() {
+            let rest = workspace.rest_body(model, &state.shape).clone();
+            let mut bones = BoneTransforms::default();
+            state.pose.bones(template.skeleton(), &rest, &mut bones);
+            let joints: std::collections::BTreeMap<&str, [f64; 3]> = template
+                .skeleton()
+                .joints()
+                .iter()
+                .zip(&bones.joints)
+                .map(|(j, p)| (j.name.as_str(), p.coords.into()))
+                .collect();
+            lines += &serde_json::json!({ "frame": i, "status": state.status, "joints": joints }).to_string();
+            lines.push('\n');
+        }
+        if a.verbose {
+            let rest = workspace.rest_body(model, &state.shape).clone();
+            let mut bones = BoneTransforms::default();
+            state.pose.bones(template.skeleton(), &rest, &mut bones);
+            let off: Vec<f64> = scene.truth.get(i).map_or(vec![], |t| {
+                let at = |n: &String| bones.joints[template.skeleton().index(n).expect("joint")];
+                scene.joint_names.iter().zip(&t.joints).map(|(n, p)| (at(n) - p).norm() * 1e3).collect()
+            });
+            let s = report.stages_ms;
             println!(
-                "{i:4} {:?} err {mean:6.1} it {:2} res {:5.2} expl {:.2} match {:.2} cells {} ms {:.2} (seg {:.2} pose {:.2} surf {:.2})",
+                "{i:4} {:?} err {:6.1} it {:2} res {:5.2} expl {:.2} match {:.2} cells {} seg {:.2} pose {:.2} size {:.2} surf {:.2}",
                 state.status,
+                mean(&off),
                 report.iterations,
                 report.residual_mm,
                 report.explained,
                 report.matched,
                 report.person_cells,
-                times[i],
                 s.segment,
                 s.pose,
+                s.size,
                 s.surface
             );
         }
-        if let Some(dir) = overlay.filter(|_| i % 15 == 0 || i + 1 == frames.len()) {
+        if let Some(dir) = a.overlay.as_ref().filter(|_| i % a.every == 0 || i + 1 == scene.frames.len()) {
             std::fs::create_dir_all(dir).expect("overlay folder");
-            let name = folder.file_name().expect("name").to_string_lossy().into_owned();
-            let (vertices, _) = workspace.posed(&model, &state);
-            let view = View::Perspective { camera, near: 0.1 };
-            let mut buffer = VisibilityBuffer::default();
-            rasterise(&view, vertices, template.mesh().faces(), &mut buffer);
-            let mut image = ColorImage::filled(camera.width, camera.height, [0, 0, 0]);
-            for (k, d) in frame.depth.data().iter().enumerate() {
-                let z = f32::from(*d) * 1e-3;
-                let shade = if z > 0.0 { (240.0 - (z - 1.2) * 70.0).clamp(20.0, 240.0) as u8 } else { 0 };
-                let mut rgb = [shade; 3];
-                if buffer.face[k] != VisibilityBuffer::NONE {
-                    let f = template.mesh().faces()[buffer.face[k] as usize];
-                    let n = tryon::mesh::face_normal(vertices, &f).normalize();
-                    let l = (-n.z).clamp(0.0, 1.0);
-                    rgb = [
-                        (f32::from(shade) * 0.5) as u8,
-                        (l * 160.0) as u8 / 2 + shade / 3,
-                        (l * 120.0) as u8 + shade / 4,
-                    ];
-                }
-                image.data_mut()[3 * k..3 * k + 3].copy_from_slice(&rgb);
-            }
-            write_png_rgb(&dir.join(format!("{name}_{i:04}.png")), &image).expect("png");
+            let image = overlay(template, model, state, workspace, scene, i);
+            write_png_rgb(&dir.join(format!("{}_{i:04}.png", scene.name)), &image).expect("png");
         }
-    }
-    if let Some(dir) = jsonl {
+    });
+    if let Some(dir) = &a.jsonl {
         std::fs::create_dir_all(dir).expect("jsonl folder");
-        let name = folder.file_name().expect("name").to_string_lossy().into_owned();
-        std::fs::write(dir.join(name + ".jsonl"), lines).expect("jsonl");
+        std::fs::write(dir.join(format!("{}.jsonl", scene.name)), lines).expect("jsonl");
     }
-    let n = errors.len().max(1) as f64;
-    let steady: Vec<f64> = times.iter().skip(75.min(times.len() / 2)).copied().collect();
-    let mut sorted = errors.clone();
-    sorted.sort_by(f64::total_cmp);
+    let size: f64 = out.stages.iter().map(|s| s.size).fold(0.0, f64::max);
     println!(
-        "{}: mean {:.1} mm, p50 {:.1}, worst {:.1}, lost {lost}/{}, steady {:.2} ms/frame, of it on the processor {:.2} (first {:.0}), stages/frame seg {:.2} place {:.2} pose {:.2} size {:.2} surf {:.2}",
-        folder.file_name().expect("name").to_string_lossy(),
-        errors.iter().sum::<f64>() / n,
-        sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN),
-        sorted.last().copied().unwrap_or(f64::NAN),
-        frames.len(),
-        steady.iter().sum::<f64>() / steady.len() as f64,
-        cpus.iter().skip(75.min(cpus.len() / 2)).sum::<f64>() / steady.len() as f64,
-        times[0],
-        stages[0] / times.len() as f64,
-        stages[1] / times.len() as f64,
-        stages[2] / times.len() as f64,
-        stages[3] / times.len() as f64,
-        stages[4] / times.len() as f64,
+        "{}{label}: joints {:.1} mm (worst frame {:.1}), visible {:.1}, whole {:.1}, vertices {:.1} mm, bones {:.1} %, lost {}, found {:?}, step {:.2} ms, pose+skin {:.2}, size {size:.0}, residual {:.2}",
+        scene.name,
+        mean(&out.joints_mm),
+        out.joints_mm.iter().copied().fold(f64::NAN, f64::max),
+        out.visible_mm,
+        out.whole_mm,
+        out.vertices_mm,
+        out.bones_percent,
+        out.lost,
+        out.found,
+        out.steady_ms(),
+        out.stage_ms(|s| s.pose) + out.posing_ms(),
+        out.last.as_ref().map_or(f64::NAN, |r| r.residual_mm),
     );
-    if verbose {
-        if let Some(t) = &truth {
-            let list: Vec<String> =
-                t.joint_names.iter().zip(&per_joint).map(|(n, s)| format!("{n} {:.0}", s / n_of(&errors))).collect();
-            println!("  per joint: {}", list.join(", "));
-        }
-        println!("  coefficients {:.2?}", state.shape.coefficients);
-        println!("  scales {:.3?}", state.shape.bone_scales);
+    if a.stages {
+        let iterations = out.last.as_ref().map_or(0, |r| r.iterations);
+        println!(
+            "  stages: segment {:.2}, pose {:.2}, size {:.2}, surface {:.2}, skin {:.2}; first frame place {:.1}, size {:.1}; {iterations} iterations at the end",
+            out.stage_ms(|s| s.segment),
+            out.stage_ms(|s| s.pose),
+            out.stage_ms(|s| s.size),
+            out.stage_ms(|s| s.surface),
+            out.posing_ms(),
+            out.stages.iter().map(|s| s.place).fold(0.0, f64::max),
+            size,
+        );
+    }
+    if a.verbose || a.stages {
+        let list: Vec<String> =
+            scene.joint_names.iter().zip(&out.per_joint_mm).map(|(n, s)| format!("{n} {s:.0}")).collect();
+        println!("  per joint: {}", list.join(", "));
     }
 }
 
-fn n_of(errors: &[f64]) -> f64 {
-    errors.len().max(1) as f64
+fn stills(a: &Args, template: &Arc<Template>, settings: &str, folder: &Path, label: &str) {
+    let config: TrackerConfig = serde_json::from_str(settings).expect("tracker settings");
+    let scene = a.overlay.as_ref().map(|_| Scene::open(folder).expect("a scene"));
+    let out = tryon::evaluate::stills::stills(template, &config, folder, a.still as u64, |i, m, state, w, _, share| {
+        if a.verbose {
+            println!("{i:4} {:?} within {:.2}", state.status, share);
+        }
+        if let (Some(dir), Some(scene)) = (&a.overlay, &scene) {
+            std::fs::create_dir_all(dir).expect("overlay folder");
+            let image = overlay(template, m, state, w, scene, i);
+            write_png_rgb(&dir.join(format!("still_{i:04}.png")), &image).expect("png");
+        }
+    })
+    .expect("stills");
+    println!(
+        "{} {label} {settings}: {:.1} % of joints within 10 cm, found {} of {}, first step {:.0} ms (median)",
+        folder.file_name().unwrap_or_default().to_string_lossy(),
+        mean(&out.within) * 100.0,
+        out.found,
+        out.within.len(),
+        median(&out.start_ms),
+    );
+    let list: Vec<String> = out.per_joint.iter().map(|(n, s)| format!("{n} {:.0}", s * 100.0)).collect();
+    println!("  {}", list.join(", "));
 }
 
-/// Time this thread has spent on a processor (Linux), milliseconds: what counts on a busy machine.
-fn cpu_ms() -> f64 {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    text.split_whitespace().next().and_then(|n| n.parse::<f64>().ok()).unwrap_or(f64::NAN) * 1e-6
+fn overlay(
+    template: &Template,
+    model: &TrackerModel,
+    state: &TrackerState,
+    workspace: &mut Workspace,
+    scene: &Scene,
+    i: usize,
+) -> ColorImage {
+    let camera = scene.calibration.depth;
+    let (vertices, _) = workspace.posed(model, state);
+    let view = View::Perspective { camera, near: 0.1 };
+    let mut buffer = VisibilityBuffer::default();
+    rasterise(&view, vertices, template.mesh().faces(), &mut buffer);
+    let mut image = ColorImage::filled(camera.width, camera.height, [0, 0, 0]);
+    for (k, d) in scene.frames[i].depth.data().iter().enumerate() {
+        let z = f32::from(*d) * 1e-3;
+        let shade = if z > 0.0 { (240.0 - (z - 1.2) * 70.0).clamp(20.0, 240.0) as u8 } else { 0 };
+        let mut rgb = [shade; 3];
+        if buffer.face[k] != VisibilityBuffer::NONE {
+            let f = template.mesh().faces()[buffer.face[k] as usize];
+            let l = (-face_normal(vertices, &f).normalize().z).clamp(0.0, 1.0);
+            rgb = [(f32::from(shade) * 0.5) as u8, (l * 160.0) as u8 / 2 + shade / 3, (l * 120.0) as u8 + shade / 4];
+        }
+        image.data_mut()[3 * k..3 * k + 3].copy_from_slice(&rgb);
+    }
+    image
 }

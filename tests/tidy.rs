@@ -83,6 +83,7 @@ const DOORS: &[(&str, &[&str])] = &[
     ("zune_jpeg", &["src/formats/"]),
     ("jpeg_encoder", &["src/formats/"]),
     ("npyz", &["src/formats/"]),
+    ("plotters", &["src/evaluate/"]),
     ("zstd", &["src/formats/"]),
     // docs/hindsight.md: MCAP channels carry foxglove protobuf messages, so formats encodes those few itself.
     ("prost", &["proto/", "src/formats/foxglove.rs"]),

@@ -1,1 +1,16 @@
 //! Run time against error: standard scenes, methods side by side, tables and plots behind `tryon bench`.
+//!
+//! A benchmark fills a [`Table`]; [`Table::write`] leaves it as CSV, JSON and one SVG plot per measure of error.
+
+pub mod ablation;
+mod plot;
+mod scene;
+pub mod scenes;
+mod spoil;
+pub mod stills;
+mod table;
+pub mod tracking;
+
+pub use plot::run_time_against_error;
+pub use scene::{Scene, SceneTruth};
+pub use table::{EvaluateError, Row, Table};

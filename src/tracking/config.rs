@@ -29,6 +29,8 @@ pub struct TrackerConfig {
     pub calibration_frames: u32,
     /// Fit surface displacements (section 3.3).
     pub displacements: bool,
+    /// Track the pose with the displaced surface (the paper's way) instead of the body without displacements.
+    pub displaced_pose: bool,
     /// Displacements are updated at every n-th frame.
     pub displacement_interval: u32,
     /// Predict the pose from the last two frames.
@@ -61,6 +63,7 @@ impl Default for TrackerConfig {
             adapt_size: true,
             calibration_frames: 60,
             displacements: true,
+            displaced_pose: false,
             displacement_interval: 3,
             predict: true,
             pull: true,

@@ -42,7 +42,8 @@ impl Workspace {
             self.rest = model.template.personalise(shape);
         }
         let pick = |v: &u32| *v as usize;
-        self.samples.positions = model.samples.iter().map(|v| self.rest.vertices[pick(v)]).collect();
+        let surface = if model.config.displaced_pose { &self.rest.vertices } else { &self.rest.base };
+        self.samples.positions = model.samples.iter().map(|v| surface[pick(v)]).collect();
         self.samples.normals = model.samples.iter().map(|v| self.rest.normals[pick(v)]).collect();
         self.cached = Some(shape.clone());
         &self.rest

@@ -1,0 +1,190 @@
+//! What each part of the tracker earns: one setting changed at a time, run time beside error.
+
+use super::tracking::follow;
+use super::{EvaluateError, Row, Scene, scenes};
+use crate::body::{Template, embedded};
+use crate::camera::NoiseModel;
+use crate::registration::Association;
+use crate::synth::{Room, Sequence, Setting, Shopper};
+use crate::tracking::TrackerConfig;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// How much is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Extent {
+    /// Every variant on every scene.
+    #[default]
+    Full,
+    /// A few variants on the first part of one scene.
+    Quick,
+}
+
+/// A tracker to measure.
+#[derive(Clone, Debug)]
+pub struct Variant {
+    /// What is varied; joined in plots.
+    pub method: &'static str,
+    /// Its value.
+    pub value: String,
+    /// The whole setting.
+    pub config: TrackerConfig,
+}
+
+/// Where frames come from, made only when they are needed.
+#[derive(Clone, Debug)]
+enum Source {
+    Folder(PathBuf),
+    Unseen(PathBuf, &'static str),
+    Embedded(NoiseModel),
+}
+
+/// What will be measured.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    template: Arc<Template>,
+    sources: Vec<Source>,
+    variants: Vec<Variant>,
+    frames: usize,
+}
+
+/// Frames of each scene in a quick run: calibration and a little more.
+const QUICK_FRAMES: usize = 50;
+/// Frames of the synthetic scene of the embedded body.
+const EMBEDDED_FRAMES: u64 = 180;
+
+/// Every variant: the default first, then one thing changed at a time, then the paper's own form.
+pub fn variants() -> Vec<Variant> {
+    let mut out = Vec::new();
+    let mut add = |method, value: &str, change: &dyn Fn(&mut TrackerConfig)| {
+        let mut config = TrackerConfig::default();
+        change(&mut config);
+        out.push(Variant { method, value: value.to_owned(), config });
+    };
+    add("default", "", &|_| {});
+    for n in [1usize, 2, 4, 8, 16] {
+        add("iterations", &n.to_string(), &|c| c.iterations = n);
+    }
+    for n in [400usize, 800, 1600, 3200] {
+        add("samples", &n.to_string(), &|c| c.samples = n);
+    }
+    for n in [1usize, 2, 4, 8] {
+        add("data step", &n.to_string(), &|c| c.data_step = n);
+    }
+    for n in [2u32, 4, 8] {
+        add("pixels per cell", &n.to_string(), &|c| c.stride = Some(n));
+    }
+    add("association", "projective", &|c| c.association = Association::Projective);
+    add("association", "kd-tree", &|c| c.association = Association::KdTree);
+    add("metric", "plane + 0.1 point", &|_| {});
+    add("metric", "plane", &|c| c.point_to_point = 0.0);
+    add("metric", "point", &|c| (c.point_to_point, c.point_to_plane) = (1.0, 0.0));
+    add("edges", "none", &|c| c.edge_weight = 0.0);
+    add("edges", "weight 1", &|c| c.edge_weight = 1.0);
+    add("prediction", "off", &|c| c.predict = false);
+    add("pull", "off", &|c| c.pull = false);
+    add("size", "off", &|c| c.adapt_size = false);
+    add("displacements", "off", &|c| c.displacements = false);
+    out
+}
+
+/// Scenes and variants: with `data`, the shared sequences and unseen ones with its bodies and motions, tracked with its
+/// template; without, the embedded body before two cameras.
+///
+/// # Errors
+/// When the template of `data` cannot be read.
+pub fn plan(data: Option<&Path>, extent: Extent) -> Result<Plan, EvaluateError> {
+    let (template, mut sources) = match data {
+        Some(data) => {
+            let folders = ["charleston_m_heavy_tof_room", "jacks_f_avg_kinect1_room", "sword_m_tall_tof_noroom_upper"];
+            let mut sources: Vec<Source> =
+                folders.iter().map(|f| Source::Folder(data.join("sequences").join(f))).collect();
+            sources.extend(scenes::unseen_names().map(|n| Source::Unseen(data.to_owned(), n)));
+            (scenes::subject(data, "template")?, sources)
+        }
+        None => {
+            let sources = [NoiseModel::KinectV1, NoiseModel::TimeOfFlight].map(Source::Embedded);
+            (embedded::template(), sources.to_vec())
+        }
+    };
+    let mut variants = variants();
+    let mut frames = usize::MAX;
+    if extent == Extent::Quick {
+        sources.truncate(1);
+        frames = QUICK_FRAMES;
+        variants.retain(|v| ["default", "iterations", "association"].contains(&v.method));
+    }
+    Ok(Plan { template, sources, variants, frames })
+}
+
+impl Source {
+    fn scene(&self) -> Result<Scene, EvaluateError> {
+        match self {
+            Self::Folder(path) => Scene::open(path),
+            Self::Unseen(data, name) => scenes::unseen(data, name),
+            Self::Embedded(noise) => {
+                let setting =
+                    Setting { noise: *noise, color: false, room: Some(Room::default()), ..Setting::default() };
+                let sequence = Sequence::new(Shopper::default(), setting);
+                let name = if *noise == NoiseModel::KinectV1 { "synthetic_kinect1" } else { "synthetic_tof" };
+                Ok(Scene::synthetic(name, &sequence, EMBEDDED_FRAMES))
+            }
+        }
+    }
+}
+
+impl Plan {
+    /// How many rows [`Plan::run`] gives.
+    pub fn runs(&self) -> usize {
+        self.sources.len() * self.variants.len()
+    }
+    /// Measures scene by scene, all variants on each; `done` takes every row as it is ready.
+    ///
+    /// # Errors
+    /// Names the scene that cannot be read.
+    pub fn run(&self, mut done: impl FnMut(Row)) -> Result<(), EvaluateError> {
+        for source in &self.sources {
+            let mut scene = source.scene()?;
+            scene.frames.truncate(self.frames);
+            for v in &self.variants {
+                let outcome = follow(&self.template, &v.config, &scene, |_, _, _, _, _| {});
+                let mut row = outcome.row(&scene, v.method);
+                row.parameters.push(("value".to_owned(), v.value.clone()));
+                done(row);
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn variants_differ_in_name_and_start_with_the_default() {
+        let all = variants();
+        assert_eq!(all[0].config, TrackerConfig::default());
+        for (i, a) in all.iter().enumerate() {
+            assert!(all[..i].iter().all(|b| (a.method, &a.value) != (b.method, &b.value)), "{} {}", a.method, a.value);
+        }
+    }
+
+    #[test]
+    fn a_quick_plan_measures_the_embedded_body_and_a_bad_folder_is_named() {
+        let mut plan = plan(None, Extent::Quick).expect("embedded");
+        plan.variants.truncate(1);
+        plan.frames = 34;
+        let mut rows = Vec::new();
+        plan.run(|r| rows.push(r)).expect("runs");
+        assert_eq!((rows.len(), plan.runs()), (1, 1));
+        let error = rows[0].get("joints_mm").expect("compared");
+        // The very body that made the scene: a few millimetres.
+        assert!(error > 0.1 && error < 40.0, "{error} mm");
+        assert!(plan_fails());
+    }
+
+    fn plan_fails() -> bool {
+        matches!(plan(Some(Path::new("/nowhere")), Extent::Quick), Err(EvaluateError::Scene { scene, .. }) if scene == "template")
+    }
+}

@@ -1,0 +1,99 @@
+//! What goes wrong in front of a camera, done to a scene on purpose.
+
+use super::{Scene, SceneTruth};
+use crate::camera::DepthImage;
+use rand::Rng;
+
+/// Chooses the pixels that are spoilt.
+const SEED: u64 = 41;
+
+impl Scene {
+    fn each_pixel(&mut self, mut f: impl FnMut(&mut rand_pcg::Pcg32, &mut u16)) {
+        for (i, frame) in self.frames.iter_mut().enumerate() {
+            let mut rng = rand_pcg::Pcg32::new(SEED, i as u64);
+            frame.depth.data_mut().iter_mut().for_each(|d| f(&mut rng, d));
+        }
+    }
+    /// A share of all pixels becomes random, saturated, very near or missing, in equal parts.
+    #[must_use]
+    pub fn corrupted(mut self, share: f64) -> Self {
+        self.each_pixel(|rng, d| {
+            if rng.random::<f64>() < share {
+                *d = match rng.random_range(0..4) {
+                    0 => rng.random_range(300..6000),
+                    1 => u16::MAX,
+                    2 => 500,
+                    _ => 0,
+                };
+            }
+        });
+        self
+    }
+    /// A share of all pixels gives no reading.
+    #[must_use]
+    pub fn thinned(mut self, share: f64) -> Self {
+        self.each_pixel(|rng, d| {
+            if rng.random::<f64>() < share {
+                *d = 0;
+            }
+        });
+        self
+    }
+    /// Only every n-th frame arrives, at its own time.
+    #[must_use]
+    pub fn every(mut self, n: usize) -> Self {
+        let mut i = 0;
+        self.frames.retain(|_| {
+            i += 1;
+            (i - 1) % n.max(1) == 0
+        });
+        self.truth = self.truth.into_iter().step_by(n.max(1)).collect();
+        self
+    }
+    /// The frames of a range show nothing; nobody is expected to be seen in them.
+    #[must_use]
+    pub fn blind(mut self, range: std::ops::Range<usize>) -> Self {
+        for i in range {
+            if let Some(frame) = self.frames.get_mut(i) {
+                frame.depth = DepthImage::empty(frame.depth.width(), frame.depth.height());
+            }
+            if let Some(truth) = self.truth.get_mut(i) {
+                *truth = SceneTruth::default();
+            }
+        }
+        self
+    }
+    /// Rows from this one on (as a share of the height) give no reading.
+    #[must_use]
+    pub fn cut_below(mut self, share: f64) -> Self {
+        for frame in &mut self.frames {
+            let (w, h) = (frame.depth.width() as usize, frame.depth.height() as usize);
+            let from = (share.clamp(0.0, 1.0) * h as f64) as usize;
+            frame.depth.data_mut()[from * w..].fill(0);
+        }
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::{Routine, Sequence, Setting, Shopper};
+
+    #[test]
+    fn shares_are_kept_and_truth_goes_along() {
+        let setting = Setting { routine: Routine::Still, color: false, ..Setting::default() };
+        let scene = Scene::synthetic("still", &Sequence::new(Shopper::default(), setting), 5);
+        let readings = |s: &Scene| s.frames[1].depth.data().iter().filter(|d| **d > 0).count() as f64;
+        let all = readings(&scene);
+        assert!((readings(&scene.clone().thinned(0.9)) / all - 0.1).abs() < 0.01);
+        let spoilt = scene.clone().corrupted(0.1);
+        let changed = spoilt.frames[0].depth.data().iter().zip(scene.frames[0].depth.data()).filter(|(a, b)| a != b);
+        assert!((changed.count() as f64 / (640.0 * 480.0) - 0.098).abs() < 0.02);
+        let halved = scene.clone().every(2);
+        assert_eq!((halved.frames.len(), halved.truth.len(), halved.frames[1].sequence), (3, 3, 2));
+        let blind = scene.clone().blind(1..3);
+        assert!(readings(&blind) == 0.0 && blind.truth[1].joints.is_empty() && !blind.truth[3].joints.is_empty());
+        assert!(scene.cut_below(0.5).frames[0].depth.data()[640 * 400..].iter().all(|d| *d == 0));
+    }
+}

@@ -1,0 +1,131 @@
+//! Unordered stills with root-relative joints (the form of ITOP): every picture is a start from nothing.
+
+use super::EvaluateError;
+use super::tracking::thread_ms;
+use crate::body::{BoneTransforms, Template};
+use crate::camera::RgbdFrame;
+use crate::math::P3d;
+use crate::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+use nalgebra::Vector3;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// A joint within this distance of the truth counts, metres (the measure of the published results).
+pub const WITHIN: f64 = 0.10;
+
+/// Names of ITOP's joints and ours; the mean of two is meant where there are two.
+const NAMES: [(&str, [&str; 2]); 15] = [
+    ("Head", ["head", "head_end"]),
+    ("Neck", ["neck", "neck"]),
+    ("R Shoulder", ["right_shoulder", "right_shoulder"]),
+    ("L Shoulder", ["left_shoulder", "left_shoulder"]),
+    ("R Elbow", ["right_elbow", "right_elbow"]),
+    ("L Elbow", ["left_elbow", "left_elbow"]),
+    ("R Hand", ["right_wrist", "right_hand_end"]),
+    ("L Hand", ["left_wrist", "left_hand_end"]),
+    ("Torso", ["spine1", "spine3"]),
+    ("R Hip", ["right_hip", "right_hip"]),
+    ("L Hip", ["left_hip", "left_hip"]),
+    ("R Knee", ["right_knee", "right_knee"]),
+    ("L Knee", ["left_knee", "left_knee"]),
+    ("R Foot", ["right_ankle", "right_foot"]),
+    ("L Foot", ["left_ankle", "left_foot"]),
+];
+
+/// What the stills showed.
+#[derive(Clone, Debug, Default)]
+pub struct StillsOutcome {
+    /// Pictures in which a person was found.
+    pub found: usize,
+    /// Share of joints within [`WITHIN`] of each picture; 0 where nobody was found.
+    pub within: Vec<f64>,
+    /// Joint names and their share.
+    pub per_joint: Vec<(String, f64)>,
+    /// Processor time of the first step of each picture, milliseconds.
+    pub start_ms: Vec<f64>,
+}
+
+#[derive(serde::Deserialize)]
+struct TruthFile {
+    joint_names: Vec<String>,
+    frames: Vec<TruthFrame>,
+}
+
+#[derive(serde::Deserialize)]
+struct TruthFrame {
+    frame: usize,
+    joints: Vec<[f64; 3]>,
+}
+
+/// Starts on each picture of an RGBD folder with `joints.json` and shows it `steps` times. `each` sees every result.
+///
+/// # Errors
+/// Names the file at fault.
+pub fn stills(
+    template: &Arc<Template>,
+    config: &TrackerConfig,
+    folder: &Path,
+    steps: u64,
+    mut each: impl FnMut(usize, &TrackerModel, &TrackerState, &mut Workspace, &RgbdFrame, f64),
+) -> Result<StillsOutcome, EvaluateError> {
+    let scene = super::Scene::open(folder)?;
+    let fault = |why: String| EvaluateError::Scene { scene: scene.name.clone(), why };
+    let text = std::fs::read_to_string(folder.join("joints.json")).map_err(|e| fault(format!("joints.json: {e}")))?;
+    let truth: TruthFile = serde_json::from_str(&text).map_err(|e| fault(format!("joints.json: {e}")))?;
+    let skeleton = template.skeleton();
+    let ours: Vec<Option<[usize; 2]>> = truth
+        .joint_names
+        .iter()
+        .map(|n| {
+            let (_, [a, b]) = NAMES.iter().find(|m| m.0 == n)?;
+            Some([skeleton.index(a)?, skeleton.index(b)?])
+        })
+        .collect();
+    let model = TrackerModel::new(template.clone(), scene.calibration.clone(), config.clone());
+    let mut workspace = Workspace::default();
+    let mut out = StillsOutcome::default();
+    let mut hits = vec![0.0; ours.len()];
+    let clock = Instant::now();
+    for t in &truth.frames {
+        let Some(picture) = scene.frames.get(t.frame) else { return Err(fault(format!("no picture {}", t.frame))) };
+        let mut state = TrackerState::new(&model);
+        let start = thread_ms(clock);
+        for i in 0..steps.max(1) {
+            let frame = RgbdFrame { sequence: i, time_ns: i * 33_333_333, ..picture.clone() };
+            step(&model, &mut state, &frame, &mut workspace).map_err(|e| fault(e.to_string()))?;
+            if i == 0 {
+                out.start_ms.push(thread_ms(clock) - start);
+            }
+        }
+        let live = state.status.is_live();
+        out.found += usize::from(live);
+        let mut share = 0.0;
+        if live {
+            let rest = workspace.rest_body(&model, &state.shape).clone();
+            let mut bones = BoneTransforms::default();
+            state.pose.bones(skeleton, &rest, &mut bones);
+            let pairs: Vec<(usize, P3d, P3d)> = ours
+                .iter()
+                .zip(&t.joints)
+                .enumerate()
+                .filter_map(|(k, (o, t))| {
+                    let [a, b] = (*o)?;
+                    Some((k, nalgebra::center(&bones.joints[a], &bones.joints[b]), P3d::from(*t)))
+                })
+                .collect();
+            let n = pairs.len().max(1) as f64;
+            let offset = pairs.iter().fold(Vector3::zeros(), |s, (_, p, t)| s + (p - t)) / n;
+            for (k, p, t) in &pairs {
+                let hit = f64::from(u8::from((p - t - offset).norm() < WITHIN));
+                hits[*k] += hit;
+                share += hit / n;
+            }
+        }
+        out.within.push(share);
+        each(t.frame, &model, &state, &mut workspace, picture, share);
+    }
+    let n = truth.frames.len().max(1) as f64;
+    out.per_joint = truth.joint_names.iter().zip(hits).map(|(n_, h)| (n_.clone(), h / n)).collect();
+    Ok(out)
+}

@@ -1,0 +1,278 @@
+//! How well and how fast a tracker follows a scene: the measures that every table of tracking uses.
+
+use super::{Row, Scene};
+use crate::body::{BoneTransforms, Template};
+use crate::camera::Intrinsics;
+use crate::math::{P3, P3d};
+use crate::mesh::Face;
+use crate::raster::{View, VisibilityBuffer, rasterise};
+use crate::spatial::PointTree;
+use crate::tracking::{StagesMs, StepReport, TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+use nalgebra::Vector3;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Joint errors count from this frame on: calibration is over.
+pub const FIRST_COMPARED: usize = 30;
+/// Steady run time counts from this frame on (or from the middle of a shorter scene): size and shape are settled.
+const FIRST_TIMED: usize = 75;
+/// A vertex of the truth is visible when the drawn truth is no farther in front of it than this, metres.
+const VISIBLE: f32 = 0.01;
+
+/// What one run found.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    /// Mean joint error of each frame from [`FIRST_COMPARED`] on, millimetres.
+    pub joints_mm: Vec<f64>,
+    /// Mean error of each joint of the truth, millimetres.
+    pub per_joint_mm: Vec<f64>,
+    /// Mean distance of the truth's visible vertices from the tracked surface, millimetres; NaN without truth.
+    pub visible_mm: f64,
+    /// The same over all vertices, unseen back included.
+    pub whole_mm: f64,
+    /// Mean distance between vertices of the same number, millimetres; NaN where the topologies differ.
+    pub vertices_mm: f64,
+    /// Mean relative error of bone lengths at the end, per cent.
+    pub bones_percent: f64,
+    /// Frames from the first with a pose on that have none.
+    pub lost: usize,
+    /// Frames until there was a pose; `None` when there never was one.
+    pub found: Option<usize>,
+    /// Processor time of each whole step, milliseconds.
+    pub step_ms: Vec<f64>,
+    /// Stages of each step.
+    pub stages: Vec<StagesMs>,
+    /// Processor time of posing all vertices, milliseconds.
+    pub skin_ms: Vec<f64>,
+    /// Report of the last step.
+    pub last: Option<StepReport>,
+}
+
+/// Mean of finite values; NaN without any.
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Median; NaN without values.
+pub fn median(values: &[f64]) -> f64 {
+    let mut v = values.to_vec();
+    v.sort_by(f64::total_cmp);
+    v.get(v.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// The part of per-frame values from which run time is taken.
+pub fn steady<T>(values: &[T]) -> &[T] {
+    &values[FIRST_TIMED.min(values.len() / 2)..]
+}
+
+impl Outcome {
+    /// Mean processor time of a whole steady step, displacements amortised, milliseconds.
+    pub fn steady_ms(&self) -> f64 {
+        // The system's clock of a thread ticks every few milliseconds: single values are rough, their mean is not.
+        mean(steady(&self.step_ms))
+    }
+    /// Time of one stage of the steady steps, milliseconds: the part of the processor time that the stage has in the
+    /// sum of all stages.
+    pub fn stage_ms(&self, stage: impl Fn(&StagesMs) -> f64) -> f64 {
+        let sum = |f: &dyn Fn(&StagesMs) -> f64| steady(&self.stages).iter().map(f).sum::<f64>();
+        self.steady_ms() * sum(&stage) / sum(&StagesMs::total)
+    }
+    /// Mean processor time of posing all vertices, milliseconds.
+    pub fn posing_ms(&self) -> f64 {
+        mean(steady(&self.skin_ms))
+    }
+    /// As a row of a table.
+    pub fn row(&self, scene: &Scene, method: &str) -> Row {
+        Row::new(&scene.name, method, self.steady_ms())
+            .error("joints_mm", mean(&self.joints_mm))
+            .error("worst_frame_mm", self.joints_mm.iter().copied().fold(f64::NAN, f64::max))
+            .error("visible_mm", self.visible_mm)
+            .error("whole_mm", self.whole_mm)
+            .error("vertices_mm", self.vertices_mm)
+            .error("bones_percent", self.bones_percent)
+            .error("lost", self.lost as f64)
+            .error("pose_ms", self.stage_ms(|s| s.pose) + self.posing_ms())
+    }
+}
+
+/// Time this thread has spent on a processor, milliseconds: what counts on a busy machine. Wall time where the system
+/// does not tell.
+pub fn thread_ms(start: Instant) -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let on_processor = text.split_whitespace().next().and_then(|n| n.parse::<f64>().ok()).map(|ns| ns * 1e-6);
+    on_processor.unwrap_or_else(|| start.elapsed().as_secs_f64() * 1e3)
+}
+
+/// Tracks a scene from its first frame on the calling thread. `each` sees every frame with the state after it.
+pub fn follow(
+    template: &Arc<Template>,
+    config: &TrackerConfig,
+    scene: &Scene,
+    mut each: impl FnMut(usize, &TrackerModel, &TrackerState, &StepReport, &mut Workspace),
+) -> Outcome {
+    let model = TrackerModel::new(template.clone(), scene.calibration.clone(), config.clone());
+    let mut state = TrackerState::new(&model);
+    let mut workspace = Workspace::default();
+    let skeleton = template.skeleton();
+    let joints: Vec<Option<usize>> = scene.joint_names.iter().map(|n| skeleton.index(n)).collect();
+    let mut out = Outcome { per_joint_mm: vec![0.0; joints.len()], ..Outcome::default() };
+    let clock = Instant::now();
+    let (mut visible, mut whole, mut vertices) = (vec![], vec![], vec![]);
+    let mut last_joints: Vec<P3d> = vec![];
+    for (i, frame) in scene.frames.iter().enumerate() {
+        let start = thread_ms(clock);
+        let Ok(report) = step(&model, &mut state, frame, &mut workspace) else { continue };
+        let stepped = thread_ms(clock);
+        let (posed, bones): (&[P3], BoneTransforms) = workspace.posed(&model, &state);
+        out.skin_ms.push(thread_ms(clock) - stepped);
+        out.step_ms.push(stepped - start);
+        out.stages.push(report.stages_ms);
+        let live = state.status.is_live();
+        let truth = scene.truth.get(i).filter(|t| !t.joints.is_empty());
+        if live && out.found.is_none() {
+            out.found = Some(i);
+        }
+        let nobody = !scene.truth.is_empty() && truth.is_none();
+        out.lost += usize::from(!live && out.found.is_some() && !nobody);
+        if let Some(truth) = truth.filter(|_| i >= FIRST_COMPARED) {
+            let off: Vec<f64> = joints
+                .iter()
+                .zip(&truth.joints)
+                .map(|(j, t)| j.map_or(f64::NAN, |j| (bones.joints[j] - t).norm() * 1e3))
+                .collect();
+            out.joints_mm.push(mean(&off));
+            out.per_joint_mm.iter_mut().zip(&off).for_each(|(s, o)| *s += o);
+            if !truth.vertices.is_empty() && live {
+                let faces = if scene.faces.is_empty() { template.mesh().faces() } else { &scene.faces };
+                let (v, w) = surface_errors(&scene.calibration.depth, truth, faces, posed, template);
+                visible.push(v);
+                whole.push(w);
+                if truth.vertices.len() == posed.len() && faces == template.mesh().faces() {
+                    let off: f64 = truth.vertices.iter().zip(posed).map(|(a, b)| f64::from((a - b).norm())).sum();
+                    vertices.push(off / posed.len() as f64 * 1e3);
+                }
+            }
+            last_joints = bones.joints.clone();
+        }
+        each(i, &model, &state, &report, &mut workspace);
+        out.last = Some(report);
+    }
+    let frames = out.joints_mm.len().max(1) as f64;
+    out.per_joint_mm.iter_mut().for_each(|s| *s /= frames);
+    (out.visible_mm, out.whole_mm, out.vertices_mm) = (mean(&visible), mean(&whole), mean(&vertices));
+    out.bones_percent = bone_error(template, scene, &joints, &last_joints);
+    out
+}
+
+/// Mean relative error of the lengths of all bones between compared joints, per cent.
+fn bone_error(template: &Template, scene: &Scene, joints: &[Option<usize>], ours: &[P3d]) -> f64 {
+    let Some(truth) = scene.truth.iter().rev().find(|t| !t.joints.is_empty()) else { return f64::NAN };
+    let skeleton = template.skeleton().joints();
+    let off: Vec<f64> = joints
+        .iter()
+        .enumerate()
+        .filter_map(|(k, j)| {
+            let parent = skeleton[(*j)?].parent?;
+            let above = joints.iter().position(|o| *o == Some(parent))?;
+            let length = (truth.joints[k] - truth.joints[above]).norm();
+            let got = (ours.get((*j)?)? - ours.get(parent)?).norm();
+            (length > 0.0).then(|| (got / length - 1.0).abs() * 100.0)
+        })
+        .collect();
+    mean(&off)
+}
+
+/// Mean distance of the truth's vertices from the tracked surface, millimetres: (those in view, all).
+fn surface_errors(
+    camera: &Intrinsics,
+    truth: &super::SceneTruth,
+    truth_faces: &[Face],
+    posed: &[P3],
+    template: &Template,
+) -> (f64, f64) {
+    let view = View::Perspective { camera: *camera, near: 0.1 };
+    let mut buffer = VisibilityBuffer::default();
+    rasterise(&view, &truth.vertices, truth_faces, &mut buffer);
+    let tree = PointTree::new(posed);
+    let (faces, around) = (template.mesh().faces(), template.topology().vertex_faces());
+    let (mut visible, mut seen, mut whole) = (0.0, 0usize, 0.0);
+    for p in &truth.vertices {
+        let Some((k, _)) = tree.nearest(p, f32::INFINITY) else { return (f64::NAN, f64::NAN) };
+        // The nearest point of the surface lies on a face of the nearest vertex, but for needles.
+        let d = around
+            .row(k)
+            .iter()
+            .map(|f| distance_to_triangle(p, faces[*f as usize].map(|v| posed[v as usize])))
+            .fold(f32::INFINITY, f32::min);
+        let d = f64::from(d) * 1e3;
+        whole += d;
+        let in_view = view.project(p).is_some_and(|[u, v, z]| {
+            let (u, v) = (u.round(), v.round());
+            let inside = u >= 0.0 && v >= 0.0 && u < buffer.width as f32 && v < buffer.height as f32;
+            inside && z < buffer.depth[v as usize * buffer.width as usize + u as usize] + VISIBLE
+        });
+        if in_view {
+            visible += d;
+            seen += 1;
+        }
+    }
+    (visible / seen as f64, whole / truth.vertices.len() as f64)
+}
+
+/// Distance of a point from a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
+fn distance_to_triangle(p: &P3, [a, b, c]: [P3; 3]) -> f32 {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
+    let at = |q: Vector3<f32>| (ap - q).norm();
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return at(Vector3::zeros());
+    }
+    let bp = p - b;
+    let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return at(ab);
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return at(ab * (d1 / (d1 - d3)));
+    }
+    let cp = p - c;
+    let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return at(ac);
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return at(ac * (d2 / (d2 - d6)));
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        return at(ab + (ac - ab) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))));
+    }
+    let n = 1.0 / (va + vb + vc);
+    at(ab * (vb * n) + ac * (vc * n))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_are_near_at_face_edge_and_corner() {
+        let t = [P3::new(0.0, 0.0, 0.0), P3::new(1.0, 0.0, 0.0), P3::new(0.0, 1.0, 0.0)];
+        let cases = [([0.2, 0.2, 0.5], 0.5), ([0.5, -0.3, 0.4], 0.5), ([-0.3, -0.4, 0.0], 0.5), ([2.0, 0.0, 0.0], 1.0)];
+        for (p, d) in cases {
+            assert!((distance_to_triangle(&P3::from(p), t) - d).abs() < 1e-6, "{p:?}");
+        }
+        let flat = [t[0], t[0], t[0]];
+        assert!(distance_to_triangle(&P3::new(0.0, 3.0, 4.0), flat) == 5.0, "a degenerate triangle is a point");
+    }
+
+    #[test]
+    fn medians_and_means_of_nothing_are_nan() {
+        assert!(mean(&[]).is_nan() && median(&[]).is_nan());
+        assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(steady(&[0; 200]).len(), 125);
+        assert_eq!(steady(&[0; 10]).len(), 5);
+    }
+}
