@@ -41,6 +41,19 @@ pub struct Skipped {
     pub cells: usize,
 }
 
+impl Skipped {
+    /// Each kind of work with its count, for counters.
+    pub fn counts(&self) -> [(&'static str, usize); 5] {
+        [
+            ("hidden points", self.hidden_points),
+            ("iterations", self.iterations),
+            ("displacements", self.displacements),
+            ("inconsistent pairs", self.inconsistent_pairs),
+            ("empty cells", self.cells),
+        ]
+    }
+}
+
 /// How one step went.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StepReport {

@@ -10,6 +10,7 @@ use tryon::garment::library as patterns;
 use tryon::math::{Camera, P3, Rigid, World};
 use tryon::par::Par;
 use tryon_kit::frames::stage;
+use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::body::pose_from_wire;
 use tryon_proto::convert::frame::stages_from_wire;
 use tryon_proto::convert::garment::{WornGarment, positions_to_wire, topology_to_wire};
@@ -120,6 +121,8 @@ impl Worn {
         let begun = Instant::now();
         let input = Input { body: &self.posed, dt: dt.clamp(DT.0, DT.1) };
         let report = realtime::step(&self.model, &mut self.state, &input, &mut self.work).map_err(|e| e.to_string())?;
+        let skipped = [("sleeping vertices", report.sleeping), ("factorisations", report.factorisations_skipped)];
+        record_skipped("cloth", skipped);
         let mut placed = self.placed(body);
         if let Some(why) = report.kept_last_good {
             placed.detail = why;

@@ -12,6 +12,7 @@ use tryon::formats::image::{encode_jpeg, encode_png_rgb};
 use tryon::math::{Camera, P3, Rigid, World};
 use tryon::par::Par;
 use tryon_kit::frames::{Exposure, stage};
+use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::body::pose_from_wire;
 use tryon_proto::convert::garment::{PlacedGarments, WornGarment};
 use tryon_proto::convert::request::PictureFormat;
@@ -116,7 +117,8 @@ impl Engine {
                 body,
                 output: size.map(|(w, h)| [w, h]),
             };
-            let (image, _) = self.card.draw(&self.model, &input, &mut self.work).map_err(|e| e.to_string())?;
+            let (image, report) = self.card.draw(&self.model, &input, &mut self.work).map_err(|e| e.to_string())?;
+            record_skipped("compositor", [("tiles", report.tiles_skipped)]);
             drawn.push((size, image));
         }
         stages.push(stage("compositor.render", start));

@@ -30,6 +30,13 @@ pub fn metrics() -> Option<&'static PrometheusHandle> {
     HANDLE.get_or_init(install).as_ref()
 }
 
+/// Counts work that a scene did not need as `tryon_skipped{service="…", what="…"}`.
+pub fn record_skipped<const N: usize>(service: &'static str, skipped: [(&'static str, usize); N]) {
+    for (what, n) in skipped {
+        metrics::counter!("tryon_skipped", "service" => service, "what" => what).increment(n as u64);
+    }
+}
+
 /// Records stage times as `tryon_stage_ms{stage="…"}`, those whose name starts with `service.`.
 pub fn record_stages(service: &str, stages: &[tryon_proto::v1::StageTime]) {
     for s in stages.iter().filter(|s| s.stage.split('.').next() == Some(service)) {

@@ -8,6 +8,7 @@ use tryon::camera::Calibration;
 use tryon::formats::npz;
 use tryon::tracking::{LostReason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace, step};
 use tryon_kit::frames::{Exposure, stage};
+use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::{body, geometry};
 use tryon_proto::v1::{self, DegradedReason, TrackingStatus};
 
@@ -75,6 +76,7 @@ impl Engine {
                     of("shape", s.size + s.surface),
                 ]);
                 (state.residual_mm, state.visible_points) = (r.residual_mm as f32, r.visible_points as u32);
+                record_skipped("tracking", r.skipped.counts());
                 state.iterations = r.iterations as u32;
                 let (status, reason) = words(self.state.status);
                 state.set_status(status);

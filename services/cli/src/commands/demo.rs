@@ -43,7 +43,9 @@ struct Report {
     live_latency_ms: Summary,
     /// Milliseconds by stage, live pictures only.
     stages_ms: BTreeMap<String, Summary>,
-    /// Counters of all services, skipped work among them.
+    /// Work that the scene did not need, by service and kind, over the whole run.
+    skipped: BTreeMap<String, f64>,
+    /// Counters of all services.
     counters: BTreeMap<String, f64>,
     /// How often each state was seen.
     states: BTreeMap<String, usize>,
@@ -107,6 +109,20 @@ async fn demo(args: &DemoArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// How counters of skipped work begin on the metrics page.
+const SKIPPED: &str = "tryon_skipped{";
+
+/// Counters of skipped work as `service: kind`.
+fn skipped(counters: &BTreeMap<String, f64>) -> BTreeMap<String, f64> {
+    let label = |k: &str, name: &str| {
+        let after = k.split_once(&format!("{name}=\""))?.1;
+        Some(after.split_once('"')?.0.to_owned())
+    };
+    (counters.iter().filter(|(k, _)| k.starts_with(SKIPPED)))
+        .filter_map(|(k, v)| Some((format!("{}: {}", label(k, "service")?, label(k, "what")?), *v)))
+        .collect()
+}
+
 fn summarise(args: &DemoArgs, received: &Received) -> Result<ExitCode> {
     let live: Vec<_> = received.pictures.iter().filter(|p| p.live).collect();
     let all_ms: Vec<f64> = received.pictures.iter().map(|p| p.latency_ms).collect();
@@ -135,7 +151,13 @@ fn summarise(args: &DemoArgs, received: &Received) -> Result<ExitCode> {
         latency_ms: Summary::of(&all_ms),
         live_latency_ms: Summary::of(&live_ms),
         stages_ms: stages.summaries(),
-        counters: received.counters.clone(),
+        skipped: skipped(&received.counters),
+        counters: received
+            .counters
+            .iter()
+            .filter(|(k, _)| !k.starts_with(SKIPPED))
+            .map(|(k, v)| (k.clone(), *v))
+            .collect(),
         states: received.states.clone(),
         garments: args.garments.clone(),
         peak_memory_bytes: peak_memory(),
