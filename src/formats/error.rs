@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum FormatError {
     /// The operating system refused.
-    #[error("{}: {source}", file.display())]
+    #[error("{}: {why}", file.display())]
     Io {
         /// The file.
         file: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
+        /// What the system said. Not a `source`, since the message says it already.
+        why: std::io::Error,
     },
     /// A field holds something that cannot be used.
     #[error("{}: `{field}`: {why}", file.display())]
@@ -28,7 +28,7 @@ pub enum FormatError {
 impl FormatError {
     /// An error of the operating system on `file`.
     pub fn io(file: &Path, source: std::io::Error) -> Self {
-        Self::Io { file: file.to_owned(), source }
+        Self::Io { file: file.to_owned(), why: source }
     }
     /// A bad field of `file`.
     pub fn field(file: &Path, field: impl Into<String>, why: impl Into<String>) -> Self {

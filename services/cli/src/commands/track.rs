@@ -2,7 +2,7 @@
 
 use crate::args::TrackArgs;
 use crate::input;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
@@ -48,7 +48,21 @@ fn track_all(
     let mut workspace = Workspace::default();
     let mut live = 0u64;
     let mut index = 0usize;
-    while let Some(frame) = source.next_frame()? {
+    let mut bad = 0usize;
+    loop {
+        let frame = match source.next_frame() {
+            Ok(Some(frame)) => frame,
+            Ok(None) => break,
+            Err(e) => {
+                // The recording goes on behind a bad frame; it is named, not hidden.
+                eprintln!("tryon: frame {index} is left out: {e}");
+                serde_json::to_writer(&mut *out, &json!({"frame": index, "status": "unreadable", "error": e.to_string()}))?;
+                out.write_all(b"\n")?;
+                bar.inc(1);
+                (index, bad) = (index + 1, bad + 1);
+                continue;
+            }
+        };
         let started = std::time::Instant::now();
         let report = step(model, &mut state, &frame, &mut workspace).with_context(|| format!("frame {index}"))?;
         let ms = started.elapsed().as_secs_f64() * 1e3;
@@ -62,6 +76,7 @@ fn track_all(
         index += 1;
     }
     bar.finish_and_clear();
+    ensure!(index > bad, "{}: no frame can be read", args.input.display());
     println!("{}: {live} of {index} frames with a live pose, in {}", args.input.display(), args.out.display());
     Ok(())
 }
