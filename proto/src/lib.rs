@@ -1,7 +1,7 @@
 //! The `tryon.v1` contracts: generated messages and services, and the only conversions between wire and domain.
 //!
 //! The protos in `proto/tryon/v1` are the reference; `src/gen` is made from them by
-//! `cargo run -p tryon-proto --example generate` and checked in.
+//! `cargo run -p tryon-proto-generate` and checked in.
 
 pub mod convert;
 pub mod keys;

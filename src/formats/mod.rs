@@ -11,11 +11,13 @@ mod motion;
 pub mod npy;
 pub mod npz;
 pub mod obj;
+mod position_codec;
 mod recording;
 mod rgbd_folder;
 
 pub use error::FormatError;
 pub use mcap_file::{McapReader, McapWriter};
 pub use motion::{MotionClip, read_motion};
+pub use position_codec::{PositionCoder, STEP as POSITION_STEP};
 pub use recording::{RgbdSource, open_recording};
 pub use rgbd_folder::{RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};

@@ -2,4 +2,5 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)] // tests stop at the first fault
 
 mod common;
+mod garment_stream;
 mod tracking;

@@ -2,13 +2,14 @@
 
 use super::{WireError, bulk, required};
 use crate::v1;
-use bytes::Bytes;
 use std::sync::Arc;
+use tryon::formats::{FormatError, PositionCoder};
 use tryon::math::P3;
 use tryon::mesh::Face;
 
 const MAX_VERTICES: u32 = 262_144;
 const MAX_FACES: u32 = 524_288;
+const MAX_DRAWN: u32 = 524_288;
 /// Most garments worn at once.
 pub const MAX_GARMENTS: usize = 8;
 
@@ -19,14 +20,24 @@ pub struct WornGarment {
     pub garment: String,
     /// Size worn.
     pub size: String,
-    /// Number of vertices.
+    /// Number of simulated vertices.
     pub vertices: usize,
-    /// Triangles, counter-clockwise seen from outside.
+    /// Simulated vertex under each drawn one.
+    pub drawn: Vec<u32>,
+    /// Triangles of drawn vertices, counter-clockwise seen from outside.
     pub faces: Vec<Face>,
-    /// Flat panel coordinates, metres, shape `[vertices]`.
+    /// Flat panel coordinates, metres, shape `[drawn]`.
     pub uvs: Vec<[f32; 2]>,
     /// Colours and pattern.
     pub look: v1::GarmentLook,
+}
+
+impl WornGarment {
+    /// One end of the stream of its positions.
+    fn coder(&self) -> PositionCoder {
+        let faces: Vec<Face> = self.faces.iter().map(|f| f.map(|i| self.drawn[i as usize])).collect();
+        PositionCoder::new(self.vertices, &faces)
+    }
 }
 
 /// Topology for the wire.
@@ -39,6 +50,8 @@ pub fn topology_to_wire(g: &WornGarment) -> v1::GarmentTopology {
         faces: bulk::write(g.faces.iter().copied()),
         uvs: bulk::write(g.uvs.iter().copied()),
         look: Some(g.look),
+        drawn_count: g.drawn.len() as u32,
+        drawn: bulk::write_flat(&g.drawn),
     }
 }
 
@@ -53,41 +66,78 @@ pub fn topology_from_wire(t: &v1::GarmentTopology) -> Result<WornGarment, WireEr
     if !(look.stripe_width.is_finite() && look.stripe_width >= 0.0) {
         return Err(WireError::new("garment_topology.look.stripe_width", "must be zero or positive"));
     }
+    let k = bulk::count("garment_topology.drawn_count", t.drawn_count, MAX_DRAWN)?;
+    let drawn: Vec<u32> =
+        bulk::read::<u32, 1>("garment_topology.drawn", k, &t.drawn)?.into_iter().map(|[v]| v).collect();
+    if let Some(i) = drawn.iter().position(|&v| v as usize >= vertices) {
+        let why = format!("{}, but there are {vertices} vertices", drawn[i]);
+        return Err(WireError::new(format!("garment_topology.drawn[{i}]"), why));
+    }
     Ok(WornGarment {
         garment: t.garment.clone(),
         size: t.size.clone(),
         vertices,
-        faces: bulk::faces("garment_topology.faces", m, vertices, &t.faces)?,
-        uvs: bulk::read("garment_topology.uvs", vertices, &t.uvs)?,
+        faces: bulk::faces("garment_topology.faces", m, k, &t.faces)?,
+        uvs: bulk::read("garment_topology.uvs", k, &t.uvs)?,
+        drawn,
         look,
     })
 }
 
-/// Positions for the wire, `f32[n][3]`.
-pub fn positions_to_wire(p: &[P3]) -> Bytes {
-    bulk::write(p.iter().map(|p| [p.x, p.y, p.z]))
+/// Simulated positions of each garment, metres, world frame.
+pub type Positions = Arc<Vec<Vec<P3>>>;
+
+/// Writes one stream of garment frames, for one reader: topology when the reader lacks it, then positions coded
+/// against what this reader got before.
+#[derive(Clone, Debug, Default)]
+pub struct GarmentWriter {
+    coders: Vec<PositionCoder>,
 }
 
-/// Positions of `vertices` points.
-///
-/// # Errors
-/// A wrong size, or the vertex that is not finite.
-pub fn positions_from_wire(b: &Bytes, vertices: usize) -> Result<Vec<P3>, WireError> {
-    Ok(bulk::read::<f32, 3>("garment_mesh.positions", vertices, b)?.into_iter().map(P3::from).collect())
+impl GarmentWriter {
+    /// Puts positions into `f`, with `keyframe` a new outfit's topology too.
+    ///
+    /// # Errors
+    /// Names the garment and vertex that cannot be coded, or says that positions do not fit the outfit.
+    pub fn write(
+        &mut self,
+        f: &mut v1::GarmentFrame,
+        keyframe: Option<&[Arc<WornGarment>]>,
+        positions: &[Vec<P3>],
+    ) -> Result<(), WireError> {
+        if let Some(worn) = keyframe {
+            self.coders = worn.iter().map(|w| w.coder()).collect();
+        }
+        if positions.len() != self.coders.len() {
+            let why = format!("positions of {} for an outfit of {}", positions.len(), self.coders.len());
+            return Err(WireError::new("garment_frame.garments", why));
+        }
+        f.garments.clear();
+        for (i, (p, coder)) in positions.iter().zip(&mut self.coders).enumerate() {
+            let bytes = coder.encode(p).map_err(|e| at(i, &e))?;
+            let topology = keyframe.map(|worn| topology_to_wire(&worn[i]));
+            f.garments.push(v1::GarmentMesh { topology, positions: bytes.into() });
+        }
+        Ok(())
+    }
 }
 
-/// Reads one stream of garment frames: remembers topology between keyframes.
+fn at(garment: usize, e: &FormatError) -> WireError {
+    WireError::new(format!("garment_frame.garments[{garment}].positions"), e.to_string())
+}
+
+/// Reads one stream of garment frames: remembers topology between keyframes, and positions that others build on.
 #[derive(Clone, Debug, Default)]
 pub struct GarmentReader {
     revision: u64,
-    worn: Vec<Arc<WornGarment>>,
+    worn: Vec<(Arc<WornGarment>, PositionCoder)>,
 }
 
-/// Garments with positions, world frame.
+/// Garments with the positions of their drawn vertices, world frame.
 pub type PlacedGarments = Vec<(Arc<WornGarment>, Vec<P3>)>;
 
 impl GarmentReader {
-    /// Garments of one message.
+    /// Garments of one message. After an error the stream must be opened again.
     ///
     /// # Errors
     /// Names the field at fault; positions without an earlier keyframe are one.
@@ -101,16 +151,19 @@ impl GarmentReader {
             for (i, g) in f.garments.iter().enumerate() {
                 let field = format!("garment_frame.garments[{i}]");
                 let t = required(g.topology.as_ref(), &format!("{field}.topology"))?;
-                worn.push(Arc::new(topology_from_wire(t).map_err(|e| e.within(&field))?));
+                let garment = topology_from_wire(t).map_err(|e| e.within(&field))?;
+                let coder = garment.coder();
+                worn.push((Arc::new(garment), coder));
             }
             (self.revision, self.worn) = (f.outfit_revision, worn);
         } else if !f.garments.is_empty() && (self.revision, self.worn.len()) != (f.outfit_revision, f.garments.len()) {
             return Err(WireError::new("garment_frame.garments", "positions came before their topology"));
         }
-        (self.worn.iter().zip(&f.garments).enumerate())
-            .map(|(i, (w, g))| {
-                let p = positions_from_wire(&g.positions, w.vertices);
-                Ok((w.clone(), p.map_err(|e| e.within(&format!("garment_frame.garments[{i}]")))?))
+        (self.worn.iter_mut().zip(&f.garments).enumerate())
+            .map(|(i, ((worn, coder), g))| {
+                let simulated = coder.decode(&g.positions).map_err(|e| at(i, &e))?;
+                let drawn = worn.drawn.iter().map(|&v| simulated[v as usize]).collect();
+                Ok((worn.clone(), drawn))
             })
             .collect()
     }
@@ -120,48 +173,63 @@ impl GarmentReader {
 mod tests {
     use super::*;
 
-    fn triangle() -> WornGarment {
+    /// Two triangles of two panels that share a seam: four simulated vertices, six drawn ones.
+    fn flag() -> WornGarment {
         let look = v1::GarmentLook { color_rgb: 0xff0000, accent_rgb: 0xff0000, stripe_width: 0.0 };
         WornGarment {
             garment: "flag".into(),
             size: "M".into(),
-            vertices: 3,
-            faces: vec![[0, 1, 2]],
-            uvs: vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
+            vertices: 4,
+            drawn: vec![0, 1, 2, 1, 3, 2],
+            faces: vec![[0, 1, 2], [3, 4, 5]],
+            uvs: vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [5.0, 0.0], [6.0, 1.0], [5.0, 1.0]],
             look,
         }
     }
 
+    fn wind(t: f32) -> Vec<P3> {
+        vec![P3::new(0.0, 0.0, t), P3::new(1.0, 0.0, t), P3::new(0.0, 1.0, t), P3::new(1.0, 1.0, t * t)]
+    }
+
     #[test]
-    fn a_stream_needs_its_keyframe_and_keeps_it() {
-        let points = vec![P3::new(0.0, 1.0, 2.0); 3];
-        let update = v1::GarmentMesh { topology: None, positions: positions_to_wire(&points) };
-        let key = v1::GarmentMesh { topology: Some(topology_to_wire(&triangle())), ..update.clone() };
-        let frame = |g: &v1::GarmentMesh, r| v1::GarmentFrame {
-            garments: vec![g.clone()],
-            outfit_revision: r,
-            ..Default::default()
+    fn a_stream_needs_its_keyframe_and_draws_seams_twice() {
+        let worn = [Arc::new(flag())];
+        let mut w = GarmentWriter::default();
+        let mut frame = |keyframe: bool, revision, t| {
+            let mut f = v1::GarmentFrame { outfit_revision: revision, ..Default::default() };
+            w.write(&mut f, keyframe.then_some(&worn[..]), &[wind(t)]).expect("written");
+            f
         };
+        let (key, update, later) = (frame(true, 1, 0.0), frame(false, 1, 0.1), frame(false, 1, 0.2));
         let mut r = GarmentReader::default();
-        assert!(r.read(&frame(&update, 1)).is_err());
-        assert_eq!(*r.read(&frame(&key, 1)).expect("keyframe")[0].0, triangle());
-        assert_eq!(r.read(&frame(&update, 1)).expect("update")[0].1, points);
-        assert!(r.read(&frame(&update, 2)).is_err(), "another outfit needs its own keyframe");
+        assert!(r.read(&update).is_err(), "no keyframe yet");
+        assert_eq!(*r.read(&key).expect("keyframe")[0].0, flag());
+        let placed = &r.read(&update).expect("update")[0].1;
+        assert_eq!(placed.len(), 6);
+        assert_eq!(placed[1], placed[3], "the seam is one line");
+        assert!((placed[4] - P3::new(1.0, 1.0, 0.01)).norm() < 2e-4);
+        assert!((r.read(&later).expect("another")[0].1[0].z - 0.2).abs() < 2e-4);
+        assert!(
+            r.read(&v1::GarmentFrame { outfit_revision: 2, ..later }).is_err(),
+            "another outfit needs its keyframe"
+        );
         assert!(r.read(&v1::GarmentFrame::default()).expect("nothing worn").is_empty());
     }
 
     #[test]
-    fn faults_are_named() {
-        let fault = |change: &dyn Fn(&mut v1::GarmentTopology)| {
-            let mut w = topology_to_wire(&triangle());
-            change(&mut w);
-            topology_from_wire(&w).expect_err("must be refused").field
-        };
-        assert_eq!(fault(&|w| w.vertex_count = 4_000_000_000), "garment_topology.vertex_count");
-        assert_eq!(fault(&|w| w.faces = bulk::write([[0u32, 1, 3]].into_iter())), "garment_topology.faces[0]");
-        assert_eq!(fault(&|w| w.uvs = w.uvs.slice(1..)), "garment_topology.uvs");
-        assert_eq!(fault(&|w| w.look = None), "garment_topology.look");
-        let nan = bulk::write([[0.0f32, f32::INFINITY, 0.0]].into_iter());
-        assert_eq!(positions_from_wire(&nan, 1).expect_err("inf").field, "garment_mesh.positions[0]");
+    fn what_cannot_be_sent_or_read_names_its_garment() {
+        let mut f = v1::GarmentFrame::default();
+        let mut bad = wind(0.0);
+        bad[2].y = f32::INFINITY;
+        let worn = [Arc::new(flag())];
+        let e = GarmentWriter::default().write(&mut f, Some(&worn), &[bad]).expect_err("refused");
+        assert!(e.to_string().contains("garments[0].positions") && e.to_string().contains("vertex 2"), "{e}");
+        assert!(GarmentWriter::default().write(&mut f, None, &[wind(0.0)]).is_err(), "no outfit yet");
+        let t = v1::GarmentTopology { drawn: bulk::write_flat(&[0u32, 1, 2, 1, 9, 2]), ..topology_to_wire(&flag()) };
+        assert!(topology_from_wire(&t).expect_err("refused").to_string().contains("drawn[4]"));
+        GarmentWriter::default().write(&mut f, Some(&worn), &[wind(0.0)]).expect("written");
+        f.garments[0].positions = f.garments[0].positions.slice(..3);
+        let e = GarmentReader::default().read(&f).expect_err("cut short");
+        assert!(e.to_string().contains("garments[0].positions"), "{e}");
     }
 }

@@ -2000,10 +2000,16 @@ pub struct GarmentFrame {
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct GarmentMesh {
-    /// Present in the first message of a stream and in the first of each outfit revision.
+    /// Present in the first message of a stream and whenever garments were put on anew (another outfit revision, another
+    /// body): a keyframe.
     #[prost(message, optional, tag = "1")]
     pub topology: ::core::option::Option<GarmentTopology>,
-    /// f32[topology.vertex_count][3], metres, world frame.
+    /// Positions of topology.vertex_count vertices, world frame, in whole steps of 0.2 mm. Layout: one byte o, the order
+    /// of the prediction; one zstd frame of LEB128 numbers, zigzag-coded i32, all x, then all y, then all z. With q\[t\] the
+    /// steps in this message and q\[t-1\], q\[t-2\] those in the messages before it that carried this garment since the
+    /// keyframe, the prediction p is 0 for o = 0, q\[t-1\] for o = 1, 2 q\[t-1\] - q\[t-2\] for o = 2. The number of vertex i is
+    /// e\[i\] - e\[j\] where e = q\[t\] - p and j is the smallest neighbour of i (vertex of a common face) if j < i, else e\[i\].
+    /// Arithmetic wraps at 32 bits. A keyframe has o = 0. Nothing builds on messages that were dropped for this reader.
     #[prost(bytes = "bytes", tag = "2")]
     pub positions: ::prost::bytes::Bytes,
 }
@@ -2014,19 +2020,25 @@ pub struct GarmentTopology {
     pub garment: ::prost::alloc::string::String,
     #[prost(string, tag = "2")]
     pub size: ::prost::alloc::string::String,
-    /// Number of vertices n, at most 262144, and faces m, at most 524288.
+    /// Number of simulated vertices n, at most 262144, and faces m, at most 524288.
     #[prost(uint32, tag = "3")]
     pub vertex_count: u32,
     #[prost(uint32, tag = "4")]
     pub face_count: u32,
-    /// u32[m][3], counter-clockwise seen from outside.
+    /// u32[m][3], indices of drawn vertices, counter-clockwise seen from outside.
     #[prost(bytes = "bytes", tag = "5")]
     pub faces: ::prost::bytes::Bytes,
-    /// f32[n][2], flat panel coordinates, metres.
+    /// f32[k][2], flat panel coordinates of the drawn vertices, metres.
     #[prost(bytes = "bytes", tag = "6")]
     pub uvs: ::prost::bytes::Bytes,
     #[prost(message, optional, tag = "7")]
     pub look: ::core::option::Option<GarmentLook>,
+    /// Number of drawn vertices k, at most 524288: a vertex on a seam is drawn once for each panel that meets there.
+    #[prost(uint32, tag = "8")]
+    pub drawn_count: u32,
+    /// u32\[k\], the simulated vertex under each drawn one.
+    #[prost(bytes = "bytes", tag = "9")]
+    pub drawn: ::prost::bytes::Bytes,
 }
 /// How a garment is drawn.
 #[derive(Clone, Copy, PartialEq, ::prost::Message)]
@@ -2323,10 +2335,10 @@ pub mod cloth_service_client {
                 .insert(GrpcMethod::new("tryon.v1.ClothService", "Undress"));
             self.inner.unary(req, path, codec).await
         }
-        /// The garments of a session, one message per simulated body state, in order. Topology is sent once per stream and
-        /// outfit revision as a keyframe and never dropped; position updates are complete in themselves, at most two wait
-        /// for a slow reader, then the older one is dropped (`sequence` shows the gap). While there is nothing to simulate a
-        /// message without garments repeats twice a second with the reason. NOT_FOUND for an unknown id.
+        /// The garments of a session, one message per simulated body state, in order. Topology is sent when garments were put
+        /// on, as a keyframe that is never dropped; of position updates at most two wait for a slow reader, then the older one
+        /// is dropped (`sequence` shows the gap) and what follows does without it. While there is nothing to simulate a message
+        /// without garments repeats twice a second with the reason. NOT_FOUND for an unknown id.
         pub async fn stream_garments(
             &mut self,
             request: impl tonic::IntoRequest<super::StreamGarmentsRequest>,
@@ -2448,10 +2460,10 @@ pub mod cloth_service_server {
             >
             + std::marker::Send
             + 'static;
-        /// The garments of a session, one message per simulated body state, in order. Topology is sent once per stream and
-        /// outfit revision as a keyframe and never dropped; position updates are complete in themselves, at most two wait
-        /// for a slow reader, then the older one is dropped (`sequence` shows the gap). While there is nothing to simulate a
-        /// message without garments repeats twice a second with the reason. NOT_FOUND for an unknown id.
+        /// The garments of a session, one message per simulated body state, in order. Topology is sent when garments were put
+        /// on, as a keyframe that is never dropped; of position updates at most two wait for a slow reader, then the older one
+        /// is dropped (`sequence` shows the gap) and what follows does without it. While there is nothing to simulate a message
+        /// without garments repeats twice a second with the reason. NOT_FOUND for an unknown id.
         async fn stream_garments(
             &self,
             request: tonic::Request<super::StreamGarmentsRequest>,

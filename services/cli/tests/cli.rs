@@ -151,7 +151,20 @@ fn the_demo_leaves_pictures_and_its_report() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().display().to_string();
     // Unoptimised and beside other tests: a slow camera, so that the chain keeps up.
-    let run = tryon(&["demo", "--headless", "--seconds", "20", "--fps", "6", "--garment", "tshirt", "--listen", "127.0.0.1:0", "--out", &out]);
+    let run = tryon(&[
+        "demo",
+        "--headless",
+        "--seconds",
+        "20",
+        "--fps",
+        "6",
+        "--garment",
+        "tshirt",
+        "--listen",
+        "127.0.0.1:0",
+        "--out",
+        &out,
+    ]);
     assert!(run.status.success(), "{}", text(&run.stderr));
     let report: Value = serde_json::from_slice(&std::fs::read(dir.path().join("report.json")).unwrap()).unwrap();
     println!("{report:#}");

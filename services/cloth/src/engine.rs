@@ -13,7 +13,7 @@ use tryon_kit::frames::stage;
 use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::body::pose_from_wire;
 use tryon_proto::convert::frame::stages_from_wire;
-use tryon_proto::convert::garment::{WornGarment, positions_to_wire, topology_to_wire};
+use tryon_proto::convert::garment::{Positions, WornGarment};
 use tryon_proto::convert::geometry::rigid_from_wire;
 use tryon_proto::convert::required;
 use tryon_proto::v1::{self, BodyState, GarmentChoice};
@@ -56,11 +56,23 @@ pub(crate) struct Worn {
     bones: BoneTransforms,
     posed: Vec<P3>,
     last_ns: u64,
-    topologies: Vec<v1::GarmentTopology>,
+    garments: Arc<[Arc<WornGarment>]>,
 }
 
-/// What a step gives: the message, all but session, status and counters.
-pub(crate) type Placed = v1::GarmentFrame;
+/// A message to all readers, before it is coded for each of them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Said {
+    /// All but the garments.
+    pub(crate) frame: v1::GarmentFrame,
+    /// Positions of each garment; empty when there are none.
+    pub(crate) positions: Positions,
+}
+
+impl From<v1::GarmentFrame> for Said {
+    fn from(frame: v1::GarmentFrame) -> Self {
+        Self { frame, positions: Positions::default() }
+    }
+}
 
 /// Puts garments on; takes about a second.
 pub(crate) fn dress(body: &Body, choices: &[GarmentChoice]) -> Result<Worn, String> {
@@ -80,20 +92,21 @@ pub(crate) fn dress(body: &Body, choices: &[GarmentChoice]) -> Result<Worn, Stri
     let list: Vec<_> = worn.iter().map(|(p, _)| p.clone()).collect();
     let dressed = dressing::dress(&body.template, &rest, &body.pose, &list, &DressOptions::default());
     let dressed = dressed.map_err(|e| e.to_string())?;
-    let topologies = dressed.model.outfit.garments.iter().zip(&worn).map(|(g, (_, c))| {
+    let garments = dressed.model.outfit.garments.iter().zip(&worn).map(|(g, (_, c))| {
         let color = c.color_rgb.unwrap_or_else(|| library::own_color(&c.garment));
-        topology_to_wire(&WornGarment {
+        Arc::new(WornGarment {
             garment: c.garment.clone(),
             size: g.size.to_string(),
             vertices: g.vertices,
-            faces: g.faces.clone(),
-            uvs: g.uv.clone(),
+            drawn: g.render.vertex.clone(),
+            faces: g.render.faces.clone(),
+            uvs: g.render.uv.clone(),
             look: v1::GarmentLook { color_rgb: color, accent_rgb: color, stripe_width: 0.0 },
         })
     });
     metrics::histogram!("tryon_stage_ms", "stage" => "cloth.dress").record(start.elapsed().as_secs_f64() * 1e3);
     Ok(Worn {
-        topologies: topologies.collect(),
+        garments: garments.collect(),
         model: dressed.model,
         state: dressed.state,
         work: Workspace::default(),
@@ -107,7 +120,7 @@ pub(crate) fn dress(body: &Body, choices: &[GarmentChoice]) -> Result<Worn, Stri
 
 impl Worn {
     /// One step to the pose of `body`.
-    pub(crate) fn step(&mut self, body: &Body) -> Result<Placed, String> {
+    pub(crate) fn step(&mut self, body: &Body) -> Result<Said, String> {
         let start = Instant::now();
         if !Arc::ptr_eq(&self.rest_of, &body.shape) {
             self.rest = body.template.personalise(&body.shape);
@@ -125,27 +138,24 @@ impl Worn {
         record_skipped("cloth", skipped);
         let mut placed = self.placed(body);
         if let Some(why) = report.kept_last_good {
-            placed.detail = why;
+            placed.frame.detail = why;
         }
-        placed.stages.extend([skinned, stage("cloth.step", begun)]);
+        placed.frame.stages.extend([skinned, stage("cloth.step", begun)]);
         Ok(placed)
     }
 
-    /// Topology of every garment, for keyframes.
-    pub(crate) fn topologies(&self) -> &[v1::GarmentTopology] {
-        &self.topologies
+    /// What does not change of every garment, for keyframes.
+    pub(crate) fn garments(&self) -> &Arc<[Arc<WornGarment>]> {
+        &self.garments
     }
 
-    fn placed(&self, body: &Body) -> Placed {
-        let meshes = self.state.garments.iter();
-        v1::GarmentFrame {
+    fn placed(&self, body: &Body) -> Said {
+        let frame = v1::GarmentFrame {
             frame: body.state.frame,
             world_from_camera: body.state.world_from_camera,
-            garments: meshes
-                .map(|g| v1::GarmentMesh { topology: None, positions: positions_to_wire(&g.positions) })
-                .collect(),
             stages: body.state.stages.clone(),
             ..Default::default()
-        }
+        };
+        Said { frame, positions: Arc::new(self.state.garments.iter().map(|g| g.positions.clone()).collect()) }
     }
 }

@@ -1,7 +1,8 @@
 //! The rpcs: check, find the session, answer.
 
+use crate::engine::Said;
 use crate::library;
-use crate::session::{self, Command, Handle, Setup, reader};
+use crate::session::{self, Command, Handle, Setup, Told, reader};
 use crate::simulation::{Frames, Simulations};
 use futures::Stream;
 use std::pin::Pin;
@@ -13,6 +14,7 @@ use tryon_kit::config::ClothConfig;
 use tryon_kit::server::Context;
 use tryon_kit::sessions::{Opened, Sessions};
 use tryon_kit::status::{exhausted, not_found};
+use tryon_proto::convert::garment::GarmentWriter;
 use tryon_proto::convert::request;
 use tryon_proto::v1::cloth_service_server::ClothService;
 use tryon_proto::v1::*;
@@ -97,9 +99,17 @@ impl ClothService for Cloth {
         let handle: Arc<Handle> = self.sessions.get(id).ok_or_else(|| not_found("session", id))?;
         let (tx, rx) = reader();
         handle.commands.send(Command::Read(tx)).await.map_err(|_| not_found("session", id))?;
-        let frames = futures::stream::unfold(rx, |mut rx| async move {
-            let frame = rx.recv().await?;
-            Some((Ok(StreamGarmentsResponse { frame: Some(frame) }), rx))
+        // Coded here, behind the queue: positions build only on what this reader was really sent.
+        let start = Some((rx, GarmentWriter::default()));
+        let frames = futures::stream::unfold(start, |at| async move {
+            let (mut rx, mut writer) = at?;
+            let Told { said: Said { mut frame, positions }, keyframe } = rx.recv().await?;
+            if !positions.is_empty()
+                && let Err(e) = writer.write(&mut frame, keyframe.as_deref(), &positions)
+            {
+                return Some((Err(Status::internal(e.to_string())), None));
+            }
+            Some((Ok(StreamGarmentsResponse { frame: Some(frame) }), Some((rx, writer))))
         });
         Ok(Response::new(Box::pin(frames)))
     }

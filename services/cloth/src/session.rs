@@ -1,6 +1,6 @@
 //! One session: its task, its outfit, its readers.
 
-use crate::engine::{Body, Placed, Worn, dress};
+use crate::engine::{Body, Said, Worn, dress};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::{mpsc, watch};
@@ -11,6 +11,7 @@ use tryon_kit::queue::{latest, ordered};
 use tryon_kit::server::Context;
 use tryon_kit::sessions::Sessions;
 use tryon_kit::telemetry::record_stages;
+use tryon_proto::convert::garment::{Positions, WornGarment};
 use tryon_proto::v1::{self, ClothStatus, DegradedReason, GarmentChoice, GarmentFrame, TrackingStatus};
 
 /// A reader hears something at least this often.
@@ -36,7 +37,7 @@ pub(crate) struct Handle {
 /// What a session can be told.
 pub(crate) enum Command {
     /// Somebody wants to read.
-    Read(ordered::Sender<GarmentFrame>),
+    Read(ordered::Sender<Told>),
     Close,
 }
 
@@ -50,7 +51,7 @@ pub(crate) struct Setup {
 }
 
 /// A queue for one reader.
-pub(crate) fn reader() -> (ordered::Sender<GarmentFrame>, ordered::Receiver<GarmentFrame>) {
+pub(crate) fn reader() -> (ordered::Sender<Told>, ordered::Receiver<Told>) {
     ordered::channel(WAITING)
 }
 
@@ -92,10 +93,21 @@ struct Dressed {
     outcome: Result<Worn, String>,
 }
 
+/// A message to one reader.
+#[derive(Clone)]
+pub(crate) struct Told {
+    pub(crate) said: Said,
+    /// The outfit, when this reader does not know it yet.
+    pub(crate) keyframe: Option<Garments>,
+}
+
+/// An outfit as it was put on once.
+type Garments = Arc<[Arc<WornGarment>]>;
+
 struct Reader {
-    queue: ordered::Sender<GarmentFrame>,
-    /// Revision whose topology it has.
-    has: Option<u64>,
+    queue: ordered::Sender<Told>,
+    /// The outfit that it knows.
+    has: Option<Garments>,
 }
 
 struct Task {
@@ -125,7 +137,7 @@ impl Task {
         let mut tick = tokio::time::interval(HEARTBEAT / 3);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         let (mut said, mut read) = (Instant::now(), Instant::now());
-        let mut status = waiting(DegradedReason::NoPerson, String::new());
+        let mut status = Said::from(waiting(DegradedReason::NoPerson, String::new()));
         loop {
             tokio::select! {
                 biased;
@@ -147,12 +159,12 @@ impl Task {
                     self.tell(status.clone());
                     said = Instant::now();
                     // What is repeated later must not pass old positions off as new ones.
-                    status.garments.clear();
+                    status.positions = Positions::default();
                 }
                 _ = tick.tick() => {
                     if said.elapsed() >= HEARTBEAT {
-                        if status.status() == ClothStatus::Live {
-                            status = waiting(DegradedReason::CameraSilent, "no body state".into());
+                        if status.frame.status() == ClothStatus::Live {
+                            status = waiting(DegradedReason::CameraSilent, "no body state".into()).into();
                         }
                         self.tell(status.clone());
                         said = Instant::now();
@@ -168,49 +180,50 @@ impl Task {
         }
     }
 
-    /// Hands a message to every reader, each with the topology that it lacks.
-    fn tell(&mut self, mut frame: GarmentFrame) {
+    /// Hands a message to every reader, each with the outfit that it does not know yet.
+    fn tell(&mut self, mut said: Said) {
+        let frame = &mut said.frame;
         frame.session_id = self.setup.id.clone();
         frame.steps_skipped = self.skipped;
         if frame.outfit_revision == 0 {
             frame.outfit_revision = self.on;
         }
-        let topologies = self.worn.as_ref().map_or(&[][..], Worn::topologies);
+        let garments = self.worn.as_ref().map(Worn::garments);
         let live = frame.status() == ClothStatus::Live;
-        if live && frame.garments.len() != topologies.len() {
+        if live && said.positions.len() != garments.map_or(0, |g| g.len()) {
             // A repeated message without its positions: nothing that a reader could use.
             return;
         }
-        let shows = live && frame.frame.is_some();
+        let shown = garments.filter(|_| live && frame.frame.is_some());
         for r in &mut self.readers {
-            if shows && r.has != Some(frame.outfit_revision) {
-                let mut key = frame.clone();
-                for (g, t) in key.garments.iter_mut().zip(topologies) {
-                    g.topology = Some(t.clone());
+            let known = |g: &&Garments| r.has.as_ref().is_some_and(|has| Arc::ptr_eq(has, g));
+            match shown.filter(|g| !known(g)) {
+                Some(g) => {
+                    r.has = Some(g.clone());
+                    r.queue.keyframe(Told { said: said.clone(), keyframe: Some(g.clone()) });
                 }
-                r.has = Some(frame.outfit_revision);
-                r.queue.keyframe(key);
-            } else {
-                r.queue.update(frame.clone());
+                None => {
+                    r.queue.update(Told { said: said.clone(), keyframe: None });
+                }
             }
         }
     }
 
-    async fn hear(&mut self, news: News) -> GarmentFrame {
+    async fn hear(&mut self, news: News) -> Said {
         let (state, shape, template) = match news {
-            News::Gone(why) => return waiting(DegradedReason::TrackingUnavailable, why),
+            News::Gone(why) => return waiting(DegradedReason::TrackingUnavailable, why).into(),
             News::Body { state, shape, template } => (*state, shape, template),
         };
         let frame = state.frame;
         let said = |mut f: GarmentFrame| {
             (f.frame, f.world_from_camera) = (frame, state.world_from_camera);
-            f
+            Said::from(f)
         };
         match (state.status(), shape) {
             (TrackingStatus::Tracking, Some(shape)) => {
                 let body = match Body::new(state.clone(), shape, template) {
                     Ok(b) => b,
-                    Err(why) => return waiting(DegradedReason::StepFailed, why),
+                    Err(why) => return waiting(DegradedReason::StepFailed, why).into(),
                 };
                 self.follow_body(body).await
             }
@@ -220,9 +233,9 @@ impl Task {
                 said(waiting(DegradedReason::Unspecified, "the body is being measured".into()))
             }
             (TrackingStatus::Lost, _) => {
-                let mut f = said(waiting(state.reason(), state.detail.clone()));
+                let mut f = waiting(state.reason(), state.detail.clone());
                 f.set_status(ClothStatus::Holding);
-                f
+                said(f)
             }
             _ => {
                 self.undress();
@@ -247,12 +260,12 @@ impl Task {
             Err(why) => {
                 tracing::warn!(session = self.setup.id, %why, "cannot be dressed");
                 self.failed = d.revision;
-                self.tell(failed(d.revision, why));
+                self.tell(failed(d.revision, why).into());
             }
         }
     }
 
-    async fn follow_body(&mut self, body: Body) -> GarmentFrame {
+    async fn follow_body(&mut self, body: Body) -> Said {
         let wanted = self.wanted.borrow_and_update().clone();
         if wanted.choices.is_empty() {
             self.undress();
@@ -264,7 +277,7 @@ impl Task {
                 stages: s.stages.clone(),
                 ..Default::default()
             };
-            return live(bare, wanted.revision);
+            return live(bare.into(), wanted.revision);
         }
         let body = Arc::new(body);
         if self.on != wanted.revision && self.failed != wanted.revision && self.dressing != Some(wanted.revision) {
@@ -272,8 +285,8 @@ impl Task {
         }
         let Some(mut worn) = self.worn.take() else {
             return match self.dressing {
-                Some(_) => dressing(&body),
-                None => failed(wanted.revision, "the outfit could not be put on".into()),
+                Some(_) => dressing(&body).into(),
+                None => failed(wanted.revision, "the outfit could not be put on".into()).into(),
             };
         };
         let step = move || {
@@ -285,17 +298,17 @@ impl Task {
                 self.worn = Some(worn);
                 match placed {
                     Ok(p) => {
-                        record_stages("cloth", &p.stages);
+                        record_stages("cloth", &p.frame.stages);
                         metrics::counter!("tryon_cloth_steps").increment(1);
                         live(p, self.on)
                     }
-                    Err(why) => waiting(DegradedReason::StepFailed, why),
+                    Err(why) => waiting(DegradedReason::StepFailed, why).into(),
                 }
             }
             Err(why) => {
                 tracing::error!(session = self.setup.id, %why, "a step was lost");
                 self.undress();
-                waiting(DegradedReason::StepFailed, why.to_string())
+                waiting(DegradedReason::StepFailed, why.to_string()).into()
             }
         }
     }
@@ -320,10 +333,10 @@ fn dressing(body: &Body) -> GarmentFrame {
     f
 }
 
-fn live(mut p: Placed, revision: u64) -> GarmentFrame {
-    p.set_status(ClothStatus::Live);
-    p.outfit_revision = revision;
-    p
+fn live(mut said: Said, revision: u64) -> Said {
+    said.frame.set_status(ClothStatus::Live);
+    said.frame.outfit_revision = revision;
+    said
 }
 
 fn waiting(reason: DegradedReason, detail: String) -> GarmentFrame {

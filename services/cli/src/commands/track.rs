@@ -56,7 +56,10 @@ fn track_all(
             Err(e) => {
                 // The recording goes on behind a bad frame; it is named, not hidden.
                 eprintln!("tryon: frame {index} is left out: {e}");
-                serde_json::to_writer(&mut *out, &json!({"frame": index, "status": "unreadable", "error": e.to_string()}))?;
+                serde_json::to_writer(
+                    &mut *out,
+                    &json!({"frame": index, "status": "unreadable", "error": e.to_string()}),
+                )?;
                 out.write_all(b"\n")?;
                 bar.inc(1);
                 (index, bad) = (index + 1, bad + 1);

@@ -1,6 +1,6 @@
 //! Keyframes and updates in order: keyframes are never lost, of updates the oldest goes first.
 //!
-//! An update is complete in itself given its keyframe, so dropping one costs a moment, not the stream. A new keyframe
+//! An update must need nothing but its keyframe, so dropping one costs a moment, not the stream. A new keyframe
 //! makes everything before it pointless, so at most one keyframe and `capacity` updates wait.
 
 use std::collections::VecDeque;

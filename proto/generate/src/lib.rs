@@ -17,7 +17,7 @@ const FILES: [&str; 6] = [
 ///
 /// # Errors
 /// A proto that does not compile, or a file that cannot be written.
-pub(crate) fn generate(root: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
+pub fn generate(root: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
     use prost_types::FileDescriptorSet;
     let mut compiler = protox::Compiler::new([root])?;
     compiler.include_source_info(true).include_imports(true);
