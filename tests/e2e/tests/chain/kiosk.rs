@@ -189,7 +189,7 @@ pub struct Watcher {
 
 /// How long anything may take here. Far beyond what is promised, because tests share their machine; what is promised
 /// is asserted where it is the point.
-pub const PATIENCE: Duration = Duration::from_secs(90);
+pub const PATIENCE: Duration = Duration::from_secs(150);
 
 impl Watcher {
     /// Opens the try-on and watches it, trying again while the compositor is away.
