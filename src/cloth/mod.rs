@@ -6,6 +6,7 @@ pub mod quasi_newton;
 pub mod realtime;
 pub mod scene;
 mod sheet;
+pub mod small_steps;
 
 pub use error::ClothError;
 pub use sheet::{Element, Hinge, Sheet};

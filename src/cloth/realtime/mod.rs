@@ -4,6 +4,7 @@ mod carry;
 mod model;
 mod state;
 mod step;
+mod touch;
 
 pub use model::{AnchorBinding, Config, Model, Outfit, body_parts};
 pub use state::{GarmentState, Input, State, StepReport, Workspace};

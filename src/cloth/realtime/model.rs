@@ -1,11 +1,10 @@
 //! What stays the same while an outfit is worn.
 
 use crate::body::{SkinWeights, Template};
-use crate::cloth::quasi_newton::hold_unit;
+use crate::cloth::small_steps::{Fabric, Fit, Plan};
 use crate::cloth::{ClothError, Sheet};
 use crate::contact::{MapView, SurfaceModel};
 use crate::garment::{GarmentMesh, Region};
-use crate::linear::SymbolicFactor;
 use crate::mesh::Topology;
 use serde::{Deserialize, Serialize};
 
@@ -37,10 +36,13 @@ pub struct Outfit {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
-    /// Steps of the integrator in one call.
-    pub substeps: usize,
-    /// Iterations of each step.
-    pub iterations: usize,
+    /// The most small steps in 1/60 s. A garment takes as many as its fabric and triangles need to be stable with all
+    /// their stiffness; where that is more than this, its stiffest triangles are softened.
+    pub most_steps: usize,
+    /// How far ahead of positions forces are evaluated, in small steps: damps ringing.
+    pub ahead: f64,
+    /// Vertices of a patch, which is what a thread works on. Changes bits, so it is a setting and not the machine's.
+    pub patch: usize,
     /// Gravity, m/s².
     pub gravity: [f64; 3],
     /// Distance of the innermost layer from the skin, metres.
@@ -61,8 +63,9 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         Self {
-            substeps: 2,
-            iterations: 5,
+            most_steps: 80,
+            ahead: 0.25,
+            patch: 5000,
             gravity: [0.0, -9.81, 0.0],
             offset: 0.005,
             layer_offset: 0.004,
@@ -78,15 +81,19 @@ impl Default for Config {
 #[derive(Debug)]
 pub(super) struct GarmentModel {
     pub(super) sheet: Sheet,
-    pub(super) symbolic: SymbolicFactor,
-    /// Typical diagonal at the configured substep of 1/60 s, N/m.
-    pub(super) unit: Vec<f64>,
+    pub(super) patches: Vec<Fabric>,
+    /// Small step, s.
+    pub(super) h: f64,
+    /// Share of the membrane stiffness that the step carries.
+    pub(super) softened: f64,
     /// Body parts that decide: cloth ends outside these.
     pub(super) own: Vec<u8>,
-    /// Body parts that push first and yield.
+    /// Body parts that push where there is room.
     pub(super) other: Vec<u8>,
     /// Distance from the skin, metres.
     pub(super) offset: f64,
+    /// Local vertex and number of the binding, for each patch.
+    pub(super) anchors: Vec<Vec<(u32, usize)>>,
 }
 
 /// Everything immutable about an outfit on a body. Share it by `Arc`.
@@ -105,8 +112,12 @@ pub struct Model {
 
 /// Rings by which neighbouring parts of the body overlap, so that cloth across a joint line always has a surface.
 const PART_OVERLAP: usize = 4;
-/// The substep hold stiffness is scaled for, s.
-pub(super) const USUAL_SUBSTEP: f64 = 1.0 / 60.0;
+/// Small steps a patch takes alone: between two searches for contacts there are more, in several rounds.
+pub(super) const ALONE: usize = 8;
+/// Steps from one evaluation of bending to the next.
+pub(super) const BEND_EVERY: usize = 4;
+/// Rings of neighbours that a patch needs for that: one a step, two more for each evaluation of bending.
+const RINGS: usize = ALONE + 2 * ALONE / BEND_EVERY + 2;
 
 /// Which [`Region`] each body vertex belongs to, by the name of its dominant joint.
 pub fn body_parts(template: &Template) -> Vec<u8> {
@@ -132,8 +143,11 @@ impl Model {
     /// Faults of the garments (triangle or edge named) or of the settings (field named).
     pub fn new(template: &Template, outfit: Outfit, config: Config) -> Result<Self, ClothError> {
         let field = |field: &str, why: &str| ClothError::Field { field: field.to_owned(), why: why.to_owned() };
-        if config.substeps == 0 || config.iterations == 0 {
-            return Err(field("substeps, iterations", "both must be at least 1"));
+        if config.most_steps == 0 || config.patch == 0 {
+            return Err(field("most_steps, patch", "both must be at least 1"));
+        }
+        if !(config.ahead >= 0.0 && config.ahead <= 1.0) {
+            return Err(field("ahead", "must be between 0 and 1 step"));
         }
         if !(config.offset.is_finite() && config.layer_offset.is_finite() && config.teleport > 0.0) {
             return Err(field("offset, layer_offset, teleport", "they must be finite, teleport positive"));
@@ -154,14 +168,24 @@ impl Model {
                 return Err(field(&format!("anchor of vertex {}", a.vertex), "it names a vertex that does not exist"));
             }
             let sheet = Sheet::of_garment(g)?;
-            let symbolic = SymbolicFactor::new(sheet.pattern.clone())?;
-            let unit = hold_unit(&sheet, USUAL_SUBSTEP);
+            let h = Plan::comfortable_step(&sheet, config.ahead).clamp(1.0 / (60.0 * config.most_steps as f64), 1e-3);
+            let plan = Plan::new(&sheet, &Fit { h, ahead: config.ahead, springs_only: false, bend_every: BEND_EVERY });
+            let patches = plan.patches(g.vertices.div_ceil(config.patch), RINGS);
             let own: Vec<u8> = g.regions.iter().map(|r| r.0).collect();
             let other = own.iter().map(|o| Region::ALL.0 & !o).collect();
             let offset = config.offset + config.layer_offset * order as f64;
-            garments.push(GarmentModel { sheet, symbolic, unit, own, other, offset });
+            garments.push(GarmentModel {
+                sheet,
+                patches,
+                h,
+                softened: plan.softened,
+                own,
+                other,
+                offset,
+                anchors: Vec::new(),
+            });
         }
-        Ok(Self {
+        let mut model = Self {
             surface: SurfaceModel::new(
                 template.mesh().faces().to_vec(),
                 Topology::new(template.mesh())?,
@@ -174,7 +198,9 @@ impl Model {
             garments,
             outfit,
             config,
-        })
+        };
+        model.sort_anchors();
+        Ok(model)
     }
     /// Vertices of the body it was made for.
     pub fn body_vertices(&self) -> usize {
@@ -183,6 +209,28 @@ impl Model {
     /// The same body and settings with other anchors.
     pub(crate) fn set_anchors(&mut self, anchors: Vec<Vec<AnchorBinding>>) {
         self.outfit.anchors = anchors;
+        self.sort_anchors();
+    }
+    /// Which anchors each patch has, by its local vertices.
+    fn sort_anchors(&mut self) {
+        for (g, anchors) in self.garments.iter_mut().zip(&self.outfit.anchors) {
+            g.anchors = g
+                .patches
+                .iter()
+                .map(|f| {
+                    let mut local: Vec<(u32, u32)> =
+                        f.vertices.iter().enumerate().map(|(i, v)| (*v, i as u32)).collect();
+                    local.sort_unstable();
+                    let find = |v: u32| local.binary_search_by_key(&v, |l| l.0).ok().map(|k| local[k].1);
+                    anchors.iter().enumerate().filter_map(|(k, a)| Some((find(a.vertex)?, k))).collect()
+                })
+                .collect();
+        }
+    }
+    /// Local vertex and binding of a patch's anchors.
+    pub(super) fn anchors_of(&self, garment: usize, patch: usize) -> impl Iterator<Item = (u32, &AnchorBinding)> {
+        let bindings = &self.outfit.anchors[garment];
+        self.garments[garment].anchors[patch].iter().map(move |(i, k)| (*i, &bindings[*k]))
     }
     /// The body surface that garments touch.
     pub(crate) fn surface(&self) -> &SurfaceModel {

@@ -2,9 +2,9 @@
 
 use super::Model;
 use crate::cloth::ClothError;
-use crate::cloth::quasi_newton::{Hold, QuasiNewton};
+use crate::cloth::small_steps::{Motion, Plane, Tie};
 use crate::contact::{DepthMaps, SurfaceFrame};
-use crate::math::{P3, V3, V3d};
+use crate::math::{P3, V3};
 use serde::{Deserialize, Serialize};
 
 /// Where one garment is.
@@ -93,10 +93,10 @@ pub struct Input<'a> {
 /// How a step went.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StepReport {
-    /// Quasi-Newton iterations, all garments and substeps.
-    pub iterations: usize,
-    /// Root mean square length of the last iteration's step, metres, worst garment: how converged it is.
-    pub residual: f64,
+    /// Small steps of the garment that needed the most.
+    pub steps: usize,
+    /// Smallest share of its membrane stiffness that a garment keeps at its step.
+    pub softened: f64,
     /// Largest stretch of an edge (length over rest length, minus one).
     pub max_strain: f64,
     /// 99th percentile of the stretch.
@@ -109,8 +109,10 @@ pub struct StepReport {
     pub contacts: usize,
     /// Vertices that were not simulated because cloth and body were still.
     pub sleeping: usize,
-    /// Numeric factorisations saved because nothing in the matrix had changed.
-    pub factorisations_skipped: usize,
+    /// Searches for the nearest skin that were left out because the vertex was too far away to reach it.
+    pub searches_skipped: usize,
+    /// Contact planes of other body parts ignored because there was no room between them and the vertex's own part.
+    pub pinched: usize,
     /// The body jumped and the cloth was carried along.
     pub teleported: bool,
     /// A fault was caught and the last good state kept: which.
@@ -126,9 +128,7 @@ pub struct StagesMs {
     pub maps: f64,
     /// Finding contacts.
     pub contact: f64,
-    /// Factorising.
-    pub factor: f64,
-    /// Iterating.
+    /// Stepping.
     pub solve: f64,
     /// Everything.
     pub total: f64,
@@ -137,28 +137,21 @@ pub struct StagesMs {
 /// Scratch. Dropping it changes no result, only the time of the next step.
 #[derive(Debug, Default)]
 pub struct Workspace {
-    pub(super) garments: Vec<GarmentScratch>,
-    pub(super) frames: Vec<SurfaceFrame>,
-    pub(super) start: SurfaceFrame,
+    pub(super) patches: Vec<PatchScratch>,
+    pub(super) before: SurfaceFrame,
+    pub(super) after: SurfaceFrame,
+    pub(super) now: SurfaceFrame,
     pub(super) maps: DepthMaps,
 }
 
+/// One patch of one garment during a call.
 #[derive(Debug, Default)]
-pub(super) struct GarmentScratch {
-    pub(super) solver: Option<QuasiNewton>,
-    pub(super) x: Vec<V3d>,
-    pub(super) before: Vec<V3d>,
-    pub(super) velocity: Vec<V3d>,
-    pub(super) y: Vec<V3d>,
-    pub(super) holds: Vec<Hold>,
-    pub(super) stiffness: Vec<f64>,
-    pub(super) contacts: Vec<super::step::Contact>,
+pub(super) struct PatchScratch {
+    pub(super) motion: Motion,
     pub(super) nearest: Vec<[u32; 2]>,
-    pub(super) outcome: Outcome,
-}
-
-#[derive(Debug, Default, Clone)]
-pub(super) struct Outcome {
+    /// Room to the nearest skin of both kinds of parts that is left before it must be looked for again, metres.
+    pub(super) clear: Vec<[f32; 2]>,
+    pub(super) planes: Vec<Plane>,
+    pub(super) ties: Vec<Tie>,
     pub(super) report: StepReport,
-    pub(super) fault: Option<ClothError>,
 }

@@ -2,9 +2,10 @@
 
 mod collider;
 mod run;
+mod small;
 
 pub use collider::{Collider, Primitive};
-pub use run::{RunConfig, RunReport, run, write_positions};
+pub use run::{Method, RunConfig, RunReport, run, write_positions};
 
 use super::{ClothError, Sheet};
 use crate::formats::FormatError;

@@ -16,6 +16,8 @@ use std::time::Instant;
 /// How finely to compute.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunConfig {
+    /// Which solver.
+    pub method: Method,
     /// Implicit steps a frame of the output. Implicit Euler loses energy with the step: 1 step a frame halves a free
     /// swing within two seconds (docs/benchmarks.md).
     pub substeps: usize,
@@ -23,11 +25,27 @@ pub struct RunConfig {
     pub iterations: usize,
     /// Distance that cloth keeps from solids, metres: half a millimetre hides neither rounding nor a fabric's thickness.
     pub offset: f64,
+    /// Small steps: how far ahead of positions forces are evaluated, in steps.
+    pub ahead: f64,
+    /// Small steps: steps from one evaluation of bending and from one search for contacts to the next.
+    pub every: [usize; 2],
+    /// Small steps: patches that may run on threads of their own.
+    pub patches: usize,
+}
+
+/// A solver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Small explicit steps ([`crate::cloth::small_steps`]).
+    SmallSteps,
+    /// Prefactorised quasi-Newton, implicit Euler.
+    QuasiNewton,
 }
 
 impl Default for RunConfig {
     fn default() -> Self {
-        Self { substeps: 8, iterations: 10, offset: 5e-4 }
+        Self { method: Method::SmallSteps, substeps: 0, iterations: 10, offset: 5e-4, ahead: 0.05, every: [4, 8], patches: 1 }
     }
 }
 
@@ -61,6 +79,10 @@ pub struct RunReport {
     pub energy_end: f64,
     /// Numeric factorisations.
     pub factorisations: u64,
+    /// Share of the membrane stiffness that the step could carry (small steps).
+    pub softened: f64,
+    /// Elements that keep less than 99 % of it (small steps).
+    pub soft_elements: usize,
 }
 
 /// Writes positions, frames × vertices, as f32 (frames, vertices, 3).
@@ -79,6 +101,17 @@ pub fn write_positions(path: &Path, frames: &[Vec<P3>]) -> Result<(), FormatErro
 /// # Errors
 /// When a position is no longer finite: names the vertex.
 pub fn run(
+    scene: &Scene,
+    config: &RunConfig,
+    frame: impl FnMut(usize, &[P3]) -> ControlFlow<()>,
+) -> Result<RunReport, SceneError> {
+    match config.method {
+        Method::SmallSteps => super::small::run(scene, config, frame),
+        Method::QuasiNewton => quasi_newton(scene, config, frame),
+    }
+}
+
+fn quasi_newton(
     scene: &Scene,
     config: &RunConfig,
     mut frame: impl FnMut(usize, &[P3]) -> ControlFlow<()>,
@@ -155,32 +188,50 @@ pub fn run(
             v.iter_mut().zip(x.iter().zip(&before)).for_each(|(v, (x, b))| *v = (x - b) / h);
         }
         times.push(started.elapsed().as_secs_f64() * 1e3);
-        let t = index as f64 / scene.rate;
-        for c in &scene.colliders {
-            let back = c.placement(t).inverse();
-            let deepest = x.iter().map(|p| -c.shape.distance(&(back * Point3::from(*p)).coords).0);
-            penetration = deepest.fold(penetration, f64::max);
-        }
+        penetration = deepest(scene, index as f64 / scene.rate, &x).max(penetration);
         shown.clear();
         shown.extend(x.iter().map(|p| P3::from(p.cast::<f32>())));
         flow = frame(index, &shown);
         finished += 1;
     }
-    times.sort_by(f64::total_cmp);
-    let kinetic: f64 = v.iter().zip(&sheet.mass).map(|(v, m)| 0.5 * m * v.norm_squared()).sum();
     Ok(RunReport {
         frames: finished,
-        vertices: n,
         substeps,
         iterations: config.iterations,
-        ms_median: times.get(times.len() / 2).copied().unwrap_or(0.0),
-        ms_mean: times.iter().sum::<f64>() / times.len().max(1) as f64,
-        ms_max: times.last().copied().unwrap_or(0.0),
-        p99_strain: sheet.strain(&x).1,
         penetration,
-        energy_end: kinetic + sheet.energy(&x),
         factorisations: solver.factorisations,
+        ..RunReport::of(scene, times, &x, &v)
     })
+}
+
+impl RunReport {
+    /// What every solver tells: times of the frames (ms) and the end.
+    pub(super) fn of(scene: &Scene, mut times: Vec<f64>, x: &[V3d], v: &[V3d]) -> Self {
+        times.sort_by(f64::total_cmp);
+        let kinetic: f64 = v.iter().zip(&scene.sheet.mass).map(|(v, m)| 0.5 * m * v.norm_squared()).sum();
+        Self {
+            frames: scene.frames(),
+            vertices: x.len(),
+            ms_median: times.get(times.len() / 2).copied().unwrap_or(0.0),
+            ms_mean: times.iter().sum::<f64>() / times.len().max(1) as f64,
+            ms_max: times.last().copied().unwrap_or(0.0),
+            p99_strain: scene.sheet.strain(x).1,
+            energy_end: kinetic + scene.sheet.energy(x),
+            ..Self::default()
+        }
+    }
+}
+
+/// Deepest vertex inside a solid at time `t`, metres.
+pub(super) fn deepest(scene: &Scene, t: f64, x: &[V3d]) -> f64 {
+    scene
+        .colliders
+        .iter()
+        .flat_map(|c| {
+            let back = c.placement(t).inverse();
+            x.iter().map(move |p| -c.shape.distance(&(back * Point3::from(*p)).coords).0)
+        })
+        .fold(0.0, f64::max)
 }
 
 fn pin(scene: &Scene, solids: &[(Isometry3<f64>, Isometry3<f64>)], local: &V3d) -> V3d {

@@ -1,0 +1,172 @@
+//! Which planes of the body keep a vertex outside, and where anchors go.
+
+use super::model::Model;
+use super::state::PatchScratch;
+use crate::cloth::small_steps::{Fabric, Plane, Tie, V4};
+use crate::contact::{Closest, DepthMaps, SurfaceFrame};
+use crate::math::{P3, V3};
+
+/// Surfaces further than this from a vertex are not looked at in a round, metres.
+const REACH: f32 = 0.04;
+/// Cloth that ends a call under the skin is put this far above it, metres: less than a fabric's thickness.
+const LIFTED: f32 = 5e-4;
+/// Anchors of strength ½ go to their place at this rate, 1/s.
+const ANCHOR_RATE: f64 = 120.0;
+
+/// The body during one round.
+pub(super) struct Touch<'a> {
+    pub(super) model: &'a Model,
+    pub(super) now: &'a SurfaceFrame,
+    pub(super) before: &'a [P3],
+    pub(super) after: &'a [P3],
+    /// Time from `before` to `after`, s.
+    pub(super) dt: f32,
+    /// Fastest body vertex, m/s.
+    pub(super) fastest: f32,
+    /// Length of the round, s.
+    pub(super) span: f32,
+}
+
+fn p3(v: V4) -> P3 {
+    P3::new(v.0[0], v.0[1], v.0[2])
+}
+
+fn v4(v: &V3) -> V4 {
+    V4::new(v.x, v.y, v.z)
+}
+
+impl Touch<'_> {
+    /// Planes of a patch for this round.
+    pub(super) fn find(&self, garment: usize, f: &Fabric, maps: Option<&DepthMaps>, p: &mut PatchScratch) {
+        let g = &self.model.garments[garment];
+        let offset = g.offset as f32;
+        p.planes.clear();
+        for (i, &v) in f.vertices.iter().enumerate() {
+            let masks = [g.own[v as usize], g.other[v as usize]];
+            let x = p3(p.motion.position(i));
+            let speed = p.motion.velocity[i].dot(p.motion.velocity[i]).sqrt();
+            let travel = (speed + self.fastest) * self.span;
+            let mut found: [Option<Closest>; 2] = [None, None];
+            if let Some(maps) = maps {
+                self.propose(maps, &x, masks, &mut p.nearest[i]);
+            }
+            for k in 0..2 {
+                if masks[k] == 0 {
+                    continue;
+                }
+                if p.clear[i][k] > travel {
+                    p.clear[i][k] -= travel;
+                    p.report.searches_skipped += 1;
+                    continue;
+                }
+                let c = self.model.surface.closest(self.now, &x, p.nearest[i][k], masks[k]);
+                p.nearest[i][k] = c.vertex;
+                p.clear[i][k] = if c.rim { 0.0 } else { c.signed - REACH };
+                if !c.rim && c.signed < REACH {
+                    found[k] = Some(c);
+                }
+            }
+            if let [Some(own), Some(other)] = &found {
+                // Faces that meet with less room than two layers of cloth: the own part decides.
+                let room = own.normal.dot(&(other.point - own.point));
+                if own.normal.dot(&other.normal) < 0.0 && room < 2.0 * offset {
+                    found[1] = None;
+                    p.report.pinched += 1;
+                }
+            }
+            for c in found.iter().rev().flatten() {
+                let corners = self.model.surface.faces()[c.face as usize];
+                let speed = (0..3).fold(V3::zeros(), |s, j| {
+                    let v = corners[j] as usize;
+                    s + (self.after[v] - self.before[v]) * (c.weights[j] / self.dt)
+                });
+                p.planes.push(Plane {
+                    vertex: i as u32,
+                    normal: v4(&c.normal),
+                    level: c.normal.dot(&c.point.coords) + offset,
+                    speed: v4(&speed),
+                    friction: g.sheet.friction as f32,
+                });
+            }
+        }
+    }
+
+    /// Better starting points for the walks, from the depth maps.
+    fn propose(&self, maps: &DepthMaps, x: &P3, masks: [u8; 2], near: &mut [u32; 2]) {
+        let surface = &self.model.surface;
+        let mut best = near.map(|v| (self.now.vertices[v as usize] - x).norm_squared());
+        for face in maps.proposals(x) {
+            let v = surface.faces()[face as usize][0];
+            let d = (self.now.vertices[v as usize] - x).norm_squared();
+            for k in 0..2 {
+                if d < best[k] && surface.part(v) & masks[k] != 0 {
+                    best[k] = d;
+                    near[k] = v;
+                }
+            }
+        }
+    }
+}
+
+/// Where a patch's anchors go during a round.
+pub(super) fn anchors(model: &Model, garment: usize, patch: usize, touch: &Touch<'_>, out: &mut Vec<Tie>) {
+    out.clear();
+    let g = &model.garments[garment];
+    for (local, a) in model.anchors_of(garment, patch) {
+        if a.strength <= 0.0 {
+            continue;
+        }
+        let start = place(a, &touch.now.vertices);
+        let moving = a.body.map(|v| {
+            let v = v as usize;
+            touch.now.vertices[v] + (touch.after[v] - touch.before[v]) * (touch.span / touch.dt)
+        });
+        let end = above(a, moving);
+        let firmness = if a.strength >= 1.0 {
+            1.0
+        } else {
+            1.0 - (-g.h * ANCHOR_RATE * a.strength / (1.0 - a.strength)).exp()
+        };
+        out.push(Tie {
+            vertex: local,
+            place: v4(&start.coords),
+            speed: v4(&((end - start) / touch.span)),
+            firmness: firmness as f32,
+        });
+    }
+}
+
+fn place(a: &super::AnchorBinding, body: &[P3]) -> P3 {
+    above(a, a.body.map(|v| body[v as usize]))
+}
+
+fn above(a: &super::AnchorBinding, [p, q, r]: [P3; 3]) -> P3 {
+    let on = p.coords * a.weights[0] + q.coords * a.weights[1] + r.coords * a.weights[2];
+    let normal = (q - p).cross(&(r - p)).try_normalize(0.0).unwrap_or_else(V3::zeros);
+    P3::from(on + normal * a.height)
+}
+
+/// Measures how deep cloth is under the skin of its own parts, and lifts what is.
+pub(super) fn settle(model: &Model, garment: usize, patch: usize, after: &SurfaceFrame, p: &mut PatchScratch) {
+    let g = &model.garments[garment];
+    let f = &g.patches[patch];
+    let mut last = u32::MAX;
+    for k in 0..p.planes.len() {
+        let i = p.planes[k].vertex;
+        if i == last || i as usize >= f.owned {
+            continue;
+        }
+        last = i;
+        let i = i as usize;
+        let own = g.own[f.vertices[i] as usize];
+        let x = p3(p.motion.position(i));
+        let c = model.surface.closest(after, &x, p.nearest[i][0], own);
+        if c.rim || c.signed >= LIFTED {
+            continue;
+        }
+        p.report.penetration = p.report.penetration.max(f64::from(-c.signed));
+        p.motion.moved[i] = v4(&(c.point + c.normal * LIFTED - p3(p.motion.start[i])));
+        let again = model.surface.closest(after, &p3(p.motion.position(i)), c.vertex, own);
+        p.report.penetration_left = p.report.penetration_left.max(f64::from(-again.signed));
+    }
+}

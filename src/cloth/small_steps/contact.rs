@@ -1,0 +1,74 @@
+//! What keeps a vertex outside a body, and what ties it to one, within small steps.
+
+use super::motion::{Motion, V4};
+
+/// A surface near a vertex: a plane that moves evenly until it is looked for again.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Plane {
+    /// Cloth vertex.
+    pub vertex: u32,
+    /// Unit normal, outward.
+    pub normal: V4,
+    /// The vertex must have `normal · x ≥ level`, metres, at time 0 of the call.
+    pub level: f32,
+    /// Speed of the surface, m/s.
+    pub speed: V4,
+    /// Coulomb coefficient.
+    pub friction: f32,
+}
+
+/// A vertex whose place is given.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tie {
+    /// Cloth vertex.
+    pub vertex: u32,
+    /// Where it belongs at time 0, metres.
+    pub place: V4,
+    /// Speed of that place, m/s.
+    pub speed: V4,
+    /// Share of the way there that each step goes: 1 is rigid.
+    pub firmness: f32,
+}
+
+/// Sunken cloth comes out at this speed at most, m/s: faster, and a body that closes on itself throws it.
+const RECOVERY: f32 = 1.0;
+/// Share of a penetration that one step takes away.
+const RECOVERED: f32 = 0.2;
+
+impl Motion {
+    /// Takes from velocities what would lead through the planes by the end of a step of `h` that begins at time `t`;
+    /// Coulomb friction against the surface. Returns how many vertices were touched.
+    pub fn restrain(&mut self, planes: &[Plane], t: f32, h: f32) -> usize {
+        let mut touched = 0;
+        for p in planes {
+            let i = p.vertex as usize;
+            let rate = p.normal.dot(p.speed);
+            let gap = p.normal.dot(self.position(i)) - p.level - rate * t;
+            let v = self.velocity[i];
+            let toward = p.normal.dot(v) - rate;
+            // Above the surface a step may just reach it; below, it may not go deeper.
+            let least = -gap.max(0.0) / h;
+            if toward < least {
+                let push = least - toward;
+                let slip = v - p.speed - p.normal.scale(toward);
+                let speed = slip.dot(slip).sqrt();
+                let kept = if speed > 0.0 { (1.0 - p.friction * push / speed).max(0.0) } else { 0.0 };
+                self.velocity[i] = p.speed + p.normal.scale(least) + slip.scale(kept);
+                touched += 1;
+            }
+            if gap < 0.0 {
+                self.moved[i] = self.moved[i] + p.normal.scale((-gap * RECOVERED).min(RECOVERY * h));
+            }
+        }
+        touched
+    }
+    /// Brings tied vertices to their places at the end of a step of `h` that begins at time `t`.
+    pub fn tie(&mut self, ties: &[Tie], t: f32, h: f32) {
+        for a in ties {
+            let i = a.vertex as usize;
+            let wanted = (a.place + a.speed.scale(t + h) - self.position(i)).scale(1.0 / h);
+            let v = self.velocity[i];
+            self.velocity[i] = v + (wanted - v).scale(a.firmness);
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! A sheet as stiffness between edges, fitted to a step.
+
+use super::stability::{element_limits, largest_eigenvalue};
+use crate::cloth::{Element, Sheet};
+use nalgebra::{Matrix2, Matrix3, Vector2};
+
+/// How a sheet is fitted to a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    /// The step it shall be stable at, s.
+    pub h: f64,
+    /// How far ahead of positions forces are evaluated, in steps: damps what changes within few steps, by its square.
+    pub ahead: f64,
+    /// Only the edges' own stiffness: the paper's mass-spring model.
+    pub springs_only: bool,
+    /// Steps from one evaluation of bending to the next.
+    pub bend_every: usize,
+}
+
+/// One edge's stiffness against its own lengthening and that of the four edges around it, N/m.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Couple {
+    pub(super) own: f32,
+    pub(super) by: [f32; 4],
+    pub(super) edge: [u32; 4],
+}
+
+/// A hinge that is bent at rest: the part of its force that is not linear.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bent {
+    pub(super) v: [u32; 4],
+    pub(super) c: [f32; 4],
+    /// Stiffness times length at rest, N.
+    pub(super) pull: f32,
+}
+
+/// Immutable. Arrays over vertices and over edges, the latter sorted by their ends.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Share of the membrane stiffness that is kept, mean over the area; less than 1 where the step is too long.
+    pub softened: f64,
+    /// Elements that keep less than 99 %.
+    pub soft_elements: usize,
+    pub(super) inverse_mass: Vec<f32>,
+    pub(super) ends: Vec<[u32; 2]>,
+    pub(super) rest: Vec<f32>,
+    pub(super) couple: Vec<Couple>,
+    /// Vertex pairs and the stiffness of bending between them, N/m.
+    pub(super) bend: Vec<([u32; 2], f32)>,
+    pub(super) bent: Vec<Bent>,
+    pub(super) damping: f32,
+}
+
+/// Room between the step and the stability limit (ratio of eigenvalues): strain turns and stiffens elements, and the
+/// eigenvalue is an estimate from below.
+const MARGIN: f64 = 1.12;
+/// Elements that may be too stiff for a step that still counts as comfortable (share).
+const FEW: f64 = 0.05;
+
+/// Hooke's law of a triangle as stiffness between lengthenings of its edges (edge k is opposite corner k), N/m, and the
+/// unit directions of these edges at rest.
+pub(super) fn edge_stiffness(sheet: &Sheet, e: &Element) -> Option<(Matrix3<f64>, [Vector2<f64>; 3])> {
+    let d = Matrix2::new(e.b[1][0], e.b[1][1], e.b[2][0], e.b[2][1]);
+    let r = d.try_inverse()?;
+    let (p, q) = (r.column(0).into_owned(), r.column(1).into_owned());
+    let edges = [q - p, -q, p];
+    let length = edges.map(|e| e.norm());
+    // Lengthening of edge i from the strain (xx, yy, xy): rᵀEr / |r|.
+    let g = Matrix3::from_fn(|i, j| {
+        let [x, y] = [edges[i].x, edges[i].y];
+        [x * x, y * y, 2.0 * x * y][j] / length[i]
+    });
+    let m = &sheet.membrane;
+    let plane = 2.0 * m.mu + m.lambda;
+    let hooke = Matrix3::new(
+        plane + m.along[0],
+        m.lambda,
+        0.0,
+        m.lambda,
+        plane + m.along[1],
+        0.0,
+        0.0,
+        0.0,
+        4.0 * m.mu,
+    );
+    let inverse = g.try_inverse()?;
+    let directions = std::array::from_fn(|i| edges[i] / length[i]);
+    Some((inverse.transpose() * hooke * inverse * e.area, directions))
+}
+
+impl Plan {
+    /// Compiles a sheet for a step size.
+    pub fn new(sheet: &Sheet, fit: &Fit) -> Self {
+        let mut edges: Vec<([u32; 2], f64)> =
+            sheet.edges.iter().map(|(v, l)| ([v[0].min(v[1]), v[0].max(v[1])], *l)).collect();
+        edges.sort_unstable_by_key(|e| e.0);
+        let find = |a: u32, b: u32| edges.binary_search_by_key(&[a.min(b), a.max(b)], |k| k.0).unwrap_or(0);
+        // How much stiffness per inertia the step can carry: symplectic Euler ends at 4/h², looking ahead costs.
+        let limit = 4.0 / (fit.h * fit.h * (1.0 + 2.0 * fit.ahead) * MARGIN);
+        let limits = element_limits(sheet, fit.springs_only);
+        let mut keep = vec![1.0; limits.len()];
+        let mut loosen = 1.0;
+        if largest_eigenvalue(sheet, &keep, fit.springs_only) > limit {
+            // An element's own limit is careful by up to a fifth; give back what the whole sheet shows to be free.
+            for _ in 0..4 {
+                for (k, l) in keep.iter_mut().zip(&limits) {
+                    *k = (loosen * limit / l).min(1.0);
+                }
+                let now = largest_eigenvalue(sheet, &keep, fit.springs_only);
+                if now < limit && now > 0.97 * limit {
+                    break;
+                }
+                loosen *= (limit / now * 0.99).clamp(0.5, 1.5);
+            }
+        }
+        let area: f64 = sheet.elements.iter().map(|e| e.area).sum();
+        let mut couple = vec![Couple::default(); edges.len()];
+        let mut used = vec![0usize; edges.len()];
+        for (i, c) in couple.iter_mut().enumerate() {
+            c.edge = [i as u32; 4];
+        }
+        for (e, keep) in sheet.elements.iter().zip(&keep) {
+            let Some((k, _)) = edge_stiffness(sheet, e) else { continue };
+            let id: [usize; 3] = std::array::from_fn(|i| find(e.v[(i + 1) % 3], e.v[(i + 2) % 3]));
+            for i in 0..3 {
+                let c = &mut couple[id[i]];
+                c.own += (k[(i, i)] * keep) as f32;
+                if fit.springs_only {
+                    continue;
+                }
+                for j in [(i + 1) % 3, (i + 2) % 3] {
+                    let slot = used[id[i]].min(3);
+                    c.edge[slot] = id[j] as u32;
+                    c.by[slot] += (k[(i, j)] * keep) as f32;
+                    used[id[i]] += 1;
+                }
+            }
+        }
+        let mut bending = std::collections::BTreeMap::<[u32; 2], f64>::new();
+        let mut bent = Vec::new();
+        // Bending is kept for several steps: its own limit is ω·(that time) ≤ 1. A hinge's share of what each vertex
+        // has to bear is bounded by w|c|².
+        let bend_limit = 1.0 / (fit.h * fit.bend_every.max(1) as f64).powi(2);
+        let mut borne = vec![0.0; sheet.mass.len()];
+        let size = |h: &crate::cloth::Hinge| h.w * h.c.iter().map(|c| c * c).sum::<f64>();
+        for h in &sheet.hinges {
+            h.v.iter().for_each(|v| borne[*v as usize] += size(h) / sheet.mass[*v as usize]);
+        }
+        for h in &sheet.hinges {
+            let stiff = h.v.iter().map(|v| borne[*v as usize]).fold(f64::MIN_POSITIVE, f64::max);
+            let w = h.w * (bend_limit / stiff).min(1.0);
+            for i in 0..4 {
+                for j in 0..i {
+                    let key = [h.v[i].min(h.v[j]), h.v[i].max(h.v[j])];
+                    *bending.entry(key).or_default() += w * h.c[i] * h.c[j];
+                }
+            }
+            if h.rest > 0.0 {
+                bent.push(Bent { v: h.v, c: h.c.map(|c| c as f32), pull: (w * h.rest) as f32 });
+            }
+        }
+        Self {
+            softened: sheet.elements.iter().zip(&keep).map(|(e, k)| e.area * k).sum::<f64>()
+                / area.max(f64::MIN_POSITIVE),
+            soft_elements: keep.iter().filter(|k| **k < 0.99).count(),
+            inverse_mass: sheet.mass.iter().map(|m| (1.0 / m) as f32).collect(),
+            ends: edges.iter().map(|e| e.0).collect(),
+            rest: edges.iter().map(|e| e.1 as f32).collect(),
+            couple,
+            bend: bending.into_iter().map(|(v, w)| (v, w as f32)).collect(),
+            bent,
+            damping: sheet.damping as f32,
+        }
+    }
+    /// Number of vertices.
+    pub fn vertices(&self) -> usize {
+        self.inverse_mass.len()
+    }
+    /// Longest step at which all but a few small elements keep all their stiffness, s.
+    pub fn comfortable_step(sheet: &Sheet, ahead: f64) -> f64 {
+        let mut all = element_limits(sheet, false);
+        all.sort_unstable_by(f64::total_cmp);
+        let n = all.len().max(1);
+        let usual = all.get(((n as f64 * (1.0 - FEW)) as usize).min(n - 1)).copied().unwrap_or(1.0);
+        (4.0 / (usual * (1.0 + 2.0 * ahead))).sqrt()
+    }
+}
