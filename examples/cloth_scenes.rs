@@ -5,44 +5,89 @@ use tryon::cloth::scene::{Method, RunConfig, load, run};
 
 fn main() {
     let args: Vec<String> = std::env::args().collect();
-    let folder = std::env::var("TRYON_SHARED").unwrap_or_else(|_| format!("{}/../shared/data", env!("CARGO_MANIFEST_DIR")));
+    let folder =
+        std::env::var("TRYON_SHARED").unwrap_or_else(|_| format!("{}/../shared/data", env!("CARGO_MANIFEST_DIR")));
     let scene = &args[1];
     let get = |k: &str| args.iter().find_map(|a| a.strip_prefix(&format!("{k}=")).map(str::to_owned));
     let s = load(Path::new(&format!("{folder}/scenes/{scene}.json"))).unwrap();
     let mut c = RunConfig::default();
     if let Some(m) = get("method") {
-        c.method = match m.as_str() { "small" => Method::SmallSteps, "qn" => Method::QuasiNewton, _ => panic!() };
+        c.method = match m.as_str() {
+            "small" => Method::SmallSteps,
+            "qn" => Method::QuasiNewton,
+            _ => panic!(),
+        };
     }
-    if let Some(v) = get("n") { c.substeps = v.parse().unwrap(); }
-    if let Some(v) = get("it") { c.iterations = v.parse().unwrap(); }
-    if let Some(v) = get("ahead") { c.ahead = v.parse().unwrap(); }
-    if let Some(v) = get("bend") { c.every[0] = v.parse().unwrap(); }
-    if let Some(v) = get("look") { c.every[1] = v.parse().unwrap(); }
-    if let Some(v) = get("patches") { c.patches = v.parse().unwrap(); }
-    let cpu = || std::fs::read_to_string("/proc/thread-self/schedstat").ok().and_then(|s| s.split(' ').next()?.parse::<f64>().ok()).unwrap_or(0.0) * 1e-6;
+    if let Some(v) = get("n") {
+        c.substeps = v.parse().unwrap();
+    }
+    if let Some(v) = get("it") {
+        c.iterations = v.parse().unwrap();
+    }
+    if let Some(v) = get("ahead") {
+        c.ahead = v.parse().unwrap();
+    }
+    if let Some(v) = get("bend") {
+        c.every[0] = v.parse().unwrap();
+    }
+    if let Some(v) = get("look") {
+        c.every[1] = v.parse().unwrap();
+    }
+    if let Some(v) = get("patches") {
+        c.patches = v.parse().unwrap();
+    }
+    let cpu = || {
+        std::fs::read_to_string("/proc/thread-self/schedstat")
+            .ok()
+            .and_then(|s| s.split(' ').next()?.parse::<f64>().ok())
+            .unwrap_or(0.0)
+            * 1e-6
+    };
     let t0 = cpu();
     let mut positions = vec![];
-    let q = run(&s, &c, |_, p| { positions.push(p.to_vec()); std::ops::ControlFlow::Continue(()) }).unwrap();
+    let q = run(&s, &c, |_, p| {
+        positions.push(p.to_vec());
+        std::ops::ControlFlow::Continue(())
+    })
+    .unwrap();
     let t1 = (cpu() - t0) / (s.frames() - 1) as f64;
     let reference = format!("{folder}/scenes/{scene}.reference.npy");
     let (mut com, mut at) = (f64::NAN, vec![]);
     if let Ok(bytes) = std::fs::read(&reference) {
         let len = u16::from_le_bytes([bytes[8], bytes[9]]) as usize;
-        let f: Vec<f32> = bytes[10 + len..].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+        let f: Vec<f32> =
+            bytes[10 + len..].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
         let n = s.start.len();
         let frames = f.len() / 3 / n;
         let mut sum = 0.0;
         for k in 0..frames.min(positions.len()) {
             let (mut a, mut b, mut d2) = ([0.0f64; 3], [0.0f64; 3], 0.0);
-            for i in 0..n { for d in 0..3 {
-                let (p, q) = (f64::from(positions[k][i][d]), f64::from(f[(k * n + i) * 3 + d]));
-                a[d] += p / n as f64; b[d] += q / n as f64; d2 += (p - q) * (p - q);
-            } }
+            for i in 0..n {
+                for d in 0..3 {
+                    let (p, q) = (f64::from(positions[k][i][d]), f64::from(f[(k * n + i) * 3 + d]));
+                    a[d] += p / n as f64;
+                    b[d] += q / n as f64;
+                    d2 += (p - q) * (p - q);
+                }
+            }
             sum += (0..3).map(|d| (a[d] - b[d]).powi(2)).sum::<f64>();
-            if k == 15 || k == 30 || k == 45 { at.push(format!("{:.1}", (d2 / n as f64).sqrt() * 1e3)); }
+            if k == 15 || k == 30 || k == 45 {
+                at.push(format!("{:.1}", (d2 / n as f64).sqrt() * 1e3));
+            }
         }
         com = (sum / frames as f64).sqrt() * 1e3;
     }
-    println!("{scene} {:?} n={} it={} com={com:.1}mm verts@.25,.5,.75={at:?} cpu {t1:.2} ms med {:.2} mean {:.2} strain99 {:.2}% pen {:.2}mm soft {:.2} scaled {} energy {:.3}",
-        c.method, q.substeps, q.iterations, q.ms_median, q.ms_mean, q.p99_strain * 100.0, q.penetration * 1e3, q.softened, q.soft_elements, q.energy_end);
+    println!(
+        "{scene} {:?} n={} it={} com={com:.1}mm verts@.25,.5,.75={at:?} cpu {t1:.2} ms med {:.2} mean {:.2} strain99 {:.2}% pen {:.2}mm soft {:.2} scaled {} energy {:.3}",
+        c.method,
+        q.substeps,
+        q.iterations,
+        q.ms_median,
+        q.ms_mean,
+        q.p99_strain * 100.0,
+        q.penetration * 1e3,
+        q.softened,
+        q.soft_elements,
+        q.energy_end
+    );
 }

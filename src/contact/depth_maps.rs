@@ -18,10 +18,10 @@ pub struct MapView {
     pub pixels_per_metre: f32,
 }
 
-/// Scale of the side, back and oblique maps: a pixel is a body edge wide.
-const COARSE: f32 = 125.0;
+/// Scale of the side and back maps: a pixel is a body edge wide.
+const COARSE: f32 = 64.0;
 /// Scale of the map that looks from the real camera; the paper asks for a higher resolution there.
-const FINE: f32 = 250.0;
+const FINE: f32 = 128.0;
 
 impl MapView {
     /// The four level directions, starting with the one of the real camera: `toward` is the horizontal direction it
@@ -81,7 +81,7 @@ impl DepthMaps {
                 top: lo.y - BORDER,
                 pixels_per_metre: v.pixels_per_metre,
             };
-            rasterise_with(Options { par: Par::Seq, cull: Cull::None }, &view, &m.points, faces, &mut m.buffer);
+            rasterise_with(Options { par: Par::Seq, cull: Cull::Back }, &view, &m.points, faces, &mut m.buffer);
             m.view = Some(view);
         });
     }

@@ -1,7 +1,9 @@
 //! Candidate pairs, continuous collision, distances and contact energies between moving triangles; it never steps time.
 
 mod depth_maps;
+mod point_grid;
 mod surface;
 
 pub use depth_maps::{DepthMaps, MapView};
+pub use point_grid::PointGrid;
 pub use surface::{Closest, Part, SurfaceFrame, SurfaceModel};

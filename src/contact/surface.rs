@@ -16,6 +16,7 @@ pub struct SurfaceModel {
     faces: Vec<Face>,
     topology: Topology,
     parts: Vec<Part>,
+    rim: Vec<bool>,
 }
 
 /// Where the surface is.
@@ -58,7 +59,7 @@ impl SurfaceModel {
                 }
             }
         }
-        Self { faces, topology, parts }
+        Self { faces, rim: topology.boundary_vertices(), topology, parts }
     }
     /// Number of vertices.
     pub fn vertices(&self) -> usize {
@@ -150,6 +151,31 @@ impl SurfaceModel {
         }
         Closest { vertex, face, weights, point, normal, signed: if outside { distance } else { -distance }, rim }
     }
+    /// The nearest point lies on the edge of an open surface: which side it is on means nothing.
+    pub fn on_rim(&self, c: &Closest) -> bool {
+        let f = self.faces[c.face as usize];
+        (0..3).all(|k| c.weights[k] < RIM || self.rim[f[k] as usize])
+    }
+    /// Vertices one edge away.
+    pub fn neighbours(&self, vertex: u32) -> &[u32] {
+        self.topology.vertex_neighbours().row(vertex as usize)
+    }
+    /// Walk, and the nearest point if it can be within `reach` metres; else how far beyond reach it is at least.
+    pub fn closest_within(
+        &self,
+        frame: &SurfaceFrame,
+        p: &P3,
+        start: u32,
+        mask: Part,
+        reach: f32,
+    ) -> (u32, Result<Closest, f32>) {
+        let v = self.walk(frame, p, start, mask);
+        let room = (frame.vertices[v as usize] - p).norm() - EDGE - reach;
+        if room > 0.0 {
+            return (v, Err(room));
+        }
+        (v, Ok(self.closest_around(frame, p, v, mask)))
+    }
     /// Walk and nearest point in one.
     pub fn closest(&self, frame: &SurfaceFrame, p: &P3, start: u32, mask: Part) -> Closest {
         let v = self.walk(frame, p, start, mask);
@@ -159,6 +185,10 @@ impl SurfaceModel {
 
 /// A walk covers at most this many edges (about 30 cm on a body of 13k vertices); more means the start was lost.
 const MOST_STEPS: usize = 40;
+/// The nearest point of the faces around the nearest vertex is not nearer than that by more than this, metres.
+const EDGE: f32 = 0.03;
+/// A corner that weighs less than this has no part in a point.
+const RIM: f32 = 1e-4;
 /// Beyond this distance the offset direction is a better normal than the interpolated one, metres.
 const FAR_ENOUGH: f32 = 2e-3;
 

@@ -110,7 +110,8 @@ pub fn dress(
     let mut body = Vec::new();
     pose_body(template, rest, &start, &mut body);
     let outfit = Outfit { anchors: vec![Vec::new(); meshes.len()], garments: meshes };
-    let config = Config { sleep: false, teleport: f64::MAX, ..options.config.clone() };
+    // Folds that placing leaves behind must be able to open.
+    let config = Config { sleep: false, self_collision: false, teleport: f64::MAX, ..options.config.clone() };
     let mut model = Model::new(template, outfit, config)?;
     let mut frame = SurfaceFrame { vertices: body.clone(), normals: Vec::new() };
     model.surface().update_normals(Par::Rayon, &mut frame);

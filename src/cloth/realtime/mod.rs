@@ -1,6 +1,7 @@
 //! The real-time simulator: Ye et al. 2014, section 4, "Near Realtime simulation", with today's solver.
 
 mod carry;
+mod cloth_touch;
 mod model;
 mod state;
 mod step;

@@ -5,7 +5,7 @@ use crate::cloth::small_steps::{Fabric, Fit, Plan};
 use crate::cloth::{ClothError, Sheet};
 use crate::contact::{MapView, SurfaceModel};
 use crate::garment::{GarmentMesh, Region};
-use crate::mesh::Topology;
+use crate::mesh::{Csr, Topology};
 use serde::{Deserialize, Serialize};
 
 /// A garment vertex tied to a triangle of the body.
@@ -51,6 +51,12 @@ pub struct Config {
     pub layer_offset: f64,
     /// Horizontal direction the real camera looks along, world x and z: its depth map is the fine one.
     pub camera_toward: [f32; 2],
+    /// Keep layers apart where they meet, not only by their distance from the skin.
+    pub layers: bool,
+    /// Keep the folds of a garment apart.
+    pub self_collision: bool,
+    /// Distance between cloth and cloth, metres.
+    pub thickness: f64,
     /// Let cloth sleep when it and the body are still.
     pub sleep: bool,
     /// A body vertex that moves further than this between two calls has jumped, metres.
@@ -70,6 +76,9 @@ impl Default for Config {
             offset: 0.005,
             layer_offset: 0.004,
             camera_toward: [0.0, -1.0],
+            layers: false,
+            self_collision: true,
+            thickness: 0.003,
             sleep: true,
             teleport: 0.2,
             par: crate::par::Par::Rayon,
@@ -92,6 +101,10 @@ pub(super) struct GarmentModel {
     pub(super) other: Vec<u8>,
     /// Distance from the skin, metres.
     pub(super) offset: f64,
+    /// The garment itself as something to touch.
+    pub(super) surface: SurfaceModel,
+    /// Vertices too near on the sheet to count as another fold.
+    pub(super) close: Csr,
     /// Local vertex and number of the binding, for each patch.
     pub(super) anchors: Vec<Vec<(u32, usize)>>,
 }
@@ -174,6 +187,7 @@ impl Model {
             let own: Vec<u8> = g.regions.iter().map(|r| r.0).collect();
             let other = own.iter().map(|o| Region::ALL.0 & !o).collect();
             let offset = config.offset + config.layer_offset * order as f64;
+            let surface = SurfaceModel::new(g.faces.clone(), g.topology()?, vec![1; g.vertices], 0);
             garments.push(GarmentModel {
                 sheet,
                 patches,
@@ -182,6 +196,8 @@ impl Model {
                 own,
                 other,
                 offset,
+                close: super::cloth_touch::close(&surface),
+                surface,
                 anchors: Vec::new(),
             });
         }

@@ -3,7 +3,7 @@
 use super::Model;
 use crate::cloth::ClothError;
 use crate::cloth::small_steps::{Motion, Plane, Tie};
-use crate::contact::{DepthMaps, SurfaceFrame};
+use crate::contact::{DepthMaps, PointGrid, SurfaceFrame};
 use crate::math::{P3, V3};
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +16,8 @@ pub struct GarmentState {
     pub velocities: Vec<V3>,
     /// Nearest body vertex of each vertex, among the parts it belongs to and among the others.
     pub(super) nearest: Vec<[u32; 2]>,
+    /// Nearest vertex of each inner garment, shape `[inner garments][vertices]`.
+    pub(super) under: Vec<Vec<u32>>,
 }
 
 /// Where an outfit is.
@@ -65,7 +67,23 @@ impl State {
                     *n = [m.own[i], m.other[i]].map(|mask| model.surface.nearest_vertex(&frame, &p[i], mask));
                 }
             });
-            garments.push(GarmentState { velocities: vec![V3::zeros(); p.len()], positions: p, nearest });
+            garments.push(GarmentState {
+                velocities: vec![V3::zeros(); p.len()],
+                positions: p,
+                nearest,
+                under: Vec::new(),
+            });
+        }
+        for k in 1..garments.len() {
+            let (inner, outer) = garments.split_at_mut(k);
+            for (j, g) in inner.iter().enumerate() {
+                let frame = SurfaceFrame { vertices: g.positions.clone(), normals: Vec::new() };
+                let mut near = Vec::new();
+                crate::par::map_into(model.config.par, outer[0].positions.len(), 64, &mut near, |i| {
+                    model.garments[j].surface.nearest_vertex(&frame, &outer[0].positions[i], u8::MAX)
+                });
+                outer[0].under.push(near);
+            }
         }
         Ok(Self { garments, body: body.to_vec(), awake_body: body.to_vec(), frames: 0, still: 0, stale: 0 })
     }
@@ -111,6 +129,8 @@ pub struct StepReport {
     pub sleeping: usize,
     /// Searches for the nearest skin that were left out because the vertex was too far away to reach it.
     pub searches_skipped: usize,
+    /// Vertices held off another layer or another fold of the same garment.
+    pub cloth_contacts: usize,
     /// Contact planes of other body parts ignored because there was no room between them and the vertex's own part.
     pub pinched: usize,
     /// The body jumped and the cloth was carried along.
@@ -141,7 +161,16 @@ pub struct Workspace {
     pub(super) before: SurfaceFrame,
     pub(super) after: SurfaceFrame,
     pub(super) now: SurfaceFrame,
+    pub(super) sheets: Vec<SheetFrame>,
     pub(super) maps: DepthMaps,
+}
+
+/// One garment at the beginning of a round, for contact of cloth with cloth.
+#[derive(Debug, Default)]
+pub(super) struct SheetFrame {
+    pub(super) surface: SurfaceFrame,
+    pub(super) velocities: Vec<V3>,
+    pub(super) grid: PointGrid,
 }
 
 /// One patch of one garment during a call.
@@ -151,6 +180,7 @@ pub(super) struct PatchScratch {
     pub(super) nearest: Vec<[u32; 2]>,
     /// Room to the nearest skin of both kinds of parts that is left before it must be looked for again, metres.
     pub(super) clear: Vec<[f32; 2]>,
+    pub(super) under: Vec<Vec<u32>>,
     pub(super) planes: Vec<Plane>,
     pub(super) ties: Vec<Tie>,
     pub(super) report: StepReport,

@@ -1,6 +1,7 @@
 //! One call of the real-time simulator.
 
 use super::carry::carry;
+use super::cloth_touch::{ClothTouch, sheets};
 use super::model::{ALONE, BEND_EVERY, Model};
 use super::state::{Input, PatchScratch, State, StepReport, Workspace, check_body};
 use super::touch::{Touch, anchors, settle};
@@ -77,10 +78,13 @@ pub fn step(
     report.stages_ms.maps = ms(timer);
     let timer = Instant::now();
     // The body at both ends of the call; in between it moves evenly.
-    work.before.vertices.clone_from(&state.body);
+    std::mem::swap(&mut work.before, &mut work.after);
+    if work.before.vertices != state.body || work.before.normals.len() != state.body.len() {
+        work.before.vertices.clone_from(&state.body);
+        model.surface.update_normals(config.par, &mut work.before);
+    }
     work.after.vertices.clear();
     work.after.vertices.extend_from_slice(input.body);
-    model.surface.update_normals(config.par, &mut work.before);
     model.surface.update_normals(config.par, &mut work.after);
     let fastest = moved(&state.body) / dt as f32;
     report.stages_ms.contact = ms(timer);
@@ -100,7 +104,12 @@ pub fn step(
             span: span as f32,
         };
         let maps = (r == 0).then_some(&work.maps);
+        sheets(model, &work.patches, &mut work.sheets);
+        let cloth = ClothTouch { model, sheets: &work.sheets };
         for_patches(model, &mut work.patches, |g, k, p| {
+            // In this order: the body has the last word.
+            p.planes.clear();
+            cloth.find(g, &model.garments[g].patches[k], p);
             touch.find(g, &model.garments[g].patches[k], maps, p);
             anchors(model, g, k, &touch, &mut p.ties);
         });
@@ -164,6 +173,11 @@ fn begin(model: &Model, state: &State, all: &mut Vec<PatchScratch>) {
         );
         p.nearest.clear();
         p.nearest.extend(local().map(|v| from.nearest[v]));
+        p.under.resize_with(from.under.len(), Vec::new);
+        for (to, from) in p.under.iter_mut().zip(&from.under) {
+            to.clear();
+            to.extend(local().map(|v| from[v]));
+        }
         p.clear.clear();
         p.clear.resize(fabric.vertices.len(), [0.0; 2]);
         p.report = StepReport::default();
@@ -172,7 +186,8 @@ fn begin(model: &Model, state: &State, all: &mut Vec<PatchScratch>) {
 
 /// All patches through `span` seconds. Garments do not wait for each other, patches of one garment do.
 fn advance(model: &Model, all: &mut [PatchScratch], span: f64) {
-    let gravity = V4::new(model.config.gravity[0] as f32, model.config.gravity[1] as f32, model.config.gravity[2] as f32);
+    let gravity =
+        V4::new(model.config.gravity[0] as f32, model.config.gravity[1] as f32, model.config.gravity[2] as f32);
     let ahead = model.config.ahead as f32;
     let mut rest = all;
     let mut garments = Vec::with_capacity(model.garments.len());
@@ -220,7 +235,8 @@ fn finish(model: &Model, state: &mut State, all: &[PatchScratch], report: &mut S
         at += m.patches.len();
         let g = &mut state.garments[k];
         let bad = m.patches.iter().zip(patches).find_map(|(f, p)| {
-            let wrong = |i: &usize| !p.motion.position(*i).0.iter().chain(&p.motion.velocity[*i].0).all(|c| c.is_finite());
+            let wrong =
+                |i: &usize| !p.motion.position(*i).0.iter().chain(&p.motion.velocity[*i].0).all(|c| c.is_finite());
             (0..f.owned).find(wrong).map(|i| f.vertices[i] as usize)
         });
         if let Some(index) = bad {
@@ -239,11 +255,15 @@ fn finish(model: &Model, state: &mut State, all: &[PatchScratch], report: &mut S
                 let speed = u.norm();
                 g.velocities[v] = if speed > FASTEST { u * (FASTEST / speed) } else { u };
                 g.nearest[v] = p.nearest[i];
+                for (to, from) in g.under.iter_mut().zip(&p.under) {
+                    to[v] = from[i];
+                }
                 sum += f64::from(speed * speed);
             }
             let r = &p.report;
             report.contacts += r.contacts;
             report.pinched += r.pinched;
+            report.cloth_contacts += r.cloth_contacts;
             report.searches_skipped += r.searches_skipped;
             report.penetration = report.penetration.max(r.penetration);
             report.penetration_left = report.penetration_left.max(r.penetration_left);

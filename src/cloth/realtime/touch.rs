@@ -40,7 +40,6 @@ impl Touch<'_> {
     pub(super) fn find(&self, garment: usize, f: &Fabric, maps: Option<&DepthMaps>, p: &mut PatchScratch) {
         let g = &self.model.garments[garment];
         let offset = g.offset as f32;
-        p.planes.clear();
         for (i, &v) in f.vertices.iter().enumerate() {
             let masks = [g.own[v as usize], g.other[v as usize]];
             let x = p3(p.motion.position(i));
@@ -59,11 +58,17 @@ impl Touch<'_> {
                     p.report.searches_skipped += 1;
                     continue;
                 }
-                let c = self.model.surface.closest(self.now, &x, p.nearest[i][k], masks[k]);
-                p.nearest[i][k] = c.vertex;
-                p.clear[i][k] = if c.rim { 0.0 } else { c.signed - REACH };
-                if !c.rim && c.signed < REACH {
-                    found[k] = Some(c);
+                let surface = &self.model.surface;
+                let (near, c) = surface.closest_within(self.now, &x, p.nearest[i][k], masks[k], REACH);
+                p.nearest[i][k] = near;
+                match c {
+                    Err(room) => p.clear[i][k] = room,
+                    Ok(c) => {
+                        p.clear[i][k] = if c.rim { 0.0 } else { c.signed - REACH };
+                        if !c.rim && c.signed < REACH {
+                            found[k] = Some(c);
+                        }
+                    }
                 }
             }
             if let [Some(own), Some(other)] = &found {
@@ -122,11 +127,8 @@ pub(super) fn anchors(model: &Model, garment: usize, patch: usize, touch: &Touch
             touch.now.vertices[v] + (touch.after[v] - touch.before[v]) * (touch.span / touch.dt)
         });
         let end = above(a, moving);
-        let firmness = if a.strength >= 1.0 {
-            1.0
-        } else {
-            1.0 - (-g.h * ANCHOR_RATE * a.strength / (1.0 - a.strength)).exp()
-        };
+        let firmness =
+            if a.strength >= 1.0 { 1.0 } else { 1.0 - (-g.h * ANCHOR_RATE * a.strength / (1.0 - a.strength)).exp() };
         out.push(Tie {
             vertex: local,
             place: v4(&start.coords),

@@ -45,7 +45,15 @@ pub enum Method {
 
 impl Default for RunConfig {
     fn default() -> Self {
-        Self { method: Method::SmallSteps, substeps: 0, iterations: 10, offset: 5e-4, ahead: 0.05, every: [4, 8], patches: 1 }
+        Self {
+            method: Method::SmallSteps,
+            substeps: 0,
+            iterations: 10,
+            offset: 5e-4,
+            ahead: 0.05,
+            every: [4, 8],
+            patches: 1,
+        }
     }
 }
 

@@ -72,17 +72,8 @@ pub(super) fn edge_stiffness(sheet: &Sheet, e: &Element) -> Option<(Matrix3<f64>
     });
     let m = &sheet.membrane;
     let plane = 2.0 * m.mu + m.lambda;
-    let hooke = Matrix3::new(
-        plane + m.along[0],
-        m.lambda,
-        0.0,
-        m.lambda,
-        plane + m.along[1],
-        0.0,
-        0.0,
-        0.0,
-        4.0 * m.mu,
-    );
+    let hooke =
+        Matrix3::new(plane + m.along[0], m.lambda, 0.0, m.lambda, plane + m.along[1], 0.0, 0.0, 0.0, 4.0 * m.mu);
     let inverse = g.try_inverse()?;
     let directions = std::array::from_fn(|i| edges[i] / length[i]);
     Some((inverse.transpose() * hooke * inverse * e.area, directions))

@@ -67,9 +67,8 @@ pub(super) fn largest_eigenvalue(sheet: &Sheet, keep: &[f64], springs_only: bool
     for _ in 0..PRODUCTS {
         y.fill(Vector2::zeros());
         for (v, k, along) in &terms {
-            let d: [f64; 3] = std::array::from_fn(|i| {
-                along[i].dot(&(x[v[(i + 2) % 3] as usize] - x[v[(i + 1) % 3] as usize]))
-            });
+            let d: [f64; 3] =
+                std::array::from_fn(|i| along[i].dot(&(x[v[(i + 2) % 3] as usize] - x[v[(i + 1) % 3] as usize])));
             for i in 0..3 {
                 let t: f64 = (0..3).filter(|j| *j == i || !springs_only).map(|j| k[(i, j)] * d[j]).sum();
                 y[v[(i + 1) % 3] as usize] -= along[i] * t;
