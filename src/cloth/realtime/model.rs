@@ -76,7 +76,7 @@ impl Default for Config {
             offset: 0.005,
             layer_offset: 0.004,
             camera_toward: [0.0, -1.0],
-            layers: false,
+            layers: true,
             self_collision: true,
             thickness: 0.003,
             sleep: true,

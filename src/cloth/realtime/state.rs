@@ -16,8 +16,8 @@ pub struct GarmentState {
     pub velocities: Vec<V3>,
     /// Nearest body vertex of each vertex, among the parts it belongs to and among the others.
     pub(super) nearest: Vec<[u32; 2]>,
-    /// Nearest vertex of each inner garment, shape `[inner garments][vertices]`.
-    pub(super) under: Vec<Vec<u32>>,
+    /// Nearest vertex of every garment further out, shape `[garments][vertices]`; empty for the others.
+    pub(super) layers: Vec<Vec<u32>>,
 }
 
 /// Where an outfit is.
@@ -71,18 +71,20 @@ impl State {
                 velocities: vec![V3::zeros(); p.len()],
                 positions: p,
                 nearest,
-                under: Vec::new(),
+                layers: Vec::new(),
             });
         }
-        for k in 1..garments.len() {
-            let (inner, outer) = garments.split_at_mut(k);
-            for (j, g) in inner.iter().enumerate() {
-                let frame = SurfaceFrame { vertices: g.positions.clone(), normals: Vec::new() };
+        let all: Vec<SurfaceFrame> =
+            garments.iter().map(|g| SurfaceFrame { vertices: g.positions.clone(), normals: Vec::new() }).collect();
+        for (k, g) in garments.iter_mut().enumerate() {
+            for (j, frame) in all.iter().enumerate() {
                 let mut near = Vec::new();
-                crate::par::map_into(model.config.par, outer[0].positions.len(), 64, &mut near, |i| {
-                    model.garments[j].surface.nearest_vertex(&frame, &outer[0].positions[i], u8::MAX)
-                });
-                outer[0].under.push(near);
+                if j > k {
+                    crate::par::map_into(model.config.par, g.positions.len(), 64, &mut near, |i| {
+                        model.garments[j].surface.nearest_vertex(frame, &g.positions[i], u8::MAX)
+                    });
+                }
+                g.layers.push(near);
             }
         }
         Ok(Self { garments, body: body.to_vec(), awake_body: body.to_vec(), frames: 0, still: 0, stale: 0 })
@@ -180,8 +182,10 @@ pub(super) struct PatchScratch {
     pub(super) nearest: Vec<[u32; 2]>,
     /// Room to the nearest skin of both kinds of parts that is left before it must be looked for again, metres.
     pub(super) clear: Vec<[f32; 2]>,
-    pub(super) under: Vec<Vec<u32>>,
+    pub(super) layers: Vec<Vec<u32>>,
     pub(super) planes: Vec<Plane>,
+    /// How many of the planes, the first ones, are of cloth.
+    pub(super) cloth_planes: usize,
     pub(super) ties: Vec<Tie>,
     pub(super) report: StepReport,
 }

@@ -109,8 +109,11 @@ pub fn step(
         for_patches(model, &mut work.patches, |g, k, p| {
             // In this order: the body has the last word.
             p.planes.clear();
-            cloth.find(g, &model.garments[g].patches[k], p);
-            touch.find(g, &model.garments[g].patches[k], maps, p);
+            let fabric = &model.garments[g].patches[k];
+            cloth.folds(g, fabric, p);
+            cloth.layers(g, fabric, p);
+            p.cloth_planes = p.planes.len();
+            touch.find(g, fabric, maps, p);
             anchors(model, g, k, &touch, &mut p.ties);
         });
         report.stages_ms.contact += ms(timer);
@@ -173,10 +176,10 @@ fn begin(model: &Model, state: &State, all: &mut Vec<PatchScratch>) {
         );
         p.nearest.clear();
         p.nearest.extend(local().map(|v| from.nearest[v]));
-        p.under.resize_with(from.under.len(), Vec::new);
-        for (to, from) in p.under.iter_mut().zip(&from.under) {
+        p.layers.resize_with(from.layers.len(), Vec::new);
+        for (to, from) in p.layers.iter_mut().zip(&from.layers) {
             to.clear();
-            to.extend(local().map(|v| from[v]));
+            to.extend(local().filter_map(|v| from.get(v)));
         }
         p.clear.clear();
         p.clear.resize(fabric.vertices.len(), [0.0; 2]);
@@ -212,7 +215,9 @@ fn advance(model: &Model, all: &mut [PatchScratch], span: f64) {
                     let t = s as f32 * h;
                     p.motion.accelerate(f, h, ahead, gravity);
                     p.motion.tie(&p.ties, t, h);
-                    p.report.contacts = p.motion.restrain(&p.planes, t, h);
+                    let (cloth, body) = p.planes.split_at(p.cloth_planes);
+                    p.motion.restrain(cloth, t, h);
+                    p.report.contacts = p.motion.restrain(body, t, h);
                     p.motion.advance(h);
                 }
             });
@@ -255,8 +260,10 @@ fn finish(model: &Model, state: &mut State, all: &[PatchScratch], report: &mut S
                 let speed = u.norm();
                 g.velocities[v] = if speed > FASTEST { u * (FASTEST / speed) } else { u };
                 g.nearest[v] = p.nearest[i];
-                for (to, from) in g.under.iter_mut().zip(&p.under) {
-                    to[v] = from[i];
+                for (to, from) in g.layers.iter_mut().zip(&p.layers) {
+                    if let (Some(to), Some(from)) = (to.get_mut(v), from.get(i)) {
+                        *to = *from;
+                    }
                 }
                 sum += f64::from(speed * speed);
             }

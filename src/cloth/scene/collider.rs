@@ -127,9 +127,12 @@ fn read_motion(path: &Path) -> Result<Vec<(f64, Isometry3<f64>)>, String> {
     placements(&rows).map_err(|(row, why)| format!("motion_csv: {} line {}: {why}", path.display(), lines[row]))
 }
 
+/// Times (s) and placements, in order.
+type Motion = Vec<(f64, Isometry3<f64>)>;
+
 /// Times and placements of rows, or the row at fault.
-fn placements(rows: &[[f64; 8]]) -> Result<Vec<(f64, Isometry3<f64>)>, (usize, &'static str)> {
-    let mut out: Vec<(f64, Isometry3<f64>)> = Vec::with_capacity(rows.len());
+fn placements(rows: &[[f64; 8]]) -> Result<Motion, (usize, &'static str)> {
+    let mut out: Motion = Vec::with_capacity(rows.len());
     for (row, v) in rows.iter().enumerate() {
         let [t, px, py, pz, qx, qy, qz, qw] = *v;
         if !v.iter().all(|x| x.is_finite()) || out.last().is_some_and(|(last, _)| *last >= t) {

@@ -1,5 +1,6 @@
 //! Scenes as plain data: one sheet, pins, moving primitives. What `tryon simulate` runs and benchmarks compare.
 
+mod baseline;
 mod collider;
 mod run;
 mod small;

@@ -41,6 +41,12 @@ pub enum Method {
     SmallSteps,
     /// Prefactorised quasi-Newton, implicit Euler.
     QuasiNewton,
+    /// The same with the second-order backward difference (BDF2).
+    QuasiNewtonBdf2,
+    /// XPBD with small steps: one pass over the triangles a step, on the same edges and bending as small steps.
+    Xpbd,
+    /// The paper's: springs along edges and across hinges, one linearised implicit Euler step.
+    MassSpring,
 }
 
 impl Default for RunConfig {
@@ -61,6 +67,9 @@ impl Default for RunConfig {
 /// contacts leave sliding free (see the real-time solver).
 const PIN_STIFFNESS: f64 = 1e3;
 const CONTACT_STIFFNESS: f64 = 2.0;
+
+/// Implicit steps a frame when none are asked for.
+const USUAL_SUBSTEPS: usize = 8;
 
 /// What a run says about itself.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -115,23 +124,28 @@ pub fn run(
 ) -> Result<RunReport, SceneError> {
     match config.method {
         Method::SmallSteps => super::small::run(scene, config, frame),
-        Method::QuasiNewton => quasi_newton(scene, config, frame),
+        Method::QuasiNewton => quasi_newton(scene, config, false, frame),
+        Method::QuasiNewtonBdf2 => quasi_newton(scene, config, true, frame),
+        Method::Xpbd | Method::MassSpring => super::baseline::run(scene, config, frame),
     }
 }
 
 fn quasi_newton(
     scene: &Scene,
     config: &RunConfig,
+    second_order: bool,
     mut frame: impl FnMut(usize, &[P3]) -> ControlFlow<()>,
 ) -> Result<RunReport, SceneError> {
     let sheet = &scene.sheet;
     let n = scene.start.len();
-    let substeps = config.substeps.max(1);
+    let substeps = if config.substeps == 0 { USUAL_SUBSTEPS } else { config.substeps };
     let h = 1.0 / (scene.rate * substeps as f64);
     let unit = hold_unit(sheet, h);
     let mut solver = QuasiNewton::new(SymbolicFactor::new(sheet.pattern.clone()).map_err(ClothError::from)?);
     let mut x: Vec<V3d> = scene.start.iter().map(|p| p.coords.cast()).collect();
     let mut v = vec![V3d::zeros(); n];
+    // Positions and velocities one step earlier, for BDF2.
+    let mut earlier: Option<(Vec<V3d>, Vec<V3d>)> = None;
     let local: Vec<V3d> = match scene.pinned_to {
         Some(c) => {
             let back = scene.colliders[c].placement(0.0).inverse();
@@ -156,7 +170,16 @@ fn quasi_newton(
                 scene.colliders.iter().map(|c| (c.placement(t - h), c.placement(t))).collect();
             let before = x.clone();
             y.clear();
-            y.extend((0..n).map(|i| x[i] + v[i] * h + scene.gravity * (h * h)));
+            // BDF2: 3x − 4x₋₁ + x₋₂ = 2h v, and the same for v: an implicit Euler step of 2h/3 from the extrapolation.
+            let hb = if second_order && earlier.is_some() { h * 2.0 / 3.0 } else { h };
+            let (base, rate): (Vec<V3d>, Vec<V3d>) = match &earlier {
+                Some((x0, v0)) if second_order => (
+                    x.iter().zip(x0).map(|(x, x0)| (x * 4.0 - x0) / 3.0).collect(),
+                    v.iter().zip(v0).map(|(v, v0)| (v * 4.0 - v0) / 3.0).collect(),
+                ),
+                _ => (x.clone(), v.clone()),
+            };
+            y.extend((0..n).map(|i| base[i] + rate[i] * hb + scene.gravity * (hb * hb)));
             x.copy_from_slice(&y);
             stiffness.clear();
             stiffness.resize(n, 0.0);
@@ -168,7 +191,7 @@ fn quasi_newton(
             for &p in &scene.pins {
                 stiffness[p as usize] = PIN_STIFFNESS * unit[p as usize];
             }
-            solver.prepare(sheet, h, &stiffness)?;
+            solver.prepare(sheet, hb, &stiffness)?;
             for _ in 0..config.iterations.max(1) {
                 holds.clear();
                 holds.extend((0..n).map(|i| {
@@ -193,7 +216,9 @@ fn quasi_newton(
             for &p in &scene.pins {
                 x[p as usize] = pin(scene, &solids, &local[p as usize]);
             }
-            v.iter_mut().zip(x.iter().zip(&before)).for_each(|(v, (x, b))| *v = (x - b) / h);
+            let old = v.clone();
+            v.iter_mut().zip(x.iter().zip(&base)).for_each(|(v, (x, b))| *v = (x - b) / hb);
+            earlier = Some((before, old));
         }
         times.push(started.elapsed().as_secs_f64() * 1e3);
         penetration = deepest(scene, index as f64 / scene.rate, &x).max(penetration);

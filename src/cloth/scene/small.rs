@@ -10,11 +10,11 @@ use nalgebra::Point3;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-fn v4(v: &V3d) -> V4 {
+pub(super) fn v4(v: &V3d) -> V4 {
     V4::new(v.x as f32, v.y as f32, v.z as f32)
 }
 
-fn v3d(v: V4) -> V3d {
+pub(super) fn v3d(v: V4) -> V3d {
     V3d::new(f64::from(v.0[0]), f64::from(v.0[1]), f64::from(v.0[2]))
 }
 
@@ -151,7 +151,7 @@ fn pins_of(scene: &Scene, f: &Fabric) -> Vec<(u32, u32)> {
 }
 
 /// Planes of the solids near each vertex, as they will move for `span` seconds from `t`.
-fn look(scene: &Scene, offset: f64, motion: &Motion, t: f64, span: f64, planes: &mut Vec<Plane>) {
+pub(super) fn look(scene: &Scene, offset: f64, motion: &Motion, t: f64, span: f64, planes: &mut Vec<Plane>) {
     planes.clear();
     for c in &scene.colliders {
         let (was, will) = (c.placement(t), c.placement(t + span));

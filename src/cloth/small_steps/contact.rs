@@ -53,6 +53,7 @@ impl Motion {
                 let slip = v - p.speed - p.normal.scale(toward);
                 let speed = slip.dot(slip).sqrt();
                 let kept = if speed > 0.0 { (1.0 - p.friction * push / speed).max(0.0) } else { 0.0 };
+                // `toward` is relative to the surface: its own speed comes back with the normal part.
                 self.velocity[i] = p.speed + p.normal.scale(least) + slip.scale(kept);
                 touched += 1;
             }

@@ -14,4 +14,4 @@ mod stability;
 pub use contact::{Plane, Tie};
 pub use fabric::{Fabric, exchange};
 pub use motion::{Motion, V4};
-pub use plan::{Fit, Plan};
+pub use plan::{Fit, Plan, triangles};

@@ -79,6 +79,17 @@ pub(super) fn edge_stiffness(sheet: &Sheet, e: &Element) -> Option<(Matrix3<f64>
     Some((inverse.transpose() * hooke * inverse * e.area, directions))
 }
 
+/// Corners, stiffness between the lengthenings of the edges (edge k is opposite corner k, N/m) and rest lengths of every
+/// triangle.
+pub fn triangles(sheet: &Sheet) -> Vec<([u32; 3], Matrix3<f64>, [f64; 3])> {
+    let of = |e: &Element| {
+        let r = Matrix2::new(e.b[1][0], e.b[1][1], e.b[2][0], e.b[2][1]).try_inverse()?;
+        let (p, q) = (r.column(0).into_owned(), r.column(1).into_owned());
+        Some((e.v, edge_stiffness(sheet, e)?.0, [(q - p).norm(), q.norm(), p.norm()]))
+    };
+    sheet.elements.iter().filter_map(of).collect()
+}
+
 impl Plan {
     /// Compiles a sheet for a step size.
     pub fn new(sheet: &Sheet, fit: &Fit) -> Self {
