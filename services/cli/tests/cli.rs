@@ -176,3 +176,78 @@ fn the_demo_leaves_pictures_and_its_report() {
         .filter(|e| e.as_ref().unwrap().path().extension().is_some_and(|x| x == "png"));
     assert!(pictures.count() >= 1, "pictures");
 }
+
+#[test]
+fn what_is_recorded_can_be_tracked_and_converted() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).display().to_string();
+    let run = |args: &[&str]| {
+        let out = tryon(args);
+        assert!(out.status.success(), "{args:?}: {}", text(&out.stderr));
+        text(&out.stdout)
+    };
+    run(&["record", "--source", "synth:still", "--seconds", "0.5", "--out", &at("a.mcap")]);
+    run(&["import", &at("a.mcap"), "--out", &at("folder")]);
+    for input in ["a.mcap", "folder"] {
+        run(&["track", "--input", &at(input), "--out", &at("out.jsonl")]);
+        let all = lines(&dir.path().join("out.jsonl"));
+        assert_eq!(all.len(), 15, "{input}");
+        let last = &all[14];
+        assert!(
+            last["joints"].as_object().unwrap().len() >= 19 && last["residual_mm"].as_f64().unwrap() < 20.0,
+            "{last}"
+        );
+    }
+    run(&["export", "tshirt", "--out", &at("shirt.obj")]);
+    assert!(run(&["import", &at("shirt.obj")]).contains("closed: false"));
+    run(&["export", "body", "--out", &at("body.glb")]);
+    assert!(run(&["import", &at("body.glb")]).contains("closed: true"));
+}
+
+#[test]
+fn a_box_starts_from_its_file_and_drains_at_a_signal() {
+    use std::io::{BufRead, BufReader, Read, Write};
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("box.toml");
+    let free = || std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let bus = free();
+    let mut config = format!("[bus]\nlisten = [\"tcp/{bus}\"]\nconnect = [\"tcp/{bus}\"]\n");
+    for service in ["capture", "tracking", "cloth", "compositor"] {
+        config += &format!("[{service}]\naddress = \"127.0.0.1:0\"\nadmin = \"127.0.0.1:0\"\n");
+    }
+    std::fs::write(&file, &config).unwrap();
+    let file_text = file.display().to_string();
+    let checked = tryon(&["up", "--config", &file_text, "--check"]);
+    assert!(checked.status.success() && text(&checked.stdout).contains("[compositor]"));
+
+    let mut child = Command::new(env!("CARGO_BIN_EXE_tryon"))
+        .args(["up", "--config", &file_text])
+        .env("XDG_RUNTIME_DIR", std::env::temp_dir())
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut said = BufReader::new(child.stdout.take().unwrap()).lines();
+    let mirror = said.by_ref().map(Result::unwrap).find_map(|l| l.strip_prefix("mirror: http://").map(str::to_owned));
+    let mut page = std::net::TcpStream::connect(mirror.expect("an address")).unwrap();
+    write!(page, "GET / HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n").unwrap();
+    let mut html = String::new();
+    page.read_to_string(&mut html).unwrap();
+    assert!(html.starts_with("HTTP/1.1 200") && html.contains("<html"), "{html}");
+    let kill = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success() && child.wait().unwrap().success());
+    assert_eq!(said.last().unwrap().unwrap(), "ended");
+
+    std::fs::write(&file, config.replace("[cloth]", "[cloth]\nmax_session = 3")).unwrap();
+    let refused = tryon(&["up", "--config", &file_text]);
+    assert!(refused.status.code() == Some(64) && text(&refused.stderr).contains("max_session"));
+}
+
+#[test]
+fn doctor_knows_the_machine() {
+    let out = tryon(&["doctor", "--json"]);
+    let report: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let looked_at: Vec<&str> = report.as_array().unwrap().iter().map(|r| r["what"].as_str().unwrap()).collect();
+    for what in ["cores", "memory", "body", "graphics", "port", "shared data"] {
+        assert!(looked_at.contains(&what), "{what} is missing in {report:#}");
+    }
+}
