@@ -14,8 +14,10 @@ pub struct Measurements {
     pub stature: f64,
     /// Around the fullest part of the chest below the armpits.
     pub chest: f64,
-    /// Around the trunk at the height of the navel.
+    /// Around the trunk at the height of the navel (ANSUR's waist).
     pub waist: f64,
+    /// Around the narrowest part of the trunk between seat and lower chest (the waist of clothes' size tables).
+    pub natural_waist: f64,
     /// Around the fullest part of the seat.
     pub hip: f64,
     /// Around the middle of the neck, across its axis.
@@ -51,6 +53,8 @@ pub enum MeasureError {
 
 /// Navel between hip joints (0) and neck joint (1): omphalion 1.017 m at a stature of 1.692 m, ANSUR II means.
 const NAVEL: f64 = 0.24;
+/// Where the narrowest part of the trunk can be, in the same measure.
+const WAIST_BETWEEN: [f64; 2] = [0.16, 0.5];
 /// The acromion lies above and a little outside the shoulder joint, 30° from the vertical (tangent).
 const ACROMION_LEAN: f64 = 0.577;
 /// Distance of slices where a maximum or an end is looked for, metres. Girths change by less than 1 mm in between.
@@ -215,6 +219,10 @@ pub fn measure(template: &Template, body: &RestBody) -> Result<Measurements, Mea
     let chest =
         steps(lower_chest, shoulder.y).map(trunk).take_while(apart).filter_map(|s| s.girth()).fold(0.0, f64::max);
     let waist = trunk(middle.y + NAVEL * (neck.y - middle.y)).girth().ok_or_else(missing("waist"))?;
+    let natural =
+        steps(middle.y + WAIST_BETWEEN[0] * (neck.y - middle.y), middle.y + WAIST_BETWEEN[1] * (neck.y - middle.y))
+            .filter_map(|y| trunk(y).girth())
+            .fold(waist, f64::min);
     let seat = steps(crotch + 2.0 * SLICE, middle.y + 0.06).map(trunk).filter_map(|s| s.girth()).fold(0.0, f64::max);
     let leg = |y: f64| {
         let t = ((hip.y - y) / (hip.y - knee.y)).clamp(0.0, 1.0);
@@ -242,6 +250,7 @@ pub fn measure(template: &Template, body: &RestBody) -> Result<Measurements, Mea
         stature: high - low,
         chest: if chest > 0.0 { chest } else { return Err(MeasureError::Section("chest")) },
         waist,
+        natural_waist: natural,
         hip: seat,
         neck: neck_girth,
         thigh,

@@ -1,15 +1,18 @@
 //! Putting garments on: place, drape, tie to the body, follow into the tracked pose.
 
 use super::canonical::{between, canonical_pose, upright_root};
-use super::measure::Figure;
+use super::drape::{Drape, Skin};
+use super::figure::Figure;
 use super::place::place;
+use super::refine::prolong;
 use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
-use crate::cloth::ClothError;
-use crate::cloth::realtime::{AnchorBinding, Config, Input, Model, Outfit, State, Workspace, step};
-use crate::contact::SurfaceFrame;
-use crate::garment::{BodyMeasures, GarmentError, GarmentMesh, Pattern, Region, Triangulation};
+use crate::cloth::realtime::{AnchorBinding, Config, Model, Outfit, State};
+use crate::cloth::{ClothError, Sheet};
+use crate::contact::{SurfaceFrame, SurfaceModel};
+use crate::garment::{GarmentError, GarmentMesh, Pattern, Region, Triangulation};
 use crate::math::{P3, World};
 use crate::par::Par;
+use std::time::Instant;
 
 /// Why a garment could not be put on.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -51,26 +54,53 @@ pub struct Dressed {
 /// How dressing went.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DressReport {
-    /// Girths of the body, metres.
-    pub measures: BodyMeasures,
-    /// Steps of the first drape and on the way to the tracked pose.
+    /// Substeps of the first drape and on the way to the tracked pose, all garments.
     pub steps: usize,
     /// Deepest garment vertex under the skin at the end, metres.
     pub penetration: f64,
-    /// 99th percentile of the stretch at the end.
+    /// 99th percentile of the stretch at the end, worst garment.
     pub p99_strain: f64,
+    /// Milliseconds by stage.
+    pub stages_ms: DressMs,
     /// Milliseconds in all.
     pub ms: f64,
 }
 
-/// Time step of dressing, s.
-const DT: f64 = 1.0 / 30.0;
-/// Steps of the first drape, until cloth that started 2 cm off the body hangs.
-const DRAPE_STEPS: usize = 24;
-/// Steps on the way from the canonical to the tracked pose: at most 8° a step for a half-turn of the arm.
-const FOLLOW_STEPS: usize = 16;
-/// Steps in the tracked pose before the first picture.
-const SETTLE_STEPS: usize = 6;
+/// Milliseconds of dressing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DressMs {
+    /// Triangulating and sewing.
+    pub sew: f64,
+    /// Measuring the body and wrapping the panels around it.
+    pub place: f64,
+    /// Draping on the coarse mesh, canonical pose, then on the way to the tracked one.
+    pub coarse: f64,
+    /// Draping on the fine mesh.
+    pub fine: f64,
+    /// Preparing the simulator.
+    pub model: f64,
+}
+
+/// Edge length of the mesh that is draped first, over that of the garment. Four times fewer vertices.
+const COARSER: f64 = 2.0;
+/// Longest edge of that mesh, metres: longer ones lose sleeves.
+const COARSEST: f64 = 0.045;
+/// Substep on the coarse mesh, s.
+const COARSE_STEP: f64 = 2e-3;
+/// Substeps that close seams and gaps before gravity acts fully.
+const CLOSING: usize = 60;
+/// Substeps of the first drape: 0.5 s, until cloth that started 2 cm off the body hangs.
+const DRAPING: usize = 260;
+/// Bodies on the way from the canonical to the tracked pose: at most 8° apart for a half-turn of the arm.
+const FOLLOW_BODIES: usize = 16;
+/// Substeps on each of them.
+const FOLLOWING: usize = 12;
+/// Substeps in the tracked pose.
+const SETTLING: usize = 80;
+/// Substep on the fine mesh, s.
+const FINE_STEP: f64 = 1e-3;
+/// Substeps on the fine mesh: wrinkles that the coarse one lacks.
+const FINISHING: usize = 90;
 
 /// Puts garments on a body in a pose (world frame, y up). Patterns are worn in the order of their `layer`; the outfit
 /// of the result has them in that order.
@@ -84,7 +114,7 @@ pub fn dress(
     patterns: &[Pattern],
     options: &DressOptions,
 ) -> Result<Dressed, DressError> {
-    let started = std::time::Instant::now();
+    let started = Instant::now();
     if patterns.is_empty() {
         return Err(DressError::NoGarments);
     }
@@ -95,59 +125,113 @@ pub fn dress(
             template.skeleton().dofs()
         )));
     }
+    let mut report = DressReport::default();
     let mut order: Vec<&Pattern> = patterns.iter().collect();
     order.sort_by_key(|p| p.layer);
-    let meshes = order.iter().map(|p| GarmentMesh::sew(p, &options.triangulation)).collect::<Result<Vec<_>, _>>()?;
+    let timer = Instant::now();
+    let fine = options.triangulation;
+    // The coarse mesh may have slimmer triangles: nothing is simulated on it later.
+    let length = (fine.edge_length * COARSER).min(COARSEST).max(fine.edge_length);
+    let coarse = Triangulation { edge_length: length, min_angle: 0.0 };
+    let sew = |how: &Triangulation| order.iter().map(|p| GarmentMesh::sew(p, how)).collect::<Result<Vec<_>, _>>();
+    let (meshes, coarse) = (sew(&fine)?, sew(&coarse)?);
+    report.stages_ms.sew = ms(timer);
+
+    let timer = Instant::now();
     let figure = Figure::new(template, rest);
     let root = upright_root(rest, &pose.root);
     let start = Pose { root, angles: canonical_pose(template, rest).angles };
-    let mut positions = Vec::new();
-    for (p, m) in order.iter().zip(&meshes) {
-        let mut world = Vec::new();
-        root.points_f32(&place(template, &figure, p, m), &mut world);
-        positions.push(world);
-    }
-    let mut body = Vec::new();
-    pose_body(template, rest, &start, &mut body);
+    let placed: Vec<Vec<P3>> = order
+        .iter()
+        .zip(&coarse)
+        .map(|(p, m)| {
+            let mut world = Vec::new();
+            root.points_f32(&place(template, &figure, p, m), &mut world);
+            world
+        })
+        .collect();
+    report.stages_ms.place = ms(timer);
+
+    let timer = Instant::now();
     let outfit = Outfit { anchors: vec![Vec::new(); meshes.len()], garments: meshes };
-    // Folds that placing leaves behind must be able to open.
-    let config = Config { sleep: false, self_collision: false, teleport: f64::MAX, ..options.config.clone() };
-    let mut model = Model::new(template, outfit, config)?;
-    let mut frame = SurfaceFrame { vertices: body.clone(), normals: Vec::new() };
-    model.surface().update_normals(Par::Rayon, &mut frame);
-    // Waistbands and shoulder seams are held from the start, at their layer's distance from the skin.
-    model.set_anchors(bind(&model, &frame, &positions, true));
-    let mut state = State::new(&model, positions, &body)?;
-    let mut work = Workspace::default();
-    let mut report = DressReport { measures: figure.measures, ..DressReport::default() };
-    let mut run = |model: &Model, state: &mut State, body: &[P3]| -> Result<(), DressError> {
-        let r = step(model, state, &Input { body, dt: DT }, &mut work)?;
-        report.steps += 1;
-        report.penetration = r.penetration_left;
-        report.p99_strain = r.p99_strain;
-        Ok(())
+    let mut model = Model::new(template, outfit, options.config.clone())?;
+    report.stages_ms.model = ms(timer);
+
+    let timer = Instant::now();
+    let bodies: Vec<Vec<P3>> = (0..=FOLLOW_BODIES)
+        .map(|i| {
+            let t = i as f64 / FOLLOW_BODIES as f64;
+            let mut body = Vec::new();
+            pose_body(template, rest, &between(template, rest, &start, pose, t * t * (3.0 - 2.0 * t)), &mut body);
+            body
+        })
+        .collect();
+    let n = bodies[0].len();
+    let mut skin = Skin {
+        model: model.surface(),
+        neighbours: template.topology().vertex_neighbours(),
+        frame: SurfaceFrame::default(),
+        height: vec![0.0; n],
     };
-    for i in 0..DRAPE_STEPS {
-        run(&model, &mut state, &body)?;
-        // The first steps close large gaps: take the speed out, or sleeves swing around the arm.
-        if i < DRAPE_STEPS / 2 {
-            for g in &mut state.garments {
-                g.velocities.iter_mut().for_each(|v| *v *= 0.3);
-            }
+    let mut draped = Vec::new();
+    for (k, (mesh, start)) in coarse.iter().zip(placed).enumerate() {
+        skin.height = vec![model.offset(k) as f32; n];
+        let mut drape = Drape::new(mesh, &Sheet::of_garment(mesh)?, start);
+        let show = |skin: &mut Skin<'_>, body: &Vec<P3>| {
+            skin.frame.vertices.clone_from(body);
+            skin.model.update_normals(Par::Rayon, &mut skin.frame);
+        };
+        show(&mut skin, &bodies[0]);
+        drape.find_all(&skin);
+        let anchors = bind(skin.model, &skin.frame, mesh, &drape.positions(), model.offset(k), true);
+        drape.pin(&anchors, &skin.frame);
+        drape.run(&skin, CLOSING, COARSE_STEP, 0.1);
+        drape.stop();
+        drape.run(&skin, DRAPING, COARSE_STEP, 1.0);
+        report.steps += CLOSING + DRAPING + FOLLOW_BODIES * FOLLOWING + SETTLING + FINISHING;
+        for w in bodies.windows(2) {
+            drape.carry(&w[0], &w[1]);
+            show(&mut skin, &w[1]);
+            drape.pin(&anchors, &skin.frame);
+            drape.run(&skin, FOLLOWING, COARSE_STEP, 1.0);
         }
+        drape.run(&skin, SETTLING, COARSE_STEP, 1.0);
+        draped.push(drape);
     }
-    let draped: Vec<Vec<P3>> = state.garments.iter().map(|g| g.positions.clone()).collect();
-    model.set_anchors(bind(&model, &frame, &draped, false));
-    for i in 1..=FOLLOW_STEPS + SETTLE_STEPS {
-        let t = (i as f64 / FOLLOW_STEPS as f64).min(1.0);
-        let t = t * t * (3.0 - 2.0 * t);
-        pose_body(template, rest, &between(template, rest, &start, pose, t), &mut body);
-        run(&model, &mut state, &body)?;
+    report.stages_ms.coarse = ms(timer);
+
+    let timer = Instant::now();
+    skin.height = vec![options.config.offset as f32; n];
+    let (mut positions, mut anchors) = (Vec::new(), Vec::new());
+    for (k, (mesh, rough)) in model.outfit.garments.iter().zip(&draped).enumerate() {
+        let x = prolong(&coarse[k], mesh, &rough.x);
+        let mut drape =
+            Drape::new(mesh, &Sheet::of_garment(mesh)?, x.iter().map(|p| P3::from(p.cast::<f32>())).collect());
+        drape.find_from(&skin, rough);
+        let tied = bind(skin.model, &skin.frame, mesh, &drape.positions(), model.offset(k), true);
+        drape.pin(&tied, &skin.frame);
+        drape.run(&skin, FINISHING, FINE_STEP, 1.0);
+        let (deepest, p99, _) = drape.judge(&skin);
+        report.penetration = report.penetration.max(deepest);
+        report.p99_strain = report.p99_strain.max(p99);
+        if k + 1 < draped.len() {
+            skin.cover(&drape, options.config.layer_offset as f32);
+        }
+        anchors.push(bind(skin.model, &skin.frame, mesh, &drape.positions(), model.offset(k), false));
+        positions.push(drape.positions());
     }
-    *model.config_mut() = options.config.clone();
-    state.frames = 0;
-    report.ms = started.elapsed().as_secs_f64() * 1e3;
+    report.stages_ms.fine = ms(timer);
+
+    let timer = Instant::now();
+    model.set_anchors(anchors);
+    let state = State::new(&model, positions, &bodies[FOLLOW_BODIES])?;
+    report.stages_ms.model += ms(timer);
+    report.ms = ms(started);
     Ok(Dressed { model, state, report })
+}
+
+fn ms(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
 }
 
 fn pose_body(template: &Template, rest: &RestBody, pose: &Pose<World>, out: &mut Vec<P3>) {
@@ -156,32 +240,30 @@ fn pose_body(template: &Template, rest: &RestBody, pose: &Pose<World>, out: &mut
     skin(Par::Rayon, &rest.vertices, template.weights(), &bones, out);
 }
 
-/// Ties the anchors to the body below them; `hug` puts them at the layer's distance instead of where they are.
-fn bind(model: &Model, frame: &SurfaceFrame, positions: &[Vec<P3>], hug: bool) -> Vec<Vec<AnchorBinding>> {
-    let surface = model.surface();
-    model
-        .outfit
-        .garments
-        .iter()
-        .enumerate()
-        .map(|(k, g)| {
-            let mut out = Vec::new();
-            for set in &g.anchors {
-                for &vertex in &set.vertices {
-                    let p = positions[k][vertex as usize];
-                    let near = surface.nearest_vertex(frame, &p, Region::ALL.0);
-                    let c = surface.closest_around(frame, &p, near, Region::ALL.0);
-                    let offset = model.offset(k) as f32;
-                    out.push(AnchorBinding {
-                        vertex,
-                        body: surface.faces()[c.face as usize],
-                        weights: c.weights,
-                        height: if hug { offset } else { c.signed.max(offset) },
-                        strength: set.strength,
-                    });
-                }
-            }
-            out
-        })
-        .collect()
+/// Ties the anchors of a garment to the body below them; `hug` puts them at `offset` metres from the skin instead of
+/// where they are.
+fn bind(
+    surface: &SurfaceModel,
+    frame: &SurfaceFrame,
+    mesh: &GarmentMesh,
+    positions: &[P3],
+    offset: f64,
+    hug: bool,
+) -> Vec<AnchorBinding> {
+    let mut out = Vec::new();
+    for set in &mesh.anchors {
+        for &vertex in &set.vertices {
+            let p = positions[vertex as usize];
+            let near = surface.nearest_vertex(frame, &p, Region::ALL.0);
+            let c = surface.closest_around(frame, &p, near, Region::ALL.0);
+            out.push(AnchorBinding {
+                vertex,
+                body: surface.faces()[c.face as usize],
+                weights: c.weights,
+                height: if hug { offset as f32 } else { c.signed.max(offset as f32) },
+                strength: set.strength,
+            });
+        }
+    }
+    out
 }

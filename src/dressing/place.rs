@@ -1,6 +1,6 @@
 //! Where the panels start: wrapped around the canonical body, seams closed.
 
-use super::measure::{Figure, Slice};
+use super::figure::{Figure, Slice};
 use crate::body::Template;
 use crate::garment::{GarmentMesh, Pattern, Placement, Region, Side};
 use crate::math::P3;
@@ -33,10 +33,44 @@ struct Chart<'a> {
 }
 
 enum Kind {
-    Trunk { top: f32, shoulder_z: f32, half: f32, armpit: f32, tip: f32, neck: f32, fall: f32 },
-    Skirt { waist: f32, apex: f32, half_angle: f32 },
-    Leg { waist: f32, rise: f32, hip_line: f32, garment_half: f32 },
-    Sleeve { axis: Vec<P3>, start: f32, bicep: f32, cap: f32, radius: Vec<[f32; 2]> },
+    Trunk {
+        top: f32,
+        shoulder_z: f32,
+        half: f32,
+        armpit: f32,
+        tip: f32,
+        neck: f32,
+        fall: f32,
+    },
+    /// A ring sector: rows are arcs about (0, apex).
+    Skirt {
+        waist: f32,
+        apex: f32,
+        half_angle: f32,
+    },
+    /// Rows are level.
+    Band {
+        waist: f32,
+    },
+    Hood {
+        top: f32,
+        nape: f32,
+        width: f32,
+        crown: Vec<[f32; 2]>,
+    },
+    Leg {
+        waist: f32,
+        rise: f32,
+        hip_line: f32,
+        garment_half: f32,
+    },
+    Sleeve {
+        axis: Vec<P3>,
+        start: f32,
+        bicep: f32,
+        cap: f32,
+        radius: Vec<[f32; 2]>,
+    },
 }
 
 fn ellipse(slice: &Slice, girth: f32) -> ([f32; 2], [f32; 2]) {
@@ -51,6 +85,16 @@ fn ellipse(slice: &Slice, girth: f32) -> ([f32; 2], [f32; 2]) {
     (c, [a, b])
 }
 
+/// As [`ellipse`], but room to spare goes all around: a skirt hangs round.
+fn round(slice: &Slice, girth: f32) -> ([f32; 2], [f32; 2]) {
+    let (c, [mut a, mut b]) = ellipse(slice, 0.0);
+    let r = girth / (2.0 * std::f32::consts::PI);
+    // The circle of that girth where it goes around the body; else the body's own shape.
+    a = a.max(r.min(a.max(b) * 2.0));
+    b = b.max(r.min(a.max(b) * 2.0));
+    (c, [a, b])
+}
+
 impl<'a> Chart<'a> {
     fn new(template: &Template, figure: &'a Figure, pattern: &Pattern, panel: &crate::garment::Panel) -> Self {
         let outline: Vec<[f32; 2]> = (0..panel.edges.len())
@@ -62,7 +106,7 @@ impl<'a> Chart<'a> {
             Placement::TrunkFront | Placement::TrunkBack => {
                 let (tip, neck) = corner("shoulder_right").unwrap_or(([0.2, -0.04], [0.08, 0.0]));
                 let armpit = corner("armhole_right").map_or([0.26, -0.22], |c| c.0);
-                let (top, shoulder_z) = shoulder_line(template, figure, [neck, tip]);
+                let (top, shoulder_z) = seam_line(template, figure, pattern);
                 Kind::Trunk {
                     top,
                     shoulder_z,
@@ -74,19 +118,44 @@ impl<'a> Chart<'a> {
                 }
             }
             Placement::SkirtFront | Placement::SkirtBack => {
-                let end = corner("waist").map_or([0.2, 0.02], |c| c.0);
-                let apex = ((end[0] * end[0] + end[1] * end[1]) / (2.0 * end[1].max(1e-4))) as f32;
-                let half_angle = (end[0] as f32).atan2(apex - end[1] as f32);
-                let girth = 4.0 * half_angle * apex;
-                // As high as it goes: at the waist, or where the hip becomes as wide as the waistband.
-                let mut waist = figure.levels.waist;
-                while waist > figure.levels.hip + 0.05 && figure.lower.at(waist).girth < girth - 0.01 {
-                    waist -= 0.01;
+                let points: Vec<[f64; 2]> = (0..panel.edges.len())
+                    .filter(|i| panel.edges[*i].name.starts_with("waist"))
+                    .flat_map(|i| panel.edges[i].sample(panel.end(i), 8))
+                    .collect();
+                let end = points.iter().copied().fold([0.0, 0.02], |e, p| if p[0] > e[0] { p } else { e });
+                let middle = points.iter().map(|p| p[1]).fold(end[1], f64::min);
+                let curved = panel.edge("hem").is_some_and(|i| panel.edges[i].curve != crate::garment::Curve::Line);
+                let sag = (end[1] - middle).max(1e-4);
+                let apex = ((end[0] * end[0] + sag * sag) / (2.0 * sag)) as f32;
+                let half_angle = (end[0] as f32).atan2(apex - sag as f32);
+                let girth = if pattern.finished[1] > 0.0 { pattern.finished[1] as f32 } else { 4.0 * end[0] as f32 };
+                let waist = match sewn_waist(template, figure, pattern) {
+                    Some(waist) => waist,
+                    None => {
+                        // As high as it goes: at the waist, or where the hip becomes as wide as the waistband.
+                        let mut waist = figure.levels.waist;
+                        while waist > figure.levels.hip + 0.05 && figure.lower.at(waist).girth < girth - 0.01 {
+                            waist -= 0.01;
+                        }
+                        waist
+                    }
+                };
+                if curved { Kind::Skirt { waist, apex, half_angle } } else { Kind::Band { waist } }
+            }
+            Placement::Hood(_) => {
+                let (top, _) = seam_line(template, figure, pattern);
+                let crown = panel.edge("crown").map_or_else(Vec::new, |i| panel.edges[i].sample(panel.end(i), 24));
+                // The head: everything well above the shoulders.
+                let width = figure.vertices.iter().filter(|p| p.y > top + 0.10).map(|p| p.x.abs()).fold(0.0, f32::max);
+                Kind::Hood {
+                    top,
+                    nape: figure.trunk.at(top + 0.01).z[0] - ROOM,
+                    width: width + ROOM,
+                    crown: crown.iter().map(|p| p.map(|c| c as f32)).collect(),
                 }
-                Kind::Skirt { waist, apex, half_angle }
             }
             Placement::LegFront(_) | Placement::LegBack(_) => {
-                let rise = corner("inseam").map_or(-0.29, |c| c.0[1]) as f32;
+                let rise = corner("inseam").map_or(-0.29, |c| c.0[1].max(c.1[1])) as f32;
                 let hip_line = corner("crotch").map_or(-0.2, |c| c.0[1].max(c.1[1])) as f32;
                 /// The cloth's crotch starts this far below the body's, metres.
                 const BELOW: f32 = 0.012;
@@ -121,6 +190,13 @@ impl<'a> Chart<'a> {
         }
         span
     }
+    /// A point of a tube of this girth around the lower body, `turn` from the middle of front or back to the side.
+    fn around(&self, y: f32, turn: f32, girth: f32) -> P3 {
+        let front = matches!(self.placement, Placement::SkirtFront);
+        let (c, [a, b]) = round(&self.figure.lower.at(y), girth);
+        let side = if front { 1.0 } else { -1.0 };
+        P3::new(c[0] + side * a * turn.sin(), y, c[1] + side * b * turn.cos())
+    }
     fn at(&self, p: [f32; 2]) -> P3 {
         use std::f32::consts::{FRAC_PI_2, PI};
         match &self.kind {
@@ -128,7 +204,8 @@ impl<'a> Chart<'a> {
                 let front = self.placement == Placement::TrunkFront;
                 let x = if front { p[0] } else { -p[0] };
                 let y = top + p[1];
-                let width = if p[1] < *armpit { self.span(p[1])[1].max(0.05) } else { *half };
+                let width =
+                    if p[1] < *armpit { self.span(p[1]).map(f32::abs).into_iter().fold(0.05, f32::max) } else { *half };
                 let slice = if p[1] < *armpit - 0.05 { self.figure.lower.at(y) } else { self.figure.trunk.at(y) };
                 let (c, [a, b]) = ellipse(&slice, 4.0 * width);
                 let angle = FRAC_PI_2 * (x / width).clamp(-1.0, 1.0);
@@ -141,21 +218,22 @@ impl<'a> Chart<'a> {
                 P3::new(wx, y, shoulder_z + (ellipse_z - shoulder_z) * round)
             }
             Kind::Skirt { waist, apex, half_angle } => {
-                let front = self.placement == Placement::SkirtFront;
                 let (r, angle) = (p[0].hypot(apex - p[1]), p[0].atan2(apex - p[1]));
-                let t = (angle / half_angle).clamp(-1.0, 1.0) * FRAC_PI_2;
-                let down = r - apex;
-                let y = waist - down * 0.97;
-                // Room to spare goes to the front and back first: a skirt hangs round, legs apart or not.
-                let mut slice = self.figure.lower.at(y);
-                let girth = 4.0 * half_angle * r;
-                let wide = (slice.x[1] - slice.x[0]) / 2.0;
-                let deep = (girth / std::f32::consts::PI - wide - 2.0 * ROOM).min(wide);
-                let grow = (deep - (slice.z[1] - slice.z[0]) / 2.0).max(0.0);
-                slice.z = [slice.z[0] - grow, slice.z[1] + grow];
-                let (c, [a, b]) = ellipse(&slice, girth);
-                let side = if front { 1.0 } else { -1.0 };
-                P3::new(c[0] + side * a * t.sin(), y, c[1] + side * b * t.cos())
+                let turn = (angle / half_angle).clamp(-1.0, 1.0) * FRAC_PI_2;
+                self.around(waist - (r - apex) * 0.97, turn, 4.0 * half_angle * r)
+            }
+            Kind::Band { waist } => {
+                let half = self.span(p[1]).map(f32::abs).into_iter().fold(0.02, f32::max);
+                self.around(waist + p[1], (p[0] / half).clamp(-1.0, 1.0) * FRAC_PI_2, 4.0 * half)
+            }
+            Kind::Hood { top, nape, width, crown } => {
+                let side = if self.placement == Placement::Hood(Side::Left) { 1.0 } else { -1.0 };
+                let far = crown.iter().map(|c| (c[0] - p[0]).hypot(c[1] - p[1])).fold(f32::MAX, f32::min);
+                /// Width of cloth over which a hood turns from the crown to the side of the head, metres.
+                const TURN: f32 = 0.11;
+                let t = (far / TURN).clamp(0.0, 1.0);
+                let out = width * (1.0 - (1.0 - t).powi(2)).sqrt();
+                P3::new(side * out, top + p[1] + 0.01, nape - side * p[0])
             }
             Kind::Leg { waist, rise, hip_line, garment_half } => {
                 let (side, front) = match self.placement {
@@ -258,6 +336,19 @@ fn sleeve(template: &Template, figure: &Figure, pattern: &Pattern, side: Side, b
         *r = [around(0), around(1)];
     }
     Kind::Sleeve { axis, start, bicep, cap, radius }
+}
+
+/// Height of y = 0 of the trunk's panels and the z of the shoulder seams, from the first panel that has one.
+fn seam_line(template: &Template, figure: &Figure, pattern: &Pattern) -> (f32, f32) {
+    let seam = pattern.panels.iter().find_map(|p| p.edge("shoulder_right").map(|i| [p.end(i), p.edges[i].from]));
+    shoulder_line(template, figure, seam.unwrap_or([[0.08, 0.0], [0.2, -0.04]]))
+}
+
+/// Height of the waist of a bodice that a skirt is sewn to.
+fn sewn_waist(template: &Template, figure: &Figure, pattern: &Pattern) -> Option<f32> {
+    let bodice = pattern.panels.iter().find(|p| p.placement == Placement::TrunkFront)?;
+    let waist = bodice.edges.iter().filter(|e| e.name.starts_with("waist")).map(|e| e.from[1]).reduce(f64::min)?;
+    Some(seam_line(template, figure, pattern).0 + waist as f32)
 }
 
 /// Height of the panel's y = 0 such that the shoulder seam clears the body, and the z of the seam.

@@ -55,6 +55,7 @@ impl Region {
             Placement::TrunkFront | Placement::TrunkBack | Placement::SkirtFront | Placement::SkirtBack => {
                 Self::TRUNK.with(Self::LEFT_LEG).with(Self::RIGHT_LEG)
             }
+            Placement::Hood(_) => Self::TRUNK,
             Placement::Sleeve(Side::Left) => Self::LEFT_ARM,
             Placement::Sleeve(Side::Right) => Self::RIGHT_ARM,
             Placement::LegFront(Side::Left) | Placement::LegBack(Side::Left) => Self::LEFT_LEG.with(Self::TRUNK),
@@ -151,10 +152,9 @@ impl GarmentMesh {
         let loose: usize = meshes.iter().map(|m| m.points.len()).sum();
         let mut sets = UnionFind::new(loose);
         let mut stitched: Vec<(usize, usize)> = Vec::new();
-        for s in &pattern.seams {
-            let (Some((pa, ea)), Some((pb, eb))) = (pattern.find(&s.a), pattern.find(&s.b)) else { continue };
+        for ((pa, ea), (pb, eb), reversed) in pattern.sewn() {
             let mut other = meshes[pb].edges[eb].clone();
-            if s.reversed {
+            if reversed {
                 other.reverse();
             }
             let mut last = None;
@@ -252,11 +252,9 @@ fn triangulate_all(pattern: &Pattern, how: &Triangulation) -> Result<Vec<PanelMe
                 .collect()
         })
         .collect();
-    for s in &pattern.seams {
-        if let (Some((pa, ea)), Some((pb, eb))) = (pattern.find(&s.a), pattern.find(&s.b)) {
-            let n = (pieces[pa][ea] + pieces[pb][eb]).div_ceil(2);
-            (pieces[pa][ea], pieces[pb][eb]) = (n, n);
-        }
+    for ((pa, ea), (pb, eb), _) in pattern.sewn() {
+        let n = (pieces[pa][ea] + pieces[pb][eb]).div_ceil(2);
+        (pieces[pa][ea], pieces[pb][eb]) = (n, n);
     }
     pattern
         .panels

@@ -14,5 +14,5 @@ pub use material::Material;
 pub use mesh::mesh_area;
 pub use mesh::{AnchorSet, GarmentMesh, Region, RenderMesh, Triangulation};
 pub use outline::{Curve, PanelEdge};
-pub use pattern::{Anchor, GarmentKind, Panel, Pattern, Placement, Seam, Side};
+pub use pattern::{Anchor, Dart, GarmentKind, Panel, Pattern, Placement, Seam, Side};
 pub use size::{BodyMeasures, Size, SizeRow, size_table};

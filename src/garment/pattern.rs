@@ -13,6 +13,8 @@ pub enum GarmentKind {
     Skirt,
     /// Hangs from the waist, two tubes.
     Trousers,
+    /// Covers trunk and hips, hangs from the shoulders.
+    Dress,
 }
 
 /// Which side of the wearer.
@@ -44,6 +46,9 @@ pub enum Placement {
     LegFront(Side),
     /// Back of a trouser leg: y = 0 at the waist, mirrored against the front.
     LegBack(Side),
+    /// Half of a hood: y = 0 at the high point of the shoulder; x = 0 at the nape, running to the face on the right
+    /// half and away from it on the left.
+    Hood(Side),
 }
 
 /// One flat piece of cloth.
@@ -82,6 +87,16 @@ pub struct Seam {
     pub reversed: bool,
 }
 
+/// A wedge taken out of a panel: two neighbouring edges from its mouth to its tip and back, sewn together.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Dart {
+    /// Panel name.
+    pub panel: String,
+    /// Edges; the first ends and the second starts at the tip.
+    pub edges: [String; 2],
+}
+
 fn yes() -> bool {
     true
 }
@@ -98,6 +113,9 @@ pub struct Anchor {
     pub strength: f64,
 }
 
+/// Panel and edge of one side, of the other, and whether they run against each other.
+pub(super) type Stitch = ((usize, usize), (usize, usize), bool);
+
 /// A garment on paper.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -112,6 +130,9 @@ pub struct Pattern {
     pub panels: Vec<Panel>,
     /// Seams.
     pub seams: Vec<Seam>,
+    /// Darts.
+    #[serde(default)]
+    pub darts: Vec<Dart>,
     /// Anchors.
     pub anchors: Vec<Anchor>,
     /// Fabric.
@@ -136,6 +157,12 @@ impl Pattern {
     /// Our own JSON.
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).unwrap_or_default()
+    }
+    /// Everything that is sewn, seams then darts.
+    pub(super) fn sewn(&self) -> Vec<Stitch> {
+        let seams = self.seams.iter().filter_map(|s| Some((self.find(&s.a)?, self.find(&s.b)?, s.reversed)));
+        let dart = |d: &Dart, k: usize| self.find(&[d.panel.clone(), d.edges[k].clone()]);
+        seams.chain(self.darts.iter().filter_map(|d| Some((dart(d, 0)?, dart(d, 1)?, true)))).collect()
     }
     /// Panel and edge numbers of a `[panel, edge]` reference.
     pub(super) fn find(&self, reference: &[String; 2]) -> Option<(usize, usize)> {
@@ -172,6 +199,33 @@ impl Pattern {
                 }
             }
         }
+        for d in &self.darts {
+            let fault = |edge: &str, why: &str| GarmentError::Edge {
+                panel: d.panel.clone(),
+                edge: edge.to_owned(),
+                why: why.to_owned(),
+            };
+            let mut at = [(0, 0); 2];
+            for (k, e) in d.edges.iter().enumerate() {
+                at[k] = self
+                    .find(&[d.panel.clone(), e.clone()])
+                    .ok_or_else(|| fault(e, "a dart names it, but it does not exist"))?;
+                if !sewn.insert(at[k]) {
+                    return Err(fault(e, "it is sewn twice"));
+                }
+            }
+            let p = &self.panels[at[0].0];
+            if (at[0].1 + 1) % p.edges.len() != at[1].1 {
+                return Err(fault(
+                    &d.edges[1],
+                    &format!("a dart's second edge must follow its first, `{}`", d.edges[0]),
+                ));
+            }
+            let [a, b] = [at[0].1, at[1].1].map(|i| p.edges[i].length(p.end(i)));
+            if (a - b).abs() > DART_MISMATCH * a.max(b) {
+                return Err(fault(&d.edges[1], &format!("the dart's sides are {a:.3} and {b:.3} m long")));
+            }
+        }
         for a in &self.anchors {
             for r in &a.edges {
                 if self.find(r).is_none() {
@@ -192,6 +246,8 @@ impl Pattern {
     }
 }
 
+/// Largest difference between the two sides of a dart, as a share: more would pucker.
+const DART_MISMATCH: f64 = 0.05;
 /// Shortest edge accepted, metres: below it two corners are the same stitch.
 const SHORTEST_EDGE: f64 = 1e-3;
 /// Longest coordinate accepted, metres: no panel of a garment is larger.
@@ -226,7 +282,8 @@ fn check_outline(p: &Panel) -> Result<(), GarmentError> {
                 continue;
             }
             let ((ej, c), (_, d)) = (outline[j], outline[(j + 1) % n]);
-            if cross(a, b, c) * cross(a, b, d) <= 0.0 && cross(c, d, a) * cross(c, d, b) <= 0.0 {
+            let apart = (0..2).any(|k| a[k].max(b[k]) < c[k].min(d[k]) || c[k].max(d[k]) < a[k].min(b[k]));
+            if !apart && cross(a, b, c) * cross(a, b, d) <= 0.0 && cross(c, d, a) * cross(c, d, b) <= 0.0 {
                 return Err(edge(ei, format!("it crosses edge `{}`", p.edges[ej].name)));
             }
         }

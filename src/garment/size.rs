@@ -79,19 +79,21 @@ pub struct SizeRow {
     pub inseam: f64,
 }
 
-/// Girths are the middle of the letter-size intervals of EN 13402-3 (chest/bust, waist, hip: bust intervals
-/// 74–82, 82–90, 90–98, 98–107, 107–119, 119–131 cm for XS … XXL with the waist and hip girths tabulated for those
-/// busts). Lengths follow its stature column and the usual 1 to 1.5 cm grade a size (Aldrich, *Metric Pattern
-/// Cutting*, standard body measurements).
+/// Rows of unisex sizes. Chest and waist are the mean of the middles of the women's and men's letter intervals of
+/// EN 13402-3:2004 (women's bust XS–XXL 82, 86 … cm with the tabulated waists; men's chest and waist), hips the mean of
+/// the women's hips there and of the seat that Aldrich (*Metric Pattern Cutting for Menswear*) gives for those chests.
+/// Lengths follow ANSUR II (Gordon et al. 2014, NATICK/TR-15/007): crotch height 0.48 and acromion-to-wrist 0.34 of
+/// stature; the grade between sizes is the usual 1 to 1.5 cm. Rounded to half centimetres; entered without the standard
+/// at hand, so compare before quoting.
 pub fn size_table() -> [SizeRow; 6] {
     // chest, waist, hip, stature, shoulders, neck, arm, upper arm, trunk, rise, inseam
     const CM: [[f64; 11]; 6] = [
-        [78.0, 62.0, 86.0, 162.0, 36.5, 34.5, 56.5, 25.0, 58.0, 26.0, 74.0],
-        [86.0, 70.0, 94.0, 165.0, 38.5, 36.0, 57.5, 27.0, 60.0, 27.0, 75.0],
-        [94.0, 78.0, 102.0, 168.0, 40.5, 37.5, 58.5, 29.0, 62.0, 28.0, 76.0],
-        [102.5, 86.5, 110.0, 171.0, 42.5, 39.0, 59.5, 31.5, 64.0, 29.0, 77.0],
-        [113.0, 97.0, 119.5, 174.0, 44.5, 41.0, 60.5, 34.5, 66.0, 30.2, 78.0],
-        [125.0, 109.0, 129.5, 177.0, 46.5, 43.0, 61.5, 38.0, 68.0, 31.5, 79.0],
+        [80.0, 66.0, 87.0, 162.0, 37.0, 35.0, 55.5, 25.5, 58.5, 26.0, 72.0],
+        [88.0, 74.0, 94.0, 165.0, 39.0, 36.5, 56.5, 27.5, 60.5, 27.0, 73.0],
+        [96.0, 82.0, 101.0, 168.0, 41.0, 38.0, 57.5, 29.5, 62.5, 28.0, 74.0],
+        [104.5, 90.5, 108.5, 171.0, 43.0, 39.5, 58.5, 32.0, 64.5, 29.0, 75.0],
+        [114.0, 100.0, 117.0, 174.0, 45.0, 41.5, 59.5, 35.0, 66.5, 30.2, 76.0],
+        [125.0, 111.0, 126.5, 177.0, 47.0, 43.5, 60.5, 38.5, 68.5, 31.5, 77.0],
     ];
     std::array::from_fn(|i| {
         let v = CM[i].map(|c| c / 100.0);

@@ -2,11 +2,12 @@
 
 use anyhow::{Context, Result};
 use std::sync::Arc;
+use tryon::body::measure::measure;
 use tryon::body::{BoneTransforms, Pose, RestBody, Template, skin};
 use tryon::camera::{Calibration, ColorImage, RgbdFrame};
 use tryon::cloth::realtime;
 use tryon::composite::{self, BodyView, GarmentView, Look};
-use tryon::dressing::{DressOptions, dress, measure, suggest};
+use tryon::dressing::{DressOptions, dress, suggest};
 use tryon::garment::{Pattern, Size, library};
 use tryon::math::{P3, World};
 use tryon::par::Par;
@@ -166,7 +167,7 @@ impl Chain {
     }
 
     fn put_on(&mut self, template: &Template, rest: &RestBody) -> Result<Worn> {
-        let measures = measure(template, rest);
+        let measures = measure(template, rest)?;
         let mut patterns: Vec<Pattern> = Vec::new();
         for c in &self.choices {
             let size = match c.size {

@@ -3,6 +3,7 @@
 use crate::library;
 use std::sync::Arc;
 use std::time::Instant;
+use tryon::body::measure::measure;
 use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use tryon::cloth::realtime::{self, Input, Model, State, Workspace};
 use tryon::dressing::{self, DressOptions};
@@ -78,7 +79,7 @@ impl From<v1::GarmentFrame> for Said {
 pub(crate) fn dress(body: &Body, choices: &[GarmentChoice]) -> Result<Worn, String> {
     let start = Instant::now();
     let rest = body.template.personalise(&body.shape);
-    let measures = dressing::measure(&body.template, &rest);
+    let measures = measure(&body.template, &rest).map_err(|e| e.to_string())?;
     let mut worn = Vec::with_capacity(choices.len());
     for c in choices {
         let size = match library::size(&c.size) {

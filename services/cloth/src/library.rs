@@ -9,7 +9,9 @@ fn title(name: &str) -> String {
     match name {
         "tshirt" => "T-shirt".into(),
         "longsleeve" => "Long-sleeved shirt".into(),
-        other => other[..1].to_uppercase() + &other[1..],
+        "tank" => "Tank top".into(),
+        "hoodie" => "Hooded top".into(),
+        other => (other[..1].to_uppercase() + &other[1..]).replace('_', " "),
     }
 }
 
@@ -28,7 +30,8 @@ pub(crate) fn garments() -> Vec<GarmentInfo> {
             GarmentInfo {
                 name: (*name).into(),
                 title: title(name),
-                category: if matches!(kind, Ok(GarmentKind::Top)) { "top" } else { "bottom" }.into(),
+                category: if matches!(kind, Ok(GarmentKind::Top | GarmentKind::Dress)) { "top" } else { "bottom" }
+                    .into(),
                 sizes: Size::ALL.iter().map(Size::to_string).collect(),
                 color_rgb: own_color(name),
             }

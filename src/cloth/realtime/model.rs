@@ -252,10 +252,6 @@ impl Model {
     pub(crate) fn surface(&self) -> &SurfaceModel {
         &self.surface
     }
-    /// Changes settings that need no new factorisation structure.
-    pub(crate) fn config_mut(&mut self) -> &mut Config {
-        &mut self.config
-    }
     /// Distance from the skin of one garment's layer, metres.
     pub(crate) fn offset(&self, garment: usize) -> f64 {
         self.garments[garment].offset

@@ -1,60 +1,163 @@
-//! A flared skirt to the knee: front and back, waist and hem on arcs.
+//! Skirts to the knee: flared (waist and hem on arcs) and straight (shaped by darts).
 
 use super::{panel, sewn};
-use crate::garment::{Anchor, Curve, GarmentError, GarmentKind, Material, Pattern, Placement, SizeRow};
+use crate::garment::{Anchor, Curve, Dart, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, SizeRow};
 
 /// Ease at the waist, metres.
 const WAIST_EASE: f64 = 0.015;
-/// Ease at the hip, metres.
-const HIP_EASE: f64 = 0.07;
+/// Ease at the hip of the flared and the straight skirt, metres.
+const HIP_EASE: [f64; 2] = [0.07, 0.045];
 /// Waist to hip line, metres.
-const HIP_DEPTH: f64 = 0.20;
+pub(super) const HIP_DEPTH: f64 = 0.20;
 /// Waist to hem, metres.
 const LENGTH: f64 = 0.56;
 /// Half angle of each panel's flare, radians: both panels together make a third of a circle.
 const FLARE: f64 = 0.30;
+/// Depth of the darts of the straight skirt, front and back, metres.
+const DART_DEPTH: [f64; 2] = [0.095, 0.13];
 
-pub(super) fn flared(row: &SizeRow) -> Result<Pattern, GarmentError> {
-    // A ring sector: arc length at the waist is half the waist. Hips that need more than the flare gives widen it.
-    let waist = (row.body.waist + WAIST_EASE) / 2.0;
-    let hip = (row.body.hip + HIP_EASE) / 2.0;
-    let half_angle = FLARE.max((hip - waist) / HIP_DEPTH / 2.0);
+/// A panel on arcs about (0, radius): `waist` is the length of the upper arc, `cuts` where it is divided (shares of
+/// it); its pieces are `waist`, or `waist_0`, `waist_1` … from paper right to paper left.
+pub(super) fn sector(
+    name: &str,
+    placement: Placement,
+    waist: f64,
+    half_angle: f64,
+    length: f64,
+    cuts: &[f64],
+) -> Panel {
     let radius = waist / (2.0 * half_angle);
-    // Cubic approximation of an arc of ±half_angle about (0, radius): control length 4/3·tan(θ/4).
+    // Cubic approximation of an arc: control length 4/3·tan(θ/4).
     let at = |r: f64, a: f64| [r * a.sin(), radius - r * a.cos()];
     let arc = |r: f64, from: f64, to: f64| {
         let k = 4.0 / 3.0 * ((to - from) / 4.0).tan() * r;
         let (p, q) = (at(r, from), at(r, to));
         Curve::Cubic([p[0] + k * from.cos(), p[1] + k * from.sin()], [q[0] - k * to.cos(), q[1] - k * to.sin()])
     };
-    let build = |name: &str, placement| {
+    let low = radius + length;
+    let mut edges = vec![
+        ("hem".to_owned(), at(low, -half_angle), arc(low, -half_angle, half_angle)),
+        ("side_right".to_owned(), at(low, half_angle), Curve::Line),
+    ];
+    let mut from = half_angle;
+    for (k, share) in cuts.iter().copied().chain([1.0]).enumerate() {
+        let to = half_angle * (1.0 - 2.0 * share);
+        let edge = if cuts.is_empty() { "waist".to_owned() } else { format!("waist_{k}") };
+        edges.push((edge, at(radius, from), arc(radius, from, to)));
+        from = to;
+    }
+    edges.push(("side_left".to_owned(), at(radius, -half_angle), Curve::Line));
+    let edges: Vec<(&str, [f64; 2], Curve)> = edges.iter().map(|(n, p, c)| (n.as_str(), *p, *c)).collect();
+    panel(name, placement, &edges)
+}
+
+/// Half angle of a panel whose girth at the hip line is at least `hip` (both in metres for one panel).
+pub(super) fn flare(waist: f64, hip: f64) -> f64 {
+    FLARE.max((hip - waist) / HIP_DEPTH / 2.0)
+}
+
+pub(super) fn flared(row: &SizeRow) -> Result<Pattern, GarmentError> {
+    let waist = (row.body.waist + WAIST_EASE) / 2.0;
+    let hip = (row.body.hip + HIP_EASE[0]) / 2.0;
+    let half_angle = flare(waist, hip);
+    let radius = waist / (2.0 * half_angle);
+    let build = |name: &str, placement| sector(name, placement, waist, half_angle, LENGTH, &[]);
+    let panels = vec![build("front", Placement::SkirtFront), build("back", Placement::SkirtBack)];
+    let hips = (radius + HIP_DEPTH) * half_angle * 4.0;
+    finish(row, "skirt", "twill", panels, vec![], vec!["waist"], [0.0, waist * 2.0, hips])
+}
+
+pub(super) fn straight(row: &SizeRow) -> Result<Pattern, GarmentError> {
+    let waist = (row.body.waist + WAIST_EASE) / 4.0; // half width of a panel
+    let hip = (row.body.hip + HIP_EASE[1]) / 4.0;
+    // What the hip has more than the waist is taken out half at the side seam, half by one dart a side.
+    let more = (hip - waist).max(0.012);
+    let (dart, top) = (0.5 * more, waist + 0.5 * more);
+    let hem = hip - 0.012;
+    let rise = 0.012; // the waist rises towards the side
+    let build = |name: &str, placement, depth: f64| {
+        let flip = |p: [f64; 2]| [-p[0], p[1]];
+        let at = top * 0.52;
+        let line = |x: f64| rise * x / top;
+        let (out, apex, inn) =
+            ([at + dart / 2.0, line(at + dart / 2.0)], [at, -depth], [at - dart / 2.0, line(at - dart / 2.0)]);
+        let (corner, hips, low) = ([top, rise], [hip, -HIP_DEPTH], [hem, -LENGTH]);
+        // The hip curve leaves the hip line upright.
+        let curve = Curve::Cubic([hip, -HIP_DEPTH * 0.55], [top + (hip - top) * 0.55, -HIP_DEPTH * 0.18]);
+        let back = Curve::Cubic([-top - (hip - top) * 0.55, -HIP_DEPTH * 0.18], [-hip, -HIP_DEPTH * 0.55]);
         panel(
             name,
             placement,
             &[
-                ("hem", at(radius + LENGTH, -half_angle), arc(radius + LENGTH, -half_angle, half_angle)),
-                ("side_right", at(radius + LENGTH, half_angle), Curve::Line),
-                ("waist", at(radius, half_angle), arc(radius, half_angle, -half_angle)),
-                ("side_left", at(radius, -half_angle), Curve::Line),
+                ("hem", flip(low), Curve::Line),
+                ("side_right", low, Curve::Line),
+                ("hip_right", hips, curve),
+                ("waist_0", corner, Curve::Line),
+                ("dart_right_a", out, Curve::Line),
+                ("dart_right_b", apex, Curve::Line),
+                ("waist_1", inn, Curve::Line),
+                ("dart_left_a", flip(inn), Curve::Line),
+                ("dart_left_b", flip(apex), Curve::Line),
+                ("waist_2", flip(out), Curve::Line),
+                ("hip_left", flip(corner), back),
+                ("side_left", flip(hips), Curve::Line),
             ],
         )
     };
+    let panels =
+        vec![build("front", Placement::SkirtFront, DART_DEPTH[0]), build("back", Placement::SkirtBack, DART_DEPTH[1])];
+    let darts = darts(&["front", "back"]);
+    finish(
+        row,
+        "straight_skirt",
+        "twill",
+        panels,
+        darts,
+        vec!["waist_0", "waist_1", "waist_2"],
+        [0.0, waist * 4.0, hip * 4.0],
+    )
+}
+
+/// The two darts of each of these panels.
+pub(super) fn darts(panels: &[&str]) -> Vec<Dart> {
+    panels
+        .iter()
+        .flat_map(|p| {
+            ["right", "left"]
+                .map(|s| Dart { panel: (*p).to_owned(), edges: [format!("dart_{s}_a"), format!("dart_{s}_b")] })
+        })
+        .collect()
+}
+
+fn finish(
+    row: &SizeRow,
+    name: &str,
+    fabric: &str,
+    panels: Vec<Panel>,
+    darts: Vec<Dart>,
+    waist: Vec<&str>,
+    finished: [f64; 3],
+) -> Result<Pattern, GarmentError> {
+    let mut seams = vec![
+        sewn(["front", "side_right"], ["back", "side_left"]),
+        sewn(["front", "side_left"], ["back", "side_right"]),
+    ];
+    if panels[0].edge("hip_right").is_some() {
+        seams.push(sewn(["front", "hip_right"], ["back", "hip_left"]));
+        seams.push(sewn(["front", "hip_left"], ["back", "hip_right"]));
+    }
+    let edges =
+        ["front", "back"].iter().flat_map(|p| waist.iter().map(move |e| [(*p).to_owned(), (*e).to_owned()])).collect();
     Ok(Pattern {
-        name: "skirt".into(),
+        name: name.into(),
         kind: GarmentKind::Skirt,
         size: row.size,
-        panels: vec![build("front", Placement::SkirtFront), build("back", Placement::SkirtBack)],
-        seams: vec![
-            sewn(["front", "side_right"], ["back", "side_left"]),
-            sewn(["front", "side_left"], ["back", "side_right"]),
-        ],
-        anchors: vec![Anchor {
-            name: "waist".into(),
-            edges: vec![["front".into(), "waist".into()], ["back".into(), "waist".into()]],
-            strength: 1.0,
-        }],
-        material: Material::preset("twill")?,
+        panels,
+        seams,
+        darts,
+        anchors: vec![Anchor { name: "waist".into(), edges, strength: 1.0 }],
+        material: Material::preset(fabric)?,
         layer: 0,
-        finished: [0.0, waist * 2.0, (radius + HIP_DEPTH) * half_angle * 4.0],
+        finished,
     })
 }

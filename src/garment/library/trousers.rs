@@ -1,4 +1,4 @@
-//! Straight trousers: two fronts, two backs.
+//! Straight trousers and shorts: two fronts, two backs.
 
 use super::{mirrored, panel, sewn};
 use crate::garment::{Anchor, Curve, GarmentError, GarmentKind, Material, Pattern, Placement, Side, SizeRow};
@@ -6,23 +6,34 @@ use crate::garment::{Anchor, Curve, GarmentError, GarmentKind, Material, Pattern
 /// Ease at the waist, metres.
 const WAIST_EASE: f64 = 0.02;
 /// Ease at the hip, metres.
-const HIP_EASE: f64 = 0.07;
+const HIP_EASE: f64 = 0.055;
 /// Crotch of the cloth below that of the body, metres.
 const RISE_EASE: f64 = 0.015;
 /// How far the crotch reaches beyond the centre line, as a share of the hip: front and back.
 const CROTCH: [f64; 2] = [0.045, 0.085];
 
-pub(super) fn straight(row: &SizeRow) -> Result<Pattern, GarmentError> {
+/// Inseam of shorts, metres.
+const SHORT: f64 = 0.20;
+
+pub(super) fn long(row: &SizeRow) -> Result<Pattern, GarmentError> {
+    draw(row, "trousers", "denim", row.inseam, 0.64)
+}
+pub(super) fn shorts(row: &SizeRow) -> Result<Pattern, GarmentError> {
+    draw(row, "shorts", "twill", SHORT, 0.96)
+}
+
+/// `taper` is the width at the hem over that at the crotch.
+fn draw(row: &SizeRow, name: &str, fabric: &str, inseam: f64, taper: f64) -> Result<Pattern, GarmentError> {
     let hip = (row.body.hip + HIP_EASE) / 4.0; // width of one of four panels at the hip
     let waist = (row.body.waist + WAIST_EASE) / 4.0;
     let rise = -(row.rise + RISE_EASE);
     let hip_line = rise * 0.68;
-    let hem = rise - row.inseam + 0.01;
+    let hem = rise - inseam;
     // Left leg: x = 0 is the centre line of the body, outer side at +x, as seen from the front.
     let leg = |name: &str, placement, crotch: f64| {
         let inner = -crotch * row.body.hip;
         let crease = (hip + inner) / 2.0;
-        let cuff = (hip - inner) * 0.62 / 2.0; // half width of the hem
+        let cuff = (hip - inner) * taper / 2.0; // half width of the hem
         let (co, wo) = ([hip, rise], [waist, 0.0]);
         panel(
             name,
@@ -56,17 +67,18 @@ pub(super) fn straight(row: &SizeRow) -> Result<Pattern, GarmentError> {
     }
     let edge = |p: &str| [p.to_owned(), "waist".to_owned()];
     Ok(Pattern {
-        name: "trousers".into(),
+        name: name.into(),
         kind: GarmentKind::Trousers,
         size: row.size,
         panels: vec![fl, fr, bl, template],
         seams,
+        darts: vec![],
         anchors: vec![Anchor {
             name: "waist".into(),
             edges: vec![edge("front_left"), edge("front_right"), edge("back_left"), edge("back_right")],
             strength: 1.0,
         }],
-        material: Material::preset("denim")?,
+        material: Material::preset(fabric)?,
         layer: 0,
         finished: [0.0, waist * 4.0, hip * 4.0],
     })

@@ -1,8 +1,8 @@
-//! Girths and cross-sections of a body.
+//! Cross-sections of a body in the canonical pose, for placing panels around it.
 
 use crate::body::{BoneTransforms, RestBody, Template, skin};
 use crate::cloth::realtime::body_parts;
-use crate::garment::{BodyMeasures, Region};
+use crate::garment::Region;
 use crate::math::P3;
 use crate::mesh::Face;
 use crate::par::Par;
@@ -130,7 +130,6 @@ pub(super) struct Figure {
     pub(super) legs: [Slices; 2],
     pub(super) parts: Vec<u8>,
     pub(super) levels: Levels,
-    pub(super) measures: BodyMeasures,
 }
 
 impl Figure {
@@ -163,19 +162,7 @@ impl Figure {
         let trunk_length = shoulder - crotch;
         let hip = lower.lowest(crotch + 0.02, crotch + 0.32 * trunk_length, |s| -s.girth);
         let waist = lower.lowest(crotch + 0.30 * trunk_length, crotch + 0.62 * trunk_length, |s| s.girth);
-        let chest = trunk.lowest(crotch + 0.62 * trunk_length, crotch + 0.86 * trunk_length, |s| -(s.z[1] - s.z[0]));
-        let measures = BodyMeasures {
-            chest: f64::from(trunk.at(chest).girth),
-            waist: f64::from(lower.at(waist).girth),
-            hip: f64::from(lower.at(hip).girth),
-            stature: f64::from(stature),
-        };
         let levels = Levels { waist, hip, crotch };
-        Self { vertices, joints: bones.joints, trunk, lower, legs, parts, levels, measures }
+        Self { vertices, joints: bones.joints, trunk, lower, legs, parts, levels }
     }
-}
-
-/// Chest, waist and hip girth (convex, as a tape measures) and stature of a body, metres.
-pub fn measure(template: &Template, rest: &RestBody) -> BodyMeasures {
-    Figure::new(template, rest).measures
 }

@@ -1,0 +1,311 @@
+//! Dresses bodies and draws each outfit from several sides into one PNG, for looking at garments.
+//!
+//! `cargo run --release --example turntable -- --garment tshirt --garment longsleeve+trousers --out DIR
+//!   [--body average,slim_woman,heavy_man | FILE.npz] [--size auto,S,M,XL] [--pose down|tpose|rest|walk|raise]
+//!   [--seconds 1.0] [--views 0,45,90,180] [--cell 220x340] [--crop] [--edge 0.021] [--fit]`
+//!
+//! A row is a body, a block of columns a size. `auto` asks the size suggestion.
+#![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
+use tryon::camera::ColorImage;
+use tryon::cloth::realtime::{Input, Workspace, step};
+use tryon::dressing::{DressOptions, Dressed, dress, suggest};
+use tryon::formats::image::write_png_rgb;
+use tryon::garment::{Pattern, library};
+use tryon::math::{Body, P3, Rigid, V3, World, log_so3};
+use tryon::mesh::Face;
+use tryon::raster::{View, VisibilityBuffer, interpolate, rasterise};
+
+struct Args {
+    garments: Vec<String>,
+    bodies: Vec<String>,
+    sizes: Vec<String>,
+    pose: String,
+    seconds: f64,
+    views: Vec<f32>,
+    cell: (u32, u32),
+    crop: bool,
+    edge: Option<f64>,
+    out: PathBuf,
+}
+
+fn args() -> Args {
+    let mut a = Args {
+        garments: vec![],
+        bodies: ["slim_woman", "average", "heavy_man"].map(String::from).to_vec(),
+        sizes: vec!["auto".into()],
+        pose: "down".into(),
+        seconds: 1.0,
+        views: vec![0.0, 45.0, 90.0, 180.0],
+        cell: (220, 340),
+        crop: false,
+        edge: None,
+        out: "/tmp/turntable".into(),
+    };
+    let list = |s: String| s.split(',').map(str::to_owned).collect::<Vec<_>>();
+    let mut it = std::env::args().skip(1);
+    while let Some(flag) = it.next() {
+        let mut value = || it.next().expect("a value");
+        match flag.as_str() {
+            "--garment" => a.garments.push(value()),
+            "--body" => a.bodies = list(value()),
+            "--size" => a.sizes = list(value()),
+            "--pose" => a.pose = value(),
+            "--seconds" => a.seconds = value().parse().expect("seconds"),
+            "--views" => a.views = list(value()).iter().map(|v| v.parse().expect("degrees")).collect(),
+            "--cell" => {
+                let v = value();
+                let (w, h) = v.split_once('x').expect("WxH");
+                a.cell = (w.parse().expect("width"), h.parse().expect("height"));
+            }
+            "--crop" => a.crop = true,
+            "--edge" => a.edge = Some(value().parse().expect("metres")),
+            "--out" => a.out = value().into(),
+            other => panic!("{other} is not known"),
+        }
+    }
+    if a.garments.is_empty() {
+        a.garments = library::names().iter().map(|n| (*n).to_owned()).collect();
+    }
+    a
+}
+
+/// Stature, girth, sex, limb length, torso length, shoulders, chest, waist, hip in standard deviations.
+fn shape(name: &str) -> Option<Vec<f64>> {
+    Some(match name {
+        "average" => vec![],
+        "slim_woman" => vec![-0.4, -1.0, -1.2, 0.2, 0.0, -0.2, 0.0, -0.3, 0.1],
+        "curvy_woman" => vec![-0.6, 1.0, -1.3, -0.2, 0.0, 0.0, 0.8, 0.2, 1.0],
+        "heavy_man" => vec![0.3, 2.0, 1.2, -0.2, 0.2, 0.3, 0.0, 0.6, 0.0],
+        "tall_man" => vec![1.8, -0.4, 1.0, 0.5, 0.0, 0.3, 0.0, 0.0, 0.0],
+        _ => return None,
+    })
+}
+
+fn load(name: &str) -> (Arc<Template>, RestBody) {
+    match shape(name) {
+        Some(coefficients) => {
+            let t = tryon::body::embedded::template();
+            let rest = t.personalise(&BodyShape { coefficients, ..BodyShape::default() });
+            (t, rest)
+        }
+        None => {
+            let arrays = tryon::formats::npz::read_smpl(std::path::Path::new(name)).expect("a body");
+            let t = tryon::body::import::template_from_smpl("file", &arrays).expect("a body");
+            let rest = t.personalise(&BodyShape::default());
+            (Arc::new(t), rest)
+        }
+    }
+}
+
+/// Named poses; `t` in seconds moves those that move.
+fn pose(name: &str, template: &Template, rest: &RestBody, t: f64) -> Pose<World> {
+    let sk = template.skeleton();
+    let mut p = Pose::rest(sk, Rigid::<World, Body>::identity());
+    let mut aim = |side: &str, down: f64| {
+        let s = if side == "left" { 1.0 } else { -1.0 };
+        let j = sk.index(&format!("{side}_shoulder")).expect("shoulder");
+        let c = sk.index(&format!("{side}_elbow")).expect("elbow");
+        let wanted = nalgebra::Vector3::new(s * down.cos(), -down.sin(), 0.0);
+        let q = nalgebra::UnitQuaternion::rotation_between(&(rest.joints[c] - rest.joints[j]), &wanted).expect("turn");
+        let at = sk.dof_offset(j);
+        p.angles[at..at + 3].copy_from_slice(log_so3(&q).as_slice());
+    };
+    let swing = 0.5 * (t * 6.0).sin();
+    let down = match name {
+        "tpose" => 0.0,
+        "raise" => 1.3 - 2.2 * (0.5 - 0.5 * (t * 2.0).cos()),
+        _ => 1.3,
+    };
+    if name != "rest" {
+        aim("left", down);
+        aim("right", down);
+    }
+    if name == "walk" {
+        for (side, a) in [("left", swing), ("right", -swing)] {
+            p.set(sk, &format!("{side}_hip"), &[-a - 0.1, 0.0, 0.0]);
+            p.set(sk, &format!("{side}_knee"), &[0.3 - 0.3 * a.signum() * a.abs(), 0.0, 0.0]);
+        }
+    }
+    p
+}
+
+fn posed(template: &Template, rest: &RestBody, pose: &Pose<World>) -> Vec<P3> {
+    let mut bones = BoneTransforms::default();
+    pose.bones(template.skeleton(), rest, &mut bones);
+    let mut out = Vec::new();
+    skin(tryon::par::Par::Seq, &rest.vertices, template.weights(), &bones, &mut out);
+    out
+}
+
+/// A surface to draw: vertices, faces, colour, and texture coordinates in metres for a 4 cm checker.
+struct Part {
+    vertices: Vec<P3>,
+    faces: Vec<Face>,
+    color: [f32; 3],
+    uv: Vec<[f32; 2]>,
+}
+
+fn draw(parts: &[Part], yaw: f32, cell: (u32, u32), y: [f32; 2], centre: [f32; 2]) -> Vec<u8> {
+    let (s, c) = yaw.sin_cos();
+    let (mut all, mut faces, mut owner) = (Vec::new(), Vec::<Face>::new(), Vec::new());
+    for (k, p) in parts.iter().enumerate() {
+        let first = all.len() as u32;
+        all.extend(p.vertices.iter().map(|q| {
+            let (x, z) = (q.x - centre[0], q.z - centre[1]);
+            P3::new(c * x - s * z, -q.y, -(s * x + c * z))
+        }));
+        for (i, f) in p.faces.iter().enumerate() {
+            faces.push(f.map(|v| v + first));
+            owner.push((k, i));
+        }
+    }
+    let mut normals = vec![V3::zeros(); all.len()];
+    for f in &faces {
+        let n = tryon::mesh::face_normal(&all, f);
+        f.iter().for_each(|&v| normals[v as usize] += n);
+    }
+    let (w, h) = cell;
+    let scale = h as f32 / (y[1] - y[0]);
+    let view = View::Orthographic {
+        width: w,
+        height: h,
+        left: -(w as f32) / scale / 2.0,
+        top: -y[1],
+        pixels_per_metre: scale,
+    };
+    let mut buffer = VisibilityBuffer::default();
+    rasterise(&view, &all, &faces, &mut buffer);
+    let light = V3::new(-0.45, -0.6, -0.66).normalize();
+    let mut out = vec![250u8; (w * h * 3) as usize];
+    for v in 0..h {
+        for u in 0..w {
+            let Some((face, b)) = interpolate(&view, &all, &faces, &buffer, u, v) else { continue };
+            let f = faces[face as usize];
+            let (part, own) = owner[face as usize];
+            let part = &parts[part];
+            let n = (0..3).fold(V3::zeros(), |s, k| s + normals[f[k] as usize].normalize() * b[k]).normalize();
+            let inside = tryon::mesh::face_normal(&all, &f).z > 0.0;
+            let n = if n.z > 0.0 { -n } else { n };
+            let mut color = part.color;
+            if inside && !part.uv.is_empty() {
+                color = [color[1] * 0.5, color[2] * 0.5, color[0] * 0.5];
+            } else if !part.uv.is_empty() {
+                let t = part.faces[own];
+                let at = |d: usize| (0..3).map(|k| part.uv[t[k] as usize][d] * b[k]).sum::<f32>();
+                let odd = ((at(0) / 0.04).floor() + (at(1) / 0.04).floor()).rem_euclid(2.0);
+                color = color.map(|c| c * (0.88 + 0.12 * odd));
+            }
+            let shade = 0.3 + 0.7 * n.dot(&light).max(0.0);
+            for k in 0..3 {
+                out[(v * w + u) as usize * 3 + k] = (color[k] * shade * 255.0).clamp(0.0, 255.0) as u8;
+            }
+        }
+    }
+    out
+}
+
+fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2], [f32; 2]) {
+    let (template, rest) = load(body);
+    let measures = tryon::body::measure::measure(&template, &rest).expect("measurable");
+    let patterns: Vec<Pattern> = outfit
+        .split('+')
+        .map(|g| {
+            let chosen = match size {
+                "auto" => {
+                    let s = suggest(g, &measures).expect("a size");
+                    println!("{body}: {g}: {}", s.reason);
+                    s.size
+                }
+                s => s.parse().expect("a size"),
+            };
+            library::pattern(g, chosen).expect("a pattern")
+        })
+        .collect();
+    let mut options = DressOptions::default();
+    if let Some(e) = a.edge {
+        options.triangulation.edge_length = e;
+    }
+    let start = pose(&a.pose, &template, &rest, 0.0);
+    let Dressed { model, mut state, report } = dress(&template, &rest, &start, &patterns, &options).expect("dressed");
+    let vertices: Vec<usize> = state.garments.iter().map(|g| g.positions.len()).collect();
+    println!(
+        "{body} {outfit} {size}: {vertices:?} vertices, dressed in {:.0} ms, {} steps, penetration {:.1} mm, p99 stretch {:.3}",
+        report.ms,
+        report.steps,
+        report.penetration * 1e3,
+        report.p99_strain
+    );
+    let mut work = Workspace::default();
+    let frames = (a.seconds * 30.0) as usize;
+    let (mut ms, mut last) = (0.0, None);
+    let mut verts = posed(&template, &rest, &start);
+    for i in 0..frames {
+        verts = posed(&template, &rest, &pose(&a.pose, &template, &rest, (i + 1) as f64 / 30.0));
+        let r = step(&model, &mut state, &Input { body: &verts, dt: 1.0 / 30.0 }, &mut work).expect("step");
+        ms += r.stages_ms.total;
+        last = Some(r);
+    }
+    if let Some(r) = last {
+        println!(
+            "  {:.2} ms a step, penetration left {:.2} mm, p99 {:.3} max {:.3}",
+            ms / frames as f64,
+            r.penetration_left * 1e3,
+            r.p99_strain,
+            r.max_strain
+        );
+    }
+    let centre = {
+        let n = verts.len() as f32;
+        let s = verts.iter().fold([0.0, 0.0], |s, p| [s[0] + p.x / n, s[1] + p.z / n]);
+        [s[0], s[1]]
+    };
+    let mut y = verts.iter().fold([f32::MAX, f32::MIN], |y, p| [y[0].min(p.y), y[1].max(p.y)]);
+    let mut parts =
+        vec![Part { vertices: verts, faces: template.mesh().faces().to_vec(), color: [0.86, 0.70, 0.60], uv: vec![] }];
+    let mut own = [f32::MAX, f32::MIN];
+    for (g, s) in model.outfit.garments.iter().zip(&state.garments) {
+        let mut world = Vec::new();
+        g.render_positions(&s.positions, &mut world);
+        own = world.iter().fold(own, |y, p| [y[0].min(p.y), y[1].max(p.y)]);
+        let color = library::dye(&g.name).map(|c| f32::from(c) / 255.0);
+        parts.push(Part { vertices: world, faces: g.render.faces.clone(), color, uv: g.render.uv.clone() });
+    }
+    if a.crop {
+        y = [own[0] - 0.08, own[1] + 0.12];
+    } else {
+        y = [y[0] - 0.03, y[1] + 0.03];
+    }
+    (parts, y, centre)
+}
+
+fn main() {
+    let a = args();
+    std::fs::create_dir_all(&a.out).expect("a folder");
+    for g in &a.garments {
+        let (w, h) = a.cell;
+        let (columns, rows) = ((a.views.len() * a.sizes.len()) as u32, a.bodies.len() as u32);
+        let (width, height) = (columns * w, rows * h);
+        let mut sheet = vec![255u8; (width * height * 3) as usize];
+        for (row, body) in a.bodies.iter().enumerate() {
+            for (block, size) in a.sizes.iter().enumerate() {
+                let (parts, y, centre) = outfit(&a, g, body, size);
+                for (k, yaw) in a.views.iter().enumerate() {
+                    let picture = draw(&parts, yaw.to_radians(), a.cell, y, centre);
+                    let column = block * a.views.len() + k;
+                    for line in 0..h as usize {
+                        let to = ((row * h as usize + line) * width as usize + column * w as usize) * 3;
+                        let from = line * w as usize * 3;
+                        sheet[to..to + w as usize * 3].copy_from_slice(&picture[from..from + w as usize * 3]);
+                    }
+                }
+            }
+        }
+        let path = a.out.join(format!("{g}.png"));
+        write_png_rgb(&path, &ColorImage::new(width, height, sheet).expect("a picture")).expect("written");
+        println!("{}", path.display());
+    }
+}
