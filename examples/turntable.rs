@@ -208,12 +208,28 @@ fn draw(parts: &[Part], yaw: f32, cell: (u32, u32), y: [f32; 2], centre: [f32; 2
     out
 }
 
+/// A pattern file: GarmentCode's or our own.
+fn imported(file: &str) -> Pattern {
+    let path = std::path::Path::new(file);
+    let text = std::fs::read_to_string(path).expect("readable");
+    if !tryon::formats::garmentcode::is_garmentcode(&text) {
+        return Pattern::from_json(&text).expect("a pattern");
+    }
+    let raw = tryon::formats::garmentcode::parse_garmentcode(&text, path).expect("a pattern");
+    let material = tryon::garment::Material::preset("cotton").expect("preset");
+    let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or("garment");
+    tryon::garment::import::from_garmentcode(&raw, name, tryon::garment::Size::M, material).expect("a pattern")
+}
+
 fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2], [f32; 2]) {
     let (template, rest) = load(body);
     let measures = tryon::body::measure::measure(&template, &rest).expect("measurable");
     let patterns: Vec<Pattern> = outfit
         .split('+')
         .map(|g| {
+            if g.ends_with(".json") {
+                return imported(g);
+            }
             let chosen = match size {
                 "auto" => {
                     let s = suggest(g, &measures).expect("a size");
@@ -304,7 +320,8 @@ fn main() {
                 }
             }
         }
-        let path = a.out.join(format!("{g}.png"));
+        let name = std::path::Path::new(g).file_stem().and_then(|s| s.to_str()).unwrap_or("outfit").to_owned();
+        let path = a.out.join(format!("{name}.png"));
         write_png_rgb(&path, &ColorImage::new(width, height, sheet).expect("a picture")).expect("written");
         println!("{}", path.display());
     }

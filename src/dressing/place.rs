@@ -104,8 +104,13 @@ impl<'a> Chart<'a> {
         let corner = |name: &str| panel.edge(name).map(|i| (panel.edges[i].from, panel.end(i)));
         let kind = match panel.placement {
             Placement::TrunkFront | Placement::TrunkBack => {
-                let (tip, neck) = corner("shoulder_right").unwrap_or(([0.2, -0.04], [0.08, 0.0]));
-                let armpit = corner("armhole_right").map_or([0.26, -0.22], |c| c.0);
+                let [neck, tip] = shoulder_ends(pattern).unwrap_or([[0.08, 0.0], [0.2, -0.04]]);
+                // The underarm point: the highest corner outside the shoulder tip.
+                let armpit = corner("armhole_right").map(|c| c.0).unwrap_or_else(|| {
+                    let outside = panel.edges.iter().map(|e| [e.from[0].abs(), e.from[1]]);
+                    let outside = outside.filter(|p| p[0] > tip[0] + 0.01 && p[1] < tip[1] - 0.05);
+                    outside.max_by(|a, b| a[1].total_cmp(&b[1])).unwrap_or([0.26, -0.22])
+                });
                 let (top, shoulder_z) = seam_line(template, figure, pattern);
                 Kind::Trunk {
                     top,
@@ -144,7 +149,10 @@ impl<'a> Chart<'a> {
             }
             Placement::Hood(_) => {
                 let (top, _) = seam_line(template, figure, pattern);
-                let crown = panel.edge("crown").map_or_else(Vec::new, |i| panel.edges[i].sample(panel.end(i), 24));
+                let crown: Vec<[f64; 2]> = (0..panel.edges.len())
+                    .filter(|i| panel.edges[*i].name.starts_with("crown"))
+                    .flat_map(|i| panel.edges[i].sample(panel.end(i), 24))
+                    .collect();
                 // The head: everything well above the shoulders.
                 let width = figure.vertices.iter().filter(|p| p.y > top + 0.10).map(|p| p.x.abs()).fold(0.0, f32::max);
                 Kind::Hood {
@@ -262,7 +270,8 @@ impl<'a> Chart<'a> {
             }
             Kind::Sleeve { axis, start, bicep, cap, radius } => {
                 let Placement::Sleeve(side) = self.placement else { return P3::origin() };
-                let half = if p[1] > *cap { *bicep } else { self.span(p[1])[1].max(0.02) };
+                let half =
+                    if p[1] > *cap { *bicep } else { self.span(p[1]).map(f32::abs).into_iter().fold(0.02, f32::max) };
                 let s = start - p[1];
                 // Along the polyline shoulder, elbow, wrist.
                 let (mut k, mut from) = (0, 0.0);
@@ -298,8 +307,7 @@ fn sleeve(template: &Template, figure: &Figure, pattern: &Pattern, side: Side, b
     let wrist = joint("wrist").unwrap_or(elbow + (elbow - shoulder));
     let axis = vec![shoulder, elbow, wrist];
     // The shirt's shoulder tip, seen along the arm.
-    let tip =
-        pattern.panels.iter().find_map(|p| p.edge("shoulder_right").map(|i| p.edges[i].from[0] as f32)).unwrap_or(0.2);
+    let tip = shoulder_ends(pattern).map_or(0.2, |[_, tip]| tip[0] as f32);
     let u = (elbow - shoulder).normalize();
     let start = (sign * tip - shoulder.x) * u.x;
     // Half sizes of the arm, up-down and front-back, at stations along it.
@@ -338,16 +346,24 @@ fn sleeve(template: &Template, figure: &Figure, pattern: &Pattern, side: Side, b
     Kind::Sleeve { axis, start, bicep, cap, radius }
 }
 
-/// Height of y = 0 of the trunk's panels and the z of the shoulder seams, from the first panel that has one.
+/// Neck and tip end of the shoulder seam on the wearer's left, panel coordinates, from the first panel that has one.
+fn shoulder_ends(pattern: &Pattern) -> Option<[[f64; 2]; 2]> {
+    pattern.panels.iter().find_map(|p| {
+        let i = p.edges.iter().position(|e| e.name.starts_with("shoulder"))?;
+        let [a, b] = [p.end(i), p.edges[i].from].map(|q| [q[0].abs(), q[1]]);
+        Some(if a[0] < b[0] { [a, b] } else { [b, a] })
+    })
+}
+
+/// Height of y = 0 of the trunk's panels and the z of the shoulder seams.
 fn seam_line(template: &Template, figure: &Figure, pattern: &Pattern) -> (f32, f32) {
-    let seam = pattern.panels.iter().find_map(|p| p.edge("shoulder_right").map(|i| [p.end(i), p.edges[i].from]));
-    shoulder_line(template, figure, seam.unwrap_or([[0.08, 0.0], [0.2, -0.04]]))
+    shoulder_line(template, figure, shoulder_ends(pattern).unwrap_or([[0.08, 0.0], [0.2, -0.04]]))
 }
 
 /// Height of the waist of a bodice that a skirt is sewn to.
 fn sewn_waist(template: &Template, figure: &Figure, pattern: &Pattern) -> Option<f32> {
     let bodice = pattern.panels.iter().find(|p| p.placement == Placement::TrunkFront)?;
-    let waist = bodice.edges.iter().filter(|e| e.name.starts_with("waist")).map(|e| e.from[1]).reduce(f64::min)?;
+    let waist = bodice.edges.iter().map(|e| e.from[1]).reduce(f64::min)?;
     Some(seam_line(template, figure, pattern).0 + waist as f32)
 }
 

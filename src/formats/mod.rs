@@ -3,10 +3,13 @@
 pub mod asf_amc;
 pub mod bvh;
 mod error;
+pub mod fabric_json;
 mod foxglove;
+pub mod garmentcode;
 pub mod gltf;
 pub mod image;
 mod mcap_file;
+pub mod mhclo;
 mod motion;
 pub mod npy;
 pub mod npz;

@@ -1,6 +1,7 @@
 //! Fabric in SI units.
 
 use super::GarmentError;
+use crate::formats::fabric_json::MeasuredFabric;
 use serde::{Deserialize, Serialize};
 
 /// A thin sheet. Stretch and shear are forces per metre of width (membrane stiffness: Young's modulus × thickness).
@@ -35,6 +36,10 @@ const CIPC: &str = "Codim-IPC fabric table (ipc-sim/Codim-IPC, FEMDiscreteShellB
                     E·h and E·h³/12; friction and damping are ours";
 
 impl Material {
+    /// Names of the presets.
+    pub const PRESETS: [&'static str; 9] =
+        ["jersey", "cotton", "denim", "twill", "fleece", "wool", "polyester", "canvas", "silk"];
+
     /// An isotropic sheet of Young's modulus `young` (Pa), Poisson ratio, volume density (kg/m³) and thickness (m).
     pub fn isotropic(name: &str, young: f64, poisson: f64, density: f64, thickness: f64, source: &str) -> Self {
         let membrane = young * thickness;
@@ -52,7 +57,8 @@ impl Material {
             source: source.to_owned(),
         }
     }
-    /// A preset by name: `jersey`, `cotton`, `denim`, `twill`, `fleece`, `silk`.
+    /// A preset by name: `jersey`, `cotton`, `denim`, `twill`, `fleece`, `wool`,
+    /// `polyester`, `canvas`, `silk`.
     ///
     /// # Errors
     /// Lists the known names.
@@ -99,6 +105,24 @@ impl Material {
                 damping: 1.5,
                 ..Self::isotropic("fleece", 1.2e6, 0.071, 543.292_683, 0.000_6, CIPC)
             },
+            "wool" => Self {
+                bending: 2e-5, // KES-F, suiting: 5e-6 to 3e-5 N·m
+                ..Self::isotropic("wool", 170_000.0, 0.277, 413.380_282, 0.000_568, CIPC)
+            },
+            "polyester" => Self {
+                bending: 5e-6, // KES-F, linings: 1e-6 to 8e-6 N·m
+                friction: 0.2,
+                ..Self::isotropic("polyester", 478_000.0, 0.381, 653.174_603, 0.000_252, CIPC)
+            },
+            // Weft, warp and base modulus of the table.
+            "canvas" => Self {
+                stretch_warp: 19_804_000.0 * 0.000_53,
+                stretch_weft: 5_366_000.0 * 0.000_53,
+                area_density: 0.294, // stored as 294: grams
+                bending: 2e-4,
+                friction: 0.5,
+                ..Self::isotropic("canvas", 2_009_000.0, 0.2, 294.0, 0.000_53, CIPC)
+            },
             "silk" => Self {
                 stretch_warp: 4_971_000.0 * 0.000_18,
                 stretch_weft: 4_300_000.0 * 0.000_18,
@@ -111,10 +135,42 @@ impl Material {
             other => {
                 return Err(GarmentError::Field {
                     field: "material".into(),
-                    why: format!("`{other}` is not known; presets are jersey, cotton, denim, twill, fleece, silk"),
+                    why: format!("`{other}` is not known; presets are {}", Self::PRESETS.join(", ")),
                 });
             }
         })
+    }
+    /// A fabric measured as by Wang et al. 2011. Their stiffness depends on direction and strain; this sheet is linear:
+    /// each modulus is the mean of the one at rest and the one at the largest strain along its own direction (weft, warp,
+    /// bias), and bending is that of the smallest curvature, averaged over directions. Friction, damping and thickness
+    /// were not measured; they are ours.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub fn from_measured(name: &str, m: &MeasuredFabric) -> Result<Self, GarmentError> {
+        /// Least stiffness of a woven or knitted sheet, N/m: fits of weak fabrics go negative at rest.
+        const LEAST: f64 = 5.0;
+        let at = |row: usize, column: usize| m.stretching.get(row).and_then(|r| r.get(column)).copied().unwrap_or(0.0);
+        let mean = |row: usize, column: usize| (0.5 * (at(0, column) + at(row, column))).max(LEAST);
+        let (weft, warp, shear) = (mean(1, 0), mean(5, 2), mean(3, 3));
+        // A coupling beyond the geometric mean would make the sheet unstable.
+        let coupling = (0.5 * (at(0, 1) + at(3, 1))).clamp(0.0, 0.9 * (weft * warp).sqrt());
+        let first: Vec<f64> = m.bending.iter().filter_map(|r| r.first()).map(|b| b.max(0.0)).collect();
+        let material = Self {
+            name: name.to_owned(),
+            area_density: m.density,
+            stretch_warp: warp,
+            stretch_weft: weft,
+            shear,
+            coupling,
+            bending: first.iter().sum::<f64>() / first.len().max(1) as f64,
+            friction: 0.3,
+            damping: 1.0,
+            thickness: 5e-4,
+            source: "measured as in Wang, O'Brien & Ramamoorthi 2011; friction, damping and thickness are ours".into(),
+        };
+        material.check()?;
+        Ok(material)
     }
     /// Refuses numbers no sheet can have.
     ///
@@ -154,7 +210,7 @@ mod tests {
 
     #[test]
     fn presets_are_sheets_and_faults_are_named() {
-        for n in ["jersey", "cotton", "denim", "twill", "fleece", "silk"] {
+        for n in Material::PRESETS {
             Material::preset(n).expect("preset").check().expect("usable");
         }
         assert!(Material::preset("chainmail").is_err());

@@ -1,6 +1,7 @@
 //! A garment before it moves: panels, seams, materials, rest shape, sizes, anchors.
 
 mod error;
+pub mod import;
 pub mod library;
 mod material;
 mod mesh;

@@ -1,0 +1,254 @@
+//! GarmentCode's sewing patterns (Korosteleva & Sorkine-Hornung 2023): `*_specification.json`, as they are.
+
+use super::FormatError;
+use super::image::read_limited;
+use serde::Deserialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Largest file, bytes; the shared examples have 20 to 60 kB.
+const MAX_BYTES: u64 = 16 << 20;
+/// Largest coordinate, metres.
+const MAX_COORDINATE: f64 = 10.0;
+
+/// How an edge runs between its ends, in the edge's own frame: x along it from 0 to 1, y to its left in the same unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RawCurve {
+    /// Straight.
+    Line,
+    /// Quadratic Bézier with this control point.
+    Quadratic([f64; 2]),
+    /// Cubic Bézier with these control points.
+    Cubic([f64; 2], [f64; 2]),
+    /// Circular arc: radius in metres, whether it is the longer one, whether it bulges to the right.
+    Circle(f64, bool, bool),
+}
+
+/// One edge.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawEdge {
+    /// Vertices it runs between.
+    pub ends: [usize; 2],
+    /// Shape.
+    pub curve: RawCurve,
+}
+
+/// One panel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawPanel {
+    /// Its name.
+    pub name: String,
+    /// Where its origin lies beside the figure, metres (y up, z to the front).
+    pub translation: [f64; 3],
+    /// Euler angles about fixed x, y, z axes, degrees.
+    pub rotation: [f64; 3],
+    /// Corners, metres.
+    pub vertices: Vec<[f64; 2]>,
+    /// Edges; each starts where the one before ends, the last ends where the first starts.
+    pub edges: Vec<RawEdge>,
+}
+
+/// A pattern.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawPattern {
+    /// Panels in the order of their names.
+    pub panels: Vec<RawPanel>,
+    /// Pairs of panel and edge numbers that are sewn together.
+    pub stitches: Vec<[(usize, usize); 2]>,
+}
+
+#[derive(Deserialize)]
+struct File {
+    pattern: Body,
+    properties: Properties,
+}
+#[derive(Deserialize)]
+struct Body {
+    panels: BTreeMap<String, JsonPanel>,
+    stitches: Vec<Vec<Value>>,
+}
+#[derive(Deserialize)]
+struct Properties {
+    units_in_meter: f64,
+    curvature_coords: String,
+}
+#[derive(Deserialize)]
+struct JsonPanel {
+    translation: [f64; 3],
+    #[serde(default)]
+    rotation: [f64; 3],
+    vertices: Vec<[f64; 2]>,
+    edges: Vec<JsonEdge>,
+}
+#[derive(Deserialize)]
+struct JsonEdge {
+    endpoints: [usize; 2],
+    curvature: Option<Value>,
+}
+#[derive(Deserialize)]
+struct JsonStitch {
+    panel: String,
+    edge: usize,
+}
+
+/// Reads a pattern file.
+///
+/// # Errors
+/// As [`parse_garmentcode`], or when the file cannot be read.
+pub fn read_garmentcode(path: &Path) -> Result<RawPattern, FormatError> {
+    let bytes = read_limited(path, MAX_BYTES)?;
+    let text = String::from_utf8(bytes).map_err(|_| FormatError::field(path, "text", "it is not UTF-8"))?;
+    parse_garmentcode(&text, path)
+}
+
+/// Whether a JSON text looks like a GarmentCode pattern (and not like ours).
+pub fn is_garmentcode(text: &str) -> bool {
+    serde_json::from_str::<Value>(text).is_ok_and(|v| v.get("pattern").is_some_and(|p| p.get("stitches").is_some()))
+}
+
+/// Reads pattern text; `origin` is named in errors.
+///
+/// # Errors
+/// Syntax errors name line and column; faults name panel, edge or stitch.
+pub fn parse_garmentcode(text: &str, origin: &Path) -> Result<RawPattern, FormatError> {
+    let file: File = serde_json::from_str(text).map_err(|e| FormatError::field(origin, "pattern", e.to_string()))?;
+    let units = file.properties.units_in_meter;
+    if !(units.is_finite() && units > 0.0) {
+        return Err(FormatError::field(origin, "properties.units_in_meter", format!("{units} is no scale")));
+    }
+    if file.properties.curvature_coords != "relative" {
+        let why = format!("`{}`; only relative curvature is read", file.properties.curvature_coords);
+        return Err(FormatError::field(origin, "properties.curvature_coords", why));
+    }
+    let mut panels = Vec::new();
+    for (name, p) in file.pattern.panels {
+        panels.push(panel(name, p, units, origin)?);
+    }
+    let mut stitches = Vec::new();
+    for (k, sides) in file.pattern.stitches.into_iter().enumerate() {
+        let field = |what: &str| format!("pattern.stitches[{k}]{what}");
+        // A third entry says which sides of the fabric meet; it does not matter here.
+        let mut pair = [(0, 0); 2];
+        if sides.len() < 2 {
+            return Err(FormatError::field(origin, field(""), format!("{} sides; 2 are sewn", sides.len())));
+        }
+        for (i, (slot, side)) in pair.iter_mut().zip(sides).enumerate() {
+            let at = |why: String| FormatError::field(origin, field(&format!("[{i}]")), why);
+            let s: JsonStitch = serde_json::from_value(side).map_err(|e| at(e.to_string()))?;
+            let p = panels
+                .iter()
+                .position(|p: &RawPanel| p.name == s.panel)
+                .ok_or_else(|| at(format!("there is no panel `{}`", s.panel)))?;
+            if s.edge >= panels[p].edges.len() {
+                let n = panels[p].edges.len();
+                return Err(at(format!("panel `{}` has no edge {} (it has {n})", s.panel, s.edge)));
+            }
+            *slot = (p, s.edge);
+        }
+        stitches.push(pair);
+    }
+    Ok(RawPattern { panels, stitches })
+}
+
+fn panel(name: String, p: JsonPanel, units: f64, origin: &Path) -> Result<RawPanel, FormatError> {
+    let fault = |what: String, why: String| FormatError::field(origin, format!("pattern.panels.{name}{what}"), why);
+    let metres = |v: f64| v / units;
+    let good = |v: f64| v.abs() <= MAX_COORDINATE;
+    let translation = p.translation.map(metres);
+    if !translation.iter().all(|v| good(*v)) || !p.rotation.iter().all(|a| a.is_finite()) {
+        return Err(fault(".translation".into(), "not finite or too far away".into()));
+    }
+    let vertices: Vec<[f64; 2]> = p.vertices.iter().map(|v| v.map(metres)).collect();
+    if let Some(k) = vertices.iter().position(|v| !v.iter().all(|c| good(*c))) {
+        return Err(fault(format!(".vertices[{k}]"), format!("{:?} is not within {MAX_COORDINATE} m", vertices[k])));
+    }
+    let n = p.edges.len();
+    if n < 3 {
+        return Err(fault(".edges".into(), format!("{n} edges; an outline needs at least 3")));
+    }
+    let mut edges: Vec<RawEdge> = Vec::with_capacity(n);
+    for (k, e) in p.edges.iter().enumerate() {
+        let at = |why: String| fault(format!(".edges[{k}]"), why);
+        if let Some(v) = e.endpoints.iter().find(|v| **v >= vertices.len()) {
+            return Err(at(format!("vertex {v} does not exist (there are {})", vertices.len())));
+        }
+        let next = &p.edges[(k + 1) % n];
+        if e.endpoints[1] != next.endpoints[0] {
+            let (a, b) = (e.endpoints[1], next.endpoints[0]);
+            return Err(at(format!("it ends in vertex {a}, but the next edge starts in vertex {b}")));
+        }
+        let curve = e.curvature.as_ref().map_or(Ok(RawCurve::Line), |c| curve(c, units)).map_err(at)?;
+        edges.push(RawEdge { ends: e.endpoints, curve });
+    }
+    Ok(RawPanel { translation, rotation: p.rotation, vertices, edges, name })
+}
+
+fn curve(value: &Value, units: f64) -> Result<RawCurve, String> {
+    if value.is_null() {
+        return Ok(RawCurve::Line);
+    }
+    let point = |v: &Value| -> Result<[f64; 2], String> {
+        let p: [f64; 2] = serde_json::from_value(v.clone()).map_err(|e| format!("curvature: {e}"))?;
+        // Control points further away than this are no edge of a garment.
+        if p.iter().all(|c| c.abs() < 100.0) { Ok(p) } else { Err(format!("control point {p:?} is out of range")) }
+    };
+    // The old form: a bare control point.
+    if value.is_array() {
+        return point(value).map(RawCurve::Quadratic);
+    }
+    let kind = value.get("type").and_then(Value::as_str).unwrap_or("");
+    let params = value.get("params").and_then(Value::as_array).ok_or("curvature has no params")?;
+    let number = |k: usize| params.get(k).and_then(Value::as_f64);
+    match (kind, params.as_slice()) {
+        ("quadratic", [a]) => point(a).map(RawCurve::Quadratic),
+        ("cubic", [a, b]) => Ok(RawCurve::Cubic(point(a)?, point(b)?)),
+        ("circle", [_, _, _]) => match (number(0), number(1), number(2)) {
+            (Some(r), Some(large), Some(right)) if r.is_finite() && r > 0.0 => {
+                Ok(RawCurve::Circle(r / units, large != 0.0, right != 0.0))
+            }
+            _ => Err("a circle needs a radius and two flags".into()),
+        },
+        _ => Err(format!("curvature `{kind}` with {} parameters is not known", params.len())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SQUARE: &str = r#"{"pattern":{"panels":{"a":{"translation":[0,0,10],"vertices":[[0,0],[50,0],[50,50],[0,50]],
+        "edges":[{"endpoints":[0,1]},{"endpoints":[1,2],"curvature":{"type":"circle","params":[30,0,1]}},
+        {"endpoints":[2,3],"curvature":[0.5,0.1]},{"endpoints":[3,0]}]}},
+        "stitches":[[{"panel":"a","edge":1},{"panel":"a","edge":3}]]},
+        "properties":{"units_in_meter":100,"curvature_coords":"relative"}}"#;
+
+    fn parse(text: &str) -> Result<RawPattern, String> {
+        parse_garmentcode(text, Path::new("p.json")).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn centimetres_become_metres_and_curves_are_read() {
+        let p = parse(SQUARE).expect("valid");
+        assert_eq!(p.panels[0].vertices[2], [0.5, 0.5]);
+        assert_eq!(p.panels[0].edges[1].curve, RawCurve::Circle(0.3, false, true));
+        assert_eq!(p.panels[0].edges[2].curve, RawCurve::Quadratic([0.5, 0.1]));
+        assert_eq!(p.stitches, [[(0, 1), (0, 3)]]);
+        assert!(is_garmentcode(SQUARE) && !is_garmentcode("{}"));
+    }
+
+    #[test]
+    fn faults_name_panel_edge_and_stitch() {
+        let e = parse(&SQUARE.replace("[2,3]", "[2,9]")).expect_err("vertex");
+        assert!(e.contains("panels.a.edges[2]") && e.contains("vertex 9"), "{e}");
+        let e = parse(&SQUARE.replace("[2,3]", "[3,2]")).expect_err("loop");
+        assert!(e.contains("edges[1]") && e.contains("next edge starts in vertex 3"), "{e}");
+        let e = parse(&SQUARE.replace(r#""edge":3"#, r#""edge":7"#)).expect_err("stitch");
+        assert!(e.contains("stitches[0][1]") && e.contains("no edge 7"), "{e}");
+        let e = parse(&SQUARE.replace("[50,50]", "[50,5e9]")).expect_err("far");
+        assert!(e.contains("vertices[2]"), "{e}");
+        for cut in 0..SQUARE.len() {
+            assert!(parse(&SQUARE[..cut]).is_err(), "cut at {cut}");
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! MakeHuman's clothes: `.mhclo` binds each vertex of an OBJ to three vertices of the base body.
+
+use super::FormatError;
+use super::image::read_limited;
+use crate::math::{P3, V3};
+use std::path::Path;
+
+/// Largest file, bytes; the largest shared suit has 700 kB.
+const MAX_BYTES: u64 = 64 << 20;
+
+/// How one vertex hangs on the body: Σ weights · corners + offset, the offset in units of the body's scale.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Binding {
+    /// Vertices of the base body.
+    pub vertices: [u32; 3],
+    /// Barycentric weights.
+    pub weights: [f32; 3],
+    /// Offset before scaling.
+    pub offset: [f32; 3],
+}
+
+/// Two body vertices whose distance along an axis, over `length`, scales the offsets along that axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// Vertices of the base body.
+    pub vertices: [u32; 2],
+    /// Their distance on the body the garment was made on, file units.
+    pub length: f32,
+}
+
+/// A garment file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mhclo {
+    /// Name in the file.
+    pub name: String,
+    /// OBJ beside it.
+    pub obj_file: String,
+    /// Material file beside it, if named.
+    pub material: Option<String>,
+    /// Base mesh it belongs to.
+    pub base: String,
+    /// Scales along x, y, z.
+    pub scales: [Option<Scale>; 3],
+    /// Drawing order: greater lies further out.
+    pub z_depth: i32,
+    /// Binding of each vertex of the OBJ.
+    pub bindings: Vec<Binding>,
+    /// Vertices of the body that the garment hides.
+    pub deleted: Vec<u32>,
+}
+
+/// Reads a `.mhclo` file.
+///
+/// # Errors
+/// As [`parse_mhclo`], or when the file cannot be read.
+pub fn read_mhclo(path: &Path) -> Result<Mhclo, FormatError> {
+    parse_mhclo(&String::from_utf8_lossy(&read_limited(path, MAX_BYTES)?), path)
+}
+
+/// Reads `.mhclo` text; `origin` is named in errors.
+///
+/// # Errors
+/// Names the line and what is wrong on it.
+pub fn parse_mhclo(text: &str, origin: &Path) -> Result<Mhclo, FormatError> {
+    let mut out = Mhclo {
+        name: String::new(),
+        obj_file: String::new(),
+        material: None,
+        base: String::new(),
+        scales: [None; 3],
+        z_depth: 0,
+        bindings: Vec::new(),
+        deleted: Vec::new(),
+    };
+    #[derive(PartialEq)]
+    enum Part {
+        Head,
+        Vertices,
+        Deleted,
+    }
+    let mut part = Part::Head;
+    for (number, line) in text.lines().enumerate() {
+        let at = |what: &str, why: String| FormatError::field(origin, format!("line {}: {what}", number + 1), why);
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let Some(first) = words.first().copied().filter(|w| !w.starts_with('#')) else { continue };
+        let rest = || line.split_once(char::is_whitespace).map_or("", |(_, r)| r).trim().to_owned();
+        match first {
+            "name" => out.name = rest(),
+            "obj_file" => out.obj_file = rest(),
+            "material" => out.material = Some(rest()),
+            "basemesh" => out.base = rest(),
+            "z_depth" => out.z_depth = words.get(1).and_then(|w| w.parse().ok()).unwrap_or(0),
+            "x_scale" | "y_scale" | "z_scale" => {
+                let axis = usize::from(first.as_bytes()[0] - b'x');
+                let (a, b) = (vertex(&words, 1), vertex(&words, 2));
+                let length = words.get(3).and_then(|w| w.parse::<f32>().ok()).filter(|l| l.is_finite() && *l > 0.0);
+                match (a, b, length) {
+                    (Ok(a), Ok(b), Some(length)) => out.scales[axis] = Some(Scale { vertices: [a, b], length }),
+                    _ => return Err(at(first, "two body vertices and a positive length are needed".into())),
+                }
+            }
+            "verts" => part = Part::Vertices,
+            "delete_verts" => part = Part::Deleted,
+            _ if part == Part::Vertices && first.starts_with(|c: char| c.is_ascii_digit()) => {
+                out.bindings.push(binding(&words).map_err(|why| at(&format!("vertex {}", out.bindings.len()), why))?);
+            }
+            _ if part == Part::Deleted => {
+                deleted(&words, &mut out.deleted).map_err(|why| at("delete_verts", why))?;
+            }
+            _ => {}
+        }
+    }
+    if out.obj_file.is_empty() {
+        return Err(FormatError::field(origin, "obj_file", "it is missing"));
+    }
+    if out.bindings.is_empty() {
+        return Err(FormatError::field(origin, "verts", "no vertex is bound to the body"));
+    }
+    Ok(out)
+}
+
+fn vertex(words: &[&str], k: usize) -> Result<u32, String> {
+    let w = words.get(k).ok_or("too few numbers")?;
+    w.parse().map_err(|_| format!("`{w}` is no vertex number"))
+}
+
+fn binding(words: &[&str]) -> Result<Binding, String> {
+    let float = |k: usize| {
+        let w = words.get(k).ok_or_else(|| format!("{} numbers; 1 or 9 are needed", words.len()))?;
+        w.parse::<f32>().ok().filter(|x| x.is_finite()).ok_or_else(|| format!("`{w}` is no finite number"))
+    };
+    if words.len() == 1 {
+        let v = vertex(words, 0)?;
+        return Ok(Binding { vertices: [v; 3], weights: [1.0, 0.0, 0.0], offset: [0.0; 3] });
+    }
+    Ok(Binding {
+        vertices: [vertex(words, 0)?, vertex(words, 1)?, vertex(words, 2)?],
+        weights: [float(3)?, float(4)?, float(5)?],
+        offset: [float(6)?, float(7)?, float(8)?],
+    })
+}
+
+/// Single numbers and ranges `a - b`.
+fn deleted(words: &[&str], out: &mut Vec<u32>) -> Result<(), String> {
+    /// More vertices than this in a range are no body.
+    const MOST: u32 = 1_000_000;
+    let mut k = 0;
+    while k < words.len() {
+        let a = vertex(words, k)?;
+        if words.get(k + 1) == Some(&"-") {
+            let b = vertex(words, k + 2)?;
+            if b < a || b - a > MOST {
+                return Err(format!("{a} - {b} is no range"));
+            }
+            out.extend(a..=b);
+            k += 3;
+        } else {
+            out.push(a);
+            k += 1;
+        }
+    }
+    Ok(())
+}
+
+impl Mhclo {
+    /// Positions of the garment on a body of the same base mesh, in the body's unit.
+    ///
+    /// # Errors
+    /// Names the garment vertex bound to a body vertex that does not exist.
+    pub fn fit(&self, body: &[P3], origin: &Path) -> Result<Vec<P3>, FormatError> {
+        let n = body.len();
+        let missing = |what: String, v: u32| {
+            FormatError::field(origin, what, format!("body vertex {v} does not exist (the body has {n})"))
+        };
+        let mut scale = [1.0f32; 3];
+        for (axis, s) in self.scales.iter().enumerate() {
+            let Some(s) = s else { continue };
+            if let Some(v) = s.vertices.iter().find(|v| **v as usize >= n) {
+                return Err(missing(format!("{}_scale", ["x", "y", "z"][axis]), *v));
+            }
+            let [a, b] = s.vertices.map(|v| body[v as usize][axis]);
+            scale[axis] = (a - b).abs() / s.length;
+        }
+        self.bindings
+            .iter()
+            .enumerate()
+            .map(|(i, b)| {
+                if let Some(v) = b.vertices.iter().find(|v| **v as usize >= n) {
+                    return Err(missing(format!("vertex {i}"), *v));
+                }
+                let on = (0..3).fold(V3::zeros(), |s, k| s + body[b.vertices[k] as usize].coords * b.weights[k]);
+                Ok(P3::from(on + V3::new(b.offset[0] * scale[0], b.offset[1] * scale[1], b.offset[2] * scale[2])))
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "# a hat\nname hat\nobj_file hat.obj\nbasemesh hm08\nx_scale 0 1 2.0\nz_depth 50\nverts 0\n\
+        0 1 2 0.5 0.25 0.25 0.1 0.2 0.3\n2\ndelete_verts\n0 - 2\n";
+
+    #[test]
+    fn bound_vertices_follow_the_body_and_offsets_scale_with_it() {
+        let m = parse_mhclo(TEXT, Path::new("hat.mhclo")).expect("valid");
+        assert_eq!((m.deleted.as_slice(), m.z_depth, m.base.as_str()), (&[0, 1, 2][..], 50, "hm08"));
+        let body = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]].map(P3::from);
+        let p = m.fit(&body, Path::new("hat.mhclo")).expect("fits");
+        // The x distance is twice what it was: the x offset doubles.
+        assert_eq!(p[0], P3::new(1.0 + 0.2, 1.0 + 0.2, 0.3));
+        assert_eq!(p[1], body[2]);
+        let e = m.fit(&body[..2], Path::new("hat.mhclo")).expect_err("short body").to_string();
+        assert!(e.contains("vertex 0") && e.contains("body vertex 2"), "{e}");
+    }
+
+    #[test]
+    fn faults_name_line_and_vertex() {
+        let e = parse_mhclo(&TEXT.replace("0.25 0.25", "0.25 x"), Path::new("h.mhclo")).expect_err("x").to_string();
+        assert!(e.contains("line 8") && e.contains("vertex 0") && e.contains("`x`"), "{e}");
+        assert!(parse_mhclo("verts 0\n1\n", Path::new("h.mhclo")).is_err());
+        for cut in 0..TEXT.len() {
+            let _ = parse_mhclo(&TEXT[..cut], Path::new("h.mhclo"));
+        }
+    }
+}
