@@ -288,11 +288,10 @@ fn name_landmarks(raw: &RawPattern, places: &[Placement], panels: &mut [Panel], 
                         continue;
                     };
                     let own = if a.0 == k { a } else { b };
-                    if matches!(places[other.0], Placement::Hood(_)) {
-                        if let Some(e) = names_at(panel, own.1) {
-                            rename(panel, k, e, &format!("crown_{crown}"));
-                            crown += 1;
-                        }
+                    let hood = matches!(places[other.0], Placement::Hood(_));
+                    if let Some(e) = names_at(panel, own.1).filter(|_| hood) {
+                        rename(panel, k, e, &format!("crown_{crown}"));
+                        crown += 1;
                     }
                 }
             }
