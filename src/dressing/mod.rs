@@ -4,10 +4,12 @@ mod canonical;
 mod drape;
 mod dress;
 mod figure;
+mod fit_map;
 mod place;
 mod refine;
 mod suggest;
 
 pub use crate::cloth::realtime::{AnchorBinding, Outfit};
 pub use dress::{DressError, DressOptions, DressReport, Dressed, dress};
+pub use fit_map::{FitMap, FitProbe, RegionFit, VertexFit};
 pub use suggest::{Fit, Room, Suggestion, hem_height, judge, rooms, suggest};

@@ -1,0 +1,366 @@
+//! Where a garment is tight, fitted or loose on the body it is worn on: stretch, pressure and room, as numbers and
+//! colours.
+//!
+//! Pressure follows from balance: what the stretched cloth and its weight press into the skin, the skin presses back.
+//! Nothing but positions is needed, so any solver's state will do; in fast motion inertia is read as pressure.
+
+use super::Fit;
+use crate::body::Template;
+use crate::cloth::realtime::{Model, State};
+use crate::cloth::{ClothError, Sheet};
+use crate::contact::{SurfaceFrame, SurfaceModel};
+use crate::garment::{GarmentMesh, Region};
+use crate::math::{P3, V3d};
+use crate::par::Par;
+use serde::{Deserialize, Serialize};
+
+/// What one vertex of a garment feels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct VertexFit {
+    /// Larger principal stretch minus one, mean of the triangles around.
+    pub stretch: f32,
+    /// Pressure on the skin, Pa; zero where the cloth does not touch.
+    pub pressure: f32,
+    /// Distance from the skin, metres.
+    pub gap: f32,
+}
+
+/// A part of the body under a garment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RegionFit {
+    /// What a tailor calls it: `chest`, `waist`, `hip`, `left upper arm` …
+    pub name: String,
+    /// Cloth there, m².
+    pub area: f64,
+    /// Mean and 95th percentile of the stretch.
+    pub stretch: [f64; 2],
+    /// Mean pressure over the touching part and 95th percentile, Pa.
+    pub pressure: [f64; 2],
+    /// Share of the cloth that touches.
+    pub touching: f64,
+    /// Mean distance from the skin, metres.
+    pub gap: f64,
+    /// In a word.
+    pub fit: Fit,
+}
+
+/// Fit of one garment.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FitMap {
+    /// Shape `[simulation vertices]`.
+    pub vertices: Vec<VertexFit>,
+    /// From top to bottom.
+    pub regions: Vec<RegionFit>,
+}
+
+/// Cloth this much further off the skin than its layer's own distance still touches, metres.
+const TOUCH: f32 = 3e-3;
+/// From this stretch (95th percentile) on a region is tight: a woven fabric's comfortable limit of about 5 % (Kirk &
+/// Ibrahim 1966 give skin strains of 12 % and more at joints, which cloth must not have to follow at rest).
+const TIGHT_STRETCH: f64 = 0.05;
+/// From this mean pressure on a region is tight, Pa. Denton 1972 puts discomfort at 6 to 10 kPa; a waistband that is
+/// felt but tolerated is at 1 to 2 kPa.
+const TIGHT_PRESSURE: f64 = 1_000.0;
+/// From this mean distance on a region is loose, metres: 19 cm of girth.
+const LOOSE_GAP: f64 = 0.03;
+
+impl VertexFit {
+    /// From −1 (loose) by 0 (follows the body) to 1 (tight).
+    pub fn tightness(&self) -> f32 {
+        let tight = (self.stretch / TIGHT_STRETCH as f32).max(self.pressure / TIGHT_PRESSURE as f32).clamp(0.0, 1.0);
+        let loose = (self.gap / LOOSE_GAP as f32).clamp(0.0, 1.0);
+        if tight >= loose { tight } else { -loose * (1.0 - tight) }
+    }
+    /// Blue where loose, green where fitted, red where tight, sRGB.
+    pub fn color(&self) -> [u8; 3] {
+        const LOOSE: [f32; 3] = [58.0, 104.0, 190.0];
+        const FITTED: [f32; 3] = [96.0, 168.0, 96.0];
+        const TIGHT: [f32; 3] = [206.0, 58.0, 48.0];
+        let t = self.tightness();
+        let to = if t >= 0.0 { TIGHT } else { LOOSE };
+        std::array::from_fn(|k| (FITTED[k] + (to[k] - FITTED[k]) * t.abs()).round() as u8)
+    }
+}
+
+/// What stays the same for an outfit; keeps the nearest skin of each vertex between calls.
+#[derive(Debug)]
+pub struct FitProbe {
+    sheets: Vec<Sheet>,
+    /// Region number of each body vertex.
+    region: Vec<u8>,
+    nearest: Vec<Vec<u32>>,
+    frame: SurfaceFrame,
+}
+
+/// Regions from top to bottom, and the joints whose skin they are.
+const REGIONS: [(&str, &[&str]); 15] = [
+    ("head", &["head", "head_end", "jaw"]),
+    ("neck", &["neck"]),
+    ("left shoulder", &["left_collar"]),
+    ("right shoulder", &["right_collar"]),
+    ("chest", &["spine3", "spine2"]),
+    ("left upper arm", &["left_shoulder"]),
+    ("right upper arm", &["right_shoulder"]),
+    ("left forearm", &["left_elbow", "left_wrist", "left_hand", "left_hand_end"]),
+    ("right forearm", &["right_elbow", "right_wrist", "right_hand", "right_hand_end"]),
+    ("waist", &["spine1"]),
+    ("hip", &["pelvis"]),
+    ("left thigh", &["left_hip"]),
+    ("right thigh", &["right_hip"]),
+    ("left lower leg", &["left_knee", "left_ankle", "left_foot", "left_foot_end"]),
+    ("right lower leg", &["right_knee", "right_ankle", "right_foot", "right_foot_end"]),
+];
+
+impl FitProbe {
+    /// Prepares an outfit.
+    ///
+    /// # Errors
+    /// Faults of the garments.
+    pub fn new(template: &Template, model: &Model) -> Result<Self, ClothError> {
+        let of = |joint: &str| REGIONS.iter().position(|(_, names)| names.contains(&joint));
+        let skeleton = template.skeleton();
+        let by_joint: Vec<u8> = (0..skeleton.len())
+            .map(|j| {
+                // Joints between the named ones belong to the nearest named ancestor.
+                let mut at = Some(j);
+                while let Some(k) = at {
+                    if let Some(r) = of(&skeleton.joints()[k].name) {
+                        return r as u8;
+                    }
+                    at = skeleton.joints()[k].parent;
+                }
+                10 // the hip, where every tree starts
+            })
+            .collect();
+        let n = template.mesh().vertices().len();
+        Ok(Self {
+            sheets: model.outfit.garments.iter().map(Sheet::of_garment).collect::<Result<_, _>>()?,
+            region: (0..n).map(|v| by_joint[template.weights().dominant(v)]).collect(),
+            nearest: vec![Vec::new(); model.outfit.garments.len()],
+            frame: SurfaceFrame::default(),
+        })
+    }
+    /// Fit of every garment, in the order of the outfit; `body` is the posed body of the last step (world, metres).
+    ///
+    /// # Errors
+    /// When the state or the body is not of this outfit.
+    pub fn measure(&mut self, model: &Model, state: &State, body: &[P3]) -> Result<Vec<FitMap>, ClothError> {
+        let count = |what, got, expected| ClothError::Count { what, got, expected };
+        let surface = model.surface();
+        if body.len() != surface.vertices() || body.len() != self.region.len() {
+            return Err(count("body vertices", body.len(), self.region.len()));
+        }
+        if state.garments.len() != self.sheets.len() || model.outfit.garments.len() != self.sheets.len() {
+            return Err(count("garments", state.garments.len(), self.sheets.len()));
+        }
+        self.frame.vertices.clear();
+        self.frame.vertices.extend_from_slice(body);
+        surface.update_normals(Par::Rayon, &mut self.frame);
+        let mut out = Vec::new();
+        for (k, g) in state.garments.iter().enumerate() {
+            let mesh = &model.outfit.garments[k];
+            if g.positions.len() != mesh.vertices {
+                return Err(count("garment vertices", g.positions.len(), mesh.vertices));
+            }
+            let offset = model.offset(k) as f32;
+            let near = &mut self.nearest[k];
+            let vertices = feel(&self.sheets[k], mesh, &g.positions, surface, &self.frame, offset, near);
+            let regions = summarise(&self.sheets[k], mesh, &vertices, near, &self.region);
+            out.push(FitMap { vertices, regions });
+        }
+        Ok(out)
+    }
+}
+
+/// Fit of each vertex. `near` holds the nearest body vertices of the last call, or nothing.
+fn feel(
+    sheet: &Sheet,
+    mesh: &GarmentMesh,
+    positions: &[P3],
+    surface: &SurfaceModel,
+    frame: &SurfaceFrame,
+    offset: f32,
+    near: &mut Vec<u32>,
+) -> Vec<VertexFit> {
+    const GRAVITY: V3d = V3d::new(0.0, -9.81, 0.0);
+    let n = positions.len();
+    let x: Vec<V3d> = positions.iter().map(|p| p.coords.cast()).collect();
+    let mut pull = vec![V3d::zeros(); n];
+    sheet.add_gradient(&x, &mut pull);
+    let (mut area, mut stretch) = (vec![0.0f64; n], vec![0.0f64; n]);
+    for e in &sheet.elements {
+        let f = e.gradient(&x);
+        let c = f.transpose() * f;
+        // Larger eigenvalue of the 2×2 Cauchy–Green tensor.
+        let (half, det) = (0.5 * c.trace(), c.determinant());
+        let largest = (half + (half * half - det).max(0.0).sqrt()).sqrt() - 1.0;
+        for v in e.v {
+            area[v as usize] += e.area / 3.0;
+            stretch[v as usize] += largest * e.area / 3.0;
+        }
+    }
+    if near.len() != n {
+        *near = (0..n)
+            .map(|i| surface.nearest_vertex(frame, &positions[i], mesh.regions.get(i).map_or(Region::ALL.0, |r| r.0)))
+            .collect();
+    }
+    (0..n)
+        .map(|i| {
+            let mask = mesh.regions.get(i).map_or(Region::ALL.0, |r| r.0);
+            let mut c = surface.closest(frame, &positions[i], near[i], mask);
+            near[i] = c.vertex;
+            if c.rim {
+                c = surface.closest(frame, &positions[i], c.vertex, Region::ALL.0);
+            }
+            let a = area[i].max(f64::MIN_POSITIVE);
+            let gap = c.signed.max(0.0);
+            let pressure = if gap < offset + TOUCH {
+                // −gradient + weight + skin = 0 along the normal.
+                c.normal.cast::<f64>().dot(&(pull[i] - GRAVITY * sheet.mass[i])).max(0.0) / a
+            } else {
+                0.0
+            };
+            VertexFit { stretch: (stretch[i] / a) as f32, pressure: pressure as f32, gap }
+        })
+        .collect()
+}
+
+fn summarise(sheet: &Sheet, mesh: &GarmentMesh, vertices: &[VertexFit], near: &[u32], region: &[u8]) -> Vec<RegionFit> {
+    let mut area = vec![0.0f64; vertices.len()];
+    for e in &sheet.elements {
+        e.v.iter().for_each(|v| area[*v as usize] += e.area / 3.0);
+    }
+    // Edges that are tied to the body stretch where they are held; they are told by their pressure.
+    let held: std::collections::BTreeSet<u32> =
+        mesh.anchors.iter().filter(|a| a.strength >= 1.0).flat_map(|a| a.vertices.iter().copied()).collect();
+    let mut out = Vec::new();
+    for (r, (name, _)) in REGIONS.iter().enumerate() {
+        let own: Vec<usize> = (0..vertices.len()).filter(|i| usize::from(region[near[*i] as usize]) == r).collect();
+        let total: f64 = own.iter().map(|i| area[*i]).sum();
+        /// Less cloth than this says nothing about a region, m²: a hand's breadth square.
+        const LEAST: f64 = 0.006;
+        if total < LEAST {
+            continue;
+        }
+        let percentile = |value: &dyn Fn(&VertexFit) -> f32| {
+            let mut all: Vec<f32> =
+                own.iter().filter(|i| !held.contains(&(**i as u32))).map(|i| value(&vertices[*i])).collect();
+            all.sort_unstable_by(f32::total_cmp);
+            all.get((all.len() * 95 / 100).min(all.len().saturating_sub(1))).map_or(0.0, |v| f64::from(*v))
+        };
+        let mean = |value: &dyn Fn(&VertexFit) -> f32| {
+            own.iter().map(|i| f64::from(value(&vertices[*i])) * area[*i]).sum::<f64>() / total
+        };
+        let touching = mean(&|v| f32::from(u8::from(v.pressure > 0.0)));
+        let stretch = [mean(&|v| v.stretch), percentile(&|v| v.stretch)];
+        let on_skin = if touching > 0.0 { mean(&|v| v.pressure) / touching } else { 0.0 };
+        let pressure = [on_skin, percentile(&|v| v.pressure)];
+        let gap = mean(&|v| v.gap);
+        let fit = if stretch[1] > TIGHT_STRETCH || pressure[0] > TIGHT_PRESSURE {
+            Fit::Tight
+        } else if gap > LOOSE_GAP {
+            Fit::Loose
+        } else {
+            Fit::Fitted
+        };
+        out.push(RegionFit { name: (*name).to_owned(), area: total, stretch, pressure, touching, gap, fit });
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::garment::{GarmentKind, Material, RenderMesh, Size};
+    use crate::mesh::{Face, Topology, TriMesh};
+    use std::f64::consts::TAU;
+
+    /// An open tube about y, radius `r`, `n` × `m` cells, 0.3 m high; faces outward.
+    fn tube(r: f64, n: u32, m: u32) -> (Vec<P3>, Vec<Face>) {
+        let at = |i: u32, j: u32| j * n + i % n;
+        let mut v = Vec::new();
+        for j in 0..=m {
+            for i in 0..n {
+                let a = TAU * f64::from(i) / f64::from(n);
+                v.push(P3::new((r * a.sin()) as f32, 0.3 * j as f32 / m as f32, (r * a.cos()) as f32));
+            }
+        }
+        let f = (0..m).flat_map(|j| {
+            (0..n).flat_map(move |i| {
+                [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
+            })
+        });
+        (v, f.collect())
+    }
+
+    /// A garment tube of girth `girth` worn at radius `r` on a body cylinder of 10 cm.
+    fn worn(girth: f64, r: f64) -> Vec<VertexFit> {
+        let (n, m) = (64, 20);
+        let (body, body_faces) = tube(0.1, 96, 30);
+        let mesh = TriMesh::new(body.clone(), body_faces.clone()).expect("mesh");
+        let surface = SurfaceModel::new(body_faces, Topology::new(&mesh).expect("topology"), vec![1; body.len()], 0);
+        let mut frame = SurfaceFrame { vertices: body, normals: Vec::new() };
+        surface.update_normals(Par::Seq, &mut frame);
+        let (x, faces) = tube(r, n, m);
+        let flat = |v: u32, wrap: bool| {
+            let (i, j) = (v % n, v / n);
+            let i = if wrap && i == 0 { n } else { i };
+            [girth * f64::from(i) / f64::from(n), 0.3 * f64::from(j) / f64::from(m)]
+        };
+        let rest: Vec<[[f64; 2]; 3]> = faces
+            .iter()
+            .map(|f| {
+                let wrap = f.iter().any(|v| v % n == n - 1);
+                f.map(|v| flat(v, wrap))
+            })
+            .collect();
+        let material = Material { coupling: 0.0, area_density: 1e-9, ..Material::preset("jersey").expect("preset") };
+        let sheet = Sheet::new(x.len(), &faces, &rest, &material, None).expect("sheet");
+        let garment = GarmentMesh {
+            name: "tube".into(),
+            kind: GarmentKind::Skirt,
+            size: Size::M,
+            material,
+            layer: 0,
+            vertices: x.len(),
+            faces,
+            rest,
+            face_panel: vec![],
+            panels: vec![],
+            placements: vec![],
+            corners: vec![],
+            uv: vec![],
+            regions: vec![Region(1); x.len()],
+            anchors: vec![],
+            seams: vec![],
+            render: RenderMesh::default(),
+            min_angle: 45.0,
+        };
+        feel(&sheet, &garment, &x, &surface, &frame, 0.005, &mut Vec::new())
+    }
+
+    #[test]
+    fn pressure_of_a_stretched_tube_is_tension_over_radius() {
+        let (r, strain) = (0.105, 0.04);
+        let fit = worn(TAU * r / (1.0 + strain), r);
+        let m = Material::preset("jersey").expect("preset");
+        let expected = m.stretch_weft * strain / r; // Laplace: p = T/r
+        // Rows away from the rims.
+        let middle: Vec<&VertexFit> = fit.iter().skip(64 * 5).take(64 * 10).collect();
+        let mean =
+            |f: &dyn Fn(&VertexFit) -> f32| middle.iter().map(|v| f64::from(f(v))).sum::<f64>() / middle.len() as f64;
+        assert!((mean(&|v| v.stretch) - strain).abs() < 2e-3, "{}", mean(&|v| v.stretch));
+        let p = mean(&|v| v.pressure);
+        assert!((p - expected).abs() < 0.05 * expected, "{p} Pa, {expected} expected");
+        assert!(middle.iter().all(|v| v.tightness() > 0.5 && v.color()[0] > v.color()[2]));
+    }
+
+    #[test]
+    fn a_tube_off_the_body_presses_nowhere_and_its_gap_is_the_distance() {
+        let fit = worn(TAU * 0.15, 0.15);
+        for v in fit.iter().skip(64 * 5).take(64 * 10) {
+            assert!(v.pressure == 0.0 && (v.gap - 0.05).abs() < 1e-3 && v.stretch.abs() < 2e-3, "{v:?}");
+            assert!(v.tightness() < -0.9 && v.color()[2] > v.color()[0]);
+        }
+    }
+}
