@@ -135,7 +135,7 @@ impl Worn {
         let begun = Instant::now();
         let input = Input { body: &self.posed, dt: dt.clamp(DT.0, DT.1) };
         let report = realtime::step(&self.model, &mut self.state, &input, &mut self.work).map_err(|e| e.to_string())?;
-        let skipped = [("sleeping vertices", report.sleeping), ("factorisations", report.factorisations_skipped)];
+        let skipped = [("sleeping vertices", report.sleeping), ("contact searches", report.searches_skipped)];
         record_skipped("cloth", skipped);
         let mut placed = self.placed(body);
         if let Some(why) = report.kept_last_good {
