@@ -1,7 +1,7 @@
 //! Tracks depth folders and prints every measure of error against their truth, for development and benchmarks.
 //!
-//! `cargo run --release --example track_sequences -- [--body FILE]… [--set JSON]… [--synth] [--frames N] [--still N]
-//! [--corrupt SHARE] [--thin SHARE] [--nth N] [--cut SHARE] [--overlay DIR] [--every N] [--jsonl DIR] [--stages] [-v] FOLDER…`
+//! `cargo run --release --example track_sequences -- [--body FILE]… [--set JSON]… [--synth] [--hard] [--frames N] [--still N]
+//! [--corrupt SHARE] [--thin SHARE] [--nth N] [--cut SHARE] [--overlay DIR] [--every N] [--labels DIR] [--jsonl DIR] [--stages] [-v] FOLDER…`
 //!
 //! Each combination of body and settings is run on each folder and, with `--synth`, on the synthetic scenes.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
@@ -16,6 +16,8 @@ use tryon::formats::image::write_png_rgb;
 use tryon::formats::npz::read_smpl;
 use tryon::mesh::face_normal;
 use tryon::raster::{View, VisibilityBuffer, rasterise};
+use tryon::segment::{SegmentScratch, find_person, find_planes};
+use tryon::spatial::{Label, OrganisedCloud};
 use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace};
 
 #[derive(Default)]
@@ -34,6 +36,8 @@ struct Args {
     thin: f64,
     nth: usize,
     cut: f64,
+    labels: Option<PathBuf>,
+    hard: bool,
     verbose: bool,
 }
 
@@ -55,6 +59,8 @@ fn main() {
             "--thin" => a.thin = next().parse().expect("a share"),
             "--nth" => a.nth = next().parse().expect("a number"),
             "--cut" => a.cut = next().parse().expect("a share"),
+            "--hard" => a.hard = true,
+            "--labels" => a.labels = Some(next().into()),
             "--synth" => a.synth = true,
             "--stages" => a.stages = true,
             "-v" => a.verbose = true,
@@ -70,6 +76,9 @@ fn main() {
     let bodies: Vec<Arc<Template>> = a.bodies.iter().map(|b| body(b)).collect();
     let mut all: Vec<Box<dyn Fn() -> Scene>> = vec![];
     for folder in &a.folders {
+        if let Some(dir) = &a.labels {
+            labels(dir, &Scene::open(folder).expect("a scene"), a.every);
+        }
         if folder.join("joints.json").exists() {
             for (template, path) in bodies.iter().zip(&a.bodies) {
                 for settings in &a.settings {
@@ -85,6 +94,14 @@ fn main() {
         for name in scenes::unseen_names() {
             let data = shared.join("data");
             all.push(Box::new(move || scenes::unseen(&data, name).expect("a scene")));
+        }
+    }
+    if a.hard {
+        for i in 0..2 {
+            let data = shared.join("data");
+            all.push(Box::new(move || scenes::hard(&data).expect("scenes").swap_remove(i)));
+            let data = shared.join("data");
+            all.push(Box::new(move || scenes::idle(&data).expect("scenes").swap_remove(i)));
         }
     }
     for make in all {
@@ -111,7 +128,7 @@ fn main() {
         }
         for (template, path) in bodies.iter().zip(&a.bodies) {
             for settings in &a.settings {
-                let config: TrackerConfig = serde_json::from_str(settings).expect("tracker settings");
+                let config = configuration(settings);
                 let label = if a.settings.len() * bodies.len() > 1 {
                     format!(" {} {settings}", path.file_stem().unwrap_or_default().to_string_lossy())
                 } else {
@@ -121,6 +138,14 @@ fn main() {
             }
         }
     }
+}
+
+/// `paper`, or JSON.
+fn configuration(settings: &str) -> TrackerConfig {
+    if settings == "paper" {
+        return TrackerConfig::paper();
+    }
+    serde_json::from_str(settings).expect("tracker settings")
 }
 
 fn body(path: &Path) -> Arc<Template> {
@@ -198,9 +223,8 @@ fn run(a: &Args, template: &Arc<Template>, config: &TrackerConfig, scene: &Scene
         out.last.as_ref().map_or(f64::NAN, |r| r.residual_mm),
     );
     if a.stages {
-        let iterations = out.last.as_ref().map_or(0, |r| r.iterations);
         println!(
-            "  stages: segment {:.2}, pose {:.2}, size {:.2}, surface {:.2}, skin {:.2}; first frame place {:.1}, size {:.1}; {iterations} iterations at the end",
+            "  stages: segment {:.2}, pose {:.2}, size {:.2}, surface {:.2}, skin {:.2}; first frame place {:.1}, size {:.1}; {:.1} iterations",
             out.stage_ms(|s| s.segment),
             out.stage_ms(|s| s.pose),
             out.stage_ms(|s| s.size),
@@ -208,6 +232,7 @@ fn run(a: &Args, template: &Arc<Template>, config: &TrackerConfig, scene: &Scene
             out.posing_ms(),
             out.stages.iter().map(|s| s.place).fold(0.0, f64::max),
             size,
+            mean(&out.iterations),
         );
     }
     if a.verbose || a.stages {
@@ -218,7 +243,7 @@ fn run(a: &Args, template: &Arc<Template>, config: &TrackerConfig, scene: &Scene
 }
 
 fn stills(a: &Args, template: &Arc<Template>, settings: &str, folder: &Path, label: &str) {
-    let config: TrackerConfig = serde_json::from_str(settings).expect("tracker settings");
+    let config = configuration(settings);
     let scene = a.overlay.as_ref().map(|_| Scene::open(folder).expect("a scene"));
     let out = tryon::evaluate::stills::stills(template, &config, folder, a.still as u64, |i, m, state, w, _, share| {
         if a.verbose {
@@ -239,8 +264,44 @@ fn stills(a: &Args, template: &Arc<Template>, settings: &str, folder: &Path, lab
         out.within.len(),
         median(&out.start_ms),
     );
-    let list: Vec<String> = out.per_joint.iter().map(|(n, s)| format!("{n} {:.0}", s * 100.0)).collect();
+    let mm = |v: &nalgebra::Vector3<f64>| format!("[{:.0} {:.0} {:.0}]", v.x * 1e3, v.y * 1e3, v.z * 1e3);
+    let list: Vec<String> =
+        out.per_joint.iter().zip(&out.bias).map(|((n, s), b)| format!("{n} {:.0} {}", s * 100.0, mm(b))).collect();
     println!("  {}", list.join(", "));
+}
+
+/// What segmentation makes of each picture on its own: red floor, blue background, green person, grey other.
+fn labels(dir: &Path, scene: &Scene, every: usize) {
+    std::fs::create_dir_all(dir).expect("folder");
+    for (i, frame) in scene.frames.iter().enumerate().step_by(every) {
+        let mut cloud = OrganisedCloud::new(&scene.calibration.depth, None);
+        cloud.sample(&frame.depth, 8.0);
+        let planes = find_planes(&cloud);
+        let found = find_person(&mut cloud, &planes, None, &mut SegmentScratch::default());
+        println!(
+            "{} {i}: floor {:?}, {} background, {} cells, {} components, cut below {}",
+            scene.name,
+            planes.floor.map(|f| f.offset),
+            planes.background.len(),
+            found.cells.len(),
+            found.components,
+            found.cut_below
+        );
+        let (w, h) = cloud.size();
+        let mut image = ColorImage::filled(w as u32, h as u32, [0; 3]);
+        for (k, label) in cloud.labels.iter().enumerate() {
+            let l = (250.0 - 50.0 * cloud.depth[k]).clamp(30.0, 250.0) as u8;
+            let rgb = match label {
+                Label::Unknown => [0, 0, 0],
+                Label::Floor => [l, 0, 0],
+                Label::Background => [0, 0, l],
+                Label::Other => [l, l, l],
+                Label::Person => [0, l, 0],
+            };
+            image.data_mut()[3 * k..3 * k + 3].copy_from_slice(&rgb);
+        }
+        write_png_rgb(&dir.join(format!("{}_{i:04}.png", scene.name)), &image).expect("png");
+    }
 }
 
 fn overlay(

@@ -3,7 +3,6 @@
 use super::{BodyError, BoneTransforms};
 use crate::math::P3;
 use crate::par::{self, Par};
-use nalgebra::Matrix3x4;
 use serde::{Deserialize, Serialize};
 
 /// Joint indices and weights of every vertex; the weights of a vertex sum to one, largest first.
@@ -48,16 +47,32 @@ impl SkinWeights {
 
 /// Poses `rest` vertices: `out[i] = Σ wᵢⱼ · boneⱼ · rest[i]`. Shapes `[vertices]`.
 pub fn skin(par: Par, rest: &[P3], weights: &SkinWeights, bones: &BoneTransforms, out: &mut Vec<P3>) {
-    let m: Vec<Matrix3x4<f32>> =
-        bones.bones.iter().map(|b| b.to_homogeneous().fixed_view::<3, 4>(0, 0).into_owned().cast::<f32>()).collect();
+    // Columns of four lanes (the fourth is padding), so that a vertex is sixteen vector operations.
+    let m: Vec<[[f32; 4]; 4]> = bones
+        .bones
+        .iter()
+        .map(|b| {
+            let h = b.to_homogeneous().cast::<f32>();
+            std::array::from_fn(|c| [h[(0, c)], h[(1, c)], h[(2, c)], 0.0])
+        })
+        .collect();
     par::map_into(par, rest.len(), 1024, out, |i| {
-        let (j, w) = (&weights.joints[i], &weights.weights[i]);
-        let mut a = m[usize::from(j[0])] * w[0];
-        for k in 1..4 {
+        let (j, w, p) = (&weights.joints[i], &weights.weights[i], &rest[i]);
+        let mut a = [[0.0f32; 4]; 4];
+        for k in 0..4 {
             if w[k] > 0.0 {
-                a += m[usize::from(j[k])] * w[k];
+                let b = &m[usize::from(j[k])];
+                for c in 0..4 {
+                    for r in 0..4 {
+                        a[c][r] += b[c][r] * w[k];
+                    }
+                }
             }
         }
-        P3::from(a * rest[i].to_homogeneous())
+        let mut q = a[3];
+        for r in 0..4 {
+            q[r] += a[0][r] * p.x + a[1][r] * p.y + a[2][r] * p.z;
+        }
+        P3::new(q[0], q[1], q[2])
     });
 }

@@ -11,6 +11,45 @@ use crate::synth::{Room, Routine, Sequence, Setting, Shopper};
 use std::path::Path;
 use std::sync::Arc;
 
+/// The paper's two failures (section 6.4) on a body that its template does not have: a torso seen from the waist up that
+/// turns by ±40°, and the same with an arm that gives no return.
+///
+/// # Errors
+/// When the body cannot be read.
+pub fn hard(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
+    let shopper = Shopper { template: subject(data, "subject_f_avg")?, ..Shopper::default() };
+    let setting = |height: f64, away: f64, routine| Setting {
+        world_from_camera: Setting::tilted(height, 0.0, 0.0),
+        home: P3d::new(0.0, 0.0, -away),
+        room: None,
+        noise: NoiseModel::KinectV1,
+        routine,
+        color: false,
+        seed: 11,
+        ..Setting::default()
+    };
+    let frames = 200;
+    let upper = Sequence::new(shopper.clone(), setting(1.35, 1.25, Routine::Turn));
+    let turn = Scene::synthetic("turn_upper", &upper, frames);
+    let whole = Sequence::new(shopper, setting(1.0, 2.4, Routine::TryOn));
+    let arm = Scene::synthetic("arm_without_return", &whole, frames);
+    let arm = arm.without_return("left_shoulder", "left_elbow", 0.10).without_return("left_elbow", "left_wrist", 0.09);
+    Ok(vec![turn, arm])
+}
+
+/// What should cost next to nothing: a person who stands still, and a room with nobody in it.
+///
+/// # Errors
+/// When the body cannot be read.
+pub fn idle(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
+    let shopper = Shopper { template: subject(data, "subject_m_heavy")?, ..Shopper::default() };
+    let scene = |name: &str, routine| {
+        let setting = Setting { routine, color: false, seed: 5, ..Setting::default() };
+        Scene::synthetic(name, &Sequence::new(shopper.clone(), setting), 150)
+    };
+    Ok(vec![scene("still", Routine::Still), scene("empty", Routine::Empty)])
+}
+
 /// Name, body of `body/makehuman_smpl_layout`, motion clip of `motion` (the try-on routine without one), noise, room,
 /// camera height (metres) and tilt (degrees), distance (metres), frames.
 type Spec = (&'static str, &'static str, Option<&'static str>, NoiseModel, bool, [f64; 3], u64);

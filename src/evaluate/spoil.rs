@@ -63,6 +63,28 @@ impl Scene {
         }
         self
     }
+    /// Readings within `radius` (metres) of the line between two joints give no return, as black sleeves do. Frames without
+    /// truth stay as they are, and so do all when the scene lacks a joint.
+    #[must_use]
+    pub fn without_return(mut self, from: &str, to: &str, radius: f32) -> Self {
+        let find = |n: &str| self.joint_names.iter().position(|m| m == n);
+        let (Some(a), Some(b)) = (find(from), find(to)) else { return self };
+        let camera = self.calibration.depth;
+        for (frame, truth) in self.frames.iter_mut().zip(&self.truth) {
+            let (Some(a), Some(b)) = (truth.joints.get(a), truth.joints.get(b)) else { continue };
+            let (a, b) = (a.cast::<f32>(), b.cast::<f32>());
+            let along = b - a;
+            for (k, d) in frame.depth.data_mut().iter_mut().enumerate().filter(|(_, d)| **d > 0) {
+                let (u, v) = (k as u32 % camera.width, k as u32 / camera.width);
+                let p = camera.unproject(u as f32, v as f32, f32::from(*d) * 1e-3);
+                let t = ((p - a).dot(&along) / along.norm_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+                if (p - (a + along * t)).norm() < radius {
+                    *d = 0;
+                }
+            }
+        }
+        self
+    }
     /// Rows from this one on (as a share of the height) give no reading.
     #[must_use]
     pub fn cut_below(mut self, share: f64) -> Self {

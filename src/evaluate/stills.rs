@@ -24,13 +24,13 @@ const NAMES: [(&str, [&str; 2]); 15] = [
     ("L Elbow", ["left_elbow", "left_elbow"]),
     ("R Hand", ["right_wrist", "right_hand_end"]),
     ("L Hand", ["left_wrist", "left_hand_end"]),
-    ("Torso", ["spine1", "spine3"]),
+    ("Torso", ["spine3", "spine3"]),
     ("R Hip", ["right_hip", "right_hip"]),
     ("L Hip", ["left_hip", "left_hip"]),
     ("R Knee", ["right_knee", "right_knee"]),
     ("L Knee", ["left_knee", "left_knee"]),
-    ("R Foot", ["right_ankle", "right_foot"]),
-    ("L Foot", ["left_ankle", "left_foot"]),
+    ("R Foot", ["right_ankle", "right_ankle"]),
+    ("L Foot", ["left_ankle", "left_ankle"]),
 ];
 
 /// What the stills showed.
@@ -42,6 +42,9 @@ pub struct StillsOutcome {
     pub within: Vec<f64>,
     /// Joint names and their share.
     pub per_joint: Vec<(String, f64)>,
+    /// Mean of (ours − truth) of each joint over the pictures in which it was within twice [`WITHIN`], metres: how far
+    /// the two skeletons mean different places by the same name.
+    pub bias: Vec<Vector3<f64>>,
     /// Processor time of the first step of each picture, milliseconds.
     pub start_ms: Vec<f64>,
 }
@@ -86,6 +89,7 @@ pub fn stills(
     let mut workspace = Workspace::default();
     let mut out = StillsOutcome::default();
     let mut hits = vec![0.0; ours.len()];
+    let mut biases = vec![(Vector3::zeros(), 0.0); ours.len()];
     let clock = Instant::now();
     for t in &truth.frames {
         let Some(picture) = scene.frames.get(t.frame) else { return Err(fault(format!("no picture {}", t.frame))) };
@@ -117,6 +121,11 @@ pub fn stills(
             let n = pairs.len().max(1) as f64;
             let offset = pairs.iter().fold(Vector3::zeros(), |s, (_, p, t)| s + (p - t)) / n;
             for (k, p, t) in &pairs {
+                let off = p - t - offset;
+                if off.norm() < 2.0 * WITHIN {
+                    biases[*k].0 += off;
+                    biases[*k].1 += 1.0;
+                }
                 let hit = f64::from(u8::from((p - t - offset).norm() < WITHIN));
                 hits[*k] += hit;
                 share += hit / n;
@@ -127,5 +136,6 @@ pub fn stills(
     }
     let n = truth.frames.len().max(1) as f64;
     out.per_joint = truth.joint_names.iter().zip(hits).map(|(n_, h)| (n_.clone(), h / n)).collect();
+    out.bias = biases.into_iter().map(|(sum, n): (Vector3<f64>, f64)| sum / n.max(1.0)).collect();
     Ok(out)
 }

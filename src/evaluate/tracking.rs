@@ -44,6 +44,8 @@ pub struct Outcome {
     pub stages: Vec<StagesMs>,
     /// Processor time of posing all vertices, milliseconds.
     pub skin_ms: Vec<f64>,
+    /// Iterations of each step.
+    pub iterations: Vec<f64>,
     /// Report of the last step.
     pub last: Option<StepReport>,
 }
@@ -127,6 +129,7 @@ pub fn follow(
         out.skin_ms.push(thread_ms(clock) - stepped);
         out.step_ms.push(stepped - start);
         out.stages.push(report.stages_ms);
+        out.iterations.push(report.iterations as f64);
         let live = state.status.is_live();
         let truth = scene.truth.get(i).filter(|t| !t.joints.is_empty());
         if live && out.found.is_none() {

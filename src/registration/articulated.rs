@@ -7,7 +7,7 @@
 
 use super::Metric;
 use crate::math::Twist;
-use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix6, RealField, Vector3, Vector6};
 
 /// One degree of freedom: a unit twist that moves a bone and all bones below it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,25 +26,38 @@ impl Dof {
 }
 
 /// What the points of one bone (and below) say.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BoneSums {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoneSums<T: RealField + Copy = f64> {
     /// Σ w Sᵀ M S.
-    pub hessian: Matrix6<f64>,
+    pub hessian: Matrix6<T>,
     /// Σ w Sᵀ M r.
-    pub gradient: Vector6<f64>,
+    pub gradient: Vector6<T>,
     // Isotropic parts, expanded by `finish`: Σw, Σw p, Σw p pᵀ (xx xy xz yy yz zz).
-    mass: f64,
-    first: Vector3<f64>,
-    second: [f64; 6],
+    mass: T,
+    first: Vector3<T>,
+    second: [T; 6],
 }
 
-impl BoneSums {
+impl<T: RealField + Copy> Default for BoneSums<T> {
+    fn default() -> Self {
+        let zero = T::zero();
+        Self {
+            hessian: Matrix6::zeros(),
+            gradient: Vector6::zeros(),
+            mass: zero,
+            first: Vector3::zeros(),
+            second: [zero; 6],
+        }
+    }
+}
+
+impl<T: RealField + Copy> BoneSums<T> {
     /// Adds one residual `r` (where the point should go minus where it is) of a point at `p`.
-    pub fn add(&mut self, p: &Vector3<f64>, r: &Vector3<f64>, metric: &Metric, weight: f64) {
+    pub fn add(&mut self, p: &Vector3<T>, r: &Vector3<T>, metric: &Metric<T>, weight: T) {
         let d = metric.direction;
         let m = p.cross(&d);
         let s = Vector6::new(d.x, d.y, d.z, m.x, m.y, m.z);
-        self.hessian.ger(metric.directional * weight, &s, &s, 1.0);
+        self.hessian.ger(metric.directional * weight, &s, &s, T::one());
         let g = metric.apply(r) * weight;
         let t = p.cross(&g);
         self.gradient += Vector6::new(g.x, g.y, g.z, t.x, t.y, t.z);
@@ -59,7 +72,9 @@ impl BoneSums {
 
     /// Moves the isotropic parts into the Hessian: Sᵀ S = [[I, −[p]], [[p], −[p][p]]].
     fn finish(&mut self) {
-        let k = crate::math::skew(&self.first);
+        let f = self.first;
+        let zero = T::zero();
+        let k = nalgebra::Matrix3::new(zero, -f.z, f.y, f.z, zero, -f.x, -f.y, f.x, zero);
         let [xx, xy, xz, yy, yz, zz] = self.second;
         let inertia = nalgebra::Matrix3::new(yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy);
         for i in 0..3 {
@@ -70,7 +85,7 @@ impl BoneSums {
                 self.hessian[(i + 3, j + 3)] += inertia[(i, j)];
             }
         }
-        (self.mass, self.first, self.second) = (0.0, Vector3::zeros(), [0.0; 6]);
+        (self.mass, self.first, self.second) = (zero, Vector3::zeros(), [zero; 6]);
     }
 }
 
@@ -79,6 +94,8 @@ impl BoneSums {
 pub struct ArticulatedSums {
     /// One entry a bone; after [`ArticulatedSums::assemble`] each holds itself and all bones below.
     pub bones: Vec<BoneSums>,
+    /// The same in single precision, added to `bones` by [`ArticulatedSums::assemble`].
+    pub single: Vec<BoneSums<f32>>,
 }
 
 impl ArticulatedSums {
@@ -86,6 +103,8 @@ impl ArticulatedSums {
     pub fn reset(&mut self, bones: usize) {
         self.bones.clear();
         self.bones.resize(bones, BoneSums::default());
+        self.single.clear();
+        self.single.resize(bones, BoneSums::default());
     }
 
     /// JᵀMJ and JᵀMr of all degrees of freedom. `parents` come before children; bone 0 is the root. Each degree of
@@ -97,7 +116,12 @@ impl ArticulatedSums {
         hessian: &mut DMatrix<f64>,
         gradient: &mut DVector<f64>,
     ) {
-        self.bones.iter_mut().for_each(BoneSums::finish);
+        for (sum, single) in self.bones.iter_mut().zip(&mut self.single) {
+            sum.finish();
+            single.finish();
+            sum.hessian += single.hessian.cast::<f64>();
+            sum.gradient += single.gradient.cast::<f64>();
+        }
         for b in (1..self.bones.len()).rev() {
             if let Some(p) = parents[b] {
                 let (h, g) = (self.bones[b].hessian, self.bones[b].gradient);

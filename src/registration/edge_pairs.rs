@@ -19,6 +19,16 @@ const REACH: i32 = 7;
 /// The outline of the model: next to a drawn surface at least this much farther away (metres), or to nothing.
 const STEP: f32 = 0.06;
 
+/// Which points of the model look for the person's outline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EdgeSide {
+    /// The model's own outline, and what lies outside the person (the paper's edge-to-edge pairs).
+    Outline,
+    /// Only what lies outside the person, where the camera sees through to something farther away: no surface can be
+    /// there (the free-space constraint).
+    Outside,
+}
+
 /// Pairs the model's outline with `true_edges`. `image` is the model drawn into the grid, `distance` the longest pair
 /// in space (Table 1: 0.2 m); outline normals in the image agree within 90°.
 pub fn pair_edges(
@@ -27,6 +37,7 @@ pub fn pair_edges(
     true_edges: &[u32],
     image: &IndexImage,
     distance: f32,
+    side: EdgeSide,
     out: &mut EdgePairs,
 ) {
     let (columns, _) = grid.size();
@@ -46,9 +57,14 @@ pub fn pair_edges(
             continue;
         }
         // Outside the person, over known free space; or on the model's own outline.
-        let outside = grid.labels[home] == Label::Background;
+        let outside = match grid.labels[home] {
+            Label::Background => true,
+            Label::Floor | Label::Other => grid.depth[home] > p.z + STEP,
+            Label::Person | Label::Unknown => false,
+        };
         let open = |du: i32, dv: i32| grid.cell(u + du, v + dv).is_some_and(|k| image.depth[k] > p.z + STEP);
-        if !(outside || open(2, 0) || open(-2, 0) || open(0, 2) || open(0, -2)) {
+        let outline = side == EdgeSide::Outline;
+        if !(outside || outline && (open(2, 0) || open(-2, 0) || open(0, 2) || open(0, -2))) {
             continue;
         }
         if let Some(cell) = nearest_edge(grid, &out.on_contour, p, (u, v), [n.x, n.y], distance) {

@@ -1,33 +1,44 @@
 //! How far apart two points are, and how much a far pair counts.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, RealField, Vector3};
 
 /// A quadratic form on residuals, `isotropic · I + directional · d dᵀ`.
 ///
 /// Point-to-plane is `d` = normal; distance from a viewing ray (eq. 10 of the paper, in metres instead of pixels) is
 /// `isotropic = 1, directional = −1, d` = ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Metric {
+pub struct Metric<T = f64> {
     /// Weight in all directions.
-    pub isotropic: f64,
+    pub isotropic: T,
     /// Extra weight along `direction`; not below `-isotropic`.
-    pub directional: f64,
+    pub directional: T,
     /// Unit vector.
-    pub direction: Vector3<f64>,
+    pub direction: Vector3<T>,
 }
 
-impl Metric {
+impl<T: RealField + Copy> Metric<T> {
     /// Squared length of a residual.
-    pub fn squared(&self, r: &Vector3<f64>) -> f64 {
+    pub fn squared(&self, r: &Vector3<T>) -> T {
         self.isotropic * r.norm_squared() + self.directional * self.direction.dot(r).powi(2)
     }
     /// Half the gradient of [`Metric::squared`].
-    pub fn apply(&self, r: &Vector3<f64>) -> Vector3<f64> {
+    pub fn apply(&self, r: &Vector3<T>) -> Vector3<T> {
         r * self.isotropic + self.direction * (self.directional * self.direction.dot(r))
     }
     /// The matrix of the form.
-    pub fn matrix(&self) -> Matrix3<f64> {
+    pub fn matrix(&self) -> Matrix3<T> {
         Matrix3::identity() * self.isotropic + self.direction * self.direction.transpose() * self.directional
+    }
+}
+
+impl Metric<f64> {
+    /// The same in single precision.
+    pub fn cast(&self) -> Metric<f32> {
+        Metric {
+            isotropic: self.isotropic as f32,
+            directional: self.directional as f32,
+            direction: self.direction.cast(),
+        }
     }
 }
 
@@ -68,7 +79,7 @@ mod tests {
 
     #[test]
     fn metric_gradient_and_matrix_agree() {
-        let m = Metric { isotropic: 0.1, directional: 1.0, direction: Vector3::new(0.6, 0.0, 0.8) };
+        let m: Metric = Metric { isotropic: 0.1, directional: 1.0, direction: Vector3::new(0.6, 0.0, 0.8) };
         let r = Vector3::new(0.02, -0.01, 0.03);
         assert!((m.matrix() * r - m.apply(&r)).norm() < 1e-15);
         assert!((r.dot(&m.apply(&r)) - m.squared(&r)).abs() < 1e-15);

@@ -7,7 +7,7 @@ mod pairing;
 mod projective;
 
 pub use articulated::{ArticulatedSums, BoneSums, Dof, solve_damped};
-pub use edge_pairs::{EdgePairs, pair_edges};
+pub use edge_pairs::{EdgePairs, EdgeSide, pair_edges};
 pub use metric::{GemanMcClure, Metric};
 pub use pairing::{Association, ModelPoints, Pair, PairingConfig, PairingScratch, PairingStats, pair_surfaces};
 pub use projective::IndexImage;

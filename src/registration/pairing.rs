@@ -77,12 +77,17 @@ pub struct PairingStats {
 pub struct PairingScratch {
     /// The model drawn into the grid.
     pub image: IndexImage,
+    /// Model points in front of a farther reading of the person, with its cell: nothing can be there.
+    pub in_front: Vec<(u32, u32)>,
     facing: Vec<u32>,
     facing_points: Vec<P3>,
 }
 
 /// A model point behind the drawn surface by less than this counts as visible (relaxed visibility), metres.
 const RELAXED_VISIBILITY: f32 = 0.05;
+/// A model point nearer than the person's reading by more than this (metres) stands in free space: more than loose
+/// clothes and the error of a body that is not yet adapted.
+const IN_FRONT: f32 = 0.06;
 /// Model points that face the camera at least this much may pull; grazing ones have unreliable readings.
 const FACING: f32 = 0.1;
 
@@ -115,6 +120,7 @@ pub fn pair_surfaces(
     // From the model to the data.
     scratch.facing.clear();
     scratch.facing_points.clear();
+    scratch.in_front.clear();
     for (i, (p, n)) in model.positions.iter().zip(model.normals).enumerate() {
         if n.dot(&p.coords) > -FACING * p.coords.norm() {
             continue;
@@ -127,6 +133,9 @@ pub fn pair_surfaces(
             continue;
         }
         stats.visible += 1;
+        if grid.labels[home] == Label::Person && grid.depth[home] > p.z + IN_FRONT {
+            scratch.in_front.push((i as u32, home as u32));
+        }
         let best = match exact {
             Some(tree) => tree
                 .nearest(p, config.distance)

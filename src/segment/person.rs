@@ -1,7 +1,7 @@
 //! The person: the nearest connected thing of the size of a body that is neither floor nor wall.
 
-use super::planes::{BACKGROUND_TOLERANCE, tolerance};
-use super::{Plane, ScenePlanes};
+use super::ScenePlanes;
+use super::planes::Bands;
 use crate::math::P3;
 use crate::spatial::{Label, OrganisedCloud};
 use nalgebra::Vector3;
@@ -22,6 +22,8 @@ const MOST_WIDTH: f32 = 2.2;
 const LIMB_REACH: f32 = 0.9;
 /// A part this near in the image (cells) to the body may belong to it.
 const PART_GAP: i32 = 2;
+/// Parts beside the main one are at most as large as this share of it.
+const LARGE_PART: f32 = 1.0;
 /// A candidate that hangs on a side of the image over this share of its rows is furniture or a wall.
 const SIDE_SHARE: f32 = 0.5;
 
@@ -31,6 +33,10 @@ const HANGING: usize = 3;
 const SIDE_COST: f32 = 4.0;
 /// The same for the upper rim; a person close by may reach it.
 const TOP_COST: f32 = 2.0;
+/// A thing lower than this (metres) is a box or a chair rather than a person, and ranks by [`LOW_COST`] farther away.
+const UPRIGHT: f32 = 0.8;
+/// See [`UPRIGHT`], metres.
+const LOW_COST: f32 = 1.5;
 
 /// Where the person was a moment ago.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +63,7 @@ pub struct PersonSearch {
 /// Scratch of the search; holds nothing that matters.
 #[derive(Clone, Debug, Default)]
 pub struct SegmentScratch {
+    bands: Bands,
     component: Vec<u32>,
     stack: Vec<u32>,
 }
@@ -85,12 +92,8 @@ pub fn find_person(
     let mut out = PersonSearch::default();
     let (columns, rows) = cloud.size();
     let up = scene.floor.map_or_else(|| Vector3::new(0.0, -1.0, 0.0), |f| f.normal).cast::<f32>();
-    for i in 0..columns * rows {
-        if cloud.depth[i] > 0.0 {
-            cloud.labels[i] = classify(&cloud.centre(i), scene);
-            out.candidates += usize::from(cloud.labels[i] == Label::Other);
-        }
-    }
+    scratch.bands.update(scene, cloud);
+    out.candidates = classify(cloud, &scratch.bands);
     if scene.floor.is_none() && scene.background.is_empty() {
         // A picture without floor and wall is one whose background was taken out: nothing means empty.
         let known = cloud.depth.iter().filter(|d| **d > 0.0).count();
@@ -111,7 +114,7 @@ pub fn find_person(
     // The main part, and what its own limbs cut off: parts beside it in the image and near it in depth.
     let mut belongs = vec![false; components.len()];
     belongs[main.id as usize] = true;
-    let depth = main.centre.z;
+    let (depth, mut area) = (main.centre.z, main.area);
     for _ in 0..2 {
         for i in 0..columns * rows {
             let id = scratch.component[i];
@@ -120,10 +123,14 @@ pub fn find_person(
             }
             let c = &components[id as usize];
             let limb = (c.centre.z - depth).abs() < LIMB_REACH
-                && c.area <= main.area
+                && c.lo.z > main.lo.z - LIMB_REACH
+                && c.hi.z < main.hi.z + LIMB_REACH
+                && area + c.area < MOST_AREA
+                && (c.area <= LARGE_PART * main.area || above_or_below(c, main))
                 && (c.side_rows as f32) < SIDE_SHARE * c.rows as f32;
             if limb && touches(cloud, scratch, &belongs, i) {
                 belongs[id as usize] = true;
+                area += c.area;
             }
         }
     }
@@ -139,15 +146,26 @@ pub fn find_person(
     out
 }
 
-fn classify(p: &P3, scene: &ScenePlanes) -> Label {
-    let near = |plane: &Plane, extra: f32| plane.distance(p) < tolerance(plane, p).max(extra);
-    if scene.floor.is_some_and(|f| near(&f, 0.0)) {
-        return Label::Floor;
+/// Labels every reading as floor, background or something else; returns how many are something else.
+fn classify(cloud: &mut OrganisedCloud, bands: &Bands) -> usize {
+    let n = cloud.depth.len();
+    let mut candidates = 0;
+    for i in 0..n {
+        let z = cloud.depth[i];
+        if z <= 0.0 {
+            continue;
+        }
+        let inside = |band: Option<&[f32; 2]>| band.is_some_and(|[lo, hi]| z > *lo && z < *hi);
+        cloud.labels[i] = if inside(bands.floor.get(i)) {
+            Label::Floor
+        } else if bands.background.iter().any(|b| inside(b.get(i))) {
+            Label::Background
+        } else {
+            candidates += 1;
+            Label::Other
+        };
     }
-    if scene.background.iter().any(|b| near(b, BACKGROUND_TOLERANCE)) {
-        return Label::Background;
-    }
-    Label::Other
+    candidates
 }
 
 /// Connected components of [`Label::Other`] cells.
@@ -226,9 +244,17 @@ fn choose(components: &[Component], prior: Option<Prior>) -> Option<&Component> 
     let rank = |c: &Component| {
         let side = if c.side_rows > HANGING { SIDE_COST } else { 0.0 };
         let top = if c.top_cells > HANGING { TOP_COST } else { 0.0 };
-        c.centre.z + side + top
+        let low = if c.hi.y - c.lo.y < UPRIGHT { LOW_COST } else { 0.0 };
+        c.centre.z + side + top + low
     };
     components.iter().filter(sized).min_by(|a, b| rank(a).total_cmp(&rank(b)).then(a.id.cmp(&b.id)))
+}
+
+/// A part of the same column: an arm across the body cuts it into an upper and a lower part, of which either may be the
+/// larger.
+fn above_or_below(c: &Component, main: &Component) -> bool {
+    let overlap = c.hi.x.min(main.hi.x) - c.lo.x.max(main.lo.x);
+    overlap > 0.5 * (c.hi.x - c.lo.x) && c.hi.x - c.lo.x < MOST_WIDTH * 0.5
 }
 
 fn touches(cloud: &OrganisedCloud, scratch: &SegmentScratch, belongs: &[bool], cell: usize) -> bool {

@@ -13,6 +13,8 @@ pub enum Routine {
     TryOn,
     /// Stands, leaves the picture to the side, stays away for two seconds, comes back.
     LeaveAndReturn,
+    /// Turns by 40° to the left, to the right and back, arms hanging: what a torso seen from the waist up shows least.
+    Turn,
     /// Stands still in the calibration pose.
     Still,
     /// Nobody comes.
@@ -83,6 +85,18 @@ const TRY_ON: [Key; 22] = [
     Key { t: 24.0, ..REST },
 ];
 
+/// To the left, to the right and back.
+const TURN: [Key; 8] = [
+    REST,
+    Key { t: 1.0, ..REST },
+    Key { t: 2.0, arms: [DOWN, DOWN], ..REST },
+    Key { t: 3.0, yaw: 40.0, arms: [DOWN, DOWN], ..REST },
+    Key { t: 3.6, yaw: 40.0, arms: [DOWN, DOWN], ..REST },
+    Key { t: 5.2, yaw: -40.0, arms: [DOWN, DOWN], ..REST },
+    Key { t: 5.8, yaw: -40.0, arms: [DOWN, DOWN], ..REST },
+    Key { t: 7.2, ..REST },
+];
+
 /// Out to the side and back.
 const LEAVE: [Key; 8] = [
     REST,
@@ -133,6 +147,7 @@ impl Routine {
         match self {
             Self::TryOn => &TRY_ON,
             Self::LeaveAndReturn => &LEAVE,
+            Self::Turn => &TURN,
             Self::Still | Self::Empty => &TRY_ON[..1],
         }
     }
@@ -211,7 +226,7 @@ mod tests {
 
     #[test]
     fn keys_are_in_order_and_the_round_closes() {
-        for r in [Routine::TryOn, Routine::LeaveAndReturn] {
+        for r in [Routine::TryOn, Routine::LeaveAndReturn, Routine::Turn] {
             assert!(r.keys().windows(2).all(|w| w[0].t < w[1].t));
             let (a, b) = (r.key(0.0), r.key(r.period() - 1e-9));
             assert!((a.yaw - b.yaw).abs() < 1e-6 && (a.place[0] - b.place[0]).abs() < 1e-6);

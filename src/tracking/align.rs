@@ -1,11 +1,12 @@
 //! The pose: pairs, normal equations, solve, until nothing moves (eq. 12).
 
-use super::kinematics::{apply, linearise};
+use super::kinematics::{LEVER, apply, linearise};
 use super::model::TrackerModel;
+use super::{Normals, TrackerConfig};
 use crate::body::{BoneTransforms, JointMotion, Pose, RestBody};
 use crate::math::{P3, V3};
 use crate::registration::{
-    ArticulatedSums, Association, Dof, EdgePairs, GemanMcClure, Metric, ModelPoints, Pair, PairingConfig,
+    ArticulatedSums, Association, Dof, EdgePairs, EdgeSide, GemanMcClure, Metric, ModelPoints, Pair, PairingConfig,
     PairingScratch, PairingStats, pair_edges, pair_surfaces, solve_damped,
 };
 use crate::segment::Contour;
@@ -31,6 +32,8 @@ pub(super) struct SampleRest {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Schedule {
     pub iterations: usize,
+    /// Iterations' worth of shrinking that are left out, because the start is good already.
+    pub ahead: usize,
     /// Width of the robust kernel at the first and from the fifth iteration on, metres.
     pub sigma: [f64; 2],
     /// Longest pair at the first and from the fifth iteration on, metres.
@@ -38,26 +41,75 @@ pub(super) struct Schedule {
     pub pull: f32,
 }
 
+/// What counts in an alignment, besides distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Terms {
+    pub association: Association,
+    /// Weight of edge-to-edge pairs.
+    pub edge_weight: f64,
+    /// Weight of the free-space constraint.
+    pub free_space: f64,
+    /// Multiplies the pull towards the rest pose.
+    pub rest_weight: f64,
+    /// See [`SEEN_SHARE`].
+    pub seen_share: f64,
+}
+
+/// From a rough start: windows skip readings whose normal does not fit instead of giving up on the nearest one, and
+/// outlines and a stronger rest pose hold what is not yet near its place. On the real still, kd-tree pairs left the arm
+/// on the hip and twisted the head; on converged poses they are the better ones (docs/benchmarks).
+pub(super) const START_TERMS: Terms = Terms {
+    association: Association::Projective,
+    edge_weight: 0.3,
+    free_space: 0.0,
+    rest_weight: 1.0,
+    seen_share: 1.0,
+};
+
+impl Terms {
+    /// From frame to frame, as configured.
+    pub(super) fn tracking(config: &TrackerConfig) -> Self {
+        Self {
+            association: config.association,
+            edge_weight: config.edge_weight,
+            free_space: config.free_space,
+            rest_weight: config.rest_weight,
+            seen_share: SEEN_SHARE,
+        }
+    }
+}
+
+impl Default for Terms {
+    fn default() -> Self {
+        START_TERMS
+    }
+}
+
 /// From frame to frame. The first reach is Table 1's 0.2 m less what prediction saves; the last is three times the
 /// residual of a wrong body.
-pub(super) const TRACK: Schedule = Schedule { iterations: 8, sigma: [0.08, 0.03], distance: [0.12, 0.06], pull: 0.35 };
+pub(super) const TRACK: Schedule =
+    Schedule { iterations: 8, ahead: 0, sigma: [0.08, 0.03], distance: [0.12, 0.06], pull: 0.35 };
 /// From a rough start.
-pub(super) const START: Schedule = Schedule { iterations: 20, sigma: [0.15, 0.04], distance: [0.20, 0.08], pull: 0.5 };
+pub(super) const START: Schedule =
+    Schedule { iterations: 20, ahead: 0, sigma: [0.15, 0.04], distance: [0.20, 0.08], pull: 0.5 };
 
 /// Iterations over which kernel and reach shrink.
-const ANNEAL: f64 = 4.0;
-/// An update below this (metres, with a lever of [`LEVER`]) ends the iteration; the paper stops at 3 mm.
-const CONVERGED: f64 = 0.8e-3;
-/// Typical distance of skin from the joint that moves it, metres.
-const LEVER: f64 = 0.25;
+pub(super) const ANNEAL: usize = 4;
 /// A reading without any model point near it, and a visible point without reading, count as this far off, metres.
 const UNEXPLAINED: f64 = 0.10;
 
-/// A degree of freedom of a leg with less data than this (per point, m²/rad²) counts as hidden; a shank in view has
-/// 7·10⁻⁴. It is then pulled to the rest pose with [`HIDDEN_LEG_PULL`].
-const HIDDEN_LEG: f64 = 1e-5;
-/// See [`HIDDEN_LEG`].
+/// A degree of freedom with less data than this (per point, m²/rad²) counts as hidden; a shank in view has 7·10⁻⁴.
+const HIDDEN: f64 = 1e-5;
+/// A hidden leg is pulled to the rest pose with this weight.
 const HIDDEN_LEG_PULL: f64 = 2e-5;
+/// Share of the pull to the rest pose that is left for a degree of freedom in full view: it shortens every motion. Hips
+/// keep it all: of a body cut off below them they see a little, and what little there is drags them.
+const SEEN_SHARE: f64 = 0.1;
+
+/// Width of the kernel for what stands in free space, metres: it may be far off.
+const FREE_SIGMA: f64 = 0.10;
+/// What stands before a reading goes back by at most this in one iteration, metres.
+const FREE_STEP: f64 = 0.10;
 
 /// How an alignment ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -78,6 +130,8 @@ pub(super) struct Fit {
 /// Scratch of the alignment.
 #[derive(Default)]
 pub(super) struct AlignScratch {
+    /// What counts until further notice.
+    pub terms: Terms,
     pub bones: BoneTransforms,
     pub positions: Vec<P3>,
     pub normals: Vec<V3>,
@@ -89,6 +143,18 @@ pub(super) struct AlignScratch {
     hessian: DMatrix<f64>,
     gradient: DVector<f64>,
     damping: Vec<f64>,
+}
+
+impl AlignScratch {
+    /// What the last normal equations know of one unknown, per point (priors included); 0 before there were any.
+    pub(super) fn information(&self, unknown: usize) -> f64 {
+        if unknown < self.hessian.nrows() { self.hessian[(unknown, unknown)] } else { 0.0 }
+    }
+    /// Number of residuals of the current pairs.
+    pub(super) fn residuals(&self) -> usize {
+        let free = if self.terms.free_space > 0.0 { self.pairing.in_front.len() } else { 0 };
+        self.pairs.len() + self.edges.pairs.len() + free
+    }
 }
 
 /// Poses the samples: positions by all weights, normals by the dominant bone.
@@ -135,7 +201,7 @@ pub(super) fn pair(
         spacing: model.spacing,
     };
     let config = PairingConfig {
-        association: model.config.association,
+        association: scratch.terms.association,
         distance,
         // Table 1: 60°.
         cos_normal: 0.5,
@@ -153,9 +219,11 @@ pub(super) fn pair(
         &mut scratch.pairing,
         &mut scratch.pairs,
     );
-    if model.config.edge_weight > 0.0 {
+    let terms = scratch.terms;
+    if terms.edge_weight > 0.0 || terms.free_space > 0.0 {
         let edges = &seen.contour.true_edges;
-        pair_edges(&points, seen.grid, edges, &scratch.pairing.image, 0.2, &mut scratch.edges);
+        let side = if terms.edge_weight > 0.0 { EdgeSide::Outline } else { EdgeSide::Outside };
+        pair_edges(&points, seen.grid, edges, &scratch.pairing.image, 0.2, side, &mut scratch.edges);
     } else {
         scratch.edges.pairs.clear();
     }
@@ -172,27 +240,26 @@ pub(super) struct Residual {
     pub weight: f64,
 }
 
-/// Point-to-point and edge weights of the pose.
-pub(super) fn weights(model: &TrackerModel) -> (f64, f64) {
-    (model.config.point_to_point, model.config.edge_weight)
-}
-
 /// All residuals of the current pairs; returns (Σ weights, Σ weighted |normal residual|, Σ robust cost).
 pub(super) fn for_residuals(
     model: &TrackerModel,
     seen: &Seen<'_>,
     scratch: &AlignScratch,
     sigma: f64,
-    (isotropic, edge_weight): (f64, f64),
+    isotropic: f64,
     mut f: impl FnMut(&Residual),
 ) -> (f64, f64, f64) {
     let (mut total, mut off, mut cost) = (0.0, 0.0, 0.0);
     let config = &model.config;
-    for pair in &scratch.pairs {
+    for pair in scratch.pairs.iter().filter(|p| config.both_ways || !p.from_data) {
         let i = pair.model as usize;
         let p = scratch.positions[i].coords.cast::<f64>();
         let r = seen.grid.points[pair.cell as usize].coords.cast::<f64>() - p;
-        let direction = scratch.normals[i].cast::<f64>();
+        let mut direction = scratch.normals[i].cast::<f64>();
+        if config.normals == Normals::Symmetric {
+            let both = direction + seen.grid.normals[pair.cell as usize].cast::<f64>();
+            direction = both.try_normalize(f64::EPSILON).unwrap_or(direction);
+        }
         let metric = Metric { isotropic, directional: config.point_to_plane, direction };
         // A coarse pull is long by nature: the kernel widens with it so that it is not taken for an outlier.
         let far = r.norm() > 0.12;
@@ -210,8 +277,22 @@ pub(super) fn for_residuals(
         let ray = seen.grid.points[cell as usize].coords.cast::<f64>().normalize();
         let r = ray * ray.dot(&p) - p;
         let metric = Metric { isotropic: 1.0, directional: -1.0, direction: ray };
-        let weight = edge_weight * GemanMcClure { sigma }.weight(r.norm_squared());
+        let weight = scratch.terms.edge_weight.max(scratch.terms.free_space);
+        let weight = weight * GemanMcClure { sigma: sigma.max(FREE_SIGMA) }.weight(r.norm_squared());
         f(&Residual { sample: i, bone: usize::from(model.bones[i]), point: p, residual: r, metric, weight });
+    }
+    if scratch.terms.free_space > 0.0 {
+        for &(i, cell) in &scratch.pairing.in_front {
+            let i = i as usize;
+            let p = scratch.positions[i].coords.cast::<f64>();
+            let ray = p.normalize();
+            // Back along the ray to what was measured there, a little at a time.
+            let behind = f64::from(seen.grid.depth[cell as usize]) / ray.z - p.norm();
+            let r = ray * behind.clamp(0.0, FREE_STEP);
+            let metric = Metric { isotropic: 0.0, directional: 1.0, direction: ray };
+            let weight = scratch.terms.free_space;
+            f(&Residual { sample: i, bone: usize::from(model.bones[i]), point: p, residual: r, metric, weight });
+        }
     }
     (total, off, cost)
 }
@@ -226,7 +307,7 @@ pub(super) fn evaluate(
     scratch: &mut AlignScratch,
 ) -> Fit {
     let stats = pair(model, rest, pose, seen, distance, 0.0, scratch);
-    let sums = for_residuals(model, seen, scratch, 0.05, weights(model), |_| {});
+    let sums = for_residuals(model, seen, scratch, 0.05, model.config.point_to_point, |_| {});
     summary(stats, sums, 0)
 }
 
@@ -255,12 +336,12 @@ pub(super) fn align(
 ) -> Fit {
     let mut fit = Fit::default();
     for iteration in 0..schedule.iterations {
-        let t = (iteration as f64 / ANNEAL).min(1.0);
+        let t = ((iteration + schedule.ahead) as f64 / ANNEAL as f64).min(1.0);
         let sigma = schedule.sigma[0] + (schedule.sigma[1] - schedule.sigma[0]) * t;
         let distance = schedule.distance[0] + (schedule.distance[1] - schedule.distance[0]) * t as f32;
         let pull = if t < 1.0 { schedule.pull } else { 0.0 };
         let stats = pair(model, rest, pose, seen, distance, pull, scratch);
-        let sums = assemble(model, pose, seen, sigma, weights(model), scratch);
+        let sums = assemble(model, pose, seen, sigma, model.config.point_to_point, scratch);
         fit = summary(stats, sums, iteration + 1);
         if sums.0 < 1.0 {
             break;
@@ -269,7 +350,7 @@ pub(super) fn align(
         let centre = scratch.bones.joints[0].coords;
         apply(model.template.skeleton(), pose, &centre, &x);
         let step = x.iter().enumerate().map(|(k, v)| if k < 3 { v.abs() } else { v.abs() * LEVER }).fold(0.0, f64::max);
-        if t >= 1.0 && step < CONVERGED {
+        if t >= 1.0 && step < model.config.converged {
             fit.converged = true;
             break;
         }
@@ -283,31 +364,39 @@ fn assemble(
     pose: &Pose,
     seen: &Seen<'_>,
     sigma: f64,
-    weights: (f64, f64),
+    isotropic: f64,
     scratch: &mut AlignScratch,
 ) -> (f64, f64, f64) {
     let skeleton = model.template.skeleton();
     let centre = scratch.bones.joints[0].coords;
     let mut sums = std::mem::take(&mut scratch.sums);
     sums.reset(model.parents.len());
-    let totals = for_residuals(model, seen, scratch, sigma, weights, |r| {
-        sums.bones[r.bone].add(&(r.point - centre), &r.residual, &r.metric, r.weight);
+    let single = model.config.single_precision;
+    let totals = for_residuals(model, seen, scratch, sigma, isotropic, |r| {
+        let p = r.point - centre;
+        if single {
+            sums.single[r.bone].add(&p.cast(), &r.residual.cast(), &r.metric.cast(), r.weight as f32);
+        } else {
+            sums.bones[r.bone].add(&p, &r.residual, &r.metric, r.weight);
+        }
     });
     let mut dofs = std::mem::take(&mut scratch.dofs);
     linearise(skeleton, &scratch.bones, pose, &centre, &mut dofs);
     sums.assemble(&model.parents, &dofs, &mut scratch.hessian, &mut scratch.gradient);
     scratch.dofs = dofs;
     scratch.sums = sums;
-    let scale = 1.0 / (scratch.pairs.len() + scratch.edges.pairs.len()).max(1) as f64;
+    let scale = 1.0 / scratch.residuals().max(1) as f64;
     scratch.hessian *= scale;
     scratch.gradient *= scale;
     scratch.damping.clear();
     scratch.damping.resize(scratch.gradient.len(), model.config.damping);
     for (k, (&stiff, &angle)) in model.stiffness.iter().zip(&pose.angles).enumerate() {
-        // A hidden leg stands; whatever is seen of it outweighs this at once.
-        let unseen = HIDDEN_LEG / (HIDDEN_LEG + scratch.hessian[(6 + k, 6 + k)]);
+        // Whatever is seen of a joint outweighs the rest pose at once; a hidden leg stands.
+        let unseen = (HIDDEN / (HIDDEN + scratch.hessian[(6 + k, 6 + k)])).powi(2);
+        let seen_share = if model.legs[k] || model.hips[k] { 1.0 } else { scratch.terms.seen_share };
+        let share = seen_share + (1.0 - seen_share) * unseen;
         let stiff =
-            stiff * model.config.rest_weight + if model.legs[k] { HIDDEN_LEG_PULL * unseen * unseen } else { 0.0 };
+            stiff * scratch.terms.rest_weight * share + if model.legs[k] { HIDDEN_LEG_PULL * unseen } else { 0.0 };
         scratch.hessian[(6 + k, 6 + k)] += stiff;
         scratch.gradient[6 + k] -= stiff * angle;
     }
@@ -320,15 +409,23 @@ pub(super) fn normal_equations(
     pose: &Pose,
     seen: &Seen<'_>,
     sigma: f64,
-    weights: (f64, f64),
+    isotropic: f64,
     scratch: &mut AlignScratch,
 ) -> (DMatrix<f64>, DVector<f64>) {
-    assemble(model, pose, seen, sigma, weights, scratch);
+    assemble(model, pose, seen, sigma, isotropic, scratch);
     (scratch.hessian.clone(), scratch.gradient.clone())
 }
 
-/// Turns a ball joint so that the bone to `child` points along `direction` (rest frame of its parent).
-pub(super) fn aim(model: &TrackerModel, pose: &mut Pose, joint: &str, child: &str, direction: Vector3<f64>) {
+/// Turns a ball joint so that the bone to `child` points along `direction` (rest frame of its parent), and then by
+/// `twist` radians about it.
+pub(super) fn aim(
+    model: &TrackerModel,
+    pose: &mut Pose,
+    joint: &str,
+    child: &str,
+    direction: Vector3<f64>,
+    twist: f64,
+) {
     let skeleton = model.template.skeleton();
     let (Some(j), Some(c)) = (skeleton.index(joint), skeleton.index(child)) else { return };
     if !matches!(skeleton.joints()[j].motion, JointMotion::Ball { .. }) {
@@ -336,7 +433,8 @@ pub(super) fn aim(model: &TrackerModel, pose: &mut Pose, joint: &str, child: &st
     }
     let along = skeleton.joints()[c].rest - skeleton.joints()[j].rest;
     if let Some(turn) = nalgebra::UnitQuaternion::rotation_between(&along, &direction) {
-        pose.set(skeleton, joint, crate::math::log_so3(&turn).as_slice());
+        let about = nalgebra::UnitQuaternion::from_scaled_axis(direction * twist);
+        pose.set(skeleton, joint, crate::math::log_so3(&(about * turn)).as_slice());
     }
 }
 

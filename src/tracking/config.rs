@@ -3,11 +3,22 @@
 use crate::registration::Association;
 use serde::{Deserialize, Serialize};
 
+/// What distance between surfaces means.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Normals {
+    /// Along the model's normal (point-to-plane).
+    Model,
+    /// Along the mean of the model's and the reading's normal (the symmetric metric of Rusinkiewicz 2019).
+    #[default]
+    Symmetric,
+}
+
 /// Settings of a tracker. The default is what the measurements in docs/benchmarks chose.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackerConfig {
-    /// How correspondences are found.
+    /// How correspondences are found from frame to frame; a first placement always searches in the images.
     pub association: Association,
     /// Points of the template that take part in pose tracking.
     pub samples: usize,
@@ -21,8 +32,18 @@ pub struct TrackerConfig {
     pub point_to_point: f64,
     /// Weight of point-to-plane.
     pub point_to_plane: f64,
+    /// Direction of point-to-plane.
+    pub normals: Normals,
+    /// Readings look for the model too, not only the model for readings.
+    pub both_ways: bool,
+    /// Sum the normal equations in single precision.
+    pub single_precision: bool,
+    /// An update below this ends the iteration, metres at a lever of 25 cm; the paper stops at 3 mm.
+    pub converged: f64,
     /// Weight of edge-to-edge pairs (λₑ of eq. 12, here on metric residuals).
     pub edge_weight: f64,
+    /// Weight of the free-space constraint: no surface in front of what was measured.
+    pub free_space: f64,
     /// Adapt the body's size and shape at the start.
     pub adapt_size: bool,
     /// Frames over which size and shape are adapted.
@@ -35,6 +56,10 @@ pub struct TrackerConfig {
     pub displacement_interval: u32,
     /// Predict the pose from the last two frames.
     pub predict: bool,
+    /// Leave out coarse iterations where the prediction explains the frame as well as the last pose did its own.
+    pub skip_coarse: bool,
+    /// Fit displacements less often once they have settled.
+    pub skip_settled: bool,
     /// Pull the model towards readings that nothing explains.
     pub pull: bool,
     /// Prior of a shape coefficient (one standard deviation = 1), per point, m².
@@ -52,26 +77,57 @@ pub struct TrackerConfig {
 impl Default for TrackerConfig {
     fn default() -> Self {
         Self {
-            association: Association::Projective,
-            samples: 1600,
+            association: Association::KdTree,
+            samples: 1000,
             data_step: 2,
             stride: None,
             iterations: 8,
             point_to_point: 0.1,
             point_to_plane: 1.0,
-            edge_weight: 0.1,
+            normals: Normals::Symmetric,
+            both_ways: true,
+            single_precision: false,
+            converged: 3e-3,
+            edge_weight: 0.0,
+            free_space: 0.0,
             adapt_size: true,
             calibration_frames: 60,
             displacements: true,
             displaced_pose: false,
             displacement_interval: 3,
             predict: true,
+            skip_coarse: true,
+            skip_settled: true,
             pull: true,
             shape_prior: 5e-7,
             scale_deviation: [0.05, 0.15],
             rest_weight: 0.5,
             damping: 1e-4,
             farthest: 8.0,
+        }
+    }
+}
+
+impl TrackerConfig {
+    /// The paper's own form (sections 3.2 to 3.4), for comparison: closest points by kd-tree from the model to the data,
+    /// point-to-point, every vertex, edges, no prediction, pull or skipping, and the displaced surface in the pose.
+    pub fn paper() -> Self {
+        Self {
+            association: Association::KdTree,
+            samples: usize::MAX,
+            stride: Some(2),
+            iterations: 20,
+            point_to_point: 1.0,
+            point_to_plane: 0.0,
+            both_ways: false,
+            converged: 3e-3,
+            edge_weight: 0.3,
+            displaced_pose: true,
+            predict: false,
+            skip_coarse: false,
+            skip_settled: false,
+            pull: false,
+            ..Self::default()
         }
     }
 }

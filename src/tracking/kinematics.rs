@@ -82,6 +82,18 @@ pub(super) fn extrapolate(skeleton: &Skeleton, before: &Pose, last: &Pose, ratio
     next
 }
 
+/// Distance of skin from the joint that moves it, metres, for comparing turns with shifts.
+pub(super) const LEVER: f64 = 0.25;
+
+/// Largest motion between two poses, metres: of the root, or of a joint's angle with a lever of [`LEVER`].
+pub(super) fn motion(skeleton: &Skeleton, from: &Pose, to: &Pose) -> f64 {
+    let root = skeleton.joints()[0].rest;
+    let shift = (to.root.point(&root) - from.root.point(&root)).norm();
+    let turn = (from.root.iso().rotation.inverse() * to.root.iso().rotation).angle();
+    let angles = from.angles.iter().zip(&to.angles).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    shift.max(LEVER * turn.max(angles))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

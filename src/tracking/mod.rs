@@ -1,6 +1,7 @@
 //! One step from a frame and the last state to pose, displacements and a confidence report.
 
 mod align;
+mod confidence;
 mod config;
 mod kinematics;
 mod model;
@@ -12,7 +13,8 @@ mod step;
 mod surface;
 mod workspace;
 
-pub use config::TrackerConfig;
+pub use confidence::{JointConfidence, Reason};
+pub use config::{Normals, TrackerConfig};
 pub use model::TrackerModel;
 pub use report::{Skipped, StagesMs, StepError, StepReport};
 pub use size::SizeEstimate;

@@ -43,6 +43,8 @@ pub struct TrackerModel {
     pub(super) stiffness: Vec<f64>,
     /// Angles of knees, ankles and feet.
     pub(super) legs: Vec<bool>,
+    /// Angles of the hips.
+    pub(super) hips: Vec<bool>,
 }
 
 impl TrackerModel {
@@ -72,6 +74,8 @@ impl TrackerModel {
         let stiffness = stiffness(&template);
         let leg = |name: &str| ["knee", "ankle", "foot"].iter().any(|s| name.contains(s));
         let legs = skeleton.joints().iter().flat_map(|j| std::iter::repeat_n(leg(&j.name), j.motion.dofs())).collect();
+        let hip = |j: &crate::body::Joint| std::iter::repeat_n(j.name.contains("hip"), j.motion.dofs());
+        let hips = skeleton.joints().iter().flat_map(hip).collect();
         Self {
             template,
             calibration,
@@ -85,6 +89,7 @@ impl TrackerModel {
             tied,
             stiffness,
             legs,
+            hips,
         }
     }
     /// The body that is tracked.
@@ -103,6 +108,9 @@ impl TrackerModel {
 
 /// About `wanted` vertices spread evenly: one per cell of a voxel grid whose size is found by bisection.
 fn choose_samples(vertices: &[P3], wanted: usize) -> Vec<u32> {
+    if wanted >= vertices.len() {
+        return (0..vertices.len() as u32).collect();
+    }
     let pick = |size: f32| {
         let mut cells: BTreeMap<[i32; 3], (f32, u32)> = BTreeMap::new();
         for (i, v) in vertices.iter().enumerate() {

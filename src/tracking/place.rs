@@ -23,13 +23,16 @@ const HALF_DEPTH: f64 = 0.11;
 const HEAD_BESIDE: f32 = 0.22;
 /// Floor tolerance that segmentation takes from the soles, metres.
 const SOLES: f64 = 0.02;
+/// A floor that is this much higher than the lowest reading is not the one the person stands on, metres.
+const AFLOAT: f64 = 0.1;
 /// Turns about the vertical that are tried, radians; the paper asks for a frontal view.
 const YAWS: [f64; 3] = [0.0, 0.6, -0.6];
-/// How many of the best guesses are aligned in full.
-const FINALISTS: usize = 3;
+/// How many of the best torsos get arms and are aligned in full.
+const TORSO_FINALISTS: usize = 2;
 
-/// Reads torso, crown and stature off the person's cells. `up` is the unit direction against gravity.
-pub(super) fn outline(seen: &Seen<'_>, up: &Vector3<f32>, cut_below: bool) -> Option<Outline> {
+/// Reads torso, crown and stature off the person's cells. `up` is the unit direction against gravity, `floor` the
+/// camera's height over the floor, metres, where one is known.
+pub(super) fn outline(seen: &Seen<'_>, up: &Vector3<f32>, cut_below: bool, floor: Option<f64>) -> Option<Outline> {
     let grid = seen.grid;
     let (columns, rows) = grid.size();
     // Chessboard distance to the nearest cell that is not the person; the torso is where it is largest.
@@ -77,7 +80,9 @@ pub(super) fn outline(seen: &Seen<'_>, up: &Vector3<f32>, cut_below: bool) -> Op
         .filter(|p| right.dot(&(p - torso)).abs() < HEAD_BESIDE)
         .max_by(|a, b| height(a).total_cmp(&height(b)))?;
     let lowest = points().map(|p| height(&p)).fold(f32::INFINITY, f32::min);
-    let stature = (!cut_below).then(|| f64::from(height(&crown) - lowest) + SOLES);
+    let seen_height = f64::from(height(&crown) - lowest) + SOLES;
+    let over_floor = floor.map(|f| f64::from(height(&crown)) + f).filter(|h| *h > seen_height - AFLOAT);
+    let stature = over_floor.or((!cut_below).then_some(seen_height));
     Some(Outline { torso, crown, stature })
 }
 
@@ -92,17 +97,76 @@ fn upright(up: &Vector3<f64>, yaw: f64) -> UnitQuaternion<f64> {
     facing * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw)
 }
 
-/// Arm poses that are tried: directions of the upper arm (x outward) and the bend of the elbow, radians.
-const ARMS: [([f64; 3], f64); 6] = [
-    ([0.35, -0.93, 0.0], 0.0),
-    ([0.75, -0.65, 0.0], 0.0),
-    ([1.0, 0.0, 0.0], 0.0),
-    // Hand on the hip.
-    ([0.75, -0.65, -0.25], 1.4),
-    // Forearm raised or forward.
-    ([0.4, -0.9, 0.2], 1.5),
-    ([0.7, 0.7, 0.0], 0.3),
+/// Directions of the upper arm that are tried (x outward, y up, z forward).
+const UPPER_ARMS: [[f64; 3]; 9] = [
+    [0.15, -0.99, 0.0],
+    [0.4, -0.92, 0.0],
+    [0.75, -0.65, -0.1],
+    [1.0, 0.0, 0.0],
+    [0.7, 0.7, 0.0],
+    [0.25, 0.95, 0.15],
+    [0.3, -0.75, 0.6],
+    [0.3, -0.1, 0.95],
+    [0.75, -0.2, 0.6],
 ];
+/// Bends of the elbow, radians, tried in a first and a second round; and turns of the upper arm about itself.
+const BENDS: [f64; 2] = [0.1, 1.4];
+/// See [`BENDS`].
+const MORE_BENDS: [f64; 3] = [0.7, 1.4, 2.2];
+/// See [`BENDS`].
+const TWISTS: [f64; 5] = [-1.8, -0.9, 0.0, 0.9, 1.8];
+/// What a bend and a twist must earn, m² per point and squared radian: a straight arm explained by a bent one that is
+/// turned inside out stays so for good. A hand of ten readings is worth 7·10⁻⁵.
+const BEND_COST: f64 = 1e-5;
+/// See [`BEND_COST`].
+const TWIST_COST: f64 = 3e-5;
+/// Upper arms that go into the second round.
+const ARM_FINALISTS: usize = 3;
+
+/// The arm pose of one side that explains the picture best.
+fn choose_arm(
+    model: &TrackerModel,
+    rest: (&RestBody, &SampleRest),
+    pose: &Pose,
+    seen: &Seen<'_>,
+    side: &str,
+    scratch: &mut AlignScratch,
+) -> Pose {
+    let skeleton = model.template.skeleton();
+    let sign = if side == "left" { 1.0 } else { -1.0 };
+    let mut guess = |direction: [f64; 3], bend: f64, twist: f64| {
+        let mut guess = pose.clone();
+        let d = Vector3::new(direction[0] * sign, direction[1], direction[2]).normalize();
+        aim(model, &mut guess, &format!("{side}_shoulder"), &format!("{side}_elbow"), d, twist * sign);
+        guess.set(skeleton, &format!("{side}_elbow"), &[bend]);
+        guess.clamp_to_limits(skeleton);
+        let effort = BEND_COST * bend * bend + TWIST_COST * twist * twist;
+        (evaluate(model, rest, &guess, seen, 0.15, scratch).cost + effort, guess)
+    };
+    let mut tried: Vec<(f64, [f64; 3], Pose)> = Vec::new();
+    for direction in UPPER_ARMS {
+        for bend in BENDS {
+            let (cost, pose) = guess(direction, bend, 0.0);
+            tried.push((cost, direction, pose));
+        }
+    }
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut finalists: Vec<[f64; 3]> = Vec::new();
+    for (_, direction, _) in &tried {
+        if finalists.len() < ARM_FINALISTS && !finalists.contains(direction) {
+            finalists.push(*direction);
+        }
+    }
+    for direction in finalists {
+        for bend in MORE_BENDS {
+            for twist in TWISTS {
+                let (cost, pose) = guess(direction, bend, twist);
+                tried.push((cost, direction, pose));
+            }
+        }
+    }
+    tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(|| pose.clone(), |t| t.2)
+}
 
 /// Finds the first pose. Returns the pose and its fit, or `None` when the outline says nothing.
 pub(super) fn place(
@@ -131,31 +195,24 @@ pub(super) fn place(
             let mut pose = Pose::rest(skeleton, Rigid::from_parts(t, rotation));
             let rough = Schedule { iterations: 3, ..START };
             align(model, rest, &mut pose, seen, &rough, scratch);
-            // Arms one side after the other: twelve tries instead of thirty-six.
-            for (side, sign) in [("left", 1.0), ("right", -1.0)] {
-                let mut chosen: Option<(f64, Pose)> = None;
-                for (direction, bend) in ARMS {
-                    let mut guess = pose.clone();
-                    let d = Vector3::new(direction[0] * sign, direction[1], direction[2]);
-                    aim(model, &mut guess, &format!("{side}_shoulder"), &format!("{side}_elbow"), d);
-                    guess.set(skeleton, &format!("{side}_elbow"), &[bend]);
-                    guess.clamp_to_limits(skeleton);
-                    let cost = evaluate(model, rest, &guess, seen, 0.15, scratch).cost;
-                    if chosen.as_ref().is_none_or(|(c, _)| cost < *c) {
-                        chosen = Some((cost, guess));
-                    }
-                }
-                if let Some((_, guess)) = chosen {
-                    pose = guess;
-                }
-            }
             let cost = evaluate(model, rest, &pose, seen, 0.15, scratch).cost;
             best.push((cost, pose));
         }
     }
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // Arms of the best torsos, one side after the other; outlines say little about hypotheses and cost the most.
+    let terms = scratch.terms;
+    scratch.terms.edge_weight = 0.0;
+    for (cost, pose) in best.iter_mut().take(TORSO_FINALISTS) {
+        for side in ["left", "right"] {
+            *pose = choose_arm(model, rest, pose, seen, side, scratch);
+        }
+        *cost = evaluate(model, rest, pose, seen, 0.15, scratch).cost;
+    }
+    scratch.terms = terms;
+    best.truncate(TORSO_FINALISTS);
     let mut winner: Option<(Pose, Fit)> = None;
-    for (_, mut pose) in best.into_iter().take(FINALISTS) {
+    for (_, mut pose) in best {
         align(model, rest, &mut pose, seen, &START, scratch);
         let fit = evaluate(model, rest, &pose, seen, 0.10, scratch);
         if winner.as_ref().is_none_or(|(_, w)| fit.cost < w.cost) {

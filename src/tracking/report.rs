@@ -1,6 +1,6 @@
 //! What a step says about itself, and how it can fail.
 
-use super::Status;
+use super::{JointConfidence, Status};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -33,6 +33,8 @@ pub struct Skipped {
     pub hidden_points: usize,
     /// Iterations that convergence saved.
     pub iterations: usize,
+    /// Coarse iterations that a good prediction saved.
+    pub coarse_iterations: usize,
     /// Vertices whose displacement was not updated at this frame.
     pub displacements: usize,
     /// Pairs dropped by relaxed bijective consistency (eq. 9), at the last iteration.
@@ -73,6 +75,11 @@ pub struct StepReport {
     pub explained: f64,
     /// Share of the body's visible points that found a reading, 0 to 1.
     pub matched: f64,
+    /// One figure for the frame, 0 to 1: how much of the person and of the body found each other, less the more the
+    /// residual exceeds a sensor's noise.
+    pub quality: f64,
+    /// Confidence of each joint of the skeleton; empty without a live pose.
+    pub confidence: Vec<JointConfidence>,
     /// Frames since the pose was measured; 0 for a live pose.
     pub pose_age: u32,
     /// What was skipped.

@@ -29,9 +29,10 @@ const TIE: f64 = 5e-3;
 const MOST_DEVIATIONS: f64 = 3.0;
 /// Bounds of a bone's scale.
 const SCALES: [f64; 2] = [0.7, 1.4];
-/// Longest pair used for size, and kernel width, metres.
-const REACH: f32 = 0.08;
-const SIGMA: f64 = 0.04;
+/// Longest pair used for size and kernel width, metres: while pose and size still look for each other, and later. Feet
+/// of a body of the wrong stature start a hand's width away.
+const START: (f32, f64) = (0.15, 0.08);
+const LATER: (f32, f64) = (0.08, 0.04);
 /// Point-to-point weight: sizes must slide along limbs, so it is a fifth of the pose's.
 const POINT_TO_POINT: f64 = 0.02;
 /// What earlier frames said fades by this factor a frame: their pairs belonged to a body not yet adapted.
@@ -54,8 +55,9 @@ impl SizeEstimate {
         if n == 0 {
             return 0.0;
         }
-        pair(model, rest, pose, seen, REACH, 0.0, scratch);
-        let Some((information, gradient)) = frame_information(model, pose, seen, scratch) else { return 0.0 };
+        let (reach, sigma) = if keep { LATER } else { START };
+        pair(model, rest, pose, seen, reach, 0.0, scratch);
+        let Some((information, gradient)) = frame_information(model, pose, seen, sigma, scratch) else { return 0.0 };
         let now = current(model, shape);
         let evidence = &information * &now + gradient;
         let mut total = information;
@@ -127,9 +129,10 @@ fn frame_information(
     model: &TrackerModel,
     pose: &Pose,
     seen: &Seen<'_>,
+    sigma: f64,
     scratch: &mut AlignScratch,
 ) -> Option<(DMatrix<f64>, DVector<f64>)> {
-    let (hpp, gp) = normal_equations(model, pose, seen, SIGMA, (POINT_TO_POINT, model.config.edge_weight), scratch);
+    let (hpp, gp) = normal_equations(model, pose, seen, sigma, POINT_TO_POINT, scratch);
     let n = model.directions.len();
     let bones = &scratch.bones.bones;
     let centre = scratch.bones.joints[0].coords;
@@ -151,7 +154,7 @@ fn frame_information(
     let mut gs = DVector::<f64>::zeros(n);
     let mut hbs = vec![Vector6::zeros(); n * bones.len()];
     let (mut moves, mut weighed) = (vec![Vector3::zeros(); n], vec![Vector3::zeros(); n]);
-    for_residuals(model, seen, scratch, SIGMA, (POINT_TO_POINT, model.config.edge_weight), |r| {
+    for_residuals(model, seen, scratch, sigma, POINT_TO_POINT, |r| {
         let p = r.point - centre;
         for d in 0..n {
             let offset = model.directions[d].samples[r.sample].cast::<f64>();
@@ -173,7 +176,7 @@ fn frame_information(
             hss[(e, d)] = hss[(d, e)];
         }
     }
-    let scale = 1.0 / (scratch.pairs.len() + scratch.edges.pairs.len()).max(1) as f64;
+    let scale = 1.0 / scratch.residuals().max(1) as f64;
     for d in 0..n {
         for b in (1..bones.len()).rev() {
             if let Some(p) = model.parents[b] {

@@ -78,6 +78,10 @@ pub struct TrackerState {
     pub(super) calibration_age: u32,
     /// Middle of what was seen of the person, camera frame.
     pub(super) centre: P3,
+    /// How the last pose fitted its frame: share of explained readings, residual in metres.
+    pub(super) quality: [f64; 2],
+    /// Frames until displacements are due, and the interval between fits.
+    pub(super) surface_due: [u32; 2],
 }
 
 /// Height of a camera whose floor is not in view, metres; kiosks mount it at about this height.
@@ -109,6 +113,8 @@ impl TrackerState {
             steady: 0,
             calibration_age: 0,
             centre: P3::origin(),
+            quality: [0.0; 2],
+            surface_due: [0; 2],
         }
     }
     /// Starts from a rough placement instead of searching: the root joint at `root` (camera frame, metres), upright,

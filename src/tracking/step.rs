@@ -1,7 +1,8 @@
 //! One frame (Algorithm 1): segment, place or predict, pose, size, displacements, and what it all means.
 
-use super::align::{Fit, START, Schedule, Seen, TRACK, align, evaluate, wants_tree};
-use super::kinematics::extrapolate;
+use super::align::{ANNEAL, Fit, START, START_TERMS, Schedule, Seen, TRACK, Terms, align, evaluate, wants_tree};
+use super::confidence::confidence;
+use super::kinematics::{extrapolate, motion};
 use super::place::{outline, place};
 use super::report::Stopwatch;
 use super::size::from_stature;
@@ -30,6 +31,15 @@ const LEAST_MATCHED: f64 = 0.35;
 const PATIENCE: u32 = 8;
 /// After this many frames without the person, whoever comes is measured anew.
 const FORGET: u32 = 150;
+/// A prediction is as good as the last fit when it explains a share of the readings no smaller than this less, and its
+/// residual is no larger than this factor and this length (metres) more.
+const AS_GOOD_EXPLAINED: f64 = 0.015;
+/// See [`AS_GOOD_EXPLAINED`].
+const AS_GOOD_RESIDUAL: [f64; 2] = [1.2, 0.3e-3];
+/// Coarse iterations are left out only when nothing moves by more than this from frame to frame, metres.
+const SLOW: f64 = 0.02;
+/// A residual at which the quality of a frame is halved, metres.
+const POOR_RESIDUAL: f64 = 0.02;
 /// Rounds of pose and size at the start (Algorithm 1), and the change that ends them.
 const ROUNDS: usize = 8;
 const SETTLED: f64 = 0.05;
@@ -46,6 +56,11 @@ const STEADY_MOTION: f64 = 6e-3;
 const STEADY_FRAMES: u32 = 6;
 /// But not longer than this many frames of calibration: a shopper who walks is dressed walking.
 const LONGEST_CALIBRATION: u32 = 90;
+/// Displacements whose root mean square change at a fit is below this (metres) have settled; they are then fitted at
+/// longer and longer intervals, up to this many frames.
+const SETTLED_DISPLACEMENT: f32 = 0.4e-3;
+/// See [`SETTLED_DISPLACEMENT`].
+const LONGEST_INTERVAL: u32 = 24;
 /// Longest interval over which motion is extrapolated, in intervals between frames.
 const FARTHEST_AHEAD: f64 = 3.0;
 /// Extrapolated motion is damped: a limb that stops overshoots less.
@@ -87,6 +102,8 @@ pub fn step(
         residual_mm: 0.0,
         explained: 0.0,
         matched: 0.0,
+        quality: 0.0,
+        confidence: Vec::new(),
         pose_age: 0,
         skipped: Skipped { cells: grid.depth.len() - person.cells.len(), ..Skipped::default() },
         stages_ms: stages,
@@ -161,12 +178,16 @@ fn follow(
     let up = state.world_from_camera.inverse().vector(&Vector3::y());
     let searching = !state.status.is_live();
     let mut pose = state.pose.clone();
+    let mut fine = false;
+    workspace.align.terms = if searching { START_TERMS } else { Terms::tracking(&model.config) };
 
     if searching {
         if state.pose_age > FORGET {
             state.reset(model);
         }
-        let first_look = outline(&seen, &up.cast(), person.cut_below);
+        // Over a floor the crown tells the stature, whether the feet are in view or not.
+        let floor = state.floor_known.then(|| state.world_from_camera.iso().translation.vector.y);
+        let first_look = outline(&seen, &up.cast(), person.cut_below, floor);
         let stature = first_look.and_then(|o| o.stature).filter(|s| (1.3..2.2).contains(s));
         if let Some(stature) = stature.filter(|_| state.size.frames == 0 && model.config.adapt_size) {
             state.shape = from_stature(model, stature);
@@ -187,21 +208,38 @@ fn follow(
     } else {
         workspace.rest_body(model, &state.shape);
         let rest = (&workspace.rest, &workspace.samples);
-        // Constant velocity, but only where it explains the frame better than standing still.
-        if let Some(before) = state.before.as_ref().filter(|_| model.config.predict && state.interval_ns > 0) {
+        // Constant velocity, but only where it explains the frame as well as the last pose did its own, or better than
+        // standing still.
+        let mut look =
+            |pose: &Pose<Camera>| evaluate(model, rest, pose, &seen, TRACK.distance[0], &mut workspace.align);
+        let [explained, residual] = state.quality;
+        let as_good = |fit: &Fit| {
+            model.config.skip_coarse
+                && fit.explained > explained - AS_GOOD_EXPLAINED
+                && fit.residual < AS_GOOD_RESIDUAL[0] * residual + AS_GOOD_RESIDUAL[1]
+        };
+        let guess = state.before.as_ref().filter(|_| model.config.predict && state.interval_ns > 0).map(|before| {
             let ahead = frame.time_ns.saturating_sub(state.time_ns) as f64 / state.interval_ns as f64;
-            let guess = extrapolate(skeleton, before, &pose, AHEAD * ahead.min(FARTHEST_AHEAD));
-            let still = evaluate(model, rest, &pose, &seen, TRACK.distance[0], &mut workspace.align).cost;
-            let moved = evaluate(model, rest, &guess, &seen, TRACK.distance[0], &mut workspace.align).cost;
-            if moved < still {
-                pose = guess;
+            extrapolate(skeleton, before, &pose, AHEAD * ahead.min(FARTHEST_AHEAD))
+        });
+        match guess {
+            Some(guess) => {
+                let moved = look(&guess);
+                fine = motion(skeleton, &pose, &guess) < SLOW && as_good(&moved);
+                if fine || moved.cost < look(&pose).cost {
+                    pose = guess;
+                }
             }
+            None if model.config.skip_coarse => fine = as_good(&look(&pose)),
+            None => {}
         }
     }
 
     // Pose; at the start alternating with size until both have settled (Algorithm 1).
     let mut schedule = TRACK;
     schedule.iterations = model.config.iterations;
+    schedule.ahead = if fine { ANNEAL } else { 0 };
+    report.skipped.coarse_iterations = schedule.ahead;
     let rest = (&workspace.rest, &workspace.samples);
     let mut fit =
         align(model, rest, &mut pose, &seen, if searching { &START } else { &schedule }, &mut workspace.align);
@@ -237,6 +275,7 @@ fn follow(
     report.residual_mm = fit.residual * 1e3;
     report.explained = fit.explained;
     report.matched = fit.matched;
+    report.quality = fit.explained.min(fit.matched) / (1.0 + fit.residual / POOR_RESIDUAL);
     report.skipped.hidden_points = fit.pairs.hidden;
     report.skipped.inconsistent_pairs = fit.pairs.inconsistent;
     report.skipped.iterations = model.config.iterations.saturating_sub(fit.iterations);
@@ -255,6 +294,7 @@ fn follow(
     }
     let root = model.template.skeleton().joints()[0].rest;
     let moved = (pose.root.point(&root) - state.pose.root.point(&root)).norm();
+    report.confidence = confidence(model, &pose, &seen, &workspace.align);
     state.steady = if !searching && moved < STEADY_MOTION { state.steady.saturating_add(1) } else { 0 };
     state.calibration_age = if searching { 0 } else { state.calibration_age.saturating_add(1) };
     state.before = (!searching).then(|| std::mem::replace(&mut state.pose, pose.clone()));
@@ -263,16 +303,19 @@ fn follow(
     state.time_ns = frame.time_ns;
     state.pose_age = 0;
     state.centre = centre_of(grid, &person.cells);
+    state.quality = [fit.explained, fit.residual];
     let settling =
         state.status != Status::Tracking && state.steady < STEADY_FRAMES && state.calibration_age < LONGEST_CALIBRATION;
     let calibrating = model.config.adapt_size && (state.size.frames < CALIBRATING || settling);
     state.status = if calibrating { Status::Calibrating } else { Status::Tracking };
 
-    let due = state.frames.is_multiple_of(u64::from(model.config.displacement_interval.max(1)));
-    if good && model.config.displacements && !calibrating && due {
+    let [wait, interval] = &mut state.surface_due;
+    *wait = wait.saturating_sub(1);
+    *interval = (*interval).max(model.config.displacement_interval.max(1));
+    if good && model.config.displacements && !calibrating && *wait == 0 {
         let rest = (&workspace.rest, &workspace.samples);
         super::align::pair(model, rest, &state.pose, &seen, 0.05, 0.0, &mut workspace.align);
-        let updated = surface::fit(
+        let (updated, change) = surface::fit(
             model,
             &workspace.rest,
             &workspace.align.bones,
@@ -283,6 +326,11 @@ fn follow(
             &mut workspace.surface,
         );
         report.skipped.displacements = state.shape.displacements.len() - updated;
+        // What hardly changed is looked at half as often, what changed as often as configured.
+        let settled = model.config.skip_settled && change < SETTLED_DISPLACEMENT;
+        *interval =
+            if settled { (*interval * 2).min(LONGEST_INTERVAL) } else { model.config.displacement_interval.max(1) };
+        *wait = *interval;
         report.stages_ms.surface = watch.lap();
     }
     workspace.contour = outline_of_person;

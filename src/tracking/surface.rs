@@ -22,6 +22,7 @@ pub struct SurfaceStatistics {
 /// Scratch of the fit.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SurfaceScratch {
+    before: Vec<f32>,
     posed: Vec<P3>,
     target: Vec<f32>,
     weight: Vec<f32>,
@@ -54,7 +55,7 @@ const HIDDEN: f32 = 0.04;
 const GRAZING: f32 = 0.35;
 
 /// Updates displacements from one frame; `image` is the model drawn into the grid. Returns how many vertices had a
-/// reading.
+/// reading, and the root mean square of the change, metres.
 pub(super) fn fit(
     model: &TrackerModel,
     rest: &RestBody,
@@ -64,14 +65,14 @@ pub(super) fn fit(
     displacements: &mut Vec<f32>,
     statistics: &mut SurfaceStatistics,
     s: &mut SurfaceScratch,
-) -> usize {
+) -> (usize, f32) {
     let template = &model.template;
     let n = rest.base.len();
     displacements.resize(n, 0.0);
     statistics.mean.resize(n, 0.0);
     statistics.spread.resize(n, 0.0);
     let weights = template.weights();
-    skin(Par::Rayon, &rest.base, weights, bones, &mut s.posed);
+    skin(Par::Seq, &rest.base, weights, bones, &mut s.posed);
     let rotations: Vec<_> =
         bones.bones.iter().map(|b| b.rotation.to_rotation_matrix().into_inner().cast::<f32>()).collect();
     s.target.clear();
@@ -103,7 +104,9 @@ pub(super) fn fit(
             readings += 1;
         }
     }
+    s.before.clone_from(displacements);
     solve(model, rest, displacements, statistics, s);
+    let change: f32 = displacements.iter().zip(&s.before).map(|(a, b)| (a - b) * (a - b)).sum();
     statistics.count += 1;
     let count = statistics.count as f32;
     for i in 0..n {
@@ -111,7 +114,7 @@ pub(super) fn fit(
         statistics.mean[i] += off / count;
         statistics.spread[i] += off * (displacements[i] - statistics.mean[i]);
     }
-    readings
+    (readings, (change / n.max(1) as f32).sqrt())
 }
 
 /// Sum in f64, in order: the same bits every time.

@@ -54,7 +54,7 @@ impl Workspace {
         self.rest_body(model, &state.shape);
         let mut bones = BoneTransforms::default();
         state.pose.bones(model.template.skeleton(), &self.rest, &mut bones);
-        skin(Par::Rayon, &self.rest.vertices, model.template.weights(), &bones, &mut self.posed);
+        skin(Par::Seq, &self.rest.vertices, model.template.weights(), &bones, &mut self.posed);
         (&self.posed, bones)
     }
 }

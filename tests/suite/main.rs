@@ -4,4 +4,5 @@
 mod common;
 mod garment_stream;
 mod garments;
+mod stress;
 mod tracking;

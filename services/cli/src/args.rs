@@ -40,6 +40,8 @@ pub(crate) enum Command {
     Record(RecordArgs),
     /// Publish a recording as if it were a live camera.
     Replay(ReplayArgs),
+    /// Run time against error, methods side by side: tables as CSV and JSON, plots as SVG.
+    Bench(BenchArgs),
     /// Look at this machine: cores, memory, graphics adapter, ports, shared data; say what would go wrong.
     Doctor(DoctorArgs),
 }
@@ -232,6 +234,32 @@ pub(crate) struct ReplayArgs {
     /// Configuration file with the bus endpoints (see `up`).
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchArgs {
+    /// What to measure.
+    #[command(subcommand)]
+    pub(crate) what: BenchWhat,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum BenchWhat {
+    /// Tracking over iterations, samples, correspondences and metric, on recorded and synthetic sequences.
+    Tracking(BenchTrackingArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchTrackingArgs {
+    /// Folder for tracking.csv, tracking.json and one tracking-*.svg per measure of error.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Folder with bodies, motions and sequences that have truth; without it, synthetic scenes of the embedded body.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: Option<PathBuf>,
+    /// One scene, a third of its frames, a few variants: a minute instead of many.
+    #[arg(long)]
+    pub(crate) quick: bool,
 }
 
 #[derive(Debug, Args)]

@@ -30,6 +30,7 @@ fn main() -> ExitCode {
         Command::Export(a) => commands::export::run(&a),
         Command::Record(a) => commands::record::run(&a),
         Command::Replay(a) => commands::replay::run(&a),
+        Command::Bench(a) => commands::bench::run(&a),
         Command::Doctor(a) => commands::doctor::run(&a),
     };
     match outcome {

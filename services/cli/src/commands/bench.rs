@@ -1,0 +1,50 @@
+//! `tryon bench`: run time against error, as tables and plots.
+
+use crate::args::{BenchArgs, BenchTrackingArgs, BenchWhat};
+use crate::input;
+use anyhow::Result;
+use std::process::ExitCode;
+use tryon::evaluate::ablation::{self, Extent};
+use tryon::evaluate::{Row, Table};
+use tryon::par::with_threads;
+
+/// Runs the command.
+///
+/// # Errors
+/// Scenes that cannot be read, or results that cannot be written.
+pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
+    match &args.what {
+        BenchWhat::Tracking(a) => tracking(a),
+    }
+}
+
+fn tracking(args: &BenchTrackingArgs) -> Result<ExitCode> {
+    let extent = if args.quick { Extent::Quick } else { Extent::Full };
+    let plan = ablation::plan(args.data.as_deref(), extent)?;
+    let bar = input::progress(Some(plan.runs() as u64), "measuring");
+    let mut table = Table::new("tracking", command(args), "one step on one thread, displacements amortised");
+    with_threads(1, || {
+        plan.run(|row: Row| {
+            bar.inc(1);
+            table.rows.push(row);
+        })
+    })??;
+    bar.finish_and_clear();
+    finish(&table, &args.out)
+}
+
+/// Writes the table and says where it is.
+fn finish(table: &Table, out: &std::path::Path) -> Result<ExitCode> {
+    for file in table.write(out)? {
+        println!("{}", file.display());
+    }
+    print!("{}", table.to_markdown());
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The command as it can be typed again.
+fn command(args: &BenchTrackingArgs) -> String {
+    let data = args.data.as_ref().map_or(String::new(), |d| format!(" --data {}", d.display()));
+    let quick = if args.quick { " --quick" } else { "" };
+    format!("tryon bench tracking --out {}{data}{quick}", args.out.display())
+}
