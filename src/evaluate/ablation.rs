@@ -6,7 +6,7 @@ use crate::body::{Template, embedded};
 use crate::camera::NoiseModel;
 use crate::registration::Association;
 use crate::synth::{Room, Sequence, Setting, Shopper};
-use crate::tracking::TrackerConfig;
+use crate::tracking::{Normals, TrackerConfig};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -65,7 +65,10 @@ pub fn variants() -> Vec<Variant> {
     for n in [1usize, 2, 4, 8, 16] {
         add("iterations", &n.to_string(), &|c| c.iterations = n);
     }
-    for n in [400usize, 800, 1600, 3200] {
+    for mm in [0.8, 1.5, 3.0, 6.0] {
+        add("converged, mm", &mm.to_string(), &|c| c.converged = mm * 1e-3);
+    }
+    for n in [250usize, 500, 1000, 2000, 4000] {
         add("samples", &n.to_string(), &|c| c.samples = n);
     }
     for n in [1usize, 2, 4, 8] {
@@ -76,15 +79,23 @@ pub fn variants() -> Vec<Variant> {
     }
     add("association", "projective", &|c| c.association = Association::Projective);
     add("association", "kd-tree", &|c| c.association = Association::KdTree);
-    add("metric", "plane + 0.1 point", &|_| {});
-    add("metric", "plane", &|c| c.point_to_point = 0.0);
+    add("association", "kd-tree, one way", &|c| c.both_ways = false);
+    add("metric", "symmetric + 0.1 point", &|_| {});
+    add("metric", "symmetric", &|c| c.point_to_point = 0.0);
+    add("metric", "plane + 0.1 point", &|c| c.normals = Normals::Model);
     add("metric", "point", &|c| (c.point_to_point, c.point_to_plane) = (1.0, 0.0));
-    add("edges", "none", &|c| c.edge_weight = 0.0);
-    add("edges", "weight 1", &|c| c.edge_weight = 1.0);
+    add("precision of sums", "f64", &|_| {});
+    add("precision of sums", "f32", &|c| c.single_precision = true);
+    add("edges", "0.1", &|c| c.edge_weight = 0.1);
+    add("edges", "1", &|c| c.edge_weight = 1.0);
+    add("free space", "0.1", &|c| c.free_space = 0.1);
     add("prediction", "off", &|c| c.predict = false);
     add("pull", "off", &|c| c.pull = false);
+    add("skipping", "nothing", &|c| (c.skip_coarse, c.skip_settled) = (false, false));
     add("size", "off", &|c| c.adapt_size = false);
     add("displacements", "off", &|c| c.displacements = false);
+    add("displacements", "in the pose", &|c| c.displaced_pose = true);
+    out.push(Variant { method: "the paper's form", value: String::new(), config: TrackerConfig::paper() });
     out
 }
 

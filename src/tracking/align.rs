@@ -51,20 +51,15 @@ pub(super) struct Terms {
     pub free_space: f64,
     /// Multiplies the pull towards the rest pose.
     pub rest_weight: f64,
-    /// See [`SEEN_SHARE`].
-    pub seen_share: f64,
+    /// The pull eases for what is seen.
+    pub eased: bool,
 }
 
 /// From a rough start: windows skip readings whose normal does not fit instead of giving up on the nearest one, and
 /// outlines and a stronger rest pose hold what is not yet near its place. On the real still, kd-tree pairs left the arm
 /// on the hip and twisted the head; on converged poses they are the better ones (docs/benchmarks).
-pub(super) const START_TERMS: Terms = Terms {
-    association: Association::Projective,
-    edge_weight: 0.3,
-    free_space: 0.0,
-    rest_weight: 1.0,
-    seen_share: 1.0,
-};
+pub(super) const START_TERMS: Terms =
+    Terms { association: Association::Projective, edge_weight: 0.3, free_space: 0.0, rest_weight: 1.0, eased: false };
 
 impl Terms {
     /// From frame to frame, as configured.
@@ -74,7 +69,7 @@ impl Terms {
             edge_weight: config.edge_weight,
             free_space: config.free_space,
             rest_weight: config.rest_weight,
-            seen_share: SEEN_SHARE,
+            eased: true,
         }
     }
 }
@@ -102,10 +97,6 @@ const UNEXPLAINED: f64 = 0.10;
 const HIDDEN: f64 = 1e-5;
 /// A hidden leg is pulled to the rest pose with this weight.
 const HIDDEN_LEG_PULL: f64 = 2e-5;
-/// Share of the pull to the rest pose that is left for a degree of freedom in full view: it shortens every motion. Hips
-/// keep it all: of a body cut off below them they see a little, and what little there is drags them.
-const SEEN_SHARE: f64 = 0.1;
-
 /// Width of the kernel for what stands in free space, metres: it may be far off.
 const FREE_SIGMA: f64 = 0.10;
 /// What stands before a reading goes back by at most this in one iteration, metres.
@@ -393,7 +384,7 @@ fn assemble(
     for (k, (&stiff, &angle)) in model.stiffness.iter().zip(&pose.angles).enumerate() {
         // Whatever is seen of a joint outweighs the rest pose at once; a hidden leg stands.
         let unseen = (HIDDEN / (HIDDEN + scratch.hessian[(6 + k, 6 + k)])).powi(2);
-        let seen_share = if model.legs[k] || model.hips[k] { 1.0 } else { scratch.terms.seen_share };
+        let seen_share = if scratch.terms.eased { model.seen_shares[k] } else { 1.0 };
         let share = seen_share + (1.0 - seen_share) * unseen;
         let stiff =
             stiff * scratch.terms.rest_weight * share + if model.legs[k] { HIDDEN_LEG_PULL * unseen } else { 0.0 };

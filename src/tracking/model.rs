@@ -43,8 +43,8 @@ pub struct TrackerModel {
     pub(super) stiffness: Vec<f64>,
     /// Angles of knees, ankles and feet.
     pub(super) legs: Vec<bool>,
-    /// Angles of the hips.
-    pub(super) hips: Vec<bool>,
+    /// Share of the pull to the rest pose that is left for each angle when its bone is in full view.
+    pub(super) seen_shares: Vec<f64>,
 }
 
 impl TrackerModel {
@@ -74,8 +74,8 @@ impl TrackerModel {
         let stiffness = stiffness(&template);
         let leg = |name: &str| ["knee", "ankle", "foot"].iter().any(|s| name.contains(s));
         let legs = skeleton.joints().iter().flat_map(|j| std::iter::repeat_n(leg(&j.name), j.motion.dofs())).collect();
-        let hip = |j: &crate::body::Joint| std::iter::repeat_n(j.name.contains("hip"), j.motion.dofs());
-        let hips = skeleton.joints().iter().flat_map(hip).collect();
+        let share = |j: &crate::body::Joint| std::iter::repeat_n(seen_share(&j.name), j.motion.dofs());
+        let seen_shares = skeleton.joints().iter().flat_map(share).collect();
         Self {
             template,
             calibration,
@@ -89,7 +89,7 @@ impl TrackerModel {
             tied,
             stiffness,
             legs,
-            hips,
+            seen_shares,
         }
     }
     /// The body that is tracked.
@@ -179,6 +179,20 @@ fn tied_bones(template: &Template, directions: &[Direction], first: usize) -> Ve
     out
 }
 
+/// Share of the pull to the rest pose that is left for a joint in full view: it shortens every motion. Hips and legs keep
+/// it all, because of a body cut off below them a little is seen, and that little drags them; neck and head keep it
+/// because of hair.
+fn seen_share(name: &str) -> f64 {
+    let any = |parts: &[&str]| parts.iter().any(|p| name.contains(p));
+    if any(&["spine", "collar"]) {
+        0.5
+    } else if any(&["shoulder", "elbow", "wrist"]) {
+        0.25
+    } else {
+        1.0
+    }
+}
+
 /// Weights of the rest-pose prior, per point and squared radian. A limb of fifty points with a lever of 15 cm has
 /// 7·10⁻⁴, so this yields where there is data; joints that share a motion (the spine) share it evenly.
 fn stiffness(template: &Template) -> Vec<f64> {
@@ -186,8 +200,8 @@ fn stiffness(template: &Template) -> Vec<f64> {
     for joint in template.skeleton().joints() {
         let name = joint.name.as_str();
         let stiff = ["spine", "neck", "collar", "wrist", "foot", "hand"].iter().any(|s| name.contains(s));
-        let ankle = name.contains("ankle") || name.contains("head");
-        let weight = if stiff {
+        let ankle = name.contains("ankle");
+        let weight = if stiff || name.contains("head") {
             2e-5
         } else if ankle {
             1e-5

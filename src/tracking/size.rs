@@ -33,6 +33,8 @@ const SCALES: [f64; 2] = [0.7, 1.4];
 /// of a body of the wrong stature start a hand's width away.
 const START: (f32, f64) = (0.15, 0.08);
 const LATER: (f32, f64) = (0.08, 0.04);
+/// Frames over which size looks farther.
+const SEARCHING: u32 = 20;
 /// Point-to-point weight: sizes must slide along limbs, so it is a fifth of the pose's.
 const POINT_TO_POINT: f64 = 0.02;
 /// What earlier frames said fades by this factor a frame: their pairs belonged to a body not yet adapted.
@@ -55,7 +57,7 @@ impl SizeEstimate {
         if n == 0 {
             return 0.0;
         }
-        let (reach, sigma) = if keep { LATER } else { START };
+        let (reach, sigma) = if keep && self.frames >= SEARCHING { LATER } else { START };
         pair(model, rest, pose, seen, reach, 0.0, scratch);
         let Some((information, gradient)) = frame_information(model, pose, seen, sigma, scratch) else { return 0.0 };
         let now = current(model, shape);

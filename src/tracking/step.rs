@@ -38,6 +38,9 @@ const AS_GOOD_EXPLAINED: f64 = 0.015;
 const AS_GOOD_RESIDUAL: [f64; 2] = [1.2, 0.3e-3];
 /// Coarse iterations are left out only when nothing moves by more than this from frame to frame, metres.
 const SLOW: f64 = 0.02;
+/// Motion below this from frame to frame, metres, is not extrapolated: what is left then is the jitter of the fit, which
+/// prediction would keep alive.
+const STILL: f64 = 3e-3;
 /// A residual at which the quality of a frame is halved, metres.
 const POOR_RESIDUAL: f64 = 0.02;
 /// Rounds of pose and size at the start (Algorithm 1), and the change that ends them.
@@ -215,10 +218,13 @@ fn follow(
         let [explained, residual] = state.quality;
         let as_good = |fit: &Fit| {
             model.config.skip_coarse
+                && state.calibrated(&model.config)
                 && fit.explained > explained - AS_GOOD_EXPLAINED
                 && fit.residual < AS_GOOD_RESIDUAL[0] * residual + AS_GOOD_RESIDUAL[1]
         };
-        let guess = state.before.as_ref().filter(|_| model.config.predict && state.interval_ns > 0).map(|before| {
+        let moving = |before: &&Pose<Camera>| motion(skeleton, before, &pose) > STILL;
+        let before = state.before.as_ref().filter(|_| model.config.predict && state.interval_ns > 0);
+        let guess = before.filter(moving).map(|before| {
             let ahead = frame.time_ns.saturating_sub(state.time_ns) as f64 / state.interval_ns as f64;
             extrapolate(skeleton, before, &pose, AHEAD * ahead.min(FARTHEST_AHEAD))
         });

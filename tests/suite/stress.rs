@@ -204,15 +204,18 @@ fn straight_limbs_and_an_arm_along_the_view_are_steady() {
     let model = TrackerModel::new(template.clone(), Calibration::registered(camera), fixed_size());
     let mut state = TrackerState::new(&model);
     let mut workspace = Workspace::default();
-    let (mut before, mut jitter, mut turned): (Option<(Vec<P3d>, Vec<f64>)>, f64, f64) = (None, 0.0, 0.0);
+    let mut before = None;
+    let (mut jitter, mut turned) = (0.0f64, 0.0f64);
     for i in 0..40u64 {
         let frame = RgbdFrame { sequence: i, time_ns: i * 33_333_333, depth: depth.clone(), color: None };
         step(&model, &mut state, &frame, &mut workspace).expect("step");
         assert!(state.status.is_live());
         let now = joints(&model, &state);
-        if let Some((old, angles)) = &before {
+        if let Some((old, angles)) = before {
+            let old: Vec<P3d> = old;
+            let angles: Vec<f64> = angles;
             let moved = old.iter().zip(&now).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-            let angle = state.pose.angles.iter().zip(angles).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let angle = state.pose.angles.iter().zip(&angles).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             turned = turned.max(angle);
             if i >= 20 {
                 jitter = jitter.max(moved);
