@@ -12,7 +12,7 @@ use std::sync::Arc;
 use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use tryon::camera::ColorImage;
 use tryon::cloth::realtime::{Input, Workspace, step};
-use tryon::dressing::{DressOptions, Dressed, dress, suggest};
+use tryon::dressing::{DressOptions, Dressed, FitProbe, dress, suggest};
 use tryon::formats::image::write_png_rgb;
 use tryon::garment::{Pattern, library};
 use tryon::math::{Body, P3, Rigid, V3, World, log_so3};
@@ -29,6 +29,7 @@ struct Args {
     cell: (u32, u32),
     crop: bool,
     edge: Option<f64>,
+    fit: bool,
     out: PathBuf,
 }
 
@@ -43,6 +44,7 @@ fn args() -> Args {
         cell: (220, 340),
         crop: false,
         edge: None,
+        fit: false,
         out: "/tmp/turntable".into(),
     };
     let list = |s: String| s.split(',').map(str::to_owned).collect::<Vec<_>>();
@@ -62,6 +64,7 @@ fn args() -> Args {
                 a.cell = (w.parse().expect("width"), h.parse().expect("height"));
             }
             "--crop" => a.crop = true,
+            "--fit" => a.fit = true,
             "--edge" => a.edge = Some(value().parse().expect("metres")),
             "--out" => a.out = value().into(),
             other => panic!("{other} is not known"),
@@ -147,6 +150,8 @@ struct Part {
     faces: Vec<Face>,
     color: [f32; 3],
     uv: Vec<[f32; 2]>,
+    /// Colour of each vertex instead, sRGB.
+    painted: Vec<[u8; 3]>,
 }
 
 fn draw(parts: &[Part], yaw: f32, cell: (u32, u32), y: [f32; 2], centre: [f32; 2]) -> Vec<u8> {
@@ -191,7 +196,12 @@ fn draw(parts: &[Part], yaw: f32, cell: (u32, u32), y: [f32; 2], centre: [f32; 2
             let inside = tryon::mesh::face_normal(&all, &f).z > 0.0;
             let n = if n.z > 0.0 { -n } else { n };
             let mut color = part.color;
-            if inside && !part.uv.is_empty() {
+            if !part.painted.is_empty() && !inside {
+                let t = part.faces[own];
+                color = std::array::from_fn(|d| {
+                    (0..3).map(|k| f32::from(part.painted[t[k] as usize][d]) / 255.0 * b[k]).sum::<f32>()
+                });
+            } else if inside && !part.uv.is_empty() {
                 color = [color[1] * 0.5, color[2] * 0.5, color[0] * 0.5];
             } else if !part.uv.is_empty() {
                 let t = part.faces[own];
@@ -280,15 +290,45 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
         [s[0], s[1]]
     };
     let mut y = verts.iter().fold([f32::MAX, f32::MIN], |y, p| [y[0].min(p.y), y[1].max(p.y)]);
-    let mut parts =
-        vec![Part { vertices: verts, faces: template.mesh().faces().to_vec(), color: [0.86, 0.70, 0.60], uv: vec![] }];
+    let mut parts = vec![Part {
+        vertices: verts,
+        faces: template.mesh().faces().to_vec(),
+        color: [0.86, 0.70, 0.60],
+        uv: vec![],
+        painted: vec![],
+    }];
+    let fits = a.fit.then(|| {
+        let mut probe = FitProbe::new(&template, &model).expect("a probe");
+        let started = std::time::Instant::now();
+        probe.measure(&model, &state, &parts[0].vertices).expect("fit");
+        let first = started.elapsed().as_secs_f64() * 1e3;
+        let started = std::time::Instant::now();
+        let maps = probe.measure(&model, &state, &parts[0].vertices).expect("fit");
+        println!("  fit map: first {first:.1} ms, then {:.1} ms", started.elapsed().as_secs_f64() * 1e3);
+        for r in maps.iter().flat_map(|m| &m.regions) {
+            println!(
+                "  {:16} {:?}: stretch {:+.1} % (p95 {:+.1}), {:.0} Pa over {:.0} %, {:.0} mm off the skin",
+                r.name,
+                r.fit,
+                r.stretch[0] * 100.0,
+                r.stretch[1] * 100.0,
+                r.pressure[0],
+                r.touching * 100.0,
+                r.gap * 1e3
+            );
+        }
+        maps
+    });
     let mut own = [f32::MAX, f32::MIN];
-    for (g, s) in model.outfit.garments.iter().zip(&state.garments) {
+    for (k, (g, s)) in model.outfit.garments.iter().zip(&state.garments).enumerate() {
         let mut world = Vec::new();
         g.render_positions(&s.positions, &mut world);
         own = world.iter().fold(own, |y, p| [y[0].min(p.y), y[1].max(p.y)]);
+        let painted = fits.as_ref().map_or_else(Vec::new, |maps| {
+            g.render.vertex.iter().map(|v| maps[k].vertices[*v as usize].color()).collect()
+        });
         let color = library::dye(&g.name).map(|c| f32::from(c) / 255.0);
-        parts.push(Part { vertices: world, faces: g.render.faces.clone(), color, uv: g.render.uv.clone() });
+        parts.push(Part { vertices: world, faces: g.render.faces.clone(), color, uv: g.render.uv.clone(), painted });
     }
     if a.crop {
         y = [own[0] - 0.08, own[1] + 0.12];

@@ -17,6 +17,7 @@ pub mod obj;
 mod position_codec;
 mod recording;
 mod rgbd_folder;
+pub mod sewn_obj;
 
 pub use error::FormatError;
 pub use mcap_file::{McapReader, McapWriter};

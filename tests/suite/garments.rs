@@ -2,12 +2,13 @@
 
 use tryon::body::measure::measure;
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
-use tryon::dressing::{DressOptions, Dressed, dress, suggest};
+use tryon::dressing::{DressOptions, Dressed, Fit, FitProbe, dress, suggest};
 use tryon::formats::fabric_json::read_fabric;
 use tryon::formats::garmentcode::{parse_garmentcode, read_garmentcode};
 use tryon::formats::mhclo::read_mhclo;
 use tryon::formats::obj::read_obj;
-use tryon::garment::import::from_garmentcode;
+use tryon::formats::sewn_obj::read_sewn_obj;
+use tryon::garment::import::{from_garmentcode, from_mesh};
 use tryon::garment::{GarmentKind, Material, Pattern, Size, Triangulation, library};
 use tryon::math::{Body, Rigid, World, log_so3};
 
@@ -174,6 +175,44 @@ fn damaged_garmentcode_files_are_refused_or_read_but_never_panic() {
             }
         }
     }
+}
+
+#[test]
+fn the_stitched_dress_becomes_one_surface() {
+    let Some(path) = crate::common::shared("garments/cipc_apache2/dress_knife/stage.obj") else { return };
+    let sewn = read_sewn_obj(&path).expect("read");
+    assert_eq!(sewn.stitches.len(), 851);
+    let g = from_mesh(&sewn, "dress", GarmentKind::Dress, Material::preset("cotton").expect("preset")).expect("sewn");
+    assert_eq!(g.garment.panels.len(), 14);
+    let (flat, kept) = (sewn.obj.mesh.faces().len(), g.garment.faces.len());
+    eprintln!("{} vertices of 15,656, {kept} of {flat} triangles, {} closed", g.garment.vertices, g.closed);
+    // Fourteen panels, one piece of cloth.
+    assert_eq!(g.garment.topology().expect("proper").components().1, 1);
+    assert!(g.closed < 40 && g.garment.vertices < 15_656 - 700);
+}
+
+#[test]
+fn a_fit_map_tells_a_tight_size_from_a_loose_one() {
+    let worn = |size| {
+        let d = wear(&[], &|_, _| vec![library::pattern("tank", size).expect("pattern")]);
+        let t = embedded::template();
+        let rest = t.personalise(&BodyShape::default());
+        let pose = arms_down(&t, &rest);
+        let (mut bones, mut body) = (tryon::body::BoneTransforms::default(), Vec::new());
+        pose.bones(t.skeleton(), &rest, &mut bones);
+        tryon::body::skin(tryon::par::Par::Seq, &rest.vertices, t.weights(), &bones, &mut body);
+        let mut probe = FitProbe::new(&t, &d.model).expect("probe");
+        let map = probe.measure(&d.model, &d.state, &body).expect("fit").remove(0);
+        assert!(probe.measure(&d.model, &d.state, &body[1..]).is_err(), "a body of another size is refused");
+        map
+    };
+    let (small, large) = (worn(Size::Xs), worn(Size::Xxl));
+    let chest = |m: &tryon::dressing::FitMap| m.regions.iter().find(|r| r.name == "chest").expect("a chest").clone();
+    let (s, l) = (chest(&small), chest(&large));
+    eprintln!("XS {s:?}\nXXL {l:?}");
+    assert!(s.stretch[0] > l.stretch[0] + 0.01 && s.gap < l.gap && s.pressure[0] > l.pressure[0]);
+    assert_eq!(s.fit, Fit::Tight);
+    assert_ne!(l.fit, Fit::Tight);
 }
 
 #[test]

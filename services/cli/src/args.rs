@@ -176,10 +176,12 @@ pub(crate) struct CompositeArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct ImportArgs {
-    /// A body (.npz in SMPL layout), a garment mesh (.obj, .glb), or a recording (.mcap or folder).
+    /// A body (.npz in SMPL layout), a garment (.obj with or without stitches, .glb, MakeHuman's .mhclo, a sewing pattern
+    /// of ours or GarmentCode's .json), a measured fabric (.json), or a recording (.mcap or folder).
     #[arg(value_name = "FILE")]
     pub(crate) input: PathBuf,
-    /// Where to write the checked copy (.obj or .glb for bodies and garments, .mcap or a folder for recordings).
+    /// Where to write the checked copy (.obj or .glb for bodies and garments, .json for patterns, .mcap or a folder for
+    /// recordings).
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
 }
@@ -195,6 +197,12 @@ pub(crate) struct ExportArgs {
     /// Garment size.
     #[arg(long, default_value = "M", value_name = "SIZE")]
     pub(crate) size: String,
+    /// The garment as worn by the embedded body instead of flat as cut.
+    #[arg(long)]
+    pub(crate) worn: bool,
+    /// With --worn: this many seconds of the try-on routine as animation (.glb).
+    #[arg(long, default_value_t = 0.0, value_name = "S", requires = "worn")]
+    pub(crate) seconds: f64,
     /// List what can be exported.
     #[arg(long)]
     pub(crate) list: bool,

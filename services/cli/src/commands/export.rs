@@ -4,12 +4,16 @@ use crate::args::ExportArgs;
 use anyhow::{Context, Result, bail};
 use std::path::Path;
 use std::process::ExitCode;
-use tryon::body::embedded;
-use tryon::formats::gltf::{GlbMesh, write_glb};
+use tryon::body::{BoneTransforms, Pose, embedded, skin};
+use tryon::cloth::realtime;
+use tryon::dressing::{DressOptions, dress};
+use tryon::formats::gltf::{GlbMesh, write_glb, write_glb_motion};
 use tryon::formats::obj::write_obj;
-use tryon::garment::{GarmentMesh, Size, Triangulation, library};
-use tryon::math::P3;
+use tryon::garment::{GarmentMesh, Pattern, Size, Triangulation, library};
+use tryon::math::{P3, World};
 use tryon::mesh::Face;
+use tryon::par::Par;
+use tryon::synth::{Sequence, Setting, Shopper};
 
 /// Runs the command.
 ///
@@ -30,6 +34,8 @@ pub(crate) fn run(args: &ExportArgs) -> Result<ExitCode> {
         let pattern = library::pattern(what, size)?;
         if out.extension().is_some_and(|e| e == "json") {
             std::fs::write(out, pattern.to_json()).with_context(|| format!("cannot write {}", out.display()))?;
+        } else if args.worn {
+            worn(out, &pattern, args.seconds)?;
         } else {
             // Flat, as cut: the rest shape is the panels laid out side by side.
             let g = GarmentMesh::sew(&pattern, &Triangulation::default())?;
@@ -39,6 +45,57 @@ pub(crate) fn run(args: &ExportArgs) -> Result<ExitCode> {
     }
     println!("{what} in {}", out.display());
     Ok(ExitCode::SUCCESS)
+}
+
+/// Frames a second of an exported animation.
+const FRAMES: f64 = 30.0;
+
+/// The garment on the embedded body: still, or moving with the try-on routine for some seconds.
+fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
+    let sequence = Sequence::new(Shopper::default(), Setting::default());
+    let template = embedded::template();
+    let rest = sequence.rest();
+    let pose = |i: u64| -> Pose<World> {
+        let p = sequence.truth(i).pose;
+        Pose { root: sequence.setting().world_from_camera * p.root, angles: p.angles }
+    };
+    let dressed = dress(&template, rest, &pose(0), std::slice::from_ref(pattern), &DressOptions::default())?;
+    let (model, mut state, mut work) = (dressed.model, dressed.state, realtime::Workspace::default());
+    let garment = &model.outfit.garments[0];
+    let drawn = |state: &realtime::State| {
+        let mut p = Vec::new();
+        garment.render_positions(&state.garments[0].positions, &mut p);
+        p
+    };
+    let start = drawn(&state);
+    let count = (seconds.clamp(0.0, 60.0) * FRAMES) as u64;
+    if count == 0 || out.extension().is_none_or(|e| e != "glb") {
+        return mesh(
+            out,
+            &garment.name,
+            &start,
+            &garment.render.faces,
+            &garment.render.uv,
+            crate::chain::look(&garment.name).base,
+        );
+    }
+    let bar = crate::input::progress(Some(count), "simulating");
+    let mut frames = Vec::new();
+    let mut body = Vec::new();
+    for i in 0..count {
+        let mut bones = BoneTransforms::default();
+        pose(i).bones(template.skeleton(), rest, &mut bones);
+        skin(Par::Rayon, &rest.vertices, template.weights(), &bones, &mut body);
+        realtime::step(&model, &mut state, &realtime::Input { body: &body, dt: 1.0 / FRAMES }, &mut work)?;
+        frames.push(drawn(&state));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let name = garment.name.as_str();
+    let color = crate::chain::look(name).base;
+    let m = GlbMesh { name, vertices: &start, faces: &garment.render.faces, uv: &garment.render.uv, color };
+    write_glb_motion(out, &[m], &[frames], (1.0 / FRAMES) as f32)?;
+    Ok(())
 }
 
 /// Writes a mesh in the format that the ending names.

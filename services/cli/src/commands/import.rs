@@ -3,12 +3,18 @@
 use super::{export::mesh, record::Sink};
 use crate::args::ImportArgs;
 use crate::input;
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use std::process::ExitCode;
+use tryon::formats::fabric_json::parse_fabric;
+use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
 use tryon::formats::gltf::read_glb;
+use tryon::formats::mhclo::read_mhclo;
 use tryon::formats::obj::read_obj;
 use tryon::formats::open_recording;
-use tryon::garment::{GarmentMesh, Pattern, Triangulation};
+use tryon::formats::sewn_obj::read_sewn_obj;
+use tryon::garment::import::{from_garmentcode, from_mesh};
+use tryon::garment::{GarmentKind, GarmentMesh, Material, Pattern, Size, Triangulation};
+use tryon::math::P3;
 use tryon::mesh::Topology;
 
 /// Colour of imported meshes without their own.
@@ -40,7 +46,15 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
         }
         "obj" | "glb" | "gltf" => {
             let (vertices, faces, uv, surface) = if ending == "obj" {
-                let o = read_obj(path)?;
+                let sewn = read_sewn_obj(path)?;
+                if !sewn.stitches.is_empty() {
+                    let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or("garment");
+                    let g = from_mesh(&sewn, name, GarmentKind::Dress, Material::preset("cotton")?)?;
+                    let (n, panels) = (g.garment.vertices, g.garment.panels.len());
+                    let s = sewn.stitches.len();
+                    println!("sewn garment: {panels} panels, {s} stitches, {n} vertices, {} closed", g.closed);
+                }
+                let o = sewn.obj;
                 let (v, t, f, _) = o.unwelded();
                 (v, f, t, o.mesh)
             } else {
@@ -60,18 +74,18 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
                 mesh(out, "garment", &vertices, &faces, &uv, GREY)?;
             }
         }
-        "json" => {
-            let text = std::fs::read_to_string(path)?;
-            let pattern = Pattern::from_json(&text)?;
-            let g = GarmentMesh::sew(&pattern, &Triangulation::default())?;
-            println!(
-                "garment: {} panels, {} seams, {} vertices",
-                pattern.panels.len(),
-                pattern.seams.len(),
-                g.vertices
-            );
+        "json" => json(args)?,
+        "mhclo" => {
+            let m = read_mhclo(path)?;
+            let o = read_obj(&path.with_file_name(&m.obj_file))?;
+            let (bound, has) = (m.bindings.len(), o.mesh.vertices().len());
+            if bound != has {
+                bail!("{}: {bound} vertices are bound, but {} has {has}", path.display(), m.obj_file);
+            }
+            println!("clothes `{}` for {}: {bound} vertices, hides {} of the body", m.name, m.base, m.deleted.len());
             if let Some(out) = &args.out {
-                std::fs::write(out, pattern.to_json())?;
+                let (v, t, f, _) = o.unwelded();
+                mesh(out, &m.name, &v, &f, &t, GREY)?;
             }
         }
         "mcap" | "" => recording(args)?,
@@ -81,6 +95,49 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
         ),
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// A sewing pattern, GarmentCode's or ours, or a measured fabric.
+fn json(args: &ImportArgs) -> Result<()> {
+    let path = &args.input;
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or("garment");
+    if text.contains("\"stretching\"") {
+        let m = Material::from_measured(name, &parse_fabric(&text, path)?)?;
+        println!(
+            "fabric `{name}`: {:.0} g/m², warp {:.0}, weft {:.0}, shear {:.0} N/m, bending {:.1e} N·m",
+            m.area_density * 1e3,
+            m.stretch_warp,
+            m.stretch_weft,
+            m.shear,
+            m.bending
+        );
+        return Ok(());
+    }
+    let pattern = if is_garmentcode(&text) {
+        from_garmentcode(&parse_garmentcode(&text, path)?, name, Size::M, Material::preset("cotton")?)
+    } else {
+        Pattern::from_json(&text)
+    }
+    .with_context(|| path.display().to_string())?;
+    let g = GarmentMesh::sew(&pattern, &Triangulation::default()).with_context(|| path.display().to_string())?;
+    println!(
+        "garment: {} panels, {} seams, {} darts, {} vertices, smallest angle {:.0}°",
+        pattern.panels.len(),
+        pattern.seams.len(),
+        pattern.darts.len(),
+        g.vertices,
+        g.min_angle
+    );
+    match &args.out {
+        Some(out) if out.extension().is_some_and(|e| e == "json") => std::fs::write(out, pattern.to_json())?,
+        Some(out) => {
+            let flat: Vec<P3> = g.render.uv.iter().map(|p| P3::new(p[0], p[1], 0.0)).collect();
+            mesh(out, name, &flat, &g.render.faces, &g.render.uv, GREY)?;
+        }
+        None => {}
+    }
+    Ok(())
 }
 
 fn recording(args: &ImportArgs) -> Result<()> {
