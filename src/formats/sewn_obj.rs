@@ -1,4 +1,5 @@
-//! OBJ files of sewn garments: `stitch V A B T` lines tie vertex V to the point T of the way from A to B.
+//! OBJ files of sewn garments (Codim-IPC's): `stitch V A B T` lines tie vertex V to the point T of the way from A to B.
+//! Unlike faces, stitches count vertices from 0.
 
 use super::FormatError;
 use super::image::read_limited;
@@ -52,8 +53,8 @@ pub fn parse_sewn_obj(text: &str, origin: &Path) -> Result<SewnObj, FormatError>
             return Err(at(format!("{} numbers; a vertex, an edge's two ends and a share are needed", words.len())));
         };
         let vertex = |w: &str| match w.parse::<usize>() {
-            Ok(k) if (1..=n).contains(&k) => Ok((k - 1) as u32),
-            _ => Err(at(format!("vertex `{w}` does not exist (the file has {n}, counted from 1)"))),
+            Ok(k) if k < n => Ok(k as u32),
+            _ => Err(at(format!("vertex `{w}` does not exist (the file has {n}, in stitches counted from 0)"))),
         };
         let share = t.parse::<f32>().ok().filter(|t| (0.0..=1.0).contains(t));
         let share = share.ok_or_else(|| at(format!("`{t}` is no share between 0 and 1")))?;
@@ -66,13 +67,13 @@ pub fn parse_sewn_obj(text: &str, origin: &Path) -> Result<SewnObj, FormatError>
 mod tests {
     use super::*;
 
-    const TEXT: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nf 1 2 3\nf 4 5 6\nstitch 4 1 2 0.25\n";
+    const TEXT: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nf 1 2 3\nf 4 5 6\nstitch 3 0 1 0.25\n";
 
     #[test]
     fn stitches_are_read_and_faults_named() {
         let parse = |t: &str| parse_sewn_obj(t, Path::new("d.obj")).map_err(|e| e.to_string());
         assert_eq!(parse(TEXT).expect("valid").stitches, [Stitch { vertex: 3, edge: [0, 1], at: 0.25 }]);
-        let e = parse(&TEXT.replace("stitch 4", "stitch 9")).expect_err("vertex");
+        let e = parse(&TEXT.replace("stitch 3", "stitch 9")).expect_err("vertex");
         assert!(e.contains("line 9: stitch 0") && e.contains("`9`"), "{e}");
         assert!(parse(&TEXT.replace("0.25", "1.5")).expect_err("share").contains("1.5"));
         for cut in 0..TEXT.len() {

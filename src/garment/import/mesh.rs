@@ -3,7 +3,7 @@
 use crate::formats::sewn_obj::{SewnObj, Stitch};
 use crate::garment::{GarmentError, GarmentKind, GarmentMesh, Material, Region, RenderMesh, Size};
 use crate::math::P3;
-use crate::mesh::{Face, Topology, TriMesh};
+use crate::mesh::{Face, Topology};
 
 /// A mesh garment and where its vertices are in the file.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +14,8 @@ pub struct MeshGarment {
     pub positions: Vec<P3>,
     /// Triangles that welding closed to a line; left out.
     pub closed: usize,
+    /// Stitches left open because three and more layers meet there (pleats); the simulator needs a proper surface.
+    pub open: usize,
 }
 
 /// Texture coordinates count as a flat rest shape when the median edge has its length in space within this share.
@@ -21,7 +23,8 @@ const SAME_SCALE: f64 = 0.05;
 /// Rest triangles smaller than this are refused, m².
 const SMALLEST: f64 = 1e-9;
 
-/// Makes a garment of a mesh. Stitches within an edge are moved to its nearer end.
+/// Makes a garment of a mesh. Stitches within an edge are moved to its nearer end; those
+/// that would join three layers along an edge are left open.
 ///
 /// # Errors
 /// Names the triangle without area, or the edge where welding makes the surface improper.
@@ -35,7 +38,7 @@ pub fn from_mesh(
     let topology = Topology::new(mesh)?;
     let (piece, pieces) = topology.components();
     let flat = flat_rest(sewn);
-    let welded = weld(mesh.vertices().len(), &sewn.stitches);
+    let (welded, open) = weld_properly(mesh.vertices().len(), mesh.faces(), &sewn.stitches);
     let vertices = welded.iter().max().map_or(0, |m| *m as usize + 1);
     let mut sums = vec![(nalgebra::Vector3::<f32>::zeros(), 0.0f32); vertices];
     for (p, w) in mesh.vertices().iter().zip(&welded) {
@@ -108,7 +111,7 @@ pub fn from_mesh(
         min_angle,
     };
     garment.topology()?;
-    Ok(MeshGarment { garment, positions, closed })
+    Ok(MeshGarment { garment, positions, closed, open })
 }
 
 /// Rest triangles from texture coordinates, when these are panels in metres.
@@ -148,6 +151,44 @@ fn smallest_angle(t: &[[f64; 2]; 3]) -> f64 {
             (u[0] * v[1] - u[1] * v[0]).abs().atan2(u[0] * v[0] + u[1] * v[1]).to_degrees()
         })
         .fold(180.0, f64::min)
+}
+
+/// Welds all stitches but those that make an edge with more than two faces, and says how many these are.
+fn weld_properly(n: usize, faces: &[Face], stitches: &[Stitch]) -> (Vec<u32>, usize) {
+    /// Rounds of taking stitches out; each opens every improper edge that is left.
+    const ROUNDS: usize = 30;
+    let mut active = stitches.to_vec();
+    let mut welded = weld(n, &active);
+    for _ in 0..ROUNDS {
+        let mut uses: std::collections::BTreeMap<(u32, u32), [u32; 2]> = std::collections::BTreeMap::new();
+        for f in faces {
+            let w = f.map(|v| welded[v as usize]);
+            if w[0] == w[1] || w[1] == w[2] || w[0] == w[2] {
+                continue;
+            }
+            for k in 0..3 {
+                let (a, b) = (w[k], w[(k + 1) % 3]);
+                uses.entry((a.min(b), a.max(b))).or_default()[usize::from(a < b)] += 1;
+            }
+        }
+        // A proper edge is used once in each direction.
+        let bad: std::collections::BTreeSet<u32> =
+            uses.iter().filter(|(_, u)| u[0] > 1 || u[1] > 1).flat_map(|((a, b), _)| [*a, *b]).collect();
+        let before = active.len();
+        let mut opened = std::collections::BTreeSet::new();
+        // One stitch of each improper vertex a round, the last in the file.
+        for k in (0..active.len()).rev() {
+            let at = welded[active[k].vertex as usize];
+            if bad.contains(&at) && opened.insert(at) {
+                active.remove(k);
+            }
+        }
+        if active.len() == before {
+            break;
+        }
+        welded = weld(n, &active);
+    }
+    (welded, stitches.len() - active.len())
 }
 
 /// Consecutive numbers of vertices after welding each stitched vertex to the nearer end of its edge.
@@ -199,7 +240,7 @@ mod tests {
     /// Two unit squares beside each other, texture coordinates as in space.
     const SQUARES: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 0 .1\nv 2 0 .1\nv 2 1 .1\nv 1 1 .1\n\
         vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt 5 0\nvt 6 0\nvt 6 1\nvt 5 1\n\
-        f 1/1 2/2 3/3 4/4\nf 5/5 6/6 7/7 8/8\nstitch 5 2 3 0\nstitch 8 2 3 0.9\n";
+        f 1/1 2/2 3/3 4/4\nf 5/5 6/6 7/7 8/8\nstitch 4 1 2 0\nstitch 7 1 2 0.9\n";
 
     #[test]
     fn stitched_panels_become_one_surface_with_flat_rest() {

@@ -52,7 +52,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
                     let g = from_mesh(&sewn, name, GarmentKind::Dress, Material::preset("cotton")?)?;
                     let (n, panels) = (g.garment.vertices, g.garment.panels.len());
                     let s = sewn.stitches.len();
-                    println!("sewn garment: {panels} panels, {s} stitches, {n} vertices, {} closed", g.closed);
+                    println!("sewn garment: {panels} panels, {s} stitches ({} left open), {n} vertices", g.open);
                 }
                 let o = sewn.obj;
                 let (v, t, f, _) = o.unwelded();
