@@ -87,9 +87,9 @@ fn follow(s: &Sequence, which: impl Iterator<Item = usize>, mut change: impl FnM
 
 /// The bar of the first version is 40 mm; these are about a quarter above what was measured.
 const SEQUENCES: [(&str, usize, f64); 3] = [
-    ("sequences/charleston_m_heavy_tof_room", 156, 14.0),
-    ("sequences/jacks_f_avg_kinect1_room", 180, 18.0),
-    ("sequences/sword_m_tall_tof_noroom_upper", 150, 36.0),
+    ("sequences/charleston_m_heavy_tof_room", 156, 8.0),
+    ("sequences/jacks_f_avg_kinect1_room", 180, 10.5),
+    ("sequences/sword_m_tall_tof_noroom_upper", 150, 24.0),
 ];
 
 #[test]
@@ -108,10 +108,6 @@ fn corrupt_pixels_and_dropped_frames_cost_little() {
     let clean = follow(&s, 0..90, |_, _| {});
     let values = [0u16, u16::MAX, 500, 3100];
     let spoiled = follow(&s, 0..90, |i, d| {
-        // From a start in such a picture it is not found yet (docs/hindsight.md): the first half second is clean.
-        if i < 15 {
-            return;
-        }
         for (k, v) in d.data_mut().iter_mut().enumerate() {
             // A tenth of all pixels, other ones in each frame.
             if (k * 7919 + i * 104_729) % 1000 < 100 {
@@ -222,5 +218,5 @@ fn a_still_of_a_real_woman_fits() {
     }
     let report = last.expect("ten steps");
     eprintln!("residual {:.1} mm, explained {:.2}", report.residual_mm, report.explained);
-    assert!(state.status.is_live() && report.residual_mm < 12.0 && report.explained > 0.8, "{report:?}");
+    assert!(state.status.is_live() && report.residual_mm < 8.0 && report.explained > 0.8, "{report:?}");
 }
