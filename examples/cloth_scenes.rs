@@ -15,6 +15,9 @@ fn main() {
         c.method = match m.as_str() {
             "small" => Method::SmallSteps,
             "qn" => Method::QuasiNewton,
+            "bdf2" => Method::QuasiNewtonBdf2,
+            "xpbd" => Method::Xpbd,
+            "springs" => Method::MassSpring,
             _ => panic!(),
         };
     }

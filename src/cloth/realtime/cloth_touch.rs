@@ -73,6 +73,9 @@ impl ClothTouch<'_> {
         let thickness = self.model.config.thickness as f32;
         let (g, s) = (&self.model.garments[garment], &self.sheets[garment]);
         for (i, &v) in f.vertices.iter().enumerate() {
+            if p.tied[i] {
+                continue;
+            }
             let Some(hit) = fold(g, s, v, &place(p, i)) else { continue };
             // Which side it is on now is the side it stays on, and folds nearer than their thickness are not thrown
             // apart. Both move on as they do on average: an impact without bounce.
@@ -91,6 +94,9 @@ impl ClothTouch<'_> {
         }
         let thickness = self.model.config.thickness as f32;
         for i in 0..f.vertices.len() {
+            if p.tied[i] || p.on_skin[i] {
+                continue;
+            }
             let x = place(p, i);
             for outer in garment + 1..self.model.garments.len() {
                 let (g, s) = (&self.model.garments[outer].surface, &self.sheets[outer]);

@@ -57,6 +57,9 @@ pub struct Config {
     pub self_collision: bool,
     /// Distance between cloth and cloth, metres.
     pub thickness: f64,
+    /// Skin further than this from cloth beyond its distance is left out until the next search, metres; what it moves
+    /// in between is added. Large while panels are being sewn, which pulls cloth faster than anything later.
+    pub reach: f64,
     /// Let cloth sleep when it and the body are still.
     pub sleep: bool,
     /// A body vertex that moves further than this between two calls has jumped, metres.
@@ -79,6 +82,7 @@ impl Default for Config {
             layers: true,
             self_collision: true,
             thickness: 0.003,
+            reach: 0.008,
             sleep: true,
             teleport: 0.2,
             par: crate::par::Par::Rayon,

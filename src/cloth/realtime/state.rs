@@ -127,6 +127,8 @@ pub struct StepReport {
     pub penetration_left: f64,
     /// Vertices in contact.
     pub contacts: usize,
+    /// Root mean square speed of the fastest garment at the end, m/s.
+    pub speed: f64,
     /// Vertices that were not simulated because cloth and body were still.
     pub sleeping: usize,
     /// Searches for the nearest skin that were left out because the vertex was too far away to reach it.
@@ -184,8 +186,12 @@ pub(super) struct PatchScratch {
     pub(super) clear: Vec<[f32; 2]>,
     pub(super) layers: Vec<Vec<u32>>,
     pub(super) planes: Vec<Plane>,
-    /// How many of the planes, the first ones, are of cloth.
-    pub(super) cloth_planes: usize,
+    /// How many of the planes, the first ones, are the body's.
+    pub(super) body_planes: usize,
+    /// Vertices that lie on the skin: no outer layer presses them further.
+    pub(super) on_skin: Vec<bool>,
     pub(super) ties: Vec<Tie>,
+    /// Vertices whose place is given: nothing else may push them.
+    pub(super) tied: Vec<bool>,
     pub(super) report: StepReport,
 }

@@ -17,12 +17,21 @@ const FASTEST: f32 = 12.0;
 const DT_RANGE: [f64; 2] = [1e-4, 0.1];
 /// Time between two searches for contacts, s: at 3 m/s a limb moves 25 mm, half of what a search reaches.
 const SEARCH: f64 = 1.0 / 120.0;
+/// The same for a body none of which is faster than [`CALM`]: half as often.
+const CALM_SEARCH: f64 = 1.0 / 60.0;
+/// m/s.
+const CALM: f32 = 1.0;
 /// Cloth slower than this on average is still, m/s.
 const STILL_SPEED: f32 = 0.02;
 /// A body that has moved less than this since the cloth was last computed is still, metres.
 const STILL_BODY: f32 = 1e-3;
 /// Calls with everything still before the cloth falls asleep.
 const STILL_FRAMES: u32 = 10;
+
+/// Sunken cloth comes out of the body at this speed at most, m/s: faster, and a body that closes on itself throws it.
+const RECOVERY: f32 = 1.0;
+/// The same for cloth in cloth, where the body may be in the way.
+const CLOTH_RECOVERY: f32 = 0.3;
 
 fn ms(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
@@ -89,7 +98,9 @@ pub fn step(
     let fastest = moved(&state.body) / dt as f32;
     report.stages_ms.contact = ms(timer);
     begin(model, state, &mut work.patches);
-    let rounds = (dt / SEARCH).ceil().max(1.0) as usize;
+    let search = if fastest < CALM { CALM_SEARCH } else { SEARCH };
+    // A hair less, so that 1/30 s are two rounds and not three.
+    let rounds = (dt / search - 1e-3).ceil().max(1.0) as usize;
     let span = dt / rounds as f64;
     for r in 0..rounds {
         let timer = Instant::now();
@@ -107,14 +118,13 @@ pub fn step(
         sheets(model, &work.patches, &mut work.sheets);
         let cloth = ClothTouch { model, sheets: &work.sheets };
         for_patches(model, &mut work.patches, |g, k, p| {
-            // In this order: the body has the last word.
-            p.planes.clear();
+            anchors(model, g, k, &touch, p);
             let fabric = &model.garments[g].patches[k];
+            p.planes.clear();
+            touch.find(g, fabric, maps, p);
+            p.body_planes = p.planes.len();
             cloth.folds(g, fabric, p);
             cloth.layers(g, fabric, p);
-            p.cloth_planes = p.planes.len();
-            touch.find(g, fabric, maps, p);
-            anchors(model, g, k, &touch, &mut p.ties);
         });
         report.stages_ms.contact += ms(timer);
         let timer = Instant::now();
@@ -125,8 +135,9 @@ pub fn step(
     for_patches(model, &mut work.patches, |g, k, p| settle(model, g, k, &work.after, p));
     report.stages_ms.contact += ms(timer);
     let timer = Instant::now();
-    let speed = finish(model, state, &work.patches, &mut report);
+    let speed = finish(model, state, &work.patches, dt, &mut report);
     report.steps = model.garments.iter().map(|g| rounds * steps(g.h, span)).max().unwrap_or(0);
+    report.speed = f64::from(speed);
     state.stale = if report.kept_last_good.is_some() { state.stale + 1 } else { 0 };
     state.still = if speed < STILL_SPEED && moved(&state.awake_body) < STILL_BODY { state.still + 1 } else { 0 };
     if state.still == 0 {
@@ -215,9 +226,10 @@ fn advance(model: &Model, all: &mut [PatchScratch], span: f64) {
                     let t = s as f32 * h;
                     p.motion.accelerate(f, h, ahead, gravity);
                     p.motion.tie(&p.ties, t, h);
-                    let (cloth, body) = p.planes.split_at(p.cloth_planes);
-                    p.motion.restrain(cloth, t, h);
-                    p.report.contacts = p.motion.restrain(body, t, h);
+                    // In this order: the body has the last word.
+                    let (body, cloth) = p.planes.split_at(p.body_planes);
+                    p.motion.restrain(cloth, t, h, CLOTH_RECOVERY);
+                    p.report.contacts = p.motion.restrain(body, t, h, RECOVERY);
                     p.motion.advance(h);
                 }
             });
@@ -232,7 +244,7 @@ fn advance(model: &Model, all: &mut [PatchScratch], span: f64) {
 }
 
 /// Takes positions over unless one is not finite; returns the fastest garment's mean speed, m/s.
-fn finish(model: &Model, state: &mut State, all: &[PatchScratch], report: &mut StepReport) -> f32 {
+fn finish(model: &Model, state: &mut State, all: &[PatchScratch], dt: f64, report: &mut StepReport) -> f32 {
     let mut fastest = 0.0f32;
     let mut at = 0;
     for (k, m) in model.garments.iter().enumerate() {
@@ -265,7 +277,9 @@ fn finish(model: &Model, state: &mut State, all: &[PatchScratch], report: &mut S
                         *to = *from;
                     }
                 }
-                sum += f64::from(speed * speed);
+                // How far it came: between planes that contradict each other a vertex has a speed and stays.
+                let way = p.motion.moved[i].dot(p.motion.moved[i]);
+                sum += f64::from(way) / (dt * dt);
             }
             let r = &p.report;
             report.contacts += r.contacts;

@@ -8,6 +8,8 @@ use crate::math::{P3, V3};
 
 /// Surfaces further than this from a vertex are not looked at in a round, metres.
 const REACH: f32 = 0.04;
+/// Cloth that is not higher than this above its distance from the skin lies on it, metres.
+const ON_SKIN: f32 = 2e-3;
 /// Cloth that ends a call under the skin is put this far above it, metres: less than a fabric's thickness.
 const LIFTED: f32 = 5e-4;
 /// Anchors of strength ½ go to their place at this rate, 1/s.
@@ -40,7 +42,13 @@ impl Touch<'_> {
     pub(super) fn find(&self, garment: usize, f: &Fabric, maps: Option<&DepthMaps>, p: &mut PatchScratch) {
         let g = &self.model.garments[garment];
         let offset = g.offset as f32;
+        let reach = self.model.config.reach as f32;
+        p.on_skin.clear();
+        p.on_skin.resize(f.vertices.len(), false);
         for (i, &v) in f.vertices.iter().enumerate() {
+            if p.tied[i] {
+                continue;
+            }
             let masks = [g.own[v as usize], g.other[v as usize]];
             let x = p3(p.motion.position(i));
             let speed = p.motion.velocity[i].dot(p.motion.velocity[i]).sqrt();
@@ -65,7 +73,7 @@ impl Touch<'_> {
                     Err(room) => p.clear[i][k] = room,
                     Ok(c) => {
                         p.clear[i][k] = if c.rim { 0.0 } else { c.signed - REACH };
-                        if !c.rim && c.signed < REACH {
+                        if !c.rim && c.signed < (offset + reach + travel).min(REACH) {
                             found[k] = Some(c);
                         }
                     }
@@ -79,6 +87,7 @@ impl Touch<'_> {
                     p.report.pinched += 1;
                 }
             }
+            p.on_skin[i] = found.iter().flatten().any(|c| c.signed < offset + ON_SKIN);
             for c in found.iter().rev().flatten() {
                 let corners = self.model.surface.faces()[c.face as usize];
                 let speed = (0..3).fold(V3::zeros(), |s, j| {
@@ -114,9 +123,11 @@ impl Touch<'_> {
 }
 
 /// Where a patch's anchors go during a round.
-pub(super) fn anchors(model: &Model, garment: usize, patch: usize, touch: &Touch<'_>, out: &mut Vec<Tie>) {
-    out.clear();
+pub(super) fn anchors(model: &Model, garment: usize, patch: usize, touch: &Touch<'_>, p: &mut PatchScratch) {
+    p.ties.clear();
+    p.tied.clear();
     let g = &model.garments[garment];
+    p.tied.resize(g.patches[patch].vertices.len(), false);
     for (local, a) in model.anchors_of(garment, patch) {
         if a.strength <= 0.0 {
             continue;
@@ -129,7 +140,8 @@ pub(super) fn anchors(model: &Model, garment: usize, patch: usize, touch: &Touch
         let end = above(a, moving);
         let firmness =
             if a.strength >= 1.0 { 1.0 } else { 1.0 - (-g.h * ANCHOR_RATE * a.strength / (1.0 - a.strength)).exp() };
-        out.push(Tie {
+        p.tied[local as usize] = a.strength >= 1.0;
+        p.ties.push(Tie {
             vertex: local,
             place: v4(&start.coords),
             speed: v4(&((end - start) / touch.span)),

@@ -1,7 +1,7 @@
 //! Solvers that are kept to be compared with: XPBD with small steps, and the paper's implicit mass-spring step.
 
 use super::run::{Method, RunConfig, RunReport, deepest};
-use super::small::{look, v3d, v4};
+use super::small::{RECOVERY, look, v3d, v4};
 use super::{Scene, SceneError};
 use crate::cloth::ClothError;
 use crate::cloth::small_steps::{Fabric, Fit, Motion, Plan, Tie, V4, triangles};
@@ -93,7 +93,7 @@ pub(super) fn run(
                 }
                 Solver::Springs(springs) => springs.step(&mut m, &ties, h, &scene.gravity),
             }
-            m.restrain(&planes, 0.0, hf);
+            m.restrain(&planes, 0.0, hf, RECOVERY);
             m.tie(&ties, 0.0, hf);
             m.advance(hf);
         }

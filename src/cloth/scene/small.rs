@@ -18,6 +18,8 @@ pub(super) fn v3d(v: V4) -> V3d {
     V3d::new(f64::from(v.0[0]), f64::from(v.0[1]), f64::from(v.0[2]))
 }
 
+/// Sunken cloth comes out at this speed at most, m/s.
+pub(super) const RECOVERY: f32 = 1.0;
 /// Solids further than this from a vertex are not looked at until the next search, metres: 1/100 s at 3 m/s.
 const REACH: f64 = 0.03;
 
@@ -94,7 +96,7 @@ pub(super) fn run(
                     }
                     let t = (s - s0) as f32 * hf;
                     w.motion.accelerate(f, hf, ahead, gravity);
-                    w.motion.restrain(&w.planes, t, hf);
+                    w.motion.restrain(&w.planes, t, hf, RECOVERY);
                     w.motion.tie(&w.ties, t, hf);
                     w.motion.advance(hf);
                 }

@@ -30,15 +30,14 @@ pub struct Tie {
     pub firmness: f32,
 }
 
-/// Sunken cloth comes out at this speed at most, m/s: faster, and a body that closes on itself throws it.
-const RECOVERY: f32 = 1.0;
 /// Share of a penetration that one step takes away.
 const RECOVERED: f32 = 0.2;
 
 impl Motion {
     /// Takes from velocities what would lead through the planes by the end of a step of `h` that begins at time `t`;
-    /// Coulomb friction against the surface. Returns how many vertices were touched.
-    pub fn restrain(&mut self, planes: &[Plane], t: f32, h: f32) -> usize {
+    /// Coulomb friction against the surface. What is sunken comes out at `recovery` m/s at most.
+    /// Returns how many vertices were touched.
+    pub fn restrain(&mut self, planes: &[Plane], t: f32, h: f32, recovery: f32) -> usize {
         let mut touched = 0;
         for p in planes {
             let i = p.vertex as usize;
@@ -58,7 +57,7 @@ impl Motion {
                 touched += 1;
             }
             if gap < 0.0 {
-                self.moved[i] = self.moved[i] + p.normal.scale((-gap * RECOVERED).min(RECOVERY * h));
+                self.moved[i] = self.moved[i] + p.normal.scale((-gap * RECOVERED).min(recovery * h));
             }
         }
         touched

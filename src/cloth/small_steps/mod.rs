@@ -15,3 +15,6 @@ pub use contact::{Plane, Tie};
 pub use fabric::{Fabric, exchange};
 pub use motion::{Motion, V4};
 pub use plan::{Fit, Plan, triangles};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,312 @@
+//! Closed forms, invariants and stress of the small-step solver.
+
+use super::*;
+use crate::cloth::Sheet;
+use crate::garment::Material;
+use crate::math::{P3, V3d};
+use crate::mesh::Face;
+
+/// An isotropic sheet without air drag: 0.18 kg/m², 1000 N/m, Poisson 0.25.
+fn cotton(bending: f64) -> Material {
+    let mut m = Material::isotropic("test", 1000.0 / 3e-4, 0.25, 0.18 / 3e-4, 3e-4, "test");
+    (m.bending, m.damping) = (bending, 0.0);
+    m
+}
+
+/// `nx` × `ny` cells in the x–z plane.
+fn grid(nx: usize, ny: usize, dx: f64, dy: f64) -> (Vec<V3d>, Vec<Face>, Vec<[[f64; 2]; 3]>) {
+    let at = |i: usize, j: usize| (j * (nx + 1) + i) as u32;
+    let flat = |v: u32| [(v as usize % (nx + 1)) as f64 * dx, (v as usize / (nx + 1)) as f64 * dy];
+    let mut faces = Vec::new();
+    for j in 0..ny {
+        for i in 0..nx {
+            // Diagonals alternate, so that no direction is favoured.
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            faces.extend(if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] });
+        }
+    }
+    let rest = faces.iter().map(|f| f.map(flat)).collect();
+    let x = (0..((nx + 1) * (ny + 1)) as u32).map(|v| V3d::new(flat(v)[0], 0.0, flat(v)[1])).collect();
+    (x, faces, rest)
+}
+
+struct Lab {
+    sheet: Sheet,
+    plan: Plan,
+    fabrics: Vec<Fabric>,
+    motions: Vec<Motion>,
+    h: f64,
+    ahead: f32,
+    gravity: V4,
+}
+
+impl Lab {
+    fn new(sheet: Sheet, x: &[V3d], h: f64, patches: usize) -> Self {
+        let plan = Plan::new(&sheet, &Fit { h, ahead: 0.25, springs_only: false, bend_every: 4 });
+        let fabrics = plan.patches(patches, 14);
+        let mut lab =
+            Self { sheet, plan, fabrics, motions: Vec::new(), h, ahead: 0.25, gravity: V4::new(0.0, -9.81, 0.0) };
+        lab.place(x, &vec![V3d::zeros(); x.len()]);
+        lab
+    }
+    fn place(&mut self, x: &[V3d], v: &[V3d]) {
+        let v4 = |p: &V3d| V4::new(p.x as f32, p.y as f32, p.z as f32);
+        self.motions.resize_with(self.fabrics.len(), Motion::default);
+        for (m, f) in self.motions.iter_mut().zip(&self.fabrics) {
+            let all = || f.vertices.iter().map(|i| *i as usize);
+            m.begin(all().map(|i| v4(&x[i])), all().map(|i| v4(&v[i])));
+        }
+    }
+    fn gather(&self, of: impl Fn(&Motion, usize) -> V4) -> Vec<V3d> {
+        let mut out = vec![V3d::zeros(); self.sheet.mass.len()];
+        for (f, m) in self.fabrics.iter().zip(&self.motions) {
+            for i in 0..f.owned {
+                out[f.vertices[i] as usize] = V3d::from([0, 1, 2].map(|k| f64::from(of(m, i).0[k])));
+            }
+        }
+        out
+    }
+    fn positions(&self) -> Vec<V3d> {
+        self.gather(Motion::position)
+    }
+    fn velocities(&self) -> Vec<V3d> {
+        self.gather(|m, i| m.velocity[i])
+    }
+    /// `n` steps; `before` may change velocities of a patch before it moves.
+    fn run(&mut self, n: usize, before: impl Fn(&Fabric, &mut Motion, f32)) {
+        let h = self.h as f32;
+        let mut done = 0;
+        while done < n {
+            let block = 8.min(n - done);
+            for (f, m) in self.fabrics.iter().zip(&mut self.motions) {
+                for s in 0..block {
+                    if s % 4 == 0 {
+                        m.bend(f, 2.0 * h);
+                    }
+                    m.accelerate(f, h, self.ahead, self.gravity);
+                    before(f, m, h);
+                    m.advance(h);
+                }
+            }
+            exchange(&self.fabrics, &mut self.motions);
+            done += block;
+        }
+    }
+}
+
+fn hold(held: Vec<u32>) -> impl Fn(&Fabric, &mut Motion, f32) {
+    move |f, m, _| {
+        for (i, v) in f.vertices.iter().enumerate() {
+            if held.contains(v) {
+                m.velocity[i] = V4::default();
+            }
+        }
+    }
+}
+
+fn sheet(faces: &[Face], rest: &[[[f64; 2]; 3]], n: usize, m: &Material) -> Sheet {
+    Sheet::new(n, faces, rest, m, None).expect("a sheet")
+}
+
+#[test]
+fn edge_stiffness_is_hookes_law() {
+    // Small uniform strain of one skew triangle: the energy of the edges equals area times Hooke's energy density.
+    let rest = [[[0.0, 0.0], [0.03, 0.004], [0.011, 0.02]]];
+    let mut m = cotton(0.0);
+    m.stretch_warp *= 2.0;
+    let s = sheet(&[[0, 1, 2]], &rest, 3, &m);
+    let (v, k, length) = triangles(&s)[0];
+    for (xx, yy, xy) in [(1e-4, 0.0, 0.0), (0.0, 1e-4, 0.0), (0.0, 0.0, 1e-4), (2e-4, -1e-4, 5e-5)] {
+        let p = rest[0].map(|p| [p[0] * (1.0 + xx) + p[1] * xy, p[1] * (1.0 + yy) + p[0] * xy]);
+        let d = nalgebra::Vector3::from_fn(|i, _| {
+            let (a, b) = (p[(i + 1) % 3], p[(i + 2) % 3]);
+            (a[0] - b[0]).hypot(a[1] - b[1]) - length[i]
+        });
+        let edges = 0.5 * d.dot(&(k * d));
+        let x: Vec<V3d> = p.iter().map(|p| V3d::new(p[0], p[1], 0.0)).collect();
+        let exact = s.energy(&x);
+        assert!((edges - exact).abs() < 2e-3 * exact, "{xx} {yy} {xy}: {edges:e} {exact:e}");
+    }
+    assert_eq!(v, [0, 1, 2]);
+}
+
+#[test]
+fn free_fall_and_momentum_hold_to_rounding() {
+    let (x, faces, rest) = grid(8, 8, 0.02, 0.02);
+    let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &cotton(1e-5)), &x, 2e-4, 1);
+    // Crumpled and turning: inner forces must not move the centre of mass.
+    let wild: Vec<V3d> =
+        x.iter().map(|p| p + V3d::new(0.0, 0.004 * (p.x * 90.0).sin() * (p.z * 70.0).cos(), 0.0)).collect();
+    let spin: Vec<V3d> = wild.iter().map(|p| V3d::new(0.3, 2.0, -1.0).cross(p)).collect();
+    lab.place(&wild, &spin);
+    let mass: f64 = lab.sheet.mass.iter().sum();
+    let mean = |v: &[V3d]| v.iter().zip(&lab.sheet.mass).map(|(v, m)| v * (m / mass)).sum::<V3d>();
+    let (c0, v0) = (mean(&wild), mean(&spin));
+    let n = 2000;
+    lab.run(n, |_, _, _| {});
+    let mean = |v: &[V3d]| v.iter().zip(&lab.sheet.mass).map(|(v, m)| v * (m / mass)).sum::<V3d>();
+    let t = n as f64 * lab.h;
+    // Symplectic Euler falls g h² n (n + 1) / 2.
+    let fall = V3d::new(0.0, -9.81 * lab.h * lab.h * (n * (n + 1)) as f64 / 2.0, 0.0);
+    assert!((mean(&lab.positions()) - (c0 + v0 * t + fall)).norm() < 2e-5, "{}", mean(&lab.positions()));
+    assert!((mean(&lab.velocities()) - v0 - V3d::new(0.0, -9.81 * t, 0.0)).norm() < 2e-4);
+}
+
+#[test]
+fn a_hanging_strip_stretches_as_computed() {
+    // Width w, hung by its upper end, without sideways coupling: elongation ρ g L² / (2 E).
+    let (nx, ny, d) = (2, 20, 0.02);
+    let (x, faces, rest) = grid(nx, ny, d, d);
+    let mut m = cotton(0.0);
+    (m.coupling, m.shear, m.damping) = (0.0, 500.0, 20.0);
+    (m.stretch_warp, m.stretch_weft) = (1000.0, 1000.0);
+    // It hangs along z here: gravity along +z.
+    let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &m), &x, 1e-4, 1);
+    assert_eq!(lab.plan.soft_elements, 0);
+    lab.gravity = V4::new(0.0, 0.0, 9.81);
+    lab.run(20_000, hold((0..=nx as u32).collect()));
+    let y = lab.positions();
+    let long = y[y.len() - 1].z - ny as f64 * d;
+    let exact = 0.18 * 9.81 * (ny as f64 * d).powi(2) / (2.0 * 1000.0);
+    assert!((long - exact).abs() < 0.03 * exact, "{long:e} {exact:e}");
+}
+
+#[test]
+fn a_heavy_chain_hangs_in_a_catenary() {
+    // A long narrow strip between two points at 0.8 of its length; bending and stretch hardly matter.
+    let (nx, ny, d) = (1, 60, 0.01);
+    let (x, faces, rest) = grid(nx, ny, d, d);
+    let mut m = cotton(0.0);
+    m.damping = 8.0;
+    let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &m), &x, 1e-4, 1);
+    let length = ny as f64 * d;
+    let span = 0.8 * length;
+    let start: Vec<V3d> = x.iter().map(|p| V3d::new(p.x, -0.02 * (p.z / length * 3.14).sin(), p.z * 0.8)).collect();
+    lab.place(&start, &vec![V3d::zeros(); x.len()]);
+    let last = x.len() as u32;
+    lab.run(25_000, hold(vec![0, 1, last - 2, last - 1]));
+    // 2 a sinh(span / 2a) = length by bisection; sag a (cosh(span / 2a) − 1).
+    let (mut lo, mut hi) = (0.05, 5.0);
+    for _ in 0..80 {
+        let a: f64 = 0.5 * (lo + hi);
+        if 2.0 * a * (span / (2.0 * a)).sinh() > length { lo = a } else { hi = a }
+    }
+    let sag = lo * ((span / (2.0 * lo)).cosh() - 1.0);
+    let deepest = lab.positions().iter().map(|p| -p.y).fold(0.0, f64::max);
+    assert!((deepest - sag).abs() < 0.02 * sag, "{deepest} {sag}");
+}
+
+#[test]
+fn a_cantilever_bends_as_a_beam() {
+    // Small deflection: w = ρ g L⁴ / (8 D) at the free end; D so large that it is small. The quadratic hinges of
+    // Bergou et al. are not consistent on every triangulation: this one gives about half of the beam's deflection
+    // (0.53 measured; docs/hindsight.md), which is held here so that it does not drift.
+    let (nx, ny, d) = (4, 6, 0.01);
+    let (x, faces, rest) = grid(nx, ny, d, d);
+    let mut m = cotton(2e-4);
+    (m.damping, m.coupling) = (12.0, 0.0);
+    (m.shear, m.stretch_warp, m.stretch_weft) = (500.0, 1000.0, 1000.0);
+    let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &m), &x, 2.5e-5, 1);
+    // Two rows hold place and slope.
+    let row = nx as u32 + 1;
+    lab.run(40_000, hold((0..2 * row).collect()));
+    let y = lab.positions();
+    let free = y[y.len() - 3].y;
+    let length: f64 = (ny - 1) as f64 * d;
+    let exact = -0.18 * 9.81 * length.powi(4) / (8.0 * 2e-4);
+    assert!((0.45..0.62).contains(&(free / exact)), "{free:e} {exact:e}");
+}
+
+#[test]
+fn a_block_slides_as_coulomb_says() {
+    // On a plane at 30°: stays for μ above tan 30°, else accelerates with g (sin − μ cos).
+    let (x, faces, rest) = grid(3, 3, 0.02, 0.02);
+    let tilt = 30f64.to_radians();
+    let normal = V4::new(tilt.sin() as f32, tilt.cos() as f32, 0.0);
+    let down = V3d::new(tilt.cos(), -tilt.sin(), 0.0);
+    for (mu, expected) in [(0.7, 0.0), (0.3, 9.81 * (tilt.sin() - 0.3 * tilt.cos()))] {
+        let s = sheet(&faces, &rest, x.len(), &cotton(1e-5));
+        let mut lab = Lab::new(s, &x, 2e-4, 1);
+        let on: Vec<V3d> = x.iter().map(|p| down * p.x + V3d::new(0.0, 0.0, p.z)).collect();
+        lab.place(&on, &vec![V3d::zeros(); x.len()]);
+        let planes: Vec<Plane> = (0..x.len() as u32)
+            .map(|vertex| Plane { vertex, normal, level: 0.0, speed: V4::default(), friction: mu })
+            .collect();
+        let n = 2500;
+        lab.run(n, |_, m, h| {
+            m.restrain(&planes, 0.0, h, 1.0);
+        });
+        let v = lab.velocities().iter().sum::<V3d>().dot(&down) / x.len() as f64;
+        assert!((v - expected * n as f64 * lab.h).abs() < 5e-3, "μ {mu}: {v}");
+        assert!(lab.positions().iter().all(|p| p.dot(&V3d::new(tilt.sin(), tilt.cos(), 0.0)) > -1e-5));
+    }
+}
+
+#[test]
+fn patches_give_the_same_motion_and_threads_the_same_bits() {
+    let (x, faces, rest) = grid(24, 24, 0.02, 0.02);
+    let make = |patches| {
+        let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &cotton(1e-5)), &x, 2e-4, patches);
+        lab.run(800, hold(vec![0, 24]));
+        lab.positions()
+    };
+    let (one, three) = (make(1), make(3));
+    let apart = one.iter().zip(&three).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    assert!(apart < 1e-4, "rounding only: {apart}");
+    let again = make(3);
+    assert!(three.iter().zip(&again).all(|(a, b)| a == b));
+}
+
+#[test]
+fn slivers_and_stiffness_ratios_stay_stable() {
+    // Aspect 1:1000 in one direction, and a sheet a million times stiffer along than across.
+    let slivers = grid(3, 40, 0.02, 0.02 / 1000.0 * 10.0);
+    let mut stiff = cotton(1e-5);
+    (stiff.stretch_warp, stiff.shear, stiff.coupling) = (1e6, 1.0, 0.0);
+    stiff.stretch_weft = 2.0;
+    let even = grid(12, 12, 0.02, 0.02);
+    for ((x, faces, rest), m) in [(slivers, cotton(1e-3)), (even, stiff)] {
+        let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &m), &x, 2e-4, 1);
+        assert!(lab.plan.softened < 1.0 && lab.plan.soft_elements > 0);
+        lab.run(5000, hold(vec![0, 1]));
+        let y = lab.positions();
+        assert!(y.iter().all(|p| p.norm() < 20.0), "it neither explodes nor becomes NaN");
+    }
+}
+
+#[test]
+fn a_sheet_at_rest_stays_and_a_swinging_one_gains_nothing() {
+    let (x, faces, rest) = grid(6, 6, 0.02, 0.02);
+    let mut airy = cotton(1e-5);
+    airy.damping = 1.0;
+    let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &airy), &x, 2e-4, 1);
+    lab.gravity = V4::default();
+    lab.run(100_000, |_, _, _| {});
+    let moved = lab.positions().iter().zip(&x).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    assert!(moved < 2e-5, "drift {moved}");
+    let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &cotton(1e-5)), &x, 2e-4, 1);
+    // Pinned at two corners for 10 s: energy never rises above that of the start.
+    lab.gravity = V4::new(0.0, -9.81, 0.0);
+    for _ in 0..25 {
+        lab.run(2000, hold(vec![0, 6]));
+        let (y, v) = (lab.positions(), lab.velocities());
+        let e: f64 = lab.sheet.energy(&y)
+            + (0..y.len()).map(|i| lab.sheet.mass[i] * (0.5 * v[i].norm_squared() + 9.81 * y[i].y)).sum::<f64>();
+        assert!(e < 1e-5, "energy {e}");
+    }
+}
+
+#[test]
+fn a_curved_rest_shape_keeps_its_bend() {
+    // A cylinder segment stays when nothing pulls.
+    let (flat, faces, rest) = grid(10, 4, 0.01, 0.01);
+    let r = 0.05;
+    let x: Vec<V3d> = flat.iter().map(|p| V3d::new(r * (p.x / r).sin(), r * (p.x / r).cos(), p.z)).collect();
+    let points: Vec<P3> = x.iter().map(|p| P3::from(p.cast::<f32>())).collect();
+    let s = Sheet::new(x.len(), &faces, &rest, &cotton(1e-3), Some(&points)).expect("a sheet");
+    let mut lab = Lab::new(s, &x, 1e-4, 1);
+    lab.gravity = V4::default();
+    lab.run(5000, |_, _, _| {});
+    let moved = lab.positions().iter().zip(&x).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    assert!(moved < 1e-3, "{moved}");
+}
