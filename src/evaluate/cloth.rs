@@ -65,7 +65,7 @@ pub fn method_name(m: Method) -> &'static str {
 pub fn cloth(folder: &Path, bench: &ClothBench, mut progress: impl FnMut(&Row)) -> Result<Table, EvaluateError> {
     let mut table = Table {
         name: "cloth".into(),
-        command: "tryon bench cloth --out DIR".into(),
+        command: "evaluate::cloth::cloth".into(),
         run_time: "milliseconds for 1/60 s of cloth, median over the scene".into(),
         rows: Vec::new(),
     };

@@ -51,7 +51,8 @@ pub struct Config {
     pub layer_offset: f64,
     /// Horizontal direction the real camera looks along, world x and z: its depth map is the fine one.
     pub camera_toward: [f32; 2],
-    /// Keep layers apart where they meet, not only by their distance from the skin.
+    /// Press inner layers under outer ones where they meet, besides their different distance from the skin. Only for
+    /// garments that were draped with it: over others it is too violent (docs/hindsight.md).
     pub layers: bool,
     /// Keep the folds of a garment apart.
     pub self_collision: bool,
@@ -79,7 +80,7 @@ impl Default for Config {
             offset: 0.005,
             layer_offset: 0.004,
             camera_toward: [0.0, -1.0],
-            layers: true,
+            layers: false,
             self_collision: true,
             thickness: 0.003,
             reach: 0.008,

@@ -127,7 +127,7 @@ pub struct StepReport {
     pub penetration_left: f64,
     /// Vertices in contact.
     pub contacts: usize,
-    /// Root mean square speed of the fastest garment at the end, m/s.
+    /// Speed that 95 % of the fastest garment do not exceed, mean over the call, m/s.
     pub speed: f64,
     /// Vertices that were not simulated because cloth and body were still.
     pub sleeping: usize,
