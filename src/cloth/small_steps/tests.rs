@@ -181,7 +181,8 @@ fn a_heavy_chain_hangs_in_a_catenary() {
     let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &m), &x, 1e-4, 1);
     let length = ny as f64 * d;
     let span = 0.8 * length;
-    let start: Vec<V3d> = x.iter().map(|p| V3d::new(p.x, -0.02 * (p.z / length * 3.14).sin(), p.z * 0.8)).collect();
+    let start: Vec<V3d> =
+        x.iter().map(|p| V3d::new(p.x, -0.02 * (p.z / length * std::f64::consts::PI).sin(), p.z * 0.8)).collect();
     lab.place(&start, &vec![V3d::zeros(); x.len()]);
     let last = x.len() as u32;
     lab.run(25_000, hold(vec![0, 1, last - 2, last - 1]));
