@@ -1,6 +1,7 @@
 //! One binary for the tests that cross modules or need real data.
 #![allow(clippy::unwrap_used, clippy::expect_used)] // tests stop at the first fault
 
+mod cloth;
 mod common;
 mod garment_stream;
 mod garments;
