@@ -1,5 +1,6 @@
 //! One binary for the tests that cross modules or need real data.
 #![allow(clippy::unwrap_used, clippy::expect_used)] // tests stop at the first fault
+#![allow(clippy::print_stdout)] // and say what they measured
 
 mod cloth;
 mod common;
