@@ -255,6 +255,24 @@ pub(crate) struct BenchArgs {
 pub(crate) enum BenchWhat {
     /// Tracking over iterations, samples, correspondences and metric, on recorded and synthetic sequences.
     Tracking(BenchTrackingArgs),
+    /// Cloth solvers on the standard scenes: small steps, XPBD, quasi-Newton, the paper's mass-spring step.
+    Cloth(BenchClothArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchClothArgs {
+    /// Folder for cloth.csv, cloth.json and one cloth-*.svg per measure of error.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Folder of the scenes and their reference positions.
+    #[arg(long, value_name = "DIR", default_value = "../shared/data/scenes")]
+    pub(crate) scenes: PathBuf,
+    /// Only these scenes, by file name without extension.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) scene: Vec<String>,
+    /// Slow methods on the large scenes too (many minutes).
+    #[arg(long)]
+    pub(crate) full: bool,
 }
 
 #[derive(Debug, Args)]

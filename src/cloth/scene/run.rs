@@ -56,7 +56,7 @@ impl Default for RunConfig {
             substeps: 0,
             iterations: 10,
             offset: 5e-4,
-            ahead: 0.05,
+            ahead: 0.1,
             every: [4, 8],
             patches: 1,
         }

@@ -1,11 +1,12 @@
 //! `tryon bench`: run time against error, as tables and plots.
 
-use crate::args::{BenchArgs, BenchTrackingArgs, BenchWhat};
+use crate::args::{BenchArgs, BenchClothArgs, BenchTrackingArgs, BenchWhat};
 use crate::input;
 use anyhow::Result;
 use std::process::ExitCode;
 use tryon::evaluate::ablation::{self, Extent};
-use tryon::evaluate::{Row, Table};
+use tryon::evaluate::cloth::ClothBench;
+use tryon::evaluate::{self, Row, Table};
 use tryon::par::with_threads;
 
 /// Runs the command.
@@ -15,6 +16,7 @@ use tryon::par::with_threads;
 pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
     match &args.what {
         BenchWhat::Tracking(a) => tracking(a),
+        BenchWhat::Cloth(a) => cloth(a),
     }
 }
 
@@ -29,6 +31,17 @@ fn tracking(args: &BenchTrackingArgs) -> Result<ExitCode> {
             table.rows.push(row);
         })
     })??;
+    bar.finish_and_clear();
+    finish(&table, &args.out)
+}
+
+fn cloth(args: &BenchClothArgs) -> Result<ExitCode> {
+    let mut bench = ClothBench { full: args.full, ..ClothBench::default() };
+    if !args.scene.is_empty() {
+        bench.scenes.clone_from(&args.scene);
+    }
+    let bar = input::progress(None, "measuring");
+    let table = evaluate::cloth::cloth(&args.scenes, &bench, |_| bar.inc(1))?;
     bar.finish_and_clear();
     finish(&table, &args.out)
 }
