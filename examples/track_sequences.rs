@@ -9,7 +9,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tryon::body::{BoneTransforms, Template, import::template_from_smpl};
-use tryon::camera::{ColorImage, RgbdFrame};
+use tryon::camera::{ColorImage, NoiseModel, RgbdFrame};
 use tryon::evaluate::tracking::{follow, mean, median};
 use tryon::evaluate::{Scene, scenes};
 use tryon::formats::image::write_png_rgb;
@@ -18,6 +18,7 @@ use tryon::mesh::face_normal;
 use tryon::raster::{View, VisibilityBuffer, rasterise};
 use tryon::segment::{SegmentScratch, find_person, find_planes};
 use tryon::spatial::{Label, OrganisedCloud};
+use tryon::synth::{Routine, Sequence, Setting, Shopper};
 use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace};
 
 #[derive(Default)]
@@ -38,6 +39,7 @@ struct Args {
     cut: f64,
     labels: Option<PathBuf>,
     hard: bool,
+    drift: Option<u64>,
     verbose: bool,
 }
 
@@ -60,6 +62,7 @@ fn main() {
             "--nth" => a.nth = next().parse().expect("a number"),
             "--cut" => a.cut = next().parse().expect("a share"),
             "--hard" => a.hard = true,
+            "--drift" => a.drift = Some(next().parse().expect("a number")),
             "--labels" => a.labels = Some(next().into()),
             "--synth" => a.synth = true,
             "--stages" => a.stages = true,
@@ -72,6 +75,13 @@ fn main() {
     }
     if a.settings.is_empty() {
         a.settings.push("{}".into());
+    }
+    if let Some(frames) = a.drift {
+        for settings in &a.settings {
+            println!("drift over {frames} frames {settings}");
+            drift(&a, settings, frames);
+        }
+        return;
     }
     let bodies: Vec<Arc<Template>> = a.bodies.iter().map(|b| body(b)).collect();
     let mut all: Vec<Box<dyn Fn() -> Scene>> = vec![];
@@ -239,6 +249,57 @@ fn run(a: &Args, template: &Arc<Template>, config: &TrackerConfig, scene: &Scene
         let list: Vec<String> =
             scene.joint_names.iter().zip(&out.per_joint_mm).map(|(n, s)| format!("{n} {s:.0}")).collect();
         println!("  per joint: {}", list.join(", "));
+    }
+}
+
+/// Frames of the routine back and forth (`--frames`, 30) with the body that is tracked: how far each joint is at each
+/// picture of a round from where it was in the second round, at rounds that grow by a half.
+fn drift(a: &Args, settings: &str, frames: u64) {
+    let shopper = Shopper::default();
+    let template = shopper.template.clone();
+    let noise = if a.hard { NoiseModel::KinectV1 } else { NoiseModel::None };
+    let setting = Setting { routine: Routine::TryOn, noise, color: false, ..Setting::default() };
+    let length = a.frames.unwrap_or(30) as u64;
+    let scene = Scene::synthetic("drift", &Sequence::new(shopper, setting), length);
+    let config = TrackerConfig { adapt_size: false, displacements: false, ..configuration(settings) };
+    let model = TrackerModel::new(template.clone(), scene.calibration.clone(), config);
+    let mut state = TrackerState::new(&model);
+    let mut workspace = Workspace::default();
+    let names: Vec<&str> = template.skeleton().joints().iter().map(|j| j.name.as_str()).collect();
+    let (mut second, mut due, mut iterations) = (vec![], 2, 0);
+    let (mut worst, mut sum) = ((0.0, 0, 0), 0.0);
+    for i in 0..frames / (2 * length) * 2 * length {
+        let (round, k) = (i / (2 * length), (i % (2 * length)) as usize);
+        let picture = &scene.frames[k.min(2 * length as usize - 1 - k)];
+        let frame = RgbdFrame { sequence: i, time_ns: i * 33_333_333, ..picture.clone() };
+        iterations += tryon::tracking::step(&model, &mut state, &frame, &mut workspace).expect("step").iterations;
+        if round == 1 || round == due {
+            let (_, bones) = workspace.posed(&model, &state);
+            if round == 1 {
+                second.push(bones.joints.clone());
+                continue;
+            }
+            let off: Vec<f64> = second[k].iter().zip(&bones.joints).map(|(a, b)| (a - b).norm() * 1e3).collect();
+            sum += mean(&off);
+            for (j, o) in off.iter().enumerate() {
+                if *o > worst.0 {
+                    worst = (*o, j, k);
+                }
+            }
+            if k as u64 == 2 * length - 1 {
+                println!(
+                    "round {round:5}, frame {:7}: worst {:.3} mm ({}, picture {}), mean {:.4} mm, {:.2} iterations a frame",
+                    i + 1,
+                    worst.0,
+                    names[worst.1],
+                    worst.2,
+                    sum / (2 * length) as f64,
+                    iterations as f64 / (i + 1) as f64
+                );
+                due = (round * 3).div_ceil(2).max(due + 1);
+                (worst, sum) = ((0.0, 0, 0), 0.0);
+            }
+        }
     }
 }
 

@@ -8,6 +8,7 @@ mod model;
 mod place;
 mod report;
 mod size;
+mod stand;
 mod state;
 mod step;
 mod surface;

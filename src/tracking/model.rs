@@ -1,6 +1,7 @@
 //! What never changes while tracking: the template, the camera and points chosen on the template.
 
 use super::TrackerConfig;
+use super::stand::{Leg, legs};
 use crate::body::{JointMotion, SkinWeights, Template};
 use crate::camera::Calibration;
 use crate::math::{P3, V3};
@@ -41,6 +42,8 @@ pub struct TrackerModel {
     pub(super) tied: Vec<(usize, usize, f64)>,
     /// Weight of the rest-pose prior of each angle.
     pub(super) stiffness: Vec<f64>,
+    /// Legs, for feet out of view.
+    pub(super) standing: Vec<Leg>,
     /// Angles of knees, ankles and feet.
     pub(super) legs: Vec<bool>,
     /// Share of the pull to the rest pose that is left for each angle when its bone is in full view.
@@ -72,6 +75,7 @@ impl TrackerModel {
         directions.extend(bone_directions(&template, &samples, &weights));
         let tied = tied_bones(&template, &directions, first);
         let stiffness = stiffness(&template);
+        let standing = legs(&template);
         let leg = |name: &str| ["knee", "ankle", "foot"].iter().any(|s| name.contains(s));
         let legs = skeleton.joints().iter().flat_map(|j| std::iter::repeat_n(leg(&j.name), j.motion.dofs())).collect();
         let share = |j: &crate::body::Joint| std::iter::repeat_n(seen_share(&j.name), j.motion.dofs());
@@ -88,6 +92,7 @@ impl TrackerModel {
             directions,
             tied,
             stiffness,
+            standing,
             legs,
             seen_shares,
         }

@@ -80,6 +80,9 @@ pub struct TrackerState {
     pub(super) centre: P3,
     /// How the last pose fitted its frame: share of explained readings, residual in metres.
     pub(super) quality: [f64; 2],
+    /// Greatest height of the hips so far along the upright, camera frame, metres.
+    #[serde(default)]
+    pub(super) tallest: Option<f64>,
     /// Frames until displacements are due, and the interval between fits.
     pub(super) surface_due: [u32; 2],
 }
@@ -114,6 +117,7 @@ impl TrackerState {
             calibration_age: 0,
             centre: P3::origin(),
             quality: [0.0; 2],
+            tallest: None,
             surface_due: [0; 2],
         }
     }

@@ -6,6 +6,7 @@ use super::kinematics::{extrapolate, motion};
 use super::place::{outline, place};
 use super::report::Stopwatch;
 use super::size::from_stature;
+use super::stand::{Ground, below, tallest, unfold};
 use super::{
     LostReason, SizeEstimate, Skipped, StagesMs, Status, StepError, StepReport, TrackerModel, TrackerState, Workspace,
     surface,
@@ -184,6 +185,15 @@ fn follow(
     let mut fine = false;
     workspace.align.terms = if searching { START_TERMS } else { Terms::tracking(&model.config) };
 
+    if !searching && model.config.standing {
+        workspace.rest_body(model, &state.shape);
+        let height = if state.floor_known {
+            Some(-state.world_from_camera.iso().translation.vector.y)
+        } else {
+            state.tallest.and_then(|t| below(model, &workspace.rest, t))
+        };
+        workspace.align.terms.ground = height.map(|height| Ground { up, height });
+    }
     if searching {
         if state.pose_age > FORGET {
             state.reset(model);
@@ -207,7 +217,7 @@ fn follow(
                 return;
             }
         }
-        state.before = None;
+        (state.before, state.tallest) = (None, None);
     } else {
         workspace.rest_body(model, &state.shape);
         let rest = (&workspace.rest, &workspace.samples);
@@ -249,6 +259,9 @@ fn follow(
     let rest = (&workspace.rest, &workspace.samples);
     let mut fit =
         align(model, rest, &mut pose, &seen, if searching { &START } else { &schedule }, &mut workspace.align);
+    if let Some(ground) = workspace.align.terms.ground {
+        unfold(model, &workspace.rest, grid, &ground, &workspace.align, &mut pose);
+    }
     report.stages_ms.pose = watch.lap();
     let good = fit.explained >= LEAST_EXPLAINED && fit.matched >= LEAST_MATCHED && pose.is_finite();
     if good && !state.calibrated(&model.config) {
@@ -314,6 +327,8 @@ fn follow(
         state.status != Status::Tracking && state.steady < STEADY_FRAMES && state.calibration_age < LONGEST_CALIBRATION;
     let calibrating = model.config.adapt_size && (state.size.frames < CALIBRATING || settling);
     state.status = if calibrating { Status::Calibrating } else { Status::Tracking };
+
+    state.tallest = tallest(model, &up, state.tallest, &workspace.align);
 
     let [wait, interval] = &mut state.surface_due;
     *wait = wait.saturating_sub(1);

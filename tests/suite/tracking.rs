@@ -89,7 +89,7 @@ fn follow(s: &Sequence, which: impl Iterator<Item = usize>, mut change: impl FnM
 const SEQUENCES: [(&str, usize, f64); 3] = [
     ("sequences/charleston_m_heavy_tof_room", 156, 8.0),
     ("sequences/jacks_f_avg_kinect1_room", 180, 10.5),
-    ("sequences/sword_m_tall_tof_noroom_upper", 150, 24.0),
+    ("sequences/sword_m_tall_tof_noroom_upper", 150, 18.5),
 ];
 
 #[test]
