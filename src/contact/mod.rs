@@ -1,9 +1,11 @@
 //! Candidate pairs, continuous collision, distances and contact energies between moving triangles; it never steps time.
 
+mod buried;
 mod depth_maps;
 mod point_grid;
 mod surface;
 
+pub use buried::Buried;
 pub use depth_maps::{DepthMaps, MapView};
 pub use point_grid::PointGrid;
 pub use surface::{Closest, Part, SurfaceFrame, SurfaceModel};

@@ -60,7 +60,8 @@ impl PointGrid {
             (i as i32, if t - i < 0.5 { -1 } else { 1 })
         });
         for k in 0..8usize {
-            let cell = [0, 1, 2].map(|d| c[d].0 + if k >> d & 1 == 1 { c[d].1 } else { 0 });
+            // Saturating: cloth that has flown away keeps its place in the last cell.
+            let cell = [0, 1, 2].map(|d| c[d].0.saturating_add(if k >> d & 1 == 1 { c[d].1 } else { 0 }));
             let b = bucket(cell);
             for &i in &self.points[self.first[b] as usize..self.first[b + 1] as usize] {
                 f(i);
@@ -90,6 +91,10 @@ mod tests {
                 assert!((p - q).norm() >= 0.04 || got.contains(&(i as u32)), "{i}");
             }
         }
+        grid.fill(&[P3::new(1e30, f32::NAN, -1e30)], 0.08);
+        let mut got = Vec::new();
+        grid.around(&P3::new(1e30, f32::NAN, -1e30), |i| got.push(i));
+        assert!(got.contains(&0), "far away and not a number: {got:?}");
         PointGrid::default().around(&P3::origin(), |_| unreachable!("an empty grid has no points"));
     }
 }

@@ -47,18 +47,18 @@ pub struct Closest {
     pub rim: bool,
 }
 
+impl Closest {
+    /// Room between this point and one of another part that faces it, metres: negative where the two parts lie in each
+    /// other. `None` if they do not face each other.
+    pub fn room(&self, other: &Self) -> Option<f32> {
+        (self.normal.dot(&other.normal) < 0.0).then(|| self.normal.dot(&(other.point - self.point)))
+    }
+}
+
 impl SurfaceModel {
-    /// Takes connectivity and parts; `grow` rings are added to every part, so that parts overlap where they meet.
-    pub fn new(faces: Vec<Face>, topology: Topology, mut parts: Vec<Part>, grow: usize) -> Self {
+    /// Takes connectivity and the parts of each vertex.
+    pub fn new(faces: Vec<Face>, topology: Topology, mut parts: Vec<Part>) -> Self {
         parts.resize(topology.vertex_neighbours().rows(), Part::MAX);
-        for _ in 0..grow {
-            let before = parts.clone();
-            for (i, p) in parts.iter_mut().enumerate() {
-                for &n in topology.vertex_neighbours().row(i) {
-                    *p |= before[n as usize];
-                }
-            }
-        }
         Self { faces, rim: topology.boundary_vertices(), topology, parts }
     }
     /// Number of vertices.
@@ -156,6 +156,25 @@ impl SurfaceModel {
         let f = self.faces[c.face as usize];
         (0..3).all(|k| c.weights[k] < RIM || self.rim[f[k] as usize])
     }
+    /// What keeps `p` under an open surface that others are worn over, from its nearest point `hit`: that point, or, where
+    /// it lies on a hem at most `reach` away, a point as far off the hem's surface as `p` is beyond it.
+    pub fn under(&self, frame: &SurfaceFrame, p: &P3, hit: &Closest, reach: f32) -> Option<Closest> {
+        if hit.rim {
+            return None;
+        }
+        if !self.on_rim(hit) {
+            return Some(*hit);
+        }
+        let corners = self.faces[hit.face as usize];
+        let normal = (0..3).fold(V3::zeros(), |s, k| s + frame.normals[corners[k] as usize] * hit.weights[k]);
+        let normal = normal.try_normalize(0.0)?;
+        let height = normal.dot(&(p - hit.point));
+        let beyond = (p - hit.point - normal * height).norm();
+        (beyond < reach).then(|| {
+            let point = hit.point + normal * beyond;
+            Closest { point, normal, signed: normal.dot(&(p - point)), ..*hit }
+        })
+    }
     /// Vertices one edge away.
     pub fn neighbours(&self, vertex: u32) -> &[u32] {
         self.topology.vertex_neighbours().row(vertex as usize)
@@ -175,6 +194,12 @@ impl SurfaceModel {
             return (v, Err(room));
         }
         (v, Ok(self.closest_around(frame, p, v, mask)))
+    }
+    /// The nearest point on the parts of `mask`; where that is their rim, the nearest one on whatever lies beyond it.
+    /// `vertex` stays within the parts.
+    pub fn closest_beyond(&self, frame: &SurfaceFrame, p: &P3, start: u32, mask: Part) -> Closest {
+        let own = self.closest(frame, p, start, mask);
+        if own.rim { Closest { vertex: own.vertex, ..self.closest(frame, p, own.vertex, Part::MAX) } } else { own }
     }
     /// Walk and nearest point in one.
     pub fn closest(&self, frame: &SurfaceFrame, p: &P3, start: u32, mask: Part) -> Closest {
@@ -233,12 +258,12 @@ fn closest_on_triangle(p: &P3, a: &P3, b: &P3, c: &P3) -> [f32; 3] {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::mesh::TriMesh;
 
     /// A sphere from a subdivided octahedron.
-    fn sphere(levels: usize) -> TriMesh {
+    pub(in crate::contact) fn sphere(levels: usize) -> TriMesh {
         let mut v: Vec<P3> = [[1., 0., 0.], [-1., 0., 0.], [0., 1., 0.], [0., -1., 0.], [0., 0., 1.], [0., 0., -1.]]
             .map(P3::from)
             .to_vec();
@@ -269,7 +294,6 @@ mod tests {
             mesh.faces().to_vec(),
             Topology::new(&mesh).expect("topology"),
             vec![1; mesh.vertices().len()],
-            0,
         );
         let mut frame = SurfaceFrame { vertices: mesh.vertices().to_vec(), normals: Vec::new() };
         model.update_normals(Par::Seq, &mut frame);
@@ -284,5 +308,31 @@ mod tests {
             assert!((walked.signed - (r - 1.0)).abs() < 4e-3, "{} {}", walked.signed, r - 1.0);
             assert!(walked.normal.dot(&dir) > 0.99 && !walked.rim);
         }
+    }
+
+    #[test]
+    fn under_a_sheet_and_below_its_hem() {
+        // A sheet at z = 0 over x in 0..1, its hem at x = 1; what lies under it has z < 0.
+        let v: Vec<P3> = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]].map(P3::from).to_vec();
+        let f: Vec<Face> = vec![[0, 1, 2], [0, 2, 3]];
+        let mesh = TriMesh::new(v.clone(), f.clone()).expect("a sheet");
+        let model = SurfaceModel::new(f, Topology::new(&mesh).expect("topology"), vec![1; 4]);
+        let mut frame = SurfaceFrame { vertices: v, normals: Vec::new() };
+        model.update_normals(Par::Seq, &mut frame);
+        let signed = |x: f32, z: f32| {
+            let p = P3::new(x, 0.4, z);
+            let near = model.nearest_vertex(&frame, &p, 1);
+            let hit = model.closest_around(&frame, &p, near, 1);
+            model.under(&frame, &p, &hit, 0.1).map(|c| c.signed)
+        };
+        let close = |a: Option<f32>, b: f32| a.is_some_and(|a| (a - b).abs() < 1e-5);
+        assert!(close(signed(0.7, -0.05), -0.05), "{:?}", signed(0.7, -0.05));
+        assert!(close(signed(0.7, 0.02), 0.02), "{:?}", signed(0.7, 0.02));
+        // 4 cm below the hem it may stand out 4 cm.
+        assert!(close(signed(1.04, 0.04), 0.0), "{:?}", signed(1.04, 0.04));
+        assert!(close(signed(1.04, 0.07), 0.03), "{:?}", signed(1.04, 0.07));
+        assert_eq!(signed(1.2, 0.0), None, "too far below");
+        let rim = Closest { rim: true, ..model.closest_around(&frame, &P3::origin(), 0, 1) };
+        assert_eq!(model.under(&frame, &P3::origin(), &rim, 0.1), None);
     }
 }

@@ -6,10 +6,10 @@
 
 use crate::cloth::Sheet;
 use crate::cloth::realtime::AnchorBinding;
-use crate::contact::{Closest, SurfaceFrame, SurfaceModel};
-use crate::garment::{GarmentMesh, Region};
+use crate::contact::{Buried, Part, SurfaceFrame, SurfaceModel};
+use crate::garment::{GarmentError, GarmentMesh, Region};
 use crate::math::{P3, V3, V3d};
-use crate::mesh::Csr;
+use crate::par::Par;
 
 /// A plane a vertex stays above.
 #[derive(Clone, Copy, Debug, Default)]
@@ -34,18 +34,83 @@ pub(super) struct Drape {
     /// Nearest body vertex among the own parts, then among the others.
     pub(super) nearest: Vec<[u32; 2]>,
     planes: Vec<[Plane; 2]>,
+    /// Nearest vertex of every garment further out, shape `[garments][vertices]`.
+    nearest_cover: Vec<Vec<u32>>,
+    /// Vertices that an outer garment covers, and the plane each stays under.
+    covers: Vec<(u32, Plane)>,
     pinned: Vec<Option<V3d>>,
     before: Vec<V3d>,
 }
 
-/// What cloth is draped on: the skin and how far each body vertex's outermost layer stands off it, metres.
+/// What cloth is draped on.
 #[derive(Debug)]
 pub(super) struct Skin<'a> {
     pub(super) model: &'a SurfaceModel,
-    pub(super) neighbours: &'a Csr,
-    pub(super) frame: SurfaceFrame,
-    /// Height over each body vertex that the next garment keeps, metres.
-    pub(super) height: Vec<f32>,
+    frame: SurfaceFrame,
+    buried: Buried,
+    opposite: &'a [Part],
+}
+
+impl<'a> Skin<'a> {
+    pub(super) fn new(model: &'a SurfaceModel, opposite: &'a [Part]) -> Self {
+        Self { model, frame: SurfaceFrame::default(), buried: Buried::default(), opposite }
+    }
+    /// The body stands like this now.
+    pub(super) fn show(&mut self, body: &[P3]) {
+        self.frame.vertices.clear();
+        self.frame.vertices.extend_from_slice(body);
+        self.model.update_normals(Par::Rayon, &mut self.frame);
+        self.buried.update(Par::Rayon, self.model, self.opposite, &self.frame);
+    }
+    pub(super) fn frame(&self) -> &SurfaceFrame {
+        &self.frame
+    }
+}
+
+/// Between what a garment is draped.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct On<'a> {
+    pub(super) skin: &'a Skin<'a>,
+    /// Distance from the skin, metres.
+    pub(super) offset: f64,
+    /// Garments further out.
+    over: &'a [Cover],
+}
+
+/// A garment that others are worn under.
+#[derive(Debug)]
+struct Cover {
+    model: SurfaceModel,
+    frame: SurfaceFrame,
+}
+
+/// Garments being draped together, innermost first: each is kept under those further out.
+#[derive(Debug)]
+pub(super) struct Layers {
+    pub(super) drapes: Vec<Drape>,
+    covers: Vec<Cover>,
+}
+
+impl Layers {
+    pub(super) fn new(meshes: &[GarmentMesh], drapes: Vec<Drape>) -> Result<Self, GarmentError> {
+        let cover = |m: &GarmentMesh| {
+            let parts = m.regions.iter().map(|r| r.decisive().0).collect();
+            Ok(Cover {
+                model: SurfaceModel::new(m.faces.clone(), m.topology()?, parts),
+                frame: SurfaceFrame::default(),
+            })
+        };
+        Ok(Self { covers: meshes.iter().map(cover).collect::<Result<_, GarmentError>>()?, drapes })
+    }
+    /// Does the same to all garments, the outermost first; `offsets` from the skin, metres.
+    pub(super) fn each(&mut self, skin: &Skin<'_>, offsets: &[f64], mut f: impl FnMut(usize, &mut Drape, &On<'_>)) {
+        for (k, drape) in self.drapes.iter_mut().enumerate().rev() {
+            let (under, over) = self.covers.split_at_mut(k + 1);
+            f(k, drape, &On { skin, offset: offsets[k], over });
+            under[k].frame.vertices = drape.positions();
+            under[k].model.update_normals(Par::Rayon, &mut under[k].frame);
+        }
+    }
 }
 
 /// Gravity, m/s².
@@ -60,6 +125,12 @@ const PLANE_SIZE: f64 = 0.10;
 const LOOK_EVERY: usize = 8;
 /// Passes over the edges a substep. With one, trousers of 40 rows hung a tenth too long.
 const SWEEPS: usize = 4;
+/// Further than this outside an outer garment a vertex has nothing to do with it, metres.
+const COVER_REACH: f32 = 0.15;
+/// An inner garment may stand out from under a hem as far as it is below it, up to this distance, metres.
+const HEM: f32 = 0.05;
+/// Distance that cloth keeps under an outer garment, metres.
+const UNDER: f64 = 0.003;
 /// Rate at which draping takes speed away, 1/s: a skirt swings out in a quarter of a second.
 const DAMPING: f64 = 5.0;
 /// No cloth falls faster while it is put on, m/s.
@@ -83,9 +154,11 @@ impl Drape {
             inverse_mass: sheet.mass.iter().map(|m| 1.0 / m).collect(),
             edges,
             hinges: sheet.hinges.iter().filter(|h| h.w > 0.0).map(|h| (h.v, h.c, 1.0 / h.w)).collect(),
-            own: mesh.regions.iter().map(|r| r.0).collect(),
+            own: mesh.regions.iter().map(|r| r.decisive().0).collect(),
             nearest: vec![[u32::MAX; 2]; n],
             planes: vec![[Plane::default(); 2]; n],
+            nearest_cover: Vec::new(),
+            covers: Vec::new(),
             pinned: vec![None; n],
             before: Vec::new(),
             x: x.iter().map(|p| p.coords.cast()).collect(),
@@ -139,14 +212,15 @@ impl Drape {
     pub(super) fn stop(&mut self) {
         self.velocity.iter_mut().for_each(|v| *v = V3d::zeros());
     }
-    /// `steps` substeps of `h` seconds on a body that stands still. `weight` scales gravity: the first steps of sewing
-    /// close gaps before anything falls.
-    pub(super) fn run(&mut self, skin: &Skin<'_>, steps: usize, h: f64, weight: f64) {
+    /// `steps` substeps of `h` seconds on a body that stands still, `offset` metres off its skin and under the garments
+    /// `over` it, which stand still too. `weight` scales gravity: the first steps of sewing close gaps before anything
+    /// falls.
+    pub(super) fn run(&mut self, on: &On<'_>, steps: usize, h: f64, weight: f64) {
         let keep = (-DAMPING * h).exp();
         let fall = V3d::new(0.0, -GRAVITY * weight * h * h, 0.0);
         for s in 0..steps {
             if s % LOOK_EVERY == 0 {
-                self.look(skin);
+                self.look(on);
             }
             self.before.clone_from(&self.x);
             for i in 0..self.x.len() {
@@ -203,35 +277,71 @@ impl Drape {
             }
         }
     }
-    /// Out of the planes, those of the vertex's own parts last.
+    /// Under the covers, then out of the body, whose planes of the vertex's own parts come last.
     fn lift(&mut self) {
+        for k in 0..self.covers.len() {
+            let (i, p) = self.covers[k];
+            self.out_of(i as usize, &p);
+        }
         for i in 0..self.x.len() {
-            for p in self.planes[i].iter().rev().filter(|p| p.near) {
-                let d = self.x[i] - p.point;
-                let gap = p.normal.dot(&d) - p.height;
-                if gap < 0.0 && d.norm_squared() < PLANE_SIZE * PLANE_SIZE {
-                    self.x[i] += p.normal * (-gap).min(LIFT);
-                }
-            }
+            let [own, other] = self.planes[i];
+            self.out_of(i, &other);
+            self.out_of(i, &own);
         }
     }
-    fn look(&mut self, skin: &Skin<'_>) {
+    fn out_of(&mut self, i: usize, p: &Plane) {
+        let d = self.x[i] - p.point;
+        let gap = p.normal.dot(&d) - p.height;
+        if p.near && gap < 0.0 && d.norm_squared() < PLANE_SIZE * PLANE_SIZE {
+            self.x[i] += p.normal * (-gap).min(LIFT);
+        }
+    }
+    fn look(&mut self, on: &On<'_>) {
+        let skin = on.skin;
         for i in 0..self.x.len() {
             let p = P3::from(self.x[i].cast::<f32>());
+            let near = &mut self.nearest[i];
+            let found = [
+                skin.model.closest_beyond(&skin.frame, &p, near[0], self.own[i]),
+                skin.model.closest(&skin.frame, &p, near[1], Region::ALL.0 & !self.own[i]),
+            ];
+            *near = found.map(|c| c.vertex);
+            // Where the body closes on itself its own part decides, and skin inside the body holds nothing.
+            let room = found[0].room(&found[1]).filter(|_| !found[1].rim).map_or(f64::INFINITY, f64::from);
+            let holds = [room >= 0.0, room >= 2.0 * on.offset];
             for k in 0..2 {
-                let mask = if k == 0 { self.own[i] } else { Region::ALL.0 & !self.own[i] };
-                let mut c = skin.model.closest(&skin.frame, &p, self.nearest[i][k], mask);
-                self.nearest[i][k] = c.vertex;
-                if c.rim && k == 0 {
-                    // In the armpit or the crotch, beyond the own parts: whatever is nearest.
-                    c = skin.model.closest(&skin.frame, &p, c.vertex, Region::ALL.0);
-                }
+                let c = &found[k];
                 self.planes[i][k] = Plane {
                     point: c.point.coords.cast(),
                     normal: c.normal.cast(),
-                    height: skin.height_at(&c),
-                    near: !c.rim && f64::from(c.signed) < REACH,
+                    height: on.offset,
+                    near: holds[k]
+                        && !c.rim
+                        && !skin.buried.holds_nothing(skin.model.faces()[c.face as usize])
+                        && f64::from(c.signed) < REACH,
                 };
+            }
+        }
+        self.look_up(on.over);
+    }
+    /// Which garments lie over which vertices.
+    fn look_up(&mut self, over: &[Cover]) {
+        self.covers.clear();
+        for (k, cover) in over.iter().enumerate() {
+            if self.nearest_cover.len() <= k {
+                let nearest =
+                    |(x, own): (&V3d, &u8)| cover.model.nearest_vertex(&cover.frame, &P3::from(x.cast::<f32>()), *own);
+                self.nearest_cover.push(self.x.iter().zip(&self.own).map(nearest).collect());
+            }
+            for (i, near) in self.nearest_cover[k].iter_mut().enumerate() {
+                let p = P3::from(self.x[i].cast::<f32>());
+                let c = cover.model.closest(&cover.frame, &p, *near, self.own[i]);
+                *near = c.vertex;
+                let Some(c) = cover.model.under(&cover.frame, &p, &c, HEM) else { continue };
+                if c.signed < COVER_REACH && -f64::from(c.signed) < REACH && self.pinned[i].is_none() {
+                    let (point, normal) = (c.point.coords.cast(), -c.normal.cast::<f64>());
+                    self.covers.push((i as u32, Plane { point, normal, height: UNDER, near: true }));
+                }
             }
         }
     }
@@ -242,7 +352,7 @@ impl Drape {
         for i in 0..self.x.len() {
             let p = P3::from(self.x[i].cast::<f32>());
             let c = skin.model.closest(&skin.frame, &p, self.nearest[i][0], self.own[i]);
-            if !c.rim {
+            if !c.rim && !skin.buried.holds_nothing(skin.model.faces()[c.face as usize]) {
                 deepest = deepest.max(-f64::from(c.signed));
             }
         }
@@ -254,39 +364,5 @@ impl Drape {
         strain.sort_unstable_by(f64::total_cmp);
         let at = |q: f64| strain.get(((strain.len() as f64 * q) as usize).min(strain.len().saturating_sub(1))).copied();
         (deepest, at(0.99).unwrap_or(0.0), at(1.0).unwrap_or(0.0))
-    }
-}
-
-impl Skin<'_> {
-    fn height_at(&self, c: &Closest) -> f64 {
-        let f = self.model.faces()[c.face as usize];
-        (0..3).map(|k| f64::from(self.height[f[k] as usize] * c.weights[k])).sum()
-    }
-    /// Raises the height over the skin to that of a garment that lies there, plus `gap`.
-    pub(super) fn cover(&mut self, drape: &Drape, gap: f32) {
-        /// A layer further off the skin than this is left to the simulator, metres.
-        const HIGHEST: f32 = 0.05;
-        /// Rings of the body that a garment's vertex covers: its triangles are larger than the skin's.
-        const RINGS: usize = 2;
-        for i in 0..drape.x.len() {
-            let p = P3::from(drape.x[i].cast::<f32>());
-            let c = self.model.closest(&self.frame, &p, drape.nearest[i][0], drape.own[i]);
-            if c.rim || c.signed > HIGHEST {
-                continue;
-            }
-            let top = c.signed.max(0.0) + gap;
-            let mut reached = vec![c.vertex];
-            for _ in 0..RINGS {
-                let outer: Vec<u32> =
-                    reached.iter().flat_map(|v| self.neighbours.row(*v as usize).iter().copied()).collect();
-                reached.extend(outer);
-                reached.sort_unstable();
-                reached.dedup();
-            }
-            for v in reached {
-                let h = &mut self.height[v as usize];
-                *h = h.max(top);
-            }
-        }
     }
 }

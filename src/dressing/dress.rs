@@ -1,7 +1,7 @@
 //! Putting garments on: place, drape, tie to the body, follow into the tracked pose.
 
 use super::canonical::{between, canonical_pose, upright_root};
-use super::drape::{Drape, Skin};
+use super::drape::{Drape, Layers, Skin};
 use super::figure::Figure;
 use super::place::place;
 use super::refine::prolong;
@@ -166,59 +166,54 @@ pub fn dress(
             body
         })
         .collect();
-    let n = bodies[0].len();
-    let mut skin = Skin {
-        model: model.surface(),
-        neighbours: template.topology().vertex_neighbours(),
-        frame: SurfaceFrame::default(),
-        height: vec![0.0; n],
-    };
-    let mut draped = Vec::new();
-    for (k, (mesh, start)) in coarse.iter().zip(placed).enumerate() {
-        skin.height = vec![model.offset(k) as f32; n];
-        let mut drape = Drape::new(mesh, &Sheet::of_garment(mesh)?, start);
-        let show = |skin: &mut Skin<'_>, body: &Vec<P3>| {
-            skin.frame.vertices.clone_from(body);
-            skin.model.update_normals(Par::Rayon, &mut skin.frame);
-        };
-        show(&mut skin, &bodies[0]);
-        drape.find_all(&skin);
-        let anchors = bind(skin.model, &skin.frame, mesh, &drape.positions(), model.offset(k), true);
-        drape.pin(&anchors, &skin.frame);
-        drape.run(&skin, CLOSING, COARSE_STEP, 0.1);
-        drape.stop();
-        drape.run(&skin, DRAPING, COARSE_STEP, 1.0);
-        report.steps += CLOSING + DRAPING + FOLLOW_BODIES * FOLLOWING + SETTLING + FINISHING;
-        for w in bodies.windows(2) {
-            drape.carry(&w[0], &w[1]);
-            show(&mut skin, &w[1]);
-            drape.pin(&anchors, &skin.frame);
-            drape.run(&skin, FOLLOWING, COARSE_STEP, 1.0);
-        }
-        drape.run(&skin, SETTLING, COARSE_STEP, 1.0);
-        draped.push(drape);
+    let mut skin = Skin::new(model.surface(), model.opposite());
+    skin.show(&bodies[0]);
+    let offsets: Vec<f64> = (0..coarse.len()).map(|k| model.offset(k)).collect();
+    let mut ties = Vec::new();
+    let mut drapes = Vec::new();
+    for ((mesh, placed), offset) in coarse.iter().zip(placed).zip(&offsets) {
+        let mut d = Drape::new(mesh, &Sheet::of_garment(mesh)?, placed);
+        d.find_all(&skin);
+        ties.push(bind(skin.model, skin.frame(), mesh, &d.positions(), *offset, true));
+        drapes.push(d);
     }
+    let mut rough = Layers::new(&coarse, drapes)?;
+    rough.each(&skin, &offsets, |k, d, on| {
+        d.pin(&ties[k], skin.frame());
+        d.run(on, CLOSING, COARSE_STEP, 0.1);
+        d.stop();
+        d.run(on, DRAPING, COARSE_STEP, 1.0);
+    });
+    for w in bodies.windows(2) {
+        skin.show(&w[1]);
+        rough.each(&skin, &offsets, |k, d, on| {
+            d.carry(&w[0], &w[1]);
+            d.pin(&ties[k], skin.frame());
+            d.run(on, FOLLOWING, COARSE_STEP, 1.0);
+        });
+    }
+    rough.each(&skin, &offsets, |_, d, on| d.run(on, SETTLING, COARSE_STEP, 1.0));
+    report.steps = coarse.len() * (CLOSING + DRAPING + FOLLOW_BODIES * FOLLOWING + SETTLING + FINISHING);
     report.stages_ms.coarse = ms(timer);
 
     let timer = Instant::now();
-    skin.height = vec![options.config.offset as f32; n];
+    let mut drapes = Vec::new();
+    for (k, mesh) in model.outfit.garments.iter().enumerate() {
+        let x = prolong(&coarse[k], mesh, &rough.drapes[k].x);
+        let mut d = Drape::new(mesh, &Sheet::of_garment(mesh)?, x.iter().map(|p| P3::from(p.cast::<f32>())).collect());
+        d.find_from(&skin, &rough.drapes[k]);
+        d.pin(&bind(skin.model, skin.frame(), mesh, &d.positions(), offsets[k], true), skin.frame());
+        drapes.push(d);
+    }
+    let mut fine = Layers::new(&model.outfit.garments, drapes)?;
+    fine.each(&skin, &offsets, |_, d, on| d.run(on, FINISHING, FINE_STEP, 1.0));
     let (mut positions, mut anchors) = (Vec::new(), Vec::new());
-    for (k, (mesh, rough)) in model.outfit.garments.iter().zip(&draped).enumerate() {
-        let x = prolong(&coarse[k], mesh, &rough.x);
-        let mut drape =
-            Drape::new(mesh, &Sheet::of_garment(mesh)?, x.iter().map(|p| P3::from(p.cast::<f32>())).collect());
-        drape.find_from(&skin, rough);
-        let tied = bind(skin.model, &skin.frame, mesh, &drape.positions(), model.offset(k), true);
-        drape.pin(&tied, &skin.frame);
-        drape.run(&skin, FINISHING, FINE_STEP, 1.0);
-        let (deepest, p99, _) = drape.judge(&skin);
+    for (k, (mesh, d)) in model.outfit.garments.iter().zip(&fine.drapes).enumerate() {
+        let (deepest, p99, _) = d.judge(&skin);
         report.penetration = report.penetration.max(deepest);
         report.p99_strain = report.p99_strain.max(p99);
-        if k + 1 < draped.len() {
-            skin.cover(&drape, options.config.layer_offset as f32);
-        }
-        anchors.push(bind(skin.model, &skin.frame, mesh, &drape.positions(), model.offset(k), false));
-        positions.push(drape.positions());
+        anchors.push(bind(skin.model, skin.frame(), mesh, &d.positions(), offsets[k], false));
+        positions.push(d.positions());
     }
     report.stages_ms.fine = ms(timer);
 

@@ -207,11 +207,8 @@ fn feel(
     (0..n)
         .map(|i| {
             let mask = mesh.regions.get(i).map_or(Region::ALL.0, |r| r.0);
-            let mut c = surface.closest(frame, &positions[i], near[i], mask);
+            let c = surface.closest_beyond(frame, &positions[i], near[i], mask);
             near[i] = c.vertex;
-            if c.rim {
-                c = surface.closest(frame, &positions[i], c.vertex, Region::ALL.0);
-            }
             let a = area[i].max(f64::MIN_POSITIVE);
             let gap = c.signed.max(0.0);
             let pressure = if gap < offset + TOUCH {
@@ -298,7 +295,7 @@ mod tests {
         let (n, m) = (64, 20);
         let (body, body_faces) = tube(0.1, 96, 30);
         let mesh = TriMesh::new(body.clone(), body_faces.clone()).expect("mesh");
-        let surface = SurfaceModel::new(body_faces, Topology::new(&mesh).expect("topology"), vec![1; body.len()], 0);
+        let surface = SurfaceModel::new(body_faces, Topology::new(&mesh).expect("topology"), vec![1; body.len()]);
         let mut frame = SurfaceFrame { vertices: body, normals: Vec::new() };
         surface.update_normals(Par::Seq, &mut frame);
         let (x, faces) = tube(r, n, m);

@@ -1,11 +1,12 @@
 //! The real-time cloth solver on a dressed body: what it must survive, and that threads change nothing.
 
+use nalgebra::UnitQuaternion;
 use std::sync::OnceLock;
 use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, skin};
 use tryon::cloth::realtime::{Config, Input, Model, State, StepReport, Workspace, step};
 use tryon::dressing::{DressOptions, dress};
 use tryon::garment::{Size, Triangulation, library};
-use tryon::math::{Body, P3, Rigid, V3, World};
+use tryon::math::{Body, P3, Rigid, V3, V3d, World, log_so3};
 use tryon::par::{Par, with_threads};
 
 const DT: f64 = 1.0 / 30.0;
@@ -22,10 +23,14 @@ fn dressed(config: &Config) -> Dressed {
     let template = tryon::body::embedded::template();
     let rest = REST.get_or_init(|| template.personalise(&BodyShape::default()));
     let pose = Pose::rest(template.skeleton(), Rigid::<World, Body>::identity());
-    let patterns = ["skirt", "tshirt"].map(|n| library::pattern(n, Size::M).expect("a pattern"));
-    let options =
-        DressOptions { triangulation: Triangulation { edge_length: 0.035, min_angle: 8.0 }, config: config.clone() };
-    let d = dress(&template, rest, &pose, &patterns, &options).expect("dressed");
+    dressed_as(rest, &pose, Size::M, 0.035, config)
+}
+
+fn dressed_as(rest: &RestBody, pose: &Pose<World>, size: Size, edge_length: f64, config: &Config) -> Dressed {
+    let template = tryon::body::embedded::template();
+    let patterns = ["skirt", "tshirt"].map(|n| library::pattern(n, size).expect("a pattern"));
+    let options = DressOptions { triangulation: Triangulation { edge_length, min_angle: 8.0 }, config: config.clone() };
+    let d = dress(&template, rest, pose, &patterns, &options).expect("dressed");
     let mut bones = BoneTransforms::default();
     pose.bones(template.skeleton(), rest, &mut bones);
     let mut body = Vec::new();
@@ -112,4 +117,94 @@ fn what_is_not_a_number_is_refused_and_nothing_moves() {
     assert!(step(&d.model, &mut state, &Input { body: &d.body, dt: 0.0 }, &mut work).is_err());
     assert!(step(&d.model, &mut state, &Input { body: &d.body[1..], dt: DT }, &mut work).is_err());
     assert!(state == d.state);
+}
+
+#[test]
+fn bodies_that_shrink_or_turn_inside_out_are_survived() {
+    let d = dressed(&Config::default());
+    let (mut state, mut work) = (d.state.clone(), Workspace::default());
+    let centre = d.body.iter().fold(V3::zeros(), |s, p| s + p.coords) / d.body.len() as f32;
+    let scaled = |k: f32| d.body.iter().map(|p| P3::from(centre + (p.coords - centre) * k)).collect::<Vec<_>>();
+    let mirrored: Vec<P3> = d.body.iter().map(|p| P3::new(2.0 * centre.x - p.x, p.y, p.z)).collect();
+    for body in [scaled(0.9), scaled(0.6), mirrored, d.body.clone()] {
+        for _ in 0..5 {
+            step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step");
+        }
+    }
+    sane(&state, &d.body);
+}
+
+/// How far outside the shirt the skirt stands, metres, at each of its vertices that the shirt goes around: along a
+/// horizontal ray from the middle of the shirt at that height.
+fn outside(skirt: &[P3], shirt: &[P3], faces: &[[u32; 3]]) -> Vec<f32> {
+    let hem = shirt.iter().map(|p| p.y).fold(f32::MAX, f32::min);
+    let above = |v: &&P3| v.y > hem + 0.04;
+    let beyond = |v: &P3| {
+        let (mut sum, mut n) = (V3::zeros(), 0.0);
+        for p in shirt.iter().filter(|p| (p.y - v.y).abs() < 0.03) {
+            (sum, n) = (sum + p.coords, n + 1.0);
+        }
+        let way = V3::new(v.x - sum.x / n, 0.0, v.z - sum.z / n);
+        let axis = v - way;
+        let hit = |f: &[u32; 3]| {
+            let [a, b, c] = f.map(|i| shirt[i as usize]);
+            // Möller and Trumbore.
+            let (e1, e2) = (b - a, c - a);
+            let h = way.cross(&e2);
+            let det = e1.dot(&h);
+            let s = axis - a;
+            let (u, w) = (s.dot(&h) / det, way.dot(&s.cross(&e1)) / det);
+            (det != 0.0 && u >= 0.0 && w >= 0.0 && u + w <= 1.0).then(|| e2.dot(&s.cross(&e1)) / det)
+        };
+        let farthest = faces.iter().filter_map(hit).fold(0.0, f32::max);
+        (farthest > 0.0).then(|| (1.0 - farthest) * way.norm())
+    };
+    skirt.iter().filter(above).filter_map(beyond).collect()
+}
+
+#[test]
+fn a_skirt_stays_under_the_shirt() {
+    let d = dressed(&Config::default());
+    let (mut state, mut work) = (d.state.clone(), Workspace::default());
+    for i in 0..30 {
+        let s = 0.1 * (5.0 * f64::from(i) * DT).sin() as f32;
+        let body = moved(&d.body, V3::new(s, 0.0, 0.0));
+        step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step");
+        if i % 5 == 0 {
+            let [skirt, shirt] = [&state.garments[0].positions, &state.garments[1].positions];
+            let out = outside(skirt, shirt, &d.model.outfit.garments[1].faces);
+            let through = out.iter().filter(|d| **d > 2e-3).count();
+            println!("frame {i}: {through} of {} skirt vertices outside the shirt", out.len());
+            assert!(out.len() > 100 && through * 100 <= 3 * out.len(), "frame {i}: {through} of {}", out.len());
+        }
+    }
+}
+
+#[test]
+fn a_heavy_body_with_its_arms_down_keeps_its_sleeves() {
+    // Two standard deviations of girth: the upper arms lie centimetres deep in the trunk.
+    let template = tryon::body::embedded::template();
+    let coefficients = vec![0.3, 2.0, 1.2, -0.2, 0.2, 0.3, 0.0, 0.6, 0.0];
+    let rest = template.personalise(&BodyShape { coefficients, ..BodyShape::default() });
+    let skeleton = template.skeleton();
+    let mut pose = Pose::rest(skeleton, Rigid::<World, Body>::identity());
+    for (side, s) in [("left", 1.0), ("right", -1.0)] {
+        let (j, c) =
+            [format!("{side}_shoulder"), format!("{side}_elbow")].map(|n| skeleton.index(&n).expect("a joint")).into();
+        let down = V3d::new(s * 0.17, -0.98, 0.0);
+        let turn = UnitQuaternion::rotation_between(&(rest.joints[c] - rest.joints[j]), &down).expect("a turn");
+        let at = skeleton.dof_offset(j);
+        pose.angles[at..at + 3].copy_from_slice(log_so3(&turn).as_slice());
+    }
+    let d = dressed_as(&rest, &pose, Size::Xl, 0.03, &Config::default());
+    let (mut state, mut work) = (d.state.clone(), Workspace::default());
+    let mut last = StepReport::default();
+    for _ in 0..30 {
+        last = step(&d.model, &mut state, &Input { body: &d.body, dt: DT }, &mut work).expect("a step");
+        assert_eq!(last.kept_last_good, None);
+    }
+    println!("stretch p99 {:.3} max {:.3}, {} buried", last.p99_strain, last.max_strain, last.buried);
+    assert!(last.buried > 50, "{}", last.buried);
+    assert!(last.p99_strain < 0.25 && last.max_strain < 1.6, "{} {}", last.p99_strain, last.max_strain);
+    assert!(last.penetration_left < 2e-3, "{}", last.penetration_left);
 }

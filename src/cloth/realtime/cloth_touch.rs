@@ -14,8 +14,13 @@ use crate::par;
 
 /// An outer layer is looked for within this distance outside a vertex, metres.
 const LAYER_REACH: f32 = 0.02;
+/// Distance between layers, metres: no more than there is between two of them on the skin.
+const LAYER_GAP: f32 = 0.002;
 /// Further than this outside an outer layer a vertex has nothing to do with it (a sleeve, the other side), metres.
 const LAYER_DEPTH: f32 = 0.15;
+/// An inner layer may stand out from under a hem as far as it is below it, up to this distance, metres: the edge of a
+/// triangle.
+const HEM: f32 = 0.03;
 /// Folds nearer than this are looked at, metres: they close at up to 1 m/s within a round.
 const FOLD_REACH: f32 = 0.01;
 /// Cells of the search, metres: half of one reaches the nearest corner of a triangle within reach.
@@ -73,7 +78,7 @@ impl ClothTouch<'_> {
         let thickness = self.model.config.thickness as f32;
         let (g, s) = (&self.model.garments[garment], &self.sheets[garment]);
         for (i, &v) in f.vertices.iter().enumerate() {
-            if p.tied[i] {
+            if p.tied[i] || p.free[i] {
                 continue;
             }
             let Some(hit) = fold(g, s, v, &place(p, i)) else { continue };
@@ -92,21 +97,23 @@ impl ClothTouch<'_> {
         if !self.model.config.layers {
             return;
         }
-        let thickness = self.model.config.thickness as f32;
         for i in 0..f.vertices.len() {
-            if p.tied[i] || p.on_skin[i] {
+            if p.tied[i] || p.on_skin[i] || p.free[i] {
                 continue;
             }
             let x = place(p, i);
+            // A skirt lies under the body of a shirt, never under its sleeves.
+            let own = self.model.garments[garment].own[f.vertices[i] as usize];
             for outer in garment + 1..self.model.garments.len() {
                 let (g, s) = (&self.model.garments[outer].surface, &self.sheets[outer]);
-                let (near, hit) = g.closest_within(&s.surface, &x, p.layers[outer][i], u8::MAX, LAYER_DEPTH);
+                let (near, hit) = g.closest_within(&s.surface, &x, p.layers[outer][i], own, LAYER_DEPTH);
                 p.layers[outer][i] = near;
                 let Ok(hit) = hit else { continue };
+                let Some(hit) = g.under(&s.surface, &x, &hit, HEM) else { continue };
                 let inside = -hit.signed;
-                if inside < LAYER_REACH && inside > -LAYER_DEPTH && !g.on_rim(&hit) {
-                    p.planes.push(plane(g, &s.velocities, i, &hit, -1.0, thickness));
-                    p.report.cloth_contacts += usize::from(inside < thickness);
+                if inside < LAYER_REACH && inside > -LAYER_DEPTH {
+                    p.planes.push(plane(g, &s.velocities, i, &hit, -1.0, LAYER_GAP));
+                    p.report.cloth_contacts += usize::from(inside < LAYER_GAP);
                 }
             }
         }

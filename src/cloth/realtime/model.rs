@@ -5,6 +5,7 @@ use crate::cloth::small_steps::{Fabric, Fit, Plan};
 use crate::cloth::{ClothError, Sheet};
 use crate::contact::{MapView, SurfaceModel};
 use crate::garment::{GarmentMesh, Region};
+use crate::math::{P3, V3};
 use crate::mesh::{Csr, Topology};
 use serde::{Deserialize, Serialize};
 
@@ -45,14 +46,11 @@ pub struct Config {
     pub patch: usize,
     /// Gravity, m/s².
     pub gravity: [f64; 3],
-    /// Distance of the innermost layer from the skin, metres.
+    /// Distance of the outermost layer from the skin, metres; the others lie evenly between.
     pub offset: f64,
-    /// Further distance of each layer, metres.
-    pub layer_offset: f64,
     /// Horizontal direction the real camera looks along, world x and z: its depth map is the fine one.
     pub camera_toward: [f32; 2],
-    /// Press inner layers under outer ones where they meet, besides their different distance from the skin. Only for
-    /// garments that were draped with it: over others it is too violent (docs/hindsight.md).
+    /// Press inner layers under outer ones where they meet.
     pub layers: bool,
     /// Keep the folds of a garment apart.
     pub self_collision: bool,
@@ -78,9 +76,8 @@ impl Default for Config {
             patch: 5000,
             gravity: [0.0, -9.81, 0.0],
             offset: 0.005,
-            layer_offset: 0.004,
             camera_toward: [0.0, -1.0],
-            layers: false,
+            layers: true,
             self_collision: true,
             thickness: 0.003,
             reach: 0.008,
@@ -123,13 +120,13 @@ pub struct Model {
     pub config: Config,
     pub(super) garments: Vec<GarmentModel>,
     pub(super) surface: SurfaceModel,
+    /// Part of the body that each of its vertices may lie in.
+    pub(super) opposite: Vec<u8>,
     pub(super) weights: SkinWeights,
     pub(super) joints: usize,
     pub(super) views: [MapView; 4],
 }
 
-/// Rings by which neighbouring parts of the body overlap, so that cloth across a joint line always has a surface.
-const PART_OVERLAP: usize = 4;
 /// Small steps a patch takes alone: between two searches for contacts there are more, in several rounds.
 pub(super) const ALONE: usize = 8;
 /// Steps from one evaluation of bending to the next.
@@ -154,6 +151,25 @@ pub fn body_parts(template: &Template) -> Vec<u8> {
     (0..template.mesh().vertices().len()).map(|i| by_joint[template.weights().dominant(i)]).collect()
 }
 
+/// The part that each body vertex may come to lie in: an arm in the trunk, the trunk in its nearer arm, a leg in the
+/// other leg.
+fn opposites(template: &Template, parts: &[u8]) -> Vec<u8> {
+    let vertices = template.mesh().vertices();
+    let mean = |part: Region| {
+        let of: Vec<_> = vertices.iter().zip(parts).filter(|(_, p)| **p == part.0).map(|(v, _)| v.coords).collect();
+        of.iter().sum::<V3>() / of.len().max(1) as f32
+    };
+    let (left, right) = (mean(Region::LEFT_ARM), mean(Region::RIGHT_ARM));
+    let of = |(v, part): (&P3, &u8)| match Region(*part) {
+        Region::LEFT_ARM | Region::RIGHT_ARM => Region::TRUNK.0,
+        Region::LEFT_LEG => Region::RIGHT_LEG.0,
+        Region::RIGHT_LEG => Region::LEFT_LEG.0,
+        _ if (v.coords - left).norm() < (v.coords - right).norm() => Region::LEFT_ARM.0,
+        _ => Region::RIGHT_ARM.0,
+    };
+    vertices.iter().zip(parts).map(of).collect()
+}
+
 impl Model {
     /// Prepares an outfit for simulation on a body made from `template`.
     ///
@@ -167,8 +183,8 @@ impl Model {
         if !(config.ahead >= 0.0 && config.ahead <= 1.0) {
             return Err(field("ahead", "must be between 0 and 1 step"));
         }
-        if !(config.offset.is_finite() && config.layer_offset.is_finite() && config.teleport > 0.0) {
-            return Err(field("offset, layer_offset, teleport", "they must be finite, teleport positive"));
+        if !(config.offset.is_finite() && config.teleport > 0.0) {
+            return Err(field("offset, teleport", "they must be finite, teleport positive"));
         }
         if outfit.anchors.len() != outfit.garments.len() {
             return Err(ClothError::Count {
@@ -189,10 +205,11 @@ impl Model {
             let h = Plan::comfortable_step(&sheet, config.ahead).clamp(1.0 / (60.0 * config.most_steps as f64), 1e-3);
             let plan = Plan::new(&sheet, &Fit { h, ahead: config.ahead, springs_only: false, bend_every: BEND_EVERY });
             let patches = plan.patches(g.vertices.div_ceil(config.patch), RINGS);
-            let own: Vec<u8> = g.regions.iter().map(|r| r.0).collect();
+            let own: Vec<u8> = g.regions.iter().map(|r| r.decisive().0).collect();
             let other = own.iter().map(|o| Region::ALL.0 & !o).collect();
-            let offset = config.offset + config.layer_offset * order as f64;
-            let surface = SurfaceModel::new(g.faces.clone(), g.topology()?, vec![1; g.vertices], 0);
+            // Evenly between the skin and where the outermost lies.
+            let offset = config.offset * (order + 1) as f64 / outfit.garments.len() as f64;
+            let surface = SurfaceModel::new(g.faces.clone(), g.topology()?, own.clone());
             garments.push(GarmentModel {
                 sheet,
                 patches,
@@ -206,13 +223,10 @@ impl Model {
                 anchors: Vec::new(),
             });
         }
+        let parts = body_parts(template);
         let mut model = Self {
-            surface: SurfaceModel::new(
-                template.mesh().faces().to_vec(),
-                Topology::new(template.mesh())?,
-                body_parts(template),
-                PART_OVERLAP,
-            ),
+            opposite: opposites(template, &parts),
+            surface: SurfaceModel::new(template.mesh().faces().to_vec(), Topology::new(template.mesh())?, parts),
             weights: template.weights().clone(),
             joints: template.skeleton().len(),
             views: MapView::around(config.camera_toward),
@@ -256,6 +270,10 @@ impl Model {
     /// The body surface that garments touch.
     pub(crate) fn surface(&self) -> &SurfaceModel {
         &self.surface
+    }
+    /// The part that each vertex of it may lie in.
+    pub(crate) fn opposite(&self) -> &[u8] {
+        &self.opposite
     }
     /// Distance from the skin of one garment's layer, metres.
     pub(crate) fn offset(&self, garment: usize) -> f64 {

@@ -3,7 +3,7 @@
 use super::Model;
 use crate::cloth::ClothError;
 use crate::cloth::small_steps::{Motion, Plane, Tie};
-use crate::contact::{DepthMaps, PointGrid, SurfaceFrame};
+use crate::contact::{Buried, DepthMaps, PointGrid, SurfaceFrame};
 use crate::math::{P3, V3};
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +27,8 @@ pub struct State {
     pub garments: Vec<GarmentState>,
     /// Body of the last step, world, metres.
     pub(super) body: Vec<P3>,
+    /// Skin that lies inside another part of the body.
+    pub(super) buried: Buried,
     /// Body of the last step that was computed (not slept through).
     pub(super) awake_body: Vec<P3>,
     /// Steps so far.
@@ -81,13 +83,13 @@ impl State {
                 let mut near = Vec::new();
                 if j > k {
                     crate::par::map_into(model.config.par, g.positions.len(), 64, &mut near, |i| {
-                        model.garments[j].surface.nearest_vertex(frame, &g.positions[i], u8::MAX)
+                        model.garments[j].surface.nearest_vertex(frame, &g.positions[i], model.garments[k].own[i])
                     });
                 }
                 g.layers.push(near);
             }
         }
-        Ok(Self { garments, body: body.to_vec(), awake_body: body.to_vec(), frames: 0, still: 0, stale: 0 })
+        Ok(Self { garments, body: body.to_vec(), awake_body: body.to_vec(), ..Self::default() })
     }
 }
 
@@ -137,6 +139,8 @@ pub struct StepReport {
     pub cloth_contacts: usize,
     /// Contact planes of other body parts ignored because there was no room between them and the vertex's own part.
     pub pinched: usize,
+    /// Body vertices that lie inside another part of it, where nothing holds cloth.
+    pub buried: usize,
     /// The body jumped and the cloth was carried along.
     pub teleported: bool,
     /// A fault was caught and the last good state kept: which.
@@ -190,6 +194,8 @@ pub(super) struct PatchScratch {
     pub(super) body_planes: usize,
     /// Vertices that lie on the skin: no outer layer presses them further.
     pub(super) on_skin: Vec<bool>,
+    /// Vertices that nothing holds: in skin that lies in other skin, or about to tear.
+    pub(super) free: Vec<bool>,
     pub(super) ties: Vec<Tie>,
     /// Vertices whose place is given: nothing else may push them.
     pub(super) tied: Vec<bool>,

@@ -96,6 +96,8 @@ pub fn step(
     work.after.vertices.extend_from_slice(input.body);
     model.surface.update_normals(config.par, &mut work.after);
     let fastest = moved(&state.body) / dt as f32;
+    state.buried.update(config.par, &model.surface, &model.opposite, &work.after);
+    report.buried = state.buried.count();
     report.stages_ms.contact = ms(timer);
     begin(model, state, &mut work.patches);
     let search = if fastest < CALM { CALM_SEARCH } else { SEARCH };
@@ -107,6 +109,7 @@ pub fn step(
         lerp(config.par, &work.before, &work.after, r as f32 / rounds as f32, &mut work.now);
         let touch = Touch {
             model,
+            buried: &state.buried,
             now: &work.now,
             before: &work.before.vertices,
             after: &work.after.vertices,
@@ -132,7 +135,7 @@ pub fn step(
         report.stages_ms.solve += ms(timer);
     }
     let timer = Instant::now();
-    for_patches(model, &mut work.patches, |g, k, p| settle(model, g, k, &work.after, p));
+    for_patches(model, &mut work.patches, |g, k, p| settle(model, g, k, &state.buried, &work.after, p));
     report.stages_ms.contact += ms(timer);
     let timer = Instant::now();
     let speed = finish(model, state, &work.patches, dt, &mut report);
@@ -230,7 +233,7 @@ fn advance(model: &Model, all: &mut [PatchScratch], span: f64) {
                     let (body, cloth) = p.planes.split_at(p.body_planes);
                     p.motion.restrain(cloth, t, h, CLOTH_RECOVERY);
                     p.report.contacts = p.motion.restrain(body, t, h, RECOVERY);
-                    p.motion.advance(h);
+                    p.motion.advance(h, FASTEST);
                 }
             });
             if patches.len() > 1 {
@@ -268,9 +271,7 @@ fn finish(model: &Model, state: &mut State, all: &[PatchScratch], dt: f64, repor
                 let v = f.vertices[i] as usize;
                 let (x, u) = (p.motion.position(i).0, p.motion.velocity[i].0);
                 g.positions[v] = P3::new(x[0], x[1], x[2]);
-                let u = V3::new(u[0], u[1], u[2]);
-                let speed = u.norm();
-                g.velocities[v] = if speed > FASTEST { u * (FASTEST / speed) } else { u };
+                g.velocities[v] = V3::new(u[0], u[1], u[2]);
                 g.nearest[v] = p.nearest[i];
                 for (to, from) in g.layers.iter_mut().zip(&p.layers) {
                     if let (Some(to), Some(from)) = (to.get_mut(v), from.get(i)) {

@@ -3,7 +3,8 @@
 use super::model::Model;
 use super::state::PatchScratch;
 use crate::cloth::small_steps::{Fabric, Plane, Tie, V4};
-use crate::contact::{Closest, DepthMaps, SurfaceFrame};
+use crate::contact::{Buried, Closest, DepthMaps, SurfaceFrame};
+use crate::garment::Region;
 use crate::math::{P3, V3};
 
 /// Surfaces further than this from a vertex are not looked at in a round, metres.
@@ -12,12 +13,15 @@ const REACH: f32 = 0.04;
 const ON_SKIN: f32 = 2e-3;
 /// Cloth that ends a call under the skin is put this far above it, metres: less than a fabric's thickness.
 const LIFTED: f32 = 5e-4;
+/// Cloth longer than this, over its rest length, is about to tear: more than knitwear is worn at.
+const TORN: f32 = 1.5;
 /// Anchors of strength ½ go to their place at this rate, 1/s.
 const ANCHOR_RATE: f64 = 120.0;
 
 /// The body during one round.
 pub(super) struct Touch<'a> {
     pub(super) model: &'a Model,
+    pub(super) buried: &'a Buried,
     pub(super) now: &'a SurfaceFrame,
     pub(super) before: &'a [P3],
     pub(super) after: &'a [P3],
@@ -45,8 +49,10 @@ impl Touch<'_> {
         let reach = self.model.config.reach as f32;
         p.on_skin.clear();
         p.on_skin.resize(f.vertices.len(), false);
+        // Planes that contradict each other would tear cloth apart: it gives way, and hangs on its neighbours.
+        p.motion.overstretched(f, TORN, &mut p.free);
         for (i, &v) in f.vertices.iter().enumerate() {
-            if p.tied[i] {
+            if p.tied[i] || p.free[i] {
                 continue;
             }
             let masks = [g.own[v as usize], g.other[v as usize]];
@@ -71,19 +77,26 @@ impl Touch<'_> {
                 p.nearest[i][k] = near;
                 match c {
                     Err(room) => p.clear[i][k] = room,
-                    Ok(c) => {
+                    Ok(mut c) => {
                         p.clear[i][k] = if c.rim { 0.0 } else { c.signed - REACH };
-                        if !c.rim && c.signed < (offset + reach + travel).min(REACH) {
+                        if c.rim && k == 0 {
+                            // Beyond the own parts: whatever is nearest.
+                            c = surface.closest(self.now, &x, near, Region::ALL.0);
+                        }
+                        let hidden = self.buried.holds_nothing(surface.faces()[c.face as usize]);
+                        p.free[i] |= hidden && !c.rim && c.signed < offset;
+                        if !hidden && !c.rim && c.signed < (offset + reach + travel).min(REACH) {
                             found[k] = Some(c);
                         }
                     }
                 }
             }
             if let [Some(own), Some(other)] = &found {
-                // Faces that meet with less room than two layers of cloth: the own part decides.
-                let room = own.normal.dot(&(other.point - own.point));
-                if own.normal.dot(&other.normal) < 0.0 && room < 2.0 * offset {
-                    found[1] = None;
+                // Faces that meet with less room than two layers of cloth: the own part decides, and where the body
+                // lies in itself nothing does: the cloth there hangs on its neighbours, out of sight.
+                if let Some(room) = own.room(other).filter(|room| *room < 2.0 * offset) {
+                    p.free[i] |= room < 0.0;
+                    found = [found[0].filter(|_| room >= 0.0), None];
                     p.report.pinched += 1;
                 }
             }
@@ -160,12 +173,19 @@ fn above(a: &super::AnchorBinding, [p, q, r]: [P3; 3]) -> P3 {
     P3::from(on + normal * a.height)
 }
 
-/// Measures how deep cloth is under the skin of its own parts, and lifts what is.
-pub(super) fn settle(model: &Model, garment: usize, patch: usize, after: &SurfaceFrame, p: &mut PatchScratch) {
+/// Measures how deep cloth is under the skin of its own parts where that holds it, and lifts what is.
+pub(super) fn settle(
+    model: &Model,
+    garment: usize,
+    patch: usize,
+    buried: &Buried,
+    after: &SurfaceFrame,
+    p: &mut PatchScratch,
+) {
     let g = &model.garments[garment];
     let f = &g.patches[patch];
     let mut last = u32::MAX;
-    for k in 0..p.planes.len() {
+    for k in 0..p.body_planes {
         let i = p.planes[k].vertex;
         if i == last || i as usize >= f.owned {
             continue;
@@ -175,7 +195,7 @@ pub(super) fn settle(model: &Model, garment: usize, patch: usize, after: &Surfac
         let own = g.own[f.vertices[i] as usize];
         let x = p3(p.motion.position(i));
         let c = model.surface.closest(after, &x, p.nearest[i][0], own);
-        if c.rim || c.signed >= LIFTED {
+        if c.rim || c.signed >= LIFTED || buried.holds_nothing(model.surface.faces()[c.face as usize]) {
             continue;
         }
         p.report.penetration = p.report.penetration.max(f64::from(-c.signed));

@@ -95,7 +95,7 @@ pub(super) fn run(
             }
             m.restrain(&planes, 0.0, hf, RECOVERY);
             m.tie(&ties, 0.0, hf);
-            m.advance(hf);
+            m.advance(hf, f32::INFINITY);
         }
         for i in 0..n {
             x[i] = m.position(i);

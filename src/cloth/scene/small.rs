@@ -98,7 +98,7 @@ pub(super) fn run(
                     w.motion.accelerate(f, hf, ahead, gravity);
                     w.motion.restrain(&w.planes, t, hf, RECOVERY);
                     w.motion.tie(&w.ties, t, hf);
-                    w.motion.advance(hf);
+                    w.motion.advance(hf, f32::INFINITY);
                 }
             });
             for (w, m) in scratch.iter_mut().zip(&mut motions) {

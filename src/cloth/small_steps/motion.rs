@@ -100,6 +100,20 @@ impl Motion {
             *a = *s + *m + v.scale(time);
         }
     }
+    /// Marks the vertices of edges that are longer than `most` times their rest length.
+    pub fn overstretched(&self, f: &Fabric, most: f32, out: &mut Vec<bool>) {
+        out.clear();
+        out.resize(self.start.len(), false);
+        let mut edges = f.other.iter().zip(&f.rest);
+        for (i, count) in f.count.iter().enumerate() {
+            for (j, rest) in edges.by_ref().take(usize::from(*count)) {
+                let d = self.position(usize::from(*j)) - self.position(i);
+                if d.dot(d) > (most * rest) * (most * rest) {
+                    (out[i], out[usize::from(*j)]) = (true, true);
+                }
+            }
+        }
+    }
     /// Bending forces, kept until called again. They change slowly: every fourth step is enough (docs/benchmarks.md);
     /// `late` is how far ahead of the positions they are taken, s, half of the time they will be kept.
     pub fn bend(&mut self, f: &Fabric, late: f32) {
@@ -215,9 +229,14 @@ impl Motion {
             *v = (*v + a.scale(m * h) + fall).scale(keep);
         }
     }
-    /// Positions after a step of `h`.
-    pub fn advance(&mut self, h: f32) {
-        for (m, v) in self.moved.iter_mut().zip(&self.velocity) {
+    /// Positions after a step of `h`, none faster than `fastest` m/s: where planes contradict each other, speeds would
+    /// grow until they are no numbers.
+    pub fn advance(&mut self, h: f32, fastest: f32) {
+        for (m, v) in self.moved.iter_mut().zip(&mut self.velocity) {
+            let square = v.dot(*v);
+            if square > fastest * fastest {
+                *v = v.scale(fastest / square.sqrt());
+            }
             *m = *m + v.scale(h);
         }
     }

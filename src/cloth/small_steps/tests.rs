@@ -85,7 +85,7 @@ impl Lab {
                     }
                     m.accelerate(f, h, self.ahead, self.gravity);
                     before(f, m, h);
-                    m.advance(h);
+                    m.advance(h, f32::INFINITY);
                 }
             }
             exchange(&self.fabrics, &mut self.motions);

@@ -1,0 +1,165 @@
+//! Skin that lies inside another part of the body: an armpit that closes, thighs that press on each other.
+//!
+//! Nothing can lie on such skin, and planes from it contradict those of the part it lies in. Measured on a heavy body
+//! with its arms down: a sleeve held by such planes tears itself off the shoulder within a second.
+
+use super::{Part, SurfaceFrame, SurfaceModel};
+use crate::math::P3;
+use crate::par::{self, Par};
+use serde::{Deserialize, Serialize};
+
+/// Which skin is buried.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Buried {
+    seen: Vec<Seen>,
+    inside: Vec<bool>,
+    before: Vec<P3>,
+}
+
+/// What is known about one vertex.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Seen {
+    /// Nearest vertex of the other part.
+    nearest: u32,
+    /// How far both may move before it must be looked at again, metres.
+    room: f32,
+    state: Side,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+enum Side {
+    #[default]
+    Outside,
+    Inside,
+    /// The nearest point is where the two parts join.
+    Unknown,
+}
+
+/// Rings by which buried skin grows into skin of which the nearest other part is the joint line between them.
+const RINGS: usize = 3;
+/// A first search looks at every so many vertices, then walks.
+const STRIDE: usize = 7;
+
+impl Buried {
+    /// Looks again at what may have changed since the last call. `opposite`: the part that each vertex may lie in, 0 for
+    /// none.
+    pub fn update(&mut self, par: Par, model: &SurfaceModel, opposite: &[Part], frame: &SurfaceFrame) {
+        let n = frame.vertices.len();
+        let first = self.seen.len() != n;
+        if first {
+            self.seen = vec![Seen::default(); n];
+            self.inside = vec![false; n];
+            self.before.clone_from(&frame.vertices);
+        }
+        let moved = self.before.iter().zip(&frame.vertices).map(|(a, b)| (a - b).norm_squared()).fold(0.0, f32::max);
+        let moved = 2.0 * moved.sqrt();
+        self.before.clone_from(&frame.vertices);
+        par::for_chunks(par, &mut self.seen, 256, |start, chunk| {
+            for (k, s) in chunk.iter_mut().enumerate() {
+                let (v, mask) = (start + k, opposite[start + k]);
+                if mask == 0 {
+                    continue;
+                }
+                if s.room > moved {
+                    s.room -= moved;
+                    continue;
+                }
+                let p = &frame.vertices[v];
+                if first {
+                    s.nearest = coarse_nearest(model, frame, p, mask);
+                }
+                let (near, hit) = model.closest_within(frame, p, s.nearest, mask, 0.0);
+                (s.nearest, s.room) = (near, 0.0);
+                let side = |inside: bool| if inside { Side::Inside } else { Side::Outside };
+                s.state = match hit {
+                    Err(room) => {
+                        // Far from the other part's skin, and nothing moves through it: outside or deep inside.
+                        s.room = room;
+                        let n = near as usize;
+                        side((p - frame.vertices[n]).dot(&frame.normals[n]) < 0.0)
+                    }
+                    Ok(c) if c.rim => Side::Unknown,
+                    Ok(c) => side(c.signed < 0.0),
+                };
+            }
+        });
+        for (inside, s) in self.inside.iter_mut().zip(&self.seen) {
+            *inside = s.state == Side::Inside;
+        }
+        for _ in 0..RINGS {
+            let reached: Vec<usize> = (0..n)
+                .filter(|&v| self.seen[v].state == Side::Unknown && !self.inside[v])
+                .filter(|&v| model.neighbours(v as u32).iter().any(|w| self.inside[*w as usize]))
+                .collect();
+            reached.into_iter().for_each(|v| self.inside[v] = true);
+        }
+    }
+    /// A triangle of the skin holds nothing: most of its corners are buried.
+    pub fn holds_nothing(&self, corners: [u32; 3]) -> bool {
+        corners.iter().filter(|v| self.inside.get(**v as usize).copied().unwrap_or(false)).count() > 1
+    }
+    /// Buried vertices.
+    pub fn count(&self) -> usize {
+        self.inside.iter().filter(|b| **b).count()
+    }
+}
+
+fn coarse_nearest(model: &SurfaceModel, frame: &SurfaceFrame, p: &P3, mask: Part) -> u32 {
+    let mut best = (f32::INFINITY, 0u32);
+    let mut of_part = 0;
+    for (i, v) in frame.vertices.iter().enumerate() {
+        if model.part(i as u32) & mask == 0 {
+            continue;
+        }
+        of_part += 1;
+        let d = (v - p).norm_squared();
+        if of_part % STRIDE == 1 && d < best.0 {
+            best = (d, i as u32);
+        }
+    }
+    best.1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::surface::tests::sphere;
+    use crate::math::V3;
+    use crate::mesh::{Topology, TriMesh};
+
+    #[test]
+    fn of_two_spheres_in_each_other_exactly_what_is_inside_is_buried() {
+        let one = sphere(3);
+        let n = one.vertices().len();
+        let mut faces = one.faces().to_vec();
+        faces.extend(one.faces().iter().map(|f| f.map(|v| v + n as u32)));
+        let at = |d: f32| -> Vec<P3> {
+            one.vertices().iter().copied().chain(one.vertices().iter().map(|p| p + V3::new(d, 0.0, 0.0))).collect()
+        };
+        let mesh = TriMesh::new(at(3.0), faces.clone()).expect("two spheres");
+        let parts: Vec<Part> = (0..2 * n).map(|i| if i < n { 1 } else { 2 }).collect();
+        let opposite: Vec<Part> = parts.iter().map(|p| 3 - p).collect();
+        let model = SurfaceModel::new(faces, Topology::new(&mesh).expect("topology"), parts);
+        let mut buried = Buried::default();
+        // Apart, into each other, out again: the same state all along.
+        for d in [3.0, 2.2, 1.7, 1.3, 1.9, 2.2, 3.0] {
+            let mut frame = SurfaceFrame { vertices: at(d), normals: Vec::new() };
+            model.update_normals(Par::Seq, &mut frame);
+            buried.update(Par::Seq, &model, &opposite, &frame);
+            let mut unsure = 0;
+            for (i, p) in frame.vertices.iter().enumerate() {
+                let other = P3::new(if i < n { d } else { 0.0 }, 0.0, 0.0);
+                let depth = 1.0 - (p - other).norm();
+                // A facet lies up to 8 mm inside its sphere.
+                if depth.abs() < 0.02 {
+                    unsure += 1;
+                } else {
+                    assert_eq!(buried.inside[i], depth > 0.0, "distance {d}, vertex {i}, {depth} m deep");
+                }
+            }
+            assert!(unsure < n / 5);
+            assert_eq!(buried.count() == 0, d > 2.0, "distance {d}");
+        }
+        assert!(!buried.holds_nothing([0, 1, u32::MAX]), "far apart, and a corner that does not exist");
+    }
+}
