@@ -10,7 +10,9 @@ use std::path::PathBuf;
 use std::time::Instant;
 use tryon::body::Pose;
 use tryon::camera::ColorImage;
-use tryon::composite::{BodyView, GarmentView, Input, Look, Model, RenderError, RenderReport, Workspace, render};
+use tryon::composite::{
+    BodyView, GarmentView, Input, Limbs, Look, Model, RenderError, RenderReport, State, Workspace, render,
+};
 use tryon::dressing::{DressOptions, dress};
 use tryon::formats::image::write_png_rgb;
 use tryon::garment::{Size, library};
@@ -65,6 +67,7 @@ fn main() {
         })
         .collect();
     let model = Model::default();
+    let limbs = Limbs::of(template);
 
     println!(
         "\n| picture | processor, one thread: p50 / p99 ms | card: p50 / p99 ms | pixels that differ by more than {DIFFERENT} |"
@@ -75,13 +78,13 @@ fn main() {
             frame: &frame,
             calibration: sequence.calibration(),
             garments: &garments,
-            body: Some(BodyView { vertices: &truth.vertices, faces: template.mesh().faces() }),
+            body: Some(BodyView { vertices: &truth.vertices, faces: template.mesh().faces(), limbs: &limbs }),
             output: Some(size),
         };
-        let mut work = Workspace::default();
-        let (on_processor, a) = timed(rounds, || render(&model, &input, &mut work));
-        let mut work = Workspace::default();
-        let (on_card, b) = timed(rounds, || card.render(&model, &input, &mut work));
+        let (mut state, mut work) = (State::default(), Workspace::default());
+        let (on_processor, a) = timed(rounds, || render(&model, &mut state, &input, &mut work));
+        let (mut state, mut work) = (State::default(), Workspace::default());
+        let (on_card, b) = timed(rounds, || card.render(&model, &mut state, &input, &mut work));
         println!("| {}×{} | {a} | {b} | {} |", size[0], size[1], different(&on_processor, &on_card));
         if let Some(dir) = &out {
             std::fs::create_dir_all(dir).unwrap();

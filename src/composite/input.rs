@@ -1,6 +1,8 @@
 //! What a picture is made of, and what is said about it afterwards.
 
 use super::framing::Framing;
+use super::hand::HandReport;
+use super::limbs::Limbs;
 use super::look::Look;
 use super::occlusion::Margins;
 use super::shade::Lights;
@@ -31,6 +33,8 @@ pub struct BodyView<'a> {
     pub vertices: &'a [P3],
     /// Triangles of the template.
     pub faces: &'a [Face],
+    /// Which vertices are arms, face and trunk; default for none.
+    pub limbs: &'a Limbs,
 }
 
 /// Everything that changes from picture to picture. Garments come from the innermost to the outermost.
@@ -108,6 +112,8 @@ pub struct RenderReport {
     pub tiles_skipped: usize,
     /// Specks of noise that were taken for occluders and dropped, pixels.
     pub specks_dropped: usize,
+    /// Bare hands and forearms that colour found in front.
+    pub hands: HandReport,
     /// Estimated brightness of the captured picture; 1 = a well exposed room.
     pub brightness: f32,
     /// Milliseconds by stage, in order.

@@ -2,10 +2,13 @@
 
 use super::background::{brightness, captured, depth_from_picture};
 use super::framing::Stage;
+use super::hand::HandReport;
+use super::hand::{self, Behind, Hands};
 use super::input::{Input, Model, RenderError, RenderReport};
 use super::occlusion::{Matte, Seen, evidence, says};
 use super::shade::{Cache, Shader};
 use super::shadow::Shadows;
+use super::skin::State;
 use super::surface::{Area, Surface, TILE, part_of};
 use crate::camera::ColorImage;
 use crate::par::{self, Par};
@@ -22,6 +25,7 @@ pub struct Workspace {
     pub(crate) shade: Shadows,
     body: VisibilityBuffer,
     body_vertices: Vec<crate::math::P3>,
+    hands: Hands,
 }
 
 /// What the samples of one picture pixel agree on.
@@ -44,16 +48,18 @@ const ROWS: usize = 8;
 /// How far a contact shadow reaches, metres.
 const SHADOW_REACH: f32 = 0.025;
 
-/// One picture: what the camera saw with the garments on.
+/// One picture: what the camera saw with the garments on. `state` is one person's in front of one camera.
 ///
 /// # Errors
 /// [`RenderError`] when the input cannot be drawn; it names what is wrong.
 pub fn render(
     model: &Model,
+    state: &mut State,
     input: &Input<'_>,
     work: &mut Workspace,
 ) -> Result<(ColorImage, RenderReport), RenderError> {
     let config = &model.config;
+    state.keep_if(input.body.is_some());
     let mut scene = Scene::begin(model, input, work)?;
     let Some(area) = scene.area else { return Ok(scene.end(work)) };
     let samples = config.samples.clamp(1, 4);
@@ -61,7 +67,7 @@ pub fn render(
     resolve(config.par, &work.surface, &area, samples, &mut work.pixels);
     scene.lap("garments");
 
-    let look_up = scene.judge(model, input, work, &area);
+    let look_up = scene.judge(model, state, input, work, &area);
     let shader =
         Shader::new(&work.surface, scene.stage.camera, &model.to_srgb, &config.lights, scene.report.brightness);
     blend(config.par, &shader, work, &area, samples, config.lights.contact, &look_up, &mut scene.image);
@@ -113,11 +119,23 @@ impl<'a> Scene<'a> {
     }
 
     /// From `work.pixels` to what hides them and the shadows between.
-    pub(crate) fn judge(&mut self, model: &Model, input: &Input<'_>, work: &mut Workspace, area: &Area) -> DepthLookUp {
+    pub(crate) fn judge(
+        &mut self,
+        model: &Model,
+        state: &mut State,
+        input: &Input<'_>,
+        work: &mut Workspace,
+        area: &Area,
+    ) -> DepthLookUp {
         let config = &model.config;
         let tracked = draw_body(config.par, input, &self.stage, area, &mut work.body, &mut work.body_vertices);
         let look_up = DepthLookUp::new(&self.stage, area, &self.depth);
         collect_evidence(model, work, area, &look_up, tracked);
+        self.lap("evidence");
+        if tracked {
+            self.report.hands = self.find_hands(state, input, work, area);
+            self.lap("hands");
+        }
         self.report.specks_dropped = work.matte.decide(
             config.par,
             &config.margins,
@@ -133,6 +151,22 @@ impl<'a> Scene<'a> {
         work.shade.cast(covered, &work.matte.alpha, area, self.reach);
         self.lap("shadows");
         look_up
+    }
+
+    /// Bare hands and forearms in front of loose cloth, by their colour.
+    fn find_hands(&self, state: &mut State, input: &Input<'_>, work: &mut Workspace, area: &Area) -> HandReport {
+        let (Some(body), Some(_)) = (input.body, &input.frame.color) else { return HandReport::default() };
+        let vertices = if input.calibration.color.is_some() { &work.body_vertices } else { body.vertices };
+        let seen = hand::Seen { stage: &self.stage, image: &self.image, depth: &self.depth };
+        let (pixels, drawn, width) = (&work.pixels, &work.body, area.width as usize);
+        let behind = |x: usize, y: usize| {
+            let at = y / BODY_STEP as usize * drawn.width as usize + x / BODY_STEP as usize;
+            let trunk = body.faces.get(drawn.face[at] as usize).is_some_and(|f| !body.limbs.is_arm(f[0]));
+            let trunk = if trunk { drawn.depth[at] } else { f32::INFINITY };
+            Behind { garment: pixels[y * width + x].depth, trunk }
+        };
+        let body = hand::Body { limbs: body.limbs, vertices };
+        work.hands.mark(state, &seen, &body, &work.surface.vertices, area, &mut work.matte.says, behind)
     }
 
     pub(crate) fn end(mut self, work: &Workspace) -> (ColorImage, RenderReport) {
@@ -375,36 +409,6 @@ mod tests {
     use super::*;
     use crate::composite::{Config, Margins};
 
-    /// Shares of arm pixels painted over and of shirt pixels with a hole, away from outlines by `border` pixels.
-    fn mistakes(s: &Scenery, image: &ColorImage, border: i32) -> [f32; 2] {
-        let (w, h) = (image.width() as i32, image.height() as i32);
-        let inside = |mask: &dyn Fn(usize) -> bool, x: i32, y: i32| {
-            (-border..=border).all(|dy| {
-                (-border..=border).all(|dx| {
-                    let (u, v) = (x + dx, y + dy);
-                    u >= 0 && v >= 0 && u < w && v < h && mask((v * w + u) as usize)
-                })
-            })
-        };
-        let captured = s.frame.color.as_ref().expect("colour");
-        let (mut counts, mut wrong) = ([0f32; 2], [0f32; 2]);
-        for y in 0..h {
-            for x in 0..w {
-                let (a, b) = (image.at(x as u32, y as u32), captured.at(x as u32, y as u32));
-                let like_captured = (0..3).all(|k| a[k].abs_diff(b[k]) < 40);
-                if inside(&|i| s.arm[i] && s.shirt_seen[i], x, y) {
-                    counts[0] += 1.0;
-                    wrong[0] += f32::from(u8::from(!like_captured));
-                } else if inside(&|i| !s.arm[i] && s.shirt_seen[i], x, y) {
-                    counts[1] += 1.0;
-                    wrong[1] += f32::from(u8::from(like_captured));
-                }
-            }
-        }
-        assert!(counts[0] > 150.0 && counts[1] > 2000.0, "{counts:?}");
-        [wrong[0] / counts[0], wrong[1] / counts[1]]
-    }
-
     #[test]
     fn the_arm_hides_the_shirt_and_noise_does_not() {
         for seed in [1, 2] {
@@ -415,15 +419,17 @@ mod tests {
                 if !body {
                     input.body = None;
                 }
-                let (image, report) = render(&Model::default(), &input, &mut Workspace::default()).expect("drawn");
-                let [arm, shirt] = mistakes(&s, &image, 3);
+                let (image, report) =
+                    render(&Model::default(), &mut State::default(), &input, &mut Workspace::default()).expect("drawn");
+                let [arm, shirt] = s.mistakes(&image, 3);
                 assert!(arm < 0.01 && shirt < 0.001, "body {body}: arm {arm}, shirt {shirt}, {report:?}");
                 // What the plain test makes of it: the oracle must see holes, or this test proves nothing.
                 let plain =
                     Margins { plain: 0.0, limb: 0.0, covered: 0.0, inner: 0.0, clear: 0.0, step: 0.0, patch: 0.0 };
                 let naive = Model::new(Config { margins: plain, ..Config::default() });
-                let (image, _) = render(&naive, &input, &mut Workspace::default()).expect("drawn");
-                assert!(mistakes(&s, &image, 3)[1] > 0.01);
+                let (image, _) =
+                    render(&naive, &mut State::default(), &input, &mut Workspace::default()).expect("drawn");
+                assert!(s.mistakes(&image, 3)[1] > 0.01);
             }
         }
     }
@@ -433,11 +439,13 @@ mod tests {
         let s = Scenery::new(320, 240, 3);
         let captured = s.frame.color.as_ref().expect("colour");
         let none = s.input(&[], None);
-        let (image, report) = render(&Model::default(), &none, &mut Workspace::default()).expect("drawn");
+        let (image, report) =
+            render(&Model::default(), &mut State::default(), &none, &mut Workspace::default()).expect("drawn");
         assert_eq!((&image, report.tiles_drawn, report.tiles_skipped), (captured, 0, 80));
         let garments = [s.garment()];
         let (image, report) =
-            render(&Model::default(), &s.input(&garments, None), &mut Workspace::default()).expect("drawn");
+            render(&Model::default(), &mut State::default(), &s.input(&garments, None), &mut Workspace::default())
+                .expect("drawn");
         // The shirt spans about 87 columns; far from it every byte is the captured one.
         for y in 0..240 {
             for x in (0..60).chain(260..320) {
@@ -454,11 +462,13 @@ mod tests {
         let garments = [s.garment(), s.garment()];
         let input = s.input(&garments, Some([400, 300]));
         let with = |par, work: &mut Workspace| {
-            render(&Model::new(Config { par, ..Config::default() }), &input, work).expect("drawn").0
+            render(&Model::new(Config { par, ..Config::default() }), &mut State::default(), &input, work)
+                .expect("drawn")
+                .0
         };
         let alone = with(Par::Seq, &mut Workspace::default());
         let mut used = Workspace::default();
-        render(&Model::default(), &s.input(&garments[..1], None), &mut used).expect("drawn");
+        render(&Model::default(), &mut State::default(), &s.input(&garments[..1], None), &mut used).expect("drawn");
         for threads in [1, 3] {
             let got = par::with_threads(threads, || with(Par::Rayon, &mut used)).expect("pool");
             assert!(got == alone, "{threads} threads");
@@ -469,7 +479,7 @@ mod tests {
     fn faults_are_named() {
         let s = Scenery::new(160, 120, 5);
         let draw = |g: super::super::GarmentView<'_>| {
-            render(&Model::default(), &s.input(&[g], None), &mut Workspace::default()).err()
+            render(&Model::default(), &mut State::default(), &s.input(&[g], None), &mut Workspace::default()).err()
         };
         let mut g = s.garment();
         let uv = [[0.0; 2]; 3];
@@ -486,7 +496,9 @@ mod tests {
             let mut g = s.garment();
             (g.vertices, g.uv, g.faces) = (&points, &[], &[[0, 1, 2]]);
             let garments = [g];
-            let (_, r) = render(&Model::default(), &s.input(&garments, None), &mut Workspace::default()).expect("fine");
+            let (_, r) =
+                render(&Model::default(), &mut State::default(), &s.input(&garments, None), &mut Workspace::default())
+                    .expect("fine");
             assert_eq!(r.pixels_drawn, 0);
         }
     }

@@ -7,7 +7,7 @@ use crate::camera::ColorImage;
 use crate::composite::render::{Pixel, Scene};
 use crate::composite::shade::Shader;
 use crate::composite::surface::Area;
-use crate::composite::{Input, Model, RenderError, RenderReport, Workspace};
+use crate::composite::{Input, Model, RenderError, RenderReport, State, Workspace};
 use std::sync::{Arc, Mutex};
 
 /// The shaders' source.
@@ -195,7 +195,7 @@ impl Renderer {
             body: None,
             output: None,
         };
-        self.render(&Model::default(), &input, &mut Workspace::default()).map(|_| ())
+        self.render(&Model::default(), &mut State::default(), &input, &mut Workspace::default()).map(|_| ())
     }
 
     /// The picture of [`crate::composite::render`] up to rounding and ties at edges.
@@ -206,9 +206,11 @@ impl Renderer {
     pub fn render(
         &mut self,
         model: &Model,
+        state: &mut State,
         input: &Input<'_>,
         work: &mut Workspace,
     ) -> Result<(ColorImage, RenderReport), RenderError> {
+        state.keep_if(input.body.is_some());
         let mut scene = Scene::begin(model, input, work)?;
         let Some(area) = scene.area else { return Ok(scene.end(work)) };
         let samples = model.config.samples.clamp(1, 4);
@@ -238,7 +240,7 @@ impl Renderer {
         })?;
         scene.lap("garments");
 
-        let look_up = scene.judge(model, input, work, &area);
+        let look_up = scene.judge(model, state, input, work, &area);
         let marks: Vec<[f32; 2]> = work.matte.alpha.iter().zip(&look_up.metres).map(|(a, z)| [*a, *z]).collect();
         write(&self.queue, &targets.marks, area.width, area.height, 8, bytemuck::cast_slice(&marks));
         let shade = &work.shade;
@@ -434,7 +436,7 @@ fn unpack(bytes: &[u8], area: &Area, out: &mut Vec<Pixel>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::composite::fixture::Scenery;
+    use crate::composite::fixture::{SKIN, Scenery};
     use crate::composite::{Config, Print, render};
 
     /// An adapter, or a loud skip; an error when everything is required.
@@ -467,8 +469,10 @@ mod tests {
                 let model = Model::new(Config { samples: 1 + k as u32 % 3, ..Config::default() });
                 let garments = [scenery.garment()];
                 let input = scenery.input(&garments, output);
-                let (cpu, a) = render(&model, &input, &mut Workspace::default()).expect("processor");
-                let (gpu, b) = card.render(&model, &input, &mut Workspace::default()).expect("card");
+                let (cpu, a) =
+                    render(&model, &mut State::default(), &input, &mut Workspace::default()).expect("processor");
+                let (gpu, b) =
+                    card.render(&model, &mut State::default(), &input, &mut Workspace::default()).expect("card");
                 let far = cpu
                     .data()
                     .chunks(3)
@@ -485,16 +489,35 @@ mod tests {
     }
 
     #[test]
+    fn a_hand_is_found_on_the_card_as_on_the_processor() {
+        let Some(mut card) = renderer() else { return };
+        let s = Scenery::resting(3, [150, 30, 40], SKIN, 1.0);
+        let garments = [s.garment()];
+        let (model, input) = (Model::default(), s.input(&garments, None));
+        let (_, a) = render(&model, &mut State::default(), &input, &mut Workspace::default()).expect("processor");
+        let (_, b) = card.render(&model, &mut State::default(), &input, &mut Workspace::default()).expect("card");
+        assert!(a.hands.known && b.hands.known && a.hands.pixels > 800, "{a:?} {b:?}");
+        // Coverage of outlines differs a little.
+        assert!(a.hands.pixels.abs_diff(b.hands.pixels) * 50 < a.hands.pixels, "{a:?} {b:?}");
+    }
+
+    #[test]
     fn nothing_to_draw_and_bad_input_are_as_on_the_processor() {
         let Some(mut card) = renderer() else { return };
         let mut scenery = Scenery::new(160, 120, 1);
         let empty = scenery.input(&[], None);
-        let (image, report) = card.render(&Model::default(), &empty, &mut Workspace::default()).expect("empty");
+        let (image, report) =
+            card.render(&Model::default(), &mut State::default(), &empty, &mut Workspace::default()).expect("empty");
         assert_eq!(Some(&image), empty.frame.color.as_ref());
         assert_eq!(report.tiles_drawn, 0);
         scenery.shirt.0[3].x = f32::NAN;
         let garments = [scenery.garment()];
-        let e = card.render(&Model::default(), &scenery.input(&garments, None), &mut Workspace::default());
+        let e = card.render(
+            &Model::default(),
+            &mut State::default(),
+            &scenery.input(&garments, None),
+            &mut Workspace::default(),
+        );
         assert_eq!(e.err(), Some(RenderError::NotFinite { garment: 0, vertex: 3 }));
     }
 

@@ -77,7 +77,9 @@ pub(crate) struct Chain {
     tracking_work: tracking::Workspace,
     worn: Option<Worn>,
     compositor: composite::Model,
+    composite_state: composite::State,
     composite_work: composite::Workspace,
+    limbs: composite::Limbs,
     last_ns: Option<u64>,
     /// What was said about sizes.
     pub(crate) notes: Vec<String>,
@@ -86,6 +88,7 @@ pub(crate) struct Chain {
 impl Chain {
     /// A session in front of this camera.
     pub(crate) fn new(template: Arc<Template>, calibration: &Calibration, choices: Vec<Choice>) -> Self {
+        let limbs = composite::Limbs::of(&template);
         let tracker = TrackerModel::new(template, calibration.clone(), TrackerConfig::default());
         let tracked = TrackerState::new(&tracker);
         Self {
@@ -95,7 +98,9 @@ impl Chain {
             tracking_work: tracking::Workspace::default(),
             worn: None,
             compositor: composite::Model::default(),
+            composite_state: composite::State::default(),
             composite_work: composite::Workspace::default(),
+            limbs,
             last_ns: None,
             notes: Vec::new(),
         }
@@ -225,11 +230,17 @@ impl Chain {
             frame,
             calibration: self.tracker.calibration(),
             garments: &garments,
-            body: body.map(|vertices| BodyView { vertices, faces: self.tracker.template().mesh().faces() }),
+            body: body.map(|vertices| BodyView {
+                vertices,
+                faces: self.tracker.template().mesh().faces(),
+                limbs: &self.limbs,
+            }),
             output: None,
         };
-        let (picture, report) = composite::render(&self.compositor, &input, &mut self.composite_work)?;
+        let (picture, report) =
+            composite::render(&self.compositor, &mut self.composite_state, &input, &mut self.composite_work)?;
         skipped.push(("picture tiles without garment", report.tiles_skipped as f64));
+        skipped.push(("hands away from garments", report.hands.skipped as f64));
         Ok(picture)
     }
 }

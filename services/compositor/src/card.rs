@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tryon::camera::ColorImage;
-use tryon::composite::{Input, Model, RenderError, RenderReport, Workspace, render};
+use tryon::composite::{Input, Model, RenderError, RenderReport, State, Workspace, render};
 use tryon::gpu::{GpuError, Prefer, Renderer, choose};
 use tryon_kit::config::RendererChoice;
 
@@ -51,12 +51,13 @@ impl Card {
     pub(crate) fn draw(
         &self,
         model: &Model,
+        state: &mut State,
         input: &Input<'_>,
         work: &mut Workspace,
     ) -> Result<(ColorImage, RenderReport), RenderError> {
         let mut slot = self.slot();
         if let Some(renderer) = slot.as_mut() {
-            match renderer.render(model, input, work) {
+            match renderer.render(model, state, input, work) {
                 Err(RenderError::Graphics(why)) => {
                     tracing::warn!(why, "the graphics card failed: drawing on the processor from now on");
                     metrics::counter!("tryon_compositor_card_failures_total").increment(1);
@@ -67,6 +68,6 @@ impl Card {
         }
         // Processors draw side by side; only the card is one at a time.
         drop(slot);
-        render(model, input, work)
+        render(model, state, input, work)
     }
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use tryon::body::{BodyShape, BoneTransforms, RestBody, skin};
 use tryon::camera::ColorImage;
-use tryon::composite::{BodyView, Config, Framing, GarmentView, Input, Look, Model, Print, Workspace};
+use tryon::composite::{BodyView, Config, Framing, GarmentView, Input, Limbs, Look, Model, Print, State, Workspace};
 use tryon::formats::image::{encode_jpeg, encode_png_rgb};
 use tryon::math::{Camera, P3, Rigid, World};
 use tryon::par::Par;
@@ -71,7 +71,9 @@ impl Job {
 pub(crate) struct Engine {
     card: Card,
     model: Model,
+    state: State,
     work: Workspace,
+    limbs: Limbs,
     rest: RestBody,
     rest_of: Option<Arc<BodyShape>>,
     bones: BoneTransforms,
@@ -104,7 +106,7 @@ impl Engine {
             .map(|(((w, _), vertices), look)| GarmentView { vertices, faces: &w.faces, uv: &w.uvs, normals: &[], look })
             .collect();
         let faces = job.body.as_ref().map_or(&[][..], |b| b.template.mesh().faces());
-        let body = has_body.then_some(BodyView { vertices: &self.posed, faces });
+        let body = has_body.then_some(BodyView { vertices: &self.posed, faces, limbs: &self.limbs });
         let (mut pictures, mut drawn) = (Vec::new(), Vec::<(Option<(u32, u32)>, ColorImage)>::new());
         for &(size, _) in &job.formats {
             if drawn.iter().any(|(s, _)| *s == size) {
@@ -117,8 +119,12 @@ impl Engine {
                 body,
                 output: size.map(|(w, h)| [w, h]),
             };
-            let (image, report) = self.card.draw(&self.model, &input, &mut self.work).map_err(|e| e.to_string())?;
-            record_skipped("compositor", [("tiles", report.tiles_skipped)]);
+            let (image, report) =
+                self.card.draw(&self.model, &mut self.state, &input, &mut self.work).map_err(|e| e.to_string())?;
+            record_skipped(
+                "compositor",
+                [("tiles", report.tiles_skipped), ("hands away from garments", report.hands.skipped)],
+            );
             drawn.push((size, image));
         }
         stages.push(stage("compositor.render", start));
@@ -144,6 +150,7 @@ impl Engine {
         if !self.rest_of.as_ref().is_some_and(|s| Arc::ptr_eq(s, &b.shape)) {
             self.rest = b.template.personalise(&b.shape);
             self.rest_of = Some(b.shape.clone());
+            self.limbs = Limbs::of(&b.template);
         }
         pose.bones(b.template.skeleton(), &self.rest, &mut self.bones);
         skin(Par::Rayon, &self.rest.vertices, b.template.weights(), &self.bones, &mut self.posed);

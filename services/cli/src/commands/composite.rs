@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use std::path::Path;
 use std::process::ExitCode;
 use tryon::camera::RgbdFrame;
-use tryon::composite::{GarmentView, Input, Look, Model, Workspace, render};
+use tryon::composite::{GarmentView, Input, Look, Model, State, Workspace, render};
 use tryon::formats::gltf::read_glb;
 use tryon::formats::image::{read_color, read_png_depth, write_png_rgb};
 use tryon::formats::obj::read_obj;
@@ -37,7 +37,7 @@ pub(crate) fn run(args: &CompositeArgs) -> Result<ExitCode> {
         .map(|g| GarmentView { vertices: &g.vertices, faces: &g.faces, uv: &g.uv, normals: &[], look: &g.look })
         .collect();
     let input = Input { frame: &frame, calibration: &calibration, garments: &views, body: None, output: None };
-    let (picture, report) = render(&Model::default(), &input, &mut Workspace::default())
+    let (picture, report) = render(&Model::default(), &mut State::default(), &input, &mut Workspace::default())
         .with_context(|| format!("cannot draw {}", args.color.display()))?;
     write_png_rgb(&args.out, &picture)?;
     println!(
