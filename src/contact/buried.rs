@@ -73,10 +73,11 @@ impl Buried {
                 let side = |inside: bool| if inside { Side::Inside } else { Side::Outside };
                 s.state = match hit {
                     Err(room) => {
-                        // Far from the other part's skin, and nothing moves through it: outside or deep inside.
+                        // Far from the other part's skin: outside or deep inside, unless that is where it ends.
                         s.room = room;
+                        let rim = model.neighbours(near).iter().any(|w| model.part(*w) & mask == 0);
                         let n = near as usize;
-                        side((p - frame.vertices[n]).dot(&frame.normals[n]) < 0.0)
+                        if rim { Side::Unknown } else { side((p - frame.vertices[n]).dot(&frame.normals[n]) < 0.0) }
                     }
                     Ok(c) if c.rim => Side::Unknown,
                     Ok(c) => side(c.signed < 0.0),
@@ -126,6 +127,20 @@ mod tests {
     use crate::contact::surface::tests::sphere;
     use crate::math::V3;
     use crate::mesh::{Topology, TriMesh};
+
+    #[test]
+    fn of_two_halves_of_one_sphere_neither_is_in_the_other() {
+        // Both parts end where they join: there "inside" means nothing, near it and far from it.
+        let mesh = sphere(4);
+        let parts: Vec<Part> = mesh.vertices().iter().map(|p| if p.x < 0.0 { 1 } else { 2 }).collect();
+        let opposite: Vec<Part> = parts.iter().map(|p| 3 - p).collect();
+        let model = SurfaceModel::new(mesh.faces().to_vec(), Topology::new(&mesh).expect("topology"), parts);
+        let mut frame = SurfaceFrame { vertices: mesh.vertices().to_vec(), normals: Vec::new() };
+        model.update_normals(Par::Seq, &mut frame);
+        let mut buried = Buried::default();
+        buried.update(Par::Seq, &model, &opposite, &frame);
+        assert_eq!(buried.count(), 0);
+    }
 
     #[test]
     fn of_two_spheres_in_each_other_exactly_what_is_inside_is_buried() {

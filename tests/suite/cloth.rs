@@ -134,6 +134,55 @@ fn bodies_that_shrink_or_turn_inside_out_are_survived() {
     sane(&state, &d.body);
 }
 
+#[test]
+fn still_cloth_sleeps_and_wakes() {
+    let d = dressed(&Config::default());
+    let (mut state, mut work) = (d.state.clone(), Workspace::default());
+    let asleep = (0..150).find(|_| {
+        let r = step(&d.model, &mut state, &Input { body: &d.body, dt: DT }, &mut work).expect("a step");
+        r.sleeping > 0
+    });
+    assert!(asleep.is_some(), "a still person's cloth is still within five seconds");
+    // Awake, it would have stayed where it is to within a millimetre or two.
+    let Dressed { mut model, .. } = d;
+    let before = state.garments.clone();
+    model.config.sleep = false;
+    for _ in 0..30 {
+        step(&model, &mut state, &Input { body: &d.body, dt: DT }, &mut work).expect("a step");
+    }
+    for (a, b) in before.iter().zip(&state.garments) {
+        let sum: f64 = a.positions.iter().zip(&b.positions).map(|(p, q)| f64::from((p - q).norm_squared())).sum();
+        let rms = (sum / a.positions.len() as f64).sqrt();
+        assert!(rms < 5e-3, "{rms}");
+    }
+    model.config.sleep = true;
+    let body = moved(&d.body, V3::new(0.01, 0.0, 0.0));
+    let r = step(&model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step");
+    assert_eq!(r.sleeping, 0, "a centimetre wakes it");
+}
+
+/// Where a ray meets a triangle, in lengths of its direction (Möller and Trumbore).
+fn crossing(from: &P3, way: &V3, [a, b, c]: &[P3; 3]) -> Option<f32> {
+    let (e1, e2) = (b - a, c - a);
+    let h = way.cross(&e2);
+    let det = e1.dot(&h);
+    let s = from - a;
+    let q = s.cross(&e1);
+    let (u, w) = (s.dot(&h) / det, way.dot(&q) / det);
+    (det != 0.0 && u >= 0.0 && w >= 0.0 && u + w <= 1.0).then(|| e2.dot(&q) / det)
+}
+
+/// Vertices of cloth more than 5 mm under the skin: a ray from there leaves the body once more than it enters it.
+fn under_the_skin(cloth: &[P3], body: &[P3], faces: &[[u32; 3]]) -> usize {
+    let way = V3::new(0.21, 0.13, 0.97);
+    let deep = |p: &&P3| body.iter().all(|v| (v - **p).norm() > 5e-3);
+    let inside = |p: &&P3| {
+        let crossed = |f: &&[u32; 3]| crossing(p, &way, &f.map(|i| body[i as usize])).is_some_and(|t| t > 0.0);
+        faces.iter().filter(crossed).count() % 2 == 1
+    };
+    cloth.iter().filter(deep).filter(inside).count()
+}
+
 /// How far outside the shirt the skirt stands, metres, at each of its vertices that the shirt goes around: along a
 /// horizontal ray from the middle of the shirt at that height.
 fn outside(skirt: &[P3], shirt: &[P3], faces: &[[u32; 3]]) -> Vec<f32> {
@@ -146,16 +195,7 @@ fn outside(skirt: &[P3], shirt: &[P3], faces: &[[u32; 3]]) -> Vec<f32> {
         }
         let way = V3::new(v.x - sum.x / n, 0.0, v.z - sum.z / n);
         let axis = v - way;
-        let hit = |f: &[u32; 3]| {
-            let [a, b, c] = f.map(|i| shirt[i as usize]);
-            // Möller and Trumbore.
-            let (e1, e2) = (b - a, c - a);
-            let h = way.cross(&e2);
-            let det = e1.dot(&h);
-            let s = axis - a;
-            let (u, w) = (s.dot(&h) / det, way.dot(&s.cross(&e1)) / det);
-            (det != 0.0 && u >= 0.0 && w >= 0.0 && u + w <= 1.0).then(|| e2.dot(&s.cross(&e1)) / det)
-        };
+        let hit = |f: &[u32; 3]| crossing(&axis, &way, &f.map(|i| shirt[i as usize]));
         let farthest = faces.iter().filter_map(hit).fold(0.0, f32::max);
         (farthest > 0.0).then(|| (1.0 - farthest) * way.norm())
     };
@@ -175,6 +215,9 @@ fn a_skirt_stays_under_the_shirt() {
             let out = outside(skirt, shirt, &d.model.outfit.garments[1].faces);
             let through = out.iter().filter(|d| **d > 2e-3).count();
             println!("frame {i}: {through} of {} skirt vertices outside the shirt", out.len());
+            let faces = tryon::body::embedded::template();
+            let sunken = under_the_skin(shirt, &body, faces.mesh().faces());
+            assert!(sunken * 100 <= shirt.len(), "frame {i}: {sunken} of {} under the skin", shirt.len());
             assert!(out.len() > 100 && through * 100 <= 3 * out.len(), "frame {i}: {through} of {}", out.len());
         }
     }

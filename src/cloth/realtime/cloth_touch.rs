@@ -98,7 +98,7 @@ impl ClothTouch<'_> {
             return;
         }
         for i in 0..f.vertices.len() {
-            if p.tied[i] || p.on_skin[i] || p.free[i] {
+            if p.tied[i] || p.free[i] {
                 continue;
             }
             let x = place(p, i);

@@ -192,8 +192,6 @@ pub(super) struct PatchScratch {
     pub(super) planes: Vec<Plane>,
     /// How many of the planes, the first ones, are the body's.
     pub(super) body_planes: usize,
-    /// Vertices that lie on the skin: no outer layer presses them further.
-    pub(super) on_skin: Vec<bool>,
     /// Vertices that nothing holds: in skin that lies in other skin, or about to tear.
     pub(super) free: Vec<bool>,
     pub(super) ties: Vec<Tie>,

@@ -9,8 +9,6 @@ use crate::math::{P3, V3};
 
 /// Surfaces further than this from a vertex are not looked at in a round, metres.
 const REACH: f32 = 0.04;
-/// Cloth that is not higher than this above its distance from the skin lies on it, metres.
-const ON_SKIN: f32 = 2e-3;
 /// Cloth that ends a call under the skin is put this far above it, metres: less than a fabric's thickness.
 const LIFTED: f32 = 5e-4;
 /// Cloth longer than this, over its rest length, is about to tear: more than knitwear is worn at.
@@ -47,8 +45,6 @@ impl Touch<'_> {
         let g = &self.model.garments[garment];
         let offset = g.offset as f32;
         let reach = self.model.config.reach as f32;
-        p.on_skin.clear();
-        p.on_skin.resize(f.vertices.len(), false);
         // Planes that contradict each other would tear cloth apart: it gives way, and hangs on its neighbours.
         p.motion.overstretched(f, TORN, &mut p.free);
         for (i, &v) in f.vertices.iter().enumerate() {
@@ -100,7 +96,6 @@ impl Touch<'_> {
                     p.report.pinched += 1;
                 }
             }
-            p.on_skin[i] = found.iter().flatten().any(|c| c.signed < offset + ON_SKIN);
             for c in found.iter().rev().flatten() {
                 let corners = self.model.surface.faces()[c.face as usize];
                 let speed = (0..3).fold(V3::zeros(), |s, j| {
