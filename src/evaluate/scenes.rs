@@ -12,7 +12,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// The paper's two failures (section 6.4) on a body that its template does not have: a torso seen from the waist up that
-/// turns by ±40°, and the same with an arm that gives no return.
+/// turns by ±40°, and an arm that gives no return, alone in the dark and before a wall.
 ///
 /// # Errors
 /// When the body cannot be read.
@@ -31,10 +31,15 @@ pub fn hard(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
     let frames = 200;
     let upper = Sequence::new(shopper.clone(), setting(1.35, 1.25, Routine::Turn));
     let turn = Scene::synthetic("turn_upper", &upper, frames);
-    let whole = Sequence::new(shopper, setting(1.0, 2.4, Routine::TryOn));
+    let whole = Sequence::new(shopper.clone(), setting(1.0, 2.4, Routine::TryOn));
     let arm = Scene::synthetic("arm_without_return", &whole, frames);
     let arm = arm.without_return("left_shoulder", "left_elbow", 0.10).without_return("left_elbow", "left_wrist", 0.09);
-    Ok(vec![turn, arm])
+    // The same before a wall: there the arm leaves a hole.
+    let walled = Setting { room: Some(Room::default()), ..setting(1.0, 2.4, Routine::TryOn) };
+    let hole = Scene::synthetic("arm_without_return_room", &Sequence::new(shopper, walled), frames);
+    let hole =
+        hole.without_return("left_shoulder", "left_elbow", 0.10).without_return("left_elbow", "left_wrist", 0.09);
+    Ok(vec![turn, arm, hole])
 }
 
 /// What should cost next to nothing: a person who stands still, and a room with nobody in it.

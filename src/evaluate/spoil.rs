@@ -85,6 +85,53 @@ impl Scene {
         }
         self
     }
+    /// From frame `first` on, columns from this share of the width on give no reading.
+    #[must_use]
+    pub fn cut_beside(mut self, share: f64, first: usize) -> Self {
+        for frame in self.frames.iter_mut().skip(first) {
+            let w = frame.depth.width() as usize;
+            let from = (share.clamp(0.0, 1.0) * w as f64) as usize;
+            frame.depth.data_mut().chunks_exact_mut(w).for_each(|row| row[from..].fill(0));
+        }
+        self
+    }
+    /// Another scene of the same camera is seen in the same room: of each pixel the nearer reading counts. Truth stays.
+    #[must_use]
+    pub fn with(mut self, other: &Scene) -> Self {
+        for (frame, second) in self.frames.iter_mut().zip(&other.frames) {
+            for (a, b) in frame.depth.data_mut().iter_mut().zip(second.depth.data()) {
+                if *b > 0 && (*a == 0 || b < a) {
+                    *a = *b;
+                }
+            }
+        }
+        self
+    }
+    /// A ball of `radius` (metres) is held in front of a joint. Frames without truth stay as they are, and so do all when
+    /// the scene lacks the joint.
+    #[must_use]
+    pub fn holding(mut self, joint: &str, radius: f64) -> Self {
+        let Some(j) = self.joint_names.iter().position(|m| m == joint) else { return self };
+        let camera = self.calibration.depth;
+        for (frame, truth) in self.frames.iter_mut().zip(&self.truth) {
+            let Some(hand) = truth.joints.get(j) else { continue };
+            let centre = hand.coords - hand.coords.normalize() * radius;
+            for (k, d) in frame.depth.data_mut().iter_mut().enumerate() {
+                let (u, v) = (k as u32 % camera.width, k as u32 / camera.width);
+                let ray = camera.unproject(u as f32, v as f32, 1.0).coords.cast::<f64>();
+                // Nearer root of |t ray − centre| = radius; t is the depth, as the ray has z = 1.
+                let (a, b) = (ray.norm_squared(), ray.dot(&centre));
+                let disc = b * b - a * (centre.norm_squared() - radius * radius);
+                if disc > 0.0 {
+                    let mm = ((b - disc.sqrt()) / a * 1e3).round();
+                    if mm > 0.0 && mm < f64::from(u16::MAX) && (*d == 0 || mm < f64::from(*d)) {
+                        *d = mm as u16;
+                    }
+                }
+            }
+        }
+        self
+    }
     /// Rows from this one on (as a share of the height) give no reading.
     #[must_use]
     pub fn cut_below(mut self, share: f64) -> Self {
@@ -116,6 +163,13 @@ mod tests {
         assert_eq!((halved.frames.len(), halved.truth.len(), halved.frames[1].sequence), (3, 3, 2));
         let blind = scene.clone().blind(1..3);
         assert!(readings(&blind) == 0.0 && blind.truth[1].joints.is_empty() && !blind.truth[3].joints.is_empty());
+        let held = scene.clone().holding("left_wrist", 0.1);
+        let new = held.frames[0].depth.data().iter().zip(scene.frames[0].depth.data()).filter(|(a, b)| a != b).count();
+        assert!((1_000..5_000).contains(&new), "a ball of 20 cm at 2.4 m covers some 1,900 pixels: {new}");
+        let both = scene.clone().with(&held);
+        assert_eq!(both.frames[0].depth.data(), held.frames[0].depth.data(), "what is nearer hides what is behind");
+        let beside = scene.clone().cut_beside(0.5, 1);
+        assert!(readings(&beside) < 0.7 * all && beside.frames[0].depth == scene.frames[0].depth);
         assert!(scene.cut_below(0.5).frames[0].depth.data()[640 * 400..].iter().all(|d| *d == 0));
     }
 }

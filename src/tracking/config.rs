@@ -46,6 +46,8 @@ pub struct TrackerConfig {
     pub free_space: f64,
     /// Adapt the body's size and shape at the start.
     pub adapt_size: bool,
+    /// Look for an arm again when too little of the person is explained.
+    pub rescue: bool,
     /// Feet out of view stand on the floor, on an estimated one where none is seen.
     pub standing: bool,
     /// Frames over which size and shape are adapted.
@@ -93,6 +95,7 @@ impl Default for TrackerConfig {
             edge_weight: 0.0,
             free_space: 0.0,
             adapt_size: true,
+            rescue: true,
             standing: true,
             calibration_frames: 60,
             displacements: true,
@@ -125,6 +128,7 @@ impl TrackerConfig {
             both_ways: false,
             converged: 3e-3,
             edge_weight: 0.3,
+            rescue: false,
             standing: false,
             displaced_pose: true,
             predict: false,

@@ -7,6 +7,7 @@ mod kinematics;
 mod model;
 mod place;
 mod report;
+mod rescue;
 mod size;
 mod stand;
 mod state;

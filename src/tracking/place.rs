@@ -124,7 +124,7 @@ const TWIST_COST: f64 = 3e-5;
 const ARM_FINALISTS: usize = 3;
 
 /// The arm pose of one side that explains the picture best.
-fn choose_arm(
+pub(super) fn choose_arm(
     model: &TrackerModel,
     rest: (&RestBody, &SampleRest),
     pose: &Pose,

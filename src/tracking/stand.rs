@@ -5,7 +5,7 @@ use super::align::AlignScratch;
 use super::model::TrackerModel;
 use crate::body::{BoneTransforms, JointMotion, Pose, RestBody, Template};
 use crate::math::P3d;
-use crate::spatial::OrganisedCloud;
+use crate::spatial::{Label, OrganisedCloud};
 use nalgebra::Vector3;
 
 /// One leg of the template.
@@ -60,9 +60,10 @@ pub(super) fn legs(template: &Template) -> Vec<Leg> {
     ["left", "right"].into_iter().filter_map(leg).collect()
 }
 
-/// A joint inside the picture is followed, not guessed.
+/// A joint before something measured is followed, not guessed; where the picture shows nothing it may stand.
 fn in_view(grid: &OrganisedCloud, joint: &P3d) -> bool {
-    grid.cell_of(&joint.cast()).is_some_and(|(u, v)| grid.cell(u, v).is_some())
+    let home = grid.cell_of(&joint.cast()).and_then(|(u, v)| grid.cell(u, v));
+    home.is_some_and(|k| grid.labels[k] != Label::Unknown)
 }
 
 /// Adds standing feet to the normal equations of `scratch`; `unseen` is the share (0 to 1) of each angle that no reading

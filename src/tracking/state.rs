@@ -1,5 +1,6 @@
 //! What a tracker remembers from frame to frame.
 
+use super::rescue::Rescue;
 use super::size::SizeEstimate;
 use super::surface::SurfaceStatistics;
 use super::{TrackerConfig, TrackerModel};
@@ -83,6 +84,8 @@ pub struct TrackerState {
     /// Greatest height of the hips so far along the upright, camera frame, metres.
     #[serde(default)]
     pub(super) tallest: Option<f64>,
+    #[serde(default)]
+    pub(super) rescue: Rescue,
     /// Frames until displacements are due, and the interval between fits.
     pub(super) surface_due: [u32; 2],
 }
@@ -118,6 +121,7 @@ impl TrackerState {
             centre: P3::origin(),
             quality: [0.0; 2],
             tallest: None,
+            rescue: Rescue::default(),
             surface_due: [0; 2],
         }
     }

@@ -263,6 +263,11 @@ fn follow(
         unfold(model, &workspace.rest, grid, &ground, &workspace.align, &mut pose);
     }
     report.stages_ms.pose = watch.lap();
+    if model.config.rescue && !searching && state.rescue.due(&fit) {
+        let found = state.rescue.look(model, rest, &mut pose, &seen, &schedule, &mut workspace.align);
+        fit = found.unwrap_or(fit);
+        report.stages_ms.place = watch.lap();
+    }
     let good = fit.explained >= LEAST_EXPLAINED && fit.matched >= LEAST_MATCHED && pose.is_finite();
     if good && !state.calibrated(&model.config) {
         if state.size.frames == 0 {

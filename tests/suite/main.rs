@@ -4,6 +4,7 @@
 
 mod cloth;
 mod common;
+mod company;
 mod garment_stream;
 mod garments;
 mod stress;
