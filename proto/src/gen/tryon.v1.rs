@@ -2142,7 +2142,9 @@ impl ClothStatus {
 #[repr(i32)]
 pub enum ClothSolver {
     Unspecified = 0,
+    /// Many small explicit steps.
     Realtime = 1,
+    /// Finite elements, implicit steps iterated to convergence; hundreds of times slower. No contact of cloth with cloth.
     Offline = 2,
 }
 impl ClothSolver {

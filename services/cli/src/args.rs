@@ -136,9 +136,10 @@ pub(crate) struct TrackArgs {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum SolverArg {
-    /// The real-time solver.
+    /// Many small explicit steps: a millisecond a frame.
     Realtime,
-    /// The offline finite-element solver.
+    /// Finite elements, implicit steps iterated to convergence: half a second a frame of 1,000 vertices. No contact
+    /// of cloth with cloth.
     Offline,
 }
 

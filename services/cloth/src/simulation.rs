@@ -59,6 +59,10 @@ impl Simulations {
     /// Checks the scene and starts its simulation.
     pub(crate) async fn start(&self, r: &StartSimulationRequest) -> Result<StartSimulationResponse, Status> {
         let scene = check(r)?;
+        let config = match r.solver() {
+            ClothSolver::Offline => RunConfig::offline(),
+            ClothSolver::Unspecified | ClothSolver::Realtime => RunConfig::default(),
+        };
         let (tx, rx) = watch::channel(Progress::default());
         let frame_count = scene.frames() as u32;
         let vertex_count = scene.start.len() as u32;
@@ -71,7 +75,7 @@ impl Simulations {
             }
             all.insert(id.clone(), (frame_count, rx));
         }
-        let spawned = std::thread::Builder::new().name(id.clone()).spawn(move || compute(&scene, &tx));
+        let spawned = std::thread::Builder::new().name(id.clone()).spawn(move || compute(&scene, &config, &tx));
         if let Err(e) = spawned {
             self.running.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
             return Err(Status::internal(format!("no thread for a simulation: {e}")));
@@ -122,9 +126,6 @@ fn check(r: &StartSimulationRequest) -> Result<Scene, Status> {
     if r.scene_json.len() > MAX_SCENE_BYTES {
         return Err(fault("scene_json", "at most 1 MiB"));
     }
-    if r.solver() == ClothSolver::Offline {
-        return Err(Status::unimplemented("the offline solver is not built yet; ask for the real-time one"));
-    }
     let scene =
         scene::parse(&r.scene_json, Path::new("scene_json"), None).map_err(|e| fault("scene_json", &e.to_string()))?;
     let bytes = scene.frames() * scene.start.len() * size_of::<[f32; 3]>();
@@ -138,9 +139,9 @@ fn check(r: &StartSimulationRequest) -> Result<Scene, Status> {
 }
 
 /// Runs a scene to its end, or until nobody can ask for it any more.
-fn compute(scene: &Scene, progress: &watch::Sender<Progress>) {
+fn compute(scene: &Scene, config: &RunConfig, progress: &watch::Sender<Progress>) {
     let mut last = Instant::now();
-    let result = scene::run(scene, &RunConfig::default(), |_, positions| {
+    let result = scene::run(scene, config, |_, positions| {
         let bytes: Vec<u8> = positions.iter().flat_map(|p| [p.x, p.y, p.z]).flat_map(f32::to_le_bytes).collect();
         let ms = last.elapsed().as_secs_f32() * 1e3;
         progress.send_modify(|p| p.frames.push((bytes.into(), ms)));

@@ -1,7 +1,7 @@
 //! A sleeveless dress: bodice shaped by waist darts, flared skirt to the knee.
 
 use super::skirt::{HIP_DEPTH, darts, flare, sector};
-use super::top::{SHOULDER_FALL, shoulders, trunk_seams};
+use super::top::{SHOULDER_FALL, shoulders, trunk_seams, yoke};
 use super::{panel, sewn};
 use crate::garment::{Anchor, Curve, GarmentError, GarmentKind, Material, Pattern, Placement, SizeRow};
 
@@ -34,22 +34,20 @@ pub(super) fn flared(row: &SizeRow) -> Result<Pattern, GarmentError> {
             name,
             placement,
             &[
-                ("waist_2", flip(wa), Curve::Line),
-                ("dart_left_a", flip(out), Curve::Line),
-                ("dart_left_b", flip(apex), Curve::Line),
-                ("waist_1", flip(inn), Curve::Line),
-                ("dart_right_a", inn, Curve::Line),
-                ("dart_right_b", apex, Curve::Line),
-                ("waist_0", out, Curve::Line),
-                ("side_right", wa, Curve::Line),
-                ("armhole_right", ua, Curve::Cubic(lower, upper)),
-                ("shoulder_right", st, Curve::Line),
-                ("neck_right", hp, Curve::Cubic([neck * 0.93, -drop * 0.62], [neck * 0.5, -drop])),
-                ("neck_left", [0.0, -drop], Curve::Cubic([-neck * 0.5, -drop], [-neck * 0.93, -drop * 0.62])),
-                ("shoulder_left", flip(hp), Curve::Line),
-                ("armhole_left", flip(st), Curve::Cubic(flip(upper), flip(lower))),
-                ("side_left", flip(ua), Curve::Line),
-            ],
+                &[
+                    ("waist_2", flip(wa), Curve::Line),
+                    ("dart_left_a", flip(out), Curve::Line),
+                    ("dart_left_b", flip(apex), Curve::Line),
+                    ("waist_1", flip(inn), Curve::Line),
+                    ("dart_right_a", inn, Curve::Line),
+                    ("dart_right_b", apex, Curve::Line),
+                    ("waist_0", out, Curve::Line),
+                    ("side_right", wa, Curve::Line),
+                ],
+                &yoke(hp, st, ua, drop, [lower, upper])[..],
+                &[("side_left", flip(ua), Curve::Line)],
+            ]
+            .concat(),
         )
     };
     let skirt_waist = 2.0 * waist;

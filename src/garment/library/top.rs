@@ -93,6 +93,27 @@ pub(super) fn hoodie(row: &SizeRow) -> Result<Pattern, GarmentError> {
     draw(row, &HOODIE)
 }
 
+/// The edges of a panel above the armpits, from the right one to the left: armholes, shoulders and a neckline `drop`
+/// metres deep. Right side of the high point of the shoulder, its tip, the underarm point, and the armhole's control points.
+pub(super) fn yoke(
+    high: [f64; 2],
+    tip: [f64; 2],
+    underarm: [f64; 2],
+    drop: f64,
+    [lower, upper]: [[f64; 2]; 2],
+) -> [(&'static str, [f64; 2], Curve); 6] {
+    let flip = |p: [f64; 2]| [-p[0], p[1]];
+    let neck = high[0];
+    [
+        ("armhole_right", underarm, Curve::Cubic(lower, upper)),
+        ("shoulder_right", tip, Curve::Line),
+        ("neck_right", high, Curve::Cubic([neck * 0.93, -drop * 0.62], [neck * 0.5, -drop])),
+        ("neck_left", [0.0, -drop], Curve::Cubic([-neck * 0.5, -drop], [-neck * 0.93, -drop * 0.62])),
+        ("shoulder_left", flip(high), Curve::Line),
+        ("armhole_left", flip(tip), Curve::Cubic(flip(upper), flip(lower))),
+    ]
+}
+
 fn draw(row: &SizeRow, cut: &Cut) -> Result<Pattern, GarmentError> {
     let half = (row.body.chest + cut.ease[0]) / 4.0; // half width of the front panel
     let hem = (row.body.hip.max(row.body.chest) + cut.ease[1]) / 4.0;
@@ -111,16 +132,11 @@ fn draw(row: &SizeRow, cut: &Cut) -> Result<Pattern, GarmentError> {
             name,
             placement,
             &[
-                ("hem", flip(he), Curve::Line),
-                ("side_right", he, Curve::Line),
-                ("armhole_right", ua, Curve::Cubic(lower, upper)),
-                ("shoulder_right", st, Curve::Line),
-                ("neck_right", hp, Curve::Cubic([neck * 0.93, -drop * 0.62], [neck * 0.5, -drop])),
-                ("neck_left", [0.0, -drop], Curve::Cubic([-neck * 0.5, -drop], [-neck * 0.93, -drop * 0.62])),
-                ("shoulder_left", flip(hp), Curve::Line),
-                ("armhole_left", flip(st), Curve::Cubic(flip(upper), flip(lower))),
-                ("side_left", flip(ua), Curve::Line),
-            ],
+                &[("hem", flip(he), Curve::Line), ("side_right", he, Curve::Line)],
+                &yoke(hp, st, ua, drop, [lower, upper])[..],
+                &[("side_left", flip(ua), Curve::Line)],
+            ]
+            .concat(),
         )
     };
     // Here `right` and `left` are the sides of the paper. On the front, paper right is the wearer's left.
