@@ -155,17 +155,26 @@ fn frame_information(
     let mut hss = DMatrix::<f64>::zeros(n, n);
     let mut gs = DVector::<f64>::zeros(n);
     let mut hbs = vec![Vector6::zeros(); n * bones.len()];
-    let (mut moves, mut weighed) = (vec![Vector3::zeros(); n], vec![Vector3::zeros(); n]);
+    let mut weighed = vec![Vector3::zeros(); n];
+    // A sample has several residuals, but moves in one way only.
+    let mut known = vec![usize::MAX; model.samples.len()];
+    let mut all_moves: Vec<Vector3<f64>> = Vec::new();
     for_residuals(model, seen, scratch, sigma, POINT_TO_POINT, |r| {
         let p = r.point - centre;
-        for d in 0..n {
-            let offset = model.directions[d].samples[r.sample].cast::<f64>();
-            let b = shifts[d * bones.len() + r.bone] + rotations[r.bone] * offset;
-            let m = r.metric.apply(&b) * r.weight;
+        if known[r.sample] == usize::MAX {
+            known[r.sample] = all_moves.len();
+            all_moves.extend((0..n).map(|d| {
+                let offset = model.directions[d].samples[r.sample].cast::<f64>();
+                shifts[d * bones.len() + r.bone] + rotations[r.bone] * offset
+            }));
+        }
+        let moves = &all_moves[known[r.sample]..known[r.sample] + n];
+        for (d, b) in moves.iter().enumerate() {
+            let m = r.metric.apply(b) * r.weight;
             let t = p.cross(&m);
             hbs[d * bones.len() + r.bone] += Vector6::new(m.x, m.y, m.z, t.x, t.y, t.z);
             gs[d] += m.dot(&r.residual);
-            (moves[d], weighed[d]) = (b, m);
+            weighed[d] = m;
         }
         for d in 0..n {
             for e in 0..=d {

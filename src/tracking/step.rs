@@ -46,6 +46,8 @@ const STILL: f64 = 3e-3;
 const POOR_RESIDUAL: f64 = 0.02;
 /// Rounds of pose and size at the start (Algorithm 1), and the change that ends them.
 const ROUNDS: usize = 8;
+/// Rounds after which another height is compared.
+const TRIAL_ROUNDS: usize = 2;
 const SETTLED: f64 = 0.05;
 /// A first fit with a larger residual (metres) is tried again from higher and lower by [`SHIFT`] (metres), and the best
 /// kept: along an upright body the surface hardly changes, so a fit a hand's width too high can settle there (6.6 mm of
@@ -272,15 +274,17 @@ fn follow(
     if good && !state.calibrated(&model.config) {
         if state.size.frames == 0 {
             let start = (state.size.clone(), state.shape.clone(), pose.clone());
-            let mut best = settle(model, start.clone(), &seen, &schedule, workspace);
+            let mut best = settle(model, start.clone(), &seen, &schedule, ROUNDS, person.cut_below, workspace);
             if best.3.residual > WELL_FITTED {
-                for shift in [-SHIFT, SHIFT] {
+                let half = person.cut_below;
+                let trials = [-SHIFT, SHIFT].map(|shift| {
                     let mut other = start.clone();
                     other.2.root = Rigid::new(Translation3::from(up * shift) * other.2.root.iso());
-                    let other = settle(model, other, &seen, &START, workspace);
-                    if other.4 < best.4 {
-                        best = other;
-                    }
+                    settle(model, other, &seen, &START, TRIAL_ROUNDS, half, workspace)
+                });
+                let better = trials.into_iter().filter(|t| t.4 < best.4).min_by(|a, b| a.4.total_cmp(&b.4));
+                if let Some((size, shape, pose, ..)) = better {
+                    best = settle(model, (size, shape, pose), &seen, &schedule, ROUNDS, false, workspace);
                 }
             }
             (state.size, state.shape, pose, fit, _) = best;
@@ -369,17 +373,22 @@ fn settle(
     (mut size, mut shape, mut pose): (SizeEstimate, BodyShape, Pose<Camera>),
     seen: &Seen<'_>,
     schedule: &Schedule,
+    rounds: usize,
+    half: bool,
     workspace: &mut Workspace,
 ) -> (SizeEstimate, BodyShape, Pose<Camera>, Fit, f64) {
     workspace.rest_body(model, &shape);
     let rest = (&workspace.rest, &workspace.samples);
     let mut fit = align(model, rest, &mut pose, seen, schedule, &mut workspace.align);
-    for _ in 0..ROUNDS {
+    // Once size and pose know of each other, neither kernel nor reach need to shrink anew; but what is seen of half a
+    // body says so little about size that its pose had better stay free (5 mm on waist-up scenes).
+    let near = Schedule { ahead: if half { schedule.ahead } else { ANNEAL }, ..*schedule };
+    for _ in 0..rounds {
         let rest = (&workspace.rest, &workspace.samples);
         let change = size.observe(model, rest, &pose, seen, &mut shape, &mut workspace.align, false);
         workspace.rest_body(model, &shape);
         let rest = (&workspace.rest, &workspace.samples);
-        fit = align(model, rest, &mut pose, seen, schedule, &mut workspace.align);
+        fit = align(model, rest, &mut pose, seen, &near, &mut workspace.align);
         if change < SETTLED {
             break;
         }

@@ -194,15 +194,15 @@ fn compare_skips(template: &Arc<Template>, own: &Scene, cases: &[(&str, TrackerC
 }
 
 #[test]
-fn an_arm_lost_at_ten_frames_a_second_is_found_again() {
+fn an_arm_lost_at_low_rate_is_found_again() {
     let (Some(folder), Some(data)) = (shared("sequences/jacks_f_avg_kinect1_room"), shared(".")) else { return };
     let template = scenes::subject(&data, "template").expect("template");
-    let own = Scene::open(&folder).expect("scene").every(3);
+    let own = Scene::open(&folder).expect("scene").every(4);
     let error = |rescue| {
         let config = TrackerConfig { rescue, ..TrackerConfig::default() };
         mean(&follow(&template, &config, &own, |_, _, _, _, _| {}).joints_mm)
     };
     let (without, with) = (error(false), error(true));
-    eprintln!("jumping jacks at ten frames a second: {with:.1} mm, {without:.1} without looking for the arm");
-    assert!(with < 14.0 && with < without);
+    eprintln!("jumping jacks at 7.5 frames a second: {with:.1} mm, {without:.1} without looking for the arm");
+    assert!(with < 16.0 && with < without);
 }
