@@ -150,6 +150,9 @@ try {
   const stages = await page.$$eval('#d-stages th', (all) => all.map((t) => t.textContent));
   must(stages.length >= 3, `latency by stage: ${stages.join(', ')}`);
   console.log(`    ${await page.textContent('#d-rate')} pictures a second, ${await page.textContent('#d-p50')} ms at the half, ${await page.textContent('#d-p99')} ms at 99 %`);
+  await page.waitForFunction(() => document.querySelectorAll('#d-fit .fit').length > 0);
+  const fits = await page.$$eval('#d-fit tr', (all) => all.map((t) => t.textContent));
+  must(fits.length >= 3, `fit by region: ${fits.join(', ')}`);
   await shot('3-details');
   await page.keyboard.press('d');
 

@@ -4,6 +4,7 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 
 import { Backoff, FIRST_DELAY, LONGEST_DELAY } from '../../services/compositor/web/js/backoff.js';
+import { fitRows } from '../../services/compositor/web/js/fit.js';
 import { Code, RpcError } from '../../services/compositor/web/js/grpc_web.js';
 import { Reason, State } from '../../services/compositor/web/js/messages.js';
 import { Outfit } from '../../services/compositor/web/js/outfit.js';
@@ -91,6 +92,13 @@ test('an outfit has one garment of a category, inner layer first', () => {
   assert.deepEqual(outfit.choices(), [{ garment: 'skirt', size: '', color_rgb: 0 }]);
   assert.ok(outfit.setLibrary(library.slice(0, 1)));
   assert.deepEqual(outfit.choices(), []);
+});
+
+test('fit in words and units', () => {
+  const regions = [{ region: 'chest', fit: 1, stretch: 0.061, pressure: 1240, touching: 0.8, gap: 0.004 }];
+  const rows = fitRows([{ garment: 'straight_skirt', size: 'M', regions }]);
+  assert.deepEqual(rows, [{ head: 'straight skirt M' }, { region: 'chest', fit: 'tight', cells: ['6 %', '1.2 kPa', '0.4 cm'] }]);
+  assert.deepEqual(fitRows([]), []);
 });
 
 test('percentiles, rate, and stages that vanish', () => {

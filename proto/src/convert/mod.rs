@@ -7,6 +7,7 @@ pub mod body;
 mod bulk;
 mod codec;
 mod error;
+pub mod fit;
 pub mod frame;
 pub mod garment;
 pub mod geometry;

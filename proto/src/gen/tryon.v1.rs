@@ -121,6 +121,38 @@ pub struct GarmentInfo {
     #[prost(uint32, tag = "5")]
     pub color_rgb: u32,
 }
+/// How a garment fits on one region of the body.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct RegionFit {
+    /// As a tailor calls it: `chest`, `waist`, `left upper arm` and so on.
+    #[prost(string, tag = "1")]
+    pub region: ::prost::alloc::string::String,
+    #[prost(enumeration = "FitClass", tag = "2")]
+    pub fit: i32,
+    /// Stretch of the cloth that 95 % of it stay below, length over rest length minus one.
+    #[prost(float, tag = "3")]
+    pub stretch: f32,
+    /// Mean pressure on the skin where the cloth touches, Pa.
+    #[prost(float, tag = "4")]
+    pub pressure: f32,
+    /// Share of the cloth that touches, 0 to 1.
+    #[prost(float, tag = "5")]
+    pub touching: f32,
+    /// Mean distance from the skin, metres.
+    #[prost(float, tag = "6")]
+    pub gap: f32,
+}
+/// How a garment fits the body that wears it now.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct GarmentFit {
+    #[prost(string, tag = "1")]
+    pub garment: ::prost::alloc::string::String,
+    #[prost(string, tag = "2")]
+    pub size: ::prost::alloc::string::String,
+    /// From top to bottom; regions with less cloth than a hand's breadth square are left out.
+    #[prost(message, repeated, tag = "3")]
+    pub regions: ::prost::alloc::vec::Vec<RegionFit>,
+}
 /// Why a picture or a state is less than it should be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
@@ -173,6 +205,38 @@ impl DegradedReason {
             "DEGRADED_REASON_CLOTH_UNAVAILABLE" => Some(Self::ClothUnavailable),
             "DEGRADED_REASON_GARMENTS_LATE" => Some(Self::GarmentsLate),
             "DEGRADED_REASON_STEP_FAILED" => Some(Self::StepFailed),
+            _ => None,
+        }
+    }
+}
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum FitClass {
+    Unspecified = 0,
+    Tight = 1,
+    Fitted = 2,
+    Loose = 3,
+}
+impl FitClass {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "FIT_CLASS_UNSPECIFIED",
+            Self::Tight => "FIT_CLASS_TIGHT",
+            Self::Fitted => "FIT_CLASS_FITTED",
+            Self::Loose => "FIT_CLASS_LOOSE",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "FIT_CLASS_UNSPECIFIED" => Some(Self::Unspecified),
+            "FIT_CLASS_TIGHT" => Some(Self::Tight),
+            "FIT_CLASS_FITTED" => Some(Self::Fitted),
+            "FIT_CLASS_LOOSE" => Some(Self::Loose),
             _ => None,
         }
     }
@@ -1997,6 +2061,9 @@ pub struct GarmentFrame {
     pub steps_skipped: u64,
     #[prost(message, repeated, tag = "10")]
     pub stages: ::prost::alloc::vec::Vec<StageTime>,
+    /// Fit of each garment in the order of `garments`, measured about once a second and absent in between.
+    #[prost(message, repeated, tag = "11")]
+    pub fit: ::prost::alloc::vec::Vec<GarmentFit>,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct GarmentMesh {
@@ -3012,6 +3079,9 @@ pub struct Picture {
     /// Pictures dropped for this reader since its stream began.
     #[prost(uint64, tag = "12")]
     pub dropped: u64,
+    /// Fit of each garment drawn, inner layer first, as last measured (about once a second); empty until then.
+    #[prost(message, repeated, tag = "13")]
+    pub fit: ::prost::alloc::vec::Vec<GarmentFit>,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct TryOnStatus {

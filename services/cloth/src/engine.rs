@@ -6,13 +6,14 @@ use std::time::Instant;
 use tryon::body::measure::measure;
 use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use tryon::cloth::realtime::{self, Input, Model, State, Workspace};
-use tryon::dressing::{self, DressOptions};
+use tryon::dressing::{self, DressOptions, FitProbe};
 use tryon::garment::library as patterns;
 use tryon::math::{Camera, P3, Rigid, World};
 use tryon::par::Par;
 use tryon_kit::frames::stage;
 use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::body::pose_from_wire;
+use tryon_proto::convert::fit::fit_to_wire;
 use tryon_proto::convert::frame::stages_from_wire;
 use tryon_proto::convert::garment::{Positions, WornGarment};
 use tryon_proto::convert::geometry::rigid_from_wire;
@@ -21,6 +22,9 @@ use tryon_proto::v1::{self, BodyState, GarmentChoice};
 
 /// Longest and shortest step of the garments, seconds: a gap in the stream must not become one huge step.
 const DT: (f64, f64) = (1.0 / 120.0, 1.0 / 10.0);
+
+/// The fit of garments is measured this often, seconds.
+const FIT_EVERY: f64 = 1.0;
 
 /// A body as the garments need it.
 pub(crate) struct Body {
@@ -58,6 +62,9 @@ pub(crate) struct Worn {
     posed: Vec<P3>,
     last_ns: u64,
     garments: Arc<[Arc<WornGarment>]>,
+    fit: FitProbe,
+    /// Seconds of the stream since the fit was measured.
+    fit_age: f64,
 }
 
 /// A message to all readers, before it is coded for each of them.
@@ -108,6 +115,8 @@ pub(crate) fn dress(body: &Body, choices: &[GarmentChoice]) -> Result<Worn, Stri
     metrics::histogram!("tryon_stage_ms", "stage" => "cloth.dress").record(start.elapsed().as_secs_f64() * 1e3);
     Ok(Worn {
         garments: garments.collect(),
+        fit: FitProbe::new(&body.template, &dressed.model).map_err(|e| e.to_string())?,
+        fit_age: FIT_EVERY,
         model: dressed.model,
         state: dressed.state,
         work: Workspace::default(),
@@ -142,6 +151,15 @@ impl Worn {
             placed.frame.detail = why;
         }
         placed.frame.stages.extend([skinned, stage("cloth.step", begun)]);
+        self.fit_age += dt;
+        if self.fit_age >= FIT_EVERY {
+            self.fit_age = 0.0;
+            let begun = Instant::now();
+            let maps = self.fit.measure(&self.model, &self.state, &self.posed).map_err(|e| e.to_string())?;
+            let named = self.garments.iter().zip(&maps);
+            placed.frame.fit = named.map(|(g, m)| fit_to_wire(&g.garment, &g.size, m)).collect();
+            placed.frame.stages.push(stage("cloth.fit", begun));
+        }
         Ok(placed)
     }
 

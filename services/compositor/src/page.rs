@@ -46,6 +46,7 @@ const FILES: &[File] = files! {
     "js/client.js": JS,
     "js/details.js": JS,
     "js/elements.js": JS,
+    "js/fit.js": JS,
     "js/grpc_web.js": JS,
     "js/main.js": JS,
     "js/messages.js": JS,

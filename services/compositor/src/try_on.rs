@@ -23,8 +23,8 @@ use tryon_kit::status::unavailable;
 use tryon_kit::telemetry::record_stages;
 use tryon_proto::v1::tracking_service_client::TrackingServiceClient;
 use tryon_proto::v1::{
-    BodyState, CloseSessionRequest, FrameId, GarmentChoice, GarmentFrame, Picture, PictureCodec, TrackingStatus,
-    TryOnState, TryOnStatus, UndressRequest,
+    BodyState, CloseSessionRequest, FrameId, GarmentChoice, GarmentFit, GarmentFrame, Picture, PictureCodec,
+    TrackingStatus, TryOnState, TryOnStatus, UndressRequest,
 };
 
 /// How often silence is looked for.
@@ -123,6 +123,7 @@ async fn open(setup: Setup, inbox: mpsc::Receiver<Command>, outfit: watch::Recei
         cloth_up: false,
         faults: Faults::default(),
         scene: Scene::default(),
+        fit: (0, Vec::new()),
         last: None,
         viewers: Vec::new(),
         engine: Some(Engine::new(card)),
@@ -192,6 +193,8 @@ struct Task {
     cloth_up: bool,
     faults: Faults,
     scene: Scene,
+    /// Fit of the garments as last told, and the revision it belongs to.
+    fit: (u64, Vec<GarmentFit>),
     /// What the last picture was made of, for snapshots.
     last: Option<(Instant, Job)>,
     viewers: Vec<Viewer>,
@@ -409,6 +412,9 @@ impl Task {
                 self.cloth_up = true;
                 self.opened();
                 self.faults.cloth = None;
+                if !frame.fit.is_empty() || self.fit.0 != placed.revision {
+                    self.fit = (placed.revision, frame.fit);
+                }
                 if let Some(id) = frame.frame {
                     self.placed(&id, placed);
                 }
@@ -559,6 +565,7 @@ impl Task {
             latency_ms: unix_ns().saturating_sub(id.received_unix_ns) as f32 * 1e-6,
             stages: drawn.stages.clone(),
             dropped: 0,
+            fit: job.placed.as_ref().filter(|p| p.revision == self.fit.0).map_or(Vec::new(), |_| self.fit.1.clone()),
         }
     }
 

@@ -1,6 +1,7 @@
-// The details panel: rate, latency, drops, time by stage. Drawn only while it is open.
+// The details panel: rate, latency, drops, fit by region, time by stage. Drawn only while it is open.
 
 import { byId, el, setText } from './elements.js';
+import { fitRows } from './fit.js';
 
 const whole = (x) => (Number.isFinite(x) ? String(Math.round(x)) : '–');
 
@@ -12,6 +13,7 @@ function stageName(stage) {
 
 export class Details {
   #rows = new Map();
+  #fit = '';
 
   constructor() {
     this.panel = byId('details');
@@ -36,6 +38,7 @@ export class Details {
     setText(byId('d-dropped'), `${summary.dropped} + ${summary.missed}`);
     this.#bars([...summary.stages, ['page.draw', summary.decode]].filter(([, ms]) => Number.isFinite(ms)));
     this.#line(summary.recent);
+    this.#fits(picture?.fit ?? []);
     const size = picture ? `${picture.width} × ${picture.height}` : '';
     setText(byId('d-frame'), picture ? `Exposure ${picture.frame?.sequence ?? '?'}, ${size}, outfit ${picture.outfit_revision}` : '');
   }
@@ -57,6 +60,18 @@ export class Details {
       bar.style.transform = `scaleX(${Math.max(0.01, ms / most).toFixed(3)})`;
       setText(cell, `${ms.toFixed(1)} ms`);
     }
+  }
+
+  #fits(fit) {
+    const rows = fitRows(fit);
+    const text = JSON.stringify(rows);
+    if (text === this.#fit) return;
+    this.#fit = text;
+    byId('d-fit-title').hidden = rows.length === 0;
+    byId('d-fit').replaceChildren(...rows.map((r) => (r.head
+      ? el('tr', {}, el('th', { scope: 'rowgroup', colspan: '5' }, r.head))
+      : el('tr', {}, el('th', { scope: 'row' }, r.region), el('td', {}, el('span', { class: 'fit', 'data-fit': r.fit }, r.fit)),
+        ...r.cells.map((c) => el('td', {}, c))))));
   }
 
   /** Latency of the last seconds' pictures, oldest left, from zero. */

@@ -12,6 +12,19 @@ export const StageTime = schema('StageTime',
   [1, 'stage', 'string'],
   [2, 'ms', 'float']);
 
+export const RegionFit = schema('RegionFit',
+  [1, 'region', 'string'],
+  [2, 'fit', 'enum'],
+  [3, 'stretch', 'float'],
+  [4, 'pressure', 'float'],
+  [5, 'touching', 'float'],
+  [6, 'gap', 'float']);
+
+export const GarmentFit = schema('GarmentFit',
+  [1, 'garment', 'string'],
+  [2, 'size', 'string'],
+  [3, 'regions', 'message[]', RegionFit]);
+
 export const GarmentChoice = schema('GarmentChoice',
   [1, 'garment', 'string'],
   [2, 'size', 'string'],
@@ -71,7 +84,8 @@ export const Picture = schema('Picture',
   [9, 'outfit_revision', 'uint64'],
   [10, 'latency_ms', 'float'],
   [11, 'stages', 'message[]', StageTime],
-  [12, 'dropped', 'uint64']);
+  [12, 'dropped', 'uint64'],
+  [13, 'fit', 'message[]', GarmentFit]);
 
 export const TryOnStatus = schema('TryOnStatus',
   [1, 'state', 'enum'],
@@ -118,3 +132,6 @@ export const Duration = schema('Duration', [1, 'seconds', 'uint64'], [2, 'nanos'
 export const RetryInfo = schema('RetryInfo', [1, 'retry_delay', 'message', Duration]);
 export const FieldViolation = schema('FieldViolation', [1, 'field', 'string'], [2, 'description', 'string']);
 export const BadRequest = schema('BadRequest', [1, 'field_violations', 'message[]', FieldViolation]);
+
+/** `FIT_CLASS_*`, in words */
+export const FIT = Object.freeze(['', 'tight', 'fitted', 'loose']);

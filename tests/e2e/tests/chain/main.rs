@@ -41,13 +41,17 @@ fn health_reflection_a_hundred_frames_another_garment_and_the_end() {
             assert!(p.stages.iter().any(|s| s.stage == stage), "{stage} is missing in {:?}", p.stages);
         }
         let (mut last, begun) = (p.frame.expect("an id"), Instant::now());
+        let mut fit = Vec::new();
         for _ in 0..99 {
             let e = w.until("a picture", |e| matches!(e, Event::Picture(_))).await;
             let Event::Picture(p) = e else { unreachable!("just matched") };
             let id = p.frame.expect("an id");
             assert!(id.epoch == last.epoch && id.sequence > last.sequence, "in order, none twice");
             last = id;
+            fit = p.fit;
         }
+        let chest = fit.first().and_then(|f| f.regions.iter().find(|r| r.region == "chest")).expect("fit at the chest");
+        assert!(fit.len() == 1 && fit[0].garment == "tshirt" && chest.fit() != FitClass::Unspecified, "{fit:?}");
         println!("100 pictures, {:.1} a second", 99.0 / begun.elapsed().as_secs_f64());
 
         let mut c = kiosk.compositor();
@@ -56,7 +60,8 @@ fn health_reflection_a_hundred_frames_another_garment_and_the_end() {
         assert_eq!(revision, 2);
         let begun = Instant::now();
         let is = |e: &Event| matches!(e, Event::Picture(p) if p.outfit_revision == 2 && p.state() == TryOnState::Live);
-        w.until("the other outfit", is).await;
+        let Event::Picture(p) = w.until("the other outfit", is).await else { unreachable!("just matched") };
+        assert!(p.fit.iter().all(|f| f.garment != "tshirt"), "the fit of what is not worn: {:?}", p.fit);
         println!("another outfit after {:.2} s", begun.elapsed().as_secs_f64());
         let snap = TakeSnapshotRequest { try_on_id: "first".into(), codec: 0 };
         let snap = c.take_snapshot(snap).await.expect("a snapshot").into_inner().picture.expect("a picture");
