@@ -4,7 +4,7 @@
 //! few neighbours instead of a tree, and a vertex that was outside an arm knows it even when the arm has moved past it.
 
 use crate::math::{P3, V3};
-use crate::mesh::{Face, Topology, vertex_normals};
+use crate::mesh::{Csr, Face, Topology, vertex_normals};
 use crate::par::Par;
 
 /// Parts of a surface as bits.
@@ -178,6 +178,21 @@ impl SurfaceModel {
     /// Vertices one edge away.
     pub fn neighbours(&self, vertex: u32) -> &[u32] {
         self.topology.vertex_neighbours().row(vertex as usize)
+    }
+    /// Vertices within two edges of each vertex, itself included.
+    pub fn second_neighbours(&self) -> Csr {
+        let mut pairs = Vec::new();
+        for v in 0..self.vertices() as u32 {
+            let mut near = vec![v];
+            for &w in self.neighbours(v) {
+                near.push(w);
+                near.extend_from_slice(self.neighbours(w));
+            }
+            near.sort_unstable();
+            near.dedup();
+            pairs.extend(near.into_iter().map(|w| (v, w)));
+        }
+        Csr::from_pairs(self.vertices(), &pairs)
     }
     /// Walk, and the nearest point if it can be within `reach` metres; else how far beyond reach it is at least.
     pub fn closest_within(

@@ -9,7 +9,6 @@ use super::state::{PatchScratch, SheetFrame};
 use crate::cloth::small_steps::{Fabric, Plane, V4};
 use crate::contact::{Closest, SurfaceModel};
 use crate::math::{P3, V3};
-use crate::mesh::Csr;
 use crate::par;
 
 /// An outer layer is looked for within this distance outside a vertex, metres.
@@ -155,20 +154,4 @@ fn fold(m: &GarmentModel, s: &SheetFrame, v: u32, x: &P3) -> Option<Closest> {
     let corners = g.faces()[hit.face as usize];
     let same = corners.iter().any(|&c| c == v || g.neighbours(v).contains(&c));
     (!same && hit.signed.abs() < FOLD_REACH && !g.on_rim(&hit)).then_some(hit)
-}
-
-/// Vertices within two edges of each other, themselves included.
-pub(super) fn close(surface: &SurfaceModel) -> Csr {
-    let mut pairs = Vec::new();
-    for v in 0..surface.vertices() as u32 {
-        let mut near = vec![v];
-        for &w in surface.neighbours(v) {
-            near.push(w);
-            near.extend_from_slice(surface.neighbours(w));
-        }
-        near.sort_unstable();
-        near.dedup();
-        pairs.extend(near.into_iter().map(|w| (v, w)));
-    }
-    Csr::from_pairs(surface.vertices(), &pairs)
 }

@@ -218,7 +218,7 @@ impl Model {
                 own,
                 other,
                 offset,
-                close: super::cloth_touch::close(&surface),
+                close: surface.second_neighbours(),
                 surface,
                 anchors: Vec::new(),
             });

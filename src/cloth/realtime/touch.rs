@@ -74,7 +74,7 @@ impl Touch<'_> {
                 match c {
                     Err(room) => p.clear[i][k] = room,
                     Ok(mut c) => {
-                        p.clear[i][k] = if c.rim { 0.0 } else { c.signed - REACH };
+                        p.clear[i][k] = if c.rim { 0.0 } else { c.signed - offset - reach };
                         if c.rim && k == 0 {
                             // Beyond the own parts: whatever is nearest.
                             c = surface.closest(self.now, &x, near, Region::ALL.0);
