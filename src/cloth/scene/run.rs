@@ -68,7 +68,7 @@ impl Default for RunConfig {
 
 impl RunConfig {
     /// The offline solver: finite elements in f64, second-order implicit steps of 1/960 s at 60 frames a second, each
-    /// iterated until a micrometre in a hundred is left. No contact of cloth with cloth.
+    /// iterated until an iteration moves vertices by less than 0.01 µm. No contact of cloth with cloth.
     pub fn offline() -> Self {
         Self {
             method: Method::QuasiNewtonBdf2,
@@ -80,12 +80,12 @@ impl RunConfig {
     }
 }
 
-/// Steps a frame of the offline solver: with twice as many the pinned square of 1k vertices moves by less than the
-/// reference's own uncertainty (docs/benchmarks.md).
+/// Steps a frame of the offline solver: 6.1 mm from the reference on the pinned square of 1k vertices, whose own
+/// uncertainty is 8 mm; a test holds the second order that more steps would gain by.
 const OFFLINE_SUBSTEPS: usize = 16;
-/// Most iterations of one of its steps.
+/// Most iterations of one of its steps: free swinging takes 113 at most, contacts that come and go never end.
 const OFFLINE_ITERATIONS: usize = 400;
-/// Metres.
+/// Root mean square of the last iteration's steps, metres: far below what positions are written with (f32).
 const OFFLINE_TOLERANCE: f64 = 1e-8;
 
 /// Stiffness of pins and contacts in units of the matrix diagonal: pins are exact to a thousandth of a step's motion,
