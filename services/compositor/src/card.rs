@@ -1,14 +1,32 @@
 //! The graphics card, if a real one is there: shared by all try-ons, the processor takes over when it fails.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
 use tryon::camera::ColorImage;
 use tryon::composite::{Input, Model, RenderError, RenderReport, State, Workspace, render};
 use tryon::gpu::{GpuError, Prefer, Renderer, choose};
 use tryon_kit::config::RendererChoice;
 
-/// Where pictures are drawn. Clones share the card.
+/// Where pictures are drawn. Clones share the card; the last one to go waits for the search to end.
 #[derive(Clone, Default)]
-pub(crate) struct Card(Arc<Mutex<Option<Renderer>>>);
+pub(crate) struct Card {
+    slot: Slot,
+    search: Option<Arc<Search>>,
+}
+
+type Slot = Arc<Mutex<Option<Renderer>>>;
+
+/// The search for a card. A process that exits while a driver is being loaded runs the driver's destructors beside its
+/// constructors, and aborts (LLVM: "Option registered more than once").
+struct Search(Option<JoinHandle<()>>);
+
+impl Drop for Search {
+    fn drop(&mut self) {
+        if self.0.take().is_some_and(|search| search.join().is_err()) {
+            tracing::warn!("the search for a graphics card panicked");
+        }
+    }
+}
 
 impl Card {
     /// Opens what the configuration asks for. With `auto` the search runs beside the start, and pictures come from the
@@ -17,34 +35,23 @@ impl Card {
     /// # Errors
     /// With `gpu`, when there is no adapter or its driver refuses.
     pub(crate) fn open(choice: RendererChoice) -> Result<Self, GpuError> {
-        let card = Self::default();
+        let mut card = Self::default();
         match choice {
             RendererChoice::Cpu => {}
-            RendererChoice::Gpu => card.put(choose(Prefer::Gpu)?),
+            RendererChoice::Gpu => put(&card.slot, choose(Prefer::Gpu)?),
             RendererChoice::Auto => {
-                let late = card.clone();
+                let slot = card.slot.clone();
                 let search = move || match choose(Prefer::Auto) {
-                    Ok(found) => late.put(found),
+                    Ok(found) => put(&slot, found),
                     Err(e) => tracing::warn!(error = %e, "no graphics card"),
                 };
-                if let Err(e) = std::thread::Builder::new().name("graphics".into()).spawn(search) {
-                    tracing::warn!(error = %e, "no thread to look for a graphics card");
+                match std::thread::Builder::new().name("graphics".into()).spawn(search) {
+                    Ok(thread) => card.search = Some(Arc::new(Search(Some(thread)))),
+                    Err(e) => tracing::warn!(error = %e, "no thread to look for a graphics card"),
                 }
             }
         }
         Ok(card)
-    }
-
-    fn slot(&self) -> MutexGuard<'_, Option<Renderer>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn put(&self, found: Option<Renderer>) {
-        match &found {
-            Some(r) => tracing::info!(adapter = r.adapter().name, backend = r.adapter().backend, "drawing on the card"),
-            None => tracing::info!("no graphics card: drawing on the processor"),
-        }
-        *self.slot() = found;
     }
 
     /// One picture. A card that fails is given up, and the processor draws this and all later pictures.
@@ -55,7 +62,7 @@ impl Card {
         input: &Input<'_>,
         work: &mut Workspace,
     ) -> Result<(ColorImage, RenderReport), RenderError> {
-        let mut slot = self.slot();
+        let mut slot = lock(&self.slot);
         if let Some(renderer) = slot.as_mut() {
             match renderer.render(model, state, input, work) {
                 Err(RenderError::Graphics(why)) => {
@@ -69,5 +76,41 @@ impl Card {
         // Processors draw side by side; only the card is one at a time.
         drop(slot);
         render(model, state, input, work)
+    }
+}
+
+fn lock(slot: &Slot) -> MutexGuard<'_, Option<Renderer>> {
+    slot.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn put(slot: &Slot, found: Option<Renderer>) {
+    match &found {
+        Some(r) => tracing::info!(adapter = r.adapter().name, backend = r.adapter().backend, "drawing on the card"),
+        None => tracing::info!("no graphics card: drawing on the processor"),
+    }
+    *lock(slot) = found;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    #[test]
+    fn a_process_does_not_end_before_its_search_for_a_card() {
+        let ended = Arc::new(AtomicBool::new(false));
+        let seen = ended.clone();
+        let (never, wait) = std::sync::mpsc::channel::<()>();
+        let slow = std::thread::spawn(move || {
+            wait.recv_timeout(std::time::Duration::from_millis(50)).ok();
+            seen.store(true, Ordering::SeqCst);
+        });
+        let card = Card { slot: Slot::default(), search: Some(Arc::new(Search(Some(slow)))) };
+        let other = card.clone();
+        drop(card);
+        assert!(!ended.load(Ordering::SeqCst), "only the last one waits");
+        drop(other);
+        assert!(ended.load(Ordering::SeqCst));
+        drop(never);
     }
 }
