@@ -4,12 +4,14 @@ pub mod embedded;
 pub mod import;
 pub mod measure;
 mod pose;
+mod rig;
 mod shape;
 mod skeleton;
 mod skinning;
 mod template;
 
 pub use pose::{BoneTransforms, Pose};
+pub use rig::rig;
 pub use shape::{BodyShape, RestBody, ShapeSpace};
 pub use skeleton::{Joint, JointMotion, Skeleton};
 pub use skinning::{SkinWeights, skin};

@@ -5,6 +5,7 @@ use super::drape::{Drape, Layers, Skin};
 use super::figure::Figure;
 use super::place::place;
 use super::refine::prolong;
+use super::waistband::spread;
 use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
 use crate::cloth::realtime::{AnchorBinding, Config, Model, Outfit, State};
 use crate::cloth::{ClothError, Sheet};
@@ -174,7 +175,7 @@ pub fn dress(
     for ((mesh, placed), offset) in coarse.iter().zip(placed).zip(&offsets) {
         let mut d = Drape::new(mesh, &Sheet::of_garment(mesh)?, placed);
         d.find_all(&skin);
-        ties.push(bind(skin.model, skin.frame(), mesh, &d.positions(), *offset, true));
+        ties.push(fasten(&skin, mesh, &d, *offset)?);
         drapes.push(d);
     }
     let mut rough = Layers::new(&coarse, drapes)?;
@@ -202,7 +203,7 @@ pub fn dress(
         let x = prolong(&coarse[k], mesh, &rough.drapes[k].x);
         let mut d = Drape::new(mesh, &Sheet::of_garment(mesh)?, x.iter().map(|p| P3::from(p.cast::<f32>())).collect());
         d.find_from(&skin, &rough.drapes[k]);
-        d.pin(&bind(skin.model, skin.frame(), mesh, &d.positions(), offsets[k], true), skin.frame());
+        d.pin(&fasten(&skin, mesh, &d, offsets[k])?, skin.frame());
         drapes.push(d);
     }
     let mut fine = Layers::new(&model.outfit.garments, drapes)?;
@@ -233,6 +234,13 @@ fn pose_body(template: &Template, rest: &RestBody, pose: &Pose<World>, out: &mut
     let mut bones = BoneTransforms::default();
     pose.bones(template.skeleton(), rest, &mut bones);
     skin(Par::Rayon, &rest.vertices, template.weights(), &bones, out);
+}
+
+/// Ties the anchors of a garment to the skin, `offset` metres off, waistbands evenly stretched.
+fn fasten(skin: &Skin<'_>, mesh: &GarmentMesh, drape: &Drape, offset: f64) -> Result<Vec<AnchorBinding>, DressError> {
+    let mut positions = drape.positions();
+    spread(mesh, &Sheet::of_garment(mesh)?.edges, skin.model, skin.frame(), offset, &mut positions);
+    Ok(bind(skin.model, skin.frame(), mesh, &positions, offset, true))
 }
 
 /// Ties the anchors of a garment to the body below them; `hug` puts them at `offset` metres from the skin instead of

@@ -8,6 +8,7 @@ mod fit_map;
 mod place;
 mod refine;
 mod suggest;
+mod waistband;
 
 pub use crate::cloth::realtime::{AnchorBinding, Outfit};
 pub use dress::{DressError, DressOptions, DressReport, Dressed, dress};

@@ -4,6 +4,8 @@
 
 pub mod ablation;
 pub mod cloth;
+pub mod dance;
+mod inside;
 mod plot;
 mod scene;
 pub mod scenes;
@@ -12,6 +14,7 @@ pub mod stills;
 mod table;
 pub mod tracking;
 
+pub use inside::Solid;
 pub use plot::run_time_against_error;
 pub use scene::{Scene, SceneTruth};
 pub use table::{EvaluateError, Row, Table};

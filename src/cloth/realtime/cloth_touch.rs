@@ -27,6 +27,11 @@ const CELL: f32 = 0.036;
 /// Friction of cloth on cloth: lower than measured (0.3), as planes that are looked for anew in each round hold already.
 const FRICTION: f32 = 0.1;
 
+/// Rounds of averaging speeds over neighbours before they are extrapolated through a round. A vertex that vibrates at
+/// 3 m/s would else carry what touches it by 1 cm each way; a dancer's skirt shook itself to pieces (without it 10k
+/// vertices stretch by 243 %, with one round by 12.6 %, with two by 8.7 %, as without contact of cloth with cloth).
+const CALMING: usize = 2;
+
 /// Garments at the beginning of a round.
 pub(super) struct ClothTouch<'a> {
     pub(super) model: &'a Model,
@@ -61,6 +66,13 @@ pub(super) fn sheets(model: &Model, patches: &[PatchScratch], out: &mut Vec<Shee
                 s.velocities[v] = V3::new(u.0[0], u.0[1], u.0[2]);
             }
         }
+        for _ in 0..CALMING {
+            let sharp = std::mem::take(&mut s.velocities);
+            s.velocities.extend(sharp.iter().enumerate().map(|(v, own)| {
+                let around = g.surface.neighbours(v as u32);
+                around.iter().fold(*own, |a, w| a + sharp[*w as usize]) / (1 + around.len()) as f32
+            }));
+        }
         g.surface.update_normals(par::Par::Seq, &mut s.surface);
         if c.self_collision {
             s.grid.fill(&s.surface.vertices, CELL);
@@ -85,7 +97,8 @@ impl ClothTouch<'_> {
             // apart. Both move on as they do on average: an impact without bounce.
             let side = if hit.signed >= 0.0 { 1.0 } else { -1.0 };
             let mut plane = plane(&g.surface, &s.velocities, i, &hit, side, thickness.min(hit.signed.abs()));
-            plane.speed = (plane.speed + p.motion.velocity[i]).scale(0.5);
+            let own = s.velocities[v as usize];
+            plane.speed = (plane.speed + V4::new(own.x, own.y, own.z)).scale(0.5);
             p.planes.push(plane);
             p.report.cloth_contacts += usize::from(hit.signed.abs() <= thickness);
         }

@@ -1,0 +1,116 @@
+//! Dresses a dancing body, measures, and draws a film strip for looking at.
+//!
+//! `cargo run --release --example dance -- [--data ../shared/data/garments/cipc_apache2] [--garment tshirt+skirt]
+//!   [--edge 0.0118] [--seconds 4.8] [--threads 2] [--most-steps 80] [--patch 5000] [--no-layers] [--no-folds]
+//!   [--out strip.png] [--from 0] [--every 0.4]`
+#![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
+
+mod drawing;
+
+use drawing::{Part, draw};
+use std::path::PathBuf;
+use tryon::camera::ColorImage;
+use tryon::cloth::realtime::Config;
+use tryon::evaluate::dance::{Outfit, load};
+use tryon::formats::image::write_png_rgb;
+use tryon::garment::library;
+use tryon::par::with_threads;
+
+/// One cell of the strip, pixels.
+const CELL: (u32, u32) = (270, 460);
+
+fn main() {
+    let mut data = PathBuf::from("../shared/data/garments/cipc_apache2");
+    let mut outfit = Outfit {
+        garments: vec!["tshirt".into(), "skirt".into()],
+        edge: 0.0118,
+        config: Config::default(),
+        seconds: 4.8,
+    };
+    let (mut threads, mut out, mut every, mut from) = (2, None::<PathBuf>, 0.4, 0.0);
+    let mut it = std::env::args().skip(1);
+    while let Some(flag) = it.next() {
+        let mut value = || it.next().expect("a value");
+        match flag.as_str() {
+            "--data" => data = value().into(),
+            "--garment" => outfit.garments = value().split('+').map(str::to_owned).collect(),
+            "--edge" => outfit.edge = value().parse().expect("metres"),
+            "--seconds" => outfit.seconds = value().parse().expect("seconds"),
+            "--threads" => threads = value().parse().expect("a number"),
+            "--most-steps" => outfit.config.most_steps = value().parse().expect("a number"),
+            "--patch" => outfit.config.patch = value().parse().expect("a number"),
+            "--no-layers" => outfit.config.layers = false,
+            "--no-folds" => outfit.config.self_collision = false,
+            "--out" => out = Some(value().into()),
+            "--from" => from = value().parse().expect("seconds"),
+            "--every" => every = value().parse().expect("seconds"),
+            other => panic!("{other} is not known"),
+        }
+    }
+    let dance = load(&data).expect("the dance");
+    println!(
+        "{} vertices, {:.1} s, fitted template {:.1} mm off",
+        dance.rest.vertices.len(),
+        dance.seconds(),
+        dance.fit * 1e3
+    );
+    let mut cells: Vec<Vec<u8>> = Vec::new();
+    let mut next = from;
+    let report = with_threads(threads, || {
+        dance.run(&outfit, |time, body, dressed| {
+            if out.is_none() || time + 1e-6 < next {
+                return;
+            }
+            next += every;
+            let skin = [0.86, 0.70, 0.60];
+            let faces = dance.template.mesh().faces().to_vec();
+            let mut parts = vec![Part { vertices: body.to_vec(), faces, color: skin, uv: vec![], painted: vec![] }];
+            for (g, s) in dressed.model.outfit.garments.iter().zip(&dressed.state.garments) {
+                let mut vertices = Vec::new();
+                g.render_positions(&s.positions, &mut vertices);
+                let color = library::dye(&g.name).map(|c| f32::from(c) / 255.0);
+                let (faces, uv) = (g.render.faces.clone(), g.render.uv.clone());
+                parts.push(Part { vertices, faces, color, uv, painted: vec![] });
+            }
+            for yaw in [0.4f32, 2.8] {
+                cells.push(draw(&parts, yaw, CELL, [0.25, 1.4], [0.0, 0.0]));
+            }
+        })
+    })
+    .expect("threads")
+    .expect("a dance");
+    let mut ms = report.ms.clone();
+    ms.sort_unstable_by(f64::total_cmp);
+    println!(
+        "{} vertices, dressed in {:.0} ms; {:.1} ms for 1/60 s (median; p90 {:.1}; maps {:.1}, contact {:.1}, steps {:.1}), \
+         stiffness kept {:.2}, faults {}\n\
+         p99 strain {:.2} %; penetration p99 {:.2} mm, max {:.2} mm (outside limbs that lie in each other {:.2}, {:.2})",
+        report.vertices,
+        report.dressing_ms,
+        report.median_ms(),
+        ms[ms.len() * 9 / 10],
+        report.stages_ms[0],
+        report.stages_ms[1],
+        report.stages_ms[2],
+        report.softened,
+        report.faults,
+        report.p99_strain * 100.0,
+        report.penetration[0] * 1e3,
+        report.penetration[1] * 1e3,
+        report.penetration_single[0] * 1e3,
+        report.penetration_single[1] * 1e3,
+    );
+    let Some(out) = out else { return };
+    let columns = cells.len() / 2;
+    let (w, h) = (CELL.0 as usize, CELL.1 as usize);
+    let mut sheet = vec![255u8; columns * w * 2 * h * 3];
+    for (k, cell) in cells.iter().enumerate() {
+        for line in 0..h {
+            let to = (((k % 2) * h + line) * columns * w + k / 2 * w) * 3;
+            sheet[to..to + w * 3].copy_from_slice(&cell[line * w * 3..(line + 1) * w * 3]);
+        }
+    }
+    let picture = ColorImage::new((columns * w) as u32, (2 * h) as u32, sheet).expect("a picture");
+    write_png_rgb(&out, &picture).expect("written");
+    println!("{}", out.display());
+}

@@ -1,0 +1,255 @@
+//! An outfit on a dancing body that the tracker has never seen: time, stretch and penetration over the whole dance.
+
+use super::inside::Solid;
+use super::{EvaluateError, Row};
+use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, embedded, measure, rig, skin};
+use crate::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+use crate::cloth::realtime::{Config, Input, State, Workspace, step};
+use crate::dressing::{DressOptions, Dressed, dress, suggest};
+use crate::formats::obj::read_obj;
+use crate::garment::library;
+use crate::math::{Body, Camera, P3, Rigid, V3d, World};
+use crate::mesh::{Face, TriMesh};
+use crate::par::Par;
+use crate::raster::{View, VisibilityBuffer, rasterise};
+use crate::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace as TrackerWorkspace, step as track};
+use nalgebra::{UnitQuaternion, Vector3};
+use std::io::Read;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// The dance of `../shared/data/garments/cipc_apache2` (Apache-2.0): 121 bodies of 12,811 vertices.
+const BODIES: &str = "rumba_dancing_121x12811x3_f32le.bin.gz";
+const FACES: &str = "wm2_15k.obj";
+/// Time between two of its bodies, s.
+const INTERVAL: f64 = 0.04;
+/// Time that the simulator is given at once, s.
+const CALL: f64 = 1.0 / 60.0;
+/// Every so many calls penetration is measured.
+const LOOK_EVERY: usize = 4;
+/// Frames that the tracker gets of the standing body.
+const LOOKS: u64 = 45;
+
+/// A body that moves, with a skeleton found for it.
+pub struct Dance {
+    /// The standing body, rigged.
+    pub template: Arc<Template>,
+    /// It as it is.
+    pub rest: RestBody,
+    /// Vertices of each body, world, metres, shape `[bodies][vertices]`.
+    pub bodies: Vec<Vec<P3>>,
+    /// How far the fitted template is from the body's vertices, mean, metres.
+    pub fit: f64,
+}
+
+/// What is worn and how it is simulated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outfit {
+    /// Names of the library's garments; sizes are those suggested for the body.
+    pub garments: Vec<String>,
+    /// Length of the triangles' edges, metres.
+    pub edge: f64,
+    /// Solver.
+    pub config: Config,
+    /// How much of the dance, s.
+    pub seconds: f64,
+}
+
+/// How it went.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DanceReport {
+    /// Vertices of all garments.
+    pub vertices: usize,
+    /// Dressing, ms.
+    pub dressing_ms: f64,
+    /// Each call, for 1/60 s, ms.
+    pub ms: Vec<f64>,
+    /// Of it depth maps, contact and stepping, means, ms.
+    pub stages_ms: [f64; 3],
+    /// 99th percentile of the edges' stretch over the whole dance.
+    pub p99_strain: f64,
+    /// Depths of vertices inside the body over the whole dance, metres: 99th percentile, largest.
+    pub penetration: [f64; 2],
+    /// The same over vertices that lie in one limb only: between two that lie in each other there is no outside.
+    pub penetration_single: [f64; 2],
+    /// Smallest share of its stiffness that a garment kept.
+    pub softened: f64,
+    /// Calls that threw their result away.
+    pub faults: usize,
+}
+
+impl DanceReport {
+    /// Median of the calls, ms.
+    pub fn median_ms(&self) -> f64 {
+        percentile(&mut self.ms.clone(), 0.5)
+    }
+    /// As a row of a benchmark.
+    pub fn row(&self, method: &str) -> Row {
+        let mm = |m: f64| m * 1e3;
+        Row::new("dance", method, self.median_ms())
+            .with("vertices", self.vertices)
+            .error("p99_strain_percent", self.p99_strain * 100.0)
+            .error("p99_penetration_mm", mm(self.penetration[0]))
+            .error("max_penetration_mm", mm(self.penetration[1]))
+    }
+}
+
+fn percentile(values: &mut [f64], share: f64) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(((values.len() as f64 * share) as usize).min(values.len().saturating_sub(1))).copied().unwrap_or(0.0)
+}
+
+/// Reads the dance and finds a skeleton for its body: the embedded template is tracked onto a picture of it.
+///
+/// # Errors
+/// A file that is missing or does not fit the others.
+pub fn load(folder: &Path) -> Result<Dance, EvaluateError> {
+    let fault = |why: String| EvaluateError::Scene { scene: "dance".into(), why };
+    let faces = read_obj(&folder.join(FACES)).map_err(|e| fault(e.to_string()))?.mesh;
+    let mut bytes = Vec::new();
+    std::fs::File::open(folder.join(BODIES))
+        .and_then(|f| flate2::read::GzDecoder::new(f).read_to_end(&mut bytes))
+        .map_err(|e| fault(format!("{BODIES}: {e}")))?;
+    let n = faces.vertices().len();
+    let numbers: Vec<f32> = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    if n == 0 || numbers.len() % (3 * n) != 0 || numbers.iter().any(|x| !x.is_finite()) {
+        return Err(fault(format!("{BODIES}: {} numbers are no bodies of {n} vertices", numbers.len())));
+    }
+    let bodies: Vec<Vec<P3>> =
+        numbers.chunks_exact(3 * n).map(|b| b.chunks_exact(3).map(|p| P3::new(p[0], p[1], p[2])).collect()).collect();
+    let first = bodies.first().ok_or_else(|| fault(format!("{BODIES}: empty")))?;
+    let mesh = faces.with_vertices(first.clone()).map_err(|e| fault(e.to_string()))?;
+    let (template, fit) = rigged(mesh).map_err(fault)?;
+    let rest = template.personalise(&BodyShape::default());
+    Ok(Dance { template: Arc::new(template), rest, bodies, fit })
+}
+
+/// A skeleton for a standing body that faces +z.
+fn rigged(mesh: TriMesh) -> Result<(Template, f64), String> {
+    let camera = Intrinsics::KINECT_V1;
+    let (low, high) = mesh.bounds().ok_or("the body has no vertices")?;
+    // A camera in front, at half its height, far enough for all of it; y down, z towards the body.
+    let away = 1.1 * f64::from((high.y - low.y).max(0.8 * (high.x - low.x))) * camera.fy / f64::from(camera.height);
+    let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    let middle = V3d::new(0.0, 0.5 * f64::from(low.y + high.y), f64::from(high.z) + away);
+    let world_from_camera: Rigid<World, Camera> = Rigid::from_parts(middle, half_turn);
+    let camera_from_world = world_from_camera.inverse();
+    let mut seen = Vec::new();
+    camera_from_world.points_f32(mesh.vertices(), &mut seen);
+    let mut picture = VisibilityBuffer::default();
+    rasterise(&View::Perspective { camera, near: 0.1 }, &seen, mesh.faces(), &mut picture);
+    let depth = picture.depth.iter().map(|z| if z.is_finite() { (z * 1e3).round() as u16 } else { 0 }).collect();
+    let depth = DepthImage::new(camera.width, camera.height, depth).map_err(|e| e.to_string())?;
+
+    let model = TrackerModel::new(embedded::template(), Calibration::registered(camera), TrackerConfig::default());
+    let (mut state, mut work) = (TrackerState::new(&model), TrackerWorkspace::default());
+    for sequence in 0..LOOKS {
+        let frame = RgbdFrame { sequence, time_ns: sequence * 33_333_333, depth: depth.clone(), color: None };
+        track(&model, &mut state, &frame, &mut work).map_err(|e| e.to_string())?;
+    }
+    if !state.status.is_live() {
+        return Err(format!("the tracker does not find the body: {:?}", state.status));
+    }
+    let t = model.template();
+    let person = t.personalise(&state.shape);
+    let pose: Pose<World> = Pose { root: world_from_camera * state.pose.root, angles: state.pose.angles.clone() };
+    let mut bones = BoneTransforms::default();
+    pose.bones(t.skeleton(), &person, &mut bones);
+    let mut fitted = RestBody::default();
+    skin(Par::Seq, &person.vertices, t.weights(), &bones, &mut fitted.vertices);
+    let tree = crate::spatial::PointTree::new(&fitted.vertices);
+    let far = mesh.vertices().iter().map(|p| tree.nearest(p, 1.0).map_or(1.0, |n| f64::from(n.1).sqrt()));
+    let fit = far.sum::<f64>() / mesh.vertices().len() as f64;
+    Ok((rig("dancer", mesh, t, &bones, &fitted).map_err(|e| e.to_string())?, fit))
+}
+
+impl Dance {
+    /// The body at a time, between the two given ones nearest to it.
+    pub fn body(&self, time: f64) -> Vec<P3> {
+        let at = (time / INTERVAL).clamp(0.0, (self.bodies.len() - 1) as f64);
+        let (i, share) = (at as usize, at.fract() as f32);
+        let next = &self.bodies[(i + 1).min(self.bodies.len() - 1)];
+        self.bodies[i].iter().zip(next).map(|(a, b)| a + (b - a) * share).collect()
+    }
+    /// Length of the dance, s.
+    pub fn seconds(&self) -> f64 {
+        (self.bodies.len() - 1) as f64 * INTERVAL
+    }
+    /// Dresses the standing body.
+    ///
+    /// # Errors
+    /// A garment that is not known or cannot be put on.
+    pub fn dress(&self, outfit: &Outfit) -> Result<Dressed, EvaluateError> {
+        let fault = |why: String| EvaluateError::Scene { scene: "dance".into(), why };
+        let measures = measure::measure(&self.template, &self.rest).map_err(|e| fault(e.to_string()))?;
+        let patterns = outfit
+            .garments
+            .iter()
+            .map(|g| {
+                let size = suggest(g, &measures).map_err(|e| fault(e.to_string()))?.size;
+                library::pattern(g, size).map_err(|e| fault(e.to_string()))
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut options = DressOptions { config: outfit.config.clone(), ..DressOptions::default() };
+        options.triangulation.edge_length = outfit.edge;
+        let standing = Pose::rest(self.template.skeleton(), Rigid::<World, Body>::identity());
+        dress(&self.template, &self.rest, &standing, &patterns, &options).map_err(|e| fault(e.to_string()))
+    }
+    /// Dances in an outfit; `frame` sees time, body and garments after each call.
+    ///
+    /// # Errors
+    /// What keeps the outfit from being put on or simulated.
+    pub fn run(
+        &self,
+        outfit: &Outfit,
+        mut frame: impl FnMut(f64, &[P3], &Dressed),
+    ) -> Result<DanceReport, EvaluateError> {
+        let fault = |why: String| EvaluateError::Scene { scene: "dance".into(), why };
+        let mut dressed = self.dress(outfit)?;
+        let mut report = DanceReport {
+            vertices: dressed.state.garments.iter().map(|g| g.positions.len()).sum(),
+            dressing_ms: dressed.report.ms,
+            softened: 1.0,
+            ..DanceReport::default()
+        };
+        let (mut work, mut depths, mut single, mut strain) = (Workspace::default(), Vec::new(), Vec::new(), Vec::new());
+        let calls = (outfit.seconds.min(self.seconds()) / CALL) as usize;
+        for call in 1..=calls {
+            let time = call as f64 * CALL;
+            let body = self.body(time);
+            let started = Instant::now();
+            let r = step(&dressed.model, &mut dressed.state, &Input { body: &body, dt: CALL }, &mut work)
+                .map_err(|e| fault(e.to_string()))?;
+            report.ms.push(started.elapsed().as_secs_f64() * 1e3);
+            for (sum, part) in
+                report.stages_ms.iter_mut().zip([r.stages_ms.maps, r.stages_ms.contact, r.stages_ms.solve])
+            {
+                *sum += part / calls as f64;
+            }
+            strain.push(r.p99_strain);
+            report.softened = report.softened.min(r.softened);
+            report.faults += usize::from(r.kept_last_good.is_some());
+            if call % LOOK_EVERY == 0 {
+                look(&dressed.state, &body, self.template.mesh().faces(), &mut depths, &mut single);
+            }
+            frame(time, &body, &dressed);
+        }
+        report.p99_strain = percentile(&mut strain, 0.99);
+        report.penetration = [percentile(&mut depths, 0.99), percentile(&mut depths, 1.0)];
+        report.penetration_single = [percentile(&mut single, 0.99), percentile(&mut single, 1.0)];
+        Ok(report)
+    }
+}
+
+/// How deep each garment vertex lies in the body.
+fn look(state: &State, body: &[P3], faces: &[Face], depths: &mut Vec<f64>, single: &mut Vec<f64>) {
+    let solid = Solid::new(body, faces);
+    for p in state.garments.iter().flat_map(|g| &g.positions) {
+        let depth = f64::from(solid.depth(p));
+        depths.push(depth);
+        if solid.winding(p) < 2 {
+            single.push(depth);
+        }
+    }
+}
