@@ -42,7 +42,7 @@ impl Region {
     pub const ALL: Self = Self(31);
 
     /// Both.
-    pub fn with(self, o: Self) -> Self {
+    pub const fn with(self, o: Self) -> Self {
         Self(self.0 | o.0)
     }
     /// Has a part in common.

@@ -5,6 +5,7 @@
 mod cloth;
 mod common;
 mod company;
+mod dance;
 mod garment_stream;
 mod garments;
 mod stress;
