@@ -113,7 +113,7 @@ pub fn load(folder: &Path) -> Result<Dance, EvaluateError> {
         .map_err(|e| fault(format!("{BODIES}: {e}")))?;
     let n = faces.vertices().len();
     let numbers: Vec<f32> = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-    if n == 0 || numbers.len() % (3 * n) != 0 || numbers.iter().any(|x| !x.is_finite()) {
+    if n == 0 || !numbers.len().is_multiple_of(3 * n) || numbers.iter().any(|x| !x.is_finite()) {
         return Err(fault(format!("{BODIES}: {} numbers are no bodies of {n} vertices", numbers.len())));
     }
     let bodies: Vec<Vec<P3>> =
