@@ -39,6 +39,13 @@ pub enum Print {
         /// Width of a stitch, metres.
         period: f32,
     },
+    /// A value instead of a fabric: u goes from −1 (`low`) over 0 (the base colour) to 1 (`high`).
+    Scale {
+        /// Colour at −1, sRGB.
+        low: [u8; 3],
+        /// Colour at 1, sRGB.
+        high: [u8; 3],
+    },
 }
 
 impl Default for Look {
@@ -76,6 +83,8 @@ impl ToSrgb {
 pub(crate) struct Fabric {
     pub(crate) base: [f32; 3],
     pub(crate) other: [f32; 3],
+    /// The third colour, where there is one.
+    pub(crate) low: [f32; 3],
     pub(crate) print: Print,
     pub(crate) gloss: f32,
     pub(crate) metres_per_uv: f32,
@@ -91,13 +100,15 @@ fn square_wave(x: f32, width: f32) -> f32 {
 
 impl Fabric {
     pub(crate) fn new(look: &Look) -> Self {
-        let other = match look.pattern {
-            Print::Stripes { color, .. } | Print::Check { color, .. } => color,
-            Print::Solid | Print::Knit { .. } => look.base,
+        let (other, low) = match look.pattern {
+            Print::Stripes { color, .. } | Print::Check { color, .. } => (color, look.base),
+            Print::Scale { low, high } => (high, low),
+            Print::Solid | Print::Knit { .. } => (look.base, look.base),
         };
         Self {
             base: look.base.map(linear),
             other: other.map(linear),
+            low: low.map(linear),
             print: look.pattern,
             gloss: (1.0 - look.roughness).clamp(0.0, 1.0),
             metres_per_uv: look.metres_per_uv,
@@ -129,6 +140,10 @@ impl Fabric {
                 let groove = 1.0 - 0.35 * visible * (1.0 - ridge) - 0.2 * visible * (2.0 * slant).powi(4);
                 self.base.map(|c| c * groove)
             }
+            Print::Scale { .. } => {
+                let (to, t) = if uv[0] < 0.0 { (&self.low, -uv[0]) } else { (&self.other, uv[0]) };
+                std::array::from_fn(|k| self.base[k] + (to[k] - self.base[k]) * t.min(1.0))
+            }
         }
     }
 }
@@ -143,6 +158,16 @@ mod tests {
         for c in 0..=255u8 {
             assert!((table.get(linear(c)) - f32::from(c)).abs() < 0.5, "{c}");
         }
+    }
+
+    #[test]
+    fn a_scale_goes_from_low_over_the_base_to_high() {
+        let (low, high) = ([0, 0, 255], [255, 0, 0]);
+        let look = Look { pattern: Print::Scale { low, high }, base: [0, 255, 0], ..Look::default() };
+        let fabric = Fabric::new(&look);
+        let at = |u: f32| fabric.albedo([u, 0.3], 0.01);
+        assert_eq!((at(-1.0), at(0.0), at(1.0)), ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]));
+        assert_eq!((at(-7.0), at(0.5)), ([0.0, 0.0, 1.0], [0.5, 0.5, 0.0]));
     }
 
     #[test]

@@ -64,6 +64,9 @@ const TIGHT_PRESSURE: f64 = 1_000.0;
 /// From this mean distance on a region is loose, metres: 19 cm of girth.
 const LOOSE_GAP: f64 = 0.03;
 
+/// Colours of loose, fitted and tight cloth, sRGB.
+pub const FIT_COLORS: [[u8; 3]; 3] = [[58, 104, 190], [96, 168, 96], [206, 58, 48]];
+
 impl VertexFit {
     /// From −1 (loose) by 0 (follows the body) to 1 (tight).
     pub fn tightness(&self) -> f32 {
@@ -73,12 +76,10 @@ impl VertexFit {
     }
     /// Blue where loose, green where fitted, red where tight, sRGB.
     pub fn color(&self) -> [u8; 3] {
-        const LOOSE: [f32; 3] = [58.0, 104.0, 190.0];
-        const FITTED: [f32; 3] = [96.0, 168.0, 96.0];
-        const TIGHT: [f32; 3] = [206.0, 58.0, 48.0];
+        let [loose, fitted, tight] = FIT_COLORS.map(|c| c.map(f32::from));
         let t = self.tightness();
-        let to = if t >= 0.0 { TIGHT } else { LOOSE };
-        std::array::from_fn(|k| (FITTED[k] + (to[k] - FITTED[k]) * t.abs()).round() as u8)
+        let to = if t >= 0.0 { tight } else { loose };
+        std::array::from_fn(|k| (fitted[k] + (to[k] - fitted[k]) * t.abs()).round() as u8)
     }
 }
 

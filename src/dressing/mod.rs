@@ -12,5 +12,5 @@ mod waistband;
 
 pub use crate::cloth::realtime::{AnchorBinding, Outfit};
 pub use dress::{DressError, DressOptions, DressReport, Dressed, dress};
-pub use fit_map::{FitMap, FitProbe, RegionFit, VertexFit};
+pub use fit_map::{FIT_COLORS, FitMap, FitProbe, RegionFit, VertexFit};
 pub use suggest::{Fit, Room, Suggestion, hem_height, judge, rooms, suggest};

@@ -55,16 +55,17 @@ pub(super) struct FabricData {
 
 impl From<&Fabric> for FabricData {
     fn from(f: &Fabric) -> Self {
-        let (kind, period) = match f.print {
-            Print::Solid => (0.0, 1.0),
-            Print::Stripes { period, .. } => (1.0, period),
-            Print::Check { period, .. } => (2.0, period),
-            Print::Knit { period } => (3.0, period),
+        let pattern = match f.print {
+            Print::Solid => [0.0, 1.0, 0.0, 0.0],
+            Print::Stripes { period, .. } => [1.0, period, 0.0, 0.0],
+            Print::Check { period, .. } => [2.0, period, 0.0, 0.0],
+            Print::Knit { period } => [3.0, period, 0.0, 0.0],
+            Print::Scale { .. } => [4.0, f.low[0], f.low[1], f.low[2]],
         };
         Self {
             base: [f.base[0], f.base[1], f.base[2], f.gloss],
             other: [f.other[0], f.other[1], f.other[2], f.metres_per_uv],
-            pattern: [kind, period, 0.0, 0.0],
+            pattern,
         }
     }
 }

@@ -25,7 +25,7 @@ struct Fabric {
     base: vec4f,
     // Second colour; metres per unit of texture coordinate.
     other: vec4f,
-    // Kind (0 solid, 1 stripes, 2 check, 3 knit), period (metres), unused.
+    // Kind (0 solid, 1 stripes, 2 check, 3 knit), period (metres), unused. Kind 4, a scale: third colour.
     pattern: vec4f,
 }
 
@@ -123,6 +123,12 @@ fn square_wave(x: f32, width: f32) -> f32 {
 }
 
 fn albedo(f: Fabric, uv: vec2f, footprint: f32) -> vec3f {
+    if f.pattern.x == 4.0 {
+        if uv.x < 0.0 {
+            return mix(f.base.xyz, f.pattern.yzw, min(-uv.x, 1.0));
+        }
+        return mix(f.base.xyz, f.other.xyz, min(uv.x, 1.0));
+    }
     let period = f.pattern.y;
     let m = uv * f.other.w / period;
     let w = footprint / period;

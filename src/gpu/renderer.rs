@@ -461,6 +461,7 @@ mod tests {
             Print::Stripes { color: [240, 235, 220], period: 0.05 },
             Print::Check { color: [20, 20, 30], period: 0.06 },
             Print::Knit { period: 0.03 },
+            Print::Scale { low: [58, 104, 190], high: [206, 58, 48] },
         ];
         for (k, print) in prints.into_iter().enumerate() {
             scenery.look.pattern = print;

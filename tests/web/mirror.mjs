@@ -153,7 +153,12 @@ try {
   await page.waitForFunction(() => document.querySelectorAll('#d-fit .fit').length > 0);
   const fits = await page.$$eval('#d-fit tr', (all) => all.map((t) => t.textContent));
   must(fits.length >= 3, `fit by region: ${fits.join(', ')}`);
+  await page.click('#fit-colors');
+  await page.waitForSelector('#fit-colors[aria-pressed="true"]');
+  await page.waitForTimeout(600);
   await shot('3-details');
+  must((requests.get('/tryon.v1.CompositorService/ShowFit') ?? 0) === 1, 'the fit is asked for in colours');
+  await page.click('#fit-colors');
   await page.keyboard.press('d');
 
   await page.click('#shutter');

@@ -167,6 +167,11 @@ export function startMock({ port = 0, rate = 20 } = {}) {
       Object.assign(tryOn, { garments, revision: tryOn.revision + 1n, chosen: Date.now() });
       return { outfit_revision: tryOn.revision };
     }],
+    ShowFit: [m.ShowFitRequest, m.ShowFitResponse, ({ try_on_id: id, show }) => {
+      if (!tryOns.has(id)) throw 5;
+      tryOns.get(id).fit = show;
+      return {};
+    }],
     TakeSnapshot: [m.TakeSnapshotRequest, m.TakeSnapshotResponse, ({ try_on_id: id }) => {
       if (!tryOns.has(id)) throw 5;
       return { picture: nextPicture(tryOns.get(id)) };

@@ -152,6 +152,9 @@ pub struct GarmentFit {
     /// From top to bottom; regions with less cloth than a hand's breadth square are left out.
     #[prost(message, repeated, tag = "3")]
     pub regions: ::prost::alloc::vec::Vec<RegionFit>,
+    /// One signed byte for each simulation vertex: from -127 (loose) over 0 (fitted) to 127 (tight). Empty in pictures.
+    #[prost(bytes = "bytes", tag = "4")]
+    pub tightness: ::prost::bytes::Bytes,
 }
 /// Why a picture or a state is less than it should be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
@@ -3003,6 +3006,15 @@ pub struct ChooseGarmentsResponse {
     #[prost(uint64, tag = "1")]
     pub outfit_revision: u64,
 }
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct ShowFitRequest {
+    #[prost(string, tag = "1")]
+    pub try_on_id: ::prost::alloc::string::String,
+    #[prost(bool, tag = "2")]
+    pub show: bool,
+}
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct ShowFitResponse {}
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct ListGarmentChoicesRequest {}
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -3368,6 +3380,32 @@ pub mod compositor_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CompositorService", "ChooseGarments"));
             self.inner.unary(req, path, codec).await
         }
+        /// Draws garments in the colours of their fit (red tight, green fitted, blue loose) instead of their own, or no longer.
+        /// Takes effect with the next picture once the fit has been measured; a garment whose fit is unknown keeps its own.
+        pub async fn show_fit(
+            &mut self,
+            request: impl tonic::IntoRequest<super::ShowFitRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::ShowFitResponse>,
+            tonic::Status,
+        > {
+            self.inner
+                .ready()
+                .await
+                .map_err(|e| {
+                    tonic::Status::unknown(
+                        format!("Service was not ready: {}", e.into()),
+                    )
+                })?;
+            let codec = tonic_prost::ProstCodec::default();
+            let path = http::uri::PathAndQuery::from_static(
+                "/tryon.v1.CompositorService/ShowFit",
+            );
+            let mut req = request.into_request();
+            req.extensions_mut()
+                .insert(GrpcMethod::new("tryon.v1.CompositorService", "ShowFit"));
+            self.inner.unary(req, path, codec).await
+        }
         /// What can be chosen, passed on from the cloth service.
         pub async fn list_garment_choices(
             &mut self,
@@ -3495,6 +3533,12 @@ pub mod compositor_service_server {
             tonic::Response<super::ChooseGarmentsResponse>,
             tonic::Status,
         >;
+        /// Draws garments in the colours of their fit (red tight, green fitted, blue loose) instead of their own, or no longer.
+        /// Takes effect with the next picture once the fit has been measured; a garment whose fit is unknown keeps its own.
+        async fn show_fit(
+            &self,
+            request: tonic::Request<super::ShowFitRequest>,
+        ) -> std::result::Result<tonic::Response<super::ShowFitResponse>, tonic::Status>;
         /// What can be chosen, passed on from the cloth service.
         async fn list_garment_choices(
             &self,
@@ -3733,6 +3777,51 @@ pub mod compositor_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ChooseGarmentsSvc(inner);
+                        let codec = tonic_prost::ProstCodec::default();
+                        let mut grpc = tonic::server::Grpc::new(codec)
+                            .apply_compression_config(
+                                accept_compression_encodings,
+                                send_compression_encodings,
+                            )
+                            .apply_max_message_size_config(
+                                max_decoding_message_size,
+                                max_encoding_message_size,
+                            );
+                        let res = grpc.unary(method, req).await;
+                        Ok(res)
+                    };
+                    Box::pin(fut)
+                }
+                "/tryon.v1.CompositorService/ShowFit" => {
+                    #[allow(non_camel_case_types)]
+                    struct ShowFitSvc<T: CompositorService>(pub Arc<T>);
+                    impl<
+                        T: CompositorService,
+                    > tonic::server::UnaryService<super::ShowFitRequest>
+                    for ShowFitSvc<T> {
+                        type Response = super::ShowFitResponse;
+                        type Future = BoxFuture<
+                            tonic::Response<Self::Response>,
+                            tonic::Status,
+                        >;
+                        fn call(
+                            &mut self,
+                            request: tonic::Request<super::ShowFitRequest>,
+                        ) -> Self::Future {
+                            let inner = Arc::clone(&self.0);
+                            let fut = async move {
+                                <T as CompositorService>::show_fit(&inner, request).await
+                            };
+                            Box::pin(fut)
+                        }
+                    }
+                    let accept_compression_encodings = self.accept_compression_encodings;
+                    let send_compression_encodings = self.send_compression_encodings;
+                    let max_decoding_message_size = self.max_decoding_message_size;
+                    let max_encoding_message_size = self.max_encoding_message_size;
+                    let inner = self.inner.clone();
+                    let fut = async move {
+                        let method = ShowFitSvc(inner);
                         let codec = tonic_prost::ProstCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(

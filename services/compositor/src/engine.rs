@@ -8,12 +8,14 @@ use std::time::Instant;
 use tryon::body::{BodyShape, BoneTransforms, RestBody, skin};
 use tryon::camera::ColorImage;
 use tryon::composite::{BodyView, Config, Framing, GarmentView, Input, Limbs, Look, Model, Print, State, Workspace};
+use tryon::dressing::FIT_COLORS;
 use tryon::formats::image::{encode_jpeg, encode_png_rgb};
 use tryon::math::{Camera, P3, Rigid, World};
 use tryon::par::Par;
 use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::body::pose_from_wire;
+use tryon_proto::convert::fit::tightness;
 use tryon_proto::convert::garment::{PlacedGarments, WornGarment};
 use tryon_proto::convert::request::PictureFormat;
 use tryon_proto::v1::{GarmentLook, StageTime};
@@ -42,6 +44,8 @@ pub(crate) struct Job {
     pub(crate) placed: Option<Arc<Placed>>,
     pub(crate) body: Option<Body>,
     pub(crate) formats: Vec<(Option<(u32, u32)>, Encoding)>,
+    /// Draw garments in the colours of their fit, as far as it is known: a byte for each simulated vertex.
+    pub(crate) fit: Option<Arc<[bytes::Bytes]>>,
 }
 
 /// One encoded picture.
@@ -93,8 +97,13 @@ impl Engine {
         let start = Instant::now();
         let has_body = job.placed.is_some() && job.body.as_ref().is_some_and(|b| self.pose(b));
         let mut stages = job.placed.as_ref().map_or_else(|| job.exposure.stages.clone(), |p| p.stages.clone());
-        let looks: Vec<Look> = job.placed.iter().flat_map(|p| &p.garments).map(|(w, _)| look(&w.look)).collect();
         let placed: &[(Arc<WornGarment>, Vec<P3>)] = job.placed.as_ref().map_or(&[], |p| &p.garments);
+        let scales: Vec<Option<Vec<[f32; 2]>>> =
+            placed.iter().enumerate().map(|(k, (w, _))| fit_scale(w, job.fit.as_ref()?.get(k)?)).collect();
+        let of = |(scale, (w, _)): (&Option<_>, &(Arc<WornGarment>, _))| {
+            scale.as_ref().map_or(look(&w.look), |_| fit_look())
+        };
+        let looks: Vec<Look> = scales.iter().zip(placed).map(of).collect();
         self.garments.resize_with(placed.len(), Vec::new);
         if let Some(p) = &job.placed {
             let camera_from_world = p.world_from_camera.inverse();
@@ -102,8 +111,11 @@ impl Engine {
                 camera_from_world.points_f32(world, out);
             }
         }
-        let views: Vec<GarmentView<'_>> = (placed.iter().zip(&self.garments).zip(&looks))
-            .map(|(((w, _), vertices), look)| GarmentView { vertices, faces: &w.faces, uv: &w.uvs, normals: &[], look })
+        let views: Vec<GarmentView<'_>> = (placed.iter().zip(&scales).zip(&self.garments).zip(&looks))
+            .map(|((((w, _), scale), vertices), look)| {
+                let uv = scale.as_ref().unwrap_or(&w.uvs);
+                GarmentView { vertices, faces: &w.faces, uv, normals: &[], look }
+            })
             .collect();
         let faces = job.body.as_ref().map_or(&[][..], |b| b.template.mesh().faces());
         let body = has_body.then_some(BodyView { vertices: &self.posed, faces, limbs: &self.limbs });
@@ -156,6 +168,16 @@ impl Engine {
         skin(Par::Rayon, &self.rest.vertices, b.template.weights(), &self.bones, &mut self.posed);
         true
     }
+}
+
+/// Tightness of each drawn vertex as a texture coordinate; `None` when the bytes are those of another garment.
+fn fit_scale(w: &WornGarment, bytes: &[u8]) -> Option<Vec<[f32; 2]>> {
+    (bytes.len() == w.vertices).then(|| w.drawn.iter().map(|v| [tightness(bytes[*v as usize]), 0.0]).collect())
+}
+
+fn fit_look() -> Look {
+    let [low, base, high] = FIT_COLORS;
+    Look { base, pattern: Print::Scale { low, high }, ..Look::default() }
 }
 
 fn rgb(c: u32) -> [u8; 3] {

@@ -144,6 +144,14 @@ impl CompositorService for Compositor {
         Ok(Response::new(ChooseGarmentsResponse { outfit_revision: handle.wanted.borrow().revision }))
     }
 
+    async fn show_fit(&self, r: Request<ShowFitRequest>) -> Result<Response<ShowFitResponse>, Status> {
+        let r = r.get_ref();
+        let handle = self.find(&r.try_on_id)?;
+        let gone = |_| not_found("try-on", &r.try_on_id);
+        handle.commands.send(Command::ShowFit(r.show)).await.map_err(gone)?;
+        Ok(Response::new(ShowFitResponse {}))
+    }
+
     async fn list_garment_choices(
         &self,
         _: Request<ListGarmentChoicesRequest>,

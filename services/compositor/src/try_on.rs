@@ -50,6 +50,7 @@ pub(crate) enum Command {
     View(Viewer),
     Snapshot(Encoding, oneshot::Sender<Result<Picture, Status>>),
     Touch,
+    ShowFit(bool),
     Close,
 }
 
@@ -124,6 +125,8 @@ async fn open(setup: Setup, inbox: mpsc::Receiver<Command>, outfit: watch::Recei
         faults: Faults::default(),
         scene: Scene::default(),
         fit: (0, Vec::new()),
+        tightness: Arc::new([]),
+        show_fit: false,
         last: None,
         viewers: Vec::new(),
         engine: Some(Engine::new(card)),
@@ -195,6 +198,10 @@ struct Task {
     scene: Scene,
     /// Fit of the garments as last told, and the revision it belongs to.
     fit: (u64, Vec<GarmentFit>),
+    /// How tight each vertex of each garment is, which pictures do not carry.
+    tightness: Arc<[bytes::Bytes]>,
+    /// Garments are drawn in the colours of their fit.
+    show_fit: bool,
     /// What the last picture was made of, for snapshots.
     last: Option<(Instant, Job)>,
     viewers: Vec<Viewer>,
@@ -225,6 +232,7 @@ impl Task {
                     }
                     Some(Command::Snapshot(encoding, answer)) => self.snapshot(encoding, answer),
                     Some(Command::Touch) => self.wanted = Instant::now(),
+                    Some(Command::ShowFit(show)) => self.show_fit = show,
                     Some(Command::Close) | None => {
                         self.happen(Event::Close);
                         return ASKED;
@@ -353,7 +361,7 @@ impl Task {
         self.scene.frame(e.clone());
         // While live, pictures wait for their garments; otherwise the plain picture is the newest truth.
         if !self.state.shows_garments() {
-            self.draw(Job { exposure: e, placed: None, body: None, formats: Vec::new() });
+            self.draw(Job { exposure: e, placed: None, body: None, formats: Vec::new(), fit: None });
         }
     }
 
@@ -413,7 +421,9 @@ impl Task {
                 self.opened();
                 self.faults.cloth = None;
                 if !frame.fit.is_empty() || self.fit.0 != placed.revision {
-                    self.fit = (placed.revision, frame.fit);
+                    let mut fit = frame.fit;
+                    self.tightness = fit.iter_mut().map(|f| std::mem::take(&mut f.tightness)).collect();
+                    self.fit = (placed.revision, fit);
                 }
                 if let Some(id) = frame.frame {
                     self.placed(&id, placed);
@@ -442,7 +452,8 @@ impl Task {
         self.happen(Event::GarmentsOn);
         if self.state.shows_garments() {
             let body = self.scene.find_body(id);
-            self.draw(Job { exposure, placed: Some(placed), body, formats: Vec::new() });
+            let fit = self.show_fit.then(|| self.tightness.clone());
+            self.draw(Job { exposure, placed: Some(placed), body, formats: Vec::new(), fit });
         }
     }
 

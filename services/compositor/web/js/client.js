@@ -15,6 +15,7 @@ export function compositor(origin = '') {
       unary(url('CloseTryOn'), m.CloseTryOnRequest, m.CloseTryOnResponse, request, options),
     chooseGarments: (request, options) =>
       unary(url('ChooseGarments'), m.ChooseGarmentsRequest, m.ChooseGarmentsResponse, request, options),
+    showFit: (request, options) => unary(url('ShowFit'), m.ShowFitRequest, m.ShowFitResponse, request, options),
     listGarmentChoices: (options) =>
       unary(url('ListGarmentChoices'), m.ListGarmentChoicesRequest, m.ListGarmentChoicesResponse, {}, options),
     takeSnapshot: (request, options) =>

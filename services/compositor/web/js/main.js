@@ -85,6 +85,7 @@ function finish() {
   wardrobe.update();
   details.show(false);
   byId('details-toggle').setAttribute('aria-expanded', 'false');
+  byId('fit-colors').setAttribute('aria-pressed', 'false');
   showScreen('welcome');
 }
 
@@ -292,6 +293,18 @@ function toggleDetails() {
   refresh();
 }
 
+/** Garments in the colours of their fit: red tight, green fitted, blue loose. */
+async function toggleFitColors() {
+  const button = byId('fit-colors');
+  const show = button.getAttribute('aria-pressed') !== 'true';
+  button.setAttribute('aria-pressed', String(show));
+  try {
+    await session?.tryOn.showFit(show);
+  } catch (error) {
+    if (error.code !== Code.CANCELLED) toast('The mirror is not answering. The colours come when it is back.');
+  }
+}
+
 function toggleFit() {
   byId('fit').setAttribute('aria-pressed', String(stage.classList.toggle('whole')));
 }
@@ -307,6 +320,7 @@ byId('photo-close').addEventListener('click', closePhoto);
 byId('photo').addEventListener('close', closePhoto);
 byId('fit').addEventListener('click', toggleFit);
 byId('details-toggle').addEventListener('click', toggleDetails);
+byId('fit-colors').addEventListener('click', toggleFitColors);
 
 document.addEventListener('keydown', (event) => {
   if (!session || event.ctrlKey || event.metaKey || event.altKey || document.querySelector('dialog[open]')) return;

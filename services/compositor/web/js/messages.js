@@ -23,7 +23,8 @@ export const RegionFit = schema('RegionFit',
 export const GarmentFit = schema('GarmentFit',
   [1, 'garment', 'string'],
   [2, 'size', 'string'],
-  [3, 'regions', 'message[]', RegionFit]);
+  [3, 'regions', 'message[]', RegionFit],
+  [4, 'tightness', 'bytes']);
 
 export const GarmentChoice = schema('GarmentChoice',
   [1, 'garment', 'string'],
@@ -58,6 +59,12 @@ export const ChooseGarmentsRequest = schema('ChooseGarmentsRequest',
 
 export const ChooseGarmentsResponse = schema('ChooseGarmentsResponse',
   [1, 'outfit_revision', 'uint64']);
+
+export const ShowFitRequest = schema('ShowFitRequest',
+  [1, 'try_on_id', 'string'],
+  [2, 'show', 'bool']);
+
+export const ShowFitResponse = schema('ShowFitResponse');
 
 export const ListGarmentChoicesRequest = schema('ListGarmentChoicesRequest');
 

@@ -37,6 +37,7 @@ export class TryOn {
   #stop = new AbortController();
   #wake = new AbortController();
   #choice = 0;
+  #fit = false;
 
   constructor({ client, on, garments, camera = {}, backoff = new Backoff(), silenceMs = SILENCE_MS }) {
     this.client = client;
@@ -78,6 +79,7 @@ export class TryOn {
     const opened = await this.client.openTryOn(request, { signal: stop });
     // A try-on that outlived our connection still wears what it wore: say again what is wanted.
     if (!opened.created) await this.#choose();
+    if (this.#fit) await this.showFit(true);
 
     const line = new AbortController();
     const signal = AbortSignal.any([stop, line.signal]);
@@ -115,6 +117,12 @@ export class TryOn {
   /** Revision that pictures will show, null when a later choice overtook this one. Throws RpcError. */
   choose() {
     return this.#choose();
+  }
+
+  /** Garments in the colours of their fit, also after the line broke. */
+  async showFit(show) {
+    this.#fit = show;
+    await this.client.showFit({ try_on_id: this.id, show }, { signal: this.#stop.signal });
   }
 
   snapshot(codec) {

@@ -13,6 +13,13 @@ use tryon_proto::v1::capture_service_client::CaptureServiceClient;
 use tryon_proto::v1::stream_frames_response::Event;
 use tryon_proto::v1::*;
 
+/// Share of a JPEG's pixels that are clearly green, blue or red.
+fn colored(jpeg: &[u8]) -> f64 {
+    let image = tryon::formats::image::decode_jpeg(jpeg).expect("a picture");
+    let strong = |p: &&[u8]| p.iter().max().zip(p.iter().min()).is_some_and(|(a, b)| a - b > 40);
+    image.data().chunks_exact(3).filter(strong).count() as f64 / (image.data().len() / 3) as f64
+}
+
 fn client<T>(f: impl Future<Output = T>) -> T {
     tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().expect("a runtime").block_on(f)
 }
@@ -55,6 +62,15 @@ fn health_reflection_a_hundred_frames_another_garment_and_the_end() {
         println!("100 pictures, {:.1} a second", 99.0 / begun.elapsed().as_secs_f64());
 
         let mut c = kiosk.compositor();
+        let before = colored(&p.image);
+        let show = ShowFitRequest { try_on_id: "first".into(), show: true };
+        c.show_fit(show).await.expect("shown");
+        let is = |e: &Event| matches!(e, Event::Picture(p) if colored(&p.image) > before + 0.02);
+        w.until("the fit in colours", is).await;
+        let gone = ShowFitRequest { try_on_id: "nobody".into(), show: true };
+        assert_eq!(c.show_fit(gone).await.expect_err("unknown").code(), Code::NotFound);
+        c.show_fit(ShowFitRequest { try_on_id: "first".into(), show: false }).await.expect("hidden");
+
         let choose = ChooseGarmentsRequest { try_on_id: "first".into(), garments: wear(&["skirt", "longsleeve"]) };
         let revision = c.choose_garments(choose).await.expect("chosen").into_inner().outfit_revision;
         assert_eq!(revision, 2);
