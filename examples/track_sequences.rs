@@ -1,9 +1,10 @@
 //! Tracks depth folders and prints every measure of error against their truth, for development and benchmarks.
 //!
-//! `cargo run --release --example track_sequences -- [--body FILE]… [--set JSON]… [--synth] [--hard] [--frames N] [--still N]
+//! `cargo run --release --example track_sequences -- [--body FILE]… [--set JSON]… [--synth] [--hard] [--upper] [--own] [--frames N] [--still N]
 //! [--corrupt SHARE] [--thin SHARE] [--nth N] [--cut SHARE] [--overlay DIR] [--every N] [--labels DIR] [--jsonl DIR] [--stages] [-v] FOLDER…`
 //!
-//! Each combination of body and settings is run on each folder and, with `--synth`, on the synthetic scenes.
+//! Each combination of body and settings is run on each folder and, with `--synth`, on the synthetic scenes; `--upper` adds
+//! clips of which the picture shows no feet, `--own` gives each recorded or clipped scene its subject's own body.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
 
 use std::path::{Path, PathBuf};
@@ -14,6 +15,7 @@ use tryon::evaluate::tracking::{follow, mean, median};
 use tryon::evaluate::{Scene, scenes};
 use tryon::formats::image::write_png_rgb;
 use tryon::formats::npz::read_smpl;
+use tryon::formats::read_motion;
 use tryon::mesh::face_normal;
 use tryon::raster::{View, VisibilityBuffer, rasterise};
 use tryon::segment::{SegmentScratch, find_person, find_planes};
@@ -27,6 +29,8 @@ struct Args {
     settings: Vec<String>,
     folders: Vec<PathBuf>,
     synth: bool,
+    upper: bool,
+    own: bool,
     frames: Option<usize>,
     still: usize,
     overlay: Option<PathBuf>,
@@ -65,6 +69,8 @@ fn main() {
             "--drift" => a.drift = Some(next().parse().expect("a number")),
             "--labels" => a.labels = Some(next().into()),
             "--synth" => a.synth = true,
+            "--upper" => a.upper = true,
+            "--own" => a.own = true,
             "--stages" => a.stages = true,
             "-v" => a.verbose = true,
             _ => a.folders.push(word.into()),
@@ -84,7 +90,7 @@ fn main() {
         return;
     }
     let bodies: Vec<Arc<Template>> = a.bodies.iter().map(|b| body(b)).collect();
-    let mut all: Vec<Box<dyn Fn() -> Scene>> = vec![];
+    let mut all: Vec<(Option<&str>, Maker)> = vec![];
     for folder in &a.folders {
         if let Some(dir) = &a.labels {
             labels(dir, &Scene::open(folder).expect("a scene"), a.every);
@@ -98,25 +104,33 @@ fn main() {
             continue;
         }
         let folder = folder.clone();
-        all.push(Box::new(move || Scene::open(&folder).expect("a scene")));
+        let name = folder.to_string_lossy().into_owned();
+        let own = SUBJECTS.into_iter().find(|s| name.contains(s.trim_start_matches("subject_")));
+        all.push((own, Box::new(move || Scene::open(&folder).expect("a scene"))));
     }
     if a.synth {
         for name in scenes::unseen_names() {
             let data = shared.join("data");
-            all.push(Box::new(move || scenes::unseen(&data, name).expect("a scene")));
+            all.push((None, Box::new(move || scenes::unseen(&data, name).expect("a scene"))));
+        }
+    }
+    if a.upper {
+        for spec in &UPPER {
+            let data = shared.join("data");
+            all.push((Some(spec.1), Box::new(move || upper(&data, spec))));
         }
     }
     if a.hard {
         let data = shared.join("data");
-        all.push(Box::new(move || scenes::hard(&data).expect("scenes").swap_remove(2)));
+        all.push((None, Box::new(move || scenes::hard(&data).expect("scenes").swap_remove(2))));
         for i in 0..2 {
             let data = shared.join("data");
-            all.push(Box::new(move || scenes::hard(&data).expect("scenes").swap_remove(i)));
+            all.push((None, Box::new(move || scenes::hard(&data).expect("scenes").swap_remove(i))));
             let data = shared.join("data");
-            all.push(Box::new(move || scenes::idle(&data).expect("scenes").swap_remove(i)));
+            all.push((None, Box::new(move || scenes::idle(&data).expect("scenes").swap_remove(i))));
         }
     }
-    for make in all {
+    for (own, make) in all {
         let mut scene = make();
         if scene.frames.len() == 1 {
             // A still is shown over and over.
@@ -138,7 +152,9 @@ fn main() {
         if a.cut < 1.0 {
             scene = scene.cut_below(a.cut);
         }
+        let subject = own.filter(|_| a.own).map(|name| scenes::subject(&shared.join("data"), name).expect("a body"));
         for (template, path) in bodies.iter().zip(&a.bodies) {
+            let template = subject.as_ref().unwrap_or(template);
             for settings in &a.settings {
                 let config = configuration(settings);
                 let label = if a.settings.len() * bodies.len() > 1 {
@@ -150,6 +166,39 @@ fn main() {
             }
         }
     }
+}
+
+type Maker = Box<dyn Fn() -> Scene>;
+
+/// Bodies that scenes were made with.
+const SUBJECTS: [&str; 4] = ["subject_f_avg", "subject_f_short_heavy", "subject_m_heavy", "subject_m_tall"];
+
+/// Name, body, clip, noise, camera height and distance (metres), frames until it walks out of the picture: clips of which the picture shows no feet.
+type Upper = (&'static str, &'static str, &'static str, NoiseModel, [f64; 2], u64);
+
+/// The lower rim of the picture is 0.456 × distance below the camera's height: at the shins, the knees and the thighs.
+const UPPER: [Upper; 5] = [
+    ("shins_13_31_f_avg", "subject_f_avg", "cmu_asf_amc/13_31.amc", NoiseModel::KinectV1, [1.45, 2.6], 150),
+    ("knees_93_04_m_heavy", "subject_m_heavy", "cmu_asf_amc/93_04.amc", NoiseModel::TimeOfFlight, [1.5, 2.2], 150),
+    ("thighs_02_07_f_short", "subject_f_short_heavy", "cmu_asf_amc/02_07.amc", NoiseModel::KinectV1, [1.45, 1.9], 150),
+    ("knees_walk_m_tall", "subject_m_tall", "cmu_bvh/02_03.bvh", NoiseModel::TimeOfFlight, [1.5, 2.3], 75),
+    ("knees_02_02_f_avg", "subject_f_avg", "cmu_bvh/02_02_makehuman.bvh", NoiseModel::TimeOfFlight, [1.4, 2.2], 90),
+];
+
+fn upper(data: &Path, &(name, body, clip, noise, [height, away], frames): &Upper) -> Scene {
+    let shopper = Shopper { template: scenes::subject(data, body).expect("a body"), ..Shopper::default() };
+    let setting = Setting {
+        world_from_camera: Setting::tilted(height, 0.0, 0.0),
+        home: nalgebra::Point3::new(0.0, 0.0, -away),
+        room: None,
+        noise,
+        color: false,
+        seed: 13,
+        ..Setting::default()
+    };
+    let motion = read_motion(&data.join("motion").join(clip)).expect("a clip");
+    let sequence = Sequence::new(shopper, setting).with_clip(motion.at_cmu_rate()).expect("a clip of a person");
+    Scene::synthetic(name, &sequence, frames)
 }
 
 /// `paper`, or JSON.

@@ -46,20 +46,8 @@ impl Template {
     /// Applies shape coefficients, bone scales (differential bone coordinates, eq. 18–20, in the rest pose)
     /// and displacements. Missing entries of `shape` count as neutral.
     pub fn personalise(&self, shape: &BodyShape) -> RestBody {
-        let mut vertices = self.mesh().vertices().to_vec();
-        let mut joints: Vec<Point3<f64>> = self.skeleton().joints().iter().map(|j| j.rest).collect();
-        if let Some(space) = self.shape_space() {
-            for (d, &c) in shape.coefficients.iter().enumerate().take(space.vertices.len()) {
-                if c != 0.0 {
-                    let c32 = c as f32;
-                    vertices.iter_mut().zip(&space.vertices[d]).for_each(|(p, o)| *p += o * c32);
-                    joints.iter_mut().zip(&space.joints[d]).for_each(|(p, o)| *p += o * c);
-                }
-            }
-        }
-        if shape.bone_scales.iter().any(|s| *s != 1.0) {
-            self.scale_bones(&shape.bone_scales, &mut vertices, &mut joints);
-        }
+        let all: Vec<u32> = (0..self.mesh().vertices().len() as u32).collect();
+        let (mut vertices, joints) = self.personalise_some(shape, &all);
         let mut normals = Vec::new();
         vertex_normals(Par::Rayon, &vertices, self.mesh().faces(), self.topology().vertex_faces(), &mut normals);
         let base = vertices.clone();
@@ -69,9 +57,30 @@ impl Template {
         RestBody { vertices, base, normals, joints }
     }
 
+    /// Some vertices of [`Template::personalise`]'s `base`, in the order of `which` (indices within the mesh), and all
+    /// joints, metres.
+    pub fn personalise_some(&self, shape: &BodyShape, which: &[u32]) -> (Vec<P3>, Vec<Point3<f64>>) {
+        let mut vertices: Vec<P3> = which.iter().map(|&i| self.mesh().vertices()[i as usize]).collect();
+        let mut joints: Vec<Point3<f64>> = self.skeleton().joints().iter().map(|j| j.rest).collect();
+        if let Some(space) = self.shape_space() {
+            for (d, &c) in shape.coefficients.iter().enumerate().take(space.vertices.len()) {
+                if c != 0.0 {
+                    let c32 = c as f32;
+                    let offsets = which.iter().map(|&i| space.vertices[d][i as usize]);
+                    vertices.iter_mut().zip(offsets).for_each(|(p, o)| *p += o * c32);
+                    joints.iter_mut().zip(&space.joints[d]).for_each(|(p, o)| *p += o * c);
+                }
+            }
+        }
+        if shape.bone_scales.iter().any(|s| *s != 1.0) {
+            self.scale_bones(&shape.bone_scales, which, &mut vertices, &mut joints);
+        }
+        (vertices, joints)
+    }
+
     /// Stretches each bone along itself. A vertex moves with the foot of its perpendicular on each controlling
     /// bone (γ of eq. 18), so that cross-sections keep their size.
-    fn scale_bones(&self, scales: &[f64], vertices: &mut [P3], joints: &mut [Point3<f64>]) {
+    fn scale_bones(&self, scales: &[f64], which: &[u32], vertices: &mut [P3], joints: &mut [Point3<f64>]) {
         let skeleton = self.skeleton();
         let scale = |j: usize| scales.get(j).copied().unwrap_or(1.0);
         let old = joints.to_vec();
@@ -81,7 +90,8 @@ impl Template {
             }
         }
         let w = self.weights();
-        for (i, v) in vertices.iter_mut().enumerate() {
+        for (&i, v) in which.iter().zip(vertices) {
+            let i = i as usize;
             let mut offset = Vector3::zeros();
             for k in 0..4 {
                 let weight = f64::from(w.weights[i][k]);

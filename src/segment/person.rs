@@ -2,7 +2,7 @@
 
 use super::ScenePlanes;
 use super::planes::Bands;
-use crate::math::P3;
+use crate::math::{P3, principal_axes};
 use crate::spatial::{Label, OrganisedCloud};
 use nalgebra::Vector3;
 
@@ -26,6 +26,14 @@ const PART_GAP: i32 = 2;
 const LARGE_PART: f32 = 1.0;
 /// A candidate that hangs on a side of the image over this share of its rows is furniture or a wall.
 const SIDE_SHARE: f32 = 0.5;
+
+/// Unless it is a person whom the side of the picture cuts: at least this tall (metres) with the head in the picture,
+const CUT_HEIGHT: f32 = 1.0;
+/// no deeper than this (metres; a wall or a table seen along its length is),
+const CUT_DEPTH: f32 = 0.9;
+/// and rounder than a door or a wardrobe: standard deviation from its own plane, metres. A sensor's noise at 3 m is 1 cm,
+/// half of a standing person has 5.
+const ROUND: f64 = 0.025;
 
 /// So many cells on the rim make a thing hang on it.
 const HANGING: usize = 3;
@@ -110,7 +118,8 @@ pub fn find_person(
     }
     let components = connect(cloud, &up, scratch);
     out.components = components.len();
-    let Some(main) = choose(&components, prior) else { return out };
+    let cut = || components.iter().filter(|c| prior.is_none() && is_cut(c, cloud, scratch)).min_by(nearer);
+    let Some(main) = choose(&components, prior).or_else(cut) else { return out };
     // The main part, and what its own limbs cut off: parts beside it in the image and near it in depth.
     let mut belongs = vec![false; components.len()];
     belongs[main.id as usize] = true;
@@ -250,6 +259,26 @@ fn choose(components: &[Component], prior: Option<Prior>) -> Option<&Component> 
     components.iter().filter(sized).min_by(|a, b| rank(a).total_cmp(&rank(b)).then(a.id.cmp(&b.id)))
 }
 
+/// The nearer of two things, for [`Iterator::min_by`].
+fn nearer(a: &&Component, b: &&Component) -> std::cmp::Ordering {
+    a.centre.z.total_cmp(&b.centre.z).then(a.id.cmp(&b.id))
+}
+
+/// A thing that hangs on a side of the image over most of its rows, and yet looks like a part of a person.
+fn is_cut(c: &Component, cloud: &OrganisedCloud, scratch: &SegmentScratch) -> bool {
+    let size = c.hi - c.lo;
+    let fits = (LEAST_AREA..MOST_AREA).contains(&c.area)
+        && (CUT_HEIGHT..HEIGHT[1]).contains(&size.y)
+        && size.x < MOST_WIDTH
+        && size.z < CUT_DEPTH
+        && c.top_cells <= HANGING;
+    let points = || {
+        let own = scratch.component.iter().enumerate().filter(|(_, id)| **id == c.id);
+        own.map(|(i, _)| cloud.centre(i)).collect::<Vec<P3>>()
+    };
+    fits && principal_axes(&points()).is_some_and(|(_, _, variance)| variance[2].sqrt() > ROUND)
+}
+
 /// A part of the same column: an arm across the body cuts it into an upper and a lower part, of which either may be the
 /// larger.
 fn above_or_below(c: &Component, main: &Component) -> bool {
@@ -289,6 +318,35 @@ mod tests {
         cloud.labels.fill(Label::Unknown);
         let again = find_person(&mut cloud, &scene, Some(prior), &mut SegmentScratch::default());
         assert_eq!(again.cells, found.cells);
+    }
+
+    /// Half a figure at the right rim at 2 m, 1.5 m tall: a half cylinder of 0.3 m, or a board that is turned by 30°.
+    fn at_the_rim(round: bool) -> OrganisedCloud {
+        use crate::camera::{DepthImage, Intrinsics};
+        let k = Intrinsics { width: 320, height: 240, fx: 262.5, fy: 262.5, cx: 159.5, cy: 119.5 };
+        let edge = 160.5 / 262.5 * 2.0;
+        let data = (0..k.pixels()).map(|i| {
+            let (x, y) = (((i % 320) as f64 - k.cx) / k.fx * 2.0, ((i / 320) as f64 - k.cy) / k.fy * 2.0);
+            let across = edge - x;
+            if across > 0.3 || y.abs() > 0.75 {
+                return 0;
+            }
+            let z = if round { 2.0 - (0.09 - across * across).max(0.0).sqrt() } else { 2.0 + 0.58 * across };
+            (z * 1000.0) as u16
+        });
+        let image = DepthImage::new(320, 240, data.collect()).expect("sizes agree");
+        let mut cloud = OrganisedCloud::new(&k, Some(2));
+        cloud.sample(&image, 8.0);
+        cloud
+    }
+
+    #[test]
+    fn half_a_person_at_the_rim_is_found_and_half_a_door_is_not() {
+        let mut scratch = SegmentScratch::default();
+        let found = find_person(&mut at_the_rim(true), &ScenePlanes::default(), None, &mut scratch);
+        assert!(found.cells.len() > 500, "{} cells", found.cells.len());
+        let door = find_person(&mut at_the_rim(false), &ScenePlanes::default(), None, &mut scratch);
+        assert!(door.cells.is_empty() && door.components == 1, "{} cells", door.cells.len());
     }
 
     #[test]

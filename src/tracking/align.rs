@@ -2,7 +2,7 @@
 
 use super::kinematics::{LEVER, apply, linearise};
 use super::model::TrackerModel;
-use super::stand::{Ground, stand};
+use super::stand::{Ground, planted, stand};
 use super::{Normals, TrackerConfig};
 use crate::body::{BoneTransforms, JointMotion, Pose, RestBody};
 use crate::math::{P3, V3};
@@ -111,6 +111,9 @@ const HIDDEN: f64 = 1e-5;
 const BARELY_SEEN: f64 = 3e-5;
 /// A hidden leg is pulled to the rest pose with this weight.
 const HIDDEN_LEG_PULL: f64 = 2e-5;
+/// The same while its foot is planted: a straight knee is no more likely then than a bent one. (With the full pull the
+/// waist-up sequence has 9.0 instead of 7.8 mm with its own body.)
+const PLANTED_LEG_PULL: f64 = 2e-6;
 /// Width of the kernel for what stands in free space, metres: it may be far off.
 const FREE_SIGMA: f64 = 0.10;
 /// What stands before a reading goes back by at most this in one iteration, metres.
@@ -164,6 +167,23 @@ impl AlignScratch {
     #[cfg(test)]
     pub(super) fn hide_all(&mut self, angles: usize) {
         self.unseen = vec![1.0; angles];
+    }
+    /// Normal equations of nothing at `pose`, whose bones are known.
+    #[cfg(test)]
+    pub(super) fn blank(&mut self, model: &TrackerModel, pose: &Pose) {
+        let centre = self.bones.joints[0].coords;
+        linearise(model.template.skeleton(), &self.bones, pose, &centre, &mut self.dofs);
+        self.hessian = DMatrix::zeros(self.dofs.len(), self.dofs.len());
+        self.gradient = DVector::zeros(self.dofs.len());
+    }
+    /// One damped step of the angles.
+    #[cfg(test)]
+    pub(super) fn follow(&mut self, model: &TrackerModel, pose: &mut Pose) {
+        let mut damping = vec![1e-5; self.dofs.len()];
+        damping[..6].fill(1e9);
+        let x = solve_damped(&self.hessian, &self.gradient, &damping).expect("damped");
+        let centre = self.bones.joints[0].coords;
+        apply(model.template.skeleton(), pose, &centre, &x);
     }
     /// Adds `weight · (slopes · x − off)²` over the given angles to the normal equations.
     pub(super) fn add_row(&mut self, angles: &[usize], slopes: &[f64], off: f64, weight: f64) {
@@ -414,6 +434,11 @@ fn assemble(
     scratch.gradient *= scale;
     scratch.damping.clear();
     scratch.damping.resize(scratch.gradient.len(), model.config.damping);
+    let stays = planted(model, seen.grid, scratch);
+    let leg_pull = |k: usize| {
+        let of = |(leg, stays): (&super::stand::Leg, bool)| stays && leg.moves(k);
+        if model.standing.iter().zip(stays).any(of) { PLANTED_LEG_PULL } else { HIDDEN_LEG_PULL }
+    };
     let mut hidden = std::mem::take(&mut scratch.unseen);
     hidden.clear();
     for (k, (&stiff, &angle)) in model.stiffness.iter().zip(&pose.angles).enumerate() {
@@ -422,13 +447,12 @@ fn assemble(
         hidden.push((BARELY_SEEN / (BARELY_SEEN + scratch.hessian[(6 + k, 6 + k)])).powi(2));
         let seen_share = if scratch.terms.eased { model.seen_shares[k] } else { 1.0 };
         let share = seen_share + (1.0 - seen_share) * unseen;
-        let stiff =
-            stiff * scratch.terms.rest_weight * share + if model.legs[k] { HIDDEN_LEG_PULL * unseen } else { 0.0 };
+        let stiff = stiff * scratch.terms.rest_weight * share + if model.legs[k] { leg_pull(k) * unseen } else { 0.0 };
         scratch.hessian[(6 + k, 6 + k)] += stiff;
         scratch.gradient[6 + k] -= stiff * angle;
     }
     if let Some(ground) = &scratch.terms.ground.clone() {
-        stand(model, seen.grid, ground, &hidden, scratch);
+        stand(model, seen.grid, ground, &hidden, stays, scratch);
     }
     scratch.unseen = hidden;
     totals

@@ -7,7 +7,7 @@
 use super::align::{AlignScratch, SampleRest, Seen, for_residuals, normal_equations, pair};
 use super::model::TrackerModel;
 use crate::body::{BodyShape, Pose, RestBody};
-use nalgebra::{DMatrix, DVector, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 /// What the frames so far say about size and shape.
@@ -155,25 +155,29 @@ fn frame_information(
     let mut hss = DMatrix::<f64>::zeros(n, n);
     let mut gs = DVector::<f64>::zeros(n);
     let mut hbs = vec![Vector6::zeros(); n * bones.len()];
-    let mut weighed = vec![Vector3::zeros(); n];
-    // A sample has several residuals, but moves in one way only.
-    let mut known = vec![usize::MAX; model.samples.len()];
-    let mut all_moves: Vec<Vector3<f64>> = Vec::new();
+    // A sample has several residuals, but moves in one way only: their metrics add up first.
+    let mut sums: Vec<(Matrix3<f64>, Vector3<f64>)> = vec![Default::default(); model.samples.len()];
+    let mut paired: Vec<(usize, usize, Vector3<f64>)> = Vec::new();
+    let mut known = vec![false; model.samples.len()];
     for_residuals(model, seen, scratch, sigma, POINT_TO_POINT, |r| {
-        let p = r.point - centre;
-        if known[r.sample] == usize::MAX {
-            known[r.sample] = all_moves.len();
-            all_moves.extend((0..n).map(|d| {
-                let offset = model.directions[d].samples[r.sample].cast::<f64>();
-                shifts[d * bones.len() + r.bone] + rotations[r.bone] * offset
-            }));
+        let (metric, pull) = &mut sums[r.sample];
+        *metric += r.metric.matrix() * r.weight;
+        *pull += r.metric.apply(&r.residual) * r.weight;
+        if !std::mem::replace(&mut known[r.sample], true) {
+            paired.push((r.sample, r.bone, r.point - centre));
         }
-        let moves = &all_moves[known[r.sample]..known[r.sample] + n];
-        for (d, b) in moves.iter().enumerate() {
-            let m = r.metric.apply(b) * r.weight;
+    });
+    let mut moves = vec![Vector3::zeros(); n];
+    let mut weighed = vec![Vector3::zeros(); n];
+    for &(sample, bone, p) in &paired {
+        let (metric, pull) = &sums[sample];
+        for d in 0..n {
+            let offset = model.directions[d].samples[sample].cast::<f64>();
+            moves[d] = shifts[d * bones.len() + bone] + rotations[bone] * offset;
+            let m = metric * moves[d];
             let t = p.cross(&m);
-            hbs[d * bones.len() + r.bone] += Vector6::new(m.x, m.y, m.z, t.x, t.y, t.z);
-            gs[d] += m.dot(&r.residual);
+            hbs[d * bones.len() + bone] += Vector6::new(m.x, m.y, m.z, t.x, t.y, t.z);
+            gs[d] += moves[d].dot(pull);
             weighed[d] = m;
         }
         for d in 0..n {
@@ -181,7 +185,7 @@ fn frame_information(
                 hss[(d, e)] += weighed[d].dot(&moves[e]);
             }
         }
-    });
+    }
     for d in 0..n {
         for e in 0..d {
             hss[(e, d)] = hss[(d, e)];

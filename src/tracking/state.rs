@@ -2,6 +2,7 @@
 
 use super::rescue::Rescue;
 use super::size::SizeEstimate;
+use super::stand::Feet;
 use super::surface::SurfaceStatistics;
 use super::{TrackerConfig, TrackerModel};
 use crate::body::{BodyShape, Pose};
@@ -84,6 +85,9 @@ pub struct TrackerState {
     /// Greatest height of the hips so far along the upright, camera frame, metres.
     #[serde(default)]
     pub(super) tallest: Option<f64>,
+    /// Where the feet stood.
+    #[serde(default)]
+    pub(super) feet: Option<Feet>,
     #[serde(default)]
     pub(super) rescue: Rescue,
     /// Frames until displacements are due, and the interval between fits.
@@ -121,6 +125,7 @@ impl TrackerState {
             centre: P3::origin(),
             quality: [0.0; 2],
             tallest: None,
+            feet: None,
             rescue: Rescue::default(),
             surface_due: [0; 2],
         }

@@ -140,6 +140,27 @@ fn half_a_person_at_the_side_of_the_picture_is_enough() {
     }
 }
 
+/// The side of the picture cuts her through the middle from the first frame on: what is in the picture is a person, not a
+/// wall, in a room and in the dark.
+#[test]
+fn a_person_cut_by_the_side_from_the_start_is_found() {
+    for (name, room) in [("dark", None), ("room", Some(Default::default()))] {
+        let (template, own) = scene(Setting { home: P3d::new(1.42, 0.0, -2.4), room, ..alone() }, 75);
+        let camera = own.calibration.depth;
+        let inside: Vec<usize> = (0..own.joint_names.len())
+            .filter(|&j| {
+                let column = |p: &P3d| p.x / p.z * camera.fx + camera.cx;
+                own.truth.iter().all(|t| (10.0..f64::from(camera.width) - 10.0).contains(&column(&t.joints[j])))
+            })
+            .collect();
+        let out = track(&template, &own);
+        let error = mean(&inside.iter().map(|&j| out.per_joint_mm[j]).collect::<Vec<_>>());
+        eprintln!("half cut off, {name}: {} of 22 joints inside, {error:.1} mm, found {:?}", inside.len(), out.found);
+        assert!((5..18).contains(&inside.len()), "{name}: the scene cuts the person: {}", inside.len());
+        assert!(error < 8.0 && out.found == Some(0) && out.lost == 0, "{name}: {error:.1} mm, {:?}", out.found);
+    }
+}
+
 /// What the tracker leaves out must not change the answer by more than this, joints and displaced surface, millimetres on
 /// average: an unhurried routine has coarse iterations to leave out, a fast dance converges late.
 #[test]

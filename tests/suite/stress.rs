@@ -286,8 +286,14 @@ const ROUNDS_AVERAGED: u64 = 10;
 
 /// Shows `frames` pictures back and forth and compares, picture by picture of a round, the mean joint of the last ten
 /// rounds with that of the ten after `settle` rounds. Returns metres by which the worst joint went and joints went on
-/// average, and radians of the worst angle.
-fn drift(model: &TrackerModel, pictures: &[RgbdFrame], frames: u64, settle: u64) -> (f64, f64, f64) {
+/// average, and radians of the worst angle. `creep` may spoil the state after each frame.
+fn drift(
+    model: &TrackerModel,
+    pictures: &[RgbdFrame],
+    frames: u64,
+    settle: u64,
+    mut creep: impl FnMut(&mut TrackerState, u64),
+) -> (f64, f64, f64) {
     let length = 2 * pictures.len() as u64;
     let rounds = frames / length;
     assert!(rounds >= settle + 2 * ROUNDS_AVERAGED, "{rounds} rounds are too few");
@@ -301,6 +307,7 @@ fn drift(model: &TrackerModel, pictures: &[RgbdFrame], frames: u64, settle: u64)
         let picture = &pictures[k.min(length as usize - 1 - k)];
         let frame = RgbdFrame { sequence: i, time_ns: i * 33_333_333, ..picture.clone() };
         step(model, &mut state, &frame, &mut workspace).expect("step");
+        creep(&mut state, i);
         let early = (settle..settle + ROUNDS_AVERAGED).contains(&round);
         let late = round >= rounds - ROUNDS_AVERAGED;
         if early || late {
@@ -333,9 +340,26 @@ fn long_sessions_do_not_drift() {
     let (template, scene) = own_body(Routine::TryOn, NoiseModel::None, 30);
     let frames: u64 = if long() { 100_000 } else { 3_600 };
     let model = TrackerModel::new(template, scene.calibration.clone(), fixed_size());
-    let (off, _, turned) = drift(&model, &scene.frames, frames, 10);
+    let (off, _, turned) = drift(&model, &scene.frames, frames, 10, |_, _| {});
     eprintln!("{frames} frames back and forth: drift {:.4} mm, {turned:.1e} rad", off * 1e3);
     assert!(off < DRIFT, "{:.3} mm", off * 1e3);
+}
+
+/// The measure must be able to fail: bones that grow by two millionths a frame, a millimetre in half a minute on a leg, are
+/// caught, while a bias of 10⁻⁵ rad in every angle after every frame is measured away again and again.
+#[test]
+fn a_planted_creep_is_caught() {
+    let (template, scene) = own_body(Routine::TryOn, NoiseModel::None, 30);
+    let joints = template.skeleton().len();
+    let model = TrackerModel::new(template, scene.calibration.clone(), fixed_size());
+    let grows = |state: &mut TrackerState, i: u64| state.shape.bone_scales = vec![1.0 + 2e-6 * i as f64; joints];
+    let (off, ..) = drift(&model, &scene.frames, 2_400, 10, grows);
+    eprintln!("bones that grow by 2·10⁻⁶ a frame: {:.3} mm in 2,400 frames", off * 1e3);
+    assert!(off > DRIFT, "a creep of bones passes for none: {:.3} mm", off * 1e3);
+    let biased = |state: &mut TrackerState, _: u64| state.pose.angles.iter_mut().for_each(|a| *a += 1e-5);
+    let (off, ..) = drift(&model, &scene.frames, 2_400, 10, biased);
+    eprintln!("every angle biased by 10⁻⁵ rad a frame: {:.4} mm", off * 1e3);
+    assert!(off < DRIFT, "a bias adds up: {:.3} mm", off * 1e3);
 }
 
 /// The whole tracker (size, displacements with their running mean and variance) on a recorded dance. Displacements are
@@ -347,7 +371,7 @@ fn long_sessions_with_displacements_do_not_drift() {
     let frames: u64 = if long() { 100_000 } else { 2_400 };
     let model = TrackerModel::new(template, scene.calibration.clone(), TrackerConfig::default());
     // Size and shape are done after 60 frames, displacements have their temporal term after 20 updates.
-    let (worst, off, turned) = drift(&model, &scene.frames[40..], frames, 30);
+    let (worst, off, turned) = drift(&model, &scene.frames[40..], frames, 30, |_, _| {});
     let (worst, off_mm) = (worst * 1e3, off * 1e3);
     eprintln!("{frames} recorded frames back and forth: drift {off_mm:.4} mm, worst {worst:.3}, {turned:.1e} rad");
     assert!(off < DRIFT, "{off_mm:.3} mm");

@@ -67,9 +67,17 @@ fn joints(model: &TrackerModel, state: &TrackerState) -> Vec<nalgebra::Point3<f6
 }
 
 /// Tracks the frames of `which` and returns the mean error from frame 30 on; `change` may spoil a frame or drop it.
-fn follow(s: &Sequence, which: impl Iterator<Item = usize>, mut change: impl FnMut(usize, &mut DepthImage)) -> f64 {
-    let template = template().expect("the sequences come with the body");
-    let (model, mut state) = tracker(&template, s.camera);
+fn follow(s: &Sequence, which: impl Iterator<Item = usize>, change: impl FnMut(usize, &mut DepthImage)) -> f64 {
+    follow_with(&template().expect("the sequences come with the body"), s, which, change)
+}
+
+fn follow_with(
+    template: &Arc<Template>,
+    s: &Sequence,
+    which: impl Iterator<Item = usize>,
+    mut change: impl FnMut(usize, &mut DepthImage),
+) -> f64 {
+    let (model, mut state) = tracker(template, s.camera);
     let mut workspace = Workspace::default();
     let (mut sum, mut n) = (0.0, 0);
     for i in which {
@@ -78,7 +86,7 @@ fn follow(s: &Sequence, which: impl Iterator<Item = usize>, mut change: impl FnM
         step(&model, &mut state, &frame(i, depth), &mut workspace).expect("step");
         if i >= 30 {
             assert!(state.status.is_live(), "frame {i}: {:?}", state.status);
-            sum += s.error(i, &template, &joints(&model, &state));
+            sum += s.error(i, template, &joints(&model, &state));
             n += 1;
         }
     }
@@ -89,7 +97,7 @@ fn follow(s: &Sequence, which: impl Iterator<Item = usize>, mut change: impl FnM
 const SEQUENCES: [(&str, usize, f64); 3] = [
     ("sequences/charleston_m_heavy_tof_room", 156, 8.0),
     ("sequences/jacks_f_avg_kinect1_room", 180, 10.5),
-    ("sequences/sword_m_tall_tof_noroom_upper", 150, 18.5),
+    ("sequences/sword_m_tall_tof_noroom_upper", 150, 15.5),
 ];
 
 #[test]
@@ -99,6 +107,20 @@ fn sequences_are_followed_to_the_end() {
         let mean = follow(&s, 0..frames, |_, _| {});
         eprintln!("{path}: mean joint error {mean:.1} mm");
         assert!(mean < bar, "{path}: {mean:.1} mm");
+    }
+}
+
+/// The bar with the subject's own body given is 8 mm, the waist-up sequence included: what the picture does not show of
+/// a leg stays where it stood.
+#[test]
+fn with_its_own_body_every_sequence_keeps_the_bar() {
+    for ((path, frames, _), subject) in SEQUENCES.into_iter().zip(["m_heavy", "f_avg", "m_tall"]) {
+        let Some(s) = Sequence::open(path) else { return };
+        let Some(body) = shared(&format!("body/makehuman_smpl_layout/subject_{subject}.npz")) else { return };
+        let body = Arc::new(template_from_smpl(subject, &read_smpl(body).expect("body")).expect("body"));
+        let mean = follow_with(&body, &s, 0..frames, |_, _| {});
+        eprintln!("{path}, own body: mean joint error {mean:.1} mm");
+        assert!(mean < 8.0, "{path}: {mean:.1} mm");
     }
 }
 
