@@ -86,10 +86,10 @@ pub(crate) struct RunArgs {
     /// An .mcap file, or a folder with camera.json, depth/ and maybe rgb/.
     #[arg(long, value_name = "REC")]
     pub(crate) input: PathBuf,
-    /// Garment names (see `tryon export --list`), worn in this order from inside to outside.
-    #[arg(long = "garment", value_name = "NAME", required = true)]
+    /// Garments: names (see `tryon export --list`) or pattern files (.json, ours or GarmentCode's), layered as they say.
+    #[arg(long = "garment", value_name = "NAME|FILE", required = true)]
     pub(crate) garments: Vec<String>,
-    /// Size for all garments; without it each is chosen from the tracked body.
+    /// Size for all garments of the library; without it each is chosen from the tracked body.
     #[arg(long, value_name = "SIZE")]
     pub(crate) size: Option<String>,
     /// Folder for frame pictures and report.json.

@@ -1,6 +1,8 @@
 //! The whole chain in one thread of thought: a frame in, a picture out. What the services do over the wire, without it.
 
+use crate::input;
 use anyhow::{Context, Result};
+use std::path::Path;
 use std::sync::Arc;
 use tryon::body::measure::measure;
 use tryon::body::{BoneTransforms, Pose, RestBody, Template, skin};
@@ -15,25 +17,33 @@ use tryon::tracking::{self, Status, TrackerConfig, TrackerModel, TrackerState};
 
 /// A garment that was asked for.
 #[derive(Debug, Clone)]
-pub(crate) struct Choice {
-    /// Name in the library.
-    pub(crate) name: String,
-    /// Size; chosen from the tracked body when absent.
-    pub(crate) size: Option<Size>,
+pub(crate) enum Choice {
+    /// A garment of the library.
+    Library {
+        /// Its name.
+        name: String,
+        /// Chosen from the tracked body when absent.
+        size: Option<Size>,
+    },
+    /// A pattern from a file, in the size that it was cut in.
+    File(Box<Pattern>),
 }
 
 impl Choice {
     /// Checks names and size at once, before any frame is read.
     ///
     /// # Errors
-    /// Names the unknown garment or size.
+    /// Names the unknown garment or size, or what is wrong in a pattern file.
     pub(crate) fn parse(names: &[String], size: Option<&str>) -> Result<Vec<Self>> {
         let size = size.map(str::parse).transpose()?;
         names
             .iter()
             .map(|name| {
+                if name.ends_with(".json") {
+                    return Ok(Self::File(Box::new(input::pattern(Path::new(name))?)));
+                }
                 library::pattern(name, size.unwrap_or_default())?;
-                Ok(Self { name: name.clone(), size })
+                Ok(Self::Library { name: name.clone(), size })
             })
             .collect()
     }
@@ -175,15 +185,15 @@ impl Chain {
         let measures = measure(template, rest)?;
         let mut patterns: Vec<Pattern> = Vec::new();
         for c in &self.choices {
-            let size = match c.size {
-                Some(size) => size,
-                None => {
-                    let s = suggest(&c.name, &measures)?;
-                    self.notes.push(format!("{}: {} ({})", c.name, s.size, s.reason));
-                    s.size
+            patterns.push(match c {
+                Choice::File(pattern) => pattern.as_ref().clone(),
+                Choice::Library { name, size: Some(size) } => library::pattern(name, *size)?,
+                Choice::Library { name, size: None } => {
+                    let s = suggest(name, &measures)?;
+                    self.notes.push(format!("{name}: {} ({})", s.size, s.reason));
+                    library::pattern(name, s.size)?
                 }
-            };
-            patterns.push(library::pattern(&c.name, size)?);
+            });
         }
         let pose: Pose<World> = Pose {
             root: self.tracked.world_from_camera * self.tracked.pose.root,

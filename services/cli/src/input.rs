@@ -6,7 +6,10 @@ use serde::Deserialize;
 use std::path::Path;
 use std::sync::Arc;
 use tryon::body::{Template, embedded, import::template_from_smpl};
+use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
 use tryon::formats::npz::read_smpl;
+use tryon::garment::import::from_garmentcode;
+use tryon::garment::{Material, Pattern, Size};
 
 /// The body to track: an SMPL-layout npz, or the embedded one.
 ///
@@ -18,6 +21,21 @@ pub(crate) fn template(path: Option<&Path>) -> Result<Arc<Template>> {
     let arrays = read_smpl(path)?;
     let template = template_from_smpl(&name, &arrays).with_context(|| format!("cannot use {}", path.display()))?;
     Ok(Arc::new(template))
+}
+
+/// A sewing pattern from a file: our own JSON or GarmentCode's, the latter cut from cotton.
+///
+/// # Errors
+/// Names the file and the panel, edge or seam at fault.
+pub(crate) fn pattern(path: &Path) -> Result<Pattern> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or("garment");
+    if is_garmentcode(&text) {
+        from_garmentcode(&parse_garmentcode(&text, path)?, name, Size::M, Material::preset("cotton")?)
+    } else {
+        Pattern::from_json(&text)
+    }
+    .with_context(|| path.display().to_string())
 }
 
 /// A rough start in the camera's frame, as recordings with truth carry it.

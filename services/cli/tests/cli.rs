@@ -251,3 +251,31 @@ fn doctor_knows_the_machine() {
         assert!(looked_at.contains(&what), "{what} is missing in {report:#}");
     }
 }
+
+#[test]
+fn a_pattern_of_another_make_is_worn_in_a_real_picture() {
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let data = std::env::var_os("TRYON_SHARED").map_or(beside, PathBuf::from).join("data");
+    let (still, pattern) = ("rgbd/depthkit_still", "garments/garmentcode_mit/Patterns/shirt_mean_specification.json");
+    if let Some(missing) = [still, pattern].iter().find(|p| !data.join(p).exists()) {
+        assert!(std::env::var_os("TRYON_REQUIRE_ALL").is_none(), "{missing} is missing");
+        eprintln!("SKIPPED: {missing} is missing");
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().display().to_string();
+    let at = |p: &str| data.join(p).display().to_string();
+    let run = tryon(&["run", "--input", &at(still), "--garment", &at(pattern), "--out", &out, "--still-frames", "24"]);
+    assert!(run.status.success(), "{}", text(&run.stderr));
+    let report: Value = serde_json::from_slice(&std::fs::read(dir.path().join("report.json")).unwrap()).unwrap();
+    assert!(report["dressed_frames"].as_u64().unwrap() > 3, "{report}");
+    let read = |p: &Path| tryon::formats::image::read_color(p).unwrap();
+    // Her red shirt lies under the cream one.
+    let red = |i: &ColorImage| i.data().chunks_exact(3).filter(|p| p[0] > 130 && p[1] < 60 && p[2] < 80).count();
+    let (before, after) = (read(&data.join(still).join("rgb/000000.png")), read(&dir.path().join("frame_000000.png")));
+    assert!(red(&before) > 5000 && red(&after) * 10 < red(&before) * 7, "{} {}", red(&before), red(&after));
+
+    std::fs::write(dir.path().join("half.json"), "{\"pattern\": {\"panels\": {").unwrap();
+    let half = dir.path().join("half.json").display().to_string();
+    assert!(refused(&["run", "--input", &at(still), "--garment", &half, "--out", &out]).contains("half.json"));
+}

@@ -6,14 +6,13 @@ use crate::input;
 use anyhow::{Context, Result, bail};
 use std::process::ExitCode;
 use tryon::formats::fabric_json::parse_fabric;
-use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
 use tryon::formats::gltf::read_glb;
 use tryon::formats::mhclo::read_mhclo;
 use tryon::formats::obj::read_obj;
 use tryon::formats::open_recording;
 use tryon::formats::sewn_obj::read_sewn_obj;
-use tryon::garment::import::{from_garmentcode, from_mesh};
-use tryon::garment::{GarmentKind, GarmentMesh, Material, Pattern, Size, Triangulation};
+use tryon::garment::import::from_mesh;
+use tryon::garment::{GarmentKind, GarmentMesh, Material, Triangulation};
 use tryon::math::P3;
 use tryon::mesh::Topology;
 
@@ -114,12 +113,7 @@ fn json(args: &ImportArgs) -> Result<()> {
         );
         return Ok(());
     }
-    let pattern = if is_garmentcode(&text) {
-        from_garmentcode(&parse_garmentcode(&text, path)?, name, Size::M, Material::preset("cotton")?)
-    } else {
-        Pattern::from_json(&text)
-    }
-    .with_context(|| path.display().to_string())?;
+    let pattern = input::pattern(path)?;
     let g = GarmentMesh::sew(&pattern, &Triangulation::default()).with_context(|| path.display().to_string())?;
     println!(
         "garment: {} panels, {} seams, {} darts, {} vertices, smallest angle {:.0}°",
