@@ -39,12 +39,17 @@ fn main() {
     if let Some(v) = get("patches") {
         c.patches = v.parse().unwrap();
     }
+    if let Some(v) = get("smooth") {
+        c.smooth = Some(v.parse().unwrap());
+    }
     let cpu = || {
-        std::fs::read_to_string("/proc/thread-self/schedstat")
-            .ok()
-            .and_then(|s| s.split(' ').next()?.parse::<f64>().ok())
-            .unwrap_or(0.0)
-            * 1e-6
+        // All threads: what the patches take together.
+        let of = |p: std::path::PathBuf| {
+            let s = std::fs::read_to_string(p.join("schedstat")).ok()?;
+            s.split(' ').next()?.parse::<f64>().ok()
+        };
+        let tasks = std::fs::read_dir("/proc/self/task").unwrap();
+        tasks.filter_map(|t| of(t.ok()?.path())).sum::<f64>() * 1e-6
     };
     let t0 = cpu();
     let mut positions = vec![];

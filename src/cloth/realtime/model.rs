@@ -95,6 +95,8 @@ pub(super) struct GarmentModel {
     pub(super) patches: Vec<Fabric>,
     /// Small step, s.
     pub(super) h: f64,
+    /// Steps from one evaluation of bending to the next.
+    pub(super) bend_every: usize,
     /// Share of the membrane stiffness that the step carries.
     pub(super) softened: f64,
     /// Body parts that decide: cloth ends outside these.
@@ -127,12 +129,11 @@ pub struct Model {
     pub(super) views: [MapView; 4],
 }
 
-/// Small steps a patch takes alone: between two searches for contacts there are more, in several rounds.
-pub(super) const ALONE: usize = 8;
-/// Steps from one evaluation of bending to the next.
-pub(super) const BEND_EVERY: usize = 4;
-/// Rings of neighbours that a patch needs for that: one a step, two more for each evaluation of bending.
-const RINGS: usize = ALONE + 2 * ALONE / BEND_EVERY + 2;
+/// Evaluations of bending, each with the steps it is kept for, that a patch makes alone: between two searches for
+/// contacts there are more, in several rounds.
+pub(super) const ALONE: usize = 2;
+/// A garment that is stable at this step needs no more smoothing, s: half of what meshes of 2 cm need unsmoothed.
+const LONG_ENOUGH: f64 = 1.0 / 2400.0;
 
 /// Which [`Region`] each body vertex belongs to, by the name of its dominant joint.
 pub fn body_parts(template: &Template) -> Vec<u8> {
@@ -202,9 +203,14 @@ impl Model {
                 return Err(field(&format!("anchor of vertex {}", a.vertex), "it names a vertex that does not exist"));
             }
             let sheet = Sheet::of_garment(g)?;
-            let h = Plan::comfortable_step(&sheet, config.ahead).clamp(1.0 / (60.0 * config.most_steps as f64), 1e-3);
-            let plan = Plan::new(&sheet, &Fit { h, ahead: config.ahead, springs_only: false, bend_every: BEND_EVERY });
-            let patches = plan.patches(g.vertices.div_ceil(config.patch), RINGS);
+            let (smooth, h) = Plan::comfortable(&sheet, config.ahead, LONG_ENOUGH);
+            let h = h.clamp(1.0 / (60.0 * config.most_steps as f64), 1e-3);
+            let bend_every = Plan::bend_every(smooth);
+            let fit = Fit { h, ahead: config.ahead, springs_only: false, bend_every, smooth };
+            let plan = Plan::new(&sheet, &fit);
+            // A step moves news by one ring and by one more for each degree, an evaluation of bending by two.
+            let rings = ALONE * bend_every * (1 + smooth) + 2 * ALONE + 2;
+            let patches = plan.patches(g.vertices.div_ceil(config.patch), rings);
             let own: Vec<u8> = g.regions.iter().map(|r| r.decisive().0).collect();
             let other = own.iter().map(|o| Region::ALL.0 & !o).collect();
             // Evenly between the skin and where the outermost lies.
@@ -214,6 +220,7 @@ impl Model {
                 sheet,
                 patches,
                 h,
+                bend_every,
                 softened: plan.softened,
                 own,
                 other,

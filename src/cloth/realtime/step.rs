@@ -2,11 +2,11 @@
 
 use super::carry::carry;
 use super::cloth_touch::{ClothTouch, sheets};
-use super::model::{ALONE, BEND_EVERY, Model};
+use super::model::{ALONE, Model};
 use super::state::{Input, PatchScratch, State, StepReport, Workspace, check_body};
 use super::touch::{Touch, anchors, settle};
 use crate::cloth::ClothError;
-use crate::cloth::small_steps::{V4, exchange};
+use crate::cloth::small_steps::{Step, V4, exchange};
 use crate::math::{P3, V3};
 use crate::par::{self, Par};
 use std::time::Instant;
@@ -219,21 +219,22 @@ fn advance(model: &Model, all: &mut [PatchScratch], span: f64) {
         let h = (span / n as f64) as f32;
         let mut s0 = 0;
         while s0 < n {
-            let s1 = (s0 + ALONE).min(n);
+            let s1 = (s0 + ALONE * m.bend_every).min(n);
             par::for_chunks(model.config.par, patches, 1, |k, p| {
                 let (f, p) = (&m.patches[k], &mut p[0]);
                 for s in s0..s1 {
-                    if (s - s0) % BEND_EVERY == 0 {
-                        p.motion.bend(f, h * BEND_EVERY.min(s1 - s) as f32 * 0.5);
+                    if (s - s0) % m.bend_every == 0 {
+                        p.motion.bend(f, h * m.bend_every.min(s1 - s) as f32 * 0.5);
                     }
                     let t = s as f32 * h;
-                    p.motion.accelerate(f, h, ahead, gravity);
+                    let step = Step { h, t, ahead, gravity };
+                    p.motion.accelerate(f, &step, &p.planes, &p.ties);
                     p.motion.tie(&p.ties, t, h);
                     // In this order: the body has the last word.
                     let (body, cloth) = p.planes.split_at(p.body_planes);
                     p.motion.restrain(cloth, t, h, CLOTH_RECOVERY);
                     p.report.contacts = p.motion.restrain(body, t, h, RECOVERY);
-                    p.motion.advance(h, FASTEST);
+                    p.motion.advance(&step, FASTEST);
                 }
             });
             if patches.len() > 1 {

@@ -4,7 +4,7 @@ use super::run::{Method, RunConfig, RunReport, deepest};
 use super::small::{RECOVERY, look, v3d, v4};
 use super::{Scene, SceneError};
 use crate::cloth::ClothError;
-use crate::cloth::small_steps::{Fabric, Fit, Motion, Plan, Tie, V4, triangles};
+use crate::cloth::small_steps::{Fabric, Fit, Motion, Plan, Step, Tie, V4, triangles};
 use crate::linear::conjugate_gradient;
 use crate::math::{P3, V3d};
 use nalgebra::{Matrix3, Point3, Vector3};
@@ -26,9 +26,9 @@ pub(super) fn run(
     let dt = 1.0 / scene.rate;
     let steps = if config.substeps == 0 { USUAL_SUBSTEPS[usize::from(springs)] } else { config.substeps };
     let h = dt / steps as f64;
-    let bend_every = config.every[0].max(1);
+    let bend_every = if config.every[0] == 0 { Plan::bend_every(0) } else { config.every[0] };
     // A plan for a step so short that nothing is softened: both are stable at any step.
-    let fit = Fit { h: 1e-9, ahead: 0.0, springs_only: springs, bend_every };
+    let fit = Fit { h: 1e-9, ahead: 0.0, springs_only: springs, bend_every, smooth: 0 };
     let plan = Plan::new(&scene.sheet, &fit);
     let fabrics = plan.patches(1, 0);
     let Some(f) = fabrics.first() else {
@@ -53,6 +53,7 @@ pub(super) fn run(
     let mut x: Vec<V4> = f.vertices.iter().map(|v| v4(&scene.start[*v as usize].coords.cast())).collect();
     let mut velocity = vec![V4::default(); n];
     let (mut planes, mut ties, mut aim) = (Vec::new(), Vec::<Tie>::new(), Vec::new());
+    let mut clear = Vec::new();
     let gravity = v4(&scene.gravity);
     let hf = h as f32;
     let mut flow = frame(0, &scene.start);
@@ -65,7 +66,7 @@ pub(super) fn run(
         m.begin(x.iter().copied(), velocity.iter().copied());
         for s in 0..steps {
             let t = (index - 1) as f64 * dt + s as f64 * h;
-            look(scene, config.offset, &m, t, h, &mut planes);
+            look(scene, config.offset, &m, t, h, &mut planes, &mut clear);
             ties.clear();
             for &(i, p) in &pins {
                 let at = |t: f64| {
@@ -95,7 +96,7 @@ pub(super) fn run(
             }
             m.restrain(&planes, 0.0, hf, RECOVERY);
             m.tie(&ties, 0.0, hf);
-            m.advance(hf, f32::INFINITY);
+            m.advance(&Step { h: hf, ..Step::default() }, f32::INFINITY);
         }
         for i in 0..n {
             x[i] = m.position(i);

@@ -23,6 +23,15 @@ pub enum Primitive {
 }
 
 impl Primitive {
+    /// No point of it comes further than this from one placement to another, metres.
+    pub fn fastest(&self, from: &Isometry3<f64>, to: &Isometry3<f64>) -> f64 {
+        let size = match self {
+            Self::Sphere { radius } => *radius,
+            Self::Capsule { radius, half_segment } => radius + half_segment,
+        };
+        let turn = from.rotation.angle_to(&to.rotation);
+        (from.translation.vector - to.translation.vector).norm() + turn * size
+    }
     /// Signed distance (metres, negative inside) and outward normal at a point of the solid's frame.
     pub fn distance(&self, p: &V3d) -> (f64, V3d) {
         let (radius, axis_point) = match self {

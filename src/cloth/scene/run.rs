@@ -29,10 +29,13 @@ pub struct RunConfig {
     pub offset: f64,
     /// Small steps: how far ahead of positions forces are evaluated, in steps.
     pub ahead: f64,
-    /// Small steps: steps from one evaluation of bending and from one search for contacts to the next.
+    /// Small steps: steps from one evaluation of bending (0: as the smoothing allows) and from one search for contacts to
+    /// the next.
     pub every: [usize; 2],
     /// Small steps: patches that may run on threads of their own.
     pub patches: usize,
+    /// Small steps: degree of the smoothing of accelerations, 0 for none; else as the sheet needs.
+    pub smooth: Option<usize>,
 }
 
 /// A solver.
@@ -60,8 +63,9 @@ impl Default for RunConfig {
             tolerance: 0.0,
             offset: 5e-4,
             ahead: 0.1,
-            every: [4, 8],
+            every: [0, 8],
             patches: 1,
+            smooth: None,
         }
     }
 }

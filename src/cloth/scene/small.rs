@@ -3,7 +3,7 @@
 use super::run::{RunConfig, RunReport, deepest};
 use super::{Scene, SceneError};
 use crate::cloth::ClothError;
-use crate::cloth::small_steps::{Fabric, Fit, Motion, Plan, Plane, Tie, V4, exchange};
+use crate::cloth::small_steps::{Fabric, Fit, Motion, Plan, Plane, Step, Tie, V4, exchange};
 use crate::math::{P3, V3d};
 use crate::par::{self, Par};
 use nalgebra::Point3;
@@ -20,8 +20,12 @@ pub(super) fn v3d(v: V4) -> V3d {
 
 /// Sunken cloth comes out at this speed at most, m/s.
 pub(super) const RECOVERY: f32 = 1.0;
-/// Solids further than this from a vertex are not looked at until the next search, metres: 1/100 s at 3 m/s.
-const REACH: f64 = 0.03;
+/// A sheet that is stable at this step needs no smoothing, s: with less, most of the time goes into waves that nobody
+/// sees. Smoothing a coarse sheet shows (docs/benchmarks.md).
+const LONG_ENOUGH: f64 = 1.0 / 4200.0;
+/// Solids are looked at when they are nearer than twice the way a vertex may come until the next search, and this,
+/// metres: what it may gain in speed in between, 1 m/s in 1 ms.
+const ROOM: f64 = 2e-3;
 
 pub(super) fn run(
     scene: &Scene,
@@ -31,15 +35,23 @@ pub(super) fn run(
     let sheet = &scene.sheet;
     let n = scene.start.len();
     let dt = 1.0 / scene.rate;
+    let (smooth, step) = match config.smooth {
+        Some(degree) => (degree, Plan::comfortable_step(sheet, config.ahead, degree)),
+        None => Plan::comfortable(sheet, config.ahead, LONG_ENOUGH),
+    };
     let substeps = match config.substeps {
-        0 => (dt / Plan::comfortable_step(sheet, config.ahead)).ceil() as usize,
+        0 => (dt / step).ceil() as usize,
         given => given,
     };
     let h = dt / substeps as f64;
-    let [bend_every, look_every] = config.every.map(|e| e.max(1));
-    let plan = Plan::new(sheet, &Fit { h, ahead: config.ahead, springs_only: false, bend_every });
-    // A step moves news by one ring, an evaluation of bending by two.
-    let fabrics = plan.patches(config.patches, look_every + 2 * look_every.div_ceil(bend_every));
+    let bend_every = if config.every[0] == 0 { Plan::bend_every(smooth) } else { config.every[0] };
+    // Contacts are looked for again after so many evaluations of bending, where patches meet.
+    let looks = config.every[1].max(1).div_ceil(bend_every);
+    let plan = Plan::new(sheet, &Fit { h, ahead: config.ahead, springs_only: false, bend_every, smooth });
+    // A step moves news by one ring and by one more for each degree, an evaluation of bending by two. Patches meet after
+    // every step: what ghosts cost is more than the meeting.
+    let alone = if config.patches > 1 { 1 } else { bend_every };
+    let fabrics = plan.patches(config.patches, (1 + smooth) * alone + 2);
     let start: Vec<V3d> = scene.start.iter().map(|p| p.coords.cast()).collect();
     let local: Vec<V3d> = match scene.pinned_to {
         Some(c) => {
@@ -68,37 +80,44 @@ pub(super) fn run(
             let all = || f.vertices.iter().map(|v| *v as usize);
             m.begin(all().map(|v| x[v]), all().map(|v| velocity[v]));
         }
-        let mut s0 = 0;
+        let (mut s0, mut looked) = (0, 0);
         while s0 < substeps {
-            let s1 = (s0 + look_every).min(substeps);
+            let s1 = (s0 + alone).min(substeps);
+            let look_now = s0 % (bend_every * looks) == 0;
+            if look_now {
+                looked = s0;
+            }
             let t0 = (index - 1) as f64 * dt + s0 as f64 * h;
-            let span = (s1 - s0) as f64 * h;
+            let span = ((s0 + bend_every * looks).min(substeps) - s0) as f64 * h;
             for (w, m) in scratch.iter_mut().zip(&mut motions) {
                 std::mem::swap(&mut w.motion, m);
             }
             let par = if fabrics.len() > 1 { Par::Rayon } else { Par::Seq };
             par::for_chunks(par, &mut scratch, 1, |k, w| {
                 let (f, w) = (&fabrics[k], &mut w[0]);
-                look(scene, config.offset, &w.motion, t0, span, &mut w.planes);
-                w.ties.clear();
-                for &(i, p) in &pinned[k] {
-                    let at = |t: f64| {
-                        scene.pinned_to.map_or(local[p as usize], |c| {
-                            (scene.colliders[c].placement(t) * Point3::from(local[p as usize])).coords
-                        })
-                    };
-                    let speed = (at(t0 + span) - at(t0)) / span;
-                    w.ties.push(Tie { vertex: i, place: v4(&at(t0)), speed: v4(&speed), firmness: 1.0 });
+                if look_now {
+                    look(scene, config.offset, &w.motion, t0, span, &mut w.planes, &mut w.clear);
+                    w.ties.clear();
+                    for &(i, p) in &pinned[k] {
+                        let at = |t: f64| {
+                            scene.pinned_to.map_or(local[p as usize], |c| {
+                                (scene.colliders[c].placement(t) * Point3::from(local[p as usize])).coords
+                            })
+                        };
+                        let speed = (at(t0 + span) - at(t0)) / span;
+                        w.ties.push(Tie { vertex: i, place: v4(&at(t0)), speed: v4(&speed), firmness: 1.0 });
+                    }
+                }
+                if s0 % bend_every == 0 {
+                    w.motion.bend(f, hf * bend_every.min(substeps - s0) as f32 * 0.5);
                 }
                 for s in s0..s1 {
-                    if (s - s0) % bend_every == 0 {
-                        w.motion.bend(f, hf * bend_every.min(s1 - s) as f32 * 0.5);
-                    }
-                    let t = (s - s0) as f32 * hf;
-                    w.motion.accelerate(f, hf, ahead, gravity);
+                    let t = (s - looked) as f32 * hf;
+                    let step = Step { h: hf, t, ahead, gravity };
+                    w.motion.accelerate(f, &step, &w.planes, &w.ties);
                     w.motion.restrain(&w.planes, t, hf, RECOVERY);
                     w.motion.tie(&w.ties, t, hf);
-                    w.motion.advance(hf, f32::INFINITY);
+                    w.motion.advance(&step, f32::INFINITY);
                 }
             });
             for (w, m) in scratch.iter_mut().zip(&mut motions) {
@@ -143,6 +162,7 @@ pub(super) fn run(
 struct Scratch {
     motion: Motion,
     planes: Vec<Plane>,
+    clear: Vec<f32>,
     ties: Vec<Tie>,
 }
 
@@ -152,20 +172,41 @@ fn pins_of(scene: &Scene, f: &Fabric) -> Vec<(u32, u32)> {
     local.filter(|(_, v)| scene.pins.contains(v)).map(|(i, v)| (i as u32, *v)).collect()
 }
 
-/// Planes of the solids near each vertex, as they will move for `span` seconds from `t`.
-pub(super) fn look(scene: &Scene, offset: f64, motion: &Motion, t: f64, span: f64, planes: &mut Vec<Plane>) {
+/// Planes of the solids near each vertex, as they will move for `span` seconds from `t`. `clear` remembers how far
+/// each vertex may come before it must be looked at again, metres: one list for all solids, kept by the caller.
+pub(super) fn look(
+    scene: &Scene,
+    offset: f64,
+    motion: &Motion,
+    t: f64,
+    span: f64,
+    planes: &mut Vec<Plane>,
+    clear: &mut Vec<f32>,
+) {
     planes.clear();
-    for c in &scene.colliders {
+    let n = motion.start.len();
+    clear.resize(n * scene.colliders.len(), 0.0);
+    for (c, clear) in scene.colliders.iter().zip(clear.chunks_mut(n.max(1))) {
         let (was, will) = (c.placement(t), c.placement(t + span));
-        for i in 0..motion.start.len() {
-            let x = Point3::from(v3d(motion.position(i)));
-            let (d, normal) = c.shape.distance(&was.inverse_transform_point(&x).coords);
-            if d > REACH {
+        let change = will * was.inverse();
+        let fastest = c.shape.fastest(&was, &will) / span;
+        for (i, clear) in clear.iter_mut().enumerate() {
+            let v = motion.velocity[i];
+            let travel = ((f64::from(v.dot(v).sqrt()) + fastest) * span) as f32;
+            if *clear > travel {
+                *clear -= travel;
                 continue;
             }
-            let on = x - was.rotation * normal * d;
-            let speed = ((will * was.inverse() * on) - on) / span;
+            let x = Point3::from(v3d(motion.position(i)));
+            let (d, normal) = c.shape.distance(&was.inverse_transform_point(&x).coords);
+            let reach = offset + ROOM + 2.0 * f64::from(travel);
+            *clear = (d - reach).max(0.0) as f32;
+            if d > reach {
+                continue;
+            }
             let normal = was.rotation * normal;
+            let on = x - normal * d;
+            let speed = (change * on - on) / span;
             planes.push(Plane {
                 vertex: i as u32,
                 normal: v4(&normal),

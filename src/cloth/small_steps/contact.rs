@@ -1,5 +1,6 @@
 //! What keeps a vertex outside a body, and what ties it to one, within small steps.
 
+use super::forces::Step;
 use super::motion::{Motion, V4};
 
 /// A surface near a vertex: a plane that moves evenly until it is looked for again.
@@ -34,6 +35,37 @@ pub struct Tie {
 const RECOVERED: f32 = 0.2;
 
 impl Motion {
+    /// Adds to the accelerations what planes and ties will answer, by the rules of [`Motion::restrain`]: smoothed without
+    /// it, a force or a speed that ends in a contact would push its neighbours, and a contact that stops one vertex alone
+    /// would give fine waves, which have much inertia, energy out of nothing.
+    pub(super) fn answer(&mut self, planes: &[Plane], ties: &[Tie], step: &Step) {
+        let h = step.h;
+        let held = &mut self.work.held;
+        let push = &mut *self.work.push.0;
+        for p in planes {
+            let i = p.vertex as usize;
+            let v = self.velocity[i] + push[i].scale(h);
+            let rate = p.normal.dot(p.speed);
+            let toward = p.normal.dot(v) - rate;
+            let gap = p.normal.dot(self.start[i] + self.moved[i]) - p.level - rate * step.t;
+            let least = -gap.max(0.0) / h;
+            if toward < least {
+                let borne = least - toward;
+                let slip = v - p.speed - p.normal.scale(toward);
+                let speed = slip.dot(slip).sqrt();
+                let stopped = if speed > 0.0 { (p.friction * borne / speed).min(1.0) } else { 0.0 };
+                push[i] = push[i] + (p.normal.scale(borne) - slip.scale(stopped)).scale(1.0 / h);
+            }
+        }
+        held.clear();
+        for t in ties {
+            let i = t.vertex as usize;
+            push[i] = push[i].scale(1.0 - t.firmness);
+            if t.firmness >= 1.0 {
+                held.push(t.vertex);
+            }
+        }
+    }
     /// Takes from velocities what would lead through the planes by the end of a step of `h` that begins at time `t`;
     /// Coulomb friction against the surface. What is sunken comes out at `recovery` m/s at most.
     /// Returns how many vertices were touched.

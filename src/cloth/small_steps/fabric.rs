@@ -23,7 +23,40 @@ pub(super) struct Couple {
 pub(super) struct Bent {
     pub(super) v: [u16; 4],
     pub(super) c: [f32; 4],
-    pub(super) pull: f32,
+    pub(super) w: f32,
+    pub(super) rest: f32,
+}
+
+/// Edges that are taken together, so that their vectors stay in the nearest cache until they are used up.
+pub(super) const BLOCK: usize = 256;
+/// Edges of a vertex that fit a row: most vertices of a triangulation have six.
+pub(super) const ROW: usize = 6;
+
+/// What a vertex gathers: three edges that begin in it and three that end there (one number beyond the last edge where
+/// there are fewer), its neighbours and their weights in the smoothing.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    pub(super) edges: [u16; ROW],
+    pub(super) near: [u16; ROW],
+    pub(super) by: [f32; ROW],
+    pub(super) own: f32,
+}
+
+/// An edge that did not fit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extra {
+    pub(super) vertex: u16,
+    pub(super) edge: u16,
+    /// 1 where it begins in the vertex, -1 where it ends there.
+    pub(super) sign: f32,
+}
+
+/// A neighbour that did not fit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Far {
+    pub(super) vertex: u16,
+    pub(super) near: u16,
+    pub(super) by: f32,
 }
 
 /// Immutable.
@@ -36,11 +69,18 @@ pub struct Fabric {
     /// Patch and place there of each ghost.
     pub(super) ghosts: Vec<[u32; 2]>,
     pub(super) inverse_mass: Vec<f32>,
-    /// Edges of each vertex to a higher one.
-    pub(super) count: Vec<u16>,
-    pub(super) other: Vec<u16>,
+    /// Edges by their lower end, directed so that about as many begin as end in each vertex.
+    pub(super) ends: Vec<[u16; 2]>,
     pub(super) rest: Vec<f32>,
     pub(super) couple: Vec<Couple>,
+    pub(super) rows: Vec<Row>,
+    pub(super) extra: Vec<Extra>,
+    pub(super) far: Vec<Far>,
+    /// For each block of edges: how many edges have all their tension, and how many vertices all their pull, when the
+    /// lengths of the block are known.
+    pub(super) ready: Vec<[u32; 2]>,
+    /// Coefficients of the smoothing, the lowest (1) first.
+    pub(super) smoothing: Vec<f32>,
     /// Bending pairs of each vertex with a higher one.
     pub(super) bend_count: Vec<u16>,
     pub(super) bend: Vec<(u16, f32)>,
@@ -58,7 +98,8 @@ impl Plan {
             around[e[1] as usize].push(e[0]);
         }
         let order = by_distance(&around);
-        let k = wanted.max(1).max(self.ends.len() / (MOST / 2) + usize::from(self.ends.len() >= MOST)).min(n.max(1));
+        let k =
+            wanted.max(1).max(self.ends.len() / (MOST / 2) + usize::from(self.ends.len() >= MOST - 1)).min(n.max(1));
         let mut owner = vec![[0u32; 2]; n];
         let sets: Vec<Vec<u32>> = (0..k).map(|p| order[p * n / k..(p + 1) * n / k].to_vec()).collect();
         for (p, set) in sets.iter().enumerate() {
@@ -112,38 +153,119 @@ impl Plan {
             c
         };
         let present = |e: u32| number[e as usize] != u16::MAX;
+        let mut ends: Vec<[u16; 2]> = edges.iter().map(|e| e.0.map(|v| v as u16)).collect();
+        balance(&mut ends, set.len());
+        let inverse_mass: Vec<f32> = set.iter().map(|v| self.inverse_mass[*v as usize]).collect();
+        let weight: Vec<f32> = edges.iter().map(|e| self.smooth[e.1]).collect();
+        let (rows, extra, far) = rows(&ends, &weight, &inverse_mass);
+        let couple: Vec<Couple> = edges
+            .iter()
+            .enumerate()
+            .map(|(i, e)| {
+                let c = &self.couple[e.1];
+                let ok = c.edge.map(present);
+                Couple {
+                    own: c.own,
+                    by: std::array::from_fn(|k| if ok[k] { c.by[k] } else { 0.0 }),
+                    edge: std::array::from_fn(|k| if ok[k] { number[c.edge[k] as usize] } else { i as u16 }),
+                }
+            })
+            .collect();
         Fabric {
-            count: counts(&mut edges.iter().map(|e| e.0[0])),
+            ready: ready(&couple, &rows),
+            rows,
+            extra,
+            far,
+            smoothing: self.smoothing.clone(),
+            ends,
             bend_count: counts(&mut bend.iter().map(|e| e.0[0])),
-            other: edges.iter().map(|e| e.0[1] as u16).collect(),
             rest: edges.iter().map(|e| self.rest[e.1]).collect(),
-            couple: edges
-                .iter()
-                .enumerate()
-                .map(|(i, e)| {
-                    let c = &self.couple[e.1];
-                    let ok = c.edge.map(present);
-                    Couple {
-                        own: c.own,
-                        by: std::array::from_fn(|k| if ok[k] { c.by[k] } else { 0.0 }),
-                        edge: std::array::from_fn(|k| if ok[k] { number[c.edge[k] as usize] } else { i as u16 }),
-                    }
-                })
-                .collect(),
+            couple,
             bend: bend.iter().map(|e| (e.0[1] as u16, e.1)).collect(),
             bent: self
                 .bent
                 .iter()
                 .filter(|b| inside(&b.v))
-                .map(|b| Bent { v: b.v.map(|v| at(v) as u16), c: b.c, pull: b.pull })
+                .map(|b| Bent { v: b.v.map(|v| at(v) as u16), c: b.c, w: b.w, rest: b.rest })
                 .collect(),
-            inverse_mass: set.iter().map(|v| self.inverse_mass[*v as usize]).collect(),
+            inverse_mass,
             ghosts: set[owned..].iter().map(|v| owner[*v as usize]).collect(),
             owned,
             vertices: set,
             damping: self.damping,
         }
     }
+}
+
+/// Directs edges along trails that never break off where they could go on: then as many begin as end in each vertex,
+/// but for one.
+fn balance(ends: &mut [[u16; 2]], vertices: usize) {
+    let mut around = vec![Vec::new(); vertices];
+    for (e, v) in ends.iter().enumerate() {
+        v.iter().for_each(|v| around[usize::from(*v)].push(e));
+    }
+    let mut used = vec![false; ends.len()];
+    // Trails that end somewhere must begin at odd vertices.
+    let odd = (0..vertices).filter(|v| around[*v].len() % 2 == 1);
+    for start in odd.collect::<Vec<_>>().into_iter().chain(0..vertices) {
+        let mut at = start;
+        while let Some(e) = std::iter::from_fn(|| around[at].pop()).find(|e| !used[*e]) {
+            used[e] = true;
+            let [a, b] = ends[e].map(usize::from);
+            if a != at {
+                ends[e].swap(0, 1);
+            }
+            at = a + b - at;
+        }
+    }
+}
+
+/// See [`Fabric::ready`]. The last block finishes all.
+fn ready(couple: &[Couple], rows: &[Row]) -> Vec<[u32; 2]> {
+    let (mut edge, mut vertex) = (0usize, 0usize);
+    let blocks = couple.len().div_ceil(BLOCK).max(1);
+    (1..=blocks)
+        .map(|k| {
+            let known = (k * BLOCK).min(couple.len());
+            while edge < known && couple[edge].edge.iter().all(|e| usize::from(*e) < known) {
+                edge += 1;
+            }
+            let complete = |r: &Row| r.edges.iter().all(|e| usize::from(*e) < edge || usize::from(*e) == couple.len());
+            while vertex < rows.len() && complete(&rows[vertex]) {
+                vertex += 1;
+            }
+            [edge as u32, vertex as u32]
+        })
+        .collect()
+}
+
+fn rows(ends: &[[u16; 2]], weight: &[f32], inverse_mass: &[f32]) -> (Vec<Row>, Vec<Extra>, Vec<Far>) {
+    let none = Row { edges: [ends.len() as u16; ROW], near: [0; ROW], by: [0.0; ROW], own: 0.0 };
+    let mut rows = vec![none; inverse_mass.len()];
+    let mut filled = vec![[0usize; 3]; inverse_mass.len()];
+    let (mut extra, mut far) = (Vec::new(), Vec::new());
+    for (e, (v, weight)) in ends.iter().zip(weight).enumerate() {
+        for side in 0..2 {
+            let (vertex, near) = (v[side], v[1 - side]);
+            let i = usize::from(vertex);
+            let half = ROW / 2;
+            if filled[i][side] < half {
+                rows[i].edges[side * half + filled[i][side]] = e as u16;
+                filled[i][side] += 1;
+            } else {
+                extra.push(Extra { vertex, edge: e as u16, sign: 1.0 - 2.0 * side as f32 });
+            }
+            let by = weight * inverse_mass[i];
+            rows[i].own += by;
+            if filled[i][2] < ROW {
+                (rows[i].near[filled[i][2]], rows[i].by[filled[i][2]]) = (near, by);
+                filled[i][2] += 1;
+            } else {
+                far.push(Far { vertex, near, by });
+            }
+        }
+    }
+    (rows, extra, far)
 }
 
 /// Vertices in order of their distance (in edges) from one at the rim: neighbours come close together in memory, and
@@ -186,6 +308,7 @@ pub fn exchange(fabrics: &[Fabric], motions: &mut [Motion]) {
             let (m, v) = (motions[*q as usize].moved[*j as usize], motions[*q as usize].velocity[*j as usize]);
             motions[p].moved[i] = m;
             motions[p].velocity[i] = v;
+            motions[p].work.looked = false;
         }
     }
 }

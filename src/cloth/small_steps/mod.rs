@@ -2,17 +2,21 @@
 //!
 //! Membrane forces are tensions along edges, coupled within each triangle so that they equal the sheet's Hooke law
 //! (Delingette 2008, "triangular biquadratic springs", here in lengths instead of squares, so that stiffness does not
-//! grow with stretch). Without the coupling this is the paper's mass-spring model. A step is symplectic Euler; elements
-//! too stiff for the step are softened when the garment is made, and counted.
+//! grow with stretch). Without the coupling this is the paper's mass-spring model. A step is symplectic Euler on
+//! accelerations that are smoothed over the nearest neighbours, which gives the finest waves more inertia and so allows
+//! longer steps ([`filter`]); elements still too stiff for the step are softened when the garment is made, and counted.
 
 mod contact;
 mod fabric;
+mod filter;
+mod forces;
 mod motion;
 mod plan;
 mod stability;
 
 pub use contact::{Plane, Tie};
 pub use fabric::{Fabric, exchange};
+pub use forces::Step;
 pub use motion::{Motion, V4};
 pub use plan::{Fit, Plan, triangles};
 

@@ -31,6 +31,7 @@ fn grid(nx: usize, ny: usize, dx: f64, dy: f64) -> (Vec<V3d>, Vec<Face>, Vec<[[f
 }
 
 struct Lab {
+    bend_every: usize,
     sheet: Sheet,
     plan: Plan,
     fabrics: Vec<Fabric>,
@@ -42,10 +43,14 @@ struct Lab {
 
 impl Lab {
     fn new(sheet: Sheet, x: &[V3d], h: f64, patches: usize) -> Self {
-        let plan = Plan::new(&sheet, &Fit { h, ahead: 0.25, springs_only: false, bend_every: 4 });
-        let fabrics = plan.patches(patches, 14);
-        let mut lab =
-            Self { sheet, plan, fabrics, motions: Vec::new(), h, ahead: 0.25, gravity: V4::new(0.0, -9.81, 0.0) };
+        Self::smooth(sheet, x, h, patches, 2)
+    }
+    fn smooth(sheet: Sheet, x: &[V3d], h: f64, patches: usize, smooth: usize) -> Self {
+        let bend_every = Plan::bend_every(smooth);
+        let plan = Plan::new(&sheet, &Fit { h, ahead: 0.25, springs_only: false, bend_every, smooth });
+        let fabrics = plan.patches(patches, 8 * (1 + smooth) + 8);
+        let gravity = V4::new(0.0, -9.81, 0.0);
+        let mut lab = Self { bend_every, sheet, plan, fabrics, motions: Vec::new(), h, ahead: 0.25, gravity };
         lab.place(x, &vec![V3d::zeros(); x.len()]);
         lab
     }
@@ -72,36 +77,45 @@ impl Lab {
     fn velocities(&self) -> Vec<V3d> {
         self.gather(|m, i| m.velocity[i])
     }
-    /// `n` steps; `before` may change velocities of a patch before it moves.
-    fn run(&mut self, n: usize, before: impl Fn(&Fabric, &mut Motion, f32)) {
+    /// `n` steps with some vertices held where they are.
+    fn run(&mut self, n: usize, held: &[u32]) {
+        self.run_on(n, held, &[]);
+    }
+    /// The same on planes, whose vertices are those of the one patch.
+    fn run_on(&mut self, n: usize, held: &[u32], planes: &[Plane]) {
         let h = self.h as f32;
+        let ties: Vec<Vec<Tie>> = self.fabrics.iter().zip(&self.motions).map(|(f, m)| tied(f, m, held)).collect();
         let mut done = 0;
         while done < n {
             let block = 8.min(n - done);
-            for (f, m) in self.fabrics.iter().zip(&mut self.motions) {
+            for ((f, m), ties) in self.fabrics.iter().zip(&mut self.motions).zip(&ties) {
                 for s in 0..block {
-                    if s % 4 == 0 {
-                        m.bend(f, 2.0 * h);
+                    if s % self.bend_every == 0 {
+                        m.bend(f, h * self.bend_every.min(block - s) as f32 * 0.5);
                     }
-                    m.accelerate(f, h, self.ahead, self.gravity);
-                    before(f, m, h);
-                    m.advance(h, f32::INFINITY);
+                    let step = Step { h, t: 0.0, ahead: self.ahead, gravity: self.gravity };
+                    m.accelerate(f, &step, planes, ties);
+                    m.restrain(planes, 0.0, h, 1.0);
+                    m.tie(ties, 0.0, h);
+                    m.advance(&step, f32::INFINITY);
                 }
             }
             exchange(&self.fabrics, &mut self.motions);
             done += block;
         }
     }
+    /// Elastic energy, kinetic energy and height, J.
+    fn energy(&self) -> f64 {
+        let (y, v) = (self.positions(), self.velocities());
+        let g = -f64::from(self.gravity.0[1]);
+        let of = |i: usize| self.sheet.mass[i] * (0.5 * v[i].norm_squared() + g * y[i].y);
+        self.sheet.energy(&y) + (0..y.len()).map(of).sum::<f64>()
+    }
 }
 
-fn hold(held: Vec<u32>) -> impl Fn(&Fabric, &mut Motion, f32) {
-    move |f, m, _| {
-        for (i, v) in f.vertices.iter().enumerate() {
-            if held.contains(v) {
-                m.velocity[i] = V4::default();
-            }
-        }
-    }
+fn tied(f: &Fabric, m: &Motion, held: &[u32]) -> Vec<Tie> {
+    let all = f.vertices.iter().enumerate().filter(|(_, v)| held.contains(v));
+    all.map(|(i, _)| Tie { vertex: i as u32, place: m.position(i), speed: V4::default(), firmness: 1.0 }).collect()
 }
 
 fn sheet(faces: &[Face], rest: &[[[f64; 2]; 3]], n: usize, m: &Material) -> Sheet {
@@ -143,7 +157,7 @@ fn free_fall_and_momentum_hold_to_rounding() {
     let mean = |v: &[V3d]| v.iter().zip(&lab.sheet.mass).map(|(v, m)| v * (m / mass)).sum::<V3d>();
     let (c0, v0) = (mean(&wild), mean(&spin));
     let n = 2000;
-    lab.run(n, |_, _, _| {});
+    lab.run(n, &[]);
     let mean = |v: &[V3d]| v.iter().zip(&lab.sheet.mass).map(|(v, m)| v * (m / mass)).sum::<V3d>();
     let t = n as f64 * lab.h;
     // Symplectic Euler falls g h² n (n + 1) / 2.
@@ -164,7 +178,7 @@ fn a_hanging_strip_stretches_as_computed() {
     let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &m), &x, 1e-4, 1);
     assert_eq!(lab.plan.soft_elements, 0);
     lab.gravity = V4::new(0.0, 0.0, 9.81);
-    lab.run(20_000, hold((0..=nx as u32).collect()));
+    lab.run(20_000, &(0..=nx as u32).collect::<Vec<_>>());
     let y = lab.positions();
     let long = y[y.len() - 1].z - ny as f64 * d;
     let exact = 0.18 * 9.81 * (ny as f64 * d).powi(2) / (2.0 * 1000.0);
@@ -185,7 +199,7 @@ fn a_heavy_chain_hangs_in_a_catenary() {
         x.iter().map(|p| V3d::new(p.x, -0.02 * (p.z / length * std::f64::consts::PI).sin(), p.z * 0.8)).collect();
     lab.place(&start, &vec![V3d::zeros(); x.len()]);
     let last = x.len() as u32;
-    lab.run(25_000, hold(vec![0, 1, last - 2, last - 1]));
+    lab.run(25_000, &[0, 1, last - 2, last - 1]);
     // 2 a sinh(span / 2a) = length by bisection; sag a (cosh(span / 2a) − 1).
     let (mut lo, mut hi) = (0.05, 5.0);
     for _ in 0..80 {
@@ -210,7 +224,7 @@ fn a_cantilever_bends_as_a_beam() {
     let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &m), &x, 2.5e-5, 1);
     // Two rows hold place and slope.
     let row = nx as u32 + 1;
-    lab.run(40_000, hold((0..2 * row).collect()));
+    lab.run(40_000, &(0..2 * row).collect::<Vec<_>>());
     let y = lab.positions();
     let free = y[y.len() - 3].y;
     let length: f64 = (ny - 1) as f64 * d;
@@ -234,9 +248,7 @@ fn a_block_slides_as_coulomb_says() {
             .map(|vertex| Plane { vertex, normal, level: 0.0, speed: V4::default(), friction: mu })
             .collect();
         let n = 2500;
-        lab.run(n, |_, m, h| {
-            m.restrain(&planes, 0.0, h, 1.0);
-        });
+        lab.run_on(n, &[], &planes);
         let v = lab.velocities().iter().sum::<V3d>().dot(&down) / x.len() as f64;
         assert!((v - expected * n as f64 * lab.h).abs() < 5e-3, "μ {mu}: {v}");
         assert!(lab.positions().iter().all(|p| p.dot(&V3d::new(tilt.sin(), tilt.cos(), 0.0)) > -1e-5));
@@ -248,7 +260,7 @@ fn patches_give_the_same_motion_and_threads_the_same_bits() {
     let (x, faces, rest) = grid(24, 24, 0.02, 0.02);
     let make = |patches| {
         let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &cotton(1e-5)), &x, 2e-4, patches);
-        lab.run(800, hold(vec![0, 24]));
+        lab.run(800, &[0, 24]);
         lab.positions()
     };
     let (one, three) = (make(1), make(3));
@@ -269,7 +281,7 @@ fn slivers_and_stiffness_ratios_stay_stable() {
     for ((x, faces, rest), m) in [(slivers, cotton(1e-3)), (even, stiff)] {
         let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &m), &x, 2e-4, 1);
         assert!(lab.plan.softened < 1.0 && lab.plan.soft_elements > 0);
-        lab.run(5000, hold(vec![0, 1]));
+        lab.run(5000, &[0, 1]);
         let y = lab.positions();
         assert!(y.iter().all(|p| p.norm() < 20.0), "it neither explodes nor becomes NaN");
     }
@@ -282,17 +294,15 @@ fn a_sheet_at_rest_stays_and_a_swinging_one_gains_nothing() {
     airy.damping = 1.0;
     let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &airy), &x, 2e-4, 1);
     lab.gravity = V4::default();
-    lab.run(100_000, |_, _, _| {});
+    lab.run(100_000, &[]);
     let moved = lab.positions().iter().zip(&x).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     assert!(moved < 2e-5, "drift {moved}");
     let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &cotton(1e-5)), &x, 2e-4, 1);
     // Pinned at two corners for 10 s: energy never rises above that of the start.
     lab.gravity = V4::new(0.0, -9.81, 0.0);
     for _ in 0..25 {
-        lab.run(2000, hold(vec![0, 6]));
-        let (y, v) = (lab.positions(), lab.velocities());
-        let e: f64 = lab.sheet.energy(&y)
-            + (0..y.len()).map(|i| lab.sheet.mass[i] * (0.5 * v[i].norm_squared() + 9.81 * y[i].y)).sum::<f64>();
+        lab.run(2000, &[0, 6]);
+        let e = lab.energy();
         assert!(e < 1e-5, "energy {e}");
     }
 }
@@ -307,7 +317,7 @@ fn a_curved_rest_shape_keeps_its_bend() {
     let s = Sheet::new(x.len(), &faces, &rest, &cotton(1e-3), Some(&points)).expect("a sheet");
     let mut lab = Lab::new(s, &x, 1e-4, 1);
     lab.gravity = V4::default();
-    lab.run(5000, |_, _, _| {});
+    lab.run(5000, &[]);
     let moved = lab.positions().iter().zip(&x).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     assert!(moved < 1e-3, "{moved}");
 }
