@@ -35,6 +35,27 @@ const CUT_DEPTH: f32 = 0.9;
 /// half of a standing person has 5.
 const ROUND: f64 = 0.025;
 
+/// A hand shows so many cells at least, fingers taken together, and less than this area, m²: a hand with the wrist is 0.02.
+const LEAST_HAND: usize = 2;
+/// See [`LEAST_HAND`].
+const MOST_HAND: f32 = 0.03;
+/// It is at most as far from what is seen of the body as a long arm reaches from the edge of the chest, metres.
+const SLEEVE: f32 = 0.80;
+/// Between them lie so many cells at least, and this share of them without a reading.
+const LEAST_HOLE: i32 = 3;
+/// See [`LEAST_HOLE`].
+const HOLE_SHARE: f32 = 0.7;
+/// So many such things are looked at, and every n-th cell of the body.
+const MOST_HANDS: usize = 6;
+/// See [`MOST_HANDS`].
+const HAND_STEP: usize = 8;
+
+/// Single cells without a reading between cells of the body, as a share of the body's: more and holes mean nothing. A
+/// picture of which nine tenths of the pixels are lost has 0.18, whole ones next to none.
+const MOST_PORES: f32 = 0.03;
+/// Parts of a hand lie within this distance, metres.
+const HAND_LENGTH: f32 = 0.15;
+
 /// So many cells on the rim make a thing hang on it.
 const HANGING: usize = 3;
 /// A thing on a side of the image ranks as if it were this much farther away, metres.
@@ -62,6 +83,9 @@ pub struct PersonSearch {
     pub cells: Vec<u32>,
     /// Part of the person may lie beyond the lower rim of the image.
     pub cut_below: bool,
+    /// Middles of small things beside a hole that begins on the person, camera frame, metres: hands beyond sleeves that
+    /// give no return.
+    pub hands: Vec<P3>,
     /// Cells that were neither floor nor background.
     pub candidates: usize,
     /// How many separate things were looked at.
@@ -102,10 +126,12 @@ pub fn find_person(
     let up = scene.floor.map_or_else(|| Vector3::new(0.0, -1.0, 0.0), |f| f.normal).cast::<f32>();
     scratch.bands.update(scene, cloud);
     out.candidates = classify(cloud, &scratch.bands);
+    let mut dark = false;
     if scene.floor.is_none() && scene.background.is_empty() {
         // A picture without floor and wall is one whose background was taken out: nothing means empty.
         let known = cloud.depth.iter().filter(|d| **d > 0.0).count();
-        if 2 * known < columns * rows {
+        dark = 2 * known < columns * rows;
+        if dark {
             for i in 0..columns * rows {
                 if cloud.depth[i] == 0.0 {
                     cloud.labels[i] = Label::Background;
@@ -150,6 +176,7 @@ pub fn find_person(
             out.cells.push(i as u32);
         }
     }
+    out.hands = hands(&components, cloud, scratch, &belongs, main, dark);
     let bottom = (rows - 1) * columns;
     out.cut_below = out.cells.iter().filter(|&&c| c as usize >= bottom).count() >= 2;
     out
@@ -259,6 +286,83 @@ fn choose(components: &[Component], prior: Option<Prior>) -> Option<&Component> 
     components.iter().filter(sized).min_by(|a, b| rank(a).total_cmp(&rank(b)).then(a.id.cmp(&b.id)))
 }
 
+/// Hands beyond sleeves that give no return: small things at the end of a hole that begins on the person. Their middles,
+/// camera frame.
+fn hands(
+    components: &[Component],
+    cloud: &OrganisedCloud,
+    scratch: &SegmentScratch,
+    belongs: &[bool],
+    main: &Component,
+    dark: bool,
+) -> Vec<P3> {
+    let depth = main.centre.z;
+    let small = |c: &&Component| {
+        // In the dark all around the person is a hole: there a hand must be well apart.
+        c.id != main.id
+            && !(dark && belongs[c.id as usize])
+            && c.area < MOST_HAND
+            && (c.centre.z - depth).abs() < SLEEVE
+            && c.side_rows <= HANGING
+            && c.top_cells <= HANGING
+    };
+    // Fingers are things of their own.
+    let mut groups: Vec<(usize, Vector3<f32>, Vec<u32>)> = Vec::new();
+    for c in components.iter().filter(small) {
+        let near = |g: &&mut (usize, Vector3<f32>, Vec<u32>)| (g.1 / g.0 as f32 - c.centre.coords).norm() < HAND_LENGTH;
+        match groups.iter_mut().find(near) {
+            Some(g) => {
+                g.0 += c.cells;
+                g.1 += c.centre.coords * c.cells as f32;
+                g.2.push(c.id);
+            }
+            None => groups.push((c.cells, c.centre.coords * c.cells as f32, vec![c.id])),
+        }
+    }
+    groups.retain(|g| g.0 >= LEAST_HAND);
+    groups.truncate(MOST_HANDS);
+    if groups.is_empty() {
+        return Vec::new();
+    }
+    let columns = cloud.size().0;
+    // A hand that hangs beside the hip counts as a part of the body already.
+    let part = |id: u32| id != u32::MAX && belongs[id as usize] && components[id as usize].area >= MOST_HAND;
+    let own = |i: &usize| part(scratch.component[*i]);
+    let body: Vec<usize> = (0..scratch.component.len()).filter(own).step_by(HAND_STEP).collect();
+    // A picture full of pores is a bad picture, not one of sleeves.
+    let inside =
+        |i: usize, step: usize| i >= step && i + step < cloud.depth.len() && own(&(i - step)) && own(&(i + step));
+    let pore = |i: &usize| cloud.depth[*i] <= 0.0 && (inside(*i, 1) || inside(*i, columns));
+    let pores = (0..cloud.depth.len()).filter(pore).count();
+    if pores as f32 > MOST_PORES * (HAND_STEP * body.len()) as f32 {
+        return Vec::new();
+    }
+    let joined = |(cells, sum, ids): (usize, Vector3<f32>, Vec<u32>)| {
+        let centre = P3::from(sum / cells as f32);
+        let (u, v) = cloud.cell_of(&centre)?;
+        let hole = |&k: &usize| {
+            if (cloud.centre(k) - centre).norm() > SLEEVE {
+                return false;
+            }
+            let (du, dv) = ((k % columns) as i32 - u, (k / columns) as i32 - v);
+            let steps = du.abs().max(dv.abs());
+            let (mut empty, mut between) = (0, 0);
+            for s in 1..steps {
+                let Some(at) = cloud.cell(u + du * s / steps, v + dv * s / steps) else { return false };
+                let id = scratch.component[at];
+                if ids.contains(&id) || part(id) {
+                    continue;
+                }
+                between += 1;
+                empty += i32::from(cloud.depth[at] <= 0.0);
+            }
+            between >= LEAST_HOLE && empty as f32 >= HOLE_SHARE * between as f32
+        };
+        body.iter().any(hole).then_some(centre)
+    };
+    groups.into_iter().filter_map(joined).collect()
+}
+
 /// The nearer of two things, for [`Iterator::min_by`].
 fn nearer(a: &&Component, b: &&Component) -> std::cmp::Ordering {
     a.centre.z.total_cmp(&b.centre.z).then(a.id.cmp(&b.id))
@@ -347,6 +451,43 @@ mod tests {
         assert!(found.cells.len() > 500, "{} cells", found.cells.len());
         let door = find_person(&mut at_the_rim(false), &ScenePlanes::default(), None, &mut scratch);
         assert!(door.cells.is_empty() && door.components == 1, "{} cells", door.cells.len());
+    }
+
+    /// A box of 0.4 × 1.4 m at 2 m before a wall at 4 m, a hand of 6 × 10 cm half a metre to its right, and between them
+    /// `hole` or the wall.
+    fn sleeve(hole: bool) -> OrganisedCloud {
+        use crate::camera::{DepthImage, Intrinsics};
+        let k = Intrinsics { width: 320, height: 240, fx: 262.5, fy: 262.5, cx: 159.5, cy: 119.5 };
+        let data = (0..k.pixels()).map(|i| {
+            let (x, y) = (((i % 320) as f64 - k.cx) / k.fx * 2.0, ((i / 320) as f64 - k.cy) / k.fy * 2.0);
+            let body = x.abs() < 0.2 && y.abs() < 0.7;
+            let hand = (0.7..0.76).contains(&x) && y.abs() < 0.05;
+            let arm = (0.2..0.7).contains(&x) && y.abs() < 0.05;
+            if body || hand {
+                2000
+            } else if arm && hole {
+                0
+            } else {
+                4000
+            }
+        });
+        let image = DepthImage::new(320, 240, data.collect()).expect("sizes agree");
+        let mut cloud = OrganisedCloud::new(&k, Some(2));
+        cloud.sample(&image, 8.0);
+        cloud
+    }
+
+    #[test]
+    fn a_hand_at_the_end_of_a_hole_is_told() {
+        for hole in [true, false] {
+            let mut cloud = sleeve(hole);
+            let scene = find_planes(&cloud);
+            let found = find_person(&mut cloud, &scene, None, &mut SegmentScratch::default());
+            assert!(!found.cells.is_empty() && found.hands.len() == usize::from(hole), "{hole}: {:?}", found.hands);
+            for hand in found.hands {
+                assert!((hand - P3::new(0.73, 0.0, 2.0)).norm() < 0.02, "{hand}");
+            }
+        }
     }
 
     #[test]

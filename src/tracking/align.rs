@@ -2,6 +2,7 @@
 
 use super::kinematics::{LEVER, apply, linearise};
 use super::model::TrackerModel;
+use super::sleeve::hold;
 use super::stand::{Ground, planted, stand};
 use super::{Normals, TrackerConfig};
 use crate::body::{BoneTransforms, JointMotion, Pose, RestBody};
@@ -56,6 +57,8 @@ pub(super) struct Terms {
     pub eased: bool,
     /// Feet out of view stand here.
     pub ground: Option<Ground>,
+    /// Hands beyond sleeves without return, left and right.
+    pub hands: [Option<Vector3<f64>>; 2],
 }
 
 /// From a rough start: windows skip readings whose normal does not fit instead of giving up on the nearest one, and
@@ -68,6 +71,7 @@ pub(super) const START_TERMS: Terms = Terms {
     rest_weight: 1.0,
     eased: false,
     ground: None,
+    hands: [None; 2],
 };
 
 impl Terms {
@@ -80,6 +84,7 @@ impl Terms {
             rest_weight: config.rest_weight,
             eased: true,
             ground: None,
+            hands: [None; 2],
         }
     }
 }
@@ -455,6 +460,7 @@ fn assemble(
         stand(model, seen.grid, ground, &hidden, stays, scratch);
     }
     scratch.unseen = hidden;
+    hold(model, scratch);
     totals
 }
 

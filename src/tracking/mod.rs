@@ -9,6 +9,7 @@ mod place;
 mod report;
 mod rescue;
 mod size;
+mod sleeve;
 mod stand;
 mod state;
 mod step;

@@ -1,6 +1,7 @@
 //! What never changes while tracking: the template, the camera and points chosen on the template.
 
 use super::TrackerConfig;
+use super::sleeve::{Arm, arms};
 use super::stand::{Leg, legs};
 use crate::body::{JointMotion, SkinWeights, Template};
 use crate::camera::Calibration;
@@ -44,6 +45,8 @@ pub struct TrackerModel {
     pub(super) stiffness: Vec<f64>,
     /// Legs, for feet out of view.
     pub(super) standing: Vec<Leg>,
+    /// Arms, left and right, for hands beyond sleeves without return.
+    pub(super) arms: [Option<Arm>; 2],
     /// Angles of knees, ankles and feet.
     pub(super) legs: Vec<bool>,
     /// Share of the pull to the rest pose that is left for each angle when its bone is in full view.
@@ -76,6 +79,7 @@ impl TrackerModel {
         let tied = tied_bones(&template, &directions, first);
         let stiffness = stiffness(&template);
         let standing = legs(&template);
+        let arms = arms(&template);
         let leg = |name: &str| ["knee", "ankle", "foot"].iter().any(|s| name.contains(s));
         let legs = skeleton.joints().iter().flat_map(|j| std::iter::repeat_n(leg(&j.name), j.motion.dofs())).collect();
         let share = |j: &crate::body::Joint| std::iter::repeat_n(seen_share(&j.name), j.motion.dofs());
@@ -93,6 +97,7 @@ impl TrackerModel {
             tied,
             stiffness,
             standing,
+            arms,
             legs,
             seen_shares,
         }

@@ -6,6 +6,7 @@ use super::kinematics::{extrapolate, motion};
 use super::place::{outline, place};
 use super::report::Stopwatch;
 use super::size::from_stature;
+use super::sleeve::assign;
 use super::stand::{Feet, Ground, below, tallest, unfold};
 use super::{
     LostReason, SizeEstimate, Skipped, StagesMs, Status, StepError, StepReport, TrackerModel, TrackerState, Workspace,
@@ -254,6 +255,10 @@ fn follow(
             None if model.config.skip_coarse => fine = as_good(&look(&pose)),
             None => {}
         }
+    }
+
+    if !person.hands.is_empty() {
+        workspace.align.terms.hands = assign(model, &workspace.rest, &mut pose, &seen, &person.hands);
     }
 
     // Pose; at the start alternating with size until both have settled (Algorithm 1).
