@@ -221,7 +221,7 @@ fn comfort(sheet: &Sheet, ahead: f64) -> impl Fn(usize) -> f64 {
 const HIGHEST: usize = 2;
 
 /// The filter of a sheet, with the edges' own stiffness as weights.
-fn filter(sheet: &Sheet, ends: Vec<[u32; 2]>, degree: usize) -> Filter {
+pub(super) fn filter(sheet: &Sheet, ends: Vec<[u32; 2]>, degree: usize) -> Filter {
     let mut order: Vec<([u32; 2], usize)> = ends.iter().enumerate().map(|(i, e)| (*e, i)).collect();
     order.sort_unstable();
     let mut own = vec![0.0; ends.len()];

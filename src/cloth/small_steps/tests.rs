@@ -321,3 +321,64 @@ fn a_curved_rest_shape_keeps_its_bend() {
     let moved = lab.positions().iter().zip(&x).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     assert!(moved < 1e-3, "{moved}");
 }
+
+#[test]
+fn smoothing_is_the_filter_and_takes_nothing_from_momentum() {
+    // One step from a crumpled, spinning state: what smoothing does to the accelerations against W in f64.
+    let (x, faces, rest) = grid(9, 7, 0.02, 0.013);
+    let wild: Vec<V3d> =
+        x.iter().map(|p| p + V3d::new(0.0, 0.006 * (p.x * 190.0).sin() * (p.z * 170.0).cos(), 0.0)).collect();
+    let h = 1e-4;
+    let accelerations = |degree| {
+        let s = sheet(&faces, &rest, x.len(), &cotton(1e-5));
+        let mut lab = Lab::smooth(s, &x, h, 1, degree);
+        lab.place(&wild, &vec![V3d::zeros(); x.len()]);
+        assert_eq!(lab.plan.soft_elements, 0);
+        lab.run(1, &[]);
+        lab.velocities().iter().map(|v| v / h).collect::<Vec<_>>()
+    };
+    let (plain, smooth) = (accelerations(0), accelerations(2));
+    let s = sheet(&faces, &rest, x.len(), &cotton(1e-5));
+    let ends = s.edges.iter().map(|(v, _)| [v[0].min(v[1]), v[0].max(v[1])]).collect();
+    let filter = super::plan::filter(&s, ends, 2);
+    let most = plain.iter().map(|a| a.norm()).fold(0.0, f64::max);
+    for pair in [[0, 1], [1, 2]] {
+        let mut expected: Vec<_> = plain.iter().map(|a| nalgebra::Vector2::new(a[pair[0]], a[pair[1]])).collect();
+        filter.apply(&mut expected);
+        for (e, a) in expected.iter().zip(&smooth) {
+            assert!((e[0] - a[pair[0]]).abs() + (e[1] - a[pair[1]]).abs() < 2e-5 * most, "{e} {a} of {most}");
+        }
+    }
+    let momentum = |a: &[V3d]| a.iter().zip(&s.mass).map(|(a, m)| a * *m).sum::<V3d>();
+    let size: f64 = plain.iter().zip(&s.mass).map(|(a, m)| a.norm() * m).sum();
+    assert!((momentum(&plain) - momentum(&smooth)).norm() < 1e-5 * size);
+}
+
+#[test]
+fn a_million_steps_at_rest_neither_drift_nor_gain() {
+    let (x, faces, rest) = grid(3, 2, 0.02, 0.02);
+    let h = Plan::comfortable_step(&sheet(&faces, &rest, x.len(), &cotton(1e-5)), 0.25, 2);
+    // Air, or a thousand seconds carry the last digit of a speed far.
+    let mut airy = cotton(1e-5);
+    airy.damping = 1.0;
+    let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &airy), &x, h, 1);
+    lab.gravity = V4::default();
+    lab.run(1_000_000, &[]);
+    let moved = lab.positions().iter().zip(&x).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    assert!(moved < 1e-4 && lab.energy() < 1e-9, "drift {moved}, energy {}", lab.energy());
+}
+
+#[test]
+fn a_swinging_sheet_gains_no_energy_at_the_step_that_is_called_comfortable() {
+    for degree in 0..3 {
+        let (x, faces, rest) = grid(6, 6, 0.02, 0.02);
+        let s = sheet(&faces, &rest, x.len(), &cotton(1e-5));
+        let h = Plan::comfortable_step(&s, 0.25, degree);
+        let mut lab = Lab::smooth(s, &x, h, 1, degree);
+        assert!(lab.plan.softened > 0.999, "{}", lab.plan.softened);
+        for _ in 0..10 {
+            lab.run(10_000, &[0, 6]);
+            assert!(lab.energy() < 1e-5, "degree {degree}: {} J", lab.energy());
+        }
+    }
+}
