@@ -199,8 +199,8 @@ impl Chain {
             root: self.tracked.world_from_camera * self.tracked.pose.root,
             angles: self.tracked.pose.angles.clone(),
         };
-        let dressed = dress(template, rest, &pose, &patterns, &DressOptions::default())
-            .context("the garments cannot be put on")?;
+        let options = DressOptions { config: realtime::Config::tracked(), ..DressOptions::default() };
+        let dressed = dress(template, rest, &pose, &patterns, &options).context("the garments cannot be put on")?;
         let looks = dressed.model.outfit.garments.iter().map(|g| look(&g.name)).collect();
         Ok(Worn { model: dressed.model, state: dressed.state, work: realtime::Workspace::default(), looks })
     }

@@ -98,7 +98,8 @@ pub(crate) fn dress(body: &Body, choices: &[GarmentChoice]) -> Result<Worn, Stri
     // The outfit comes back in the order of its layers; choices must follow.
     worn.sort_by_key(|(p, _)| p.layer);
     let list: Vec<_> = worn.iter().map(|(p, _)| p.clone()).collect();
-    let dressed = dressing::dress(&body.template, &rest, &body.pose, &list, &DressOptions::default());
+    let options = DressOptions { config: realtime::Config::tracked(), ..DressOptions::default() };
+    let dressed = dressing::dress(&body.template, &rest, &body.pose, &list, &options);
     let dressed = dressed.map_err(|e| e.to_string())?;
     let garments = dressed.model.outfit.garments.iter().zip(&worn).map(|(g, (_, c))| {
         let color = c.color_rgb.unwrap_or_else(|| library::own_color(&c.garment));

@@ -4,6 +4,7 @@ mod carry;
 mod cloth_touch;
 mod model;
 mod state;
+mod steady;
 mod step;
 mod touch;
 

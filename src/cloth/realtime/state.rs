@@ -31,6 +31,9 @@ pub struct State {
     pub(super) buried: Buried,
     /// Body of the last step that was computed (not slept through).
     pub(super) awake_body: Vec<P3>,
+    /// The measured body, held steady; empty before the first step.
+    #[serde(default)]
+    pub(super) followed: Vec<P3>,
     /// Steps so far.
     pub frames: u64,
     /// Steps in a row with body and cloth still.

@@ -4,6 +4,7 @@ use super::carry::carry;
 use super::cloth_touch::{ClothTouch, sheets};
 use super::model::{ALONE, Model};
 use super::state::{Input, PatchScratch, State, StepReport, Workspace, check_body};
+use super::steady::follow;
 use super::touch::{Touch, anchors, settle};
 use crate::cloth::ClothError;
 use crate::cloth::small_steps::{Step, V4, exchange};
@@ -48,7 +49,6 @@ pub fn step(
     input: &Input<'_>,
     work: &mut Workspace,
 ) -> Result<StepReport, ClothError> {
-    let started = Instant::now();
     check_body(model, input.body)?;
     if !(input.dt > 0.0 && input.dt.is_finite()) {
         return Err(ClothError::Field { field: "dt".into(), why: format!("{} s is not a positive time", input.dt) });
@@ -60,15 +60,30 @@ pub fn step(
             expected: model.garments.len(),
         });
     }
+    let mut body = std::mem::take(&mut state.followed);
+    if body.len() != input.body.len() {
+        body.clone_from(&state.body);
+    }
+    follow(&mut body, input.body, model.config.steady, input.dt);
+    let report = step_on(model, state, &Input { body: &body, dt: input.dt }, work);
+    state.followed = body;
+    Ok(report)
+}
+
+/// As [`step`], on a body that fits the model, taken as it is.
+fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Workspace) -> StepReport {
+    let started = Instant::now();
     let config = &model.config;
     let moved =
         |from: &[P3]| from.iter().zip(input.body).map(|(a, b)| (a - b).norm_squared()).fold(0.0, f32::max).sqrt();
+    // Where noise was taken away, what is left of it is no motion either.
+    let still_body = STILL_BODY.max(0.5 * config.steady as f32);
     state.frames += 1;
-    if config.sleep && state.still >= STILL_FRAMES && moved(&state.awake_body) < STILL_BODY {
+    if config.sleep && state.still >= STILL_FRAMES && moved(&state.awake_body) < still_body {
         let mut report =
             StepReport { sleeping: state.garments.iter().map(|g| g.positions.len()).sum(), ..StepReport::default() };
         report.stages_ms.total = ms(started);
-        return Ok(report);
+        return report;
     }
     // The mean, not the farthest vertex: a waving hand is no teleport, and carrying cloth costs it its folds.
     let sum: f64 = state.body.iter().zip(input.body).map(|(a, b)| f64::from((a - b).norm())).sum();
@@ -142,14 +157,14 @@ pub fn step(
     report.steps = model.garments.iter().map(|g| rounds * steps(g.h, span)).max().unwrap_or(0);
     report.speed = f64::from(speed);
     state.stale = if report.kept_last_good.is_some() { state.stale + 1 } else { 0 };
-    state.still = if speed < STILL_SPEED && moved(&state.awake_body) < STILL_BODY { state.still + 1 } else { 0 };
+    state.still = if speed < STILL_SPEED && moved(&state.awake_body) < still_body { state.still + 1 } else { 0 };
     if state.still == 0 {
         state.awake_body.copy_from_slice(input.body);
     }
     state.body.copy_from_slice(input.body);
     report.stages_ms.solve += ms(timer);
     report.stages_ms.total = ms(started);
-    Ok(report)
+    report
 }
 
 fn steps(h: f64, span: f64) -> usize {
