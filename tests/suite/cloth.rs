@@ -1,6 +1,7 @@
 //! The real-time cloth solver on a dressed body: what it must survive, and that threads change nothing.
 
 use nalgebra::UnitQuaternion;
+use rand::{Rng, SeedableRng};
 use std::sync::OnceLock;
 use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, skin};
 use tryon::cloth::realtime::{Config, Input, Model, State, StepReport, Workspace, step};
@@ -158,6 +159,30 @@ fn still_cloth_sleeps_and_wakes() {
     model.config.sleep = true;
     let body = moved(&d.body, V3::new(0.01, 0.0, 0.0));
     let r = step(&model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step");
+    assert_eq!(r.sleeping, 0, "a centimetre wakes it");
+}
+
+#[test]
+fn cloth_on_a_body_that_trembles_sleeps_and_wakes() {
+    let d = dressed(&Config::tracked());
+    let (mut state, mut work) = (d.state.clone(), Workspace::default());
+    let mut rng = rand_pcg::Pcg32::seed_from_u64(9);
+    // As a tracker's noise: 1.5 mm for the whole body, a wave of 1.5 mm along it.
+    let mut trembling = || {
+        let mut some = || 1.5e-3 * rng.random_range(-1.0f32..1.0);
+        let (whole, wave) = (V3::new(some(), some(), some()), V3::new(some(), some(), some()));
+        let moved = |p: &P3| p + whole + wave * (7.0 * p.y).sin();
+        d.body.iter().map(moved).collect::<Vec<_>>()
+    };
+    let mut slept = 0;
+    for _ in 0..150 {
+        let r = step(&d.model, &mut state, &Input { body: &trembling(), dt: DT }, &mut work).expect("a step");
+        slept += usize::from(r.sleeping > 0);
+    }
+    println!("slept {slept} of 150 calls");
+    assert!(slept > 75, "{slept} of 150");
+    let body = moved(&d.body, V3::new(0.01, 0.0, 0.0));
+    let r = step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step");
     assert_eq!(r.sleeping, 0, "a centimetre wakes it");
 }
 

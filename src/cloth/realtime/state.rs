@@ -29,7 +29,7 @@ pub struct State {
     pub(super) body: Vec<P3>,
     /// Skin that lies inside another part of the body.
     pub(super) buried: Buried,
-    /// Body of the last step that was computed (not slept through).
+    /// Body when it last moved by more than it may while cloth sleeps.
     pub(super) awake_body: Vec<P3>,
     /// The measured body, held steady; empty before the first step.
     #[serde(default)]
