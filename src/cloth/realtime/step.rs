@@ -26,6 +26,8 @@ const CALM: f32 = 1.0;
 const STILL_SPEED: f32 = 0.02;
 /// The same on a body that trembles: a skirt that is shaken by a millimetre swings at 0.04 to 0.13 m/s, m/s.
 const TREMBLING_SPEED: f32 = 0.15;
+/// Skin of a trembling body that no cloth is near may move this many times as far.
+const ELSEWHERE: f32 = 4.0;
 /// A body that has moved less than this since the cloth was last computed is still, metres.
 const STILL_BODY: f32 = 1e-3;
 /// Calls with everything still before the cloth falls asleep.
@@ -78,10 +80,8 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
     let config = &model.config;
     let moved =
         |from: &[P3]| from.iter().zip(input.body).map(|(a, b)| (a - b).norm_squared()).fold(0.0, f32::max).sqrt();
-    // Where noise was taken away, what is left of it is no motion either.
-    let still_body = STILL_BODY.max(0.5 * config.steady as f32);
     state.frames += 1;
-    if config.sleep && state.still >= STILL_FRAMES && moved(&state.awake_body) < still_body {
+    if config.sleep && state.still >= STILL_FRAMES && is_quiet(config.steady, state, input.body) {
         let mut report =
             StepReport { sleeping: state.garments.iter().map(|g| g.positions.len()).sum(), ..StepReport::default() };
         report.stages_ms.total = ms(started);
@@ -159,7 +159,7 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
     report.steps = model.garments.iter().map(|g| rounds * steps(g.h, span)).max().unwrap_or(0);
     report.speed = f64::from(speed);
     state.stale = if report.kept_last_good.is_some() { state.stale + 1 } else { 0 };
-    let quiet = moved(&state.awake_body) < still_body;
+    let quiet = is_quiet(config.steady, state, input.body);
     if !quiet {
         state.awake_body.copy_from_slice(input.body);
     }
@@ -169,6 +169,16 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
     report.stages_ms.solve += ms(timer);
     report.stages_ms.total = ms(started);
     report
+}
+
+/// The body is where it was when it last stirred: its skin under cloth, and roughly the rest of it, whose hands and feet
+/// a tracker knows less well. Where noise was taken away, what is left of it is no motion either.
+fn is_quiet(steady: f64, state: &State, body: &[P3]) -> bool {
+    let still = STILL_BODY.max(0.5 * steady as f32);
+    let far = if steady > 0.0 { ELSEWHERE * still } else { still };
+    let within = |v: usize, most: f32| (body[v] - state.awake_body[v]).norm_squared() < most * most;
+    let worn = state.garments.iter().flat_map(|g| &g.nearest).flatten();
+    (0..body.len()).all(|v| within(v, far)) && worn.into_iter().all(|v| within(*v as usize, still))
 }
 
 fn steps(h: f64, span: f64) -> usize {
