@@ -4,7 +4,7 @@
 //! (Delingette 2008, "triangular biquadratic springs", here in lengths instead of squares, so that stiffness does not
 //! grow with stretch). Without the coupling this is the paper's mass-spring model. A step is symplectic Euler on
 //! accelerations that are smoothed over the nearest neighbours, which gives the finest waves more inertia and so allows
-//! longer steps ([`filter`]); elements still too stiff for the step are softened when the garment is made, and counted.
+//! longer steps (`filter.rs`); elements still too stiff for the step are softened when the garment is made, and counted.
 
 mod contact;
 mod fabric;
