@@ -220,7 +220,12 @@ impl Model {
                 return Err(field(&format!("anchor of vertex {}", a.vertex), "it names a vertex that does not exist"));
             }
             let sheet = Sheet::of_garment(g)?;
-            let (smooth, h) = Plan::comfortable(&sheet, config.ahead, LONG_ENOUGH);
+            // Of the second degree, layers and folds tore the dancer's clothes of 12 mm edges apart: finer garments are
+            // softened to the step instead.
+            let (smooth, h) = match Plan::comfortable(&sheet, config.ahead, LONG_ENOUGH) {
+                (2.., _) => (0, Plan::comfortable_step(&sheet, config.ahead, 0)),
+                found => found,
+            };
             let h = h.clamp(1.0 / (60.0 * config.most_steps as f64), 1e-3);
             let bend_every = Plan::bend_every(smooth);
             let fit = Fit { h, ahead: config.ahead, springs_only: false, bend_every, smooth };
