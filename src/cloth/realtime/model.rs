@@ -95,7 +95,8 @@ impl Default for Config {
 impl Config {
     /// For a body that is tracked by a camera.
     pub fn tracked() -> Self {
-        /// Twice what a standing body trembles by with a Kinect v1 at 2.4 m (95 % of the vertices), metres.
+        /// A standing body trembles by 3 mm with a Kinect v1 at 2.4 m (95 % of its vertices, from call to call); at
+        /// 5 mm twice as much of that was left, metres.
         const TREMBLE: f64 = 8e-3;
         Self { steady: TREMBLE, ..Self::default() }
     }

@@ -4,7 +4,7 @@ use crate::math::P3;
 
 /// Calls a second that [`SHARE`] is meant for.
 const RATE: f64 = 30.0;
-/// Share of the way that the least movement is followed in one call: what trembles by 1 mm moves cloth at 1 mm/s, and
+/// Share of the way that the least movement is followed in one call: what trembles by 1 mm moves cloth at 1.5 mm/s, and
 /// still nothing is left behind for longer than a second.
 const SHARE: f64 = 0.05;
 

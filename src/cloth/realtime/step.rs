@@ -26,7 +26,8 @@ const CALM: f32 = 1.0;
 const STILL_SPEED: f32 = 0.02;
 /// The same on a body that trembles: a skirt that is shaken by a millimetre swings at 0.04 to 0.13 m/s, m/s.
 const TREMBLING_SPEED: f32 = 0.15;
-/// Skin of a trembling body that no cloth is near may move this many times as far.
+/// Skin of a trembling body that no cloth is near may move this many times as far: hands were seen to wander by 9 mm
+/// where skin under cloth stayed within 4.
 const ELSEWHERE: f32 = 4.0;
 /// A body that has moved less than this since the cloth was last computed is still, metres.
 const STILL_BODY: f32 = 1e-3;
