@@ -361,6 +361,21 @@ fn stills(a: &Args, template: &Arc<Template>, settings: &str, folder: &Path, lab
         if a.verbose {
             println!("{i:4} {:?} within {:.2}", state.status, share);
         }
+        if let Some(dir) = &a.jsonl {
+            let rest = w.rest_body(m, &state.shape).clone();
+            let mut bones = BoneTransforms::default();
+            state.pose.bones(template.skeleton(), &rest, &mut bones);
+            let joints: std::collections::BTreeMap<&str, [f64; 3]> = template
+                .skeleton()
+                .joints()
+                .iter()
+                .zip(&bones.joints)
+                .map(|(j, p)| (j.name.as_str(), p.coords.into()))
+                .collect();
+            std::fs::create_dir_all(dir).expect("jsonl folder");
+            let line = serde_json::json!({ "frame": i, "status": state.status, "joints": joints }).to_string();
+            std::fs::write(dir.join(format!("still_{i:04}.json")), line).expect("json");
+        }
         if let (Some(dir), Some(scene)) = (&a.overlay, &scene) {
             std::fs::create_dir_all(dir).expect("overlay folder");
             let image = overlay(template, m, state, w, scene, i);

@@ -3,7 +3,9 @@
 mod align;
 mod confidence;
 mod config;
+mod hypotheses;
 mod kinematics;
+mod limb;
 mod model;
 mod place;
 mod report;

@@ -1,7 +1,7 @@
 //! What never changes while tracking: the template, the camera and points chosen on the template.
 
 use super::TrackerConfig;
-use super::sleeve::{Arm, arms};
+use super::limb::{self, Limb};
 use super::stand::{Leg, legs};
 use crate::body::{JointMotion, SkinWeights, Template};
 use crate::camera::Calibration;
@@ -46,7 +46,9 @@ pub struct TrackerModel {
     /// Legs, for feet out of view.
     pub(super) standing: Vec<Leg>,
     /// Arms, left and right, for hands beyond sleeves without return.
-    pub(super) arms: [Option<Arm>; 2],
+    pub(super) arms: [Option<Limb>; 2],
+    /// Legs, left and right, for feet found at the start.
+    pub(super) legs_in_view: [Option<Limb>; 2],
     /// Angles of knees, ankles and feet.
     pub(super) legs: Vec<bool>,
     /// Share of the pull to the rest pose that is left for each angle when its bone is in full view.
@@ -79,7 +81,8 @@ impl TrackerModel {
         let tied = tied_bones(&template, &directions, first);
         let stiffness = stiffness(&template);
         let standing = legs(&template);
-        let arms = arms(&template);
+        let arms = limb::arms(&template);
+        let legs_in_view = limb::legs(&template);
         let leg = |name: &str| ["knee", "ankle", "foot"].iter().any(|s| name.contains(s));
         let legs = skeleton.joints().iter().flat_map(|j| std::iter::repeat_n(leg(&j.name), j.motion.dofs())).collect();
         let share = |j: &crate::body::Joint| std::iter::repeat_n(seen_share(&j.name), j.motion.dofs());
@@ -98,6 +101,7 @@ impl TrackerModel {
             stiffness,
             standing,
             arms,
+            legs_in_view,
             legs,
             seen_shares,
         }

@@ -1,6 +1,7 @@
 //! The first pose: where the body is by its outline and principal axes, then a handful of poses tried.
 
-use super::align::{AlignScratch, Fit, START, SampleRest, Schedule, Seen, aim, align, evaluate};
+use super::align::{AlignScratch, Fit, START, SampleRest, Schedule, Seen, align, evaluate};
+use super::hypotheses::{choose_arm, choose_leg, ends};
 use super::model::TrackerModel;
 use crate::body::{Pose, RestBody};
 use crate::math::{P3, Rigid, principal_axes};
@@ -97,77 +98,6 @@ fn upright(up: &Vector3<f64>, yaw: f64) -> UnitQuaternion<f64> {
     facing * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw)
 }
 
-/// Directions of the upper arm that are tried (x outward, y up, z forward).
-const UPPER_ARMS: [[f64; 3]; 9] = [
-    [0.15, -0.99, 0.0],
-    [0.4, -0.92, 0.0],
-    [0.75, -0.65, -0.1],
-    [1.0, 0.0, 0.0],
-    [0.7, 0.7, 0.0],
-    [0.25, 0.95, 0.15],
-    [0.3, -0.75, 0.6],
-    [0.3, -0.1, 0.95],
-    [0.75, -0.2, 0.6],
-];
-/// Bends of the elbow, radians, tried in a first and a second round; and turns of the upper arm about itself.
-const BENDS: [f64; 2] = [0.1, 1.4];
-/// See [`BENDS`].
-const MORE_BENDS: [f64; 3] = [0.7, 1.4, 2.2];
-/// See [`BENDS`].
-const TWISTS: [f64; 5] = [-1.8, -0.9, 0.0, 0.9, 1.8];
-/// What a bend and a twist must earn, m² per point and squared radian: a straight arm explained by a bent one that is
-/// turned inside out stays so for good. A hand of ten readings is worth 7·10⁻⁵.
-const BEND_COST: f64 = 1e-5;
-/// See [`BEND_COST`].
-const TWIST_COST: f64 = 3e-5;
-/// Upper arms that go into the second round.
-const ARM_FINALISTS: usize = 3;
-
-/// The arm pose of one side that explains the picture best.
-pub(super) fn choose_arm(
-    model: &TrackerModel,
-    rest: (&RestBody, &SampleRest),
-    pose: &Pose,
-    seen: &Seen<'_>,
-    side: &str,
-    scratch: &mut AlignScratch,
-) -> Pose {
-    let skeleton = model.template.skeleton();
-    let sign = if side == "left" { 1.0 } else { -1.0 };
-    let mut guess = |direction: [f64; 3], bend: f64, twist: f64| {
-        let mut guess = pose.clone();
-        let d = Vector3::new(direction[0] * sign, direction[1], direction[2]).normalize();
-        aim(model, &mut guess, &format!("{side}_shoulder"), &format!("{side}_elbow"), d, twist * sign);
-        guess.set(skeleton, &format!("{side}_elbow"), &[bend]);
-        guess.clamp_to_limits(skeleton);
-        let effort = BEND_COST * bend * bend + TWIST_COST * twist * twist;
-        (evaluate(model, rest, &guess, seen, 0.15, scratch).cost + effort, guess)
-    };
-    let mut tried: Vec<(f64, [f64; 3], Pose)> = Vec::new();
-    for direction in UPPER_ARMS {
-        for bend in BENDS {
-            let (cost, pose) = guess(direction, bend, 0.0);
-            tried.push((cost, direction, pose));
-        }
-    }
-    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut finalists: Vec<[f64; 3]> = Vec::new();
-    for (_, direction, _) in &tried {
-        if finalists.len() < ARM_FINALISTS && !finalists.contains(direction) {
-            finalists.push(*direction);
-        }
-    }
-    for direction in finalists {
-        for bend in MORE_BENDS {
-            for twist in TWISTS {
-                let (cost, pose) = guess(direction, bend, twist);
-                tried.push((cost, direction, pose));
-            }
-        }
-    }
-    tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(|| pose.clone(), |t| t.2)
-}
-
 /// Finds the first pose. Returns the pose and its fit, or `None` when the outline says nothing.
 pub(super) fn place(
     model: &TrackerModel,
@@ -200,12 +130,16 @@ pub(super) fn place(
         }
     }
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let ends = ends(seen, &outline.torso);
     // Arms of the best torsos, one side after the other; outlines say little about hypotheses and cost the most.
     let terms = scratch.terms;
     scratch.terms.edge_weight = 0.0;
     for (cost, pose) in best.iter_mut().take(TORSO_FINALISTS) {
-        for side in ["left", "right"] {
-            *pose = choose_arm(model, rest, pose, seen, side, scratch);
+        for side in 0..2 {
+            *pose = choose_arm(model, rest, pose, seen, side, &ends, scratch);
+        }
+        for side in 0..2 {
+            *pose = choose_leg(model, rest, pose, seen, side, &ends, scratch);
         }
         *cost = evaluate(model, rest, pose, seen, 0.15, scratch).cost;
     }

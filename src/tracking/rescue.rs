@@ -1,8 +1,8 @@
 //! An arm that went astray is looked for again: by the arm poses of a first placement, the rest of the body as it is.
 
 use super::align::{AlignScratch, Fit, START_TERMS, SampleRest, Schedule, Seen, align, evaluate};
+use super::hypotheses::{choose_arm, ends};
 use super::model::TrackerModel;
-use super::place::choose_arm;
 use crate::body::{Pose, RestBody};
 use serde::{Deserialize, Serialize};
 
@@ -54,12 +54,15 @@ impl Rescue {
         schedule: &Schedule,
         scratch: &mut AlignScratch,
     ) -> Option<Fit> {
-        let side = if self.looks.is_multiple_of(2) { "left" } else { "right" };
+        let side = (self.looks % 2) as usize;
         self.looks = self.looks.wrapping_add(1);
         let now = evaluate(model, rest, pose, seen, REACH, scratch);
+        // The trunk's middle, as the pose has it.
+        let chest = model.template.skeleton().index("spine3").unwrap_or(0);
+        let torso = scratch.bones.joints[chest].cast::<f32>();
         let terms = scratch.terms;
         scratch.terms = super::align::Terms { edge_weight: 0.0, ..START_TERMS };
-        let mut other = choose_arm(model, rest, pose, seen, side, scratch);
+        let mut other = choose_arm(model, rest, pose, seen, side, &ends(seen, &torso), scratch);
         scratch.terms = terms;
         align(model, rest, &mut other, seen, &Schedule { ahead: 0, ..*schedule }, scratch);
         let fit = evaluate(model, rest, &other, seen, REACH, scratch);

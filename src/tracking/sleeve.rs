@@ -1,32 +1,16 @@
 //! An arm whose sleeve gives no return, but whose hand does: the hand tells where the arm goes.
 
 use super::align::{AlignScratch, Seen};
+use super::limb::Limb;
 use super::model::TrackerModel;
-use crate::body::{BoneTransforms, JointMotion, Pose, RestBody, Template};
-use crate::math::{P3, P3d, exp_so3, log_so3};
+use crate::body::{BoneTransforms, Pose, RestBody};
+use crate::math::{P3, P3d};
 use crate::spatial::Label;
-use nalgebra::{UnitQuaternion, Vector3};
-
-/// One arm of the template.
-#[derive(Clone, Debug)]
-pub(super) struct Arm {
-    shoulder: usize,
-    elbow: usize,
-    wrist: usize,
-    /// End of the hand.
-    tip: usize,
-    /// Angles of shoulder and elbow.
-    angles: Vec<usize>,
-    /// The elbow's only angle.
-    bend: usize,
-}
+use nalgebra::Vector3;
 
 /// Weight of a hand's place, per point: against arms without a reading (2·10⁻⁶ per squared radian) it decides, against
 /// seen ones (10⁻³) it has hardly a say.
 const HAND: f64 = 1e-3;
-/// What is seen of a hand is taken for the point at this share of the way from the wrist to the finger tips: of a hand out
-/// of its sleeve the middle shows, of one half in it the fingers.
-const MIDDLE: f64 = 0.7;
 /// A hand this near to where the pose has it is followed, one farther away is reached for anew, metres.
 const FOLLOWED: f64 = 0.15;
 /// A forearm is seen when so many of the points along it have a reading of the person this near in depth, metres.
@@ -38,27 +22,10 @@ const ALONG: usize = 5;
 /// A hand farther from the shoulder than the arm is long times this belongs to somebody else.
 const STRETCH: f64 = 1.15;
 
-/// The arms of a template, left and right; `None` for one without.
-pub(super) fn arms(template: &Template) -> [Option<Arm>; 2] {
-    let skeleton = template.skeleton();
-    ["left", "right"].map(|side| {
-        let at = |part: &str| skeleton.index(&format!("{side}_{part}"));
-        let (shoulder, elbow, wrist) = (at("shoulder")?, at("elbow")?, at("wrist")?);
-        let hinge = matches!(skeleton.joints()[elbow].motion, JointMotion::Hinge { .. });
-        let ball = matches!(skeleton.joints()[shoulder].motion, JointMotion::Ball { .. });
-        let (s, bend) = (skeleton.dof_offset(shoulder), skeleton.dof_offset(elbow));
-        let tip = at("hand_end").or_else(|| at("hand")).unwrap_or(wrist);
-        (hinge && ball).then(|| Arm { shoulder, elbow, wrist, tip, angles: vec![s, s + 1, s + 2, bend], bend })
-    })
-}
-
-impl Arm {
-    fn hand(&self, bones: &BoneTransforms) -> P3d {
-        bones.joints[self.wrist] + (bones.joints[self.tip] - bones.joints[self.wrist]) * MIDDLE
-    }
+impl Limb {
     /// The camera has readings of the person along the forearm.
     fn seen(&self, bones: &BoneTransforms, seen: &Seen<'_>) -> bool {
-        let (from, to) = (bones.joints[self.elbow], self.hand(bones));
+        let (from, to) = (bones.joints[self.hinge], self.hand(bones));
         let on = |k: &usize| {
             let p = from + (to - from) * (*k as f64 / (ALONG - 1) as f64);
             let cell = seen.grid.cell_of(&p.cast()).and_then(|(u, v)| seen.grid.cell(u, v));
@@ -67,29 +34,6 @@ impl Arm {
             })
         };
         (0..ALONG).filter(on).count() >= SEEN_POINTS
-    }
-    /// Points the arm at `target` with the elbow bent as far as the distance asks, from hanging loosely on.
-    fn reach(&self, model: &TrackerModel, rest: &RestBody, pose: &mut Pose, target: &P3d) {
-        let skeleton = model.template.skeleton();
-        let mut bones = BoneTransforms::default();
-        pose.angles[self.angles[0]..self.angles[0] + 3].fill(0.0);
-        pose.bones(skeleton, rest, &mut bones);
-        let shoulder = bones.joints[self.shoulder];
-        let upper = (bones.joints[self.elbow] - shoulder).norm();
-        let fore = (self.hand(&bones) - bones.joints[self.elbow]).norm();
-        let far = (target - shoulder).norm();
-        let cos = (upper * upper + fore * fore - far * far) / (2.0 * upper * fore).max(f64::MIN_POSITIVE);
-        pose.angles[self.bend] = std::f64::consts::PI - cos.clamp(-1.0, 1.0).acos();
-        pose.clamp_to_limits(skeleton);
-        pose.bones(skeleton, rest, &mut bones);
-        let (now, wanted) = (self.hand(&bones) - shoulder, target - shoulder);
-        let Some(turn) = UnitQuaternion::rotation_between(&now, &wanted) else { return };
-        let parent = model.parents[self.shoulder].map_or(pose.root.iso().rotation, |p| bones.bones[p].rotation);
-        let at = self.angles[0];
-        let old = exp_so3(&Vector3::new(pose.angles[at], pose.angles[at + 1], pose.angles[at + 2]));
-        let new = log_so3(&(parent.inverse() * turn * parent * old));
-        pose.angles[at..at + 3].copy_from_slice(new.as_slice());
-        pose.clamp_to_limits(skeleton);
     }
 }
 
@@ -109,21 +53,20 @@ pub(super) fn assign(
     pose.bones(model.template.skeleton(), rest, &mut bones);
     for (found, arm) in out.iter_mut().zip(&model.arms) {
         let Some(arm) = arm.as_ref().filter(|a| !a.seen(&bones, seen)) else { continue };
-        let shoulder = bones.joints[arm.shoulder];
-        let length = (rest.joints[arm.elbow] - rest.joints[arm.shoulder]).norm()
-            + (rest.joints[arm.tip] - rest.joints[arm.elbow]).norm();
+        let shoulder = bones.joints[arm.root];
+        let length = arm.length(rest);
         // The other shoulder's hand is not this one's, unless this one's is nearer.
-        let across = model.arms.iter().flatten().find(|a| a.shoulder != arm.shoulder);
+        let across = model.arms.iter().flatten().find(|a| a.root != arm.root);
         let mine = |h: &P3d| {
             let off = (h - shoulder).norm();
-            let other = across.map_or(f64::INFINITY, |a| (h - bones.joints[a.shoulder]).norm());
+            let other = across.map_or(f64::INFINITY, |a| (h - bones.joints[a.root]).norm());
             off < STRETCH * length && off < other
         };
         let near = |h: &P3d| (h - arm.hand(&bones)).norm();
         let hand = hands.iter().map(|h| h.cast::<f64>()).filter(mine).min_by(|a, b| near(a).total_cmp(&near(b)));
         if let Some(hand) = hand {
             if near(&hand) > FOLLOWED {
-                arm.reach(model, rest, pose, &hand);
+                arm.reach(model, rest, pose, &hand, None);
             }
             *found = Some(hand.coords);
         }
@@ -168,7 +111,7 @@ mod tests {
         pose.bones(model.template.skeleton(), &rest, &mut bones);
         for side in 0..2 {
             let arm = model.arms[side].as_ref().expect("an arm");
-            let shoulder = bones.joints[arm.shoulder];
+            let shoulder = bones.joints[arm.root];
             let outward = (shoulder - bones.joints[0]).x.signum();
             for offset in [[0.3, 0.3, -0.1], [0.2, -0.2, -0.35], [0.45, 0.0, 0.0]] {
                 let hand = shoulder + Vector3::new(outward * offset[0], offset[1], offset[2]);

@@ -8,5 +8,6 @@ mod company;
 mod dance;
 mod garment_stream;
 mod garments;
+mod starts;
 mod stress;
 mod tracking;

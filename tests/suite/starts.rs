@@ -1,0 +1,121 @@
+//! Starts from nothing in poses that are no calibration pose: a kick, a lifted knee, hands on the hips.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use tryon::body::{BoneTransforms, Pose, embedded, skin};
+use tryon::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+use tryon::math::{Camera, Rigid};
+use tryon::par::Par;
+use tryon::raster::{View, VisibilityBuffer, rasterise};
+use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+
+/// Angles of named joints (rotation vectors; one number for a hinge) of somebody who stands 2.5 m away, turned by `yaw`.
+fn mean_error_mm(angles: &[(&str, &[f64])], yaw: f64, of: &[&str]) -> f64 {
+    let template = embedded::template();
+    let skeleton = template.skeleton();
+    let rest = template.personalise(&Default::default());
+    let facing = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+        * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw);
+    let middle = rest.joints[0].coords;
+    let root = Rigid::from_parts(Vector3::new(0.0, 0.1, 2.5) - facing * middle, facing);
+    let mut pose: Pose<Camera> = Pose::rest(skeleton, root);
+    for (joint, values) in angles {
+        assert!(skeleton.index(joint).is_some(), "{joint}");
+        pose.set(skeleton, joint, values);
+    }
+    pose.clamp_to_limits(skeleton);
+    let mut bones = BoneTransforms::default();
+    pose.bones(skeleton, &rest, &mut bones);
+    let mut vertices = Vec::new();
+    skin(Par::Seq, &rest.vertices, template.weights(), &bones, &mut vertices);
+    let camera = Intrinsics::KINECT_V1;
+    let mut seen = VisibilityBuffer::default();
+    rasterise(&View::Perspective { camera, near: 0.1 }, &vertices, template.mesh().faces(), &mut seen);
+    let mut depth = DepthImage::empty(camera.width, camera.height);
+    for (d, z) in depth.data_mut().iter_mut().zip(&seen.depth) {
+        *d = if z.is_finite() { (z * 1e3).round() as u16 } else { 0 };
+    }
+    let model = TrackerModel::new(template.clone(), Calibration::registered(camera), TrackerConfig::default());
+    let mut state = TrackerState::new(&model);
+    let mut workspace = Workspace::default();
+    for i in 0..3u64 {
+        let frame = RgbdFrame { sequence: i, time_ns: i * 33_333_333, depth: depth.clone(), color: None };
+        step(&model, &mut state, &frame, &mut workspace).expect("a step");
+    }
+    assert!(state.status.is_live(), "{:?}", state.status);
+    let (_, found) = workspace.posed(&model, &state);
+    let off = |j: &&str| {
+        let j = skeleton.index(j).expect("a joint");
+        (found.joints[j] - bones.joints[j]).norm() * 1e3
+    };
+    of.iter().map(off).sum::<f64>() / of.len() as f64
+}
+
+/// Who lifts a knee, kicks, sits, or crosses the arms is found in the first picture. Without ends of the body the high
+/// kicks and the knee turned out were 116 to 370 mm off; two of the thirty-six still are (a shank hidden behind its thigh,
+/// a knee turned out on the far side).
+#[test]
+fn a_start_needs_no_calibration_pose() {
+    let legs = ["left_hip", "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle"];
+    let arms = ["left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist"];
+    let scenes: [(&str, &[(&str, &[f64])], &[&str]); 12] = [
+        ("knee lifted", &[("left_hip", &[-1.4, 0.0, 0.0]), ("left_knee", &[1.5])], &legs),
+        ("kick", &[("right_hip", &[-1.2, 0.0, 0.0])], &legs),
+        ("leg aside", &[("right_hip", &[0.0, 0.0, -0.6])], &legs),
+        ("hand to the front", &[("left_shoulder", &[-1.2, 0.0, -0.5]), ("left_elbow", &[1.0])], &arms),
+        ("high kick", &[("right_hip", &[-1.9, 0.0, 0.0])], &legs),
+        ("leg far aside", &[("right_hip", &[0.0, 0.0, -1.2])], &legs),
+        ("foot behind", &[("right_hip", &[0.3, 0.0, 0.0]), ("right_knee", &[1.8])], &legs),
+        (
+            "lunge",
+            &[
+                ("right_hip", &[-1.3, 0.0, 0.0]),
+                ("right_knee", &[1.4]),
+                ("left_hip", &[0.4, 0.0, 0.0]),
+                ("left_knee", &[0.7]),
+            ],
+            &legs,
+        ),
+        (
+            "seated",
+            &[
+                ("right_hip", &[-1.5, 0.0, 0.0]),
+                ("right_knee", &[1.5]),
+                ("left_hip", &[-1.5, 0.0, 0.0]),
+                ("left_knee", &[1.5]),
+            ],
+            &legs,
+        ),
+        ("flamingo", &[("left_hip", &[0.0, 0.8, 1.0]), ("left_knee", &[2.0])], &legs),
+        (
+            "hands behind head",
+            &[
+                ("left_shoulder", &[0.0, 0.0, 1.3]),
+                ("left_elbow", &[2.2]),
+                ("right_shoulder", &[0.0, 0.0, -1.3]),
+                ("right_elbow", &[2.2]),
+            ],
+            &arms,
+        ),
+        (
+            "arms crossed",
+            &[
+                ("left_shoulder", &[-0.6, 0.8, -0.5]),
+                ("left_elbow", &[1.9]),
+                ("right_shoulder", &[-0.9, -0.8, 0.5]),
+                ("right_elbow", &[1.9]),
+            ],
+            &arms,
+        ),
+    ];
+    let mut found = 0;
+    let mut all = 0;
+    for (name, angles, of) in scenes {
+        for yaw in [0.0, 0.5, -0.9] {
+            let off = mean_error_mm(angles, yaw, of);
+            println!("{name}, turned by {yaw}: {off:.0} mm");
+            all += 1;
+            found += u32::from(off < 25.0);
+        }
+    }
+    assert!(all == 36 && found >= 34, "{found} of {all}");
+}
