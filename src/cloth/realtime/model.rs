@@ -42,7 +42,8 @@ pub struct Config {
     pub most_steps: usize,
     /// How far ahead of positions forces are evaluated, in small steps: damps ringing.
     pub ahead: f64,
-    /// Vertices of a patch, which is what a thread works on. Changes bits, so it is a setting and not the machine's.
+    /// Vertices of a patch, which is what a thread works on. Changes bits, so it is a setting and not the machine's. A
+    /// garment that is cut pays for ghosts: of two garments with 10k vertices together each shall be one.
     pub patch: usize,
     /// Gravity, m/s².
     pub gravity: [f64; 3],
@@ -76,7 +77,7 @@ impl Default for Config {
         Self {
             most_steps: 80,
             ahead: 0.25,
-            patch: 5000,
+            patch: 6000,
             gravity: [0.0, -9.81, 0.0],
             offset: 0.005,
             camera_toward: [0.0, -1.0],
@@ -111,6 +112,8 @@ pub(super) struct GarmentModel {
     pub(super) h: f64,
     /// Steps from one evaluation of bending to the next.
     pub(super) bend_every: usize,
+    /// Degree of the smoothing of accelerations.
+    pub(super) smooth: usize,
     /// Share of the membrane stiffness that the step carries.
     pub(super) softened: f64,
     /// Body parts that decide: cloth ends outside these.
@@ -149,6 +152,19 @@ pub(super) const ALONE: usize = 2;
 /// A garment that is stable at this step needs no more smoothing, s. At 1/2400 s, with higher degrees, a still person's
 /// cloth trembled on and never slept.
 const LONG_ENOUGH: f64 = 1.0 / 3600.0;
+
+/// Rings of ghosts that a patch needs for so many steps alone: a step moves news by one ring and by one more for each
+/// degree, an evaluation of bending before it by one more.
+fn rings(steps: usize, bend_every: usize, smooth: usize) -> usize {
+    steps * (1 + smooth) + steps.div_ceil(bend_every)
+}
+
+impl GarmentModel {
+    /// Rings around a patch that must be right where it makes so many more steps alone.
+    pub(super) fn rings(&self, steps: usize) -> usize {
+        rings(steps, self.bend_every, self.smooth)
+    }
+}
 
 /// Which [`Region`] each body vertex belongs to, by the name of its dominant joint.
 pub fn body_parts(template: &Template) -> Vec<u8> {
@@ -228,11 +244,10 @@ impl Model {
                 found => found,
             };
             let h = h.clamp(1.0 / (60.0 * config.most_steps as f64), 1e-3);
-            let bend_every = Plan::bend_every(smooth);
+            let bend_every = Plan::bend_every(&sheet, h);
             let fit = Fit { h, ahead: config.ahead, springs_only: false, bend_every, smooth };
             let plan = Plan::new(&sheet, &fit);
-            // A step moves news by one ring and by one more for each degree, an evaluation of bending by two.
-            let rings = ALONE * bend_every * (1 + smooth) + 2 * ALONE + 2;
+            let rings = rings(ALONE * bend_every, bend_every, smooth);
             let patches = plan.patches(g.vertices.div_ceil(config.patch), rings);
             let own: Vec<u8> = g.regions.iter().map(|r| r.decisive().0).collect();
             let other = own.iter().map(|o| Region::ALL.0 & !o).collect();
@@ -244,6 +259,7 @@ impl Model {
                 patches,
                 h,
                 bend_every,
+                smooth,
                 softened: plan.softened,
                 own,
                 other,

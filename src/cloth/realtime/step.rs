@@ -252,25 +252,25 @@ fn advance(model: &Model, all: &mut [PatchScratch], span: f64) {
             let s1 = (s0 + ALONE * m.bend_every).min(n);
             par::for_chunks(model.config.par, patches, 1, |k, p| {
                 let (f, p) = (&m.patches[k], &mut p[0]);
+                // What must be right after step `s` for the steps that a patch makes alone after it.
+                let rings = |s: usize| m.rings(s1 - s - 1);
                 for s in s0..s1 {
                     if (s - s0) % m.bend_every == 0 {
-                        p.motion.bend(f, h * m.bend_every.min(s1 - s) as f32 * 0.5);
+                        p.motion.bend(f, h * m.bend_every.min(s1 - s) as f32 * 0.5, rings(s) + m.smooth);
                     }
                     let t = s as f32 * h;
-                    let step = Step { h, t, ahead, gravity };
+                    let step = Step { h, t, ahead, gravity, rings: rings(s) };
                     p.motion.accelerate(f, &step, &p.planes, &p.ties);
                     p.motion.tie(&p.ties, t, h);
                     // In this order: the body has the last word.
                     let (body, cloth) = p.planes.split_at(p.body_planes);
                     p.motion.restrain(cloth, t, h, CLOTH_RECOVERY);
                     p.report.contacts = p.motion.restrain(body, t, h, RECOVERY);
-                    p.motion.advance(&step, FASTEST);
+                    p.motion.advance(f, &step, FASTEST);
                 }
             });
             if patches.len() > 1 {
-                let mut motions: Vec<_> = patches.iter_mut().map(|p| std::mem::take(&mut p.motion)).collect();
-                exchange(&m.patches, &mut motions);
-                patches.iter_mut().zip(motions).for_each(|(p, m)| p.motion = m);
+                exchange(&m.patches, patches, |p| &mut p.motion);
             }
             s0 = s1;
         }

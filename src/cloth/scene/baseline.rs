@@ -13,6 +13,8 @@ use std::time::Instant;
 
 /// Steps a frame when none are asked for.
 const USUAL_SUBSTEPS: [usize; 2] = [40, 8];
+/// XPBD: steps from one evaluation of bending to the next.
+const BEND_EVERY: usize = 4;
 /// Relative residual and most products of the linear solve.
 const SOLVE: (f64, usize) = (1e-3, 60);
 
@@ -26,7 +28,7 @@ pub(super) fn run(
     let dt = 1.0 / scene.rate;
     let steps = if config.substeps == 0 { USUAL_SUBSTEPS[usize::from(springs)] } else { config.substeps };
     let h = dt / steps as f64;
-    let bend_every = if config.every[0] == 0 { Plan::bend_every(0) } else { config.every[0] };
+    let bend_every = if config.every[0] == 0 { BEND_EVERY } else { config.every[0] };
     // A plan for a step so short that nothing is softened: both are stable at any step.
     let fit = Fit { h: 1e-9, ahead: 0.0, springs_only: springs, bend_every, smooth: 0 };
     let plan = Plan::new(&scene.sheet, &fit);
@@ -79,7 +81,7 @@ pub(super) fn run(
             match &mut solver {
                 Solver::Xpbd(blocks) => {
                     if s % bend_every == 0 {
-                        m.bend(f, hf * bend_every as f32 * 0.5);
+                        m.bend(f, hf * bend_every as f32 * 0.5, 0);
                     }
                     m.fall(f, hf, gravity);
                     m.tie(&ties, 0.0, hf);
@@ -96,7 +98,7 @@ pub(super) fn run(
             }
             m.restrain(&planes, 0.0, hf, RECOVERY);
             m.tie(&ties, 0.0, hf);
-            m.advance(&Step { h: hf, ..Step::default() }, f32::INFINITY);
+            m.advance(f, &Step { h: hf, ..Step::default() }, f32::INFINITY);
         }
         for i in 0..n {
             x[i] = m.position(i);

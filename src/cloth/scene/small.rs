@@ -44,14 +44,14 @@ pub(super) fn run(
         given => given,
     };
     let h = dt / substeps as f64;
-    let bend_every = if config.every[0] == 0 { Plan::bend_every(smooth) } else { config.every[0] };
+    let bend_every = if config.every[0] == 0 { Plan::bend_every(sheet, h) } else { config.every[0] };
     // Contacts are looked for again after so many evaluations of bending, where patches meet.
     let looks = config.every[1].max(1).div_ceil(bend_every);
     let plan = Plan::new(sheet, &Fit { h, ahead: config.ahead, springs_only: false, bend_every, smooth });
-    // A step moves news by one ring and by one more for each degree, an evaluation of bending by two. Patches meet after
-    // every step: what ghosts cost is more than the meeting.
+    // A step moves news by one ring and by one more for each degree, an evaluation of bending before it by one more.
+    // Patches meet after every step: what ghosts cost is more than the meeting.
     let alone = if config.patches > 1 { 1 } else { bend_every };
-    let fabrics = plan.patches(config.patches, (1 + smooth) * alone + 2);
+    let fabrics = plan.patches(config.patches, (1 + smooth) * alone + 1);
     let start: Vec<V3d> = scene.start.iter().map(|p| p.coords.cast()).collect();
     let local: Vec<V3d> = match scene.pinned_to {
         Some(c) => {
@@ -63,7 +63,6 @@ pub(super) fn run(
     let mut flow = frame(0, &scene.start);
     let (mut finished, mut shown) = (1, Vec::new());
     let mut times = Vec::new();
-    let mut motions = vec![Motion::default(); fabrics.len()];
     let mut scratch: Vec<Scratch> = fabrics.iter().map(|_| Scratch::default()).collect();
     let mut x: Vec<V4> = scene.start.iter().map(|p| V4::new(p.x, p.y, p.z)).collect();
     let mut velocity = vec![V4::default(); n];
@@ -76,9 +75,9 @@ pub(super) fn run(
             break;
         }
         let started = Instant::now();
-        for (m, f) in motions.iter_mut().zip(&fabrics) {
+        for (w, f) in scratch.iter_mut().zip(&fabrics) {
             let all = || f.vertices.iter().map(|v| *v as usize);
-            m.begin(all().map(|v| x[v]), all().map(|v| velocity[v]));
+            w.motion.begin(all().map(|v| x[v]), all().map(|v| velocity[v]));
         }
         let (mut s0, mut looked) = (0, 0);
         while s0 < substeps {
@@ -89,9 +88,6 @@ pub(super) fn run(
             }
             let t0 = (index - 1) as f64 * dt + s0 as f64 * h;
             let span = ((s0 + bend_every * looks).min(substeps) - s0) as f64 * h;
-            for (w, m) in scratch.iter_mut().zip(&mut motions) {
-                std::mem::swap(&mut w.motion, m);
-            }
             let par = if fabrics.len() > 1 { Par::Rayon } else { Par::Seq };
             par::for_chunks(par, &mut scratch, 1, |k, w| {
                 let (f, w) = (&fabrics[k], &mut w[0]);
@@ -109,27 +105,24 @@ pub(super) fn run(
                     }
                 }
                 if s0 % bend_every == 0 {
-                    w.motion.bend(f, hf * bend_every.min(substeps - s0) as f32 * 0.5);
+                    w.motion.bend(f, hf * bend_every.min(substeps - s0) as f32 * 0.5, smooth);
                 }
                 for s in s0..s1 {
                     let t = (s - looked) as f32 * hf;
-                    let step = Step { h: hf, t, ahead, gravity };
+                    let step = Step { h: hf, t, ahead, gravity, rings: 0 };
                     w.motion.accelerate(f, &step, &w.planes, &w.ties);
                     w.motion.restrain(&w.planes, t, hf, RECOVERY);
                     w.motion.tie(&w.ties, t, hf);
-                    w.motion.advance(&step, f32::INFINITY);
+                    w.motion.advance(f, &step, f32::INFINITY);
                 }
             });
-            for (w, m) in scratch.iter_mut().zip(&mut motions) {
-                std::mem::swap(&mut w.motion, m);
-            }
-            exchange(&fabrics, &mut motions);
+            exchange(&fabrics, &mut scratch, |w| &mut w.motion);
             s0 = s1;
         }
-        for (m, f) in motions.iter().zip(&fabrics) {
+        for (w, f) in scratch.iter().zip(&fabrics) {
             for (i, v) in f.vertices[..f.owned].iter().enumerate() {
-                x[*v as usize] = m.position(i);
-                velocity[*v as usize] = m.velocity[i];
+                x[*v as usize] = w.motion.position(i);
+                velocity[*v as usize] = w.motion.velocity[i];
             }
         }
         times.push(started.elapsed().as_secs_f64() * 1e3);

@@ -1,5 +1,6 @@
 //! What keeps a vertex outside a body, and what ties it to one, within small steps.
 
+use super::fabric::Fabric;
 use super::forces::Step;
 use super::motion::{Motion, V4};
 
@@ -38,12 +39,16 @@ impl Motion {
     /// Adds to the accelerations what planes and ties will answer, by the rules of [`Motion::restrain`]: smoothed without
     /// it, a force or a speed that ends in a contact would push its neighbours, and a contact that stops one vertex alone
     /// would give fine waves, which have much inertia, energy out of nothing.
-    pub(super) fn answer(&mut self, planes: &[Plane], ties: &[Tie], step: &Step) {
+    pub(super) fn answer(&mut self, f: &Fabric, planes: &[Plane], ties: &[Tie], step: &Step) {
         let h = step.h;
+        let n = f.reach(step.rings.saturating_add(f.smoothing.len() - 1));
         let held = &mut self.work.held;
         let push = &mut *self.work.push.0;
         for p in planes {
             let i = p.vertex as usize;
+            if i >= n {
+                continue;
+            }
             let v = self.velocity[i] + push[i].scale(h);
             let rate = p.normal.dot(p.speed);
             let toward = p.normal.dot(v) - rate;

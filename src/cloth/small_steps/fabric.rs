@@ -4,58 +4,47 @@
 //! are copied from their owners. How many patches there are is part of the model, not of the machine: so the bits do
 //! not depend on the number of threads.
 
+use super::lanes::{At, LANES, Place};
 use super::motion::Motion;
-use super::plan::Plan;
+use super::plan::{Plan, Triangle};
 
-/// The most vertices or edges a patch may have: indices are 16 bits.
-pub(super) const MOST: usize = 1 << 16;
+/// The most vertices a patch may have.
+pub(super) const MOST: usize = 1 << 15;
 
-/// Stiffness between an edge and its neighbours.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Couple {
-    pub(super) own: f32,
-    pub(super) by: [f32; 4],
-    pub(super) edge: [u16; 4],
+/// Eight triangles; the last eight are filled up with ones that pull nothing.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(32))]
+pub(super) struct Triangles {
+    pub(super) rest: [[f32; LANES]; 3],
+    pub(super) k: [[f32; LANES]; 6],
+    pub(super) v: [At; 3],
 }
 
-/// A hinge bent at rest.
+/// A hinge bent at rest; sorted by the lowest vertex.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bent {
-    pub(super) v: [u16; 4],
+    pub(super) v: [Place; 4],
     pub(super) c: [f32; 4],
     pub(super) w: f32,
     pub(super) rest: f32,
 }
 
-/// Edges that are taken together, so that their vectors stay in the nearest cache until they are used up.
-pub(super) const BLOCK: usize = 256;
-/// Edges of a vertex that fit a row: most vertices of a triangulation have six.
+/// Neighbours of a vertex that fit a row: most vertices of a triangulation have six.
 pub(super) const ROW: usize = 6;
 
-/// What a vertex gathers: three edges that begin in it and three that end there (one number beyond the last edge where
-/// there are fewer), its neighbours and their weights in the smoothing.
+/// A vertex in the smoothing: its neighbours, their weights and its own.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row {
-    pub(super) edges: [u16; ROW],
-    pub(super) near: [u16; ROW],
+    pub(super) near: [Place; ROW],
     pub(super) by: [f32; ROW],
     pub(super) own: f32,
-}
-
-/// An edge that did not fit.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Extra {
-    pub(super) vertex: u16,
-    pub(super) edge: u16,
-    /// 1 where it begins in the vertex, -1 where it ends there.
-    pub(super) sign: f32,
 }
 
 /// A neighbour that did not fit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Far {
-    pub(super) vertex: u16,
-    pub(super) near: u16,
+    pub(super) vertex: Place,
+    pub(super) near: Place,
     pub(super) by: f32,
 }
 
@@ -66,30 +55,36 @@ pub struct Fabric {
     pub vertices: Vec<u32>,
     /// Number of owned vertices.
     pub owned: usize,
+    /// Vertices within so many rings of the owned ones.
+    pub(super) within: Vec<usize>,
     /// Patch and place there of each ghost.
     pub(super) ghosts: Vec<[u32; 2]>,
     pub(super) inverse_mass: Vec<f32>,
-    /// Edges by their lower end, directed so that about as many begin as end in each vertex.
+    /// By their lowest corner.
+    pub(super) triangles: Vec<Triangles>,
+    /// Edges by their lower end.
     pub(super) ends: Vec<[u16; 2]>,
     pub(super) rest: Vec<f32>,
-    pub(super) couple: Vec<Couple>,
     pub(super) rows: Vec<Row>,
-    pub(super) extra: Vec<Extra>,
     pub(super) far: Vec<Far>,
-    /// For each block of edges: how many edges have all their tension, and how many vertices all their pull, when the
-    /// lengths of the block are known.
-    pub(super) ready: Vec<[u32; 2]>,
     /// Coefficients of the smoothing, the lowest (1) first.
     pub(super) smoothing: Vec<f32>,
     /// Bending pairs of each vertex with a higher one.
     pub(super) bend_count: Vec<u16>,
-    pub(super) bend: Vec<(u16, f32)>,
+    pub(super) bend: Vec<(Place, f32)>,
     pub(super) bent: Vec<Bent>,
     pub(super) damping: f32,
 }
 
+impl Fabric {
+    /// Vertices that are computed where what lies `rings` rings around the owned ones must be right.
+    pub(super) fn reach(&self, rings: usize) -> usize {
+        self.within.get(rings).copied().unwrap_or(self.vertices.len())
+    }
+}
+
 impl Plan {
-    /// Cuts the sheet into patches: as many as asked for, more where 16 bits would not do.
+    /// Cuts the sheet into patches: as many as asked for, more where they would be too large.
     pub fn patches(&self, wanted: usize, rings: usize) -> Vec<Fabric> {
         let n = self.vertices();
         let mut around = vec![Vec::new(); n];
@@ -98,8 +93,8 @@ impl Plan {
             around[e[1] as usize].push(e[0]);
         }
         let order = by_distance(&around);
-        let k =
-            wanted.max(1).max(self.ends.len() / (MOST / 2) + usize::from(self.ends.len() >= MOST - 1)).min(n.max(1));
+        // A large patch leaves half of its room to ghosts.
+        let k = wanted.max(1).max(if n < MOST { 1 } else { n.div_ceil(MOST / 2) }).min(n.max(1));
         let mut owner = vec![[0u32; 2]; n];
         let sets: Vec<Vec<u32>> = (0..k).map(|p| order[p * n / k..(p + 1) * n / k].to_vec()).collect();
         for (p, set) in sets.iter().enumerate() {
@@ -114,18 +109,20 @@ impl Plan {
         let owned = set.len();
         let mut local = vec![u32::MAX; self.vertices()];
         set.iter().enumerate().for_each(|(i, v)| local[*v as usize] = i as u32);
-        let mut from = 0;
+        let (mut from, mut within) = (0, vec![owned]);
         for _ in 0..rings {
             let to = set.len();
             for i in from..to {
                 for &w in &around[set[i] as usize] {
-                    if local[w as usize] == u32::MAX {
+                    // Where one vertex has more neighbours than there is room for, some are left out.
+                    if local[w as usize] == u32::MAX && set.len() < MOST {
                         local[w as usize] = set.len() as u32;
                         set.push(w);
                     }
                 }
             }
             from = to;
+            within.push(set.len());
         }
         let at = |v: u32| local[v as usize];
         let inside = |v: &[u32]| v.iter().all(|v| local[*v as usize] != u32::MAX);
@@ -138,8 +135,6 @@ impl Plan {
             .map(|(i, e)| ([at(e[0]).min(at(e[1])), at(e[0]).max(at(e[1]))], i))
             .collect();
         edges.sort_unstable_by_key(|e| e.0);
-        let mut number = vec![u16::MAX; self.ends.len()];
-        edges.iter().enumerate().for_each(|(i, e)| number[e.1] = i as u16);
         let mut bend: Vec<([u32; 2], f32)> = self
             .bend
             .iter()
@@ -152,42 +147,26 @@ impl Plan {
             of.for_each(|v| c[v as usize] += 1);
             c
         };
-        let present = |e: u32| number[e as usize] != u16::MAX;
-        let mut ends: Vec<[u16; 2]> = edges.iter().map(|e| e.0.map(|v| v as u16)).collect();
-        balance(&mut ends, set.len());
         let inverse_mass: Vec<f32> = set.iter().map(|v| self.inverse_mass[*v as usize]).collect();
         let weight: Vec<f32> = edges.iter().map(|e| self.smooth[e.1]).collect();
-        let (rows, extra, far) = rows(&ends, &weight, &inverse_mass);
-        let couple: Vec<Couple> = edges
-            .iter()
-            .enumerate()
-            .map(|(i, e)| {
-                let c = &self.couple[e.1];
-                let ok = c.edge.map(present);
-                Couple {
-                    own: c.own,
-                    by: std::array::from_fn(|k| if ok[k] { c.by[k] } else { 0.0 }),
-                    edge: std::array::from_fn(|k| if ok[k] { number[c.edge[k] as usize] } else { i as u16 }),
-                }
-            })
-            .collect();
+        let ends: Vec<[u16; 2]> = edges.iter().map(|e| e.0.map(|v| v as u16)).collect();
+        let (rows, far) = rows(&ends, &weight, &inverse_mass);
+        let triangles = self.triangles.iter().filter(|t| inside(&t.v)).map(|t| Triangle { v: t.v.map(at), ..*t });
+        let bent = self.bent.iter().filter(|b| inside(&b.v));
+        let mut bent: Vec<Bent> =
+            bent.map(|b| Bent { v: b.v.map(|v| Place::of(at(v) as usize)), c: b.c, w: b.w, rest: b.rest }).collect();
+        bent.sort_by_key(|b| b.v.iter().min().copied());
         Fabric {
-            ready: ready(&couple, &rows),
+            triangles: eights(triangles.collect()),
             rows,
-            extra,
             far,
+            within,
             smoothing: self.smoothing.clone(),
             ends,
             bend_count: counts(&mut bend.iter().map(|e| e.0[0])),
             rest: edges.iter().map(|e| self.rest[e.1]).collect(),
-            couple,
-            bend: bend.iter().map(|e| (e.0[1] as u16, e.1)).collect(),
-            bent: self
-                .bent
-                .iter()
-                .filter(|b| inside(&b.v))
-                .map(|b| Bent { v: b.v.map(|v| at(v) as u16), c: b.c, w: b.w, rest: b.rest })
-                .collect(),
+            bend: bend.iter().map(|e| (Place::of(e.0[1] as usize), e.1)).collect(),
+            bent,
             inverse_mass,
             ghosts: set[owned..].iter().map(|v| owner[*v as usize]).collect(),
             owned,
@@ -197,75 +176,42 @@ impl Plan {
     }
 }
 
-/// Directs edges along trails that never break off where they could go on: then as many begin as end in each vertex,
-/// but for one.
-fn balance(ends: &mut [[u16; 2]], vertices: usize) {
-    let mut around = vec![Vec::new(); vertices];
-    for (e, v) in ends.iter().enumerate() {
-        v.iter().for_each(|v| around[usize::from(*v)].push(e));
-    }
-    let mut used = vec![false; ends.len()];
-    // Trails that end somewhere must begin at odd vertices.
-    let odd = (0..vertices).filter(|v| around[*v].len() % 2 == 1);
-    for start in odd.collect::<Vec<_>>().into_iter().chain(0..vertices) {
-        let mut at = start;
-        while let Some(e) = std::iter::from_fn(|| around[at].pop()).find(|e| !used[*e]) {
-            used[e] = true;
-            let [a, b] = ends[e].map(usize::from);
-            if a != at {
-                ends[e].swap(0, 1);
+/// Triangles by their lowest corner, eight to a block.
+fn eights(mut all: Vec<Triangle>) -> Vec<Triangles> {
+    all.sort_by_key(|t| t.v.iter().min().copied());
+    let block = |of: &[Triangle]| {
+        let mut out = Triangles::default();
+        for (lane, t) in of.iter().enumerate() {
+            for i in 0..3 {
+                (out.v[i][lane], out.rest[i][lane]) = (Place::of(t.v[i] as usize), t.rest[i]);
             }
-            at = a + b - at;
+            for i in 0..6 {
+                out.k[i][lane] = t.k[i];
+            }
         }
-    }
+        out
+    };
+    all.chunks(LANES).map(block).collect()
 }
 
-/// See [`Fabric::ready`]. The last block finishes all.
-fn ready(couple: &[Couple], rows: &[Row]) -> Vec<[u32; 2]> {
-    let (mut edge, mut vertex) = (0usize, 0usize);
-    let blocks = couple.len().div_ceil(BLOCK).max(1);
-    (1..=blocks)
-        .map(|k| {
-            let known = (k * BLOCK).min(couple.len());
-            while edge < known && couple[edge].edge.iter().all(|e| usize::from(*e) < known) {
-                edge += 1;
-            }
-            let complete = |r: &Row| r.edges.iter().all(|e| usize::from(*e) < edge || usize::from(*e) == couple.len());
-            while vertex < rows.len() && complete(&rows[vertex]) {
-                vertex += 1;
-            }
-            [edge as u32, vertex as u32]
-        })
-        .collect()
-}
-
-fn rows(ends: &[[u16; 2]], weight: &[f32], inverse_mass: &[f32]) -> (Vec<Row>, Vec<Extra>, Vec<Far>) {
-    let none = Row { edges: [ends.len() as u16; ROW], near: [0; ROW], by: [0.0; ROW], own: 0.0 };
-    let mut rows = vec![none; inverse_mass.len()];
-    let mut filled = vec![[0usize; 3]; inverse_mass.len()];
-    let (mut extra, mut far) = (Vec::new(), Vec::new());
-    for (e, (v, weight)) in ends.iter().zip(weight).enumerate() {
-        for side in 0..2 {
-            let (vertex, near) = (v[side], v[1 - side]);
-            let i = usize::from(vertex);
-            let half = ROW / 2;
-            if filled[i][side] < half {
-                rows[i].edges[side * half + filled[i][side]] = e as u16;
-                filled[i][side] += 1;
-            } else {
-                extra.push(Extra { vertex, edge: e as u16, sign: 1.0 - 2.0 * side as f32 });
-            }
+fn rows(ends: &[[u16; 2]], weight: &[f32], inverse_mass: &[f32]) -> (Vec<Row>, Vec<Far>) {
+    let mut rows = vec![Row { near: [Place::default(); ROW], by: [0.0; ROW], own: 0.0 }; inverse_mass.len()];
+    let mut filled = vec![0usize; rows.len()];
+    let mut far = Vec::new();
+    for (v, weight) in ends.iter().zip(weight) {
+        for (vertex, near) in [(v[0], v[1]), (v[1], v[0])] {
+            let (i, near) = (usize::from(vertex), Place::of(usize::from(near)));
             let by = weight * inverse_mass[i];
             rows[i].own += by;
-            if filled[i][2] < ROW {
-                (rows[i].near[filled[i][2]], rows[i].by[filled[i][2]]) = (near, by);
-                filled[i][2] += 1;
+            if filled[i] < ROW {
+                (rows[i].near[filled[i]], rows[i].by[filled[i]]) = (near, by);
+                filled[i] += 1;
             } else {
-                far.push(Far { vertex, near, by });
+                far.push(Far { vertex: Place::of(i), near, by });
             }
         }
     }
-    (rows, extra, far)
+    (rows, far)
 }
 
 /// Vertices in order of their distance (in edges) from one at the rim: neighbours come close together in memory, and
@@ -300,15 +246,15 @@ fn by_distance(around: &[Vec<u32>]) -> Vec<u32> {
     sweep(&first)
 }
 
-/// Copies what owners know to the ghosts of every patch.
-pub fn exchange(fabrics: &[Fabric], motions: &mut [Motion]) {
+/// Copies what owners know to the ghosts of every patch; `motion` finds a patch's motion.
+pub fn exchange<T>(fabrics: &[Fabric], patches: &mut [T], motion: impl Fn(&mut T) -> &mut Motion) {
     for p in 0..fabrics.len() {
         for (k, [q, j]) in fabrics[p].ghosts.iter().enumerate() {
-            let i = fabrics[p].owned + k;
-            let (m, v) = (motions[*q as usize].moved[*j as usize], motions[*q as usize].velocity[*j as usize]);
-            motions[p].moved[i] = m;
-            motions[p].velocity[i] = v;
-            motions[p].work.looked = false;
+            let (i, j) = (fabrics[p].owned + k, *j as usize);
+            let from = motion(&mut patches[*q as usize]);
+            let (m, v, a) = (from.moved[j], from.velocity[j], from.work.ahead.0[j % MOST]);
+            let to = motion(&mut patches[p]);
+            (to.moved[i], to.velocity[i], to.work.ahead.0[i % MOST]) = (m, v, a);
         }
     }
 }

@@ -10,6 +10,7 @@ mod contact;
 mod fabric;
 mod filter;
 mod forces;
+mod lanes;
 mod motion;
 mod plan;
 mod stability;

@@ -41,7 +41,7 @@ impl std::ops::Sub for V4 {
     }
 }
 
-/// One value for every index of 16 bits: such an index needs no check.
+/// One value for every [`super::lanes::Place`]: such an index needs no check.
 #[derive(Clone, Debug)]
 pub(super) struct Table<T>(pub(super) Box<[T; MOST]>);
 
@@ -73,10 +73,6 @@ pub struct Motion {
 pub(super) struct Work {
     /// Where forces are evaluated: a little ahead.
     pub(super) ahead: Table<V4>,
-    /// Of each edge: its vector, then its pull.
-    pub(super) pull: Table<V4>,
-    pub(super) longer: Table<f32>,
-    pub(super) tension: Table<f32>,
     /// Acceleration of each vertex, and what becomes of it by smoothing.
     pub(super) push: Table<V4>,
     pub(super) smooth: Table<V4>,

@@ -1,4 +1,4 @@
-//! A sheet as stiffness between edges, fitted to a step.
+//! A sheet as stiffness between the edges of its triangles, fitted to a step.
 
 use super::filter::Filter;
 use super::stability::{bending_eigenvalue, element_limits, laid_flat, membrane_eigenvalue, soften};
@@ -21,12 +21,13 @@ pub struct Fit {
     pub smooth: usize,
 }
 
-/// One edge's stiffness against its own lengthening and that of the four edges around it, N/m.
+/// A triangle: its corners, lengths of its edges at rest (each opposite the corner of its number), and stiffness between
+/// their lengthenings, N/m: 00, 11, 22, 12, 20, 01.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Couple {
-    pub(super) own: f32,
-    pub(super) by: [f32; 4],
-    pub(super) edge: [u32; 4],
+pub(super) struct Triangle {
+    pub(super) v: [u32; 3],
+    pub(super) rest: [f32; 3],
+    pub(super) k: [f32; 6],
 }
 
 /// A hinge that is bent at rest.
@@ -50,7 +51,7 @@ pub struct Plan {
     pub(super) inverse_mass: Vec<f32>,
     pub(super) ends: Vec<[u32; 2]>,
     pub(super) rest: Vec<f32>,
-    pub(super) couple: Vec<Couple>,
+    pub(super) triangles: Vec<Triangle>,
     /// Vertex pairs and the stiffness of bending between them, N/m.
     pub(super) bend: Vec<([u32; 2], f32)>,
     pub(super) bent: Vec<Bent>,
@@ -114,45 +115,26 @@ impl Plan {
         let flat = laid_flat(sheet);
         let keep = soften(limit, &limits, |k| membrane_eigenvalue(&flat, k, fit.springs_only, &filter));
         let area: f64 = sheet.elements.iter().map(|e| e.area).sum();
-        let mut couple = vec![Couple::default(); edges.len()];
-        let mut used = vec![0usize; edges.len()];
-        for (i, c) in couple.iter_mut().enumerate() {
-            c.edge = [i as u32; 4];
-        }
-        for (e, keep) in sheet.elements.iter().zip(&keep) {
-            let Some((k, _)) = edge_stiffness(sheet, e) else { continue };
-            let id: [usize; 3] = std::array::from_fn(|i| find(e.v[(i + 1) % 3], e.v[(i + 2) % 3]));
-            for i in 0..3 {
-                let c = &mut couple[id[i]];
-                c.own += (k[(i, i)] * keep) as f32;
-                if fit.springs_only {
-                    continue;
-                }
-                for j in [(i + 1) % 3, (i + 2) % 3] {
-                    let slot = used[id[i]].min(3);
-                    c.edge[slot] = id[j] as u32;
-                    c.by[slot] += (k[(i, j)] * keep) as f32;
-                    used[id[i]] += 1;
-                }
-            }
-        }
+        let triangle = |(e, keep): (&Element, &f64)| {
+            let (k, _) = edge_stiffness(sheet, e)?;
+            let between = if fit.springs_only { 0.0 } else { *keep };
+            let rest = |i: usize| edges[find(e.v[(i + 1) % 3], e.v[(i + 2) % 3])].1 as f32;
+            let own = [0, 1, 2].map(|i| (k[(i, i)] * keep) as f32);
+            let k = [(1, 2), (2, 0), (0, 1)].map(|i| (k[i] * between) as f32);
+            Some(Triangle { v: e.v, rest: [rest(0), rest(1), rest(2)], k: [own[0], own[1], own[2], k[0], k[1], k[2]] })
+        };
+        let triangles = sheet.elements.iter().zip(&keep).filter_map(triangle).collect();
         let mut bending = std::collections::BTreeMap::<[u32; 2], f64>::new();
         let mut bent = Vec::new();
-        // Bending is kept for several steps: its own limit is ω·(that time) ≤ 1. A hinge's share of what each vertex
-        // has to bear is bounded by w|c|².
+        // Bending is kept for several steps: its own limit is ω·(that time) ≤ 1.
         let bend_limit = 1.0 / (fit.h * fit.bend_every.max(1) as f64).powi(2);
-        let mut borne = vec![0.0; sheet.mass.len()];
-        let size = |h: &crate::cloth::Hinge| h.w * h.c.iter().map(|c| c * c).sum::<f64>();
-        for h in &sheet.hinges {
-            h.v.iter().for_each(|v| borne[*v as usize] += size(h) / sheet.mass[*v as usize]);
-        }
-        let worst = |h: &crate::cloth::Hinge| h.v.iter().map(|v| borne[*v as usize]).fold(f64::MIN_POSITIVE, f64::max);
-        let stiff: Vec<f64> = sheet.hinges.iter().map(worst).collect();
+        let stiff = hinge_limits(sheet);
+        let length = |a: u32, b: u32| edges[find(a, b)].1;
         let plain = filter.without();
         let bend_keep = soften(bend_limit, &stiff, |k| bending_eigenvalue(sheet, k, &plain));
         for (h, keep) in sheet.hinges.iter().zip(&bend_keep) {
             let w = h.w * keep;
-            if h.rest > 0.0 {
+            if h.rest > FLAT * h.c.iter().map(|c| c.abs()).sum::<f64>() * length(h.v[0], h.v[1]) {
                 bent.push(Bent { v: h.v, c: h.c.map(|c| c as f32), w: w as f32, rest: h.rest as f32 });
                 continue;
             }
@@ -170,7 +152,7 @@ impl Plan {
             inverse_mass: sheet.mass.iter().map(|m| (1.0 / m) as f32).collect(),
             ends: edges.iter().map(|e| e.0).collect(),
             rest: edges.iter().map(|e| e.1 as f32).collect(),
-            couple,
+            triangles,
             bend: bending.into_iter().map(|(v, w)| (v, w as f32)).collect(),
             bent,
             smooth: filter.weight.iter().map(|w| *w as f32).collect(),
@@ -191,9 +173,15 @@ impl Plan {
         }
         found
     }
-    /// Steps that bending forces may be kept for: longer steps keep them less often.
-    pub fn bend_every(smooth: usize) -> usize {
-        if smooth == 0 { 4 } else { 3 }
+    /// Small steps of `h` seconds that bending forces may be kept for: as many as all but a few small hinges allow with all
+    /// their stiffness, within [`KEPT`].
+    pub fn bend_every(sheet: &Sheet, h: f64) -> usize {
+        let limits = hinge_limits(sheet);
+        let usual = usual(&limits);
+        let keep: Vec<f64> = limits.iter().map(|l| (usual / l).min(1.0)).collect();
+        let plain = filter(sheet, sheet.edges.iter().map(|e| e.0).collect(), 0);
+        let fastest = bending_eigenvalue(sheet, &keep, &plain).max(f64::MIN_POSITIVE).sqrt();
+        ((1.0 / (fastest * h)) as usize).clamp(KEPT[0], KEPT[1])
     }
     /// Longest step at which all but a few small elements keep all their stiffness, s.
     pub fn comfortable_step(sheet: &Sheet, ahead: f64, smooth: usize) -> f64 {
@@ -204,10 +192,7 @@ impl Plan {
 /// [`Plan::comfortable_step`] of any degree.
 fn comfort(sheet: &Sheet, ahead: f64) -> impl Fn(usize) -> f64 {
     let limits = element_limits(sheet, false);
-    let mut all = limits.clone();
-    all.sort_unstable_by(f64::total_cmp);
-    let n = all.len().max(1);
-    let usual = all.get(((n as f64 * (1.0 - FEW)) as usize).min(n - 1)).copied().unwrap_or(1.0);
+    let usual = usual(&limits);
     let keep: Vec<f64> = limits.iter().map(|l| (usual / l.max(f64::MIN_POSITIVE)).min(1.0)).collect();
     let flat = laid_flat(sheet);
     move |smooth| {
@@ -217,6 +202,31 @@ fn comfort(sheet: &Sheet, ahead: f64) -> impl Fn(usize) -> f64 {
     }
 }
 
+/// What all but a few do not exceed.
+fn usual(limits: &[f64]) -> f64 {
+    let mut all = limits.to_vec();
+    all.sort_unstable_by(f64::total_cmp);
+    let n = all.len().max(1);
+    all.get(((n as f64 * (1.0 - FEW)) as usize).min(n - 1)).copied().unwrap_or(1.0)
+}
+
+/// For each hinge the most that one of its vertices has to bear of bending over its mass, 1/s²: a hinge's share of that is
+/// bounded by w|c|².
+fn hinge_limits(sheet: &Sheet) -> Vec<f64> {
+    let mut borne = vec![0.0; sheet.mass.len()];
+    for h in &sheet.hinges {
+        let size = h.w * h.c.iter().map(|c| c * c).sum::<f64>();
+        h.v.iter().for_each(|v| borne[*v as usize] += size / sheet.mass[*v as usize]);
+    }
+    let worst = |h: &crate::cloth::Hinge| h.v.iter().map(|v| borne[*v as usize]).fold(f64::MIN_POSITIVE, f64::max);
+    sheet.hinges.iter().map(worst).collect()
+}
+
+/// A hinge is flat if it is bent by less at rest, rad: what rounding of coordinates makes of a flat sheet.
+const FLAT: f64 = 1e-4;
+/// Fewest and most steps that bending is kept for: fewer cost more than the stiffness of a few narrow hinges is worth, more
+/// gain little.
+const KEPT: [usize; 2] = [3, 6];
 /// The highest degree: a third one gains another quarter and costs as much.
 const HIGHEST: usize = 2;
 
