@@ -1,7 +1,7 @@
 //! Tracks depth folders and prints every measure of error against their truth, for development and benchmarks.
 //!
 //! `cargo run --release --example track_sequences -- [--body FILE]… [--set JSON]… [--synth] [--hard] [--upper] [--own] [--frames N] [--still N]
-//! [--corrupt SHARE] [--thin SHARE] [--nth N] [--cut SHARE] [--overlay DIR] [--every N] [--labels DIR] [--jsonl DIR] [--stages] [-v] FOLDER…`
+//! [--corrupt SHARE] [--thin SHARE] [--nth N] [--cut SHARE] [--overlay DIR] [--every N] [--labels DIR] [--jsonl DIR] [--stages] [--tremble] [-v] FOLDER…`
 //!
 //! Each combination of body and settings is run on each folder and, with `--synth`, on the synthetic scenes; `--upper` adds
 //! clips of which the picture shows no feet, `--own` gives each recorded or clipped scene its subject's own body.
@@ -44,6 +44,7 @@ struct Args {
     labels: Option<PathBuf>,
     hard: bool,
     drift: Option<u64>,
+    tremble: bool,
     verbose: bool,
 }
 
@@ -72,6 +73,7 @@ fn main() {
             "--upper" => a.upper = true,
             "--own" => a.own = true,
             "--stages" => a.stages = true,
+            "--tremble" => a.tremble = true,
             "-v" => a.verbose = true,
             _ => a.folders.push(word.into()),
         }
@@ -86,6 +88,12 @@ fn main() {
         for settings in &a.settings {
             println!("drift over {frames} frames {settings}");
             drift(&a, settings, frames);
+        }
+        return;
+    }
+    if a.tremble {
+        for settings in &a.settings {
+            tremble(&a, settings);
         }
         return;
     }
@@ -351,6 +359,51 @@ fn drift(a: &Args, settings: &str, frames: u64) {
                 (worst, sum) = ((0.0, 0, 0), 0.0);
             }
         }
+    }
+}
+
+/// How much the skin of a person who stands still moves (`--frames`, 180; embedded body, Kinect v1 noise), from picture to
+/// picture and within a third of a second: mean over vertices and pictures from the second second on, and the worst
+/// twentieth.
+fn tremble(a: &Args, settings: &str) {
+    for (name, routine) in [("still", Routine::Still), ("moving", Routine::TryOn)] {
+        let setting = Setting { routine, noise: NoiseModel::KinectV1, color: false, ..Setting::default() };
+        let frames = a.frames.unwrap_or(180) as u64;
+        let sequence = Sequence::new(Shopper::default(), setting);
+        let scene = Scene::synthetic(name, &sequence, frames);
+        let template = Shopper::default().template;
+        let model = TrackerModel::new(template, scene.calibration.clone(), configuration(settings));
+        let (mut state, mut workspace) = (TrackerState::new(&model), Workspace::default());
+        let (mut skins, mut off): (Vec<Vec<tryon::math::P3>>, Vec<f64>) = (vec![], vec![]);
+        for (i, frame) in scene.frames.iter().enumerate() {
+            tryon::tracking::step(&model, &mut state, frame, &mut workspace).expect("step");
+            let (vertices, _) = workspace.posed(&model, &state);
+            if i >= 60 {
+                let truth = &scene.truth[i].vertices;
+                off.extend(vertices.iter().zip(truth).step_by(10).map(|(a, b)| f64::from((a - b).norm()) * 1e3));
+                skins.push(vertices.to_vec());
+            }
+        }
+        let truth: Vec<_> =
+            scene.truth[60..].iter().map(|t| t.joints.iter().map(|p| p.cast::<f32>()).collect()).collect();
+        let moved = |skins: &[Vec<tryon::math::P3>], lag: usize| {
+            let pairs = skins.windows(lag + 1);
+            let mut all: Vec<f64> = pairs
+                .flat_map(|w| {
+                    w[0].iter().zip(&w[lag]).map(|(a, b)| f64::from((a - b).norm()) * 1e3).collect::<Vec<_>>()
+                })
+                .collect();
+            all.sort_by(f64::total_cmp);
+            format!("{:.2} mm (p95 {:.2})", mean(&all), all[all.len() * 95 / 100])
+        };
+        println!(
+            "{name} {settings}: from picture to picture {}, in a third of a second {}, off {:.2} mm; true joints {} and {}",
+            moved(&skins, 1),
+            moved(&skins, 10),
+            mean(&off),
+            moved(&truth, 1),
+            moved(&truth, 10)
+        );
     }
 }
 

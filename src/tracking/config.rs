@@ -60,6 +60,9 @@ pub struct TrackerConfig {
     pub displacement_interval: u32,
     /// Predict the pose from the last two frames.
     pub predict: bool,
+    /// The last pose counts as much as a frame that differs from it by so many times the frame's residual; 0 takes every
+    /// frame as it is.
+    pub calm: f64,
     /// Leave out coarse iterations where the prediction explains the frame as well as the last pose did its own.
     pub skip_coarse: bool,
     /// Fit displacements less often once they have settled.
@@ -102,6 +105,7 @@ impl Default for TrackerConfig {
             displaced_pose: false,
             displacement_interval: 3,
             predict: true,
+            calm: 1.0,
             skip_coarse: true,
             skip_settled: true,
             pull: true,
@@ -132,6 +136,7 @@ impl TrackerConfig {
             standing: false,
             displaced_pose: true,
             predict: false,
+            calm: 0.0,
             skip_coarse: false,
             skip_settled: false,
             pull: false,

@@ -1,6 +1,7 @@
 //! One step from a frame and the last state to pose, displacements and a confidence report.
 
 mod align;
+mod calm;
 mod confidence;
 mod config;
 mod hypotheses;

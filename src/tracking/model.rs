@@ -1,6 +1,7 @@
 //! What never changes while tracking: the template, the camera and points chosen on the template.
 
 use super::TrackerConfig;
+use super::calm;
 use super::limb::{self, Limb};
 use super::stand::{Leg, legs};
 use crate::body::{JointMotion, SkinWeights, Template};
@@ -49,6 +50,8 @@ pub struct TrackerModel {
     pub(super) arms: [Option<Limb>; 2],
     /// Legs, left and right, for feet found at the start.
     pub(super) legs_in_view: [Option<Limb>; 2],
+    /// Part of the body that each joint belongs to, see [`calm::parts`].
+    pub(super) parts: Vec<usize>,
     /// Angles of knees, ankles and feet.
     pub(super) legs: Vec<bool>,
     /// Share of the pull to the rest pose that is left for each angle when its bone is in full view.
@@ -83,6 +86,7 @@ impl TrackerModel {
         let standing = legs(&template);
         let arms = limb::arms(&template);
         let legs_in_view = limb::legs(&template);
+        let parts = calm::parts(&template);
         let leg = |name: &str| ["knee", "ankle", "foot"].iter().any(|s| name.contains(s));
         let legs = skeleton.joints().iter().flat_map(|j| std::iter::repeat_n(leg(&j.name), j.motion.dofs())).collect();
         let share = |j: &crate::body::Joint| std::iter::repeat_n(seen_share(&j.name), j.motion.dofs());
@@ -102,6 +106,7 @@ impl TrackerModel {
             standing,
             arms,
             legs_in_view,
+            parts,
             legs,
             seen_shares,
         }

@@ -85,6 +85,9 @@ pub struct TrackerState {
     /// Greatest height of the hips so far along the upright, camera frame, metres.
     #[serde(default)]
     pub(super) tallest: Option<f64>,
+    /// Running mean of the way from the last pose's joints to each fit's, camera frame, metres; empty at a start.
+    #[serde(default)]
+    pub(super) drift: Vec<Vector3<f64>>,
     /// Where the feet stood.
     #[serde(default)]
     pub(super) feet: Option<Feet>,
@@ -125,6 +128,7 @@ impl TrackerState {
             centre: P3::origin(),
             quality: [0.0; 2],
             tallest: None,
+            drift: Vec::new(),
             feet: None,
             rescue: Rescue::default(),
             surface_due: [0; 2],

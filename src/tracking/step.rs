@@ -1,6 +1,7 @@
 //! One frame (Algorithm 1): segment, place or predict, pose, size, displacements, and what it all means.
 
 use super::align::{ANNEAL, Fit, START, START_TERMS, Schedule, Seen, TRACK, Terms, align, evaluate, wants_tree};
+use super::calm::calm;
 use super::confidence::confidence;
 use super::kinematics::{extrapolate, motion};
 use super::place::{outline, place};
@@ -224,6 +225,7 @@ fn follow(
             }
         }
         (state.before, state.tallest, state.feet) = (None, None, None);
+        state.drift.clear();
     } else {
         workspace.rest_body(model, &state.shape);
         let rest = (&workspace.rest, &workspace.samples);
@@ -257,6 +259,7 @@ fn follow(
         }
     }
 
+    let expected = (!searching && model.config.calm > 0.0).then(|| state.pose.clone());
     if !person.hands.is_empty() {
         workspace.align.terms.hands = assign(model, &workspace.rest, &mut pose, &seen, &person.hands);
     }
@@ -321,6 +324,9 @@ fn follow(
         workspace.contour = outline_of_person;
         lose(state, LostReason::NotFinite);
         return;
+    }
+    if let Some(expected) = expected.filter(|_| good) {
+        pose = calm(model, &workspace.rest, &expected, &pose, model.config.calm * fit.residual, &mut state.drift);
     }
     state.bad_frames = if good { 0 } else { state.bad_frames + 1 };
     if state.bad_frames > PATIENCE {

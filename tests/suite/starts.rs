@@ -8,8 +8,11 @@ use tryon::par::Par;
 use tryon::raster::{View, VisibilityBuffer, rasterise};
 use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
 
+/// Angles of named joints.
+type Angles<'a> = [(&'a str, &'a [f64])];
+
 /// Angles of named joints (rotation vectors; one number for a hinge) of somebody who stands 2.5 m away, turned by `yaw`.
-fn mean_error_mm(angles: &[(&str, &[f64])], yaw: f64, of: &[&str]) -> f64 {
+fn mean_error_mm(angles: &Angles<'_>, yaw: f64, of: &[&str]) -> f64 {
     let template = embedded::template();
     let skeleton = template.skeleton();
     let rest = template.personalise(&Default::default());
@@ -57,7 +60,7 @@ fn mean_error_mm(angles: &[(&str, &[f64])], yaw: f64, of: &[&str]) -> f64 {
 fn a_start_needs_no_calibration_pose() {
     let legs = ["left_hip", "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle"];
     let arms = ["left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist"];
-    let scenes: [(&str, &[(&str, &[f64])], &[&str]); 12] = [
+    let scenes: [(&str, &Angles<'_>, &[&str]); 12] = [
         ("knee lifted", &[("left_hip", &[-1.4, 0.0, 0.0]), ("left_knee", &[1.5])], &legs),
         ("kick", &[("right_hip", &[-1.2, 0.0, 0.0])], &legs),
         ("leg aside", &[("right_hip", &[0.0, 0.0, -0.6])], &legs),
