@@ -84,6 +84,17 @@ pub fn variants() -> Vec<Variant> {
     add("metric", "symmetric", &|c| c.point_to_point = 0.0);
     add("metric", "plane + 0.1 point", &|c| c.normals = Normals::Model);
     add("metric", "point", &|c| (c.point_to_point, c.point_to_plane) = (1.0, 0.0));
+    add("robust kernel", "off", &|c| c.robust = false);
+    for damping in [1e-6, 1e-5, 1e-3] {
+        add("damping", &format!("{damping:e}"), &|c| c.damping = damping);
+    }
+    add("joint limits", "off", &|c| c.joint_limits = false);
+    add("rest pose", "off", &|c| c.rest_weight = 0.0);
+    for calm in [0.0, 1.5] {
+        add("last pose", &calm.to_string(), &|c| c.calm = calm);
+    }
+    add("hidden feet on the floor", "off", &|c| c.standing = false);
+    add("lost arms looked for", "off", &|c| c.rescue = false);
     add("precision of sums", "f64", &|_| {});
     add("precision of sums", "f32", &|c| c.single_precision = true);
     add("edges", "0.1", &|c| c.edge_weight = 0.1);

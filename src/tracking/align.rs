@@ -314,7 +314,7 @@ pub(super) fn for_residuals(
         let far = r.norm() > 0.12;
         let kernel = GemanMcClure { sigma: if far { sigma.max(0.12) } else { sigma } };
         let e2 = r.norm_squared();
-        let weight = kernel.weight(e2);
+        let weight = if config.robust { kernel.weight(e2) } else { 1.0 };
         cost += kernel.value(e2).min(UNEXPLAINED * UNEXPLAINED);
         total += weight;
         off += weight * direction.dot(&r).abs();
@@ -398,6 +398,7 @@ pub(super) fn align(
         let Some(x) = solve_damped(&scratch.hessian, &scratch.gradient, &scratch.damping) else { break };
         let centre = scratch.bones.joints[0].coords;
         apply(model.template.skeleton(), pose, &centre, &x);
+        limit(model, pose);
         let step = x.iter().enumerate().map(|(k, v)| if k < 3 { v.abs() } else { v.abs() * LEVER }).fold(0.0, f64::max);
         if t >= 1.0 && step < model.config.converged {
             fit.converged = true;
@@ -405,6 +406,13 @@ pub(super) fn align(
         }
     }
     fit
+}
+
+/// Moves joints back into their limits, where those count.
+pub(super) fn limit(model: &TrackerModel, pose: &mut Pose) {
+    if model.config.joint_limits {
+        pose.clamp_to_limits(model.template.skeleton());
+    }
 }
 
 /// Fills the normal equations of the pose, per point, priors included.

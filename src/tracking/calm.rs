@@ -1,6 +1,7 @@
 //! The last pose and what this frame says, each by its uncertainty: a person who stands still does not tremble with the
 //! sensor's noise.
 
+use super::align::limit;
 use super::model::TrackerModel;
 use crate::body::{BoneTransforms, JointMotion, Pose, RestBody, Template};
 use crate::math::{Rigid, exp_so3, log_so3};
@@ -80,7 +81,7 @@ pub(super) fn calm(
             }
         }
     }
-    out.clamp_to_limits(skeleton);
+    limit(model, &mut out);
     out
 }
 

@@ -34,6 +34,10 @@ pub struct TrackerConfig {
     pub point_to_plane: f64,
     /// Direction of point-to-plane.
     pub normals: Normals,
+    /// Far pairs count less (Geman–McClure) instead of as much as near ones.
+    pub robust: bool,
+    /// Joints stay within the template's limits.
+    pub joint_limits: bool,
     /// Readings look for the model too, not only the model for readings.
     pub both_ways: bool,
     /// Sum the normal equations in single precision.
@@ -92,6 +96,8 @@ impl Default for TrackerConfig {
             point_to_point: 0.1,
             point_to_plane: 1.0,
             normals: Normals::Symmetric,
+            robust: true,
+            joint_limits: true,
             both_ways: true,
             single_precision: false,
             converged: 3e-3,
@@ -105,7 +111,7 @@ impl Default for TrackerConfig {
             displaced_pose: false,
             displacement_interval: 3,
             predict: true,
-            calm: 1.0,
+            calm: 0.75,
             skip_coarse: true,
             skip_settled: true,
             pull: true,

@@ -34,7 +34,7 @@ pub(super) fn linearise(
     }
 }
 
-/// Moves `pose` by the solution `x` of the normal equations and back into the joint limits.
+/// Moves `pose` by the solution `x` of the normal equations.
 pub(super) fn apply(skeleton: &Skeleton, pose: &mut Pose, centre: &Vector3<f64>, x: &DVector<f64>) {
     let xi = Twist { linear: Vector3::new(x[0], x[1], x[2]), angular: Vector3::new(x[3], x[4], x[5]) };
     let shift = nalgebra::Translation3::from(*centre);
@@ -54,7 +54,6 @@ pub(super) fn apply(skeleton: &Skeleton, pose: &mut Pose, centre: &Vector3<f64>,
             }
         }
     }
-    pose.clamp_to_limits(skeleton);
 }
 
 /// The pose that comes after `last` when the motion from `before` to `last` goes on for `ratio` of its time.
@@ -78,7 +77,6 @@ pub(super) fn extrapolate(skeleton: &Skeleton, before: &Pose, last: &Pose, ratio
             }
         }
     }
-    next.clamp_to_limits(skeleton);
     next
 }
 

@@ -1,6 +1,6 @@
 //! One frame (Algorithm 1): segment, place or predict, pose, size, displacements, and what it all means.
 
-use super::align::{ANNEAL, Fit, START, START_TERMS, Schedule, Seen, TRACK, Terms, align, evaluate, wants_tree};
+use super::align::{ANNEAL, Fit, START, START_TERMS, Schedule, Seen, TRACK, Terms, align, evaluate, limit, wants_tree};
 use super::calm::calm;
 use super::confidence::confidence;
 use super::kinematics::{extrapolate, motion};
@@ -247,7 +247,8 @@ fn follow(
             extrapolate(skeleton, before, &pose, AHEAD * ahead.min(FARTHEST_AHEAD))
         });
         match guess {
-            Some(guess) => {
+            Some(mut guess) => {
+                limit(model, &mut guess);
                 let moved = look(&guess);
                 fine = motion(skeleton, &pose, &guess) < SLOW && as_good(&moved);
                 if fine || moved.cost < look(&pose).cost {
