@@ -1,8 +1,8 @@
 //! Dresses bodies and draws each outfit from several sides into one PNG, for looking at garments.
 //!
 //! `cargo run --release --example turntable -- --garment tshirt --garment longsleeve+trousers --out DIR
-//!   [--body average,slim_woman,heavy_man | FILE.npz] [--size auto,S,M,XL] [--pose down|tpose|rest|walk|raise]
-//!   [--seconds 1.0] [--views 0,45,90,180] [--cell 220x340] [--crop] [--edge 0.021] [--fit]`
+//!   [--garment FILE.obj|.glb|.mhclo|.json [--garment-body FILE.npz|.obj]] [--body average,slim_woman,heavy_man | FILE.npz] [--size auto,S,M,XL] [--pose down|tpose|rest|walk|raise]
+//!   [--seconds 1.0] [--views 0,45,90,180] [--cell 220x340] [--crop] [--edge 0.021] [--fit] [--any-size]`
 //!
 //! A row is a body, a block of columns a size. `auto` asks the size suggestion.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
@@ -15,13 +15,14 @@ use std::sync::Arc;
 use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use tryon::camera::ColorImage;
 use tryon::cloth::realtime::{Input, Workspace, step};
-use tryon::dressing::{DressOptions, Dressed, FitProbe, dress, suggest};
+use tryon::dressing::{DressError, DressOptions, Dressed, FitProbe, MadeOn, MeshWear, Wear, dress_all, suggest};
 use tryon::formats::image::write_png_rgb;
 use tryon::garment::{Pattern, library};
 use tryon::math::{Body, P3, Rigid, World, log_so3};
 
 struct Args {
     garments: Vec<String>,
+    garment_body: Option<MadeOn>,
     bodies: Vec<String>,
     sizes: Vec<String>,
     pose: String,
@@ -31,12 +32,14 @@ struct Args {
     crop: bool,
     edge: Option<f64>,
     fit: bool,
+    any_size: bool,
     out: PathBuf,
 }
 
 fn args() -> Args {
     let mut a = Args {
         garments: vec![],
+        garment_body: None,
         bodies: ["slim_woman", "average", "heavy_man"].map(String::from).to_vec(),
         sizes: vec!["auto".into()],
         pose: "down".into(),
@@ -46,6 +49,7 @@ fn args() -> Args {
         crop: false,
         edge: None,
         fit: false,
+        any_size: false,
         out: "/tmp/turntable".into(),
     };
     let list = |s: String| s.split(',').map(str::to_owned).collect::<Vec<_>>();
@@ -54,6 +58,11 @@ fn args() -> Args {
         let mut value = || it.next().expect("a value");
         match flag.as_str() {
             "--garment" => a.garments.push(value()),
+            "--garment-body" => {
+                let body = MadeOn::read(std::path::Path::new(&value())).expect("a body");
+                println!("{}", body.said);
+                a.garment_body = Some(body);
+            }
             "--body" => a.bodies = list(value()),
             "--size" => a.sizes = list(value()),
             "--pose" => a.pose = value(),
@@ -65,6 +74,7 @@ fn args() -> Args {
                 a.cell = (w.parse().expect("width"), h.parse().expect("height"));
             }
             "--crop" => a.crop = true,
+            "--any-size" => a.any_size = true,
             "--fit" => a.fit = true,
             "--edge" => a.edge = Some(value().parse().expect("metres")),
             "--out" => a.out = value().into(),
@@ -161,11 +171,23 @@ fn imported(file: &str) -> Pattern {
 fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2], [f32; 2]) {
     let (template, rest) = load(body);
     let measures = tryon::body::measure::measure(&template, &rest).expect("measurable");
-    let patterns: Vec<Pattern> = outfit
+    enum Worn {
+        Pattern(Pattern),
+        Mesh(MeshWear),
+    }
+    let edge = a.edge.unwrap_or(tryon::garment::Triangulation::default().edge_length);
+    let worn: Vec<Worn> = outfit
         .split('+')
         .map(|g| {
             if g.ends_with(".json") {
-                return imported(g);
+                return Worn::Pattern(imported(g));
+            }
+            if [".obj", ".glb", ".gltf", ".mhclo"].iter().any(|e| g.ends_with(e)) {
+                let fabric = tryon::garment::Material::preset("cotton").expect("preset");
+                let m =
+                    MeshWear::on(std::path::Path::new(g), a.garment_body.clone(), &fabric, edge).expect("a garment");
+                m.notes.iter().for_each(|n| println!("  {n}"));
+                return Worn::Mesh(m);
             }
             let chosen = match size {
                 "auto" => {
@@ -175,15 +197,36 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
                 }
                 s => s.parse().expect("a size"),
             };
-            library::pattern(g, chosen).expect("a pattern")
+            Worn::Pattern(library::pattern(g, chosen).expect("a pattern"))
         })
         .collect();
-    let mut options = DressOptions::default();
+    let wear: Vec<Wear<'_>> = worn
+        .iter()
+        .map(|w| match w {
+            Worn::Pattern(p) => Wear::Pattern(p),
+            Worn::Mesh(m) => Wear::Mesh(m),
+        })
+        .collect();
+    let mut options = DressOptions { any_size: a.any_size, ..DressOptions::default() };
     if let Some(e) = a.edge {
         options.triangulation.edge_length = e;
     }
     let start = pose(&a.pose, &template, &rest, 0.0);
-    let Dressed { model, mut state, report } = dress(&template, &rest, &start, &patterns, &options).expect("dressed");
+    let dressed = match dress_all(&template, &rest, &start, &wear, &options) {
+        Ok(d) => Some(d),
+        Err(DressError::Misfit(m)) => {
+            println!("{body} {outfit} {size}: {m}");
+            None
+        }
+        Err(e) => panic!("{e}"),
+    };
+    let Some(Dressed { model, mut state, report }) = dressed else {
+        let vertices = posed(&template, &rest, &start);
+        let y = vertices.iter().fold([f32::MAX, f32::MIN], |y, p| [y[0].min(p.y), y[1].max(p.y)]);
+        let faces = template.mesh().faces().to_vec();
+        let bare = Part { vertices, faces, color: [0.86, 0.70, 0.60], uv: vec![], painted: vec![] };
+        return (vec![bare], y, [0.0; 2]);
+    };
     let vertices: Vec<usize> = state.garments.iter().map(|g| g.positions.len()).collect();
     println!(
         "{body} {outfit} {size}: {vertices:?} vertices, dressed in {:.0} ms, {} steps, penetration {:.1} mm, p99 stretch {:.3}",
@@ -254,7 +297,9 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
         let painted = fits.as_ref().map_or_else(Vec::new, |maps| {
             g.render.vertex.iter().map(|v| maps[k].vertices[*v as usize].color()).collect()
         });
-        let color = library::dye(&g.name).map(|c| f32::from(c) / 255.0);
+        let known = library::names().contains(&g.name.as_str());
+        let color = (if known { library::dye(&g.name) } else { library::dye(library::names()[k % 9]) })
+            .map(|c| f32::from(c) / 255.0);
         parts.push(Part { vertices: world, faces: g.render.faces.clone(), color, uv: g.render.uv.clone(), painted });
     }
     if a.crop {

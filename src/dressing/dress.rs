@@ -3,9 +3,12 @@
 use super::canonical::{between, canonical_pose, upright_root};
 use super::drape::{Drape, Layers, Skin};
 use super::figure::Figure;
+use super::mesh_wear::{CARRIED, MeshWear};
 use super::place::place;
 use super::refine::prolong;
+use super::suggest::{Misfit, wearable};
 use super::waistband::spread;
+use crate::body::measure::measure;
 use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
 use crate::cloth::realtime::{AnchorBinding, Config, Model, Outfit, State};
 use crate::cloth::{ClothError, Sheet};
@@ -27,6 +30,9 @@ pub enum DressError {
     /// The body or the simulation is at fault.
     #[error(transparent)]
     Cloth(#[from] ClothError),
+    /// A size that cannot be worn by this body.
+    #[error(transparent)]
+    Misfit(#[from] Misfit),
     /// The pose has a value that is not finite or the wrong number of angles.
     #[error("pose: {0}")]
     Pose(String),
@@ -39,6 +45,8 @@ pub struct DressOptions {
     pub triangulation: Triangulation,
     /// How to simulate afterwards.
     pub config: Config,
+    /// Put on what does not fit too: panels are stretched or slide, which shows as crumpled cloth.
+    pub any_size: bool,
 }
 
 /// A dressed body, ready for [`crate::cloth::realtime::step`].
@@ -103,6 +111,39 @@ const FINE_STEP: f64 = 1e-3;
 /// Substeps on the fine mesh: wrinkles that the coarse one lacks.
 const FINISHING: usize = 90;
 
+/// Something to put on.
+#[derive(Clone, Copy, Debug)]
+pub enum Wear<'a> {
+    /// Cut from a pattern.
+    Pattern(&'a Pattern),
+    /// A mesh made on another body.
+    Mesh(&'a MeshWear),
+}
+
+impl Wear<'_> {
+    fn layer(&self) -> u8 {
+        match self {
+            Self::Pattern(p) => p.layer,
+            Self::Mesh(m) => m.layer(),
+        }
+    }
+}
+
+/// One sheet of cloth on its way onto the body.
+struct Sheeted {
+    fine: GarmentMesh,
+    /// What is draped first; `None` where that is the garment's own mesh.
+    coarse: Option<GarmentMesh>,
+    /// Start positions of what is draped first, frame of the canonical body, metres.
+    placed: Vec<P3>,
+}
+
+impl Sheeted {
+    fn first(&self) -> &GarmentMesh {
+        self.coarse.as_ref().unwrap_or(&self.fine)
+    }
+}
+
 /// Puts garments on a body in a pose (world frame, y up). Patterns are worn in the order of their `layer`; the outfit
 /// of the result has them in that order.
 ///
@@ -115,8 +156,24 @@ pub fn dress(
     patterns: &[Pattern],
     options: &DressOptions,
 ) -> Result<Dressed, DressError> {
+    let wear: Vec<Wear<'_>> = patterns.iter().map(Wear::Pattern).collect();
+    dress_all(template, rest, pose, &wear, options)
+}
+
+/// As [`dress`], for patterns and meshes together. A mesh becomes as many garments of the outfit as it has pieces of
+/// cloth.
+///
+/// # Errors
+/// As [`dress`].
+pub fn dress_all(
+    template: &Template,
+    rest: &RestBody,
+    pose: &Pose<World>,
+    wear: &[Wear<'_>],
+    options: &DressOptions,
+) -> Result<Dressed, DressError> {
     let started = Instant::now();
-    if patterns.is_empty() {
+    if wear.is_empty() {
         return Err(DressError::NoGarments);
     }
     if !pose.is_finite() || pose.angles.len() != template.skeleton().dofs() {
@@ -127,31 +184,51 @@ pub fn dress(
         )));
     }
     let mut report = DressReport::default();
-    let mut order: Vec<&Pattern> = patterns.iter().collect();
-    order.sort_by_key(|p| p.layer);
+    let mut order: Vec<&Wear<'_>> = wear.iter().collect();
+    order.sort_by_key(|w| w.layer());
+    let timer = Instant::now();
+    let figure = Figure::new(template, rest);
+    report.stages_ms.place = ms(timer);
     let timer = Instant::now();
     let fine = options.triangulation;
     // The coarse mesh may have slimmer triangles: nothing is simulated on it later.
     let length = (fine.edge_length * COARSER).min(COARSEST).max(fine.edge_length);
     let coarse = Triangulation { edge_length: length, min_angle: 0.0 };
-    let sew = |how: &Triangulation| order.iter().map(|p| GarmentMesh::sew(p, how)).collect::<Result<Vec<_>, _>>();
-    let (meshes, coarse) = (sew(&fine)?, sew(&coarse)?);
+    let measures = if options.any_size { None } else { measure(template, rest).ok() };
+    let mut sheets: Vec<Sheeted> = Vec::new();
+    for w in order {
+        match w {
+            Wear::Pattern(p) => {
+                if let Some(m) = &measures {
+                    wearable(p, m)?;
+                }
+                let rough = GarmentMesh::sew(p, &coarse)?;
+                let placed = place(template, &figure, p, &rough);
+                sheets.push(Sheeted { fine: GarmentMesh::sew(p, &fine)?, coarse: Some(rough), placed });
+            }
+            Wear::Mesh(m) => sheets.extend(m.put_on(template, &figure).into_iter().map(|(fine, placed)| Sheeted {
+                fine,
+                coarse: None,
+                placed,
+            })),
+        }
+    }
+    // Hats and shoes press nothing: cloth goes over them.
+    let is_carried = |s: &Sheeted| s.fine.anchors.iter().any(|a| a.name == CARRIED);
+    sheets.sort_by_key(|s| !is_carried(s));
     report.stages_ms.sew = ms(timer);
 
-    let timer = Instant::now();
-    let figure = Figure::new(template, rest);
     let root = upright_root(rest, &pose.root);
     let start = Pose { root, angles: canonical_pose(template, rest).angles };
-    let placed: Vec<Vec<P3>> = order
-        .iter()
-        .zip(&coarse)
-        .map(|(p, m)| {
-            let mut world = Vec::new();
-            root.points_f32(&place(template, &figure, p, m), &mut world);
-            world
-        })
-        .collect();
-    report.stages_ms.place = ms(timer);
+    let coarse: Vec<GarmentMesh> = sheets.iter().map(|s| s.first().clone()).collect();
+    let own: Vec<bool> = sheets.iter().map(|s| s.coarse.is_none()).collect();
+    let (mut meshes, mut placed) = (Vec::new(), Vec::new());
+    for s in sheets {
+        let mut world = Vec::new();
+        root.points_f32(&s.placed, &mut world);
+        placed.push(world);
+        meshes.push(s.fine);
+    }
 
     let timer = Instant::now();
     let outfit = Outfit { anchors: vec![Vec::new(); meshes.len()], garments: meshes };
@@ -200,7 +277,7 @@ pub fn dress(
     let timer = Instant::now();
     let mut drapes = Vec::new();
     for (k, mesh) in model.outfit.garments.iter().enumerate() {
-        let x = prolong(&coarse[k], mesh, &rough.drapes[k].x);
+        let x = if own[k] { rough.drapes[k].x.clone() } else { prolong(&coarse[k], mesh, &rough.drapes[k].x) };
         let mut d = Drape::new(mesh, &Sheet::of_garment(mesh)?, x.iter().map(|p| P3::from(p.cast::<f32>())).collect());
         d.find_from(&skin, &rough.drapes[k]);
         d.pin(&fasten(&skin, mesh, &d, offsets[k])?, skin.frame());
@@ -259,6 +336,10 @@ fn bind(
             let p = positions[vertex as usize];
             let near = surface.nearest_vertex(frame, &p, Region::ALL.0);
             let c = surface.closest_around(frame, &p, near, Region::ALL.0);
+            if set.name == CARRIED {
+                out.push(exactly(vertex, &p, surface.faces()[c.face as usize], frame));
+                continue;
+            }
             out.push(AnchorBinding {
                 vertex,
                 body: surface.faces()[c.face as usize],
@@ -269,4 +350,14 @@ fn bind(
         }
     }
     out
+}
+
+/// Ties a vertex to a triangle exactly where it is: weights of where it stands over the triangle's plane, and its height.
+fn exactly(vertex: u32, at: &P3, body: [u32; 3], frame: &SurfaceFrame) -> AnchorBinding {
+    let [p, q, r] = body.map(|v| frame.vertices[v as usize]);
+    let (u, v, d) = (q - p, r - p, at - p);
+    let normal = u.cross(&v);
+    let square = normal.norm_squared().max(f32::MIN_POSITIVE);
+    let (b, c) = (d.cross(&v).dot(&normal) / square, u.cross(&d).dot(&normal) / square);
+    AnchorBinding { vertex, body, weights: [1.0 - b - c, b, c], height: d.dot(&normal) / square.sqrt(), strength: 1.0 }
 }

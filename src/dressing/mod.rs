@@ -1,16 +1,21 @@
 //! A garment onto a body: panel placement, sewing, size choice, first drape, fit map.
 
 mod canonical;
+mod carry;
 mod drape;
 mod dress;
 mod figure;
 mod fit_map;
+mod made_on;
+mod mesh_wear;
 mod place;
 mod refine;
 mod suggest;
 mod waistband;
 
 pub use crate::cloth::realtime::{AnchorBinding, Outfit};
-pub use dress::{DressError, DressOptions, DressReport, Dressed, dress};
+pub use dress::{DressError, DressOptions, DressReport, Dressed, Wear, dress, dress_all};
 pub use fit_map::{FIT_COLORS, FitMap, FitProbe, RegionFit, VertexFit};
-pub use suggest::{Fit, Room, Suggestion, hem_height, judge, rooms, suggest};
+pub use made_on::{MadeOn, WearError, rig_standing};
+pub use mesh_wear::MeshWear;
+pub use suggest::{Fit, Misfit, Room, Suggestion, hem_height, judge, rooms, suggest, wearable};

@@ -136,6 +136,106 @@ pub fn suggest(garment: &str, body: &Measurements) -> Result<Suggestion, Garment
     Ok(s)
 }
 
+/// Why a size cannot be worn, and which one can.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Misfit {
+    /// Even stretched it does not go around the body.
+    #[error("{garment} {size} cannot be closed: at the {place} it lacks {:.0} cm (body {:.0} cm, garment {:.0} cm, {fabric} gives {:.0} cm){}",
+        (lacks * 100.0).ceil(), body * 100.0, girth * 100.0, gives * 100.0, advice(*better))]
+    TooSmall {
+        /// Garment.
+        garment: String,
+        /// Its size.
+        size: Size,
+        /// `chest`, `waist` or `hip`.
+        place: &'static str,
+        /// Girth of the body, metres.
+        body: f64,
+        /// Girth of the finished garment, metres.
+        girth: f64,
+        /// How far the fabric stretches there, metres.
+        gives: f64,
+        /// What is missing beyond that, metres.
+        lacks: f64,
+        /// The fabric.
+        fabric: String,
+        /// A size that can be worn.
+        better: Option<Size>,
+    },
+    /// Nothing holds it up.
+    #[error("{garment} {size} would slide off: its waist is {:.0} cm wider than the hips (hips {:.0} cm, waist {:.0} cm){}",
+        ((girth - body) * 100.0).ceil(), body * 100.0, girth * 100.0, advice(*better))]
+    TooLarge {
+        /// Garment.
+        garment: String,
+        /// Its size.
+        size: Size,
+        /// Girth of the hips, metres.
+        body: f64,
+        /// Girth of the waistband, metres.
+        girth: f64,
+        /// A size that can be worn.
+        better: Option<Size>,
+    },
+}
+
+fn advice(better: Option<Size>) -> String {
+    better.map_or_else(|| "; no size of it can be worn".to_owned(), |s| format!("; {s} can be worn"))
+}
+
+/// A waistband that lacks this much still closes: it sits lower, or the button moves, metres.
+const SITS_LOWER: f64 = 0.03;
+
+/// Whether a pattern can be worn by a body at all: closed with what its fabric gives, and held up.
+///
+/// # Errors
+/// What is missing where, and which size of the library can be worn.
+pub fn wearable(pattern: &Pattern, body: &Measurements) -> Result<(), Misfit> {
+    let fault = misfit(pattern, body);
+    fault.map_or(Ok(()), |mut m| {
+        let wears = |s: &Size| library::pattern(&pattern.name, *s).is_ok_and(|p| misfit(&p, body).is_none());
+        // The nearest in the direction that is needed.
+        let found = match m {
+            Misfit::TooSmall { .. } => Size::ALL.into_iter().filter(|s| *s > pattern.size).find(wears),
+            Misfit::TooLarge { .. } => Size::ALL.into_iter().rev().filter(|s| *s < pattern.size).find(wears),
+        };
+        let (Misfit::TooSmall { better, .. } | Misfit::TooLarge { better, .. }) = &mut m;
+        *better = found;
+        Err(m)
+    })
+}
+
+fn misfit(pattern: &Pattern, body: &Measurements) -> Option<Misfit> {
+    let (garment, size) = (pattern.name.clone(), pattern.size);
+    let held = matches!(pattern.kind, GarmentKind::Skirt | GarmentKind::Trousers);
+    let tightest = rooms(pattern, body)
+        .into_iter()
+        .map(|r| {
+            let gives = r.garment * pattern.material.give();
+            let lower = if held && r.place == "waist" { SITS_LOWER } else { 0.0 };
+            (r.body - r.garment - gives - lower, gives, r)
+        })
+        .filter(|(lacks, ..)| *lacks > 0.0)
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some((lacks, gives, r)) = tightest {
+        let fabric = pattern.material.name.clone();
+        let (body, girth) = (r.body, r.garment);
+        return Some(Misfit::TooSmall {
+            garment,
+            size,
+            place: r.place,
+            body,
+            girth,
+            gives,
+            lacks,
+            fabric,
+            better: None,
+        });
+    }
+    let (body, girth) = (body.hip, pattern.finished[1]);
+    (held && girth > body).then_some(Misfit::TooLarge { garment, size, body, girth, better: None })
+}
+
 /// How one pattern fits a body, in numbers and in a sentence.
 pub fn judge(pattern: &Pattern, body: &Measurements) -> Suggestion {
     let rooms = rooms(pattern, body);
@@ -215,6 +315,34 @@ mod tests {
         assert!((s.ease[0] - (p.finished[0] - 0.88)).abs() < 1e-12 && s.ease[1].is_nan());
         let fit = |g: f64| judge(&p, &body(g)).rooms[0].fit;
         assert_eq!([fit(1.3), fit(1.1), fit(0.8)], [Fit::Tight, Fit::Fitted, Fit::Loose]);
+    }
+
+    #[test]
+    fn what_cannot_be_closed_or_held_up_is_refused_with_what_is_missing() {
+        let p = library::pattern("tshirt", Size::S).expect("pattern");
+        let give = p.material.give();
+        let mut b = body(1.0);
+        b.hip = 0.5;
+        b.chest = p.finished[0] * (1.0 + give) - 0.001;
+        assert_eq!(wearable(&p, &b), Ok(()), "worn tight");
+        b.chest += 0.0505;
+        let e = wearable(&p, &b).expect_err("too small");
+        let text = e.to_string();
+        assert!(
+            text.contains("tshirt S cannot be closed: at the chest it lacks 5 cm") && text.contains("M can"),
+            "{text}"
+        );
+        // A waistband closes with less than its hips, and slides off if it is wider than these.
+        let skirt = library::pattern("skirt", Size::Xl).expect("pattern");
+        let slim = body(0.9);
+        let e = wearable(&skirt, &slim).expect_err("too large").to_string();
+        assert!(e.contains("slide off") && e.contains("can be worn"), "{e}");
+        let none =
+            wearable(&library::pattern("skirt", Size::Xxl).expect("pattern"), &body(2.0)).expect_err("too small");
+        assert!(none.to_string().contains("no size"), "{none}");
+        // A knit gives more than denim.
+        let give = |n: &str| crate::garment::Material::preset(n).expect("preset").give();
+        assert!(give("jersey") > 0.1 && give("denim") < 0.05);
     }
 
     #[test]

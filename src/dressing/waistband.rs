@@ -1,6 +1,7 @@
 //! Where a waistband is tied: spread evenly around the body before it is, so that no part of it is pulled more than
 //! another.
 
+use super::mesh_wear::{CARRIED, SHOULDERS};
 use crate::contact::{SurfaceFrame, SurfaceModel};
 use crate::garment::{GarmentMesh, Region};
 use crate::math::P3;
@@ -20,7 +21,7 @@ pub(super) fn spread(
     offset: f64,
     positions: &mut [P3],
 ) {
-    for set in mesh.anchors.iter().filter(|s| s.strength >= 1.0) {
+    for set in mesh.anchors.iter().filter(|s| s.strength >= 1.0 && ![CARRIED, SHOULDERS].contains(&s.name.as_str())) {
         let held: std::collections::BTreeSet<u32> = set.vertices.iter().copied().collect();
         let mut around = std::collections::BTreeMap::<u32, Vec<(u32, f32)>>::new();
         for ([a, b], rest) in edges {

@@ -2,18 +2,13 @@
 
 use super::inside::Solid;
 use super::{EvaluateError, Row};
-use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, embedded, measure, rig, skin};
-use crate::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+use crate::body::{BodyShape, Pose, RestBody, Template, measure};
 use crate::cloth::realtime::{Config, Input, State, Workspace, step};
-use crate::dressing::{DressOptions, Dressed, dress, suggest};
+use crate::dressing::{DressOptions, Dressed, dress, rig_standing, suggest};
 use crate::formats::obj::read_obj;
 use crate::garment::library;
-use crate::math::{Body, Camera, P3, Rigid, V3d, World};
-use crate::mesh::{Face, TriMesh};
-use crate::par::Par;
-use crate::raster::{View, VisibilityBuffer, rasterise};
-use crate::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace as TrackerWorkspace, step as track};
-use nalgebra::{UnitQuaternion, Vector3};
+use crate::math::{Body, P3, Rigid, World};
+use crate::mesh::Face;
 use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
@@ -28,8 +23,6 @@ const INTERVAL: f64 = 0.04;
 const CALL: f64 = 1.0 / 60.0;
 /// Every so many calls penetration is measured.
 const LOOK_EVERY: usize = 4;
-/// Frames that the tracker gets of the standing body.
-const LOOKS: u64 = 45;
 
 /// A body that moves, with a skeleton found for it.
 pub struct Dance {
@@ -120,48 +113,9 @@ pub fn load(folder: &Path) -> Result<Dance, EvaluateError> {
         numbers.chunks_exact(3 * n).map(|b| b.chunks_exact(3).map(|p| P3::new(p[0], p[1], p[2])).collect()).collect();
     let first = bodies.first().ok_or_else(|| fault(format!("{BODIES}: empty")))?;
     let mesh = faces.with_vertices(first.clone()).map_err(|e| fault(e.to_string()))?;
-    let (template, fit) = rigged(mesh).map_err(fault)?;
+    let (template, fit) = rig_standing(mesh).map_err(fault)?;
     let rest = template.personalise(&BodyShape::default());
     Ok(Dance { template: Arc::new(template), rest, bodies, fit })
-}
-
-/// A skeleton for a standing body that faces +z.
-fn rigged(mesh: TriMesh) -> Result<(Template, f64), String> {
-    let camera = Intrinsics::KINECT_V1;
-    let (low, high) = mesh.bounds().ok_or("the body has no vertices")?;
-    // A camera in front, at half its height, far enough for all of it; y down, z towards the body.
-    let away = 1.1 * f64::from((high.y - low.y).max(0.8 * (high.x - low.x))) * camera.fy / f64::from(camera.height);
-    let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-    let middle = V3d::new(0.0, 0.5 * f64::from(low.y + high.y), f64::from(high.z) + away);
-    let world_from_camera: Rigid<World, Camera> = Rigid::from_parts(middle, half_turn);
-    let camera_from_world = world_from_camera.inverse();
-    let mut seen = Vec::new();
-    camera_from_world.points_f32(mesh.vertices(), &mut seen);
-    let mut picture = VisibilityBuffer::default();
-    rasterise(&View::Perspective { camera, near: 0.1 }, &seen, mesh.faces(), &mut picture);
-    let depth = picture.depth.iter().map(|z| if z.is_finite() { (z * 1e3).round() as u16 } else { 0 }).collect();
-    let depth = DepthImage::new(camera.width, camera.height, depth).map_err(|e| e.to_string())?;
-
-    let model = TrackerModel::new(embedded::template(), Calibration::registered(camera), TrackerConfig::default());
-    let (mut state, mut work) = (TrackerState::new(&model), TrackerWorkspace::default());
-    for sequence in 0..LOOKS {
-        let frame = RgbdFrame { sequence, time_ns: sequence * 33_333_333, depth: depth.clone(), color: None };
-        track(&model, &mut state, &frame, &mut work).map_err(|e| e.to_string())?;
-    }
-    if !state.status.is_live() {
-        return Err(format!("the tracker does not find the body: {:?}", state.status));
-    }
-    let t = model.template();
-    let person = t.personalise(&state.shape);
-    let pose: Pose<World> = Pose { root: world_from_camera * state.pose.root, angles: state.pose.angles.clone() };
-    let mut bones = BoneTransforms::default();
-    pose.bones(t.skeleton(), &person, &mut bones);
-    let mut fitted = RestBody::default();
-    skin(Par::Seq, &person.vertices, t.weights(), &bones, &mut fitted.vertices);
-    let tree = crate::spatial::PointTree::new(&fitted.vertices);
-    let far = mesh.vertices().iter().map(|p| tree.nearest(p, 1.0).map_or(1.0, |n| f64::from(n.1).sqrt()));
-    let fit = far.sum::<f64>() / mesh.vertices().len() as f64;
-    Ok((rig("dancer", mesh, t, &bones, &fitted).map_err(|e| e.to_string())?, fit))
 }
 
 impl Dance {

@@ -172,6 +172,16 @@ impl Material {
         material.check()?;
         Ok(material)
     }
+    /// How far the fabric gives around the body before it is felt as too tight, as a share of its length: until its
+    /// tension, in the direction that gives more, presses a trunk of 15 cm radius with 0.7 kPa (Laplace's p = T/r), half
+    /// of what a tolerated waistband does; and at most as far as skin itself stretches comfortably.
+    pub fn give(&self) -> f64 {
+        /// N/m.
+        const TENSION: f64 = 105.0;
+        /// Kirk & Ibrahim 1966: skin strains from 12 % on; a garment cannot ask for more than a knit of low power has.
+        const MOST: f64 = 0.12;
+        (TENSION / self.stretch_warp.min(self.stretch_weft)).min(MOST)
+    }
     /// Refuses numbers no sheet can have.
     ///
     /// # Errors

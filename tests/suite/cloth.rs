@@ -30,7 +30,11 @@ fn dressed(config: &Config) -> Dressed {
 fn dressed_as(rest: &RestBody, pose: &Pose<World>, size: Size, edge_length: f64, config: &Config) -> Dressed {
     let template = tryon::body::embedded::template();
     let patterns = ["skirt", "tshirt"].map(|n| library::pattern(n, size).expect("a pattern"));
-    let options = DressOptions { triangulation: Triangulation { edge_length, min_angle: 8.0 }, config: config.clone() };
+    let options = DressOptions {
+        triangulation: Triangulation { edge_length, min_angle: 8.0 },
+        config: config.clone(),
+        any_size: false,
+    };
     let d = dress(&template, rest, pose, &patterns, &options).expect("dressed");
     let mut bones = BoneTransforms::default();
     pose.bones(template.skeleton(), rest, &mut bones);

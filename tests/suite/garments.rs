@@ -211,10 +211,10 @@ fn a_fit_map_tells_a_tight_size_from_a_loose_one() {
         assert!(probe.measure(&d.model, &d.state, &body[1..]).is_err(), "a body of another size is refused");
         map
     };
-    let (small, large) = (worn(Size::Xs), worn(Size::Xxl));
+    let (small, large) = (worn(Size::S), worn(Size::Xxl));
     let chest = |m: &tryon::dressing::FitMap| m.regions.iter().find(|r| r.name == "chest").expect("a chest").clone();
     let (s, l) = (chest(&small), chest(&large));
-    eprintln!("XS {s:?}\nXXL {l:?}");
+    eprintln!("S {s:?}\nXXL {l:?}");
     assert!(s.stretch[0] > l.stretch[0] + 0.01 && s.gap < l.gap && s.pressure[0] > l.pressure[0]);
     assert_eq!(s.fit, Fit::Tight);
     assert_ne!(l.fit, Fit::Tight);

@@ -6,6 +6,7 @@ mod cloth;
 mod common;
 mod company;
 mod dance;
+mod dressing_meshes;
 mod garment_stream;
 mod garments;
 mod starts;

@@ -86,9 +86,14 @@ pub(crate) struct RunArgs {
     /// An .mcap file, or a folder with camera.json, depth/ and maybe rgb/.
     #[arg(long, value_name = "REC")]
     pub(crate) input: PathBuf,
-    /// Garments: names (see `tryon export --list`) or pattern files (.json, ours or GarmentCode's), layered as they say.
+    /// Garments: names (see `tryon export --list`), pattern files (.json, ours or GarmentCode's), layered as they say, or
+    /// meshes (.obj with or without stitches, .glb, .gltf, MakeHuman's .mhclo).
     #[arg(long = "garment", value_name = "NAME|FILE", required = true)]
     pub(crate) garments: Vec<String>,
+    /// The body that mesh garments were made on (.npz in SMPL layout, or an .obj that stands upright; MakeHuman clothes:
+    /// its base mesh with the helpers). Without it the garment's own place and size are guessed from.
+    #[arg(long, value_name = "NPZ|OBJ")]
+    pub(crate) garment_body: Option<PathBuf>,
     /// Size for all garments of the library; without it each is chosen from the tracked body.
     #[arg(long, value_name = "SIZE")]
     pub(crate) size: Option<String>,

@@ -9,7 +9,7 @@ use tryon::body::{BoneTransforms, Pose, RestBody, Template, skin};
 use tryon::camera::{Calibration, ColorImage, RgbdFrame};
 use tryon::cloth::realtime;
 use tryon::composite::{self, BodyView, GarmentView, Look};
-use tryon::dressing::{DressOptions, dress, suggest};
+use tryon::dressing::{DressOptions, MadeOn, MeshWear, Wear, dress_all, suggest};
 use tryon::garment::{Pattern, Size, library};
 use tryon::math::{P3, World};
 use tryon::par::Par;
@@ -27,6 +27,8 @@ pub(crate) enum Choice {
     },
     /// A pattern from a file, in the size that it was cut in.
     File(Box<Pattern>),
+    /// A mesh from a file, made on another body.
+    Mesh(Arc<MeshWear>),
 }
 
 impl Choice {
@@ -34,13 +36,17 @@ impl Choice {
     ///
     /// # Errors
     /// Names the unknown garment or size, or what is wrong in a pattern file.
-    pub(crate) fn parse(names: &[String], size: Option<&str>) -> Result<Vec<Self>> {
+    pub(crate) fn parse(names: &[String], size: Option<&str>, body: Option<&Path>) -> Result<Vec<Self>> {
         let size = size.map(str::parse).transpose()?;
+        let body = body.map(MadeOn::read).transpose().context("--garment-body")?;
         names
             .iter()
             .map(|name| {
                 if name.ends_with(".json") {
                     return Ok(Self::File(Box::new(input::pattern(Path::new(name))?)));
+                }
+                if input::is_mesh(name) {
+                    return Ok(Self::Mesh(Arc::new(input::mesh_garment(Path::new(name), body.clone())?)));
                 }
                 library::pattern(name, size.unwrap_or_default())?;
                 Ok(Self::Library { name: name.clone(), size })
@@ -183,24 +189,39 @@ impl Chain {
 
     fn put_on(&mut self, template: &Template, rest: &RestBody) -> Result<Worn> {
         let measures = measure(template, rest)?;
-        let mut patterns: Vec<Pattern> = Vec::new();
+        enum Chosen {
+            Pattern(Box<Pattern>),
+            Mesh(Arc<MeshWear>),
+        }
+        let mut chosen: Vec<Chosen> = Vec::new();
         for c in &self.choices {
-            patterns.push(match c {
-                Choice::File(pattern) => pattern.as_ref().clone(),
-                Choice::Library { name, size: Some(size) } => library::pattern(name, *size)?,
+            chosen.push(match c {
+                Choice::File(pattern) => Chosen::Pattern(pattern.clone()),
+                Choice::Mesh(mesh) => {
+                    self.notes.extend(mesh.notes.iter().map(|n| format!("{}: {n}", mesh.name)));
+                    Chosen::Mesh(mesh.clone())
+                }
+                Choice::Library { name, size: Some(size) } => Chosen::Pattern(Box::new(library::pattern(name, *size)?)),
                 Choice::Library { name, size: None } => {
                     let s = suggest(name, &measures)?;
                     self.notes.push(format!("{name}: {} ({})", s.size, s.reason));
-                    library::pattern(name, s.size)?
+                    Chosen::Pattern(Box::new(library::pattern(name, s.size)?))
                 }
             });
         }
+        let wear: Vec<Wear<'_>> = chosen
+            .iter()
+            .map(|c| match c {
+                Chosen::Pattern(p) => Wear::Pattern(p),
+                Chosen::Mesh(m) => Wear::Mesh(m),
+            })
+            .collect();
         let pose: Pose<World> = Pose {
             root: self.tracked.world_from_camera * self.tracked.pose.root,
             angles: self.tracked.pose.angles.clone(),
         };
         let options = DressOptions { config: realtime::Config::tracked(), ..DressOptions::default() };
-        let dressed = dress(template, rest, &pose, &patterns, &options).context("the garments cannot be put on")?;
+        let dressed = dress_all(template, rest, &pose, &wear, &options).context("the garments cannot be put on")?;
         let looks = dressed.model.outfit.garments.iter().map(|g| look(&g.name)).collect();
         Ok(Worn { model: dressed.model, state: dressed.state, work: realtime::Workspace::default(), looks })
     }

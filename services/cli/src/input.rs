@@ -6,10 +6,11 @@ use serde::Deserialize;
 use std::path::Path;
 use std::sync::Arc;
 use tryon::body::{Template, embedded, import::template_from_smpl};
+use tryon::dressing::{MadeOn, MeshWear};
 use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
 use tryon::formats::npz::read_smpl;
 use tryon::garment::import::from_garmentcode;
-use tryon::garment::{Material, Pattern, Size};
+use tryon::garment::{Material, Pattern, Size, Triangulation};
 
 /// The body to track: an SMPL-layout npz, or the embedded one.
 ///
@@ -36,6 +37,23 @@ pub(crate) fn pattern(path: &Path) -> Result<Pattern> {
         Pattern::from_json(&text)
     }
     .with_context(|| path.display().to_string())
+}
+
+/// The name is that of a mesh garment's file.
+pub(crate) fn is_mesh(name: &str) -> bool {
+    Path::new(name)
+        .extension()
+        .and_then(|e| e.to_str())
+        .is_some_and(|e| ["obj", "glb", "gltf", "mhclo"].contains(&e.to_ascii_lowercase().as_str()))
+}
+
+/// A mesh garment from a file, made on `body` (a guess without one), of cotton.
+///
+/// # Errors
+/// Names the file and the edge, face or vertex at fault.
+pub(crate) fn mesh_garment(path: &Path, body: Option<MadeOn>) -> Result<MeshWear> {
+    let edge = Triangulation::default().edge_length;
+    MeshWear::on(path, body, &Material::preset("cotton")?, edge).with_context(|| path.display().to_string())
 }
 
 /// A rough start in the camera's frame, as recordings with truth carry it.

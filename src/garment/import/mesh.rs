@@ -16,10 +16,14 @@ pub struct MeshGarment {
     pub closed: usize,
     /// Stitches left open because three and more layers meet there (pleats); the simulator needs a proper surface.
     pub open: usize,
+    /// The rest shape is that of flat panels (texture coordinates in metres), not that of the triangles as they are.
+    pub flat: bool,
 }
 
-/// Texture coordinates count as a flat rest shape when the median edge has its length in space within this share.
+/// Texture coordinates count as a flat rest shape when the median edge has its length in space within this share …
 const SAME_SCALE: f64 = 0.05;
+/// … and the quartiles have it within this one.
+const ISOMETRIC: f64 = 0.25;
 /// Rest triangles smaller than this are refused, m².
 const SMALLEST: f64 = 1e-9;
 
@@ -111,7 +115,12 @@ pub fn from_mesh(
         min_angle,
     };
     garment.topology()?;
-    Ok(MeshGarment { garment, positions, closed, open })
+    Ok(MeshGarment { garment, positions, closed, open, flat: flat.is_some() })
+}
+
+/// The texture coordinates are panels in metres: the rest shape is theirs.
+pub fn panels_in_metres(sewn: &SewnObj) -> bool {
+    flat_rest(sewn).is_some()
 }
 
 /// Rest triangles from texture coordinates, when these are panels in metres.
@@ -132,12 +141,12 @@ fn flat_rest(sewn: &SewnObj) -> Option<Vec<[[f64; 2]; 3]>> {
         })
         .collect();
     ratio.sort_by(f64::total_cmp);
-    let median = *ratio.get(ratio.len() / 2)?;
-    ((median - 1.0).abs() < SAME_SCALE).then_some(rest)
+    let at = |share: usize| ratio.get(ratio.len() * share / 100).map(|r| (r - 1.0).abs());
+    (at(50)? < SAME_SCALE && at(25)? < ISOMETRIC && at(75)? < ISOMETRIC).then_some(rest)
 }
 
 /// A triangle laid flat: first edge along x.
-fn unfold(p: [nalgebra::Vector3<f64>; 3]) -> [[f64; 2]; 3] {
+pub(crate) fn unfold(p: [nalgebra::Vector3<f64>; 3]) -> [[f64; 2]; 3] {
     let (a, b) = (p[1] - p[0], p[2] - p[0]);
     let x = a.norm().max(f64::MIN_POSITIVE);
     [[0.0; 2], [x, 0.0], [a.dot(&b) / x, a.cross(&b).norm() / x]]

@@ -1,7 +1,12 @@
 //! Garments made by others, as ours.
 
+mod file;
 mod garmentcode;
 mod mesh;
+mod remesh;
 
+pub use file::{MeshFile, read_mesh, some_faces, split};
 pub use garmentcode::from_garmentcode;
-pub use mesh::{MeshGarment, from_mesh};
+pub(crate) use mesh::unfold;
+pub use mesh::{MeshGarment, from_mesh, panels_in_metres};
+pub use remesh::remesh;

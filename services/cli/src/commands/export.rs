@@ -59,7 +59,13 @@ fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
         let p = sequence.truth(i).pose;
         Pose { root: sequence.setting().world_from_camera * p.root, angles: p.angles }
     };
-    let dressed = dress(&template, rest, &pose(0), std::slice::from_ref(pattern), &DressOptions::default())?;
+    let dressed = dress(
+        &template,
+        rest,
+        &pose(0),
+        std::slice::from_ref(pattern),
+        &DressOptions { any_size: true, ..DressOptions::default() },
+    )?;
     let (model, mut state, mut work) = (dressed.model, dressed.state, realtime::Workspace::default());
     let garment = &model.outfit.garments[0];
     let drawn = |state: &realtime::State| {

@@ -39,7 +39,7 @@ struct Report {
 /// # Errors
 /// Bad input, named; or pictures that cannot be written.
 pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
-    let choices = Choice::parse(&args.garments, args.size.as_deref())?;
+    let choices = Choice::parse(&args.garments, args.size.as_deref(), args.garment_body.as_deref())?;
     let source = open_recording(&args.input)?;
     let template = input::template(args.body.as_deref())?;
     input::create_dir(&args.out)?;
