@@ -222,6 +222,7 @@ struct Judge<'a> {
     /// Is no cloth over this vertex of the body: head, hands, feet.
     end: Vec<bool>,
     shoulder: f32,
+    knee: f32,
 }
 
 impl<'a> Judge<'a> {
@@ -240,6 +241,7 @@ impl<'a> Judge<'a> {
             tree: PointTree::new(body),
             end: (0..body.len()).map(|i| ends[template.weights().dominant(i)]).collect(),
             shoulder,
+            knee: at("left_knee").unwrap_or(f32::MIN),
             template,
         }
     }
@@ -247,7 +249,8 @@ impl<'a> Judge<'a> {
         let Some((lo, hi)) = s.obj.mesh.bounds() else { return false };
         let v = s.obj.mesh.vertices();
         let over = v.iter().filter(|p| self.tree.nearest(p, 10.0).is_some_and(|(i, _)| self.end[i])).count();
-        (hi - lo).amax() > SMALL && (over as f64) < MOSTLY * v.len() as f64
+        // Socks go with the feet.
+        (hi - lo).amax() > SMALL && hi.y > self.knee && (over as f64) < MOSTLY * v.len() as f64
     }
 }
 
