@@ -7,7 +7,8 @@ use crate::math::P3;
 pub struct PointGrid {
     cell: f32,
     first: Vec<u32>,
-    points: Vec<u32>,
+    /// Number and place of each point, bucket by bucket.
+    points: Vec<(u32, P3)>,
     keys: Vec<u32>,
 }
 
@@ -38,19 +39,19 @@ impl PointGrid {
             self.first[i + 1] += self.first[i];
         }
         self.points.clear();
-        self.points.resize(points.len(), 0);
+        self.points.resize(points.len(), (0, P3::origin()));
         let mut next = self.first.clone();
         for (i, k) in self.keys.iter().enumerate() {
             let slot = &mut next[*k as usize];
-            self.points[*slot as usize] = i as u32;
+            self.points[*slot as usize] = (i as u32, points[i]);
             *slot += 1;
         }
     }
     fn at(&self, p: &P3) -> [i32; 3] {
         [p.x, p.y, p.z].map(|c| (c / self.cell).floor() as i32)
     }
-    /// Calls `f` with every point that may be within half a cell of `p` (and some others, maybe more than once).
-    pub fn around(&self, p: &P3, mut f: impl FnMut(u32)) {
+    /// Calls `f` with number and place of every point that may be within half a cell of `p` (and some others, maybe more than once).
+    pub fn around(&self, p: &P3, mut f: impl FnMut(u32, &P3)) {
         if self.points.is_empty() {
             return;
         }
@@ -63,8 +64,8 @@ impl PointGrid {
             // Saturating: cloth that has flown away keeps its place in the last cell.
             let cell = [0, 1, 2].map(|d| c[d].0.saturating_add(if k >> d & 1 == 1 { c[d].1 } else { 0 }));
             let b = bucket(cell);
-            for &i in &self.points[self.first[b] as usize..self.first[b + 1] as usize] {
-                f(i);
+            for (i, q) in &self.points[self.first[b] as usize..self.first[b + 1] as usize] {
+                f(*i, q);
             }
         }
     }
@@ -86,15 +87,15 @@ mod tests {
         grid.fill(&points, 0.08);
         for q in points.iter().step_by(97) {
             let mut got = Vec::new();
-            grid.around(q, |i| got.push(i));
+            grid.around(q, |i, _| got.push(i));
             for (i, p) in points.iter().enumerate() {
                 assert!((p - q).norm() >= 0.04 || got.contains(&(i as u32)), "{i}");
             }
         }
         grid.fill(&[P3::new(1e30, f32::NAN, -1e30)], 0.08);
         let mut got = Vec::new();
-        grid.around(&P3::new(1e30, f32::NAN, -1e30), |i| got.push(i));
+        grid.around(&P3::new(1e30, f32::NAN, -1e30), |i, _| got.push(i));
         assert!(got.contains(&0), "far away and not a number: {got:?}");
-        PointGrid::default().around(&P3::origin(), |_| unreachable!("an empty grid has no points"));
+        PointGrid::default().around(&P3::origin(), |_, _| unreachable!("an empty grid has no points"));
     }
 }

@@ -126,6 +126,8 @@ pub(super) struct GarmentModel {
     pub(super) surface: SurfaceModel,
     /// Vertices too near on the sheet to count as another fold.
     pub(super) close: Csr,
+    /// Length that 95 % of the edges do not exceed, metres.
+    pub(super) edge: f32,
     /// Local vertex and number of the binding, for each patch.
     pub(super) anchors: Vec<Vec<(u32, usize)>>,
 }
@@ -253,6 +255,9 @@ impl Model {
             let other = own.iter().map(|o| Region::ALL.0 & !o).collect();
             // Evenly between the skin and where the outermost lies.
             let offset = config.offset * (order + 1) as f64 / outfit.garments.len() as f64;
+            let mut lengths: Vec<f32> = sheet.edges.iter().map(|e| e.1 as f32).collect();
+            lengths.sort_unstable_by(f32::total_cmp);
+            let edge = lengths.get(lengths.len() * 95 / 100).copied().unwrap_or(0.0);
             let surface = SurfaceModel::new(g.faces.clone(), g.topology()?, own.clone());
             garments.push(GarmentModel {
                 sheet,
@@ -265,6 +270,7 @@ impl Model {
                 other,
                 offset,
                 close: surface.second_neighbours(),
+                edge,
                 surface,
                 anchors: Vec::new(),
             });

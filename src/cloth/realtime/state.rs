@@ -195,6 +195,13 @@ pub(super) struct PatchScratch {
     pub(super) planes: Vec<Plane>,
     /// How many of the planes, the first ones, are the body's.
     pub(super) body_planes: usize,
+    /// Planes within reach for some steps, and how many of them are the body's.
+    pub(super) near: Vec<Plane>,
+    pub(super) body_near: usize,
+    /// Vertices that had no other fold near them in the last round.
+    pub(super) alone: Vec<bool>,
+    /// For each vertex of the garment the last one that it was a neighbour of.
+    pub(super) neighbour_of: Vec<u32>,
     /// Vertices that nothing holds: in skin that lies in other skin, or about to tear.
     pub(super) free: Vec<bool>,
     pub(super) ties: Vec<Tie>,

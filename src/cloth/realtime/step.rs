@@ -100,7 +100,10 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
     }
     let dt = input.dt.clamp(DT_RANGE[0], DT_RANGE[1]);
     let timer = Instant::now();
-    work.maps.render(config.par, &model.views, input.body, model.surface.faces());
+    // Two opposite views in turn: a map only proposes where to begin looking, and all are wanted after a jump.
+    let turn = state.frames as usize % 2 * 2;
+    let views = if teleported { &model.views[..] } else { &model.views[turn..turn + 2] };
+    work.maps.render(config.par, views, input.body, model.surface.faces());
     let mut report = StepReport { teleported, softened: 1.0, ..StepReport::default() };
     report.stages_ms.maps = ms(timer);
     let timer = Instant::now();
@@ -136,8 +139,8 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
             span: span as f32,
         };
         let maps = (r == 0).then_some(&work.maps);
-        sheets(model, &work.patches, &mut work.sheets);
-        let cloth = ClothTouch { model, sheets: &work.sheets };
+        sheets(model, &work.patches, span as f32, &mut work.sheets);
+        let cloth = ClothTouch { model, sheets: &work.sheets, span: span as f32 };
         for_patches(model, &mut work.patches, |g, k, p| {
             anchors(model, g, k, &touch, p);
             let fabric = &model.garments[g].patches[k];
@@ -225,6 +228,10 @@ fn begin(model: &Model, state: &State, all: &mut Vec<PatchScratch>) {
             to.clear();
             to.extend(local().filter_map(|v| from.get(v)));
         }
+        p.alone.clear();
+        p.alone.resize(fabric.vertices.len(), false);
+        p.neighbour_of.clear();
+        p.neighbour_of.resize(from.positions.len(), u32::MAX);
         p.clear.clear();
         p.clear.resize(fabric.vertices.len(), [0.0; 2]);
         p.report = StepReport::default();
@@ -254,16 +261,22 @@ fn advance(model: &Model, all: &mut [PatchScratch], span: f64) {
                 let (f, p) = (&m.patches[k], &mut p[0]);
                 // What must be right after step `s` for the steps that a patch makes alone after it.
                 let rings = |s: usize| m.rings(s1 - s - 1);
+                let (t0, alone) = (s0 as f32 * h, (s1 - s0) as f32 * h);
+                let (body, cloth) = p.planes.split_at(p.body_planes);
+                p.near.clear();
+                p.motion.within_reach(body, t0, alone, &mut p.near);
+                p.body_near = p.near.len();
+                p.motion.within_reach(cloth, t0, alone, &mut p.near);
                 for s in s0..s1 {
                     if (s - s0) % m.bend_every == 0 {
                         p.motion.bend(f, h * m.bend_every.min(s1 - s) as f32 * 0.5, rings(s) + m.smooth);
                     }
                     let t = s as f32 * h;
                     let step = Step { h, t, ahead, gravity, rings: rings(s) };
-                    p.motion.accelerate(f, &step, &p.planes, &p.ties);
+                    p.motion.accelerate(f, &step, &p.near, &p.ties);
                     p.motion.tie(&p.ties, t, h);
                     // In this order: the body has the last word.
-                    let (body, cloth) = p.planes.split_at(p.body_planes);
+                    let (body, cloth) = p.near.split_at(p.body_near);
                     p.motion.restrain(cloth, t, h, CLOTH_RECOVERY);
                     p.report.contacts = p.motion.restrain(body, t, h, RECOVERY);
                     p.motion.advance(f, &step, FASTEST);

@@ -69,10 +69,11 @@ impl Touch<'_> {
                     continue;
                 }
                 let surface = &self.model.surface;
-                let (near, c) = surface.closest_within(self.now, &x, p.nearest[i][k], masks[k], REACH);
+                let wanted = (offset + reach + travel).min(REACH);
+                let (near, c) = surface.closest_within(self.now, &x, p.nearest[i][k], masks[k], wanted);
                 p.nearest[i][k] = near;
                 match c {
-                    Err(room) => p.clear[i][k] = room,
+                    Err(room) => p.clear[i][k] = room + wanted - offset - reach,
                     Ok(mut c) => {
                         p.clear[i][k] = if c.rim { 0.0 } else { c.signed - offset - reach };
                         if c.rim && k == 0 {
@@ -81,7 +82,7 @@ impl Touch<'_> {
                         }
                         let hidden = self.buried.holds_nothing(surface.faces()[c.face as usize]);
                         p.free[i] |= hidden && !c.rim && c.signed < offset;
-                        if !hidden && !c.rim && c.signed < (offset + reach + travel).min(REACH) {
+                        if !hidden && !c.rim && c.signed < wanted {
                             found[k] = Some(c);
                         }
                     }

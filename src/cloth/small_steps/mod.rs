@@ -22,4 +22,6 @@ pub use motion::{Motion, V4};
 pub use plan::{Fit, Plan, triangles};
 
 #[cfg(test)]
+mod stress;
+#[cfg(test)]
 mod tests;

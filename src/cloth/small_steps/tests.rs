@@ -7,14 +7,14 @@ use crate::math::{P3, V3d};
 use crate::mesh::Face;
 
 /// An isotropic sheet without air drag: 0.18 kg/m², 1000 N/m, Poisson 0.25.
-fn cotton(bending: f64) -> Material {
+pub(super) fn cotton(bending: f64) -> Material {
     let mut m = Material::isotropic("test", 1000.0 / 3e-4, 0.25, 0.18 / 3e-4, 3e-4, "test");
     (m.bending, m.damping) = (bending, 0.0);
     m
 }
 
 /// `nx` × `ny` cells in the x–z plane.
-fn grid(nx: usize, ny: usize, dx: f64, dy: f64) -> (Vec<V3d>, Vec<Face>, Vec<[[f64; 2]; 3]>) {
+pub(super) fn grid(nx: usize, ny: usize, dx: f64, dy: f64) -> (Vec<V3d>, Vec<Face>, Vec<[[f64; 2]; 3]>) {
     let at = |i: usize, j: usize| (j * (nx + 1) + i) as u32;
     let flat = |v: u32| [(v as usize % (nx + 1)) as f64 * dx, (v as usize / (nx + 1)) as f64 * dy];
     let mut faces = Vec::new();
@@ -30,22 +30,22 @@ fn grid(nx: usize, ny: usize, dx: f64, dy: f64) -> (Vec<V3d>, Vec<Face>, Vec<[[f
     (x, faces, rest)
 }
 
-struct Lab {
-    bend_every: usize,
-    sheet: Sheet,
-    plan: Plan,
+pub(super) struct Lab {
+    pub(super) bend_every: usize,
+    pub(super) sheet: Sheet,
+    pub(super) plan: Plan,
     fabrics: Vec<Fabric>,
     motions: Vec<Motion>,
     h: f64,
     ahead: f32,
-    gravity: V4,
+    pub(super) gravity: V4,
 }
 
 impl Lab {
     fn new(sheet: Sheet, x: &[V3d], h: f64, patches: usize) -> Self {
         Self::smooth(sheet, x, h, patches, 2)
     }
-    fn smooth(sheet: Sheet, x: &[V3d], h: f64, patches: usize, smooth: usize) -> Self {
+    pub(super) fn smooth(sheet: Sheet, x: &[V3d], h: f64, patches: usize, smooth: usize) -> Self {
         let bend_every = Plan::bend_every(&sheet, h);
         let plan = Plan::new(&sheet, &Fit { h, ahead: 0.25, springs_only: false, bend_every, smooth });
         let fabrics = plan.patches(patches, 8 * (1 + smooth) + 8);
@@ -54,7 +54,7 @@ impl Lab {
         lab.place(x, &vec![V3d::zeros(); x.len()]);
         lab
     }
-    fn place(&mut self, x: &[V3d], v: &[V3d]) {
+    pub(super) fn place(&mut self, x: &[V3d], v: &[V3d]) {
         let v4 = |p: &V3d| V4::new(p.x as f32, p.y as f32, p.z as f32);
         self.motions.resize_with(self.fabrics.len(), Motion::default);
         for (m, f) in self.motions.iter_mut().zip(&self.fabrics) {
@@ -71,14 +71,14 @@ impl Lab {
         }
         out
     }
-    fn positions(&self) -> Vec<V3d> {
+    pub(super) fn positions(&self) -> Vec<V3d> {
         self.gather(Motion::position)
     }
-    fn velocities(&self) -> Vec<V3d> {
+    pub(super) fn velocities(&self) -> Vec<V3d> {
         self.gather(|m, i| m.velocity[i])
     }
     /// `n` steps with some vertices held where they are.
-    fn run(&mut self, n: usize, held: &[u32]) {
+    pub(super) fn run(&mut self, n: usize, held: &[u32]) {
         self.run_on(n, held, &[]);
     }
     /// The same on planes, whose vertices are those of the one patch.
@@ -118,7 +118,7 @@ fn tied(f: &Fabric, m: &Motion, held: &[u32]) -> Vec<Tie> {
     all.map(|(i, _)| Tie { vertex: i as u32, place: m.position(i), speed: V4::default(), firmness: 1.0 }).collect()
 }
 
-fn sheet(faces: &[Face], rest: &[[[f64; 2]; 3]], n: usize, m: &Material) -> Sheet {
+pub(super) fn sheet(faces: &[Face], rest: &[[[f64; 2]; 3]], n: usize, m: &Material) -> Sheet {
     Sheet::new(n, faces, rest, m, None).expect("a sheet")
 }
 
