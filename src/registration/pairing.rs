@@ -62,6 +62,8 @@ pub struct PairingStats {
     pub visible: usize,
     /// Model points left out because they face away or are hidden.
     pub hidden: usize,
+    /// Of them, those without a pair where the camera has no reading at all: neither right nor wrong.
+    pub unknown: usize,
     /// Pairs from the model's side.
     pub from_model: usize,
     /// Readings searched from the data's side.
@@ -166,7 +168,10 @@ pub fn pair_surfaces(
                 best
             }
         };
-        let Some(cell) = best else { continue };
+        let Some(cell) = best else {
+            stats.unknown += usize::from(grid.labels[home] == Label::Unknown);
+            continue;
+        };
         let back = scratch.image.index[cell];
         if back != IndexImage::NONE && !consistent(model.parents, model.bones[i], model.bones[back as usize]) {
             stats.inconsistent += 1;

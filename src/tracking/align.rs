@@ -361,15 +361,16 @@ pub(super) fn evaluate(
 }
 
 fn summary(stats: PairingStats, (total, off, cost): (f64, f64, f64), iterations: usize) -> Fit {
-    let missing = (stats.readings - stats.explained) + (stats.visible - stats.from_model);
-    let all = (stats.readings + stats.visible).max(1) as f64;
+    let judged = stats.visible - stats.unknown;
+    let missing = (stats.readings - stats.explained) + (judged - stats.from_model);
+    let all = (stats.readings + judged).max(1) as f64;
     Fit {
         iterations,
         converged: false,
         residual: if total > 0.0 { off / total } else { 0.0 },
         cost: (cost + missing as f64 * UNEXPLAINED * UNEXPLAINED) / all,
         explained: stats.explained as f64 / stats.readings.max(1) as f64,
-        matched: stats.from_model as f64 / stats.visible.max(1) as f64,
+        matched: stats.from_model as f64 / judged.max(1) as f64,
         pairs: stats,
     }
 }
