@@ -85,7 +85,10 @@ pub(super) fn choose_arm(
     };
     let outward = |d: [f64; 3]| Vector3::new(d[0] * sign, d[1], d[2]).normalize();
     let mut directions: Vec<Vector3<f64>> = UPPER_ARMS.into_iter().map(outward).collect();
-    directions.extend(towards_ends(model, rest.0, pose, arm, ends));
+    // An end may be the elbow, and the way to one passes it.
+    let lower = (rest.0.joints[arm.tip] - rest.0.joints[arm.hinge]).norm() as f32;
+    let elbows = ends.iter().flat_map(|e| [e.point, e.along(lower)]);
+    directions.extend(towards(model, rest.0, pose, arm, elbows));
     for direction in directions {
         for bend in BENDS {
             let (cost, pose) = guess(direction, bend, 0.0);
@@ -125,11 +128,12 @@ pub(super) fn choose_leg(
     let skeleton = model.template.skeleton();
     let (hip, knee) = (&skeleton.joints()[leg.root].name, &skeleton.joints()[leg.hinge].name);
     let mut guesses = at_ends(model, rest.0, pose, leg, ends);
+    let directions = towards(model, rest.0, pose, leg, ends.iter().map(|e| e.point));
     for bend in MORE_BENDS {
         let mut bent = pose.clone();
         bent.set(skeleton, knee, &[bend]);
         guesses.push(bent);
-        for direction in towards_ends(model, rest.0, pose, leg, ends) {
+        for &direction in &directions {
             for twist in LEG_TWISTS {
                 let mut guess = pose.clone();
                 aim(model, &mut guess, hip, knee, direction, twist);
@@ -189,19 +193,16 @@ fn at_ends(model: &TrackerModel, rest: &RestBody, pose: &Pose, limb: &Limb, ends
     out
 }
 
-/// Directions (rest frame of the parent bone) from the limb's root to ends that may be its hinge, and to where the way to
-/// an end says that its hinge is.
-fn towards_ends(
+/// Directions (rest frame of the parent bone) from the limb's root to those of `points` that may be its hinge.
+fn towards(
     model: &TrackerModel,
     rest: &RestBody,
     pose: &Pose,
     limb: &Limb,
-    ends: &[Extremity],
+    points: impl Iterator<Item = P3>,
 ) -> Vec<Vector3<f64>> {
     let (root, parent) = root_of(model, rest, pose, limb);
     let upper = (rest.joints[limb.hinge] - rest.joints[limb.root]).norm();
     let near = |p: &P3d| (0.5..1.4).contains(&((p - root).norm() / upper));
-    let lower = (rest.joints[limb.tip] - rest.joints[limb.hinge]).norm();
-    let hinges = ends.iter().flat_map(|e| [inside(&e.point), inside(&e.along(lower as f32))]);
-    hinges.filter(near).map(|p| (parent.inverse() * (p - root)).normalize()).collect()
+    points.map(|p| inside(&p)).filter(near).map(|p| (parent.inverse() * (p - root)).normalize()).collect()
 }
