@@ -98,7 +98,8 @@ pub(crate) fn dress(body: &Body, choices: &[GarmentChoice]) -> Result<Worn, Stri
     // The outfit comes back in the order of its layers; choices must follow.
     worn.sort_by_key(|(p, _)| p.layer);
     let list: Vec<_> = worn.iter().map(|(p, _)| p.clone()).collect();
-    let options = DressOptions { config: realtime::Config::tracked(), ..DressOptions::default() };
+    // A shopper may see herself in a size that does not fit; the fit says so.
+    let options = DressOptions { config: realtime::Config::tracked(), any_size: true, ..DressOptions::default() };
     let dressed = dressing::dress(&body.template, &rest, &body.pose, &list, &options);
     let dressed = dressed.map_err(|e| e.to_string())?;
     let garments = dressed.model.outfit.garments.iter().zip(&worn).map(|(g, (_, c))| {
