@@ -174,7 +174,7 @@ impl Plan {
         found
     }
     /// Small steps of `h` seconds that bending forces may be kept for: as many as all but a few small hinges allow with all
-    /// their stiffness, within [`KEPT`].
+    /// their stiffness, within `KEPT`.
     pub fn bend_every(sheet: &Sheet, h: f64) -> usize {
         let limits = hinge_limits(sheet);
         let usual = usual(&limits);
