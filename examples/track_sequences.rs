@@ -224,21 +224,22 @@ fn body(path: &Path) -> Arc<Template> {
     Arc::new(template_from_smpl("body", &read_smpl(path).expect("body")).expect("body"))
 }
 
+/// Frame, status and joints (camera frame, metres) as one line of JSON.
+fn joints_line(model: &TrackerModel, state: &TrackerState, workspace: &mut Workspace, frame: usize) -> String {
+    let skeleton = model.template().skeleton();
+    let rest = workspace.rest_body(model, &state.shape).clone();
+    let mut bones = BoneTransforms::default();
+    state.pose.bones(skeleton, &rest, &mut bones);
+    let named = skeleton.joints().iter().zip(&bones.joints).map(|(j, p)| (j.name.as_str(), p.coords.into()));
+    let joints: std::collections::BTreeMap<&str, [f64; 3]> = named.collect();
+    serde_json::json!({ "frame": frame, "status": state.status, "joints": joints }).to_string()
+}
+
 fn run(a: &Args, template: &Arc<Template>, config: &TrackerConfig, scene: &Scene, label: &str) {
     let mut lines = String::new();
     let out = follow(template, config, scene, |i, model, state, report, workspace| {
         if a.jsonl.is_some() {
-            let rest = workspace.rest_body(model, &state.shape).clone();
-            let mut bones = BoneTransforms::default();
-            state.pose.bones(template.skeleton(), &rest, &mut bones);
-            let joints: std::collections::BTreeMap<&str, [f64; 3]> = template
-                .skeleton()
-                .joints()
-                .iter()
-                .zip(&bones.joints)
-                .map(|(j, p)| (j.name.as_str(), p.coords.into()))
-                .collect();
-            lines += &serde_json::json!({ "frame": i, "status": state.status, "joints": joints }).to_string();
+            lines += &joints_line(model, state, workspace, i);
             lines.push('\n');
         }
         if a.verbose {
@@ -415,19 +416,8 @@ fn stills(a: &Args, template: &Arc<Template>, settings: &str, folder: &Path, lab
             println!("{i:4} {:?} within {:.2}", state.status, share);
         }
         if let Some(dir) = &a.jsonl {
-            let rest = w.rest_body(m, &state.shape).clone();
-            let mut bones = BoneTransforms::default();
-            state.pose.bones(template.skeleton(), &rest, &mut bones);
-            let joints: std::collections::BTreeMap<&str, [f64; 3]> = template
-                .skeleton()
-                .joints()
-                .iter()
-                .zip(&bones.joints)
-                .map(|(j, p)| (j.name.as_str(), p.coords.into()))
-                .collect();
             std::fs::create_dir_all(dir).expect("jsonl folder");
-            let line = serde_json::json!({ "frame": i, "status": state.status, "joints": joints }).to_string();
-            std::fs::write(dir.join(format!("still_{i:04}.json")), line).expect("json");
+            std::fs::write(dir.join(format!("still_{i:04}.json")), joints_line(m, state, w, i)).expect("json");
         }
         if let (Some(dir), Some(scene)) = (&a.overlay, &scene) {
             std::fs::create_dir_all(dir).expect("overlay folder");

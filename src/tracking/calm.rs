@@ -23,9 +23,9 @@ pub(super) fn parts(template: &Template) -> Vec<usize> {
 
 /// Share of the newest way in its running mean, four frames' worth: noise averages out of it, motion does not.
 const MEMORY: f64 = 0.25;
-/// What is left of a frame's uncertainty in the running mean. 0.15 / 0.25 / 0.4: a person who stands still moves by 0.63 /
-/// 0.49 / 0.40 mm from picture to picture (1.06 without any of this, truly 0.11), a slowly moving one is 3.36 / 3.66 / 4.4
-/// mm off (3.26).
+/// What is left of a frame's uncertainty in the running mean. 0.15 / 0.25: a person who stands still moves by 0.63 / 0.49 mm
+/// from picture to picture (1.06 without any of this, truly 0.11), a slowly moving one is 3.36 / 3.66 mm off (3.26), both at
+/// an uncertainty of one residual.
 const MEAN_UNCERTAINTY: f64 = 0.25;
 
 /// Moves each part from `last` towards `fitted` by the gain v²/(v² + r²) of a Kalman filter, where v is the part's way
