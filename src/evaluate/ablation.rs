@@ -102,7 +102,7 @@ pub fn variants() -> Vec<Variant> {
     add("free space", "0.1", &|c| c.free_space = 0.1);
     add("prediction", "off", &|c| c.predict = false);
     add("pull", "off", &|c| c.pull = false);
-    add("skipping", "nothing", &|c| (c.skip_coarse, c.skip_settled) = (false, false));
+    add("skipping", "nothing", &|c| (c.skip_coarse, c.skip_settled, c.skip_unchanged) = (false, false, false));
     add("size", "off", &|c| c.adapt_size = false);
     add("displacements", "off", &|c| c.displacements = false);
     add("displacements", "in the pose", &|c| c.displaced_pose = true);

@@ -4,10 +4,10 @@ use super::align::{AlignScratch, Seen};
 use super::model::TrackerModel;
 use crate::body::{JointMotion, Pose};
 use crate::spatial::Label;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What a joint's angles rest on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
     /// Readings of its own bone.
@@ -23,7 +23,7 @@ pub enum Reason {
 }
 
 /// Confidence of one joint.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointConfidence {
     /// 0 (a guess) to 1 (well measured).
     pub value: f32,

@@ -72,6 +72,9 @@ pub struct TrackerConfig {
     pub skip_coarse: bool,
     /// Fit displacements less often once they have settled.
     pub skip_settled: bool,
+    /// Keep the last pose while a person stands still, and the last answer while nobody is there, where the picture shows the
+    /// same but for noise; every sixth frame is gone through whatever it shows.
+    pub skip_unchanged: bool,
     /// Pull the model towards readings that nothing explains.
     pub pull: bool,
     /// Prior of a shape coefficient (one standard deviation = 1), per point, m².
@@ -115,6 +118,7 @@ impl Default for TrackerConfig {
             calm: 0.75,
             skip_coarse: true,
             skip_settled: true,
+            skip_unchanged: true,
             pull: true,
             shape_prior: 5e-7,
             scale_deviation: [0.05, 0.15],
@@ -146,6 +150,7 @@ impl TrackerConfig {
             calm: 0.0,
             skip_coarse: false,
             skip_settled: false,
+            skip_unchanged: false,
             pull: false,
             ..Self::default()
         }

@@ -17,6 +17,7 @@ mod stand;
 mod state;
 mod step;
 mod surface;
+mod unchanged;
 mod workspace;
 
 pub use confidence::{JointConfidence, Reason};

@@ -1,11 +1,11 @@
 //! What a step says about itself, and how it can fail.
 
 use super::{JointConfidence, Status};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Milliseconds of each stage of one step. Measured, never used.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StagesMs {
     /// Sampling the depth image, floor, background, person, outline.
     pub segment: f64,
@@ -27,7 +27,7 @@ impl StagesMs {
 }
 
 /// Work that the scene did not need.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Skipped {
     /// Template samples that the camera cannot see, at the last iteration.
     pub hidden_points: usize,
@@ -41,23 +41,27 @@ pub struct Skipped {
     pub inconsistent_pairs: usize,
     /// Cells of the grid that were not the person.
     pub cells: usize,
+    /// 1 for a frame that showed nothing new, so that nothing was searched or fitted and the last pose holds.
+    #[serde(default)]
+    pub frames: usize,
 }
 
 impl Skipped {
     /// Each kind of work with its count, for counters.
-    pub fn counts(&self) -> [(&'static str, usize); 5] {
+    pub fn counts(&self) -> [(&'static str, usize); 6] {
         [
             ("hidden points", self.hidden_points),
             ("iterations", self.iterations),
             ("displacements", self.displacements),
             ("inconsistent pairs", self.inconsistent_pairs),
             ("empty cells", self.cells),
+            ("unchanged frames", self.frames),
         ]
     }
 }
 
 /// How one step went.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepReport {
     /// Status after the step.
     pub status: Status,

@@ -4,6 +4,7 @@ use super::rescue::Rescue;
 use super::size::SizeEstimate;
 use super::stand::Feet;
 use super::surface::SurfaceStatistics;
+use super::unchanged::Reference;
 use super::{TrackerConfig, TrackerModel};
 use crate::body::{BodyShape, Pose};
 use crate::math::{Camera, P3, Rigid, World};
@@ -93,6 +94,9 @@ pub struct TrackerState {
     pub(super) feet: Option<Feet>,
     #[serde(default)]
     pub(super) rescue: Rescue,
+    /// What a picture is compared with while the person stands still or nobody is there.
+    #[serde(default)]
+    pub(super) unchanged: Option<Reference>,
     /// Frames until displacements are due, and the interval between fits.
     pub(super) surface_due: [u32; 2],
 }
@@ -131,6 +135,7 @@ impl TrackerState {
             drift: Vec::new(),
             feet: None,
             rescue: Rescue::default(),
+            unchanged: None,
             surface_due: [0; 2],
         }
     }
@@ -145,6 +150,7 @@ impl TrackerState {
         self.status = Status::Calibrating;
         self.centre = P3::from(root.cast::<f32>());
         self.before = None;
+        self.unchanged = None;
         self.pose_age = 0;
     }
     /// Forgets the person, keeps the room.

@@ -9,6 +9,7 @@ use super::report::Stopwatch;
 use super::size::from_stature;
 use super::sleeve::assign;
 use super::stand::{Feet, Ground, below, tallest, unfold};
+use super::unchanged::Reference;
 use super::{
     LostReason, SizeEstimate, Skipped, StagesMs, Status, StepError, StepReport, TrackerModel, TrackerState, Workspace,
     surface,
@@ -44,6 +45,8 @@ const SLOW: f64 = 0.02;
 /// Motion below this from frame to frame, metres, is not extrapolated: what is left then is the jitter of the fit, which
 /// prediction would keep alive.
 const STILL: f64 = 3e-3;
+/// An empty room is compared at every so many-th cell of the grid.
+const NOBODY_STEP: u32 = 2;
 /// A residual at which the quality of a frame is halved, metres.
 const POOR_RESIDUAL: f64 = 0.02;
 /// Rounds of pose and size at the start (Algorithm 1), and the change that ends them.
@@ -99,6 +102,11 @@ pub fn step(
     }
     let mut watch = Stopwatch::start();
     let mut stages = StagesMs::default();
+    if let Some(mut report) = kept(state, frame) {
+        report.stages_ms.segment = watch.lap();
+        return Ok(report);
+    }
+    state.unchanged = None;
     let fresh = workspace.grid.take().filter(|g| g.fits(camera, model.config.stride));
     let mut grid = fresh.unwrap_or_else(|| OrganisedCloud::new(camera, model.config.stride));
     state.frames += 1;
@@ -119,15 +127,48 @@ pub fn step(
         skipped: Skipped { cells: grid.depth.len() - person.cells.len(), ..Skipped::default() },
         stages_ms: stages,
     };
-    if person.cells.len() < LEAST_CELLS {
+    let nobody = person.cells.len() < LEAST_CELLS;
+    if nobody {
         lose(state, LostReason::NoPerson);
     } else {
         follow(model, state, frame, &grid, &person, workspace, &mut report, &mut watch);
     }
-    workspace.grid = Some(grid);
     report.status = state.status;
     report.pose_age = state.pose_age;
+    if model.config.skip_unchanged {
+        state.unchanged = if nobody {
+            Some(Reference::of_all(&frame.depth, NOBODY_STEP * grid.stride(), &report))
+        } else {
+            still(model, state).then(|| Reference::of_cells(&frame.depth, &grid, &person.cells, &report))
+        };
+    }
+    workspace.grid = Some(grid);
     Ok(report)
+}
+
+/// What holds for a frame that shows the same as one before it: that one's pose and report.
+fn kept(state: &mut TrackerState, frame: &RgbdFrame) -> Option<StepReport> {
+    let mut report = state.unchanged.as_mut()?.keep(&frame.depth)?.clone();
+    state.frames += 1;
+    state.scene_age = state.scene_age.map(|a| a.saturating_add(1));
+    if !state.status.is_live() {
+        lose(state, LostReason::NoPerson);
+    }
+    report.status = state.status;
+    report.pose_age = state.pose_age;
+    report.iterations = 0;
+    report.skipped.frames = 1;
+    report.skipped.displacements = state.shape.displacements.len();
+    Some(report)
+}
+
+/// The person stands still in a settled pose, so that a picture like this one would be answered by it.
+fn still(model: &TrackerModel, state: &TrackerState) -> bool {
+    let moved = |before: &Pose<Camera>| motion(model.template.skeleton(), before, &state.pose);
+    state.status == Status::Tracking
+        && state.calibrated(&model.config)
+        && state.bad_frames == 0
+        && state.before.as_ref().is_some_and(|b| moved(b) < STILL)
 }
 
 /// Depth image to the person's refined cells and outline.

@@ -175,6 +175,9 @@ fn each_skip_keeps_its_bound() {
         &calm,
         &[("coarse iterations", coarse, 2.5, 3.0), ("settled displacements", settled, 1e-6, 0.5)],
     );
+    let unchanged = TrackerConfig { skip_unchanged: false, ..TrackerConfig::default() };
+    let (template, still) = scene(Setting { routine: Routine::Still, room: Some(Default::default()), ..alone() }, 160);
+    compare_skips(&template, &still, &[("unchanged frames", unchanged, 2.0, 2.0)]);
     let (Some(folder), Some(data)) = (shared("sequences/charleston_m_heavy_tof_room"), shared(".")) else { return };
     let template = scenes::subject(&data, "template").expect("template");
     let mut dance = Scene::open(&folder).expect("scene");
@@ -185,10 +188,10 @@ fn each_skip_keeps_its_bound() {
 
 fn compare_skips(template: &Arc<Template>, own: &Scene, cases: &[(&str, TrackerConfig, f64, f64)]) {
     let run = |config: &TrackerConfig| {
-        let (mut tracks, mut done) = (vec![], [0usize; 3]);
+        let (mut tracks, mut done) = (vec![], [0usize; 4]);
         let out = follow(template, config, own, |i, model, state, report, workspace| {
             let skipped = &report.skipped;
-            let counts = [skipped.coarse_iterations, skipped.displacements, skipped.iterations];
+            let counts = [skipped.coarse_iterations, skipped.displacements, skipped.iterations, skipped.frames];
             done.iter_mut().zip(counts).for_each(|(d, c)| *d += c);
             if i >= 75 {
                 let (vertices, bones) = workspace.posed(model, state);

@@ -145,7 +145,10 @@ impl Chain {
         };
         let report = tracking::step(&self.tracker, &mut self.tracked, frame, &mut self.tracking_work)?;
         lap("tracking", &mut stages);
-        let mut skipped = vec![("hidden template points", report.skipped.hidden_points as f64)];
+        let mut skipped = vec![
+            ("hidden template points", report.skipped.hidden_points as f64),
+            ("pictures that show nothing new", report.skipped.frames as f64),
+        ];
 
         let dt = self.time_step(frame.time_ns);
         let template = Arc::clone(self.tracker.template());
