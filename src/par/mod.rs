@@ -3,6 +3,10 @@
 //! Work is cut into chunks of a fixed size, never into one chunk a thread, and partial results are
 //! combined in the order of the chunks. So sums come out the same with 1, 2 or N threads.
 
+mod rounds;
+
+pub use rounds::rounds;
+
 use rayon::prelude::*;
 
 /// How a step may use the machine. Threads come from the caller's pool ([`with_threads`]) or the global one.

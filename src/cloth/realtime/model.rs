@@ -148,25 +148,11 @@ pub struct Model {
     pub(super) views: [MapView; 4],
 }
 
-/// Evaluations of bending, each with the steps it is kept for, that a patch makes alone: between two searches for
-/// contacts there are more, in several rounds.
-pub(super) const ALONE: usize = 2;
+/// Evaluations of bending between two looks at which planes are within reach.
+pub(super) const RECALLED: usize = 2;
 /// A garment that is stable at this step needs no more smoothing, s. At 1/2400 s, with higher degrees, a still person's
 /// cloth trembled on and never slept.
 const LONG_ENOUGH: f64 = 1.0 / 3600.0;
-
-/// Rings of ghosts that a patch needs for so many steps alone: a step moves news by one ring and by one more for each
-/// degree, an evaluation of bending before it by one more.
-fn rings(steps: usize, bend_every: usize, smooth: usize) -> usize {
-    steps * (1 + smooth) + steps.div_ceil(bend_every)
-}
-
-impl GarmentModel {
-    /// Rings around a patch that must be right where it makes so many more steps alone.
-    pub(super) fn rings(&self, steps: usize) -> usize {
-        rings(steps, self.bend_every, self.smooth)
-    }
-}
 
 /// Which [`Region`] each body vertex belongs to, by the name of its dominant joint.
 pub fn body_parts(template: &Template) -> Vec<u8> {
@@ -249,8 +235,8 @@ impl Model {
             let bend_every = Plan::bend_every(&sheet, h);
             let fit = Fit { h, ahead: config.ahead, springs_only: false, bend_every, smooth };
             let plan = Plan::new(&sheet, &fit);
-            let rings = rings(ALONE * bend_every, bend_every, smooth);
-            let patches = plan.patches(g.vertices.div_ceil(config.patch), rings);
+            // A step moves news by one ring and by one more for each degree, an evaluation of bending by one more.
+            let patches = plan.patches(g.vertices.div_ceil(config.patch), 1 + smooth + 1);
             let own: Vec<u8> = g.regions.iter().map(|r| r.decisive().0).collect();
             let other = own.iter().map(|o| Region::ALL.0 & !o).collect();
             // Evenly between the skin and where the outermost lies.

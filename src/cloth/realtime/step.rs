@@ -2,12 +2,12 @@
 
 use super::carry::carry;
 use super::cloth_touch::{ClothTouch, sheets};
-use super::model::{ALONE, Model};
+use super::model::{Model, RECALLED};
 use super::state::{Input, PatchScratch, State, StepReport, Workspace, check_body};
 use super::steady::follow;
 use super::touch::{Touch, anchors, settle};
 use crate::cloth::ClothError;
-use crate::cloth::small_steps::{Step, V4, exchange};
+use crate::cloth::small_steps::{Borders, Step, V4};
 use crate::math::{P3, V3};
 use crate::par::{self, Par};
 use std::time::Instant;
@@ -254,39 +254,35 @@ fn advance(model: &Model, all: &mut [PatchScratch], span: f64) {
         let (m, patches) = &mut g[0];
         let n = steps(m.h, span);
         let h = (span / n as f64) as f32;
-        let mut s0 = 0;
-        while s0 < n {
-            let s1 = (s0 + ALONE * m.bend_every).min(n);
-            par::for_chunks(model.config.par, patches, 1, |k, p| {
-                let (f, p) = (&m.patches[k], &mut p[0]);
-                // What must be right after step `s` for the steps that a patch makes alone after it.
-                let rings = |s: usize| m.rings(s1 - s - 1);
-                let (t0, alone) = (s0 as f32 * h, (s1 - s0) as f32 * h);
+        let borders = Borders::new(patches.len());
+        par::rounds(model.config.par, patches, n, |s, k, p| {
+            let f = &m.patches[k];
+            if s > 0 {
+                borders.hear(s - 1, f, &mut p.motion);
+            }
+            let t = s as f32 * h;
+            if s % (RECALLED * m.bend_every) == 0 {
+                let alone = (RECALLED * m.bend_every).min(n - s) as f32 * h;
                 let (body, cloth) = p.planes.split_at(p.body_planes);
                 p.near.clear();
-                p.motion.within_reach(body, t0, alone, &mut p.near);
+                p.motion.within_reach(body, t, alone, &mut p.near);
                 p.body_near = p.near.len();
-                p.motion.within_reach(cloth, t0, alone, &mut p.near);
-                for s in s0..s1 {
-                    if (s - s0) % m.bend_every == 0 {
-                        p.motion.bend(f, h * m.bend_every.min(s1 - s) as f32 * 0.5, rings(s) + m.smooth);
-                    }
-                    let t = s as f32 * h;
-                    let step = Step { h, t, ahead, gravity, rings: rings(s) };
-                    p.motion.accelerate(f, &step, &p.near, &p.ties);
-                    p.motion.tie(&p.ties, t, h);
-                    // In this order: the body has the last word.
-                    let (body, cloth) = p.near.split_at(p.body_near);
-                    p.motion.restrain(cloth, t, h, CLOTH_RECOVERY);
-                    p.report.contacts = p.motion.restrain(body, t, h, RECOVERY);
-                    p.motion.advance(f, &step, FASTEST);
-                }
-            });
-            if patches.len() > 1 {
-                exchange(&m.patches, patches, |p| &mut p.motion);
+                p.motion.within_reach(cloth, t, alone, &mut p.near);
             }
-            s0 = s1;
-        }
+            if s % m.bend_every == 0 {
+                p.motion.bend(f, h * m.bend_every.min(n - s) as f32 * 0.5, m.smooth);
+            }
+            let step = Step { h, t, ahead, gravity, rings: 0 };
+            p.motion.accelerate(f, &step, &p.near, &p.ties);
+            p.motion.tie(&p.ties, t, h);
+            // In this order: the body has the last word.
+            let (body, cloth) = p.near.split_at(p.body_near);
+            p.motion.restrain(cloth, t, h, CLOTH_RECOVERY);
+            p.report.contacts = p.motion.restrain(body, t, h, RECOVERY);
+            p.motion.advance(f, &step, FASTEST);
+            borders.tell(s, k, f, &p.motion);
+        });
+        m.patches.iter().zip(patches.iter_mut()).for_each(|(f, p)| borders.hear(n - 1, f, &mut p.motion));
     });
 }
 

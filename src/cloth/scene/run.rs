@@ -395,6 +395,17 @@ mod tests {
     }
 
     #[test]
+    fn patches_on_any_number_of_threads_give_the_same_bits() {
+        for patches in [1, 2, 3] {
+            let c = RunConfig { patches, smooth: Some(2), ..RunConfig::default() };
+            let on = |threads| crate::par::with_threads(threads, || end(&c)).expect("threads");
+            let one = on(1);
+            assert!(one == on(2) && one == on(5), "{patches} patches");
+            assert!(apart(&one, &end(&RunConfig { patches: 1, ..c })) < 1e-4, "{patches} patches and one");
+        }
+    }
+
+    #[test]
     fn the_offline_solver_is_of_second_order() {
         let with = |substeps| end(&RunConfig { substeps, ..RunConfig::offline() });
         let [coarse, middle, fine] = [16, 32, 64].map(with);

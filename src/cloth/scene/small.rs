@@ -3,7 +3,7 @@
 use super::run::{RunConfig, RunReport, deepest};
 use super::{Scene, SceneError};
 use crate::cloth::ClothError;
-use crate::cloth::small_steps::{Fabric, Fit, Motion, Plan, Plane, Step, Tie, V4, exchange};
+use crate::cloth::small_steps::{Borders, Fabric, Fit, Motion, Plan, Plane, Step, Tie, V4};
 use crate::math::{P3, V3d};
 use crate::par::{self, Par};
 use nalgebra::Point3;
@@ -50,8 +50,8 @@ pub(super) fn run(
     let plan = Plan::new(sheet, &Fit { h, ahead: config.ahead, springs_only: false, bend_every, smooth });
     // A step moves news by one ring and by one more for each degree, an evaluation of bending before it by one more.
     // Patches meet after every step: what ghosts cost is more than the meeting.
-    let alone = if config.patches > 1 { 1 } else { bend_every };
-    let fabrics = plan.patches(config.patches, (1 + smooth) * alone + 1);
+    let fabrics = plan.patches(config.patches, 1 + smooth + 1);
+    let borders = Borders::new(fabrics.len());
     let start: Vec<V3d> = scene.start.iter().map(|p| p.coords.cast()).collect();
     let local: Vec<V3d> = match scene.pinned_to {
         Some(c) => {
@@ -75,50 +75,42 @@ pub(super) fn run(
             break;
         }
         let started = Instant::now();
-        for (w, f) in scratch.iter_mut().zip(&fabrics) {
-            let all = || f.vertices.iter().map(|v| *v as usize);
-            w.motion.begin(all().map(|v| x[v]), all().map(|v| velocity[v]));
-        }
-        let (mut s0, mut looked) = (0, 0);
-        while s0 < substeps {
-            let s1 = (s0 + alone).min(substeps);
-            let look_now = s0 % (bend_every * looks) == 0;
-            if look_now {
-                looked = s0;
+        let par = if fabrics.len() > 1 { Par::Rayon } else { Par::Seq };
+        par::rounds(par, &mut scratch, substeps, |s, k, w| {
+            let f = &fabrics[k];
+            if s == 0 {
+                let all = || f.vertices.iter().map(|v| *v as usize);
+                w.motion.begin(all().map(|v| x[v]), all().map(|v| velocity[v]));
+            } else {
+                borders.hear(s - 1, f, &mut w.motion);
             }
-            let t0 = (index - 1) as f64 * dt + s0 as f64 * h;
-            let span = ((s0 + bend_every * looks).min(substeps) - s0) as f64 * h;
-            let par = if fabrics.len() > 1 { Par::Rayon } else { Par::Seq };
-            par::for_chunks(par, &mut scratch, 1, |k, w| {
-                let (f, w) = (&fabrics[k], &mut w[0]);
-                if look_now {
-                    look(scene, config.offset, &w.motion, t0, span, &mut w.planes, &mut w.clear);
-                    w.ties.clear();
-                    for &(i, p) in &pinned[k] {
-                        let at = |t: f64| {
-                            scene.pinned_to.map_or(local[p as usize], |c| {
-                                (scene.colliders[c].placement(t) * Point3::from(local[p as usize])).coords
-                            })
-                        };
-                        let speed = (at(t0 + span) - at(t0)) / span;
-                        w.ties.push(Tie { vertex: i, place: v4(&at(t0)), speed: v4(&speed), firmness: 1.0 });
-                    }
+            let since = s % (bend_every * looks);
+            if since == 0 {
+                let t0 = (index - 1) as f64 * dt + s as f64 * h;
+                let span = (bend_every * looks).min(substeps - s) as f64 * h;
+                look(scene, config.offset, &w.motion, t0, span, &mut w.planes, &mut w.clear);
+                w.ties.clear();
+                for &(i, p) in &pinned[k] {
+                    let at = |t: f64| {
+                        scene.pinned_to.map_or(local[p as usize], |c| {
+                            (scene.colliders[c].placement(t) * Point3::from(local[p as usize])).coords
+                        })
+                    };
+                    let speed = (at(t0 + span) - at(t0)) / span;
+                    w.ties.push(Tie { vertex: i, place: v4(&at(t0)), speed: v4(&speed), firmness: 1.0 });
                 }
-                if s0 % bend_every == 0 {
-                    w.motion.bend(f, hf * bend_every.min(substeps - s0) as f32 * 0.5, smooth);
-                }
-                for s in s0..s1 {
-                    let t = (s - looked) as f32 * hf;
-                    let step = Step { h: hf, t, ahead, gravity, rings: 0 };
-                    w.motion.accelerate(f, &step, &w.planes, &w.ties);
-                    w.motion.restrain(&w.planes, t, hf, RECOVERY);
-                    w.motion.tie(&w.ties, t, hf);
-                    w.motion.advance(f, &step, f32::INFINITY);
-                }
-            });
-            exchange(&fabrics, &mut scratch, |w| &mut w.motion);
-            s0 = s1;
-        }
+            }
+            if s % bend_every == 0 {
+                w.motion.bend(f, hf * bend_every.min(substeps - s) as f32 * 0.5, smooth);
+            }
+            let t = since as f32 * hf;
+            let step = Step { h: hf, t, ahead, gravity, rings: 0 };
+            w.motion.accelerate(f, &step, &w.planes, &w.ties);
+            w.motion.restrain(&w.planes, t, hf, RECOVERY);
+            w.motion.tie(&w.ties, t, hf);
+            w.motion.advance(f, &step, f32::INFINITY);
+            borders.tell(s, k, f, &w.motion);
+        });
         for (w, f) in scratch.iter().zip(&fabrics) {
             for (i, v) in f.vertices[..f.owned].iter().enumerate() {
                 x[*v as usize] = w.motion.position(i);

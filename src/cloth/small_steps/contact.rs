@@ -1,6 +1,6 @@
 //! What keeps a vertex outside a body, and what ties it to one, within small steps.
 
-use super::fabric::Fabric;
+use super::fabric::{Fabric, MOST};
 use super::forces::Step;
 use super::motion::{Motion, V4};
 
@@ -46,7 +46,7 @@ impl Motion {
         let h = step.h;
         let n = f.reach(step.rings.saturating_add(f.smoothing.len() - 1));
         let held = &mut self.work.held;
-        let push = &mut *self.work.push.0;
+        let push: &mut [V4; MOST] = &mut self.work.push;
         for p in planes {
             let i = p.vertex as usize;
             if i >= n {

@@ -4,40 +4,22 @@
 //! are copied from their owners. How many patches there are is part of the model, not of the machine: so the bits do
 //! not depend on the number of threads.
 
-use super::lanes::{At, LANES, Place};
-use super::motion::Motion;
-use super::plan::{Plan, Triangle};
+use super::blocks::{Hinges, Quads, hinges, quads};
+use super::lanes::Place;
+use super::plan::{Bent, Plan, Triangle};
 
 /// The most vertices a patch may have.
 pub(super) const MOST: usize = 1 << 15;
 
-/// Eight triangles; the last eight are filled up with ones that pull nothing.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(align(32))]
-pub(super) struct Triangles {
-    pub(super) rest: [[f32; LANES]; 3],
-    pub(super) k: [[f32; LANES]; 6],
-    pub(super) v: [At; 3],
-}
-
-/// A hinge bent at rest; sorted by the lowest vertex.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bent {
-    pub(super) v: [Place; 4],
-    pub(super) c: [f32; 4],
-    pub(super) w: f32,
-    pub(super) rest: f32,
-}
-
 /// Neighbours of a vertex that fit a row: most vertices of a triangulation have six.
 pub(super) const ROW: usize = 6;
 
-/// A vertex in the smoothing: its neighbours, their weights and its own.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Row {
-    pub(super) near: [Place; ROW],
-    pub(super) by: [f32; ROW],
-    pub(super) own: f32,
+/// Two vertices in the smoothing, one after the other: their neighbours, the neighbours' weights and their own.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Rows {
+    pub(super) near: [[Place; 2]; ROW],
+    /// Two of them each; the last their own and nothing.
+    pub(super) by: [[[f32; 2]; 2]; ROW / 2 + 1],
 }
 
 /// A neighbour that did not fit.
@@ -57,22 +39,24 @@ pub struct Fabric {
     pub owned: usize,
     /// Vertices within so many rings of the owned ones.
     pub(super) within: Vec<usize>,
-    /// Patch and place there of each ghost.
+    /// Owned vertices that others have as ghosts.
+    pub(super) border: Vec<u32>,
+    /// Patch of each ghost and where it is in that one's border.
     pub(super) ghosts: Vec<[u32; 2]>,
     pub(super) inverse_mass: Vec<f32>,
     /// By their lowest corner.
-    pub(super) triangles: Vec<Triangles>,
+    pub(super) quads: Vec<Quads>,
     /// Edges by their lower end.
     pub(super) ends: Vec<[u16; 2]>,
     pub(super) rest: Vec<f32>,
-    pub(super) rows: Vec<Row>,
+    pub(super) rows: Vec<Rows>,
     pub(super) far: Vec<Far>,
     /// Coefficients of the smoothing, the lowest (1) first.
     pub(super) smoothing: Vec<f32>,
     /// Bending pairs of each vertex with a higher one.
     pub(super) bend_count: Vec<u16>,
     pub(super) bend: Vec<(Place, f32)>,
-    pub(super) bent: Vec<Bent>,
+    pub(super) bent: Vec<Hinges>,
     pub(super) damping: f32,
 }
 
@@ -92,17 +76,98 @@ impl Plan {
             around[e[0] as usize].push(e[1]);
             around[e[1] as usize].push(e[0]);
         }
-        let order = by_distance(&around);
         // A large patch leaves half of its room to ghosts.
         let k = wanted.max(1).max(if n < MOST { 1 } else { n.div_ceil(MOST / 2) }).min(n.max(1));
+        let orders = if k > 1 { self.orders(&around) } else { vec![by_distance(&around)] };
+        let bands =
+            |order: Vec<u32>| -> Vec<Vec<u32>> { (0..k).map(|p| order[p * n / k..(p + 1) * n / k].to_vec()).collect() };
+        // The one whose patches have the fewest neighbours in others.
+        let cut = |sets: &Vec<Vec<u32>>| {
+            let mut of = vec![0usize; n];
+            for (p, set) in sets.iter().enumerate() {
+                set.iter().for_each(|v| of[*v as usize] = p);
+            }
+            self.ends.iter().filter(|e| of[e[0] as usize] != of[e[1] as usize]).count()
+        };
+        let sets = orders.into_iter().map(bands).min_by_key(cut).unwrap_or_default();
         let mut owner = vec![[0u32; 2]; n];
-        let sets: Vec<Vec<u32>> = (0..k).map(|p| order[p * n / k..(p + 1) * n / k].to_vec()).collect();
         for (p, set) in sets.iter().enumerate() {
             for (i, v) in set.iter().enumerate() {
                 owner[*v as usize] = [p as u32, i as u32];
             }
         }
-        sets.into_iter().map(|set| self.patch(set, if k > 1 { rings } else { 0 }, &around, &owner)).collect()
+        let mut all: Vec<Fabric> =
+            sets.into_iter().map(|set| self.patch(set, if k > 1 { rings } else { 0 }, &around, &owner)).collect();
+        // Ghosts name the owner's vertex so far; now its place in the border.
+        for q in 0..all.len() as u32 {
+            let wanted = all.iter().flat_map(|f| &f.ghosts).filter(|g| g[0] == q).map(|g| g[1]);
+            let mut border: Vec<u32> = wanted.collect();
+            border.sort_unstable();
+            border.dedup();
+            for g in all.iter_mut().flat_map(|f| &mut f.ghosts).filter(|g| g[0] == q) {
+                g[1] = border.binary_search(&g[1]).unwrap_or(0) as u32;
+            }
+            all[q as usize].border = border;
+        }
+        all
+    }
+
+    /// Orders in which stretches may be short to cut: by the distance from a corner, from each rim, and from a shortest
+    /// way between two rims (which halves a tube along its length).
+    fn orders(&self, around: &[Vec<u32>]) -> Vec<Vec<u32>> {
+        let mut orders = vec![by_distance(around)];
+        let rims = self.rims();
+        for rim in &rims {
+            let ways = ways(around, rim);
+            orders.push(ways.order.clone());
+            let others = rims.iter().filter(|o| o[0] != rim[0]).flatten();
+            if let Some(mut v) = others.copied().min_by_key(|v| ways.far[*v as usize]) {
+                let mut line = vec![v];
+                while ways.from[v as usize] != v {
+                    v = ways.from[v as usize];
+                    line.push(v);
+                }
+                orders.push(self::ways(around, &line).order);
+            }
+        }
+        orders
+    }
+
+    /// Vertices of each rim, the longest two first and no more.
+    fn rims(&self) -> Vec<Vec<u32>> {
+        let mut edges: Vec<[u32; 2]> = self
+            .triangles
+            .iter()
+            .flat_map(|t| [(0, 1), (1, 2), (2, 0)].map(|(i, j)| [t.v[i].min(t.v[j]), t.v[i].max(t.v[j])]))
+            .collect();
+        edges.sort_unstable();
+        let mut next = vec![Vec::new(); self.vertices()];
+        for same in edges.chunk_by(|a, b| a == b).filter(|s| s.len() == 1) {
+            let [a, b] = same[0];
+            next[a as usize].push(b);
+            next[b as usize].push(a);
+        }
+        let mut seen = vec![false; next.len()];
+        let mut rims = Vec::new();
+        for v in 0..next.len() as u32 {
+            if seen[v as usize] || next[v as usize].is_empty() {
+                continue;
+            }
+            seen[v as usize] = true;
+            let (mut rim, mut at) = (vec![v], 0);
+            while at < rim.len() {
+                for w in &next[rim[at] as usize] {
+                    if !std::mem::replace(&mut seen[*w as usize], true) {
+                        rim.push(*w);
+                    }
+                }
+                at += 1;
+            }
+            rims.push(rim);
+        }
+        rims.sort_by_key(|r| std::cmp::Reverse(r.len()));
+        rims.truncate(2);
+        rims
     }
 
     fn patch(&self, mut set: Vec<u32>, rings: usize, around: &[Vec<u32>], owner: &[[u32; 2]]) -> Fabric {
@@ -152,12 +217,9 @@ impl Plan {
         let ends: Vec<[u16; 2]> = edges.iter().map(|e| e.0.map(|v| v as u16)).collect();
         let (rows, far) = rows(&ends, &weight, &inverse_mass);
         let triangles = self.triangles.iter().filter(|t| inside(&t.v)).map(|t| Triangle { v: t.v.map(at), ..*t });
-        let bent = self.bent.iter().filter(|b| inside(&b.v));
-        let mut bent: Vec<Bent> =
-            bent.map(|b| Bent { v: b.v.map(|v| Place::of(at(v) as usize)), c: b.c, w: b.w, rest: b.rest }).collect();
-        bent.sort_by_key(|b| b.v.iter().min().copied());
+        let bent = self.bent.iter().filter(|b| inside(&b.v)).map(|b| Bent { v: b.v.map(at), ..*b });
         Fabric {
-            triangles: eights(triangles.collect()),
+            quads: quads(&triangles.collect::<Vec<_>>()),
             rows,
             far,
             within,
@@ -166,9 +228,10 @@ impl Plan {
             bend_count: counts(&mut bend.iter().map(|e| e.0[0])),
             rest: edges.iter().map(|e| self.rest[e.1]).collect(),
             bend: bend.iter().map(|e| (Place::of(e.0[1] as usize), e.1)).collect(),
-            bent,
+            bent: hinges(bent.collect()),
             inverse_mass,
             ghosts: set[owned..].iter().map(|v| owner[*v as usize]).collect(),
+            border: Vec::new(),
             owned,
             vertices: set,
             damping: self.damping,
@@ -176,35 +239,19 @@ impl Plan {
     }
 }
 
-/// Triangles by their lowest corner, eight to a block.
-fn eights(mut all: Vec<Triangle>) -> Vec<Triangles> {
-    all.sort_by_key(|t| t.v.iter().min().copied());
-    let block = |of: &[Triangle]| {
-        let mut out = Triangles::default();
-        for (lane, t) in of.iter().enumerate() {
-            for i in 0..3 {
-                (out.v[i][lane], out.rest[i][lane]) = (Place::of(t.v[i] as usize), t.rest[i]);
-            }
-            for i in 0..6 {
-                out.k[i][lane] = t.k[i];
-            }
-        }
-        out
-    };
-    all.chunks(LANES).map(block).collect()
-}
-
-fn rows(ends: &[[u16; 2]], weight: &[f32], inverse_mass: &[f32]) -> (Vec<Row>, Vec<Far>) {
-    let mut rows = vec![Row { near: [Place::default(); ROW], by: [0.0; ROW], own: 0.0 }; inverse_mass.len()];
-    let mut filled = vec![0usize; rows.len()];
+fn rows(ends: &[[u16; 2]], weight: &[f32], inverse_mass: &[f32]) -> (Vec<Rows>, Vec<Far>) {
+    let mut rows = vec![Rows::default(); inverse_mass.len().div_ceil(2)];
+    let mut filled = vec![0usize; inverse_mass.len()];
     let mut far = Vec::new();
     for (v, weight) in ends.iter().zip(weight) {
         for (vertex, near) in [(v[0], v[1]), (v[1], v[0])] {
             let (i, near) = (usize::from(vertex), Place::of(usize::from(near)));
             let by = weight * inverse_mass[i];
-            rows[i].own += by;
+            let (row, k) = (&mut rows[i / 2], i % 2);
+            row.by[ROW / 2][0][k] += by;
             if filled[i] < ROW {
-                (rows[i].near[filled[i]], rows[i].by[filled[i]]) = (near, by);
+                let n = filled[i];
+                (row.near[n][k], row.by[n / 2][n % 2][k]) = (near, by);
                 filled[i] += 1;
             } else {
                 far.push(Far { vertex: Place::of(i), near, by });
@@ -214,47 +261,46 @@ fn rows(ends: &[[u16; 2]], weight: &[f32], inverse_mass: &[f32]) -> (Vec<Row>, V
     (rows, far)
 }
 
+/// Shortest ways in edges.
+struct Ways {
+    /// All vertices, the nearest first.
+    order: Vec<u32>,
+    far: Vec<u32>,
+    /// The one before each on its way; itself at the start.
+    from: Vec<u32>,
+}
+
+/// Ways from some vertices to all, sheet by sheet where there are several.
+fn ways(around: &[Vec<u32>], starts: &[u32]) -> Ways {
+    let n = around.len();
+    let mut w = Ways { order: Vec::with_capacity(n), far: vec![u32::MAX; n], from: (0..n as u32).collect() };
+    let mut next = 0;
+    let all = 0..n as u32;
+    // The starts together, then whatever they do not reach.
+    for group in std::iter::once(starts.to_vec()).chain(all.map(|v| vec![v])) {
+        for v in group {
+            if w.far[v as usize] == u32::MAX {
+                w.far[v as usize] = 0;
+                w.order.push(v);
+            }
+        }
+        while next < w.order.len() {
+            let v = w.order[next];
+            for &o in &around[v as usize] {
+                if w.far[o as usize] == u32::MAX {
+                    (w.far[o as usize], w.from[o as usize]) = (w.far[v as usize] + 1, v);
+                    w.order.push(o);
+                }
+            }
+            next += 1;
+        }
+    }
+    w
+}
+
 /// Vertices in order of their distance (in edges) from one at the rim: neighbours come close together in memory, and
 /// stretches of the order are bands of the sheet.
 fn by_distance(around: &[Vec<u32>]) -> Vec<u32> {
-    let n = around.len();
-    let sweep = |from: &[u32]| {
-        let mut seen = vec![false; n];
-        let mut order: Vec<u32> = Vec::with_capacity(n);
-        for &f in from {
-            if seen[f as usize] {
-                continue;
-            }
-            seen[f as usize] = true;
-            let mut next = order.len();
-            order.push(f);
-            while next < order.len() {
-                for &w in &around[order[next] as usize] {
-                    if !seen[w as usize] {
-                        seen[w as usize] = true;
-                        order.push(w);
-                    }
-                }
-                next += 1;
-            }
-        }
-        order
-    };
-    let all: Vec<u32> = (0..n as u32).collect();
-    let mut first = sweep(&all);
-    first.reverse();
-    sweep(&first)
-}
-
-/// Copies what owners know to the ghosts of every patch; `motion` finds a patch's motion.
-pub fn exchange<T>(fabrics: &[Fabric], patches: &mut [T], motion: impl Fn(&mut T) -> &mut Motion) {
-    for p in 0..fabrics.len() {
-        for (k, [q, j]) in fabrics[p].ghosts.iter().enumerate() {
-            let (i, j) = (fabrics[p].owned + k, *j as usize);
-            let from = motion(&mut patches[*q as usize]);
-            let (m, v, a) = (from.moved[j], from.velocity[j], from.work.ahead.0[j % MOST]);
-            let to = motion(&mut patches[p]);
-            (to.moved[i], to.velocity[i], to.work.ahead.0[i % MOST]) = (m, v, a);
-        }
-    }
+    let last = ways(around, &[]).order.last().copied();
+    ways(around, last.as_slice()).order
 }

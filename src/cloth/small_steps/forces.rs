@@ -1,8 +1,8 @@
 //! The inner loop: forces of a sheet, and velocities after a step.
 
 use super::contact::{Plane, Tie};
-use super::fabric::{Fabric, MOST, Row};
-use super::lanes::{self, Lanes, Place, add3, dot, inverse_root, scale3, sub3};
+use super::fabric::{Fabric, MOST, Rows};
+use super::lanes::{self, Lanes, add3, dot, inverse_root, mul_add3, scale3, sub3};
 use super::motion::{Motion, V4, Work};
 
 /// One small step.
@@ -22,6 +22,8 @@ pub struct Step {
 
 /// Shortest length of an edge that still has a direction, metres.
 const SHORTEST: f32 = 1e-6;
+/// Square of the bow of a hinge that still has a direction, m².
+const SMALLEST: f32 = 1e-24;
 /// No number of 15 bits is beyond this: tables need no check.
 const MASK: usize = MOST - 1;
 
@@ -30,7 +32,7 @@ macro_rules! wide {
     ($self:ident.$kernel:ident($($arg:ident: $kind:ty),*)) => {{
         #[cfg(target_arch = "x86_64")]
         {
-            #[target_feature(enable = "avx2")]
+            #[target_feature(enable = "avx2,fma")]
             fn avx2(m: &mut Motion, l: lanes::Avx2, $($arg: $kind),*) {
                 m.$kernel(l, $($arg),*);
             }
@@ -46,14 +48,32 @@ macro_rules! wide {
     }};
 }
 
-/// M⁻¹L of one vertex, of which `own` is the value.
+/// 1 / length of edges and how much longer than at rest they are.
 #[inline(always)]
-fn laplacian(y: &[V4; MOST], r: &Row, own: V4) -> V4 {
+fn spring<L: Lanes>(l: L, edge: [L::F; 3], rest: &[f32; lanes::LANES], shortest: L::F) -> (L::F, L::F) {
+    let square = l.max(dot(l, edge, edge), shortest);
+    let inverse = inverse_root(l, square);
+    (inverse, l.mul_sub(square, inverse, l.load(rest)))
+}
+
+/// M⁻¹L of two vertices, of which `own` are the values.
+#[inline(always)]
+fn laplacian<L: Lanes>(l: L, y: &[V4; MOST], r: &Rows, own: L::F) -> L::F {
     let [a, b, c, d, e, f] = r.near;
-    let [p, q, s, t, u, v] = r.by;
-    let near = ((a.get(y).scale(p) + b.get(y).scale(q)) + c.get(y).scale(s))
-        + ((d.get(y).scale(t) + e.get(y).scale(u)) + f.get(y).scale(v));
-    own.scale(r.own) - near
+    let [[p, q], [s, t], [u, v], [own_by, _]] =
+        [l.each(&r.by[0]), l.each(&r.by[1]), l.each(&r.by[2]), l.each(&r.by[3])];
+    let low = l.mul(l.pair(y, a), p);
+    let low = l.mul_add(l.pair(y, b), q, low);
+    let low = l.mul_add(l.pair(y, c), s, low);
+    let high = l.mul(l.pair(y, d), t);
+    let high = l.mul_add(l.pair(y, e), u, high);
+    let high = l.mul_add(l.pair(y, f), v, high);
+    l.mul_sub(own, own_by, l.add(low, high))
+}
+
+/// So many vertices and one more where they are odd: its value is not needed, and there is room for it.
+fn even(n: usize) -> usize {
+    n.next_multiple_of(2)
 }
 
 impl Motion {
@@ -78,7 +98,7 @@ impl Motion {
     }
     #[inline(always)]
     fn look_ahead(&mut self, time: f32) {
-        let all = self.work.ahead.0.iter_mut().zip(&self.start).zip(&self.moved).zip(&self.velocity);
+        let all = self.work.ahead.iter_mut().zip(&self.start).zip(&self.moved).zip(&self.velocity);
         for (((a, s), m), v) in all {
             *a = *s + *m + v.scale(time);
         }
@@ -94,7 +114,7 @@ impl Motion {
         let (h, ahead, most) = (step.h, step.h * step.ahead, fastest * fastest);
         let n = f.reach(step.rings);
         let all = self.moved[..n].iter_mut().zip(&mut self.velocity).zip(&self.start);
-        for (((m, v), s), a) in all.zip(self.work.ahead.0.iter_mut()) {
+        for (((m, v), s), a) in all.zip(self.work.ahead.iter_mut()) {
             let square = v.dot(*v);
             if square > most {
                 *v = v.scale(fastest / square.sqrt());
@@ -111,38 +131,45 @@ impl Motion {
             self.look_ahead(step.h * step.ahead);
         }
         let Work { ahead, push, bending, .. } = &mut self.work;
-        let (x, push) = (&*ahead.0, &mut *push.0);
+        let (x, push): (&[V4; MOST], &mut [V4; MOST]) = (ahead, push);
         let rings = step.rings.saturating_add(f.smoothing.len() - 1);
         let n = f.reach(rings);
-        // Triangles at the rim reach one ring further.
-        let around = f.reach(rings.saturating_add(1));
+        // Pairs of triangles at the rim reach two rings further.
+        let around = f.reach(rings.saturating_add(2));
         push[..around].copy_from_slice(&bending[..around]);
         let shortest = l.splat(SHORTEST * SHORTEST);
-        let blocks = f.triangles.partition_point(|t| t.v[0][0].min(t.v[1][0]).min(t.v[2][0]).index() < n);
-        for t in &f.triangles[..blocks] {
-            // Two edges; the third closes the triangle.
-            let e1 = l.between(x, &t.v[2], &t.v[0]);
-            let e2 = l.between(x, &t.v[0], &t.v[1]);
-            let e0 = add3(l, e1, e2);
-            let square =
-                [l.max(dot(l, e0, e0), shortest), l.max(dot(l, e1, e1), shortest), l.max(dot(l, e2, e2), shortest)];
-            let inverse = [inverse_root(l, square[0]), inverse_root(l, square[1]), inverse_root(l, square[2])];
-            let longer = [
-                l.sub(l.mul(square[0], inverse[0]), l.load(&t.rest[0])),
-                l.sub(l.mul(square[1], inverse[1]), l.load(&t.rest[1])),
-                l.sub(l.mul(square[2], inverse[2]), l.load(&t.rest[2])),
-            ];
-            let [own0, own1, own2] = [l.load(&t.k[0]), l.load(&t.k[1]), l.load(&t.k[2])];
-            let [k12, k20, k01] = [l.load(&t.k[3]), l.load(&t.k[4]), l.load(&t.k[5])];
-            let tension = [
-                l.mul(dot(l, [own0, k01, k20], longer), inverse[0]),
-                l.mul(dot(l, [k01, own1, k12], longer), inverse[1]),
-                l.mul(dot(l, [k20, k12, own2], longer), inverse[2]),
-            ];
-            let p2 = scale3(l, e2, tension[2]);
-            let a = sub3(l, p2, scale3(l, e1, tension[1]));
-            let b = add3(l, p2, scale3(l, e0, tension[0]));
-            l.push(push, &t.v, a, b);
+        let blocks = f.quads.partition_point(|q| q.lowest() < n);
+        for q in &f.quads[..blocks] {
+            let ab = l.between(x, &q.v[0], &q.v[1]);
+            let ac = l.between(x, &q.v[0], &q.v[2]);
+            let ad = l.between(x, &q.v[0], &q.v[3]);
+            let (bc, bd) = (sub3(l, ac, ab), sub3(l, ad, ab));
+            let (ab1, ab2) = spring(l, ab, &q.rest[0], shortest);
+            let (ac1, ac2) = spring(l, ac, &q.rest[1], shortest);
+            let (bc1, bc2) = spring(l, bc, &q.rest[2], shortest);
+            let (ad1, ad2) = spring(l, ad, &q.rest[3], shortest);
+            let (bd1, bd2) = spring(l, bd, &q.rest[4], shortest);
+            let [k0, k1, k2, k3, k4] =
+                [l.load(&q.k[0]), l.load(&q.k[1]), l.load(&q.k[2]), l.load(&q.k[3]), l.load(&q.k[4])];
+            let [k01, k02, k03, k04] = [l.load(&q.k[5]), l.load(&q.k[6]), l.load(&q.k[7]), l.load(&q.k[8])];
+            let [k12, k34] = [l.load(&q.k[9]), l.load(&q.k[10])];
+            // Tensions over lengths.
+            let t0 = l.mul_add(k04, bd2, l.mul_add(k03, ad2, dot(l, [k0, k01, k02], [ab2, ac2, bc2])));
+            let t0 = l.mul(t0, ab1);
+            let t1 = l.mul(dot(l, [k01, k1, k12], [ab2, ac2, bc2]), ac1);
+            let t2 = l.mul(dot(l, [k02, k12, k2], [ab2, ac2, bc2]), bc1);
+            let t3 = l.mul(dot(l, [k03, k3, k34], [ab2, ad2, bd2]), ad1);
+            let t4 = l.mul(dot(l, [k04, k34, k4], [ab2, ad2, bd2]), bd1);
+            let c = mul_add3(l, ac, t1, scale3(l, bc, t2));
+            let d = mul_add3(l, ad, t3, scale3(l, bd, t4));
+            let a = mul_add3(l, ab, t0, mul_add3(l, ac, t1, scale3(l, ad, t3)));
+            // All that pulls at c and d, and what pulls at a is taken from that.
+            let b = sub3(l, add3(l, c, d), a);
+            let zero = l.splat(0.0);
+            l.put(push, &q.v[0], a);
+            l.put(push, &q.v[1], b);
+            l.put(push, &q.v[2], sub3(l, [zero; 3], c));
+            l.put(push, &q.v[3], sub3(l, [zero; 3], d));
         }
         for (a, m) in push[..n].iter_mut().zip(&f.inverse_mass) {
             *a = a.scale(*m) + step.gravity;
@@ -154,14 +181,14 @@ impl Motion {
     fn hasten_kernel(&mut self, _: impl Lanes, f: &Fabric, step: &Step) {
         let keep = 1.0 / (1.0 + step.h * f.damping);
         let n = f.reach(step.rings);
-        for (v, a) in self.velocity[..n].iter_mut().zip(self.work.push.0.iter()) {
+        for (v, a) in self.velocity[..n].iter_mut().zip(self.work.push.iter()) {
             *v = (*v + a.scale(step.h)).scale(keep);
         }
     }
 
     /// W times `push` by Horner's scheme, and velocities under that.
     #[inline(always)]
-    fn smooth_kernel(&mut self, _: impl Lanes, f: &Fabric, step: &Step) {
+    fn smooth_kernel<L: Lanes>(&mut self, l: L, f: &Fabric, step: &Step) {
         let Work { push, smooth, smoother, held, .. } = &mut self.work;
         let Some((highest, lower)) = f.smoothing.split_last() else { return };
         let rounds = lower.len();
@@ -170,16 +197,23 @@ impl Motion {
             let n = f.reach(step.rings.saturating_add(rounds - 1 - round));
             // The first round takes the accelerations themselves, times the highest coefficient.
             let (y, out): (&[V4; MOST], &mut [V4; MOST]) = match round {
-                0 => (&push.0, &mut smooth.0),
-                _ => (&smooth.0, &mut smoother.0),
+                0 => (&**push, &mut **smooth),
+                _ => (&**smooth, &mut **smoother),
             };
             let scale = if round == 0 { *highest } else { 1.0 };
+            let (wide, by) = (l.splat(scale), l.splat(*c));
+            let pairs = f.rows.iter().zip(y.as_chunks::<2>().0.iter().zip(push.as_chunks::<2>().0));
             if round + 1 == rounds {
-                let all = self.velocity[..n].iter_mut().zip(&f.rows).zip(y.iter().zip(push.0.iter()));
-                for ((v, r), (own, first)) in all {
-                    let a = laplacian(y, r, *own).scale(scale) + first.scale(*c);
-                    *v = (*v + a.scale(step.h)).scale(keep);
+                let (h, kept) = (l.splat(step.h), l.splat(keep));
+                // The velocity of an odd last vertex has no partner.
+                let (both, last) = self.velocity[..even(n).min(f.vertices.len())].as_chunks_mut::<2>();
+                let mut odd = [last.first().copied().unwrap_or_default(); 2];
+                for (v, (r, (own, first))) in both.iter_mut().chain([&mut odd]).zip(pairs) {
+                    let own = l.load_pair(own);
+                    let a = l.mul_add(laplacian(l, y, r, own), wide, l.mul(l.load_pair(first), by));
+                    l.store_pair(l.mul(l.mul_add(a, h, l.load_pair(v)), kept), v);
                 }
+                last.iter_mut().for_each(|v| *v = odd[0]);
                 for e in &f.far {
                     let i = e.vertex.index();
                     if i < n {
@@ -189,9 +223,10 @@ impl Motion {
                 }
                 return;
             }
-            let all = out[..n].iter_mut().zip(&f.rows).zip(y.iter().zip(push.0.iter()));
-            for ((o, r), (own, first)) in all {
-                *o = laplacian(y, r, *own).scale(scale) + first.scale(*c);
+            for (o, (r, (own, first))) in out[..even(n)].as_chunks_mut::<2>().0.iter_mut().zip(pairs) {
+                let own = l.load_pair(own);
+                let a = l.mul_add(laplacian(l, y, r, own), wide, l.mul(l.load_pair(first), by));
+                l.store_pair(a, o);
             }
             for e in &f.far {
                 let i = e.vertex.index();
@@ -207,14 +242,14 @@ impl Motion {
     }
 
     #[inline(always)]
-    fn bend_kernel(&mut self, _: impl Lanes, f: &Fabric, late: f32, rings: usize) {
+    fn bend_kernel<L: Lanes>(&mut self, l: L, f: &Fabric, late: f32, rings: usize) {
         let end = f.reach(rings);
         let Work { smoother, push, bending, .. } = &mut self.work;
-        for (((a, s), m), v) in smoother.0.iter_mut().zip(&self.start).zip(&self.moved).zip(&self.velocity) {
+        for (((a, s), m), v) in smoother.iter_mut().zip(&self.start).zip(&self.moved).zip(&self.velocity) {
             *a = *s + *m + v.scale(late);
         }
-        let x = &*smoother.0;
-        let out = &mut push.0;
+        let x: &[V4; MOST] = smoother;
+        let out: &mut [V4; MOST] = push;
         let n = bending.len();
         out[..n].fill(V4::default());
         let mut rest = &f.bend[..];
@@ -230,19 +265,23 @@ impl Motion {
             }
             out[i & MASK] = sum;
         }
-        for b in &f.bent {
-            let [i, j, k, l] = b.v;
-            if i.min(j).min(k).min(l).index() >= end {
-                break;
-            }
-            let of = |v: Place| v.get(x) - i.get(x);
+        let (least, one) = (l.splat(SMALLEST), l.splat(1.0));
+        for b in &f.bent[..f.bent.partition_point(|b| b.lowest() < end)] {
             // The coefficients sum to zero: differences lose no digits.
-            let q = of(j).scale(b.c[1]) + (of(k).scale(b.c[2]) + of(l).scale(b.c[3]));
-            let pull = q.scale(b.w * (b.rest / q.dot(q).sqrt().max(f32::MIN_POSITIVE) - 1.0));
-            i.set(out, i.get(out) + pull.scale(b.c[0]));
-            j.set(out, j.get(out) + pull.scale(b.c[1]));
-            k.set(out, k.get(out) + pull.scale(b.c[2]));
-            l.set(out, l.get(out) + pull.scale(b.c[3]));
+            let [p, q, r] = [l.load(&b.c[0]), l.load(&b.c[1]), l.load(&b.c[2])];
+            let bow = scale3(l, l.between(x, &b.v[0], &b.v[1]), p);
+            let bow = mul_add3(l, l.between(x, &b.v[0], &b.v[2]), q, bow);
+            let bow = mul_add3(l, l.between(x, &b.v[0], &b.v[3]), r, bow);
+            let inverse = inverse_root(l, l.max(dot(l, bow, bow), least));
+            let more = l.mul_sub(l.load(&b.rest), inverse, one);
+            let pull = scale3(l, bow, l.mul(l.load(&b.w), more));
+            let (j, k, m) = (scale3(l, pull, p), scale3(l, pull, q), scale3(l, pull, r));
+            let all = add3(l, add3(l, j, k), m);
+            let zero = l.splat(0.0);
+            l.put(out, &b.v[0], sub3(l, [zero; 3], all));
+            l.put(out, &b.v[1], j);
+            l.put(out, &b.v[2], k);
+            l.put(out, &b.v[3], m);
         }
         bending.copy_from_slice(&out[..n]);
     }

@@ -1,5 +1,6 @@
 //! Eight numbers at once: what the kernels compute with. With AVX2 a register holds them, else the compiler cuts them
-//! up; both round after each operation, none is fused, so both give the same bits.
+//! up. A product and a sum are fused (rounded once) where [`Lanes::mul_add`] says so and nowhere else, so both give the
+//! same bits.
 
 use super::fabric::MOST;
 use super::motion::V4;
@@ -49,19 +50,33 @@ pub(super) trait Lanes: Copy {
     fn add(self, a: Self::F, b: Self::F) -> Self::F;
     fn sub(self, a: Self::F, b: Self::F) -> Self::F;
     fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    /// a b + c, rounded once.
+    fn mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// a b − c, rounded once.
+    fn mul_sub(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// c − a b, rounded once.
+    fn sub_mul(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     fn max(self, a: Self::F, b: Self::F) -> Self::F;
     /// `magic` minus half of the bits of positive numbers: the start of a reciprocal square root.
     fn guess(self, a: Self::F, magic: u32) -> Self::F;
     /// Components of x[b] − x[a].
     fn between(self, x: &[V4; MOST], a: &At, b: &At) -> [Self::F; 3];
-    /// Adds `a` to each first corner, takes `b` from each second and adds b − a to each third, lane by lane.
-    fn push(self, out: &mut [V4; MOST], v: &[At; 3], a: [Self::F; 3], b: [Self::F; 3]);
+    /// Adds vectors to what is at eight places, lane by lane.
+    fn put(self, out: &mut [V4; MOST], at: &At, a: [Self::F; 3]);
+    /// Two vectors side by side.
+    fn pair(self, x: &[V4; MOST], at: [Place; 2]) -> Self::F;
+    /// Two vectors that follow each other.
+    fn load_pair(self, x: &[V4; 2]) -> Self::F;
+    /// The other way round.
+    fn store_pair(self, x: Self::F, to: &mut [V4; 2]);
+    /// A number for each of two vectors, twice.
+    fn each(self, a: &[[f32; 2]; 2]) -> [Self::F; 2];
 }
 
 /// The inner product of three components.
 #[inline(always)]
 pub(super) fn dot<L: Lanes>(l: L, a: [L::F; 3], b: [L::F; 3]) -> L::F {
-    l.add(l.add(l.mul(a[0], b[0]), l.mul(a[1], b[1])), l.mul(a[2], b[2]))
+    l.mul_add(a[2], b[2], l.mul_add(a[1], b[1], l.mul(a[0], b[0])))
 }
 
 // No closures here and where lanes are used: they would be compiled for themselves, without the wide registers.
@@ -78,6 +93,12 @@ pub(super) fn sub3<L: Lanes>(l: L, a: [L::F; 3], b: [L::F; 3]) -> [L::F; 3] {
     [l.sub(a[0], b[0]), l.sub(a[1], b[1]), l.sub(a[2], b[2])]
 }
 
+/// Vectors times numbers, added to others.
+#[inline(always)]
+pub(super) fn mul_add3<L: Lanes>(l: L, a: [L::F; 3], s: L::F, b: [L::F; 3]) -> [L::F; 3] {
+    [l.mul_add(a[0], s, b[0]), l.mul_add(a[1], s, b[1]), l.mul_add(a[2], s, b[2])]
+}
+
 /// Vectors times numbers.
 #[inline(always)]
 pub(super) fn scale3<L: Lanes>(l: L, a: [L::F; 3], s: L::F) -> [L::F; 3] {
@@ -91,8 +112,8 @@ pub(super) fn inverse_root<L: Lanes>(l: L, a: L::F) -> L::F {
     const MAGIC: u32 = 0x5F1F_FFF9;
     const FIRST: [f32; 2] = [0.703_952_25, 2.389_244_6];
     let y = l.guess(a, MAGIC);
-    let y = l.mul(l.mul(l.splat(FIRST[0]), y), l.sub(l.splat(FIRST[1]), l.mul(l.mul(a, y), y)));
-    l.mul(y, l.sub(l.splat(1.5), l.mul(l.mul(l.mul(l.splat(0.5), a), y), y)))
+    let y = l.mul(l.mul(l.splat(FIRST[0]), y), l.sub_mul(l.mul(a, y), y, l.splat(FIRST[1])));
+    l.mul(y, l.sub_mul(l.mul(l.mul(l.splat(0.5), a), y), y, l.splat(1.5)))
 }
 
 /// Any processor.
@@ -122,6 +143,18 @@ impl Lanes for Plain {
         std::array::from_fn(|k| a[k] * b[k])
     }
     #[inline(always)]
+    fn mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
+        std::array::from_fn(|k| a[k].mul_add(b[k], c[k]))
+    }
+    #[inline(always)]
+    fn mul_sub(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
+        std::array::from_fn(|k| a[k].mul_add(b[k], -c[k]))
+    }
+    #[inline(always)]
+    fn sub_mul(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F {
+        std::array::from_fn(|k| (-a[k]).mul_add(b[k], c[k]))
+    }
+    #[inline(always)]
     fn max(self, a: Self::F, b: Self::F) -> Self::F {
         // As the instruction: the second where they don't compare.
         std::array::from_fn(|k| if a[k] > b[k] { a[k] } else { b[k] })
@@ -136,21 +169,33 @@ impl Lanes for Plain {
         std::array::from_fn(|c| d.map(|d| d.0[c]))
     }
     #[inline(always)]
-    fn push(self, out: &mut [V4; MOST], v: &[At; 3], a: [Self::F; 3], b: [Self::F; 3]) {
-        for k in 0..LANES {
-            let [a, b] = [a, b].map(|f| V4::new(f[0][k], f[1][k], f[2][k]));
-            let [i, j, l] = v.map(|v| v[k]);
-            i.set(out, i.get(out) + a);
-            j.set(out, j.get(out) - b);
-            l.set(out, l.get(out) + (b - a));
+    fn put(self, out: &mut [V4; MOST], at: &At, a: [Self::F; 3]) {
+        for (k, at) in at.iter().enumerate() {
+            at.set(out, at.get(out) + V4::new(a[0][k], a[1][k], a[2][k]));
         }
+    }
+    #[inline(always)]
+    fn pair(self, x: &[V4; MOST], at: [Place; 2]) -> Self::F {
+        self.load_pair(&at.map(|at| at.get(x)))
+    }
+    #[inline(always)]
+    fn load_pair(self, x: &[V4; 2]) -> Self::F {
+        std::array::from_fn(|k| x[k / 4].0[k % 4])
+    }
+    #[inline(always)]
+    fn store_pair(self, x: Self::F, to: &mut [V4; 2]) {
+        *to = std::array::from_fn(|v| V4(std::array::from_fn(|k| x[4 * v + k])));
+    }
+    #[inline(always)]
+    fn each(self, a: &[[f32; 2]; 2]) -> [Self::F; 2] {
+        a.map(|a| std::array::from_fn(|k| a[k / 4]))
     }
 }
 
-/// A processor with AVX2: only made where there is one.
+/// A processor with AVX2 and fused products: only made where there is one.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Avx2(());
+pub(super) struct Avx2([[i32; LANES]; 2]);
 
 #[cfg(target_arch = "x86_64")]
 pub(super) use avx2::detect;
@@ -164,7 +209,9 @@ mod avx2 {
     use std::arch::x86_64::*;
 
     pub(in super::super) fn detect() -> Option<Avx2> {
-        std::arch::is_x86_feature_detected!("avx2").then_some(Avx2(()))
+        let can = std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma");
+        // Were these orders known to the compiler, it would take two instructions for each and not one.
+        can.then(|| Avx2(std::hint::black_box([[0, 0, 0, 0, 1, 1, 1, 1], [2, 2, 2, 2, 3, 3, 3, 3]])))
     }
 
     /// Two vectors side by side.
@@ -204,34 +251,12 @@ mod avx2 {
         }
     }
 
-    /// One triangle of [`Lanes::push`].
+    /// One lane of [`Lanes::put`].
     #[inline(always)]
-    unsafe fn corners(out: &mut [V4; MOST], v: &[At; 3], k: usize, a: __m128, b: __m128, c: __m128) {
+    unsafe fn add(out: *mut u8, at: Place, a: __m128) {
         unsafe {
-            let out = out.as_mut_ptr().cast::<u8>();
-            let (i, j, l): (*mut f32, *mut f32, *mut f32) = (
-                out.add(8 * usize::from(v[0][k].0)).cast(),
-                out.add(8 * usize::from(v[1][k].0)).cast(),
-                out.add(8 * usize::from(v[2][k].0)).cast(),
-            );
-            _mm_store_ps(i, _mm_add_ps(_mm_load_ps(i), a));
-            _mm_store_ps(j, _mm_sub_ps(_mm_load_ps(j), b));
-            _mm_store_ps(l, _mm_add_ps(_mm_load_ps(l), c));
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn low(out: &mut [V4; MOST], v: &[At; 3], k: usize, a: __m256, b: __m256, c: __m256) {
-        unsafe {
-            corners(out, v, k, _mm256_castps256_ps128(a), _mm256_castps256_ps128(b), _mm256_castps256_ps128(c));
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn high(out: &mut [V4; MOST], v: &[At; 3], k: usize, a: __m256, b: __m256, c: __m256) {
-        unsafe {
-            let (a, b) = (_mm256_extractf128_ps::<1>(a), _mm256_extractf128_ps::<1>(b));
-            corners(out, v, k, a, b, _mm256_extractf128_ps::<1>(c));
+            let to = out.add(8 * usize::from(at.0)).cast();
+            _mm_store_ps(to, _mm_add_ps(_mm_load_ps(to), a));
         }
     }
 
@@ -258,6 +283,18 @@ mod avx2 {
             unsafe { _mm256_mul_ps(a, b) }
         }
         #[inline(always)]
+        fn mul_add(self, a: __m256, b: __m256, c: __m256) -> __m256 {
+            unsafe { _mm256_fmadd_ps(a, b, c) }
+        }
+        #[inline(always)]
+        fn mul_sub(self, a: __m256, b: __m256, c: __m256) -> __m256 {
+            unsafe { _mm256_fmsub_ps(a, b, c) }
+        }
+        #[inline(always)]
+        fn sub_mul(self, a: __m256, b: __m256, c: __m256) -> __m256 {
+            unsafe { _mm256_fnmadd_ps(a, b, c) }
+        }
+        #[inline(always)]
         fn max(self, a: __m256, b: __m256) -> __m256 {
             unsafe { _mm256_max_ps(a, b) }
         }
@@ -280,23 +317,37 @@ mod avx2 {
             }
         }
         #[inline(always)]
-        fn push(self, out: &mut [V4; MOST], v: &[At; 3], a: [__m256; 3], b: [__m256; 3]) {
+        fn put(self, out: &mut [V4; MOST], at: &At, a: [__m256; 3]) {
             unsafe {
-                let (a, b) = (rows(a), rows(b));
-                let c = [
-                    _mm256_sub_ps(b[0], a[0]),
-                    _mm256_sub_ps(b[1], a[1]),
-                    _mm256_sub_ps(b[2], a[2]),
-                    _mm256_sub_ps(b[3], a[3]),
-                ];
-                low(out, v, 0, a[0], b[0], c[0]);
-                low(out, v, 1, a[1], b[1], c[1]);
-                low(out, v, 2, a[2], b[2], c[2]);
-                low(out, v, 3, a[3], b[3], c[3]);
-                high(out, v, 4, a[0], b[0], c[0]);
-                high(out, v, 5, a[1], b[1], c[1]);
-                high(out, v, 6, a[2], b[2], c[2]);
-                high(out, v, 7, a[3], b[3], c[3]);
+                let (r, out) = (rows(a), out.as_mut_ptr().cast::<u8>());
+                add(out, at[0], _mm256_castps256_ps128(r[0]));
+                add(out, at[1], _mm256_castps256_ps128(r[1]));
+                add(out, at[2], _mm256_castps256_ps128(r[2]));
+                add(out, at[3], _mm256_castps256_ps128(r[3]));
+                add(out, at[4], _mm256_extractf128_ps::<1>(r[0]));
+                add(out, at[5], _mm256_extractf128_ps::<1>(r[1]));
+                add(out, at[6], _mm256_extractf128_ps::<1>(r[2]));
+                add(out, at[7], _mm256_extractf128_ps::<1>(r[3]));
+            }
+        }
+        #[inline(always)]
+        fn pair(self, x: &[V4; MOST], at: [Place; 2]) -> __m256 {
+            unsafe { pair(x, at[0], at[1]) }
+        }
+        #[inline(always)]
+        fn load_pair(self, x: &[V4; 2]) -> __m256 {
+            unsafe { _mm256_loadu_ps(x.as_ptr().cast()) }
+        }
+        #[inline(always)]
+        fn store_pair(self, x: __m256, to: &mut [V4; 2]) {
+            unsafe { _mm256_storeu_ps(to.as_mut_ptr().cast(), x) }
+        }
+        #[inline(always)]
+        fn each(self, a: &[[f32; 2]; 2]) -> [__m256; 2] {
+            unsafe {
+                let four = _mm256_castps128_ps256(_mm_loadu_ps(a.as_ptr().cast()));
+                let of = |order: &[i32; LANES]| _mm256_loadu_si256(order.as_ptr().cast());
+                [_mm256_permutevar8x32_ps(four, of(&self.0[0])), _mm256_permutevar8x32_ps(four, of(&self.0[1]))]
             }
         }
     }

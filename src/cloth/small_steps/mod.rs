@@ -6,6 +6,8 @@
 //! accelerations that are smoothed over the nearest neighbours, which gives the finest waves more inertia and so allows
 //! longer steps (`filter.rs`); elements still too stiff for the step are softened when the garment is made, and counted.
 
+mod blocks;
+mod border;
 mod contact;
 mod fabric;
 mod filter;
@@ -15,8 +17,9 @@ mod motion;
 mod plan;
 mod stability;
 
+pub use border::Borders;
 pub use contact::{Plane, Tie};
-pub use fabric::{Fabric, exchange};
+pub use fabric::Fabric;
 pub use forces::Step;
 pub use motion::{Motion, V4};
 pub use plan::{Fit, Plan, triangles};

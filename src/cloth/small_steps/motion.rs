@@ -41,17 +41,37 @@ impl std::ops::Sub for V4 {
     }
 }
 
-/// One value for every [`super::lanes::Place`]: such an index needs no check.
+/// One vector for every [`super::lanes::Place`]: such an index needs no check.
 #[derive(Clone, Debug)]
-pub(super) struct Table<T>(pub(super) Box<[T; MOST]>);
+pub(super) struct Table {
+    all: Vec<V4>,
+    from: usize,
+}
 
-impl<T: Copy + Default> Default for Table<T> {
-    fn default() -> Self {
+/// So many vectors lie between the beginnings of two tables, beside whole pages: a processor takes a load for one of what
+/// was just stored where both addresses end in the same 12 bits, and waits.
+const APART: usize = 72;
+
+impl Table {
+    fn new(number: usize) -> Self {
         // Zeroed memory is lent page by page when it is touched, so a small patch does not cost what a large one does.
-        match vec![T::default(); MOST].into_boxed_slice().try_into() {
-            Ok(t) => Self(t),
-            Err(_) => unreachable!("the length is MOST"),
-        }
+        let from = number * APART;
+        Self { all: vec![V4::default(); MOST + from], from }
+    }
+}
+
+impl std::ops::Deref for Table {
+    type Target = [V4; MOST];
+    #[inline(always)]
+    fn deref(&self) -> &[V4; MOST] {
+        self.all[self.from..].first_chunk().expect("it was made so long")
+    }
+}
+
+impl std::ops::DerefMut for Table {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [V4; MOST] {
+        self.all[self.from..].first_chunk_mut().expect("it was made so long")
     }
 }
 
@@ -69,19 +89,33 @@ pub struct Motion {
 }
 
 /// Scratch of the inner loop.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Work {
     /// Where forces are evaluated: a little ahead.
-    pub(super) ahead: Table<V4>,
+    pub(super) ahead: Table,
     /// Acceleration of each vertex, and what becomes of it by smoothing.
-    pub(super) push: Table<V4>,
-    pub(super) smooth: Table<V4>,
-    pub(super) smoother: Table<V4>,
+    pub(super) push: Table,
+    pub(super) smooth: Table,
+    pub(super) smoother: Table,
     pub(super) bending: Vec<V4>,
     /// Whether `ahead` is where the next step needs it.
     pub(super) looked: bool,
     /// Vertices whose place is given.
     pub(super) held: Vec<u32>,
+}
+
+impl Default for Work {
+    fn default() -> Self {
+        Self {
+            ahead: Table::new(0),
+            push: Table::new(1),
+            smooth: Table::new(2),
+            smoother: Table::new(3),
+            bending: Vec::new(),
+            looked: false,
+            held: Vec::new(),
+        }
+    }
 }
 
 impl Motion {

@@ -100,7 +100,11 @@ impl Lab {
                     m.advance(f, &step, f32::INFINITY);
                 }
             }
-            exchange(&self.fabrics, &mut self.motions, |m| m);
+            let borders = Borders::new(self.fabrics.len());
+            for (p, (f, m)) in self.fabrics.iter().zip(&self.motions).enumerate() {
+                borders.tell(0, p, f, m);
+            }
+            self.fabrics.iter().zip(&mut self.motions).for_each(|(f, m)| borders.hear(0, f, m));
             done += block;
         }
     }
@@ -399,8 +403,8 @@ fn wide_registers_change_no_bit_and_the_root_is_near() {
     plain.motions[0].pull_kernel(Plain, &plain.fabrics[0], &step);
     wide.motions[0].accelerate(&wide.fabrics[0], &step, &[], &[]);
     let n = x.len();
-    let moved = plain.motions[0].work.push.0[..n].iter().any(|a| a.dot(*a) > 1.0);
-    assert!(moved && plain.motions[0].work.push.0[..n] == wide.motions[0].work.push.0[..n]);
+    let moved = plain.motions[0].work.push[..n].iter().any(|a| a.dot(*a) > 1.0);
+    assert!(moved && plain.motions[0].work.push[..n] == wide.motions[0].work.push[..n]);
     let numbers: [f32; LANES] = [1e-12, 1e-7, 2.5e-4, 0.9, 1.0, 1.7, 4.1, 3e5];
     for (a, y) in numbers.iter().zip(inverse_root(Plain, numbers)) {
         assert!((f64::from(y) * f64::from(*a).sqrt() - 1.0).abs() < 1e-6, "{a}: {y}");

@@ -1,0 +1,182 @@
+//! Triangles and hinges, eight to a block: what one pass of the kernels takes.
+
+use super::lanes::{At, LANES, Place};
+use super::plan::{Bent, Triangle};
+use std::collections::BTreeSet;
+
+/// Eight pairs of triangles a b c and b a d; those without a partner have no stiffness in the second. The last eight are
+/// filled up with ones that pull nothing.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(32))]
+pub(super) struct Quads {
+    /// Lengths at rest of ab, ac, bc, ad, bd.
+    pub(super) rest: [[f32; LANES]; 5],
+    /// Stiffness between their lengthenings, N/m: of each by itself, ab with the others, ac with bc, ad with bd.
+    pub(super) k: [[f32; LANES]; 11],
+    /// a, b, c, d.
+    pub(super) v: [At; 4],
+}
+
+/// Eight hinges bent at rest; the last eight are filled up.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(32))]
+pub(super) struct Hinges {
+    /// Coefficients of all but the first vertex; they sum to zero with its.
+    pub(super) c: [[f32; LANES]; 3],
+    pub(super) w: [f32; LANES],
+    pub(super) rest: [f32; LANES],
+    pub(super) v: [At; 4],
+}
+
+impl Quads {
+    /// Its lowest vertex is the lowest of all blocks after it.
+    pub(super) fn lowest(&self) -> usize {
+        lowest(&self.v)
+    }
+}
+
+impl Hinges {
+    /// Its lowest vertex is the lowest of all blocks after it.
+    pub(super) fn lowest(&self) -> usize {
+        lowest(&self.v)
+    }
+}
+
+fn lowest(v: &[At; 4]) -> usize {
+    v.iter().map(|v| v[0].index()).min().unwrap_or(0)
+}
+
+/// Stiffness between edges `i` and `j` of a triangle.
+fn between(t: &Triangle, i: usize, j: usize) -> f32 {
+    if i == j { t.k[i] } else { t.k[6 - i - j] }
+}
+
+/// For each triangle its partner across an edge. Those with the fewest left to choose from choose first, which leaves few
+/// alone.
+fn partners(all: &[Triangle]) -> Vec<Option<usize>> {
+    let mut edges: Vec<([u32; 2], usize)> = Vec::with_capacity(3 * all.len());
+    for (n, t) in all.iter().enumerate() {
+        edges.extend([(0, 1), (1, 2), (2, 0)].map(|(i, j)| ([t.v[i].min(t.v[j]), t.v[i].max(t.v[j])], n)));
+    }
+    edges.sort_unstable();
+    let mut near = vec![Vec::new(); all.len()];
+    for same in edges.chunk_by(|a, b| a.0 == b.0) {
+        for (_, a) in same {
+            near[*a].extend(same.iter().map(|s| s.1).filter(|b| b != a));
+        }
+    }
+    let mut free: Vec<usize> = near.iter().map(Vec::len).collect();
+    let mut queue: BTreeSet<(usize, usize)> = free.iter().enumerate().map(|(t, f)| (*f, t)).collect();
+    let mut partner = vec![None; all.len()];
+    while let Some((_, t)) = queue.pop_first() {
+        let Some(other) = near[t].iter().copied().filter(|o| queue.contains(&(free[*o], *o))).min_by_key(|o| free[*o])
+        else {
+            continue;
+        };
+        queue.remove(&(free[other], other));
+        (partner[t], partner[other]) = (Some(other), Some(t));
+        for gone in [t, other] {
+            for n in near[gone].iter().copied() {
+                if queue.remove(&(free[n], n)) {
+                    free[n] -= 1;
+                    queue.insert((free[n], n));
+                }
+            }
+        }
+    }
+    partner
+}
+
+/// One lane of [`Quads`].
+struct Quad {
+    v: [u32; 4],
+    rest: [f32; 5],
+    k: [f32; 11],
+}
+
+impl Quad {
+    fn new(t: &Triangle, other: Option<&Triangle>) -> Self {
+        // The corner that the other triangle has not.
+        let i = other.map_or(0, |o| (0..3).find(|i| !o.v.contains(&t.v[*i])).unwrap_or(0));
+        let (j, l) = ((i + 1) % 3, (i + 2) % 3);
+        let (a, b, c) = (t.v[j], t.v[l], t.v[i]);
+        // Edge k lies opposite corner k.
+        let k = |x, y| between(t, x, y);
+        let mut quad = Self {
+            v: [a, b, c, c],
+            rest: [t.rest[i], t.rest[l], t.rest[j], t.rest[l], t.rest[j]],
+            k: [k(i, i), k(l, l), k(j, j), 0.0, 0.0, k(i, l), k(i, j), 0.0, 0.0, k(l, j), 0.0],
+        };
+        let corner = |v: u32| other.and_then(|o| o.v.iter().position(|w| *w == v));
+        if let (Some(o), Some(p), Some(q)) = (other, corner(a), corner(b)) {
+            let d = 3 - p - q;
+            let k = |x, y| between(o, x, y);
+            quad.v[3] = o.v[d];
+            (quad.rest[3], quad.rest[4]) = (o.rest[q], o.rest[p]);
+            quad.k[0] += k(d, d);
+            (quad.k[3], quad.k[4]) = (k(q, q), k(p, p));
+            (quad.k[7], quad.k[8], quad.k[10]) = (k(d, q), k(d, p), k(p, q));
+        }
+        quad
+    }
+}
+
+/// Pairs of triangles by their lowest corner.
+pub(super) fn quads(all: &[Triangle]) -> Vec<Quads> {
+    let partner = partners(all);
+    let firsts = (0..all.len()).filter(|t| partner[*t].is_none_or(|p| *t < p));
+    let mut quads: Vec<Quad> = firsts.map(|t| Quad::new(&all[t], partner[t].map(|p| &all[p]))).collect();
+    quads.sort_by_key(|q| q.v.iter().min().copied());
+    let block = |of: &[Quad]| {
+        let mut out = Quads::default();
+        for (lane, q) in of.iter().enumerate() {
+            (0..4).for_each(|i| out.v[i][lane] = Place::of(q.v[i] as usize));
+            (0..5).for_each(|i| out.rest[i][lane] = q.rest[i]);
+            (0..11).for_each(|i| out.k[i][lane] = q.k[i]);
+        }
+        out
+    };
+    quads.chunks(LANES).map(block).collect()
+}
+
+/// Hinges by their lowest vertex.
+pub(super) fn hinges(mut all: Vec<Bent>) -> Vec<Hinges> {
+    all.sort_by_key(|b| b.v.iter().min().copied());
+    let block = |of: &[Bent]| {
+        let mut out = Hinges::default();
+        for (lane, b) in of.iter().enumerate() {
+            (0..4).for_each(|i| out.v[i][lane] = Place::of(b.v[i] as usize));
+            (0..3).for_each(|i| out.c[i][lane] = b.c[i + 1]);
+            (out.w[lane], out.rest[lane]) = (b.w, b.rest);
+        }
+        out
+    };
+    all.chunks(LANES).map(block).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_triangle_is_in_one_pair_and_few_are_alone() {
+        // A strip of squares cut in triangles, 20 by 9: an odd number of triangles cannot be, so all find a partner.
+        let at = |i: u32, j: u32| j * 21 + i;
+        let mut all = Vec::new();
+        for j in 0..9 {
+            for i in 0..20 {
+                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                all.extend([[a, b, c], [a, c, d]].map(|v| Triangle { v, ..Triangle::default() }));
+            }
+        }
+        let partner = partners(&all);
+        for (t, p) in partner.iter().enumerate() {
+            let Some(p) = p else { continue };
+            assert_eq!(partner[*p], Some(t));
+            assert_eq!(all[t].v.iter().filter(|v| all[*p].v.contains(v)).count(), 2, "{t} and {p} share an edge");
+        }
+        let alone = partner.iter().filter(|p| p.is_none()).count();
+        assert!(alone <= all.len() / 50, "{alone} of {} alone", all.len());
+        assert_eq!(partners(&all[..1]), [None]);
+    }
+}
