@@ -97,7 +97,7 @@ impl Default for TrackerConfig {
             data_step: 2,
             stride: None,
             iterations: 8,
-            point_to_point: 0.1,
+            point_to_point: 0.05,
             point_to_plane: 1.0,
             normals: Normals::Symmetric,
             robust: true,

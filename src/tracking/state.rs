@@ -94,6 +94,9 @@ pub struct TrackerState {
     pub(super) feet: Option<Feet>,
     #[serde(default)]
     pub(super) rescue: Rescue,
+    /// Frames in a row that were gone through and in which hardly anything moved.
+    #[serde(default)]
+    pub(super) still: u32,
     /// What a picture is compared with while the person stands still or nobody is there.
     #[serde(default)]
     pub(super) unchanged: Option<Reference>,
@@ -135,6 +138,7 @@ impl TrackerState {
             drift: Vec::new(),
             feet: None,
             rescue: Rescue::default(),
+            still: 0,
             unchanged: None,
             surface_due: [0; 2],
         }

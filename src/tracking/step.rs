@@ -45,6 +45,11 @@ const SLOW: f64 = 0.02;
 /// Motion below this from frame to frame, metres, is not extrapolated: what is left then is the jitter of the fit, which
 /// prediction would keep alive.
 const STILL: f64 = 3e-3;
+/// So many frames in a row nothing has moved by more than [`RESTLESS`], metres, before pictures are compared: a fit still creeps to its
+/// place for a dozen frames (an arm that points at the camera by 0.3 mm a frame), and would do so in jerks.
+const SETTLED_STILL: u32 = 15;
+/// See [`SETTLED_STILL`].
+const RESTLESS: f64 = 2.0 * STILL;
 /// An empty room is compared at every so many-th cell of the grid.
 const NOBODY_STEP: u32 = 2;
 /// A residual at which the quality of a frame is halved, metres.
@@ -162,13 +167,15 @@ fn kept(state: &mut TrackerState, frame: &RgbdFrame) -> Option<StepReport> {
     Some(report)
 }
 
-/// The person stands still in a settled pose, so that a picture like this one would be answered by it.
-fn still(model: &TrackerModel, state: &TrackerState) -> bool {
-    let moved = |before: &Pose<Camera>| motion(model.template.skeleton(), before, &state.pose);
+/// The person stands still in a settled pose, so that a picture like this one would be answered by it. Counts for how long.
+fn still(model: &TrackerModel, state: &mut TrackerState) -> bool {
+    let moved = state.before.as_ref().map_or(f64::MAX, |b| motion(model.template.skeleton(), b, &state.pose));
+    state.still = if moved < RESTLESS { state.still.saturating_add(1) } else { 0 };
     state.status == Status::Tracking
         && state.calibrated(&model.config)
         && state.bad_frames == 0
-        && state.before.as_ref().is_some_and(|b| moved(b) < STILL)
+        && state.still >= SETTLED_STILL
+        && moved < STILL
 }
 
 /// Depth image to the person's refined cells and outline.
