@@ -2,22 +2,60 @@
 //!
 //! `cargo run --release --example dance -- [--data ../shared/data/garments/cipc_apache2] [--garment tshirt+skirt]
 //!   [--edge 0.0118] [--seconds 4.8] [--threads 2] [--most-steps 80] [--patch 6000] [--no-layers] [--no-folds]
-//!   [--out strip.png] [--from 0] [--every 0.4]`
+//!   [--deepest 12] [--out strip.png] [--from 0] [--every 0.4]`
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
 
 mod drawing;
 
 use drawing::{Part, draw};
 use std::path::PathBuf;
+use tryon::body::Template;
 use tryon::camera::ColorImage;
 use tryon::cloth::realtime::Config;
+use tryon::dressing::Dressed;
+use tryon::evaluate::Solid;
 use tryon::evaluate::dance::{Outfit, load};
 use tryon::formats::image::write_png_rgb;
 use tryon::garment::library;
+use tryon::math::P3;
 use tryon::par::with_threads;
 
 /// One cell of the strip, pixels.
 const CELL: (u32, u32) = (270, 460);
+/// As often as the report measures penetration, calls.
+const LOOK_EVERY: usize = 4;
+/// Vertices less deep in the body than this are not listed, metres.
+const SUNKEN: f32 = 1e-3;
+
+/// Which vertices lie how deep in the body, where and when.
+fn find_sunken(template: &Template, time: f64, body: &[P3], dressed: &Dressed, out: &mut Vec<(f32, String)>) {
+    let solid = Solid::new(body, template.mesh().faces());
+    let outfit = &dressed.model.outfit;
+    for (g, s) in outfit.garments.iter().zip(&dressed.state.garments) {
+        for (i, p) in s.positions.iter().enumerate() {
+            let depth = solid.depth(p);
+            if depth < SUNKEN {
+                continue;
+            }
+            let far = |v: &usize| (body[*v] - p).norm_squared();
+            let near = (0..body.len()).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(0);
+            let joint = &template.skeleton().joints()[template.weights().dominant(near)].name;
+            let panels: Vec<&str> = g.corners[i].iter().map(|c| g.panels[usize::from(c.0)].as_str()).collect();
+            out.push((
+                depth,
+                format!(
+                    "at {time:.3} s, {} vertex {i} ({}, regions {:08b}) under body vertex {near} ({joint}), {} limbs deep, \
+                     {:.3?}",
+                    g.name,
+                    panels.join("+"),
+                    g.regions[i].0,
+                    solid.winding(p),
+                    p.coords.as_slice()
+                ),
+            ));
+        }
+    }
+}
 
 fn main() {
     let mut data = PathBuf::from("../shared/data/garments/cipc_apache2");
@@ -28,6 +66,7 @@ fn main() {
         seconds: 4.8,
     };
     let (mut threads, mut out, mut every, mut from) = (2, None::<PathBuf>, 0.4, 0.0);
+    let mut deepest = 0usize;
     let mut it = std::env::args().skip(1);
     while let Some(flag) = it.next() {
         let mut value = || it.next().expect("a value");
@@ -41,6 +80,7 @@ fn main() {
             "--patch" => outfit.config.patch = value().parse().expect("a number"),
             "--no-layers" => outfit.config.layers = false,
             "--no-folds" => outfit.config.self_collision = false,
+            "--deepest" => deepest = value().parse().expect("a number"),
             "--out" => out = Some(value().into()),
             "--from" => from = value().parse().expect("seconds"),
             "--every" => every = value().parse().expect("seconds"),
@@ -56,8 +96,13 @@ fn main() {
     );
     let mut cells: Vec<Vec<u8>> = Vec::new();
     let mut next = from;
+    let (mut call, mut sunken) = (0, Vec::new());
     let report = with_threads(threads, || {
         dance.run(&outfit, |time, body, dressed| {
+            call += 1;
+            if deepest > 0 && call % LOOK_EVERY == 0 {
+                find_sunken(&dance.template, time, body, dressed, &mut sunken);
+            }
             if out.is_none() || time + 1e-6 < next {
                 return;
             }
@@ -100,6 +145,8 @@ fn main() {
         report.penetration_single[0] * 1e3,
         report.penetration_single[1] * 1e3,
     );
+    sunken.sort_by(|a, b| b.0.total_cmp(&a.0));
+    sunken.iter().take(deepest).for_each(|(depth, what)| println!("{:6.2} mm {what}", depth * 1e3));
     let Some(out) = out else { return };
     let columns = cells.len() / 2;
     let (w, h) = (CELL.0 as usize, CELL.1 as usize);

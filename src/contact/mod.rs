@@ -4,6 +4,7 @@ mod buried;
 mod depth_maps;
 mod point_grid;
 mod surface;
+mod winding;
 
 pub use buried::Buried;
 pub use depth_maps::{DepthMaps, MapView};

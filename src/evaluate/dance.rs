@@ -66,6 +66,8 @@ pub struct DanceReport {
     pub penetration: [f64; 2],
     /// The same over vertices that lie in one limb only: between two that lie in each other there is no outside.
     pub penetration_single: [f64; 2],
+    /// Most body vertices that were taken to lie inside another limb.
+    pub buried: usize,
     /// Smallest share of its stiffness that a garment kept.
     pub softened: f64,
     /// Calls that threw their result away.
@@ -182,6 +184,7 @@ impl Dance {
                 *sum += part / calls as f64;
             }
             strain.push(r.p99_strain);
+            report.buried = report.buried.max(r.buried);
             report.softened = report.softened.min(r.softened);
             report.faults += usize::from(r.kept_last_good.is_some());
             if call % LOOK_EVERY == 0 {

@@ -18,7 +18,10 @@ fn an_outfit_survives_a_dance_outside_the_body_and_unstretched() {
         report.vertices, report.p99_strain, report.penetration
     );
     assert_eq!((report.faults, report.ms.len()), (0, 288));
+    // She touches herself and no skin of hers is ever inside another limb: taken to be, a shoulder blade (107 vertices,
+    // with an arm stretched back) held no cloth for a tenth of a second.
+    assert_eq!(report.buried, 0);
     // Speeds of single vertices carried through contact tore the skirt apart: 0.7 to 2.4.
     assert!(report.p99_strain < 0.2, "{}", report.p99_strain);
-    assert!(report.penetration[0] < 1e-3 && report.penetration[1] < 0.02, "{:?}", report.penetration);
+    assert!(report.penetration[0] < 1e-3 && report.penetration[1] < 0.01, "{:?}", report.penetration);
 }

@@ -137,6 +137,8 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
             dt: dt as f32,
             fastest,
             span: span as f32,
+            turn: state.frames,
+            nearest: &state.garments,
         };
         let maps = (r == 0).then_some(&work.maps);
         sheets(model, &work.patches, span as f32, &mut work.sheets);

@@ -1,7 +1,7 @@
 //! Which planes of the body keep a vertex outside, and where anchors go.
 
 use super::model::Model;
-use super::state::PatchScratch;
+use super::state::{GarmentState, PatchScratch};
 use crate::cloth::small_steps::{Fabric, Plane, Tie, V4};
 use crate::contact::{Buried, Closest, DepthMaps, SurfaceFrame};
 use crate::garment::Region;
@@ -29,6 +29,10 @@ pub(super) struct Touch<'a> {
     pub(super) fastest: f32,
     /// Length of the round, s.
     pub(super) span: f32,
+    /// Calls so far.
+    pub(super) turn: u64,
+    /// Nearest body vertices of each garment's vertices at the beginning of the call.
+    pub(super) nearest: &'a [GarmentState],
 }
 
 fn p3(v: V4) -> P3 {
@@ -58,6 +62,7 @@ impl Touch<'_> {
             let mut found: [Option<Closest>; 2] = [None, None];
             if let Some(maps) = maps {
                 self.propose(maps, &x, masks, &mut p.nearest[i]);
+                self.ask_neighbour(garment, v, &x, &mut p.nearest[i]);
             }
             for k in 0..2 {
                 if masks[k] == 0 {
@@ -88,13 +93,17 @@ impl Touch<'_> {
                     }
                 }
             }
+            let mut offset = offset;
             if let [Some(own), Some(other)] = &found {
-                // Faces that meet with less room than two layers of cloth: the own part decides, and where the body
-                // lies in itself nothing does: the cloth there hangs on its neighbours, out of sight.
+                // Faces that meet with less room than two layers of cloth: it lies half-way, and where the body lies in
+                // itself nothing holds it: the cloth there hangs on its neighbours, out of sight.
                 if let Some(room) = own.room(other).filter(|room| *room < 2.0 * offset) {
-                    p.free[i] |= room < 0.0;
-                    found = [found[0].filter(|_| room >= 0.0), None];
                     p.report.pinched += 1;
+                    if room < 0.0 {
+                        p.free[i] = true;
+                        found = [None, None];
+                    }
+                    offset = 0.5 * room.max(0.0);
                 }
             }
             for c in found.iter().rev().flatten() {
@@ -110,6 +119,18 @@ impl Touch<'_> {
                     speed: v4(&speed),
                     friction: g.sheet.friction as f32,
                 });
+            }
+        }
+    }
+
+    /// A walk may end on a finger that is not the nearest one, where no map sees the gap. Cloth beside it knows better.
+    fn ask_neighbour(&self, garment: usize, v: u32, x: &P3, near: &mut [u32; 2]) {
+        let around = self.model.garments[garment].surface.neighbours(v);
+        let Some(&w) = around.get(self.turn as usize % around.len().max(1)) else { return };
+        for (k, &told) in self.nearest[garment].nearest[w as usize].iter().enumerate() {
+            let far = |b: u32| (self.now.vertices[b as usize] - x).norm_squared();
+            if told != near[k] && far(told) < far(near[k]) {
+                near[k] = told;
             }
         }
     }
