@@ -87,7 +87,8 @@ fn correspondences(c: &mut Criterion) {
         ModelPoints { positions: &positions, normals: &normals, bones: &bones, parents: &parents, spacing: 0.04 };
     let (mut scratch, mut pairs) = (PairingScratch::default(), vec![]);
     for association in [Association::Projective, Association::KdTree] {
-        let config = PairingConfig { association, distance: 0.12, cos_normal: 0.5, pull: 0.35, data_step: 2 };
+        let config =
+            PairingConfig { association, distance: 0.12, cos_normal: 0.5, pull: 0.35, data_step: 2, reuse: 0.0 };
         c.bench_function(&format!("pairs/{association:?}, 1,000 points both ways"), |b| {
             b.iter(|| {
                 let e = &edges.false_edges;
@@ -98,8 +99,14 @@ fn correspondences(c: &mut Criterion) {
     // The body is somewhere else: nothing pairs, every reading pulls.
     let away: Vec<P3> = positions.iter().map(|p| p + V3::new(3.0, 0.0, 0.0)).collect();
     let model = ModelPoints { positions: &away, ..model };
-    let config =
-        PairingConfig { association: Association::KdTree, distance: 0.12, cos_normal: 0.5, pull: 0.35, data_step: 2 };
+    let config = PairingConfig {
+        association: Association::KdTree,
+        distance: 0.12,
+        cos_normal: 0.5,
+        pull: 0.35,
+        data_step: 2,
+        reuse: 0.0,
+    };
     c.bench_function("pairs/KdTree, the body is elsewhere", |b| {
         b.iter(|| {
             let e = &edges.false_edges;

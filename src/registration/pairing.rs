@@ -53,6 +53,9 @@ pub struct PairingConfig {
     pub pull: f32,
     /// Use every n-th reading in the search from the data to the model.
     pub data_step: usize,
+    /// Trees are not asked again for points that have moved by no more than this since, metres (0: always asked): such a
+    /// pair is longer than the shortest by twice as much at most. The scratch must forget when readings change.
+    pub reuse: f32,
 }
 
 /// What pairing did and left out.
@@ -72,6 +75,8 @@ pub struct PairingStats {
     pub explained: usize,
     /// Pairs dropped by relaxed bijective consistency, eq. 9.
     pub inconsistent: usize,
+    /// Questions to a tree that an earlier answer saved.
+    pub reused: usize,
 }
 
 /// Scratch of pairing.
@@ -83,7 +88,22 @@ pub struct PairingScratch {
     pub in_front: Vec<(u32, u32)>,
     facing: Vec<u32>,
     facing_points: Vec<P3>,
+    /// Where each model point was when the readings were asked, and the cell that answered ([`UNASKED`] before).
+    asked: Vec<(P3, u32)>,
+    /// All model points when they last answered, and the point that answered each reading, in the order of asking.
+    answered: (Vec<P3>, Vec<u32>),
 }
+
+impl PairingScratch {
+    /// Readings have changed: no earlier answer counts.
+    pub fn forget(&mut self) {
+        self.asked.clear();
+        self.answered.0.clear();
+    }
+}
+
+/// No answer yet.
+const UNASKED: u32 = u32::MAX;
 
 /// A model point behind the drawn surface by less than this counts as visible (relaxed visibility), metres.
 const RELAXED_VISIBILITY: f32 = 0.05;
@@ -119,6 +139,9 @@ pub fn pair_surfaces(
     let window = |z: f32| ((config.distance * focal / z.max(0.1)).ceil() as i32).clamp(1, 12);
     let exact = tree.filter(|_| config.association == Association::KdTree);
 
+    let near = |a: &P3, b: &P3| (a - b).norm_squared() <= config.reuse * config.reuse;
+    scratch.asked.resize(model.positions.len(), (P3::origin(), UNASKED));
+
     // From the model to the data.
     scratch.facing.clear();
     scratch.facing_points.clear();
@@ -139,10 +162,20 @@ pub fn pair_surfaces(
             scratch.in_front.push((i as u32, home as u32));
         }
         let best = match exact {
-            Some(tree) => tree
-                .nearest(p, config.distance)
-                .map(|(k, _)| cells[k] as usize)
-                .filter(|&k| !false_edges[k] && grid.normals[k].dot(n) >= config.cos_normal),
+            Some(tree) => {
+                let (at, mut cell) = scratch.asked[i];
+                if cell != UNASKED && near(&at, p) {
+                    stats.reused += 1;
+                } else {
+                    cell = tree.nearest(p, f32::INFINITY).map_or(UNASKED, |(k, _)| cells[k]);
+                    scratch.asked[i] = (*p, cell);
+                }
+                let within = |k: &usize| (grid.points[*k] - p).norm_squared() < config.distance * config.distance;
+                (cell != UNASKED)
+                    .then_some(cell as usize)
+                    .filter(within)
+                    .filter(|&k| !false_edges[k] && grid.normals[k].dot(n) >= config.cos_normal)
+            }
             None => {
                 let r = window(p.z);
                 // Thin out wide windows: a step of two misses nothing that the next iteration would not find.
@@ -183,7 +216,16 @@ pub fn pair_surfaces(
     stats.hidden = model.positions.len() - stats.visible;
 
     // From the data to the model.
-    let model_tree = exact.map(|_| PointTree::new(&scratch.facing_points));
+    let (mut then, mut answers) = std::mem::take(&mut scratch.answered);
+    let same = config.reuse > 0.0
+        && then.len() == model.positions.len()
+        && then.iter().zip(model.positions).all(|(a, b)| near(a, b));
+    if exact.is_some() && !same {
+        answers.clear();
+        then.clear();
+        then.extend_from_slice(model.positions);
+    }
+    let model_tree = exact.filter(|_| !same).map(|_| PointTree::new(&scratch.facing_points));
     let mut unexplained = 0usize;
     for &cell in cells.iter().step_by(config.data_step.max(1)) {
         let k = cell as usize;
@@ -192,11 +234,26 @@ pub fn pair_surfaces(
             continue;
         }
         stats.readings += 1;
-        let best = match &model_tree {
-            Some(tree) => tree
-                .nearest(&c, config.distance)
-                .map(|(i, _)| scratch.facing[i])
-                .filter(|&i| model.normals[i as usize].dot(&n) >= config.cos_normal),
+        let best = match exact {
+            Some(_) => {
+                let i = match &model_tree {
+                    Some(tree) => {
+                        let i = tree.nearest(&c, f32::INFINITY).map_or(UNASKED, |(i, _)| scratch.facing[i]);
+                        answers.push(i);
+                        i
+                    }
+                    None => {
+                        stats.reused += 1;
+                        answers.get(stats.readings - 1).copied().unwrap_or(UNASKED)
+                    }
+                };
+                let within =
+                    |i: &u32| (model.positions[*i as usize] - c).norm_squared() < config.distance * config.distance;
+                (i != UNASKED)
+                    .then_some(i)
+                    .filter(within)
+                    .filter(|&i| model.normals[i as usize].dot(&n) >= config.cos_normal)
+            }
             None => {
                 let (u, v) = ((k % columns) as i32, (k / columns) as i32);
                 let r = window(c.z).min(6);
@@ -237,6 +294,7 @@ pub fn pair_surfaces(
             }
         }
     }
+    scratch.answered = (then, answers);
     stats
 }
 
@@ -298,7 +356,8 @@ mod tests {
         let tree = PointTree::new(&points);
         let no_edges = vec![false; cloud.depth.len()];
         for association in [Association::Projective, Association::KdTree] {
-            let config = PairingConfig { association, distance: 0.1, cos_normal: 0.5, pull: 0.0, data_step: 1 };
+            let config =
+                PairingConfig { association, distance: 0.1, cos_normal: 0.5, pull: 0.0, data_step: 1, reuse: 0.0 };
             let (mut scratch, mut pairs) = (PairingScratch::default(), vec![]);
             let stats =
                 pair_surfaces(&model, &cloud, &cells, &no_edges, Some(&tree), &config, &mut scratch, &mut pairs);
@@ -322,7 +381,8 @@ mod tests {
         let tree = PointTree::new(&points);
         let no_edges = vec![false; cloud.depth.len()];
         let mean = |association| {
-            let config = PairingConfig { association, distance: 0.05, cos_normal: 0.5, pull: 0.0, data_step: 1 };
+            let config =
+                PairingConfig { association, distance: 0.05, cos_normal: 0.5, pull: 0.0, data_step: 1, reuse: 0.0 };
             let (mut scratch, mut pairs) = (PairingScratch::default(), vec![]);
             pair_surfaces(&model, &cloud, &cells, &no_edges, Some(&tree), &config, &mut scratch, &mut pairs);
             let d: f32 =
@@ -334,13 +394,58 @@ mod tests {
     }
 
     #[test]
+    fn earlier_answers_hold_within_their_bound_until_forgotten() {
+        const REUSE: f32 = 2e-3;
+        let (cloud, cells, positions, normals) = sphere(V3::new(0.01, 0.0, 0.0));
+        let bones = vec![0u8; positions.len()];
+        let points: Vec<P3> = cells.iter().map(|&c| cloud.points[c as usize]).collect();
+        let tree = PointTree::new(&points);
+        let no_edges = vec![false; cloud.depth.len()];
+        let ask = |positions: &[P3], reuse, scratch: &mut PairingScratch| {
+            let model = ModelPoints { positions, normals: &normals, bones: &bones, parents: &[None], spacing: 0.028 };
+            let association = Association::KdTree;
+            let config = PairingConfig { association, distance: 0.1, cos_normal: 0.5, pull: 0.0, data_step: 1, reuse };
+            let mut pairs = vec![];
+            let tree = Some(&tree);
+            let stats = pair_surfaces(&model, &cloud, &cells, &no_edges, tree, &config, scratch, &mut pairs);
+            (stats, pairs)
+        };
+        let mut scratch = PairingScratch::default();
+        let (stats, first) = ask(&positions, REUSE, &mut scratch);
+        assert_eq!(stats.reused, 0, "nothing was asked before");
+        let (stats, again) = ask(&positions, REUSE, &mut scratch);
+        assert_eq!((stats.reused, &again), (stats.visible + stats.readings, &first), "all of it is known");
+        let shifted = |x: f32| positions.iter().map(|p| p + V3::new(x, 0.0, 0.0)).collect::<Vec<_>>();
+        let near = shifted(0.8 * REUSE);
+        let (stats, kept) = ask(&near, REUSE, &mut scratch);
+        assert!(stats.reused > stats.visible, "{stats:?}");
+        let (_, shortest) = ask(&near, 0.0, &mut PairingScratch::default());
+        let length = |pair: &Pair| (cloud.points[pair.cell as usize] - near[pair.model as usize]).norm();
+        let of_model =
+            |pairs: &[Pair]| pairs.iter().filter(|p| !p.from_data).map(|p| (p.model, length(p))).collect::<Vec<_>>();
+        let best: std::collections::BTreeMap<u32, f32> = of_model(&shortest).into_iter().collect();
+        let worst = of_model(&kept).iter().filter_map(|(i, d)| Some(d - best.get(i)?)).fold(0.0, f32::max);
+        assert!(worst <= 2.0 * REUSE, "{worst} m longer than the shortest");
+        let (stats, _) = ask(&shifted(3.0 * REUSE), REUSE, &mut scratch);
+        assert_eq!(stats.reused, 0, "too far");
+        scratch.forget();
+        assert_eq!(ask(&shifted(3.0 * REUSE), REUSE, &mut scratch).0.reused, 0, "readings changed");
+    }
+
+    #[test]
     fn nothing_pairs_with_nothing() {
         let (cloud, _, positions, normals) = sphere(V3::zeros());
         let bones = vec![0u8; positions.len()];
         let model =
             ModelPoints { positions: &positions, normals: &normals, bones: &bones, parents: &[None], spacing: 0.028 };
-        let config =
-            PairingConfig { association: Association::KdTree, distance: 0.1, cos_normal: 0.5, pull: 0.3, data_step: 1 };
+        let config = PairingConfig {
+            association: Association::KdTree,
+            distance: 0.1,
+            cos_normal: 0.5,
+            pull: 0.3,
+            data_step: 1,
+            reuse: 0.0,
+        };
         let (mut scratch, mut pairs) = (PairingScratch::default(), vec![]);
         let no_edges = vec![false; cloud.depth.len()];
         let tree = PointTree::new(&[]);

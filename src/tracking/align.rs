@@ -105,6 +105,8 @@ pub(super) const START: Schedule =
 
 /// Iterations over which kernel and reach shrink.
 pub(super) const ANNEAL: usize = 4;
+/// A point that has moved by no more than this since it was paired keeps its reading, metres: a fifth of a cell.
+const REUSE: f32 = 2e-3;
 /// A reading without any model point near it, and a visible point without reading, count as this far off, metres.
 const UNEXPLAINED: f64 = 0.10;
 
@@ -256,6 +258,7 @@ pub(super) fn pair(
         cos_normal: 0.5,
         pull: if model.config.pull { pull } else { 0.0 },
         data_step: model.config.data_step,
+        reuse: if model.config.skip_converged { REUSE } else { 0.0 },
     };
     let false_edges = &seen.contour.false_edges;
     let stats = pair_surfaces(

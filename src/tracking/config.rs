@@ -72,6 +72,8 @@ pub struct TrackerConfig {
     pub skip_coarse: bool,
     /// Fit displacements less often once they have settled.
     pub skip_settled: bool,
+    /// Points that have hardly moved since they were paired in the same frame keep their pairs.
+    pub skip_converged: bool,
     /// Keep the last pose while a person stands still, and the last answer while nobody is there, where the picture shows the
     /// same but for noise; every sixth frame is gone through whatever it shows.
     pub skip_unchanged: bool,
@@ -118,6 +120,7 @@ impl Default for TrackerConfig {
             calm: 0.75,
             skip_coarse: true,
             skip_settled: true,
+            skip_converged: true,
             skip_unchanged: true,
             pull: true,
             shape_prior: 5e-7,
@@ -150,6 +153,7 @@ impl TrackerConfig {
             calm: 0.0,
             skip_coarse: false,
             skip_settled: false,
+            skip_converged: false,
             skip_unchanged: false,
             pull: false,
             ..Self::default()

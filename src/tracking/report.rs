@@ -39,6 +39,9 @@ pub struct Skipped {
     pub displacements: usize,
     /// Pairs dropped by relaxed bijective consistency (eq. 9), at the last iteration.
     pub inconsistent_pairs: usize,
+    /// Searches for a pair that bones and points which hardly moved since the last did not need, at the last iteration.
+    #[serde(default)]
+    pub searches: usize,
     /// Cells of the grid that were not the person.
     pub cells: usize,
     /// 1 for a frame that showed nothing new, so that nothing was searched or fitted and the last pose holds.
@@ -48,12 +51,13 @@ pub struct Skipped {
 
 impl Skipped {
     /// Each kind of work with its count, for counters.
-    pub fn counts(&self) -> [(&'static str, usize); 6] {
+    pub fn counts(&self) -> [(&'static str, usize); 7] {
         [
             ("hidden points", self.hidden_points),
             ("iterations", self.iterations),
             ("displacements", self.displacements),
             ("inconsistent pairs", self.inconsistent_pairs),
+            ("searches for pairs", self.searches),
             ("empty cells", self.cells),
             ("unchanged frames", self.frames),
         ]

@@ -234,6 +234,7 @@ fn follow(
     let tree = wants_tree(model).then(|| PointTree::new(&points));
     let outline_of_person = std::mem::take(&mut workspace.contour);
     let seen = Seen { grid, cells: &person.cells, contour: &outline_of_person, tree: tree.as_ref() };
+    workspace.align.pairing.forget();
     let up = state.world_from_camera.inverse().vector(&Vector3::y());
     let searching = !state.status.is_live();
     let mut pose = state.pose.clone();
@@ -366,6 +367,7 @@ fn follow(
     report.quality = fit.explained.min(fit.matched) / (1.0 + fit.residual / POOR_RESIDUAL);
     report.skipped.hidden_points = fit.pairs.hidden;
     report.skipped.inconsistent_pairs = fit.pairs.inconsistent;
+    report.skipped.searches = fit.pairs.reused;
     report.skipped.iterations = model.config.iterations.saturating_sub(fit.iterations);
     report.skipped.displacements = state.shape.displacements.len();
 

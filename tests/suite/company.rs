@@ -183,15 +183,26 @@ fn each_skip_keeps_its_bound() {
     let mut dance = Scene::open(&folder).expect("scene");
     dance.frames.truncate(110);
     dance.truth.truncate(110);
-    compare_skips(&template, &dance, &[("converged iterations", converged, 3.0, 3.0)]);
+    let searches = TrackerConfig { skip_converged: false, ..TrackerConfig::default() };
+    compare_skips(
+        &template,
+        &dance,
+        &[("converged iterations", converged, 3.0, 3.0), ("searches of converged bones", searches, 1.5, 1.5)],
+    );
 }
 
 fn compare_skips(template: &Arc<Template>, own: &Scene, cases: &[(&str, TrackerConfig, f64, f64)]) {
     let run = |config: &TrackerConfig| {
-        let (mut tracks, mut done) = (vec![], [0usize; 4]);
+        let (mut tracks, mut done) = (vec![], [0usize; 5]);
         let out = follow(template, config, own, |i, model, state, report, workspace| {
             let skipped = &report.skipped;
-            let counts = [skipped.coarse_iterations, skipped.displacements, skipped.iterations, skipped.frames];
+            let counts = [
+                skipped.coarse_iterations,
+                skipped.displacements,
+                skipped.iterations,
+                skipped.frames,
+                skipped.searches,
+            ];
             done.iter_mut().zip(counts).for_each(|(d, c)| *d += c);
             if i >= 75 {
                 let (vertices, bones) = workspace.posed(model, state);
