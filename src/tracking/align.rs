@@ -464,7 +464,8 @@ fn assemble(
         hidden.push((BARELY_SEEN / (BARELY_SEEN + scratch.hessian[(6 + k, 6 + k)])).powi(2));
         let seen_share = if scratch.terms.eased { model.seen_shares[k] } else { 1.0 };
         let share = seen_share + (1.0 - seen_share) * unseen;
-        let stiff = stiff * scratch.terms.rest_weight * share + if model.legs[k] { leg_pull(k) * unseen } else { 0.0 };
+        let stiff =
+            stiff * scratch.terms.rest_weight * share + if model.below_knee[k] { leg_pull(k) * unseen } else { 0.0 };
         scratch.hessian[(6 + k, 6 + k)] += stiff;
         scratch.gradient[6 + k] -= stiff * angle;
     }

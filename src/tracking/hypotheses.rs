@@ -124,7 +124,7 @@ pub(super) fn choose_leg(
     ends: &[Extremity],
     scratch: &mut AlignScratch,
 ) -> Pose {
-    let Some(leg) = &model.legs_in_view[side] else { return pose.clone() };
+    let Some(leg) = &model.legs[side] else { return pose.clone() };
     let skeleton = model.template.skeleton();
     let (hip, knee) = (&skeleton.joints()[leg.root].name, &skeleton.joints()[leg.hinge].name);
     let mut guesses = at_ends(model, rest.0, pose, leg, ends);

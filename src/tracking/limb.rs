@@ -115,7 +115,7 @@ mod tests {
         let pose = TrackerState::new(&model).pose;
         let mut bones = BoneTransforms::default();
         pose.bones(model.template.skeleton(), &rest, &mut bones);
-        let limbs = model.arms.iter().chain(&model.legs_in_view).flatten();
+        let limbs = model.arms.iter().chain(&model.legs).flatten();
         for limb in limbs {
             let root = bones.joints[limb.root];
             let outward = (root - bones.joints[0]).x.signum();

@@ -3,7 +3,7 @@
 use super::TrackerConfig;
 use super::calm;
 use super::limb::{self, Limb};
-use super::stand::{Leg, legs};
+use super::stand::{self, Leg};
 use crate::body::{JointMotion, SkinWeights, Template};
 use crate::camera::Calibration;
 use crate::math::{P3, V3};
@@ -49,11 +49,11 @@ pub struct TrackerModel {
     /// Arms, left and right, for hands beyond sleeves without return.
     pub(super) arms: [Option<Limb>; 2],
     /// Legs, left and right, for feet found at the start.
-    pub(super) legs_in_view: [Option<Limb>; 2],
+    pub(super) legs: [Option<Limb>; 2],
     /// Part of the body that each joint belongs to, see [`calm::parts`].
     pub(super) parts: Vec<usize>,
     /// Angles of knees, ankles and feet.
-    pub(super) legs: Vec<bool>,
+    pub(super) below_knee: Vec<bool>,
     /// Share of the pull to the rest pose that is left for each angle when its bone is in full view.
     pub(super) seen_shares: Vec<f64>,
 }
@@ -83,12 +83,13 @@ impl TrackerModel {
         directions.extend(bone_directions(&template, &samples, &weights));
         let tied = tied_bones(&template, &directions, first);
         let stiffness = stiffness(&template);
-        let standing = legs(&template);
+        let standing = stand::legs(&template);
         let arms = limb::arms(&template);
-        let legs_in_view = limb::legs(&template);
+        let legs = limb::legs(&template);
         let parts = calm::parts(&template);
-        let leg = |name: &str| ["knee", "ankle", "foot"].iter().any(|s| name.contains(s));
-        let legs = skeleton.joints().iter().flat_map(|j| std::iter::repeat_n(leg(&j.name), j.motion.dofs())).collect();
+        let below_knee = |name: &str| ["knee", "ankle", "foot"].iter().any(|s| name.contains(s));
+        let below_knee =
+            skeleton.joints().iter().flat_map(|j| std::iter::repeat_n(below_knee(&j.name), j.motion.dofs())).collect();
         let share = |j: &crate::body::Joint| std::iter::repeat_n(seen_share(&j.name), j.motion.dofs());
         let seen_shares = skeleton.joints().iter().flat_map(share).collect();
         Self {
@@ -105,9 +106,9 @@ impl TrackerModel {
             stiffness,
             standing,
             arms,
-            legs_in_view,
-            parts,
             legs,
+            parts,
+            below_knee,
             seen_shares,
         }
     }
