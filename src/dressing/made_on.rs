@@ -112,18 +112,25 @@ impl MadeOn {
         p.iter().map(|p| self.frame.metres(p)).collect()
     }
     /// The body again where a garment lies whose file has a unit and place of its own: a bound garment keeps the body's.
-    pub(super) fn beneath(self, garment: &[P3]) -> Self {
-        Self { frame: fit_under(&self.template, garment, false).1, ..self }
+    ///
+    /// # Errors
+    /// None with a body as it is.
+    pub(super) fn beneath(self, garment: &[P3]) -> Result<Self, WearError> {
+        let (_, frame) = fit_under(&self.template, garment, false)?;
+        Ok(Self { frame, ..self })
     }
     /// The embedded body, scaled, moved and with its arms turned so that garment vertices lie just above its skin.
     /// Garments say little about the body they were made on: this is a guess.
-    pub fn guess(garment: &[P3]) -> Self {
-        let (template, frame) = fit_under(&embedded::template(), garment, true);
+    ///
+    /// # Errors
+    /// When no body fits into them.
+    pub fn guess(garment: &[P3]) -> Result<Self, WearError> {
+        let (template, frame) = fit_under(&embedded::template(), garment, true)?;
         let stature = template.mesh().bounds().map_or(0.0, |(lo, hi)| hi.y - lo.y);
         let up = frame.shift.y * 100.0;
         let said =
             format!("a guess: our body, {:.0} cm tall, its floor {up:.0} cm below the file's zero", stature * 100.0);
-        Self { template, file: Vec::new(), frame, said }
+        Ok(Self { template, file: Vec::new(), frame, said })
     }
 }
 
@@ -213,6 +220,8 @@ fn stood(template: &Template, rest: &RestBody, scale: f64, arms: Option<f64>) ->
     (out, bones)
 }
 
+/// A garment whose middle lies farther than this from the upright through the file's zero, metres, is moved there first.
+const ASIDE: f32 = 0.4;
 /// Garment vertices that are looked at while guessing.
 const SAMPLES: usize = 500;
 /// Skin further away than this says no more, metres.
@@ -231,7 +240,10 @@ const UNUSUAL: f32 = 0.002;
 
 /// Finds where a body would have stood in a garment: its scale and the turn of its arms (both only if `free`), and the
 /// garment's own frame, which gets all of the shift.
-fn fit_under(template: &Arc<Template>, garment: &[P3], free: bool) -> (Arc<Template>, FileFrame) {
+///
+/// # Errors
+/// When nothing of a body lies near the garment (only if `free`).
+fn fit_under(template: &Arc<Template>, garment: &[P3], free: bool) -> Result<(Arc<Template>, FileFrame), WearError> {
     let (lo, hi) =
         garment.iter().fold((P3::from([f32::MAX; 3]), P3::from([f32::MIN; 3])), |(l, h), p| (l.inf(p), h.sup(p)));
     let largest = (hi - lo).amax();
@@ -239,6 +251,10 @@ fn fit_under(template: &Arc<Template>, garment: &[P3], free: bool) -> (Arc<Templ
     const EXTENT: [f32; 2] = [0.22, 2.2];
     let unit = [1.0f32, 0.1, 0.01, 0.001].into_iter().find(|s| largest * s > EXTENT[0] && largest * s < EXTENT[1]);
     let unit = FileFrame { scale: unit.unwrap_or(1.0), z_up: false, shift: V3::zeros() };
+    // A file may hold a person who stands anywhere in a room.
+    let middle = nalgebra::center(&lo, &hi).coords * unit.scale;
+    let aside = V3::new(middle.x, 0.0, middle.z);
+    let unit = FileFrame { shift: if aside.norm() > ASIDE { -aside } else { V3::zeros() }, ..unit };
     let points: Vec<P3> =
         garment.iter().step_by(garment.len().div_ceil(SAMPLES).max(1)).map(|p| unit.metres(p)).collect();
     let rest = template.personalise(&BodyShape::default());
@@ -296,9 +312,13 @@ fn fit_under(template: &Arc<Template>, garment: &[P3], free: bool) -> (Arc<Templ
         step.iter_mut().for_each(|s| *s *= 0.5);
     }
     let q = best.1;
-    let frame = FileFrame { shift: V3::new(0.0, q[2] as f32, q[3] as f32), ..unit };
+    let frame = FileFrame { shift: unit.shift + V3::new(0.0, q[2] as f32, q[3] as f32), ..unit };
     if !free {
-        return (template.clone(), frame);
+        return Ok((template.clone(), frame));
+    }
+    if best.0 > 0.9 * FAR {
+        let why = "no body fits into it: is it worn, upright, y up, and facing +z?";
+        return Err(WearError::NotFound(why.into()));
     }
     let (vertices, bones) = stood(template, &rest, q[0], Some(q[1]));
     let joints = template.skeleton().joints().iter().enumerate();
@@ -308,5 +328,5 @@ fn fit_under(template: &Arc<Template>, garment: &[P3], free: bool) -> (Arc<Templ
         .with_vertices(vertices)
         .map_err(BodyError::Mesh)
         .and_then(|m| Template::new("guessed", m, Skeleton::new(joints)?, template.weights().clone(), None));
-    (made.map_or_else(|_| template.clone(), Arc::new), frame)
+    Ok((Arc::new(made?), frame))
 }

@@ -78,9 +78,9 @@ impl MeshWear {
         let raw = sewn.obj.mesh.vertices().to_vec();
         let made_on = match body {
             // A binding to vertices that the body lacks: the positions in the file, moved over its skin.
-            Some(b) if is_bound && !file.bound => b.beneath(&raw),
+            Some(b) if is_bound && !file.bound => b.beneath(&raw)?,
             Some(b) => b,
-            None => MadeOn::guess(&raw),
+            None => MadeOn::guess(&raw)?,
         };
         let unit = made_on.unit();
         let fault = |why| WearError::Piece { piece: 0, why };

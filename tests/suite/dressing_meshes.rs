@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
 use tryon::cloth::realtime::{Config, Input, Workspace, step};
 use tryon::dressing::{DressError, DressOptions, Dressed, MadeOn, MeshWear, Wear, dress, dress_all};
+use tryon::formats::gltf::{GlbMesh, write_glb};
 use tryon::garment::{GarmentKind, Material, Size, library};
 use tryon::math::{Body, Rigid, World, log_so3};
 
@@ -147,4 +148,35 @@ fn a_size_that_cannot_be_closed_is_refused_with_what_is_missing() {
     let ([low, high], _) = look(&d, 0);
     println!("M from {low:.2} to {high:.2} m");
     assert!(low < 1.0 && high > 1.35, "rolled up: {low} to {high}");
+}
+
+#[test]
+fn our_own_gltf_is_worn_wherever_its_person_stood() {
+    let (t, rest) = person(AVERAGE);
+    let pattern = library::pattern("tshirt", Size::M).expect("pattern");
+    let pose = standing(&t, &rest, 0.9);
+    let first = dress(&t, &rest, &pose, std::slice::from_ref(&pattern), &DressOptions::default()).expect("dressed");
+    let g = &first.model.outfit.garments[0];
+    let (mut drawn, folder) = (Vec::new(), tempfile::tempdir().expect("a folder"));
+    g.render_positions(&first.state.garments[0].positions, &mut drawn);
+    let worn_from = |aside: [f32; 3]| {
+        let vertices: Vec<_> = drawn.iter().map(|p| p + nalgebra::Vector3::from(aside)).collect();
+        let file = folder.path().join("shirt.glb");
+        let color = [200, 40, 40];
+        let mesh = GlbMesh { name: "shirt", vertices: &vertices, faces: &g.render.faces, uv: &g.render.uv, color };
+        write_glb(&file, &[mesh]).expect("written");
+        MeshWear::on(&file, None, &Material::preset("cotton").expect("preset"), 0.021)
+    };
+    let before = look(&first, 0).0;
+    for aside in [[0.0; 3], [0.3, 0.0, -2.4]] {
+        let d = worn(AVERAGE, &worn_from(aside).expect("wearable"));
+        let (after, area) = look(&d, 0);
+        println!("{aside:?}: {before:?} before, {after:?} after, area {area:.3}");
+        assert!((0.93..1.08).contains(&area), "{area}");
+        for (a, b) in before.iter().zip(after) {
+            assert!((a - b).abs() < 0.06, "{aside:?}: {before:?} before, {after:?} after");
+        }
+    }
+    let high = worn_from([0.0, 4.0, 0.0]).expect_err("nobody is that tall");
+    assert!(high.to_string().contains("no body fits"), "{high}");
 }

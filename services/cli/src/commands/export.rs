@@ -50,7 +50,8 @@ pub(crate) fn run(args: &ExportArgs) -> Result<ExitCode> {
 /// Frames a second of an exported animation.
 const FRAMES: f64 = 30.0;
 
-/// The garment on the embedded body: still, or moving with the try-on routine for some seconds.
+/// The garment on the embedded body, which starts upright over the origin and faces +z: still, or moving with the try-on
+/// routine for some seconds.
 fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
     let sequence = Sequence::new(Shopper::default(), Setting::default());
     let template = embedded::template();
@@ -68,9 +69,11 @@ fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
     )?;
     let (model, mut state, mut work) = (dressed.model, dressed.state, realtime::Workspace::default());
     let garment = &model.outfit.garments[0];
+    let stands = pose(0).root.point(&template.skeleton().joints()[0].rest).coords.cast::<f32>();
     let drawn = |state: &realtime::State| {
         let mut p = Vec::new();
         garment.render_positions(&state.garments[0].positions, &mut p);
+        p.iter_mut().for_each(|p| *p -= nalgebra::Vector3::new(stands.x, 0.0, stands.z));
         p
     };
     let start = drawn(&state);
