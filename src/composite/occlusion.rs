@@ -83,7 +83,8 @@ pub(crate) fn evidence(m: &Margins, s: &Seen) -> u8 {
     }
     let limb = s.body < s.garment - LIMB_GAP;
     if s.captured <= 0.0 {
-        return if limb { says::LIMB } else { says::UNKNOWN };
+        // The far side of a sleeve's end lies behind the tracked arm and beside the real one: colours decide there.
+        return if limb && !s.inner { says::LIMB } else { says::UNKNOWN };
     }
     let margin = if s.inner {
         m.inner
