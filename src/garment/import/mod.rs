@@ -1,10 +1,12 @@
 //! Garments made by others, as ours.
 
+mod coarsen;
 mod file;
 mod garmentcode;
 mod mesh;
 mod remesh;
 
+pub use coarsen::{coarsen, median_edge};
 pub use file::{MeshFile, read_mesh, some_faces, split};
 pub use garmentcode::from_garmentcode;
 pub(crate) use mesh::unfold;
