@@ -80,9 +80,9 @@ pub fn variants() -> Vec<Variant> {
     add("association", "projective", &|c| c.association = Association::Projective);
     add("association", "kd-tree", &|c| c.association = Association::KdTree);
     add("association", "kd-tree, one way", &|c| c.both_ways = false);
-    add("metric", "symmetric + 0.1 point", &|_| {});
+    add("metric", "symmetric + 0.05 point", &|_| {});
     add("metric", "symmetric", &|c| c.point_to_point = 0.0);
-    add("metric", "plane + 0.1 point", &|c| c.normals = Normals::Model);
+    add("metric", "plane + 0.05 point", &|c| c.normals = Normals::Model);
     add("metric", "point", &|c| (c.point_to_point, c.point_to_plane) = (1.0, 0.0));
     add("robust kernel", "off", &|c| c.robust = false);
     for damping in [1e-6, 1e-5, 1e-3] {
