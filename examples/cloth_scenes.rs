@@ -1,6 +1,7 @@
 //! Standard cloth scenes by every solver: time a frame, error against the reference, strain, penetration.
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 use std::path::Path;
+use tryon::cloth::crossings;
 use tryon::cloth::scene::{Method, RunConfig, load, run};
 
 fn main() {
@@ -41,6 +42,13 @@ fn main() {
     }
     if let Some(v) = get("smooth") {
         c.smooth = Some(v.parse().unwrap());
+    }
+    c.self_collision = get("folds").is_some_and(|v| v != "0");
+    if let Some(v) = get("thickness") {
+        c.thickness = v.parse().unwrap();
+    }
+    if let Some(v) = get("search") {
+        c.fold_search = v.parse::<f64>().unwrap() * 1e-3;
     }
     let cpu = || {
         // All threads: what the patches take together.
@@ -86,7 +94,7 @@ fn main() {
         com = (sum / frames as f64).sqrt() * 1e3;
     }
     println!(
-        "{scene} {:?} n={} it={} com={com:.1}mm verts@.25,.5,.75={at:?} cpu {t1:.2} ms med {:.2} mean {:.2} strain99 {:.2}% pen {:.2}mm soft {:.2} scaled {} energy {:.3}",
+        "{scene} {:?} n={} it={} com={com:.1}mm verts@.25,.5,.75={at:?} cpu {t1:.2} ms med {:.2} mean {:.2} strain99 {:.2}% pen {:.2}mm soft {:.2} scaled {} energy {:.3} held off {} skipped {} most crossings {}",
         c.method,
         q.substeps,
         q.iterations,
@@ -96,6 +104,9 @@ fn main() {
         q.penetration * 1e3,
         q.softened,
         q.soft_elements,
-        q.energy_end
+        q.energy_end,
+        q.fold_contacts,
+        q.fold_searches_skipped,
+        positions.iter().skip(5).step_by(5).map(|p| crossings(&s.faces, p)).max().unwrap_or(0)
     );
 }

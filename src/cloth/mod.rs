@@ -1,6 +1,8 @@
 //! One step of garment motion against a moving body: the real-time and the offline solvers.
 
+mod crossings;
 mod error;
+mod folds;
 pub mod membrane;
 pub mod quasi_newton;
 pub mod realtime;
@@ -8,5 +10,6 @@ pub mod scene;
 mod sheet;
 pub mod small_steps;
 
+pub use crossings::crossings;
 pub use error::ClothError;
 pub use sheet::{Element, Hinge, Sheet};

@@ -7,10 +7,14 @@ use crate::math::P3;
 pub struct PointGrid {
     cell: f32,
     first: Vec<u32>,
-    /// Number and place of each point, bucket by bucket.
-    points: Vec<(u32, P3)>,
+    /// Number and coordinates of each point, bucket by bucket, then as many points at infinity as are looked at together.
+    numbers: Vec<u32>,
+    places: [Vec<f32>; 3],
     keys: Vec<u32>,
 }
+
+/// Points that are looked at together.
+const LANES: usize = 8;
 
 /// Buckets of the hash: a power of two, twice the points of a usual garment.
 const BUCKETS: usize = 1 << 13;
@@ -38,21 +42,27 @@ impl PointGrid {
         for i in 0..BUCKETS {
             self.first[i + 1] += self.first[i];
         }
-        self.points.clear();
-        self.points.resize(points.len(), (0, P3::origin()));
+        self.numbers.clear();
+        self.numbers.resize(points.len(), 0);
+        for axis in &mut self.places {
+            axis.clear();
+            axis.resize(points.len() + LANES, f32::INFINITY);
+        }
         let mut next = self.first.clone();
         for (i, k) in self.keys.iter().enumerate() {
-            let slot = &mut next[*k as usize];
-            self.points[*slot as usize] = (i as u32, points[i]);
-            *slot += 1;
+            let slot = next[*k as usize] as usize;
+            next[*k as usize] += 1;
+            self.numbers[slot] = i as u32;
+            (0..3).for_each(|d| self.places[d][slot] = points[i][d]);
         }
     }
     fn at(&self, p: &P3) -> [i32; 3] {
         [p.x, p.y, p.z].map(|c| (c / self.cell).floor() as i32)
     }
-    /// Calls `f` with number and place of every point that may be within half a cell of `p` (and some others, maybe more than once).
-    pub fn around(&self, p: &P3, mut f: impl FnMut(u32, &P3)) {
-        if self.points.is_empty() {
+    /// Calls `f` with number and squared distance (m²) of every point within `reach` of `p`, half a cell at most; maybe
+    /// more than once.
+    pub fn within(&self, p: &P3, reach: f32, mut f: impl FnMut(u32, f32)) {
+        if self.numbers.is_empty() {
             return;
         }
         let c = [p.x, p.y, p.z].map(|v| {
@@ -60,12 +70,36 @@ impl PointGrid {
             let i = t.floor();
             (i as i32, if t - i < 0.5 { -1 } else { 1 })
         });
+        let most = reach * reach;
+        let [x, y, z] = &self.places;
         for k in 0..8usize {
             // Saturating: cloth that has flown away keeps its place in the last cell.
             let cell = [0, 1, 2].map(|d| c[d].0.saturating_add(if k >> d & 1 == 1 { c[d].1 } else { 0 }));
             let b = bucket(cell);
-            for (i, q) in &self.points[self.first[b] as usize..self.first[b + 1] as usize] {
-                f(*i, q);
+            let (mut from, to) = (self.first[b] as usize, self.first[b + 1] as usize);
+            while from < to {
+                let (Some(x), Some(y), Some(z)) = (
+                    x[from..].first_chunk::<LANES>(),
+                    y[from..].first_chunk::<LANES>(),
+                    z[from..].first_chunk::<LANES>(),
+                ) else {
+                    break;
+                };
+                let mut square = [0.0f32; LANES];
+                let mut any = false;
+                for l in 0..LANES {
+                    let d = [x[l] - p.x, y[l] - p.y, z[l] - p.z];
+                    square[l] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                    any |= square[l] <= most;
+                }
+                if any {
+                    for (l, d) in square.iter().enumerate().take(to - from) {
+                        if *d <= most {
+                            f(self.numbers[from + l], *d);
+                        }
+                    }
+                }
+                from += LANES;
             }
         }
     }
@@ -87,15 +121,18 @@ mod tests {
         grid.fill(&points, 0.08);
         for q in points.iter().step_by(97) {
             let mut got = Vec::new();
-            grid.around(q, |i, _| got.push(i));
+            grid.within(q, 0.039, |i, d| got.push((i, d)));
             for (i, p) in points.iter().enumerate() {
-                assert!((p - q).norm() >= 0.04 || got.contains(&(i as u32)), "{i}");
+                let d = (p - q).norm_squared();
+                assert_eq!(d <= 0.039 * 0.039, got.contains(&(i as u32, d)), "{i}");
             }
         }
-        grid.fill(&[P3::new(1e30, f32::NAN, -1e30)], 0.08);
+        // Far away, and not a number: found or not, but nothing breaks.
+        grid.fill(&[P3::new(1e30, 0.0, -1e30), P3::new(1e30, f32::NAN, -1e30)], 0.08);
         let mut got = Vec::new();
-        grid.around(&P3::new(1e30, f32::NAN, -1e30), |i, _| got.push(i));
-        assert!(got.contains(&0), "far away and not a number: {got:?}");
-        PointGrid::default().around(&P3::origin(), |_, _| unreachable!("an empty grid has no points"));
+        grid.within(&P3::new(1e30, 0.0, -1e30), 0.04, |i, _| got.push(i));
+        assert!(got.contains(&0) && !got.contains(&1), "{got:?}");
+        grid.within(&P3::new(1e30, f32::NAN, -1e30), 0.04, |_, _| unreachable!("it is nowhere"));
+        PointGrid::default().within(&P3::origin(), 1.0, |_, _| unreachable!("an empty grid has no points"));
     }
 }

@@ -17,6 +17,8 @@ pub struct SurfaceModel {
     topology: Topology,
     parts: Vec<Part>,
     rim: Vec<bool>,
+    /// Parts that all corners of the faces around each vertex share.
+    shared: Vec<Part>,
 }
 
 /// Where the surface is.
@@ -59,7 +61,10 @@ impl SurfaceModel {
     /// Takes connectivity and the parts of each vertex.
     pub fn new(faces: Vec<Face>, topology: Topology, mut parts: Vec<Part>) -> Self {
         parts.resize(topology.vertex_neighbours().rows(), Part::MAX);
-        Self { faces, rim: topology.boundary_vertices(), topology, parts }
+        let of = |f: &u32| faces[*f as usize].iter().fold(Part::MAX, |all, c| all & parts[*c as usize]);
+        let around = |v: usize| topology.vertex_faces().row(v).iter().map(of).fold(Part::MAX, |a, b| a & b);
+        let shared = (0..parts.len()).map(around).collect();
+        Self { rim: topology.boundary_vertices(), shared, faces, topology, parts }
     }
     /// Number of vertices.
     pub fn vertices(&self) -> usize {
@@ -110,22 +115,26 @@ impl SurfaceModel {
     }
     /// The nearest point on the faces around a vertex.
     pub fn closest_around(&self, frame: &SurfaceFrame, p: &P3, vertex: u32, mask: Part) -> Closest {
-        let mut best: Option<(f32, u32, [f32; 3], P3)> = None;
-        let mut rim = false;
-        for &f in self.topology.vertex_faces().row(vertex as usize) {
-            let corners = self.faces[f as usize];
-            if corners.iter().any(|&c| self.parts[c as usize] & mask == 0) {
-                rim = true;
+        let around = self.topology.vertex_faces().row(vertex as usize);
+        let outside = |f: &u32| self.faces[*f as usize].iter().any(|&c| self.parts[c as usize] & mask == 0);
+        let rim = self.shared[vertex as usize] & mask == 0 && around.iter().any(outside);
+        let mut best: Option<(f32, u32, [f32; 2])> = None;
+        for some in around.chunks(LANES) {
+            let mut fan = Fan::default();
+            for (l, f) in some.iter().enumerate() {
+                let [a, b, c] = self.faces[*f as usize].map(|i| frame.vertices[i as usize]);
+                for d in 0..3 {
+                    (fan.ab[d][l], fan.ac[d][l], fan.ap[d][l]) = (b[d] - a[d], c[d] - a[d], p[d] - a[d]);
+                }
             }
-            let [a, b, c] = corners.map(|i| frame.vertices[i as usize]);
-            let w = closest_on_triangle(p, &a, &b, &c);
-            let q = P3::from(a.coords * w[0] + b.coords * w[1] + c.coords * w[2]);
-            let d = (q - p).norm_squared();
-            if best.is_none_or(|o| d < o.0) {
-                best = Some((d, f, w, q));
+            let (weights, square) = fan.nearest();
+            for (l, f) in some.iter().enumerate() {
+                if best.is_none_or(|o| square[l] < o.0) {
+                    best = Some((square[l], *f, [weights[0][l], weights[1][l]]));
+                }
             }
         }
-        let Some((d, face, weights, point)) = best else {
+        let Some((d, face, [v, w])) = best else {
             let point = frame.vertices[vertex as usize];
             return Closest {
                 vertex,
@@ -137,6 +146,9 @@ impl SurfaceModel {
                 rim: true,
             };
         };
+        let weights = [1.0 - v - w, v, w];
+        let [a, b, c] = self.faces[face as usize].map(|i| frame.vertices[i as usize].coords);
+        let point = P3::from(a * weights[0] + b * v + c * w);
         let n = self.faces[face as usize];
         let smooth = (0..3).fold(V3::zeros(), |s, k| s + frame.normals[n[k] as usize] * weights[k]);
         let mut normal = smooth.try_normalize(0.0).unwrap_or_else(V3::y);
@@ -232,44 +244,46 @@ const RIM: f32 = 1e-4;
 /// Beyond this distance the offset direction is a better normal than the interpolated one, metres.
 const FAR_ENOUGH: f32 = 2e-3;
 
-/// Barycentric weights of the point of a triangle nearest to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
-fn closest_on_triangle(p: &P3, a: &P3, b: &P3, c: &P3) -> [f32; 3] {
-    let (ab, ac, ap) = (b - a, c - a, p - a);
-    let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return [1.0, 0.0, 0.0];
+/// Triangles that are looked at together.
+const LANES: usize = 8;
+
+/// Some triangles a b c and a point p: coordinates of b − a, c − a and p − a.
+#[derive(Default)]
+struct Fan {
+    ab: [[f32; LANES]; 3],
+    ac: [[f32; LANES]; 3],
+    ap: [[f32; LANES]; 3],
+}
+
+impl Fan {
+    /// Weights of b and c at the points nearest to p, and squared distances (Ericson, Real-Time Collision Detection,
+    /// 5.1.5). All regions are computed and one is chosen, so that all triangles take the same way.
+    fn nearest(&self) -> ([[f32; LANES]; 2], [f32; LANES]) {
+        let (mut weights, mut square) = ([[0.0; LANES]; 2], [0.0; LANES]);
+        for l in 0..LANES {
+            let (ab, ac, ap) =
+                (self.ab.each_ref().map(|a| a[l]), self.ac.each_ref().map(|a| a[l]), self.ap.each_ref().map(|a| a[l]));
+            let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+            let (d1, d2, across) = (dot(ab, ap), dot(ac, ap), dot(ab, ac));
+            let (d3, d4, d5, d6) = (d1 - dot(ab, ab), d2 - across, d1 - across, d2 - dot(ac, ac));
+            let (vc, vb, va) = (d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4);
+            let share = |a: f32, of: f32| if of == 0.0 { 0.0 } else { a / of };
+            let sum = va + vb + vc;
+            let mut at = [share(vb, sum), share(vc, sum)];
+            let choose = |yes: bool, a: [f32; 2], b: [f32; 2]| if yes { a } else { b };
+            // The later, the stronger.
+            let t = share(d4 - d3, (d4 - d3) + (d5 - d6));
+            at = choose((va <= 0.0) & (d4 >= d3) & (d5 >= d6), [1.0 - t, t], at);
+            at = choose((vb <= 0.0) & (d2 >= 0.0) & (d6 <= 0.0), [0.0, share(d2, d2 - d6)], at);
+            at = choose((d6 >= 0.0) & (d5 <= d6), [0.0, 1.0], at);
+            at = choose((vc <= 0.0) & (d1 >= 0.0) & (d3 <= 0.0), [share(d1, d1 - d3), 0.0], at);
+            at = choose((d3 >= 0.0) & (d4 <= d3), [1.0, 0.0], at);
+            at = choose((d1 <= 0.0) & (d2 <= 0.0), [0.0, 0.0], at);
+            let r: [f32; 3] = std::array::from_fn(|d| ap[d] - ab[d] * at[0] - ac[d] * at[1]);
+            (weights[0][l], weights[1][l], square[l]) = (at[0], at[1], dot(r, r));
+        }
+        (weights, square)
     }
-    let bp = p - b;
-    let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
-    if d3 >= 0.0 && d4 <= d3 {
-        return [0.0, 1.0, 0.0];
-    }
-    let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        let v = if d1 == d3 { 0.0 } else { d1 / (d1 - d3) };
-        return [1.0 - v, v, 0.0];
-    }
-    let cp = p - c;
-    let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
-    if d6 >= 0.0 && d5 <= d6 {
-        return [0.0, 0.0, 1.0];
-    }
-    let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        let w = if d2 == d6 { 0.0 } else { d2 / (d2 - d6) };
-        return [1.0 - w, 0.0, w];
-    }
-    let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        let s = (d4 - d3) + (d5 - d6);
-        let w = if s == 0.0 { 0.0 } else { (d4 - d3) / s };
-        return [0.0, 1.0 - w, w];
-    }
-    let sum = va + vb + vc;
-    if sum == 0.0 {
-        return [1.0, 0.0, 0.0];
-    }
-    [va / sum, vb / sum, vc / sum]
 }
 
 #[cfg(test)]
@@ -349,5 +363,74 @@ pub(super) mod tests {
         assert_eq!(signed(1.2, 0.0), None, "too far below");
         let rim = Closest { rim: true, ..model.closest_around(&frame, &P3::origin(), 0, 1) };
         assert_eq!(model.under(&frame, &P3::origin(), &rim, 0.1), None);
+    }
+
+    #[test]
+    fn triangles_together_have_the_nearest_points_that_each_has_alone() {
+        let mut seed = 7u32;
+        let mut random = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 8) as f32 / (1u32 << 24) as f32 - 0.5
+        };
+        for round in 0..400 {
+            let mut fan = Fan::default();
+            for axis in 0..3 {
+                fan.ab[axis] = std::array::from_fn(|_| random());
+                // Every fourth time without area, every fourth time a point.
+                let thin = [random(), 0.5, 0.0, random()][round % 4];
+                fan.ac[axis] = fan.ab[axis].map(|a| if round % 4 == 1 || round % 4 == 2 { thin * a } else { random() });
+                fan.ap[axis] = std::array::from_fn(|_| 2.0 * random());
+            }
+            let (weights, square) = fan.nearest();
+            for l in 0..LANES {
+                let of = |a: &[[f32; LANES]; 3]| P3::new(a[0][l], a[1][l], a[2][l]);
+                let (b, c, p) = (of(&fan.ab), of(&fan.ac), of(&fan.ap));
+                let w = closest_on_triangle(&p, &P3::origin(), &b, &c);
+                let alone = (p - (b.coords * w[1] + c.coords * w[2])).coords.norm_squared();
+                let sum = weights[0][l] + weights[1][l];
+                assert!((square[l] - alone).abs() < 1e-4, "{round} {l}: {} {alone}", square[l]);
+                assert!(weights[0][l] >= -1e-3 && weights[1][l] >= -1e-3 && sum <= 1.001, "{round} {l}");
+            }
+        }
+    }
+
+    /// Barycentric weights of the point of a triangle nearest to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
+    fn closest_on_triangle(p: &P3, a: &P3, b: &P3, c: &P3) -> [f32; 3] {
+        let (ab, ac, ap) = (b - a, c - a, p - a);
+        let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
+        if d1 <= 0.0 && d2 <= 0.0 {
+            return [1.0, 0.0, 0.0];
+        }
+        let bp = p - b;
+        let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
+        if d3 >= 0.0 && d4 <= d3 {
+            return [0.0, 1.0, 0.0];
+        }
+        let vc = d1 * d4 - d3 * d2;
+        if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+            let v = if d1 == d3 { 0.0 } else { d1 / (d1 - d3) };
+            return [1.0 - v, v, 0.0];
+        }
+        let cp = p - c;
+        let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
+        if d6 >= 0.0 && d5 <= d6 {
+            return [0.0, 0.0, 1.0];
+        }
+        let vb = d5 * d2 - d1 * d6;
+        if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+            let w = if d2 == d6 { 0.0 } else { d2 / (d2 - d6) };
+            return [1.0 - w, 0.0, w];
+        }
+        let va = d3 * d6 - d5 * d4;
+        if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+            let s = (d4 - d3) + (d5 - d6);
+            let w = if s == 0.0 { 0.0 } else { (d4 - d3) / s };
+            return [0.0, 1.0 - w, w];
+        }
+        let sum = va + vb + vc;
+        if sum == 0.0 {
+            return [1.0, 0.0, 0.0];
+        }
+        [va / sum, vb / sum, vc / sum]
     }
 }

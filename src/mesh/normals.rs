@@ -21,8 +21,11 @@ pub fn vertex_normals(
     vertex_faces: &super::topology::Csr,
     out: &mut Vec<V3>,
 ) {
+    // Each is wanted by three vertices.
+    let mut normals = Vec::new();
+    par::map_into(par, faces.len(), 2048, &mut normals, |f| face_normal(vertices, &faces[f]));
     par::map_into(par, vertices.len(), 1024, out, |i| {
-        let sum = vertex_faces.row(i).iter().fold(V3::zeros(), |s, &f| s + face_normal(vertices, &faces[f as usize]));
+        let sum = vertex_faces.row(i).iter().fold(V3::zeros(), |s, &f| s + normals[f as usize]);
         sum.try_normalize(0.0).unwrap_or_else(V3::zeros)
     });
 }

@@ -1,12 +1,13 @@
 //! What stays the same while an outfit is worn.
 
 use crate::body::{SkinWeights, Template};
+use crate::cloth::folds::FoldModel;
 use crate::cloth::small_steps::{Fabric, Fit, Plan};
 use crate::cloth::{ClothError, Sheet};
 use crate::contact::{MapView, SurfaceModel};
 use crate::garment::{GarmentMesh, Region};
 use crate::math::{P3, V3};
-use crate::mesh::{Csr, Topology};
+use crate::mesh::Topology;
 use serde::{Deserialize, Serialize};
 
 /// A garment vertex tied to a triangle of the body.
@@ -123,11 +124,7 @@ pub(super) struct GarmentModel {
     /// Distance from the skin, metres.
     pub(super) offset: f64,
     /// The garment itself as something to touch.
-    pub(super) surface: SurfaceModel,
-    /// Vertices too near on the sheet to count as another fold.
-    pub(super) close: Csr,
-    /// Length that 95 % of the edges do not exceed, metres.
-    pub(super) edge: f32,
+    pub(super) folds: FoldModel,
     /// Local vertex and number of the binding, for each patch.
     pub(super) anchors: Vec<Vec<(u32, usize)>>,
 }
@@ -241,10 +238,8 @@ impl Model {
             let other = own.iter().map(|o| Region::ALL.0 & !o).collect();
             // Evenly between the skin and where the outermost lies.
             let offset = config.offset * (order + 1) as f64 / outfit.garments.len() as f64;
-            let mut lengths: Vec<f32> = sheet.edges.iter().map(|e| e.1 as f32).collect();
-            lengths.sort_unstable_by(f32::total_cmp);
-            let edge = lengths.get(lengths.len() * 95 / 100).copied().unwrap_or(0.0);
             let surface = SurfaceModel::new(g.faces.clone(), g.topology()?, own.clone());
+            let lengths = sheet.edges.iter().map(|e| e.1 as f32).collect::<Vec<_>>().into_iter();
             garments.push(GarmentModel {
                 sheet,
                 patches,
@@ -255,9 +250,7 @@ impl Model {
                 own,
                 other,
                 offset,
-                close: surface.second_neighbours(),
-                edge,
-                surface,
+                folds: FoldModel::new(surface, lengths),
                 anchors: Vec::new(),
             });
         }

@@ -2,8 +2,9 @@
 
 use super::Model;
 use crate::cloth::ClothError;
+use crate::cloth::folds::FoldFrame;
 use crate::cloth::small_steps::{Motion, Plane, Tie};
-use crate::contact::{Buried, DepthMaps, PointGrid, SurfaceFrame};
+use crate::contact::{Buried, DepthMaps, SurfaceFrame};
 use crate::math::{P3, V3};
 use serde::{Deserialize, Serialize};
 
@@ -86,7 +87,7 @@ impl State {
                 let mut near = Vec::new();
                 if j > k {
                     crate::par::map_into(model.config.par, g.positions.len(), 64, &mut near, |i| {
-                        model.garments[j].surface.nearest_vertex(frame, &g.positions[i], model.garments[k].own[i])
+                        model.garments[j].folds.surface.nearest_vertex(frame, &g.positions[i], model.garments[k].own[i])
                     });
                 }
                 g.layers.push(near);
@@ -172,16 +173,9 @@ pub struct Workspace {
     pub(super) before: SurfaceFrame,
     pub(super) after: SurfaceFrame,
     pub(super) now: SurfaceFrame,
-    pub(super) sheets: Vec<SheetFrame>,
+    /// Garments at the beginning of a round, for contact of cloth with cloth.
+    pub(super) sheets: Vec<FoldFrame>,
     pub(super) maps: DepthMaps,
-}
-
-/// One garment at the beginning of a round, for contact of cloth with cloth.
-#[derive(Debug, Default)]
-pub(super) struct SheetFrame {
-    pub(super) surface: SurfaceFrame,
-    pub(super) velocities: Vec<V3>,
-    pub(super) grid: PointGrid,
 }
 
 /// One patch of one garment during a call.

@@ -125,7 +125,7 @@ impl Touch<'_> {
 
     /// A walk may end on a finger that is not the nearest one, where no map sees the gap. Cloth beside it knows better.
     fn ask_neighbour(&self, garment: usize, v: u32, x: &P3, near: &mut [u32; 2]) {
-        let around = self.model.garments[garment].surface.neighbours(v);
+        let around = self.model.garments[garment].folds.surface.neighbours(v);
         let Some(&w) = around.get(self.turn as usize % around.len().max(1)) else { return };
         for (k, &told) in self.nearest[garment].nearest[w as usize].iter().enumerate() {
             let far = |b: u32| (self.now.vertices[b as usize] - x).norm_squared();

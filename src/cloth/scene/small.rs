@@ -3,10 +3,13 @@
 use super::run::{RunConfig, RunReport, deepest};
 use super::{Scene, SceneError};
 use crate::cloth::ClothError;
+use crate::cloth::folds::{FoldFrame, FoldModel, Search};
 use crate::cloth::small_steps::{Borders, Fabric, Fit, Motion, Plan, Plane, Step, Tie, V4};
-use crate::math::{P3, V3d};
+use crate::contact::SurfaceModel;
+use crate::math::{P3, V3, V3d};
+use crate::mesh::{Topology, TriMesh};
 use crate::par::{self, Par};
-use nalgebra::Point3;
+use nalgebra::{Matrix3, Point3};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -20,6 +23,8 @@ pub(super) fn v3d(v: V4) -> V3d {
 
 /// Sunken cloth comes out at this speed at most, m/s.
 pub(super) const RECOVERY: f32 = 1.0;
+/// The same for cloth in cloth, where a solid may be in the way.
+const CLOTH_RECOVERY: f32 = 0.3;
 /// A sheet that is stable at this step needs no smoothing, s: with less, most of the time goes into waves that nobody
 /// sees. Smoothing a coarse sheet shows (docs/benchmarks.md).
 const LONG_ENOUGH: f64 = 1.0 / 4200.0;
@@ -37,6 +42,8 @@ pub(super) fn run(
     let dt = 1.0 / scene.rate;
     let (smooth, step) = match config.smooth {
         Some(degree) => (degree, Plan::comfortable_step(sheet, config.ahead, degree)),
+        // Smoothed accelerations move what other folds have stopped: drapes that press on themselves exploded.
+        None if config.self_collision => (0, Plan::comfortable_step(sheet, config.ahead, 0)),
         None => Plan::comfortable(sheet, config.ahead, LONG_ENOUGH),
     };
     let substeps = match config.substeps {
@@ -66,9 +73,11 @@ pub(super) fn run(
     let mut scratch: Vec<Scratch> = fabrics.iter().map(|_| Scratch::default()).collect();
     let mut x: Vec<V4> = scene.start.iter().map(|p| V4::new(p.x, p.y, p.z)).collect();
     let mut velocity = vec![V4::default(); n];
+    let mut folds = config.self_collision.then(|| Folds::new(scene, config, bend_every * looks, h)).transpose()?;
     let gravity = v4(&scene.gravity);
     let (hf, ahead) = (h as f32, config.ahead as f32);
     let mut penetration: f64 = 0.0;
+    let mut fold_contacts = 0;
     let pinned: Vec<Vec<(u32, u32)>> = fabrics.iter().map(|f| pins_of(scene, f)).collect();
     for index in 1..scene.frames() {
         if flow.is_break() {
@@ -76,46 +85,64 @@ pub(super) fn run(
         }
         let started = Instant::now();
         let par = if fabrics.len() > 1 { Par::Rayon } else { Par::Seq };
-        par::rounds(par, &mut scratch, substeps, |s, k, w| {
-            let f = &fabrics[k];
-            if s == 0 {
-                let all = || f.vertices.iter().map(|v| *v as usize);
-                w.motion.begin(all().map(|v| x[v]), all().map(|v| velocity[v]));
-            } else {
-                borders.hear(s - 1, f, &mut w.motion);
-            }
-            let since = s % (bend_every * looks);
-            if since == 0 {
-                let t0 = (index - 1) as f64 * dt + s as f64 * h;
-                let span = (bend_every * looks).min(substeps - s) as f64 * h;
-                look(scene, config.offset, &w.motion, t0, span, &mut w.planes, &mut w.clear);
-                w.ties.clear();
-                for &(i, p) in &pinned[k] {
-                    let at = |t: f64| {
-                        scene.pinned_to.map_or(local[p as usize], |c| {
-                            (scene.colliders[c].placement(t) * Point3::from(local[p as usize])).coords
-                        })
-                    };
-                    let speed = (at(t0 + span) - at(t0)) / span;
-                    w.ties.push(Tie { vertex: i, place: v4(&at(t0)), speed: v4(&speed), firmness: 1.0 });
+        let mut s0 = 0;
+        while s0 < substeps {
+            let segment = folds.as_mut().map_or(substeps, |f| f.begin(par, &x, &velocity));
+            let steps = segment.min(substeps - s0);
+            par::rounds(par, &mut scratch, steps, |r, k, w| {
+                let f = &fabrics[k];
+                if r == 0 {
+                    let all = || f.vertices.iter().map(|v| *v as usize);
+                    w.motion.begin(all().map(|v| x[v]), all().map(|v| velocity[v]));
+                    if let Some(folds) = &folds {
+                        folds.find(f, &pinned[k], w);
+                    }
+                } else {
+                    borders.hear(r - 1, f, &mut w.motion);
+                }
+                let since = r % (bend_every * looks);
+                if since == 0 {
+                    let t0 = (index - 1) as f64 * dt + (s0 + r) as f64 * h;
+                    let span = (bend_every * looks).min(steps - r) as f64 * h;
+                    look(scene, config.offset, &w.motion, t0, span, &mut w.planes, &mut w.clear);
+                    w.solid = w.planes.len();
+                    let t = r as f32 * hf;
+                    w.motion.within_reach(&w.folds, t, span as f32, &mut w.planes);
+                    // Times count from the last look, for folds too.
+                    w.planes[w.solid..].iter_mut().for_each(|p| p.level += p.normal.dot(p.speed) * t);
+                    w.ties.clear();
+                    for &(i, p) in &pinned[k] {
+                        let at = |t: f64| {
+                            scene.pinned_to.map_or(local[p as usize], |c| {
+                                (scene.colliders[c].placement(t) * Point3::from(local[p as usize])).coords
+                            })
+                        };
+                        let speed = (at(t0 + span) - at(t0)) / span;
+                        w.ties.push(Tie { vertex: i, place: v4(&at(t0)), speed: v4(&speed), firmness: 1.0 });
+                    }
+                }
+                if r % bend_every == 0 {
+                    w.motion.bend(f, hf * bend_every.min(steps - r) as f32 * 0.5, smooth);
+                }
+                let t = since as f32 * hf;
+                let step = Step { h: hf, t, ahead, gravity, rings: 0 };
+                w.motion.accelerate(f, &step, &w.planes, &w.ties);
+                // In this order: a solid has the last word.
+                let (solid, cloth) = w.planes.split_at(w.solid);
+                w.motion.restrain(cloth, t, hf, CLOTH_RECOVERY);
+                w.motion.restrain(solid, t, hf, RECOVERY);
+                w.motion.tie(&w.ties, t, hf);
+                w.motion.advance(f, &step, f32::INFINITY);
+                borders.tell(r, k, f, &w.motion);
+            });
+            for (w, f) in scratch.iter().zip(&fabrics) {
+                for (i, v) in f.vertices[..f.owned].iter().enumerate() {
+                    x[*v as usize] = w.motion.position(i);
+                    velocity[*v as usize] = w.motion.velocity[i];
                 }
             }
-            if s % bend_every == 0 {
-                w.motion.bend(f, hf * bend_every.min(substeps - s) as f32 * 0.5, smooth);
-            }
-            let t = since as f32 * hf;
-            let step = Step { h: hf, t, ahead, gravity, rings: 0 };
-            w.motion.accelerate(f, &step, &w.planes, &w.ties);
-            w.motion.restrain(&w.planes, t, hf, RECOVERY);
-            w.motion.tie(&w.ties, t, hf);
-            w.motion.advance(f, &step, f32::INFINITY);
-            borders.tell(s, k, f, &w.motion);
-        });
-        for (w, f) in scratch.iter().zip(&fabrics) {
-            for (i, v) in f.vertices[..f.owned].iter().enumerate() {
-                x[*v as usize] = w.motion.position(i);
-                velocity[*v as usize] = w.motion.velocity[i];
-            }
+            s0 += steps;
+            fold_contacts = fold_contacts.max(scratch.iter().map(|w| w.held_off).sum());
         }
         times.push(started.elapsed().as_secs_f64() * 1e3);
         if let Some(index) = x.iter().position(|p| !p.0.iter().all(|c| c.is_finite())) {
@@ -139,6 +166,8 @@ pub(super) fn run(
         penetration,
         softened: plan.softened,
         soft_elements: plan.soft_elements,
+        fold_contacts,
+        fold_searches_skipped: scratch.iter().map(|w| w.spared).sum(),
         ..RunReport::of(scene, times, &end, &v)
     })
 }
@@ -149,6 +178,110 @@ struct Scratch {
     planes: Vec<Plane>,
     clear: Vec<f32>,
     ties: Vec<Tie>,
+    /// How many of the planes, the first ones, are the solids'.
+    solid: usize,
+    /// Planes of other folds since they were looked for.
+    folds: Vec<Plane>,
+    /// How much nearer other folds may come to each vertex before they are looked for, metres.
+    room: Vec<f32>,
+    /// Searches left out for that.
+    spared: usize,
+    neighbour_of: Vec<u32>,
+    /// Owned vertices that another fold is as near as its thickness.
+    held_off: usize,
+}
+
+/// Fills `rest` with the speeds that are left without the rigid motion nearest to all, m/s; returns how fast that turns,
+/// rad/s. What turns as one does not come nearer to itself.
+fn rigid_part(x: &[P3], v: &[V3], rest: &mut Vec<f32>) -> f32 {
+    let n = x.len().max(1) as f32;
+    let centre = x.iter().fold(V3::zeros(), |a, p| a + p.coords) / n;
+    let mean = v.iter().fold(V3::zeros(), |a, v| a + v) / n;
+    let (mut inertia, mut momentum) = (Matrix3::zeros(), V3::zeros());
+    for (x, v) in x.iter().zip(v) {
+        let r = x.coords - centre;
+        inertia += Matrix3::identity() * r.norm_squared() - r * r.transpose();
+        momentum += r.cross(&(v - mean));
+    }
+    let turn = inertia.try_inverse().map_or(V3::zeros(), |i| i * momentum);
+    let turn = if turn.iter().all(|c| c.is_finite()) { turn } else { V3::zeros() };
+    rest.clear();
+    rest.extend(x.iter().zip(v).map(|(x, v)| (v - mean - turn.cross(&(x.coords - centre))).norm()));
+    turn.norm()
+}
+
+/// Contact of the sheet with itself.
+struct Folds {
+    model: FoldModel,
+    frame: FoldFrame,
+    search: Search,
+    thickness: f32,
+    /// Speed of each vertex beside the rigid motion of the whole, and the most of it that a neighbour may have, m/s.
+    speeds: Vec<f32>,
+    fastest: f32,
+    span: f32,
+    /// Steps between two looks at the solids, their length, s, and the most looks from one search to the next.
+    looks: usize,
+    h: f32,
+    most: usize,
+}
+
+impl Folds {
+    /// Searches after a whole number of `looks`, which are so many steps of `h` seconds.
+    fn new(scene: &Scene, config: &RunConfig, looks: usize, h: f64) -> Result<Self, SceneError> {
+        let fault = |why: String| SceneError::Field { scene: "scene".into(), field: "mesh".into(), why };
+        let mesh = TriMesh::new(scene.start.clone(), scene.faces.clone()).map_err(|e| fault(e.to_string()))?;
+        let topology = Topology::new(&mesh).map_err(|e| fault(e.to_string()))?;
+        let surface = SurfaceModel::new(scene.faces.clone(), topology, vec![1; scene.start.len()]);
+        let model = FoldModel::new(surface, scene.sheet.edges.iter().map(|e| e.1 as f32));
+        let most = ((config.fold_search / (looks as f64 * h)) as usize).max(1);
+        let thickness = config.thickness as f32;
+        let search = model.search_all(thickness, 0.0);
+        let (frame, speeds, h) = (FoldFrame::default(), Vec::new(), h as f32);
+        Ok(Self { model, frame, search, thickness, speeds, fastest: 0.0, span: 0.0, looks, h, most })
+    }
+    /// The sheet is here now. Returns after how many steps it must be looked at again: none come together by more than
+    /// their thickness before, if that can be.
+    fn begin(&mut self, par: Par, x: &[V4], velocity: &[V4]) -> usize {
+        let frame = &mut self.frame;
+        frame.surface.vertices.clear();
+        frame.surface.vertices.extend(x.iter().map(|p| P3::new(p.0[0], p.0[1], p.0[2])));
+        frame.velocities.clear();
+        frame.velocities.extend(velocity.iter().map(|v| V3::new(v.0[0], v.0[1], v.0[2])));
+        let turn = rigid_part(&frame.surface.vertices, &frame.velocities, &mut self.speeds);
+        self.fastest = self.speeds.iter().copied().fold(0.0, f32::max);
+        let look = self.looks as f32 * self.h;
+        let looks = ((self.thickness / (2.0 * self.fastest * look)) as usize).clamp(1, self.most);
+        self.span = looks as f32 * look;
+        self.search = self.model.search_all(self.thickness, 2.0 * self.fastest * self.span);
+        self.fastest += turn * self.search.corner;
+        self.model.begin(par, frame, Some(&self.search));
+        looks * self.looks
+    }
+    /// Planes between the vertices of a patch and other folds.
+    fn find(&self, f: &Fabric, pinned: &[(u32, u32)], w: &mut Scratch) {
+        w.folds.clear();
+        w.held_off = 0;
+        w.room.resize(f.vertices.len(), 0.0);
+        w.neighbour_of.resize(self.frame.surface.vertices.len(), u32::MAX);
+        pinned.iter().for_each(|p| w.room[p.0 as usize] = f32::INFINITY);
+        for (i, &v) in f.vertices.iter().enumerate() {
+            let way = (self.speeds[v as usize] + self.fastest) * self.span;
+            if w.room[i] > way {
+                w.room[i] -= way;
+                w.spared += 1;
+                continue;
+            }
+            let x = self.frame.surface.vertices[v as usize];
+            let corner = self.model.corner(&self.frame, v, &x, &self.search, &mut w.neighbour_of);
+            w.room[i] = FoldModel::room(&self.search, corner);
+            let Some((corner, _)) = corner.filter(|_| w.room[i] < 0.0) else { continue };
+            if let Some((plane, far)) = self.model.plane(&self.frame, i, v, &x, corner, &self.search) {
+                w.folds.push(plane);
+                w.held_off += usize::from(i < f.owned && far <= self.search.thickness);
+            }
+        }
+    }
 }
 
 /// Local and sheet numbers of a patch's pinned vertices.
