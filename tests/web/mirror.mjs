@@ -153,6 +153,8 @@ try {
   await page.waitForFunction(() => document.querySelectorAll('#d-fit .fit').length > 0);
   const fits = await page.$$eval('#d-fit tr', (all) => all.map((t) => t.textContent));
   must(fits.length >= 3, `fit by region: ${fits.join(', ')}`);
+  const said = await page.$$eval('[data-fit-of]', (all) => all.map((p) => p.textContent).filter((t) => t !== ''));
+  must(said.length > 0, `fit in words: ${said.join('; ')}`);
   await page.click('#fit-colors');
   await page.waitForSelector('#fit-colors[aria-pressed="true"]');
   await page.waitForTimeout(600);

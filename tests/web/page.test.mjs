@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 
 import { Backoff, FIRST_DELAY, LONGEST_DELAY } from '../../services/compositor/web/js/backoff.js';
-import { fitRows } from '../../services/compositor/web/js/fit.js';
+import { fitRows, fitWords } from '../../services/compositor/web/js/fit.js';
 import { Code, RpcError } from '../../services/compositor/web/js/grpc_web.js';
 import { Reason, State } from '../../services/compositor/web/js/messages.js';
 import { Outfit } from '../../services/compositor/web/js/outfit.js';
@@ -99,6 +99,10 @@ test('fit in words and units', () => {
   const rows = fitRows([{ garment: 'straight_skirt', size: 'M', regions }]);
   assert.deepEqual(rows, [{ head: 'straight skirt M' }, { region: 'chest', fit: 'tight', cells: ['6 %', '1.2 kPa', '0.4 cm'] }]);
   assert.deepEqual(fitRows([]), []);
+  const loose = { region: 'hip', fit: 3, stretch: 0.01, pressure: 20, touching: 0.1, gap: 0.0412 };
+  assert.equal(fitWords({ size: 'S', regions: [...regions, loose] }), 'S: tight at the chest (stretched by 6 %), loose at the hip (4 cm off you)');
+  assert.equal(fitWords({ size: 'M', regions: [{ ...loose, fit: 2 }] }), 'M: fits');
+  assert.equal(fitWords({ size: 'M', regions: [] }), '', 'not measured yet');
 });
 
 test('percentiles, rate, and stages that vanish', () => {

@@ -13,3 +13,13 @@ export function fitRows(fit) {
     })),
   ]);
 }
+
+/** Where a garment is not as drawn and by how much, in one line: `tight at the chest (stretched by 18 %)`. */
+export function fitWords({ size, regions }) {
+  const told = regions.flatMap((r) => {
+    const fit = FIT[r.fit] ?? '';
+    if (fit === 'tight') return [`tight at the ${r.region} (stretched by ${(100 * r.stretch).toFixed(0)} %)`];
+    return fit === 'loose' ? [`loose at the ${r.region} (${(100 * r.gap).toFixed(0)} cm off you)`] : [];
+  });
+  return regions.length === 0 ? '' : `${size}: ${told.length > 0 ? told.join(', ') : 'fits'}`;
+}

@@ -208,6 +208,7 @@ function show({ known, stats, picture, fitting }) {
   const summary = stats.summary(now);
   setText(byId('figures'), summary.rate ? `${Math.round(summary.rate)} fps · ${Math.round(summary.p50)} ms` : '');
   details.update(summary, picture);
+  wardrobe.sayFit(picture?.fit ?? []);
   watchIdle(known, said.tone, now);
 }
 

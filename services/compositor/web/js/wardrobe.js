@@ -1,6 +1,7 @@
 // The wardrobe: a card for each garment, size and colour for each one worn. Reads and changes an Outfit, sends nothing.
 
 import { byId, drawing, el, setData, setText } from './elements.js';
+import { fitWords } from './fit.js';
 import { css } from './outfit.js';
 
 /** Colours offered beside a garment's own, sRGB. */
@@ -69,6 +70,14 @@ export class Wardrobe {
     }
   }
 
+  /** How what is worn fits, under its name; `fit` as pictures carry it. */
+  sayFit(fit) {
+    for (const line of this.options.querySelectorAll('[data-fit-of]')) {
+      const worn = fit.find((f) => f.garment === line.dataset.fitOf);
+      setText(line, worn ? fitWords(worn) : '');
+    }
+  }
+
   #option(info) {
     const choice = this.outfit.worn(info.name);
     const pick = (change) => () => {
@@ -90,6 +99,7 @@ export class Wardrobe {
     const title = info.title || info.name;
     return el('div', { class: 'option' },
       el('h3', {}, title),
+      el('p', { class: 'fine', 'data-fit-of': info.name }),
       el('div', { class: 'chips', role: 'radiogroup', 'aria-label': `${title}: size` }, ...sizes),
       el('div', { class: 'chips', role: 'radiogroup', 'aria-label': `${title}: colour` }, ...colors));
   }
