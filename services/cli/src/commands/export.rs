@@ -10,7 +10,7 @@ use tryon::dressing::{DressOptions, dress};
 use tryon::formats::gltf::{GlbMesh, write_glb, write_glb_motion};
 use tryon::formats::obj::write_obj;
 use tryon::garment::{GarmentMesh, Pattern, Size, Triangulation, library};
-use tryon::math::{P3, World};
+use tryon::math::{P3, V3, World};
 use tryon::mesh::Face;
 use tryon::par::Par;
 use tryon::synth::{Sequence, Setting, Shopper};
@@ -73,7 +73,7 @@ fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
     let drawn = |state: &realtime::State| {
         let mut p = Vec::new();
         garment.render_positions(&state.garments[0].positions, &mut p);
-        p.iter_mut().for_each(|p| *p -= nalgebra::Vector3::new(stands.x, 0.0, stands.z));
+        p.iter_mut().for_each(|p| *p -= V3::new(stands.x, 0.0, stands.z));
         p
     };
     let start = drawn(&state);
