@@ -190,6 +190,40 @@ fn cloth_on_a_body_that_trembles_sleeps_and_wakes() {
     assert_eq!(r.sleeping, 0, "a centimetre wakes it");
 }
 
+/// A standing person sways by a centimetre or so: cloth sleeps on, moves with her, and is where it would be if it had been
+/// computed.
+#[test]
+fn cloth_on_a_body_that_sways_rides_asleep() {
+    let mut d = dressed(&Config::tracked());
+    let body = d.body.clone();
+    let swaying = |i: u32| {
+        let t = i as f32 / 30.0;
+        let by = V3::new(6e-3 * (0.9 * t).sin(), 0.0, 4e-3 * (1.3 * t).cos());
+        // More at the head than at the feet.
+        body.iter().map(|p| p + by * (1.0 + 0.5 * p.y)).collect::<Vec<_>>()
+    };
+    let mut run = |sleep: bool| {
+        d.model.config.sleep = sleep;
+        let (mut state, mut work, mut slept) = (d.state.clone(), Workspace::default(), 0);
+        for i in 0..300 {
+            let r = step(&d.model, &mut state, &Input { body: &swaying(i), dt: DT }, &mut work).expect("a step");
+            slept += usize::from(r.sleeping > 0);
+        }
+        (state, slept)
+    };
+    let ((asleep, slept), (awake, never)) = (run(true), run(false));
+    let off = asleep.garments.iter().zip(&awake.garments).flat_map(|(a, b)| a.positions.iter().zip(&b.positions));
+    let off: Vec<f64> = off.map(|(p, q)| f64::from((p - q).norm_squared())).collect();
+    let rms = (off.iter().sum::<f64>() / off.len() as f64).sqrt() * 1e3;
+    println!("slept {slept} of 300 calls, {rms:.1} mm from cloth that never did");
+    assert!(slept > 200 && never == 0, "{slept}");
+    assert!(rms < 5.0, "{rms} mm");
+    let faces = tryon::body::embedded::template().mesh().faces().to_vec();
+    let deep =
+        |s: &State| s.garments.iter().map(|g| under_the_skin(&g.positions, &swaying(299), &faces)).sum::<usize>();
+    assert!(deep(&asleep) <= deep(&awake) + 2, "{} against {} vertices under the skin", deep(&asleep), deep(&awake));
+}
+
 /// Where a ray meets a triangle, in lengths of its direction (Möller and Trumbore).
 fn crossing(from: &P3, way: &V3, [a, b, c]: &[P3; 3]) -> Option<f32> {
     let (e1, e2) = (b - a, c - a);

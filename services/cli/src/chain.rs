@@ -155,9 +155,9 @@ impl Chain {
         let mut body_camera = Vec::new();
         let mut penetration = 0.0;
         if self.tracked.status == Status::Tracking {
-            let rest = template.personalise(&self.tracked.shape);
-            pose_surface(&template, &rest, &self.tracked.pose, &mut body_camera);
+            body_camera.extend_from_slice(self.tracking_work.posed(&self.tracker, &self.tracked).0);
             if self.worn.is_none() && !self.choices.is_empty() {
+                let rest = template.personalise(&self.tracked.shape);
                 self.worn = Some(self.put_on(&template, &rest)?);
                 lap("dressing", &mut stages);
             }

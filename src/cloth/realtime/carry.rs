@@ -1,7 +1,8 @@
-//! Carrying cloth with a body that has jumped: every joint's rigid motion, blended like skin.
+//! Carrying cloth without computing it: with a body that has jumped by every joint's rigid motion, blended like skin; with
+//! one that sways while cloth sleeps by the way of the skin beneath.
 
 use super::Model;
-use crate::math::{P3, polar_rotation_3};
+use crate::math::{P3, V3, polar_rotation_3};
 use nalgebra::{Isometry3, Matrix3, Matrix3x4, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 /// Rigid motion of each joint's vertices from `from` to `to` (Kabsch), parents standing in where a joint has no skin.
@@ -30,6 +31,26 @@ fn joint_motions(model: &Model, from: &[P3], to: &[P3]) -> Vec<Isometry3<f64>> {
     const ENOUGH: f64 = 12.0;
     let whole = if all.0 >= 1.0 { fit(&all) } else { Isometry3::identity() };
     sums.iter().map(|s| if s.0 >= ENOUGH { fit(s) } else { whole }).collect()
+}
+
+/// Moves sleeping cloth by the way of the skin at `nearest` (one body vertex each), averaged over cloth neighbours. Ways are
+/// sums, so that a body that comes back brings its cloth back, whatever way it took.
+pub(super) fn ride(edges: &[([u32; 2], f64)], nearest: &[[u32; 2]], from: &[P3], to: &[P3], positions: &mut [P3]) {
+    /// Rounds of averaging: cloth between two legs goes with both.
+    const ROUNDS: usize = 6;
+    let mut ways: Vec<V3> = nearest.iter().map(|n| to[n[0] as usize] - from[n[0] as usize]).collect();
+    for _ in 0..ROUNDS {
+        let mut sums: Vec<(V3, f32)> = ways.iter().map(|w| (*w, 1.0)).collect();
+        for ([a, b], _) in edges {
+            let (a, b) = (*a as usize, *b as usize);
+            sums[a].0 += ways[b];
+            sums[b].0 += ways[a];
+            sums[a].1 += 1.0;
+            sums[b].1 += 1.0;
+        }
+        ways.iter_mut().zip(&sums).for_each(|(w, (sum, n))| *w = sum / *n);
+    }
+    positions.iter_mut().zip(&ways).for_each(|(p, w)| *p += w);
 }
 
 /// Moves `positions` as skin bound to the body at `nearest` (one body vertex each) would.
@@ -77,5 +98,35 @@ pub(super) fn carry(
         let m = (0..j).fold(Matrix3x4::zeros(), |s, k| s + motions[k] * weights[i * j + k]);
         let q: Point3<f64> = Point3::from(m * p.cast::<f64>().to_homogeneous());
         *p = q.cast();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+
+    #[test]
+    fn cloth_rides_with_the_skin_beneath_and_comes_back_with_it() {
+        let mut rng = rand_pcg::Pcg32::seed_from_u64(4);
+        let mut some = |by: f32| V3::new(0.0, 0.0, 0.0).map(|_: f32| by * rng.random_range(-1.0f32..1.0));
+        // A strip over the first half of some skin.
+        let skin: Vec<P3> = (0..40).map(|i| P3::new(0.02 * i as f32, 0.0, 0.0)).collect();
+        let cloth: Vec<P3> = skin[..20].iter().map(|p| p + V3::new(0.0, 0.01, 0.0)).collect();
+        let nearest: Vec<[u32; 2]> = (0..20).map(|i| [i, i]).collect();
+        let edges: Vec<([u32; 2], f64)> = (1..20).map(|i| ([i - 1, i], 0.02)).collect();
+        let whole = some(0.01);
+        let mut there = cloth.clone();
+        let moved: Vec<P3> = skin.iter().map(|p| p + whole).collect();
+        ride(&edges, &nearest, &skin, &moved, &mut there);
+        assert!(there.iter().zip(&cloth).all(|(a, b)| (a - b - whole).norm() < 1e-6), "as the skin as one");
+        let (mut at, mut last) = (cloth.clone(), skin.clone());
+        for step in 0..1000 {
+            let next: Vec<P3> = if step == 999 { skin.clone() } else { skin.iter().map(|p| p + some(0.01)).collect() };
+            ride(&edges, &nearest, &last, &next, &mut at);
+            last = next;
+        }
+        let off = at.iter().zip(&cloth).map(|(a, b)| (a - b).norm()).fold(0.0, f32::max);
+        assert!(off < 2e-5, "{off} m off after a thousand ways and back");
     }
 }

@@ -1,6 +1,6 @@
 //! One call of the real-time simulator.
 
-use super::carry::carry;
+use super::carry::{carry, ride};
 use super::cloth_touch::{ClothTouch, sheets};
 use super::model::{Model, RECALLED};
 use super::state::{Input, PatchScratch, State, StepReport, Workspace, check_body};
@@ -29,6 +29,10 @@ const TREMBLING_SPEED: f32 = 0.15;
 /// Skin of a trembling body that no cloth is near may move this many times as far: hands were seen to wander by 9 mm
 /// where skin under cloth stayed within 4.
 const ELSEWHERE: f32 = 4.0;
+/// Sleeping cloth rides on a tracked body that sways, so many times as far as it may to let cloth fall asleep (a standing
+/// person sways by one or two centimetres either way within some seconds), and by so many times from call to call (a person who stands
+/// still is measured anew at every sixth picture only).
+const SWAY: [f32; 2] = [5.0, 2.0];
 /// A body that has moved less than this since the cloth was last computed is still, metres.
 const STILL_BODY: f32 = 1e-3;
 /// Calls with everything still before the cloth falls asleep.
@@ -82,9 +86,15 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
     let moved =
         |from: &[P3]| from.iter().zip(input.body).map(|(a, b)| (a - b).norm_squared()).fold(0.0, f32::max).sqrt();
     state.frames += 1;
-    if config.sleep && state.still >= STILL_FRAMES && is_quiet(config.steady, state, input.body) {
+    if config.sleep && state.still >= STILL_FRAMES && sleeps_on(config.steady, state, input.body) {
         let mut report =
             StepReport { sleeping: state.garments.iter().map(|g| g.positions.len()).sum(), ..StepReport::default() };
+        if state.body != input.body {
+            for (g, m) in state.garments.iter_mut().zip(&model.garments) {
+                ride(&m.sheet.edges, &g.nearest, &state.body, input.body, &mut g.positions);
+            }
+            state.body.copy_from_slice(input.body);
+        }
         report.stages_ms.total = ms(started);
         return report;
     }
@@ -180,11 +190,29 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
 /// The body is where it was when it last stirred: its skin under cloth, and roughly the rest of it, whose hands and feet
 /// a tracker knows less well. Where noise was taken away, what is left of it is no motion either.
 fn is_quiet(steady: f64, state: &State, body: &[P3]) -> bool {
-    let still = STILL_BODY.max(0.5 * steady as f32);
-    let far = if steady > 0.0 { ELSEWHERE * still } else { still };
+    let [worn, elsewhere] = stillness(steady);
     let within = |v: usize, most: f32| (body[v] - state.awake_body[v]).norm_squared() < most * most;
-    let worn = state.garments.iter().flat_map(|g| &g.nearest).flatten();
-    (0..body.len()).all(|v| within(v, far)) && worn.into_iter().all(|v| within(*v as usize, still))
+    (0..body.len()).all(|v| within(v, elsewhere)) && skin_worn(state).all(|v| within(v, worn))
+}
+
+/// Sleeping cloth rides on a tracked body that sways, until that has gone too far from where it fell asleep, or too fast.
+fn sleeps_on(steady: f64, state: &State, body: &[P3]) -> bool {
+    let [worn, elsewhere] = stillness(steady);
+    let [sway, hop] = if steady > 0.0 { SWAY } else { [1.0; 2] };
+    let within = |from: &[P3], v: usize, most: f32| (body[v] - from[v]).norm_squared() < most * most;
+    (0..body.len()).all(|v| within(&state.awake_body, v, sway * elsewhere))
+        && skin_worn(state).all(|v| within(&state.awake_body, v, sway * worn) && within(&state.body, v, hop * worn))
+}
+
+/// How far skin under cloth, and any other, may be from where it last stirred, metres.
+fn stillness(steady: f64) -> [f32; 2] {
+    let still = STILL_BODY.max(0.5 * steady as f32);
+    [still, if steady > 0.0 { ELSEWHERE * still } else { still }]
+}
+
+/// Skin that cloth lies on.
+fn skin_worn(state: &State) -> impl Iterator<Item = usize> + '_ {
+    state.garments.iter().flat_map(|g| &g.nearest).flatten().map(|v| *v as usize)
 }
 
 fn steps(h: f64, span: f64) -> usize {
