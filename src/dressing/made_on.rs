@@ -226,6 +226,9 @@ const ASIDE: f32 = 0.4;
 const SAMPLES: usize = 500;
 /// Skin further away than this says no more, metres.
 const FAR: f32 = 0.08;
+/// A garment whose vertices are this share of [`FAR`] from the nearest body on average is not worn by it: one that hangs in
+/// the air has all of it.
+const NOT_WORN: f32 = 0.9;
 /// A vertex inside the body counts as much as one this many times as far outside.
 const INSIDE: f32 = 4.0;
 /// Cloth lies about this far above skin, metres.
@@ -316,7 +319,7 @@ fn fit_under(template: &Arc<Template>, garment: &[P3], free: bool) -> Result<(Ar
     if !free {
         return Ok((template.clone(), frame));
     }
-    if best.0 > 0.9 * FAR {
+    if best.0 > NOT_WORN * FAR {
         let why = "no body fits into it: is it worn, upright, y up, and facing +z?";
         return Err(WearError::NotFound(why.into()));
     }

@@ -45,8 +45,8 @@ const SLOW: f64 = 0.02;
 /// Motion below this from frame to frame, metres, is not extrapolated: what is left then is the jitter of the fit, which
 /// prediction would keep alive.
 const STILL: f64 = 3e-3;
-/// So many frames in a row nothing has moved by more than [`RESTLESS`], metres, before pictures are compared: a fit still creeps to its
-/// place for a dozen frames (an arm that points at the camera by 0.3 mm a frame), and would do so in jerks.
+/// So many frames in a row nothing has moved by more than [`RESTLESS`], metres, before pictures are compared: a fit still
+/// creeps to its place for a dozen frames (an arm that points at the camera by 0.3 mm a frame), and would do so in jerks.
 const SETTLED_STILL: u32 = 15;
 /// See [`SETTLED_STILL`].
 const RESTLESS: f64 = 2.0 * STILL;

@@ -1,6 +1,6 @@
 //! Pictures that show nothing new: what came of the last one that was gone through holds for them too.
 
-use super::StepReport;
+use super::{StagesMs, StepReport};
 use crate::camera::DepthImage;
 use crate::spatial::OrganisedCloud;
 use serde::{Deserialize, Serialize};
@@ -66,7 +66,9 @@ impl Reference {
         for &block in &blocks {
             samples(image, step, columns, block, |d| readings.push(d));
         }
-        Self { step, columns, blocks, readings, kept: 0, report: report.clone() }
+        // Times are of that frame alone, and no part of a state.
+        let report = StepReport { stages_ms: StagesMs::default(), ..report.clone() };
+        Self { step, columns, blocks, readings, kept: 0, report }
     }
 
     /// The report of the frame this was made of, when `image` shows the same but for noise. Counts what it keeps.
@@ -131,7 +133,7 @@ fn samples(image: &DepthImage, step: u32, columns: u32, block: u32, mut f: impl 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracking::{Skipped, StagesMs, Status};
+    use crate::tracking::{Skipped, Status};
     use rand::{Rng, SeedableRng};
 
     const WIDTH: u32 = 160;

@@ -33,11 +33,12 @@ fn joint_motions(model: &Model, from: &[P3], to: &[P3]) -> Vec<Isometry3<f64>> {
     sums.iter().map(|s| if s.0 >= ENOUGH { fit(s) } else { whole }).collect()
 }
 
+/// Rounds of averaging over cloth neighbours, so that cloth between two legs goes with both: a hand's width on the cloth.
+const ROUNDS: usize = 6;
+
 /// Moves sleeping cloth by the way of the skin at `nearest` (one body vertex each), averaged over cloth neighbours. Ways are
 /// sums, so that a body that comes back brings its cloth back, whatever way it took.
 pub(super) fn ride(edges: &[([u32; 2], f64)], nearest: &[[u32; 2]], from: &[P3], to: &[P3], positions: &mut [P3]) {
-    /// Rounds of averaging: cloth between two legs goes with both.
-    const ROUNDS: usize = 6;
     let mut ways: Vec<V3> = nearest.iter().map(|n| to[n[0] as usize] - from[n[0] as usize]).collect();
     for _ in 0..ROUNDS {
         let mut sums: Vec<(V3, f32)> = ways.iter().map(|w| (*w, 1.0)).collect();
@@ -63,8 +64,6 @@ pub(super) fn carry(
     to: &[P3],
     positions: &mut [P3],
 ) {
-    /// Rounds of averaging weights: a hand's width on the cloth.
-    const ROUNDS: usize = 6;
     let motions: Vec<Matrix3x4<f64>> = joint_motions(model, from, to)
         .iter()
         .map(|m| m.to_homogeneous().fixed_view::<3, 4>(0, 0).into_owned())

@@ -30,8 +30,8 @@ const TREMBLING_SPEED: f32 = 0.15;
 /// where skin under cloth stayed within 4.
 const ELSEWHERE: f32 = 4.0;
 /// Sleeping cloth rides on a tracked body that sways, so many times as far as it may to let cloth fall asleep (a standing
-/// person sways by one or two centimetres either way within some seconds), and by so many times from call to call (a person who stands
-/// still is measured anew at every sixth picture only).
+/// person sways by one or two centimetres either way within some seconds), and by so many times from call to call (a
+/// person who stands still is measured anew at every sixth picture only).
 const SWAY: [f32; 2] = [5.0, 2.0];
 /// A body that has moved less than this since the cloth was last computed is still, metres.
 const STILL_BODY: f32 = 1e-3;
