@@ -69,6 +69,12 @@ pub struct Config {
     /// An outer garment is drawn this much nearer than the one inside it, metres: layers that the simulation holds
     /// less than a millimetre apart would show through each other.
     pub layer_offset: f32,
+    /// Leave out faces behind other garments or behind the garment's own front while drawing. The picture is the same,
+    /// bit for bit; the graphics card tests depth by itself and pays no heed.
+    pub skip_hidden: bool,
+    /// Compute normals and the light in folds only where a face is seen. The picture is the same, bit for bit; the
+    /// graphics card takes all, since it learns what is seen while it shades.
+    pub skip_unseen: bool,
 }
 
 impl Default for Config {
@@ -80,6 +86,8 @@ impl Default for Config {
             lights: Lights::default(),
             framing: Framing::Cover,
             layer_offset: 15e-3,
+            skip_hidden: true,
+            skip_unseen: true,
         }
     }
 }
@@ -110,6 +118,12 @@ pub struct RenderReport {
     pub tiles_drawn: usize,
     /// Tiles that are the captured picture, untouched.
     pub tiles_skipped: usize,
+    /// Faces that were not drawn because all of them lies behind garments drawn before.
+    pub faces_hidden: usize,
+    /// Garments of which nothing is seen behind others or outside the picture.
+    pub garments_hidden: usize,
+    /// Garment vertices without a seen face, for which no normal was computed.
+    pub normals_skipped: usize,
     /// Specks of noise that were taken for occluders and dropped, pixels.
     pub specks_dropped: usize,
     /// Bare hands and forearms that colour found in front.

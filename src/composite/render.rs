@@ -63,9 +63,13 @@ pub fn render(
     let mut scene = Scene::begin(model, input, work)?;
     let Some(area) = scene.area else { return Ok(scene.end(work)) };
     let samples = config.samples.clamp(1, 4);
-    work.surface.rasterise(config, &scene.stage, &area, samples);
+    scene.report.faces_hidden = work.surface.rasterise(config, &scene.stage, &area, samples);
+    work.surface.seen.reset(work.surface.faces.len(), !config.skip_unseen);
     resolve(config.par, &work.surface, &area, samples, &mut work.pixels);
+    scene.report.garments_hidden = work.surface.garments_hidden();
     scene.lap("garments");
+    scene.report.normals_skipped = work.surface.light();
+    scene.lap("normals");
 
     let look_up = scene.judge(model, state, input, work, &area);
     let shader =
@@ -179,13 +183,15 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Sums up the samples of each pixel.
+/// Sums up the samples of each pixel, and marks the faces they see.
 fn resolve(par: Par, surface: &Surface, area: &Area, n: u32, out: &mut Vec<Pixel>) {
     let width = area.width as usize;
     let stride = width * n as usize;
     let samples = &surface.samples;
     out.resize(area.len(), Pixel::default());
     par::for_chunks(par, out, width * ROWS, |start, chunk| {
+        // Neighbours mostly see the same face.
+        let mut last = VisibilityBuffer::NONE;
         for (k, row) in chunk.chunks_mut(width).enumerate() {
             let y = start / width + k;
             for (x, pixel) in row.iter_mut().enumerate() {
@@ -195,6 +201,10 @@ fn resolve(par: Par, surface: &Surface, area: &Area, n: u32, out: &mut Vec<Pixel
                 if (0..n as usize).all(|sy| samples.face[first + sy * stride..][..n as usize].iter().all(|f| *f == id))
                 {
                     if id != VisibilityBuffer::NONE {
+                        if id != last {
+                            surface.seen.set(id);
+                            last = id;
+                        }
                         (p.face, p.covered) = (id, (n * n) as u8);
                         for sy in 0..n as usize {
                             for d in &samples.depth[first + sy * stride..][..n as usize] {
@@ -210,6 +220,7 @@ fn resolve(par: Par, surface: &Surface, area: &Area, n: u32, out: &mut Vec<Pixel
                     let at = (y * n as usize + sy) * stride + x * n as usize;
                     for (d, f) in samples.depth[at..at + n as usize].iter().zip(&samples.face[at..]) {
                         if *f != VisibilityBuffer::NONE {
+                            surface.seen.set(*f);
                             p.covered += 1;
                             far = far.max(*d);
                             if *d < p.depth {
@@ -472,6 +483,38 @@ mod tests {
         for threads in [1, 3] {
             let got = par::with_threads(threads, || with(Par::Rayon, &mut used)).expect("pool");
             assert!(got == alone, "{threads} threads");
+        }
+    }
+
+    #[test]
+    fn what_is_not_seen_costs_nothing_and_changes_no_byte() {
+        let s = Scenery::new(320, 240, 6);
+        // The shirt twice, and one inside the body's outline that no sample sees.
+        let mut under = s.garment();
+        let small: Vec<_> = under.vertices.iter().map(|p| crate::math::P3::new(0.5 * p.x, 0.5 * p.y, p.z)).collect();
+        under.vertices = &small;
+        let garments = [under, s.garment(), s.garment()];
+        let vertices: usize = garments.iter().map(|g| g.vertices.len()).sum();
+        let faces: usize = garments.iter().map(|g| g.faces.len()).sum();
+        for par in [Par::Seq, Par::Rayon] {
+            for samples in [1, 2, 3] {
+                let with = |skip_hidden, skip_unseen| {
+                    let config = Config { skip_hidden, skip_unseen, par, samples, ..Config::default() };
+                    let work = &mut Workspace::default();
+                    render(&Model::new(config), &mut State::default(), &s.input(&garments, None), work).expect("drawn")
+                };
+                let (all, plain) = with(false, false);
+                assert_eq!([plain.faces_hidden, plain.normals_skipped, plain.garments_hidden], [0; 3]);
+                for switches in [[true, false], [false, true], [true, true]] {
+                    let (image, report) = with(switches[0], switches[1]);
+                    assert!(image == all, "{switches:?}");
+                    // Five of six walls lie behind the nearest; faces between samples and at outlines do not count.
+                    assert_eq!(report.faces_hidden > faces * 2 / 5, switches[0], "{report:?} of {faces}");
+                    assert_eq!(report.normals_skipped > vertices * 3 / 5, switches[1], "{report:?} of {vertices}");
+                    assert_eq!(report.garments_hidden, 2 * usize::from(switches[1]));
+                    assert_eq!(report.pixels_drawn, plain.pixels_drawn);
+                }
+            }
         }
     }
 

@@ -213,6 +213,8 @@ impl Renderer {
         state.keep_if(input.body.is_some());
         let mut scene = Scene::begin(model, input, work)?;
         let Some(area) = scene.area else { return Ok(scene.end(work)) };
+        work.surface.seen.reset(work.surface.faces.len(), true);
+        work.surface.light();
         let samples = model.config.samples.clamp(1, 4);
         if !self.targets.as_ref().is_some_and(|t| t.fits(area.width, area.height, samples)) {
             self.targets = Some(Targets::new(&self.device, area.width, area.height, samples));

@@ -1,11 +1,13 @@
 //! The fast rasteriser: corners snapped once, bands of rows in parallel.
 
+use super::hidden::{Coarse, draw_layers};
 use super::kernel::Band;
 use super::screen::{Corner, Projector, SUB_BITS};
 use super::{View, VisibilityBuffer, clip};
 use crate::math::P3;
 use crate::mesh::Face;
 use crate::par::{self, Par};
+use std::ops::Range;
 
 /// Which side of faces to leave out. Faces are counter-clockwise seen from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -44,6 +46,8 @@ pub(super) struct Scratch {
     corners: Vec<Corner>,
     /// First and last band of every face.
     ranges: Vec<[u8; 2]>,
+    /// What each band knows of its depth from afar.
+    coarse: Vec<Coarse>,
 }
 
 /// Draws all faces, both sides, on the calling thread: the pixels of [`super::rasterise_reference`], faster.
@@ -54,6 +58,32 @@ pub fn rasterise(view: &View, vertices: &[P3], faces: &[Face], out: &mut Visibil
 
 /// [`rasterise`] with threads and culling. The bits do not depend on the thread count.
 pub fn rasterise_with(options: Options, view: &View, vertices: &[P3], faces: &[Face], out: &mut VisibilityBuffer) {
+    draw(options, view, vertices, faces, &[], out);
+}
+
+/// The picture of [`rasterise_with`] without culling, bit for bit, in less time: what lies behind something drawn
+/// before costs a look at a coarse depth image. `layers` are the faces of each garment (ascending, without gaps,
+/// innermost first): outer ones are drawn first, and sides turned away last. Returns how many faces were left out as
+/// hidden; one that spans several bands of rows counts where it begins.
+pub fn rasterise_layers(
+    par: Par,
+    view: &View,
+    vertices: &[P3],
+    faces: &[Face],
+    layers: &[Range<usize>],
+    out: &mut VisibilityBuffer,
+) -> usize {
+    draw(Options { par, cull: Cull::None }, view, vertices, faces, layers, out)
+}
+
+fn draw(
+    options: Options,
+    view: &View,
+    vertices: &[P3],
+    faces: &[Face],
+    layers: &[Range<usize>],
+    out: &mut VisibilityBuffer,
+) -> usize {
     out.reset(view);
     let projector = Projector::new(view);
     let mut corners = std::mem::take(&mut out.scratch.corners);
@@ -75,27 +105,34 @@ pub fn rasterise_with(options: Options, view: &View, vertices: &[P3], faces: &[F
             }
         });
     }
-    let job = Job { projector, cull: options.cull, vertices, corners: &corners, faces, ranges: &ranges };
+    let job = Job { projector, cull: options.cull, vertices, corners: &corners, faces, layers, ranges: &ranges };
+    let mut coarse = std::mem::take(&mut out.scratch.coarse);
+    coarse.resize_with(BANDS, Coarse::default);
+    let mut afar = coarse.iter_mut();
     let mut depth = out.depth.chunks_mut(rows * width.max(1));
     let mut face = out.face.chunks_mut(rows * width.max(1));
-    let mut parts: [Band<'_>; BANDS] = std::array::from_fn(|k| {
+    let mut parts: [Option<Band<'_>>; BANDS] = std::array::from_fn(|k| {
         let (depth, face) = (depth.next().unwrap_or_default(), face.next().unwrap_or_default());
-        Band {
+        let coarse = afar.next()?;
+        coarse.hidden = 0;
+        Some(Band {
             width: width as i32,
             top: (k * rows) as i32,
             rows: (depth.len() / width.max(1)) as i32,
             height: height as i32,
             depth,
             face,
-        }
+            coarse,
+        })
     });
     par::for_chunks(options.par, &mut parts[..bands], 1, |number, parts| {
-        for band in parts.iter_mut().filter(|b| b.rows > 0) {
+        for band in parts.iter_mut().flatten().filter(|b| b.rows > 0) {
             draw_band(&job, number as u8, band);
         }
     });
-    out.scratch.ranges = ranges;
-    out.scratch.corners = corners;
+    let hidden = coarse.iter().map(|c| c.hidden).sum();
+    (out.scratch.ranges, out.scratch.corners, out.scratch.coarse) = (ranges, corners, coarse);
+    hidden
 }
 
 #[inline(always)]
@@ -106,14 +143,50 @@ fn project_generic(projector: &Projector, vertices: &[P3], corners: &mut [Corner
 }
 
 /// What all bands read.
-struct Job<'a> {
+pub(super) struct Job<'a> {
     projector: Projector,
     cull: Cull,
     vertices: &'a [P3],
     corners: &'a [Corner],
-    faces: &'a [Face],
+    pub(super) faces: &'a [Face],
+    /// Faces of each garment, innermost first; empty for no order at all.
+    pub(super) layers: &'a [Range<usize>],
     /// Empty when there is one band.
     ranges: &'a [[u8; 2]],
+}
+
+impl Job<'_> {
+    /// The corners of a face that may touch a band; `None` when it does not, or is no face.
+    #[inline(always)]
+    pub(super) fn corners(&self, id: usize, number: u8) -> Option<[Corner; 3]> {
+        if self.ranges.get(id).is_some_and(|r| number < r[0] || r[1] < number) {
+            return None;
+        }
+        let [Some(a), Some(b), Some(c)] = self.faces[id].map(|i| self.corners.get(i as usize)) else { return None };
+        Some([*a, *b, *c])
+    }
+    /// Whether a face begins in this band.
+    #[inline(always)]
+    pub(super) fn begins(&self, id: usize, number: u8) -> bool {
+        self.ranges.get(id).is_none_or(|r| r[0] == number)
+    }
+    /// Draws a face.
+    #[inline(always)]
+    pub(super) fn draw<const PERSPECTIVE: bool, const TIES: bool>(
+        &self,
+        id: usize,
+        corners: [Corner; 3],
+        band: &mut Band<'_>,
+    ) {
+        if corners.iter().any(Corner::is_outside) {
+            let points = self.faces[id].map(|i| self.vertices[i as usize]);
+            clip::clip(&self.projector, points, |piece| {
+                band.draw::<PERSPECTIVE, TIES>(piece, id as u32, self.cull);
+            });
+        } else {
+            band.draw::<PERSPECTIVE, TIES>(corners, id as u32, self.cull);
+        }
+    }
 }
 
 /// First and last band a face may touch.
@@ -134,36 +207,20 @@ fn band_range(corners: &[Corner], f: &Face, cull: Cull, rows: i32) -> [u8; 2] {
 
 #[inline(always)]
 fn draw_generic(job: &Job<'_>, number: u8, band: &mut Band<'_>) {
-    if job.projector.perspective {
-        draw_faces::<true>(job, number, band);
-    } else {
-        draw_faces::<false>(job, number, band);
+    match (job.projector.perspective, job.layers.is_empty()) {
+        (true, true) => draw_faces::<true>(job, number, band),
+        (false, true) => draw_faces::<false>(job, number, band),
+        (true, false) => draw_layers::<true>(job, number, band),
+        (false, false) => draw_layers::<false>(job, number, band),
     }
 }
 
 #[inline(always)]
 fn draw_faces<const PERSPECTIVE: bool>(job: &Job<'_>, number: u8, band: &mut Band<'_>) {
-    if job.ranges.is_empty() {
-        for (id, f) in job.faces.iter().enumerate() {
-            draw_face::<PERSPECTIVE>(job, id, f, band);
+    for id in 0..job.faces.len() {
+        if let Some(corners) = job.corners(id, number) {
+            job.draw::<PERSPECTIVE, false>(id, corners, band);
         }
-    } else {
-        for (id, (f, range)) in job.faces.iter().zip(job.ranges).enumerate() {
-            if range[0] <= number && number <= range[1] {
-                draw_face::<PERSPECTIVE>(job, id, f, band);
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn draw_face<const PERSPECTIVE: bool>(job: &Job<'_>, id: usize, f: &Face, band: &mut Band<'_>) {
-    let [Some(a), Some(b), Some(c)] = f.map(|i| job.corners.get(i as usize)) else { return };
-    if a.is_outside() | b.is_outside() | c.is_outside() {
-        let points = f.map(|i| job.vertices[i as usize]);
-        clip::clip(&job.projector, points, |piece| band.draw::<PERSPECTIVE>(piece, id as u32, job.cull));
-    } else {
-        band.draw::<PERSPECTIVE>([*a, *b, *c], id as u32, job.cull);
     }
 }
 

@@ -4,6 +4,7 @@
 //! span of each row in i64. Both decide the same pixels, since both are exact.
 
 use super::fast::Cull;
+use super::hidden::Coarse;
 use super::screen::{Corner, ONE, SUB_BITS};
 
 /// Triangles whose box has no side above this (sub-pixels, 64 px) keep their edge functions inside i32.
@@ -18,6 +19,23 @@ pub(super) struct Band<'a> {
     pub(super) height: i32,
     pub(super) depth: &'a mut [f32],
     pub(super) face: &'a mut [u32],
+    pub(super) coarse: &'a mut Coarse,
+}
+
+/// Columns and rows of the pixels whose centres may lie in a triangle.
+#[derive(Clone, Copy)]
+pub(super) struct Span {
+    pub(super) columns: [i32; 2],
+    pub(super) rows: [i32; 2],
+    /// First row were there no bands.
+    top: i32,
+}
+
+/// Whether a sample at depth `z` of face `id` wins against what is there. Of equal depths the first face drawn wins,
+/// or with `TIES` the one of the lowest number, whatever the order.
+#[inline(always)]
+fn wins<const TIES: bool>(z: f32, id: u32, depth: f32, face: u32) -> bool {
+    if TIES { (z < depth) | ((z == depth) & (id < face)) } else { z < depth }
 }
 
 /// The plane of the affine quantity q over the picture, anchored at pixel (x0, y0).
@@ -38,26 +56,34 @@ impl Plane {
 }
 
 impl Band<'_> {
-    /// Draws the part of a triangle that lies in the band.
+    /// Pixels of the band that a triangle may touch.
     #[inline(always)]
-    pub(super) fn draw<const PERSPECTIVE: bool>(&mut self, corners: [Corner; 3], id: u32, cull: Cull) {
-        let [a, mut b, mut c] = corners;
+    pub(super) fn span(&self, [a, b, c]: &[Corner; 3]) -> Option<Span> {
         let min_y = a.y.min(b.y).min(c.y);
         let max_y = a.y.max(b.y).max(c.y);
         // First pixel centre at or after the minimum, last one at or before the maximum.
         let y0 = ((min_y + (ONE - 1)) >> SUB_BITS).max(0);
         let y1 = (max_y >> SUB_BITS).min(self.height - 1);
         let (first, last) = (y0.max(self.top), y1.min(self.top + self.rows - 1));
-        if first > last {
-            return;
-        }
         let min_x = a.x.min(b.x).min(c.x);
         let max_x = a.x.max(b.x).max(c.x);
         let x0 = ((min_x + (ONE - 1)) >> SUB_BITS).max(0);
         let x1 = (max_x >> SUB_BITS).min(self.width - 1);
-        if x0 > x1 {
-            return;
-        }
+        (first <= last && x0 <= x1).then_some(Span { columns: [x0, x1], rows: [first, last], top: y0 })
+    }
+
+    /// Draws the part of a triangle that lies in the band.
+    #[inline(always)]
+    pub(super) fn draw<const PERSPECTIVE: bool, const TIES: bool>(
+        &mut self,
+        corners: [Corner; 3],
+        id: u32,
+        cull: Cull,
+    ) {
+        let Some(Span { columns: [x0, x1], rows: [first, last], top: y0 }) = self.span(&corners) else { return };
+        let [a, mut b, mut c] = corners;
+        let [min_x, max_x] = [a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x)];
+        let [min_y, max_y] = [a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y)];
         let small = max_x - min_x < SMALL && max_y - min_y < SMALL;
         let area = if small {
             i64::from((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x))
@@ -85,14 +111,14 @@ impl Band<'_> {
             f64::from(a.q) + (gx * f64::from((x0 << SUB_BITS) - a.x) + gy * f64::from((y0 << SUB_BITS) - a.y)) * unit;
         let plane = Plane { x0, y0, q0, gx, gy, lo: a.q.min(b.q).min(c.q), hi: a.q.max(b.q).max(c.q) };
         if small {
-            self.boxed::<PERSPECTIVE>([a, b, c], id, &plane, [first, last], x1);
+            self.boxed::<PERSPECTIVE, TIES>([a, b, c], id, &plane, [first, last], x1);
         } else {
-            self.spans::<PERSPECTIVE>([a, b, c], id, &plane, [first, last], x1);
+            self.spans::<PERSPECTIVE, TIES>([a, b, c], id, &plane, [first, last], x1);
         }
     }
 
     #[inline(always)]
-    fn boxed<const PERSPECTIVE: bool>(
+    fn boxed<const PERSPECTIVE: bool, const TIES: bool>(
         &mut self,
         [a, b, c]: [Corner; 3],
         id: u32,
@@ -117,7 +143,7 @@ impl Band<'_> {
                 let inside = (w[0] | w[1] | w[2]) >= 0;
                 let q = (base + gx * i as f32).max(plane.lo).min(plane.hi);
                 let z = if PERSPECTIVE { 1.0 / q } else { q };
-                let win = inside & (z < *d);
+                let win = inside & wins::<TIES>(z, id, *d, *f);
                 *d = if win { z } else { *d };
                 *f = if win { id } else { *f };
                 for k in 0..3 {
@@ -131,7 +157,7 @@ impl Band<'_> {
     }
 
     #[inline(never)]
-    fn spans<const PERSPECTIVE: bool>(
+    fn spans<const PERSPECTIVE: bool, const TIES: bool>(
         &mut self,
         [a, b, c]: [Corner; 3],
         id: u32,
@@ -164,7 +190,7 @@ impl Band<'_> {
             for (i, (d, f)) in self.depth[from..to].iter_mut().zip(&mut self.face[from..to]).enumerate() {
                 let q = (base + gx * (skip + i) as f32).max(plane.lo).min(plane.hi);
                 let z = if PERSPECTIVE { 1.0 / q } else { q };
-                let win = z < *d;
+                let win = wins::<TIES>(z, id, *d, *f);
                 *d = if win { z } else { *d };
                 *f = if win { id } else { *f };
             }

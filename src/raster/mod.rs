@@ -5,13 +5,14 @@
 
 mod clip;
 mod fast;
+mod hidden;
 mod interpolate;
 mod kernel;
 mod reference;
 mod screen;
 mod view;
 
-pub use fast::{Cull, Options, rasterise, rasterise_with};
+pub use fast::{Cull, Options, rasterise, rasterise_layers, rasterise_with};
 pub use interpolate::{barycentrics, id_image, interpolate};
 pub use reference::rasterise_reference;
 pub use view::{View, VisibilityBuffer};

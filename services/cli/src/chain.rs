@@ -274,6 +274,9 @@ impl Chain {
         let (picture, report) =
             composite::render(&self.compositor, &mut self.composite_state, &input, &mut self.composite_work)?;
         skipped.push(("picture tiles without garment", report.tiles_skipped as f64));
+        skipped.push(("garment faces hidden by others", report.faces_hidden as f64));
+        skipped.push(("garments hidden by others", report.garments_hidden as f64));
+        skipped.push(("normals of unseen garment vertices", report.normals_skipped as f64));
         skipped.push(("hands away from garments", report.hands.skipped as f64));
         Ok(picture)
     }

@@ -135,7 +135,13 @@ impl Engine {
                 self.card.draw(&self.model, &mut self.state, &input, &mut self.work).map_err(|e| e.to_string())?;
             record_skipped(
                 "compositor",
-                [("tiles", report.tiles_skipped), ("hands away from garments", report.hands.skipped)],
+                [
+                    ("tiles", report.tiles_skipped),
+                    ("hidden faces", report.faces_hidden),
+                    ("hidden garments", report.garments_hidden),
+                    ("normals", report.normals_skipped),
+                    ("hands away from garments", report.hands.skipped),
+                ],
             );
             drawn.push((size, image));
         }
