@@ -152,8 +152,14 @@ impl MeshWear {
         }
         Ok(Self { name: file.name, notes, made_on: Arc::new(made_on), parts })
     }
+    /// The same under another name, which its garments carry too.
+    #[must_use]
+    pub fn named(mut self, name: &str) -> Self {
+        self.parts.iter_mut().for_each(|p| p.garment.name = name.to_owned());
+        Self { name: name.to_owned(), ..self }
+    }
     /// Its place among other garments: that of what its outermost part is.
-    pub(super) fn layer(&self) -> u8 {
+    pub fn layer(&self) -> u8 {
         let over = |p: &Part| matches!(p.garment.kind, GarmentKind::Top | GarmentKind::Dress);
         u8::from(self.parts.iter().any(over))
     }

@@ -24,6 +24,8 @@ pub struct Room {
     pub body: f64,
     /// Girth of the finished garment, metres.
     pub garment: f64,
+    /// Least ease it is made to have, metres.
+    pub needed: f64,
     /// How that feels.
     pub fit: Fit,
 }
@@ -46,6 +48,8 @@ pub struct Suggestion {
     pub rooms: Vec<Room>,
     /// Where the hem will be, metres above the floor.
     pub hem: f64,
+    /// The same above a mark of the body that tells more, metres (negative below it), and the mark.
+    pub length: (f64, &'static str),
     /// One sentence for the shopper.
     pub reason: String,
 }
@@ -76,6 +80,7 @@ pub fn rooms(pattern: &Pattern, body: &Measurements) -> Vec<Room> {
                 place: ["chest", "waist", "hip"][k],
                 body: girths[k],
                 garment: pattern.finished[k],
+                needed: LEAST[k],
                 fit: if more < 0.0 {
                     Fit::Tight
                 } else if more > LOOSE {
@@ -242,8 +247,7 @@ pub fn judge(pattern: &Pattern, body: &Measurements) -> Suggestion {
     let girths = [body.chest, body.natural_waist, body.hip];
     let ease: [f64; 3] =
         std::array::from_fn(|k| if pattern.finished[k] > 0.0 { pattern.finished[k] - girths[k] } else { f64::NAN });
-    let least = |r: &Room| LEAST[["chest", "waist", "hip"].iter().position(|p| *p == r.place).unwrap_or(0)];
-    let tightest = rooms.iter().min_by(|a, b| (a.ease() - least(a)).total_cmp(&(b.ease() - least(b))));
+    let tightest = rooms.iter().min_by(|a, b| (a.ease() - a.needed).total_cmp(&(b.ease() - b.needed)));
     let (what, leaves) = match pattern.kind {
         GarmentKind::Top => ("top", "leaves"),
         GarmentKind::Skirt => ("skirt", "leaves"),
@@ -252,10 +256,10 @@ pub fn judge(pattern: &Pattern, body: &Measurements) -> Suggestion {
     };
     let hem = hem_height(pattern, body);
     let length = match pattern.kind {
-        GarmentKind::Top => relative(hem - body.inseam, "the crotch"),
-        GarmentKind::Skirt | GarmentKind::Dress => relative(hem - KNEE_HEIGHT * body.stature, "the knee"),
-        GarmentKind::Trousers if hem > 0.25 => relative(hem - KNEE_HEIGHT * body.stature, "the knee"),
-        GarmentKind::Trousers => relative(hem, "the floor"),
+        GarmentKind::Top => (hem - body.inseam, "the crotch"),
+        GarmentKind::Skirt | GarmentKind::Dress => (hem - KNEE_HEIGHT * body.stature, "the knee"),
+        GarmentKind::Trousers if hem > 0.25 => (hem - KNEE_HEIGHT * body.stature, "the knee"),
+        GarmentKind::Trousers => (hem, "the floor"),
     };
     let room = tightest.map_or_else(String::new, |r| {
         format!("the {what} {leaves} {:+.0} cm at the {} of {:.0} cm; ", r.ease() * 100.0, r.place, r.body * 100.0)
@@ -265,7 +269,8 @@ pub fn judge(pattern: &Pattern, body: &Measurements) -> Suggestion {
         ease,
         rooms,
         hem,
-        reason: format!("{}: {room}the hem ends {length}", pattern.size),
+        length,
+        reason: format!("{}: {room}the hem ends {}", pattern.size, relative(length.0, length.1)),
     }
 }
 

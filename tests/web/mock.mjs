@@ -146,9 +146,10 @@ export function startMock({ port = 0, rate = 20 } = {}) {
       codec, width: WIDTH, height: HEIGHT, image, outfit_revision: dressed ? tryOn.revision : 0n,
       latency_ms: 78 + 18 * Math.random(), stages: stages(), dropped: 0n,
       fit: dressed ? tryOn.garments.map(({ garment, size }) => ({ garment, size, regions: [
-        { region: 'chest', fit: 2, stretch: 0.01, pressure: 120, touching: 0.4, gap: 0.012 },
-        { region: 'waist', fit: 1, stretch: 0.07, pressure: 1600, touching: 0.9, gap: 0.002 },
-        { region: 'hip', fit: 3, stretch: 0.0, pressure: 0, touching: 0, gap: 0.045 }] })) : [],
+        { region: 'chest', fit: 2, stretch: 0.01, pressure: 120, touching: 0.4, gap: 0.012, ease: 0.062, ease_needed: 0.04 },
+        { region: 'waist', fit: 1, stretch: 0.07, pressure: 1600, touching: 0.9, gap: 0.002, ease: -0.05, ease_needed: -0.03 },
+        { region: 'hip', fit: 3, stretch: 0.0, pressure: 0, touching: 0, gap: 0.045, ease: 0.21, ease_needed: 0.02 }],
+      hem_above: 0.04, hem_mark: 'the knee' })) : [],
     };
   }
   const nextStatus = (tryOn) => ({ state: stateOf(tryOn), reason: world.reason, age: (Date.now() - world.since) / 1000, service: '', detail: '', retry_after: 0 });

@@ -97,12 +97,19 @@ test('an outfit has one garment of a category, inner layer first', () => {
 test('fit in words and units', () => {
   const regions = [{ region: 'chest', fit: 1, stretch: 0.061, pressure: 1240, touching: 0.8, gap: 0.004 }];
   const rows = fitRows([{ garment: 'straight_skirt', size: 'M', regions }]);
-  assert.deepEqual(rows, [{ head: 'straight skirt M' }, { region: 'chest', fit: 'tight', cells: ['6 %', '1.2 kPa', '0.4 cm'] }]);
+  assert.deepEqual(rows, [{ head: 'straight skirt M' }, { region: 'chest', fit: 'tight', cells: ['6 %', '1.2 kPa', '0.4 cm', ''] }]);
   assert.deepEqual(fitRows([]), []);
   const loose = { region: 'hip', fit: 3, stretch: 0.01, pressure: 20, touching: 0.1, gap: 0.0412 };
   assert.equal(fitWords({ size: 'S', regions: [...regions, loose] }), 'S: tight at the chest (stretched by 6 %), loose at the hip (4 cm off you)');
   assert.equal(fitWords({ size: 'M', regions: [{ ...loose, fit: 2 }] }), 'M: fits');
   assert.equal(fitWords({ size: 'M', regions: [] }), '', 'not measured yet');
+  const room = (region, fit, ease, ease_needed) => ({ ...loose, region, fit, ease, ease_needed });
+  const hem = { hem_above: -0.0712, hem_mark: 'the crotch' };
+  assert.equal(fitWords({ size: 'S', regions: [room('chest', 1, 0.02, 0.04), room('hip', 3, 0.21, 0.02)], ...hem }),
+    'S: 2 cm too tight at the chest, loose at the hip (21 cm of room), ends 7 cm below the crotch');
+  assert.equal(fitWords({ size: 'S', regions: [room('chest', 1, 0.06, 0.04)] }), 'S: tight at the chest (stretched by 1 %)', 'stretched though there is room');
+  assert.equal(fitWords({ size: '', regions: [room('chest', 2, 0.06, 0.04)], hem_above: 0.004, hem_mark: 'the knee' }), 'fits, ends at the knee');
+  assert.deepEqual(fitRows([{ garment: 'skirt', size: 'M', regions: [room('hip', 2, -0.013, 0.02)] }])[1].cells[3], '−1 cm');
 });
 
 test('percentiles, rate, and stages that vanish', () => {

@@ -1,7 +1,7 @@
 //! Fit maps, by region.
 
 use crate::v1::{FitClass, GarmentFit, RegionFit};
-use tryon::dressing::{Fit, FitMap};
+use tryon::dressing::{Fit, FitMap, Suggestion};
 
 /// The byte of cloth as tight as the map tells.
 const TIGHTEST: f32 = 127.0;
@@ -11,8 +11,10 @@ pub fn tightness(byte: u8) -> f32 {
     f32::from(byte as i8) / TIGHTEST
 }
 
-/// A fit map: its regions, and a byte for each vertex.
-pub fn fit_to_wire(garment: &str, size: &str, map: &FitMap) -> GarmentFit {
+/// A fit map: its regions, and a byte for each vertex. `cut` is how the garment's pattern is cut for the body, which
+/// tells the room in metres; `None` for a garment without pattern.
+pub fn fit_to_wire(garment: &str, size: &str, map: &FitMap, cut: Option<&Suggestion>) -> GarmentFit {
+    let room = |place: &str| cut.and_then(|c| c.rooms.iter().find(|r| r.place == place));
     let regions = map.regions.iter().map(|r| RegionFit {
         region: r.name.clone(),
         fit: match r.fit {
@@ -25,7 +27,53 @@ pub fn fit_to_wire(garment: &str, size: &str, map: &FitMap) -> GarmentFit {
         pressure: r.pressure[0] as f32,
         touching: r.touching as f32,
         gap: r.gap as f32,
+        ease: room(&r.name).map(|r| r.ease() as f32),
+        ease_needed: room(&r.name).map(|r| r.needed as f32),
     });
     let tightness = map.vertices.iter().map(|v| (v.tightness() * TIGHTEST).round() as i8 as u8).collect();
-    GarmentFit { garment: garment.to_owned(), size: size.to_owned(), regions: regions.collect(), tightness }
+    GarmentFit {
+        garment: garment.to_owned(),
+        size: size.to_owned(),
+        regions: regions.collect(),
+        tightness,
+        hem_above: cut.map(|c| c.length.0 as f32),
+        hem_mark: cut.map_or_else(String::new, |c| c.length.1.to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tryon::body::measure::Measurements;
+    use tryon::dressing::{RegionFit as Region, judge};
+    use tryon::garment::{Size, library};
+
+    #[test]
+    fn room_in_metres_comes_with_the_region_it_belongs_to() {
+        let region = |name: &str| Region {
+            name: name.to_owned(),
+            area: 0.1,
+            stretch: [0.0; 2],
+            pressure: [0.0; 2],
+            touching: 0.0,
+            gap: 0.01,
+            fit: Fit::Fitted,
+        };
+        let map = FitMap { vertices: Vec::new(), regions: ["chest", "waist", "left thigh"].map(region).to_vec() };
+        let pattern = library::pattern("tshirt", Size::S).expect("pattern");
+        // 2 cm more than the shirt is made for.
+        let chest = pattern.finished[0] - 0.04 + 0.02;
+        let body =
+            Measurements { chest, natural_waist: 0.7, hip: 0.9, stature: 1.7, inseam: 0.8, ..Measurements::default() };
+        let cut = judge(&pattern, &body);
+        let wire = fit_to_wire("tshirt", "S", &map, Some(&cut));
+        let [chest, waist, thigh] = &wire.regions[..] else { panic!("{wire:?}") };
+        let lacks = chest.ease_needed.expect("needed") - chest.ease.expect("ease");
+        assert!((lacks - 0.02).abs() < 1e-6, "{chest:?}");
+        assert_eq!((waist.ease, thigh.ease), (None, None), "a T-shirt has no girth at the waist");
+        assert_eq!(wire.hem_mark, "the crotch");
+        assert!((f64::from(wire.hem_above.expect("hem")) - (cut.hem - 0.8)).abs() < 1e-6);
+        let mesh = fit_to_wire("suit", "", &map, None);
+        assert!(mesh.hem_above.is_none() && mesh.hem_mark.is_empty() && mesh.regions[0].ease.is_none());
+    }
 }

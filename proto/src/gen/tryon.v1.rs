@@ -141,6 +141,12 @@ pub struct RegionFit {
     /// Mean distance from the skin, metres.
     #[prost(float, tag = "6")]
     pub gap: f32,
+    /// Girth of the finished garment minus the body's, metres. At `chest`, `waist` and `hip`, where the garment has a girth.
+    #[prost(float, optional, tag = "7")]
+    pub ease: ::core::option::Option<f32>,
+    /// The least ease it is made to have there, metres: what `ease` lacks of it, the garment is too tight by.
+    #[prost(float, optional, tag = "8")]
+    pub ease_needed: ::core::option::Option<f32>,
 }
 /// How a garment fits the body that wears it now.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -155,6 +161,12 @@ pub struct GarmentFit {
     /// One signed byte for each simulation vertex: from -127 (loose) over 0 (fitted) to 127 (tight). Empty in pictures.
     #[prost(bytes = "bytes", tag = "4")]
     pub tightness: ::prost::bytes::Bytes,
+    /// Lowest hem above a mark of the body, metres; negative below it. Absent for garments that are no patterns.
+    #[prost(float, optional, tag = "5")]
+    pub hem_above: ::core::option::Option<f32>,
+    /// The mark: `the crotch`, `the knee` or `the floor`.
+    #[prost(string, tag = "6")]
+    pub hem_mark: ::prost::alloc::string::String,
 }
 /// Why a picture or a state is less than it should be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]

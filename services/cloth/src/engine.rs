@@ -1,13 +1,13 @@
 //! Dressing and stepping: everything of a session that computes.
 
-use crate::library;
+use crate::library::{self, Library};
 use std::sync::Arc;
 use std::time::Instant;
-use tryon::body::measure::measure;
+use tryon::body::measure::{Measurements, measure};
 use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use tryon::cloth::realtime::{self, Input, Model, State, Workspace};
-use tryon::dressing::{self, DressOptions, FitProbe};
-use tryon::garment::library as patterns;
+use tryon::dressing::{self, DressOptions, FitProbe, MeshWear, Suggestion, Wear};
+use tryon::garment::{Pattern, library as patterns};
 use tryon::math::{Camera, P3, Rigid, World};
 use tryon::par::Par;
 use tryon_kit::frames::stage;
@@ -63,6 +63,10 @@ pub(crate) struct Worn {
     last_ns: u64,
     garments: Arc<[Arc<WornGarment>]>,
     fit: FitProbe,
+    /// What is cut from a pattern, garment by garment.
+    patterns: Vec<Option<Pattern>>,
+    /// How each pattern is cut for the body.
+    cuts: Vec<Option<Suggestion>>,
     /// Seconds of the stream since the fit was measured.
     fit_age: f64,
 }
@@ -82,41 +86,81 @@ impl From<v1::GarmentFrame> for Said {
     }
 }
 
+/// A garment that was chosen.
+enum Chosen<'a> {
+    Cut(Box<Pattern>),
+    Made(&'a MeshWear),
+}
+
+impl Chosen<'_> {
+    fn name(&self) -> &str {
+        match self {
+            Self::Cut(p) => &p.name,
+            Self::Made(m) => &m.name,
+        }
+    }
+}
+
+/// How each pattern is cut for a body.
+fn cuts(patterns: &[Option<Pattern>], measures: &Measurements) -> Vec<Option<Suggestion>> {
+    patterns.iter().map(|p| p.as_ref().map(|p| dressing::judge(p, measures))).collect()
+}
+
 /// Puts garments on; takes about a second.
-pub(crate) fn dress(body: &Body, choices: &[GarmentChoice]) -> Result<Worn, String> {
+pub(crate) fn dress(body: &Body, choices: &[GarmentChoice], library: &Library) -> Result<Worn, String> {
     let start = Instant::now();
     let rest = body.template.personalise(&body.shape);
     let measures = measure(&body.template, &rest).map_err(|e| e.to_string())?;
     let mut worn = Vec::with_capacity(choices.len());
     for c in choices {
-        let size = match library::size(&c.size) {
-            Some(s) => s,
-            None => dressing::suggest(&c.garment, &measures).map_err(|e| e.to_string())?.size,
+        let chosen = match (library.mesh(&c.garment), library::size(&c.size)) {
+            (Some(m), _) => Chosen::Made(m),
+            (None, size) => {
+                let size = match size {
+                    Some(s) => s,
+                    None => dressing::suggest(&c.garment, &measures).map_err(|e| e.to_string())?.size,
+                };
+                Chosen::Cut(Box::new(patterns::pattern(&c.garment, size).map_err(|e| e.to_string())?))
+            }
         };
-        worn.push((patterns::pattern(&c.garment, size).map_err(|e| e.to_string())?, c));
+        worn.push((chosen, c));
     }
-    // The outfit comes back in the order of its layers; choices must follow.
-    worn.sort_by_key(|(p, _)| p.layer);
-    let list: Vec<_> = worn.iter().map(|(p, _)| p.clone()).collect();
+    let list: Vec<Wear<'_>> = worn
+        .iter()
+        .map(|(w, _)| match w {
+            Chosen::Cut(p) => Wear::Pattern(p),
+            Chosen::Made(m) => Wear::Mesh(m),
+        })
+        .collect();
     // A shopper may see herself in a size that does not fit; the fit says so.
     let options = DressOptions { config: realtime::Config::tracked(), any_size: true, ..DressOptions::default() };
-    let dressed = dressing::dress(&body.template, &rest, &body.pose, &list, &options);
+    let dressed = dressing::dress_all(&body.template, &rest, &body.pose, &list, &options);
     let dressed = dressed.map_err(|e| e.to_string())?;
-    let garments = dressed.model.outfit.garments.iter().zip(&worn).map(|(g, (_, c))| {
+    // The outfit comes back in the order of its layers, and a mesh may have become several garments.
+    let (mut garments, mut patterns) = (Vec::new(), Vec::new());
+    for g in &dressed.model.outfit.garments {
+        let (chosen, c) = worn.iter().find(|(w, _)| w.name() == g.name).ok_or("a garment has lost its name")?;
+        let (size, pattern) = match chosen {
+            Chosen::Cut(p) => (g.size.to_string(), Some((**p).clone())),
+            Chosen::Made(_) => (String::new(), None),
+        };
         let color = c.color_rgb.unwrap_or_else(|| library::own_color(&c.garment));
-        Arc::new(WornGarment {
+        patterns.push(pattern);
+        garments.push(Arc::new(WornGarment {
             garment: c.garment.clone(),
-            size: g.size.to_string(),
+            size,
             vertices: g.vertices,
             drawn: g.render.vertex.clone(),
             faces: g.render.faces.clone(),
             uvs: g.render.uv.clone(),
             look: v1::GarmentLook { color_rgb: color, accent_rgb: color, stripe_width: 0.0 },
-        })
-    });
+        }));
+    }
     metrics::histogram!("tryon_stage_ms", "stage" => "cloth.dress").record(start.elapsed().as_secs_f64() * 1e3);
     Ok(Worn {
-        garments: garments.collect(),
+        garments: garments.into(),
+        cuts: cuts(&patterns, &measures),
+        patterns,
         fit: FitProbe::new(&body.template, &dressed.model).map_err(|e| e.to_string())?,
         fit_age: FIT_EVERY,
         model: dressed.model,
@@ -137,6 +181,8 @@ impl Worn {
         if !Arc::ptr_eq(&self.rest_of, &body.shape) {
             self.rest = body.template.personalise(&body.shape);
             self.rest_of = body.shape.clone();
+            let measures = measure(&body.template, &self.rest).map_err(|e| e.to_string())?;
+            self.cuts = cuts(&self.patterns, &measures);
         }
         body.pose.bones(body.template.skeleton(), &self.rest, &mut self.bones);
         skin(Par::Rayon, &self.rest.vertices, body.template.weights(), &self.bones, &mut self.posed);
@@ -158,8 +204,8 @@ impl Worn {
             self.fit_age = 0.0;
             let begun = Instant::now();
             let maps = self.fit.measure(&self.model, &self.state, &self.posed).map_err(|e| e.to_string())?;
-            let named = self.garments.iter().zip(&maps);
-            placed.frame.fit = named.map(|(g, m)| fit_to_wire(&g.garment, &g.size, m)).collect();
+            let named = self.garments.iter().zip(&maps).zip(&self.cuts);
+            placed.frame.fit = named.map(|((g, m), cut)| fit_to_wire(&g.garment, &g.size, m, cut.as_ref())).collect();
             placed.frame.stages.push(stage("cloth.fit", begun));
         }
         Ok(placed)

@@ -1,7 +1,7 @@
 //! The rpcs: check, find the session, answer.
 
 use crate::engine::Said;
-use crate::library;
+use crate::library::Library;
 use crate::session::{self, Command, Handle, Setup, Told, reader};
 use crate::simulation::{Frames, Simulations};
 use futures::Stream;
@@ -26,16 +26,18 @@ pub(crate) struct Cloth {
     ctx: Context,
     tracking: Channel,
     idle: Duration,
+    library: Arc<Library>,
 }
 
 impl Cloth {
-    pub(crate) fn new(config: &ClothConfig, ctx: &Context, tracking: Channel) -> Self {
+    pub(crate) fn new(config: &ClothConfig, ctx: &Context, tracking: Channel, library: Library) -> Self {
         Self {
             sessions: Sessions::new(config.max_sessions),
             simulations: Simulations::new(config.max_simulations),
             ctx: ctx.clone(),
             tracking,
             idle: Duration::from_secs(config.idle_s),
+            library: Arc::new(library),
         }
     }
 }
@@ -43,14 +45,14 @@ impl Cloth {
 #[tonic::async_trait]
 impl ClothService for Cloth {
     async fn list_garments(&self, _: Request<ListGarmentsRequest>) -> Result<Response<ListGarmentsResponse>, Status> {
-        Ok(Response::new(ListGarmentsResponse { garments: library::garments() }))
+        Ok(Response::new(ListGarmentsResponse { garments: self.library.garments() }))
     }
 
     async fn dress(&self, r: Request<DressRequest>) -> Result<Response<DressResponse>, Status> {
         let r = r.get_ref();
         let id = request::session_id("dress_request.session_id", &r.session_id)?;
         let choices = request::choices("dress_request", &r.garments)?;
-        library::check(&choices)?;
+        self.library.check(&choices)?;
         if self.sessions.get(&id).is_some_and(|h| h.commands.is_closed()) {
             self.sessions.remove(&id);
         }
@@ -59,6 +61,7 @@ impl ClothService for Cloth {
             ctx: self.ctx.clone(),
             tracking: self.tracking.clone(),
             idle: self.idle,
+            library: self.library.clone(),
             directory: self.sessions.clone(),
         };
         let handle = match self.sessions.open(&id, || session::spawn(setup())) {

@@ -1,6 +1,7 @@
 //! One session: its task, its outfit, its readers.
 
 use crate::engine::{Body, Said, Worn, dress};
+use crate::library::Library;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::{mpsc, watch};
@@ -47,6 +48,7 @@ pub(crate) struct Setup {
     pub(crate) ctx: Context,
     pub(crate) tracking: Channel,
     pub(crate) idle: Duration,
+    pub(crate) library: Arc<Library>,
     pub(crate) directory: Sessions<Handle>,
 }
 
@@ -317,8 +319,9 @@ impl Task {
     fn put_on(&mut self, body: Arc<Body>, wanted: Outfit) {
         self.dressing = Some(wanted.revision);
         let (pool, done) = (self.setup.ctx.pool.clone(), self.dressed.clone());
+        let library = self.setup.library.clone();
         tokio::spawn(async move {
-            let outcome = pool.run(move || dress(&body, &wanted.choices)).await;
+            let outcome = pool.run(move || dress(&body, &wanted.choices, &library)).await;
             let outcome = outcome.map_err(|e| e.to_string()).and_then(|r| r);
             // The session may be gone by now.
             let _ = done.send(Dressed { revision: wanted.revision, outcome }).await;

@@ -69,7 +69,7 @@ export class Details {
     this.#fit = text;
     byId('d-fit-title').hidden = rows.length === 0;
     byId('d-fit').replaceChildren(...rows.map((r) => (r.head
-      ? el('tr', {}, el('th', { scope: 'rowgroup', colspan: '5' }, r.head))
+      ? el('tr', {}, el('th', { scope: 'rowgroup', colspan: '6' }, r.head))
       : el('tr', {}, el('th', { scope: 'row' }, r.region), el('td', {}, el('span', { class: 'fit', 'data-fit': r.fit }, r.fit)),
         ...r.cells.map((c) => el('td', {}, c))))));
   }

@@ -18,13 +18,17 @@ export const RegionFit = schema('RegionFit',
   [3, 'stretch', 'float'],
   [4, 'pressure', 'float'],
   [5, 'touching', 'float'],
-  [6, 'gap', 'float']);
+  [6, 'gap', 'float'],
+  [7, 'ease', 'float?'],
+  [8, 'ease_needed', 'float?']);
 
 export const GarmentFit = schema('GarmentFit',
   [1, 'garment', 'string'],
   [2, 'size', 'string'],
   [3, 'regions', 'message[]', RegionFit],
-  [4, 'tightness', 'bytes']);
+  [4, 'tightness', 'bytes'],
+  [5, 'hem_above', 'float?'],
+  [6, 'hem_mark', 'string']);
 
 export const GarmentChoice = schema('GarmentChoice',
   [1, 'garment', 'string'],

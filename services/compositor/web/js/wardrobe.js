@@ -90,7 +90,7 @@ export class Wardrobe {
         el('input', { type: 'radio', name: `${group}-${info.name}`, checked, 'aria-label': more.name ?? null, 'data-value': label, onchange: pick(change) }),
         el('span', {}, more.class ? '' : label));
     const sizes = ['', ...info.sizes].map((size) =>
-      chip('size', size || 'My size', choice.size === size, size ? { name: `Size ${size}` } : {}, () => this.outfit.setSize(info.name, size)));
+      chip('size', size || (info.sizes.length > 0 ? 'My size' : 'One size'), choice.size === size, size ? { name: `Size ${size}` } : {}, () => this.outfit.setSize(info.name, size)));
     const colors = [['As made', null], ...COLORS].map(([name, rgb]) => {
       const swatch = chip('color', name, choice.color_rgb === rgb, { class: 'swatch', name }, () => this.outfit.setColor(info.name, rgb));
       swatch.style.setProperty('--swatch', css(rgb ?? info.color_rgb));

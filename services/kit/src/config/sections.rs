@@ -1,6 +1,7 @@
 //! The sections of the configuration with their defaults.
 
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
@@ -159,6 +160,15 @@ pub struct ClothConfig {
     pub idle_s: u64,
     /// Most simulations at a time.
     pub max_simulations: usize,
+    /// Folder of mesh garments (`.obj`, `.glb`, `.gltf`, `.mhclo`; one level of folders in it is looked into) that are
+    /// offered under their files' names beside the library; empty for none. A faulty file is left out and logged.
+    pub garments: PathBuf,
+    /// Body that the garments of the folder were made on (`.obj` or SMPL-layout `.npz`); empty: a guess for each.
+    pub garments_body: PathBuf,
+    /// What the garments of the folder are made of: `cotton` or another preset.
+    pub garments_material: String,
+    /// Other materials for garments of the folder, by the name they are offered under.
+    pub garment_materials: BTreeMap<String, String>,
 }
 
 impl Default for ClothConfig {
@@ -170,6 +180,10 @@ impl Default for ClothConfig {
             max_sessions: 4,
             idle_s: 30,
             max_simulations: 1,
+            garments: PathBuf::new(),
+            garments_body: PathBuf::new(),
+            garments_material: "cotton".into(),
+            garment_materials: BTreeMap::new(),
         }
     }
 }

@@ -39,6 +39,11 @@ pub struct Kiosk {
 impl Kiosk {
     /// Starts all four, with a camera `front` on `source`, and `side` on the test picture.
     pub fn start(source: &str, rate: f64) -> Self {
+        Self::with(source, rate, |_| {})
+    }
+
+    /// The same with other settings.
+    pub fn with(source: &str, rate: f64, change: impl FnOnce(&mut Config)) -> Self {
         let mut config = Config::default();
         let any: SocketAddr = "127.0.0.1:0".parse().expect("an address");
         let endpoint = vec![free_tcp_endpoint().expect("a free port")];
@@ -64,6 +69,7 @@ impl Kiosk {
         ] {
             *a = any;
         }
+        change(&mut config);
         let mut kiosk = Self { config, processes: vec![None, None, None, None] };
         PARTS.into_iter().for_each(|p| kiosk.restart(p));
         kiosk

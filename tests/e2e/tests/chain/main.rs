@@ -24,9 +24,33 @@ fn client<T>(f: impl Future<Output = T>) -> T {
     tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().expect("a runtime").block_on(f)
 }
 
+/// A garment made as a mesh: a hoop skirt, as its OBJ.
+fn hoop_skirt() -> String {
+    let (rings, around) = (12u32, 36u32);
+    let mut text = String::new();
+    for k in 0..=rings {
+        let t = f64::from(k) / f64::from(rings);
+        let (y, r) = (0.55 + 0.45 * t, 0.24 - 0.04 * t);
+        for j in 0..around {
+            let t = std::f64::consts::TAU * f64::from(j) / f64::from(around);
+            text.push_str(&format!("v {} {y} {}\n", r * t.cos(), -r * t.sin()));
+        }
+    }
+    for k in 0..rings {
+        for j in 0..around {
+            let (a, b) = (k * around + j + 1, k * around + (j + 1) % around + 1);
+            text.push_str(&format!("f {a} {b} {}\nf {b} {} {}\n", a + around, b + around, a + around));
+        }
+    }
+    text
+}
+
 #[test]
 fn health_reflection_a_hundred_frames_another_garment_and_the_end() {
-    let kiosk = Kiosk::start("synth:still", 10.0);
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("hoop.obj"), hoop_skirt()).expect("written");
+    std::fs::write(folder.path().join("torn.obj"), hoop_skirt() + "f 1 2 99999\n").expect("written");
+    let kiosk = Kiosk::with("synth:still", 10.0, |c| c.cloth.garments = folder.path().to_owned());
     client(async {
         for part in PARTS {
             let mut health = tonic_health::pb::health_client::HealthClient::new(kiosk.channel(part));
@@ -59,6 +83,15 @@ fn health_reflection_a_hundred_frames_another_garment_and_the_end() {
         }
         let chest = fit.first().and_then(|f| f.regions.iter().find(|r| r.region == "chest")).expect("fit at the chest");
         assert!(fit.len() == 1 && fit[0].garment == "tshirt" && chest.fit() != FitClass::Unspecified, "{fit:?}");
+        // In centimetres too: a T-shirt in M has room to spare on this shopper, and says where it ends.
+        let ease = chest.ease.expect("room at the chest") - chest.ease_needed.expect("what it needs");
+        let hem = fit[0].hem_above.expect("a hem");
+        assert!(ease.abs() < 0.3 && hem.abs() < 0.4 && fit[0].hem_mark == "the crotch", "{ease} {hem} {fit:?}");
+        println!(
+            "the shirt has {:.1} cm to spare at the chest and ends {:.1} cm above the crotch",
+            ease * 1e2,
+            hem * 1e2
+        );
         println!("100 pictures, {:.1} a second", 99.0 / begun.elapsed().as_secs_f64());
 
         let mut c = kiosk.compositor();
@@ -79,6 +112,17 @@ fn health_reflection_a_hundred_frames_another_garment_and_the_end() {
         let Event::Picture(p) = w.until("the other outfit", is).await else { unreachable!("just matched") };
         assert!(p.fit.iter().all(|f| f.garment != "tshirt"), "the fit of what is not worn: {:?}", p.fit);
         println!("another outfit after {:.2} s", begun.elapsed().as_secs_f64());
+
+        // A mesh from the folder; the torn one beside it is not offered.
+        let offered = c.list_garment_choices(ListGarmentChoicesRequest {}).await.expect("listed").into_inner().garments;
+        let hoop = offered.iter().find(|g| g.name == "hoop").expect("offered");
+        assert!(hoop.sizes.is_empty() && offered.iter().all(|g| g.name != "torn"), "{offered:?}");
+        let mesh = vec![GarmentChoice { garment: "hoop".into(), ..Default::default() }];
+        let choose = ChooseGarmentsRequest { try_on_id: "first".into(), garments: mesh };
+        c.choose_garments(choose).await.expect("chosen");
+        let is = |e: &Event| matches!(e, Event::Picture(p) if p.outfit_revision == 3 && !p.fit.is_empty());
+        let Event::Picture(p) = w.until("the mesh is worn", is).await else { unreachable!("just matched") };
+        assert!(p.fit.iter().all(|f| f.garment == "hoop" && f.hem_above.is_none()), "{:?}", p.fit);
         let snap = TakeSnapshotRequest { try_on_id: "first".into(), codec: 0 };
         let snap = c.take_snapshot(snap).await.expect("a snapshot").into_inner().picture.expect("a picture");
         assert_eq!((&snap.image[1..4], snap.width), (&b"PNG"[..], 640));
