@@ -1,10 +1,11 @@
 //! Dresses bodies and draws each outfit from several sides into one PNG, for looking at garments.
 //!
 //! `cargo run --release --example turntable -- --garment tshirt --garment longsleeve+trousers --out DIR
-//!   [--garment FILE.obj|.glb|.mhclo|.json [--garment-body FILE.npz|.obj]] [--body average,slim_woman,heavy_man | FILE.npz] [--size auto,S,M,XL] [--pose down|tpose|rest|walk|raise]
-//!   [--seconds 1.0] [--views 0,45,90,180] [--cell 220x340] [--crop] [--edge 0.021] [--fit] [--any-size]`
+//!   [--garment FILE.obj|.glb|.mhclo|.json [--garment-body FILE.npz|.obj]] [--body average,slim_woman,heavy_man | FILE.npz | RECORDING] [--size auto,S,M,XL] [--pose down|tpose|rest|walk|raise]
+//!   [--seconds 1.0] [--views 0,45,90,180] [--cell 220x340] [--crop] [--edge 0.021] [--fit] [--any-size] [--no-folds] [--crossings]`
 //!
-//! A row is a body, a block of columns a size. `auto` asks the size suggestion.
+//! A row is a body, a block of columns a size. `auto` asks the size suggestion. A recording (a folder or .mcap) shows the
+//! person tracked in it, at its end; a still picture is tracked 45 times.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
 
 mod drawing;
@@ -14,11 +15,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use tryon::camera::ColorImage;
-use tryon::cloth::realtime::{Input, Workspace, step};
+use tryon::cloth::crossings;
+use tryon::cloth::realtime::{Config, Input, State, Workspace, step};
 use tryon::dressing::{DressError, DressOptions, Dressed, FitProbe, MadeOn, MeshWear, Wear, dress_all, suggest};
 use tryon::formats::image::write_png_rgb;
 use tryon::garment::{Pattern, library};
 use tryon::math::{Body, P3, Rigid, World, log_so3};
+use tryon::tracking::{self, TrackerConfig, TrackerModel, TrackerState};
 
 struct Args {
     garments: Vec<String>,
@@ -33,6 +36,8 @@ struct Args {
     edge: Option<f64>,
     fit: bool,
     any_size: bool,
+    crossings: bool,
+    folds: bool,
     out: PathBuf,
 }
 
@@ -50,6 +55,8 @@ fn args() -> Args {
         edge: None,
         fit: false,
         any_size: false,
+        crossings: false,
+        folds: true,
         out: "/tmp/turntable".into(),
     };
     let list = |s: String| s.split(',').map(str::to_owned).collect::<Vec<_>>();
@@ -74,6 +81,8 @@ fn args() -> Args {
                 a.cell = (w.parse().expect("width"), h.parse().expect("height"));
             }
             "--crop" => a.crop = true,
+            "--crossings" => a.crossings = true,
+            "--no-folds" => a.folds = false,
             "--any-size" => a.any_size = true,
             "--fit" => a.fit = true,
             "--edge" => a.edge = Some(value().parse().expect("metres")),
@@ -99,20 +108,59 @@ fn shape(name: &str) -> Option<Vec<f64>> {
     })
 }
 
-fn load(name: &str) -> (Arc<Template>, RestBody) {
-    match shape(name) {
-        Some(coefficients) => {
-            let t = tryon::body::embedded::template();
-            let rest = t.personalise(&BodyShape { coefficients, ..BodyShape::default() });
-            (t, rest)
+struct Person {
+    template: Arc<Template>,
+    rest: RestBody,
+    /// Of a recording: the pose in which garments are put on, and the body in each picture after it.
+    film: Option<(Pose<World>, Vec<Vec<P3>>)>,
+}
+
+fn load(name: &str) -> Person {
+    let path = std::path::Path::new(name);
+    if let Some(coefficients) = shape(name) {
+        let template = tryon::body::embedded::template();
+        let rest = template.personalise(&BodyShape { coefficients, ..BodyShape::default() });
+        return Person { template, rest, film: None };
+    }
+    if path.is_dir() || name.ends_with(".mcap") {
+        return tracked(path);
+    }
+    let arrays = tryon::formats::npz::read_smpl(path).expect("a body");
+    let template = Arc::new(tryon::body::import::template_from_smpl("file", &arrays).expect("a body"));
+    let rest = template.personalise(&BodyShape::default());
+    Person { template, rest, film: None }
+}
+
+/// The person in a recording, from the first picture in which they are tracked.
+fn tracked(path: &std::path::Path) -> Person {
+    const STILL: u64 = 45;
+    let mut source = tryon::formats::open_recording(path).expect("a recording");
+    let template = tryon::body::embedded::template();
+    let model = TrackerModel::new(template.clone(), source.calibration().clone(), TrackerConfig::default());
+    let (mut state, mut work) = (TrackerState::new(&model), tracking::Workspace::default());
+    let (mut film, mut begun) = (Vec::new(), None);
+    let mut see = |frame: &tryon::camera::RgbdFrame| {
+        tracking::step(&model, &mut state, frame, &mut work).expect("a step");
+        if state.status != tracking::Status::Tracking {
+            return;
         }
-        None => {
-            let arrays = tryon::formats::npz::read_smpl(std::path::Path::new(name)).expect("a body");
-            let t = tryon::body::import::template_from_smpl("file", &arrays).expect("a body");
-            let rest = t.personalise(&BodyShape::default());
-            (Arc::new(t), rest)
+        let mut body = Vec::new();
+        state.world_from_camera.points_f32(work.posed(&model, &state).0, &mut body);
+        film.push(body);
+        begun.get_or_insert_with(|| {
+            let pose = Pose { root: state.world_from_camera * state.pose.root, angles: state.pose.angles.clone() };
+            (template.personalise(&state.shape), pose)
+        });
+    };
+    let still = source.len() == Some(1);
+    while let Some(mut frame) = source.next_frame().expect("a picture") {
+        for _ in 0..if still { STILL } else { 1 } {
+            see(&frame);
+            frame.time_ns += 33_333_333;
         }
     }
+    let (rest, pose) = begun.expect("nobody is tracked");
+    Person { template, rest, film: Some((pose, film)) }
 }
 
 /// Named poses; `t` in seconds moves those that move.
@@ -169,7 +217,7 @@ fn imported(file: &str) -> Pattern {
 }
 
 fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2], [f32; 2]) {
-    let (template, rest) = load(body);
+    let Person { template, rest, film } = load(body);
     let measures = tryon::body::measure::measure(&template, &rest).expect("measurable");
     enum Worn {
         Pattern(Pattern),
@@ -211,7 +259,11 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
     if let Some(e) = a.edge {
         options.triangulation.edge_length = e;
     }
-    let start = pose(&a.pose, &template, &rest, 0.0);
+    options.config.self_collision = a.folds;
+    let start = film.as_ref().map_or_else(|| pose(&a.pose, &template, &rest, 0.0), |(pose, _)| pose.clone());
+    if film.is_some() {
+        options.config = Config { self_collision: a.folds, ..Config::tracked() };
+    }
     let dressed = match dress_all(&template, &rest, &start, &wear, &options) {
         Ok(d) => Some(d),
         Err(DressError::Misfit(m)) => {
@@ -235,12 +287,29 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
         report.penetration * 1e3,
         report.p99_strain
     );
+    let crossed = |state: &State| -> Vec<usize> {
+        model
+            .outfit
+            .garments
+            .iter()
+            .zip(&state.garments)
+            .map(|(g, s)| crossings(&g.faces, &s.positions).len())
+            .collect()
+    };
+    println!("  edges through its own triangles: {:?}", crossed(&state));
     let mut work = Workspace::default();
-    let frames = (a.seconds * 30.0) as usize;
+    let film = film.map_or_else(
+        || {
+            let at = |i| posed(&template, &rest, &pose(&a.pose, &template, &rest, f64::from(i + 1) / 30.0));
+            (0..(a.seconds * 30.0) as i32).map(at).collect()
+        },
+        |(_, film)| film,
+    );
+    let frames = film.len();
     let (mut ms, mut last) = (0.0, None);
     let mut verts = posed(&template, &rest, &start);
-    for i in 0..frames {
-        verts = posed(&template, &rest, &pose(&a.pose, &template, &rest, (i + 1) as f64 / 30.0));
+    for body in film {
+        verts = body;
         let r = step(&model, &mut state, &Input { body: &verts, dt: 1.0 / 30.0 }, &mut work).expect("step");
         ms += r.stages_ms.total;
         last = Some(r);
@@ -253,6 +322,7 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
             r.p99_strain,
             r.max_strain
         );
+        println!("  edges through its own triangles: {:?}", crossed(&state));
     }
     let centre = {
         let n = verts.len() as f32;
@@ -294,9 +364,17 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
         let mut world = Vec::new();
         g.render_positions(&s.positions, &mut world);
         own = world.iter().fold(own, |y, p| [y[0].min(p.y), y[1].max(p.y)]);
-        let painted = fits.as_ref().map_or_else(Vec::new, |maps| {
-            g.render.vertex.iter().map(|v| maps[k].vertices[*v as usize].color()).collect()
-        });
+        let mut torn = vec![[225u8, 220, 200]; g.vertices];
+        for c in crossings(&g.faces, &s.positions) {
+            c.edge.iter().chain(&g.faces[c.face as usize]).for_each(|v| torn[*v as usize] = [220, 0, 0]);
+        }
+        let torn = || g.render.vertex.iter().map(|v| torn[*v as usize]).collect();
+        let painted = if a.crossings { Some(torn()) } else { None }
+            .or_else(|| {
+                fits.as_ref()
+                    .map(|maps| g.render.vertex.iter().map(|v| maps[k].vertices[*v as usize].color()).collect())
+            })
+            .unwrap_or_default();
         let known = library::names().contains(&g.name.as_str());
         let color = (if known { library::dye(&g.name) } else { library::dye(library::names()[k % 9]) })
             .map(|c| f32::from(c) / 255.0);

@@ -3,8 +3,17 @@
 use crate::math::{P3, V3d};
 use crate::mesh::Face;
 
+/// An edge that passes through a triangle of the same sheet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crossing {
+    /// Vertices of the edge.
+    pub edge: [u32; 2],
+    /// Number of the triangle.
+    pub face: u32,
+}
+
 /// Pairs of an edge and a triangle without a common corner that pass through each other.
-pub fn crossings(faces: &[Face], positions: &[P3]) -> usize {
+pub fn crossings(faces: &[Face], positions: &[P3]) -> Vec<Crossing> {
     let x: Vec<V3d> = positions.iter().map(|p| p.coords.cast()).collect();
     let corners = |f: &Face| f.map(|v| x[v as usize]);
     let mut edges: Vec<[u32; 2]> =
@@ -18,13 +27,15 @@ pub fn crossings(faces: &[Face], positions: &[P3]) -> usize {
         faces.iter().enumerate().map(|(n, f)| (low(&corners(f)), high(&corners(f)), n)).collect();
     sorted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let widest = sorted.iter().map(|s| s.1 - s.0).fold(0.0, f64::max);
-    let mut found = 0;
+    let mut found = Vec::new();
     for e in &edges {
         let ends = e.map(|v| x[v as usize]);
         let from = sorted.partition_point(|s| s.0 < low(&ends) - widest);
         for (_, _, n) in sorted[from..].iter().take_while(|s| s.0 <= high(&ends)).filter(|s| s.1 >= low(&ends)) {
             let f = &faces[*n];
-            found += usize::from(!f.iter().any(|v| e.contains(v)) && passes(&ends, &corners(f)));
+            if !f.iter().any(|v| e.contains(v)) && passes(&ends, &corners(f)) {
+                found.push(Crossing { edge: *e, face: *n as u32 });
+            }
         }
     }
     found
@@ -51,8 +62,8 @@ mod tests {
             crossings(&faces, &two.map(P3::from))
         };
         // Both long edges of the needle pass through, and at 0.2 so does one side of the triangle through the needle's.
-        assert!(at(0.2) > 0);
-        assert_eq!(at(1.2), 0);
-        assert_eq!(crossings(&faces[..1], &[P3::origin(); 3]), 0);
+        assert!(at(0.2).contains(&Crossing { edge: [3, 4], face: 0 }));
+        assert_eq!(at(1.2), []);
+        assert_eq!(crossings(&faces[..1], &[P3::origin(); 3]), []);
     }
 }

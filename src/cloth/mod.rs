@@ -10,6 +10,6 @@ pub mod scene;
 mod sheet;
 pub mod small_steps;
 
-pub use crossings::crossings;
+pub use crossings::{Crossing, crossings};
 pub use error::ClothError;
 pub use sheet::{Element, Hinge, Sheet};

@@ -44,8 +44,6 @@ const RINGS: usize = 8;
 /// Skin is inside where the body goes around a point this far off it, metres: less than a fabric's thickness, more than
 /// rounding.
 const OFF: f32 = 1e-3;
-/// A first search looks at every so many vertices, then walks.
-const STRIDE: usize = 7;
 
 impl Buried {
     /// Looks again at what may have changed since the last call. `opposite`: the part that each vertex may lie in, 0 for
@@ -73,7 +71,7 @@ impl Buried {
                 }
                 let p = &frame.vertices[v];
                 if first {
-                    s.nearest = coarse_nearest(model, frame, p, mask);
+                    s.nearest = model.nearest_of_some(frame, p, mask);
                 }
                 let (near, hit) = model.closest_within(frame, p, s.nearest, mask, 0.0);
                 (s.nearest, s.room) = (near, 0.0);
@@ -133,22 +131,6 @@ impl Buried {
     pub fn count(&self) -> usize {
         self.inside.iter().filter(|b| **b).count()
     }
-}
-
-fn coarse_nearest(model: &SurfaceModel, frame: &SurfaceFrame, p: &P3, mask: Part) -> u32 {
-    let mut best = (f32::INFINITY, 0u32);
-    let mut of_part = 0;
-    for (i, v) in frame.vertices.iter().enumerate() {
-        if model.part(i as u32) & mask == 0 {
-            continue;
-        }
-        of_part += 1;
-        let d = (v - p).norm_squared();
-        if of_part % STRIDE == 1 && d < best.0 {
-            best = (d, i as u32);
-        }
-    }
-    best.1
 }
 
 #[cfg(test)]

@@ -1,11 +1,13 @@
 //! Candidate pairs, continuous collision, distances and contact energies between moving triangles; it never steps time.
 
+mod apart;
 mod buried;
 mod depth_maps;
 mod point_grid;
 mod surface;
 mod winding;
 
+pub use apart::Apart;
 pub use buried::Buried;
 pub use depth_maps::{DepthMaps, MapView};
 pub use point_grid::PointGrid;

@@ -93,6 +93,13 @@ impl SurfaceModel {
         }
         best.1
     }
+    /// A vertex of `mask` to start a walk from: the nearest of every seventh.
+    pub fn nearest_of_some(&self, frame: &SurfaceFrame, p: &P3, mask: Part) -> u32 {
+        const STRIDE: usize = 7;
+        let far = |i: &usize| (frame.vertices[*i] - p).norm_squared();
+        let of_mask = (0..self.parts.len()).filter(|i| self.parts[*i] & mask != 0);
+        of_mask.step_by(STRIDE).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(0) as u32
+    }
     /// Walks from `start` to a vertex nearer to `p` than all its neighbours. At most 40 steps.
     pub fn walk(&self, frame: &SurfaceFrame, p: &P3, start: u32, mask: Part) -> u32 {
         let mut at = start;

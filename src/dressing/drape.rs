@@ -5,8 +5,8 @@
 //! one in a few steps more. The simulator that follows starts from cloth at rest.
 
 use crate::cloth::Sheet;
-use crate::cloth::realtime::AnchorBinding;
-use crate::contact::{Buried, Part, SurfaceFrame, SurfaceModel};
+use crate::cloth::realtime::{AnchorBinding, Model};
+use crate::contact::{Apart, Buried, Part, SurfaceFrame, SurfaceModel};
 use crate::garment::{GarmentError, GarmentMesh, Region};
 use crate::math::{P3, V3, V3d};
 use crate::par::Par;
@@ -50,22 +50,39 @@ pub(super) struct Skin<'a> {
     pub(super) model: &'a SurfaceModel,
     frame: SurfaceFrame,
     buried: Buried,
+    apart: Apart,
     opposite: &'a [Part],
+    pressing: &'a [Part],
+    /// What cloth needs between parts that press on each other, metres.
+    room: f32,
 }
 
 impl<'a> Skin<'a> {
-    pub(super) fn new(model: &'a SurfaceModel, opposite: &'a [Part]) -> Self {
-        Self { model, frame: SurfaceFrame::default(), buried: Buried::default(), opposite }
+    /// Of the body that an outfit is simulated on.
+    pub(super) fn of(model: &'a Model) -> Self {
+        Self {
+            model: model.surface(),
+            frame: SurfaceFrame::default(),
+            buried: Buried::default(),
+            apart: Apart::default(),
+            opposite: model.opposite(),
+            pressing: model.pressing(),
+            room: model.room(),
+        }
     }
     /// The body stands like this now.
     pub(super) fn show(&mut self, body: &[P3]) {
         self.frame.vertices.clear();
         self.frame.vertices.extend_from_slice(body);
-        self.model.update_normals(Par::Rayon, &mut self.frame);
+        self.apart.make_room(Par::Rayon, self.model, self.pressing, &mut self.frame, self.room);
         self.buried.update(Par::Rayon, self.model, self.opposite, &self.frame);
     }
     pub(super) fn frame(&self) -> &SurfaceFrame {
         &self.frame
+    }
+    /// The body as cloth meets it, and what is known about its skin.
+    pub(super) fn known(self) -> (Vec<P3>, Buried, Apart) {
+        (self.frame.vertices, self.buried, self.apart)
     }
 }
 

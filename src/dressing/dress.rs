@@ -244,7 +244,7 @@ pub fn dress_all(
             body
         })
         .collect();
-    let mut skin = Skin::new(model.surface(), model.opposite());
+    let mut skin = Skin::of(&model);
     skin.show(&bodies[0]);
     let offsets: Vec<f64> = (0..coarse.len()).map(|k| model.offset(k)).collect();
     let mut ties = Vec::new();
@@ -296,8 +296,9 @@ pub fn dress_all(
     report.stages_ms.fine = ms(timer);
 
     let timer = Instant::now();
+    let (body, buried, apart) = skin.known();
     model.set_anchors(anchors);
-    let state = State::new(&model, positions, &bodies[FOLLOW_BODIES])?;
+    let state = State::new(&model, positions, &body)?.on_skin(buried, apart);
     report.stages_ms.model += ms(timer);
     report.ms = ms(started);
     Ok(Dressed { model, state, report })

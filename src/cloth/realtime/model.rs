@@ -140,6 +140,8 @@ pub struct Model {
     pub(super) surface: SurfaceModel,
     /// Part of the body that each of its vertices may lie in.
     pub(super) opposite: Vec<u8>,
+    /// The same where both are thick: part of the body that presses on each of its vertices.
+    pub(super) pressing: Vec<u8>,
     pub(super) weights: SkinWeights,
     pub(super) joints: usize,
     pub(super) views: [MapView; 4],
@@ -185,6 +187,16 @@ fn opposites(template: &Template, parts: &[u8]) -> Vec<u8> {
         _ => Region::RIGHT_ARM.0,
     };
     vertices.iter().zip(parts).map(of).collect()
+}
+
+/// Of these [`opposites`] those of thick parts: hands and forearms have cloth on one side only, and a hand in a hip does
+/// not know any more which one that is.
+fn pressing(template: &Template, opposite: Vec<u8>) -> Vec<u8> {
+    const THIN: [&str; 9] = ["elbow", "wrist", "hand", "finger", "thumb", "knee", "ankle", "foot", "toe"];
+    let thin: Vec<bool> =
+        template.skeleton().joints().iter().map(|j| THIN.iter().any(|t| j.name.contains(t))).collect();
+    let of = |(v, part): (usize, u8)| if thin[template.weights().dominant(v)] { 0 } else { part };
+    opposite.into_iter().enumerate().map(of).collect()
 }
 
 impl Model {
@@ -256,6 +268,7 @@ impl Model {
         }
         let parts = body_parts(template);
         let mut model = Self {
+            pressing: pressing(template, opposites(template, &parts)),
             opposite: opposites(template, &parts),
             surface: SurfaceModel::new(template.mesh().faces().to_vec(), Topology::new(template.mesh())?, parts),
             weights: template.weights().clone(),
@@ -303,6 +316,14 @@ impl Model {
         &self.surface
     }
     /// The part that each vertex of it may lie in.
+    /// See [`Apart::make_room`](crate::contact::Apart::make_room).
+    pub(crate) fn pressing(&self) -> &[u8] {
+        &self.pressing
+    }
+    /// What two layers of cloth need between parts of the body that press on each other, metres.
+    pub(crate) fn room(&self) -> f32 {
+        (2.0 * self.config.offset + self.config.thickness) as f32
+    }
     pub(crate) fn opposite(&self) -> &[u8] {
         &self.opposite
     }

@@ -4,7 +4,7 @@ use super::Model;
 use crate::cloth::ClothError;
 use crate::cloth::folds::FoldFrame;
 use crate::cloth::small_steps::{Motion, Plane, Tie};
-use crate::contact::{Buried, DepthMaps, SurfaceFrame};
+use crate::contact::{Apart, Buried, DepthMaps, SurfaceFrame};
 use crate::math::{P3, V3};
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +30,9 @@ pub struct State {
     pub(super) body: Vec<P3>,
     /// Skin that lies inside another part of the body.
     pub(super) buried: Buried,
+    /// How near parts of the body are to each other.
+    #[serde(default)]
+    pub(super) apart: Apart,
     /// Body when it last moved by more than it may while cloth sleeps.
     pub(super) awake_body: Vec<P3>,
     /// The measured body, held steady; empty before the first step.
@@ -94,6 +97,10 @@ impl State {
             }
         }
         Ok(Self { garments, body: body.to_vec(), awake_body: body.to_vec(), ..Self::default() })
+    }
+    /// With what is known already about the skin of the body that the garments were put on.
+    pub(crate) fn on_skin(self, buried: Buried, apart: Apart) -> Self {
+        Self { buried, apart, ..self }
     }
 }
 
@@ -173,6 +180,8 @@ pub struct Workspace {
     pub(super) before: SurfaceFrame,
     pub(super) after: SurfaceFrame,
     pub(super) now: SurfaceFrame,
+    /// The body with room between its parts.
+    pub(super) roomy: SurfaceFrame,
     /// Garments at the beginning of a round, for contact of cloth with cloth.
     pub(super) sheets: Vec<FoldFrame>,
     pub(super) maps: DepthMaps,

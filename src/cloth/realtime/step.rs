@@ -74,7 +74,11 @@ pub fn step(
         body.clone_from(&state.body);
     }
     follow(&mut body, input.body, model.config.steady, input.dt);
-    let report = step_on(model, state, &Input { body: &body, dt: input.dt }, work);
+    let mut roomy = std::mem::take(&mut work.roomy);
+    roomy.vertices.clone_from(&body);
+    state.apart.make_room(model.config.par, &model.surface, &model.pressing, &mut roomy, model.room());
+    let report = step_on(model, state, &Input { body: &roomy.vertices, dt: input.dt }, work);
+    work.roomy = roomy;
     state.followed = body;
     Ok(report)
 }

@@ -461,7 +461,7 @@ mod tests {
             let mut most = 0;
             let report = run(&scene, config, |k, x| {
                 if k % 5 == 0 {
-                    most = crossings(&scene.faces, x).max(most);
+                    most = crossings(&scene.faces, x).len().max(most);
                 }
                 ControlFlow::Continue(())
             });

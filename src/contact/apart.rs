@@ -1,0 +1,176 @@
+//! Room between parts of the body that press on each other, for cloth that lies between them.
+//!
+//! An upper arm against the chest, thighs of someone who stands: flesh gives way, a skinned surface does not, it lies in
+//! itself. Two layers of cloth have no place there, and each kept off its own part they pass through each other and tear
+//! at what hangs on them. So cloth meets skin that was moved back, half-way on either side, where nobody sees it.
+
+use super::{Part, SurfaceFrame, SurfaceModel};
+use crate::math::{P3, V3};
+use crate::par::{self, Par};
+use serde::{Deserialize, Serialize};
+
+/// What is known about how near the parts are.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Apart {
+    seen: Vec<Seen>,
+    before: Vec<P3>,
+}
+
+/// What is known about one vertex.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Seen {
+    /// Nearest vertex of the other part.
+    nearest: u32,
+    /// How far both may move before it must be looked at again, metres.
+    room: f32,
+    /// Out of the other part, and how far it goes, metres.
+    way: V3,
+}
+
+/// No skin is moved back further than this, metres: deeper, and the surface does not know any more what is outside.
+const MOST: f32 = 0.02;
+/// Rounds of averaging over neighbours, so that the skin beside has no step.
+const ROUNDS: usize = 3;
+
+impl Apart {
+    /// Moves skin of `frame` back where less than `room` metres are left between parts, and renews its normals. `pressing`:
+    /// the part that presses on each vertex, 0 where that shall not count. Says how many vertices moved.
+    pub fn make_room(
+        &mut self,
+        par: Par,
+        model: &SurfaceModel,
+        pressing: &[Part],
+        frame: &mut SurfaceFrame,
+        room: f32,
+    ) -> usize {
+        model.update_normals(par, frame);
+        let n = frame.vertices.len();
+        let first = self.seen.len() != n;
+        if first {
+            self.seen = vec![Seen::default(); n];
+            self.before.clone_from(&frame.vertices);
+        }
+        let moved = self.before.iter().zip(&frame.vertices).map(|(a, b)| (a - b).norm_squared()).fold(0.0, f32::max);
+        let moved = 2.0 * moved.sqrt();
+        self.before.clone_from(&frame.vertices);
+        par::for_chunks(par, &mut self.seen, 256, |start, chunk| {
+            for (k, s) in chunk.iter_mut().enumerate() {
+                let (v, mask) = (start + k, pressing[start + k]);
+                if mask == 0 {
+                    continue;
+                }
+                if s.room > moved {
+                    s.room -= moved;
+                    continue;
+                }
+                let p = &frame.vertices[v];
+                if first {
+                    s.nearest = model.nearest_of_some(frame, p, mask);
+                }
+                let (near, hit) = model.closest_within(frame, p, s.nearest, mask, room);
+                (s.nearest, s.room, s.way) = (near, 0.0, V3::zeros());
+                match hit {
+                    Err(far) => s.room = far,
+                    Ok(c)
+                        if !c.rim
+                            && pressing[near as usize] != 0
+                            && c.signed < room
+                            && c.normal.dot(&frame.normals[v]) < 0.0 =>
+                    {
+                        s.way = c.normal * (0.5 * (room - c.signed)).min(MOST);
+                    }
+                    Ok(_) => {}
+                }
+            }
+        });
+        let count = self.seen.iter().filter(|s| s.way != V3::zeros()).count();
+        if count > 0 {
+            let mut ways: Vec<V3> = self.seen.iter().map(|s| s.way).collect();
+            let mut smooth = Vec::new();
+            for _ in 0..ROUNDS {
+                par::map_into(par, n, 1024, &mut smooth, |v| {
+                    let around = model.neighbours(v as u32);
+                    let sum = around.iter().fold(ways[v], |s, w| s + ways[*w as usize]);
+                    let mean = sum / (1 + around.len()) as f32;
+                    // What must go goes all its way.
+                    if mean.norm_squared() > self.seen[v].way.norm_squared() { mean } else { self.seen[v].way }
+                });
+                std::mem::swap(&mut ways, &mut smooth);
+            }
+            frame.vertices.iter_mut().zip(&ways).for_each(|(p, w)| *p += w);
+            model.update_normals(par, frame);
+        }
+        count
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::surface::tests::sphere;
+    use crate::mesh::{Topology, TriMesh};
+
+    /// Two spheres of radius 1, their centres `d` apart.
+    fn two(d: f32) -> (SurfaceModel, SurfaceFrame, Vec<Part>, usize) {
+        let one = sphere(4);
+        let n = one.vertices().len();
+        let mut faces = one.faces().to_vec();
+        faces.extend(one.faces().iter().map(|f| f.map(|v| v + n as u32)));
+        let along = V3::new(d, 0.0, 0.0);
+        let vertices: Vec<P3> =
+            one.vertices().iter().copied().chain(one.vertices().iter().map(|p| p + along)).collect();
+        let mesh = TriMesh::new(vertices.clone(), faces.clone()).expect("two spheres");
+        let parts: Vec<Part> = (0..2 * n).map(|i| if i < n { 1 } else { 2 }).collect();
+        let pressing = parts.iter().map(|p| 3 - p).collect();
+        let model = SurfaceModel::new(faces, Topology::new(&mesh).expect("topology"), parts);
+        (model, SurfaceFrame { vertices, normals: Vec::new() }, pressing, n)
+    }
+
+    #[test]
+    fn between_two_spheres_that_press_on_each_other_there_is_room_and_elsewhere_nothing_moves() {
+        const ROOM: f32 = 0.013;
+        // In each other by 1 cm, and just apart.
+        for d in [1.99, 2.005] {
+            let (model, mut frame, pressing, n) = two(d);
+            let before = frame.vertices.clone();
+            let count = Apart::default().make_room(Par::Seq, &model, &pressing, &mut frame, ROOM);
+            assert!(count > 0 && count < n / 4, "{count}");
+            // The poles lie opposite of each other, so each goes half of what is lacking.
+            let (low, high) = (frame.vertices[0].x, frame.vertices[n + 1].x);
+            assert!((high - low - ROOM).abs() < 1e-3, "{} m between the poles", high - low);
+            for (i, (a, b)) in before.iter().zip(&frame.vertices).enumerate() {
+                let other = P3::new(if i < n { d } else { 0.0 }, 0.0, 0.0);
+                let way = (a - b).norm();
+                assert!(way <= MOST + 1e-6);
+                // Three rounds of averaging reach three edges (6 cm each) further.
+                assert!(way < 1e-6 || (a - other).norm() < 1.0 + 0.2, "vertex {i} moved by {way} m");
+            }
+        }
+        let (model, mut frame, pressing, _) = two(2.1);
+        let before = frame.vertices.clone();
+        assert_eq!(Apart::default().make_room(Par::Seq, &model, &pressing, &mut frame, ROOM), 0);
+        assert_eq!(frame.vertices, before);
+    }
+
+    #[test]
+    fn what_was_known_before_gives_the_same_as_knowing_nothing() {
+        let mut known = Apart::default();
+        for d in [2.1, 2.0, 1.97, 2.004, 2.2] {
+            let (model, mut frame, pressing, _) = two(d);
+            let mut anew = SurfaceFrame { vertices: frame.vertices.clone(), normals: Vec::new() };
+            known.make_room(Par::Seq, &model, &pressing, &mut frame, 0.013);
+            Apart::default().make_room(Par::Rayon, &model, &pressing, &mut anew, 0.013);
+            let far = frame.vertices.iter().zip(&anew.vertices).map(|(a, b)| (a - b).norm()).fold(0.0, f32::max);
+            assert!(far < 1e-6, "{d}: {far} m");
+        }
+    }
+
+    #[test]
+    fn parts_that_do_not_press_are_left_alone() {
+        let (model, mut frame, mut pressing, n) = two(1.99);
+        pressing[n..].fill(0);
+        let before = frame.vertices.clone();
+        assert_eq!(Apart::default().make_room(Par::Seq, &model, &pressing, &mut frame, 0.013), 0);
+        assert_eq!(frame.vertices, before);
+    }
+}
