@@ -28,7 +28,7 @@ struct Seen {
 }
 
 /// No skin is moved back further than this, metres: deeper, and the surface does not know any more what is outside.
-const MOST: f32 = 0.02;
+const MOST: f32 = 0.035;
 /// Rounds of averaging over neighbours, so that the skin beside has no step.
 const ROUNDS: usize = 3;
 
