@@ -12,6 +12,7 @@ use std::path::PathBuf;
 use tryon::body::Template;
 use tryon::camera::ColorImage;
 use tryon::cloth::realtime::Config;
+use tryon::contact::MapDetail;
 use tryon::dressing::Dressed;
 use tryon::evaluate::Solid;
 use tryon::evaluate::dance::{Outfit, load};
@@ -78,6 +79,14 @@ fn main() {
             "--threads" => threads = value().parse().expect("a number"),
             "--most-steps" => outfit.config.most_steps = value().parse().expect("a number"),
             "--patch" => outfit.config.patch = value().parse().expect("a number"),
+            "--maps" => {
+                outfit.config.map_detail = match value().as_str() {
+                    "view" => MapDetail::InView,
+                    "fine" => MapDetail::Everywhere,
+                    "coarse" => MapDetail::Nowhere,
+                    other => panic!("--maps {other}: view, fine or coarse"),
+                }
+            }
             "--no-layers" => outfit.config.layers = false,
             "--no-folds" => outfit.config.self_collision = false,
             "--deepest" => deepest = value().parse().expect("a number"),

@@ -9,6 +9,6 @@ mod winding;
 
 pub use apart::Apart;
 pub use buried::Buried;
-pub use depth_maps::{DepthMaps, MapView};
+pub use depth_maps::{DepthMaps, MapDetail, MapView};
 pub use point_grid::PointGrid;
 pub use surface::{Closest, Part, SurfaceFrame, SurfaceModel};

@@ -223,7 +223,8 @@ impl Chain {
             root: self.tracked.world_from_camera * self.tracked.pose.root,
             angles: self.tracked.pose.angles.clone(),
         };
-        let options = DressOptions { config: realtime::Config::tracked(), ..DressOptions::default() };
+        let config = realtime::Config::tracked().seen_from(&self.tracked.world_from_camera);
+        let options = DressOptions { config, ..DressOptions::default() };
         let dressed = dress_all(template, rest, &pose, &wear, &options).context("the garments cannot be put on")?;
         let looks = dressed.model.outfit.garments.iter().map(|g| look(&g.name)).collect();
         Ok(Worn { model: dressed.model, state: dressed.state, work: realtime::Workspace::default(), looks })

@@ -31,6 +31,7 @@ pub(crate) struct Body {
     pub(crate) template: Arc<Template>,
     pub(crate) shape: Arc<BodyShape>,
     pose: Pose<World>,
+    world_from_camera: Rigid<World, Camera>,
     pub(crate) state: BodyState,
 }
 
@@ -44,7 +45,7 @@ impl Body {
         let pose = pose_from_wire(pose, template.skeleton().dofs()).map_err(fault)?;
         stages_from_wire(&state.stages, "stages").map_err(fault)?;
         let pose = Pose { root: world * pose.root, angles: pose.angles };
-        Ok(Self { template, shape, pose, state })
+        Ok(Self { template, shape, pose, world_from_camera: world, state })
     }
     fn time_ns(&self) -> u64 {
         self.state.frame.map_or(0, |f| f.capture_time_ns)
@@ -133,7 +134,8 @@ pub(crate) fn dress(body: &Body, choices: &[GarmentChoice], library: &Library) -
         })
         .collect();
     // A shopper may see herself in a size that does not fit; the fit says so.
-    let options = DressOptions { config: realtime::Config::tracked(), any_size: true, ..DressOptions::default() };
+    let config = realtime::Config::tracked().seen_from(&body.world_from_camera);
+    let options = DressOptions { config, any_size: true, ..DressOptions::default() };
     let dressed = dressing::dress_all(&body.template, &rest, &body.pose, &list, &options);
     let dressed = dressed.map_err(|e| e.to_string())?;
     // The outfit comes back in the order of its layers, and a mesh may have become several garments.

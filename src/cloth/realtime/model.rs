@@ -4,9 +4,9 @@ use crate::body::{SkinWeights, Template};
 use crate::cloth::folds::FoldModel;
 use crate::cloth::small_steps::{Fabric, Fit, Plan};
 use crate::cloth::{ClothError, Sheet};
-use crate::contact::{MapView, SurfaceModel};
+use crate::contact::{MapDetail, MapView, SurfaceModel};
 use crate::garment::{GarmentMesh, Region};
-use crate::math::{P3, V3};
+use crate::math::{Camera, P3, Rigid, V3, World};
 use crate::mesh::Topology;
 use serde::{Deserialize, Serialize};
 
@@ -52,6 +52,8 @@ pub struct Config {
     pub offset: f64,
     /// Horizontal direction the real camera looks along, world x and z: its depth map is the fine one.
     pub camera_toward: [f32; 2],
+    /// Which depth maps of the body are fine.
+    pub map_detail: MapDetail,
     /// Press inner layers under outer ones where they meet.
     pub layers: bool,
     /// Keep the folds of a garment apart.
@@ -82,6 +84,7 @@ impl Default for Config {
             gravity: [0.0, -9.81, 0.0],
             offset: 0.005,
             camera_toward: [0.0, -1.0],
+            map_detail: MapDetail::InView,
             layers: true,
             self_collision: true,
             thickness: 0.003,
@@ -101,6 +104,14 @@ impl Config {
         /// 5 mm twice as much of that was left, metres.
         const TREMBLE: f64 = 8e-3;
         Self { steady: TREMBLE, ..Self::default() }
+    }
+    /// The same for a camera that stands there. One that looks straight down or up leaves the direction as it is.
+    #[must_use]
+    pub fn seen_from(self, world_from_camera: &Rigid<World, Camera>) -> Self {
+        let axis = world_from_camera.vector(&crate::math::V3d::z());
+        /// Sine of the angle to the vertical below which a direction says nothing.
+        const LEVEL: f64 = 1e-3;
+        if axis.x.hypot(axis.z) < LEVEL { self } else { Self { camera_toward: [axis.x as f32, axis.z as f32], ..self } }
     }
 }
 
@@ -273,7 +284,7 @@ impl Model {
             surface: SurfaceModel::new(template.mesh().faces().to_vec(), Topology::new(template.mesh())?, parts),
             weights: template.weights().clone(),
             joints: template.skeleton().len(),
-            views: MapView::around(config.camera_toward),
+            views: MapView::around(config.camera_toward, config.map_detail),
             garments,
             outfit,
             config,
@@ -330,5 +341,35 @@ impl Model {
     /// Distance from the skin of one garment's layer, metres.
     pub(crate) fn offset(&self, garment: usize) -> f64 {
         self.garments[garment].offset
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+
+    #[test]
+    fn the_fine_map_looks_where_the_camera_looks() {
+        use crate::math::V3d;
+        let turned = |axis, angle: f64| -> Rigid<Camera, Camera> {
+            Rigid::from_parts(V3d::zeros(), UnitQuaternion::from_axis_angle(&axis, angle))
+        };
+        let level = Rigid::<World, Camera>::level(1.2);
+        let toward = |camera: Rigid<Camera, Camera>| {
+            let [x, z] = Config::tracked().seen_from(&(level * camera)).camera_toward;
+            let n = x.hypot(z);
+            [x / n, z / n]
+        };
+        let close = |a: [f32; 2], b: [f32; 2]| (a[0] - b[0]).abs() < 1e-6 && (a[1] - b[1]).abs() < 1e-6;
+        // Tilted down or mounted upright it looks along −z all the same: that is what the default says.
+        let default = Config::default().camera_toward;
+        assert!(close(toward(turned(V3d::x_axis(), -0.3)), default));
+        assert!(close(toward(turned(V3d::z_axis(), std::f64::consts::FRAC_PI_2)), default));
+        // Turned to its right (about its own axis down) it looks towards +x.
+        let (sin, cos) = 0.5f32.sin_cos();
+        assert!(close(toward(turned(V3d::y_axis(), 0.5)), [sin, -cos]));
+        // Straight down: nothing is level, the default stays.
+        assert!(close(toward(turned(V3d::x_axis(), -std::f64::consts::FRAC_PI_2)), default));
     }
 }
