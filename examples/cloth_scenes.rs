@@ -107,6 +107,6 @@ fn main() {
         q.energy_end,
         q.fold_contacts,
         q.fold_searches_skipped,
-        positions.iter().skip(5).step_by(5).map(|p| crossings(&s.faces, p)).max().unwrap_or(0)
+        positions.iter().skip(5).step_by(5).map(|p| crossings(&s.faces, p).len()).max().unwrap_or(0)
     );
 }
