@@ -172,7 +172,9 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         report.stages_ms.solve += ms(timer);
     }
     let timer = Instant::now();
-    for_patches(model, &mut work.patches, |g, k, p| settle(model, g, k, &state.buried, &work.after, p));
+    for_patches(model, &mut work.patches, |g, k, p| {
+        settle(model, g, k, &state.buried, &work.after, &state.garments[g].nearest, p)
+    });
     report.stages_ms.contact += ms(timer);
     let timer = Instant::now();
     let speed = finish(model, state, &work.patches, dt, &mut report);

@@ -11,6 +11,10 @@ use crate::math::{P3, V3};
 const REACH: f32 = 0.04;
 /// Cloth that ends a call under the skin is put this far above it, metres: less than a fabric's thickness.
 const LIFTED: f32 = 5e-4;
+/// Deeper in another part of the body cloth is left where it is, metres: it may have come from the other side.
+const OTHER_DEPTH: f32 = 0.01;
+/// Skin so far from where a walk began may have a nearer point, metres.
+const ELSEWHERE: f32 = 0.025;
 /// Cloth longer than this, over its rest length, is about to tear: more than knitwear is worn at.
 const TORN: f32 = 1.5;
 /// Anchors of strength ½ go to their place at this rate, 1/s.
@@ -190,13 +194,15 @@ fn above(a: &super::AnchorBinding, [p, q, r]: [P3; 3]) -> P3 {
     P3::from(on + normal * a.height)
 }
 
-/// Measures how deep cloth is under the skin of its own parts where that holds it, and lifts what is.
+/// Measures how deep cloth is under the skin where that holds it, and lifts what is. `told` are the nearest body vertices
+/// of all the garment's vertices at the beginning of the call.
 pub(super) fn settle(
     model: &Model,
     garment: usize,
     patch: usize,
     buried: &Buried,
     after: &SurfaceFrame,
+    told: &[[u32; 2]],
     p: &mut PatchScratch,
 ) {
     let g = &model.garments[garment];
@@ -209,15 +215,42 @@ pub(super) fn settle(
         }
         last = i;
         let i = i as usize;
-        let own = g.own[f.vertices[i] as usize];
-        let x = p3(p.motion.position(i));
-        let c = model.surface.closest(after, &x, p.nearest[i][0], own);
-        if c.rim || c.signed >= LIFTED || buried.holds_nothing(model.surface.faces()[c.face as usize]) {
-            continue;
+        let v = f.vertices[i] as usize;
+        // The own parts have the last word.
+        for (side, mask) in [(1, g.other[v]), (0, g.own[v])].into_iter().filter(|s| s.1 != 0) {
+            let x = p3(p.motion.position(i));
+            let around = g.folds.surface.neighbours(v as u32).iter().map(|w| told[*w as usize][side]);
+            let c = nearest_skin(model, after, &x, p.nearest[i][side], around, mask);
+            let elsewhere = side == 1 && c.signed < -OTHER_DEPTH;
+            let nothing = buried.holds_nothing(model.surface.faces()[c.face as usize]);
+            if c.rim || c.signed >= LIFTED || elsewhere || nothing {
+                continue;
+            }
+            p.report.penetration = p.report.penetration.max(f64::from(-c.signed));
+            p.motion.moved[i] = v4(&(c.point + c.normal * LIFTED - p3(p.motion.start[i])));
+            let again = model.surface.closest(after, &p3(p.motion.position(i)), c.vertex, mask);
+            p.report.penetration_left = p.report.penetration_left.max(f64::from(-again.signed));
         }
-        p.report.penetration = p.report.penetration.max(f64::from(-c.signed));
-        p.motion.moved[i] = v4(&(c.point + c.normal * LIFTED - p3(p.motion.start[i])));
-        let again = model.surface.closest(after, &p3(p.motion.position(i)), c.vertex, own);
-        p.report.penetration_left = p.report.penetration_left.max(f64::from(-again.signed));
     }
+}
+
+/// The nearest point by walks from `near` and from what the cloth around knows, where that is elsewhere: in the crook of an
+/// elbow a walk ends on the upper arm though the forearm is nearer.
+fn nearest_skin(
+    model: &Model,
+    after: &SurfaceFrame,
+    x: &P3,
+    near: u32,
+    around: impl Iterator<Item = u32>,
+    mask: u8,
+) -> Closest {
+    let place = |v: u32| after.vertices[v as usize];
+    let mut best = model.surface.closest(after, x, near, mask);
+    for start in around.filter(|v| (place(*v) - place(near)).norm_squared() > ELSEWHERE * ELSEWHERE) {
+        let other = model.surface.closest(after, x, start, mask);
+        if !other.rim && other.signed.abs() < best.signed.abs() {
+            best = other;
+        }
+    }
+    best
 }
