@@ -71,6 +71,10 @@ impl FoldModel {
         let edge = lengths.get(lengths.len() * 95 / 100).copied().unwrap_or(0.0);
         Self { close: surface.second_neighbours(), surface, edge }
     }
+    /// Length that 95 % of the edges do not exceed, metres.
+    pub(crate) fn edge(&self) -> f32 {
+        self.edge
+    }
     /// A search in worn garments, whose planes are kept for `span` seconds.
     pub(crate) fn search(&self, thickness: f32, span: f32) -> Search {
         let reach = (thickness + CLOSING * span).min(MOST_REACH).min(REACH_EDGES * self.edge);

@@ -4,6 +4,7 @@ mod crossings;
 mod error;
 mod folds;
 pub mod membrane;
+mod pieces;
 pub mod quasi_newton;
 pub mod realtime;
 pub mod scene;

@@ -4,6 +4,7 @@
 
 pub mod ablation;
 pub mod cloth;
+pub mod cloth_rest;
 pub mod dance;
 mod inside;
 mod plot;

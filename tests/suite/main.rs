@@ -3,6 +3,7 @@
 #![allow(clippy::print_stdout)] // and say what they measured
 
 mod cloth;
+mod cloth_rest;
 mod common;
 mod company;
 mod dance;

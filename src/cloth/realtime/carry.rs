@@ -39,11 +39,24 @@ const ROUNDS: usize = 6;
 /// Moves sleeping cloth by the way of the skin at `nearest` (one body vertex each), averaged over cloth neighbours. Ways are
 /// sums, so that a body that comes back brings its cloth back, whatever way it took.
 pub(super) fn ride(edges: &[([u32; 2], f64)], nearest: &[[u32; 2]], from: &[P3], to: &[P3], positions: &mut [P3]) {
+    let ways = ways(edges, nearest, from, to, |_| true);
+    positions.iter_mut().zip(&ways).for_each(|(p, w)| *p += w);
+}
+
+/// The way of the skin under each vertex that `rides`, averaged over neighbours that do.
+pub(super) fn ways(
+    edges: &[([u32; 2], f64)],
+    nearest: &[[u32; 2]],
+    from: &[P3],
+    to: &[P3],
+    rides: impl Fn(usize) -> bool,
+) -> Vec<V3> {
     let mut ways: Vec<V3> = nearest.iter().map(|n| to[n[0] as usize] - from[n[0] as usize]).collect();
+    let edges: Vec<[usize; 2]> =
+        edges.iter().map(|(v, _)| v.map(|v| v as usize)).filter(|v| rides(v[0]) && rides(v[1])).collect();
     for _ in 0..ROUNDS {
         let mut sums: Vec<(V3, f32)> = ways.iter().map(|w| (*w, 1.0)).collect();
-        for ([a, b], _) in edges {
-            let (a, b) = (*a as usize, *b as usize);
+        for [a, b] in edges.iter().copied() {
             sums[a].0 += ways[b];
             sums[b].0 += ways[a];
             sums[a].1 += 1.0;
@@ -51,7 +64,7 @@ pub(super) fn ride(edges: &[([u32; 2], f64)], nearest: &[[u32; 2]], from: &[P3],
         }
         ways.iter_mut().zip(&sums).for_each(|(w, (sum, n))| *w = sum / *n);
     }
-    positions.iter_mut().zip(&ways).for_each(|(p, w)| *p += w);
+    ways
 }
 
 /// Moves `positions` as skin bound to the body at `nearest` (one body vertex each) would.

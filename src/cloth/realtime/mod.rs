@@ -3,6 +3,7 @@
 mod carry;
 mod cloth_touch;
 mod model;
+mod regions;
 mod state;
 mod steady;
 mod step;

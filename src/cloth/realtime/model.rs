@@ -1,7 +1,9 @@
 //! What stays the same while an outfit is worn.
 
+use super::regions::{REGION, Regions, clusters};
 use crate::body::{SkinWeights, Template};
 use crate::cloth::folds::FoldModel;
+use crate::cloth::pieces::Pieces;
 use crate::cloth::small_steps::{Fabric, Fit, Plan};
 use crate::cloth::{ClothError, Sheet};
 use crate::contact::{MapDetail, MapView, SurfaceModel};
@@ -68,6 +70,10 @@ pub struct Config {
     pub steady: f64,
     /// Let cloth sleep when it and the body are still.
     pub sleep: bool,
+    /// Let regions of it sleep while others move, if it may sleep at all.
+    pub sleep_regions: bool,
+    /// Leave out searches for skin and for other folds of vertices that cannot have come near them since the last one.
+    pub skip_far: bool,
     /// A body vertex that moves further than this between two calls has jumped, metres.
     pub teleport: f64,
     /// Threads.
@@ -91,6 +97,8 @@ impl Default for Config {
             reach: 0.008,
             steady: 0.0,
             sleep: true,
+            sleep_regions: true,
+            skip_far: true,
             teleport: 0.2,
             par: crate::par::Par::Rayon,
         }
@@ -136,6 +144,7 @@ pub(super) struct GarmentModel {
     pub(super) offset: f64,
     /// The garment itself as something to touch.
     pub(super) folds: FoldModel,
+    pub(super) regions: Regions,
     /// Local vertex and number of the binding, for each patch.
     pub(super) anchors: Vec<Vec<(u32, usize)>>,
 }
@@ -153,6 +162,8 @@ pub struct Model {
     pub(super) opposite: Vec<u8>,
     /// The same where both are thick: part of the body that presses on each of its vertices.
     pub(super) pressing: Vec<u8>,
+    /// Its vertices, some at a time.
+    pub(super) clusters: Pieces,
     pub(super) weights: SkinWeights,
     pub(super) joints: usize,
     pub(super) views: [MapView; 4],
@@ -256,13 +267,14 @@ impl Model {
             let fit = Fit { h, ahead: config.ahead, springs_only: false, bend_every, smooth };
             let plan = Plan::new(&sheet, &fit);
             // A step moves news by one ring and by one more for each degree, an evaluation of bending by one more.
-            let patches = plan.patches(g.vertices.div_ceil(config.patch), 1 + smooth + 1);
+            let patches = plan.patches(g.vertices.div_ceil(config.patch), 1 + smooth + 1, REGION);
             let own: Vec<u8> = g.regions.iter().map(|r| r.decisive().0).collect();
             let other = own.iter().map(|o| Region::ALL.0 & !o).collect();
             // Evenly between the skin and where the outermost lies.
             let offset = config.offset * (order + 1) as f64 / outfit.garments.len() as f64;
             let surface = SurfaceModel::new(g.faces.clone(), g.topology()?, own.clone());
-            let lengths = sheet.edges.iter().map(|e| e.1 as f32).collect::<Vec<_>>().into_iter();
+            let folds = FoldModel::new(surface, sheet.edges.iter().map(|e| e.1 as f32));
+            let regions = Regions::new(&patches, g.vertices, &sheet.edges, folds.edge());
             garments.push(GarmentModel {
                 sheet,
                 patches,
@@ -273,15 +285,19 @@ impl Model {
                 own,
                 other,
                 offset,
-                folds: FoldModel::new(surface, lengths),
+                folds,
+                regions,
                 anchors: Vec::new(),
             });
         }
         let parts = body_parts(template);
+        let opposite = opposites(template, &parts);
+        let surface = SurfaceModel::new(template.mesh().faces().to_vec(), Topology::new(template.mesh())?, parts);
         let mut model = Self {
-            pressing: pressing(template, opposites(template, &parts)),
-            opposite: opposites(template, &parts),
-            surface: SurfaceModel::new(template.mesh().faces().to_vec(), Topology::new(template.mesh())?, parts),
+            pressing: pressing(template, opposite.clone()),
+            opposite,
+            clusters: clusters(&surface),
+            surface,
             weights: template.weights().clone(),
             joints: template.skeleton().len(),
             views: MapView::around(config.camera_toward, config.map_detail),

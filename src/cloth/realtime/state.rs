@@ -1,6 +1,7 @@
 //! What changes from step to step, what goes in and what comes out.
 
 use super::Model;
+use super::regions::Rest;
 use crate::cloth::ClothError;
 use crate::cloth::folds::FoldFrame;
 use crate::cloth::small_steps::{Motion, Plane, Tie};
@@ -38,6 +39,9 @@ pub struct State {
     /// The measured body, held steady; empty before the first step.
     #[serde(default)]
     pub(super) followed: Vec<P3>,
+    /// What of the cloth sleeps by itself.
+    #[serde(default)]
+    pub(super) rest: Rest,
     /// Steps so far.
     pub frames: u64,
     /// Steps in a row with body and cloth still.
@@ -146,6 +150,9 @@ pub struct StepReport {
     pub sleeping: usize,
     /// Searches for the nearest skin that were left out because the vertex was too far away to reach it.
     pub searches_skipped: usize,
+    /// Searches for other folds of the same garment that were left out for the same reason.
+    #[serde(default)]
+    pub fold_searches_skipped: usize,
     /// Vertices held off another layer or another fold of the same garment.
     pub cloth_contacts: usize,
     /// Contact planes of other body parts ignored because there was no room between them and the vertex's own part.
@@ -192,6 +199,8 @@ pub struct Workspace {
 pub(super) struct PatchScratch {
     pub(super) motion: Motion,
     pub(super) nearest: Vec<[u32; 2]>,
+    /// Vertices that sleep.
+    pub(super) asleep: Vec<bool>,
     /// Room to the nearest skin of both kinds of parts that is left before it must be looked for again, metres.
     pub(super) clear: Vec<[f32; 2]>,
     pub(super) layers: Vec<Vec<u32>>,

@@ -3,6 +3,7 @@
 use super::carry::{carry, ride};
 use super::cloth_touch::{ClothTouch, sheets};
 use super::model::{Model, RECALLED};
+use super::regions::{carry_on, fall_asleep, wake, wake_all};
 use super::state::{Input, PatchScratch, State, StepReport, Workspace, check_body};
 use super::steady::follow;
 use super::touch::{Touch, anchors, settle};
@@ -113,6 +114,7 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         state.body.copy_from_slice(input.body);
     }
     let dt = input.dt.clamp(DT_RANGE[0], DT_RANGE[1]);
+    wake(model, state, input.body, dt, teleported);
     let timer = Instant::now();
     // Two opposite views in turn: a map only proposes where to begin looking, and all are wanted after a jump.
     let turn = state.frames as usize % 2 * 2;
@@ -161,6 +163,9 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
             anchors(model, g, k, &touch, p);
             let fabric = &model.garments[g].patches[k];
             p.planes.clear();
+            if !config.skip_far {
+                p.clear.fill([0.0; 2]);
+            }
             touch.find(g, fabric, maps, p);
             p.body_planes = p.planes.len();
             cloth.folds(g, fabric, p);
@@ -177,9 +182,16 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
     });
     report.stages_ms.contact += ms(timer);
     let timer = Instant::now();
+    for_patches(model, &mut work.patches, |_, _, p| carry_on(p, dt));
     let speed = finish(model, state, &work.patches, dt, &mut report);
     report.steps = model.garments.iter().map(|g| rounds * steps(g.h, span)).max().unwrap_or(0);
     report.speed = f64::from(speed);
+    report.sleeping = state.rest.sleeping(model);
+    if report.kept_last_good.is_some() {
+        wake_all(state);
+    } else {
+        fall_asleep(model, state, &work.patches, input.body, dt);
+    }
     state.stale = if report.kept_last_good.is_some() { state.stale + 1 } else { 0 };
     let quiet = is_quiet(config.steady, state, input.body);
     if !quiet {
@@ -211,7 +223,7 @@ fn sleeps_on(steady: f64, state: &State, body: &[P3]) -> bool {
 }
 
 /// How far skin under cloth, and any other, may be from where it last stirred, metres.
-fn stillness(steady: f64) -> [f32; 2] {
+pub(super) fn stillness(steady: f64) -> [f32; 2] {
     let still = STILL_BODY.max(0.5 * steady as f32);
     [still, if steady > 0.0 { ELSEWHERE * still } else { still }]
 }
@@ -257,6 +269,9 @@ fn begin(model: &Model, state: &State, all: &mut Vec<PatchScratch>) {
             local().map(|v| v4(from.positions[v].x, from.positions[v].y, from.positions[v].z)),
             local().map(|v| v4(from.velocities[v].x, from.velocities[v].y, from.velocities[v].z)),
         );
+        p.asleep.clear();
+        p.asleep.extend(fabric.vertices.iter().map(|v| state.rest.sleeps(model, g, *v)));
+        p.motion.leave(fabric, &p.asleep);
         p.nearest.clear();
         p.nearest.extend(local().map(|v| from.nearest[v]));
         p.layers.resize_with(from.layers.len(), Vec::new);
@@ -362,6 +377,7 @@ fn finish(model: &Model, state: &mut State, all: &[PatchScratch], dt: f64, repor
             report.pinched += r.pinched;
             report.cloth_contacts += r.cloth_contacts;
             report.searches_skipped += r.searches_skipped;
+            report.fold_searches_skipped += r.fold_searches_skipped;
             report.penetration = report.penetration.max(r.penetration);
             report.penetration_left = report.penetration_left.max(r.penetration_left);
         }

@@ -161,9 +161,10 @@ pub(super) fn anchors(model: &Model, garment: usize, patch: usize, touch: &Touch
     p.ties.clear();
     p.tied.clear();
     let g = &model.garments[garment];
-    p.tied.resize(g.patches[patch].vertices.len(), false);
+    // Cloth that sleeps is held by nothing else either.
+    p.tied.extend_from_slice(&p.asleep);
     for (local, a) in model.anchors_of(garment, patch) {
-        if a.strength <= 0.0 {
+        if a.strength <= 0.0 || p.asleep[local as usize] {
             continue;
         }
         let start = place(a, &touch.now.vertices);

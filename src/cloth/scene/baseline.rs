@@ -32,7 +32,7 @@ pub(super) fn run(
     // A plan for a step so short that nothing is softened: both are stable at any step.
     let fit = Fit { h: 1e-9, ahead: 0.0, springs_only: springs, bend_every, smooth: 0 };
     let plan = Plan::new(&scene.sheet, &fit);
-    let fabrics = plan.patches(1, 0);
+    let fabrics = plan.patches(1, 0, 0);
     let Some(f) = fabrics.first() else {
         return Err(ClothError::Count { what: "vertices", got: 0, expected: 1 }.into());
     };

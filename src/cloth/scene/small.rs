@@ -57,7 +57,7 @@ pub(super) fn run(
     let plan = Plan::new(sheet, &Fit { h, ahead: config.ahead, springs_only: false, bend_every, smooth });
     // A step moves news by one ring and by one more for each degree, an evaluation of bending before it by one more.
     // Patches meet after every step: what ghosts cost is more than the meeting.
-    let fabrics = plan.patches(config.patches, 1 + smooth + 1);
+    let fabrics = plan.patches(config.patches, 1 + smooth + 1, 0);
     let borders = Borders::new(fabrics.len());
     let start: Vec<V3d> = scene.start.iter().map(|p| p.coords.cast()).collect();
     let local: Vec<V3d> = match scene.pinned_to {

@@ -5,8 +5,9 @@
 //! not depend on the number of threads.
 
 use super::blocks::{Hinges, Quads, hinges, quads};
-use super::lanes::Place;
+use super::lanes::{LANES, Place};
 use super::plan::{Bent, Plan, Triangle};
+use crate::cloth::pieces;
 
 /// The most vertices a patch may have.
 pub(super) const MOST: usize = 1 << 15;
@@ -37,6 +38,8 @@ pub struct Fabric {
     pub vertices: Vec<u32>,
     /// Number of owned vertices.
     pub owned: usize,
+    /// Where its regions begin among the owned vertices, and how many those are: compact pieces that may sleep.
+    pub regions: Vec<usize>,
     /// Vertices within so many rings of the owned ones.
     pub(super) within: Vec<usize>,
     /// Owned vertices that others have as ghosts.
@@ -68,8 +71,9 @@ impl Fabric {
 }
 
 impl Plan {
-    /// Cuts the sheet into patches: as many as asked for, more where they would be too large.
-    pub fn patches(&self, wanted: usize, rings: usize) -> Vec<Fabric> {
+    /// Cuts the sheet into patches: as many as asked for, more where they would be too large; and these into regions of at
+    /// most `region` vertices, if that is not 0.
+    pub fn patches(&self, wanted: usize, rings: usize, region: usize) -> Vec<Fabric> {
         let n = self.vertices();
         let mut around = vec![Vec::new(); n];
         for e in &self.ends {
@@ -90,9 +94,13 @@ impl Plan {
             self.ends.iter().filter(|e| of[e[0] as usize] != of[e[1] as usize]).count()
         };
         let sets = orders.into_iter().map(bands).min_by_key(cut).unwrap_or_default();
+        let whole = |set: Vec<u32>| pieces::Pieces { starts: vec![0, set.len()], order: set };
+        let in_regions = |set| pieces::cut(n, |v| &around[v as usize], set, region, LANES);
+        let sets: Vec<pieces::Pieces> =
+            sets.into_iter().map(|set| if region > 0 { in_regions(set) } else { whole(set) }).collect();
         let mut owner = vec![[0u32; 2]; n];
         for (p, set) in sets.iter().enumerate() {
-            for (i, v) in set.iter().enumerate() {
+            for (i, v) in set.order.iter().enumerate() {
                 owner[*v as usize] = [p as u32, i as u32];
             }
         }
@@ -170,7 +178,8 @@ impl Plan {
         rims
     }
 
-    fn patch(&self, mut set: Vec<u32>, rings: usize, around: &[Vec<u32>], owner: &[[u32; 2]]) -> Fabric {
+    fn patch(&self, own: pieces::Pieces, rings: usize, around: &[Vec<u32>], owner: &[[u32; 2]]) -> Fabric {
+        let pieces::Pieces { order: mut set, starts: regions } = own;
         let owned = set.len();
         let mut local = vec![u32::MAX; self.vertices()];
         set.iter().enumerate().for_each(|(i, v)| local[*v as usize] = i as u32);
@@ -233,6 +242,7 @@ impl Plan {
             ghosts: set[owned..].iter().map(|v| owner[*v as usize]).collect(),
             border: Vec::new(),
             owned,
+            regions,
             vertices: set,
             damping: self.damping,
         }

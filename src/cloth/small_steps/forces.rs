@@ -1,5 +1,6 @@
 //! The inner loop: forces of a sheet, and velocities after a step.
 
+use super::awake::{before, part};
 use super::contact::{Plane, Tie};
 use super::fabric::{Fabric, MOST, Rows};
 use super::lanes::{self, Lanes, add3, dot, inverse_root, mul_add3, scale3, sub3};
@@ -113,14 +114,23 @@ impl Motion {
     fn advance_kernel(&mut self, _: impl Lanes, f: &Fabric, step: &Step, fastest: f32) {
         let (h, ahead, most) = (step.h, step.h * step.ahead, fastest * fastest);
         let n = f.reach(step.rings);
-        let all = self.moved[..n].iter_mut().zip(&mut self.velocity).zip(&self.start);
-        for (((m, v), s), a) in all.zip(self.work.ahead.iter_mut()) {
-            let square = v.dot(*v);
-            if square > most {
-                *v = v.scale(fastest / square.sqrt());
+        let Work { ahead: look, awake, .. } = &mut self.work;
+        let whole = 0..n;
+        for r in part(awake, &whole, |a| &a.vertices) {
+            let r = before(r, n);
+            let all = self.moved[r.clone()].iter_mut().zip(&mut self.velocity[r.clone()]).zip(&self.start[r.clone()]);
+            for (((m, v), s), a) in all.zip(look[r].iter_mut()) {
+                let square = v.dot(*v);
+                if square > most {
+                    *v = v.scale(fastest / square.sqrt());
+                }
+                *m = *m + v.scale(h);
+                *a = *s + *m + v.scale(ahead);
             }
-            *m = *m + v.scale(h);
-            *a = *s + *m + v.scale(ahead);
+        }
+        for i in awake.iter().flat_map(|a| &a.rim).map(|i| *i as usize) {
+            self.moved[i] = self.moved[i] + self.velocity[i].scale(h);
+            look[i & MASK] = self.start[i] + self.moved[i] + self.velocity[i].scale(ahead);
         }
     }
 
@@ -130,50 +140,62 @@ impl Motion {
         if !self.work.looked {
             self.look_ahead(step.h * step.ahead);
         }
-        let Work { ahead, push, bending, .. } = &mut self.work;
+        let Work { ahead, push, bending, awake, .. } = &mut self.work;
         let (x, push): (&[V4; MOST], &mut [V4; MOST]) = (ahead, push);
         let rings = step.rings.saturating_add(f.smoothing.len() - 1);
         let n = f.reach(rings);
         // Pairs of triangles at the rim reach two rings further.
         let around = f.reach(rings.saturating_add(2));
-        push[..around].copy_from_slice(&bending[..around]);
+        let (whole, whole_n) = (0..around, 0..n);
+        for r in part(awake, &whole, |a| &a.seen) {
+            let r = before(r, around);
+            push[r.clone()].copy_from_slice(&bending[r]);
+        }
         let shortest = l.splat(SHORTEST * SHORTEST);
         let blocks = f.quads.partition_point(|q| q.lowest() < n);
-        for q in &f.quads[..blocks] {
-            let ab = l.between(x, &q.v[0], &q.v[1]);
-            let ac = l.between(x, &q.v[0], &q.v[2]);
-            let ad = l.between(x, &q.v[0], &q.v[3]);
-            let (bc, bd) = (sub3(l, ac, ab), sub3(l, ad, ab));
-            let (ab1, ab2) = spring(l, ab, &q.rest[0], shortest);
-            let (ac1, ac2) = spring(l, ac, &q.rest[1], shortest);
-            let (bc1, bc2) = spring(l, bc, &q.rest[2], shortest);
-            let (ad1, ad2) = spring(l, ad, &q.rest[3], shortest);
-            let (bd1, bd2) = spring(l, bd, &q.rest[4], shortest);
-            let [k0, k1, k2, k3, k4] =
-                [l.load(&q.k[0]), l.load(&q.k[1]), l.load(&q.k[2]), l.load(&q.k[3]), l.load(&q.k[4])];
-            let [k01, k02, k03, k04] = [l.load(&q.k[5]), l.load(&q.k[6]), l.load(&q.k[7]), l.load(&q.k[8])];
-            let [k12, k34] = [l.load(&q.k[9]), l.load(&q.k[10])];
-            // Tensions over lengths.
-            let t0 = l.mul_add(k04, bd2, l.mul_add(k03, ad2, dot(l, [k0, k01, k02], [ab2, ac2, bc2])));
-            let t0 = l.mul(t0, ab1);
-            let t1 = l.mul(dot(l, [k01, k1, k12], [ab2, ac2, bc2]), ac1);
-            let t2 = l.mul(dot(l, [k02, k12, k2], [ab2, ac2, bc2]), bc1);
-            let t3 = l.mul(dot(l, [k03, k3, k34], [ab2, ad2, bd2]), ad1);
-            let t4 = l.mul(dot(l, [k04, k34, k4], [ab2, ad2, bd2]), bd1);
-            let c = mul_add3(l, ac, t1, scale3(l, bc, t2));
-            let d = mul_add3(l, ad, t3, scale3(l, bd, t4));
-            let a = mul_add3(l, ab, t0, mul_add3(l, ac, t1, scale3(l, ad, t3)));
-            // All that pulls at c and d, and what pulls at a is taken from that.
-            let b = sub3(l, add3(l, c, d), a);
-            let zero = l.splat(0.0);
-            l.put(push, &q.v[0], a);
-            l.put(push, &q.v[1], b);
-            l.put(push, &q.v[2], sub3(l, [zero; 3], c));
-            l.put(push, &q.v[3], sub3(l, [zero; 3], d));
+        let all = 0..blocks;
+        for r in part(awake, &all, |a| &a.quads) {
+            for q in &f.quads[before(r, blocks)] {
+                let ab = l.between(x, &q.v[0], &q.v[1]);
+                let ac = l.between(x, &q.v[0], &q.v[2]);
+                let ad = l.between(x, &q.v[0], &q.v[3]);
+                let (bc, bd) = (sub3(l, ac, ab), sub3(l, ad, ab));
+                let (ab1, ab2) = spring(l, ab, &q.rest[0], shortest);
+                let (ac1, ac2) = spring(l, ac, &q.rest[1], shortest);
+                let (bc1, bc2) = spring(l, bc, &q.rest[2], shortest);
+                let (ad1, ad2) = spring(l, ad, &q.rest[3], shortest);
+                let (bd1, bd2) = spring(l, bd, &q.rest[4], shortest);
+                let [k0, k1, k2, k3, k4] =
+                    [l.load(&q.k[0]), l.load(&q.k[1]), l.load(&q.k[2]), l.load(&q.k[3]), l.load(&q.k[4])];
+                let [k01, k02, k03, k04] = [l.load(&q.k[5]), l.load(&q.k[6]), l.load(&q.k[7]), l.load(&q.k[8])];
+                let [k12, k34] = [l.load(&q.k[9]), l.load(&q.k[10])];
+                // Tensions over lengths.
+                let t0 = l.mul_add(k04, bd2, l.mul_add(k03, ad2, dot(l, [k0, k01, k02], [ab2, ac2, bc2])));
+                let t0 = l.mul(t0, ab1);
+                let t1 = l.mul(dot(l, [k01, k1, k12], [ab2, ac2, bc2]), ac1);
+                let t2 = l.mul(dot(l, [k02, k12, k2], [ab2, ac2, bc2]), bc1);
+                let t3 = l.mul(dot(l, [k03, k3, k34], [ab2, ad2, bd2]), ad1);
+                let t4 = l.mul(dot(l, [k04, k34, k4], [ab2, ad2, bd2]), bd1);
+                let c = mul_add3(l, ac, t1, scale3(l, bc, t2));
+                let d = mul_add3(l, ad, t3, scale3(l, bd, t4));
+                let a = mul_add3(l, ab, t0, mul_add3(l, ac, t1, scale3(l, ad, t3)));
+                // All that pulls at c and d, and what pulls at a is taken from that.
+                let b = sub3(l, add3(l, c, d), a);
+                let zero = l.splat(0.0);
+                l.put(push, &q.v[0], a);
+                l.put(push, &q.v[1], b);
+                l.put(push, &q.v[2], sub3(l, [zero; 3], c));
+                l.put(push, &q.v[3], sub3(l, [zero; 3], d));
+            }
         }
-        for (a, m) in push[..n].iter_mut().zip(&f.inverse_mass) {
-            *a = a.scale(*m) + step.gravity;
+        for r in part(awake, &whole_n, |a| &a.vertices) {
+            let r = before(r, n);
+            for (a, m) in push[r.clone()].iter_mut().zip(&f.inverse_mass[r]) {
+                *a = a.scale(*m) + step.gravity;
+            }
         }
+        // What sleeps has no acceleration to be smoothed.
+        awake.iter().flat_map(|a| &a.rim).for_each(|i| push[*i as usize & MASK] = V4::default());
     }
 
     /// Velocities under accelerations that are not smoothed.
@@ -181,15 +203,20 @@ impl Motion {
     fn hasten_kernel(&mut self, _: impl Lanes, f: &Fabric, step: &Step) {
         let keep = 1.0 / (1.0 + step.h * f.damping);
         let n = f.reach(step.rings);
-        for (v, a) in self.velocity[..n].iter_mut().zip(self.work.push.iter()) {
-            *v = (*v + a.scale(step.h)).scale(keep);
+        let Work { push, awake, .. } = &self.work;
+        let whole = 0..n;
+        for r in part(awake, &whole, |a| &a.vertices) {
+            let r = before(r, n);
+            for (v, a) in self.velocity[r.clone()].iter_mut().zip(&push[r]) {
+                *v = (*v + a.scale(step.h)).scale(keep);
+            }
         }
     }
 
     /// W times `push` by Horner's scheme, and velocities under that.
     #[inline(always)]
     fn smooth_kernel<L: Lanes>(&mut self, l: L, f: &Fabric, step: &Step) {
-        let Work { push, smooth, smoother, held, .. } = &mut self.work;
+        let Work { push, smooth, smoother, held, awake, .. } = &mut self.work;
         let Some((highest, lower)) = f.smoothing.split_last() else { return };
         let rounds = lower.len();
         let keep = 1.0 / (1.0 + step.h * f.damping);
@@ -202,32 +229,51 @@ impl Motion {
             };
             let scale = if round == 0 { *highest } else { 1.0 };
             let (wide, by) = (l.splat(scale), l.splat(*c));
-            let pairs = f.rows.iter().zip(y.as_chunks::<2>().0.iter().zip(push.as_chunks::<2>().0));
+            let whole = 0..n;
+            let stretches = part(awake, &whole, |a| &a.vertices);
+            let sleeps = |i: usize| awake.as_ref().is_some_and(|a| a.asleep[i]);
             if round + 1 == rounds {
                 let (h, kept) = (l.splat(step.h), l.splat(keep));
-                // The velocity of an odd last vertex has no partner.
-                let (both, last) = self.velocity[..even(n).min(f.vertices.len())].as_chunks_mut::<2>();
-                let mut odd = [last.first().copied().unwrap_or_default(); 2];
-                for (v, (r, (own, first))) in both.iter_mut().chain([&mut odd]).zip(pairs) {
-                    let own = l.load_pair(own);
-                    let a = l.mul_add(laplacian(l, y, r, own), wide, l.mul(l.load_pair(first), by));
-                    l.store_pair(l.mul(l.mul_add(a, h, l.load_pair(v)), kept), v);
+                for r in stretches {
+                    // Two by two: stretches of what a patch owns begin at even places, and what others own they compute.
+                    let r = even(r.start).min(n)..r.end.min(n);
+                    let pairs = f.rows[r.start / 2..]
+                        .iter()
+                        .zip(y[r.start..].as_chunks::<2>().0.iter().zip(push[r.start..].as_chunks::<2>().0));
+                    // The velocity of an odd last vertex has no partner.
+                    let (both, last) = self.velocity[r.start..even(r.end).min(f.vertices.len())].as_chunks_mut::<2>();
+                    let mut odd = [last.first().copied().unwrap_or_default(); 2];
+                    for (v, (r, (own, first))) in both.iter_mut().chain([&mut odd]).zip(pairs) {
+                        let own = l.load_pair(own);
+                        let a = l.mul_add(laplacian(l, y, r, own), wide, l.mul(l.load_pair(first), by));
+                        l.store_pair(l.mul(l.mul_add(a, h, l.load_pair(v)), kept), v);
+                    }
+                    last.iter_mut().for_each(|v| *v = odd[0]);
                 }
-                last.iter_mut().for_each(|v| *v = odd[0]);
                 for e in &f.far {
                     let i = e.vertex.index();
-                    if i < n {
+                    if i < n && !sleeps(i) {
                         let far = e.near.get(y).scale(e.by * scale * step.h * keep);
                         self.velocity[i] = self.velocity[i] - far;
                     }
                 }
                 return;
             }
-            for (o, (r, (own, first))) in out[..even(n)].as_chunks_mut::<2>().0.iter_mut().zip(pairs) {
-                let own = l.load_pair(own);
-                let a = l.mul_add(laplacian(l, y, r, own), wide, l.mul(l.load_pair(first), by));
-                l.store_pair(a, o);
+            for r in stretches {
+                let r = r.start / 2 * 2..even(r.end.min(n));
+                if r.is_empty() {
+                    continue;
+                }
+                let pairs = f.rows[r.start / 2..]
+                    .iter()
+                    .zip(y[r.start..].as_chunks::<2>().0.iter().zip(push[r.start..].as_chunks::<2>().0));
+                for (o, (r, (own, first))) in out[r].as_chunks_mut::<2>().0.iter_mut().zip(pairs) {
+                    let own = l.load_pair(own);
+                    let a = l.mul_add(laplacian(l, y, r, own), wide, l.mul(l.load_pair(first), by));
+                    l.store_pair(a, o);
+                }
             }
+            awake.iter().flat_map(|a| &a.rim).for_each(|i| out[*i as usize & MASK] = V4::default());
             for e in &f.far {
                 let i = e.vertex.index();
                 out[i] = out[i] - e.near.get(y).scale(e.by * scale);
@@ -244,45 +290,63 @@ impl Motion {
     #[inline(always)]
     fn bend_kernel<L: Lanes>(&mut self, l: L, f: &Fabric, late: f32, rings: usize) {
         let end = f.reach(rings);
-        let Work { smoother, push, bending, .. } = &mut self.work;
-        for (((a, s), m), v) in smoother.iter_mut().zip(&self.start).zip(&self.moved).zip(&self.velocity) {
-            *a = *s + *m + v.scale(late);
+        let Work { smoother, push, bending, awake, .. } = &mut self.work;
+        let n = bending.len();
+        let whole = 0..n;
+        let seen = part(awake, &whole, |a| &a.seen);
+        let out: &mut [V4; MOST] = push;
+        for r in seen {
+            let r = before(r, n);
+            let all = self.start[r.clone()].iter().zip(&self.moved[r.clone()]).zip(&self.velocity[r.clone()]);
+            for (a, ((s, m), v)) in smoother[r.clone()].iter_mut().zip(all) {
+                *a = *s + *m + v.scale(late);
+            }
+            out[r].fill(V4::default());
         }
         let x: &[V4; MOST] = smoother;
-        let out: &mut [V4; MOST] = push;
-        let n = bending.len();
-        out[..n].fill(V4::default());
-        let mut rest = &f.bend[..];
-        for (i, count) in f.bend_count[..end].iter().enumerate() {
-            let Some((row, after)) = rest.split_at_checked(usize::from(*count)) else { break };
-            rest = after;
-            let here = x[i & MASK];
-            let mut sum = out[i & MASK];
-            for (j, w) in row {
-                let pull = (here - j.get(x)).scale(*w);
-                sum = sum + pull;
-                j.set(out, j.get(out) - pull);
+        let rows = (0..end, 0);
+        for (r, from) in awake.as_ref().map_or(std::slice::from_ref(&rows), |a| &a.bend[..]) {
+            let r = before(r, end);
+            let mut rest = &f.bend[*from..];
+            for (i, count) in r.clone().zip(&f.bend_count[r]) {
+                let Some((row, after)) = rest.split_at_checked(usize::from(*count)) else { break };
+                rest = after;
+                let here = x[i & MASK];
+                let mut sum = out[i & MASK];
+                for (j, w) in row {
+                    let pull = (here - j.get(x)).scale(*w);
+                    sum = sum + pull;
+                    j.set(out, j.get(out) - pull);
+                }
+                out[i & MASK] = sum;
             }
-            out[i & MASK] = sum;
         }
         let (least, one) = (l.splat(SMALLEST), l.splat(1.0));
-        for b in &f.bent[..f.bent.partition_point(|b| b.lowest() < end)] {
-            // The coefficients sum to zero: differences lose no digits.
-            let [p, q, r] = [l.load(&b.c[0]), l.load(&b.c[1]), l.load(&b.c[2])];
-            let bow = scale3(l, l.between(x, &b.v[0], &b.v[1]), p);
-            let bow = mul_add3(l, l.between(x, &b.v[0], &b.v[2]), q, bow);
-            let bow = mul_add3(l, l.between(x, &b.v[0], &b.v[3]), r, bow);
-            let inverse = inverse_root(l, l.max(dot(l, bow, bow), least));
-            let more = l.mul_sub(l.load(&b.rest), inverse, one);
-            let pull = scale3(l, bow, l.mul(l.load(&b.w), more));
-            let (j, k, m) = (scale3(l, pull, p), scale3(l, pull, q), scale3(l, pull, r));
-            let all = add3(l, add3(l, j, k), m);
-            let zero = l.splat(0.0);
-            l.put(out, &b.v[0], sub3(l, [zero; 3], all));
-            l.put(out, &b.v[1], j);
-            l.put(out, &b.v[2], k);
-            l.put(out, &b.v[3], m);
+        let last = f.bent.partition_point(|b| b.lowest() < end);
+        let all = 0..last;
+        let blocks = part(awake, &all, |a| &a.bent);
+        for r in blocks {
+            for b in &f.bent[before(r, last)] {
+                // The coefficients sum to zero: differences lose no digits.
+                let [p, q, r] = [l.load(&b.c[0]), l.load(&b.c[1]), l.load(&b.c[2])];
+                let bow = scale3(l, l.between(x, &b.v[0], &b.v[1]), p);
+                let bow = mul_add3(l, l.between(x, &b.v[0], &b.v[2]), q, bow);
+                let bow = mul_add3(l, l.between(x, &b.v[0], &b.v[3]), r, bow);
+                let inverse = inverse_root(l, l.max(dot(l, bow, bow), least));
+                let more = l.mul_sub(l.load(&b.rest), inverse, one);
+                let pull = scale3(l, bow, l.mul(l.load(&b.w), more));
+                let (j, k, m) = (scale3(l, pull, p), scale3(l, pull, q), scale3(l, pull, r));
+                let all = add3(l, add3(l, j, k), m);
+                let zero = l.splat(0.0);
+                l.put(out, &b.v[0], sub3(l, [zero; 3], all));
+                l.put(out, &b.v[1], j);
+                l.put(out, &b.v[2], k);
+                l.put(out, &b.v[3], m);
+            }
         }
-        bending.copy_from_slice(&out[..n]);
+        for r in seen {
+            let r = before(r, n);
+            bending[r.clone()].copy_from_slice(&out[r]);
+        }
     }
 }

@@ -6,6 +6,7 @@
 //! accelerations that are smoothed over the nearest neighbours, which gives the finest waves more inertia and so allows
 //! longer steps (`filter.rs`); elements still too stiff for the step are softened when the garment is made, and counted.
 
+mod awake;
 mod blocks;
 mod border;
 mod contact;

@@ -1,5 +1,6 @@
 //! The state of one sheet between two outer calls, and one small step of it.
 
+use super::awake::Awake;
 use super::fabric::{Fabric, MOST};
 
 /// Four floats that load at once: x, y, z and a spare lane.
@@ -102,6 +103,8 @@ pub(super) struct Work {
     pub(super) looked: bool,
     /// Vertices whose place is given.
     pub(super) held: Vec<u32>,
+    /// What is computed; everything, if nothing sleeps.
+    pub(super) awake: Option<Awake>,
 }
 
 impl Default for Work {
@@ -114,6 +117,7 @@ impl Default for Work {
             bending: Vec::new(),
             looked: false,
             held: Vec::new(),
+            awake: None,
         }
     }
 }
@@ -128,6 +132,7 @@ impl Motion {
         self.moved.clear();
         self.moved.resize(self.start.len(), V4::default());
         self.work.looked = false;
+        self.work.awake = None;
         self.work.bending.clear();
         self.work.bending.resize(self.start.len(), V4::default());
     }

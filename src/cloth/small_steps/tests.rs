@@ -48,7 +48,7 @@ impl Lab {
     pub(super) fn smooth(sheet: Sheet, x: &[V3d], h: f64, patches: usize, smooth: usize) -> Self {
         let bend_every = Plan::bend_every(&sheet, h);
         let plan = Plan::new(&sheet, &Fit { h, ahead: 0.25, springs_only: false, bend_every, smooth });
-        let fabrics = plan.patches(patches, 8 * (1 + smooth) + 8);
+        let fabrics = plan.patches(patches, 8 * (1 + smooth) + 8, 0);
         let gravity = V4::new(0.0, -9.81, 0.0);
         let mut lab = Self { bend_every, sheet, plan, fabrics, motions: Vec::new(), h, ahead: 0.25, gravity };
         lab.place(x, &vec![V3d::zeros(); x.len()]);

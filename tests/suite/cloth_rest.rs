@@ -1,0 +1,80 @@
+//! Cloth that sleeps by region: what it saves, how far off it is, and that nothing stays behind.
+
+use std::sync::{Mutex, MutexGuard, OnceLock};
+use tryon::cloth::realtime::Config;
+use tryon::evaluate::cloth_rest::{Doing, RestReport, Standing, Wearing};
+use tryon::par::with_threads;
+
+/// A skirt and a shirt over it, edges of 2 cm.
+fn her() -> MutexGuard<'static, Standing> {
+    static HER: OnceLock<Mutex<Standing>> = OnceLock::new();
+    let dressed = || {
+        let garments = ["skirt", "tshirt"].map(str::to_owned).to_vec();
+        Mutex::new(Standing::new(&Wearing { garments, edge: 0.02, config: Config::default() }).unwrap())
+    };
+    HER.get_or_init(dressed).lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+fn run(config: &Config, doing: Doing, calls: usize, noise: f32) -> RestReport {
+    her().run(config, doing, calls, noise).unwrap()
+}
+
+fn never(base: Config) -> Config {
+    Config { sleep: false, ..base }
+}
+
+#[test]
+fn a_waving_arm_leaves_the_hem_asleep_and_cloth_near_where_it_would_be() {
+    for (base, noise) in [(Config::default(), 0.0), (Config::tracked(), 1.5e-3)] {
+        let whole = Config { sleep_regions: false, ..base.clone() };
+        let truth = run(&never(base.clone()), Doing::Waving, 90, noise);
+        let outfit = run(&whole, Doing::Waving, 30, noise);
+        let r = run(&base, Doing::Waving, 90, noise);
+        let apart = r.apart(&truth).map(|d| d * 1e3);
+        println!(
+            "asleep {:.0} % (whole outfit {:.0} %), {apart:.1?} mm apart (rms, p99, most)",
+            r.mean_asleep() * 100.0,
+            outfit.mean_asleep() * 100.0
+        );
+        assert!(truth.mean_asleep() == 0.0 && outfit.mean_asleep() < 0.2, "{}", outfit.mean_asleep());
+        assert!(r.mean_asleep() > 0.2 && r.asleep[10..].iter().all(|a| *a < 0.99), "{}", r.mean_asleep());
+        assert!(apart[0] < 6.0 && apart[1] < 25.0, "{apart:?}");
+        assert!(r.penetration < 2e-3, "{}", r.penetration);
+    }
+}
+
+#[test]
+fn nothing_stays_behind_when_she_walks_off() {
+    let base = Config::default();
+    let truth = run(&never(base.clone()), Doing::WalkingOff, 30, 0.0);
+    let r = run(&base, Doing::WalkingOff, 30, 0.0);
+    let first = r.asleep[0];
+    let apart = r.apart(&truth).map(|d| d * 1e3);
+    println!("asleep when she starts {first:.2}, then {:?}; {apart:.1?} mm apart", &r.asleep[1..4]);
+    assert!(r.asleep[2..].iter().all(|a| *a == 0.0), "{:?}", r.asleep);
+    assert!(apart[0] < 12.0 && apart[2] < 100.0, "{apart:?}");
+}
+
+#[test]
+fn what_sleeps_does_not_depend_on_threads() {
+    let run = |threads| with_threads(threads, || run(&Config::tracked(), Doing::Waving, 30, 1.5e-3)).unwrap();
+    let (one, two) = (run(1), run(2));
+    assert!(one.positions == two.positions && one.asleep == two.asleep);
+    assert!(one.mean_asleep() > 0.0);
+}
+
+/// Vertices that cannot have come near skin or another fold are not asked again; asked, they are where they were.
+#[test]
+fn searches_left_out_change_next_to_nothing() {
+    let skip = never(Config::default());
+    let ask = Config { skip_far: false, ..skip.clone() };
+    let (r, truth) = (run(&skip, Doing::Lifting, 30, 0.0), run(&ask, Doing::Lifting, 30, 0.0));
+    let apart = r.apart(&truth).map(|d| d * 1e3);
+    println!(
+        "left out {} and {} in the last call, {apart:.3?} mm apart",
+        r.last.searches_skipped, r.last.fold_searches_skipped
+    );
+    assert!(r.last.searches_skipped > 100 && r.last.fold_searches_skipped > 100, "{:?}", r.last);
+    assert_eq!((truth.last.searches_skipped, truth.last.fold_searches_skipped), (0, 0));
+    assert!(apart[0] < 2.0, "{apart:?}");
+}
