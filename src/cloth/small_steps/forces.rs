@@ -273,11 +273,11 @@ impl Motion {
                     l.store_pair(a, o);
                 }
             }
-            awake.iter().flat_map(|a| &a.rim).for_each(|i| out[*i as usize & MASK] = V4::default());
             for e in &f.far {
                 let i = e.vertex.index();
                 out[i] = out[i] - e.near.get(y).scale(e.by * scale);
             }
+            awake.iter().flat_map(|a| &a.rim).for_each(|i| out[*i as usize & MASK] = V4::default());
             for i in held.iter() {
                 out[*i as usize & MASK] = V4::default();
             }

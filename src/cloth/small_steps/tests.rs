@@ -410,3 +410,75 @@ fn wide_registers_change_no_bit_and_the_root_is_near() {
         assert!((f64::from(y) * f64::from(*a).sqrt() - 1.0).abs() < 1e-6, "{a}: {y}");
     }
 }
+
+#[test]
+fn cloth_beside_sleeping_cloth_moves_as_beside_held_cloth() {
+    let (x, faces, rest) = grid(24, 16, 0.02, 0.02);
+    for smooth in 0..3 {
+        let s = sheet(&faces, &rest, x.len(), &cotton(1e-5));
+        let h = Plan::comfortable_step(&s, 0.25, smooth);
+        let plan = Plan::new(&s, &Fit { h, ahead: 0.25, springs_only: false, bend_every: 3, smooth });
+        let f = &plan.patches(1, 0, 64)[0];
+        let n = x.len();
+        // The regions of one half.
+        let half = f.regions[f.regions.len() / 2];
+        let asleep: Vec<bool> = (0..n).map(|i| i < half).collect();
+        let held: Vec<u32> = f.vertices[..half].to_vec();
+        let v4 = |p: &V3d| V4::new(p.x as f32, p.y as f32, p.z as f32);
+        let run = |sleeps: bool| {
+            let mut m = Motion::default();
+            m.begin(f.vertices.iter().map(|v| v4(&x[*v as usize])), (0..n).map(|_| V4::default()));
+            let ties = if sleeps { Vec::new() } else { tied(f, &m, &held) };
+            if sleeps {
+                m.leave(f, &asleep);
+            }
+            for i in 0..300 {
+                if i % 3 == 0 {
+                    m.bend(f, 1.5 * h as f32, usize::MAX);
+                }
+                let gravity = V4::new(0.0, -9.81, 0.0);
+                let step = Step { h: h as f32, t: 0.0, ahead: 0.25, gravity, rings: usize::MAX };
+                m.accelerate(f, &step, &[], &ties);
+                m.tie(&ties, 0.0, h as f32);
+                m.advance(f, &step, f32::INFINITY);
+            }
+            m
+        };
+        let (sleeping, tied) = (run(true), run(false));
+        let fallen = (0..n).map(|i| -tied.moved[i].0[1]).fold(0.0, f32::max);
+        assert!(fallen > 1e-3, "{fallen}");
+        assert!((0..half).all(|i| sleeping.moved[i] == V4::default()));
+        let apart =
+            (half..n).map(|i| (sleeping.moved[i] - tied.moved[i]).0.iter().fold(0.0, |a: f32, c| a.max(c.abs())));
+        let apart = apart.fold(0.0, f32::max);
+        assert!(apart < 1e-4 * fallen, "degree {smooth}: {apart} m apart, fallen by {fallen}");
+        let computed: usize = sleeping.work.awake.iter().flat_map(|a| &a.quads).map(|r| r.len()).sum();
+        assert!(computed * 10 < f.quads.len() * 8, "{computed} of {} blocks for half of the cloth", f.quads.len());
+    }
+}
+
+/// `TRYON_LONG_TESTS=1` takes 10⁶ steps.
+#[test]
+fn a_hanging_sheet_stays_where_it_hangs_for_a_million_steps() {
+    let long = std::env::var_os("TRYON_LONG_TESTS").is_some();
+    let (x, faces, rest) = grid(16, 16, 0.02, 0.02);
+    let mut fabric = cotton(1e-5);
+    fabric.damping = 4.0;
+    for degree in [0, 1] {
+        let s = sheet(&faces, &rest, x.len(), &fabric);
+        let h = Plan::comfortable_step(&s, 0.25, degree);
+        let mut lab = Lab::smooth(s, &x, h, 1, degree);
+        let held = [0, 8, 16];
+        lab.run((8.0 / h) as usize, &held);
+        let (before, energy) = (lab.positions(), lab.energy());
+        let steps = if long { 1_000_000 } else { 50_000 };
+        let mut most = f64::NEG_INFINITY;
+        for _ in 0..10 {
+            lab.run(steps / 10, &held);
+            most = most.max(lab.energy());
+        }
+        let drift = lab.positions().iter().zip(&before).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        let speed = lab.velocities().iter().map(|v| v.norm()).fold(0.0, f64::max);
+        assert!(drift < 1e-3 && speed < 1e-3 && most < energy + 1e-6, "{drift} {speed} {energy} {most}");
+    }
+}
