@@ -5,7 +5,7 @@ use super::regions::Rest;
 use crate::cloth::ClothError;
 use crate::cloth::folds::FoldFrame;
 use crate::cloth::small_steps::{Motion, Plane, Tie};
-use crate::contact::{Apart, Buried, DepthMaps, SurfaceFrame};
+use crate::contact::{Apart, Buried, DepthMaps, PointGrid, SurfaceFrame};
 use crate::math::{P3, V3};
 use serde::{Deserialize, Serialize};
 
@@ -187,6 +187,8 @@ pub struct Workspace {
     pub(super) before: SurfaceFrame,
     pub(super) after: SurfaceFrame,
     pub(super) now: SurfaceFrame,
+    /// Vertices of the body at the end of the call.
+    pub(super) skin_grid: PointGrid,
     /// The body with room between its parts.
     pub(super) roomy: SurfaceFrame,
     /// Garments at the beginning of a round, for contact of cloth with cloth.

@@ -6,7 +6,7 @@ use super::model::{Model, RECALLED};
 use super::regions::{carry_on, fall_asleep, wake, wake_all};
 use super::state::{Input, PatchScratch, State, StepReport, Workspace, check_body};
 use super::steady::follow;
-use super::touch::{Touch, anchors, settle};
+use super::touch::{HIDDEN, Settled, Touch, anchors, settle};
 use crate::cloth::ClothError;
 use crate::cloth::small_steps::{Borders, Step, V4};
 use crate::math::{P3, V3};
@@ -177,9 +177,9 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         report.stages_ms.solve += ms(timer);
     }
     let timer = Instant::now();
-    for_patches(model, &mut work.patches, |g, k, p| {
-        settle(model, g, k, &state.buried, &work.after, &state.garments[g].nearest, p)
-    });
+    work.skin_grid.fill(&work.after.vertices, 2.0 * HIDDEN);
+    let body = Settled { skin: &work.after, grid: &work.skin_grid, buried: &state.buried };
+    for_patches(model, &mut work.patches, |g, k, p| settle(model, g, k, &body, p));
     report.stages_ms.contact += ms(timer);
     let timer = Instant::now();
     for_patches(model, &mut work.patches, |_, _, p| carry_on(p, dt));

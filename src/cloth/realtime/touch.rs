@@ -3,7 +3,7 @@
 use super::model::Model;
 use super::state::{GarmentState, PatchScratch};
 use crate::cloth::small_steps::{Fabric, Plane, Tie, V4};
-use crate::contact::{Buried, Closest, DepthMaps, SurfaceFrame};
+use crate::contact::{Buried, Closest, DepthMaps, PointGrid, SurfaceFrame};
 use crate::garment::Region;
 use crate::math::{P3, V3};
 
@@ -13,8 +13,9 @@ const REACH: f32 = 0.04;
 const LIFTED: f32 = 5e-4;
 /// Deeper in another part of the body cloth is left where it is, metres: it may have come from the other side.
 const OTHER_DEPTH: f32 = 0.01;
-/// Skin so far from where a walk began may have a nearer point, metres.
-const ELSEWHERE: f32 = 0.025;
+/// Cloth is not expected deeper than this under skin that no walk led to, metres: the vertices of a body are about as far
+/// from each other.
+pub(super) const HIDDEN: f32 = 0.015;
 /// Cloth longer than this, over its rest length, is about to tear: more than knitwear is worn at.
 const TORN: f32 = 1.5;
 /// Anchors of strength ½ go to their place at this rate, 1/s.
@@ -195,17 +196,16 @@ fn above(a: &super::AnchorBinding, [p, q, r]: [P3; 3]) -> P3 {
     P3::from(on + normal * a.height)
 }
 
-/// Measures how deep cloth is under the skin where that holds it, and lifts what is. `told` are the nearest body vertices
-/// of all the garment's vertices at the beginning of the call.
-pub(super) fn settle(
-    model: &Model,
-    garment: usize,
-    patch: usize,
-    buried: &Buried,
-    after: &SurfaceFrame,
-    told: &[[u32; 2]],
-    p: &mut PatchScratch,
-) {
+/// The body at the end of a call.
+pub(super) struct Settled<'a> {
+    pub(super) skin: &'a SurfaceFrame,
+    /// Its vertices, looked for within [`HIDDEN`].
+    pub(super) grid: &'a PointGrid,
+    pub(super) buried: &'a Buried,
+}
+
+/// Measures how deep cloth is under the skin where that holds it, and lifts what is.
+pub(super) fn settle(model: &Model, garment: usize, patch: usize, body: &Settled<'_>, p: &mut PatchScratch) {
     let g = &model.garments[garment];
     let f = &g.patches[patch];
     let mut last = u32::MAX;
@@ -220,38 +220,34 @@ pub(super) fn settle(
         // The own parts have the last word.
         for (side, mask) in [(1, g.other[v]), (0, g.own[v])].into_iter().filter(|s| s.1 != 0) {
             let x = p3(p.motion.position(i));
-            let around = g.folds.surface.neighbours(v as u32).iter().map(|w| told[*w as usize][side]);
-            let c = nearest_skin(model, after, &x, p.nearest[i][side], around, mask);
+            let c = nearest_skin(model, body, &x, p.nearest[i][side], mask);
+            p.nearest[i][side] = c.vertex;
             let elsewhere = side == 1 && c.signed < -OTHER_DEPTH;
-            let nothing = buried.holds_nothing(model.surface.faces()[c.face as usize]);
+            let nothing = body.buried.holds_nothing(model.surface.faces()[c.face as usize]);
             if c.rim || c.signed >= LIFTED || elsewhere || nothing {
                 continue;
             }
             p.report.penetration = p.report.penetration.max(f64::from(-c.signed));
             p.motion.moved[i] = v4(&(c.point + c.normal * LIFTED - p3(p.motion.start[i])));
-            let again = model.surface.closest(after, &p3(p.motion.position(i)), c.vertex, mask);
+            let again = model.surface.closest(body.skin, &p3(p.motion.position(i)), c.vertex, mask);
             p.report.penetration_left = p.report.penetration_left.max(f64::from(-again.signed));
         }
     }
 }
 
-/// The nearest point by walks from `near` and from what the cloth around knows, where that is elsewhere: in the crook of an
-/// elbow a walk ends on the upper arm though the forearm is nearer.
-fn nearest_skin(
-    model: &Model,
-    after: &SurfaceFrame,
-    x: &P3,
-    near: u32,
-    around: impl Iterator<Item = u32>,
-    mask: u8,
-) -> Closest {
-    let place = |v: u32| after.vertices[v as usize];
-    let mut best = model.surface.closest(after, x, near, mask);
-    for start in around.filter(|v| (place(*v) - place(near)).norm_squared() > ELSEWHERE * ELSEWHERE) {
-        let other = model.surface.closest(after, x, start, mask);
-        if !other.rim && other.signed.abs() < best.signed.abs() {
-            best = other;
+/// The nearest point by a walk from `near`, or around the nearest of all vertices where that is not where the walk ended: in
+/// the crook of an elbow it ends on the upper arm though the forearm is nearer, and between fingers on any of them.
+fn nearest_skin(model: &Model, body: &Settled<'_>, x: &P3, near: u32, mask: u8) -> Closest {
+    let walked = model.surface.closest(body.skin, x, near, mask);
+    let mut best = (HIDDEN * HIDDEN, walked.vertex);
+    body.grid.within(x, HIDDEN, |v, d| {
+        if (d, v) < best && model.surface.part(v) & mask != 0 {
+            best = (d, v);
         }
+    });
+    if best.1 == walked.vertex {
+        return walked;
     }
-    best
+    let other = model.surface.closest_around(body.skin, x, best.1, mask);
+    if !other.rim && other.signed.abs() < walked.signed.abs() { other } else { walked }
 }
