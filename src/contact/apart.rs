@@ -29,6 +29,8 @@ struct Seen {
 
 /// No skin is moved back further than this, metres: deeper, and the surface does not know any more what is outside.
 const MOST: f32 = 0.035;
+/// Skin beside it goes at most so much further than it must, metres: cloth on it lies as far off, and so not deeper.
+const BESIDE: f32 = 0.005;
 /// Rounds of averaging over neighbours, so that the skin beside has no step.
 const ROUNDS: usize = 3;
 
@@ -92,8 +94,11 @@ impl Apart {
                     let around = model.neighbours(v as u32);
                     let sum = around.iter().fold(ways[v], |s, w| s + ways[*w as usize]);
                     let mean = sum / (1 + around.len()) as f32;
-                    // What must go goes all its way.
-                    if mean.norm_squared() > self.seen[v].way.norm_squared() { mean } else { self.seen[v].way }
+                    // What must go goes all its way, and takes what is beside it along a little.
+                    let own = self.seen[v].way;
+                    let most = own.norm() + BESIDE;
+                    let far = mean.norm();
+                    if far <= own.norm() { own } else { mean * (most / far).min(1.0) }
                 });
                 std::mem::swap(&mut ways, &mut smooth);
             }
