@@ -35,7 +35,8 @@ const BESIDE: f32 = 0.005;
 const ROUNDS: usize = 3;
 
 impl Apart {
-    /// Moves skin of `frame` back where less than `room` metres are left between parts, and renews its normals. `pressing`:
+    /// Moves skin of `frame` back where less than `room` metres are left between parts; its normals stay those of the body as
+    /// it is. `pressing`:
     /// the part that presses on each vertex, 0 where that shall not count. Says how many vertices moved.
     pub fn make_room(
         &mut self,
@@ -52,7 +53,8 @@ impl Apart {
             self.seen = vec![Seen::default(); n];
             self.before.clone_from(&frame.vertices);
         }
-        let moved = self.before.iter().zip(&frame.vertices).map(|(a, b)| (a - b).norm_squared()).fold(0.0, f32::max);
+        let thick = self.before.iter().zip(&frame.vertices).zip(pressing).filter(|(_, mask)| **mask != 0);
+        let moved = thick.map(|((a, b), _)| (a - b).norm_squared()).fold(0.0, f32::max);
         let moved = 2.0 * moved.sqrt();
         self.before.clone_from(&frame.vertices);
         par::for_chunks(par, &mut self.seen, 256, |start, chunk| {
@@ -85,27 +87,45 @@ impl Apart {
                 }
             }
         });
-        let count = self.seen.iter().filter(|s| s.way != V3::zeros()).count();
-        if count > 0 {
-            let mut ways: Vec<V3> = self.seen.iter().map(|s| s.way).collect();
-            let mut smooth = Vec::new();
-            for _ in 0..ROUNDS {
-                par::map_into(par, n, 1024, &mut smooth, |v| {
-                    let around = model.neighbours(v as u32);
-                    let sum = around.iter().fold(ways[v], |s, w| s + ways[*w as usize]);
-                    let mean = sum / (1 + around.len()) as f32;
-                    // What must go goes all its way, and takes what is beside it along a little.
-                    let own = self.seen[v].way;
-                    let most = own.norm() + BESIDE;
-                    let far = mean.norm();
-                    if far <= own.norm() { own } else { mean * (most / far).min(1.0) }
-                });
-                std::mem::swap(&mut ways, &mut smooth);
-            }
-            frame.vertices.iter_mut().zip(&ways).for_each(|(p, w)| *p += w);
-            model.update_normals(par, frame);
+        let must: Vec<u32> = (0..n as u32).filter(|v| self.seen[*v as usize].way != V3::zeros()).collect();
+        for (v, way) in self.eased(model, &must) {
+            frame.vertices[v as usize] += way;
         }
-        count
+        must.len()
+    }
+
+    /// Ways of the vertices that must go and of those around them.
+    fn eased(&self, model: &SurfaceModel, must: &[u32]) -> Vec<(u32, V3)> {
+        let mut near = vec![false; self.seen.len()];
+        let mut all = must.to_vec();
+        all.iter().for_each(|v| near[*v as usize] = true);
+        let mut last = 0;
+        for _ in 0..ROUNDS {
+            let ring = last..all.len();
+            last = all.len();
+            for k in ring {
+                for &w in model.neighbours(all[k]) {
+                    if !std::mem::replace(&mut near[w as usize], true) {
+                        all.push(w);
+                    }
+                }
+            }
+        }
+        let mut ways: Vec<V3> = self.seen.iter().map(|s| s.way).collect();
+        let mut next = vec![V3::zeros(); all.len()];
+        for _ in 0..ROUNDS {
+            for (to, &v) in next.iter_mut().zip(&all) {
+                let around = model.neighbours(v);
+                let sum = around.iter().fold(ways[v as usize], |s, w| s + ways[*w as usize]);
+                let mean = sum / (1 + around.len()) as f32;
+                // What must go goes all its way, and takes what is beside it along a little.
+                let own = self.seen[v as usize].way;
+                let (most, far) = (own.norm() + BESIDE, mean.norm());
+                *to = if far <= own.norm() { own } else { mean * (most / far).min(1.0) };
+            }
+            all.iter().zip(&next).for_each(|(v, way)| ways[*v as usize] = *way);
+        }
+        all.into_iter().map(|v| (v, ways[v as usize])).collect()
     }
 }
 

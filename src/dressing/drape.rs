@@ -75,6 +75,7 @@ impl<'a> Skin<'a> {
         self.frame.vertices.clear();
         self.frame.vertices.extend_from_slice(body);
         self.apart.make_room(Par::Rayon, self.model, self.pressing, &mut self.frame, self.room);
+        self.model.update_normals(Par::Rayon, &mut self.frame);
         self.buried.update(Par::Rayon, self.model, self.opposite, &self.frame);
     }
     pub(super) fn frame(&self) -> &SurfaceFrame {
