@@ -259,11 +259,9 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
     if let Some(e) = a.edge {
         options.triangulation.edge_length = e;
     }
-    options.config.self_collision = a.folds;
     let start = film.as_ref().map_or_else(|| pose(&a.pose, &template, &rest, 0.0), |(pose, _)| pose.clone());
-    if film.is_some() {
-        options.config = Config { self_collision: a.folds, ..Config::tracked() };
-    }
+    let config = if film.is_some() { Config::tracked() } else { Config::default() };
+    options.config = Config { self_collision: a.folds, ..config };
     let dressed = match dress_all(&template, &rest, &start, &wear, &options) {
         Ok(d) => Some(d),
         Err(DressError::Misfit(m)) => {
@@ -364,17 +362,16 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
         let mut world = Vec::new();
         g.render_positions(&s.positions, &mut world);
         own = world.iter().fold(own, |y, p| [y[0].min(p.y), y[1].max(p.y)]);
-        let mut torn = vec![[225u8, 220, 200]; g.vertices];
-        for c in crossings(&g.faces, &s.positions) {
-            c.edge.iter().chain(&g.faces[c.face as usize]).for_each(|v| torn[*v as usize] = [220, 0, 0]);
+        let mut painted = Vec::new();
+        if a.crossings {
+            let mut marked = vec![[225u8, 220, 200]; g.vertices];
+            for c in crossings(&g.faces, &s.positions) {
+                c.edge.iter().chain(&g.faces[c.face as usize]).for_each(|v| marked[*v as usize] = [220, 0, 0]);
+            }
+            painted.extend(g.render.vertex.iter().map(|v| marked[*v as usize]));
+        } else if let Some(maps) = &fits {
+            painted.extend(g.render.vertex.iter().map(|v| maps[k].vertices[*v as usize].color()));
         }
-        let torn = || g.render.vertex.iter().map(|v| torn[*v as usize]).collect();
-        let painted = if a.crossings { Some(torn()) } else { None }
-            .or_else(|| {
-                fits.as_ref()
-                    .map(|maps| g.render.vertex.iter().map(|v| maps[k].vertices[*v as usize].color()).collect())
-            })
-            .unwrap_or_default();
         let known = library::names().contains(&g.name.as_str());
         let color = (if known { library::dye(&g.name) } else { library::dye(library::names()[k % 9]) })
             .map(|c| f32::from(c) / 255.0);

@@ -4,28 +4,15 @@
 //! itself. Two layers of cloth have no place there, and each kept off its own part they pass through each other and tear
 //! at what hangs on them. So cloth meets skin that was moved back, half-way on either side, where nobody sees it.
 
+use super::across::Across;
 use super::{Part, SurfaceFrame, SurfaceModel};
-use crate::math::{P3, V3};
-use crate::par::{self, Par};
+use crate::math::V3;
+use crate::par::Par;
 use serde::{Deserialize, Serialize};
 
-/// What is known about how near the parts are.
+/// What is known about how near the parts are: how far each vertex goes out of the other part, metres.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Apart {
-    seen: Vec<Seen>,
-    before: Vec<P3>,
-}
-
-/// What is known about one vertex.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Seen {
-    /// Nearest vertex of the other part.
-    nearest: u32,
-    /// How far both may move before it must be looked at again, metres.
-    room: f32,
-    /// Out of the other part, and how far it goes, metres.
-    way: V3,
-}
+pub struct Apart(Across<V3>);
 
 /// No skin is moved back further than this, metres: deeper, and the surface does not know any more what is outside.
 const MOST: f32 = 0.035;
@@ -36,8 +23,7 @@ const ROUNDS: usize = 3;
 
 impl Apart {
     /// Moves skin of `frame` back where less than `room` metres are left between parts; its normals stay those of the body as
-    /// it is. `pressing`:
-    /// the part that presses on each vertex, 0 where that shall not count. Says how many vertices moved.
+    /// it is. `pressing`: the part that presses on each vertex, 0 where that shall not count. Says how many vertices moved.
     pub fn make_room(
         &mut self,
         par: Par,
@@ -47,47 +33,16 @@ impl Apart {
         room: f32,
     ) -> usize {
         model.update_normals(par, frame);
-        let n = frame.vertices.len();
-        let first = self.seen.len() != n;
-        if first {
-            self.seen = vec![Seen::default(); n];
-            self.before.clone_from(&frame.vertices);
-        }
-        let thick = self.before.iter().zip(&frame.vertices).zip(pressing).filter(|(_, mask)| **mask != 0);
-        let moved = thick.map(|((a, b), _)| (a - b).norm_squared()).fold(0.0, f32::max);
-        let moved = 2.0 * moved.sqrt();
-        self.before.clone_from(&frame.vertices);
-        par::for_chunks(par, &mut self.seen, 256, |start, chunk| {
-            for (k, s) in chunk.iter_mut().enumerate() {
-                let (v, mask) = (start + k, pressing[start + k]);
-                if mask == 0 {
-                    continue;
-                }
-                if s.room > moved {
-                    s.room -= moved;
-                    continue;
-                }
-                let p = &frame.vertices[v];
-                if first {
-                    s.nearest = model.nearest_of_some(frame, p, mask);
-                }
-                let (near, hit) = model.closest_within(frame, p, s.nearest, mask, room);
-                (s.nearest, s.room, s.way) = (near, 0.0, V3::zeros());
-                match hit {
-                    Err(far) => s.room = far,
-                    Ok(c)
-                        if !c.rim
-                            && pressing[near as usize] != 0
-                            && c.signed < room
-                            && c.normal.dot(&frame.normals[v]) < 0.0 =>
-                    {
-                        s.way = c.normal * (0.5 * (room - c.signed)).min(MOST);
-                    }
-                    Ok(_) => {}
-                }
+        let frame_now = &*frame;
+        self.0.look(par, model, pressing, frame_now, room, |v, near, hit| match hit {
+            Ok(c) if !c.rim && pressing[near as usize] != 0 && c.signed < room => {
+                let facing = c.normal.dot(&frame_now.normals[v]) < 0.0;
+                if facing { c.normal * (0.5 * (room - c.signed)).min(MOST) } else { V3::zeros() }
             }
+            _ => V3::zeros(),
         });
-        let must: Vec<u32> = (0..n as u32).filter(|v| self.seen[*v as usize].way != V3::zeros()).collect();
+        let goes = |v: &u32| self.0.seen[*v as usize].found != V3::zeros();
+        let must: Vec<u32> = (0..frame.vertices.len() as u32).filter(goes).collect();
         for (v, way) in self.eased(model, &must) {
             frame.vertices[v as usize] += way;
         }
@@ -96,7 +51,7 @@ impl Apart {
 
     /// Ways of the vertices that must go and of those around them.
     fn eased(&self, model: &SurfaceModel, must: &[u32]) -> Vec<(u32, V3)> {
-        let mut near = vec![false; self.seen.len()];
+        let mut near = vec![false; self.0.seen.len()];
         let mut all = must.to_vec();
         all.iter().for_each(|v| near[*v as usize] = true);
         let mut last = 0;
@@ -111,7 +66,7 @@ impl Apart {
                 }
             }
         }
-        let mut ways: Vec<V3> = self.seen.iter().map(|s| s.way).collect();
+        let mut ways: Vec<V3> = self.0.seen.iter().map(|s| s.found).collect();
         let mut next = vec![V3::zeros(); all.len()];
         for _ in 0..ROUNDS {
             for (to, &v) in next.iter_mut().zip(&all) {
@@ -119,7 +74,7 @@ impl Apart {
                 let sum = around.iter().fold(ways[v as usize], |s, w| s + ways[*w as usize]);
                 let mean = sum / (1 + around.len()) as f32;
                 // What must go goes all its way, and takes what is beside it along a little.
-                let own = self.seen[v as usize].way;
+                let own = self.0.seen[v as usize].found;
                 let (most, far) = (own.norm() + BESIDE, mean.norm());
                 *to = if far <= own.norm() { own } else { mean * (most / far).min(1.0) };
             }
@@ -133,6 +88,7 @@ impl Apart {
 mod tests {
     use super::*;
     use crate::contact::surface::tests::sphere;
+    use crate::math::P3;
     use crate::mesh::{Topology, TriMesh};
 
     /// Two spheres of radius 1, their centres `d` apart.

@@ -3,30 +3,20 @@
 //! Nothing can lie on such skin, and planes from it contradict those of the part it lies in. Measured on a heavy body
 //! with its arms down: a sleeve held by such planes tears itself off the shoulder within a second.
 
+use super::across::Across;
 use super::winding::Winding;
 use super::{Part, SurfaceFrame, SurfaceModel};
-use crate::math::P3;
 use crate::par::{self, Par};
 use serde::{Deserialize, Serialize};
 
 /// Which skin is buried.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Buried {
-    seen: Vec<Seen>,
+    sides: Across<Side>,
     inside: Vec<bool>,
-    before: Vec<P3>,
 }
 
-/// What is known about one vertex.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Seen {
-    /// Nearest vertex of the other part.
-    nearest: u32,
-    /// How far both may move before it must be looked at again, metres.
-    room: f32,
-    state: Side,
-}
-
+/// Where a vertex lies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 enum Side {
     #[default]
@@ -49,44 +39,19 @@ impl Buried {
     /// Looks again at what may have changed since the last call. `opposite`: the part that each vertex may lie in, 0 for
     /// none.
     pub fn update(&mut self, par: Par, model: &SurfaceModel, opposite: &[Part], frame: &SurfaceFrame) {
-        let n = frame.vertices.len();
-        let first = self.seen.len() != n;
-        if first {
-            self.seen = vec![Seen::default(); n];
-            self.inside = vec![false; n];
-            self.before.clone_from(&frame.vertices);
-        }
-        let moved = self.before.iter().zip(&frame.vertices).map(|(a, b)| (a - b).norm_squared()).fold(0.0, f32::max);
-        let moved = 2.0 * moved.sqrt();
-        self.before.clone_from(&frame.vertices);
-        par::for_chunks(par, &mut self.seen, 256, |start, chunk| {
-            for (k, s) in chunk.iter_mut().enumerate() {
-                let (v, mask) = (start + k, opposite[start + k]);
-                if mask == 0 {
-                    continue;
+        self.inside.resize(frame.vertices.len(), false);
+        self.sides.look(par, model, opposite, frame, 0.0, |v, near, hit| {
+            let side = |inside: bool| if inside { Side::Suspect } else { Side::Outside };
+            match hit {
+                // Far from the other part's skin: outside or deep inside, unless that is where it ends.
+                Err(_) => {
+                    let rim = model.neighbours(near).iter().any(|w| model.part(*w) & opposite[v] == 0);
+                    let n = near as usize;
+                    let depth = (frame.vertices[v] - frame.vertices[n]).dot(&frame.normals[n]);
+                    if rim { Side::Unknown } else { side(depth < 0.0) }
                 }
-                if s.room > moved {
-                    s.room -= moved;
-                    continue;
-                }
-                let p = &frame.vertices[v];
-                if first {
-                    s.nearest = model.nearest_of_some(frame, p, mask);
-                }
-                let (near, hit) = model.closest_within(frame, p, s.nearest, mask, 0.0);
-                (s.nearest, s.room) = (near, 0.0);
-                let side = |inside: bool| if inside { Side::Suspect } else { Side::Outside };
-                s.state = match hit {
-                    Err(room) => {
-                        // Far from the other part's skin: outside or deep inside, unless that is where it ends.
-                        s.room = room;
-                        let rim = model.neighbours(near).iter().any(|w| model.part(*w) & mask == 0);
-                        let n = near as usize;
-                        if rim { Side::Unknown } else { side((p - frame.vertices[n]).dot(&frame.normals[n]) < 0.0) }
-                    }
-                    Ok(c) if c.rim => Side::Unknown,
-                    Ok(c) => side(c.signed < 0.0),
-                };
+                Ok(c) if c.rim => Side::Unknown,
+                Ok(c) => side(c.signed < 0.0),
             }
         });
         self.prove(par, model, frame);
@@ -95,27 +60,27 @@ impl Buried {
     /// a shoulder blade the arm's nearest skin, where the arm ends, faces away, and 107 vertices of a dancer's back held
     /// no cloth for a tenth of a second (17 mm under the skin).
     fn prove(&mut self, par: Par, model: &SurfaceModel, frame: &SurfaceFrame) {
-        self.inside.iter_mut().zip(&self.seen).for_each(|(i, s)| *i = s.state == Side::Inside);
-        let suspects = self.seen.iter().any(|s| s.state == Side::Suspect);
+        self.inside.iter_mut().zip(&self.sides.seen).for_each(|(i, s)| *i = s.found == Side::Inside);
+        let suspects = self.sides.seen.iter().any(|s| s.found == Side::Suspect);
         if !suspects && !self.inside.contains(&true) {
             return;
         }
         let body = Winding::new(&frame.vertices, model.faces());
         let inside = |v: usize| body.holds(&(frame.vertices[v] + frame.normals[v] * OFF));
-        par::for_chunks(par, &mut self.seen, 256, |start, chunk| {
-            for (k, s) in chunk.iter_mut().enumerate().filter(|(_, s)| s.state == Side::Suspect) {
-                s.state = if inside(start + k) { Side::Inside } else { Side::Outside };
+        par::for_chunks(par, &mut self.sides.seen, 256, |start, chunk| {
+            for (k, s) in chunk.iter_mut().enumerate().filter(|(_, s)| s.found == Side::Suspect) {
+                s.found = if inside(start + k) { Side::Inside } else { Side::Outside };
             }
         });
         let mut last: Vec<u32> =
-            (0..self.seen.len() as u32).filter(|v| self.seen[*v as usize].state == Side::Inside).collect();
+            (0..self.sides.seen.len() as u32).filter(|v| self.sides.seen[*v as usize].found == Side::Inside).collect();
         last.iter().for_each(|v| self.inside[*v as usize] = true);
         let mut asked = self.inside.clone();
         for _ in 0..RINGS {
             let mut next = Vec::new();
             for &w in last.iter().flat_map(|v| model.neighbours(*v)) {
                 let v = w as usize;
-                if self.seen[v].state == Side::Unknown && !std::mem::replace(&mut asked[v], true) && inside(v) {
+                if self.sides.seen[v].found == Side::Unknown && !std::mem::replace(&mut asked[v], true) && inside(v) {
                     self.inside[v] = true;
                     next.push(w);
                 }
@@ -137,6 +102,7 @@ impl Buried {
 mod tests {
     use super::*;
     use crate::contact::surface::tests::sphere;
+    use crate::math::P3;
     use crate::math::V3;
     use crate::mesh::{Topology, TriMesh};
 

@@ -1,5 +1,6 @@
 //! Candidate pairs, continuous collision, distances and contact energies between moving triangles; it never steps time.
 
+mod across;
 mod apart;
 mod buried;
 mod depth_maps;
