@@ -28,6 +28,8 @@ pub(crate) const FRICTION: f32 = 0.1;
 /// 3 m/s would else carry what touches it by 1 cm each way; a dancer's skirt shook itself to pieces (without it 10k
 /// vertices stretch by 243 %, with one round by 12.6 %, with two by 8.7 %, as without contact of cloth with cloth).
 const CALMING: usize = 2;
+/// One normal and calm velocity that is computed when it is wanted costs as much as so many of all in their order.
+const DEAR: usize = 32;
 
 /// A sheet as something that touches itself.
 #[derive(Debug)]
@@ -43,9 +45,28 @@ pub(crate) struct FoldModel {
 #[derive(Debug, Default)]
 pub(crate) struct FoldFrame {
     pub(crate) surface: SurfaceFrame,
-    /// m/s, calmed by [`FoldModel::begin`].
+    /// m/s.
     pub(crate) velocities: Vec<V3>,
+    /// The same calmed, m/s; empty where each is computed when it is wanted.
+    calm: Vec<V3>,
     grid: PointGrid,
+}
+
+impl FoldFrame {
+    /// Calm velocity of a vertex, m/s.
+    fn speed(&self, g: &SurfaceModel, v: u32) -> V3 {
+        self.calm.get(v as usize).copied().unwrap_or_else(|| calmed(g, &self.velocities, v, CALMING))
+    }
+}
+
+/// Velocity of a vertex after so many rounds of averaging over neighbours, m/s.
+fn calmed(g: &SurfaceModel, sharp: &[V3], v: u32, rounds: usize) -> V3 {
+    if rounds == 0 {
+        return sharp[v as usize];
+    }
+    let around = g.neighbours(v);
+    let own = calmed(g, sharp, v, rounds - 1);
+    around.iter().fold(own, |a, w| a + calmed(g, sharp, *w, rounds - 1)) / (1 + around.len()) as f32
 }
 
 /// How far one search looks.
@@ -91,16 +112,23 @@ impl FoldModel {
         let thickness = thickness.min(THICKNESS_EDGES * self.edge);
         Search { thickness, reach, needed: reach.hypot(beside), corner: (reach + further).hypot(beside), halfway: true }
     }
-    /// Prepares a frame whose positions and velocities have been set; with a search also for that.
-    pub(crate) fn begin(&self, par: Par, frame: &mut FoldFrame, search: Option<&Search>) {
-        for _ in 0..CALMING {
-            let sharp = std::mem::take(&mut frame.velocities);
-            crate::par::map_into(par, sharp.len(), 1024, &mut frame.velocities, |v| {
-                let around = self.surface.neighbours(v as u32);
-                around.iter().fold(sharp[v], |a, w| a + sharp[*w as usize]) / (1 + around.len()) as f32
-            });
+    /// Prepares a frame whose positions and velocities have been set; with a search also for that. `touches`: how many
+    /// planes are expected. For few of them normals and calm velocities are computed when they are wanted.
+    pub(crate) fn begin(&self, par: Par, frame: &mut FoldFrame, search: Option<&Search>, touches: usize) {
+        frame.calm.clear();
+        frame.surface.normals.clear();
+        if touches * DEAR > self.surface.vertices() {
+            let mut once = Vec::new();
+            for _ in 0..CALMING {
+                let sharp = if once.is_empty() { &frame.velocities } else { &once };
+                crate::par::map_into(par, sharp.len(), 1024, &mut frame.calm, |v| {
+                    calmed(&self.surface, sharp, v as u32, 1)
+                });
+                std::mem::swap(&mut once, &mut frame.calm);
+            }
+            frame.calm = once;
+            self.surface.update_normals(par, &mut frame.surface);
         }
-        self.surface.update_normals(par, &mut frame.surface);
         if let Some(search) = search {
             frame.grid.fill(&frame.surface.vertices, 2.0 * search.corner);
         }
@@ -156,8 +184,8 @@ impl FoldModel {
             true => search.thickness,
             false => far,
         };
-        let mut plane = touching(g, &frame.velocities, i, &hit, side, gap);
-        let own = frame.velocities[v as usize];
+        let mut plane = touching(g, frame, i, &hit, side, gap);
+        let own = frame.speed(g, v);
         let own = V4::new(own.x, own.y, own.z);
         plane.speed = (plane.speed + own).scale(0.5);
         // Folds that part need no plane: one that follows them would carry what has long met something else.
@@ -169,9 +197,9 @@ impl FoldModel {
 }
 
 /// The plane at a hit, `gap` away from it on its `side`, as fast as its corners.
-pub(crate) fn touching(g: &SurfaceModel, speeds: &[V3], i: usize, hit: &Closest, side: f32, gap: f32) -> Plane {
+pub(crate) fn touching(g: &SurfaceModel, frame: &FoldFrame, i: usize, hit: &Closest, side: f32, gap: f32) -> Plane {
     let corners = g.faces()[hit.face as usize];
-    let speed = (0..3).fold(V3::zeros(), |a, k| a + speeds[corners[k] as usize] * hit.weights[k]);
+    let speed = (0..3).fold(V3::zeros(), |a, k| a + frame.speed(g, corners[k]) * hit.weights[k]);
     let n = hit.normal * side;
     Plane {
         vertex: i as u32,

@@ -1,6 +1,7 @@
 //! Points in cubic cells, to find those near a place. Made anew each time: two passes over the points.
 
 use crate::math::P3;
+use wide::f32x8;
 
 /// Points sorted by the hash of their cell.
 #[derive(Clone, Debug, Default)]
@@ -18,6 +19,12 @@ const LANES: usize = 8;
 
 /// Buckets of the hash: a power of two, twice the points of a usual garment.
 const BUCKETS: usize = 1 << 13;
+
+/// The whole number below `t`: `f32::floor` is a call into the C library on the machines that this is built for.
+fn below(t: f32) -> i32 {
+    let i = t as i32;
+    i.saturating_sub(i32::from(i as f32 > t))
+}
 
 fn bucket(c: [i32; 3]) -> usize {
     let h = (c[0] as u32).wrapping_mul(0x9E37_79B1)
@@ -57,7 +64,7 @@ impl PointGrid {
         }
     }
     fn at(&self, p: &P3) -> [i32; 3] {
-        [p.x, p.y, p.z].map(|c| (c / self.cell).floor() as i32)
+        [p.x, p.y, p.z].map(|c| below(c / self.cell))
     }
     /// Calls `f` with number and squared distance (m²) of every point within `reach` of `p`, half a cell at most; maybe
     /// more than once.
@@ -67,10 +74,11 @@ impl PointGrid {
         }
         let c = [p.x, p.y, p.z].map(|v| {
             let t = v / self.cell;
-            let i = t.floor();
-            (i as i32, if t - i < 0.5 { -1 } else { 1 })
+            let i = below(t);
+            (i, if t - (i as f32) < 0.5 { -1 } else { 1 })
         });
-        let most = reach * reach;
+        let most = f32x8::splat(reach * reach);
+        let at = [p.x, p.y, p.z].map(f32x8::splat);
         let [x, y, z] = &self.places;
         for k in 0..8usize {
             // Saturating: cloth that has flown away keeps its place in the last cell.
@@ -85,18 +93,16 @@ impl PointGrid {
                 ) else {
                     break;
                 };
-                let mut square = [0.0f32; LANES];
-                let mut any = false;
-                for l in 0..LANES {
-                    let d = [x[l] - p.x, y[l] - p.y, z[l] - p.z];
-                    square[l] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-                    any |= square[l] <= most;
-                }
-                if any {
-                    for (l, d) in square.iter().enumerate().take(to - from) {
-                        if *d <= most {
-                            f(self.numbers[from + l], *d);
-                        }
+                let d = [f32x8::from(*x) - at[0], f32x8::from(*y) - at[1], f32x8::from(*z) - at[2]];
+                let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                let mut near = square.simd_le(most).to_bitmask();
+                if near != 0 {
+                    let square = square.to_array();
+                    near &= u32::MAX >> (u32::BITS - (to - from).min(LANES) as u32);
+                    while near != 0 {
+                        let l = near.trailing_zeros() as usize;
+                        near &= near - 1;
+                        f(self.numbers[from + l], square[l]);
                     }
                 }
                 from += LANES;

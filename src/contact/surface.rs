@@ -4,7 +4,7 @@
 //! few neighbours instead of a tree, and a vertex that was outside an arm knows it even when the arm has moved past it.
 
 use crate::math::{P3, V3};
-use crate::mesh::{Csr, Face, Topology, vertex_normals};
+use crate::mesh::{Csr, Face, Topology, vertex_normal, vertex_normals};
 use crate::par::Par;
 
 /// Parts of a surface as bits.
@@ -26,7 +26,7 @@ pub struct SurfaceModel {
 pub struct SurfaceFrame {
     /// Vertices, metres, shape `[vertices]`.
     pub vertices: Vec<P3>,
-    /// Unit normals, shape `[vertices]`.
+    /// Unit normals, shape `[vertices]`. Left empty, each is computed when it is wanted.
     pub normals: Vec<V3>,
 }
 
@@ -81,6 +81,12 @@ impl SurfaceModel {
     /// Fills the normals of a frame from its vertices.
     pub fn update_normals(&self, par: Par, frame: &mut SurfaceFrame) {
         vertex_normals(par, &frame.vertices, &self.faces, self.topology.vertex_faces(), &mut frame.normals);
+    }
+    /// Unit normal at a vertex.
+    fn normal(&self, frame: &SurfaceFrame, vertex: u32) -> V3 {
+        let around = || self.topology.vertex_faces().row(vertex as usize);
+        let known = frame.normals.get(vertex as usize).copied();
+        known.unwrap_or_else(|| vertex_normal(&frame.vertices, &self.faces, around()))
     }
     /// Nearest vertex among those of `mask`, by looking at all: the oracle of the walk, and the first start.
     pub fn nearest_vertex(&self, frame: &SurfaceFrame, p: &P3, mask: Part) -> u32 {
@@ -157,7 +163,7 @@ impl SurfaceModel {
         let [a, b, c] = self.faces[face as usize].map(|i| frame.vertices[i as usize].coords);
         let point = P3::from(a * weights[0] + b * v + c * w);
         let n = self.faces[face as usize];
-        let smooth = (0..3).fold(V3::zeros(), |s, k| s + frame.normals[n[k] as usize] * weights[k]);
+        let smooth = (0..3).fold(V3::zeros(), |s, k| s + self.normal(frame, n[k]) * weights[k]);
         let mut normal = smooth.try_normalize(0.0).unwrap_or_else(V3::y);
         let outside = (p - point).dot(&normal) >= 0.0;
         let distance = d.sqrt();
@@ -185,7 +191,7 @@ impl SurfaceModel {
             return Some(*hit);
         }
         let corners = self.faces[hit.face as usize];
-        let normal = (0..3).fold(V3::zeros(), |s, k| s + frame.normals[corners[k] as usize] * hit.weights[k]);
+        let normal = (0..3).fold(V3::zeros(), |s, k| s + self.normal(frame, corners[k]) * hit.weights[k]);
         let normal = normal.try_normalize(0.0)?;
         let height = normal.dot(&(p - hit.point));
         let beyond = (p - hit.point - normal * height).norm();

@@ -3,7 +3,7 @@
 mod normals;
 mod topology;
 
-pub use normals::{face_normal, vertex_normals};
+pub use normals::{face_normal, vertex_normal, vertex_normals};
 pub use topology::{Csr, Edge, Topology};
 
 use crate::math::P3;

@@ -29,3 +29,9 @@ pub fn vertex_normals(
         sum.try_normalize(0.0).unwrap_or_else(V3::zeros)
     });
 }
+
+/// As [`vertex_normals`], of the vertex that has these `faces` around it.
+pub fn vertex_normal(vertices: &[P3], faces: &[Face], around: &[u32]) -> V3 {
+    let sum = around.iter().fold(V3::zeros(), |s, &f| s + face_normal(vertices, &faces[f as usize]));
+    sum.try_normalize(0.0).unwrap_or_else(V3::zeros)
+}

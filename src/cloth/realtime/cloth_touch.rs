@@ -57,7 +57,7 @@ pub(super) fn sheets(model: &Model, patches: &[PatchScratch], span: f32, out: &m
             }
         }
         let search = c.self_collision.then(|| g.folds.search(c.thickness as f32, span));
-        g.folds.begin(par::Par::Seq, s, search.as_ref());
+        g.folds.begin(par::Par::Seq, s, search.as_ref(), n);
     });
 }
 
@@ -110,7 +110,7 @@ impl ClothTouch<'_> {
                 let Some(hit) = g.under(&s.surface, &x, &hit, HEM) else { continue };
                 let inside = -hit.signed;
                 if inside < LAYER_REACH && inside > -LAYER_DEPTH {
-                    p.planes.push(touching(g, &s.velocities, i, &hit, -1.0, LAYER_GAP));
+                    p.planes.push(touching(g, s, i, &hit, -1.0, LAYER_GAP));
                     p.report.cloth_contacts += usize::from(inside < LAYER_GAP);
                 }
             }

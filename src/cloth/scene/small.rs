@@ -142,6 +142,9 @@ pub(super) fn run(
                 }
             }
             s0 += steps;
+            if let Some(f) = &mut folds {
+                f.touches = scratch.iter().map(|w| w.folds.len()).sum();
+            }
             fold_contacts = fold_contacts.max(scratch.iter().map(|w| w.held_off).sum());
         }
         times.push(started.elapsed().as_secs_f64() * 1e3);
@@ -220,6 +223,8 @@ struct Folds {
     speeds: Vec<f32>,
     fastest: f32,
     span: f32,
+    /// Planes after the last search.
+    touches: usize,
     /// Steps between two looks at the solids, their length, s, and the most looks from one search to the next.
     looks: usize,
     h: f32,
@@ -238,7 +243,7 @@ impl Folds {
         let thickness = config.thickness as f32;
         let search = model.search_all(thickness, 0.0);
         let (frame, speeds, h) = (FoldFrame::default(), Vec::new(), h as f32);
-        Ok(Self { model, frame, search, thickness, speeds, fastest: 0.0, span: 0.0, looks, h, most })
+        Ok(Self { model, frame, search, thickness, speeds, fastest: 0.0, span: 0.0, touches: 0, looks, h, most })
     }
     /// The sheet is here now. Returns after how many steps it must be looked at again: none come together by more than
     /// their thickness before, if that can be.
@@ -255,7 +260,7 @@ impl Folds {
         self.span = looks as f32 * look;
         self.search = self.model.search_all(self.thickness, 2.0 * self.fastest * self.span);
         self.fastest += turn * self.search.corner;
-        self.model.begin(par, frame, Some(&self.search));
+        self.model.begin(par, frame, Some(&self.search), self.touches);
         looks * self.looks
     }
     /// Planes between the vertices of a patch and other folds.
