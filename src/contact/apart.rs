@@ -22,8 +22,8 @@ const BESIDE: f32 = 0.005;
 const ROUNDS: usize = 3;
 
 impl Apart {
-    /// Moves skin of `frame` back where less than `room` metres are left between parts; its normals stay those of the body as
-    /// it is. `pressing`: the part that presses on each vertex, 0 where that shall not count. Says how many vertices moved.
+    /// Moves skin of `frame` back where less than `room` metres are left between parts, and leaves its normals empty.
+    /// `pressing`: the part that presses on each vertex, 0 where that shall not count. Says how many vertices moved.
     pub fn make_room(
         &mut self,
         par: Par,
@@ -32,11 +32,12 @@ impl Apart {
         frame: &mut SurfaceFrame,
         room: f32,
     ) -> usize {
-        model.update_normals(par, frame);
-        let frame_now = &*frame;
-        self.0.look(par, model, pressing, frame_now, room, |v, near, hit| match hit {
+        // Few of them are wanted.
+        frame.normals.clear();
+        let still = &*frame;
+        self.0.look(par, model, pressing, still, room, |v, near, hit| match hit {
             Ok(c) if !c.rim && pressing[near as usize] != 0 && c.signed < room => {
-                let facing = c.normal.dot(&frame_now.normals[v]) < 0.0;
+                let facing = c.normal.dot(&model.normal(still, v as u32)) < 0.0;
                 if facing { c.normal * (0.5 * (room - c.signed)).min(MOST) } else { V3::zeros() }
             }
             _ => V3::zeros(),

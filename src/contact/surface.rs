@@ -83,7 +83,7 @@ impl SurfaceModel {
         vertex_normals(par, &frame.vertices, &self.faces, self.topology.vertex_faces(), &mut frame.normals);
     }
     /// Unit normal at a vertex.
-    fn normal(&self, frame: &SurfaceFrame, vertex: u32) -> V3 {
+    pub(super) fn normal(&self, frame: &SurfaceFrame, vertex: u32) -> V3 {
         let around = || self.topology.vertex_faces().row(vertex as usize);
         let known = frame.normals.get(vertex as usize).copied();
         known.unwrap_or_else(|| vertex_normal(&frame.vertices, &self.faces, around()))

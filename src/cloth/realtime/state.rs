@@ -189,7 +189,8 @@ pub struct Workspace {
     pub(super) now: SurfaceFrame,
     /// Vertices of the body at the end of the call.
     pub(super) skin_grid: PointGrid,
-    /// The body with room between its parts.
+    /// The measured body, held steady, and the same with room between its parts.
+    pub(super) followed: Vec<P3>,
     pub(super) roomy: SurfaceFrame,
     /// Garments at the beginning of a round, for contact of cloth with cloth.
     pub(super) sheets: Vec<FoldFrame>,

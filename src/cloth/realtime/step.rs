@@ -70,17 +70,25 @@ pub fn step(
             expected: model.garments.len(),
         });
     }
-    let mut body = std::mem::take(&mut state.followed);
-    if body.len() != input.body.len() {
-        body.clone_from(&state.body);
-    }
-    follow(&mut body, input.body, model.config.steady, input.dt);
+    let started = Instant::now();
+    let mut followed = std::mem::take(&mut work.followed);
+    let known = state.followed.len() == input.body.len();
+    followed.clone_from(if known { &state.followed } else { &state.body });
+    follow(&mut followed, input.body, model.config.steady, input.dt);
     let mut roomy = std::mem::take(&mut work.roomy);
-    roomy.vertices.clone_from(&body);
-    state.apart.make_room(model.config.par, &model.surface, &model.pressing, &mut roomy, model.room());
-    let report = step_on(model, state, &Input { body: &roomy.vertices, dt: input.dt }, work);
+    if followed == state.followed {
+        roomy.vertices.clone_from(&state.body);
+    } else {
+        roomy.vertices.clone_from(&followed);
+        state.apart.make_room(model.config.par, &model.surface, &model.pressing, &mut roomy, model.room());
+        std::mem::swap(&mut state.followed, &mut followed);
+    }
+    work.followed = followed;
+    let before = ms(started);
+    let mut report = step_on(model, state, &Input { body: &roomy.vertices, dt: input.dt }, work);
+    report.stages_ms.contact += before;
+    report.stages_ms.total += before;
     work.roomy = roomy;
-    state.followed = body;
     Ok(report)
 }
 

@@ -217,10 +217,12 @@ pub(super) fn settle(model: &Model, garment: usize, patch: usize, body: &Settled
         last = i;
         let i = i as usize;
         let v = f.vertices[i] as usize;
+        let masks = [g.own[v], g.other[v]];
+        let mut near = nearest_vertices(model, body, &p3(p.motion.position(i)), masks);
         // The own parts have the last word.
-        for (side, mask) in [(1, g.other[v]), (0, g.own[v])].into_iter().filter(|s| s.1 != 0) {
+        for side in [1, 0].into_iter().filter(|s| masks[*s] != 0) {
             let x = p3(p.motion.position(i));
-            let c = nearest_skin(model, body, &x, p.nearest[i][side], mask);
+            let c = nearest_skin(model, body, &x, p.nearest[i][side], near[side], masks[side]);
             p.nearest[i][side] = c.vertex;
             let elsewhere = side == 1 && c.signed < -OTHER_DEPTH;
             let nothing = body.buried.holds_nothing(model.surface.faces()[c.face as usize]);
@@ -229,25 +231,33 @@ pub(super) fn settle(model: &Model, garment: usize, patch: usize, body: &Settled
             }
             p.report.penetration = p.report.penetration.max(f64::from(-c.signed));
             p.motion.moved[i] = v4(&(c.point + c.normal * LIFTED - p3(p.motion.start[i])));
-            let again = model.surface.closest(body.skin, &p3(p.motion.position(i)), c.vertex, mask);
+            let lifted = p3(p.motion.position(i));
+            let again = model.surface.closest(body.skin, &lifted, c.vertex, masks[side]);
             p.report.penetration_left = p.report.penetration_left.max(f64::from(-again.signed));
+            near = nearest_vertices(model, body, &lifted, masks);
         }
     }
 }
 
-/// The nearest point by a walk from `near`, or around the nearest of all vertices where that is not where the walk ended: in
-/// the crook of an elbow it ends on the upper arm though the forearm is nearer, and between fingers on any of them.
-fn nearest_skin(model: &Model, body: &Settled<'_>, x: &P3, near: u32, mask: u8) -> Closest {
-    let walked = model.surface.closest(body.skin, x, near, mask);
-    let mut best = (HIDDEN * HIDDEN, walked.vertex);
+/// Of two kinds of parts the nearest vertex within [`HIDDEN`], if there is one.
+fn nearest_vertices(model: &Model, body: &Settled<'_>, x: &P3, masks: [u8; 2]) -> [Option<u32>; 2] {
+    let mut best = [(HIDDEN * HIDDEN, None); 2];
     body.grid.within(x, HIDDEN, |v, d| {
-        if (d, v) < best && model.surface.part(v) & mask != 0 {
-            best = (d, v);
+        let part = model.surface.part(v);
+        for (best, mask) in best.iter_mut().zip(masks) {
+            if (d, Some(v)) < *best && part & mask != 0 {
+                *best = (d, Some(v));
+            }
         }
     });
-    if best.1 == walked.vertex {
-        return walked;
-    }
-    let other = model.surface.closest_around(body.skin, x, best.1, mask);
+    best.map(|b| b.1)
+}
+
+/// The nearest point by a walk from `start`, or around the nearest of all vertices where that is not where the walk ended:
+/// in the crook of an elbow it ends on the upper arm though the forearm is nearer, and between fingers on any of them.
+fn nearest_skin(model: &Model, body: &Settled<'_>, x: &P3, start: u32, nearest: Option<u32>, mask: u8) -> Closest {
+    let walked = model.surface.closest(body.skin, x, start, mask);
+    let Some(nearest) = nearest.filter(|v| *v != walked.vertex) else { return walked };
+    let other = model.surface.closest_around(body.skin, x, nearest, mask);
     if !other.rim && other.signed.abs() < walked.signed.abs() { other } else { walked }
 }
