@@ -74,7 +74,7 @@ pub fn step(
     let mut followed = std::mem::take(&mut work.followed);
     let known = state.followed.len() == input.body.len();
     followed.clone_from(if known { &state.followed } else { &state.body });
-    follow(&mut followed, input.body, model.config.steady, input.dt);
+    follow(model.config.par, &mut followed, input.body, model.config.steady, input.dt);
     let mut roomy = std::mem::take(&mut work.roomy);
     if followed == state.followed {
         roomy.vertices.clone_from(&state.body);
