@@ -5,7 +5,9 @@
 
 use crate::math::{P3, V3};
 use crate::mesh::{Csr, Face, Topology, vertex_normal, vertex_normals};
-use crate::par::Par;
+use crate::par::{self, Par};
+use crate::spatial::PointTree;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Parts of a surface as bits.
 pub type Part = u8;
@@ -98,6 +100,33 @@ impl SurfaceModel {
             }
         }
         best.1
+    }
+    /// [`Self::nearest_vertex`] of many points at once, each with its own mask.
+    pub fn nearest_vertices<'a>(
+        &self,
+        par: Par,
+        frame: &SurfaceFrame,
+        points: &'a [P3],
+        masks: impl Iterator<Item = &'a Part>,
+    ) -> Vec<u32> {
+        let masks: Vec<Part> = masks.copied().collect();
+        let trees: BTreeMap<Part, (Vec<u32>, PointTree)> = masks
+            .iter()
+            .copied()
+            .collect::<BTreeSet<_>>()
+            .into_iter()
+            .map(|mask| {
+                let of: Vec<u32> = (0..self.parts.len() as u32).filter(|v| self.part(*v) & mask != 0).collect();
+                let places: Vec<P3> = of.iter().map(|v| frame.vertices[*v as usize]).collect();
+                (mask, (of, PointTree::new(&places)))
+            })
+            .collect();
+        let mut found = Vec::new();
+        par::map_into(par, points.len().min(masks.len()), 256, &mut found, |i| {
+            let near = trees.get(&masks[i]).and_then(|(of, tree)| Some(of[tree.nearest(&points[i], f32::MAX)?.0]));
+            near.unwrap_or(0)
+        });
+        found
     }
     /// A vertex of `mask` to start a walk from: the nearest of every seventh.
     pub fn nearest_of_some(&self, frame: &SurfaceFrame, p: &P3, mask: Part) -> u32 {

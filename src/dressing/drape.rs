@@ -230,10 +230,9 @@ impl Drape {
     }
     /// First search: all body vertices.
     pub(super) fn find_all(&mut self, skin: &Skin<'_>) {
-        for (i, near) in self.nearest.iter_mut().enumerate() {
-            let p = P3::from(self.x[i].cast::<f32>());
-            *near = [self.own[i], Region::ALL.0 & !self.own[i]].map(|m| skin.model.nearest_vertex(&skin.frame, &p, m));
-        }
+        let (points, other) = (self.positions(), self.own.iter().map(|o| Region::ALL.0 & !o).collect::<Vec<_>>());
+        let of = |masks: &[u8]| skin.model.nearest_vertices(Par::Rayon, &skin.frame, &points, masks.iter());
+        self.nearest = of(&self.own).into_iter().zip(of(&other)).map(|(own, other)| [own, other]).collect();
     }
     /// Starts from the nearest body vertices of a coarser drape of the same garment.
     pub(super) fn find_from(&mut self, skin: &Skin<'_>, coarse: &Self) {

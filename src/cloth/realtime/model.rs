@@ -258,9 +258,11 @@ impl Model {
             let sheet = Sheet::of_garment(g)?;
             // Of the second degree, layers and folds tore the dancer's clothes of 12 mm edges apart: finer garments are
             // softened to the step instead.
-            let (smooth, h) = match Plan::comfortable(&sheet, config.ahead, LONG_ENOUGH) {
-                (2.., _) => (0, Plan::comfortable_step(&sheet, config.ahead, 0)),
-                found => found,
+            let (smooth, h) = {
+                let step = Plan::comfortable_steps(&sheet, config.ahead);
+                let plain = step(0);
+                let smoothed = (plain < LONG_ENOUGH).then(|| step(1)).filter(|h| *h >= LONG_ENOUGH);
+                smoothed.map_or((0, plain), |h| (1, h))
             };
             let h = h.clamp(1.0 / (60.0 * config.most_steps as f64), 1e-3);
             let bend_every = Plan::bend_every(&sheet, h);

@@ -73,13 +73,8 @@ impl State {
             if let Some(index) = p.iter().position(|q| !q.iter().all(|c| c.is_finite())) {
                 return Err(ClothError::NotFinite { what: "garment vertex", index });
             }
-            let mut nearest = vec![[0u32; 2]; p.len()];
-            crate::par::for_chunks(model.config.par, &mut nearest, 64, |start, c| {
-                for (k, n) in c.iter_mut().enumerate() {
-                    let i = start + k;
-                    *n = [m.own[i], m.other[i]].map(|mask| model.surface.nearest_vertex(&frame, &p[i], mask));
-                }
-            });
+            let of = |masks: &[u8]| model.surface.nearest_vertices(model.config.par, &frame, &p, masks.iter());
+            let nearest = of(&m.own).into_iter().zip(of(&m.other)).map(|(own, other)| [own, other]).collect();
             garments.push(GarmentState {
                 velocities: vec![V3::zeros(); p.len()],
                 positions: p,
@@ -91,12 +86,12 @@ impl State {
             garments.iter().map(|g| SurfaceFrame { vertices: g.positions.clone(), normals: Vec::new() }).collect();
         for (k, g) in garments.iter_mut().enumerate() {
             for (j, frame) in all.iter().enumerate() {
-                let mut near = Vec::new();
-                if j > k {
-                    crate::par::map_into(model.config.par, g.positions.len(), 64, &mut near, |i| {
-                        model.garments[j].folds.surface.nearest_vertex(frame, &g.positions[i], model.garments[k].own[i])
-                    });
-                }
+                let (surface, own) = (&model.garments[j].folds.surface, &model.garments[k].own);
+                let near = if j > k {
+                    surface.nearest_vertices(model.config.par, frame, &g.positions, own.iter())
+                } else {
+                    Vec::new()
+                };
                 g.layers.push(near);
             }
         }

@@ -166,7 +166,7 @@ impl Plan {
     }
     /// The lowest degree of smoothing with a step of at least `enough` seconds, or the highest, and that step, s.
     pub fn comfortable(sheet: &Sheet, ahead: f64, enough: f64) -> (usize, f64) {
-        let step = comfort(sheet, ahead);
+        let step = Self::comfortable_steps(sheet, ahead);
         let mut found = (0, step(0));
         while found.1 < enough && found.0 < HIGHEST {
             found = (found.0 + 1, step(found.0 + 1));
@@ -185,20 +185,19 @@ impl Plan {
     }
     /// Longest step at which all but a few small elements keep all their stiffness, s.
     pub fn comfortable_step(sheet: &Sheet, ahead: f64, smooth: usize) -> f64 {
-        comfort(sheet, ahead)(smooth)
+        Self::comfortable_steps(sheet, ahead)(smooth)
     }
-}
-
-/// [`Plan::comfortable_step`] of any degree.
-fn comfort(sheet: &Sheet, ahead: f64) -> impl Fn(usize) -> f64 {
-    let limits = element_limits(sheet, false);
-    let usual = usual(&limits);
-    let keep: Vec<f64> = limits.iter().map(|l| (usual / l.max(f64::MIN_POSITIVE)).min(1.0)).collect();
-    let flat = laid_flat(sheet);
-    move |smooth| {
-        let ends = sheet.edges.iter().map(|(v, _)| [v[0].min(v[1]), v[0].max(v[1])]).collect();
-        let fastest = membrane_eigenvalue(&flat, &keep, false, &filter(sheet, ends, smooth));
-        (4.0 / (fastest.max(f64::MIN_POSITIVE) * MARGIN * (1.0 + 2.0 * ahead))).sqrt()
+    /// [`Self::comfortable_step`] of any degree of smoothing.
+    pub fn comfortable_steps(sheet: &Sheet, ahead: f64) -> impl Fn(usize) -> f64 {
+        let limits = element_limits(sheet, false);
+        let usual = usual(&limits);
+        let keep: Vec<f64> = limits.iter().map(|l| (usual / l.max(f64::MIN_POSITIVE)).min(1.0)).collect();
+        let flat = laid_flat(sheet);
+        move |smooth| {
+            let ends = sheet.edges.iter().map(|(v, _)| [v[0].min(v[1]), v[0].max(v[1])]).collect();
+            let fastest = membrane_eigenvalue(&flat, &keep, false, &filter(sheet, ends, smooth));
+            (4.0 / (fastest.max(f64::MIN_POSITIVE) * MARGIN * (1.0 + 2.0 * ahead))).sqrt()
+        }
     }
 }
 
