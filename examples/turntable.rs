@@ -2,7 +2,8 @@
 //!
 //! `cargo run --release --example turntable -- --garment tshirt --garment longsleeve+trousers --out DIR
 //!   [--garment FILE.obj|.glb|.mhclo|.json [--garment-body FILE.npz|.obj]] [--body average,slim_woman,heavy_man | FILE.npz | RECORDING] [--size auto,S,M,XL] [--pose down|tpose|rest|walk|raise]
-//!   [--seconds 1.0] [--views 0,45,90,180] [--cell 220x340] [--crop] [--edge 0.021] [--fit] [--any-size] [--no-folds] [--crossings]`
+//!   [--seconds 1.0] [--views 0,45,90,180] [--cell 220x340] [--crop] [--edge 0.021] [--fit] [--any-size] [--no-folds]
+//!   [--crossings] [--untangle]`
 //!
 //! A row is a body, a block of columns a size. `auto` asks the size suggestion. A recording (a folder or .mcap) shows the
 //! person tracked in it, at its end; a still picture is tracked 45 times.
@@ -38,6 +39,7 @@ struct Args {
     any_size: bool,
     crossings: bool,
     folds: bool,
+    untangle: bool,
     out: PathBuf,
 }
 
@@ -57,6 +59,7 @@ fn args() -> Args {
         any_size: false,
         crossings: false,
         folds: true,
+        untangle: false,
         out: "/tmp/turntable".into(),
     };
     let list = |s: String| s.split(',').map(str::to_owned).collect::<Vec<_>>();
@@ -83,6 +86,7 @@ fn args() -> Args {
             "--crop" => a.crop = true,
             "--crossings" => a.crossings = true,
             "--no-folds" => a.folds = false,
+            "--untangle" => a.untangle = true,
             "--any-size" => a.any_size = true,
             "--fit" => a.fit = true,
             "--edge" => a.edge = Some(value().parse().expect("metres")),
@@ -255,7 +259,7 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
             Worn::Mesh(m) => Wear::Mesh(m),
         })
         .collect();
-    let mut options = DressOptions { any_size: a.any_size, ..DressOptions::default() };
+    let mut options = DressOptions { any_size: a.any_size, untangle: a.untangle, ..DressOptions::default() };
     if let Some(e) = a.edge {
         options.triangulation.edge_length = e;
     }
@@ -279,11 +283,12 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
     };
     let vertices: Vec<usize> = state.garments.iter().map(|g| g.positions.len()).collect();
     println!(
-        "{body} {outfit} {size}: {vertices:?} vertices, dressed in {:.0} ms, {} steps, penetration {:.1} mm, p99 stretch {:.3}",
+        "{body} {outfit} {size}: {vertices:?} vertices, dressed in {:.0} ms, {} steps, penetration {:.1} mm, p99 stretch {:.3}; {:.0?}",
         report.ms,
         report.steps,
         report.penetration * 1e3,
-        report.p99_strain
+        report.p99_strain,
+        report.stages_ms
     );
     let crossed = |state: &State| -> Vec<usize> {
         model

@@ -2,6 +2,7 @@
 
 use crate::math::{P3, V3d};
 use crate::mesh::Face;
+use crate::par::{self, Par};
 
 /// An edge that passes through a triangle of the same sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,43 +16,215 @@ pub struct Crossing {
 /// Pairs of an edge and a triangle without a common corner that pass through each other.
 pub fn crossings(faces: &[Face], positions: &[P3]) -> Vec<Crossing> {
     let x: Vec<V3d> = positions.iter().map(|p| p.coords.cast()).collect();
-    let corners = |f: &Face| f.map(|v| x[v as usize]);
-    let mut edges: Vec<[u32; 2]> =
-        faces.iter().flat_map(|f| [(0, 1), (1, 2), (2, 0)].map(|(i, j)| [f[i].min(f[j]), f[i].max(f[j])])).collect();
-    edges.sort_unstable();
-    edges.dedup();
-    // Along one axis in order, so that each edge sees only what lies beside it.
-    let low = |all: &[V3d]| all.iter().map(|p| p.x).fold(f64::INFINITY, f64::min);
-    let high = |all: &[V3d]| all.iter().map(|p| p.x).fold(f64::NEG_INFINITY, f64::max);
-    let mut sorted: Vec<(f64, f64, usize)> =
-        faces.iter().enumerate().map(|(n, f)| (low(&corners(f)), high(&corners(f)), n)).collect();
-    sorted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    let widest = sorted.iter().map(|s| s.1 - s.0).fold(0.0, f64::max);
-    let mut found = Vec::new();
-    for e in &edges {
-        let ends = e.map(|v| x[v as usize]);
-        let from = sorted.partition_point(|s| s.0 < low(&ends) - widest);
-        for (_, _, n) in sorted[from..].iter().take_while(|s| s.0 <= high(&ends)).filter(|s| s.1 >= low(&ends)) {
-            let f = &faces[*n];
-            if !f.iter().any(|v| e.contains(v)) && passes(&ends, &corners(f)) {
-                found.push(Crossing { edge: *e, face: *n as u32 });
+    let mut finder = Finder::new(faces, &x);
+    let found = finder.find(Par::Rayon, &x);
+    found.iter().map(|(e, face)| Crossing { edge: finder.edges[*e as usize], face: *face }).collect()
+}
+
+/// Triangles in the leaves of the tree: with two or eight a search takes a tenth longer.
+const LEAF: usize = 4;
+/// Edges that one thread asks about in a row.
+const CHUNK: usize = 512;
+/// No second triangle lies beside a border.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// A box around triangles. Inner nodes are followed by their first child; `skip` is the node after all below.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    /// Single precision, rounded outwards; the fourth number is 0.
+    low: [f32; 4],
+    high: [f32; 4],
+    skip: u32,
+    /// Range in the order of triangles; empty in inner nodes.
+    first: u32,
+    count: u32,
+}
+
+/// Finds crossings of a sheet that moves: a tree of boxes, built once and fitted anew.
+#[derive(Clone, Debug)]
+pub(crate) struct Finder {
+    pub(crate) faces: Vec<Face>,
+    /// Ends, the smaller one first, in order.
+    pub(crate) edges: Vec<[u32; 2]>,
+    /// Triangles beside each edge, the second one [`NONE`] on borders.
+    pub(crate) beside: Vec<[u32; 2]>,
+    order: Vec<u32>,
+    /// Lowest and highest corner of the triangles, in that order.
+    boxes: Vec<[[f32; 4]; 2]>,
+    nodes: Vec<Node>,
+}
+
+impl Finder {
+    /// For these triangles, which may move from `x` as they like; where they went far apart a search takes longer.
+    pub(crate) fn new(faces: &[Face], x: &[V3d]) -> Self {
+        let mut sides: Vec<([u32; 2], u32)> = faces
+            .iter()
+            .enumerate()
+            .flat_map(|(n, f)| [(0, 1), (1, 2), (2, 0)].map(|(i, j)| ([f[i].min(f[j]), f[i].max(f[j])], n as u32)))
+            .collect();
+        sides.sort_unstable();
+        let (mut edges, mut beside): (Vec<[u32; 2]>, Vec<[u32; 2]>) = (Vec::new(), Vec::new());
+        for (e, f) in sides {
+            match beside.last_mut() {
+                Some(b) if edges.last() == Some(&e) => b[1] = f,
+                _ => {
+                    edges.push(e);
+                    beside.push([f, NONE]);
+                }
             }
         }
+        let middles: Vec<V3d> = faces.iter().map(|f| f.iter().map(|v| x[*v as usize]).sum()).collect();
+        let mut built = Self {
+            faces: faces.to_vec(),
+            edges,
+            beside,
+            order: (0..faces.len() as u32).collect(),
+            boxes: Vec::new(),
+            nodes: Vec::new(),
+        };
+        let mut order = std::mem::take(&mut built.order);
+        built.split(&middles, &mut order, 0);
+        built.order = order;
+        built
     }
-    found
+
+    fn split(&mut self, middles: &[V3d], order: &mut [u32], first: usize) {
+        let at = self.nodes.len();
+        let count = if order.len() <= LEAF { order.len() } else { 0 };
+        self.nodes.push(Node { low: [0.0; 4], high: [0.0; 4], skip: 0, first: first as u32, count: count as u32 });
+        if order.len() > LEAF {
+            let (mut low, mut high) = (V3d::repeat(f64::INFINITY), V3d::repeat(f64::NEG_INFINITY));
+            for f in order.iter() {
+                low = low.inf(&middles[*f as usize]);
+                high = high.sup(&middles[*f as usize]);
+            }
+            let axis = (high - low).imax();
+            let half = order.len() / 2;
+            let by_axis = |f: &u32| middles[*f as usize][axis];
+            order.select_nth_unstable_by(half, |a, b| by_axis(a).total_cmp(&by_axis(b)).then(a.cmp(b)));
+            let (left, right) = order.split_at_mut(half);
+            self.split(middles, left, first);
+            self.split(middles, right, first + half);
+        }
+        self.nodes[at].skip = self.nodes.len() as u32;
+    }
+
+    /// Fits the boxes to where the triangles are now.
+    fn refit(&mut self, x: &[V3d]) {
+        self.boxes.clear();
+        self.boxes.extend(self.order.iter().map(|f| {
+            let [a, b, c] = self.faces[*f as usize].map(|v| x[v as usize]);
+            [below(&a.inf(&b).inf(&c)), above(&a.sup(&b).sup(&c))]
+        }));
+        for k in (0..self.nodes.len()).rev() {
+            let n = self.nodes[k];
+            let (mut low, mut high) = ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]);
+            let mut grow = |l: &[f32; 4], h: &[f32; 4]| {
+                for c in 0..4 {
+                    low[c] = low[c].min(l[c]);
+                    high[c] = high[c].max(h[c]);
+                }
+            };
+            for [low, high] in &self.boxes[n.first as usize..(n.first + n.count) as usize] {
+                grow(low, high);
+            }
+            if n.count == 0 && k + 1 < n.skip as usize {
+                let second = self.nodes[k + 1].skip as usize;
+                for child in [self.nodes[k + 1], self.nodes[second]] {
+                    grow(&child.low, &child.high);
+                }
+            }
+            (self.nodes[k].low, self.nodes[k].high) = (low, high);
+        }
+    }
+
+    /// Numbers of the edge and the triangle of each crossing, in order.
+    pub(crate) fn find(&mut self, par: Par, x: &[V3d]) -> Vec<(u32, u32)> {
+        self.refit(x);
+        let mut chunks: Vec<Vec<(u32, u32)>> = Vec::new();
+        par::map_into(par, self.edges.len().div_ceil(CHUNK), 1, &mut chunks, |c| {
+            let mut found = Vec::new();
+            for e in c * CHUNK..((c + 1) * CHUNK).min(self.edges.len()) {
+                self.of_edge(e, x, &mut found);
+            }
+            found
+        });
+        chunks.concat()
+    }
+
+    fn of_edge(&self, e: usize, x: &[V3d], found: &mut Vec<(u32, u32)>) {
+        let edge = self.edges[e];
+        let ends = edge.map(|v| x[v as usize]);
+        let (low, high) = (below(&ends[0].inf(&ends[1])), above(&ends[0].sup(&ends[1])));
+        let (before, mut k) = (found.len(), 0);
+        while let Some(n) = self.nodes.get(k) {
+            if apart(&n.low, &n.high, &low, &high) {
+                k = n.skip as usize;
+                continue;
+            }
+            k += 1;
+            for i in n.first as usize..(n.first + n.count) as usize {
+                let f = &self.order[i];
+                let corners = self.faces[*f as usize];
+                let far = apart(&self.boxes[i][0], &self.boxes[i][1], &low, &high);
+                if !far && !corners.iter().any(|v| edge.contains(v)) && passes(&ends, &corners.map(|v| x[v as usize])) {
+                    found.push((e as u32, *f));
+                }
+            }
+        }
+        // Whatever the tree.
+        found[before..].sort_unstable();
+    }
+}
+
+/// Two boxes have nothing in common. Written so that the axes are compared together, without a branch.
+fn apart(low: &[f32; 4], high: &[f32; 4], from: &[f32; 4], to: &[f32; 4]) -> bool {
+    (0..4).fold(false, |a, c| a | (low[c] > to[c]) | (high[c] < from[c]))
+}
+
+fn below(p: &V3d) -> [f32; 4] {
+    [(p.x as f32).next_down(), (p.y as f32).next_down(), (p.z as f32).next_down(), 0.0]
+}
+
+fn above(p: &V3d) -> [f32; 4] {
+    [(p.x as f32).next_up(), (p.y as f32).next_up(), (p.z as f32).next_up(), 0.0]
 }
 
 /// A segment passes through a triangle: its ends lie on both sides, and it turns the same way around all three sides.
 fn passes([p, q]: &[V3d; 2], [a, b, c]: &[V3d; 3]) -> bool {
     let volume = |a: &V3d, b: &V3d, c: &V3d, d: &V3d| (b - a).cross(&(c - a)).dot(&(d - a));
-    let (from, to) = (volume(a, b, c, p), volume(a, b, c, q));
+    let normal = (b - a).cross(&(c - a));
+    if !(normal.dot(&(p - a)) * normal.dot(&(q - a)) < 0.0) {
+        return false;
+    }
     let around = [volume(p, q, a, b), volume(p, q, b, c), volume(p, q, c, a)];
-    from * to < 0.0 && (around.iter().all(|v| *v > 0.0) || around.iter().all(|v| *v < 0.0))
+    around.iter().all(|v| *v > 0.0) || around.iter().all(|v| *v < 0.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{Rng, SeedableRng};
+
+    /// Every edge with every triangle.
+    fn slowly(faces: &[Face], positions: &[P3]) -> Vec<Crossing> {
+        let x: Vec<V3d> = positions.iter().map(|p| p.coords.cast()).collect();
+        let mut edges: Vec<[u32; 2]> = faces
+            .iter()
+            .flat_map(|f| [(0, 1), (1, 2), (2, 0)].map(|(i, j)| [f[i].min(f[j]), f[i].max(f[j])]))
+            .collect();
+        edges.sort_unstable();
+        edges.dedup();
+        let mut found = Vec::new();
+        for e in edges {
+            for (n, f) in faces.iter().enumerate() {
+                if !f.iter().any(|v| e.contains(v)) && passes(&e.map(|v| x[v as usize]), &f.map(|v| x[v as usize])) {
+                    found.push(Crossing { edge: e, face: n as u32 });
+                }
+            }
+        }
+        found
+    }
 
     #[test]
     fn a_needle_through_a_triangle_is_seen_and_one_beside_it_is_not() {
@@ -65,5 +238,49 @@ mod tests {
         assert!(at(0.2).contains(&Crossing { edge: [3, 4], face: 0 }));
         assert_eq!(at(1.2), []);
         assert_eq!(crossings(&faces[..1], &[P3::origin(); 3]), []);
+    }
+
+    #[test]
+    fn the_tree_finds_what_a_look_at_every_pair_finds_also_after_the_sheet_has_moved() {
+        let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(3);
+        for (n, spread, size) in [(0, 1.0, 0.1), (1, 1.0, 0.1), (5, 0.1, 0.2), (300, 1.0, 0.3), (300, 0.0, 0.2)] {
+            let mut points = |n: usize| -> Vec<P3> {
+                let mut out = Vec::new();
+                for _ in 0..n {
+                    let mut p = || std::array::from_fn::<f32, 3, _>(|_| random.random::<f32>() - 0.5);
+                    let middle = p().map(|c| c * spread);
+                    for _ in 0..3 {
+                        let c = p();
+                        out.push(P3::from(std::array::from_fn::<f32, 3, _>(|k| middle[k] + c[k] * size)));
+                    }
+                }
+                out
+            };
+            // Some have a corner in common with the next one.
+            let faces: Vec<Face> = (0..n as u32)
+                .map(|k| [3 * k, 3 * k + 1, if k % 3 == 0 { (3 * k + 3) % (3 * n as u32) } else { 3 * k + 2 }])
+                .collect();
+            let first = points(n);
+            let d = |p: &[P3]| -> Vec<V3d> { p.iter().map(|p| p.coords.cast()).collect() };
+            let mut finder = Finder::new(&faces, &d(&first));
+            for mut x in [first, points(n)] {
+                for broken in [false, true] {
+                    if broken && n > 2 {
+                        x[4].x = f32::NAN;
+                        x[7].y = f32::INFINITY;
+                    }
+                    let key = |c: &Crossing| (c.edge, c.face);
+                    let mut fast: Vec<Crossing> = finder
+                        .find(Par::Rayon, &d(&x))
+                        .iter()
+                        .map(|(e, f)| Crossing { edge: finder.edges[*e as usize], face: *f })
+                        .collect();
+                    fast.sort_by_key(key);
+                    let slow = slowly(&faces, &x);
+                    assert!(n < 300 || broken || slow.len() > 100, "{}", slow.len());
+                    assert_eq!(fast, slow, "{n}");
+                }
+            }
+        }
     }
 }

@@ -10,6 +10,7 @@ pub mod realtime;
 pub mod scene;
 mod sheet;
 pub mod small_steps;
+pub(crate) mod untangle;
 
 pub use crossings::{Crossing, crossings};
 pub use error::ClothError;

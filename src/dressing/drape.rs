@@ -6,6 +6,7 @@
 
 use crate::cloth::Sheet;
 use crate::cloth::realtime::{AnchorBinding, Model};
+use crate::cloth::untangle::Untangler;
 use crate::contact::{Apart, Buried, Part, SurfaceFrame, SurfaceModel};
 use crate::garment::{GarmentError, GarmentMesh, Region};
 use crate::math::{P3, V3, V3d};
@@ -18,6 +19,25 @@ struct Plane {
     normal: V3d,
     height: f64,
     near: bool,
+}
+
+impl Plane {
+    /// Between skins that face each other with `room` between them, `far` metres from `x`, cloth stays on its own half:
+    /// sleeves and the trunk of a shirt press on each other as the arms go down. Says whether that is so.
+    fn keep_half(&mut self, other: &mut Self, x: &V3d, far: [f64; 2], room: f64) -> bool {
+        let away = other.normal - self.normal;
+        let steep = away.norm();
+        let facing = steep > FACING && far[0] < HALVED && far[1] < 2.0 * HALVED;
+        if facing {
+            let gap = HALF_GAP.min(0.25 * room);
+            // Where it would be as far from either.
+            other.point = x - away * ((far[1] - far[0]) / (steep * steep));
+            other.normal = away / steep;
+            other.height = gap;
+            self.height = self.height.min(0.5 * room - gap);
+        }
+        facing
+    }
 }
 
 /// One garment being draped.
@@ -42,6 +62,12 @@ pub(super) struct Drape {
     covers: Vec<(u32, Plane)>,
     pinned: Vec<Option<V3d>>,
     before: Vec<V3d>,
+    /// What skin gives way by, where cloth has no room between skins, metres.
+    slack: Vec<f64>,
+    /// Where the sheet is to be taken out of itself.
+    sheet: Option<Untangler>,
+    /// How often it passed through itself when that was last looked for.
+    crossings: usize,
 }
 
 /// What cloth is draped on.
@@ -174,6 +200,35 @@ const AROUND: Region = Region::TRUNK.with(Region::LEFT_LEG).with(Region::RIGHT_L
 /// Most that one lift out of the body may move a vertex, metres: deeper ones come out over several substeps.
 const LIFT: f64 = 0.01;
 
+/// Skins face each other where the difference of their normals is longer than this: at a right angle √2.
+const FACING: f64 = 1.41;
+/// Cloth further from its own skin than this may hang on the other half, metres: a shirt hangs beside a forearm.
+const HALVED: f64 = 0.06;
+/// Distance of either layer from the middle, metres: half of that between two layers on the skin.
+const HALF_GAP: f64 = 0.00125;
+/// Most that a round of untangling moves an edge against a triangle, metres. With a third of it what came in one body on the
+/// way was not gone in the next.
+const APART_STEP: f64 = 0.003;
+/// Distance that vertices which were on the wrong side are put at, metres.
+const APART_GAP: f64 = 0.001;
+/// Skin gives way to cloth that passes through itself, by so much more a round and at most to the skin itself, metres: where
+/// two layers press on each other their distance from the skin is the only room there is. Cloth that does not is let sink less by
+/// this share a round.
+const SLACK_STEP: f64 = 0.001;
+const SLACK: f64 = 0.005;
+const SLACK_KEPT: f64 = 0.98;
+/// While it is untangled cloth takes its lengths and leaves the skin in every other round only, as both may cross it anew.
+const RELAX_EVERY: usize = 2;
+/// For so many rounds.
+const RELAXED: usize = 10;
+/// In the others it may sink so deep into the skin, metres: deeper, and skin shows in the armpits of a heavy man.
+const SUNK: f64 = 0.002;
+/// And edges are only kept from this times their length: a hood in folds on the neck was not free before it was
+/// stretched by 19 % (p99).
+const TAUT: f64 = 1.07;
+/// As if in a step of so many seconds.
+const RELAX_STEP: f64 = 1e-3;
+
 /// Length of cloth from each vertex to the nearest of some others, metres, along edges; infinite far beyond `up_to`.
 fn distances(n: usize, edges: &[([u32; 2], f64)], up_to: f64, from: impl Fn(usize) -> bool) -> Vec<f64> {
     let mut far: Vec<f64> = (0..n).map(|i| if from(i) { 0.0 } else { f64::INFINITY }).collect();
@@ -221,8 +276,16 @@ impl Drape {
             covers: Vec::new(),
             pinned: vec![None; n],
             before: Vec::new(),
+            slack: vec![0.0; n],
+            crossings: 0,
+            sheet: None,
             x: x.iter().map(|p| p.coords.cast()).collect(),
         }
+    }
+    /// From now on the sheet is taken out of itself.
+    pub(super) fn untangled(mut self, mesh: &GarmentMesh) -> Self {
+        self.sheet = Some(Untangler::new(&mesh.faces, &self.x));
+        self
     }
     /// Positions as f32.
     pub(super) fn positions(&self) -> Vec<P3> {
@@ -294,12 +357,52 @@ impl Drape {
                 self.stretch(h, (s + sweep) % 2 == 1);
             }
             self.bend(h);
-            self.lift();
+            self.lift(0.0);
+            if weight >= 1.0 && (s % LOOK_EVERY == 0 || self.crossings > 0 && s % 2 == 0) {
+                self.untangle();
+            }
             for i in 0..self.x.len() {
                 let v = (self.x[i] - self.before[i]) / h;
                 let speed = v.norm();
                 self.velocity[i] = if speed > FASTEST { v * (FASTEST / speed) } else { v };
             }
+        }
+    }
+    /// One round of taking the sheet out of itself, which gives no speed.
+    fn untangle(&mut self) {
+        let Some(sheet) = &mut self.sheet else { return };
+        let (pinned, inverse) = (&self.pinned, &self.inverse_mass);
+        let weight = |i: usize| if pinned[i].is_some() { 0.0 } else { inverse[i] };
+        let r = sheet.round(Par::Rayon, &mut self.x, weight, APART_STEP, APART_GAP);
+        self.crossings = r.crossings;
+        for (i, (push, n)) in sheet.pushes.iter().enumerate() {
+            self.before[i] += push;
+            self.slack[i] = if *n > 0.0 { (self.slack[i] + SLACK_STEP).min(SLACK) } else { self.slack[i] * SLACK_KEPT };
+        }
+    }
+    /// Takes the sheet out of itself in at most `most` rounds, on a body that stands still, and takes all speed away if it
+    /// crossed itself. After [`RELAXED`] of them only edges that are about to
+    /// tear and skin far above it move it.
+    pub(super) fn clear(&mut self, on: &On<'_>, most: usize) {
+        for k in 0..most {
+            self.before.clone_from(&self.x);
+            self.untangle();
+            if self.crossings == 0 {
+                break;
+            }
+            if k % LOOK_EVERY == 0 {
+                self.look(on);
+            }
+            if k >= RELAXED {
+                self.rein_in();
+                self.lift(SUNK);
+            } else if k % RELAX_EVERY == 0 {
+                for backwards in [false, true] {
+                    self.stretch(RELAX_STEP, backwards);
+                }
+                self.lift(0.0);
+            }
+            self.stop();
         }
     }
     fn weight(&self, i: u32) -> f64 {
@@ -322,6 +425,20 @@ impl Drape {
             self.x[b as usize] += push * wb;
         }
     }
+    /// Edges that are stretched by more than [`TAUT`] are drawn together to that.
+    fn rein_in(&mut self) {
+        for k in 0..self.edges.len() {
+            let ([a, b], rest, _) = self.edges[k];
+            let (wa, wb) = (self.weight(a), self.weight(b));
+            let d = self.x[a as usize] - self.x[b as usize];
+            let length = d.norm();
+            if wa + wb > 0.0 && length > TAUT * rest {
+                let push = d * ((length - TAUT * rest) / (length * (wa + wb)));
+                self.x[a as usize] -= push * wa;
+                self.x[b as usize] += push * wb;
+            }
+        }
+    }
     /// Hinges flatten: the constraint is the vector Σ cₖ xₖ = 0 (quadratic bending).
     fn bend(&mut self, h: f64) {
         for k in 0..self.hinges.len() {
@@ -339,14 +456,15 @@ impl Drape {
         }
     }
     /// Under the covers, then out of the body, whose planes of the vertex's own parts come last.
-    fn lift(&mut self) {
+    /// Cloth that passed through itself may be `sunk` under the skin, metres.
+    fn lift(&mut self, sunk: f64) {
         for k in 0..self.covers.len() {
             let (i, p) = self.covers[k];
-            self.out_of(i as usize, &p);
+            self.out_of(i as usize, &p, sunk);
         }
         for i in 0..self.x.len() {
             let [own, other] = self.planes[i];
-            let pushed = self.out_of(i, &other) + self.out_of(i, &own);
+            let pushed = self.out_of(i, &other, sunk) + self.out_of(i, &own, sunk);
             let up = self.x[i].y - self.before[i].y;
             if pushed > 0.0 && up > 0.0 && self.held_down[i] && self.pinned[i].is_none() {
                 self.x[i].y -= up.min(HELD_DOWN * pushed);
@@ -354,9 +472,11 @@ impl Drape {
         }
     }
     /// Lifts a vertex above a plane, and says how far.
-    fn out_of(&mut self, i: usize, p: &Plane) -> f64 {
+    fn out_of(&mut self, i: usize, p: &Plane, sunk: f64) -> f64 {
         let d = self.x[i] - p.point;
-        let gap = p.normal.dot(&d) - p.height;
+        let slack = self.slack[i];
+        let height = p.height - if slack > 0.0 { (slack + sunk).min((p.height + sunk).max(0.0)) } else { 0.0 };
+        let gap = p.normal.dot(&d) - height;
         if p.near && gap < 0.0 && d.norm_squared() < PLANE_SIZE * PLANE_SIZE {
             let push = (-gap).min(LIFT);
             self.x[i] += p.normal * push;
@@ -375,20 +495,24 @@ impl Drape {
             ];
             *near = found.map(|c| c.vertex);
             // Where the body closes on itself its own part decides, and skin inside the body holds nothing.
-            let room = found[0].room(&found[1]).filter(|_| !found[1].rim).map_or(f64::INFINITY, f64::from);
-            let holds = [room >= 0.0, room >= 2.0 * on.offset];
-            for k in 0..2 {
-                let c = &found[k];
-                self.planes[i][k] = Plane {
+            let facing = found[0].room(&found[1]).filter(|_| !found[1].rim).map(f64::from);
+            let room = facing.unwrap_or(f64::INFINITY);
+            for (plane, c) in self.planes[i].iter_mut().zip(&found) {
+                *plane = Plane {
                     point: c.point.coords.cast(),
                     normal: c.normal.cast(),
                     height: on.offset,
-                    near: holds[k]
+                    near: room >= 0.0
                         && !c.rim
                         && !skin.buried.holds_nothing(skin.model.faces()[c.face as usize])
                         && f64::from(c.signed) < REACH,
                 };
             }
+            let [own, other] = &mut self.planes[i];
+            let far = found.map(|c| f64::from(c.signed));
+            let halved = self.sheet.is_some() && facing.is_some() && own.near && other.near;
+            let kept = halved && own.keep_half(other, &self.x[i], far, room);
+            other.near &= kept || room >= 2.0 * on.offset;
         }
         self.look_up(on.over);
     }

@@ -11,7 +11,7 @@ use super::waistband::spread;
 use crate::body::measure::measure;
 use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
 use crate::cloth::realtime::{AnchorBinding, Config, Model, Outfit, State};
-use crate::cloth::{ClothError, Sheet};
+use crate::cloth::{ClothError, Sheet, crossings};
 use crate::contact::{SurfaceFrame, SurfaceModel};
 use crate::garment::{GarmentError, GarmentMesh, Pattern, Region, Triangulation};
 use crate::math::{P3, World};
@@ -47,6 +47,10 @@ pub struct DressOptions {
     pub config: Config,
     /// Put on what does not fit too: panels are stretched or slide, which shows as crumpled cloth.
     pub any_size: bool,
+    /// Take garments out of themselves, so that no edge passes through a triangle of the same garment. Off by default: where
+    /// parts of the body lie in each other two layers that are kept apart lie inside the skin as it is drawn, which then
+    /// shows in the armpits, and shirts take 1.6 to 2.3 times as long to put on (hooded tops three times).
+    pub untangle: bool,
 }
 
 /// A dressed body, ready for [`crate::cloth::realtime::step`].
@@ -67,6 +71,8 @@ pub struct DressReport {
     pub steps: usize,
     /// Deepest garment vertex under the skin at the end, metres.
     pub penetration: f64,
+    /// Edges that pass through triangles of the same garment at the end.
+    pub crossings: usize,
     /// 99th percentile of the stretch at the end, worst garment.
     pub p99_strain: f64,
     /// Milliseconds by stage.
@@ -102,8 +108,15 @@ const CLOSING: usize = 60;
 const DRAPING: usize = 260;
 /// Bodies on the way from the canonical to the tracked pose: at most 8° apart for a half-turn of the arm.
 const FOLLOW_BODIES: usize = 16;
+/// The same, and substeps on each, where garments are taken out of themselves: what an arm carries passes into other cloth by the
+/// way from one body to the next.
+const UNTANGLED_BODIES: [usize; 2] = [24, 8];
 /// Substeps on each of them.
 const FOLLOWING: usize = 12;
+/// Rounds of untangling on each of them.
+const CLEARING: usize = 6;
+/// Rounds of untangling on the coarse mesh at the end, on the fine one at first, and at its end: most garments need none.
+const CLEARED: usize = 50;
 /// Substeps in the tracked pose.
 const SETTLING: usize = 80;
 /// Substep on the fine mesh, s.
@@ -236,9 +249,10 @@ pub fn dress_all(
     report.stages_ms.model = ms(timer);
 
     let timer = Instant::now();
-    let bodies: Vec<Vec<P3>> = (0..=FOLLOW_BODIES)
+    let [follow, following] = if options.untangle { UNTANGLED_BODIES } else { [FOLLOW_BODIES, FOLLOWING] };
+    let bodies: Vec<Vec<P3>> = (0..=follow)
         .map(|i| {
-            let t = i as f64 / FOLLOW_BODIES as f64;
+            let t = i as f64 / follow as f64;
             let mut body = Vec::new();
             pose_body(template, rest, &between(template, rest, &start, pose, t * t * (3.0 - 2.0 * t)), &mut body);
             body
@@ -253,7 +267,7 @@ pub fn dress_all(
         let mut d = Drape::new(mesh, &Sheet::of_garment(mesh)?, placed);
         d.find_all(&skin);
         ties.push(fasten(&skin, mesh, &d, *offset)?);
-        drapes.push(d);
+        drapes.push(if options.untangle { d.untangled(mesh) } else { d });
     }
     let mut rough = Layers::new(&coarse, drapes)?;
     rough.each(&skin, &offsets, |k, d, on| {
@@ -267,11 +281,15 @@ pub fn dress_all(
         rough.each(&skin, &offsets, |k, d, on| {
             d.carry(&w[0], &w[1]);
             d.pin(&ties[k], skin.frame());
-            d.run(on, FOLLOWING, COARSE_STEP, 1.0);
+            d.run(on, following, COARSE_STEP, 1.0);
+            d.clear(on, CLEARING);
         });
     }
-    rough.each(&skin, &offsets, |_, d, on| d.run(on, SETTLING, COARSE_STEP, 1.0));
-    report.steps = coarse.len() * (CLOSING + DRAPING + FOLLOW_BODIES * FOLLOWING + SETTLING + FINISHING);
+    rough.each(&skin, &offsets, |_, d, on| {
+        d.run(on, SETTLING, COARSE_STEP, 1.0);
+        d.clear(on, CLEARED);
+    });
+    report.steps = coarse.len() * (CLOSING + DRAPING + follow * following + SETTLING + FINISHING);
     report.stages_ms.coarse = ms(timer);
 
     let timer = Instant::now();
@@ -281,15 +299,20 @@ pub fn dress_all(
         let mut d = Drape::new(mesh, &Sheet::of_garment(mesh)?, x.iter().map(|p| P3::from(p.cast::<f32>())).collect());
         d.find_from(&skin, &rough.drapes[k]);
         d.pin(&fasten(&skin, mesh, &d, offsets[k])?, skin.frame());
-        drapes.push(d);
+        drapes.push(if options.untangle { d.untangled(mesh) } else { d });
     }
     let mut fine = Layers::new(&model.outfit.garments, drapes)?;
-    fine.each(&skin, &offsets, |_, d, on| d.run(on, FINISHING, FINE_STEP, 1.0));
+    fine.each(&skin, &offsets, |_, d, on| {
+        d.clear(on, CLEARED);
+        d.run(on, FINISHING, FINE_STEP, 1.0);
+        d.clear(on, CLEARED);
+    });
     let (mut positions, mut anchors) = (Vec::new(), Vec::new());
     for (k, (mesh, d)) in model.outfit.garments.iter().zip(&fine.drapes).enumerate() {
         let (deepest, p99, _) = d.judge(&skin);
         report.penetration = report.penetration.max(deepest);
         report.p99_strain = report.p99_strain.max(p99);
+        report.crossings += crossings(&mesh.faces, &d.positions()).len();
         anchors.push(bind(skin.model, skin.frame(), mesh, &d.positions(), offsets[k], false));
         positions.push(d.positions());
     }

@@ -34,6 +34,7 @@ fn dressed_as(rest: &RestBody, pose: &Pose<World>, size: Size, edge_length: f64,
         triangulation: Triangulation { edge_length, min_angle: 8.0 },
         config: config.clone(),
         any_size: false,
+        untangle: false,
     };
     let d = dress(&template, rest, pose, &patterns, &options).expect("dressed");
     let mut bones = BoneTransforms::default();

@@ -96,6 +96,23 @@ fn every_garment_hangs_on_three_bodies() {
 }
 
 #[test]
+fn a_shirt_that_is_taken_out_of_itself_crosses_itself_nowhere_and_is_not_torn() {
+    let t = embedded::template();
+    for (body, shape) in BODIES {
+        let rest = t.personalise(&BodyShape { coefficients: shape.to_vec(), ..BodyShape::default() });
+        let shirt = suggested("tshirt")(&t, &rest);
+        let worn = |untangle| {
+            let options = DressOptions { untangle, ..DressOptions::default() };
+            dress(&t, &rest, &arms_down(&t, &rest), &shirt, &options).expect("dressed").report
+        };
+        let (as_it_falls, free) = (worn(false), worn(true));
+        assert!(as_it_falls.crossings > 50, "{body}: {}", as_it_falls.crossings);
+        assert_eq!(free.crossings, 0, "{body}");
+        assert!(free.p99_strain < as_it_falls.p99_strain + 0.01, "{body}: {}", free.p99_strain);
+    }
+}
+
+#[test]
 fn an_outer_layer_lies_outside_the_inner_one() {
     let untucked = |_: &Template, _: &RestBody| {
         ["tshirt", "skirt"].map(|n| library::pattern(n, Size::M).expect("pattern")).to_vec()
