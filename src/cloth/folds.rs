@@ -22,10 +22,8 @@ const THICKNESS_EDGES: f32 = 0.25;
 /// Corners are looked for so much further than needed, in lengths of edges: what they are farther off is room that they
 /// may come nearer by until they are looked for again.
 const ROOM_EDGES: f32 = 0.75;
-/// Friction of layer on layer: lower than measured (0.3), as planes that are looked for anew in each round hold already.
-const FRICTION: f32 = 0.1;
-/// The same of folds: with 0.1 a dress that a kick had thrown up over the hips stayed there.
-const FOLD_FRICTION: f32 = 0.03;
+/// Friction of cloth on cloth: lower than measured (0.3), as planes that are looked for anew in each round hold already.
+pub(crate) const FRICTION: f32 = 0.1;
 /// Rounds of averaging speeds over neighbours before they are extrapolated through a round. A vertex that vibrates at
 /// 3 m/s would else carry what touches it by 1 cm each way; a dancer's skirt shook itself to pieces (without it 10k
 /// vertices stretch by 243 %, with one round by 12.6 %, with two by 8.7 %, as without contact of cloth with cloth).
@@ -189,7 +187,6 @@ impl FoldModel {
         let mut plane = touching(g, frame, i, &hit, side, gap);
         let own = frame.speed(g, v);
         let own = V4::new(own.x, own.y, own.z);
-        plane.friction = FOLD_FRICTION;
         plane.speed = (plane.speed + own).scale(0.5);
         // Folds that part need no plane: one that follows them would carry what has long met something else.
         if search.halfway && plane.normal.dot(own - plane.speed) > 0.0 {

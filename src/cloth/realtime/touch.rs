@@ -15,7 +15,7 @@ const LIFTED: f32 = 5e-4;
 const OTHER_DEPTH: f32 = 0.01;
 /// Cloth is not expected deeper than this under skin that no walk led to, metres: the vertices of a body are about as far
 /// from each other.
-pub(super) const HIDDEN: f32 = 0.02;
+pub(super) const HIDDEN: f32 = 0.015;
 /// Cloth longer than this, over its rest length, is about to tear: more than knitwear is worn at.
 const TORN: f32 = 1.5;
 /// Anchors of strength ½ go to their place at this rate, 1/s.
@@ -204,18 +204,21 @@ pub(super) struct Settled<'a> {
     pub(super) buried: &'a Buried,
 }
 
-/// Measures how deep cloth is under the skin, and lifts what is.
+/// Measures how deep cloth is under the skin where that holds it, and lifts what is.
 pub(super) fn settle(model: &Model, garment: usize, patch: usize, body: &Settled<'_>, p: &mut PatchScratch) {
     let g = &model.garments[garment];
     let f = &g.patches[patch];
-    for i in (0..f.owned).filter(|i| !p.tied[*i]) {
+    let mut last = u32::MAX;
+    for k in 0..p.body_planes {
+        let i = p.planes[k].vertex;
+        if i == last || i as usize >= f.owned {
+            continue;
+        }
+        last = i;
+        let i = i as usize;
         let v = f.vertices[i] as usize;
         let masks = [g.own[v], g.other[v]];
         let mut near = nearest_vertices(model, body, &p3(p.motion.position(i)), masks);
-        let far = |k: usize| near[k].is_none() && (masks[k] == 0 || p.clear[i][k] > 0.0);
-        if far(0) && far(1) {
-            continue;
-        }
         // The own parts have the last word.
         for side in [1, 0].into_iter().filter(|s| masks[*s] != 0) {
             let x = p3(p.motion.position(i));
