@@ -118,15 +118,12 @@ impl FoldModel {
         frame.calm.clear();
         frame.surface.normals.clear();
         if touches * DEAR > self.surface.vertices() {
-            let mut once = Vec::new();
+            let (mut calm, mut next) = (frame.velocities.clone(), std::mem::take(&mut frame.calm));
             for _ in 0..CALMING {
-                let sharp = if once.is_empty() { &frame.velocities } else { &once };
-                crate::par::map_into(par, sharp.len(), 1024, &mut frame.calm, |v| {
-                    calmed(&self.surface, sharp, v as u32, 1)
-                });
-                std::mem::swap(&mut once, &mut frame.calm);
+                crate::par::map_into(par, calm.len(), 1024, &mut next, |v| calmed(&self.surface, &calm, v as u32, 1));
+                std::mem::swap(&mut calm, &mut next);
             }
-            frame.calm = once;
+            frame.calm = calm;
             self.surface.update_normals(par, &mut frame.surface);
         }
         if let Some(search) = search {

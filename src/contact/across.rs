@@ -40,6 +40,7 @@ impl<T: Copy + Default + Send + Sync> Across<T> {
             self.seen = vec![Seen::default(); n];
             self.before.clone_from(&frame.vertices);
         }
+        // Skin that is not looked for is not found either.
         let looked_for = self.before.iter().zip(&frame.vertices).zip(others).filter(|(_, mask)| **mask != 0);
         let moved = 2.0 * looked_for.map(|((a, b), _)| (a - b).norm_squared()).fold(0.0, f32::max).sqrt();
         self.before.clone_from(&frame.vertices);
