@@ -23,8 +23,8 @@ pub fn crossings(faces: &[Face], positions: &[P3]) -> Vec<Crossing> {
 
 /// Triangles in the leaves of the tree: with two or eight a search takes a tenth longer.
 const LEAF: usize = 4;
-/// Edges that one thread asks about in a row.
-const CHUNK: usize = 512;
+/// Leaves that one thread asks about in a row.
+const CHUNK: usize = 64;
 /// No second triangle lies beside a border.
 pub(crate) const NONE: u32 = u32::MAX;
 
@@ -52,6 +52,11 @@ pub(crate) struct Finder {
     /// Lowest and highest corner of the triangles, in that order.
     boxes: Vec<[[f32; 4]; 2]>,
     nodes: Vec<Node>,
+    /// Nodes that hold triangles.
+    leaves: Vec<u32>,
+    /// Edges by the place of their first triangle in the order, and where those of each place begin.
+    by_place: Vec<u32>,
+    begin: Vec<u32>,
 }
 
 impl Finder {
@@ -81,10 +86,21 @@ impl Finder {
             order: (0..faces.len() as u32).collect(),
             boxes: Vec::new(),
             nodes: Vec::new(),
+            leaves: Vec::new(),
+            by_place: Vec::new(),
+            begin: Vec::new(),
         };
         let mut order = std::mem::take(&mut built.order);
         built.split(&middles, &mut order, 0);
         built.order = order;
+        built.leaves = (0..built.nodes.len() as u32).filter(|n| built.nodes[*n as usize].count > 0).collect();
+        let mut place = vec![0; faces.len()];
+        built.order.iter().zip(0u32..).for_each(|(f, k)| place[*f as usize] = k);
+        let of = |e: u32| place[built.beside[e as usize][0] as usize];
+        let mut by_place: Vec<u32> = (0..built.edges.len() as u32).collect();
+        by_place.sort_unstable_by_key(|e| (of(*e), *e));
+        built.begin = (0..=faces.len() as u32).map(|k| by_place.partition_point(|e| of(*e) < k) as u32).collect();
+        built.by_place = by_place;
         built
     }
 
@@ -142,21 +158,31 @@ impl Finder {
     pub(crate) fn find(&mut self, par: Par, x: &[V3d]) -> Vec<(u32, u32)> {
         self.refit(x);
         let mut chunks: Vec<Vec<(u32, u32)>> = Vec::new();
-        par::map_into(par, self.edges.len().div_ceil(CHUNK), 1, &mut chunks, |c| {
-            let mut found = Vec::new();
-            for e in c * CHUNK..((c + 1) * CHUNK).min(self.edges.len()) {
-                self.of_edge(e, x, &mut found);
+        par::map_into(par, self.leaves.len().div_ceil(CHUNK), 1, &mut chunks, |c| {
+            let (mut found, mut edges) = (Vec::new(), Vec::new());
+            for leaf in &self.leaves[c * CHUNK..((c + 1) * CHUNK).min(self.leaves.len())] {
+                self.of_leaf(&self.nodes[*leaf as usize], x, &mut edges, &mut found);
             }
             found
         });
-        chunks.concat()
+        let mut found = chunks.concat();
+        // Whatever the tree.
+        found.sort_unstable();
+        found
     }
 
-    fn of_edge(&self, e: usize, x: &[V3d], found: &mut Vec<(u32, u32)>) {
-        let edge = self.edges[e];
-        let ends = edge.map(|v| x[v as usize]);
-        let (low, high) = (below(&ends[0].inf(&ends[1])), above(&ends[0].sup(&ends[1])));
-        let (before, mut k) = (found.len(), 0);
+    /// Crossings of the edges that begin in a leaf: the tree is gone through once for all of them. `edges` is scratch.
+    fn of_leaf(&self, leaf: &Node, x: &[V3d], edges: &mut Vec<([[f32; 4]; 2], u32)>, found: &mut Vec<(u32, u32)>) {
+        let [first, end] = [leaf.first, leaf.first + leaf.count].map(|k| self.begin[k as usize] as usize);
+        edges.clear();
+        let (mut low, mut high) = ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]);
+        for e in &self.by_place[first..end] {
+            let [a, b] = self.edges[*e as usize].map(|v| x[v as usize]);
+            let (from, to) = (below(&a.inf(&b)), above(&a.sup(&b)));
+            (0..4).for_each(|c| (low[c], high[c]) = (low[c].min(from[c]), high[c].max(to[c])));
+            edges.push(([from, to], *e));
+        }
+        let mut k = 0;
         while let Some(n) = self.nodes.get(k) {
             if apart(&n.low, &n.high, &low, &high) {
                 k = n.skip as usize;
@@ -164,16 +190,21 @@ impl Finder {
             }
             k += 1;
             for i in n.first as usize..(n.first + n.count) as usize {
-                let f = &self.order[i];
-                let corners = self.faces[*f as usize];
-                let far = apart(&self.boxes[i][0], &self.boxes[i][1], &low, &high);
-                if !far && !corners.iter().any(|v| edge.contains(v)) && passes(&ends, &corners.map(|v| x[v as usize])) {
-                    found.push((e as u32, *f));
+                let [from, to] = &self.boxes[i];
+                if apart(from, to, &low, &high) {
+                    continue;
+                }
+                let f = self.order[i];
+                let corners = self.faces[f as usize];
+                for (_, e) in edges.iter().filter(|(b, _)| !apart(from, to, &b[0], &b[1])) {
+                    let edge = self.edges[*e as usize];
+                    let shared = corners.iter().any(|v| edge.contains(v));
+                    if !shared && passes(&edge.map(|v| x[v as usize]), &corners.map(|v| x[v as usize])) {
+                        found.push((*e, f));
+                    }
                 }
             }
         }
-        // Whatever the tree.
-        found[before..].sort_unstable();
     }
 }
 

@@ -9,6 +9,7 @@ pub mod quasi_newton;
 pub mod realtime;
 pub mod scene;
 mod sheet;
+pub(crate) mod sleeves;
 pub mod small_steps;
 pub(crate) mod untangle;
 

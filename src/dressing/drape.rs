@@ -6,10 +6,12 @@
 
 use crate::cloth::Sheet;
 use crate::cloth::realtime::{AnchorBinding, Model};
+use crate::cloth::sleeves::{Arms, Sleeve};
 use crate::cloth::untangle::Untangler;
 use crate::contact::{Apart, Buried, Part, SurfaceFrame, SurfaceModel};
 use crate::garment::{GarmentError, GarmentMesh, Region};
 use crate::math::{P3, V3, V3d};
+use crate::mesh::distances;
 use crate::par::Par;
 
 /// A plane a vertex stays above.
@@ -51,6 +53,7 @@ pub(super) struct Drape {
     edges: Vec<([u32; 2], f64, f64)>,
     hinges: Vec<([u32; 4], [f64; 4], f64)>,
     own: Vec<u8>,
+    sleeves: Vec<Sleeve>,
     /// Skin keeps it from sliding up: around the trunk, away from the sleeves.
     held_down: Vec<bool>,
     /// Nearest body vertex among the own parts, then among the others.
@@ -77,6 +80,7 @@ pub(super) struct Skin<'a> {
     frame: SurfaceFrame,
     buried: Buried,
     apart: Apart,
+    arms: &'a Arms,
     opposite: &'a [Part],
     pressing: &'a [Part],
     /// What cloth needs between parts that press on each other, metres.
@@ -91,6 +95,7 @@ impl<'a> Skin<'a> {
             frame: SurfaceFrame::default(),
             buried: Buried::default(),
             apart: Apart::default(),
+            arms: model.arms(),
             opposite: model.opposite(),
             pressing: model.pressing(),
             room: model.room(),
@@ -229,25 +234,6 @@ const TAUT: f64 = 1.07;
 /// As if in a step of so many seconds.
 const RELAX_STEP: f64 = 1e-3;
 
-/// Length of cloth from each vertex to the nearest of some others, metres, along edges; infinite far beyond `up_to`.
-fn distances(n: usize, edges: &[([u32; 2], f64)], up_to: f64, from: impl Fn(usize) -> bool) -> Vec<f64> {
-    let mut far: Vec<f64> = (0..n).map(|i| if from(i) { 0.0 } else { f64::INFINITY }).collect();
-    loop {
-        let mut moved = false;
-        for ([a, b], l) in edges.iter().map(|(v, l)| (v.map(|v| v as usize), l)) {
-            for (p, q) in [(a, b), (b, a)] {
-                if far[p] + l < far[q] && far[p] <= up_to {
-                    far[q] = far[p] + l;
-                    moved = true;
-                }
-            }
-        }
-        if !moved {
-            return far;
-        }
-    }
-}
-
 impl Drape {
     pub(super) fn new(mesh: &GarmentMesh, sheet: &Sheet, x: Vec<P3>) -> Self {
         let n = x.len();
@@ -270,6 +256,7 @@ impl Drape {
             edges,
             hinges: sheet.hinges.iter().filter(|h| h.w > 0.0).map(|h| (h.v, h.c, 1.0 / h.w)).collect(),
             own,
+            sleeves: Sleeve::of(mesh, &sheet.edges),
             nearest: vec![[u32::MAX; 2]; n],
             planes: vec![[Plane::default(); 2]; n],
             nearest_cover: Vec::new(),
@@ -332,6 +319,23 @@ impl Drape {
             *x += (to[v] - from[v]).cast::<f64>() * share;
         }
     }
+    /// Puts rings of sleeves that lost their arm around it again.
+    pub(super) fn put_back(&mut self, skin: &Skin<'_>) {
+        let lines = skin.arms.lines(&skin.frame.vertices);
+        let at = |v: u32| P3::from(self.x[v as usize].cast::<f32>());
+        let ways: Vec<(u32, P3)> = self
+            .sleeves
+            .iter()
+            .flat_map(|s| s.lost(&lines, at))
+            .flat_map(|f| f.ring.iter().map(move |v| (*v, f.way * at(*v))))
+            .collect();
+        for (v, to) in ways {
+            let i = v as usize;
+            self.x[i] = to.coords.cast();
+            self.velocity[i] = V3d::zeros();
+            self.nearest[i][0] = skin.model.nearest_vertex(&skin.frame, &to, self.own[i]);
+        }
+    }
     /// Takes all speed away.
     pub(super) fn stop(&mut self) {
         self.velocity.iter_mut().for_each(|v| *v = V3d::zeros());
@@ -381,8 +385,7 @@ impl Drape {
         }
     }
     /// Takes the sheet out of itself in at most `most` rounds, on a body that stands still, and takes all speed away if it
-    /// crossed itself. After [`RELAXED`] of them only edges that are about to
-    /// tear and skin far above it move it.
+    /// crossed itself. After [`RELAXED`] of them only edges that are about to tear and skin far above it move it.
     pub(super) fn clear(&mut self, on: &On<'_>, most: usize) {
         for k in 0..most {
             self.before.clone_from(&self.x);
@@ -412,31 +415,27 @@ impl Drape {
     fn stretch(&mut self, h: f64, backwards: bool) {
         let n = self.edges.len();
         for k in 0..n {
-            let ([a, b], rest, compliance) = self.edges[if backwards { n - 1 - k } else { k }];
-            let (wa, wb) = (self.weight(a), self.weight(b));
-            let d = self.x[a as usize] - self.x[b as usize];
-            let length = d.norm();
-            let w = wa + wb;
-            if w == 0.0 || length == 0.0 {
-                continue;
-            }
-            let push = d * ((length - rest) / (length * (w + compliance / (h * h))));
-            self.x[a as usize] -= push * wa;
-            self.x[b as usize] += push * wb;
+            let (ends, rest, compliance) = self.edges[if backwards { n - 1 - k } else { k }];
+            self.bring_to(ends, rest, 0.0, compliance / (h * h));
         }
     }
     /// Edges that are stretched by more than [`TAUT`] are drawn together to that.
     fn rein_in(&mut self) {
         for k in 0..self.edges.len() {
-            let ([a, b], rest, _) = self.edges[k];
-            let (wa, wb) = (self.weight(a), self.weight(b));
-            let d = self.x[a as usize] - self.x[b as usize];
-            let length = d.norm();
-            if wa + wb > 0.0 && length > TAUT * rest {
-                let push = d * ((length - TAUT * rest) / (length * (wa + wb)));
-                self.x[a as usize] -= push * wa;
-                self.x[b as usize] += push * wb;
-            }
+            let (ends, rest, _) = self.edges[k];
+            self.bring_to(ends, TAUT * rest, TAUT * rest, 0.0);
+        }
+    }
+    /// Brings an edge that is longer than `least` towards a length; `give`: compliance over the square of the step, 1/kg.
+    fn bring_to(&mut self, [a, b]: [u32; 2], to: f64, least: f64, give: f64) {
+        let (wa, wb) = (self.weight(a), self.weight(b));
+        let d = self.x[a as usize] - self.x[b as usize];
+        let length = d.norm();
+        let w = wa + wb;
+        if w > 0.0 && length > least {
+            let push = d * ((length - to) / (length * (w + give)));
+            self.x[a as usize] -= push * wa;
+            self.x[b as usize] += push * wb;
         }
     }
     /// Hinges flatten: the constraint is the vector Σ cₖ xₖ = 0 (quadratic bending).

@@ -280,6 +280,7 @@ pub fn dress_all(
         skin.show(&w[1]);
         rough.each(&skin, &offsets, |k, d, on| {
             d.carry(&w[0], &w[1]);
+            d.put_back(&skin);
             d.pin(&ties[k], skin.frame());
             d.run(on, following, COARSE_STEP, 1.0);
             d.clear(on, CLEARING);

@@ -1,8 +1,10 @@
 //! Triangle meshes and their topology, checked once at construction; normals, boundaries, UVs.
 
+mod distances;
 mod normals;
 mod topology;
 
+pub use distances::distances;
 pub use normals::{face_normal, vertex_normal, vertex_normals};
 pub use topology::{Csr, Edge, Topology};
 

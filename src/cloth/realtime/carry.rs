@@ -2,6 +2,9 @@
 //! one that sways while cloth sleeps by the way of the skin beneath.
 
 use super::Model;
+use super::regions::wake_all;
+use super::state::State;
+use crate::contact::SurfaceFrame;
 use crate::math::{P3, V3, polar_rotation_3};
 use nalgebra::{Isometry3, Matrix3, Matrix3x4, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
@@ -31,6 +34,35 @@ fn joint_motions(model: &Model, from: &[P3], to: &[P3]) -> Vec<Isometry3<f64>> {
     const ENOUGH: f64 = 12.0;
     let whole = if all.0 >= 1.0 { fit(&all) } else { Isometry3::identity() };
     sums.iter().map(|s| if s.0 >= ENOUGH { fit(s) } else { whole }).collect()
+}
+
+/// Puts rings of sleeves that lost their arm around it again, at rest on the body of the last call. Says how many.
+pub(super) fn put_back(model: &Model, state: &mut State) -> usize {
+    let lines = model.arms.lines(&state.body);
+    let mut count = 0;
+    for (g, m) in state.garments.iter_mut().zip(&model.garments) {
+        for sleeve in &m.sleeves {
+            let found = sleeve.lost(&lines, |v| g.positions[v as usize]);
+            if found.is_empty() {
+                continue;
+            }
+            count += found.len();
+            let (vertices, places): (Vec<u32>, Vec<P3>) =
+                found.iter().flat_map(|f| f.ring.iter().map(|v| (*v, f.way * g.positions[*v as usize]))).unzip();
+            let frame = SurfaceFrame { vertices: state.body.clone(), normals: Vec::new() };
+            let masks = vertices.iter().map(|v| &m.own[*v as usize]);
+            let near = model.surface.nearest_vertices(model.config.par, &frame, &places, masks);
+            for ((v, to), near) in vertices.into_iter().zip(places).zip(near) {
+                g.positions[v as usize] = to;
+                g.velocities[v as usize] = V3::zeros();
+                g.nearest[v as usize][0] = near;
+            }
+        }
+    }
+    if count > 0 {
+        wake_all(state);
+    }
+    count
 }
 
 /// Rounds of averaging over cloth neighbours, so that cloth between two legs goes with both: a hand's width on the cloth.

@@ -8,6 +8,7 @@ mod state;
 mod steady;
 mod step;
 mod touch;
+mod untangle;
 
 pub use model::{AnchorBinding, Config, Model, Outfit, body_parts};
 pub use state::{GarmentState, Input, State, StepReport, Workspace};

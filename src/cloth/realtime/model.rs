@@ -4,6 +4,7 @@ use super::regions::{REGION, Regions, clusters};
 use crate::body::{SkinWeights, Template};
 use crate::cloth::folds::FoldModel;
 use crate::cloth::pieces::Pieces;
+use crate::cloth::sleeves::{Arms, Sleeve};
 use crate::cloth::small_steps::{Fabric, Fit, Plan};
 use crate::cloth::{ClothError, Sheet};
 use crate::contact::{MapDetail, MapView, SurfaceModel};
@@ -72,6 +73,8 @@ pub struct Config {
     pub sleep: bool,
     /// Let regions of it sleep while others move, if it may sleep at all.
     pub sleep_regions: bool,
+    /// Time from one look at all of a garment, which takes it out of itself, to the next, s; 0 for never.
+    pub untangle: f64,
     /// Leave out searches for skin and for other folds of vertices that cannot have come near them since the last one.
     pub skip_far: bool,
     /// A body vertex that moves further than this between two calls has jumped, metres.
@@ -98,6 +101,7 @@ impl Default for Config {
             steady: 0.0,
             sleep: true,
             sleep_regions: true,
+            untangle: 0.13,
             skip_far: true,
             teleport: 0.2,
             par: crate::par::Par::Rayon,
@@ -145,6 +149,7 @@ pub(super) struct GarmentModel {
     /// The garment itself as something to touch.
     pub(super) folds: FoldModel,
     pub(super) regions: Regions,
+    pub(super) sleeves: Vec<Sleeve>,
     /// Local vertex and number of the binding, for each patch.
     pub(super) anchors: Vec<Vec<(u32, usize)>>,
 }
@@ -164,6 +169,7 @@ pub struct Model {
     pub(super) pressing: Vec<u8>,
     /// Its vertices, some at a time.
     pub(super) clusters: Pieces,
+    pub(super) arms: Arms,
     pub(super) weights: SkinWeights,
     pub(super) joints: usize,
     pub(super) views: [MapView; 4],
@@ -234,10 +240,10 @@ impl Model {
         if !(config.ahead >= 0.0 && config.ahead <= 1.0) {
             return Err(field("ahead", "must be between 0 and 1 step"));
         }
-        if !(config.offset.is_finite() && config.teleport > 0.0 && config.steady >= 0.0) {
+        if !(config.offset.is_finite() && config.teleport > 0.0 && config.steady >= 0.0 && config.untangle >= 0.0) {
             return Err(field(
-                "offset, teleport, steady",
-                "they must be finite, teleport positive, steady not negative",
+                "offset, teleport, steady, untangle",
+                "they must be finite, teleport positive, steady and untangle not negative",
             ));
         }
         if outfit.anchors.len() != outfit.garments.len() {
@@ -278,6 +284,7 @@ impl Model {
             let folds = FoldModel::new(surface, sheet.edges.iter().map(|e| e.1 as f32));
             let regions = Regions::new(&patches, g.vertices, &sheet.edges, folds.edge());
             garments.push(GarmentModel {
+                sleeves: Sleeve::of(g, &sheet.edges),
                 sheet,
                 patches,
                 h,
@@ -294,11 +301,13 @@ impl Model {
         }
         let parts = body_parts(template);
         let opposite = opposites(template, &parts);
-        let surface = SurfaceModel::new(template.mesh().faces().to_vec(), Topology::new(template.mesh())?, parts);
+        let surface =
+            SurfaceModel::new(template.mesh().faces().to_vec(), Topology::new(template.mesh())?, parts.clone());
         let mut model = Self {
             pressing: pressing(template, opposite.clone()),
             opposite,
             clusters: clusters(&surface),
+            arms: Arms::new(template, &parts),
             surface,
             weights: template.weights().clone(),
             joints: template.skeleton().len(),
@@ -344,8 +353,7 @@ impl Model {
     pub(crate) fn surface(&self) -> &SurfaceModel {
         &self.surface
     }
-    /// The part that each vertex of it may lie in.
-    /// See [`Apart::make_room`](crate::contact::Apart::make_room).
+    /// The part that presses on each vertex of it, see [`Apart::make_room`](crate::contact::Apart::make_room).
     pub(crate) fn pressing(&self) -> &[u8] {
         &self.pressing
     }
@@ -353,8 +361,12 @@ impl Model {
     pub(crate) fn room(&self) -> f32 {
         (2.0 * self.config.offset + self.config.thickness) as f32
     }
+    /// The part that each vertex of it may lie in.
     pub(crate) fn opposite(&self) -> &[u8] {
         &self.opposite
+    }
+    pub(crate) fn arms(&self) -> &Arms {
+        &self.arms
     }
     /// Distance from the skin of one garment's layer, metres.
     pub(crate) fn offset(&self, garment: usize) -> f64 {

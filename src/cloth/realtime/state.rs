@@ -2,6 +2,7 @@
 
 use super::Model;
 use super::regions::Rest;
+use super::untangle::Untangle;
 use crate::cloth::ClothError;
 use crate::cloth::folds::FoldFrame;
 use crate::cloth::small_steps::{Motion, Plane, Tie};
@@ -154,6 +155,12 @@ pub struct StepReport {
     pub pinched: usize,
     /// Body vertices that lie inside another part of it, where nothing holds cloth.
     pub buried: usize,
+    /// Edges that passed through triangles of the same garment, of the garments that were looked at in this call.
+    #[serde(default)]
+    pub crossings: usize,
+    /// Rings of sleeves that had lost their arm and were put around it again.
+    #[serde(default)]
+    pub sleeves_put_back: usize,
     /// The body jumped and the cloth was carried along.
     pub teleported: bool,
     /// A fault was caught and the last good state kept: which.
@@ -190,6 +197,7 @@ pub struct Workspace {
     /// Garments at the beginning of a round, for contact of cloth with cloth.
     pub(super) sheets: Vec<FoldFrame>,
     pub(super) maps: DepthMaps,
+    pub(super) untangle: Untangle,
 }
 
 /// One patch of one garment during a call.

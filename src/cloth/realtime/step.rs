@@ -1,6 +1,6 @@
 //! One call of the real-time simulator.
 
-use super::carry::{carry, ride};
+use super::carry::{carry, put_back, ride};
 use super::cloth_touch::{ClothTouch, sheets};
 use super::model::{Model, RECALLED};
 use super::regions::{carry_on, fall_asleep, wake, wake_all};
@@ -137,6 +137,8 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         work.before.vertices.clone_from(&state.body);
         model.surface.update_normals(config.par, &mut work.before);
     }
+    report.sleeves_put_back = put_back(model, state);
+    report.crossings = work.untangle.look(model, state, &work.before, dt);
     work.after.vertices.clear();
     work.after.vertices.extend_from_slice(input.body);
     model.surface.update_normals(config.par, &mut work.after);

@@ -1,0 +1,86 @@
+//! Takes garments out of themselves while they are worn.
+//!
+//! Planes keep a fold on the side it is on, also where that is the wrong one: a hem that was kicked up through itself stayed
+//! up. So each garment is looked at now and then as a whole, and what passes through it goes back a little.
+
+use super::Model;
+use super::state::State;
+use crate::cloth::untangle::Untangler;
+use crate::contact::SurfaceFrame;
+use crate::math::{P3, V3d};
+
+/// Most that a look moves cloth, metres.
+const STEP: f64 = 0.003;
+/// Distance that what was on the wrong side is put at, metres.
+const GAP: f64 = 0.001;
+/// Nothing is moved nearer to the skin than this, metres: less than a fabric's thickness.
+const ABOVE: f64 = 5e-4;
+/// Skin further away than this says nothing about where inside is, metres.
+const NEAR: f64 = 0.02;
+
+/// Scratch of it.
+#[derive(Debug, Default)]
+pub(super) struct Untangle {
+    /// Of each garment.
+    sheets: Vec<Untangler>,
+    x: Vec<V3d>,
+    held: Vec<bool>,
+}
+
+impl Untangle {
+    /// Looks at the garments whose turn it is in a call of `dt` seconds and that do not sleep, on the body of the last
+    /// call. Says how many edges passed through triangles.
+    pub(super) fn look(&mut self, model: &Model, state: &mut State, body: &SurfaceFrame, dt: f64) -> usize {
+        if model.config.untangle <= 0.0 {
+            return 0;
+        }
+        let every = (model.config.untangle / dt).round().max(1.0) as u64;
+        let mut found = 0;
+        for (k, m) in model.garments.iter().enumerate() {
+            // In turn, so that no call pays for all.
+            if !(state.frames + k as u64).is_multiple_of(every) {
+                continue;
+            }
+            let State { garments, rest, .. } = state;
+            let positions = &mut garments[k].positions;
+            self.held.clear();
+            self.held.extend((0..positions.len() as u32).map(|v| rest.sleeps(model, k, v)));
+            if self.held.iter().all(|h| *h) {
+                continue;
+            }
+            let anchors = &model.outfit.anchors[k];
+            anchors.iter().filter(|a| a.strength >= 1.0).for_each(|a| self.held[a.vertex as usize] = true);
+            self.x.clear();
+            self.x.extend(positions.iter().map(|p| p.coords.cast::<f64>()));
+            for g in self.sheets.len()..=k {
+                let at: Vec<V3d> = garments[g].positions.iter().map(|p| p.coords.cast()).collect();
+                self.sheets.push(Untangler::new(&model.outfit.garments[g].faces, &at));
+            }
+            let weight = |v: usize| if self.held[v] { 0.0 } else { 1.0 / m.sheet.mass[v] };
+            let round = self.sheets[k].round(model.config.par, &mut self.x, weight, STEP, GAP);
+            if round.crossings > 0 {
+                let g = &mut garments[k];
+                for (v, (push, _)) in self.sheets[k].pushes.iter().enumerate().filter(|(_, p)| p.1 > 0.0) {
+                    let x = self.x[v] - push;
+                    g.positions[v] = P3::from((x + off_skin(&x, *push, g.nearest[v], body)).cast::<f32>());
+                }
+            }
+            found += round.crossings;
+        }
+        found
+    }
+}
+
+/// A way from `x` without what of it goes into the skin at the two nearest vertices of the body.
+fn off_skin(x: &V3d, mut way: V3d, nearest: [u32; 2], body: &SurfaceFrame) -> V3d {
+    for v in nearest {
+        let (Some(at), Some(normal)) = (body.vertices.get(v as usize), body.normals.get(v as usize)) else { continue };
+        let (normal, height) = (normal.cast::<f64>(), (x - at.coords.cast::<f64>()).dot(&normal.cast()));
+        let lowest = ABOVE.min(height);
+        let sinks = lowest - (height + way.dot(&normal));
+        if height < NEAR && sinks > 0.0 {
+            way += normal * sinks;
+        }
+    }
+    way
+}
