@@ -287,6 +287,7 @@ pub fn dress_all(
         });
     }
     rough.each(&skin, &offsets, |_, d, on| {
+        d.put_back(&skin);
         d.run(on, SETTLING, COARSE_STEP, 1.0);
         d.clear(on, CLEARED);
     });
@@ -304,6 +305,7 @@ pub fn dress_all(
     }
     let mut fine = Layers::new(&model.outfit.garments, drapes)?;
     fine.each(&skin, &offsets, |_, d, on| {
+        d.put_back(&skin);
         d.clear(on, CLEARED);
         d.run(on, FINISHING, FINE_STEP, 1.0);
         d.clear(on, CLEARED);

@@ -1,7 +1,8 @@
 //! Garments of the library on bodies: what an eye would see at once, as numbers.
 
+use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use tryon::body::measure::measure;
-use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
+use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, embedded};
 use tryon::dressing::{DressOptions, Dressed, Fit, FitProbe, dress, suggest};
 use tryon::formats::fabric_json::read_fabric;
 use tryon::formats::garmentcode::{parse_garmentcode, read_garmentcode};
@@ -110,6 +111,65 @@ fn a_shirt_that_is_taken_out_of_itself_crosses_itself_nowhere_and_is_not_torn() 
         assert_eq!(free.crossings, 0, "{body}");
         assert!(free.p99_strain < as_it_falls.p99_strain + 0.01, "{body}: {}", free.p99_strain);
     }
+}
+
+/// Widest angle about the middle of a forearm in which no cloth lies, degrees: what is 3 cm or less along the bone from there
+/// and 20 cm or less beside it counts.
+fn bare(d: &Dressed, joints: [Point3<f64>; 2]) -> f64 {
+    let along = (joints[1] - joints[0]).normalize();
+    let middle = joints[0] + (joints[1] - joints[0]) * 0.5;
+    let u = along.cross(&Vector3::new(0.31, 0.52, 0.79)).normalize();
+    let v = along.cross(&u);
+    let mut turns: Vec<f64> = d.state.garments[0]
+        .positions
+        .iter()
+        .map(|p| p.cast::<f64>() - middle)
+        .filter(|r| r.dot(&along).abs() < 0.03 && r.norm() < 0.20)
+        .map(|r| r.dot(&v).atan2(r.dot(&u)).to_degrees())
+        .collect();
+    turns.sort_unstable_by(f64::total_cmp);
+    let Some((first, last)) = turns.first().zip(turns.last()) else { return 360.0 };
+    turns.windows(2).map(|w| w[1] - w[0]).fold(first + 360.0 - last, f64::max)
+}
+
+#[test]
+fn bent_arms_are_in_their_sleeves() {
+    let t = embedded::template();
+    let sk = t.skeleton();
+    let mut lost = Vec::new();
+    for (body, shape) in &BODIES[1..] {
+        let rest = t.personalise(&BodyShape { coefficients: shape.to_vec(), ..BodyShape::default() });
+        let pattern = suggested("longsleeve")(&t, &rest);
+        for k in 0..9 {
+            let mut pose = arms_down(&t, &rest);
+            for (side, k) in [("left", k), ("right", 8 - k)] {
+                let s = if side == "left" { 1.0 } else { -1.0 };
+                let (out, bend): (f64, f64) = ([0.1, 0.5, 1.1][k % 3], [1.0, 1.75, 2.2][k / 3]);
+                let joint = |n: &str| sk.index(&format!("{side}_{n}")).expect("joint");
+                let at = sk.dof_offset(joint("shoulder"));
+                let arm = rest.joints[joint("elbow")] - rest.joints[joint("shoulder")];
+                let wanted = Vector3::new(s * out.sin(), -out.cos(), 0.3);
+                let turn = UnitQuaternion::rotation_between(&arm, &wanted).expect("turn");
+                // The crook of the elbow to the front or outwards: inwards a forearm is in the belly.
+                let twist =
+                    UnitQuaternion::from_axis_angle(&Unit::new_normalize(arm), s * [0.0, -0.3, -0.6][(k + k / 3) % 3]);
+                pose.angles[at..at + 3].copy_from_slice(log_so3(&(turn * twist)).as_slice());
+                pose.set(sk, &format!("{side}_elbow"), &[bend]);
+            }
+            let d = dress(&t, &rest, &pose, &pattern, &DressOptions::default()).expect("dressed");
+            let mut bones = BoneTransforms::default();
+            pose.bones(sk, &rest, &mut bones);
+            for side in ["left", "right"] {
+                let at = ["elbow", "wrist"].map(|n| bones.joints[sk.index(&format!("{side}_{n}")).expect("joint")]);
+                let gap = bare(&d, at);
+                eprintln!("{body} {k} {side}: {gap:.0}°, stretch {:.3}", d.report.p99_strain);
+                if gap > 90.0 {
+                    lost.push(format!("{body} {k} {side}: {gap:.0}°"));
+                }
+            }
+        }
+    }
+    assert!(lost.is_empty(), "{lost:?}");
 }
 
 #[test]
