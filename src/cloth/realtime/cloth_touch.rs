@@ -71,7 +71,7 @@ impl ClothTouch<'_> {
         let search = g.search(self.model.config.thickness as f32, self.span);
         for (i, &v) in f.vertices.iter().enumerate() {
             // Where no corner was near, no fold comes within reach before the round after this one.
-            if p.tied[i] || p.free[i] {
+            if p.tied[i] || p.free[i] || p.passing[i] {
                 continue;
             }
             if std::mem::take(&mut p.alone[i]) && self.model.config.skip_far {

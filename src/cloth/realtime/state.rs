@@ -21,6 +21,9 @@ pub struct GarmentState {
     pub(super) nearest: Vec<[u32; 2]>,
     /// Nearest vertex of every garment further out, shape `[garments][vertices]`; empty for the others.
     pub(super) layers: Vec<Vec<u32>>,
+    /// Vertices that passed through other cloth when that was last looked for, in order.
+    #[serde(default)]
+    pub(super) passing: Vec<u32>,
 }
 
 /// Where an outfit is.
@@ -81,6 +84,7 @@ impl State {
                 positions: p,
                 nearest,
                 layers: Vec::new(),
+                passing: Vec::new(),
             });
         }
         let all: Vec<SurfaceFrame> =
@@ -216,6 +220,8 @@ pub(super) struct PatchScratch {
     /// Planes within reach for some steps, and how many of them are the body's.
     pub(super) near: Vec<Plane>,
     pub(super) body_near: usize,
+    /// Vertices that pass through other cloth: no fold may hold them where they are.
+    pub(super) passing: Vec<bool>,
     /// Vertices that had no other fold near them in the last round.
     pub(super) alone: Vec<bool>,
     /// For each vertex of the garment the last one that it was a neighbour of.

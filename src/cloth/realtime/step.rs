@@ -289,6 +289,8 @@ fn begin(model: &Model, state: &State, all: &mut Vec<PatchScratch>) {
             to.clear();
             to.extend(local().filter_map(|v| from.get(v)));
         }
+        p.passing.clear();
+        p.passing.extend(fabric.vertices.iter().map(|v| from.passing.binary_search(v).is_ok()));
         p.alone.clear();
         p.alone.resize(fabric.vertices.len(), false);
         p.neighbour_of.clear();

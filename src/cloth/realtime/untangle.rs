@@ -58,11 +58,13 @@ impl Untangle {
             }
             let weight = |v: usize| if self.held[v] { 0.0 } else { 1.0 / m.sheet.mass[v] };
             let round = self.sheets[k].round(model.config.par, &mut self.x, weight, STEP, GAP);
+            let g = &mut garments[k];
+            g.passing.clear();
             if round.crossings > 0 {
-                let g = &mut garments[k];
                 for (v, (push, _)) in self.sheets[k].pushes.iter().enumerate().filter(|(_, p)| p.1 > 0.0) {
                     let x = self.x[v] - push;
                     g.positions[v] = P3::from((x + off_skin(&x, *push, g.nearest[v], body)).cast::<f32>());
+                    g.passing.push(v as u32);
                 }
             }
             found += round.crossings;
