@@ -3,8 +3,9 @@
 //! `cargo run --release --example turntable -- --garment tshirt --garment longsleeve+trousers --out DIR
 //!   [--garment FILE.obj|.glb|.mhclo|.json [--garment-body FILE.npz|.obj]] [--body average,slim_woman,heavy_man | FILE.npz | RECORDING] [--size auto,S,M,XL] [--pose down|tpose|rest|walk|raise]
 //!   [--seconds 1.0] [--views 0,45,90,180] [--cell 220x340] [--crop] [--edge 0.021] [--fit] [--any-size] [--no-folds]
-//!   [--crossings] [--untangle]`
+//!   [--crossings] [--tangled] [--measured]`
 //!
+//! Bodies are drawn as cloth meets them, with room in the armpits, with `--measured` as they are.
 //! A row is a body, a block of columns a size. `auto` asks the size suggestion. A recording (a folder or .mcap) shows the
 //! person tracked in it, at its end; a still picture is tracked 45 times.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
@@ -17,7 +18,7 @@ use std::sync::Arc;
 use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use tryon::camera::ColorImage;
 use tryon::cloth::crossings;
-use tryon::cloth::realtime::{Config, Input, State, Workspace, step};
+use tryon::cloth::realtime::{Config, Input, RoomyBody, State, Workspace, step};
 use tryon::dressing::{DressError, DressOptions, Dressed, FitProbe, MadeOn, MeshWear, Wear, dress_all, suggest};
 use tryon::formats::image::write_png_rgb;
 use tryon::garment::{Pattern, library};
@@ -40,6 +41,7 @@ struct Args {
     crossings: bool,
     folds: bool,
     untangle: bool,
+    measured: bool,
     out: PathBuf,
 }
 
@@ -59,7 +61,8 @@ fn args() -> Args {
         any_size: false,
         crossings: false,
         folds: true,
-        untangle: false,
+        untangle: true,
+        measured: false,
         out: "/tmp/turntable".into(),
     };
     let list = |s: String| s.split(',').map(str::to_owned).collect::<Vec<_>>();
@@ -86,7 +89,8 @@ fn args() -> Args {
             "--crop" => a.crop = true,
             "--crossings" => a.crossings = true,
             "--no-folds" => a.folds = false,
-            "--untangle" => a.untangle = true,
+            "--measured" => a.measured = true,
+            "--tangled" => a.untangle = false,
             "--any-size" => a.any_size = true,
             "--fit" => a.fit = true,
             "--edge" => a.edge = Some(value().parse().expect("metres")),
@@ -310,17 +314,22 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
     );
     let frames = film.len();
     let (mut ms, mut last) = (0.0, None);
+    let (mut roomy, mut room_ms) = (RoomyBody::new(&template, &options.config).expect("a body"), 0.0);
     let mut verts = posed(&template, &rest, &start);
     for body in film {
         verts = body;
         let r = step(&model, &mut state, &Input { body: &verts, dt: 1.0 / 30.0 }, &mut work).expect("step");
         ms += r.stages_ms.total;
+        let started = std::time::Instant::now();
+        roomy.make_room(tryon::par::Par::Rayon, &verts);
+        room_ms += if last.is_some() { started.elapsed().as_secs_f64() * 1e3 } else { 0.0 };
         last = Some(r);
     }
     if let Some(r) = last {
         println!(
-            "  {:.2} ms a step, penetration left {:.2} mm, p99 {:.3} max {:.3}",
+            "  {:.2} ms a step, {:.2} ms room for drawing, penetration left {:.2} mm, p99 {:.3} max {:.3}",
             ms / frames as f64,
+            room_ms / frames as f64,
             r.penetration_left * 1e3,
             r.p99_strain,
             r.max_strain
@@ -333,8 +342,9 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
         [s[0], s[1]]
     };
     let mut y = verts.iter().fold([f32::MAX, f32::MIN], |y, p| [y[0].min(p.y), y[1].max(p.y)]);
+    let drawn = if a.measured { &verts } else { roomy.make_room(tryon::par::Par::Rayon, &verts) };
     let mut parts = vec![Part {
-        vertices: verts,
+        vertices: drawn.to_vec(),
         faces: template.mesh().faces().to_vec(),
         color: [0.86, 0.70, 0.60],
         uv: vec![],
@@ -343,10 +353,10 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
     let fits = a.fit.then(|| {
         let mut probe = FitProbe::new(&template, &model).expect("a probe");
         let started = std::time::Instant::now();
-        probe.measure(&model, &state, &parts[0].vertices).expect("fit");
+        probe.measure(&model, &state, &verts).expect("fit");
         let first = started.elapsed().as_secs_f64() * 1e3;
         let started = std::time::Instant::now();
-        let maps = probe.measure(&model, &state, &parts[0].vertices).expect("fit");
+        let maps = probe.measure(&model, &state, &verts).expect("fit");
         println!("  fit map: first {first:.1} ms, then {:.1} ms", started.elapsed().as_secs_f64() * 1e3);
         for r in maps.iter().flat_map(|m| &m.regions) {
             println!(

@@ -17,7 +17,7 @@ pub struct Crossing {
 pub fn crossings(faces: &[Face], positions: &[P3]) -> Vec<Crossing> {
     let x: Vec<V3d> = positions.iter().map(|p| p.coords.cast()).collect();
     let mut finder = Finder::new(faces, &x);
-    let found = finder.find(Par::Rayon, &x);
+    let found = finder.find(Par::Rayon, &x, &[]);
     found.iter().map(|(e, face)| Crossing { edge: finder.edges[*e as usize], face: *face }).collect()
 }
 
@@ -154,14 +154,19 @@ impl Finder {
         }
     }
 
-    /// Numbers of the edge and the triangle of each crossing, in order.
-    pub(crate) fn find(&mut self, par: Par, x: &[V3d]) -> Vec<(u32, u32)> {
+    /// Numbers of the edge and the triangle of each crossing, in order. `only` some edges, or all where it is empty.
+    pub(crate) fn find(&mut self, par: Par, x: &[V3d], only: &[bool]) -> Vec<(u32, u32)> {
         self.refit(x);
         let mut chunks: Vec<Vec<(u32, u32)>> = Vec::new();
         par::map_into(par, self.leaves.len().div_ceil(CHUNK), 1, &mut chunks, |c| {
             let (mut found, mut edges) = (Vec::new(), Vec::new());
             for leaf in &self.leaves[c * CHUNK..((c + 1) * CHUNK).min(self.leaves.len())] {
-                self.of_leaf(&self.nodes[*leaf as usize], x, &mut edges, &mut found);
+                let n = &self.nodes[*leaf as usize];
+                let [from, to] = [n.first, n.first + n.count].map(|k| self.begin[k as usize] as usize);
+                edges.clear();
+                let wanted = |e: &&u32| only.get(**e as usize).is_none_or(|w| *w);
+                edges.extend(self.by_place[from..to].iter().filter(wanted).map(|e| (self.edge_box(*e, x), *e)));
+                self.of_edges(&edges, x, &mut found);
             }
             found
         });
@@ -171,16 +176,16 @@ impl Finder {
         found
     }
 
-    /// Crossings of the edges that begin in a leaf: the tree is gone through once for all of them. `edges` is scratch.
-    fn of_leaf(&self, leaf: &Node, x: &[V3d], edges: &mut Vec<([[f32; 4]; 2], u32)>, found: &mut Vec<(u32, u32)>) {
-        let [first, end] = [leaf.first, leaf.first + leaf.count].map(|k| self.begin[k as usize] as usize);
-        edges.clear();
+    fn edge_box(&self, e: u32, x: &[V3d]) -> [[f32; 4]; 2] {
+        let [a, b] = self.edges[e as usize].map(|v| x[v as usize]);
+        [below(&a.inf(&b)), above(&a.sup(&b))]
+    }
+
+    /// Crossings of edges near each other, with their boxes: the tree is gone through once for all of them.
+    fn of_edges(&self, edges: &[([[f32; 4]; 2], u32)], x: &[V3d], found: &mut Vec<(u32, u32)>) {
         let (mut low, mut high) = ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]);
-        for e in &self.by_place[first..end] {
-            let [a, b] = self.edges[*e as usize].map(|v| x[v as usize]);
-            let (from, to) = (below(&a.inf(&b)), above(&a.sup(&b)));
+        for ([from, to], _) in edges {
             (0..4).for_each(|c| (low[c], high[c]) = (low[c].min(from[c]), high[c].max(to[c])));
-            edges.push(([from, to], *e));
         }
         let mut k = 0;
         while let Some(n) = self.nodes.get(k) {
@@ -302,7 +307,7 @@ mod tests {
                     }
                     let key = |c: &Crossing| (c.edge, c.face);
                     let mut fast: Vec<Crossing> = finder
-                        .find(Par::Rayon, &d(&x))
+                        .find(Par::Rayon, &d(&x), &[])
                         .iter()
                         .map(|(e, f)| Crossing { edge: finder.edges[*e as usize], face: *f })
                         .collect();

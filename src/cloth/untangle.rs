@@ -22,6 +22,8 @@ const SMALL: f64 = 0.3;
 
 /// Rings of vertices beyond the crossing edges that follow them in a round.
 const FOLLOWING: usize = 4;
+/// Rings of vertices beyond them in which the next rounds look for crossings: in eight rounds of 3 mm they go no further.
+const AROUND: usize = 2;
 
 /// What one round found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,7 +34,8 @@ pub(crate) struct Round {
     pub(crate) astray: usize,
 }
 
-/// A sheet that is taken out of itself round by round, and scratch for it. What it did before changes no result.
+/// A sheet that is taken out of itself round by round, and scratch for it. Where it crossed itself the next rounds look
+/// first, and everywhere where nothing is found there.
 #[derive(Clone, Debug)]
 pub(crate) struct Untangler {
     pub(crate) finder: Finder,
@@ -45,6 +48,8 @@ pub(crate) struct Untangler {
     wrong: Vec<bool>,
     /// Size of the sheet that each vertex is in.
     whole: Vec<u32>,
+    /// Of each edge whether it is near a crossing that the last look at all of them found; empty where it found none.
+    hot: Vec<bool>,
 }
 
 /// Where an edge meets a triangle, and which way out.
@@ -68,6 +73,7 @@ impl Untangler {
             odd: Vec::new(),
             wrong: Vec::new(),
             whole: Vec::new(),
+            hot: Vec::new(),
         };
         new.whole = new.parts(x.len(), false);
         new
@@ -82,7 +88,7 @@ impl Untangler {
         step: f64,
         gap: f64,
     ) -> Round {
-        let found = self.finder.find(par, x);
+        let found = self.find(par, x);
         self.pushes.clear();
         self.pushes.resize(x.len(), (V3d::zeros(), 0.0));
         if found.is_empty() {
@@ -111,6 +117,34 @@ impl Untangler {
         }
         x.iter_mut().zip(&self.pushes).for_each(|(x, (push, _))| *x += *push);
         Round { crossings: found.len(), astray }
+    }
+    /// The next round looks for crossings everywhere: the sheet was moved by others.
+    pub(crate) fn look_anew(&mut self) {
+        self.hot.clear();
+    }
+    fn find(&mut self, par: Par, x: &[V3d]) -> Vec<(u32, u32)> {
+        if !self.hot.is_empty() {
+            let found = self.finder.find(par, x, &self.hot);
+            if !found.is_empty() {
+                return found;
+            }
+        }
+        let found = self.finder.find(par, x, &[]);
+        self.hot.clear();
+        if !found.is_empty() {
+            let mut near = vec![false; x.len()];
+            for (e, f) in &found {
+                let corners = self.finder.faces[*f as usize];
+                self.finder.edges[*e as usize].iter().chain(&corners).for_each(|v| near[*v as usize] = true);
+            }
+            let touches = |e: &[u32; 2], near: &[bool]| e.iter().any(|v| near[*v as usize]);
+            for _ in 0..AROUND {
+                let ring: Vec<[u32; 2]> = self.finder.edges.iter().filter(|e| touches(e, &near)).copied().collect();
+                ring.iter().flatten().for_each(|v| near[*v as usize] = true);
+            }
+            self.hot.extend(self.finder.edges.iter().map(|e| touches(e, &near)));
+        }
+        found
     }
     /// Vertices on the wrong side that no crossing edge tells where to go follow those beside them.
     fn follow(&mut self) {

@@ -44,6 +44,7 @@ impl<T: Copy + Default + Send + Sync> Across<T> {
         let looked_for = self.before.iter().zip(&frame.vertices).zip(others).filter(|(_, mask)| **mask != 0);
         let moved = 2.0 * looked_for.map(|((a, b), _)| (a - b).norm_squared()).fold(0.0, f32::max).sqrt();
         self.before.clone_from(&frame.vertices);
+        let starts = if first { model.starts(par, frame, &frame.vertices, others.iter()) } else { Vec::new() };
         par::for_chunks(par, &mut self.seen, 256, |start, chunk| {
             for (k, s) in chunk.iter_mut().enumerate() {
                 let (v, mask) = (start + k, others[start + k]);
@@ -55,8 +56,8 @@ impl<T: Copy + Default + Send + Sync> Across<T> {
                     continue;
                 }
                 let p = &frame.vertices[v];
-                if first {
-                    s.nearest = model.nearest_of_some(frame, p, mask);
+                if let Some(start) = starts.get(v) {
+                    s.nearest = *start;
                 }
                 let (near, hit) = model.closest_within(frame, p, s.nearest, mask, reach);
                 *s = Seen { nearest: near, room: hit.err().unwrap_or(0.0), found: judge(v, near, &hit) };

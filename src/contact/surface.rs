@@ -109,6 +109,27 @@ impl SurfaceModel {
         points: &'a [P3],
         masks: impl Iterator<Item = &'a Part>,
     ) -> Vec<u32> {
+        self.nearest_of_every(1, par, frame, points, masks)
+    }
+    /// Vertices to start walks from: of each mask the nearest of every seventh.
+    pub fn starts<'a>(
+        &self,
+        par: Par,
+        frame: &SurfaceFrame,
+        points: &'a [P3],
+        masks: impl Iterator<Item = &'a Part>,
+    ) -> Vec<u32> {
+        const STRIDE: usize = 7;
+        self.nearest_of_every(STRIDE, par, frame, points, masks)
+    }
+    fn nearest_of_every<'a>(
+        &self,
+        stride: usize,
+        par: Par,
+        frame: &SurfaceFrame,
+        points: &'a [P3],
+        masks: impl Iterator<Item = &'a Part>,
+    ) -> Vec<u32> {
         let masks: Vec<Part> = masks.copied().collect();
         let trees: BTreeMap<Part, (Vec<u32>, PointTree)> = masks
             .iter()
@@ -116,7 +137,8 @@ impl SurfaceModel {
             .collect::<BTreeSet<_>>()
             .into_iter()
             .map(|mask| {
-                let of: Vec<u32> = (0..self.parts.len() as u32).filter(|v| self.part(*v) & mask != 0).collect();
+                let of = (0..self.parts.len() as u32).filter(|v| self.part(*v) & mask != 0);
+                let of: Vec<u32> = of.step_by(stride).collect();
                 let places: Vec<P3> = of.iter().map(|v| frame.vertices[*v as usize]).collect();
                 (mask, (of, PointTree::new(&places)))
             })
@@ -127,13 +149,6 @@ impl SurfaceModel {
             near.unwrap_or(0)
         });
         found
-    }
-    /// A vertex of `mask` to start a walk from: the nearest of every seventh.
-    pub fn nearest_of_some(&self, frame: &SurfaceFrame, p: &P3, mask: Part) -> u32 {
-        const STRIDE: usize = 7;
-        let far = |i: &usize| (frame.vertices[*i] - p).norm_squared();
-        let of_mask = (0..self.parts.len()).filter(|i| self.parts[*i] & mask != 0);
-        of_mask.step_by(STRIDE).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(0) as u32
     }
     /// Walks from `start` to a vertex nearer to `p` than all its neighbours. At most 40 steps.
     pub fn walk(&self, frame: &SurfaceFrame, p: &P3, start: u32, mask: Part) -> u32 {

@@ -71,6 +71,8 @@ pub(super) struct Drape {
     sheet: Option<Untangler>,
     /// How often it passed through itself when that was last looked for.
     crossings: usize,
+    /// It comes from a coarser drape of the same garment.
+    fine: bool,
 }
 
 /// What cloth is draped on.
@@ -209,6 +211,8 @@ const LIFT: f64 = 0.01;
 const FACING: f64 = 1.41;
 /// Cloth further from its own skin than this may hang on the other half, metres: a shirt hangs beside a forearm.
 const HALVED: f64 = 0.06;
+/// Skin that lies deeper than this in other skin holds no cloth, metres.
+const CLOSED: f64 = 0.03;
 /// Distance of either layer from the middle, metres: half of that between two layers on the skin.
 const HALF_GAP: f64 = 0.00125;
 /// Most that a round of untangling moves an edge against a triangle, metres. With a third of it what came in one body on the
@@ -226,6 +230,8 @@ const SLACK_KEPT: f64 = 0.98;
 const RELAX_EVERY: usize = 2;
 /// For so many rounds.
 const RELAXED: usize = 10;
+/// Rounds without fewer crossings after which no more are made.
+const STUCK: usize = 16;
 /// In the others it may sink so deep into the skin, metres: deeper, and skin shows in the armpits of a heavy man.
 const SUNK: f64 = 0.002;
 /// And edges are only kept from this times their length: a hood in folds on the neck was not free before it was
@@ -265,6 +271,7 @@ impl Drape {
             before: Vec::new(),
             slack: vec![0.0; n],
             crossings: 0,
+            fine: false,
             sheet: None,
             x: x.iter().map(|p| p.coords.cast()).collect(),
         }
@@ -286,6 +293,7 @@ impl Drape {
     }
     /// Starts from the nearest body vertices of a coarser drape of the same garment.
     pub(super) fn find_from(&mut self, skin: &Skin<'_>, coarse: &Self) {
+        self.fine = true;
         for (i, near) in self.nearest.iter_mut().enumerate() {
             let d = |k: usize| (coarse.x[k] - self.x[i]).norm_squared();
             let k = (0..coarse.x.len()).min_by(|a, b| d(*a).total_cmp(&d(*b))).unwrap_or(0);
@@ -362,8 +370,9 @@ impl Drape {
             }
             self.bend(h);
             self.lift(0.0);
-            if weight >= 1.0 && (s % LOOK_EVERY == 0 || self.crossings > 0 && s % 2 == 0) {
-                self.untangle();
+            let anew = s % LOOK_EVERY == 0;
+            if weight >= 1.0 && (anew || self.crossings > 0 && s % 2 == 0) {
+                self.untangle(anew);
             }
             for i in 0..self.x.len() {
                 let v = (self.x[i] - self.before[i]) / h;
@@ -372,9 +381,13 @@ impl Drape {
             }
         }
     }
-    /// One round of taking the sheet out of itself, which gives no speed.
-    fn untangle(&mut self) {
+    /// One round of taking the sheet out of itself, which gives no speed; `anew` looks everywhere, else where it crossed
+    /// itself in the last rounds.
+    fn untangle(&mut self, anew: bool) {
         let Some(sheet) = &mut self.sheet else { return };
+        if anew {
+            sheet.look_anew();
+        }
         let (pinned, inverse) = (&self.pinned, &self.inverse_mass);
         let weight = |i: usize| if pinned[i].is_some() { 0.0 } else { inverse[i] };
         let r = sheet.round(Par::Rayon, &mut self.x, weight, APART_STEP, APART_GAP);
@@ -387,10 +400,14 @@ impl Drape {
     /// Takes the sheet out of itself in at most `most` rounds, on a body that stands still, and takes all speed away if it
     /// crossed itself. After [`RELAXED`] of them only edges that are about to tear and skin far above it move it.
     pub(super) fn clear(&mut self, on: &On<'_>, most: usize) {
+        let (mut fewest, mut since) = (usize::MAX, 0);
         for k in 0..most {
             self.before.clone_from(&self.x);
-            self.untangle();
-            if self.crossings == 0 {
+            self.untangle(k % LOOK_EVERY == 0);
+            if self.crossings < fewest {
+                (fewest, since) = (self.crossings, k);
+            }
+            if self.crossings == 0 || k - since > STUCK {
                 break;
             }
             if k % LOOK_EVERY == 0 {
@@ -508,6 +525,11 @@ impl Drape {
                 };
             }
             let [own, other] = &mut self.planes[i];
+            if self.fine && self.sheet.is_some() && (-CLOSED..0.0).contains(&room) && !found[0].rim {
+                // No deeper than half-way into skin that lies in other skin; coarse cloth needs its way out through it.
+                let held = !skin.buried.holds_nothing(skin.model.faces()[found[0].face as usize]);
+                (own.near, own.height) = (held && f64::from(found[0].signed) < REACH, 0.5 * room);
+            }
             let far = found.map(|c| f64::from(c.signed));
             let halved = self.sheet.is_some() && facing.is_some() && own.near && other.near;
             let kept = halved && own.keep_half(other, &self.x[i], far, room);

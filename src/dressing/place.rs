@@ -238,21 +238,21 @@ impl<'a> Chart<'a> {
                 let side = if self.placement == Placement::Hood(Side::Left) { 1.0 } else { -1.0 };
                 let far = crown.iter().map(|c| (c[0] - p[0]).hypot(c[1] - p[1])).fold(f32::MAX, f32::min);
                 /// How far a hood lies back, radians.
-                const BACK: f32 = 2.6;
+                const BACK: f32 = 2.5;
                 /// Height of cloth over which it folds back, metres.
-                const FOLD: f32 = 0.10;
-                /// What it folds about: this far above the neckline and in front of the nape, metres.
+                const FOLD: f32 = 0.25;
+                /// What it folds about: this far above the nape, metres.
                 const RISE: f32 = 0.03;
-                const NECK: f32 = 0.05;
                 /// Width of cloth over which a hood turns from the crown to the side of the head, metres.
                 const TURN: f32 = 0.11;
                 let t = (far / TURN).clamp(0.0, 1.0);
                 let out = width * (1.0 - (1.0 - t).powi(2)).sqrt();
-                // Worn down: from the neckline it rises a little, then lies back over the shoulders.
+                // Worn down: laid back behind the head from the neckline on, ever more, so that it passes nowhere through itself
+                // (less high or about a point before the nape the back would turn inside out).
                 let up = (p[1] / FOLD).clamp(0.0, 1.0);
                 let (sin, cos) = (BACK * up * up * (3.0 - 2.0 * up)).sin_cos();
-                let (y, z) = (p[1] - RISE, -side * p[0] - NECK);
-                P3::new(side * out, top + 0.01 + RISE + y * cos + z * sin, nape + NECK + z * cos - y * sin)
+                let (y, z) = (p[1] - RISE, -side * p[0]);
+                P3::new(side * out, top + 0.01 + RISE + y * cos + z * sin, nape + z * cos - y * sin)
             }
             Kind::Leg { waist, rise, hip_line, garment_half } => {
                 let (side, front) = match self.placement {

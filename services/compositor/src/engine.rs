@@ -5,8 +5,9 @@ use crate::scene::Body;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
-use tryon::body::{BodyShape, BoneTransforms, RestBody, skin};
+use tryon::body::{BodyShape, BoneTransforms, RestBody, Template, skin};
 use tryon::camera::ColorImage;
+use tryon::cloth::realtime::{self, RoomyBody};
 use tryon::composite::{BodyView, Config, Framing, GarmentView, Input, Limbs, Look, Model, Print, State, Workspace};
 use tryon::dressing::FIT_COLORS;
 use tryon::formats::image::{encode_jpeg, encode_png_rgb};
@@ -82,6 +83,8 @@ pub(crate) struct Engine {
     rest_of: Option<Arc<BodyShape>>,
     bones: BoneTransforms,
     posed: Vec<P3>,
+    /// Where cloth lies between parts of the body, and for which template; `None` inside where it has faults.
+    roomy: Option<(Arc<Template>, Option<RoomyBody>)>,
     garments: Vec<Vec<P3>>,
 }
 
@@ -118,7 +121,10 @@ impl Engine {
             })
             .collect();
         let faces = job.body.as_ref().map_or(&[][..], |b| b.template.mesh().faces());
-        let body = has_body.then_some(BodyView { vertices: &self.posed, faces, limbs: &self.limbs });
+        // Who wears nothing here needs no room for it.
+        let roomy = self.roomy.as_mut().and_then(|r| r.1.as_mut()).filter(|_| has_body && !views.is_empty());
+        let vertices = roomy.map_or(&self.posed[..], |r| r.make_room(Par::Rayon, &self.posed));
+        let body = has_body.then_some(BodyView { vertices, faces, limbs: &self.limbs });
         let (mut pictures, mut drawn) = (Vec::new(), Vec::<(Option<(u32, u32)>, ColorImage)>::new());
         for &(size, _) in &job.formats {
             if drawn.iter().any(|(s, _)| *s == size) {
@@ -169,6 +175,10 @@ impl Engine {
             self.rest = b.template.personalise(&b.shape);
             self.rest_of = Some(b.shape.clone());
             self.limbs = Limbs::of(&b.template);
+        }
+        if !self.roomy.as_ref().is_some_and(|(t, _)| Arc::ptr_eq(t, &b.template)) {
+            let made = RoomyBody::new(&b.template, &realtime::Config::tracked()).ok();
+            self.roomy = Some((b.template.clone(), made));
         }
         pose.bones(b.template.skeleton(), &self.rest, &mut self.bones);
         skin(Par::Rayon, &self.rest.vertices, b.template.weights(), &self.bones, &mut self.posed);

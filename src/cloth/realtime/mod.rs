@@ -4,6 +4,7 @@ mod carry;
 mod cloth_touch;
 mod model;
 mod regions;
+mod roomy;
 mod state;
 mod steady;
 mod step;
@@ -11,5 +12,6 @@ mod touch;
 mod untangle;
 
 pub use model::{AnchorBinding, Config, Model, Outfit, body_parts};
+pub use roomy::RoomyBody;
 pub use state::{GarmentState, Input, State, StepReport, Workspace};
 pub use step::step;

@@ -110,6 +110,10 @@ impl Default for Config {
 }
 
 impl Config {
+    /// What two layers of cloth need between parts of the body that press on each other, metres.
+    pub(crate) fn room(&self) -> f32 {
+        (2.0 * self.offset + self.thickness) as f32
+    }
     /// For a body that is tracked by a camera.
     pub fn tracked() -> Self {
         /// A standing body trembles by 3 mm with a Kinect v1 at 2.4 m (95 % of its vertices, from call to call); at
@@ -200,7 +204,7 @@ pub fn body_parts(template: &Template) -> Vec<u8> {
 
 /// The part that each body vertex may come to lie in: an arm in the trunk, the trunk in its nearer arm, a leg in the
 /// other leg.
-fn opposites(template: &Template, parts: &[u8]) -> Vec<u8> {
+pub(super) fn opposites(template: &Template, parts: &[u8]) -> Vec<u8> {
     let vertices = template.mesh().vertices();
     let mean = |part: Region| {
         let of: Vec<_> = vertices.iter().zip(parts).filter(|(_, p)| **p == part.0).map(|(v, _)| v.coords).collect();
@@ -219,7 +223,7 @@ fn opposites(template: &Template, parts: &[u8]) -> Vec<u8> {
 
 /// Of these [`opposites`] those of thick parts: hands and forearms have cloth on one side only, and a hand in a hip does
 /// not know any more which one that is.
-fn pressing(template: &Template, opposite: Vec<u8>) -> Vec<u8> {
+pub(super) fn pressing(template: &Template, opposite: Vec<u8>) -> Vec<u8> {
     const THIN: [&str; 9] = ["elbow", "wrist", "hand", "finger", "thumb", "knee", "ankle", "foot", "toe"];
     let thin: Vec<bool> =
         template.skeleton().joints().iter().map(|j| THIN.iter().any(|t| j.name.contains(t))).collect();
@@ -357,9 +361,9 @@ impl Model {
     pub(crate) fn pressing(&self) -> &[u8] {
         &self.pressing
     }
-    /// What two layers of cloth need between parts of the body that press on each other, metres.
+    /// See [`Config::room`].
     pub(crate) fn room(&self) -> f32 {
-        (2.0 * self.config.offset + self.config.thickness) as f32
+        self.config.room()
     }
     /// The part that each vertex of it may lie in.
     pub(crate) fn opposite(&self) -> &[u8] {

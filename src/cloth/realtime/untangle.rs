@@ -57,6 +57,7 @@ impl Untangle {
                 self.sheets.push(Untangler::new(&model.outfit.garments[g].faces, &at));
             }
             let weight = |v: usize| if self.held[v] { 0.0 } else { 1.0 / m.sheet.mass[v] };
+            self.sheets[k].look_anew();
             let round = self.sheets[k].round(model.config.par, &mut self.x, weight, STEP, GAP);
             let g = &mut garments[k];
             g.passing.clear();
