@@ -18,6 +18,9 @@ const OTHER_DEPTH: f32 = 0.01;
 pub(super) const HIDDEN: f32 = 0.015;
 /// Cloth longer than this, over its rest length, is about to tear: more than knitwear is worn at.
 const TORN: f32 = 1.5;
+/// Between skins with less room than this cloth stays on its own half, metres, and so far from the middle.
+const HALVED: f32 = 0.03;
+const HALF_GAP: f32 = 0.00125;
 /// Anchors of strength ½ go to their place at this rate, 1/s.
 const ANCHOR_RATE: f64 = 120.0;
 
@@ -98,20 +101,22 @@ impl Touch<'_> {
                     }
                 }
             }
-            let mut offset = offset;
+            let mut offsets = [offset; 2];
             if let [Some(own), Some(other)] = &found {
-                // Faces that meet with less room than two layers of cloth: it lies half-way, and where the body lies in
-                // itself nothing holds it: the cloth there hangs on its neighbours, out of sight.
-                if let Some(room) = own.room(other).filter(|room| *room < 2.0 * offset) {
-                    p.report.pinched += 1;
+                // Between skins that face each other cloth stays on its own half, so that two layers pass each other
+                // nowhere; where the body lies in itself nothing holds it: it hangs on its neighbours, out of sight.
+                if let Some(room) = own.room(other).filter(|room| *room < HALVED) {
+                    p.report.pinched += usize::from(room < 2.0 * offset);
                     if room < 0.0 {
                         p.free[i] = true;
                         found = [None, None];
                     }
-                    offset = 0.5 * room.max(0.0);
+                    let half = 0.5 * room.max(0.0);
+                    let gap = HALF_GAP.min(0.5 * half);
+                    offsets = [offset.min(half - gap), half + gap];
                 }
             }
-            for c in found.iter().rev().flatten() {
+            for (c, offset) in found.iter().zip(offsets).rev().filter_map(|(c, o)| c.map(|c| (c, o))) {
                 let corners = self.model.surface.faces()[c.face as usize];
                 let speed = (0..3).fold(V3::zeros(), |s, j| {
                     let v = corners[j] as usize;
