@@ -25,6 +25,9 @@ const FOLLOWING: usize = 4;
 /// Rings of vertices beyond them in which the next rounds look for crossings: in eight rounds of 3 mm they go no further.
 const AROUND: usize = 2;
 
+/// Rounds of averaging in one ironing.
+const IRONED: usize = 4;
+
 /// What one round found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Round {
@@ -121,6 +124,30 @@ impl Untangler {
     /// The next round looks for crossings everywhere: the sheet was moved by others.
     pub(crate) fn look_anew(&mut self) {
         self.hot.clear();
+    }
+    /// Draws cloth within `rings` of what crossed in the last round to the mean of its neighbours.
+    pub(crate) fn iron(&self, x: &mut [V3d], movable: impl Fn(usize) -> bool, rings: usize) {
+        let n = x.len();
+        let mut near: Vec<bool> = self.pushes.iter().map(|p| p.1 > 0.0).collect();
+        for _ in 0..rings {
+            let ring: Vec<[u32; 2]> =
+                self.finder.edges.iter().filter(|e| e.iter().any(|v| near[*v as usize])).copied().collect();
+            ring.iter().flatten().for_each(|v| near[*v as usize] = true);
+        }
+        for _ in 0..IRONED {
+            let mut sum = vec![(V3d::zeros(), 0.0); n];
+            for e in &self.finder.edges {
+                for [a, b] in [[e[0], e[1]], [e[1], e[0]]].map(|e| e.map(|v| v as usize)) {
+                    if near[a] {
+                        sum[a].0 += x[b];
+                        sum[a].1 += 1.0;
+                    }
+                }
+            }
+            for v in (0..n).filter(|v| near[*v] && movable(*v) && sum[*v].1 > 0.0) {
+                x[v] = (x[v] + sum[v].0 / sum[v].1) * 0.5;
+            }
+        }
     }
     fn find(&mut self, par: Par, x: &[V3d]) -> Vec<(u32, u32)> {
         if !self.hot.is_empty() {
@@ -362,6 +389,30 @@ mod tests {
         let (seen, _) = rounds(strip, 0.002, 60);
         assert!(seen[0] > 4, "{seen:?}");
         assert_eq!(seen.last(), Some(&0), "{seen:?}");
+    }
+
+    #[test]
+    fn ironing_flattens_what_crossed_and_no_more() {
+        let flat = grid(16, 16, 0, |u, v| [(u - 8.1) * CELL, 0.0, (v - 8.2) * CELL]);
+        let n = flat.0.len();
+        // A sheet above it with a spike through it.
+        let spiked = grid(16, 16, n, |u, v| {
+            let spike = if (u, v) == (8.0, 8.0) { 0.03 } else { 0.0 };
+            [(u - 8.0) * CELL, 0.02 - spike, (v - 8.0) * CELL]
+        });
+        let (mut x, faces) = two(flat, spiked);
+        let tip = n + 8 * 17 + 8;
+        let mut u = Untangler::new(&faces, &x);
+        assert!(u.round(Par::Seq, &mut x, |_| 1.0, 0.001, 0.0).crossings > 0);
+        let before = x.clone();
+        u.iron(&mut x, |v| v != tip, 2);
+        assert_eq!(x[tip], before[tip], "it may not move");
+        u.iron(&mut x, |_| true, 2);
+        assert!(x[tip].y > before[tip].y + 0.01, "{} {}", x[tip].y, before[tip].y);
+        // Three cells from the spike, of which one is an edge that crossed.
+        let near = |v: usize| [0, 2].iter().all(|k| before[v][*k].abs() < 3.5 * CELL);
+        assert!((0..x.len()).all(|v| near(v) || x[v] == before[v]));
+        assert!(u.round(Par::Seq, &mut x, |_| 1.0, 0.001, 0.0).crossings == 0);
     }
 
     #[test]

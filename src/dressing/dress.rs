@@ -121,13 +121,16 @@ const FOLLOWING: usize = 12;
 /// Rounds of untangling on each of them.
 const CLEARING: usize = 6;
 /// Rounds of untangling on the coarse mesh at the end, on the fine one at first, and at its end: most garments need none.
-const CLEARED: usize = 50;
+const CLEARED: usize = 120;
 /// Substeps in the tracked pose.
 const SETTLING: usize = 80;
 /// Substep on the fine mesh, s.
 const FINE_STEP: f64 = 1e-3;
 /// Substeps on the fine mesh: wrinkles that the coarse one lacks.
 const FINISHING: usize = 90;
+/// Half of them are done so often again where cloth was ironed: it is pressed together, and finds room from one time to the
+/// next.
+const AGAIN: usize = 4;
 
 /// Something to put on.
 #[derive(Clone, Copy, Debug)]
@@ -296,7 +299,6 @@ pub fn dress_all(
         d.run(on, SETTLING, COARSE_STEP, 1.0);
         d.clear(on, CLEARED);
     });
-    report.steps = coarse.len() * (CLOSING + DRAPING + follow * following + SETTLING + FINISHING);
     report.stages_ms.coarse = ms(timer);
 
     let timer = Instant::now();
@@ -313,8 +315,15 @@ pub fn dress_all(
         d.put_back(&skin);
         d.clear(on, CLEARED);
         d.run(on, FINISHING, FINE_STEP, 1.0);
+        for _ in 0..AGAIN {
+            if !d.clear(on, CLEARED) {
+                break;
+            }
+            d.run(on, FINISHING / 2, FINE_STEP, 1.0);
+        }
         d.clear(on, CLEARED);
     });
+    report.steps = rough.drapes.iter().chain(&fine.drapes).map(|d| d.steps).sum();
     let (mut positions, mut anchors) = (Vec::new(), Vec::new());
     for (k, (mesh, d)) in model.outfit.garments.iter().zip(&fine.drapes).enumerate() {
         let (deepest, p99, _) = d.judge(&skin);
