@@ -310,7 +310,7 @@ fn a_hem_that_is_woven_through_itself_comes_loose() {
         println!("{untangle} s between looks: {pulled} crossings, {left} two seconds later");
         left
     });
-    // Held as it is it gets worse; taken out of itself half is left (68 of 134).
+    // Held as it is it gets worse (1097).
     assert!(left[0] > 90 && 3 * left[1] < 2 * left[0], "{left:?}");
 }
 
