@@ -78,7 +78,8 @@ impl Untangle {
             for (v, (from, to)) in self.from.iter().zip(&self.x).enumerate().filter(|(_, w)| w.0 != w.1) {
                 let way = (to - from).cap_magnitude(MOST);
                 g.positions[v] = P3::from((from + off_skin(from, way, g.nearest[v], body)).cast::<f32>());
-                if sheet.pushes[v].1 > 0.0 {
+                // What has further to go than that is still on the wrong side.
+                if sheet.pushes[v].1 > 0.0 || way != to - from {
                     g.passing.push(v as u32);
                 }
             }
