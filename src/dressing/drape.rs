@@ -4,6 +4,7 @@
 //! a projection out of a plane per vertex, so nothing sticks, and what the coarse mesh cannot show is added on the fine
 //! one in a few steps more. The simulator that follows starts from cloth at rest.
 
+use super::plane::Plane;
 use crate::cloth::Sheet;
 use crate::cloth::realtime::{AnchorBinding, Model};
 use crate::cloth::sleeves::{Arms, Sleeve};
@@ -13,34 +14,6 @@ use crate::garment::{GarmentError, GarmentMesh, Region};
 use crate::math::{P3, V3, V3d};
 use crate::mesh::distances;
 use crate::par::Par;
-
-/// A plane a vertex stays above.
-#[derive(Clone, Copy, Debug, Default)]
-struct Plane {
-    point: V3d,
-    normal: V3d,
-    height: f64,
-    near: bool,
-}
-
-impl Plane {
-    /// Between skins that face each other with `room` between them, `far` metres from `x`, cloth stays on its own half:
-    /// sleeves and the trunk of a shirt press on each other as the arms go down. Says whether that is so.
-    fn keep_half(&mut self, other: &mut Self, x: &V3d, far: [f64; 2], room: f64) -> bool {
-        let away = other.normal - self.normal;
-        let steep = away.norm();
-        let facing = steep > FACING && far[0] < HALVED && far[1] < 2.0 * HALVED;
-        if facing {
-            let gap = HALF_GAP.min(0.25 * room);
-            // Where it would be as far from either.
-            other.point = x - away * ((far[1] - far[0]) / (steep * steep));
-            other.normal = away / steep;
-            other.height = gap;
-            self.height = self.height.min(0.5 * room - gap);
-        }
-        facing
-    }
-}
 
 /// One garment being draped.
 #[derive(Debug)]
@@ -214,14 +187,8 @@ const AROUND: Region = Region::TRUNK.with(Region::LEFT_LEG).with(Region::RIGHT_L
 /// Most that one lift out of the body may move a vertex, metres: deeper ones come out over several substeps.
 const LIFT: f64 = 0.01;
 
-/// Skins face each other where the difference of their normals is longer than this: at a right angle √2.
-const FACING: f64 = 1.41;
-/// Cloth further from its own skin than this may hang on the other half, metres: a shirt hangs beside a forearm.
-const HALVED: f64 = 0.06;
 /// Skin that lies deeper than this in other skin holds no cloth, metres.
 const CLOSED: f64 = 0.03;
-/// Distance of either layer from the middle, metres: half of that between two layers on the skin.
-const HALF_GAP: f64 = 0.00125;
 /// Most that a round of untangling moves an edge against a triangle, metres. With a third of it what came in one body on the
 /// way was not gone in the next.
 const APART_STEP: f64 = 0.003;

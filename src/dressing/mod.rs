@@ -9,6 +9,7 @@ mod fit_map;
 mod made_on;
 mod mesh_wear;
 mod place;
+mod plane;
 mod refine;
 mod suggest;
 mod waistband;
