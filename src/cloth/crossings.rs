@@ -3,6 +3,7 @@
 use crate::math::{P3, V3d};
 use crate::mesh::Face;
 use crate::par::{self, Par};
+use wide::f32x8;
 
 /// An edge that passes through a triangle of the same sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,15 +18,15 @@ pub struct Crossing {
 pub fn crossings(faces: &[Face], positions: &[P3]) -> Vec<Crossing> {
     let x: Vec<V3d> = positions.iter().map(|p| p.coords.cast()).collect();
     let mut finder = Finder::new(faces, &x);
-    let found = finder.find(Par::Rayon, &x, &[]);
+    let found = finder.find(Par::Rayon, &x);
     found.iter().map(|(e, face)| Crossing { edge: finder.edges[*e as usize], face: *face }).collect()
 }
 
-/// Triangles in the leaves of the tree: with two or eight a search takes a tenth longer.
-const LEAF: usize = 4;
+/// Triangles in a leaf of the tree, which are looked at together.
+const LEAF: usize = 8;
 /// Leaves that one thread asks about in a row.
-const CHUNK: usize = 64;
-/// No second triangle lies beside a border.
+const CHUNK: usize = 32;
+/// No second triangle lies beside a border, and none fills a leaf that has too few.
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// A box around triangles. Inner nodes are followed by their first child; `skip` is the node after all below.
@@ -35,9 +36,19 @@ struct Node {
     low: [f32; 4],
     high: [f32; 4],
     skip: u32,
-    /// Range in the order of triangles; empty in inner nodes.
-    first: u32,
-    count: u32,
+    /// Number of the leaf; [`NONE`] of inner nodes.
+    leaf: u32,
+}
+
+/// Triangles that lie together.
+#[derive(Clone, Debug)]
+struct Leaf {
+    faces: [u32; LEAF],
+    /// Their lowest and highest corners, axis by axis.
+    low: [[f32; LEAF]; 3],
+    high: [[f32; LEAF]; 3],
+    /// Edges of which they are the first triangle.
+    edges: Vec<u32>,
 }
 
 /// Finds crossings of a sheet that moves: a tree of boxes, built once and fitted anew.
@@ -48,15 +59,8 @@ pub(crate) struct Finder {
     pub(crate) edges: Vec<[u32; 2]>,
     /// Triangles beside each edge, the second one [`NONE`] on borders.
     pub(crate) beside: Vec<[u32; 2]>,
-    order: Vec<u32>,
-    /// Lowest and highest corner of the triangles, in that order.
-    boxes: Vec<[[f32; 4]; 2]>,
     nodes: Vec<Node>,
-    /// Nodes that hold triangles.
-    leaves: Vec<u32>,
-    /// Edges by the place of their first triangle in the order, and where those of each place begin.
-    by_place: Vec<u32>,
-    begin: Vec<u32>,
+    leaves: Vec<Leaf>,
 }
 
 impl Finder {
@@ -78,60 +82,70 @@ impl Finder {
                 }
             }
         }
-        let middles: Vec<V3d> = faces.iter().map(|f| f.iter().map(|v| x[*v as usize]).sum()).collect();
-        let mut built = Self {
-            faces: faces.to_vec(),
-            edges,
-            beside,
-            order: (0..faces.len() as u32).collect(),
-            boxes: Vec::new(),
-            nodes: Vec::new(),
-            leaves: Vec::new(),
-            by_place: Vec::new(),
-            begin: Vec::new(),
-        };
-        let mut order = std::mem::take(&mut built.order);
-        built.split(&middles, &mut order, 0);
-        built.order = order;
-        built.leaves = (0..built.nodes.len() as u32).filter(|n| built.nodes[*n as usize].count > 0).collect();
-        let mut place = vec![0; faces.len()];
-        built.order.iter().zip(0u32..).for_each(|(f, k)| place[*f as usize] = k);
-        let of = |e: u32| place[built.beside[e as usize][0] as usize];
-        let mut by_place: Vec<u32> = (0..built.edges.len() as u32).collect();
-        by_place.sort_unstable_by_key(|e| (of(*e), *e));
-        built.begin = (0..=faces.len() as u32).map(|k| by_place.partition_point(|e| of(*e) < k) as u32).collect();
-        built.by_place = by_place;
-        built
+        Self::grown(faces.to_vec(), edges, beside, x)
     }
 
-    fn split(&mut self, middles: &[V3d], order: &mut [u32], first: usize) {
+    /// The triangles for which `wanted` says so, as a sheet of their own, and the numbers that its edges and triangles
+    /// have in this one.
+    pub(crate) fn piece(&self, wanted: impl Fn(&Face) -> bool, x: &[V3d]) -> (Self, [Vec<u32>; 2]) {
+        let of: Vec<u32> = (0..self.faces.len() as u32).filter(|f| wanted(&self.faces[*f as usize])).collect();
+        let mut number = vec![NONE; self.faces.len()];
+        (0u32..).zip(&of).for_each(|(k, f)| number[*f as usize] = k);
+        let (mut edges, mut beside, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
+        for (k, (e, b)) in self.edges.iter().zip(&self.beside).enumerate() {
+            let [p, q] = b.map(|f| number.get(f as usize).copied().unwrap_or(NONE));
+            if p.min(q) != NONE {
+                edges.push(*e);
+                beside.push(if p == NONE { [q, p] } else { [p, q] });
+                numbers.push(k as u32);
+            }
+        }
+        let faces = of.iter().map(|f| self.faces[*f as usize]).collect();
+        (Self::grown(faces, edges, beside, x), [numbers, of])
+    }
+
+    fn grown(faces: Vec<Face>, edges: Vec<[u32; 2]>, beside: Vec<[u32; 2]>, x: &[V3d]) -> Self {
+        let middles: Vec<V3d> = faces.iter().map(|f| f.iter().map(|v| x[*v as usize]).sum()).collect();
+        let mut grown = Self { faces, edges, beside, nodes: Vec::new(), leaves: Vec::new() };
+        grown.split(&middles, &mut (0..middles.len() as u32).collect::<Vec<_>>());
+        let mut leaf = vec![0; middles.len()];
+        for (k, l) in grown.leaves.iter().enumerate() {
+            l.faces.iter().filter(|f| **f != NONE).for_each(|f| leaf[*f as usize] = k);
+        }
+        for (e, faces) in grown.beside.iter().enumerate() {
+            grown.leaves[leaf[faces[0] as usize]].edges.push(e as u32);
+        }
+        grown
+    }
+
+    fn split(&mut self, middles: &[V3d], some: &mut [u32]) {
         let at = self.nodes.len();
-        let count = if order.len() <= LEAF { order.len() } else { 0 };
-        self.nodes.push(Node { low: [0.0; 4], high: [0.0; 4], skip: 0, first: first as u32, count: count as u32 });
-        if order.len() > LEAF {
+        let leaf = if some.len() <= LEAF { self.leaves.len() as u32 } else { NONE };
+        self.nodes.push(Node { low: [0.0; 4], high: [0.0; 4], skip: 0, leaf });
+        if some.len() > LEAF {
             let (mut low, mut high) = (V3d::repeat(f64::INFINITY), V3d::repeat(f64::NEG_INFINITY));
-            for f in order.iter() {
+            for f in some.iter() {
                 low = low.inf(&middles[*f as usize]);
                 high = high.sup(&middles[*f as usize]);
             }
             let axis = (high - low).imax();
-            let half = order.len() / 2;
+            // Whole leaves on the left.
+            let half = (some.len() / 2).next_multiple_of(LEAF);
             let by_axis = |f: &u32| middles[*f as usize][axis];
-            order.select_nth_unstable_by(half, |a, b| by_axis(a).total_cmp(&by_axis(b)).then(a.cmp(b)));
-            let (left, right) = order.split_at_mut(half);
-            self.split(middles, left, first);
-            self.split(middles, right, first + half);
+            some.select_nth_unstable_by(half - 1, |a, b| by_axis(a).total_cmp(&by_axis(b)).then(a.cmp(b)));
+            let (left, right) = some.split_at_mut(half);
+            self.split(middles, left);
+            self.split(middles, right);
+        } else {
+            let faces = std::array::from_fn(|l| some.get(l).copied().unwrap_or(NONE));
+            let (low, high) = ([[f32::INFINITY; LEAF]; 3], [[f32::NEG_INFINITY; LEAF]; 3]);
+            self.leaves.push(Leaf { faces, low, high, edges: Vec::new() });
         }
         self.nodes[at].skip = self.nodes.len() as u32;
     }
 
     /// Fits the boxes to where the triangles are now.
     fn refit(&mut self, x: &[V3d]) {
-        self.boxes.clear();
-        self.boxes.extend(self.order.iter().map(|f| {
-            let [a, b, c] = self.faces[*f as usize].map(|v| x[v as usize]);
-            [below(&a.inf(&b).inf(&c)), above(&a.sup(&b).sup(&c))]
-        }));
         for k in (0..self.nodes.len()).rev() {
             let n = self.nodes[k];
             let (mut low, mut high) = ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]);
@@ -141,10 +155,15 @@ impl Finder {
                     high[c] = high[c].max(h[c]);
                 }
             };
-            for [low, high] in &self.boxes[n.first as usize..(n.first + n.count) as usize] {
-                grow(low, high);
-            }
-            if n.count == 0 && k + 1 < n.skip as usize {
+            if let Some(leaf) = self.leaves.get_mut(n.leaf as usize) {
+                for l in 0..LEAF {
+                    let Some(f) = self.faces.get(leaf.faces[l] as usize) else { break };
+                    let [a, b, c] = f.map(|v| x[v as usize]);
+                    let (from, to) = (below(&a.inf(&b).inf(&c)), above(&a.sup(&b).sup(&c)));
+                    grow(&from, &to);
+                    (0..3).for_each(|d| (leaf.low[d][l], leaf.high[d][l]) = (from[d], to[d]));
+                }
+            } else {
                 let second = self.nodes[k + 1].skip as usize;
                 for child in [self.nodes[k + 1], self.nodes[second]] {
                     grow(&child.low, &child.high);
@@ -154,18 +173,15 @@ impl Finder {
         }
     }
 
-    /// Numbers of the edge and the triangle of each crossing, in order. `only` some edges, or all where it is empty.
-    pub(crate) fn find(&mut self, par: Par, x: &[V3d], only: &[bool]) -> Vec<(u32, u32)> {
+    /// Numbers of the edge and the triangle of each crossing, in order.
+    pub(crate) fn find(&mut self, par: Par, x: &[V3d]) -> Vec<(u32, u32)> {
         self.refit(x);
         let mut chunks: Vec<Vec<(u32, u32)>> = Vec::new();
         par::map_into(par, self.leaves.len().div_ceil(CHUNK), 1, &mut chunks, |c| {
             let (mut found, mut edges) = (Vec::new(), Vec::new());
             for leaf in &self.leaves[c * CHUNK..((c + 1) * CHUNK).min(self.leaves.len())] {
-                let n = &self.nodes[*leaf as usize];
-                let [from, to] = [n.first, n.first + n.count].map(|k| self.begin[k as usize] as usize);
                 edges.clear();
-                let wanted = |e: &&u32| only.get(**e as usize).is_none_or(|w| *w);
-                edges.extend(self.by_place[from..to].iter().filter(wanted).map(|e| (self.edge_box(*e, x), *e)));
+                edges.extend(leaf.edges.iter().map(|e| (self.edge_box(*e, x), *e)));
                 self.of_edges(&edges, x, &mut found);
             }
             found
@@ -194,15 +210,13 @@ impl Finder {
                 continue;
             }
             k += 1;
-            for i in n.first as usize..(n.first + n.count) as usize {
-                let [from, to] = &self.boxes[i];
-                if apart(from, to, &low, &high) {
-                    continue;
-                }
-                let f = self.order[i];
-                let corners = self.faces[f as usize];
-                for (_, e) in edges.iter().filter(|(b, _)| !apart(from, to, &b[0], &b[1])) {
-                    let edge = self.edges[*e as usize];
+            let Some(leaf) = self.leaves.get(n.leaf as usize) else { continue };
+            for (b, e) in edges.iter().filter(|(b, _)| !apart(&n.low, &n.high, &b[0], &b[1])) {
+                let mut near = leaf.meets(b);
+                while near != 0 {
+                    let f = leaf.faces[near.trailing_zeros() as usize];
+                    near &= near - 1;
+                    let (edge, corners) = (self.edges[*e as usize], self.faces[f as usize]);
                     let shared = corners.iter().any(|v| edge.contains(v));
                     if !shared && passes(&edge.map(|v| x[v as usize]), &corners.map(|v| x[v as usize])) {
                         found.push((*e, f));
@@ -210,6 +224,17 @@ impl Finder {
                 }
             }
         }
+    }
+}
+
+impl Leaf {
+    /// Bits of the triangles whose boxes have something in common with another one.
+    fn meets(&self, [low, high]: &[[f32; 4]; 2]) -> u32 {
+        let axis = |d: usize| {
+            let above = f32x8::from(self.high[d]).simd_ge(f32x8::splat(low[d]));
+            above & f32x8::from(self.low[d]).simd_le(f32x8::splat(high[d]))
+        };
+        (axis(0) & axis(1) & axis(2)).to_bitmask()
     }
 }
 
@@ -307,7 +332,7 @@ mod tests {
                     }
                     let key = |c: &Crossing| (c.edge, c.face);
                     let mut fast: Vec<Crossing> = finder
-                        .find(Par::Rayon, &d(&x), &[])
+                        .find(Par::Rayon, &d(&x))
                         .iter()
                         .map(|(e, f)| Crossing { edge: finder.edges[*e as usize], face: *f })
                         .collect();

@@ -51,8 +51,28 @@ pub(crate) struct Untangler {
     wrong: Vec<bool>,
     /// Size of the sheet that each vertex is in.
     whole: Vec<u32>,
-    /// Of each edge whether it is near a crossing that the last look at all of them found; empty where it found none.
-    hot: Vec<bool>,
+    /// What is near a crossing that the last look at everything found, if there was one.
+    hot: Option<Hot>,
+}
+
+/// A piece of the sheet, and the numbers that its edges and triangles have there.
+#[derive(Clone, Debug)]
+struct Hot {
+    finder: Finder,
+    edges: Vec<u32>,
+    faces: Vec<u32>,
+}
+
+impl Hot {
+    /// The triangles of `whole` with a corner that is `near`, at `x`.
+    fn new(whole: &Finder, near: &[bool], x: &[V3d]) -> Self {
+        let (finder, [edges, faces]) = whole.piece(|f| f.iter().any(|v| near[*v as usize]), x);
+        Self { finder, edges, faces }
+    }
+    fn find(&mut self, par: Par, x: &[V3d]) -> Vec<(u32, u32)> {
+        let found = self.finder.find(par, x);
+        found.into_iter().map(|(e, f)| (self.edges[e as usize], self.faces[f as usize])).collect()
+    }
 }
 
 /// Where an edge meets a triangle, and which way out.
@@ -76,7 +96,7 @@ impl Untangler {
             odd: Vec::new(),
             wrong: Vec::new(),
             whole: Vec::new(),
-            hot: Vec::new(),
+            hot: None,
         };
         new.whole = new.parts(x.len(), false);
         new
@@ -123,7 +143,7 @@ impl Untangler {
     }
     /// The next round looks for crossings everywhere: the sheet was moved by others.
     pub(crate) fn look_anew(&mut self) {
-        self.hot.clear();
+        self.hot = None;
     }
     /// Draws cloth within `rings` of what crossed in the last round to the mean of its neighbours.
     pub(crate) fn iron(&self, x: &mut [V3d], movable: impl Fn(usize) -> bool, rings: usize) {
@@ -150,26 +170,26 @@ impl Untangler {
         }
     }
     fn find(&mut self, par: Par, x: &[V3d]) -> Vec<(u32, u32)> {
-        if !self.hot.is_empty() {
-            let found = self.finder.find(par, x, &self.hot);
+        if let Some(hot) = &mut self.hot {
+            let found = hot.find(par, x);
             if !found.is_empty() {
                 return found;
             }
         }
-        let found = self.finder.find(par, x, &[]);
-        self.hot.clear();
+        let found = self.finder.find(par, x);
+        self.hot = None;
         if !found.is_empty() {
             let mut near = vec![false; x.len()];
             for (e, f) in &found {
                 let corners = self.finder.faces[*f as usize];
                 self.finder.edges[*e as usize].iter().chain(&corners).for_each(|v| near[*v as usize] = true);
             }
-            let touches = |e: &[u32; 2], near: &[bool]| e.iter().any(|v| near[*v as usize]);
             for _ in 0..AROUND {
-                let ring: Vec<[u32; 2]> = self.finder.edges.iter().filter(|e| touches(e, &near)).copied().collect();
+                let touches = |e: &&[u32; 2]| e.iter().any(|v| near[*v as usize]);
+                let ring: Vec<[u32; 2]> = self.finder.edges.iter().filter(touches).copied().collect();
                 ring.iter().flatten().for_each(|v| near[*v as usize] = true);
             }
-            self.hot.extend(self.finder.edges.iter().map(|e| touches(e, &near)));
+            self.hot = Some(Hot::new(&self.finder, &near, x));
         }
         found
     }
@@ -389,6 +409,30 @@ mod tests {
         let (seen, _) = rounds(strip, 0.002, 60);
         assert!(seen[0] > 4, "{seen:?}");
         assert_eq!(seen.last(), Some(&0), "{seen:?}");
+    }
+
+    #[test]
+    fn a_piece_of_a_sheet_finds_what_a_look_at_all_of_it_finds_there() {
+        // A crumpled sheet.
+        let mut seed = 5u32;
+        let mut random = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(seed >> 8) / f64::from(1u32 << 24)
+        };
+        let (mut x, faces) = grid(20, 20, 0, |u, v| [(u % 7.0) * CELL, 0.0, (v % 5.0) * CELL]);
+        x.iter_mut().for_each(|p| *p += V3d::new(random(), random(), random()) * CELL);
+        let mut whole = Finder::new(&faces, &x);
+        let all = whole.find(Par::Seq, &x);
+        assert!(all.len() > 100, "{}", all.len());
+        for share in [0.0, 0.3, 1.0] {
+            let near: Vec<bool> = (0..x.len()).map(|_| random() < share).collect();
+            let hot = |corners: &[u32]| corners.iter().any(|v| near[*v as usize]);
+            let beside = |e: u32| whole.beside[e as usize].into_iter().filter(|f| *f != NONE);
+            let inside = |(e, f): &&(u32, u32)| hot(&faces[*f as usize]) && beside(*e).any(|f| hot(&faces[f as usize]));
+            let wanted: Vec<(u32, u32)> = all.iter().filter(inside).copied().collect();
+            assert_eq!(Hot::new(&whole, &near, &x).find(Par::Seq, &x), wanted, "{share}");
+            assert_eq!(wanted.len() == all.len(), share == 1.0);
+        }
     }
 
     #[test]
