@@ -22,7 +22,7 @@ pub fn crossings(faces: &[Face], positions: &[P3]) -> Vec<Crossing> {
     found.iter().map(|(e, face)| Crossing { edge: finder.edges[*e as usize], face: *face }).collect()
 }
 
-/// Triangles in a leaf of the tree, which are looked at together.
+/// Triangles in a leaf of the tree, which are looked at together: as many numbers as a wide register holds.
 const LEAF: usize = 8;
 /// Leaves that one thread asks about in a row.
 const CHUNK: usize = 32;
@@ -82,7 +82,7 @@ impl Finder {
                 }
             }
         }
-        Self::grown(faces.to_vec(), edges, beside, x)
+        Self::with_tree(faces.to_vec(), edges, beside, x)
     }
 
     /// The triangles for which `wanted` says so, as a sheet of their own, and the numbers that its edges and triangles
@@ -101,21 +101,21 @@ impl Finder {
             }
         }
         let faces = of.iter().map(|f| self.faces[*f as usize]).collect();
-        (Self::grown(faces, edges, beside, x), [numbers, of])
+        (Self::with_tree(faces, edges, beside, x), [numbers, of])
     }
 
-    fn grown(faces: Vec<Face>, edges: Vec<[u32; 2]>, beside: Vec<[u32; 2]>, x: &[V3d]) -> Self {
+    fn with_tree(faces: Vec<Face>, edges: Vec<[u32; 2]>, beside: Vec<[u32; 2]>, x: &[V3d]) -> Self {
         let middles: Vec<V3d> = faces.iter().map(|f| f.iter().map(|v| x[*v as usize]).sum()).collect();
-        let mut grown = Self { faces, edges, beside, nodes: Vec::new(), leaves: Vec::new() };
-        grown.split(&middles, &mut (0..middles.len() as u32).collect::<Vec<_>>());
+        let mut new = Self { faces, edges, beside, nodes: Vec::new(), leaves: Vec::new() };
+        new.split(&middles, &mut (0..middles.len() as u32).collect::<Vec<_>>());
         let mut leaf = vec![0; middles.len()];
-        for (k, l) in grown.leaves.iter().enumerate() {
+        for (k, l) in new.leaves.iter().enumerate() {
             l.faces.iter().filter(|f| **f != NONE).for_each(|f| leaf[*f as usize] = k);
         }
-        for (e, faces) in grown.beside.iter().enumerate() {
-            grown.leaves[leaf[faces[0] as usize]].edges.push(e as u32);
+        for (e, faces) in new.beside.iter().enumerate() {
+            new.leaves[leaf[faces[0] as usize]].edges.push(e as u32);
         }
-        grown
+        new
     }
 
     fn split(&mut self, middles: &[V3d], some: &mut [u32]) {
@@ -138,8 +138,9 @@ impl Finder {
             self.split(middles, right);
         } else {
             let faces = std::array::from_fn(|l| some.get(l).copied().unwrap_or(NONE));
-            let (low, high) = ([[f32::INFINITY; LEAF]; 3], [[f32::NEG_INFINITY; LEAF]; 3]);
-            self.leaves.push(Leaf { faces, low, high, edges: Vec::new() });
+            // What no triangle fills meets nothing, not even a box without end.
+            let nowhere = [[f32::NAN; LEAF]; 3];
+            self.leaves.push(Leaf { faces, low: nowhere, high: nowhere, edges: Vec::new() });
         }
         self.nodes[at].skip = self.nodes.len() as u32;
     }
@@ -299,6 +300,14 @@ mod tests {
         assert!(at(0.2).contains(&Crossing { edge: [3, 4], face: 0 }));
         assert_eq!(at(1.2), []);
         assert_eq!(crossings(&faces[..1], &[P3::origin(); 3]), []);
+    }
+
+    #[test]
+    fn a_sheet_without_end_breaks_nothing() {
+        let far = |by: f32| [[-by; 3], [by; 3], [0.0, 0.0, 1.0], [0.1, 0.0, 0.0], [0.2, 0.1, 0.0], [0.1, 0.2, 0.1]];
+        for by in [f32::INFINITY, f32::MAX] {
+            crossings(&[[0, 1, 2], [3, 4, 5]], &far(by).map(P3::from));
+        }
     }
 
     #[test]
