@@ -5,11 +5,12 @@
 //! one in a few steps more. The simulator that follows starts from cloth at rest.
 
 use super::plane::Plane;
+use super::skin::Skin;
 use crate::cloth::Sheet;
-use crate::cloth::realtime::{AnchorBinding, Model};
-use crate::cloth::sleeves::{Arms, Sleeve};
+use crate::cloth::realtime::AnchorBinding;
+use crate::cloth::sleeves::Sleeve;
 use crate::cloth::untangle::Untangler;
-use crate::contact::{Apart, Buried, Part, SurfaceFrame, SurfaceModel};
+use crate::contact::{Closest, Part, SurfaceFrame, SurfaceModel};
 use crate::garment::{GarmentError, GarmentMesh, Region};
 use crate::math::{P3, V3, V3d};
 use crate::mesh::distances;
@@ -52,51 +53,6 @@ pub(super) struct Drape {
     pub(super) steps: usize,
 }
 
-/// What cloth is draped on.
-#[derive(Debug)]
-pub(super) struct Skin<'a> {
-    pub(super) model: &'a SurfaceModel,
-    frame: SurfaceFrame,
-    buried: Buried,
-    apart: Apart,
-    arms: &'a Arms,
-    opposite: &'a [Part],
-    pressing: &'a [Part],
-    /// What cloth needs between parts that press on each other, metres.
-    room: f32,
-}
-
-impl<'a> Skin<'a> {
-    /// Of the body that an outfit is simulated on.
-    pub(super) fn of(model: &'a Model) -> Self {
-        Self {
-            model: model.surface(),
-            frame: SurfaceFrame::default(),
-            buried: Buried::default(),
-            apart: Apart::default(),
-            arms: model.arms(),
-            opposite: model.opposite(),
-            pressing: model.pressing(),
-            room: model.room(),
-        }
-    }
-    /// The body stands like this now.
-    pub(super) fn show(&mut self, body: &[P3]) {
-        self.frame.vertices.clear();
-        self.frame.vertices.extend_from_slice(body);
-        self.apart.make_room(Par::Rayon, self.model, self.pressing, &mut self.frame, self.room);
-        self.model.update_normals(Par::Rayon, &mut self.frame);
-        self.buried.update(Par::Rayon, self.model, self.opposite, &self.frame);
-    }
-    pub(super) fn frame(&self) -> &SurfaceFrame {
-        &self.frame
-    }
-    /// The body as cloth meets it, and what is known about its skin.
-    pub(super) fn known(self) -> (Vec<P3>, Buried, Apart) {
-        (self.frame.vertices, self.buried, self.apart)
-    }
-}
-
 /// Between what a garment is draped.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct On<'a> {
@@ -115,7 +71,7 @@ struct Cover {
 }
 
 /// Garments being draped together, innermost first: each is kept under those further out.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Layers {
     pub(super) drapes: Vec<Drape>,
     covers: Vec<Cover>,
@@ -210,11 +166,18 @@ const STUCK: usize = 16;
 const IRONINGS: usize = 4;
 /// In the others it may sink so deep into the skin, metres: deeper, and skin shows in the armpits of a heavy man.
 const SUNK: f64 = 0.002;
+/// At the end nothing is left deeper than this, metres.
+const DEEP: f64 = 0.003;
 /// And edges are only kept from this times their length: a hood in folds on the neck was not free before it was
 /// stretched by 19 % (p99).
 const TAUT: f64 = 1.07;
 /// As if in a step of so many seconds.
 const RELAX_STEP: f64 = 1e-3;
+
+/// Cloth that belongs to arms alone: a sleeve.
+fn on_arms(own: Part) -> bool {
+    own & !Region::LEFT_ARM.with(Region::RIGHT_ARM).0 == 0
+}
 
 impl Drape {
     pub(super) fn new(mesh: &GarmentMesh, sheet: &Sheet, x: Vec<P3>) -> Self {
@@ -266,7 +229,7 @@ impl Drape {
     /// First search: all body vertices.
     pub(super) fn find_all(&mut self, skin: &Skin<'_>) {
         let (points, other) = (self.positions(), self.own.iter().map(|o| Region::ALL.0 & !o).collect::<Vec<_>>());
-        let of = |masks: &[u8]| skin.model.nearest_vertices(Par::Rayon, &skin.frame, &points, masks.iter());
+        let of = |masks: &[u8]| skin.model.nearest_vertices(Par::Rayon, skin.frame(), &points, masks.iter());
         self.nearest = of(&self.own).into_iter().zip(of(&other)).map(|(own, other)| [own, other]).collect();
     }
     /// Starts from the nearest body vertices of a coarser drape of the same garment.
@@ -279,7 +242,7 @@ impl Drape {
             // A walk may not leave its parts: where the coarse vertex belongs to others, all are looked at.
             for (slot, mask) in near.iter_mut().zip([self.own[i], Region::ALL.0 & !self.own[i]]) {
                 if skin.model.part(*slot) & mask == 0 {
-                    *slot = skin.model.nearest_vertex(&skin.frame, &P3::from(self.x[i].cast::<f32>()), mask);
+                    *slot = skin.model.nearest_vertex(skin.frame(), &P3::from(self.x[i].cast::<f32>()), mask);
                 }
             }
         }
@@ -296,18 +259,17 @@ impl Drape {
     }
     /// Moves cloth near the skin along with a body that goes from `from` to `to`.
     pub(super) fn carry(&mut self, from: &[P3], to: &[P3]) {
-        let arms = Region::LEFT_ARM.with(Region::RIGHT_ARM);
         for ((x, near), own) in self.x.iter_mut().zip(&self.nearest).zip(&self.own) {
             let v = near[0] as usize;
             let d = (from[v].coords.cast::<f64>() - *x).norm();
-            let within = if own & !arms.0 == 0 { CARRIED_SLEEVE } else { CARRIED };
+            let within = if on_arms(*own) { CARRIED_SLEEVE } else { CARRIED };
             let share = (2.0 - d / within).clamp(0.0, 1.0);
             *x += (to[v] - from[v]).cast::<f64>() * share;
         }
     }
     /// Puts rings of sleeves that lost their arm around it again.
     pub(super) fn put_back(&mut self, skin: &Skin<'_>) {
-        let lines = skin.arms.lines(&skin.frame.vertices);
+        let lines = skin.arm_lines();
         let at = |v: u32| P3::from(self.x[v as usize].cast::<f32>());
         let ways: Vec<(u32, P3)> = self
             .sleeves
@@ -319,7 +281,7 @@ impl Drape {
             let i = v as usize;
             self.x[i] = to.coords.cast();
             self.velocity[i] = V3d::zeros();
-            self.nearest[i][0] = skin.model.nearest_vertex(&skin.frame, &to, self.own[i]);
+            self.nearest[i][0] = skin.model.nearest_vertex(skin.frame(), &to, self.own[i]);
         }
     }
     /// Takes all speed away.
@@ -387,17 +349,15 @@ impl Drape {
     }
     /// Takes the sheet out of itself in at most `most` rounds, on a body that stands still, and takes all speed away if it
     /// crossed itself. After [`RELAXED`] of them only edges that are about to tear and skin far above it move it. Where that
-    /// leads no further it is ironed, each time in a wider circle. Says whether it is pressed together now, and wants room.
-    pub(super) fn clear(&mut self, on: &On<'_>, most: usize) -> bool {
+    /// leads no further it is ironed, each time in a wider circle. Says how often it passes through itself still.
+    pub(super) fn clear(&mut self, on: &On<'_>, most: usize) -> usize {
         let (mut fewest, mut since, mut ironed) = (usize::MAX, 0, 0);
-        let mut crossed = false;
         for k in 0..most {
             self.before.clone_from(&self.x);
             self.untangle(k % LOOK_EVERY == 0);
             if self.crossings == 0 {
                 break;
             }
-            crossed = true;
             if self.crossings < fewest {
                 (fewest, since) = (self.crossings, k);
             }
@@ -409,9 +369,8 @@ impl Drape {
                 self.pressed = true;
                 if let Some(sheet) = &self.sheet {
                     // Ironed, a sleeve comes through the arm.
-                    let arms = Region::LEFT_ARM.with(Region::RIGHT_ARM);
                     let (pinned, own) = (&self.pinned, &self.own);
-                    sheet.iron(&mut self.x, |v| pinned[v].is_none() && own[v] & !arms.0 != 0, ironed);
+                    sheet.iron(&mut self.x, |v| pinned[v].is_none() && !on_arms(own[v]), ironed);
                 }
             }
             if k % LOOK_EVERY == 0 {
@@ -428,7 +387,28 @@ impl Drape {
             }
             self.stop();
         }
-        crossed && self.pressed
+        self.crossings
+    }
+    /// Cloth that is left deep under the skin goes to the skin. Between toes it is lifted from one into the next.
+    pub(super) fn surface(&mut self, skin: &Skin<'_>) {
+        for i in 0..self.x.len() {
+            let p = P3::from(self.x[i].cast::<f32>());
+            let c = self.skin_of(skin, i, &p);
+            if f64::from(c.signed) < -DEEP && !c.rim && !skin.holds_nothing(&c) && self.pinned[i].is_none() {
+                self.x[i] = c.point.coords.cast();
+            }
+        }
+    }
+    /// The nearest point of the own parts to `p`, where vertex `i` is.
+    fn skin_of(&self, skin: &Skin<'_>, i: usize, p: &P3) -> Closest {
+        let walked = skin.model.closest(skin.frame(), p, self.nearest[i][0], self.own[i]);
+        let [c, _] = skin.nearer(p, [walked; 2], [self.own[i]; 2]);
+        c
+    }
+    /// Where it passed through itself in the last round there is cloth that is on no arm.
+    pub(super) fn crosses_off_arms(&self) -> bool {
+        let crosses = |s: &Untangler| s.pushes.iter().zip(&self.own).any(|((_, n), own)| *n > 0.0 && !on_arms(*own));
+        self.crossings > 0 && self.sheet.as_ref().is_some_and(crosses)
     }
     fn weight(&self, i: u32) -> f64 {
         if self.pinned[i as usize].is_some() { 0.0 } else { self.inverse_mass[i as usize] }
@@ -510,10 +490,14 @@ impl Drape {
         for i in 0..self.x.len() {
             let p = P3::from(self.x[i].cast::<f32>());
             let near = &mut self.nearest[i];
-            let found = [
-                skin.model.closest_beyond(&skin.frame, &p, near[0], self.own[i]),
-                skin.model.closest(&skin.frame, &p, near[1], Region::ALL.0 & !self.own[i]),
+            let masks = [self.own[i], Region::ALL.0 & !self.own[i]];
+            let mut found = [
+                skin.model.closest_beyond(skin.frame(), &p, near[0], masks[0]),
+                skin.model.closest(skin.frame(), &p, near[1], masks[1]),
             ];
+            if self.fine {
+                found = skin.nearer(&p, found, masks);
+            }
             *near = found.map(|c| c.vertex);
             // Where the body closes on itself its own part decides, and skin inside the body holds nothing.
             let facing = found[0].room(&found[1]).filter(|_| !found[1].rim).map(f64::from);
@@ -523,16 +507,13 @@ impl Drape {
                     point: c.point.coords.cast(),
                     normal: c.normal.cast(),
                     height: on.offset,
-                    near: room >= 0.0
-                        && !c.rim
-                        && !skin.buried.holds_nothing(skin.model.faces()[c.face as usize])
-                        && f64::from(c.signed) < REACH,
+                    near: room >= 0.0 && !c.rim && !skin.holds_nothing(c) && f64::from(c.signed) < REACH,
                 };
             }
             let [own, other] = &mut self.planes[i];
             if self.fine && self.sheet.is_some() && (-CLOSED..0.0).contains(&room) && !found[0].rim {
                 // No deeper than half-way into skin that lies in other skin; coarse cloth needs its way out through it.
-                let held = !skin.buried.holds_nothing(skin.model.faces()[found[0].face as usize]);
+                let held = !skin.holds_nothing(&found[0]);
                 (own.near, own.height) = (held && f64::from(found[0].signed) < REACH, 0.5 * room);
             }
             let far = found.map(|c| f64::from(c.signed));
@@ -569,8 +550,8 @@ impl Drape {
         let mut deepest = 0.0f64;
         for i in 0..self.x.len() {
             let p = P3::from(self.x[i].cast::<f32>());
-            let c = skin.model.closest(&skin.frame, &p, self.nearest[i][0], self.own[i]);
-            if !c.rim && !skin.buried.holds_nothing(skin.model.faces()[c.face as usize]) {
+            let c = self.skin_of(skin, i, &p);
+            if !c.rim && !skin.holds_nothing(&c) {
                 deepest = deepest.max(-f64::from(c.signed));
             }
         }

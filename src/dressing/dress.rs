@@ -1,11 +1,12 @@
 //! Putting garments on: place, drape, tie to the body, follow into the tracked pose.
 
 use super::canonical::{between, canonical_pose, upright_root};
-use super::drape::{Drape, Layers, Skin};
+use super::drape::{Drape, Layers};
 use super::figure::Figure;
 use super::mesh_wear::{CARRIED, MeshWear};
 use super::place::place;
 use super::refine::prolong;
+use super::skin::Skin;
 use super::suggest::{Misfit, wearable};
 use super::waistband::spread;
 use crate::body::measure::measure;
@@ -128,9 +129,12 @@ const SETTLING: usize = 80;
 const FINE_STEP: f64 = 1e-3;
 /// Substeps on the fine mesh: wrinkles that the coarse one lacks.
 const FINISHING: usize = 90;
-/// Half of them are done so often again where cloth was ironed: it is pressed together, and finds room from one time to the
-/// next.
-const AGAIN: usize = 4;
+/// Half of them are done so often again where rounds of untangling leave something: ironed cloth is pressed together, and
+/// finds room from one time to the next.
+const AGAIN: usize = 1;
+/// So often a coarse garment settles, until the fine one that is made from it is free of itself on the trunk: a hood on a
+/// thick neck may come to lie in folds that nothing takes apart. The crook of a bent elbow always does.
+const TRIES: usize = 4;
 
 /// Something to put on.
 #[derive(Clone, Copy, Debug)]
@@ -208,19 +212,19 @@ pub fn dress_all(
     let mut order: Vec<&Wear<'_>> = wear.iter().collect();
     order.sort_by_key(|w| w.layer());
     let timer = Instant::now();
-    let figure = Figure::new(template, rest);
+    let measures = measure(template, rest).ok();
+    let figure = Figure::new(template, rest, measures.as_ref());
     report.stages_ms.place = ms(timer);
     let timer = Instant::now();
     let fine = options.triangulation;
     // The coarse mesh may have slimmer triangles: nothing is simulated on it later.
     let length = (fine.edge_length * COARSER).min(COARSEST).max(fine.edge_length);
     let coarse = Triangulation { edge_length: length, min_angle: 0.0 };
-    let measures = if options.any_size { None } else { measure(template, rest).ok() };
     let mut sheets: Vec<Sheeted> = Vec::new();
     for w in order {
         match w {
             Wear::Pattern(p) => {
-                if let Some(m) = &measures {
+                if let Some(m) = measures.as_ref().filter(|_| !options.any_size) {
                     wearable(p, m)?;
                 }
                 let rough = GarmentMesh::sew(p, &coarse)?;
@@ -294,36 +298,26 @@ pub fn dress_all(
             d.clear(on, CLEARING);
         });
     }
-    rough.each(&skin, &offsets, |_, d, on| {
-        d.put_back(&skin);
-        d.run(on, SETTLING, COARSE_STEP, 1.0);
-        d.clear(on, CLEARED);
-    });
     report.stages_ms.coarse = ms(timer);
-
-    let timer = Instant::now();
-    let mut drapes = Vec::new();
-    for (k, mesh) in model.outfit.garments.iter().enumerate() {
-        let x = if own[k] { rough.drapes[k].x.clone() } else { prolong(&coarse[k], mesh, &rough.drapes[k].x) };
-        let mut d = Drape::new(mesh, &Sheet::of_garment(mesh)?, x.iter().map(|p| P3::from(p.cast::<f32>())).collect());
-        d.find_from(&skin, &rough.drapes[k]);
-        d.pin(&fasten(&skin, mesh, &d, offsets[k])?, skin.frame());
-        drapes.push(if options.untangle { d.untangled(mesh) } else { d });
-    }
-    let mut fine = Layers::new(&model.outfit.garments, drapes)?;
-    fine.each(&skin, &offsets, |_, d, on| {
-        d.put_back(&skin);
-        d.clear(on, CLEARED);
-        d.run(on, FINISHING, FINE_STEP, 1.0);
-        for _ in 0..AGAIN {
-            if !d.clear(on, CLEARED) {
-                break;
-            }
-            d.run(on, FINISHING / 2, FINE_STEP, 1.0);
+    let mut fine = Layers::default();
+    for _ in 0..TRIES {
+        let timer = Instant::now();
+        rough.each(&skin, &offsets, |_, d, on| {
+            d.put_back(&skin);
+            d.run(on, SETTLING, COARSE_STEP, 1.0);
+            d.clear(on, CLEARED);
+        });
+        report.stages_ms.coarse += ms(timer);
+        let timer = Instant::now();
+        fine = refine(&model, &coarse, &rough, &own, &skin, &offsets, options.untangle)?;
+        report.stages_ms.fine += ms(timer);
+        report.steps += fine.drapes.iter().map(|d| d.steps).sum::<usize>();
+        if !fine.drapes.iter().any(Drape::crosses_off_arms) {
+            break;
         }
-        d.clear(on, CLEARED);
-    });
-    report.steps = rough.drapes.iter().chain(&fine.drapes).map(|d| d.steps).sum();
+    }
+    let timer = Instant::now();
+    report.steps += rough.drapes.iter().map(|d| d.steps).sum::<usize>();
     let (mut positions, mut anchors) = (Vec::new(), Vec::new());
     for (k, (mesh, d)) in model.outfit.garments.iter().zip(&fine.drapes).enumerate() {
         let (deepest, p99, _) = d.judge(&skin);
@@ -333,7 +327,7 @@ pub fn dress_all(
         anchors.push(bind(skin.model, skin.frame(), mesh, &d.positions(), offsets[k], false));
         positions.push(d.positions());
     }
-    report.stages_ms.fine = ms(timer);
+    report.stages_ms.fine += ms(timer);
 
     let timer = Instant::now();
     let (body, buried, apart) = skin.known();
@@ -342,6 +336,41 @@ pub fn dress_all(
     report.stages_ms.model += ms(timer);
     report.ms = ms(started);
     Ok(Dressed { model, state, report })
+}
+
+/// Drapes the garments of `model` from coarse ones; those that are their `own` coarse ones start from where those are.
+fn refine(
+    model: &Model,
+    coarse: &[GarmentMesh],
+    rough: &Layers,
+    own: &[bool],
+    skin: &Skin<'_>,
+    offsets: &[f64],
+    untangle: bool,
+) -> Result<Layers, DressError> {
+    let mut drapes = Vec::new();
+    for (k, mesh) in model.outfit.garments.iter().enumerate() {
+        let x = if own[k] { rough.drapes[k].x.clone() } else { prolong(&coarse[k], mesh, &rough.drapes[k].x) };
+        let mut d = Drape::new(mesh, &Sheet::of_garment(mesh)?, x.iter().map(|p| P3::from(p.cast::<f32>())).collect());
+        d.find_from(skin, &rough.drapes[k]);
+        d.pin(&fasten(skin, mesh, &d, offsets[k])?, skin.frame());
+        drapes.push(if untangle { d.untangled(mesh) } else { d });
+    }
+    let mut fine = Layers::new(&model.outfit.garments, drapes)?;
+    fine.each(skin, offsets, |_, d, on| {
+        d.put_back(skin);
+        d.clear(on, CLEARED);
+        d.run(on, FINISHING, FINE_STEP, 1.0);
+        for _ in 0..AGAIN {
+            if d.clear(on, CLEARED) == 0 {
+                break;
+            }
+            d.run(on, FINISHING / 2, FINE_STEP, 1.0);
+        }
+        d.clear(on, CLEARED);
+        d.surface(skin);
+    });
+    Ok(fine)
 }
 
 fn ms(since: Instant) -> f64 {

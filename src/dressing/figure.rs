@@ -1,5 +1,6 @@
 //! Cross-sections of a body in the canonical pose, for placing panels around it.
 
+use crate::body::measure::Measurements;
 use crate::body::{BoneTransforms, RestBody, Template, skin};
 use crate::cloth::realtime::body_parts;
 use crate::garment::Region;
@@ -9,6 +10,10 @@ use crate::par::Par;
 
 /// Distance between two cross-sections, metres.
 const STEP: f32 = 0.01;
+
+/// Between thighs that touch trousers go up this share of the way to the crotch. All the way up they never came to rest there,
+/// not at all a heavy man's hung 9 cm too low, on the floor.
+const UP: f32 = 0.5;
 
 /// One horizontal cross-section: its bounding box and the girth of its convex hull (what a tape measures), metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -119,6 +124,8 @@ pub(super) struct Levels {
     pub(super) waist: f32,
     pub(super) hip: f32,
     pub(super) crotch: f32,
+    /// How high trousers go between the legs: higher than `crotch` where the thighs touch.
+    pub(super) fork: f32,
 }
 
 /// A body in the canonical pose with its cross-sections.
@@ -133,7 +140,7 @@ pub(super) struct Figure {
 }
 
 impl Figure {
-    pub(super) fn new(template: &Template, rest: &RestBody) -> Self {
+    pub(super) fn new(template: &Template, rest: &RestBody, measures: Option<&Measurements>) -> Self {
         let pose = super::canonical::canonical_pose(template, rest);
         let mut bones = BoneTransforms::default();
         pose.bones(template.skeleton(), rest, &mut bones);
@@ -162,7 +169,10 @@ impl Figure {
         let trunk_length = shoulder - crotch;
         let hip = lower.lowest(crotch + 0.02, crotch + 0.32 * trunk_length, |s| -s.girth);
         let waist = lower.lowest(crotch + 0.30 * trunk_length, crotch + 0.62 * trunk_length, |s| s.girth);
-        let levels = Levels { waist, hip, crotch };
+        // Legs turn about the hips: the crotch stays where it is.
+        let low = rest.vertices.iter().map(|p| p.y).fold(f32::MAX, f32::min);
+        let fork = measures.map_or(crotch, |m| crotch + UP * (low + m.inseam as f32 - crotch).max(0.0));
+        let levels = Levels { waist, hip, crotch, fork };
         Self { vertices, joints: bones.joints, trunk, lower, legs, parts, levels }
     }
 }

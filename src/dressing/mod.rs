@@ -11,6 +11,7 @@ mod mesh_wear;
 mod place;
 mod plane;
 mod refine;
+mod skin;
 mod suggest;
 mod waistband;
 

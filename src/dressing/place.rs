@@ -5,6 +5,8 @@ use crate::body::Template;
 use crate::garment::{GarmentMesh, Pattern, Placement, Region, Side};
 use crate::math::P3;
 
+/// Distance of the legs of trousers from the middle, at least, metres.
+const APART: f32 = 0.001;
 /// Room between body and cloth at the start, metres.
 const ROOM: f32 = 0.015;
 /// Depth over which a shirt turns over the shoulder, metres.
@@ -168,7 +170,12 @@ impl<'a> Chart<'a> {
                 /// The cloth's crotch starts this far below the body's, metres.
                 const BELOW: f32 = 0.012;
                 let garment_half = outline.iter().map(|p| p[0].abs()).fold(0.0, f32::max);
-                Kind::Leg { waist: figure.levels.crotch - BELOW - rise, rise, hip_line, garment_half }
+                Kind::Leg {
+                    waist: (figure.levels.fork - BELOW - rise).min(figure.levels.waist),
+                    rise,
+                    hip_line,
+                    garment_half,
+                }
             }
             Placement::Sleeve(side) => {
                 let bicep = outline.iter().map(|p| p[0].abs()).fold(0.0, f32::max);
@@ -277,7 +284,8 @@ impl<'a> Chart<'a> {
                 let (c, [a, b]) = ellipse(&self.figure.lower.at(y), 4.0 * (hi - lo));
                 let hip = [c[0] + left * a * (FRAC_PI_2 * t).sin(), c[1] + z_sign * b * (FRAC_PI_2 * t).cos()];
                 let mix = |k: usize| leg[k] + (hip[k] - leg[k]) * share;
-                P3::new(mix(0), y, mix(1))
+                // Where the thighs touch each leg of the trousers stays on its own side.
+                P3::new(left * (left * mix(0)).max(APART), y, mix(1))
             }
             Kind::Sleeve { axis, start, bicep, cap, radius } => {
                 let Placement::Sleeve(side) = self.placement else { return P3::origin() };

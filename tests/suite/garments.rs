@@ -76,12 +76,13 @@ fn every_garment_hangs_on_three_bodies() {
             assert!((0.93..1.10).contains(&ratio), "{name} on {body}: area {ratio}");
             assert!(crumpled < 0.02, "{name} on {body}: {crumpled} of the triangles are crumpled");
             assert_eq!(d.report.crossings, 0, "{name} on {body} passes through itself");
-            assert!(d.report.p99_strain < 0.20, "{name} on {body}: stretch {}", d.report.p99_strain);
+            assert!(d.report.penetration < 0.004, "{name} on {body}: {} m under the skin", d.report.penetration);
+            assert!(d.report.p99_strain < 0.15, "{name} on {body}: stretch {}", d.report.p99_strain);
             let hem: std::ops::Range<f32> = match g.kind {
                 GarmentKind::Top => 0.60..1.0,
                 GarmentKind::Skirt | GarmentKind::Dress => 0.30..0.75,
                 GarmentKind::Trousers if *name == "shorts" => 0.45..0.75,
-                GarmentKind::Trousers => -0.01..0.12,
+                GarmentKind::Trousers => 0.02..0.12,
             };
             assert!(hem.contains(&low), "{name} on {body}: the hem is at {low}");
             // The suggestion's sentence says where the hem will be.
@@ -90,7 +91,11 @@ fn every_garment_hangs_on_three_bodies() {
                 let rest = t.personalise(&BodyShape { coefficients: shape.to_vec(), ..BodyShape::default() });
                 let said = suggest(name, &measure(&t, &rest).expect("measurable")).expect("size").hem;
                 // Over a belly or a bust a top hangs shorter than its back is long.
-                let off = if g.kind == GarmentKind::Top { 0.13 } else { 0.09 };
+                let off = match g.kind {
+                    GarmentKind::Top => 0.13,
+                    GarmentKind::Trousers => 0.05,
+                    _ => 0.09,
+                };
                 assert!((said - f64::from(low)).abs() < off, "{name} on {body}: {said} said, {low} hangs");
             }
         }
@@ -112,6 +117,21 @@ fn a_shirt_that_is_taken_out_of_itself_crosses_itself_nowhere_and_is_not_torn() 
         assert_eq!(free.crossings, 0, "{body}");
         assert!(free.p99_strain < as_it_falls.p99_strain + 0.015, "{body}: {}", free.p99_strain);
     }
+}
+
+#[test]
+fn a_hood_of_fine_cloth_in_folds_on_a_thick_neck_passes_through_itself_nowhere() {
+    let t = embedded::template();
+    let rest = t.personalise(&BodyShape { coefficients: BODIES[2].1.to_vec(), ..BodyShape::default() });
+    // From the first coarse drape of this one nothing takes it apart.
+    let options = DressOptions {
+        triangulation: Triangulation { edge_length: 0.0155, ..Triangulation::default() },
+        ..DressOptions::default()
+    };
+    let worn = dress(&t, &rest, &arms_down(&t, &rest), &suggested("hoodie")(&t, &rest), &options).expect("dressed");
+    assert!(worn.model.outfit.garments[0].corners.len() > 5000);
+    assert_eq!(worn.report.crossings, 0);
+    assert!(worn.report.penetration < 0.004 && worn.report.p99_strain < 0.15, "{:?}", worn.report);
 }
 
 /// Widest angle about the middle of a forearm in which no cloth lies, degrees: what is 3 cm or less along the bone from there

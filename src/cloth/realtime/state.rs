@@ -6,7 +6,7 @@ use super::untangle::Untangle;
 use crate::cloth::ClothError;
 use crate::cloth::folds::FoldFrame;
 use crate::cloth::small_steps::{Motion, Plane, Tie};
-use crate::contact::{Apart, Buried, DepthMaps, PointGrid, SurfaceFrame};
+use crate::contact::{Apart, Buried, DepthMaps, NearSkin, SurfaceFrame};
 use crate::math::{P3, V3};
 use serde::{Deserialize, Serialize};
 
@@ -194,7 +194,7 @@ pub struct Workspace {
     pub(super) after: SurfaceFrame,
     pub(super) now: SurfaceFrame,
     /// Vertices of the body at the end of the call.
-    pub(super) skin_grid: PointGrid,
+    pub(super) near_skin: NearSkin,
     /// The measured body, held steady, and the same with room between its parts.
     pub(super) followed: Vec<P3>,
     pub(super) roomy: SurfaceFrame,

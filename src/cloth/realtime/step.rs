@@ -6,7 +6,7 @@ use super::model::{Model, RECALLED};
 use super::regions::{carry_on, fall_asleep, wake, wake_all};
 use super::state::{Input, PatchScratch, State, StepReport, Workspace, check_body};
 use super::steady::follow;
-use super::touch::{HIDDEN, Settled, Touch, anchors, settle};
+use super::touch::{Settled, Touch, anchors, settle};
 use crate::cloth::ClothError;
 use crate::cloth::small_steps::{Borders, Step, V4};
 use crate::math::{P3, V3};
@@ -187,8 +187,8 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         report.stages_ms.solve += ms(timer);
     }
     let timer = Instant::now();
-    work.skin_grid.fill(&work.after.vertices, 2.0 * HIDDEN);
-    let body = Settled { skin: &work.after, grid: &work.skin_grid, buried: &state.buried };
+    work.near_skin.fill(&work.after);
+    let body = Settled { skin: &work.after, near: &work.near_skin, buried: &state.buried };
     for_patches(model, &mut work.patches, |g, k, p| settle(model, g, k, &body, p));
     report.stages_ms.contact += ms(timer);
     let timer = Instant::now();

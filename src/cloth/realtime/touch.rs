@@ -3,7 +3,7 @@
 use super::model::Model;
 use super::state::{GarmentState, PatchScratch};
 use crate::cloth::small_steps::{Fabric, Plane, Tie, V4};
-use crate::contact::{Buried, Closest, DepthMaps, PointGrid, SurfaceFrame};
+use crate::contact::{Buried, Closest, DepthMaps, NearSkin, SurfaceFrame, nearer};
 use crate::garment::Region;
 use crate::math::{P3, V3};
 
@@ -13,9 +13,6 @@ const REACH: f32 = 0.04;
 const LIFTED: f32 = 5e-4;
 /// Deeper in another part of the body cloth is left where it is, metres: it may have come from the other side.
 const OTHER_DEPTH: f32 = 0.01;
-/// Cloth is not expected deeper than this under skin that no walk led to, metres: the vertices of a body are about as far
-/// from each other.
-pub(super) const HIDDEN: f32 = 0.015;
 /// Cloth longer than this, over its rest length, is about to tear: more than knitwear is worn at.
 const TORN: f32 = 1.5;
 /// Between skins with less room than this cloth stays on its own half, metres, and so far from the middle.
@@ -204,8 +201,7 @@ fn above(a: &super::AnchorBinding, [p, q, r]: [P3; 3]) -> P3 {
 /// The body at the end of a call.
 pub(super) struct Settled<'a> {
     pub(super) skin: &'a SurfaceFrame,
-    /// Its vertices, looked for within [`HIDDEN`].
-    pub(super) grid: &'a PointGrid,
+    pub(super) near: &'a NearSkin,
     pub(super) buried: &'a Buried,
 }
 
@@ -223,46 +219,25 @@ pub(super) fn settle(model: &Model, garment: usize, patch: usize, body: &Settled
         let i = i as usize;
         let v = f.vertices[i] as usize;
         let masks = [g.own[v], g.other[v]];
-        let mut near = nearest_vertices(model, body, &p3(p.motion.position(i)), masks);
+        let surface = &model.surface;
+        let mut near = body.near.vertices(surface, &p3(p.motion.position(i)), masks);
         // The own parts have the last word.
         for side in [1, 0].into_iter().filter(|s| masks[*s] != 0) {
             let x = p3(p.motion.position(i));
-            let c = nearest_skin(model, body, &x, p.nearest[i][side], near[side], masks[side]);
+            let walked = surface.closest(body.skin, &x, p.nearest[i][side], masks[side]);
+            let c = nearer(surface, body.skin, &x, walked, near[side], masks[side]);
             p.nearest[i][side] = c.vertex;
             let elsewhere = side == 1 && c.signed < -OTHER_DEPTH;
-            let nothing = body.buried.holds_nothing(model.surface.faces()[c.face as usize]);
+            let nothing = body.buried.holds_nothing(surface.faces()[c.face as usize]);
             if c.rim || c.signed >= LIFTED || elsewhere || nothing {
                 continue;
             }
             p.report.penetration = p.report.penetration.max(f64::from(-c.signed));
             p.motion.moved[i] = v4(&(c.point + c.normal * LIFTED - p3(p.motion.start[i])));
             let lifted = p3(p.motion.position(i));
-            let again = model.surface.closest(body.skin, &lifted, c.vertex, masks[side]);
+            let again = surface.closest(body.skin, &lifted, c.vertex, masks[side]);
             p.report.penetration_left = p.report.penetration_left.max(f64::from(-again.signed));
-            near = nearest_vertices(model, body, &lifted, masks);
+            near = body.near.vertices(surface, &lifted, masks);
         }
     }
-}
-
-/// Of two kinds of parts the nearest vertex within [`HIDDEN`], if there is one.
-fn nearest_vertices(model: &Model, body: &Settled<'_>, x: &P3, masks: [u8; 2]) -> [Option<u32>; 2] {
-    let mut best = [(HIDDEN * HIDDEN, None); 2];
-    body.grid.within(x, HIDDEN, |v, d| {
-        let part = model.surface.part(v);
-        for (best, mask) in best.iter_mut().zip(masks) {
-            if (d, Some(v)) < *best && part & mask != 0 {
-                *best = (d, Some(v));
-            }
-        }
-    });
-    best.map(|b| b.1)
-}
-
-/// The nearest point by a walk from `start`, or around the nearest of all vertices where that is not where the walk ended:
-/// in the crook of an elbow it ends on the upper arm though the forearm is nearer, and between fingers on any of them.
-fn nearest_skin(model: &Model, body: &Settled<'_>, x: &P3, start: u32, nearest: Option<u32>, mask: u8) -> Closest {
-    let walked = model.surface.closest(body.skin, x, start, mask);
-    let Some(nearest) = nearest.filter(|v| *v != walked.vertex) else { return walked };
-    let other = model.surface.closest_around(body.skin, x, nearest, mask);
-    if !other.rim && other.signed.abs() < walked.signed.abs() { other } else { walked }
 }

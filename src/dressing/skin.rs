@@ -1,0 +1,68 @@
+//! The body as garments meet it while they are put on.
+
+use crate::cloth::realtime::Model;
+use crate::cloth::sleeves::{Arms, Line};
+use crate::contact::{Apart, Buried, Closest, NearSkin, Part, SurfaceFrame, SurfaceModel, nearer};
+use crate::math::P3;
+use crate::par::Par;
+
+/// What cloth is draped on.
+#[derive(Debug)]
+pub(super) struct Skin<'a> {
+    pub(super) model: &'a SurfaceModel,
+    frame: SurfaceFrame,
+    buried: Buried,
+    apart: Apart,
+    near: NearSkin,
+    arms: &'a Arms,
+    opposite: &'a [Part],
+    pressing: &'a [Part],
+    /// What cloth needs between parts that press on each other, metres.
+    room: f32,
+}
+
+impl<'a> Skin<'a> {
+    /// Of the body that an outfit is simulated on.
+    pub(super) fn of(model: &'a Model) -> Self {
+        Self {
+            model: model.surface(),
+            frame: SurfaceFrame::default(),
+            buried: Buried::default(),
+            apart: Apart::default(),
+            near: NearSkin::default(),
+            arms: model.arms(),
+            opposite: model.opposite(),
+            pressing: model.pressing(),
+            room: model.room(),
+        }
+    }
+    /// The body stands like this now.
+    pub(super) fn show(&mut self, body: &[P3]) {
+        self.frame.vertices.clear();
+        self.frame.vertices.extend_from_slice(body);
+        self.apart.make_room(Par::Rayon, self.model, self.pressing, &mut self.frame, self.room);
+        self.model.update_normals(Par::Rayon, &mut self.frame);
+        self.buried.update(Par::Rayon, self.model, self.opposite, &self.frame);
+        self.near.fill(&self.frame);
+    }
+    pub(super) fn frame(&self) -> &SurfaceFrame {
+        &self.frame
+    }
+    /// Where its arms are.
+    pub(super) fn arm_lines(&self) -> [Line; 2] {
+        self.arms.lines(&self.frame.vertices)
+    }
+    /// Skin that lies in other skin, which it faces.
+    pub(super) fn holds_nothing(&self, c: &Closest) -> bool {
+        self.buried.holds_nothing(self.model.faces()[c.face as usize])
+    }
+    /// Of two kinds of parts the nearest points to `p` where walks led, or nearer ones that no walk led to.
+    pub(super) fn nearer(&self, p: &P3, walked: [Closest; 2], masks: [Part; 2]) -> [Closest; 2] {
+        let near = self.near.vertices(self.model, p, masks);
+        std::array::from_fn(|k| nearer(self.model, &self.frame, p, walked[k], near[k], masks[k]))
+    }
+    /// The body as cloth meets it, and what is known about its skin.
+    pub(super) fn known(self) -> (Vec<P3>, Buried, Apart) {
+        (self.frame.vertices, self.buried, self.apart)
+    }
+}
