@@ -228,6 +228,8 @@ pub(super) struct PatchScratch {
     pub(super) neighbour_of: Vec<u32>,
     /// Vertices that nothing holds: in skin that lies in other skin, or about to tear.
     pub(super) free: Vec<bool>,
+    /// Local vertices that no plane was looked for as they were about to tear.
+    pub(super) torn: Vec<u32>,
     pub(super) ties: Vec<Tie>,
     /// Vertices whose place is given: nothing else may push them.
     pub(super) tied: Vec<bool>,

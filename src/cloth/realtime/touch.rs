@@ -56,8 +56,13 @@ impl Touch<'_> {
         let reach = self.model.config.reach as f32;
         // Planes that contradict each other would tear cloth apart: it gives way, and hangs on its neighbours.
         p.motion.overstretched(f, TORN, &mut p.free);
+        p.torn.clear();
         for (i, &v) in f.vertices.iter().enumerate() {
-            if p.tied[i] || p.free[i] {
+            if p.tied[i] {
+                continue;
+            }
+            if p.free[i] {
+                p.torn.push(i as u32);
                 continue;
             }
             let masks = [g.own[v as usize], g.other[v as usize]];
@@ -205,13 +210,14 @@ pub(super) struct Settled<'a> {
     pub(super) buried: &'a Buried,
 }
 
-/// Measures how deep cloth is under the skin where that holds it, and lifts what is.
+/// Measures how deep cloth is under the skin where that holds it, or gave way to cloth that was about to tear, and lifts what
+/// is.
 pub(super) fn settle(model: &Model, garment: usize, patch: usize, body: &Settled<'_>, p: &mut PatchScratch) {
     let g = &model.garments[garment];
     let f = &g.patches[patch];
     let mut last = u32::MAX;
-    for k in 0..p.body_planes {
-        let i = p.planes[k].vertex;
+    for k in 0..p.body_planes + p.torn.len() {
+        let i = if k < p.body_planes { p.planes[k].vertex } else { p.torn[k - p.body_planes] };
         if i == last || i as usize >= f.owned {
             continue;
         }
