@@ -10,7 +10,7 @@ use crate::cloth::Sheet;
 use crate::cloth::realtime::AnchorBinding;
 use crate::cloth::sleeves::Sleeve;
 use crate::cloth::untangle::Untangler;
-use crate::contact::{Closest, Part, SurfaceFrame, SurfaceModel};
+use crate::contact::{Part, SurfaceFrame, SurfaceModel};
 use crate::garment::{GarmentError, GarmentMesh, Region};
 use crate::math::{P3, V3, V3d};
 use crate::mesh::distances;
@@ -166,7 +166,7 @@ const STUCK: usize = 16;
 const IRONINGS: usize = 4;
 /// In the others it may sink so deep into the skin, metres: deeper, and skin shows in the armpits of a heavy man.
 const SUNK: f64 = 0.002;
-/// At the end nothing is left deeper than this, metres.
+/// At the end nothing is left deeper than this, metres: a millimetre more than it may sink while it is untangled.
 const DEEP: f64 = 0.003;
 /// And edges are only kept from this times their length: a hood in folds on the neck was not free before it was
 /// stretched by 19 % (p99).
@@ -390,20 +390,14 @@ impl Drape {
         self.crossings
     }
     /// Cloth that is left deep under the skin goes to the skin. Between toes it is lifted from one into the next.
-    pub(super) fn surface(&mut self, skin: &Skin<'_>) {
+    pub(super) fn lift_deep(&mut self, skin: &Skin<'_>) {
         for i in 0..self.x.len() {
             let p = P3::from(self.x[i].cast::<f32>());
-            let c = self.skin_of(skin, i, &p);
+            let c = skin.closest(&p, self.nearest[i][0], self.own[i]);
             if f64::from(c.signed) < -DEEP && !c.rim && !skin.holds_nothing(&c) && self.pinned[i].is_none() {
                 self.x[i] = c.point.coords.cast();
             }
         }
-    }
-    /// The nearest point of the own parts to `p`, where vertex `i` is.
-    fn skin_of(&self, skin: &Skin<'_>, i: usize, p: &P3) -> Closest {
-        let walked = skin.model.closest(skin.frame(), p, self.nearest[i][0], self.own[i]);
-        let [c, _] = skin.nearer(p, [walked; 2], [self.own[i]; 2]);
-        c
     }
     /// Where it passed through itself in the last round there is cloth that is on no arm.
     pub(super) fn crosses_off_arms(&self) -> bool {
@@ -550,7 +544,7 @@ impl Drape {
         let mut deepest = 0.0f64;
         for i in 0..self.x.len() {
             let p = P3::from(self.x[i].cast::<f32>());
-            let c = self.skin_of(skin, i, &p);
+            let c = skin.closest(&p, self.nearest[i][0], self.own[i]);
             if !c.rim && !skin.holds_nothing(&c) {
                 deepest = deepest.max(-f64::from(c.signed));
             }

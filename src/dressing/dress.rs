@@ -127,11 +127,9 @@ const CLEARED: usize = 120;
 const SETTLING: usize = 80;
 /// Substep on the fine mesh, s.
 const FINE_STEP: f64 = 1e-3;
-/// Substeps on the fine mesh: wrinkles that the coarse one lacks.
+/// Substeps on the fine mesh: wrinkles that the coarse one lacks. Half of them again where rounds of untangling leave
+/// something.
 const FINISHING: usize = 90;
-/// Half of them are done so often again where rounds of untangling leave something: ironed cloth is pressed together, and
-/// finds room from one time to the next.
-const AGAIN: usize = 1;
 /// So often a coarse garment settles, until the fine one that is made from it is free of itself on the trunk: a hood on a
 /// thick neck may come to lie in folds that nothing takes apart. The crook of a bent elbow always does.
 const TRIES: usize = 4;
@@ -361,14 +359,12 @@ fn refine(
         d.put_back(skin);
         d.clear(on, CLEARED);
         d.run(on, FINISHING, FINE_STEP, 1.0);
-        for _ in 0..AGAIN {
-            if d.clear(on, CLEARED) == 0 {
-                break;
-            }
+        if d.clear(on, CLEARED) > 0 {
+            // Ironed cloth is pressed together, and finds room.
             d.run(on, FINISHING / 2, FINE_STEP, 1.0);
+            d.clear(on, CLEARED);
         }
-        d.clear(on, CLEARED);
-        d.surface(skin);
+        d.lift_deep(skin);
     });
     Ok(fine)
 }

@@ -5,7 +5,8 @@ use crate::body::Template;
 use crate::garment::{GarmentMesh, Pattern, Placement, Region, Side};
 use crate::math::P3;
 
-/// Distance of the legs of trousers from the middle, at least, metres.
+/// Distance of the legs of trousers from the middle, at least, metres: placed in each other they would pass through each
+/// other from the start.
 const APART: f32 = 0.001;
 /// Room between body and cloth at the start, metres.
 const ROOM: f32 = 0.015;

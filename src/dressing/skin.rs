@@ -56,6 +56,12 @@ impl<'a> Skin<'a> {
     pub(super) fn holds_nothing(&self, c: &Closest) -> bool {
         self.buried.holds_nothing(self.model.faces()[c.face as usize])
     }
+    /// The nearest point of some parts to `p`: where a walk from `start` leads, or a nearer one that no walk led to.
+    pub(super) fn closest(&self, p: &P3, start: u32, mask: Part) -> Closest {
+        let walked = self.model.closest(&self.frame, p, start, mask);
+        let [near, _] = self.near.vertices(self.model, p, [mask, 0]);
+        nearer(self.model, &self.frame, p, walked, near, mask)
+    }
     /// Of two kinds of parts the nearest points to `p` where walks led, or nearer ones that no walk led to.
     pub(super) fn nearer(&self, p: &P3, walked: [Closest; 2], masks: [Part; 2]) -> [Closest; 2] {
         let near = self.near.vertices(self.model, p, masks);
