@@ -3,7 +3,7 @@
 //! `cargo run --release --example turntable -- --garment tshirt --garment longsleeve+trousers --out DIR
 //!   [--garment FILE.obj|.glb|.mhclo|.json [--garment-body FILE.npz|.obj]] [--body average,slim_woman,heavy_man | FILE.npz | RECORDING] [--size auto,S,M,XL] [--pose down|tpose|rest|walk|raise]
 //!   [--seconds 1.0] [--views 0,45,90,180] [--cell 220x340] [--crop] [--edge 0.021] [--fit] [--any-size] [--no-folds]
-//!   [--crossings] [--tangled] [--measured]`
+//!   [--sharpest 0.6] [--crossings] [--tangled] [--measured]`
 //!
 //! Bodies are drawn as cloth meets them, with room in the armpits, with `--measured` as they are.
 //! A row is a body, a block of columns a size. `auto` asks the size suggestion. A recording (a folder or .mcap) shows the
@@ -41,6 +41,7 @@ struct Args {
     crossings: bool,
     folds: bool,
     untangle: bool,
+    sharpest: f64,
     measured: bool,
     out: PathBuf,
 }
@@ -62,6 +63,7 @@ fn args() -> Args {
         crossings: false,
         folds: true,
         untangle: true,
+        sharpest: Config::default().sharpest,
         measured: false,
         out: "/tmp/turntable".into(),
     };
@@ -90,6 +92,7 @@ fn args() -> Args {
             "--crossings" => a.crossings = true,
             "--no-folds" => a.folds = false,
             "--measured" => a.measured = true,
+            "--sharpest" => a.sharpest = value().parse().expect("a share"),
             "--tangled" => a.untangle = false,
             "--any-size" => a.any_size = true,
             "--fit" => a.fit = true,
@@ -269,7 +272,7 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
     }
     let start = film.as_ref().map_or_else(|| pose(&a.pose, &template, &rest, 0.0), |(pose, _)| pose.clone());
     let config = if film.is_some() { Config::tracked() } else { Config::default() };
-    options.config = Config { self_collision: a.folds, ..config };
+    options.config = Config { self_collision: a.folds, sharpest: a.sharpest, ..config };
     let dressed = match dress_all(&template, &rest, &start, &wear, &options) {
         Ok(d) => Some(d),
         Err(DressError::Misfit(m)) => {
@@ -314,12 +317,14 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
     );
     let frames = film.len();
     let (mut ms, mut last) = (0.0, None);
+    let mut all_crossed = vec![0; state.garments.len()];
     let (mut roomy, mut room_ms) = (RoomyBody::new(&template, &options.config).expect("a body"), 0.0);
     let mut verts = posed(&template, &rest, &start);
     for body in film {
         verts = body;
         let r = step(&model, &mut state, &Input { body: &verts, dt: 1.0 / 30.0 }, &mut work).expect("step");
         ms += r.stages_ms.total;
+        all_crossed.iter_mut().zip(crossed(&state)).for_each(|(all, now)| *all += now);
         let started = std::time::Instant::now();
         roomy.make_room(tryon::par::Par::Rayon, &verts);
         room_ms += if last.is_some() { started.elapsed().as_secs_f64() * 1e3 } else { 0.0 };
@@ -334,7 +339,8 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
             r.p99_strain,
             r.max_strain
         );
-        println!("  edges through its own triangles: {:?}", crossed(&state));
+        let mean: Vec<usize> = all_crossed.iter().map(|n| n / frames).collect();
+        println!("  edges through its own triangles: {:?}, over all pictures {mean:?}", crossed(&state));
     }
     let centre = {
         let n = verts.len() as f32;

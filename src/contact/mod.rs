@@ -3,6 +3,7 @@
 mod across;
 mod apart;
 mod buried;
+mod creases;
 mod depth_maps;
 mod near_skin;
 mod point_grid;
@@ -11,6 +12,7 @@ mod winding;
 
 pub use apart::Apart;
 pub use buried::Buried;
+pub use creases::Crease;
 pub use depth_maps::{DepthMaps, MapDetail, MapView};
 pub use near_skin::{NearSkin, nearer};
 pub use point_grid::PointGrid;

@@ -2,7 +2,7 @@
 
 use crate::cloth::realtime::Model;
 use crate::cloth::sleeves::{Arms, Line};
-use crate::contact::{Apart, Buried, Closest, NearSkin, Part, SurfaceFrame, SurfaceModel, nearer};
+use crate::contact::{Apart, Buried, Closest, Crease, NearSkin, Part, SurfaceFrame, SurfaceModel, nearer};
 use crate::math::P3;
 use crate::par::Par;
 
@@ -16,6 +16,7 @@ pub(super) struct Skin<'a> {
     near: NearSkin,
     arms: &'a Arms,
     opposite: &'a [Part],
+    creases: &'a [Crease],
     pressing: &'a [Part],
     /// What cloth needs between parts that press on each other, metres.
     room: f32,
@@ -32,6 +33,7 @@ impl<'a> Skin<'a> {
             near: NearSkin::default(),
             arms: model.arms(),
             opposite: model.opposite(),
+            creases: model.creases(),
             pressing: model.pressing(),
             room: model.room(),
         }
@@ -41,6 +43,7 @@ impl<'a> Skin<'a> {
         self.frame.vertices.clear();
         self.frame.vertices.extend_from_slice(body);
         self.apart.make_room(Par::Rayon, self.model, self.pressing, &mut self.frame, self.room);
+        self.creases.iter().for_each(|c| c.make_room(&mut self.frame.vertices, self.room));
         self.model.update_normals(Par::Rayon, &mut self.frame);
         self.buried.update(Par::Rayon, self.model, self.opposite, &self.frame);
         self.near.fill(&self.frame);

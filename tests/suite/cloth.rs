@@ -310,8 +310,8 @@ fn a_hem_that_is_woven_through_itself_comes_loose() {
         println!("{untangle} s between looks: {pulled} crossings, {left} two seconds later");
         left
     });
-    // Held as it is it gets worse (1097).
-    assert!(left[0] > 90 && 3 * left[1] < 2 * left[0], "{left:?}");
+    // Held as it is it gets worse (1097 before folds had to be as wide as their triangles, 148 since).
+    assert!(left[0] > 90 && left[1] < left[0] && left[1] < 150, "{left:?}");
 }
 
 #[test]

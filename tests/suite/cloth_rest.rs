@@ -53,7 +53,7 @@ fn nothing_stays_behind_when_she_walks_off() {
     let apart = r.apart(&truth).map(|d| d * 1e3);
     println!("asleep when she starts {first:.2}, then {:?}; {apart:.1?} mm apart", &r.asleep[1..4]);
     assert!(r.asleep[2..].iter().all(|a| *a == 0.0), "{:?}", r.asleep);
-    assert!(apart[0] < 12.0 && apart[2] < 100.0, "{apart:?}");
+    assert!(apart[0] < 15.0 && apart[2] < 100.0, "{apart:?}");
 }
 
 #[test]

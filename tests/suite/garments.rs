@@ -1,8 +1,10 @@
 //! Garments of the library on bodies: what an eye would see at once, as numbers.
 
+use super::common::arms_down;
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use tryon::body::measure::measure;
-use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, embedded};
+use tryon::body::{BodyShape, BoneTransforms, RestBody, Template, embedded};
+use tryon::cloth::realtime::{Input, Workspace, step};
 use tryon::dressing::{DressOptions, Dressed, Fit, FitProbe, dress, suggest};
 use tryon::formats::fabric_json::read_fabric;
 use tryon::formats::garmentcode::{parse_garmentcode, read_garmentcode};
@@ -11,7 +13,7 @@ use tryon::formats::obj::read_obj;
 use tryon::formats::sewn_obj::read_sewn_obj;
 use tryon::garment::import::{from_garmentcode, from_mesh};
 use tryon::garment::{GarmentKind, Material, Pattern, Size, Triangulation, library};
-use tryon::math::{Body, Rigid, World, log_so3};
+use tryon::math::log_so3;
 
 /// Stature, girth, sex and so on in standard deviations.
 const BODIES: [(&str, &[f64]); 3] = [
@@ -19,20 +21,6 @@ const BODIES: [(&str, &[f64]); 3] = [
     ("average", &[]),
     ("heavy man", &[0.3, 2.0, 1.2, -0.2, 0.2, 0.3, 0.0, 0.6, 0.0]),
 ];
-
-fn arms_down(template: &Template, rest: &RestBody) -> Pose<World> {
-    let sk = template.skeleton();
-    let mut p = Pose::rest(sk, Rigid::<World, Body>::identity());
-    for (side, s) in [("left", 1.0), ("right", -1.0)] {
-        let joint = |n: &str| sk.index(&format!("{side}_{n}")).expect("joint");
-        let (j, c) = (joint("shoulder"), joint("elbow"));
-        let wanted = nalgebra::Vector3::new(s * 1.3f64.cos(), -1.3f64.sin(), 0.0);
-        let q = nalgebra::UnitQuaternion::rotation_between(&(rest.joints[c] - rest.joints[j]), &wanted).expect("turn");
-        let at = sk.dof_offset(j);
-        p.angles[at..at + 3].copy_from_slice(log_so3(&q).as_slice());
-    }
-    p
-}
 
 fn wear(coefficients: &[f64], patterns: &dyn Fn(&Template, &RestBody) -> Vec<Pattern>) -> Dressed {
     let t = embedded::template();
@@ -113,7 +101,7 @@ fn a_shirt_that_is_taken_out_of_itself_crosses_itself_nowhere_and_is_not_torn() 
             dress(&t, &rest, &arms_down(&t, &rest), &shirt, &options).expect("dressed").report
         };
         let (as_it_falls, free) = (worn(false), worn(true));
-        assert!(as_it_falls.crossings > 50, "{body}: {}", as_it_falls.crossings);
+        assert!(as_it_falls.crossings > 20, "{body}: {}", as_it_falls.crossings);
         assert_eq!(free.crossings, 0, "{body}");
         assert!(free.p99_strain < as_it_falls.p99_strain + 0.015, "{body}: {}", free.p99_strain);
     }
@@ -297,13 +285,18 @@ fn the_stitched_dress_becomes_one_surface() {
 #[test]
 fn a_fit_map_tells_a_tight_size_from_a_loose_one() {
     let worn = |size| {
-        let d = wear(&[], &|_, _| vec![library::pattern("tank", size).expect("pattern")]);
+        let mut d = wear(&[], &|_, _| vec![library::pattern("tank", size).expect("pattern")]);
         let t = embedded::template();
         let rest = t.personalise(&BodyShape::default());
         let pose = arms_down(&t, &rest);
         let (mut bones, mut body) = (tryon::body::BoneTransforms::default(), Vec::new());
         pose.bones(t.skeleton(), &rest, &mut bones);
         tryon::body::skin(tryon::par::Par::Seq, &rest.vertices, t.weights(), &bones, &mut body);
+        // Forces at rest are read as pressure, and cloth that has just been put on is not.
+        let mut work = Workspace::default();
+        for _ in 0..30 {
+            step(&d.model, &mut d.state, &Input { body: &body, dt: 1.0 / 30.0 }, &mut work).expect("a step");
+        }
         let mut probe = FitProbe::new(&t, &d.model).expect("probe");
         let map = probe.measure(&d.model, &d.state, &body).expect("fit").remove(0);
         assert!(probe.measure(&d.model, &d.state, &body[1..]).is_err(), "a body of another size is refused");

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)] // tests stop at the first fault
 #![allow(clippy::print_stdout)] // and say what they measured
 
+mod bending;
 mod cloth;
 mod cloth_rest;
 mod common;

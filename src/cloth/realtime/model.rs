@@ -7,7 +7,7 @@ use crate::cloth::pieces::Pieces;
 use crate::cloth::sleeves::{Arms, Sleeve};
 use crate::cloth::small_steps::{Fabric, Fit, Plan};
 use crate::cloth::{ClothError, Sheet};
-use crate::contact::{MapDetail, MapView, SurfaceModel};
+use crate::contact::{Crease, MapDetail, MapView, SurfaceModel};
 use crate::garment::{GarmentMesh, Region};
 use crate::math::{Camera, P3, Rigid, V3, World};
 use crate::mesh::Topology;
@@ -75,6 +75,9 @@ pub struct Config {
     pub sleep_regions: bool,
     /// Time from one look at all of a garment, which takes it out of itself, to the next, s; 0 for never.
     pub untangle: f64,
+    /// How far apart two corners across an edge stay, over their distance where it is flat: ½ lets a fold close to 60°. 0 for
+    /// no limit.
+    pub sharpest: f64,
     /// Leave out searches for skin and for other folds of vertices that cannot have come near them since the last one.
     pub skip_far: bool,
     /// A body vertex that moves further than this between two calls has jumped, metres.
@@ -102,6 +105,7 @@ impl Default for Config {
             sleep: true,
             sleep_regions: true,
             untangle: 0.13,
+            sharpest: 0.6,
             skip_far: true,
             teleport: 0.2,
             par: crate::par::Par::Rayon,
@@ -169,6 +173,8 @@ pub struct Model {
     pub(super) surface: SurfaceModel,
     /// Part of the body that each of its vertices may lie in.
     pub(super) opposite: Vec<u8>,
+    /// Its elbows and knees.
+    pub(super) creases: Vec<Crease>,
     /// The same where both are thick: part of the body that presses on each of its vertices.
     pub(super) pressing: Vec<u8>,
     /// Its vertices, some at a time.
@@ -221,6 +227,18 @@ pub(super) fn opposites(template: &Template, parts: &[u8]) -> Vec<u8> {
     vertices.iter().zip(parts).map(of).collect()
 }
 
+/// Elbows and knees, where both limbs are one part.
+pub(super) fn creases(template: &Template, surface: &SurfaceModel) -> Vec<Crease> {
+    let joints = template.skeleton().joints();
+    let moved_by =
+        |j: usize| (0..surface.vertices()).filter(|v| template.weights().dominant(*v) == j).map(|v| v as u32).collect();
+    let of = |(j, joint): (usize, &crate::body::Joint)| {
+        let bends = ["elbow", "knee"].iter().any(|n| joint.name.contains(n));
+        bends.then(|| Crease::new(surface, moved_by(joint.parent?), moved_by(j))).flatten()
+    };
+    joints.iter().enumerate().filter_map(of).collect()
+}
+
 /// Of these [`opposites`] those of thick parts: hands and forearms have cloth on one side only, and a hand in a hip does
 /// not know any more which one that is.
 pub(super) fn pressing(template: &Template, opposite: Vec<u8>) -> Vec<u8> {
@@ -249,6 +267,9 @@ impl Model {
                 "offset, teleport, steady, untangle",
                 "they must be finite, teleport positive, steady and untangle not negative",
             ));
+        }
+        if !(0.0..1.0).contains(&config.sharpest) {
+            return Err(field("sharpest", "must be at least 0 and less than 1"));
         }
         if outfit.anchors.len() != outfit.garments.len() {
             return Err(ClothError::Count {
@@ -310,6 +331,7 @@ impl Model {
         let mut model = Self {
             pressing: pressing(template, opposite.clone()),
             opposite,
+            creases: creases(template, &surface),
             clusters: clusters(&surface),
             arms: Arms::new(template, &parts),
             surface,
@@ -364,6 +386,9 @@ impl Model {
     /// See [`Config::room`].
     pub(crate) fn room(&self) -> f32 {
         self.config.room()
+    }
+    pub(crate) fn creases(&self) -> &[Crease] {
+        &self.creases
     }
     /// The part that each vertex of it may lie in.
     pub(crate) fn opposite(&self) -> &[u8] {

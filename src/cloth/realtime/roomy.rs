@@ -1,10 +1,10 @@
 //! The body as cloth meets it, for who draws a dressed body.
 
 use super::Config;
-use super::model::{body_parts, opposites, pressing};
+use super::model::{body_parts, creases, opposites, pressing};
 use crate::body::Template;
 use crate::cloth::ClothError;
-use crate::contact::{Apart, Part, SurfaceFrame, SurfaceModel};
+use crate::contact::{Apart, Crease, Part, SurfaceFrame, SurfaceModel};
 use crate::math::P3;
 use crate::mesh::Topology;
 use crate::par::Par;
@@ -20,7 +20,8 @@ const SUNK: f32 = 0.015;
 pub struct RoomyBody {
     surface: SurfaceModel,
     pressing: Vec<Part>,
-    /// Metres.
+    creases: Vec<Crease>,
+    /// What cloth is given, metres.
     room: f32,
     apart: Apart,
     measured: Vec<P3>,
@@ -34,10 +35,13 @@ impl RoomyBody {
     /// Faults of the template's mesh.
     pub fn new(template: &Template, config: &Config) -> Result<Self, ClothError> {
         let parts = body_parts(template);
+        let pressing = pressing(template, opposites(template, &parts));
+        let surface = SurfaceModel::new(template.mesh().faces().to_vec(), Topology::new(template.mesh())?, parts);
         Ok(Self {
-            pressing: pressing(template, opposites(template, &parts)),
-            surface: SurfaceModel::new(template.mesh().faces().to_vec(), Topology::new(template.mesh())?, parts),
-            room: config.room() + SUNK,
+            pressing,
+            creases: creases(template, &surface),
+            surface,
+            room: config.room(),
             apart: Apart::default(),
             measured: Vec::new(),
             frame: SurfaceFrame::default(),
@@ -52,7 +56,8 @@ impl RoomyBody {
             self.frame.vertices.clone_from(&self.measured);
             let fits = body.len() == self.surface.vertices();
             if fits && body.iter().all(|p| p.iter().all(|c| c.is_finite())) {
-                self.apart.make_room(par, &self.surface, &self.pressing, &mut self.frame, self.room);
+                self.apart.make_room(par, &self.surface, &self.pressing, &mut self.frame, self.room + SUNK);
+                self.creases.iter().for_each(|c| c.make_room(&mut self.frame.vertices, self.room));
             } else {
                 self.apart = Apart::default();
             }

@@ -5,7 +5,7 @@ use super::regions::Rest;
 use super::untangle::Untangle;
 use crate::cloth::ClothError;
 use crate::cloth::folds::FoldFrame;
-use crate::cloth::small_steps::{Motion, Plane, Tie};
+use crate::cloth::small_steps::{Motion, Plane, Strut, Tie};
 use crate::contact::{Apart, Buried, DepthMaps, NearSkin, SurfaceFrame};
 use crate::math::{P3, V3};
 use serde::{Deserialize, Serialize};
@@ -228,9 +228,13 @@ pub(super) struct PatchScratch {
     pub(super) neighbour_of: Vec<u32>,
     /// Vertices that nothing holds: in skin that lies in other skin, or about to tear.
     pub(super) free: Vec<bool>,
+    /// Vertices of cloth that is drawn long: it has no room for wide folds.
+    pub(super) drawn: Vec<bool>,
     /// Local vertices that no plane was looked for as they were about to tear.
     pub(super) torn: Vec<u32>,
     pub(super) ties: Vec<Tie>,
+    /// What keeps folds from becoming too sharp during a round.
+    pub(super) struts: Vec<Strut>,
     /// Vertices whose place is given: nothing else may push them.
     pub(super) tied: Vec<bool>,
     pub(super) report: StepReport,

@@ -17,6 +17,7 @@ mod lanes;
 mod motion;
 mod plan;
 mod stability;
+mod struts;
 
 pub use border::Borders;
 pub use contact::{Plane, Tie};
@@ -24,6 +25,7 @@ pub use fabric::Fabric;
 pub use forces::Step;
 pub use motion::{Motion, V4};
 pub use plan::{Fit, Plan, triangles};
+pub use struts::{Excepted, Strut};
 
 #[cfg(test)]
 mod stress;
