@@ -197,7 +197,6 @@ mod tests {
     fn a_clapped_strip_folds_no_sharper_than_its_struts_allow_and_keeps_its_momentum() {
         let (free, ..) = clapped(0.0, None);
         let (braced, momentum, moment) = clapped(LIMIT, None);
-        println!("{free} {braced} {momentum:e} {moment:e}");
         assert!(free < 0.1, "without struts it folds flat: {free}");
         // One pass a step: it gives way a little.
         assert!(braced > f64::from(LIMIT) - 0.15, "{braced}");
