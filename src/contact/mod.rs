@@ -14,6 +14,6 @@ pub use apart::Apart;
 pub use buried::Buried;
 pub use creases::Crease;
 pub use depth_maps::{DepthMaps, MapDetail, MapView};
-pub use near_skin::{NearSkin, nearer};
+pub use near_skin::{Near, NearSkin};
 pub use point_grid::PointGrid;
 pub use surface::{Closest, Part, SurfaceFrame, SurfaceModel};

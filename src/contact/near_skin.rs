@@ -6,9 +6,12 @@
 use super::{Closest, Part, PointGrid, SurfaceFrame, SurfaceModel};
 use crate::math::P3;
 
-/// Cloth is not expected deeper than this under skin that no walk led to, metres: the vertices of a body are about as far
-/// from each other.
-const REACH: f32 = 0.015;
+/// The nearest vertex is looked for within this, metres: the vertices of a body are about as far from each other. Within
+/// 25 mm a hood on a slim neck was crumpled.
+const NEAREST: f32 = 0.015;
+/// The nearest vertex that a place is under is looked for within this, metres: between a dancer's knees that pass each other
+/// cloth got 15 mm deep in one call.
+const UNDER: f32 = 0.025;
 
 /// The vertices of a surface, looked for around a place.
 #[derive(Clone, Debug, Default)]
@@ -19,35 +22,52 @@ pub struct NearSkin {
 impl NearSkin {
     /// The surface is there now.
     pub fn fill(&mut self, frame: &SurfaceFrame) {
-        self.grid.fill(&frame.vertices, 2.0 * REACH);
+        self.grid.fill(&frame.vertices, 2.0 * UNDER);
     }
-    /// Of two kinds of parts the vertex nearest to `x`, if there is one within 15 mm.
-    pub fn vertices(&self, surface: &SurfaceModel, x: &P3, masks: [Part; 2]) -> [Option<u32>; 2] {
-        let mut best = [(REACH * REACH, None); 2];
-        self.grid.within(x, REACH, |v, d| {
+    /// Of two kinds of parts the skin near `x`.
+    pub fn around(&self, surface: &SurfaceModel, frame: &SurfaceFrame, x: &P3, masks: [Part; 2]) -> [Near; 2] {
+        let mut found = [[(NEAREST * NEAREST, None), (UNDER * UNDER, None)]; 2];
+        self.grid.within(x, UNDER, |v, d| {
             let part = surface.part(v);
-            for (best, mask) in best.iter_mut().zip(masks) {
-                if (d, Some(v)) < *best && part & mask != 0 {
-                    *best = (d, Some(v));
+            for ([any, above], mask) in found.iter_mut().zip(masks) {
+                if part & mask == 0 {
+                    continue;
+                }
+                if (d, Some(v)) < *any {
+                    *any = (d, Some(v));
+                }
+                if (d, Some(v)) < *above && (x - frame.vertices[v as usize]).dot(&surface.normal(frame, v)) < 0.0 {
+                    *above = (d, Some(v));
                 }
             }
         });
-        best.map(|b| b.1)
+        found.map(|of| Near(of.map(|f| f.1)))
     }
 }
 
-/// Where a walk led, or the point around the `nearest` of all vertices where that is nearer to `x`.
-pub fn nearer(
-    surface: &SurfaceModel,
-    frame: &SurfaceFrame,
-    x: &P3,
-    walked: Closest,
-    nearest: Option<u32>,
-    mask: Part,
-) -> Closest {
-    let Some(nearest) = nearest.filter(|v| *v != walked.vertex) else { return walked };
-    let other = surface.closest_around(frame, x, nearest, mask);
-    if !other.rim && other.signed.abs() < walked.signed.abs() { other } else { walked }
+/// Skin near a place: the nearest vertex, and the nearest one of those that the place is under.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Near([Option<u32>; 2]);
+
+impl Near {
+    /// Where a walk led, or a point around these vertices that is nearer to `x`. In a fold the nearest vertex may belong to
+    /// the skin in front of `x`, and the nearest triangle to that above it.
+    pub fn or_nearer(
+        &self,
+        surface: &SurfaceModel,
+        frame: &SurfaceFrame,
+        x: &P3,
+        walked: Closest,
+        mask: Part,
+    ) -> Closest {
+        self.0.iter().flatten().fold(walked, |best, v| {
+            if *v == best.vertex {
+                return best;
+            }
+            let other = surface.closest_around(frame, x, *v, mask);
+            if !other.rim && other.signed.abs() < best.signed.abs() { other } else { best }
+        })
+    }
 }
 
 #[cfg(test)]
@@ -77,15 +97,43 @@ mod tests {
         let x = P3::new(0.003, 0.0, 0.0);
         let walked = surface.closest(&frame, &x, 0, 1);
         assert!(walked.signed > 0.0 && walked.vertex < n, "{walked:?}");
-        let [own, other] = near.vertices(&surface, &x, [1, 2]);
-        assert!(own.is_some_and(|v| v >= n) && other.is_none(), "{own:?} {other:?}");
-        let found = nearer(&surface, &frame, &x, walked, own, 1);
+        let [own, other] = near.around(&surface, &frame, &x, [1, 2]);
+        assert!(own.0.iter().all(|v| v.is_some_and(|v| v >= n)) && other == Near::default(), "{own:?} {other:?}");
+        let found = own.or_nearer(&surface, &frame, &x, walked, 1);
         assert!((found.signed + 0.002).abs() < 3e-4, "{}", found.signed);
         // Nothing within reach, or nothing nearer: the walk stands.
         let far = P3::new(0.1, 0.0, 0.0);
-        assert_eq!(near.vertices(&surface, &far, [1, 1]), [None; 2]);
+        assert_eq!(near.around(&surface, &frame, &far, [1, 1]), [Near::default(); 2]);
         let walked = surface.closest(&frame, &far, n, 1);
-        assert_eq!(nearer(&surface, &frame, &far, walked, None, 1), walked);
-        assert_eq!(nearer(&surface, &frame, &far, walked, Some(0), 1), walked);
+        for near in [Near::default(), Near([Some(0), Some(1)])] {
+            assert_eq!(near.or_nearer(&surface, &frame, &far, walked, 1), walked);
+        }
+    }
+
+    #[test]
+    fn under_a_large_triangle_whose_corners_are_far_it_is_found_behind_nearer_vertices() {
+        // A ball of 5 mm in front of a flat piece of skin with corners 17 mm apart, and a place between, under the skin.
+        let ball = sphere(2);
+        let n = ball.vertices().len() as u32;
+        let mut places: Vec<P3> = ball.vertices().iter().map(|p| P3::from(p.coords * 0.005)).collect();
+        let turn = |k: f32| (k * std::f32::consts::TAU / 3.0).sin_cos();
+        places.extend([0.0, 1.0, 2.0].map(|k| P3::new(0.011, 0.01 * turn(k).0, 0.01 * turn(k).1)));
+        let mut faces = ball.faces().to_vec();
+        faces.push([n, n + 1, n + 2]);
+        let mesh = TriMesh::new(places, faces).expect("a ball and a triangle");
+        let parts = vec![1; mesh.vertices().len()];
+        let surface = SurfaceModel::new(mesh.faces().to_vec(), Topology::new(&mesh).expect("topology"), parts);
+        let mut frame = SurfaceFrame { vertices: mesh.vertices().to_vec(), normals: Vec::new() };
+        surface.update_normals(Par::Seq, &mut frame);
+        let side = frame.normals[n as usize].x.signum();
+        let x = P3::new(0.011 - 0.002 * side, 0.0, 0.0);
+        let mut near = NearSkin::default();
+        near.fill(&frame);
+        let [own, _] = near.around(&surface, &frame, &x, [1, 0]);
+        assert!(own.0[0].is_some_and(|v| v < n) && own.0[1].is_some_and(|v| v >= n), "{own:?}");
+        let walked = surface.closest(&frame, &x, 0, 1);
+        assert!(walked.signed > 0.0035 && walked.vertex < n, "{walked:?}");
+        let found = own.or_nearer(&surface, &frame, &x, walked, 1);
+        assert!((found.signed + 0.002).abs() < 1e-5, "{found:?}");
     }
 }

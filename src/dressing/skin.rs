@@ -2,7 +2,7 @@
 
 use crate::cloth::realtime::Model;
 use crate::cloth::sleeves::{Arms, Line};
-use crate::contact::{Apart, Buried, Closest, Crease, NearSkin, Part, SurfaceFrame, SurfaceModel, nearer};
+use crate::contact::{Apart, Buried, Closest, Crease, NearSkin, Part, SurfaceFrame, SurfaceModel};
 use crate::math::P3;
 use crate::par::Par;
 
@@ -62,13 +62,13 @@ impl<'a> Skin<'a> {
     /// The nearest point of some parts to `p`: where a walk from `start` leads, or a nearer one that no walk led to.
     pub(super) fn closest(&self, p: &P3, start: u32, mask: Part) -> Closest {
         let walked = self.model.closest(&self.frame, p, start, mask);
-        let [near, _] = self.near.vertices(self.model, p, [mask, 0]);
-        nearer(self.model, &self.frame, p, walked, near, mask)
+        let [near, _] = self.near.around(self.model, &self.frame, p, [mask, 0]);
+        near.or_nearer(self.model, &self.frame, p, walked, mask)
     }
     /// Of two kinds of parts the nearest points to `p` where walks led, or nearer ones that no walk led to.
     pub(super) fn nearer(&self, p: &P3, walked: [Closest; 2], masks: [Part; 2]) -> [Closest; 2] {
-        let near = self.near.vertices(self.model, p, masks);
-        std::array::from_fn(|k| nearer(self.model, &self.frame, p, walked[k], near[k], masks[k]))
+        let near = self.near.around(self.model, &self.frame, p, masks);
+        std::array::from_fn(|k| near[k].or_nearer(self.model, &self.frame, p, walked[k], masks[k]))
     }
     /// The body as cloth meets it, and what is known about its skin.
     pub(super) fn known(self) -> (Vec<P3>, Buried, Apart) {

@@ -86,13 +86,15 @@ impl Standing {
         let mut pose = Pose::rest(skeleton, Rigid::<World, Body>::identity());
         let phase = std::f64::consts::PI * time.max(0.0);
         let turns = match doing {
-            Doing::Waving => [0.2 * phase.sin(), 0.6 * phase.sin()],
+            Doing::Waving => [0.2 * phase.sin(), 0.3 * (1.0 - (2.0 * phase).cos())],
             Doing::Lifting => [0.45 * (1.0 - phase.cos()), 0.0],
             Doing::Standing | Doing::WalkingOff => [0.0; 2],
         };
         for (joint, turn) in ["left_shoulder", "left_elbow"].iter().zip(turns) {
-            if let Some(j) = skeleton.index(joint) {
-                pose.angles[skeleton.dof_offset(j) + 2] += turn;
+            // The last angle: about z of the shoulder, the only one of the elbow.
+            let last = |j: usize| (skeleton.dof_offset(j) + skeleton.joints()[j].motion.dofs()).checked_sub(1);
+            if let Some(angle) = skeleton.index(joint).and_then(last).and_then(|k| pose.angles.get_mut(k)) {
+                *angle += turn;
             }
         }
         let mut bones = BoneTransforms::default();

@@ -39,7 +39,7 @@ fn a_waving_arm_leaves_the_hem_asleep_and_cloth_near_where_it_would_be() {
         assert!(truth.mean_asleep() == 0.0 && outfit.mean_asleep() < 0.2, "{}", outfit.mean_asleep());
         assert!(r.mean_asleep() > 0.2 && r.asleep[10..].iter().all(|a| *a < 0.99), "{}", r.mean_asleep());
         // A hem that creeps by a centimetre a second counts as still, and stays where it fell asleep.
-        assert!(apart[0] < 12.0 && apart[1] < 55.0, "{apart:?}");
+        assert!(apart[0] < 14.0 && apart[1] < 75.0, "{apart:?}");
         assert!(r.penetration < 2e-3, "{}", r.penetration);
     }
 }

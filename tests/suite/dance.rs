@@ -1,7 +1,7 @@
 //! A T-shirt and a skirt on a body that dances fast and touches itself.
 
 use crate::common::shared;
-use tryon::cloth::realtime::Config;
+use tryon::cloth::realtime::{Config, body_parts};
 use tryon::evaluate::dance::{Outfit, load};
 
 #[test]
@@ -10,6 +10,9 @@ fn an_outfit_survives_a_dance_outside_the_body_and_unstretched() {
     let dance = load(&folder).unwrap();
     // The skeleton that was found for the bare mesh lies in it.
     assert!(dance.fit < 0.012, "{}", dance.fit);
+    // Pegs in its wrists and ankles, four pieces of five vertices, are no skin: cloth in front of their tips is inside a limb.
+    let parts = body_parts(&dance.template);
+    assert_eq!(parts.iter().filter(|p| **p == 0).count(), 20);
     let garments = ["tshirt", "skirt"].map(str::to_owned).to_vec();
     let outfit = Outfit { garments, edge: 0.022, config: Config::default(), seconds: 10.0 };
     let report = dance.run(&outfit, |_, _, _| {}).unwrap();
@@ -22,8 +25,8 @@ fn an_outfit_survives_a_dance_outside_the_body_and_unstretched() {
     // with an arm stretched back) held no cloth for a tenth of a second. Skin moved back for room may fold at the end of a
     // crease: one vertex there; it takes two for a triangle to hold nothing.
     assert!(report.buried < 2, "{}", report.buried);
-    // Speeds of single vertices carried through contact tore the skirt apart: 0.7 to 2.4.
-    assert!(report.p99_strain < 0.2, "{}", report.p99_strain);
-    // The deepest vertex hangs on roundings: 0.1 to 3.9 mm over six lengths of edges.
-    assert!(report.penetration[0] < 1e-3 && report.penetration[1] < 6e-3, "{:?}", report.penetration);
+    // Speeds of single vertices carried through contact tore the skirt apart: 0.7 to 2.4. Pegs taken for skin: 0.16.
+    assert!(report.p99_strain < 0.12, "{}", report.p99_strain);
+    // The deepest vertex hangs on roundings: 1.4 to 3.9 mm over six lengths of edges.
+    assert!(report.penetration[0] < 1e-3 && report.penetration[1] < 5e-3, "{:?}", report.penetration);
 }

@@ -191,7 +191,12 @@ pub(super) const RECALLED: usize = 2;
 /// cloth trembled on and never slept.
 const LONG_ENOUGH: f64 = 1.0 / 3600.0;
 
-/// Which [`Region`] each body vertex belongs to, by the name of its dominant joint.
+/// A piece of a body's surface with at most this share of all vertices is no skin.
+const CRUMB: f64 = 1e-3;
+
+/// Which [`Region`] each body vertex belongs to, by the name of its dominant joint; 0 where it belongs to a piece of the
+/// surface that is too small to be skin. A mannequin's pegs at its wrists end just under the skin: cloth in front of such
+/// a point is inside the arm, and was taken to be outside.
 pub fn body_parts(template: &Template) -> Vec<u8> {
     let of = |name: &str| {
         let left = name.starts_with("left");
@@ -205,7 +210,12 @@ pub fn body_parts(template: &Template) -> Vec<u8> {
         }
     };
     let by_joint: Vec<u8> = template.skeleton().joints().iter().map(|j| of(&j.name).0).collect();
-    (0..template.mesh().vertices().len()).map(|i| by_joint[template.weights().dominant(i)]).collect()
+    let (piece, pieces) = template.topology().components();
+    let mut sizes = vec![0usize; pieces];
+    piece.iter().for_each(|p| sizes[*p as usize] += 1);
+    let crumb = |i: usize| sizes[piece[i] as usize] as f64 <= CRUMB * piece.len() as f64;
+    let part = |i| if crumb(i) { 0 } else { by_joint[template.weights().dominant(i)] };
+    (0..template.mesh().vertices().len()).map(part).collect()
 }
 
 /// The part that each body vertex may come to lie in: an arm in the trunk, the trunk in its nearer arm, a leg in the
@@ -218,6 +228,7 @@ pub(super) fn opposites(template: &Template, parts: &[u8]) -> Vec<u8> {
     };
     let (left, right) = (mean(Region::LEFT_ARM), mean(Region::RIGHT_ARM));
     let of = |(v, part): (&P3, &u8)| match Region(*part) {
+        Region(0) => 0,
         Region::LEFT_ARM | Region::RIGHT_ARM => Region::TRUNK.0,
         Region::LEFT_LEG => Region::RIGHT_LEG.0,
         Region::RIGHT_LEG => Region::LEFT_LEG.0,

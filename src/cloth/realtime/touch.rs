@@ -3,7 +3,7 @@
 use super::model::Model;
 use super::state::{GarmentState, PatchScratch};
 use crate::cloth::small_steps::{Fabric, Plane, Tie, V4};
-use crate::contact::{Buried, Closest, DepthMaps, NearSkin, SurfaceFrame, nearer};
+use crate::contact::{Buried, Closest, DepthMaps, NearSkin, SurfaceFrame};
 use crate::garment::Region;
 use crate::math::{P3, V3};
 
@@ -226,12 +226,12 @@ pub(super) fn settle(model: &Model, garment: usize, patch: usize, body: &Settled
         let v = f.vertices[i] as usize;
         let masks = [g.own[v], g.other[v]];
         let surface = &model.surface;
-        let mut near = body.near.vertices(surface, &p3(p.motion.position(i)), masks);
+        let mut near = body.near.around(surface, body.skin, &p3(p.motion.position(i)), masks);
         // The own parts have the last word.
         for side in [1, 0].into_iter().filter(|s| masks[*s] != 0) {
             let x = p3(p.motion.position(i));
             let walked = surface.closest(body.skin, &x, p.nearest[i][side], masks[side]);
-            let c = nearer(surface, body.skin, &x, walked, near[side], masks[side]);
+            let c = near[side].or_nearer(surface, body.skin, &x, walked, masks[side]);
             p.nearest[i][side] = c.vertex;
             let elsewhere = side == 1 && c.signed < -OTHER_DEPTH;
             let nothing = body.buried.holds_nothing(surface.faces()[c.face as usize]);
@@ -243,7 +243,7 @@ pub(super) fn settle(model: &Model, garment: usize, patch: usize, body: &Settled
             let lifted = p3(p.motion.position(i));
             let again = surface.closest(body.skin, &lifted, c.vertex, masks[side]);
             p.report.penetration_left = p.report.penetration_left.max(f64::from(-again.signed));
-            near = body.near.vertices(surface, &lifted, masks);
+            near = body.near.around(surface, body.skin, &lifted, masks);
         }
     }
 }
