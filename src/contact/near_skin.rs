@@ -50,22 +50,23 @@ impl NearSkin {
 pub struct Near([Option<u32>; 2]);
 
 impl Near {
-    /// Where a walk led, or a point around these vertices that is nearer to `x`. In a fold the nearest vertex may belong to
-    /// the skin in front of `x`, and the nearest triangle to that above it.
+    /// Where a walk led, if anywhere, or a point around these vertices that is nearer to `x`. In a fold the nearest vertex may
+    /// belong to the skin in front of `x`, and the nearest triangle to that above it.
     pub fn or_nearer(
         &self,
         surface: &SurfaceModel,
         frame: &SurfaceFrame,
         x: &P3,
-        walked: Closest,
+        walked: Option<Closest>,
         mask: Part,
-    ) -> Closest {
+    ) -> Option<Closest> {
         self.0.iter().flatten().fold(walked, |best, v| {
-            if *v == best.vertex {
+            if best.is_some_and(|b| b.vertex == *v) {
                 return best;
             }
             let other = surface.closest_around(frame, x, *v, mask);
-            if !other.rim && other.signed.abs() < best.signed.abs() { other } else { best }
+            let nearer = best.is_none_or(|b| other.signed.abs() < b.signed.abs());
+            if nearer && !other.rim { Some(other) } else { best }
         })
     }
 }
@@ -99,14 +100,15 @@ mod tests {
         assert!(walked.signed > 0.0 && walked.vertex < n, "{walked:?}");
         let [own, other] = near.around(&surface, &frame, &x, [1, 2]);
         assert!(own.0.iter().all(|v| v.is_some_and(|v| v >= n)) && other == Near::default(), "{own:?} {other:?}");
-        let found = own.or_nearer(&surface, &frame, &x, walked, 1);
+        let found = own.or_nearer(&surface, &frame, &x, Some(walked), 1).expect("skin");
         assert!((found.signed + 0.002).abs() < 3e-4, "{}", found.signed);
         // Nothing within reach, or nothing nearer: the walk stands.
         let far = P3::new(0.1, 0.0, 0.0);
         assert_eq!(near.around(&surface, &frame, &far, [1, 1]), [Near::default(); 2]);
         let walked = surface.closest(&frame, &far, n, 1);
+        assert_eq!(Near::default().or_nearer(&surface, &frame, &far, None, 1), None);
         for near in [Near::default(), Near([Some(0), Some(1)])] {
-            assert_eq!(near.or_nearer(&surface, &frame, &far, walked, 1), walked);
+            assert_eq!(near.or_nearer(&surface, &frame, &far, Some(walked), 1), Some(walked));
         }
     }
 
@@ -133,7 +135,7 @@ mod tests {
         assert!(own.0[0].is_some_and(|v| v < n) && own.0[1].is_some_and(|v| v >= n), "{own:?}");
         let walked = surface.closest(&frame, &x, 0, 1);
         assert!(walked.signed > 0.0035 && walked.vertex < n, "{walked:?}");
-        let found = own.or_nearer(&surface, &frame, &x, walked, 1);
+        let found = own.or_nearer(&surface, &frame, &x, Some(walked), 1).expect("skin");
         assert!((found.signed + 0.002).abs() < 1e-5, "{found:?}");
     }
 }

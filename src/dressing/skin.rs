@@ -63,12 +63,15 @@ impl<'a> Skin<'a> {
     pub(super) fn closest(&self, p: &P3, start: u32, mask: Part) -> Closest {
         let walked = self.model.closest(&self.frame, p, start, mask);
         let [near, _] = self.near.around(self.model, &self.frame, p, [mask, 0]);
-        near.or_nearer(self.model, &self.frame, p, walked, mask)
+        near.or_nearer(self.model, &self.frame, p, Some(walked), mask).unwrap_or(walked)
     }
     /// Of two kinds of parts the nearest points to `p` where walks led, or nearer ones that no walk led to.
     pub(super) fn nearer(&self, p: &P3, walked: [Closest; 2], masks: [Part; 2]) -> [Closest; 2] {
         let near = self.near.around(self.model, &self.frame, p, masks);
-        std::array::from_fn(|k| near[k].or_nearer(self.model, &self.frame, p, walked[k], masks[k]))
+        std::array::from_fn(|k| {
+            let found = near[k].or_nearer(self.model, &self.frame, p, Some(walked[k]), masks[k]);
+            found.unwrap_or(walked[k])
+        })
     }
     /// The body as cloth meets it, and what is known about its skin.
     pub(super) fn known(self) -> (Vec<P3>, Buried, Apart) {

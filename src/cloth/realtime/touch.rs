@@ -230,8 +230,11 @@ pub(super) fn settle(model: &Model, garment: usize, patch: usize, body: &Settled
         // The own parts have the last word.
         for side in [1, 0].into_iter().filter(|s| masks[*s] != 0) {
             let x = p3(p.motion.position(i));
-            let walked = surface.closest(body.skin, &x, p.nearest[i][side], masks[side]);
-            let c = near[side].or_nearer(surface, body.skin, &x, walked, masks[side]);
+            // Skin of other parts is far from most cloth.
+            let reach = if side == 1 { OTHER_DEPTH } else { f32::MAX };
+            let (vertex, walked) = surface.closest_within(body.skin, &x, p.nearest[i][side], masks[side], reach);
+            p.nearest[i][side] = vertex;
+            let Some(c) = near[side].or_nearer(surface, body.skin, &x, walked.ok(), masks[side]) else { continue };
             p.nearest[i][side] = c.vertex;
             let elsewhere = side == 1 && c.signed < -OTHER_DEPTH;
             let nothing = body.buried.holds_nothing(surface.faces()[c.face as usize]);
