@@ -24,7 +24,7 @@ const FRONT: f32 = 0.03;
 const SLICE: f32 = 0.02;
 const SLICES: usize = 12;
 /// Where limbs just touch, there is at most so much room, metres; all of it where they lie in each other: cloth that has room
-/// lies below the skin as it is measured.
+/// lies below the skin as it is measured, by up to half of it.
 const TOUCHING: f32 = 0.007;
 /// On which side of the plane between them the limbs lie.
 const SIDES: [f32; 2] = [-1.0, 1.0];

@@ -233,9 +233,9 @@ pub(super) fn settle(model: &Model, garment: usize, patch: usize, body: &Settled
             // Skin of other parts is far from most cloth.
             let reach = if side == 1 { OTHER_DEPTH } else { f32::MAX };
             let (vertex, walked) = surface.closest_within(body.skin, &x, p.nearest[i][side], masks[side], reach);
-            p.nearest[i][side] = vertex;
-            let Some(c) = near[side].or_nearer(surface, body.skin, &x, walked.ok(), masks[side]) else { continue };
-            p.nearest[i][side] = c.vertex;
+            let found = near[side].or_nearer(surface, body.skin, &x, walked.ok(), masks[side]);
+            p.nearest[i][side] = found.map_or(vertex, |c| c.vertex);
+            let Some(c) = found else { continue };
             let elsewhere = side == 1 && c.signed < -OTHER_DEPTH;
             let nothing = body.buried.holds_nothing(surface.faces()[c.face as usize]);
             if c.rim || c.signed >= LIFTED || elsewhere || nothing {

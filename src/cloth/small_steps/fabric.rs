@@ -7,7 +7,7 @@
 use super::blocks::{Hinges, Quads, hinges, quads};
 use super::lanes::{LANES, Place};
 use super::plan::{Bent, Plan, Triangle};
-use super::struts::Across;
+use super::struts::Diagonal;
 use crate::cloth::pieces;
 
 /// The most vertices a patch may have.
@@ -61,7 +61,7 @@ pub struct Fabric {
     pub(super) bend_count: Vec<u16>,
     pub(super) bend: Vec<(Place, f32)>,
     pub(super) bent: Vec<Hinges>,
-    pub(super) across: Vec<Across>,
+    pub(super) diagonals: Vec<Diagonal>,
     pub(super) damping: f32,
 }
 
@@ -229,9 +229,10 @@ impl Plan {
         let (rows, far) = rows(&ends, &weight, &inverse_mass);
         let triangles = self.triangles.iter().filter(|t| inside(&t.v)).map(|t| Triangle { v: t.v.map(at), ..*t });
         let bent = self.bent.iter().filter(|b| inside(&b.v)).map(|b| Bent { v: b.v.map(at), ..*b });
-        let across = self.across.iter().filter(|s| inside(&s.ends)).map(|s| Across { ends: s.ends.map(at), ..*s });
+        let diagonals =
+            self.diagonals.iter().filter(|s| inside(&s.ends)).map(|s| Diagonal { ends: s.ends.map(at), ..*s });
         Fabric {
-            across: across.collect(),
+            diagonals: diagonals.collect(),
             quads: quads(&triangles.collect::<Vec<_>>()),
             rows,
             far,

@@ -2,7 +2,7 @@
 
 use super::filter::Filter;
 use super::stability::{bending_eigenvalue, element_limits, laid_flat, membrane_eigenvalue, soften};
-use super::struts::{Across, across};
+use super::struts::{Diagonal, diagonals};
 use crate::cloth::{Element, Sheet};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 
@@ -56,7 +56,7 @@ pub struct Plan {
     /// Vertex pairs and the stiffness of bending between them, N/m.
     pub(super) bend: Vec<([u32; 2], f32)>,
     pub(super) bent: Vec<Bent>,
-    pub(super) across: Vec<Across>,
+    pub(super) diagonals: Vec<Diagonal>,
     /// Weight of each edge in the smoothing of accelerations, kg.
     pub(super) smooth: Vec<f32>,
     /// Coefficients of the smoothing, the lowest (1) first.
@@ -157,7 +157,7 @@ impl Plan {
             triangles,
             bend: bending.into_iter().map(|(v, w)| (v, w as f32)).collect(),
             bent,
-            across: across(sheet).map(|(ends, flat)| Across { ends, flat: flat as f32 }).collect(),
+            diagonals: diagonals(sheet).map(|(ends, flat)| Diagonal { ends, flat: flat as f32 }).collect(),
             smooth: filter.weight.iter().map(|w| *w as f32).collect(),
             smoothing: filter.w.iter().map(|c| *c as f32).collect(),
             damping: sheet.damping as f32,

@@ -12,7 +12,7 @@ use std::collections::HashMap;
 
 /// Two corners opposite each other across an edge, and how far apart they are where it is flat, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Across {
+pub(super) struct Diagonal {
     pub(super) ends: [u32; 2],
     pub(super) flat: f32,
 }
@@ -48,7 +48,7 @@ const SHORTEST: f32 = 1e-6;
 const WIDEST: f32 = 0.02;
 
 /// The corners across every hinge of a sheet and how far apart they are where it is flat, metres.
-pub(super) fn across(sheet: &Sheet) -> impl Iterator<Item = ([u32; 2], f64)> {
+pub(super) fn diagonals(sheet: &Sheet) -> impl Iterator<Item = ([u32; 2], f64)> {
     let edges: HashMap<[u32; 2], f64> =
         sheet.edges.iter().map(|(v, l)| ([v[0].min(v[1]), v[0].max(v[1])], *l)).collect();
     sheet.hinges.iter().filter_map(move |h| {
@@ -69,7 +69,7 @@ impl Motion {
     /// Struts that may become shorter than `limit` times their flat length within `span` seconds, none if that is 0.
     pub fn short(&self, f: &Fabric, limit: f32, span: f32, except: &Excepted<'_>, out: &mut Vec<Strut>) {
         out.clear();
-        let all = if limit > 0.0 { &f.across[..] } else { &[] };
+        let all = if limit > 0.0 { &f.diagonals[..] } else { &[] };
         for s in all {
             let [a, b] = s.ends.map(|v| v as usize);
             let d = self.position(b) - self.position(a);
@@ -127,7 +127,7 @@ mod tests {
     fn corners_across_an_edge_are_as_far_apart_as_in_the_flat_sheet() {
         let (x, faces, rest) = grid(5, 4, 0.02, 0.013);
         let s = sheet(&faces, &rest, x.len(), &cotton(1e-5));
-        let all: Vec<_> = across(&s).collect();
+        let all: Vec<_> = diagonals(&s).collect();
         assert_eq!(all.len(), s.hinges.len());
         for (ends, flat) in all {
             let is = (x[ends[0] as usize] - x[ends[1] as usize]).norm();
@@ -180,7 +180,7 @@ mod tests {
                 m.velocity[i] = V4::default();
             }
             m.advance(f, &step, f32::INFINITY);
-            for a in &f.across {
+            for a in &f.diagonals {
                 let d = v3(m.position(a.ends[0] as usize)) - v3(m.position(a.ends[1] as usize));
                 sharpest = sharpest.min(d.norm() / f64::from(a.flat));
             }
