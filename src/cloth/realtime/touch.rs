@@ -18,6 +18,8 @@ const TORN: f32 = 1.5;
 /// Between skins with less room than this cloth stays on its own half, metres, and so far from the middle.
 const HALVED: f32 = 0.03;
 const HALF_GAP: f32 = 0.00125;
+/// Cloth that seems to be deeper than this in skin has been led astray, metres: it was outside at the end of the last call.
+const ASTRAY: f32 = 0.01;
 /// Anchors of strength ½ go to their place at this rate, 1/s.
 const ANCHOR_RATE: f64 = 120.0;
 
@@ -52,6 +54,7 @@ impl Touch<'_> {
     /// Planes of a patch for this round.
     pub(super) fn find(&self, garment: usize, f: &Fabric, maps: Option<&DepthMaps>, p: &mut PatchScratch) {
         let g = &self.model.garments[garment];
+        let around = |v: u32| g.folds.surface.neighbours(v);
         let offset = g.offset as f32;
         let reach = self.model.config.reach as f32;
         // Planes that contradict each other would tear cloth apart: it gives way, and hangs on its neighbours.
@@ -85,7 +88,8 @@ impl Touch<'_> {
                 }
                 let surface = &self.model.surface;
                 let wanted = (offset + reach + travel).min(REACH);
-                let (near, c) = surface.closest_within(self.now, &x, p.nearest[i][k], masks[k], wanted);
+                let told = around(v).iter().map(|w| self.nearest[garment].nearest[*w as usize][k]);
+                let (near, c) = self.search(&x, p.nearest[i][k], told, masks[k], wanted);
                 p.nearest[i][k] = near;
                 match c {
                     Err(room) => p.clear[i][k] = room + wanted - offset - reach,
@@ -133,6 +137,25 @@ impl Touch<'_> {
                 });
             }
         }
+    }
+
+    /// The nearest skin of some parts, by a walk from `start`. A wrong one leads to the other side of the trunk, and the plane
+    /// there draws cloth through it at 12 m/s; where that seems to be so, what neighbours were told is tried.
+    fn search(
+        &self,
+        x: &P3,
+        start: u32,
+        told: impl Iterator<Item = u32>,
+        mask: u8,
+        reach: f32,
+    ) -> (u32, Result<Closest, f32>) {
+        let from = |start: u32| self.model.surface.closest_within(self.now, x, start, mask, reach);
+        let walked = from(start);
+        if !walked.1.is_ok_and(|c| c.signed < -ASTRAY) {
+            return walked;
+        }
+        let far = |found: &(u32, Result<Closest, f32>)| found.1.map_or(f32::INFINITY, |c| c.signed.abs());
+        told.map(from).fold(walked, |best, other| if far(&other) < far(&best) { other } else { best })
     }
 
     /// A walk may end on a finger that is not the nearest one, where no map sees the gap. Cloth beside it knows better.
