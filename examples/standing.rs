@@ -1,6 +1,9 @@
 //! A person who stands, waves or walks off: what of her clothes sleeps, how long a call takes, how far off that is.
 //!
-//! `cargo run --release --example standing -- [--garment skirt+tshirt] [--edge 0.0118] [--threads 2] [--calls 120]`
+//! `cargo run --release --example standing -- [--garment skirt+tshirt] [--edge 0.0118] [--threads 2] [--calls 120]
+//!   [--rounds 2] [--arms 75]`
+//!
+//! `--arms`: degrees below the horizontal; 75 hang, without it they are off the trunk.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
 
 use tryon::cloth::realtime::Config;
@@ -8,8 +11,12 @@ use tryon::evaluate::cloth_rest::{Doing, Standing, Wearing};
 use tryon::par::with_threads;
 
 fn main() {
-    let mut wearing =
-        Wearing { garments: vec!["skirt".into(), "tshirt".into()], edge: 0.0118, config: Config::default() };
+    let mut wearing = Wearing {
+        garments: vec!["skirt".into(), "tshirt".into()],
+        edge: 0.0118,
+        config: Config::default(),
+        arms: None,
+    };
     let (mut threads, mut calls, mut rounds) = (2, 120, 2);
     let mut it = std::env::args().skip(1);
     while let Some(flag) = it.next() {
@@ -19,6 +26,7 @@ fn main() {
             "--edge" => wearing.edge = value.parse().expect("metres"),
             "--threads" => threads = value.parse().expect("a number"),
             "--calls" => calls = value.parse().expect("a number"),
+            "--arms" => wearing.arms = Some(value.parse::<f64>().expect("degrees").to_radians()),
             "--rounds" => rounds = value.parse().expect("a number"),
             other => panic!("{other} is not known"),
         }

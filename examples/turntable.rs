@@ -316,14 +316,15 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
         |(_, film)| film,
     );
     let frames = film.len();
-    let (mut ms, mut last) = (0.0, None);
+    let (mut ms, mut last, mut rested) = (0.0, None, None);
     let mut all_crossed = vec![0; state.garments.len()];
     let (mut roomy, mut room_ms) = (RoomyBody::new(&template, &options.config).expect("a body"), 0.0);
     let mut verts = posed(&template, &rest, &start);
-    for body in film {
+    for (call, body) in film.into_iter().enumerate() {
         verts = body;
         let r = step(&model, &mut state, &Input { body: &verts, dt: 1.0 / 30.0 }, &mut work).expect("step");
         ms += r.stages_ms.total;
+        rested = if r.sleeping < vertices.iter().sum() { None } else { rested.or(Some(call + 1)) };
         all_crossed.iter_mut().zip(crossed(&state)).for_each(|(all, now)| *all += now);
         let started = std::time::Instant::now();
         roomy.make_room(tryon::par::Par::Rayon, &verts);
@@ -339,6 +340,10 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
             r.p99_strain,
             r.max_strain
         );
+        match rested {
+            Some(call) => println!("  at rest after {call} of {frames} calls"),
+            None => println!("  {} vertices asleep at the end", r.sleeping),
+        }
         let mean: Vec<usize> = all_crossed.iter().map(|n| n / frames).collect();
         println!("  edges through its own triangles: {:?}, over all pictures {mean:?}", crossed(&state));
     }

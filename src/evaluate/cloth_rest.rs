@@ -5,8 +5,9 @@ use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use crate::cloth::realtime::{Config, Input, State, StepReport, Workspace, step};
 use crate::dressing::{DressOptions, Dressed, dress};
 use crate::garment::{Size, library};
-use crate::math::{Body, P3, Rigid, V3, World};
+use crate::math::{Body, P3, Rigid, V3, V3d, World, log_so3};
 use crate::par::Par;
+use nalgebra::UnitQuaternion;
 use rand::{Rng, SeedableRng};
 use std::sync::Arc;
 use std::time::Instant;
@@ -25,6 +26,8 @@ pub struct Wearing {
     pub edge: f64,
     /// The solver while dressing.
     pub config: Config,
+    /// Angle of straight arms below the horizontal, rad; as in the rest pose (off the trunk) if there is none.
+    pub arms: Option<f64>,
 }
 
 /// What the person does after she has stood still for two seconds.
@@ -59,6 +62,7 @@ pub struct RestReport {
 pub struct Standing {
     template: Arc<Template>,
     rest: RestBody,
+    standing: Pose<World>,
     /// The outfit on her.
     pub dressed: Dressed,
 }
@@ -76,14 +80,17 @@ impl Standing {
         let patterns = patterns.collect::<Result<Vec<_>, _>>().map_err(|e| fault(e.to_string()))?;
         let mut options = DressOptions { config: wearing.config.clone(), ..DressOptions::default() };
         options.triangulation.edge_length = wearing.edge;
-        let pose = Pose::rest(template.skeleton(), Rigid::<World, Body>::identity());
-        let dressed = dress(&template, &rest, &pose, &patterns, &options).map_err(|e| fault(e.to_string()))?;
-        Ok(Self { template, rest, dressed })
+        let mut standing = Pose::rest(template.skeleton(), Rigid::<World, Body>::identity());
+        if let Some(angle) = wearing.arms {
+            lower_arms(&template, &rest, angle, &mut standing);
+        }
+        let dressed = dress(&template, &rest, &standing, &patterns, &options).map_err(|e| fault(e.to_string()))?;
+        Ok(Self { template, rest, standing, dressed })
     }
     /// Her skin at a time since she began doing something, s, in world coordinates, metres.
     pub fn body(&self, doing: Doing, time: f64) -> Vec<P3> {
         let skeleton = self.template.skeleton();
-        let mut pose = Pose::rest(skeleton, Rigid::<World, Body>::identity());
+        let mut pose = self.standing.clone();
         let phase = std::f64::consts::PI * time.max(0.0);
         let turns = match doing {
             Doing::Waving => [0.2 * phase.sin(), 0.3 * (1.0 - (2.0 * phase).cos())],
@@ -143,6 +150,21 @@ impl Standing {
         }
         self.dressed.model.config = before;
         Ok(report)
+    }
+}
+
+/// Turns the upper arms to `angle` below the horizontal, to the sides.
+fn lower_arms(template: &Template, rest: &RestBody, angle: f64, pose: &mut Pose<World>) {
+    let skeleton = template.skeleton();
+    for (side, s) in [("left", 1.0), ("right", -1.0)] {
+        let [shoulder, elbow] = ["shoulder", "elbow"].map(|n| skeleton.index(&format!("{side}_{n}")));
+        let (Some(shoulder), Some(elbow)) = (shoulder, elbow) else { continue };
+        let down = V3d::new(s * angle.cos(), -angle.sin(), 0.0);
+        let turn = UnitQuaternion::rotation_between(&(rest.joints[elbow] - rest.joints[shoulder]), &down);
+        let at = skeleton.dof_offset(shoulder);
+        if let (Some(turn), Some(angles)) = (turn, pose.angles.get_mut(at..at + 3)) {
+            angles.copy_from_slice(log_so3(&turn).as_slice());
+        }
     }
 }
 

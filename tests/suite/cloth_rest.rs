@@ -10,7 +10,7 @@ fn her() -> MutexGuard<'static, Standing> {
     static HER: OnceLock<Mutex<Standing>> = OnceLock::new();
     let dressed = || {
         let garments = ["skirt", "tshirt"].map(str::to_owned).to_vec();
-        Mutex::new(Standing::new(&Wearing { garments, edge: 0.02, config: Config::default() }).unwrap())
+        Mutex::new(Standing::new(&Wearing { garments, edge: 0.02, config: Config::default(), arms: None }).unwrap())
     };
     HER.get_or_init(dressed).lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
@@ -21,6 +21,20 @@ fn run(config: &Config, doing: Doing, calls: usize, noise: f32) -> RestReport {
 
 fn never(base: Config) -> Config {
     Config { sleep: false, ..base }
+}
+
+/// As shoppers stand. Between arm and trunk cloth has two skins to lie on, and would jump from one to the other for ever.
+#[test]
+fn clothes_of_someone_who_stands_with_hanging_arms_come_to_rest() {
+    for garments in [vec!["skirt", "tshirt"], vec!["longsleeve"], vec!["hoodie"]] {
+        let names = garments.iter().map(|g| (*g).to_owned()).collect();
+        let wearing = Wearing { garments: names, edge: 0.02, config: Config::default(), arms: Some(1.3) };
+        let mut her = Standing::new(&wearing).unwrap();
+        let r = her.run(&Config::default(), Doing::Standing, 30, 0.0).unwrap();
+        println!("{garments:?}: {:?} asleep, deepest {:.2} mm", r.asleep, r.penetration * 1e3);
+        assert!(r.asleep.iter().all(|a| *a == 1.0), "{garments:?}: {:?}", r.asleep);
+        assert!(r.penetration < 2e-3, "{}", r.penetration);
+    }
 }
 
 #[test]

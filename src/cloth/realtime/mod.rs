@@ -8,6 +8,7 @@ mod roomy;
 mod state;
 mod steady;
 mod step;
+mod still;
 mod touch;
 mod untangle;
 

@@ -6,7 +6,7 @@
 use super::carry::ways;
 use super::model::Model;
 use super::state::{GarmentState, PatchScratch, State};
-use super::step::stillness;
+use super::still::stillness;
 use crate::cloth::pieces::{Pieces, cut};
 use crate::cloth::small_steps::Fabric;
 use crate::contact::SurfaceModel;

@@ -46,6 +46,9 @@ pub struct State {
     /// What of the cloth sleeps by itself.
     #[serde(default)]
     pub(super) rest: Rest,
+    /// How long the body has been still, s.
+    #[serde(default)]
+    pub(super) quiet_for: f64,
     /// Steps so far.
     pub frames: u64,
     /// Steps in a row with body and cloth still.

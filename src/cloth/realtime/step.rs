@@ -6,6 +6,7 @@ use super::model::{Model, RECALLED};
 use super::regions::{carry_on, fall_asleep, wake, wake_all};
 use super::state::{Input, PatchScratch, State, StepReport, Workspace, check_body};
 use super::steady::follow;
+use super::still::{coming_to_rest, is_quiet, sleeps_on};
 use super::touch::{Settled, Touch, anchors, settle};
 use crate::cloth::ClothError;
 use crate::cloth::small_steps::{Borders, Excepted, Step, V4};
@@ -27,15 +28,6 @@ const CALM: f32 = 1.0;
 const STILL_SPEED: f32 = 0.02;
 /// The same on a body that trembles: a skirt that is shaken by a millimetre swings at 0.04 to 0.13 m/s, m/s.
 const TREMBLING_SPEED: f32 = 0.15;
-/// Skin of a trembling body that no cloth is near may move this many times as far: hands were seen to wander by 9 mm
-/// where skin under cloth stayed within 4.
-const ELSEWHERE: f32 = 4.0;
-/// Sleeping cloth rides on a tracked body that sways, so many times as far as it may to let cloth fall asleep (a standing
-/// person sways by one or two centimetres either way within some seconds), and by so many times from call to call (a
-/// person who stands still is measured anew at every sixth picture only).
-const SWAY: [f32; 2] = [5.0, 2.0];
-/// A body that has moved less than this since the cloth was last computed is still, metres.
-const STILL_BODY: f32 = 1e-3;
 /// Calls with everything still before the cloth falls asleep.
 const STILL_FRAMES: u32 = 10;
 
@@ -116,6 +108,8 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         report.stages_ms.total = ms(started);
         return report;
     }
+    // On this body, not the last one: who walks off shall find her cloth free.
+    let quiet = is_quiet(config.steady, state, input.body);
     // The mean, not the farthest vertex: a waving hand is no teleport, and carrying cloth costs it its folds.
     let sum: f64 = state.body.iter().zip(input.body).map(|(a, b)| f64::from((a - b).norm())).sum();
     let teleported = sum / input.body.len().max(1) as f64 > config.teleport;
@@ -127,6 +121,8 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         state.body.copy_from_slice(input.body);
     }
     let dt = input.dt.clamp(DT_RANGE[0], DT_RANGE[1]);
+    state.quiet_for = if quiet { state.quiet_for + dt } else { 0.0 };
+    let limit = if config.sleep { coming_to_rest(state.quiet_for) } else { None };
     wake(model, state, input.body, dt, teleported);
     let timer = Instant::now();
     // Two opposite views in turn: a map only proposes where to begin looking, and all are wanted after a jump.
@@ -191,7 +187,7 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         });
         report.stages_ms.contact += ms(timer);
         let timer = Instant::now();
-        advance(model, &mut work.patches, span);
+        advance(model, &mut work.patches, span, limit);
         report.stages_ms.solve += ms(timer);
     }
     let timer = Instant::now();
@@ -211,7 +207,6 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         fall_asleep(model, state, &work.patches, input.body, dt);
     }
     state.stale = if report.kept_last_good.is_some() { state.stale + 1 } else { 0 };
-    let quiet = is_quiet(config.steady, state, input.body);
     if !quiet {
         state.awake_body.copy_from_slice(input.body);
     }
@@ -221,34 +216,6 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
     report.stages_ms.solve += ms(timer);
     report.stages_ms.total = ms(started);
     report
-}
-
-/// The body is where it was when it last stirred: its skin under cloth, and roughly the rest of it, whose hands and feet
-/// a tracker knows less well. Where noise was taken away, what is left of it is no motion either.
-fn is_quiet(steady: f64, state: &State, body: &[P3]) -> bool {
-    let [worn, elsewhere] = stillness(steady);
-    let within = |v: usize, most: f32| (body[v] - state.awake_body[v]).norm_squared() < most * most;
-    (0..body.len()).all(|v| within(v, elsewhere)) && skin_worn(state).all(|v| within(v, worn))
-}
-
-/// Sleeping cloth rides on a tracked body that sways, until that has gone too far from where it fell asleep, or too fast.
-fn sleeps_on(steady: f64, state: &State, body: &[P3]) -> bool {
-    let [worn, elsewhere] = stillness(steady);
-    let [sway, hop] = if steady > 0.0 { SWAY } else { [1.0; 2] };
-    let within = |from: &[P3], v: usize, most: f32| (body[v] - from[v]).norm_squared() < most * most;
-    (0..body.len()).all(|v| within(&state.awake_body, v, sway * elsewhere))
-        && skin_worn(state).all(|v| within(&state.awake_body, v, sway * worn) && within(&state.body, v, hop * worn))
-}
-
-/// How far skin under cloth, and any other, may be from where it last stirred, metres.
-pub(super) fn stillness(steady: f64) -> [f32; 2] {
-    let still = STILL_BODY.max(0.5 * steady as f32);
-    [still, if steady > 0.0 { ELSEWHERE * still } else { still }]
-}
-
-/// Skin that cloth lies on.
-fn skin_worn(state: &State) -> impl Iterator<Item = usize> + '_ {
-    state.garments.iter().flat_map(|g| &g.nearest).flatten().map(|v| *v as usize)
 }
 
 fn steps(h: f64, span: f64) -> usize {
@@ -309,8 +276,8 @@ fn begin(model: &Model, state: &State, all: &mut Vec<PatchScratch>) {
     });
 }
 
-/// All patches through `span` seconds. Garments do not wait for each other, patches of one garment do.
-fn advance(model: &Model, all: &mut [PatchScratch], span: f64) {
+/// All patches through `span` seconds, none faster than `limit` m/s if there is one. Garments do not wait for each other, patches of one garment do.
+fn advance(model: &Model, all: &mut [PatchScratch], span: f64, limit: Option<f32>) {
     let gravity =
         V4::new(model.config.gravity[0] as f32, model.config.gravity[1] as f32, model.config.gravity[2] as f32);
     let ahead = model.config.ahead as f32;
@@ -351,6 +318,9 @@ fn advance(model: &Model, all: &mut [PatchScratch], span: f64) {
             let (body, cloth) = p.near.split_at(p.body_near);
             p.motion.restrain(cloth, t, h, CLOTH_RECOVERY);
             p.report.contacts = p.motion.restrain(body, t, h, RECOVERY);
+            if let Some(limit) = limit {
+                p.motion.slow_down(limit, &Excepted { held: &p.tied, free: &p.drawn });
+            }
             p.motion.advance(f, &step, FASTEST);
             borders.tell(s, k, f, &p.motion);
         });

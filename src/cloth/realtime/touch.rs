@@ -54,7 +54,6 @@ impl Touch<'_> {
     /// Planes of a patch for this round.
     pub(super) fn find(&self, garment: usize, f: &Fabric, maps: Option<&DepthMaps>, p: &mut PatchScratch) {
         let g = &self.model.garments[garment];
-        let around = |v: u32| g.folds.surface.neighbours(v);
         let offset = g.offset as f32;
         let reach = self.model.config.reach as f32;
         // Planes that contradict each other would tear cloth apart: it gives way, and hangs on its neighbours.
@@ -88,7 +87,8 @@ impl Touch<'_> {
                 }
                 let surface = &self.model.surface;
                 let wanted = (offset + reach + travel).min(REACH);
-                let told = around(v).iter().map(|w| self.nearest[garment].nearest[*w as usize][k]);
+                let around = g.folds.surface.neighbours(v).iter();
+                let told = around.map(|w| self.nearest[garment].nearest[*w as usize][k]);
                 let (near, c) = self.search(&x, p.nearest[i][k], told, masks[k], wanted);
                 p.nearest[i][k] = near;
                 match c {

@@ -22,6 +22,9 @@ const ABOVE: f64 = 5e-4;
 /// Skin further away than this says nothing about where inside is, metres.
 const NEAR: f64 = 0.02;
 
+/// Once a body has been still for so long nothing is looked at: what no room has to come apart would never rest, s.
+const LAST: f64 = 1.0;
+
 /// Scratch of it.
 #[derive(Debug, Default)]
 pub(super) struct Untangle {
@@ -37,7 +40,8 @@ impl Untangle {
     /// Looks at the garments whose turn it is in a call of `dt` seconds and that do not sleep, on the body of the last
     /// call. Says how many edges passed through triangles.
     pub(super) fn look(&mut self, model: &Model, state: &mut State, body: &SurfaceFrame, dt: f64) -> usize {
-        if model.config.untangle <= 0.0 {
+        let resting = model.config.sleep && state.quiet_for > LAST;
+        if model.config.untangle <= 0.0 || resting {
             return 0;
         }
         let every = (model.config.untangle / dt).round().max(1.0) as u64;

@@ -2,6 +2,7 @@
 
 use super::awake::Awake;
 use super::fabric::{Fabric, MOST};
+use super::struts::Excepted;
 
 /// Four floats that load at once: x, y, z and a spare lane.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -153,6 +154,15 @@ impl Motion {
             }
         }
     }
+    /// No vertex stays faster than `most` m/s.
+    pub fn slow_down(&mut self, most: f32, except: &Excepted<'_>) {
+        for ((v, held), free) in self.velocity.iter_mut().zip(except.held).zip(except.free) {
+            let square = v.dot(*v);
+            if !held && !free && square > most * most {
+                *v = v.scale(most / square.sqrt());
+            }
+        }
+    }
     /// Velocities after a step of `h` under bending, gravity and air alone.
     pub fn fall(&mut self, f: &Fabric, h: f32, gravity: V4) {
         let keep = 1.0 / (1.0 + h * f.damping);
@@ -160,5 +170,25 @@ impl Motion {
         for ((v, a), m) in self.velocity.iter_mut().zip(&self.work.bending).zip(&f.inverse_mass) {
             *v = (*v + a.scale(m * h) + fall).scale(keep);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_is_fast_and_free_to_go_slower_is_slowed_down() {
+        let v = |x: f32, y: f32| V4::new(x, y, 0.0);
+        let mut motion = Motion {
+            velocity: vec![v(3.0, 4.0), v(0.3, 0.4), v(3.0, 4.0), v(3.0, 4.0), v(0.0, 0.0)],
+            ..Motion::default()
+        };
+        let (held, free) = ([false, false, true, false, false], [false, false, false, true, false]);
+        motion.slow_down(0.5, &Excepted { held: &held, free: &free });
+        let speeds: Vec<f32> = motion.velocity.iter().map(|v| v.dot(*v).sqrt()).collect();
+        assert_eq!(speeds, [0.5, 0.5, 5.0, 5.0, 0.0]);
+        // The way stays the same.
+        assert!((motion.velocity[0].0[0] - 0.3).abs() < 1e-6);
     }
 }

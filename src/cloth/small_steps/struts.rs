@@ -27,12 +27,12 @@ pub struct Strut {
     share: [f32; 2],
 }
 
-/// Vertices, by their numbers, that struts treat in another way.
+/// Vertices, by their numbers, that struts and limits of speed leave as they are.
 #[derive(Clone, Copy, Debug)]
 pub struct Excepted<'a> {
     /// They go nowhere.
     pub held: &'a [bool],
-    /// They have none.
+    /// They go as far and as fast as they must.
     pub free: &'a [bool],
 }
 
