@@ -1,7 +1,7 @@
 //! A pattern sewn: one welded simulation mesh whose triangles keep their flat rest shape.
 
 use super::triangulate::{PanelMesh, triangulate};
-use super::{GarmentError, GarmentKind, Material, Pattern, Placement, Side, Size};
+use super::{GarmentError, GarmentKind, Material, Panel, Pattern, Placement, Side, Size};
 use crate::math::P3;
 use crate::mesh::{Face, Topology, TriMesh};
 use serde::{Deserialize, Serialize};
@@ -247,15 +247,17 @@ impl GarmentMesh {
     }
 }
 
+/// Edges of a hood are so much shorter: worn down it lies in folds that longer ones cannot show.
+const FOLDED: f64 = 0.66;
+
 /// Pieces of each edge of each panel: by length, equal on both sides of a seam.
 fn triangulate_all(pattern: &Pattern, how: &Triangulation) -> Result<Vec<PanelMesh>, GarmentError> {
+    let length = |p: &Panel| how.edge_length * if matches!(p.placement, Placement::Hood(_)) { FOLDED } else { 1.0 };
     let mut pieces: Vec<Vec<usize>> = pattern
         .panels
         .iter()
         .map(|p| {
-            (0..p.edges.len())
-                .map(|i| ((p.edges[i].length(p.end(i)) / how.edge_length).round() as usize).max(1))
-                .collect()
+            (0..p.edges.len()).map(|i| ((p.edges[i].length(p.end(i)) / length(p)).round() as usize).max(1)).collect()
         })
         .collect();
     for ((pa, ea), (pb, eb), _) in pattern.sewn() {
@@ -267,7 +269,7 @@ fn triangulate_all(pattern: &Pattern, how: &Triangulation) -> Result<Vec<PanelMe
         .iter()
         .zip(&pieces)
         .map(|(p, n)| {
-            let m = triangulate(p, n, how.edge_length)?;
+            let m = triangulate(p, n, length(p))?;
             if m.min_angle < how.min_angle {
                 return Err(GarmentError::Panel {
                     panel: p.name.clone(),
