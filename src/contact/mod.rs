@@ -2,6 +2,7 @@
 
 mod across;
 mod apart;
+mod astray;
 mod buried;
 mod creases;
 mod depth_maps;

@@ -53,7 +53,8 @@ mod tests {
     #[test]
     fn a_linear_map_of_the_panels_is_reproduced() {
         let p = library::pattern("skirt", Size::M).expect("pattern");
-        let sew = |edge_length| GarmentMesh::sew(&p, &Triangulation { edge_length, min_angle: 0.0 }).expect("sewn");
+        let how = |edge_length| Triangulation { edge_length, min_angle: 0.0, ..Triangulation::default() };
+        let sew = |edge_length| GarmentMesh::sew(&p, &how(edge_length)).expect("sewn");
         let (coarse, fine) = (sew(0.05), sew(0.02));
         // Inner vertices only: seams average two panels that a linear map pulls apart.
         let map = |q: [f64; 2]| V3d::new(2.0 * q[0] - q[1], 0.5 * q[0], 3.0 * q[1] + 1.0);

@@ -11,6 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct Triangulation {
     /// Target edge length, metres.
     pub edge_length: f64,
+    /// Longest edges of a hood, metres: worn down it lies in folds that longer ones cannot show.
+    pub hood_length: f64,
     /// Refuse a panel with a smaller angle than this, degrees.
     pub min_angle: f64,
 }
@@ -18,7 +20,7 @@ pub struct Triangulation {
 impl Default for Triangulation {
     fn default() -> Self {
         // 21 mm gives a T-shirt or a skirt about 2,000 vertices; the library's panels stay above 20°.
-        Self { edge_length: 0.021, min_angle: 12.0 }
+        Self { edge_length: 0.021, hood_length: 0.014, min_angle: 12.0 }
     }
 }
 
@@ -140,11 +142,11 @@ impl GarmentMesh {
     /// Faults of the pattern or of its triangulation, naming panel, edge or seam.
     pub fn sew(pattern: &Pattern, how: &Triangulation) -> Result<Self, GarmentError> {
         pattern.check()?;
-        if !(how.edge_length > 1e-3 && how.edge_length < 0.5) {
-            return Err(GarmentError::Field {
-                field: "edge_length".into(),
-                why: format!("{} m is not between 0.001 and 0.5", how.edge_length),
-            });
+        for (field, length) in [("edge_length", how.edge_length), ("hood_length", how.hood_length)] {
+            if !(length > 1e-3 && length < 0.5) {
+                let why = format!("{length} m is not between 0.001 and 0.5");
+                return Err(GarmentError::Field { field: field.into(), why });
+            }
         }
         let meshes = triangulate_all(pattern, how)?;
         let first: Vec<usize> = meshes
@@ -247,12 +249,12 @@ impl GarmentMesh {
     }
 }
 
-/// Edges of a hood are so much shorter: worn down it lies in folds that longer ones cannot show.
-const FOLDED: f64 = 0.66;
-
 /// Pieces of each edge of each panel: by length, equal on both sides of a seam.
 fn triangulate_all(pattern: &Pattern, how: &Triangulation) -> Result<Vec<PanelMesh>, GarmentError> {
-    let length = |p: &Panel| how.edge_length * if matches!(p.placement, Placement::Hood(_)) { FOLDED } else { 1.0 };
+    let length = |p: &Panel| match p.placement {
+        Placement::Hood(_) => how.edge_length.min(how.hood_length),
+        _ => how.edge_length,
+    };
     let mut pieces: Vec<Vec<usize>> = pattern
         .panels
         .iter()

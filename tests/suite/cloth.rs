@@ -32,7 +32,7 @@ fn dressed_as(rest: &RestBody, pose: &Pose<World>, size: Size, edge_length: f64,
     let template = tryon::body::embedded::template();
     let patterns = ["skirt", "tshirt"].map(|n| library::pattern(n, size).expect("a pattern"));
     let options = DressOptions {
-        triangulation: Triangulation { edge_length, min_angle: 8.0 },
+        triangulation: Triangulation { edge_length, min_angle: 8.0, ..Triangulation::default() },
         config: config.clone(),
         ..DressOptions::default()
     };

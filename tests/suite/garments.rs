@@ -256,7 +256,7 @@ fn damaged_garmentcode_files_are_refused_or_read_but_never_panic() {
         if let Ok(raw) = parse_garmentcode(&damaged, at) {
             let p = from_garmentcode(&raw, "damaged", Size::M, Material::preset("cotton").expect("preset"));
             if let Ok(p) = p {
-                let how = Triangulation { edge_length: 0.05, min_angle: 0.0 };
+                let how = Triangulation { edge_length: 0.05, min_angle: 0.0, ..Triangulation::default() };
                 let _ = tryon::garment::GarmentMesh::sew(&p, &how);
             }
         }

@@ -18,8 +18,6 @@ const TORN: f32 = 1.5;
 /// Between skins with less room than this cloth stays on its own half, metres, and so far from the middle.
 const HALVED: f32 = 0.03;
 const HALF_GAP: f32 = 0.00125;
-/// Cloth that seems to be deeper than this in skin has been led astray, metres: it was outside at the end of the last call.
-const ASTRAY: f32 = 0.01;
 /// Anchors of strength ½ go to their place at this rate, 1/s.
 const ANCHOR_RATE: f64 = 120.0;
 
@@ -89,7 +87,7 @@ impl Touch<'_> {
                 let wanted = (offset + reach + travel).min(REACH);
                 let around = g.folds.surface.neighbours(v).iter();
                 let told = around.map(|w| self.nearest[garment].nearest[*w as usize][k]);
-                let (near, c) = self.search(&x, p.nearest[i][k], told, masks[k], wanted);
+                let (near, c) = surface.closest_unless_astray(self.now, &x, p.nearest[i][k], masks[k], wanted, told);
                 p.nearest[i][k] = near;
                 match c {
                     Err(room) => p.clear[i][k] = room + wanted - offset - reach,
@@ -137,25 +135,6 @@ impl Touch<'_> {
                 });
             }
         }
-    }
-
-    /// The nearest skin of some parts, by a walk from `start`. A wrong one leads to the other side of the trunk, and the plane
-    /// there draws cloth through it at 12 m/s; where that seems to be so, what neighbours were told is tried.
-    fn search(
-        &self,
-        x: &P3,
-        start: u32,
-        told: impl Iterator<Item = u32>,
-        mask: u8,
-        reach: f32,
-    ) -> (u32, Result<Closest, f32>) {
-        let from = |start: u32| self.model.surface.closest_within(self.now, x, start, mask, reach);
-        let walked = from(start);
-        if !walked.1.is_ok_and(|c| c.signed < -ASTRAY) {
-            return walked;
-        }
-        let far = |found: &(u32, Result<Closest, f32>)| found.1.map_or(f32::INFINITY, |c| c.signed.abs());
-        told.map(from).fold(walked, |best, other| if far(&other) < far(&best) { other } else { best })
     }
 
     /// A walk may end on a finger that is not the nearest one, where no map sees the gap. Cloth beside it knows better.

@@ -226,7 +226,9 @@ mod tests {
     #[test]
     fn panels_keep_their_area_seams_and_holes_with_a_tenth_of_the_vertices() {
         let p = library::pattern("tshirt", Size::M).expect("pattern");
-        let fine = GarmentMesh::sew(&p, &Triangulation { edge_length: 0.008, min_angle: 20.0 }).expect("sewn");
+        let fine =
+            GarmentMesh::sew(&p, &Triangulation { edge_length: 0.008, min_angle: 20.0, ..Triangulation::default() })
+                .expect("sewn");
         let at: Vec<P3> = (0..fine.vertices).map(|i| P3::new(i as f32, 0.0, 0.0)).collect();
         let (coarse, kept) = coarsen(&fine, &at, 0.024);
         assert!(coarse.vertices * 6 < fine.vertices, "{} of {}", coarse.vertices, fine.vertices);
@@ -252,7 +254,8 @@ mod tests {
     #[test]
     fn what_is_coarse_already_stays() {
         let p = library::pattern("skirt", Size::M).expect("pattern");
-        let g = GarmentMesh::sew(&p, &Triangulation { edge_length: 0.03, min_angle: 20.0 }).expect("sewn");
+        let g = GarmentMesh::sew(&p, &Triangulation { edge_length: 0.03, min_angle: 20.0, ..Triangulation::default() })
+            .expect("sewn");
         let at = vec![P3::origin(); g.vertices];
         let (same, _) = coarsen(&g, &at, 0.01);
         assert_eq!((same.vertices, &same.faces), (g.vertices, &g.faces));
