@@ -20,9 +20,10 @@ use tryon::camera::ColorImage;
 use tryon::cloth::crossings;
 use tryon::cloth::realtime::{Config, Input, RoomyBody, State, Workspace, step};
 use tryon::dressing::{DressError, DressOptions, Dressed, FitProbe, MadeOn, MeshWear, Wear, dress_all, suggest};
+use tryon::evaluate::cloth_rest::lower_arms;
 use tryon::formats::image::write_png_rgb;
 use tryon::garment::{Pattern, library};
-use tryon::math::{Body, P3, Rigid, World, log_so3};
+use tryon::math::{Body, P3, Rigid, World};
 use tryon::tracking::{self, TrackerConfig, TrackerModel, TrackerState};
 
 struct Args {
@@ -178,15 +179,6 @@ fn tracked(path: &std::path::Path) -> Person {
 fn pose(name: &str, template: &Template, rest: &RestBody, t: f64) -> Pose<World> {
     let sk = template.skeleton();
     let mut p = Pose::rest(sk, Rigid::<World, Body>::identity());
-    let mut aim = |side: &str, down: f64| {
-        let s = if side == "left" { 1.0 } else { -1.0 };
-        let j = sk.index(&format!("{side}_shoulder")).expect("shoulder");
-        let c = sk.index(&format!("{side}_elbow")).expect("elbow");
-        let wanted = nalgebra::Vector3::new(s * down.cos(), -down.sin(), 0.0);
-        let q = nalgebra::UnitQuaternion::rotation_between(&(rest.joints[c] - rest.joints[j]), &wanted).expect("turn");
-        let at = sk.dof_offset(j);
-        p.angles[at..at + 3].copy_from_slice(log_so3(&q).as_slice());
-    };
     let swing = 0.5 * (t * 6.0).sin();
     let down = match name {
         "tpose" => 0.0,
@@ -194,8 +186,7 @@ fn pose(name: &str, template: &Template, rest: &RestBody, t: f64) -> Pose<World>
         _ => 1.3,
     };
     if name != "rest" {
-        aim("left", down);
-        aim("right", down);
+        lower_arms(template, rest, down, &mut p);
     }
     if name == "walk" {
         for (side, a) in [("left", swing), ("right", -swing)] {

@@ -88,24 +88,14 @@ impl Apart {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::surface::tests::sphere;
+    use crate::contact::surface::tests::two_spheres;
     use crate::math::P3;
-    use crate::mesh::{Topology, TriMesh};
 
     /// Two spheres of radius 1, their centres `d` apart.
     fn two(d: f32) -> (SurfaceModel, SurfaceFrame, Vec<Part>, usize) {
-        let one = sphere(4);
-        let n = one.vertices().len();
-        let mut faces = one.faces().to_vec();
-        faces.extend(one.faces().iter().map(|f| f.map(|v| v + n as u32)));
-        let along = V3::new(d, 0.0, 0.0);
-        let vertices: Vec<P3> =
-            one.vertices().iter().copied().chain(one.vertices().iter().map(|p| p + along)).collect();
-        let mesh = TriMesh::new(vertices.clone(), faces.clone()).expect("two spheres");
-        let parts: Vec<Part> = (0..2 * n).map(|i| if i < n { 1 } else { 2 }).collect();
-        let pressing = parts.iter().map(|p| 3 - p).collect();
-        let model = SurfaceModel::new(faces, Topology::new(&mesh).expect("topology"), parts);
-        (model, SurfaceFrame { vertices, normals: Vec::new() }, pressing, n)
+        let (model, frame, n) = two_spheres(4, 1.0, [0.0, d], [1, 2]);
+        let pressing = (0..2 * n).map(|i| if i < n { 2 } else { 1 }).collect();
+        (model, frame, pressing, n)
     }
 
     #[test]

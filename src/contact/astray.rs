@@ -31,28 +31,14 @@ impl SurfaceModel {
 
 #[cfg(test)]
 mod tests {
-    use super::super::surface::tests::sphere;
+    use super::super::surface::tests::two_spheres;
     use super::*;
-    use crate::math::V3;
-    use crate::mesh::{Topology, TriMesh};
-    use crate::par::Par;
 
     #[test]
     fn what_seems_to_lie_deep_in_one_ball_is_found_on_the_other() {
-        // Two balls of 5 cm that lie 2 cm in each other, of the same part: no edge leads from one to the other.
-        let ball = sphere(4);
-        let n = ball.vertices().len() as u32;
-        let side = |by: f32| ball.vertices().iter().map(move |p| P3::from(p.coords * 0.05 + V3::x() * by));
-        let places: Vec<P3> = side(0.0).chain(side(0.08)).collect();
-        let faces = ball.faces().iter().copied().chain(ball.faces().iter().map(|f| f.map(|v| v + n))).collect();
-        let mesh = TriMesh::new(places, faces).expect("two balls");
-        let surface = SurfaceModel::new(
-            mesh.faces().to_vec(),
-            Topology::new(&mesh).expect("topology"),
-            vec![1; mesh.vertices().len()],
-        );
-        let mut frame = SurfaceFrame { vertices: mesh.vertices().to_vec(), normals: Vec::new() };
-        surface.update_normals(Par::Seq, &mut frame);
+        // Two balls of 5 cm that lie 2 cm in each other, of the same part.
+        let (surface, frame, n) = two_spheres(4, 0.05, [0.0, 0.08], [1, 1]);
+        let n = n as u32;
         // 2 mm outside the right ball, 22 mm deep in the left one.
         let x = P3::new(0.028, 0.0, 0.0);
         let ask = |x: &P3, start: u32, reach: f32, others: &[u32]| {

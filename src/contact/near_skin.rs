@@ -73,25 +73,16 @@ impl Near {
 
 #[cfg(test)]
 mod tests {
-    use super::super::surface::tests::sphere;
+    use super::super::surface::tests::{sphere, two_spheres};
     use super::*;
-    use crate::math::V3;
     use crate::mesh::{Topology, TriMesh};
     use crate::par::Par;
 
     #[test]
     fn under_one_of_two_toes_a_walk_on_the_other_is_brought_to_it() {
-        // Two spheres of 1 cm beside each other, of the same part: no edge leads from one to the other.
-        let ball = sphere(3);
-        let n = ball.vertices().len() as u32;
-        let side = |by: f32| ball.vertices().iter().map(move |p| P3::from(p.coords * 0.01 + V3::x() * by));
-        let places: Vec<P3> = side(-0.011).chain(side(0.011)).collect();
-        let faces = ball.faces().iter().copied().chain(ball.faces().iter().map(|f| f.map(|v| v + n))).collect();
-        let mesh = TriMesh::new(places, faces).expect("two spheres");
-        let parts = vec![1; mesh.vertices().len()];
-        let surface = SurfaceModel::new(mesh.faces().to_vec(), Topology::new(&mesh).expect("topology"), parts);
-        let mut frame = SurfaceFrame { vertices: mesh.vertices().to_vec(), normals: Vec::new() };
-        surface.update_normals(Par::Seq, &mut frame);
+        // Two spheres of 1 cm beside each other, of the same part.
+        let (surface, frame, n) = two_spheres(3, 0.01, [-0.011, 0.011], [1, 1]);
+        let n = n as u32;
         let mut near = NearSkin::default();
         near.fill(&frame);
         // 2 mm under the right one, found from the left one.

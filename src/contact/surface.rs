@@ -373,6 +373,27 @@ pub(super) mod tests {
         TriMesh::new(v, f).expect("sphere")
     }
 
+    /// Two spheres of one radius with their centres on the x axis, each of its parts: no edge leads from one to the other. Also
+    /// says how many vertices one of them has.
+    pub(in crate::contact) fn two_spheres(
+        levels: usize,
+        radius: f32,
+        centres: [f32; 2],
+        parts: [Part; 2],
+    ) -> (SurfaceModel, SurfaceFrame, usize) {
+        let one = sphere(levels);
+        let n = one.vertices().len();
+        let at = |x: f32| one.vertices().iter().map(move |p| P3::from(p.coords * radius + V3::x() * x));
+        let vertices: Vec<P3> = centres.into_iter().flat_map(at).collect();
+        let faces = one.faces().iter().copied().chain(one.faces().iter().map(|f| f.map(|v| v + n as u32))).collect();
+        let mesh = TriMesh::new(vertices.clone(), faces).expect("two spheres");
+        let parts = parts.into_iter().flat_map(|p| std::iter::repeat_n(p, n)).collect();
+        let model = SurfaceModel::new(mesh.faces().to_vec(), Topology::new(&mesh).expect("topology"), parts);
+        let mut frame = SurfaceFrame { vertices, normals: Vec::new() };
+        model.update_normals(Par::Seq, &mut frame);
+        (model, frame, n)
+    }
+
     #[test]
     fn distances_to_a_sphere_have_their_closed_form_and_the_walk_finds_the_nearest_vertex() {
         let mesh = sphere(4);

@@ -104,7 +104,8 @@ pub struct DressMs {
 
 /// Edge length of the mesh that is draped first, over that of the garment. Four times fewer vertices.
 const COARSER: f64 = 2.0;
-/// The same for hoods: draped from edges of 28 mm seven of 75 keep crossings, from 35 mm none, but pressed flat (docs/benchmarks.md).
+/// The same for hoods: draped from edges of 28 mm seven of 75 keep crossings, from 35 mm none, but pressed flat; 31 mm lies
+/// between (docs/benchmarks.md).
 const HOOD_COARSER: f64 = 2.2;
 /// Longest edge of that mesh, metres: longer ones lose sleeves.
 const COARSEST: f64 = 0.045;

@@ -153,8 +153,8 @@ impl Standing {
     }
 }
 
-/// Turns the upper arms to `angle` below the horizontal, to the sides.
-fn lower_arms(template: &Template, rest: &RestBody, angle: f64, pose: &mut Pose<World>) {
+/// Turns the upper arms to `angle` rad below the horizontal, to the sides; a template without them keeps its pose.
+pub fn lower_arms(template: &Template, rest: &RestBody, angle: f64, pose: &mut Pose<World>) {
     let skeleton = template.skeleton();
     for (side, s) in [("left", 1.0), ("right", -1.0)] {
         let [shoulder, elbow] = ["shoulder", "elbow"].map(|n| skeleton.index(&format!("{side}_{n}")));

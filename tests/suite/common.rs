@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 use tryon::body::{Pose, RestBody, Template};
-use tryon::math::{Body, Rigid, World, log_so3};
+use tryon::evaluate::cloth_rest::lower_arms;
+use tryon::math::{Body, Rigid, World};
 
 /// A path below `../shared/data` (or `$TRYON_SHARED/data`). When it is missing the test says so loudly and skips;
 /// with `TRYON_REQUIRE_ALL=1` it fails.
@@ -20,15 +21,7 @@ pub(crate) fn shared(path: &str) -> Option<PathBuf> {
 
 /// Standing with the arms hanging down.
 pub(crate) fn arms_down(template: &Template, rest: &RestBody) -> Pose<World> {
-    let sk = template.skeleton();
-    let mut p = Pose::rest(sk, Rigid::<World, Body>::identity());
-    for (side, s) in [("left", 1.0), ("right", -1.0)] {
-        let joint = |n: &str| sk.index(&format!("{side}_{n}")).expect("joint");
-        let (j, c) = (joint("shoulder"), joint("elbow"));
-        let wanted = nalgebra::Vector3::new(s * 1.3f64.cos(), -1.3f64.sin(), 0.0);
-        let q = nalgebra::UnitQuaternion::rotation_between(&(rest.joints[c] - rest.joints[j]), &wanted).expect("turn");
-        let at = sk.dof_offset(j);
-        p.angles[at..at + 3].copy_from_slice(log_so3(&q).as_slice());
-    }
+    let mut p = Pose::rest(template.skeleton(), Rigid::<World, Body>::identity());
+    lower_arms(template, rest, 1.3, &mut p);
     p
 }

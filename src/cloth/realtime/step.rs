@@ -36,7 +36,7 @@ const RECOVERY: f32 = 1.0;
 /// The same for cloth in cloth, where the body may be in the way.
 const CLOTH_RECOVERY: f32 = 0.3;
 
-/// Cloth longer than this, over its rest length, may fold as sharply as it must: held open in an armpit, sleeves of 3 cm
+/// Cloth longer than this, over its rest length, may fold as sharply as it must and move as fast on a still body: held open in an armpit, sleeves of 3 cm
 /// edges tore (p99 0.26 instead of 0.16).
 const DRAWN: f32 = 1.15;
 
@@ -276,7 +276,8 @@ fn begin(model: &Model, state: &State, all: &mut Vec<PatchScratch>) {
     });
 }
 
-/// All patches through `span` seconds, none faster than `limit` m/s if there is one. Garments do not wait for each other, patches of one garment do.
+/// All patches through `span` seconds; what is neither held nor drawn is no faster than `limit` m/s if there is one. Garments
+/// do not wait for each other, patches of one garment do.
 fn advance(model: &Model, all: &mut [PatchScratch], span: f64, limit: Option<f32>) {
     let gravity =
         V4::new(model.config.gravity[0] as f32, model.config.gravity[1] as f32, model.config.gravity[2] as f32);
