@@ -86,7 +86,9 @@ impl Motion {
         out.extend(planes.iter().filter(near));
     }
     /// Takes from velocities what would lead through the planes by the end of a step of `h` that begins at time `t`;
-    /// Coulomb friction against the surface. What is sunken comes out at `recovery` m/s at most.
+    /// Coulomb friction against the surface. What is sunken comes out at `recovery` m/s at most; where planes of one step
+    /// push against each other, none moves it along the others: a skirt pinched between belly and shirt crept up under
+    /// the shirt until it was gone (docs/hindsight.md).
     /// Returns how many vertices were touched.
     pub fn restrain(&mut self, planes: &[Plane], t: f32, h: f32, recovery: f32) -> usize {
         let mut touched = 0;
@@ -108,7 +110,15 @@ impl Motion {
                 touched += 1;
             }
             if gap < 0.0 {
-                self.moved[i] = self.moved[i] + p.normal.scale((-gap * RECOVERED).min(recovery * h));
+                let before = self.work.pressed[i];
+                let against = before.dot(p.normal).min(0.0);
+                let mut push = p.normal.scale((-gap * RECOVERED).min(recovery * h));
+                if against < 0.0 {
+                    push = push + p.normal.scale(against) - before;
+                }
+                self.moved[i] = self.moved[i] + push;
+                self.work.pressed[i] = before + push;
+                self.work.sunken.push(p.vertex);
             }
         }
         touched
@@ -121,5 +131,35 @@ impl Motion {
             let v = self.velocity[i];
             self.velocity[i] = v + (wanted - v).scale(a.firmness);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where a vertex at the origin goes in one step between planes with these normals that it is 1 cm under, metres.
+    fn pushed(normals: &[[f32; 2]]) -> V4 {
+        let mut m = Motion::default();
+        m.begin([V4::default()].into_iter(), [V4::default()].into_iter());
+        for n in normals {
+            let normal = V4::new(n[0], n[1], 0.0);
+            m.restrain(&[Plane { normal, level: 0.01, ..Plane::default() }], 0.0, 1e-3, 1.0);
+        }
+        m.moved[0]
+    }
+
+    #[test]
+    fn a_vertex_pressed_from_two_sides_is_not_squeezed_out_between_them() {
+        let way = 1e-3; // a step at 1 m/s
+        for angle in [0.0f32, 0.1, 0.5, 1.0, 1.5] {
+            let shirt = [-angle.cos(), angle.sin()];
+            let V4([x, y, z, _]) = pushed(&[shirt, [1.0, 0.0]]);
+            // The belly says how far out it goes; up, where the shirt leans to, it does not go.
+            let out = way * (1.0 - angle.cos());
+            assert!((x - out).abs() < 1e-9 && y.abs() < 1e-9 && z == 0.0, "{angle}: {x} {y}");
+        }
+        let right = pushed(&[[0.0, 1.0], [1.0, 0.0]]);
+        assert_eq!(right, V4::new(way, way, 0.0), "in a corner both push");
     }
 }

@@ -114,7 +114,8 @@ impl Motion {
     fn advance_kernel(&mut self, _: impl Lanes, f: &Fabric, step: &Step, fastest: f32) {
         let (h, ahead, most) = (step.h, step.h * step.ahead, fastest * fastest);
         let n = f.reach(step.rings);
-        let Work { ahead: look, awake, .. } = &mut self.work;
+        let Work { ahead: look, awake, pressed, sunken, .. } = &mut self.work;
+        sunken.drain(..).for_each(|i| pressed[i as usize] = V4::default());
         let whole = 0..n;
         for r in part(awake, &whole, |a| &a.vertices) {
             let r = before(r, n);

@@ -104,6 +104,9 @@ pub(super) struct Work {
     pub(super) looked: bool,
     /// Vertices whose place is given.
     pub(super) held: Vec<u32>,
+    /// What contacts of this step have pushed sunken vertices by, metres, and which these are.
+    pub(super) pressed: Vec<V4>,
+    pub(super) sunken: Vec<u32>,
     /// What is computed; everything, if nothing sleeps.
     pub(super) awake: Option<Awake>,
 }
@@ -118,6 +121,8 @@ impl Default for Work {
             bending: Vec::new(),
             looked: false,
             held: Vec::new(),
+            pressed: Vec::new(),
+            sunken: Vec::new(),
             awake: None,
         }
     }
@@ -134,6 +139,9 @@ impl Motion {
         self.moved.resize(self.start.len(), V4::default());
         self.work.looked = false;
         self.work.awake = None;
+        self.work.pressed.clear();
+        self.work.pressed.resize(self.start.len(), V4::default());
+        self.work.sunken.clear();
         self.work.bending.clear();
         self.work.bending.resize(self.start.len(), V4::default());
     }
