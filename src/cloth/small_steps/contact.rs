@@ -111,7 +111,7 @@ impl Motion {
             }
             if gap < 0.0 {
                 let before = self.work.pressed[i];
-                let against = before.dot(p.normal).min(0.0);
+                let against = before.dot(p.normal);
                 let mut push = p.normal.scale((-gap * RECOVERED).min(recovery * h));
                 if against < 0.0 {
                     push = push + p.normal.scale(against) - before;
