@@ -153,6 +153,13 @@ impl FoldModel {
     pub(crate) fn room(search: &Search, corner: Option<(u32, f32)>) -> f32 {
         corner.map_or(search.corner, |c| c.1) - search.needed
     }
+    /// Where the triangles around a corner of another fold are nearest to vertex `v` at `x`.
+    pub(crate) fn other_fold(&self, frame: &FoldFrame, v: u32, x: &P3, corner: u32) -> Option<Closest> {
+        let g = &self.surface;
+        let hit = g.closest_around(&frame.surface, x, corner, u8::MAX);
+        let same = g.faces()[hit.face as usize].iter().any(|&c| c == v || g.neighbours(v).contains(&c));
+        (!same && !g.on_rim(&hit)).then_some(hit)
+    }
     /// What holds vertex `v` at `x` off the triangles around a corner of another fold, and how far they are, metres.
     /// `i` is the vertex that the plane names.
     pub(crate) fn plane(
@@ -165,11 +172,9 @@ impl FoldModel {
         search: &Search,
     ) -> Option<(Plane, f32)> {
         let g = &self.surface;
-        let hit = g.closest_around(&frame.surface, x, corner, u8::MAX);
-        let corners = g.faces()[hit.face as usize];
-        let same = corners.iter().any(|&c| c == v || g.neighbours(v).contains(&c));
+        let hit = self.other_fold(frame, v, x, corner)?;
         let far = hit.signed.abs();
-        if same || !(far < search.reach) || g.on_rim(&hit) {
+        if !(far < search.reach) {
             return None;
         }
         // Which side it is on now is the side it stays on, and folds nearer than their thickness are not thrown apart.

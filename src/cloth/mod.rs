@@ -2,7 +2,7 @@
 
 mod crossings;
 mod error;
-mod folds;
+pub(crate) mod folds;
 pub mod membrane;
 mod pieces;
 pub mod quasi_newton;

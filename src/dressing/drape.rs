@@ -4,6 +4,7 @@
 //! a projection out of a plane per vertex, so nothing sticks, and what the coarse mesh cannot show is added on the fine
 //! one in a few steps more. The simulator that follows starts from cloth at rest.
 
+use super::hood::Hood;
 use super::plane::Plane;
 use super::skin::Skin;
 use crate::cloth::Sheet;
@@ -43,6 +44,8 @@ pub(super) struct Drape {
     slack: Vec<f64>,
     /// Where the sheet is to be taken out of itself.
     sheet: Option<Untangler>,
+    /// What is to be held off itself.
+    hood: Option<Hood>,
     /// How often it passed through itself when that was last looked for.
     crossings: usize,
     /// It comes from a coarser drape of the same garment.
@@ -109,6 +112,8 @@ const REACH: f64 = 0.10;
 const PLANE_SIZE: f64 = 0.10;
 /// Substeps between two searches for the nearest skin: cloth at 1 m/s moves 1.6 cm at 2 ms.
 const LOOK_EVERY: usize = 8;
+/// Substeps between two looks at how near a hood is to itself.
+const HOOD_EVERY: usize = 4;
 /// Speed of a fine sheet that was ironed at most, m/s: what was pressed together to come free springs back at 2 m/s, and
 /// through itself.
 const PRESSED_FASTEST: f64 = 0.3;
@@ -214,13 +219,15 @@ impl Drape {
             pressed: false,
             steps: 0,
             sheet: None,
+            hood: None,
             x: x.iter().map(|p| p.coords.cast()).collect(),
         }
     }
-    /// From now on the sheet is taken out of itself.
-    pub(super) fn untangled(mut self, mesh: &GarmentMesh) -> Self {
+    /// From now on the sheet is taken out of itself, and a hood held off it.
+    pub(super) fn untangled(mut self, mesh: &GarmentMesh, sheet: &Sheet) -> Result<Self, GarmentError> {
         self.sheet = Some(Untangler::new(&mesh.faces, &self.x));
-        self
+        self.hood = Hood::of(mesh, sheet)?;
+        Ok(self)
     }
     /// Positions as f32.
     pub(super) fn positions(&self) -> Vec<P3> {
@@ -310,12 +317,13 @@ impl Drape {
                 self.stretch(h, (s + sweep) % 2 == 1);
             }
             self.bend(h);
+            self.hold_hood(s % HOOD_EVERY == 0, h);
             if self.fine && self.pressed {
                 self.slow_down(PRESSED_FASTEST * h);
             }
             self.lift(0.0);
             let anew = s % LOOK_EVERY == 0;
-            if weight >= 1.0 && (anew || self.crossings > 0 && s % 2 == 0) {
+            if (weight >= 1.0 || self.hood.is_some()) && (anew || self.crossings > 0 && s % 2 == 0) {
                 self.untangle(anew);
             }
             for i in 0..self.x.len() {
@@ -324,6 +332,17 @@ impl Drape {
                 self.velocity[i] = if speed > FASTEST { v * (FASTEST / speed) } else { v };
             }
         }
+    }
+    /// Holds a hood off itself; `anew` looks where it is near.
+    fn hold_hood(&mut self, anew: bool, h: f64) {
+        let Some(hood) = &mut self.hood else { return };
+        if anew {
+            let pushes = self.sheet.as_ref().map_or(&[][..], |s| &s.pushes);
+            hood.look(&self.x, |v| pushes.get(v as usize).is_some_and(|p| p.1 > 0.0));
+        }
+        let (pinned, inverse) = (&self.pinned, &self.inverse_mass);
+        let weight = |v: u32| if pinned[v as usize].is_some() { 0.0 } else { inverse[v as usize] };
+        hood.hold(&mut self.x, &self.before, weight, h);
     }
     /// One round of taking the sheet out of itself, which gives no speed; `anew` looks everywhere, else where it crossed
     /// itself in the last rounds.

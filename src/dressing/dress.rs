@@ -104,8 +104,7 @@ pub struct DressMs {
 
 /// Edge length of the mesh that is draped first, over that of the garment. Four times fewer vertices.
 const COARSER: f64 = 2.0;
-/// The same for hoods: draped from edges of 28 mm seven of 75 keep crossings, from 35 mm none, but pressed flat; 31 mm lies
-/// between (docs/benchmarks.md).
+/// The same for hoods. From edges of 28 instead of 31 mm they had a fifth more crossings when worn (docs/benchmarks.md).
 const HOOD_COARSER: f64 = 2.2;
 /// Longest edge of that mesh, metres: longer ones lose sleeves.
 const COARSEST: f64 = 0.045;
@@ -277,10 +276,11 @@ pub fn dress_all(
     let mut ties = Vec::new();
     let mut drapes = Vec::new();
     for ((mesh, placed), offset) in coarse.iter().zip(placed).zip(&offsets) {
-        let mut d = Drape::new(mesh, &Sheet::of_garment(mesh)?, placed);
+        let sheet = Sheet::of_garment(mesh)?;
+        let mut d = Drape::new(mesh, &sheet, placed);
         d.find_all(&skin);
         ties.push(fasten(&skin, mesh, &d, *offset)?);
-        drapes.push(if options.untangle { d.untangled(mesh) } else { d });
+        drapes.push(if options.untangle { d.untangled(mesh, &sheet)? } else { d });
     }
     let mut rough = Layers::new(&coarse, drapes)?;
     rough.each(&skin, &offsets, |k, d, on| {
@@ -352,10 +352,11 @@ fn refine(
     let mut drapes = Vec::new();
     for (k, mesh) in model.outfit.garments.iter().enumerate() {
         let x = if own[k] { rough.drapes[k].x.clone() } else { prolong(&coarse[k], mesh, &rough.drapes[k].x) };
-        let mut d = Drape::new(mesh, &Sheet::of_garment(mesh)?, x.iter().map(|p| P3::from(p.cast::<f32>())).collect());
+        let sheet = Sheet::of_garment(mesh)?;
+        let mut d = Drape::new(mesh, &sheet, x.iter().map(|p| P3::from(p.cast::<f32>())).collect());
         d.find_from(skin, &rough.drapes[k]);
         d.pin(&fasten(skin, mesh, &d, offsets[k])?, skin.frame());
-        drapes.push(if untangle { d.untangled(mesh) } else { d });
+        drapes.push(if untangle { d.untangled(mesh, &sheet)? } else { d });
     }
     let mut fine = Layers::new(&model.outfit.garments, drapes)?;
     fine.each(skin, offsets, |_, d, on| {

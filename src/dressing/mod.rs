@@ -6,6 +6,7 @@ mod drape;
 mod dress;
 mod figure;
 mod fit_map;
+mod hood;
 mod made_on;
 mod mesh_wear;
 mod place;
