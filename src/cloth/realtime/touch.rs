@@ -217,7 +217,14 @@ pub(super) struct Settled<'a> {
 pub(super) fn settle(model: &Model, garment: usize, patch: usize, body: &Settled<'_>, p: &mut PatchScratch) {
     let g = &model.garments[garment];
     let f = &g.patches[patch];
+    // What was far from the skin when that was looked for, and is near or under it now: drawn cloth snaps back by 2 cm in a
+    // round.
     let mut last = u32::MAX;
+    p.torn.extend((0..f.owned).filter(|i| p.clear[*i][0] > 0.0 && !p.tied[*i]).filter_map(|i| {
+        let v = p.nearest[i][0] as usize;
+        let height = body.skin.normals.get(v)?.dot(&(p3(p.motion.position(i)) - body.skin.vertices[v]));
+        (height < LIFTED).then_some(i as u32)
+    }));
     for k in 0..p.body_planes + p.torn.len() {
         let i = if k < p.body_planes { p.planes[k].vertex } else { p.torn[k - p.body_planes] };
         if i == last || i as usize >= f.owned {
