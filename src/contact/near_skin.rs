@@ -50,6 +50,14 @@ impl NearSkin {
 pub struct Near([Option<u32>; 2]);
 
 impl Near {
+    /// Is skin that the place is under near?
+    pub fn under(&self) -> bool {
+        self.0[1].is_some()
+    }
+    /// Is any skin near?
+    pub fn seen(&self) -> bool {
+        self.0.iter().any(Option::is_some)
+    }
     /// Where a walk led, if anywhere, or a point around these vertices that is nearer to `x`. In a fold the nearest vertex may
     /// belong to the skin in front of `x`, and the nearest triangle to that above it.
     pub fn or_nearer(
@@ -93,6 +101,7 @@ mod tests {
         assert!(own.0.iter().all(|v| v.is_some_and(|v| v >= n)) && other == Near::default(), "{own:?} {other:?}");
         let found = own.or_nearer(&surface, &frame, &x, Some(walked), 1).expect("skin");
         assert!((found.signed + 0.002).abs() < 3e-4, "{}", found.signed);
+        assert!(own.seen() && own.under() && !other.seen() && !other.under());
         // Nothing within reach, or nothing nearer: the walk stands.
         let far = P3::new(0.1, 0.0, 0.0);
         assert_eq!(near.around(&surface, &frame, &far, [1, 1]), [Near::default(); 2]);
@@ -100,6 +109,17 @@ mod tests {
         assert_eq!(Near::default().or_nearer(&surface, &frame, &far, None, 1), None);
         for near in [Near::default(), Near([Some(0), Some(1)])] {
             assert_eq!(near.or_nearer(&surface, &frame, &far, Some(walked), 1), Some(walked));
+        }
+    }
+
+    #[test]
+    fn five_millimetres_over_a_limb_a_place_is_near_skin_and_under_none() {
+        let (surface, frame, _) = two_spheres(4, 0.1, [-0.15, 0.15], [1, 1]);
+        let mut near = NearSkin::default();
+        near.fill(&frame);
+        for (height, seen, under) in [(0.05, false, false), (0.005, true, false), (-0.002, true, true)] {
+            let [own, _] = near.around(&surface, &frame, &P3::new(0.15, 0.1 + height, 0.0), [1, 0]);
+            assert_eq!((own.seen(), own.under()), (seen, under), "{height} m: {own:?}");
         }
     }
 

@@ -233,8 +233,8 @@ pub(super) struct PatchScratch {
     pub(super) free: Vec<bool>,
     /// Vertices of cloth that is drawn long: it has no room for wide folds.
     pub(super) drawn: Vec<bool>,
-    /// Local vertices that no plane was looked for as they were about to tear.
-    pub(super) torn: Vec<u32>,
+    /// Vertices that no plane was looked for as they were about to tear.
+    pub(super) torn: Vec<bool>,
     pub(super) ties: Vec<Tie>,
     /// What keeps folds from becoming too sharp during a round.
     pub(super) struts: Vec<Strut>,

@@ -57,12 +57,13 @@ impl Touch<'_> {
         // Planes that contradict each other would tear cloth apart: it gives way, and hangs on its neighbours.
         p.motion.overstretched(f, TORN, &mut p.free);
         p.torn.clear();
+        p.torn.resize(f.vertices.len(), false);
         for (i, &v) in f.vertices.iter().enumerate() {
             if p.tied[i] {
                 continue;
             }
             if p.free[i] {
-                p.torn.push(i as u32);
+                p.torn[i] = true;
                 continue;
             }
             let masks = [g.own[v as usize], g.other[v as usize]];
@@ -212,30 +213,30 @@ pub(super) struct Settled<'a> {
     pub(super) buried: &'a Buried,
 }
 
-/// Measures how deep cloth is under the skin where that holds it, or gave way to cloth that was about to tear, and lifts what
-/// is.
+/// Measures how deep cloth is under the skin, and lifts what is.
 pub(super) fn settle(model: &Model, garment: usize, patch: usize, body: &Settled<'_>, p: &mut PatchScratch) {
     let g = &model.garments[garment];
     let f = &g.patches[patch];
-    // What was far from the skin when that was looked for, and is near or under it now: drawn cloth snaps back by 2 cm in a
-    // round.
-    let mut last = u32::MAX;
-    p.torn.extend((0..f.owned).filter(|i| p.clear[*i][0] > 0.0 && !p.tied[*i]).filter_map(|i| {
-        let v = p.nearest[i][0] as usize;
-        let height = body.skin.normals.get(v)?.dot(&(p3(p.motion.position(i)) - body.skin.vertices[v]));
-        (height < LIFTED).then_some(i as u32)
-    }));
-    for k in 0..p.body_planes + p.torn.len() {
-        let i = if k < p.body_planes { p.planes[k].vertex } else { p.torn[k - p.body_planes] };
-        if i == last || i as usize >= f.owned {
+    let mut planes = p.planes[..p.body_planes].iter().map(|plane| plane.vertex as usize).peekable();
+    for i in 0..f.owned {
+        let mut held = p.torn[i];
+        while planes.next_if(|v| *v == i).is_some() {
+            held = true;
+        }
+        // What was far from all skin when that was looked for may be under it now: drawn cloth snaps back by 2 cm in a
+        // round, and the nearest skin may have been the other leg's.
+        if !held && (p.tied[i] || p.clear[i][0] <= 0.0) {
             continue;
         }
-        last = i;
-        let i = i as usize;
         let v = f.vertices[i] as usize;
         let masks = [g.own[v], g.other[v]];
         let surface = &model.surface;
         let mut near = body.near.around(surface, body.skin, &p3(p.motion.position(i)), masks);
+        // What is above the skin around it needs no walk.
+        let under = near[0].under() || held && (near[1].under() || !near[0].seen());
+        if !under {
+            continue;
+        }
         // The own parts have the last word.
         for side in [1, 0].into_iter().filter(|s| masks[*s] != 0) {
             let x = p3(p.motion.position(i));
