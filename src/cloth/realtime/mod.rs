@@ -3,6 +3,7 @@
 mod carry;
 mod cloth_touch;
 mod model;
+mod piled;
 mod regions;
 mod roomy;
 mod state;

@@ -1,6 +1,7 @@
 //! What changes from step to step, what goes in and what comes out.
 
 use super::Model;
+use super::piled::Piled;
 use super::regions::Rest;
 use super::untangle::Untangle;
 use crate::cloth::ClothError;
@@ -203,6 +204,8 @@ pub struct Workspace {
     pub(super) roomy: SurfaceFrame,
     /// Garments at the beginning of a round, for contact of cloth with cloth.
     pub(super) sheets: Vec<FoldFrame>,
+    /// What lies on the skin, for garments over it.
+    pub(super) piled: Piled,
     pub(super) maps: DepthMaps,
     pub(super) untangle: Untangle,
 }

@@ -148,6 +148,7 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
     report.buried = state.buried.count();
     report.stages_ms.contact = ms(timer);
     begin(model, state, &mut work.patches);
+    work.piled.measure(model, state, &work.before);
     let search = if fastest < CALM { CALM_SEARCH } else { SEARCH };
     // A hair less, so that 1/30 s are two rounds and not three.
     let rounds = (dt / search - 1e-3).ceil().max(1.0) as usize;
@@ -165,6 +166,7 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
             fastest,
             span: span as f32,
             turn: state.frames,
+            piled: &work.piled,
             nearest: &state.garments,
         };
         let maps = (r == 0).then_some(&work.maps);

@@ -1,6 +1,7 @@
 //! Which planes of the body keep a vertex outside, and where anchors go.
 
 use super::model::Model;
+use super::piled::Piled;
 use super::state::{GarmentState, PatchScratch};
 use crate::cloth::small_steps::{Fabric, Plane, Tie, V4};
 use crate::contact::{Buried, Closest, DepthMaps, NearSkin, SurfaceFrame};
@@ -36,6 +37,8 @@ pub(super) struct Touch<'a> {
     pub(super) span: f32,
     /// Calls so far.
     pub(super) turn: u64,
+    /// What lies on the skin at the beginning of the call.
+    pub(super) piled: &'a Piled,
     /// Nearest body vertices of each garment's vertices at the beginning of the call.
     pub(super) nearest: &'a [GarmentState],
 }
@@ -53,6 +56,7 @@ impl Touch<'_> {
     pub(super) fn find(&self, garment: usize, f: &Fabric, maps: Option<&DepthMaps>, p: &mut PatchScratch) {
         let g = &self.model.garments[garment];
         let offset = g.offset as f32;
+        let highest = self.piled.most(garment, offset);
         let reach = self.model.config.reach as f32;
         // Planes that contradict each other would tear cloth apart: it gives way, and hangs on its neighbours.
         p.motion.overstretched(f, TORN, &mut p.free);
@@ -85,15 +89,15 @@ impl Touch<'_> {
                     continue;
                 }
                 let surface = &self.model.surface;
-                let wanted = (offset + reach + travel).min(REACH);
+                let wanted = (highest + reach + travel).min(REACH);
                 let around = g.folds.surface.neighbours(v).iter();
                 let told = around.map(|w| self.nearest[garment].nearest[*w as usize][k]);
                 let (near, c) = surface.closest_unless_astray(self.now, &x, p.nearest[i][k], masks[k], wanted, told);
                 p.nearest[i][k] = near;
                 match c {
-                    Err(room) => p.clear[i][k] = room + wanted - offset - reach,
+                    Err(room) => p.clear[i][k] = room + wanted - highest - reach,
                     Ok(mut c) => {
-                        p.clear[i][k] = if c.rim { 0.0 } else { c.signed - offset - reach };
+                        p.clear[i][k] = if c.rim { 0.0 } else { c.signed - highest - reach };
                         if c.rim && k == 0 {
                             // Beyond the own parts: whatever is nearest.
                             c = surface.closest(self.now, &x, near, Region::ALL.0);
@@ -107,6 +111,9 @@ impl Touch<'_> {
                 }
             }
             let mut offsets = [offset; 2];
+            if let Some(own) = &found[0] {
+                offsets[0] = self.piled.over(garment, self.model.surface.faces()[own.face as usize], offset);
+            }
             if let [Some(own), Some(other)] = &found {
                 // Between skins that face each other cloth stays on its own half, so that two layers pass each other
                 // nowhere; where the body lies in itself nothing holds it: it hangs on its neighbours, out of sight.
