@@ -124,13 +124,7 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
     state.quiet_for = if quiet { state.quiet_for + dt } else { 0.0 };
     let limit = if config.sleep { coming_to_rest(state.quiet_for) } else { None };
     wake(model, state, input.body, dt, teleported);
-    let timer = Instant::now();
-    // Two opposite views in turn: a map only proposes where to begin looking, and all are wanted after a jump.
-    let turn = state.frames as usize % 2 * 2;
-    let views = if teleported { &model.views[..] } else { &model.views[turn..turn + 2] };
-    work.maps.render(config.par, views, input.body, model.surface.faces());
     let mut report = StepReport { teleported, softened: 1.0, ..StepReport::default() };
-    report.stages_ms.maps = ms(timer);
     let timer = Instant::now();
     // The body at both ends of the call; in between it moves evenly.
     std::mem::swap(&mut work.before, &mut work.after);
@@ -139,14 +133,30 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         model.surface.update_normals(config.par, &mut work.before);
     }
     report.sleeves_put_back = put_back(model, state);
-    report.crossings = work.untangle.look(model, state, &work.before, dt);
-    work.after.vertices.clear();
-    work.after.vertices.extend_from_slice(input.body);
-    model.surface.update_normals(config.par, &mut work.after);
+    // Two opposite views in turn: a map only proposes where to begin looking, and all are wanted after a jump.
+    let turn = state.frames as usize % 2 * 2;
+    let views = if teleported { &model.views[..] } else { &model.views[turn..turn + 2] };
+    let mut buried = std::mem::take(&mut state.buried);
+    let Workspace { maps, before, after, near_skin, untangle, .. } = work;
+    ((report.stages_ms.maps, report.crossings), ()) = par::join(
+        config.par,
+        || {
+            let timer = Instant::now();
+            maps.render(config.par, views, input.body, model.surface.faces());
+            (ms(timer), untangle.look(model, state, before, dt))
+        },
+        || {
+            after.vertices.clear();
+            after.vertices.extend_from_slice(input.body);
+            model.surface.update_normals(config.par, after);
+            near_skin.fill(after);
+            buried.update(config.par, &model.surface, &model.opposite, after);
+        },
+    );
+    report.buried = buried.count();
+    state.buried = buried;
     let fastest = moved(&state.body) / dt as f32;
-    state.buried.update(config.par, &model.surface, &model.opposite, &work.after);
-    report.buried = state.buried.count();
-    report.stages_ms.contact = ms(timer);
+    report.stages_ms.contact = ms(timer) - report.stages_ms.maps;
     begin(model, state, &mut work.patches);
     work.piled.measure(model, state, &work.before);
     let search = if fastest < CALM { CALM_SEARCH } else { SEARCH };
@@ -193,7 +203,6 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         report.stages_ms.solve += ms(timer);
     }
     let timer = Instant::now();
-    work.near_skin.fill(&work.after);
     let body = Settled { skin: &work.after, near: &work.near_skin, buried: &state.buried };
     for_patches(model, &mut work.patches, |g, k, p| settle(model, g, k, &body, p));
     report.stages_ms.contact += ms(timer);
