@@ -84,17 +84,18 @@ pub(super) fn ways(
     rides: impl Fn(usize) -> bool,
 ) -> Vec<V3> {
     let mut ways: Vec<V3> = nearest.iter().map(|n| to[n[0] as usize] - from[n[0] as usize]).collect();
-    let edges: Vec<[usize; 2]> =
-        edges.iter().map(|(v, _)| v.map(|v| v as usize)).filter(|v| rides(v[0]) && rides(v[1])).collect();
+    let mut counts = vec![1.0f32; ways.len()];
+    let edges: Vec<[u32; 2]> =
+        edges.iter().map(|(v, _)| *v).filter(|v| rides(v[0] as usize) && rides(v[1] as usize)).collect();
+    edges.iter().flatten().for_each(|v| counts[*v as usize] += 1.0);
+    let mut sums = ways.clone();
     for _ in 0..ROUNDS {
-        let mut sums: Vec<(V3, f32)> = ways.iter().map(|w| (*w, 1.0)).collect();
-        for [a, b] in edges.iter().copied() {
-            sums[a].0 += ways[b];
-            sums[b].0 += ways[a];
-            sums[a].1 += 1.0;
-            sums[b].1 += 1.0;
+        for [a, b] in edges.iter().map(|v| v.map(|v| v as usize)) {
+            sums[a] += ways[b];
+            sums[b] += ways[a];
         }
-        ways.iter_mut().zip(&sums).for_each(|(w, (sum, n))| *w = sum / *n);
+        sums.iter_mut().zip(&counts).for_each(|(s, n)| *s /= *n);
+        ways.copy_from_slice(&sums);
     }
     ways
 }

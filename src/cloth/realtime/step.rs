@@ -72,6 +72,12 @@ pub fn step(
     followed.clone_from(if known { &state.followed } else { &state.body });
     follow(model.config.par, &mut followed, input.body, model.config.steady, input.dt);
     let mut roomy = std::mem::take(&mut work.roomy);
+    if let Some(mut report) = ride_asleep(model, state, &followed, &mut roomy.vertices) {
+        std::mem::swap(&mut state.followed, &mut followed);
+        (work.followed, work.roomy) = (followed, roomy);
+        report.stages_ms.total = ms(started);
+        return Ok(report);
+    }
     if followed == state.followed {
         roomy.vertices.clone_from(&state.body);
     } else {
@@ -89,25 +95,36 @@ pub fn step(
     Ok(report)
 }
 
-/// As [`step`], on a body that fits the model, taken as it is.
+/// Cloth all of which sleeps rides on the body as it is `followed` now, if it sleeps on. Its body keeps the room that was
+/// made for the cloth when it fell asleep.
+fn ride_asleep(model: &Model, state: &mut State, followed: &[P3], body: &mut Vec<P3>) -> Option<StepReport> {
+    let config = &model.config;
+    if !config.sleep || state.still < STILL_FRAMES || state.followed.len() != followed.len() {
+        return None;
+    }
+    if *followed != *state.followed {
+        par::map_into(config.par, followed.len(), 4096, body, |v| state.body[v] + (followed[v] - state.followed[v]));
+        if !sleeps_on(config.steady, state, body) {
+            return None;
+        }
+        let from = &state.body;
+        par::for_chunks(config.par, &mut state.garments, 1, |k, g| {
+            let g = &mut g[0];
+            ride(&model.garments[k].sheet.edges, &g.nearest, from, body, &mut g.positions);
+        });
+        state.body.copy_from_slice(body);
+    }
+    state.frames += 1;
+    Some(StepReport { sleeping: state.garments.iter().map(|g| g.positions.len()).sum(), ..StepReport::default() })
+}
+
+/// As [`step`], on a body that fits the model, taken as it is, of someone whose cloth does not all sleep.
 fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Workspace) -> StepReport {
     let started = Instant::now();
     let config = &model.config;
     let moved =
         |from: &[P3]| from.iter().zip(input.body).map(|(a, b)| (a - b).norm_squared()).fold(0.0, f32::max).sqrt();
     state.frames += 1;
-    if config.sleep && state.still >= STILL_FRAMES && sleeps_on(config.steady, state, input.body) {
-        let mut report =
-            StepReport { sleeping: state.garments.iter().map(|g| g.positions.len()).sum(), ..StepReport::default() };
-        if state.body != input.body {
-            for (g, m) in state.garments.iter_mut().zip(&model.garments) {
-                ride(&m.sheet.edges, &g.nearest, &state.body, input.body, &mut g.positions);
-            }
-            state.body.copy_from_slice(input.body);
-        }
-        report.stages_ms.total = ms(started);
-        return report;
-    }
     // On this body, not the last one: who walks off shall find her cloth free.
     let quiet = is_quiet(config.steady, state, input.body);
     // The mean, not the farthest vertex: a waving hand is no teleport, and carrying cloth costs it its folds.
