@@ -1,14 +1,13 @@
 //! Worn cloth where the body folds: the insides of elbows and knees, and the groin.
 
-use super::common::arms_down;
-use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, embedded, skin};
+use super::common::{arms_down, posed};
+use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
 use tryon::cloth::crossings;
 use tryon::cloth::realtime::{Config, Input, StepReport, Workspace, step};
 use tryon::dressing::{DressOptions, dress};
 use tryon::evaluate::Solid;
 use tryon::garment::{Size, Triangulation, library};
 use tryon::math::{P3, World};
-use tryon::par::Par;
 
 const DT: f64 = 1.0 / 30.0;
 /// Bending and straightening again takes so many calls: two seconds.
@@ -42,9 +41,7 @@ fn bend(garment: &str, joints: &[(&str, f64)], sharpest: f64) -> (Vec<StepReport
     let before = state.garments[0].positions.clone();
     let (mut reports, mut crossed) = (Vec::new(), Vec::new());
     for call in 1..=CALLS {
-        let (mut bones, mut body) = (BoneTransforms::default(), Vec::new());
-        pose(&t, &rest, joints, call).bones(t.skeleton(), &rest, &mut bones);
-        skin(Par::Rayon, &rest.vertices, t.weights(), &bones, &mut body);
+        let body = posed(&t, &rest, &pose(&t, &rest, joints, call));
         reports.push(step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step"));
         crossed.push(crossings(&d.model.outfit.garments[0].faces, &state.garments[0].positions).len());
     }
@@ -87,25 +84,22 @@ fn legs_that_swing_past_each_other_under_a_skirt_leave_no_cloth_in_them() {
     let rest = t.personalise(&BodyShape::default());
     // Thighs to 57° to the front and 34° to the back, twice a second: knees at 4 m/s. What only knew the skin of the leg
     // that it came from was 27 mm deep in the other one.
-    let body = |call: usize| {
+    let pose = |call: usize| {
         let s = (std::f64::consts::TAU * 2.0 * call as f64 * DT).sin();
         let mut pose = arms_down(&t, &rest);
         pose.set(t.skeleton(), "left_hip", &[-0.2 + 0.8 * s, 0.0, 0.08]);
         pose.set(t.skeleton(), "right_hip", &[-0.2 - 0.8 * s, 0.0, -0.08]);
-        let (mut bones, mut body) = (BoneTransforms::default(), Vec::new());
-        pose.bones(t.skeleton(), &rest, &mut bones);
-        skin(Par::Rayon, &rest.vertices, t.weights(), &bones, &mut body);
-        (pose, body)
+        pose
     };
     let options = DressOptions {
         triangulation: Triangulation { edge_length: 0.022, ..Triangulation::default() },
         ..DressOptions::default()
     };
     let pattern = library::pattern("skirt", Size::M).expect("a pattern");
-    let d = dress(&t, &rest, &body(0).0, &[pattern], &options).expect("dressed");
+    let d = dress(&t, &rest, &pose(0), &[pattern], &options).expect("dressed");
     let (mut state, mut work, mut deepest) = (d.state.clone(), Workspace::default(), 0.0f32);
     for call in 1..=60 {
-        let (_, body) = body(call);
+        let body = posed(&t, &rest, &pose(call));
         step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step");
         let solid = Solid::new(&body, t.mesh().faces());
         let depth = |p: &P3| if solid.winding(p) < 2 { solid.depth(p) } else { 0.0 };

@@ -1,15 +1,16 @@
 //! The real-time cloth solver on a dressed body: what it must survive, and that threads change nothing.
 
+use super::common::posed;
 use nalgebra::UnitQuaternion;
 use rand::{Rng, SeedableRng};
 use std::sync::OnceLock;
-use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, skin};
+use tryon::body::{BodyShape, Pose, RestBody};
 use tryon::cloth::crossings;
 use tryon::cloth::realtime::{Config, Input, Model, State, StepReport, Workspace, step};
 use tryon::dressing::{DressOptions, dress};
 use tryon::garment::{Size, Triangulation, library};
 use tryon::math::{Body, P3, Rigid, V3, V3d, World, log_so3};
-use tryon::par::{Par, with_threads};
+use tryon::par::with_threads;
 
 const DT: f64 = 1.0 / 30.0;
 
@@ -37,11 +38,7 @@ fn dressed_as(rest: &RestBody, pose: &Pose<World>, size: Size, edge_length: f64,
         ..DressOptions::default()
     };
     let d = dress(&template, rest, pose, &patterns, &options).expect("dressed");
-    let mut bones = BoneTransforms::default();
-    pose.bones(template.skeleton(), rest, &mut bones);
-    let mut body = Vec::new();
-    skin(Par::Seq, &rest.vertices, template.weights(), &bones, &mut body);
-    Dressed { model: d.model, state: d.state, body }
+    Dressed { model: d.model, state: d.state, body: posed(&template, rest, pose) }
 }
 
 fn moved(body: &[P3], by: V3) -> Vec<P3> {

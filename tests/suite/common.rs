@@ -1,9 +1,10 @@
-//! What several tests share: finding the data that lies beside the project.
+//! What several tests share: finding the data that lies beside the project, and bodies that stand somehow.
 
 use std::path::PathBuf;
-use tryon::body::{Pose, RestBody, Template};
+use tryon::body::{BoneTransforms, Pose, RestBody, Template, skin};
 use tryon::evaluate::cloth_rest::lower_arms;
-use tryon::math::{Body, Rigid, World};
+use tryon::math::{Body, P3, Rigid, World};
+use tryon::par::Par;
 
 /// A path below `../shared/data` (or `$TRYON_SHARED/data`). When it is missing the test says so loudly and skips;
 /// with `TRYON_REQUIRE_ALL=1` it fails.
@@ -24,4 +25,12 @@ pub(crate) fn arms_down(template: &Template, rest: &RestBody) -> Pose<World> {
     let mut p = Pose::rest(template.skeleton(), Rigid::<World, Body>::identity());
     lower_arms(template, rest, 1.3, &mut p);
     p
+}
+
+/// The surface of a body that stands like this, metres.
+pub(crate) fn posed(template: &Template, rest: &RestBody, pose: &Pose<World>) -> Vec<P3> {
+    let (mut bones, mut body) = (BoneTransforms::default(), Vec::new());
+    pose.bones(template.skeleton(), rest, &mut bones);
+    skin(Par::Rayon, &rest.vertices, template.weights(), &bones, &mut body);
+    body
 }

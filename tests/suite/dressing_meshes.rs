@@ -1,6 +1,6 @@
 //! Garments that others made as meshes, worn by bodies they were not made on; and sizes that cannot be worn.
 
-use crate::common::shared;
+use crate::common::{posed, shared};
 use std::path::{Path, PathBuf};
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
 use tryon::cloth::realtime::{Config, Input, Workspace, step};
@@ -109,21 +109,16 @@ fn hats_are_carried_by_the_head() {
     // The person walks half a metre in half a second: the hat goes with the head and keeps its shape.
     let mut work = Workspace::default();
     for i in 1..=15 {
-        let body: Vec<_> =
-            tryon_body(&t, &rest, 1.3).iter().map(|p| p + nalgebra::Vector3::new(0.0, 0.0, 0.033 * i as f32)).collect();
+        let body: Vec<_> = posed(&t, &rest, &standing(&t, &rest, 1.3))
+            .iter()
+            .map(|p| p + nalgebra::Vector3::new(0.0, 0.0, 0.033 * i as f32))
+            .collect();
         step(&d.model, &mut d.state, &Input { body: &body, dt: 1.0 / 30.0 }, &mut work).expect("a step");
     }
     for (a, b) in before.iter().zip(&d.state.garments[0].positions) {
         let moved = b - a;
         assert!((moved - nalgebra::Vector3::new(0.0, 0.0, 0.495)).norm() < 3e-3, "{moved}");
     }
-}
-
-fn tryon_body(t: &Template, rest: &RestBody, down: f64) -> Vec<tryon::math::P3> {
-    let (mut bones, mut body) = (tryon::body::BoneTransforms::default(), Vec::new());
-    standing(t, rest, down).bones(t.skeleton(), rest, &mut bones);
-    tryon::body::skin(tryon::par::Par::Seq, &rest.vertices, t.weights(), &bones, &mut body);
-    body
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Garments of the library on bodies: what an eye would see at once, as numbers.
 
-use super::common::arms_down;
+use super::common::{arms_down, posed};
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use tryon::body::measure::measure;
 use tryon::body::{BodyShape, BoneTransforms, RestBody, Template, embedded};
@@ -303,10 +303,7 @@ fn a_fit_map_tells_a_tight_size_from_a_loose_one() {
         let mut d = wear(&[], &|_, _| vec![library::pattern("tank", size).expect("pattern")]);
         let t = embedded::template();
         let rest = t.personalise(&BodyShape::default());
-        let pose = arms_down(&t, &rest);
-        let (mut bones, mut body) = (tryon::body::BoneTransforms::default(), Vec::new());
-        pose.bones(t.skeleton(), &rest, &mut bones);
-        tryon::body::skin(tryon::par::Par::Seq, &rest.vertices, t.weights(), &bones, &mut body);
+        let body = posed(&t, &rest, &arms_down(&t, &rest));
         // Forces at rest are read as pressure, and cloth that has just been put on is not.
         let mut work = Workspace::default();
         for _ in 0..30 {
