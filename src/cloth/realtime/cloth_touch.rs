@@ -5,9 +5,9 @@
 //! two folds of one garment each is held off the other. Nothing needs a common solution.
 
 use super::model::Model;
+use super::piece::Piece;
 use super::state::PatchScratch;
 use crate::cloth::folds::{FoldFrame, touching};
-use crate::cloth::small_steps::Fabric;
 use crate::math::{P3, V3};
 use crate::par;
 
@@ -62,63 +62,61 @@ pub(super) fn sheets(model: &Model, patches: &[PatchScratch], span: f32, out: &m
 }
 
 impl ClothTouch<'_> {
-    /// Adds the planes of a patch's own other folds for this round.
-    pub(super) fn folds(&self, garment: usize, f: &Fabric, p: &mut PatchScratch) {
-        if !self.model.config.self_collision {
-            return;
+    /// Planes of the garment's own other folds and of the garments outside of it for a piece of a patch in this round.
+    pub(super) fn find(&self, p: &PatchScratch, q: &mut Piece) {
+        q.cloth.clear();
+        if self.model.config.self_collision {
+            self.folds(p, q);
         }
-        let (g, s) = (&self.model.garments[garment].folds, &self.sheets[garment]);
+        if self.model.config.layers {
+            self.layers(p, q);
+        }
+    }
+    fn folds(&self, p: &PatchScratch, q: &mut Piece) {
+        let (m, f) = q.model(self.model);
+        let (g, s) = (&m.folds, &self.sheets[q.garment]);
         let search = g.search(self.model.config.thickness as f32, self.span);
-        for (i, &v) in f.vertices.iter().enumerate() {
+        for (j, i) in q.range.clone().enumerate() {
+            if p.tied[i] || q.free[j] || q.passing[j] {
+                continue;
+            }
             // Where no corner was near, no fold comes within reach before the round after this one.
-            if p.tied[i] || p.free[i] || p.passing[i] {
+            if std::mem::take(&mut q.alone[j]) && self.model.config.skip_far {
+                q.report.fold_searches_skipped += 1;
                 continue;
             }
-            if std::mem::take(&mut p.alone[i]) && self.model.config.skip_far {
-                p.report.fold_searches_skipped += 1;
-                continue;
-            }
-            let x = place(p, i);
-            let Some((corner, _)) = g.corner(s, v, &x, &search, &mut p.neighbour_of) else {
-                p.alone[i] = true;
+            let (v, x) = (f.vertices[i], p.place(i));
+            let Some((corner, _)) = g.corner(s, v, &x, &search, &mut q.neighbour_of) else {
+                q.alone[j] = true;
                 continue;
             };
             if let Some((plane, far)) = g.plane(s, i, v, &x, corner, &search) {
-                p.planes.push(plane);
-                p.report.cloth_contacts += usize::from(far <= search.thickness);
+                q.cloth.push(plane);
+                q.report.cloth_contacts += usize::from(far <= search.thickness);
             }
         }
     }
-
-    /// Adds the planes of the garments outside of this one.
-    pub(super) fn layers(&self, garment: usize, f: &Fabric, p: &mut PatchScratch) {
-        if !self.model.config.layers {
-            return;
-        }
-        for i in 0..f.vertices.len() {
-            if p.tied[i] || p.free[i] {
+    fn layers(&self, p: &PatchScratch, q: &mut Piece) {
+        let (m, f) = q.model(self.model);
+        for (j, i) in q.range.clone().enumerate() {
+            if p.tied[i] || q.free[j] {
                 continue;
             }
-            let x = place(p, i);
+            let x = p.place(i);
             // A skirt lies under the body of a shirt, never under its sleeves.
-            let own = self.model.garments[garment].own[f.vertices[i] as usize];
-            for outer in garment + 1..self.model.garments.len() {
+            let own = m.own[f.vertices[i] as usize];
+            for outer in q.garment + 1..self.model.garments.len() {
                 let (g, s) = (&self.model.garments[outer].folds.surface, &self.sheets[outer]);
-                let (near, hit) = g.closest_within(&s.surface, &x, p.layers[outer][i], own, LAYER_DEPTH);
-                p.layers[outer][i] = near;
+                let (near, hit) = g.closest_within(&s.surface, &x, q.layers[outer][j], own, LAYER_DEPTH);
+                q.layers[outer][j] = near;
                 let Ok(hit) = hit else { continue };
                 let Some(hit) = g.under(&s.surface, &x, &hit, HEM) else { continue };
                 let inside = -hit.signed;
                 if inside < LAYER_REACH && inside > -LAYER_DEPTH {
-                    p.planes.push(touching(g, s, i, &hit, -1.0, LAYER_GAP));
-                    p.report.cloth_contacts += usize::from(inside < LAYER_GAP);
+                    q.cloth.push(touching(g, s, i, &hit, -1.0, LAYER_GAP));
+                    q.report.cloth_contacts += usize::from(inside < LAYER_GAP);
                 }
             }
         }
     }
-}
-
-fn place(p: &PatchScratch, i: usize) -> P3 {
-    let [x, y, z, _] = p.motion.position(i).0;
-    P3::new(x, y, z)
 }

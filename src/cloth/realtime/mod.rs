@@ -2,7 +2,9 @@
 
 mod carry;
 mod cloth_touch;
+mod finish;
 mod model;
+mod piece;
 mod piled;
 mod regions;
 mod roomy;

@@ -210,8 +210,13 @@ impl Rest {
     fn forget(&mut self) {
         self.regions.iter_mut().flatten().for_each(|r| *r = Region::default());
     }
+    /// Nothing sleeps.
+    fn awake(&self) -> bool {
+        self.regions.iter().flatten().all(|r| !r.asleep)
+    }
     /// Follows the body; returns skin that went far.
     fn follow(&mut self, model: &Model, before: &[P3], body: &[P3], bounds: &Bounds) -> Disturbance {
+        let awake = self.awake();
         for ((at, calls), now) in self.calm.iter_mut().zip(body) {
             let still = (now - *at).norm_squared() < bounds.calm * bounds.calm;
             *calls = if still { calls.saturating_add(1) } else { 0 };
@@ -225,6 +230,9 @@ impl Rest {
             for v in model.clusters.members(k).iter().map(|v| *v as usize) {
                 if (body[v] - self.strayed[v]).norm_squared() >= bounds.sway * bounds.sway {
                     self.strayed[v] = body[v];
+                    if awake {
+                        continue;
+                    }
                     points.push(body[v]);
                     farthest = farthest.max((body[v] - before[v]).norm());
                 }
@@ -264,6 +272,8 @@ pub(super) fn wake(model: &Model, state: &mut State, body: &[P3], dt: f64, jumpe
     let mut disturbance = rest.follow(model, before, body, &bounds);
     if jumped {
         rest.forget();
+    }
+    if rest.awake() {
         return;
     }
     disturbance.by_cloth(model, garments, rest, bounds.slow);
@@ -327,12 +337,16 @@ pub(super) fn fall_asleep(model: &Model, state: &mut State, patches: &[PatchScra
             }
         }
     }
+    let awhile = |r: &Region| !r.asleep && r.slow_for >= SLOW_CALLS;
+    if !rest.regions.iter().flatten().any(awhile) {
+        return;
+    }
     let mut disturbance = Disturbance(Vec::new());
     disturbance.by_cloth(model, garments, rest, bounds.slow);
     let mut tired = Vec::new();
     for (g, (m, s)) in model.garments.iter().zip(garments.iter()).enumerate() {
         let all = &rest.regions[g];
-        for (r, region) in all.iter().enumerate().filter(|r| !r.1.asleep && r.1.slow_for >= SLOW_CALLS) {
+        for (r, region) in all.iter().enumerate().filter(|r| awhile(r.1)) {
             if m.regions.beside[r].iter().any(|q| all[*q as usize].speed >= bounds.slow) {
                 continue;
             }

@@ -1,6 +1,7 @@
 //! What changes from step to step, what goes in and what comes out.
 
 use super::Model;
+use super::piece::{Piece, p3};
 use super::piled::Piled;
 use super::regions::Rest;
 use super::untangle::Untangle;
@@ -194,6 +195,7 @@ pub struct StagesMs {
 #[derive(Debug, Default)]
 pub struct Workspace {
     pub(super) patches: Vec<PatchScratch>,
+    pub(super) pieces: Vec<Piece>,
     pub(super) before: SurfaceFrame,
     pub(super) after: SurfaceFrame,
     pub(super) now: SurfaceFrame,
@@ -214,34 +216,27 @@ pub struct Workspace {
 #[derive(Debug, Default)]
 pub(super) struct PatchScratch {
     pub(super) motion: Motion,
-    pub(super) nearest: Vec<[u32; 2]>,
     /// Vertices that sleep.
     pub(super) asleep: Vec<bool>,
-    /// Room to the nearest skin of both kinds of parts that is left before it must be looked for again, metres.
-    pub(super) clear: Vec<[f32; 2]>,
-    pub(super) layers: Vec<Vec<u32>>,
-    pub(super) planes: Vec<Plane>,
-    /// How many of the planes, the first ones, are the body's.
-    pub(super) body_planes: usize,
-    /// Planes within reach for some steps, and how many of them are the body's.
+    /// Planes within reach for some steps, and how many of them are the body's, the first ones.
     pub(super) near: Vec<Plane>,
     pub(super) body_near: usize,
-    /// Vertices that pass through other cloth: no fold may hold them where they are.
-    pub(super) passing: Vec<bool>,
-    /// Vertices that had no other fold near them in the last round.
-    pub(super) alone: Vec<bool>,
-    /// For each vertex of the garment the last one that it was a neighbour of.
-    pub(super) neighbour_of: Vec<u32>,
-    /// Vertices that nothing holds: in skin that lies in other skin, or about to tear.
-    pub(super) free: Vec<bool>,
     /// Vertices of cloth that is drawn long: it has no room for wide folds.
     pub(super) drawn: Vec<bool>,
-    /// Vertices that no plane was looked for as they were about to tear.
+    /// Vertices that are about to tear.
     pub(super) torn: Vec<bool>,
     pub(super) ties: Vec<Tie>,
     /// What keeps folds from becoming too sharp during a round.
     pub(super) struts: Vec<Strut>,
     /// Vertices whose place is given: nothing else may push them.
     pub(super) tied: Vec<bool>,
-    pub(super) report: StepReport,
+    /// Vertices in contact with the body.
+    pub(super) contacts: usize,
+}
+
+impl PatchScratch {
+    /// Where vertex `i` of it is, metres.
+    pub(super) fn place(&self, i: usize) -> P3 {
+        p3(self.motion.position(i))
+    }
 }

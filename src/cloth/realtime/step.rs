@@ -2,7 +2,9 @@
 
 use super::carry::{carry, put_back, ride};
 use super::cloth_touch::{ClothTouch, sheets};
+use super::finish::finish;
 use super::model::{Model, RECALLED};
+use super::piece::{Piece, cut};
 use super::regions::{carry_on, fall_asleep, wake, wake_all};
 use super::state::{Input, PatchScratch, State, StepReport, Workspace, check_body};
 use super::steady::follow;
@@ -39,6 +41,8 @@ const CLOTH_RECOVERY: f32 = 0.3;
 /// Cloth longer than this, over its rest length, may fold as sharply as it must and move as fast on a still body: held open in an armpit, sleeves of 3 cm
 /// edges tore (p99 0.26 instead of 0.16).
 const DRAWN: f32 = 1.15;
+/// Cloth longer than this, over its rest length, is about to tear: more than knitwear is worn at.
+const TORN: f32 = 1.5;
 
 fn ms(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
@@ -175,6 +179,7 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
     let fastest = moved(&state.body) / dt as f32;
     report.stages_ms.contact = ms(timer) - report.stages_ms.maps;
     begin(model, state, &mut work.patches);
+    cut(model, state, &mut work.pieces);
     work.piled.measure(model, state, &work.before);
     let search = if fastest < CALM { CALM_SEARCH } else { SEARCH };
     // A hair less, so that 1/30 s are two rounds and not three.
@@ -202,30 +207,36 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         for_patches(model, &mut work.patches, |g, k, p| {
             anchors(model, g, k, &touch, p);
             let fabric = &model.garments[g].patches[k];
-            p.planes.clear();
-            if !config.skip_far {
-                p.clear.fill([0.0; 2]);
-            }
-            touch.find(g, fabric, maps, p);
-            p.body_planes = p.planes.len();
-            cloth.folds(g, fabric, p);
-            cloth.layers(g, fabric, p);
+            p.motion.overstretched(fabric, TORN, &mut p.torn);
             p.motion.overstretched(fabric, DRAWN, &mut p.drawn);
             let excepted = Excepted { held: &p.tied, free: &p.drawn };
             p.motion.short(fabric, config.sharpest as f32, span as f32, &excepted, &mut p.struts);
         });
+        let patches = &work.patches;
+        par::for_chunks(config.par, &mut work.pieces, 1, |_, q| {
+            let q = &mut q[0];
+            touch.find(maps, &patches[q.at], q);
+            cloth.find(&patches[q.at], q);
+        });
         report.stages_ms.contact += ms(timer);
         let timer = Instant::now();
-        advance(model, &mut work.patches, span, limit);
+        advance(model, &mut work.patches, &work.pieces, span, limit);
         report.stages_ms.solve += ms(timer);
     }
     let timer = Instant::now();
     let body = Settled { skin: &work.after, near: &work.near_skin, buried: &state.buried };
-    for_patches(model, &mut work.patches, |g, k, p| settle(model, g, k, &body, p));
+    let patches = &work.patches;
+    par::for_chunks(config.par, &mut work.pieces, 1, |_, q| {
+        let q = &mut q[0];
+        settle(model, &body, &patches[q.at], q);
+    });
+    for q in &work.pieces {
+        q.lifted.iter().for_each(|(i, moved)| work.patches[q.at].motion.moved[*i as usize] = *moved);
+    }
     report.stages_ms.contact += ms(timer);
     let timer = Instant::now();
     for_patches(model, &mut work.patches, |_, _, p| carry_on(p, dt));
-    let speed = finish(model, state, &work.patches, dt, &mut report);
+    let speed = finish(model, state, &work.patches, &work.pieces, dt, &mut report);
     report.steps = model.garments.iter().map(|g| rounds * steps(g.h, span)).max().unwrap_or(0);
     report.speed = f64::from(speed);
     report.sleeping = state.rest.sleeping(model);
@@ -285,40 +296,24 @@ fn begin(model: &Model, state: &State, all: &mut Vec<PatchScratch>) {
         p.asleep.clear();
         p.asleep.extend(fabric.vertices.iter().map(|v| state.rest.sleeps(model, g, *v)));
         p.motion.leave(fabric, &p.asleep);
-        p.nearest.clear();
-        p.nearest.extend(local().map(|v| from.nearest[v]));
-        p.layers.resize_with(from.layers.len(), Vec::new);
-        for (to, from) in p.layers.iter_mut().zip(&from.layers) {
-            to.clear();
-            to.extend(local().filter_map(|v| from.get(v)));
-        }
-        p.passing.clear();
-        p.passing.extend(fabric.vertices.iter().map(|v| from.passing.binary_search(v).is_ok()));
-        p.alone.clear();
-        p.alone.resize(fabric.vertices.len(), false);
-        p.neighbour_of.clear();
-        p.neighbour_of.resize(from.positions.len(), u32::MAX);
-        p.clear.clear();
-        p.clear.resize(fabric.vertices.len(), [0.0; 2]);
-        p.report = StepReport::default();
     });
 }
 
 /// All patches through `span` seconds; what is neither held nor drawn is no faster than `limit` m/s if there is one. Garments
 /// do not wait for each other, patches of one garment do.
-fn advance(model: &Model, all: &mut [PatchScratch], span: f64, limit: Option<f32>) {
+fn advance(model: &Model, all: &mut [PatchScratch], pieces: &[Piece], span: f64, limit: Option<f32>) {
     let gravity =
         V4::new(model.config.gravity[0] as f32, model.config.gravity[1] as f32, model.config.gravity[2] as f32);
     let ahead = model.config.ahead as f32;
     let mut rest = all;
     let mut garments = Vec::with_capacity(model.garments.len());
-    for m in &model.garments {
+    for (g, m) in model.garments.iter().enumerate() {
         let (mine, others) = rest.split_at_mut(m.patches.len());
-        garments.push((m, mine));
+        garments.push((g, m, mine));
         rest = others;
     }
     par::for_chunks(model.config.par, &mut garments, 1, |_, g| {
-        let (m, patches) = &mut g[0];
+        let (g, m, patches) = &mut g[0];
         let n = steps(m.h, span);
         let h = (span / n as f64) as f32;
         let borders = Borders::new(patches.len());
@@ -330,11 +325,11 @@ fn advance(model: &Model, all: &mut [PatchScratch], span: f64, limit: Option<f32
             let t = s as f32 * h;
             if s % (RECALLED * m.bend_every) == 0 {
                 let alone = (RECALLED * m.bend_every).min(n - s) as f32 * h;
-                let (body, cloth) = p.planes.split_at(p.body_planes);
+                let found = || pieces.iter().filter(|q| (q.garment, q.patch) == (*g, k));
                 p.near.clear();
-                p.motion.within_reach(body, t, alone, &mut p.near);
+                found().for_each(|q| p.motion.within_reach(&q.body, t, alone, &mut p.near));
                 p.body_near = p.near.len();
-                p.motion.within_reach(cloth, t, alone, &mut p.near);
+                found().for_each(|q| p.motion.within_reach(&q.cloth, t, alone, &mut p.near));
             }
             if s % m.bend_every == 0 {
                 p.motion.bend(f, h * m.bend_every.min(n - s) as f32 * 0.5, m.smooth);
@@ -346,7 +341,7 @@ fn advance(model: &Model, all: &mut [PatchScratch], span: f64, limit: Option<f32
             // In this order: the body has the last word.
             let (body, cloth) = p.near.split_at(p.body_near);
             p.motion.restrain(cloth, t, h, CLOTH_RECOVERY);
-            p.report.contacts = p.motion.restrain(body, t, h, RECOVERY);
+            p.contacts = p.motion.restrain(body, t, h, RECOVERY);
             if let Some(limit) = limit {
                 p.motion.slow_down(limit, &Excepted { held: &p.tied, free: &p.drawn });
             }
@@ -355,71 +350,4 @@ fn advance(model: &Model, all: &mut [PatchScratch], span: f64, limit: Option<f32
         });
         m.patches.iter().zip(patches.iter_mut()).for_each(|(f, p)| borders.hear(n - 1, f, &mut p.motion));
     });
-}
-
-/// Takes positions over unless one is not finite; returns how fast 95 % of the fastest garment is at most, m/s.
-fn finish(model: &Model, state: &mut State, all: &[PatchScratch], dt: f64, report: &mut StepReport) -> f32 {
-    let mut fastest = 0.0f32;
-    let mut at = 0;
-    for (k, m) in model.garments.iter().enumerate() {
-        let patches = &all[at..at + m.patches.len()];
-        at += m.patches.len();
-        let g = &mut state.garments[k];
-        let bad = m.patches.iter().zip(patches).find_map(|(f, p)| {
-            let wrong =
-                |i: &usize| !p.motion.position(*i).0.iter().chain(&p.motion.velocity[*i].0).all(|c| c.is_finite());
-            (0..f.owned).find(wrong).map(|i| f.vertices[i] as usize)
-        });
-        if let Some(index) = bad {
-            let fault = ClothError::NotFinite { what: "cloth vertex", index };
-            report.kept_last_good = Some(format!("garment `{}`: {fault}", model.outfit.garments[k].name));
-            g.velocities.iter_mut().for_each(|v| *v = V3::zeros());
-            continue;
-        }
-        let mut ways: Vec<f32> = Vec::with_capacity(g.positions.len());
-        for (f, p) in m.patches.iter().zip(patches) {
-            for i in 0..f.owned {
-                let v = f.vertices[i] as usize;
-                let (x, u) = (p.motion.position(i).0, p.motion.velocity[i].0);
-                g.positions[v] = P3::new(x[0], x[1], x[2]);
-                g.velocities[v] = V3::new(u[0], u[1], u[2]);
-                g.nearest[v] = p.nearest[i];
-                for (to, from) in g.layers.iter_mut().zip(&p.layers) {
-                    if let (Some(to), Some(from)) = (to.get_mut(v), from.get(i)) {
-                        *to = *from;
-                    }
-                }
-                // How far it came: between planes that contradict each other a vertex has a speed and stays.
-                ways.push(p.motion.moved[i].dot(p.motion.moved[i]));
-            }
-            let r = &p.report;
-            report.contacts += r.contacts;
-            report.pinched += r.pinched;
-            report.cloth_contacts += r.cloth_contacts;
-            report.searches_skipped += r.searches_skipped;
-            report.fold_searches_skipped += r.fold_searches_skipped;
-            report.penetration = report.penetration.max(r.penetration);
-            report.penetration_left = report.penetration_left.max(r.penetration_left);
-        }
-        if !ways.is_empty() {
-            // A few vertices caught between layers and skin may never rest, and shall not keep the others awake.
-            let most = (ways.len() * 95 / 100).min(ways.len() - 1);
-            let way = *ways.select_nth_unstable_by(most, f32::total_cmp).1;
-            fastest = fastest.max(way.sqrt() / dt as f32);
-        }
-        let mut strain: Vec<f32> = m
-            .sheet
-            .edges
-            .iter()
-            .map(|(v, l)| (g.positions[v[0] as usize] - g.positions[v[1] as usize]).norm() / *l as f32 - 1.0)
-            .collect();
-        if !strain.is_empty() {
-            let high = (strain.len() * 99 / 100).min(strain.len() - 1);
-            let p99 = *strain.select_nth_unstable_by(high, f32::total_cmp).1;
-            report.p99_strain = report.p99_strain.max(f64::from(p99));
-            report.max_strain = report.max_strain.max(f64::from(strain.iter().copied().fold(p99, f32::max)));
-        }
-        report.softened = report.softened.min(m.softened);
-    }
-    fastest
 }

@@ -1,9 +1,10 @@
 //! Which planes of the body keep a vertex outside, and where anchors go.
 
 use super::model::Model;
+use super::piece::{Piece, p3};
 use super::piled::Piled;
 use super::state::{GarmentState, PatchScratch};
-use crate::cloth::small_steps::{Fabric, Plane, Tie, V4};
+use crate::cloth::small_steps::{Plane, Tie, V4};
 use crate::contact::{Buried, Closest, DepthMaps, NearSkin, SurfaceFrame};
 use crate::garment::Region;
 use crate::math::{P3, V3};
@@ -14,8 +15,6 @@ const REACH: f32 = 0.04;
 const LIFTED: f32 = 5e-4;
 /// Deeper in another part of the body cloth is left where it is, metres: it may have come from the other side.
 const OTHER_DEPTH: f32 = 0.01;
-/// Cloth longer than this, over its rest length, is about to tear: more than knitwear is worn at.
-const TORN: f32 = 1.5;
 /// Between skins with less room than this cloth stays on its own half, metres, and so far from the middle.
 const HALVED: f32 = 0.03;
 const HALF_GAP: f32 = 0.00125;
@@ -43,67 +42,62 @@ pub(super) struct Touch<'a> {
     pub(super) nearest: &'a [GarmentState],
 }
 
-fn p3(v: V4) -> P3 {
-    P3::new(v.0[0], v.0[1], v.0[2])
-}
-
 fn v4(v: &V3) -> V4 {
     V4::new(v.x, v.y, v.z)
 }
 
 impl Touch<'_> {
-    /// Planes of a patch for this round.
-    pub(super) fn find(&self, garment: usize, f: &Fabric, maps: Option<&DepthMaps>, p: &mut PatchScratch) {
-        let g = &self.model.garments[garment];
+    /// Planes of the body for a piece of a patch in this round.
+    pub(super) fn find(&self, maps: Option<&DepthMaps>, p: &PatchScratch, q: &mut Piece) {
+        let (garment, (g, f)) = (q.garment, q.model(self.model));
         let offset = g.offset as f32;
         let highest = self.piled.most(garment, offset);
         let reach = self.model.config.reach as f32;
-        // Planes that contradict each other would tear cloth apart: it gives way, and hangs on its neighbours.
-        p.motion.overstretched(f, TORN, &mut p.free);
-        p.torn.clear();
-        p.torn.resize(f.vertices.len(), false);
-        for (i, &v) in f.vertices.iter().enumerate() {
-            if p.tied[i] {
+        if !self.model.config.skip_far {
+            q.clear.fill([0.0; 2]);
+        }
+        q.body.clear();
+        for (j, i) in q.range.clone().enumerate() {
+            // Planes that contradict each other would tear cloth apart: it gives way, and hangs on its neighbours.
+            q.free[j] = p.torn[i];
+            if p.tied[i] || p.torn[i] {
                 continue;
             }
-            if p.free[i] {
-                p.torn[i] = true;
-                continue;
-            }
+            let v = f.vertices[i];
             let masks = [g.own[v as usize], g.other[v as usize]];
-            let x = p3(p.motion.position(i));
+            let x = p.place(i);
             let speed = p.motion.velocity[i].dot(p.motion.velocity[i]).sqrt();
             let travel = (speed + self.fastest) * self.span;
             let mut found: [Option<Closest>; 2] = [None, None];
             if let Some(maps) = maps {
-                self.propose(maps, &x, masks, &mut p.nearest[i]);
-                self.ask_neighbour(garment, v, &x, &mut p.nearest[i]);
+                self.propose(maps, &x, masks, &mut q.nearest[j]);
+                self.ask_neighbour(garment, v, &x, &mut q.nearest[j]);
             }
             for k in 0..2 {
                 if masks[k] == 0 {
                     continue;
                 }
-                if p.clear[i][k] > travel {
-                    p.clear[i][k] -= travel;
-                    p.report.searches_skipped += 1;
+                if q.clear[j][k] > travel {
+                    q.clear[j][k] -= travel;
+                    q.report.searches_skipped += 1;
                     continue;
                 }
                 let surface = &self.model.surface;
                 let wanted = (highest + reach + travel).min(REACH);
                 let around = g.folds.surface.neighbours(v).iter();
                 let told = around.map(|w| self.nearest[garment].nearest[*w as usize][k]);
-                let (near, c) = surface.closest_unless_astray(self.now, &x, p.nearest[i][k], masks[k], wanted, told);
-                p.nearest[i][k] = near;
+                let (near, c) = surface.closest_unless_astray(self.now, &x, q.nearest[j][k], masks[k], wanted, told);
+                q.nearest[j][k] = near;
                 match c {
-                    Err(room) => p.clear[i][k] = room + wanted - highest - reach,
+                    Err(room) => q.clear[j][k] = room + wanted - highest - reach,
                     Ok(mut c) => {
-                        p.clear[i][k] = if c.rim { 0.0 } else { c.signed - highest - reach };
+                        q.clear[j][k] = if c.rim { 0.0 } else { c.signed - highest - reach };
                         if c.rim && k == 0 {
                             // Beyond the own parts: whatever is nearest.
                             c = surface.closest(self.now, &x, near, Region::ALL.0);
                         }
                         let hidden = self.buried.holds_nothing(surface.faces()[c.face as usize]);
-                        p.free[i] |= hidden && !c.rim && c.signed < offset;
+                        q.free[j] |= hidden && !c.rim && c.signed < offset;
                         if !hidden && !c.rim && c.signed < wanted {
                             found[k] = Some(c);
                         }
@@ -118,9 +112,9 @@ impl Touch<'_> {
                 // Between skins that face each other cloth stays on its own half, so that two layers pass each other
                 // nowhere; where the body lies in itself nothing holds it: it hangs on its neighbours, out of sight.
                 if let Some(room) = own.room(other).filter(|room| *room < HALVED) {
-                    p.report.pinched += usize::from(room < 2.0 * offset);
+                    q.report.pinched += usize::from(room < 2.0 * offset);
                     if room < 0.0 {
-                        p.free[i] = true;
+                        q.free[j] = true;
                         found = [None, None];
                     }
                     let half = 0.5 * room.max(0.0);
@@ -130,11 +124,11 @@ impl Touch<'_> {
             }
             for (c, offset) in found.iter().zip(offsets).rev().filter_map(|(c, o)| c.map(|c| (c, o))) {
                 let corners = self.model.surface.faces()[c.face as usize];
-                let speed = (0..3).fold(V3::zeros(), |s, j| {
-                    let v = corners[j] as usize;
-                    s + (self.after[v] - self.before[v]) * (c.weights[j] / self.dt)
+                let speed = (0..3).fold(V3::zeros(), |s, k| {
+                    let v = corners[k] as usize;
+                    s + (self.after[v] - self.before[v]) * (c.weights[k] / self.dt)
                 });
-                p.planes.push(Plane {
+                q.body.push(Plane {
                     vertex: i as u32,
                     normal: v4(&c.normal),
                     level: c.normal.dot(&c.point.coords) + offset,
@@ -221,24 +215,28 @@ pub(super) struct Settled<'a> {
 }
 
 /// Measures how deep cloth is under the skin, and lifts what is.
-pub(super) fn settle(model: &Model, garment: usize, patch: usize, body: &Settled<'_>, p: &mut PatchScratch) {
-    let g = &model.garments[garment];
-    let f = &g.patches[patch];
-    let mut planes = p.planes[..p.body_planes].iter().map(|plane| plane.vertex as usize).peekable();
-    for i in 0..f.owned {
+pub(super) fn settle(model: &Model, body: &Settled<'_>, p: &PatchScratch, q: &mut Piece) {
+    let (g, f) = q.model(model);
+    q.lifted.clear();
+    let mut planes = q.body.iter().map(|plane| plane.vertex as usize).peekable();
+    for (j, i) in q.owned(f) {
+        if p.tied[i] {
+            continue;
+        }
         let mut held = p.torn[i];
         while planes.next_if(|v| *v == i).is_some() {
             held = true;
         }
         // What was far from all skin when that was looked for may be under it now: drawn cloth snaps back by 2 cm in a
         // round, and the nearest skin may have been the other leg's.
-        if !held && (p.tied[i] || p.clear[i][0] <= 0.0) {
+        if !held && q.clear[j][0] <= 0.0 {
             continue;
         }
         let v = f.vertices[i] as usize;
         let masks = [g.own[v], g.other[v]];
         let surface = &model.surface;
-        let mut near = body.near.around(surface, body.skin, &p3(p.motion.position(i)), masks);
+        let mut x = p.place(i);
+        let mut near = body.near.around(surface, body.skin, &x, masks);
         // What is above the skin around it needs no walk.
         let under = near[0].under() || held && (near[1].under() || !near[0].seen());
         if !under {
@@ -246,24 +244,24 @@ pub(super) fn settle(model: &Model, garment: usize, patch: usize, body: &Settled
         }
         // The own parts have the last word.
         for side in [1, 0].into_iter().filter(|s| masks[*s] != 0) {
-            let x = p3(p.motion.position(i));
             // Skin of other parts is far from most cloth.
             let reach = if side == 1 { OTHER_DEPTH } else { f32::MAX };
-            let (vertex, walked) = surface.closest_within(body.skin, &x, p.nearest[i][side], masks[side], reach);
+            let (vertex, walked) = surface.closest_within(body.skin, &x, q.nearest[j][side], masks[side], reach);
             let found = near[side].or_nearer(surface, body.skin, &x, walked.ok(), masks[side]);
-            p.nearest[i][side] = found.map_or(vertex, |c| c.vertex);
+            q.nearest[j][side] = found.map_or(vertex, |c| c.vertex);
             let Some(c) = found else { continue };
             let elsewhere = side == 1 && c.signed < -OTHER_DEPTH;
             let nothing = body.buried.holds_nothing(surface.faces()[c.face as usize]);
             if c.rim || c.signed >= LIFTED || elsewhere || nothing {
                 continue;
             }
-            p.report.penetration = p.report.penetration.max(f64::from(-c.signed));
-            p.motion.moved[i] = v4(&(c.point + c.normal * LIFTED - p3(p.motion.start[i])));
-            let lifted = p3(p.motion.position(i));
-            let again = surface.closest(body.skin, &lifted, c.vertex, masks[side]);
-            p.report.penetration_left = p.report.penetration_left.max(f64::from(-again.signed));
-            near = body.near.around(surface, body.skin, &lifted, masks);
+            q.report.penetration = q.report.penetration.max(f64::from(-c.signed));
+            let moved = v4(&(c.point + c.normal * LIFTED - p3(p.motion.start[i])));
+            q.lifted.push((i as u32, moved));
+            x = p3(p.motion.start[i] + moved);
+            let again = surface.closest(body.skin, &x, c.vertex, masks[side]);
+            q.report.penetration_left = q.report.penetration_left.max(f64::from(-again.signed));
+            near = body.near.around(surface, body.skin, &x, masks);
         }
     }
 }
