@@ -90,7 +90,7 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         Self {
-            most_steps: 80,
+            most_steps: 72,
             ahead: 0.25,
             patch: 6000,
             gravity: [0.0, -9.81, 0.0],
