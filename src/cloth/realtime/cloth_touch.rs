@@ -51,8 +51,8 @@ pub(super) fn sheets(model: &Model, patches: &[PatchScratch], span: f32, out: &m
         s.velocities.resize(n, V3::zeros());
         for (f, p) in g.patches.iter().zip(&patches[starts[k]..]) {
             for i in 0..f.owned {
-                let (v, x, u) = (f.vertices[i] as usize, p.motion.position(i).0, p.motion.velocity[i]);
-                s.surface.vertices[v] = P3::new(x[0], x[1], x[2]);
+                let (v, u) = (f.vertices[i] as usize, p.motion.velocity[i]);
+                s.surface.vertices[v] = p.place(i);
                 s.velocities[v] = V3::new(u.0[0], u.0[1], u.0[2]);
             }
         }

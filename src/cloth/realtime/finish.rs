@@ -4,7 +4,7 @@ use super::model::{GarmentModel, Model};
 use super::piece::Piece;
 use super::state::{GarmentState, PatchScratch, State, StepReport};
 use crate::cloth::ClothError;
-use crate::math::{P3, V3};
+use crate::math::V3;
 use crate::par;
 
 /// What one garment came to.
@@ -79,8 +79,8 @@ fn take_over<'a>(
         let (f, motion) = (&m.patches[q.patch], &patches[q.at].motion);
         for (j, i) in q.owned(f) {
             let v = f.vertices[i] as usize;
-            let (x, u) = (motion.position(i).0, motion.velocity[i].0);
-            g.positions[v] = P3::new(x[0], x[1], x[2]);
+            let u = motion.velocity[i].0;
+            g.positions[v] = motion.position(i).point();
             g.velocities[v] = V3::new(u[0], u[1], u[2]);
             g.nearest[v] = q.nearest[j];
             for (to, from) in g.layers.iter_mut().zip(&q.layers) {
@@ -104,7 +104,7 @@ fn take_over<'a>(
 }
 
 /// What so many of a hundred do not exceed; nothing of nothing. Orders them anew.
-fn percentile(of: &mut [f32], hundredths: usize) -> Option<f32> {
+pub(super) fn percentile(of: &mut [f32], hundredths: usize) -> Option<f32> {
     let at = (of.len() * hundredths / 100).min(of.len().checked_sub(1)?);
     Some(*of.select_nth_unstable_by(at, f32::total_cmp).1)
 }

@@ -42,7 +42,8 @@ pub struct Outfit {
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
     /// The most small steps in 1/60 s. A garment takes as many as its fabric and triangles need to be stable with all
-    /// their stiffness; where that is more than this, its stiffest triangles are softened.
+    /// their stiffness; where that is more than this, its stiffest triangles are softened. Fewer
+    /// strain cloth more, more cost time: docs/benchmarks.md.
     pub most_steps: usize,
     /// How far ahead of positions forces are evaluated, in small steps: damps ringing.
     pub ahead: f64,

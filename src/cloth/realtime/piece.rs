@@ -4,10 +4,10 @@
 use super::model::{GarmentModel, Model};
 use super::state::{GarmentState, State, StepReport};
 use crate::cloth::small_steps::{Fabric, Plane, V4};
-use crate::math::P3;
 use std::ops::Range;
 
-/// Vertices of a piece.
+/// Vertices of a piece: few enough that threads end together, many enough that what is
+/// around a piece stays less than the piece. 256 and 1024 take as long within 3 %.
 const VERTICES: usize = 512;
 
 /// Some vertices of a patch, what is around them, and what keeps them off that.
@@ -100,10 +100,6 @@ pub(super) fn cut(model: &Model, state: &State, pieces: &mut Vec<Piece>) {
         let (_, f) = q.model(model);
         q.begin(&f.vertices[q.range.clone()], &state.garments[q.garment]);
     });
-}
-
-pub(super) fn p3(v: V4) -> P3 {
-    P3::new(v.0[0], v.0[1], v.0[2])
 }
 
 #[cfg(test)]

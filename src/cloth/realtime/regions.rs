@@ -4,6 +4,7 @@
 //! moves is near. It wakes when that skin, an anchor, or cloth sewn to it moves, or when other cloth or skin comes near.
 
 use super::carry::ways;
+use super::finish::percentile;
 use super::model::Model;
 use super::state::{GarmentState, PatchScratch, State};
 use super::still::stillness;
@@ -25,8 +26,8 @@ const SLOW_CALLS: u32 = 10;
 /// How far, in what skin may move while a region falls asleep, a region rides on skin that sways, and how far in one call.
 /// At what the whole outfit may (5 and 2) sleeves fell asleep where a waving arm turns, and were 2 cm off.
 const RIDES: [f32; 2] = [2.5, 1.0];
-/// Share of a region's vertices whose speed is its own.
-const MOST: f32 = 0.9;
+/// Of a hundred vertices of a region, so many are as slow as it is said to be.
+const MOST: usize = 90;
 /// Skin of other parts of the body counts as what a region lies on, and skin that moves wakes it, within this, metres.
 const SKIN: f32 = 0.03;
 /// Other cloth that moves wakes a region within this and so many lengths of its edges, metres.
@@ -330,8 +331,7 @@ pub(super) fn fall_asleep(model: &Model, state: &mut State, patches: &[PatchScra
             let Some(p) = patches.next() else { return };
             for (region, r) in regions[*first..].iter_mut().zip(f.regions.windows(2)) {
                 let mut ways: Vec<f32> = p.motion.moved[r[0]..r[1]].iter().map(|w| w.dot(*w)).collect();
-                let most = ((ways.len() as f32 * MOST) as usize).min(ways.len().saturating_sub(1));
-                let way = if ways.is_empty() { 0.0 } else { *ways.select_nth_unstable_by(most, f32::total_cmp).1 };
+                let way = percentile(&mut ways, MOST).unwrap_or(0.0);
                 region.speed = if region.asleep { 0.0 } else { way.sqrt() / dt as f32 };
                 region.slow_for = if region.speed < bounds.slow { region.slow_for + 1 } else { 0 };
             }

@@ -1,7 +1,7 @@
 //! What changes from step to step, what goes in and what comes out.
 
 use super::Model;
-use super::piece::{Piece, p3};
+use super::piece::Piece;
 use super::piled::Piled;
 use super::regions::Rest;
 use super::untangle::Untangle;
@@ -237,6 +237,6 @@ pub(super) struct PatchScratch {
 impl PatchScratch {
     /// Where vertex `i` of it is, metres.
     pub(super) fn place(&self, i: usize) -> P3 {
-        p3(self.motion.position(i))
+        self.motion.position(i).point()
     }
 }

@@ -1,7 +1,7 @@
 //! Which planes of the body keep a vertex outside, and where anchors go.
 
 use super::model::Model;
-use super::piece::{Piece, p3};
+use super::piece::Piece;
 use super::piled::Piled;
 use super::state::{GarmentState, PatchScratch};
 use crate::cloth::small_steps::{Plane, Tie, V4};
@@ -256,9 +256,9 @@ pub(super) fn settle(model: &Model, body: &Settled<'_>, p: &PatchScratch, q: &mu
                 continue;
             }
             q.report.penetration = q.report.penetration.max(f64::from(-c.signed));
-            let moved = v4(&(c.point + c.normal * LIFTED - p3(p.motion.start[i])));
+            let moved = v4(&(c.point + c.normal * LIFTED - p.motion.start[i].point()));
             q.lifted.push((i as u32, moved));
-            x = p3(p.motion.start[i] + moved);
+            x = (p.motion.start[i] + moved).point();
             let again = surface.closest(body.skin, &x, c.vertex, masks[side]);
             q.report.penetration_left = q.report.penetration_left.max(f64::from(-again.signed));
             near = body.near.around(surface, body.skin, &x, masks);

@@ -3,6 +3,7 @@
 use super::awake::Awake;
 use super::fabric::{Fabric, MOST};
 use super::struts::Excepted;
+use crate::math::P3;
 
 /// Four floats that load at once: x, y, z and a spare lane.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -14,6 +15,11 @@ impl V4 {
     #[inline(always)]
     pub fn new(x: f32, y: f32, z: f32) -> Self {
         Self([x, y, z, 0.0])
+    }
+    /// The first three as a place.
+    #[inline(always)]
+    pub fn point(self) -> P3 {
+        P3::new(self.0[0], self.0[1], self.0[2])
     }
     /// Inner product of the first three.
     #[inline(always)]
