@@ -145,10 +145,13 @@ impl Untangler {
     pub(crate) fn look_anew(&mut self) {
         self.hot = None;
     }
-    /// Draws cloth within `rings` of what crossed in the last round to the mean of its neighbours.
-    pub(crate) fn iron(&self, x: &mut [V3d], movable: impl Fn(usize) -> bool, rings: usize) {
+    /// Vertices of what crossed in the last round.
+    pub(crate) fn crossed(&self) -> impl Iterator<Item = bool> {
+        self.pushes.iter().map(|p| p.1 > 0.0)
+    }
+    /// Draws cloth within `rings` of what is `near` to the mean of its neighbours.
+    pub(crate) fn iron(&self, x: &mut [V3d], mut near: Vec<bool>, movable: impl Fn(usize) -> bool, rings: usize) {
         let n = x.len();
-        let mut near: Vec<bool> = self.pushes.iter().map(|p| p.1 > 0.0).collect();
         for _ in 0..rings {
             let ring: Vec<[u32; 2]> =
                 self.finder.edges.iter().filter(|e| e.iter().any(|v| near[*v as usize])).copied().collect();
@@ -449,9 +452,9 @@ mod tests {
         let mut u = Untangler::new(&faces, &x);
         assert!(u.round(Par::Seq, &mut x, |_| 1.0, 0.001, 0.0).crossings > 0);
         let before = x.clone();
-        u.iron(&mut x, |v| v != tip, 2);
+        u.iron(&mut x, u.crossed().collect(), |v| v != tip, 2);
         assert_eq!(x[tip], before[tip], "it may not move");
-        u.iron(&mut x, |_| true, 2);
+        u.iron(&mut x, u.crossed().collect(), |_| true, 2);
         assert!(x[tip].y > before[tip].y + 0.01, "{} {}", x[tip].y, before[tip].y);
         // Three cells from the spike, of which one is an edge that crossed.
         let near = |v: usize| [0, 2].iter().all(|k| before[v][*k].abs() < 3.5 * CELL);

@@ -389,7 +389,12 @@ impl Drape {
                 if let Some(sheet) = &self.sheet {
                     // Ironed, a sleeve comes through the arm.
                     let (pinned, own) = (&self.pinned, &self.own);
-                    sheet.iron(&mut self.x, |v| pinned[v].is_none() && !on_arms(own[v]), ironed);
+                    sheet.iron(
+                        &mut self.x,
+                        sheet.crossed().collect(),
+                        |v| pinned[v].is_none() && !on_arms(own[v]),
+                        ironed,
+                    );
                 }
             }
             if k % LOOK_EVERY == 0 {

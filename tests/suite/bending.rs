@@ -10,8 +10,9 @@ use tryon::garment::{Size, Triangulation, library};
 use tryon::math::{P3, World};
 
 const DT: f64 = 1.0 / 30.0;
-/// Bending and straightening again takes so many calls: two seconds.
+/// Bending and straightening again takes so many calls, two seconds, and the person stands for so many more.
 const CALLS: usize = 60;
+const STANDING: usize = 30;
 
 /// Arms down, and in the middle of the time each joint turned by so much, rad.
 fn pose(template: &Template, rest: &RestBody, joints: &[(&str, f64)], call: usize) -> Pose<World> {
@@ -40,8 +41,8 @@ fn bend(garment: &str, joints: &[(&str, f64)], sharpest: f64) -> (Vec<StepReport
     let (mut state, mut work) = (d.state.clone(), Workspace::default());
     let before = state.garments[0].positions.clone();
     let (mut reports, mut crossed) = (Vec::new(), Vec::new());
-    for call in 1..=CALLS {
-        let body = posed(&t, &rest, &pose(&t, &rest, joints, call));
+    for call in 1..=CALLS + STANDING {
+        let body = posed(&t, &rest, &pose(&t, &rest, joints, call.min(CALLS)));
         reports.push(step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step"));
         crossed.push(crossings(&d.model.outfit.garments[0].faces, &state.garments[0].positions).len());
     }
@@ -68,7 +69,7 @@ fn trousers_of_someone_who_squats_come_down_again_and_pass_through_themselves_le
     let [free, braced] = [0.0, Config::default().sharpest].map(|sharpest| {
         let (reports, crossed, [before, after]) = bend("trousers", &joints, sharpest);
         let lowest = |x: &[P3]| x.iter().fold(f32::MAX, |l, p| l.min(p.y));
-        let mean = crossed.iter().sum::<usize>() / CALLS;
+        let mean = crossed[..CALLS].iter().sum::<usize>() / CALLS;
         let p99 = reports.iter().map(|r| r.p99_strain).fold(0.0, f64::max);
         println!("{sharpest}: {mean} crossings, p99 stretch {p99}, hem {} m up", lowest(&after) - lowest(&before));
         assert!(lowest(&after) - lowest(&before) < 0.05);
@@ -76,6 +77,18 @@ fn trousers_of_someone_who_squats_come_down_again_and_pass_through_themselves_le
         mean
     });
     assert!(free > 200 && 3 * braced < 2 * free, "{free} {braced}");
+}
+
+#[test]
+fn what_a_deep_squat_pushed_through_itself_is_ironed_out() {
+    // Thighs on the belly, 126°. Without ironing 608, 189 and 187 crossings were left for good.
+    let left = ["skirt", "shorts", "trousers"].map(|garment| {
+        let (_, crossed, _) = bend(garment, &[("hip", -2.2), ("knee", 2.2)], Config::default().sharpest);
+        let (most, left) = (crossed.iter().max().expect("calls"), crossed[crossed.len() - 1]);
+        println!("{garment}: {most} crossings at most, {left} after a second of standing");
+        left
+    });
+    assert!(left.iter().sum::<usize>() < 300, "{left:?}");
 }
 
 #[test]

@@ -307,10 +307,10 @@ fn a_hem_that_is_woven_through_itself_comes_loose() {
         println!("{untangle} s between looks, {height} m: {pulled} crossings, {left} two seconds later");
         left
     };
-    // Single hems are left with 80 to 290 crossings, and held as they are with up to 1400.
+    // Single hems are left with 70 to 120 crossings, without ironing with 140 to 290 and held as they are with up to 650.
     let left =
         [0.0, Config::default().untangle].map(|u| [0.10, 0.115, 0.13].map(|h| left_of(u, h)).iter().sum::<usize>());
-    assert!(left[1] < left[0] && left[1] < 3 * 200, "{left:?}");
+    assert!(left[1] < left[0] && left[1] < 3 * 140, "{left:?}");
 }
 
 #[test]

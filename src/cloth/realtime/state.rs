@@ -26,6 +26,10 @@ pub struct GarmentState {
     /// Vertices that passed through other cloth when that was last looked for, in order.
     #[serde(default)]
     pub(super) passing: Vec<u32>,
+    /// In how many of the last looks at it each vertex passed through other cloth, less those in which it did not; empty
+    /// before the first look.
+    #[serde(default)]
+    pub(super) stuck: Vec<u8>,
 }
 
 /// Where an outfit is.
@@ -90,6 +94,7 @@ impl State {
                 nearest,
                 layers: Vec::new(),
                 passing: Vec::new(),
+                stuck: Vec::new(),
             });
         }
         let all: Vec<SurfaceFrame> =

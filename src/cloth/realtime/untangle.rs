@@ -1,12 +1,14 @@
 //! Takes garments out of themselves while they are worn.
 //!
 //! Planes keep a fold on the side it is on, also where that is the wrong one: a hem that was kicked up through itself stayed
-//! up. So each garment is looked at now and then as a whole, and what passes through it goes back a little.
+//! up. So each garment is looked at now and then as a whole, and what passes through it goes back a little. Where that does
+//! not help for a while, cloth is ironed: drawn flat between what lies around it, and it falls into other folds.
 
 use super::Model;
-use super::state::State;
+use super::state::{GarmentState, State};
 use crate::cloth::untangle::Untangler;
 use crate::contact::SurfaceFrame;
+use crate::garment::Region;
 use crate::math::{P3, V3d};
 
 /// Rounds that a look takes at most, and how far each moves cloth, metres.
@@ -15,6 +17,12 @@ const STEP: f64 = 0.003;
 /// Most that they move it together, metres: with 5 mm armpits without room for two layers stretched by 18 %. The rest is
 /// left to the next look.
 const MOST: f64 = 0.003;
+/// Looks in which a vertex crossed, less those in which it did not, from which on it is ironed, and what is counted at most.
+const STUCK: [u8; 2] = [3, 6];
+/// Rings of vertices that are ironed around it, and how far a look moves them at most, metres (docs/benchmarks.md).
+const IRONED: (usize, f64) = (2, 0.015);
+/// Of them what is on a sleeve stays: it left its cuff behind and turned inside out.
+const ARMS: Region = Region::LEFT_ARM.with(Region::RIGHT_ARM);
 /// Distance that what was on the wrong side is put at, metres.
 const GAP: f64 = 0.001;
 /// Nothing is moved nearer to the skin than this, metres: less than a fabric's thickness.
@@ -70,9 +78,17 @@ impl Untangle {
             self.from.clone_from(&self.x);
             let sheet = &mut self.sheets[k];
             sheet.look_anew();
+            let stuck = &mut garments[k].stuck;
+            stuck.resize(self.x.len(), 0);
             for r in 0..ROUNDS {
                 let crossings = sheet.round(model.config.par, &mut self.x, weight, STEP, GAP).crossings;
-                found += if r == 0 { crossings } else { 0 };
+                if r == 0 {
+                    found += crossings;
+                    let count = |(n, crossed): (&mut u8, bool)| {
+                        *n = if crossed { (*n + 1).min(STUCK[1]) } else { n.saturating_sub(1) };
+                    };
+                    stuck.iter_mut().zip(sheet.crossed()).for_each(count);
+                }
                 if crossings == 0 {
                     break;
                 }
@@ -81,14 +97,31 @@ impl Untangle {
             g.passing.clear();
             for (v, (from, to)) in self.from.iter().zip(&self.x).enumerate().filter(|(_, w)| w.0 != w.1) {
                 let way = (to - from).cap_magnitude(MOST);
-                g.positions[v] = P3::from((from + off_skin(from, way, g.nearest[v], body)).cast::<f32>());
+                g.go(v, from, way, body);
                 // What has further to go than that is still on the wrong side.
                 if sheet.pushes[v].1 > 0.0 || way != to - from {
                     g.passing.push(v as u32);
                 }
             }
+            let stuck: Vec<bool> = g.stuck.iter().map(|n| *n >= STUCK[0]).collect();
+            if stuck.contains(&true) {
+                self.from.iter_mut().zip(&g.positions).for_each(|(x, p)| *x = p.coords.cast());
+                self.x.clone_from(&self.from);
+                let movable = |v: usize| !self.held[v] && !Region(m.own[v]).meets(ARMS);
+                sheet.iron(&mut self.x, stuck, movable, IRONED.0);
+                for (v, (from, to)) in self.from.iter().zip(&self.x).enumerate().filter(|(_, w)| w.0 != w.1) {
+                    g.go(v, from, (to - from).cap_magnitude(IRONED.1), body);
+                }
+            }
         }
         found
+    }
+}
+
+impl GarmentState {
+    /// Puts a vertex `way` from `from`, metres, but not into the skin.
+    fn go(&mut self, v: usize, from: &V3d, way: V3d, body: &SurfaceFrame) {
+        self.positions[v] = P3::from((from + off_skin(from, way, self.nearest[v], body)).cast::<f32>());
     }
 }
 

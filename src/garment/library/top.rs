@@ -53,7 +53,7 @@ const TSHIRT: Cut = Cut {
 const LONGSLEEVE: Cut = Cut {
     name: "longsleeve",
     fabric: "cotton",
-    sleeve: Some(Sleeve { ease: 0.085, length: None, cuff: 0.64 }),
+    sleeve: Some(Sleeve { ease: 0.085, length: None, cuff: 0.50 }),
     ..TSHIRT
 };
 const TANK: Cut = Cut {
@@ -75,7 +75,7 @@ const HOODIE: Cut = Cut {
     drop: [0.085, 0.020],
     scye: 0.125,
     longer: 0.04,
-    sleeve: Some(Sleeve { ease: 0.12, length: None, cuff: 0.60 }),
+    sleeve: Some(Sleeve { ease: 0.12, length: None, cuff: 0.50 }),
     hood: true,
     ..TSHIRT
 };
