@@ -8,6 +8,7 @@ use crate::contact::{Closest, PointGrid, SurfaceFrame, SurfaceModel};
 use crate::math::{P3, V3};
 use crate::mesh::Csr;
 use crate::par::Par;
+use wide::f32x4;
 
 /// Folds close at up to this speed, m/s.
 pub(crate) const CLOSING: f32 = 1.0;
@@ -48,14 +49,17 @@ pub(crate) struct FoldFrame {
     /// m/s.
     pub(crate) velocities: Vec<V3>,
     /// The same calmed, m/s; empty where each is computed when it is wanted.
-    calm: Vec<V3>,
+    calm: Vec<f32x4>,
+    /// Scratch.
+    calmer: Vec<f32x4>,
     grid: PointGrid,
 }
 
 impl FoldFrame {
     /// Calm velocity of a vertex, m/s.
     fn speed(&self, g: &SurfaceModel, v: u32) -> V3 {
-        self.calm.get(v as usize).copied().unwrap_or_else(|| calmed(g, &self.velocities, v, CALMING))
+        let calm = self.calm.get(v as usize).map(|c| c.to_array());
+        calm.map_or_else(|| calmed(g, &self.velocities, v, CALMING), |[x, y, z, _]| V3::new(x, y, z))
     }
 }
 
@@ -118,12 +122,16 @@ impl FoldModel {
         frame.calm.clear();
         frame.surface.normals.clear();
         if touches * DEAR > self.surface.vertices() {
-            let (mut calm, mut next) = (frame.velocities.clone(), std::mem::take(&mut frame.calm));
+            frame.calm.extend(frame.velocities.iter().map(|v| f32x4::new([v.x, v.y, v.z, 0.0])));
             for _ in 0..CALMING {
-                crate::par::map_into(par, calm.len(), 1024, &mut next, |v| calmed(&self.surface, &calm, v as u32, 1));
-                std::mem::swap(&mut calm, &mut next);
+                let calm = &frame.calm;
+                crate::par::map_into(par, calm.len(), 1024, &mut frame.calmer, |v| {
+                    let around = self.surface.neighbours(v as u32);
+                    let sum = around.iter().fold(calm[v], |a, w| a + calm[*w as usize]);
+                    sum / f32x4::splat((1 + around.len()) as f32)
+                });
+                std::mem::swap(&mut frame.calm, &mut frame.calmer);
             }
-            frame.calm = calm;
             self.surface.update_normals(par, &mut frame.surface);
         }
         if let Some(search) = search {

@@ -1,4 +1,4 @@
-//! Points in cubic cells, to find those near a place. Made anew each time: two passes over the points.
+//! Points in cells, to find those near a place. Made anew each time: two passes over the points.
 
 use crate::math::P3;
 use wide::f32x8;
@@ -19,6 +19,8 @@ const LANES: usize = 8;
 
 /// Buckets of the hash: a power of two, twice the points of a usual garment.
 const BUCKETS: usize = 1 << 13;
+/// Cells are so many times as narrow along x, where they lie in a row of buckets.
+const NARROW: f32 = 2.0;
 
 /// The whole number below `t`: `f32::floor` is a call into the C library on the machines that this is built for.
 fn below(t: f32) -> i32 {
@@ -26,20 +28,26 @@ fn below(t: f32) -> i32 {
     i.saturating_sub(i32::from(i as f32 > t))
 }
 
-fn bucket(c: [i32; 3]) -> usize {
-    let h = (c[0] as u32).wrapping_mul(0x9E37_79B1)
-        ^ (c[1] as u32).wrapping_mul(0x85EB_CA77)
-        ^ (c[2] as u32).wrapping_mul(0xC2B2_AE3D);
-    ((h ^ (h >> 15)) as usize) & (BUCKETS - 1)
+/// Where a row of cells along x has its first bucket.
+fn row(y: i32, z: i32) -> u32 {
+    let h = (y as u32).wrapping_mul(0x85EB_CA77) ^ (z as u32).wrapping_mul(0xC2B2_AE3D);
+    h ^ (h >> 15)
+}
+
+fn bucket(x: i32, row: u32) -> usize {
+    row.wrapping_add(x as u32) as usize & (BUCKETS - 1)
 }
 
 impl PointGrid {
-    /// Sorts points into cells of this size, metres.
+    /// Sorts points into cells of this size, metres; along x they are [`NARROW`] times smaller.
     pub fn fill(&mut self, points: &[P3], cell: f32) {
         self.cell = cell.max(f32::MIN_POSITIVE);
         let mut keys = std::mem::take(&mut self.keys);
         keys.clear();
-        keys.extend(points.iter().map(|p| bucket(self.at(p)) as u32));
+        let [narrow, wide] = [NARROW / self.cell, 1.0 / self.cell];
+        keys.extend(
+            points.iter().map(|p| bucket(below(p.x * narrow), row(below(p.y * wide), below(p.z * wide))) as u32),
+        );
         self.keys = keys;
         self.first.clear();
         self.first.resize(BUCKETS + 1, 0);
@@ -63,50 +71,58 @@ impl PointGrid {
             (0..3).for_each(|d| self.places[d][slot] = points[i][d]);
         }
     }
-    fn at(&self, p: &P3) -> [i32; 3] {
-        [p.x, p.y, p.z].map(|c| below(c / self.cell))
-    }
     /// Calls `f` with number and squared distance (m²) of every point within `reach` of `p`, half a cell at most; maybe
     /// more than once.
     pub fn within(&self, p: &P3, reach: f32, mut f: impl FnMut(u32, f32)) {
         if self.numbers.is_empty() {
             return;
         }
-        let c = [p.x, p.y, p.z].map(|v| {
-            let t = v / self.cell;
+        let [narrow, wide] = [NARROW / self.cell, 1.0 / self.cell];
+        // Saturating: cloth that has flown away keeps its place in the last cell.
+        let [low, high] = [p.x - reach, p.x + reach].map(|x| below(x * narrow));
+        let beside = |v: f32| {
+            let t = v * wide;
             let i = below(t);
-            (i, if t - (i as f32) < 0.5 { -1 } else { 1 })
-        });
+            [i, i.saturating_add(if t - (i as f32) < 0.5 { -1 } else { 1 })]
+        };
+        let (ys, zs) = (beside(p.y), beside(p.z));
         let most = f32x8::splat(reach * reach);
         let at = [p.x, p.y, p.z].map(f32x8::splat);
-        let [x, y, z] = &self.places;
-        for k in 0..8usize {
-            // Saturating: cloth that has flown away keeps its place in the last cell.
-            let cell = [0, 1, 2].map(|d| c[d].0.saturating_add(if k >> d & 1 == 1 { c[d].1 } else { 0 }));
-            let b = bucket(cell);
-            let (mut from, to) = (self.first[b] as usize, self.first[b + 1] as usize);
-            while from < to {
-                let (Some(x), Some(y), Some(z)) = (
-                    x[from..].first_chunk::<LANES>(),
-                    y[from..].first_chunk::<LANES>(),
-                    z[from..].first_chunk::<LANES>(),
-                ) else {
-                    break;
-                };
-                let d = [f32x8::from(*x) - at[0], f32x8::from(*y) - at[1], f32x8::from(*z) - at[2]];
-                let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-                let mut near = square.simd_le(most).to_bitmask();
-                if near != 0 {
-                    let square = square.to_array();
-                    near &= u32::MAX >> (u32::BITS - (to - from).min(LANES) as u32);
-                    while near != 0 {
-                        let l = near.trailing_zeros() as usize;
-                        near &= near - 1;
-                        f(self.numbers[from + l], square[l]);
-                    }
-                }
-                from += LANES;
+        for k in 0..4usize {
+            let row = row(ys[k & 1], zs[k >> 1]);
+            let [from, to] = [low, high].map(|x| bucket(x, row));
+            if from <= to {
+                self.scan(self.first[from], self.first[to + 1], at, most, &mut f);
+            } else {
+                self.scan(self.first[from], self.first[BUCKETS], at, most, &mut f);
+                self.scan(self.first[0], self.first[to + 1], at, most, &mut f);
             }
+        }
+    }
+    /// Calls `f` with those of some points that are near `at`.
+    #[inline(always)]
+    fn scan(&self, from: u32, to: u32, at: [f32x8; 3], most: f32x8, f: &mut impl FnMut(u32, f32)) {
+        let (mut from, to) = (from as usize, to as usize);
+        let [x, y, z] = &self.places;
+        while from < to {
+            let (Some(x), Some(y), Some(z)) =
+                (x[from..].first_chunk::<LANES>(), y[from..].first_chunk::<LANES>(), z[from..].first_chunk::<LANES>())
+            else {
+                break;
+            };
+            let d = [f32x8::from(*x) - at[0], f32x8::from(*y) - at[1], f32x8::from(*z) - at[2]];
+            let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            let mut near = square.simd_le(most).to_bitmask();
+            if near != 0 {
+                let square = square.to_array();
+                near &= u32::MAX >> (u32::BITS - (to - from).min(LANES) as u32);
+                while near != 0 {
+                    let l = near.trailing_zeros() as usize;
+                    near &= near - 1;
+                    f(self.numbers[from + l], square[l]);
+                }
+            }
+            from += LANES;
         }
     }
 }

@@ -26,6 +26,8 @@ const SEARCH: f64 = 1.0 / 120.0;
 const CALM_SEARCH: f64 = 1.0 / 60.0;
 /// m/s.
 const CALM: f32 = 1.0;
+/// Depth maps of the body that are drawn in a second: each of four directions 15 times.
+const VIEWS: f64 = 60.0;
 /// Cloth of which 95 % is slower than this is still, m/s.
 const STILL_SPEED: f32 = 0.02;
 /// The same on a body that trembles: a skirt that is shaken by a millimetre swings at 0.04 to 0.13 m/s, m/s.
@@ -154,9 +156,11 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         model.surface.update_normals(config.par, &mut work.before);
     }
     report.sleeves_put_back = put_back(model, state);
-    // Two opposite views in turn: a map only proposes where to begin looking, and all are wanted after a jump.
-    let turn = state.frames as usize % 2 * 2;
-    let views = if teleported { &model.views[..] } else { &model.views[turn..turn + 2] };
+    // Some views in turn: a map only proposes where to begin looking, and all are wanted after a jump.
+    let wanted =
+        if teleported { model.views.len() } else { ((dt * VIEWS).round() as usize).clamp(1, model.views.len()) };
+    let turns: Vec<_> = model.views.chunks(wanted).collect();
+    let views = turns[state.frames as usize % turns.len()];
     let mut buried = std::mem::take(&mut state.buried);
     let Workspace { maps, before, after, near_skin, untangle, .. } = work;
     ((report.stages_ms.maps, report.crossings), ()) = par::join(
