@@ -67,32 +67,42 @@ fn main() {
     })
     .unwrap();
     let t1 = (cpu() - t0) / (s.frames() - 1) as f64;
-    let reference = format!("{folder}/scenes/{scene}.reference.npy");
-    let (mut com, mut at) = (f64::NAN, vec![]);
-    if let Ok(bytes) = std::fs::read(&reference) {
+    // From the file beside the scene, or from a run of its own with `against` small steps and nothing smoothed.
+    let n = s.start.len();
+    let reference: Vec<Vec<[f32; 3]>> = if let Some(steps) = get("against") {
+        let mut all = vec![];
+        let fine = RunConfig { substeps: steps.parse().unwrap(), smooth: Some(0), ..c };
+        run(&s, &fine, |_, p| {
+            all.push(p.iter().map(|p| [p.x, p.y, p.z]).collect());
+            std::ops::ControlFlow::Continue(())
+        })
+        .unwrap();
+        all
+    } else if let Ok(bytes) = std::fs::read(format!("{folder}/scenes/{scene}.reference.npy")) {
         let len = u16::from_le_bytes([bytes[8], bytes[9]]) as usize;
-        let f: Vec<f32> =
-            bytes[10 + len..].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-        let n = s.start.len();
-        let frames = f.len() / 3 / n;
-        let mut sum = 0.0;
-        for k in 0..frames.min(positions.len()) {
-            let (mut a, mut b, mut d2) = ([0.0f64; 3], [0.0f64; 3], 0.0);
-            for i in 0..n {
-                for d in 0..3 {
-                    let (p, q) = (f64::from(positions[k][i][d]), f64::from(f[(k * n + i) * 3 + d]));
-                    a[d] += p / n as f64;
-                    b[d] += q / n as f64;
-                    d2 += (p - q) * (p - q);
-                }
-            }
-            sum += (0..3).map(|d| (a[d] - b[d]).powi(2)).sum::<f64>();
-            if k == 15 || k == 30 || k == 45 {
-                at.push(format!("{:.1}", (d2 / n as f64).sqrt() * 1e3));
+        let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+        let all: Vec<[f32; 3]> =
+            bytes[10 + len..].chunks_exact(12).map(|p| [0, 4, 8].map(|k| number(&p[k..]))).collect();
+        all.chunks_exact(n).map(<[_]>::to_vec).collect()
+    } else {
+        vec![]
+    };
+    let (mut sum, mut at) = (0.0, vec![]);
+    for (k, (now, then)) in positions.iter().zip(&reference).enumerate() {
+        let (mut way, mut d2) = ([0.0f64; 3], 0.0);
+        for (p, q) in now.iter().zip(then) {
+            for d in 0..3 {
+                let off = f64::from(p[d]) - f64::from(q[d]);
+                way[d] += off / n as f64;
+                d2 += off * off;
             }
         }
-        com = (sum / frames as f64).sqrt() * 1e3;
+        sum += way.iter().map(|w| w * w).sum::<f64>();
+        if k == 15 || k == 30 || k == 45 {
+            at.push(format!("{:.1}", (d2 / n as f64).sqrt() * 1e3));
+        }
     }
+    let com = (sum / reference.len() as f64).sqrt() * 1e3;
     println!(
         "{scene} {:?} n={} it={} com={com:.1}mm verts@.25,.5,.75={at:?} cpu {t1:.2} ms med {:.2} mean {:.2} strain99 {:.2}% pen {:.2}mm soft {:.2} scaled {} energy {:.3} held off {} skipped {} most crossings {}",
         c.method,
