@@ -52,7 +52,7 @@ fn raster(c: &mut Criterion) {
     for (name, view) in [("640x480", &kinect), ("parallel 256x256", &parallel)] {
         for cull in [Cull::None, Cull::Back] {
             for par in [Par::Seq, Par::Rayon] {
-                let options = Options { par, cull };
+                let options = Options { par, cull, ..Options::default() };
                 c.bench_function(&format!("fast {name}, {cull:?} culled, {par:?}"), |b| {
                     b.iter(|| rasterise_with(options, view, &v, &f, &mut out));
                 });

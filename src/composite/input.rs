@@ -69,6 +69,9 @@ pub struct Config {
     /// An outer garment is drawn this much nearer than the one inside it, metres: layers that the simulation holds
     /// less than a millimetre apart would show through each other.
     pub layer_offset: f32,
+    /// The inside of a garment is drawn this much farther, metres: a fold that goes a few millimetres through another, in
+    /// an elbow or an armpit, would show as a dark slit.
+    pub inside_offset: f32,
     /// Leave out faces behind other garments or behind the garment's own front while drawing. The picture is the same,
     /// bit for bit; the graphics card tests depth by itself and pays no heed.
     pub skip_hidden: bool,
@@ -86,6 +89,7 @@ impl Default for Config {
             lights: Lights::default(),
             framing: Framing::Cover,
             layer_offset: 15e-3,
+            inside_offset: 10e-3,
             skip_hidden: true,
             skip_unseen: true,
         }

@@ -263,7 +263,7 @@ fn draw_body(
     let crate::raster::View::Perspective { camera, near } = part_of(stage, area, 1) else { return false };
     let camera = camera.resized(area.width.div_ceil(BODY_STEP), area.height.div_ceil(BODY_STEP));
     let view = crate::raster::View::Perspective { camera, near };
-    rasterise_with(Options { par, cull: Cull::Back }, &view, vertices, body.faces, out);
+    rasterise_with(Options { par, cull: Cull::Back, ..Options::default() }, &view, vertices, body.faces, out);
     true
 }
 
@@ -418,7 +418,8 @@ fn count(work: &Workspace, area: &Area, samples: u32, tiles: usize, report: &mut
 mod tests {
     use super::super::fixture::Scenery;
     use super::*;
-    use crate::composite::{Config, Margins};
+    use crate::composite::{Config, GarmentView, Margins};
+    use crate::mesh::{Face, face_normal};
 
     #[test]
     fn the_arm_hides_the_shirt_and_noise_does_not() {
@@ -519,9 +520,40 @@ mod tests {
     }
 
     #[test]
+    fn a_fold_that_comes_through_from_inside_is_not_seen() {
+        let s = Scenery::new(320, 240, 4);
+        let shirt = s.garment();
+        // Its front once more, 5 mm nearer and inside out.
+        let n = shirt.vertices.len() as u32;
+        let nearer = shirt.vertices.iter().map(|p| p * (1.0 - 5e-3 / p.z));
+        let vertices: Vec<_> = shirt.vertices.iter().copied().chain(nearer).collect();
+        let front = |f: &&Face| face_normal(shirt.vertices, f).dot(&shirt.vertices[f[0] as usize].coords) < 0.0;
+        let through = shirt.faces.iter().filter(front).map(|f| [f[0] + n, f[2] + n, f[1] + n]);
+        let faces: Vec<_> = shirt.faces.iter().copied().chain(through).collect();
+        let uv = shirt.uv.repeat(2);
+        let folded = GarmentView { vertices: &vertices, faces: &faces, uv: &uv, normals: &[], ..shirt };
+        for skip_hidden in [true, false] {
+            let changed = |inside_offset: f32| {
+                let model = Model::new(Config { inside_offset, skip_hidden, ..Config::default() });
+                let [a, b] = [s.garment(), folded].map(|g| {
+                    render(&model, &mut State::default(), &s.input(&[g], None), &mut Workspace::default())
+                        .expect("drawn")
+                        .0
+                });
+                (0..240)
+                    .flat_map(|y| (0..320).map(move |x| (x, y)))
+                    .filter(|(x, y)| a.at(*x, *y) != b.at(*x, *y))
+                    .count()
+            };
+            let [shown, hidden] = [changed(0.0), changed(Config::default().inside_offset)];
+            assert!(shown > 3000 && hidden < shown / 100, "{shown} {hidden}");
+        }
+    }
+
+    #[test]
     fn faults_are_named() {
         let s = Scenery::new(160, 120, 5);
-        let draw = |g: super::super::GarmentView<'_>| {
+        let draw = |g: GarmentView<'_>| {
             render(&Model::default(), &mut State::default(), &s.input(&[g], None), &mut Workspace::default()).err()
         };
         let mut g = s.garment();

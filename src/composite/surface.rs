@@ -243,9 +243,10 @@ impl Surface {
     pub(crate) fn rasterise(&mut self, config: &Config, stage: &Stage, area: &Area, n: u32) -> usize {
         let view = part_of(stage, area, n);
         if config.skip_hidden {
-            return rasterise_layers(config.par, &view, &self.vertices, &self.faces, &self.layers, &mut self.samples);
+            let (x, f, of) = (&self.vertices, &self.faces, &self.layers);
+            return rasterise_layers(config.par, config.inside_offset, &view, x, f, of, &mut self.samples);
         }
-        let options = Options { par: config.par, cull: Cull::None };
+        let options = Options { par: config.par, cull: Cull::None, behind: config.inside_offset };
         rasterise_with(options, &view, &self.vertices, &self.faces, &mut self.samples);
         0
     }

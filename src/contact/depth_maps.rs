@@ -97,7 +97,13 @@ impl DepthMaps {
                 top: lo.y - BORDER,
                 pixels_per_metre: v.pixels_per_metre,
             };
-            rasterise_with(Options { par: Par::Seq, cull: Cull::Back }, &view, &m.points, faces, &mut m.buffer);
+            rasterise_with(
+                Options { par: Par::Seq, cull: Cull::Back, ..Options::default() },
+                &view,
+                &m.points,
+                faces,
+                &mut m.buffer,
+            );
             m.view = Some(view);
         });
     }

@@ -24,7 +24,7 @@ pub(super) struct SceneData {
 }
 
 impl SceneData {
-    pub(super) fn new(stage: &Stage, area: &Area, samples: u32, shader: &Shader<'_>) -> Self {
+    pub(super) fn new(stage: &Stage, area: &Area, samples: u32, behind: f32, shader: &Shader<'_>) -> Self {
         let mut lens = [0.0; 4];
         if let View::Perspective { camera: k, .. } = part_of(stage, area, samples) {
             lens = [k.fx, k.fy, k.cx + 0.5, k.cy + 0.5].map(|v| v as f32);
@@ -39,7 +39,7 @@ impl SceneData {
             up: [shader.up.x, shader.up.y, shader.up.z, l.sky],
             key: [shader.key.x, shader.key.y, shader.key.z, l.key],
             light: [l.ground, l.inside, l.contact, shader.brightness],
-            limits: [FOLD_GAP, SHADOW_DEPTH, NO_SHADOW, 0.0],
+            limits: [FOLD_GAP, SHADOW_DEPTH, NO_SHADOW, behind],
         }
     }
 }

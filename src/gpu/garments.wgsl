@@ -16,7 +16,7 @@ struct Scene {
     key: vec4f,
     // Ground, inside, contact, brightness.
     light: vec4f,
-    // Fold gap (metres), shadow depth (metres), least shadow, unused.
+    // Fold gap (metres), shadow depth (metres), least shadow, how much farther insides are drawn (metres).
     limits: vec4f,
 }
 
@@ -58,7 +58,13 @@ struct Seen {
 
 @vertex
 fn garment_vertex(@builtin(vertex_index) index: u32) -> Seen {
-    let p = points[corners[index]].xyz;
+    var p = points[corners[index]].xyz;
+    let first = index / 3u * 3u;
+    let a = points[corners[first]].xyz;
+    let away = cross(points[corners[first + 1u]].xyz - a, points[corners[first + 2u]].xyz - a);
+    if p.z > scene.size.z && dot(away, a) > 0.0 {
+        p *= 1.0 + scene.limits.w / p.z;
+    }
     let u = scene.lens.x * p.x + scene.lens.z * p.z;
     let v = scene.lens.y * p.y + scene.lens.w * p.z;
     var out: Seen;

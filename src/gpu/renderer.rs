@@ -226,7 +226,7 @@ impl Renderer {
             &model.config.lights,
             scene.report.brightness,
         );
-        let data = SceneData::new(&scene.stage, &area, samples, &shader);
+        let data = SceneData::new(&scene.stage, &area, samples, model.config.inside_offset, &shader);
         self.queue.write_buffer(&self.scene, 0, bytemuck::bytes_of(&data));
         for (slot, bytes) in self.storage.iter_mut().zip(geometry(&work.surface)) {
             if slot.size() < bytes.len() as u64 {

@@ -22,12 +22,14 @@ pub enum Cull {
 }
 
 /// How to rasterise.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Options {
     /// Threads.
     pub par: Par,
     /// Sides drawn.
     pub cull: Cull,
+    /// Faces turned away are drawn so much farther, metres.
+    pub behind: f32,
 }
 
 /// Bands of rows when threads are allowed: enough to balance a body between a few threads, few enough that
@@ -53,7 +55,7 @@ pub(super) struct Scratch {
 /// Draws all faces, both sides, on the calling thread: the pixels of [`super::rasterise_reference`], faster.
 /// Points in the view's frame; faces out of range or with corners that are not finite are left out.
 pub fn rasterise(view: &View, vertices: &[P3], faces: &[Face], out: &mut VisibilityBuffer) {
-    rasterise_with(Options { par: Par::Seq, cull: Cull::None }, view, vertices, faces, out);
+    rasterise_with(Options { par: Par::Seq, ..Options::default() }, view, vertices, faces, out);
 }
 
 /// [`rasterise`] with threads and culling. The bits do not depend on the thread count.
@@ -61,19 +63,20 @@ pub fn rasterise_with(options: Options, view: &View, vertices: &[P3], faces: &[F
     draw(options, view, vertices, faces, &[], out);
 }
 
-/// The picture of [`rasterise_with`] without culling, bit for bit, in less time: what lies behind something drawn
+/// The picture of [`rasterise_with`] without culling and with the same `behind`, bit for bit, in less time: what lies behind something drawn
 /// before costs a look at a coarse depth image. `layers` are the faces of each garment (ascending, without gaps,
 /// innermost first): outer ones are drawn first, and sides turned away last. Returns how many faces were left out as
 /// hidden; one that spans several bands of rows counts where it begins.
 pub fn rasterise_layers(
     par: Par,
+    behind: f32,
     view: &View,
     vertices: &[P3],
     faces: &[Face],
     layers: &[Range<usize>],
     out: &mut VisibilityBuffer,
 ) -> usize {
-    draw(Options { par, cull: Cull::None }, view, vertices, faces, layers, out)
+    draw(Options { par, behind, cull: Cull::None }, view, vertices, faces, layers, out)
 }
 
 fn draw(
@@ -120,6 +123,7 @@ fn draw(
             top: (k * rows) as i32,
             rows: (depth.len() / width.max(1)) as i32,
             height: height as i32,
+            behind: options.behind,
             depth,
             face,
             coarse,
@@ -312,7 +316,7 @@ mod tests {
                 let mut slow = VisibilityBuffer::default();
                 for face in &f {
                     rasterise_reference(&view, &v, std::slice::from_ref(face), &mut slow);
-                    let fast = drawn(Options { par: Par::Seq, cull: Cull::None }, &view, &v, &[*face]);
+                    let fast = drawn(Options { par: Par::Seq, ..Options::default() }, &view, &v, &[*face]);
                     assert_eq!(slow.face, fast.face, "coverage of {face:?}, seed {seed}");
                     for (a, b) in slow.depth.iter().zip(&fast.depth) {
                         assert!(close(&view, &v, face, *a, *b), "{a} {b} {face:?}");
@@ -320,7 +324,7 @@ mod tests {
                 }
                 // And all together: only ties within rounding may fall differently.
                 rasterise_reference(&view, &v, &f, &mut slow);
-                let fast = drawn(Options { par: Par::Seq, cull: Cull::None }, &view, &v, &f);
+                let fast = drawn(Options { par: Par::Seq, ..Options::default() }, &view, &v, &f);
                 assert!(slow.face.iter().any(|&id| id != VisibilityBuffer::NONE));
                 for i in 0..slow.face.len() {
                     let (a, b) = (slow.depth[i], fast.depth[i]);
@@ -336,10 +340,11 @@ mod tests {
         for view in [pinhole(), parallel()] {
             let (v, f) = soup(9, 400);
             for cull in [Cull::None, Cull::Back, Cull::Front] {
-                let seq = drawn(Options { par: Par::Seq, cull }, &view, &v, &f);
+                let seq = drawn(Options { par: Par::Seq, cull, ..Options::default() }, &view, &v, &f);
                 for threads in [1, 2, 5] {
-                    let got = par::with_threads(threads, || drawn(Options { par: Par::Rayon, cull }, &view, &v, &f))
-                        .expect("pool");
+                    let got =
+                        par::with_threads(threads, || drawn(Options { cull, ..Options::default() }, &view, &v, &f))
+                            .expect("pool");
                     assert!(seq == got, "{threads} threads, {cull:?}");
                 }
             }
@@ -393,7 +398,7 @@ mod tests {
         // Counter-clockwise seen from the camera, so turned to it.
         let v = [[-0.5, 0.5, 2.0], [0.5, 0.5, 2.0], [0.0, -0.5, 2.0]].map(P3::from);
         let count = |cull, f: Face| {
-            let b = drawn(Options { par: Par::Seq, cull }, &pinhole(), &v, &[f]);
+            let b = drawn(Options { par: Par::Seq, cull, ..Options::default() }, &pinhole(), &v, &[f]);
             b.face.iter().filter(|&&id| id == 0).count()
         };
         let front = [0, 1, 2];
@@ -407,6 +412,22 @@ mod tests {
         let empty = View::Orthographic { width: 0, height: 0, left: 0.0, top: 0.0, pixels_per_metre: 1.0 };
         rasterise_with(Options::default(), &empty, &v, &[front], &mut out);
         assert!(out.face.is_empty());
+    }
+
+    #[test]
+    fn faces_turned_away_are_drawn_so_much_farther() {
+        let v = [[-0.5, 0.5, 2.0], [0.5, 0.5, 2.5], [0.0, -0.5, 3.0]].map(P3::from);
+        for view in [pinhole(), parallel()] {
+            for (face, farther) in [([0, 1, 2], 0.0), ([0, 2, 1], 0.01)] {
+                let there = drawn(Options::default(), &view, &v, &[face]);
+                let moved = drawn(Options { behind: 0.01, ..Options::default() }, &view, &v, &[face]);
+                assert_eq!(there.face, moved.face);
+                let seen = there.depth.iter().zip(&moved.depth).filter(|(a, _)| a.is_finite());
+                // Between the corners 1/z is no longer quite that of a flat face.
+                assert!(seen.clone().count() > 100);
+                assert!(seen.into_iter().all(|(a, b)| (b - a - farther).abs() < 2e-5 + 0.05 * farther), "{farther}");
+            }
+        }
     }
 
     #[test]

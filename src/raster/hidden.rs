@@ -92,7 +92,7 @@ pub(super) fn draw_layers<const PERSPECTIVE: bool>(job: &Job<'_>, number: u8, ba
     for &id in &later {
         let id = id as usize;
         let Some(corners) = job.corners(id, number) else { continue };
-        if band.hides::<PERSPECTIVE>(&corners) {
+        if band.hides::<PERSPECTIVE>(&corners.map(|c| c.farther::<PERSPECTIVE>(band.behind))) {
             hidden += usize::from(job.begins(id, number));
         } else {
             job.draw::<PERSPECTIVE, true>(id, corners, band);
@@ -108,7 +108,7 @@ mod tests {
     use crate::math::{P3, V3};
     use crate::mesh::Face;
     use crate::par::{self, Par};
-    use crate::raster::{Cull, Options, View, VisibilityBuffer, rasterise_layers, rasterise_with};
+    use crate::raster::{Options, View, VisibilityBuffer, rasterise_layers, rasterise_with};
     use rand::{Rng, SeedableRng};
     use std::ops::Range;
 
@@ -168,17 +168,19 @@ mod tests {
                 f.iter_mut().for_each(|f| f.swap(0, 1));
             }
             for view in &views {
+                let behind = if seed % 4 < 2 { 0.0 } else { 0.03 };
                 let mut plain = VisibilityBuffer::default();
-                rasterise_with(Options { par: Par::Seq, cull: Cull::None }, view, &v, &f, &mut plain);
+                let options = Options { par: Par::Seq, behind, ..Options::default() };
+                rasterise_with(options, view, &v, &f, &mut plain);
                 let mut out = VisibilityBuffer::default();
-                let hidden = rasterise_layers(Par::Seq, view, &v, &f, &layers, &mut out);
+                let hidden = rasterise_layers(Par::Seq, behind, view, &v, &f, &layers, &mut out);
                 assert!(out == plain, "seed {seed}");
                 // Six walls, one of them seen: five of six minus what stands out.
                 assert!(seed % 2 == 1 || hidden > f.len() / 3, "{hidden} of {}", f.len());
                 for threads in [1, 3] {
                     let mut banded = VisibilityBuffer::default();
                     let counts = par::with_threads(threads, || {
-                        [0, 1].map(|_| rasterise_layers(Par::Rayon, view, &v, &f, &layers, &mut banded))
+                        [0, 1].map(|_| rasterise_layers(Par::Rayon, behind, view, &v, &f, &layers, &mut banded))
                     });
                     let counts = counts.expect("pool");
                     assert!(banded == plain && counts[0] == counts[1], "{threads} threads, seed {seed}");
@@ -192,12 +194,15 @@ mod tests {
         let view = View::Orthographic { width: 64, height: 64, left: 0.0, top: 0.0, pixels_per_metre: 64.0 };
         let v = [[0.1, 0.1, 1.0], [0.9, 0.1, 1.0], [0.1, 0.9, 1.0], [0.9, 0.9, 2.0]].map(P3::from);
         let mut out = VisibilityBuffer::default();
-        assert_eq!(rasterise_layers(Par::Seq, &view, &v, &[[0, 1, 2]], std::slice::from_ref(&(0..1)), &mut out), 0);
+        assert_eq!(
+            rasterise_layers(Par::Seq, 0.0, &view, &v, &[[0, 1, 2]], std::slice::from_ref(&(0..1)), &mut out),
+            0
+        );
         // The second lies beside the first, both sides of both.
         let faces = [[0, 1, 2], [1, 2, 3], [0, 2, 1], [1, 3, 2]];
-        rasterise_layers(Par::Seq, &view, &v, &faces, &[0..2, 2..4], &mut out);
+        rasterise_layers(Par::Seq, 0.0, &view, &v, &faces, &[0..2, 2..4], &mut out);
         assert!(out.face.contains(&0) && out.face.contains(&1));
         let empty = View::Orthographic { width: 0, height: 0, left: 0.0, top: 0.0, pixels_per_metre: 1.0 };
-        assert_eq!(rasterise_layers(Par::Seq, &empty, &v, &faces, &[0..2, 2..4], &mut out), 0);
+        assert_eq!(rasterise_layers(Par::Seq, 0.0, &empty, &v, &faces, &[0..2, 2..4], &mut out), 0);
     }
 }

@@ -17,6 +17,8 @@ pub(super) struct Band<'a> {
     pub(super) rows: i32,
     /// Size of the whole picture in rows; anchors of the depth plane depend on it, never on the band.
     pub(super) height: i32,
+    /// Faces turned away are so much farther, metres.
+    pub(super) behind: f32,
     pub(super) depth: &'a mut [f32],
     pub(super) face: &'a mut [u32],
     pub(super) coarse: &'a mut Coarse,
@@ -81,7 +83,7 @@ impl Band<'_> {
         cull: Cull,
     ) {
         let Some(Span { columns: [x0, x1], rows: [first, last], top: y0 }) = self.span(&corners) else { return };
-        let [a, mut b, mut c] = corners;
+        let [mut a, mut b, mut c] = corners;
         let [min_x, max_x] = [a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x)];
         let [min_y, max_y] = [a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y)];
         let small = max_x - min_x < SMALL && max_y - min_y < SMALL;
@@ -101,6 +103,8 @@ impl Band<'_> {
         }
         if area < 0 {
             std::mem::swap(&mut b, &mut c);
+        } else {
+            [a, b, c] = [a, b, c].map(|c| c.farther::<PERSPECTIVE>(self.behind));
         }
         let scale = f64::from(ONE) / area.unsigned_abs() as f64;
         let (db, dc) = (f64::from(b.q - a.q), f64::from(c.q - a.q));

@@ -36,6 +36,11 @@ impl Corner {
             Self::OUTSIDE
         }
     }
+    /// The same so many metres behind.
+    #[inline(always)]
+    pub(super) fn farther<const PERSPECTIVE: bool>(self, by: f32) -> Self {
+        Self { q: if PERSPECTIVE { self.q / (1.0 + by * self.q) } else { self.q + by }, ..self }
+    }
     pub(super) fn is_outside(&self) -> bool {
         self.x == i32::MIN
     }

@@ -217,7 +217,13 @@ impl Sequence {
         let faces = t.mesh().faces();
         let view = View::Perspective { camera: self.setting.camera, near: NEAR };
         let mut buffer = VisibilityBuffer::default();
-        rasterise_with(Options { par: Par::Seq, cull: Cull::Back }, &view, &truth.vertices, faces, &mut buffer);
+        rasterise_with(
+            Options { par: Par::Seq, cull: Cull::Back, ..Options::default() },
+            &view,
+            &truth.vertices,
+            faces,
+            &mut buffer,
+        );
         let mut normals = Vec::new();
         if color.is_some() {
             vertex_normals(Par::Seq, &truth.vertices, faces, t.topology().vertex_faces(), &mut normals);
