@@ -39,7 +39,7 @@ fn bucket(x: i32, row: u32) -> usize {
 }
 
 impl PointGrid {
-    /// Sorts points into cells of this size, metres; along x they are [`NARROW`] times smaller.
+    /// Sorts points into cells of this size, metres; along x they are half as wide.
     pub fn fill(&mut self, points: &[P3], cell: f32) {
         self.cell = cell.max(f32::MIN_POSITIVE);
         let mut keys = std::mem::take(&mut self.keys);
