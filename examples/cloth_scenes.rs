@@ -3,6 +3,7 @@
 use std::path::Path;
 use tryon::cloth::crossings;
 use tryon::cloth::scene::{Method, RunConfig, load, run};
+use tryon::formats::npy::read_npy;
 
 fn main() {
     let args: Vec<String> = std::env::args().collect();
@@ -78,12 +79,8 @@ fn main() {
         })
         .unwrap();
         all
-    } else if let Ok(bytes) = std::fs::read(format!("{folder}/scenes/{scene}.reference.npy")) {
-        let len = u16::from_le_bytes([bytes[8], bytes[9]]) as usize;
-        let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-        let all: Vec<[f32; 3]> =
-            bytes[10 + len..].chunks_exact(12).map(|p| [0, 4, 8].map(|k| number(&p[k..]))).collect();
-        all.chunks_exact(n).map(<[_]>::to_vec).collect()
+    } else if let Ok((_, all)) = read_npy(Path::new(&format!("{folder}/scenes/{scene}.reference.npy"))) {
+        all.chunks_exact(3 * n).map(|f| f.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()).collect()
     } else {
         vec![]
     };

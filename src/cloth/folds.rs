@@ -58,19 +58,26 @@ pub(crate) struct FoldFrame {
 impl FoldFrame {
     /// Calm velocity of a vertex, m/s.
     fn speed(&self, g: &SurfaceModel, v: u32) -> V3 {
-        let calm = self.calm.get(v as usize).map(|c| c.to_array());
-        calm.map_or_else(|| calmed(g, &self.velocities, v, CALMING), |[x, y, z, _]| V3::new(x, y, z))
+        let calm = self.calm.get(v as usize).copied();
+        let [x, y, z, _] = calm.unwrap_or_else(|| calmed(g, &self.velocities, v, CALMING)).to_array();
+        V3::new(x, y, z)
     }
 }
 
 /// Velocity of a vertex after so many rounds of averaging over neighbours, m/s.
-fn calmed(g: &SurfaceModel, sharp: &[V3], v: u32, rounds: usize) -> V3 {
-    if rounds == 0 {
-        return sharp[v as usize];
-    }
+fn calmed(g: &SurfaceModel, sharp: &[V3], v: u32, rounds: usize) -> f32x4 {
+    if rounds == 0 { lanes(&sharp[v as usize]) } else { mean(g, v, |w| calmed(g, sharp, w, rounds - 1)) }
+}
+
+fn lanes(v: &V3) -> f32x4 {
+    f32x4::new([v.x, v.y, v.z, 0.0])
+}
+
+/// Mean of a vertex and its neighbours.
+#[inline(always)]
+fn mean(g: &SurfaceModel, v: u32, of: impl Fn(u32) -> f32x4) -> f32x4 {
     let around = g.neighbours(v);
-    let own = calmed(g, sharp, v, rounds - 1);
-    around.iter().fold(own, |a, w| a + calmed(g, sharp, *w, rounds - 1)) / (1 + around.len()) as f32
+    around.iter().fold(of(v), |a, w| a + of(*w)) / f32x4::splat((1 + around.len()) as f32)
 }
 
 /// How far one search looks.
@@ -122,13 +129,11 @@ impl FoldModel {
         frame.calm.clear();
         frame.surface.normals.clear();
         if touches * DEAR > self.surface.vertices() {
-            frame.calm.extend(frame.velocities.iter().map(|v| f32x4::new([v.x, v.y, v.z, 0.0])));
+            frame.calm.extend(frame.velocities.iter().map(lanes));
             for _ in 0..CALMING {
                 let calm = &frame.calm;
                 crate::par::map_into(par, calm.len(), 1024, &mut frame.calmer, |v| {
-                    let around = self.surface.neighbours(v as u32);
-                    let sum = around.iter().fold(calm[v], |a, w| a + calm[*w as usize]);
-                    sum / f32x4::splat((1 + around.len()) as f32)
+                    mean(&self.surface, v as u32, |w| calm[w as usize])
                 });
                 std::mem::swap(&mut frame.calm, &mut frame.calmer);
             }

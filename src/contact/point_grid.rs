@@ -19,7 +19,7 @@ const LANES: usize = 8;
 
 /// Buckets of the hash: a power of two, twice the points of a usual garment.
 const BUCKETS: usize = 1 << 13;
-/// Cells are so many times as narrow along x, where they lie in a row of buckets.
+/// Cells are so many times as narrow along x, where they lie in a row of buckets. Narrower ones gain nothing.
 const NARROW: f32 = 2.0;
 
 /// The whole number below `t`: `f32::floor` is a call into the C library on the machines that this is built for.

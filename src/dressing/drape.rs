@@ -181,7 +181,7 @@ const RELAX_STEP: f64 = 1e-3;
 
 /// Cloth that belongs to arms alone: a sleeve.
 fn on_arms(own: Part) -> bool {
-    own & !Region::LEFT_ARM.with(Region::RIGHT_ARM).0 == 0
+    own & !Region::ARMS.0 == 0
 }
 
 impl Drape {
@@ -194,8 +194,7 @@ impl Drape {
         let membrane = LATTICE * (mesh.material.stretch_warp * mesh.material.stretch_weft).sqrt();
         let edges = order.iter().map(|k| (sheet.edges[*k].0, sheet.edges[*k].1, 1.0 / membrane)).collect();
         let own: Vec<u8> = mesh.regions.iter().map(|r| r.decisive().0).collect();
-        let arms = Region::LEFT_ARM.with(Region::RIGHT_ARM);
-        let from_sleeve = distances(n, &sheet.edges, SLEEVE, |i| mesh.regions[i].meets(arms));
+        let from_sleeve = distances(n, &sheet.edges, SLEEVE, |i| mesh.regions[i].meets(Region::ARMS));
         let soft = mesh.anchors.iter().filter(|a| a.strength < 1.0).flat_map(|a| &a.vertices);
         let tops: std::collections::BTreeSet<u32> = soft.copied().collect();
         let from_top = distances(n, &sheet.edges, TOP, |i| tops.contains(&(i as u32)));
@@ -389,12 +388,8 @@ impl Drape {
                 if let Some(sheet) = &self.sheet {
                     // Ironed, a sleeve comes through the arm.
                     let (pinned, own) = (&self.pinned, &self.own);
-                    sheet.iron(
-                        &mut self.x,
-                        sheet.crossed().collect(),
-                        |v| pinned[v].is_none() && !on_arms(own[v]),
-                        ironed,
-                    );
+                    let movable = |v: usize| pinned[v].is_none() && !on_arms(own[v]);
+                    sheet.iron(&mut self.x, sheet.crossed().collect(), movable, ironed);
                 }
             }
             if k % LOOK_EVERY == 0 {

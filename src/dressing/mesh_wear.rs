@@ -350,10 +350,9 @@ impl Part {
         if !two_legs {
             one_tube(judge.template, &x, &mut bound);
         }
-        let arms = Region::LEFT_ARM.with(Region::RIGHT_ARM);
         let own = |i: usize| -> Region {
             let p = Region(part[i]);
-            if p.meets(arms) {
+            if p.meets(Region::ARMS) {
                 return p;
             }
             if !two_legs {

@@ -47,6 +47,8 @@ impl Region {
     pub const fn with(self, o: Self) -> Self {
         Self(self.0 | o.0)
     }
+    /// Both arms.
+    pub const ARMS: Self = Self::LEFT_ARM.with(Self::RIGHT_ARM);
     /// Has a part in common.
     pub fn meets(self, o: Self) -> bool {
         self.0 & o.0 != 0
@@ -54,8 +56,7 @@ impl Region {
     /// The parts whose skin decides for cloth that touches these: where a sleeve meets the trunk, the trunk. Its arm
     /// counts as another part there, so that an armpit that closes is known to be closed.
     pub fn decisive(self) -> Self {
-        let arms = Self::LEFT_ARM.with(Self::RIGHT_ARM);
-        if self.meets(Self::TRUNK) { Self(self.0 & !arms.0) } else { self }
+        if self.meets(Self::TRUNK) { Self(self.0 & !Self::ARMS.0) } else { self }
     }
     /// What a panel wraps.
     pub fn of(p: Placement) -> Self {

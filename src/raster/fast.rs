@@ -63,8 +63,8 @@ pub fn rasterise_with(options: Options, view: &View, vertices: &[P3], faces: &[F
     draw(options, view, vertices, faces, &[], out);
 }
 
-/// The picture of [`rasterise_with`] without culling and with the same `behind`, bit for bit, in less time: what lies behind something drawn
-/// before costs a look at a coarse depth image. `layers` are the faces of each garment (ascending, without gaps,
+/// The picture of [`rasterise_with`] without culling and with the same `behind`, bit for bit, in less time: what lies
+/// behind something drawn before costs a look at a coarse depth image. `layers` are the faces of each garment (ascending, without gaps,
 /// innermost first): outer ones are drawn first, and sides turned away last. Returns how many faces were left out as
 /// hidden; one that spans several bands of rows counts where it begins.
 pub fn rasterise_layers(

@@ -26,7 +26,8 @@ const SEARCH: f64 = 1.0 / 120.0;
 const CALM_SEARCH: f64 = 1.0 / 60.0;
 /// m/s.
 const CALM: f32 = 1.0;
-/// Depth maps of the body that are drawn in a second: each of four directions 15 times.
+/// Depth maps of the body that are drawn in a second: each of four directions 15 times. Twice as many cost time and keep
+/// cloth no higher (docs/benchmarks.md).
 const VIEWS: f64 = 60.0;
 /// Cloth of which 95 % is slower than this is still, m/s.
 const STILL_SPEED: f32 = 0.02;

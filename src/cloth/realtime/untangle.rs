@@ -17,12 +17,11 @@ const STEP: f64 = 0.003;
 /// Most that they move it together, metres: with 5 mm armpits without room for two layers stretched by 18 %. The rest is
 /// left to the next look.
 const MOST: f64 = 0.003;
-/// Looks in which a vertex crossed, less those in which it did not, from which on it is ironed, and what is counted at most.
+/// Looks in which a vertex crossed, less those in which it did not, from which on it is ironed (docs/benchmarks.md), and what is
+/// counted at most, so that what came free is left alone after four more looks.
 const STUCK: [u8; 2] = [3, 6];
 /// Rings of vertices that are ironed around it, and how far a look moves them at most, metres (docs/benchmarks.md).
 const IRONED: (usize, f64) = (2, 0.015);
-/// Of them what is on a sleeve stays: it left its cuff behind and turned inside out.
-const ARMS: Region = Region::LEFT_ARM.with(Region::RIGHT_ARM);
 /// Distance that what was on the wrong side is put at, metres.
 const GAP: f64 = 0.001;
 /// Nothing is moved nearer to the skin than this, metres: less than a fabric's thickness.
@@ -107,7 +106,8 @@ impl Untangle {
             if stuck.contains(&true) {
                 self.from.iter_mut().zip(&g.positions).for_each(|(x, p)| *x = p.coords.cast());
                 self.x.clone_from(&self.from);
-                let movable = |v: usize| !self.held[v] && !Region(m.own[v]).meets(ARMS);
+                // A sleeve that was ironed left its cuff behind and turned inside out.
+                let movable = |v: usize| !self.held[v] && !Region(m.own[v]).meets(Region::ARMS);
                 sheet.iron(&mut self.x, stuck, movable, IRONED.0);
                 for (v, (from, to)) in self.from.iter().zip(&self.x).enumerate().filter(|(_, w)| w.0 != w.1) {
                     g.go(v, from, (to - from).cap_magnitude(IRONED.1), body);

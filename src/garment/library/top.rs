@@ -34,7 +34,8 @@ struct Sleeve {
     ease: f64,
     /// Length from the shoulder tip; `None` to the wrist.
     length: Option<f64>,
-    /// Width at the cuff over width at the underarm.
+    /// Width at the cuff over width at the underarm: of long sleeves half, wider ones slide to the elbow
+    /// (docs/benchmarks.md).
     cuff: f64,
 }
 
