@@ -12,7 +12,8 @@ use tryon::camera::{DepthImage, NoiseModel, RgbdFrame};
 use tryon::math::{P3, Twist, V3};
 use tryon::par::Par;
 use tryon::registration::{
-    ArticulatedSums, Association, Dof, Metric, ModelPoints, PairingConfig, PairingScratch, pair_surfaces, solve_damped,
+    ArticulatedSums, Association, Dof, Metric, ModelPoints, PairingConfig, PairingScratch,
+    pair_surfaces, solve_damped,
 };
 use tryon::segment::{Contour, SegmentScratch, contour, find_person, find_planes};
 use tryon::spatial::{OrganisedCloud, PointTree};
@@ -20,7 +21,12 @@ use tryon::synth::{Routine, Sequence, Setting, Shopper};
 use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
 
 fn shopper(routine: Routine) -> Sequence {
-    let setting = Setting { routine, noise: NoiseModel::KinectV1, color: false, ..Setting::default() };
+    let setting = Setting {
+        routine,
+        noise: NoiseModel::KinectV1,
+        color: false,
+        ..Setting::default()
+    };
     Sequence::new(Shopper::default(), setting)
 }
 
@@ -28,7 +34,9 @@ fn segmentation(c: &mut Criterion) {
     let sequence = shopper(Routine::TryOn);
     let (frame, _) = sequence.frame(0);
     let mut grid = OrganisedCloud::new(&sequence.calibration().depth, None);
-    c.bench_function("segment/sample 640x480", |b| b.iter(|| grid.sample(&frame.depth, 8.0)));
+    c.bench_function("segment/sample 640x480", |b| {
+        b.iter(|| grid.sample(&frame.depth, 8.0))
+    });
     c.bench_function("segment/planes", |b| b.iter(|| find_planes(&grid)));
     let planes = find_planes(&grid);
     let (mut scratch, mut edges) = (SegmentScratch::default(), Contour::default());
@@ -45,7 +53,9 @@ fn segmentation(c: &mut Criterion) {
     c.bench_function("segment/no reading at all", |b| {
         b.iter(|| {
             grid.sample(&empty, 8.0);
-            find_person(&mut grid, &planes, None, &mut scratch).cells.len()
+            find_person(&mut grid, &planes, None, &mut scratch)
+                .cells
+                .len()
         });
     });
 }
@@ -60,11 +70,26 @@ fn samples(sequence: &Sequence) -> (Vec<P3>, Vec<V3>, Vec<u8>) {
     let mut bones = Default::default();
     truth.pose.bones(template.skeleton(), rest, &mut bones);
     let mut posed = vec![];
-    skin(Par::Seq, &rest.vertices, template.weights(), &bones, &mut posed);
+    skin(
+        Par::Seq,
+        &rest.vertices,
+        template.weights(),
+        &bones,
+        &mut posed,
+    );
     let chosen: Vec<usize> = (0..posed.len()).filter(pick).collect();
     let bone = |i: &usize| template.weights().dominant(*i) as u8;
-    let turn = |i: &usize| (bones.bones[template.weights().dominant(*i)].rotation.cast::<f32>()) * rest.normals[*i];
-    (chosen.iter().map(|i| posed[*i]).collect(), chosen.iter().map(turn).collect(), chosen.iter().map(bone).collect())
+    let turn = |i: &usize| {
+        (bones.bones[template.weights().dominant(*i)]
+            .rotation
+            .cast::<f32>())
+            * rest.normals[*i]
+    };
+    (
+        chosen.iter().map(|i| posed[*i]).collect(),
+        chosen.iter().map(turn).collect(),
+        chosen.iter().map(bone).collect(),
+    )
 }
 
 fn correspondences(c: &mut Criterion) {
@@ -77,28 +102,69 @@ fn correspondences(c: &mut Criterion) {
     grid.refine(&frame.depth, &person.cells);
     let mut edges = Contour::default();
     contour(&grid, &person.cells, &mut edges);
-    let points: Vec<P3> = person.cells.iter().map(|&k| grid.points[k as usize]).collect();
-    c.bench_function("pairs/tree over the readings", |b| b.iter(|| PointTree::new(&points)));
+    let points: Vec<P3> = person
+        .cells
+        .iter()
+        .map(|&k| grid.points[k as usize])
+        .collect();
+    c.bench_function("pairs/tree over the readings", |b| {
+        b.iter(|| PointTree::new(&points))
+    });
     let tree = PointTree::new(&points);
     let (positions, normals, bones) = samples(&sequence);
-    let parents: Vec<Option<usize>> =
-        sequence.shopper().template.skeleton().joints().iter().map(|j| j.parent).collect();
-    let model =
-        ModelPoints { positions: &positions, normals: &normals, bones: &bones, parents: &parents, spacing: 0.04 };
+    let parents: Vec<Option<usize>> = sequence
+        .shopper()
+        .template
+        .skeleton()
+        .joints()
+        .iter()
+        .map(|j| j.parent)
+        .collect();
+    let model = ModelPoints {
+        positions: &positions,
+        normals: &normals,
+        bones: &bones,
+        parents: &parents,
+        spacing: 0.04,
+    };
     let (mut scratch, mut pairs) = (PairingScratch::default(), vec![]);
     for association in [Association::Projective, Association::KdTree] {
-        let config =
-            PairingConfig { association, distance: 0.12, cos_normal: 0.5, pull: 0.35, data_step: 2, reuse: 0.0 };
-        c.bench_function(&format!("pairs/{association:?}, 1,000 points both ways"), |b| {
-            b.iter(|| {
-                let e = &edges.false_edges;
-                pair_surfaces(&model, &grid, &person.cells, e, Some(&tree), &config, &mut scratch, &mut pairs)
-            });
-        });
+        let config = PairingConfig {
+            association,
+            distance: 0.12,
+            cos_normal: 0.5,
+            pull: 0.35,
+            data_step: 2,
+            reuse: 0.0,
+        };
+        c.bench_function(
+            &format!("pairs/{association:?}, 1,000 points both ways"),
+            |b| {
+                b.iter(|| {
+                    let e = &edges.false_edges;
+                    pair_surfaces(
+                        &model,
+                        &grid,
+                        &person.cells,
+                        e,
+                        Some(&tree),
+                        &config,
+                        &mut scratch,
+                        &mut pairs,
+                    )
+                });
+            },
+        );
     }
     // The body is somewhere else: nothing pairs, every reading pulls.
-    let away: Vec<P3> = positions.iter().map(|p| p + V3::new(3.0, 0.0, 0.0)).collect();
-    let model = ModelPoints { positions: &away, ..model };
+    let away: Vec<P3> = positions
+        .iter()
+        .map(|p| p + V3::new(3.0, 0.0, 0.0))
+        .collect();
+    let model = ModelPoints {
+        positions: &away,
+        ..model
+    };
     let config = PairingConfig {
         association: Association::KdTree,
         distance: 0.12,
@@ -110,7 +176,16 @@ fn correspondences(c: &mut Criterion) {
     c.bench_function("pairs/KdTree, the body is elsewhere", |b| {
         b.iter(|| {
             let e = &edges.false_edges;
-            pair_surfaces(&model, &grid, &person.cells, e, Some(&tree), &config, &mut scratch, &mut pairs)
+            pair_surfaces(
+                &model,
+                &grid,
+                &person.cells,
+                e,
+                Some(&tree),
+                &config,
+                &mut scratch,
+                &mut pairs,
+            )
         });
     });
 }
@@ -122,17 +197,36 @@ type Pull = (usize, Vector3<f64>, Vector3<f64>, Metric);
 fn chain() -> (Vec<Option<usize>>, Vec<Dof>, Vec<Pull>) {
     let parents: Vec<Option<usize>> = (0..24usize).map(|b| (b > 0).then(|| (b - 1) / 2)).collect();
     let axis = |k: usize| Vector3::from_fn(|r, _| f64::from(u8::from(r == k)));
-    let mut dofs: Vec<Dof> =
-        (0..3).map(|k| Dof { bone: 0, twist: Twist { linear: axis(k), angular: Vector3::zeros() } }).collect();
+    let mut dofs: Vec<Dof> = (0..3)
+        .map(|k| Dof {
+            bone: 0,
+            twist: Twist {
+                linear: axis(k),
+                angular: Vector3::zeros(),
+            },
+        })
+        .collect();
     for bone in 0..24 {
         let at = Vector3::new(0.1 * bone as f64, (bone as f64).sin(), 0.05);
-        dofs.extend((0..3).map(|k| Dof { bone, twist: Twist::revolute(axis(k), at) }));
+        dofs.extend((0..3).map(|k| Dof {
+            bone,
+            twist: Twist::revolute(axis(k), at),
+        }));
     }
     let residual = |i: usize| {
         let t = i as f64 * 0.37;
         let direction = Vector3::new(t.sin(), t.cos(), 0.3).normalize();
         let p = Vector3::new((1.3 * t).sin(), (0.7 * t).cos(), 0.1 * t.sin());
-        (i % 24, p, direction * 0.01, Metric { isotropic: 0.1, directional: 1.0, direction })
+        (
+            i % 24,
+            p,
+            direction * 0.01,
+            Metric {
+                isotropic: 0.1,
+                directional: 1.0,
+                direction,
+            },
+        )
     };
     (parents, dofs, (0..1600).map(residual).collect())
 }
@@ -152,29 +246,48 @@ fn equations(c: &mut Criterion) {
         }
         sums.assemble(&parents, &dofs, &mut h, &mut g);
     };
-    c.bench_function("equations/1,600 residuals, 75 unknowns, f64", |b| b.iter(|| fill(&mut sums, false, &residuals)));
-    c.bench_function("equations/the same, f32", |b| b.iter(|| fill(&mut sums, true, &residuals)));
-    c.bench_function("equations/no residual", |b| b.iter(|| fill(&mut sums, false, &[])));
+    c.bench_function("equations/1,600 residuals, 75 unknowns, f64", |b| {
+        b.iter(|| fill(&mut sums, false, &residuals))
+    });
+    c.bench_function("equations/the same, f32", |b| {
+        b.iter(|| fill(&mut sums, true, &residuals))
+    });
+    c.bench_function("equations/no residual", |b| {
+        b.iter(|| fill(&mut sums, false, &[]))
+    });
     fill(&mut sums, false, &residuals);
     let damping = vec![1e-1; dofs.len()];
-    c.bench_function("solve/75 unknowns", |b| b.iter(|| solve_damped(&h, &g, &damping)));
+    c.bench_function("solve/75 unknowns", |b| {
+        b.iter(|| solve_damped(&h, &g, &damping))
+    });
     let flat = DMatrix::zeros(dofs.len(), dofs.len());
-    c.bench_function("solve/nothing known but the damping", |b| b.iter(|| solve_damped(&flat, &g, &damping)));
+    c.bench_function("solve/nothing known but the damping", |b| {
+        b.iter(|| solve_damped(&flat, &g, &damping))
+    });
     let broken = DMatrix::from_element(dofs.len(), dofs.len(), f64::NAN);
-    c.bench_function("solve/not a number", |b| b.iter(|| solve_damped(&broken, &g, &damping)));
+    c.bench_function("solve/not a number", |b| {
+        b.iter(|| solve_damped(&broken, &g, &damping))
+    });
 }
 
 fn whole_step(c: &mut Criterion) {
     for (name, routine) in [("still person", Routine::Still), ("nobody", Routine::Empty)] {
         let sequence = shopper(routine);
         let template = sequence.shopper().template.clone();
-        let model = TrackerModel::new(template, sequence.calibration().clone(), TrackerConfig::default());
+        let model = TrackerModel::new(
+            template,
+            sequence.calibration().clone(),
+            TrackerConfig::default(),
+        );
         let (mut state, mut workspace) = (TrackerState::new(&model), Workspace::default());
         let frames: Vec<RgbdFrame> = (0..10).map(|i| sequence.frame(i).0).collect();
         let mut next = 0u64;
         let mut one = || {
-            let frame =
-                RgbdFrame { sequence: next, time_ns: next * 33_333_333, ..frames[(next % 10) as usize].clone() };
+            let frame = RgbdFrame {
+                sequence: next,
+                time_ns: next * 33_333_333,
+                ..frames[(next % 10) as usize].clone()
+            };
             next += 1;
             step(&model, &mut state, &frame, &mut workspace).expect("a frame of the camera")
         };
@@ -185,5 +298,11 @@ fn whole_step(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, segmentation, correspondences, equations, whole_step);
+criterion_group!(
+    benches,
+    segmentation,
+    correspondences,
+    equations,
+    whole_step
+);
 criterion_main!(benches);

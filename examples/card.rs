@@ -11,7 +11,8 @@ use std::time::Instant;
 use tryon::body::Pose;
 use tryon::camera::ColorImage;
 use tryon::composite::{
-    BodyView, GarmentView, Input, Limbs, Look, Model, RenderError, RenderReport, State, Workspace, render,
+    BodyView, GarmentView, Input, Limbs, Look, Model, RenderError, RenderReport, State, Workspace,
+    render,
 };
 use tryon::dressing::{DressOptions, dress};
 use tryon::formats::image::write_png_rgb;
@@ -44,8 +45,18 @@ fn main() {
     let patterns = ["tshirt", "skirt"].map(|name| library::pattern(name, Size::default()).unwrap());
     let template = &sequence.shopper().template;
     let world_from_camera = sequence.setting().world_from_camera;
-    let pose: Pose<World> = Pose { root: world_from_camera * truth.pose.root, angles: truth.pose.angles.clone() };
-    let dressed = dress(template, sequence.rest(), &pose, &patterns, &DressOptions::default()).unwrap();
+    let pose: Pose<World> = Pose {
+        root: world_from_camera * truth.pose.root,
+        angles: truth.pose.angles.clone(),
+    };
+    let dressed = dress(
+        template,
+        sequence.rest(),
+        &pose,
+        &patterns,
+        &DressOptions::default(),
+    )
+    .unwrap();
     let camera_from_world = world_from_camera.inverse();
     let meshes = &dressed.model.outfit.garments;
     let drawn: Vec<Vec<P3>> = (meshes.iter().zip(&dressed.state.garments))
@@ -56,7 +67,13 @@ fn main() {
             camera
         })
         .collect();
-    let looks = [Look::default(), Look { base: [120, 40, 60], ..Look::default() }];
+    let looks = [
+        Look::default(),
+        Look {
+            base: [120, 40, 60],
+            ..Look::default()
+        },
+    ];
     let garments: Vec<GarmentView<'_>> = (drawn.iter().zip(meshes).zip(&looks))
         .map(|((vertices, m), look)| GarmentView {
             vertices,
@@ -78,17 +95,32 @@ fn main() {
             frame: &frame,
             calibration: sequence.calibration(),
             garments: &garments,
-            body: Some(BodyView { vertices: &truth.vertices, faces: template.mesh().faces(), limbs: &limbs }),
+            body: Some(BodyView {
+                vertices: &truth.vertices,
+                faces: template.mesh().faces(),
+                limbs: &limbs,
+            }),
             output: Some(size),
         };
         let (mut state, mut work) = (State::default(), Workspace::default());
         let (on_processor, a) = timed(rounds, || render(&model, &mut state, &input, &mut work));
         let (mut state, mut work) = (State::default(), Workspace::default());
-        let (on_card, b) = timed(rounds, || card.render(&model, &mut state, &input, &mut work));
-        println!("| {}×{} | {a} | {b} | {} |", size[0], size[1], different(&on_processor, &on_card));
+        let (on_card, b) = timed(rounds, || {
+            card.render(&model, &mut state, &input, &mut work)
+        });
+        println!(
+            "| {}×{} | {a} | {b} | {} |",
+            size[0],
+            size[1],
+            different(&on_processor, &on_card)
+        );
         if let Some(dir) = &out {
             std::fs::create_dir_all(dir).unwrap();
-            write_png_rgb(&dir.join(format!("{}_processor.png", size[0])), &on_processor).unwrap();
+            write_png_rgb(
+                &dir.join(format!("{}_processor.png", size[0])),
+                &on_processor,
+            )
+            .unwrap();
             write_png_rgb(&dir.join(format!("{}_card.png", size[0])), &on_card).unwrap();
         }
     }
@@ -115,12 +147,33 @@ fn timed(
     }
     times.sort_by(f64::total_cmp);
     let (image, report) = last.expect("at least one");
-    let stages: Vec<String> = report.stages_ms.iter().map(|(n, t)| format!("{n} {t:.2}")).collect();
-    (image, format!("{:.2} / {:.2} ({})", times[times.len() / 2], times[times.len() * 99 / 100], stages.join(", ")))
+    let stages: Vec<String> = report
+        .stages_ms
+        .iter()
+        .map(|(n, t)| format!("{n} {t:.2}"))
+        .collect();
+    (
+        image,
+        format!(
+            "{:.2} / {:.2} ({})",
+            times[times.len() / 2],
+            times[times.len() * 99 / 100],
+            stages.join(", ")
+        ),
+    )
 }
 
 fn different(a: &ColorImage, b: &ColorImage) -> String {
-    let far = |a: &[u8], b: &[u8]| a.iter().zip(b).any(|(a, b)| (i32::from(*a) - i32::from(*b)).abs() > DIFFERENT);
-    let n = a.data().chunks(3).zip(b.data().chunks(3)).filter(|(a, b)| far(a, b)).count();
+    let far = |a: &[u8], b: &[u8]| {
+        a.iter()
+            .zip(b)
+            .any(|(a, b)| (i32::from(*a) - i32::from(*b)).abs() > DIFFERENT)
+    };
+    let n = a
+        .data()
+        .chunks(3)
+        .zip(b.data().chunks(3))
+        .filter(|(a, b)| far(a, b))
+        .count();
     format!("{n} of {}", a.width() * a.height())
 }

@@ -7,10 +7,13 @@ use tryon::formats::npy::read_npy;
 
 fn main() {
     let args: Vec<String> = std::env::args().collect();
-    let folder =
-        std::env::var("TRYON_SHARED").unwrap_or_else(|_| format!("{}/../shared/data", env!("CARGO_MANIFEST_DIR")));
+    let folder = std::env::var("TRYON_SHARED")
+        .unwrap_or_else(|_| format!("{}/../shared/data", env!("CARGO_MANIFEST_DIR")));
     let scene = &args[1];
-    let get = |k: &str| args.iter().find_map(|a| a.strip_prefix(&format!("{k}=")).map(str::to_owned));
+    let get = |k: &str| {
+        args.iter()
+            .find_map(|a| a.strip_prefix(&format!("{k}=")).map(str::to_owned))
+    };
     let s = load(Path::new(&format!("{folder}/scenes/{scene}.json"))).unwrap();
     let mut c = RunConfig::default();
     if let Some(m) = get("method") {
@@ -72,15 +75,23 @@ fn main() {
     let n = s.start.len();
     let reference: Vec<Vec<[f32; 3]>> = if let Some(steps) = get("against") {
         let mut all = vec![];
-        let fine = RunConfig { substeps: steps.parse().unwrap(), smooth: Some(0), ..c };
+        let fine = RunConfig {
+            substeps: steps.parse().unwrap(),
+            smooth: Some(0),
+            ..c
+        };
         run(&s, &fine, |_, p| {
             all.push(p.iter().map(|p| [p.x, p.y, p.z]).collect());
             std::ops::ControlFlow::Continue(())
         })
         .unwrap();
         all
-    } else if let Ok((_, all)) = read_npy(Path::new(&format!("{folder}/scenes/{scene}.reference.npy"))) {
-        all.chunks_exact(3 * n).map(|f| f.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()).collect()
+    } else if let Ok((_, all)) =
+        read_npy(Path::new(&format!("{folder}/scenes/{scene}.reference.npy")))
+    {
+        all.chunks_exact(3 * n)
+            .map(|f| f.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect())
+            .collect()
     } else {
         vec![]
     };
@@ -114,6 +125,12 @@ fn main() {
         q.energy_end,
         q.fold_contacts,
         q.fold_searches_skipped,
-        positions.iter().skip(5).step_by(5).map(|p| crossings(&s.faces, p).len()).max().unwrap_or(0)
+        positions
+            .iter()
+            .skip(5)
+            .step_by(5)
+            .map(|p| crossings(&s.faces, p).len())
+            .max()
+            .unwrap_or(0)
     );
 }

@@ -29,7 +29,13 @@ const LOOK_EVERY: usize = 4;
 const SUNKEN: f32 = 1e-3;
 
 /// Which vertices lie how deep in the body, where and when.
-fn find_sunken(template: &Template, time: f64, body: &[P3], dressed: &Dressed, out: &mut Vec<(f32, String)>) {
+fn find_sunken(
+    template: &Template,
+    time: f64,
+    body: &[P3],
+    dressed: &Dressed,
+    out: &mut Vec<(f32, String)>,
+) {
     let solid = Solid::new(body, template.mesh().faces());
     let outfit = &dressed.model.outfit;
     for (g, s) in outfit.garments.iter().zip(&dressed.state.garments) {
@@ -39,9 +45,14 @@ fn find_sunken(template: &Template, time: f64, body: &[P3], dressed: &Dressed, o
                 continue;
             }
             let far = |v: &usize| (body[*v] - p).norm_squared();
-            let near = (0..body.len()).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(0);
+            let near = (0..body.len())
+                .min_by(|a, b| far(a).total_cmp(&far(b)))
+                .unwrap_or(0);
             let joint = &template.skeleton().joints()[template.weights().dominant(near)].name;
-            let panels: Vec<&str> = g.corners[i].iter().map(|c| g.panels[usize::from(c.0)].as_str()).collect();
+            let panels: Vec<&str> = g.corners[i]
+                .iter()
+                .map(|c| g.panels[usize::from(c.0)].as_str())
+                .collect();
             out.push((
                 depth,
                 format!(
@@ -119,13 +130,31 @@ fn main() {
             next += every;
             let skin = [0.86, 0.70, 0.60];
             let faces = dance.template.mesh().faces().to_vec();
-            let mut parts = vec![Part { vertices: body.to_vec(), faces, color: skin, uv: vec![], painted: vec![] }];
-            for (g, s) in dressed.model.outfit.garments.iter().zip(&dressed.state.garments) {
+            let mut parts = vec![Part {
+                vertices: body.to_vec(),
+                faces,
+                color: skin,
+                uv: vec![],
+                painted: vec![],
+            }];
+            for (g, s) in dressed
+                .model
+                .outfit
+                .garments
+                .iter()
+                .zip(&dressed.state.garments)
+            {
                 let mut vertices = Vec::new();
                 g.render_positions(&s.positions, &mut vertices);
                 let color = library::dye(&g.name).map(|c| f32::from(c) / 255.0);
                 let (faces, uv) = (g.render.faces.clone(), g.render.uv.clone());
-                parts.push(Part { vertices, faces, color, uv, painted: vec![] });
+                parts.push(Part {
+                    vertices,
+                    faces,
+                    color,
+                    uv,
+                    painted: vec![],
+                });
             }
             for yaw in [0.4f32, 2.8] {
                 cells.push(draw(&parts, yaw, CELL, [0.25, 1.4], [0.0, 0.0]));
@@ -156,7 +185,10 @@ fn main() {
         report.penetration_single[1] * 1e3,
     );
     sunken.sort_by(|a, b| b.0.total_cmp(&a.0));
-    sunken.iter().take(deepest).for_each(|(depth, what)| println!("{:6.2} mm {what}", depth * 1e3));
+    sunken
+        .iter()
+        .take(deepest)
+        .for_each(|(depth, what)| println!("{:6.2} mm {what}", depth * 1e3));
     let Some(out) = out else { return };
     let columns = cells.len() / 2;
     let (w, h) = (CELL.0 as usize, CELL.1 as usize);

@@ -49,8 +49,15 @@ struct Args {
 }
 
 fn main() {
-    let shared = PathBuf::from(std::env::var("TRYON_SHARED").unwrap_or_else(|_| "../shared".into()));
-    let mut a = Args { still: 10, every: 15, nth: 1, cut: 1.0, ..Args::default() };
+    let shared =
+        PathBuf::from(std::env::var("TRYON_SHARED").unwrap_or_else(|_| "../shared".into()));
+    let mut a = Args {
+        still: 10,
+        every: 15,
+        nth: 1,
+        cut: 1.0,
+        ..Args::default()
+    };
     let mut args = std::env::args().skip(1);
     while let Some(word) = args.next() {
         let mut next = || args.next().expect("a value");
@@ -79,7 +86,8 @@ fn main() {
         }
     }
     if a.bodies.is_empty() {
-        a.bodies.push(shared.join("data/body/makehuman_smpl_layout/template.npz"));
+        a.bodies
+            .push(shared.join("data/body/makehuman_smpl_layout/template.npz"));
     }
     if a.settings.is_empty() {
         a.settings.push("{}".into());
@@ -106,20 +114,34 @@ fn main() {
         if folder.join("joints.json").exists() {
             for (template, path) in bodies.iter().zip(&a.bodies) {
                 for settings in &a.settings {
-                    stills(&a, template, settings, folder, &path.file_stem().unwrap_or_default().to_string_lossy());
+                    stills(
+                        &a,
+                        template,
+                        settings,
+                        folder,
+                        &path.file_stem().unwrap_or_default().to_string_lossy(),
+                    );
                 }
             }
             continue;
         }
         let folder = folder.clone();
         let name = folder.to_string_lossy().into_owned();
-        let own = SUBJECTS.into_iter().find(|s| name.contains(s.trim_start_matches("subject_")));
-        all.push((own, Box::new(move || Scene::open(&folder).expect("a scene"))));
+        let own = SUBJECTS
+            .into_iter()
+            .find(|s| name.contains(s.trim_start_matches("subject_")));
+        all.push((
+            own,
+            Box::new(move || Scene::open(&folder).expect("a scene")),
+        ));
     }
     if a.synth {
         for name in scenes::unseen_names() {
             let data = shared.join("data");
-            all.push((None, Box::new(move || scenes::unseen(&data, name).expect("a scene"))));
+            all.push((
+                None,
+                Box::new(move || scenes::unseen(&data, name).expect("a scene")),
+            ));
         }
     }
     if a.upper {
@@ -130,12 +152,21 @@ fn main() {
     }
     if a.hard {
         let data = shared.join("data");
-        all.push((None, Box::new(move || scenes::hard(&data).expect("scenes").swap_remove(2))));
+        all.push((
+            None,
+            Box::new(move || scenes::hard(&data).expect("scenes").swap_remove(2)),
+        ));
         for i in 0..2 {
             let data = shared.join("data");
-            all.push((None, Box::new(move || scenes::hard(&data).expect("scenes").swap_remove(i))));
+            all.push((
+                None,
+                Box::new(move || scenes::hard(&data).expect("scenes").swap_remove(i)),
+            ));
             let data = shared.join("data");
-            all.push((None, Box::new(move || scenes::idle(&data).expect("scenes").swap_remove(i))));
+            all.push((
+                None,
+                Box::new(move || scenes::idle(&data).expect("scenes").swap_remove(i)),
+            ));
         }
     }
     for (own, make) in all {
@@ -144,7 +175,11 @@ fn main() {
             // A still is shown over and over.
             let one = scene.frames[0].clone();
             scene.frames = (0..a.still as u64)
-                .map(|i| RgbdFrame { sequence: i, time_ns: i * 33_333_333, ..one.clone() })
+                .map(|i| RgbdFrame {
+                    sequence: i,
+                    time_ns: i * 33_333_333,
+                    ..one.clone()
+                })
                 .collect();
         }
         scene.frames.truncate(a.frames.unwrap_or(usize::MAX));
@@ -160,13 +195,18 @@ fn main() {
         if a.cut < 1.0 {
             scene = scene.cut_below(a.cut);
         }
-        let subject = own.filter(|_| a.own).map(|name| scenes::subject(&shared.join("data"), name).expect("a body"));
+        let subject = own
+            .filter(|_| a.own)
+            .map(|name| scenes::subject(&shared.join("data"), name).expect("a body"));
         for (template, path) in bodies.iter().zip(&a.bodies) {
             let template = subject.as_ref().unwrap_or(template);
             for settings in &a.settings {
                 let config = configuration(settings);
                 let label = if a.settings.len() * bodies.len() > 1 {
-                    format!(" {} {settings}", path.file_stem().unwrap_or_default().to_string_lossy())
+                    format!(
+                        " {} {settings}",
+                        path.file_stem().unwrap_or_default().to_string_lossy()
+                    )
                 } else {
                     String::new()
                 };
@@ -179,22 +219,72 @@ fn main() {
 type Maker = Box<dyn Fn() -> Scene>;
 
 /// Bodies that scenes were made with.
-const SUBJECTS: [&str; 4] = ["subject_f_avg", "subject_f_short_heavy", "subject_m_heavy", "subject_m_tall"];
+const SUBJECTS: [&str; 4] = [
+    "subject_f_avg",
+    "subject_f_short_heavy",
+    "subject_m_heavy",
+    "subject_m_tall",
+];
 
 /// Name, body, clip, noise, camera height and distance (metres), frames until it walks out of the picture: clips of which the picture shows no feet.
-type Upper = (&'static str, &'static str, &'static str, NoiseModel, [f64; 2], u64);
+type Upper = (
+    &'static str,
+    &'static str,
+    &'static str,
+    NoiseModel,
+    [f64; 2],
+    u64,
+);
 
 /// The lower rim of the picture is 0.456 × distance below the camera's height: at the shins, the knees and the thighs.
 const UPPER: [Upper; 5] = [
-    ("shins_13_31_f_avg", "subject_f_avg", "cmu_asf_amc/13_31.amc", NoiseModel::KinectV1, [1.45, 2.6], 150),
-    ("knees_93_04_m_heavy", "subject_m_heavy", "cmu_asf_amc/93_04.amc", NoiseModel::TimeOfFlight, [1.5, 2.2], 150),
-    ("thighs_02_07_f_short", "subject_f_short_heavy", "cmu_asf_amc/02_07.amc", NoiseModel::KinectV1, [1.45, 1.9], 150),
-    ("knees_walk_m_tall", "subject_m_tall", "cmu_bvh/02_03.bvh", NoiseModel::TimeOfFlight, [1.5, 2.3], 75),
-    ("knees_02_02_f_avg", "subject_f_avg", "cmu_bvh/02_02_makehuman.bvh", NoiseModel::TimeOfFlight, [1.4, 2.2], 90),
+    (
+        "shins_13_31_f_avg",
+        "subject_f_avg",
+        "cmu_asf_amc/13_31.amc",
+        NoiseModel::KinectV1,
+        [1.45, 2.6],
+        150,
+    ),
+    (
+        "knees_93_04_m_heavy",
+        "subject_m_heavy",
+        "cmu_asf_amc/93_04.amc",
+        NoiseModel::TimeOfFlight,
+        [1.5, 2.2],
+        150,
+    ),
+    (
+        "thighs_02_07_f_short",
+        "subject_f_short_heavy",
+        "cmu_asf_amc/02_07.amc",
+        NoiseModel::KinectV1,
+        [1.45, 1.9],
+        150,
+    ),
+    (
+        "knees_walk_m_tall",
+        "subject_m_tall",
+        "cmu_bvh/02_03.bvh",
+        NoiseModel::TimeOfFlight,
+        [1.5, 2.3],
+        75,
+    ),
+    (
+        "knees_02_02_f_avg",
+        "subject_f_avg",
+        "cmu_bvh/02_02_makehuman.bvh",
+        NoiseModel::TimeOfFlight,
+        [1.4, 2.2],
+        90,
+    ),
 ];
 
 fn upper(data: &Path, &(name, body, clip, noise, [height, away], frames): &Upper) -> Scene {
-    let shopper = Shopper { template: scenes::subject(data, body).expect("a body"), ..Shopper::default() };
+    let shopper = Shopper {
+        template: scenes::subject(data, body).expect("a body"),
+        ..Shopper::default()
+    };
     let setting = Setting {
         world_from_camera: Setting::tilted(height, 0.0, 0.0),
         home: nalgebra::Point3::new(0.0, 0.0, -away),
@@ -205,7 +295,9 @@ fn upper(data: &Path, &(name, body, clip, noise, [height, away], frames): &Upper
         ..Setting::default()
     };
     let motion = read_motion(&data.join("motion").join(clip)).expect("a clip");
-    let sequence = Sequence::new(shopper, setting).with_clip(motion.at_cmu_rate()).expect("a clip of a person");
+    let sequence = Sequence::new(shopper, setting)
+        .with_clip(motion.at_cmu_rate())
+        .expect("a clip of a person");
     Scene::synthetic(name, &sequence, frames)
 }
 
@@ -225,53 +317,78 @@ fn body(path: &Path) -> Arc<Template> {
 }
 
 /// Frame, status and joints (camera frame, metres) as one line of JSON.
-fn joints_line(model: &TrackerModel, state: &TrackerState, workspace: &mut Workspace, frame: usize) -> String {
+fn joints_line(
+    model: &TrackerModel,
+    state: &TrackerState,
+    workspace: &mut Workspace,
+    frame: usize,
+) -> String {
     let skeleton = model.template().skeleton();
     let rest = workspace.rest_body(model, &state.shape).clone();
     let mut bones = BoneTransforms::default();
     state.pose.bones(skeleton, &rest, &mut bones);
-    let named = skeleton.joints().iter().zip(&bones.joints).map(|(j, p)| (j.name.as_str(), p.coords.into()));
+    let named = skeleton
+        .joints()
+        .iter()
+        .zip(&bones.joints)
+        .map(|(j, p)| (j.name.as_str(), p.coords.into()));
     let joints: std::collections::BTreeMap<&str, [f64; 3]> = named.collect();
     serde_json::json!({ "frame": frame, "status": state.status, "joints": joints }).to_string()
 }
 
 fn run(a: &Args, template: &Arc<Template>, config: &TrackerConfig, scene: &Scene, label: &str) {
     let mut lines = String::new();
-    let out = follow(template, config, scene, |i, model, state, report, workspace| {
-        if a.jsonl.is_some() {
-            lines += &joints_line(model, state, workspace, i);
-            lines.push('\n');
-        }
-        if a.verbose {
-            let rest = workspace.rest_body(model, &state.shape).clone();
-            let mut bones = BoneTransforms::default();
-            state.pose.bones(template.skeleton(), &rest, &mut bones);
-            let off: Vec<f64> = scene.truth.get(i).map_or(vec![], |t| {
-                let at = |n: &String| bones.joints[template.skeleton().index(n).expect("joint")];
-                scene.joint_names.iter().zip(&t.joints).map(|(n, p)| (at(n) - p).norm() * 1e3).collect()
-            });
-            let s = report.stages_ms;
-            println!(
-                "{i:4} {:?} err {:6.1} it {:2} res {:5.2} expl {:.2} match {:.2} cells {} seg {:.2} pose {:.2} size {:.2} surf {:.2}",
-                state.status,
-                mean(&off),
-                report.iterations,
-                report.residual_mm,
-                report.explained,
-                report.matched,
-                report.person_cells,
-                s.segment,
-                s.pose,
-                s.size,
-                s.surface
-            );
-        }
-        if let Some(dir) = a.overlay.as_ref().filter(|_| i % a.every == 0 || i + 1 == scene.frames.len()) {
-            std::fs::create_dir_all(dir).expect("overlay folder");
-            let image = overlay(template, model, state, workspace, scene, i);
-            write_png_rgb(&dir.join(format!("{}_{i:04}.png", scene.name)), &image).expect("png");
-        }
-    });
+    let out = follow(
+        template,
+        config,
+        scene,
+        |i, model, state, report, workspace| {
+            if a.jsonl.is_some() {
+                lines += &joints_line(model, state, workspace, i);
+                lines.push('\n');
+            }
+            if a.verbose {
+                let rest = workspace.rest_body(model, &state.shape).clone();
+                let mut bones = BoneTransforms::default();
+                state.pose.bones(template.skeleton(), &rest, &mut bones);
+                let off: Vec<f64> = scene.truth.get(i).map_or(vec![], |t| {
+                    let at =
+                        |n: &String| bones.joints[template.skeleton().index(n).expect("joint")];
+                    scene
+                        .joint_names
+                        .iter()
+                        .zip(&t.joints)
+                        .map(|(n, p)| (at(n) - p).norm() * 1e3)
+                        .collect()
+                });
+                let s = report.stages_ms;
+                println!(
+                    "{i:4} {:?} err {:6.1} it {:2} res {:5.2} expl {:.2} match {:.2} cells {} seg {:.2} pose {:.2} size {:.2} surf {:.2}",
+                    state.status,
+                    mean(&off),
+                    report.iterations,
+                    report.residual_mm,
+                    report.explained,
+                    report.matched,
+                    report.person_cells,
+                    s.segment,
+                    s.pose,
+                    s.size,
+                    s.surface
+                );
+            }
+            if let Some(dir) = a
+                .overlay
+                .as_ref()
+                .filter(|_| i % a.every == 0 || i + 1 == scene.frames.len())
+            {
+                std::fs::create_dir_all(dir).expect("overlay folder");
+                let image = overlay(template, model, state, workspace, scene, i);
+                write_png_rgb(&dir.join(format!("{}_{i:04}.png", scene.name)), &image)
+                    .expect("png");
+            }
+        },
+    );
     if let Some(dir) = &a.jsonl {
         std::fs::create_dir_all(dir).expect("jsonl folder");
         std::fs::write(dir.join(format!("{}.jsonl", scene.name)), lines).expect("jsonl");
@@ -306,8 +423,12 @@ fn run(a: &Args, template: &Arc<Template>, config: &TrackerConfig, scene: &Scene
         );
     }
     if a.verbose || a.stages {
-        let list: Vec<String> =
-            scene.joint_names.iter().zip(&out.per_joint_mm).map(|(n, s)| format!("{n} {s:.0}")).collect();
+        let list: Vec<String> = scene
+            .joint_names
+            .iter()
+            .zip(&out.per_joint_mm)
+            .map(|(n, s)| format!("{n} {s:.0}"))
+            .collect();
         println!("  per joint: {}", list.join(", "));
     }
 }
@@ -317,29 +438,57 @@ fn run(a: &Args, template: &Arc<Template>, config: &TrackerConfig, scene: &Scene
 fn drift(a: &Args, settings: &str, frames: u64) {
     let shopper = Shopper::default();
     let template = shopper.template.clone();
-    let noise = if a.hard { NoiseModel::KinectV1 } else { NoiseModel::None };
-    let setting = Setting { routine: Routine::TryOn, noise, color: false, ..Setting::default() };
+    let noise = if a.hard {
+        NoiseModel::KinectV1
+    } else {
+        NoiseModel::None
+    };
+    let setting = Setting {
+        routine: Routine::TryOn,
+        noise,
+        color: false,
+        ..Setting::default()
+    };
     let length = a.frames.unwrap_or(30) as u64;
     let scene = Scene::synthetic("drift", &Sequence::new(shopper, setting), length);
-    let config = TrackerConfig { adapt_size: false, displacements: false, ..configuration(settings) };
+    let config = TrackerConfig {
+        adapt_size: false,
+        displacements: false,
+        ..configuration(settings)
+    };
     let model = TrackerModel::new(template.clone(), scene.calibration.clone(), config);
     let mut state = TrackerState::new(&model);
     let mut workspace = Workspace::default();
-    let names: Vec<&str> = template.skeleton().joints().iter().map(|j| j.name.as_str()).collect();
+    let names: Vec<&str> = template
+        .skeleton()
+        .joints()
+        .iter()
+        .map(|j| j.name.as_str())
+        .collect();
     let (mut second, mut due, mut iterations) = (vec![], 2, 0);
     let (mut worst, mut sum) = ((0.0, 0, 0), 0.0);
     for i in 0..frames / (2 * length) * 2 * length {
         let (round, k) = (i / (2 * length), (i % (2 * length)) as usize);
         let picture = &scene.frames[k.min(2 * length as usize - 1 - k)];
-        let frame = RgbdFrame { sequence: i, time_ns: i * 33_333_333, ..picture.clone() };
-        iterations += tryon::tracking::step(&model, &mut state, &frame, &mut workspace).expect("step").iterations;
+        let frame = RgbdFrame {
+            sequence: i,
+            time_ns: i * 33_333_333,
+            ..picture.clone()
+        };
+        iterations += tryon::tracking::step(&model, &mut state, &frame, &mut workspace)
+            .expect("step")
+            .iterations;
         if round == 1 || round == due {
             let (_, bones) = workspace.posed(&model, &state);
             if round == 1 {
                 second.push(bones.joints.clone());
                 continue;
             }
-            let off: Vec<f64> = second[k].iter().zip(&bones.joints).map(|(a, b)| (a - b).norm() * 1e3).collect();
+            let off: Vec<f64> = second[k]
+                .iter()
+                .zip(&bones.joints)
+                .map(|(a, b)| (a - b).norm() * 1e3)
+                .collect();
             sum += mean(&off);
             for (j, o) in off.iter().enumerate() {
                 if *o > worst.0 {
@@ -368,7 +517,12 @@ fn drift(a: &Args, settings: &str, frames: u64) {
 /// twentieth.
 fn tremble(a: &Args, settings: &str) {
     for (name, routine) in [("still", Routine::Still), ("moving", Routine::TryOn)] {
-        let setting = Setting { routine, noise: NoiseModel::KinectV1, color: false, ..Setting::default() };
+        let setting = Setting {
+            routine,
+            noise: NoiseModel::KinectV1,
+            color: false,
+            ..Setting::default()
+        };
         let frames = a.frames.unwrap_or(180) as u64;
         let sequence = Sequence::new(Shopper::default(), setting);
         let scene = Scene::synthetic(name, &sequence, frames);
@@ -381,21 +535,36 @@ fn tremble(a: &Args, settings: &str) {
             let (vertices, _) = workspace.posed(&model, &state);
             if i >= 60 {
                 let truth = &scene.truth[i].vertices;
-                off.extend(vertices.iter().zip(truth).step_by(10).map(|(a, b)| f64::from((a - b).norm()) * 1e3));
+                off.extend(
+                    vertices
+                        .iter()
+                        .zip(truth)
+                        .step_by(10)
+                        .map(|(a, b)| f64::from((a - b).norm()) * 1e3),
+                );
                 skins.push(vertices.to_vec());
             }
         }
-        let truth: Vec<_> =
-            scene.truth[60..].iter().map(|t| t.joints.iter().map(|p| p.cast::<f32>()).collect()).collect();
+        let truth: Vec<_> = scene.truth[60..]
+            .iter()
+            .map(|t| t.joints.iter().map(|p| p.cast::<f32>()).collect())
+            .collect();
         let moved = |skins: &[Vec<tryon::math::P3>], lag: usize| {
             let pairs = skins.windows(lag + 1);
             let mut all: Vec<f64> = pairs
                 .flat_map(|w| {
-                    w[0].iter().zip(&w[lag]).map(|(a, b)| f64::from((a - b).norm()) * 1e3).collect::<Vec<_>>()
+                    w[0].iter()
+                        .zip(&w[lag])
+                        .map(|(a, b)| f64::from((a - b).norm()) * 1e3)
+                        .collect::<Vec<_>>()
                 })
                 .collect();
             all.sort_by(f64::total_cmp);
-            format!("{:.2} mm (p95 {:.2})", mean(&all), all[all.len() * 95 / 100])
+            format!(
+                "{:.2} mm (p95 {:.2})",
+                mean(&all),
+                all[all.len() * 95 / 100]
+            )
         };
         println!(
             "{name} {settings}: from picture to picture {}, in a third of a second {}, off {:.2} mm; true joints {} and {}",
@@ -410,21 +579,34 @@ fn tremble(a: &Args, settings: &str) {
 
 fn stills(a: &Args, template: &Arc<Template>, settings: &str, folder: &Path, label: &str) {
     let config = configuration(settings);
-    let scene = a.overlay.as_ref().map(|_| Scene::open(folder).expect("a scene"));
-    let out = tryon::evaluate::stills::stills(template, &config, folder, a.still as u64, |i, m, state, w, _, share| {
-        if a.verbose {
-            println!("{i:4} {:?} within {:.2}", state.status, share);
-        }
-        if let Some(dir) = &a.jsonl {
-            std::fs::create_dir_all(dir).expect("jsonl folder");
-            std::fs::write(dir.join(format!("still_{i:04}.json")), joints_line(m, state, w, i)).expect("json");
-        }
-        if let (Some(dir), Some(scene)) = (&a.overlay, &scene) {
-            std::fs::create_dir_all(dir).expect("overlay folder");
-            let image = overlay(template, m, state, w, scene, i);
-            write_png_rgb(&dir.join(format!("still_{i:04}.png")), &image).expect("png");
-        }
-    })
+    let scene = a
+        .overlay
+        .as_ref()
+        .map(|_| Scene::open(folder).expect("a scene"));
+    let out = tryon::evaluate::stills::stills(
+        template,
+        &config,
+        folder,
+        a.still as u64,
+        |i, m, state, w, _, share| {
+            if a.verbose {
+                println!("{i:4} {:?} within {:.2}", state.status, share);
+            }
+            if let Some(dir) = &a.jsonl {
+                std::fs::create_dir_all(dir).expect("jsonl folder");
+                std::fs::write(
+                    dir.join(format!("still_{i:04}.json")),
+                    joints_line(m, state, w, i),
+                )
+                .expect("json");
+            }
+            if let (Some(dir), Some(scene)) = (&a.overlay, &scene) {
+                std::fs::create_dir_all(dir).expect("overlay folder");
+                let image = overlay(template, m, state, w, scene, i);
+                write_png_rgb(&dir.join(format!("still_{i:04}.png")), &image).expect("png");
+            }
+        },
+    )
     .expect("stills");
     println!(
         "{} {label} {settings}: {:.1} % of joints within 10 cm, found {} of {}, first step {:.0} ms (median)",
@@ -434,9 +616,15 @@ fn stills(a: &Args, template: &Arc<Template>, settings: &str, folder: &Path, lab
         out.within.len(),
         median(&out.start_ms),
     );
-    let mm = |v: &nalgebra::Vector3<f64>| format!("[{:.0} {:.0} {:.0}]", v.x * 1e3, v.y * 1e3, v.z * 1e3);
-    let list: Vec<String> =
-        out.per_joint.iter().zip(&out.bias).map(|((n, s), b)| format!("{n} {:.0} {}", s * 100.0, mm(b))).collect();
+    let mm = |v: &nalgebra::Vector3<f64>| {
+        format!("[{:.0} {:.0} {:.0}]", v.x * 1e3, v.y * 1e3, v.z * 1e3)
+    };
+    let list: Vec<String> = out
+        .per_joint
+        .iter()
+        .zip(&out.bias)
+        .map(|((n, s), b)| format!("{n} {:.0} {}", s * 100.0, mm(b)))
+        .collect();
     println!("  {}", list.join(", "));
 }
 
@@ -490,12 +678,20 @@ fn overlay(
     let mut image = ColorImage::filled(camera.width, camera.height, [0, 0, 0]);
     for (k, d) in scene.frames[i].depth.data().iter().enumerate() {
         let z = f32::from(*d) * 1e-3;
-        let shade = if z > 0.0 { (240.0 - (z - 1.2) * 70.0).clamp(20.0, 240.0) as u8 } else { 0 };
+        let shade = if z > 0.0 {
+            (240.0 - (z - 1.2) * 70.0).clamp(20.0, 240.0) as u8
+        } else {
+            0
+        };
         let mut rgb = [shade; 3];
         if buffer.face[k] != VisibilityBuffer::NONE {
             let f = template.mesh().faces()[buffer.face[k] as usize];
             let l = (-face_normal(vertices, &f).normalize().z).clamp(0.0, 1.0);
-            rgb = [(f32::from(shade) * 0.5) as u8, (l * 160.0) as u8 / 2 + shade / 3, (l * 120.0) as u8 + shade / 4];
+            rgb = [
+                (f32::from(shade) * 0.5) as u8,
+                (l * 160.0) as u8 / 2 + shade / 3,
+                (l * 120.0) as u8 + shade / 4,
+            ];
         }
         image.data_mut()[3 * k..3 * k + 3].copy_from_slice(&rgb);
     }

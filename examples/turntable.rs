@@ -19,7 +19,9 @@ use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use tryon::camera::ColorImage;
 use tryon::cloth::crossings;
 use tryon::cloth::realtime::{Config, Input, RoomyBody, State, Workspace, step};
-use tryon::dressing::{DressError, DressOptions, Dressed, FitProbe, MadeOn, MeshWear, Wear, dress_all, suggest};
+use tryon::dressing::{
+    DressError, DressOptions, Dressed, FitProbe, MadeOn, MeshWear, Wear, dress_all, suggest,
+};
 use tryon::evaluate::cloth_rest::lower_arms;
 use tryon::formats::image::write_png_rgb;
 use tryon::garment::{Pattern, library};
@@ -51,7 +53,9 @@ fn args() -> Args {
     let mut a = Args {
         garments: vec![],
         garment_body: None,
-        bodies: ["slim_woman", "average", "heavy_man"].map(String::from).to_vec(),
+        bodies: ["slim_woman", "average", "heavy_man"]
+            .map(String::from)
+            .to_vec(),
         sizes: vec!["auto".into()],
         pose: "down".into(),
         seconds: 1.0,
@@ -83,7 +87,12 @@ fn args() -> Args {
             "--size" => a.sizes = list(value()),
             "--pose" => a.pose = value(),
             "--seconds" => a.seconds = value().parse().expect("seconds"),
-            "--views" => a.views = list(value()).iter().map(|v| v.parse().expect("degrees")).collect(),
+            "--views" => {
+                a.views = list(value())
+                    .iter()
+                    .map(|v| v.parse().expect("degrees"))
+                    .collect()
+            }
             "--cell" => {
                 let v = value();
                 let (w, h) = v.split_once('x').expect("WxH");
@@ -131,16 +140,28 @@ fn load(name: &str) -> Person {
     let path = std::path::Path::new(name);
     if let Some(coefficients) = shape(name) {
         let template = tryon::body::embedded::template();
-        let rest = template.personalise(&BodyShape { coefficients, ..BodyShape::default() });
-        return Person { template, rest, film: None };
+        let rest = template.personalise(&BodyShape {
+            coefficients,
+            ..BodyShape::default()
+        });
+        return Person {
+            template,
+            rest,
+            film: None,
+        };
     }
     if path.is_dir() || name.ends_with(".mcap") {
         return tracked(path);
     }
     let arrays = tryon::formats::npz::read_smpl(path).expect("a body");
-    let template = Arc::new(tryon::body::import::template_from_smpl("file", &arrays).expect("a body"));
+    let template =
+        Arc::new(tryon::body::import::template_from_smpl("file", &arrays).expect("a body"));
     let rest = template.personalise(&BodyShape::default());
-    Person { template, rest, film: None }
+    Person {
+        template,
+        rest,
+        film: None,
+    }
 }
 
 /// The person in a recording, from the first picture in which they are tracked.
@@ -148,7 +169,11 @@ fn tracked(path: &std::path::Path) -> Person {
     const STILL: u64 = 45;
     let mut source = tryon::formats::open_recording(path).expect("a recording");
     let template = tryon::body::embedded::template();
-    let model = TrackerModel::new(template.clone(), source.calibration().clone(), TrackerConfig::default());
+    let model = TrackerModel::new(
+        template.clone(),
+        source.calibration().clone(),
+        TrackerConfig::default(),
+    );
     let (mut state, mut work) = (TrackerState::new(&model), tracking::Workspace::default());
     let (mut film, mut begun) = (Vec::new(), None);
     let mut see = |frame: &tryon::camera::RgbdFrame| {
@@ -157,10 +182,15 @@ fn tracked(path: &std::path::Path) -> Person {
             return;
         }
         let mut body = Vec::new();
-        state.world_from_camera.points_f32(work.posed(&model, &state).0, &mut body);
+        state
+            .world_from_camera
+            .points_f32(work.posed(&model, &state).0, &mut body);
         film.push(body);
         begun.get_or_insert_with(|| {
-            let pose = Pose { root: state.world_from_camera * state.pose.root, angles: state.pose.angles.clone() };
+            let pose = Pose {
+                root: state.world_from_camera * state.pose.root,
+                angles: state.pose.angles.clone(),
+            };
             (template.personalise(&state.shape), pose)
         });
     };
@@ -172,7 +202,11 @@ fn tracked(path: &std::path::Path) -> Person {
         }
     }
     let (rest, pose) = begun.expect("nobody is tracked");
-    Person { template, rest, film: Some((pose, film)) }
+    Person {
+        template,
+        rest,
+        film: Some((pose, film)),
+    }
 }
 
 /// Named poses; `t` in seconds moves those that move.
@@ -191,7 +225,11 @@ fn pose(name: &str, template: &Template, rest: &RestBody, t: f64) -> Pose<World>
     if name == "walk" {
         for (side, a) in [("left", swing), ("right", -swing)] {
             p.set(sk, &format!("{side}_hip"), &[-a - 0.1, 0.0, 0.0]);
-            p.set(sk, &format!("{side}_knee"), &[0.3 - 0.3 * a.signum() * a.abs(), 0.0, 0.0]);
+            p.set(
+                sk,
+                &format!("{side}_knee"),
+                &[0.3 - 0.3 * a.signum() * a.abs(), 0.0, 0.0],
+            );
         }
     }
     p
@@ -201,7 +239,13 @@ fn posed(template: &Template, rest: &RestBody, pose: &Pose<World>) -> Vec<P3> {
     let mut bones = BoneTransforms::default();
     pose.bones(template.skeleton(), rest, &mut bones);
     let mut out = Vec::new();
-    skin(tryon::par::Par::Seq, &rest.vertices, template.weights(), &bones, &mut out);
+    skin(
+        tryon::par::Par::Seq,
+        &rest.vertices,
+        template.weights(),
+        &bones,
+        &mut out,
+    );
     out
 }
 
@@ -214,28 +258,46 @@ fn imported(file: &str) -> Pattern {
     }
     let raw = tryon::formats::garmentcode::parse_garmentcode(&text, path).expect("a pattern");
     let material = tryon::garment::Material::preset("cotton").expect("preset");
-    let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or("garment");
-    tryon::garment::import::from_garmentcode(&raw, name, tryon::garment::Size::M, material).expect("a pattern")
+    let name = path
+        .file_stem()
+        .and_then(|s| s.to_str())
+        .unwrap_or("garment");
+    tryon::garment::import::from_garmentcode(&raw, name, tryon::garment::Size::M, material)
+        .expect("a pattern")
 }
 
 fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2], [f32; 2]) {
-    let Person { template, rest, film } = load(body);
+    let Person {
+        template,
+        rest,
+        film,
+    } = load(body);
     let measures = tryon::body::measure::measure(&template, &rest).expect("measurable");
     enum Worn {
         Pattern(Pattern),
         Mesh(MeshWear),
     }
-    let edge = a.edge.unwrap_or(tryon::garment::Triangulation::default().edge_length);
+    let edge = a
+        .edge
+        .unwrap_or(tryon::garment::Triangulation::default().edge_length);
     let worn: Vec<Worn> = outfit
         .split('+')
         .map(|g| {
             if g.ends_with(".json") {
                 return Worn::Pattern(imported(g));
             }
-            if [".obj", ".glb", ".gltf", ".mhclo"].iter().any(|e| g.ends_with(e)) {
+            if [".obj", ".glb", ".gltf", ".mhclo"]
+                .iter()
+                .any(|e| g.ends_with(e))
+            {
                 let fabric = tryon::garment::Material::preset("cotton").expect("preset");
-                let m =
-                    MeshWear::on(std::path::Path::new(g), a.garment_body.clone(), &fabric, edge).expect("a garment");
+                let m = MeshWear::on(
+                    std::path::Path::new(g),
+                    a.garment_body.clone(),
+                    &fabric,
+                    edge,
+                )
+                .expect("a garment");
                 m.notes.iter().for_each(|n| println!("  {n}"));
                 return Worn::Mesh(m);
             }
@@ -257,13 +319,28 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
             Worn::Mesh(m) => Wear::Mesh(m),
         })
         .collect();
-    let mut options = DressOptions { any_size: a.any_size, untangle: a.untangle, ..DressOptions::default() };
+    let mut options = DressOptions {
+        any_size: a.any_size,
+        untangle: a.untangle,
+        ..DressOptions::default()
+    };
     if let Some(e) = a.edge {
         options.triangulation.edge_length = e;
     }
-    let start = film.as_ref().map_or_else(|| pose(&a.pose, &template, &rest, 0.0), |(pose, _)| pose.clone());
-    let config = if film.is_some() { Config::tracked() } else { Config::default() };
-    options.config = Config { self_collision: a.folds, sharpest: a.sharpest, ..config };
+    let start = film.as_ref().map_or_else(
+        || pose(&a.pose, &template, &rest, 0.0),
+        |(pose, _)| pose.clone(),
+    );
+    let config = if film.is_some() {
+        Config::tracked()
+    } else {
+        Config::default()
+    };
+    options.config = Config {
+        self_collision: a.folds,
+        sharpest: a.sharpest,
+        ..config
+    };
     let dressed = match dress_all(&template, &rest, &start, &wear, &options) {
         Ok(d) => Some(d),
         Err(DressError::Misfit(m)) => {
@@ -272,11 +349,24 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
         }
         Err(e) => panic!("{e}"),
     };
-    let Some(Dressed { model, mut state, report }) = dressed else {
+    let Some(Dressed {
+        model,
+        mut state,
+        report,
+    }) = dressed
+    else {
         let vertices = posed(&template, &rest, &start);
-        let y = vertices.iter().fold([f32::MAX, f32::MIN], |y, p| [y[0].min(p.y), y[1].max(p.y)]);
+        let y = vertices
+            .iter()
+            .fold([f32::MAX, f32::MIN], |y, p| [y[0].min(p.y), y[1].max(p.y)]);
         let faces = template.mesh().faces().to_vec();
-        let bare = Part { vertices, faces, color: [0.86, 0.70, 0.60], uv: vec![], painted: vec![] };
+        let bare = Part {
+            vertices,
+            faces,
+            color: [0.86, 0.70, 0.60],
+            uv: vec![],
+            painted: vec![],
+        };
         return (vec![bare], y, [0.0; 2]);
     };
     let vertices: Vec<usize> = state.garments.iter().map(|g| g.positions.len()).collect();
@@ -301,7 +391,13 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
     let mut work = Workspace::default();
     let film = film.map_or_else(
         || {
-            let at = |i| posed(&template, &rest, &pose(&a.pose, &template, &rest, f64::from(i + 1) / 30.0));
+            let at = |i| {
+                posed(
+                    &template,
+                    &rest,
+                    &pose(&a.pose, &template, &rest, f64::from(i + 1) / 30.0),
+                )
+            };
             (0..(a.seconds * 30.0) as i32).map(at).collect()
         },
         |(_, film)| film,
@@ -309,17 +405,40 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
     let frames = film.len();
     let (mut ms, mut last, mut rested) = (0.0, None, None);
     let mut all_crossed = vec![0; state.garments.len()];
-    let (mut roomy, mut room_ms) = (RoomyBody::new(&template, &options.config).expect("a body"), 0.0);
+    let (mut roomy, mut room_ms) = (
+        RoomyBody::new(&template, &options.config).expect("a body"),
+        0.0,
+    );
     let mut verts = posed(&template, &rest, &start);
     for (call, body) in film.into_iter().enumerate() {
         verts = body;
-        let r = step(&model, &mut state, &Input { body: &verts, dt: 1.0 / 30.0 }, &mut work).expect("step");
+        let r = step(
+            &model,
+            &mut state,
+            &Input {
+                body: &verts,
+                dt: 1.0 / 30.0,
+            },
+            &mut work,
+        )
+        .expect("step");
         ms += r.stages_ms.total;
-        rested = if r.sleeping < vertices.iter().sum() { None } else { rested.or(Some(call + 1)) };
-        all_crossed.iter_mut().zip(crossed(&state)).for_each(|(all, now)| *all += now);
+        rested = if r.sleeping < vertices.iter().sum() {
+            None
+        } else {
+            rested.or(Some(call + 1))
+        };
+        all_crossed
+            .iter_mut()
+            .zip(crossed(&state))
+            .for_each(|(all, now)| *all += now);
         let started = std::time::Instant::now();
         roomy.make_room(tryon::par::Par::Rayon, &verts);
-        room_ms += if last.is_some() { started.elapsed().as_secs_f64() * 1e3 } else { 0.0 };
+        room_ms += if last.is_some() {
+            started.elapsed().as_secs_f64() * 1e3
+        } else {
+            0.0
+        };
         last = Some(r);
     }
     if let Some(r) = last {
@@ -336,15 +455,26 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
             None => println!("  {} vertices asleep at the end", r.sleeping),
         }
         let mean: Vec<usize> = all_crossed.iter().map(|n| n / frames).collect();
-        println!("  edges through its own triangles: {:?}, over all pictures {mean:?}", crossed(&state));
+        println!(
+            "  edges through its own triangles: {:?}, over all pictures {mean:?}",
+            crossed(&state)
+        );
     }
     let centre = {
         let n = verts.len() as f32;
-        let s = verts.iter().fold([0.0, 0.0], |s, p| [s[0] + p.x / n, s[1] + p.z / n]);
+        let s = verts
+            .iter()
+            .fold([0.0, 0.0], |s, p| [s[0] + p.x / n, s[1] + p.z / n]);
         [s[0], s[1]]
     };
-    let mut y = verts.iter().fold([f32::MAX, f32::MIN], |y, p| [y[0].min(p.y), y[1].max(p.y)]);
-    let drawn = if a.measured { &verts } else { roomy.make_room(tryon::par::Par::Rayon, &verts) };
+    let mut y = verts
+        .iter()
+        .fold([f32::MAX, f32::MIN], |y, p| [y[0].min(p.y), y[1].max(p.y)]);
+    let drawn = if a.measured {
+        &verts
+    } else {
+        roomy.make_room(tryon::par::Par::Rayon, &verts)
+    };
     let mut parts = vec![Part {
         vertices: drawn.to_vec(),
         faces: template.mesh().faces().to_vec(),
@@ -375,24 +505,50 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<Part>, [f32; 2
         maps
     });
     let mut own = [f32::MAX, f32::MIN];
-    for (k, (g, s)) in model.outfit.garments.iter().zip(&state.garments).enumerate() {
+    for (k, (g, s)) in model
+        .outfit
+        .garments
+        .iter()
+        .zip(&state.garments)
+        .enumerate()
+    {
         let mut world = Vec::new();
         g.render_positions(&s.positions, &mut world);
-        own = world.iter().fold(own, |y, p| [y[0].min(p.y), y[1].max(p.y)]);
+        own = world
+            .iter()
+            .fold(own, |y, p| [y[0].min(p.y), y[1].max(p.y)]);
         let mut painted = Vec::new();
         if a.crossings {
             let mut marked = vec![[225u8, 220, 200]; g.vertices];
             for c in crossings(&g.faces, &s.positions) {
-                c.edge.iter().chain(&g.faces[c.face as usize]).for_each(|v| marked[*v as usize] = [220, 0, 0]);
+                c.edge
+                    .iter()
+                    .chain(&g.faces[c.face as usize])
+                    .for_each(|v| marked[*v as usize] = [220, 0, 0]);
             }
             painted.extend(g.render.vertex.iter().map(|v| marked[*v as usize]));
         } else if let Some(maps) = &fits {
-            painted.extend(g.render.vertex.iter().map(|v| maps[k].vertices[*v as usize].color()));
+            painted.extend(
+                g.render
+                    .vertex
+                    .iter()
+                    .map(|v| maps[k].vertices[*v as usize].color()),
+            );
         }
         let known = library::names().contains(&g.name.as_str());
-        let color = (if known { library::dye(&g.name) } else { library::dye(library::names()[k % 9]) })
-            .map(|c| f32::from(c) / 255.0);
-        parts.push(Part { vertices: world, faces: g.render.faces.clone(), color, uv: g.render.uv.clone(), painted });
+        let color = (if known {
+            library::dye(&g.name)
+        } else {
+            library::dye(library::names()[k % 9])
+        })
+        .map(|c| f32::from(c) / 255.0);
+        parts.push(Part {
+            vertices: world,
+            faces: g.render.faces.clone(),
+            color,
+            uv: g.render.uv.clone(),
+            painted,
+        });
     }
     if a.crop {
         y = [own[0] - 0.08, own[1] + 0.12];
@@ -407,7 +563,10 @@ fn main() {
     std::fs::create_dir_all(&a.out).expect("a folder");
     for g in &a.garments {
         let (w, h) = a.cell;
-        let (columns, rows) = ((a.views.len() * a.sizes.len()) as u32, a.bodies.len() as u32);
+        let (columns, rows) = (
+            (a.views.len() * a.sizes.len()) as u32,
+            a.bodies.len() as u32,
+        );
         let (width, height) = (columns * w, rows * h);
         let mut sheet = vec![255u8; (width * height * 3) as usize];
         for (row, body) in a.bodies.iter().enumerate() {
@@ -417,16 +576,26 @@ fn main() {
                     let picture = draw(&parts, yaw.to_radians(), a.cell, y, centre);
                     let column = block * a.views.len() + k;
                     for line in 0..h as usize {
-                        let to = ((row * h as usize + line) * width as usize + column * w as usize) * 3;
+                        let to =
+                            ((row * h as usize + line) * width as usize + column * w as usize) * 3;
                         let from = line * w as usize * 3;
-                        sheet[to..to + w as usize * 3].copy_from_slice(&picture[from..from + w as usize * 3]);
+                        sheet[to..to + w as usize * 3]
+                            .copy_from_slice(&picture[from..from + w as usize * 3]);
                     }
                 }
             }
         }
-        let name = std::path::Path::new(g).file_stem().and_then(|s| s.to_str()).unwrap_or("outfit").to_owned();
+        let name = std::path::Path::new(g)
+            .file_stem()
+            .and_then(|s| s.to_str())
+            .unwrap_or("outfit")
+            .to_owned();
         let path = a.out.join(format!("{name}.png"));
-        write_png_rgb(&path, &ColorImage::new(width, height, sheet).expect("a picture")).expect("written");
+        write_png_rgb(
+            &path,
+            &ColorImage::new(width, height, sheet).expect("a picture"),
+        )
+        .expect("written");
         println!("{}", path.display());
     }
 }

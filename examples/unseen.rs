@@ -13,7 +13,9 @@ use std::time::Instant;
 use tryon::body::{Pose, embedded};
 use tryon::camera::RgbdFrame;
 use tryon::cloth::realtime::{self, Config as ClothConfig};
-use tryon::composite::{BodyView, Config, GarmentView, Input, Limbs, Look, Model, State, Workspace, render};
+use tryon::composite::{
+    BodyView, Config, GarmentView, Input, Limbs, Look, Model, State, Workspace, render,
+};
 use tryon::dressing::{DressOptions, dress, suggest};
 use tryon::formats::image::write_png_rgb;
 use tryon::formats::open_recording;
@@ -28,7 +30,12 @@ const SETTLE: u64 = 60;
 /// Between pictures, nanoseconds.
 const INTERVAL_NS: u64 = 33_333_333;
 /// Innermost first.
-const OUTFITS: [&[&str]; 4] = [&["tshirt"], &["straight_skirt", "tshirt"], &["tank", "hoodie"], &["shorts", "dress"]];
+const OUTFITS: [&[&str]; 4] = [
+    &["tshirt"],
+    &["straight_skirt", "tshirt"],
+    &["tank", "hoodie"],
+    &["shorts", "dress"],
+];
 /// Hidden faces and unseen normals left out.
 const SWITCHES: [(&str, bool, bool); 4] = [
     ("everything", false, false),
@@ -46,7 +53,8 @@ struct Drawn {
 
 impl Drawn {
     fn finer(&self) -> Self {
-        let (mut vertices, mut uv, mut faces) = (self.vertices.clone(), self.uv.clone(), Vec::new());
+        let (mut vertices, mut uv, mut faces) =
+            (self.vertices.clone(), self.uv.clone(), Vec::new());
         let mut middles = BTreeMap::new();
         for f in &self.faces {
             let m = [0, 1, 2].map(|k| {
@@ -58,15 +66,29 @@ impl Drawn {
                     vertices.len() as u32 - 1
                 })
             });
-            faces.extend([[f[0], m[0], m[2]], [m[0], f[1], m[1]], [m[2], m[1], f[2]], m]);
+            faces.extend([
+                [f[0], m[0], m[2]],
+                [m[0], f[1], m[1]],
+                [m[2], m[1], f[2]],
+                m,
+            ]);
         }
-        Self { vertices, faces, uv, look: self.look.clone() }
+        Self {
+            vertices,
+            faces,
+            uv,
+            look: self.look.clone(),
+        }
     }
 }
 
 fn main() {
-    let (mut input, mut rounds, mut threads, mut out) =
-        (PathBuf::from("../shared/data/rgbd/depthkit_still"), 60, 1, None::<PathBuf>);
+    let (mut input, mut rounds, mut threads, mut out) = (
+        PathBuf::from("../shared/data/rgbd/depthkit_still"),
+        60,
+        1,
+        None::<PathBuf>,
+    );
     let mut args = std::env::args().skip(1);
     while let Some(word) = args.next() {
         let value = args.next().unwrap();
@@ -82,65 +104,119 @@ fn main() {
     let calibration = source.calibration().clone();
     let frame = source.next_frame().unwrap().unwrap();
     let template = embedded::template();
-    let tracker = TrackerModel::new(template.clone(), calibration.clone(), TrackerConfig::default());
+    let tracker = TrackerModel::new(
+        template.clone(),
+        calibration.clone(),
+        TrackerConfig::default(),
+    );
     let (mut tracked, mut work) = (TrackerState::new(&tracker), tracking::Workspace::default());
     for k in 0..SETTLE {
-        let frame =
-            RgbdFrame { time_ns: frame.time_ns + k * INTERVAL_NS, sequence: frame.sequence + k, ..frame.clone() };
+        let frame = RgbdFrame {
+            time_ns: frame.time_ns + k * INTERVAL_NS,
+            sequence: frame.sequence + k,
+            ..frame.clone()
+        };
         tracking::step(&tracker, &mut tracked, &frame, &mut work).unwrap();
     }
     assert_eq!(tracked.status, Status::Tracking);
     let body_camera = work.posed(&tracker, &tracked).0.to_vec();
     let mut body = Vec::new();
-    tracked.world_from_camera.points_f32(&body_camera, &mut body);
+    tracked
+        .world_from_camera
+        .points_f32(&body_camera, &mut body);
     let rest = template.personalise(&tracked.shape);
     let measures = tryon::body::measure::measure(&template, &rest).unwrap();
-    let pose: Pose<World> =
-        Pose { root: tracked.world_from_camera * tracked.pose.root, angles: tracked.pose.angles.clone() };
+    let pose: Pose<World> = Pose {
+        root: tracked.world_from_camera * tracked.pose.root,
+        angles: tracked.pose.angles.clone(),
+    };
     let limbs = Limbs::of(&template);
 
     print!("| worn | vertices |");
     SWITCHES.iter().for_each(|s| print!(" {} |", s.0));
-    println!(" drawing, normals (everything → neither) | faces hidden | no normals | garments hidden |");
+    println!(
+        " drawing, normals (everything → neither) | faces hidden | no normals | garments hidden |"
+    );
     println!("|---|---|{}---|---|---|---|", "---|".repeat(SWITCHES.len()));
     for names in OUTFITS {
         let patterns: Vec<_> = names
             .iter()
-            .map(|n| library::pattern(n, suggest(n, &measures).map_or(Default::default(), |s| s.size)).unwrap())
+            .map(|n| {
+                library::pattern(
+                    n,
+                    suggest(n, &measures).map_or(Default::default(), |s| s.size),
+                )
+                .unwrap()
+            })
             .collect();
-        let options = DressOptions { config: ClothConfig::tracked(), any_size: true, ..DressOptions::default() };
+        let options = DressOptions {
+            config: ClothConfig::tracked(),
+            any_size: true,
+            ..DressOptions::default()
+        };
         let mut dressed = dress(&template, &rest, &pose, &patterns, &options).unwrap();
         let mut work = realtime::Workspace::default();
         for _ in 0..SETTLE {
-            let input = realtime::Input { body: &body, dt: 1.0 / 30.0 };
+            let input = realtime::Input {
+                body: &body,
+                dt: 1.0 / 30.0,
+            };
             realtime::step(&dressed.model, &mut dressed.state, &input, &mut work).unwrap();
         }
         let camera_from_world = tracked.world_from_camera.inverse();
-        let coarse: Vec<Drawn> = (dressed.model.outfit.garments.iter().zip(&dressed.state.garments))
-            .map(|(mesh, state)| {
-                let (mut world, mut vertices) = (Vec::new(), Vec::new());
-                mesh.render_positions(&state.positions, &mut world);
-                camera_from_world.points_f32(&world, &mut vertices);
-                let look = Look { base: library::dye(&mesh.name), ..Look::default() };
-                Drawn { vertices, faces: mesh.render.faces.clone(), uv: mesh.render.uv.clone(), look }
-            })
-            .collect();
+        let coarse: Vec<Drawn> = (dressed
+            .model
+            .outfit
+            .garments
+            .iter()
+            .zip(&dressed.state.garments))
+        .map(|(mesh, state)| {
+            let (mut world, mut vertices) = (Vec::new(), Vec::new());
+            mesh.render_positions(&state.positions, &mut world);
+            camera_from_world.points_f32(&world, &mut vertices);
+            let look = Look {
+                base: library::dye(&mesh.name),
+                ..Look::default()
+            };
+            Drawn {
+                vertices,
+                faces: mesh.render.faces.clone(),
+                uv: mesh.render.uv.clone(),
+                look,
+            }
+        })
+        .collect();
         let fine: Vec<Drawn> = coarse.iter().map(Drawn::finer).collect();
         for (name, drawn) in [("", &coarse), (", fine", &fine)] {
             let garments: Vec<GarmentView<'_>> = drawn
                 .iter()
-                .map(|d| GarmentView { vertices: &d.vertices, faces: &d.faces, uv: &d.uv, normals: &[], look: &d.look })
+                .map(|d| GarmentView {
+                    vertices: &d.vertices,
+                    faces: &d.faces,
+                    uv: &d.uv,
+                    normals: &[],
+                    look: &d.look,
+                })
                 .collect();
             let input = Input {
                 frame: &frame,
                 calibration: &calibration,
                 garments: &garments,
-                body: Some(BodyView { vertices: &body_camera, faces: template.mesh().faces(), limbs: &limbs }),
+                body: Some(BodyView {
+                    vertices: &body_camera,
+                    faces: template.mesh().faces(),
+                    limbs: &limbs,
+                }),
                 output: None,
             };
             let par = if threads == 1 { Par::Seq } else { Par::Rayon };
             let models = SWITCHES.map(|(_, skip_hidden, skip_unseen)| {
-                Model::new(Config { par, skip_hidden, skip_unseen, ..Config::default() })
+                Model::new(Config {
+                    par,
+                    skip_hidden,
+                    skip_unseen,
+                    ..Config::default()
+                })
             });
             let mut works = SWITCHES.map(|_| (State::default(), Workspace::default()));
             let mut times: [[Vec<f64>; 3]; 4] = Default::default();
@@ -148,14 +224,25 @@ fn main() {
             with_threads(threads, || {
                 for round in 0..rounds + 3 {
                     last.clear();
-                    for ((model, (state, work)), times) in models.iter().zip(&mut works).zip(&mut times) {
+                    for ((model, (state, work)), times) in
+                        models.iter().zip(&mut works).zip(&mut times)
+                    {
                         let begun = Instant::now();
                         let (image, report) = render(model, state, &input, work).unwrap();
                         let all = begun.elapsed().as_secs_f64() * 1e3;
                         if round >= 3 {
-                            let stage =
-                                |name| report.stages_ms.iter().find(|s| s.0 == name).map_or(0.0, |s| f64::from(s.1));
-                            for (list, ms) in times.iter_mut().zip([all, stage("garments"), stage("normals")]) {
+                            let stage = |name| {
+                                report
+                                    .stages_ms
+                                    .iter()
+                                    .find(|s| s.0 == name)
+                                    .map_or(0.0, |s| f64::from(s.1))
+                            };
+                            for (list, ms) in
+                                times
+                                    .iter_mut()
+                                    .zip([all, stage("garments"), stage("normals")])
+                            {
                                 list.push(ms);
                             }
                         }
@@ -170,8 +257,13 @@ fn main() {
                     l[l.len() / 2]
                 })
             });
-            assert!(last.iter().all(|(image, _)| *image == last[0].0), "pictures differ");
-            let (vertices, faces) = drawn.iter().fold((0, 0), |(v, f), d| (v + d.vertices.len(), f + d.faces.len()));
+            assert!(
+                last.iter().all(|(image, _)| *image == last[0].0),
+                "pictures differ"
+            );
+            let (vertices, faces) = drawn.iter().fold((0, 0), |(v, f), d| {
+                (v + d.vertices.len(), f + d.faces.len())
+            });
             print!("| {}{name} | {vertices} |", names.join(" under "));
             medians.iter().for_each(|m| print!(" {:.2} |", m[0]));
             let (image, r) = &last[3];

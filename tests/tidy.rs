@@ -12,9 +12,21 @@ const MODULES: &[(u8, &str, &str)] = &[
         "math",
         "Small fixed-size algebra that nalgebra lacks: so(3)/se(3) maps, twists, polar, PSD projection, stable roots.",
     ),
-    (0, "par", "The only door to rayon: parallel loops and reductions whose bits do not depend on the thread count."),
-    (1, "mesh", "Triangle meshes and their topology, checked once at construction; normals, boundaries, UVs."),
-    (1, "camera", "Intrinsics, depth and colour images, projection, noise models, what a sensor saw and when."),
+    (
+        0,
+        "par",
+        "The only door to rayon: parallel loops and reductions whose bits do not depend on the thread count.",
+    ),
+    (
+        1,
+        "mesh",
+        "Triangle meshes and their topology, checked once at construction; normals, boundaries, UVs.",
+    ),
+    (
+        1,
+        "camera",
+        "Intrinsics, depth and colour images, projection, noise models, what a sensor saw and when.",
+    ),
     (
         1,
         "linear",
@@ -40,20 +52,56 @@ const MODULES: &[(u8, &str, &str)] = &[
         "body",
         "The articulated template: skeleton, twists, skinning, shape, bone scales, displacements; the embedded body; importers.",
     ),
-    (3, "garment", "A garment before it moves: panels, seams, materials, rest shape, sizes, anchors."),
+    (
+        3,
+        "garment",
+        "A garment before it moves: panels, seams, materials, rest shape, sizes, anchors.",
+    ),
     (
         3,
         "contact",
         "Candidate pairs, continuous collision, distances and contact energies between moving triangles; it never steps time.",
     ),
-    (3, "segment", "Which pixels are the person: floor, background, nearest body, edges."),
-    (3, "registration", "Correspondences, robust kernels and Gauss–Newton that pull one surface onto another."),
-    (4, "tracking", "One step from a frame and the last state to pose, displacements and a confidence report."),
-    (4, "cloth", "One step of garment motion against a moving body: the real-time and the offline solvers."),
-    (4, "clothcap", "Garments from scans: alignment, segmentation, multi-part templates, undressing, retargeting."),
-    (4, "composite", "The captured image and the garments in one picture: visibility, shading, edges."),
-    (5, "gpu", "wgpu twins of `raster` and `composite`, same inputs and outputs; the only module naming wgpu."),
-    (5, "dressing", "A garment onto a body: panel placement, sewing, size choice, first drape, fit map."),
+    (
+        3,
+        "segment",
+        "Which pixels are the person: floor, background, nearest body, edges.",
+    ),
+    (
+        3,
+        "registration",
+        "Correspondences, robust kernels and Gauss–Newton that pull one surface onto another.",
+    ),
+    (
+        4,
+        "tracking",
+        "One step from a frame and the last state to pose, displacements and a confidence report.",
+    ),
+    (
+        4,
+        "cloth",
+        "One step of garment motion against a moving body: the real-time and the offline solvers.",
+    ),
+    (
+        4,
+        "clothcap",
+        "Garments from scans: alignment, segmentation, multi-part templates, undressing, retargeting.",
+    ),
+    (
+        4,
+        "composite",
+        "The captured image and the garments in one picture: visibility, shading, edges.",
+    ),
+    (
+        5,
+        "gpu",
+        "wgpu twins of `raster` and `composite`, same inputs and outputs; the only module naming wgpu.",
+    ),
+    (
+        5,
+        "dressing",
+        "A garment onto a body: panel placement, sewing, size choice, first drape, fit map.",
+    ),
     (
         5,
         "synth",
@@ -100,7 +148,9 @@ fn root() -> PathBuf {
 }
 
 fn rust_files(dir: &Path, out: &mut Vec<PathBuf>) {
-    let Ok(entries) = fs::read_dir(dir) else { return };
+    let Ok(entries) = fs::read_dir(dir) else {
+        return;
+    };
     for entry in entries.flatten() {
         let path = entry.path();
         let name = entry.file_name();
@@ -123,7 +173,11 @@ fn all_files() -> Vec<(String, String)> {
     files
         .into_iter()
         .map(|p| {
-            let rel = p.strip_prefix(root()).expect("inside the root").to_string_lossy().replace('\\', "/");
+            let rel = p
+                .strip_prefix(root())
+                .expect("inside the root")
+                .to_string_lossy()
+                .replace('\\', "/");
             (rel, fs::read_to_string(&p).expect("readable"))
         })
         .collect()
@@ -131,15 +185,28 @@ fn all_files() -> Vec<(String, String)> {
 
 /// Source without comments (doc comments may name whatever they like). String literals stay; none names a crate path.
 fn code(source: &str) -> String {
-    source.lines().map(|l| l.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n")
+    source
+        .lines()
+        .map(|l| l.split("//").next().unwrap_or(""))
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
 /// First path segments after each `crate::`, also inside `use crate::{a::b, c}`.
 fn modules_named(code: &str) -> Vec<String> {
-    let ident = |s: &str| s.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+    let ident = |s: &str| {
+        s.chars()
+            .take_while(|c| c.is_alphanumeric() || *c == '_')
+            .collect::<String>()
+    };
     let mut named = Vec::new();
     for (at, _) in code.match_indices("crate::") {
-        if code[..at].ends_with('$') || code[..at].chars().last().is_some_and(|c| c.is_alphanumeric() || c == '_') {
+        if code[..at].ends_with('$')
+            || code[..at]
+                .chars()
+                .last()
+                .is_some_and(|c| c.is_alphanumeric() || c == '_')
+        {
             continue;
         }
         let rest = &code[at + "crate::".len()..];
@@ -175,7 +242,13 @@ fn layer_of(module: &str) -> Option<u8> {
 fn a_module_uses_only_lower_layers() {
     let mut faults = Vec::new();
     for (path, source) in all_files() {
-        let Some(module) = path.strip_prefix("src/").and_then(|p| p.split_once('/')).map(|p| p.0) else { continue };
+        let Some(module) = path
+            .strip_prefix("src/")
+            .and_then(|p| p.split_once('/'))
+            .map(|p| p.0)
+        else {
+            continue;
+        };
         let Some(own) = layer_of(module) else {
             faults.push(format!("{path}: module `{module}` is not in the table"));
             continue;
@@ -185,7 +258,9 @@ fn a_module_uses_only_lower_layers() {
                 continue;
             }
             if let Some(layer) = layer_of(&other).filter(|layer| *layer >= own) {
-                faults.push(format!("{path}: `{module}` (layer {own}) uses `{other}` (layer {layer})"));
+                faults.push(format!(
+                    "{path}: `{module}` (layer {own}) uses `{other}` (layer {layer})"
+                ));
             }
         }
     }
@@ -208,10 +283,17 @@ fn external_crates_stay_behind_their_doors() {
             let named = text.match_indices(&pattern).any(|(at, _)| {
                 // `formats::mcap::…` is ours, `mcap::…` at the start of a path is the crate.
                 let before = &text[..at];
-                !before.ends_with("::") && !before.chars().last().is_some_and(|c| c.is_alphanumeric() || c == '_')
+                !before.ends_with("::")
+                    && !before
+                        .chars()
+                        .last()
+                        .is_some_and(|c| c.is_alphanumeric() || c == '_')
             });
             if named {
-                faults.push(format!("{path}: names `{name}`, whose door is {}", doors.join(", ")));
+                faults.push(format!(
+                    "{path}: names `{name}`, whose door is {}",
+                    doors.join(", ")
+                ));
             }
         }
     }
@@ -222,8 +304,14 @@ fn external_crates_stay_behind_their_doors() {
 fn every_module_opens_with_its_charter() {
     for (_, module, charter) in MODULES {
         let path = root().join("src").join(module).join("mod.rs");
-        let source = fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-        assert_eq!(source.lines().next(), Some(format!("//! {charter}").as_str()), "{}", path.display());
+        let source =
+            fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        assert_eq!(
+            source.lines().next(),
+            Some(format!("//! {charter}").as_str()),
+            "{}",
+            path.display()
+        );
     }
 }
 
@@ -241,20 +329,31 @@ fn files_stay_small() {
 
 #[test]
 fn services_do_not_depend_on_each_other() {
-    let services = ["tryon-capture", "tryon-tracking", "tryon-cloth", "tryon-compositor"];
+    let services = [
+        "tryon-capture",
+        "tryon-tracking",
+        "tryon-cloth",
+        "tryon-compositor",
+    ];
     for own in services {
         let dir = own.trim_start_matches("tryon-");
-        let manifest = fs::read_to_string(root().join("services").join(dir).join("Cargo.toml")).expect("manifest");
+        let manifest = fs::read_to_string(root().join("services").join(dir).join("Cargo.toml"))
+            .expect("manifest");
         // Only the production dependencies: tests may start a neighbour.
         let production = manifest.split("[dev-dependencies]").next().unwrap_or("");
         for other in services.iter().filter(|s| **s != own) {
-            assert!(!production.lines().any(|l| l.starts_with(other)), "{own} depends on {other}");
+            assert!(
+                !production.lines().any(|l| l.starts_with(other)),
+                "{own} depends on {other}"
+            );
         }
     }
 }
 
 #[test]
 fn the_scanner_sees_grouped_and_plain_paths() {
-    let found = modules_named("use crate::{math::{P3, V3}, mesh};\nlet x = crate::raster::View; $crate::par::x");
+    let found = modules_named(
+        "use crate::{math::{P3, V3}, mesh};\nlet x = crate::raster::View; $crate::par::x",
+    );
     assert_eq!(found, ["math", "mesh", "raster"]);
 }

@@ -19,7 +19,13 @@ pub(crate) struct Part {
 }
 
 /// Draws `parts` from the side `yaw` (radians) into a cell; `y` is the range of heights shown, `centre` the axis (x, z).
-pub(crate) fn draw(parts: &[Part], yaw: f32, cell: (u32, u32), y: [f32; 2], centre: [f32; 2]) -> Vec<u8> {
+pub(crate) fn draw(
+    parts: &[Part],
+    yaw: f32,
+    cell: (u32, u32),
+    y: [f32; 2],
+    centre: [f32; 2],
+) -> Vec<u8> {
     let (s, c) = yaw.sin_cos();
     let (mut all, mut faces, mut owner) = (Vec::new(), Vec::<Face>::new(), Vec::new());
     for (k, p) in parts.iter().enumerate() {
@@ -53,30 +59,43 @@ pub(crate) fn draw(parts: &[Part], yaw: f32, cell: (u32, u32), y: [f32; 2], cent
     let mut out = vec![250u8; (w * h * 3) as usize];
     for v in 0..h {
         for u in 0..w {
-            let Some((face, b)) = interpolate(&view, &all, &faces, &buffer, u, v) else { continue };
+            let Some((face, b)) = interpolate(&view, &all, &faces, &buffer, u, v) else {
+                continue;
+            };
             let f = faces[face as usize];
             let (part, own) = owner[face as usize];
             let part = &parts[part];
-            let n = (0..3).fold(V3::zeros(), |s, k| s + normals[f[k] as usize].normalize() * b[k]).normalize();
+            let n = (0..3)
+                .fold(V3::zeros(), |s, k| {
+                    s + normals[f[k] as usize].normalize() * b[k]
+                })
+                .normalize();
             let inside = tryon::mesh::face_normal(&all, &f).z > 0.0;
             let n = if n.z > 0.0 { -n } else { n };
             let mut color = part.color;
             if !part.painted.is_empty() && !inside {
                 let t = part.faces[own];
                 color = std::array::from_fn(|d| {
-                    (0..3).map(|k| f32::from(part.painted[t[k] as usize][d]) / 255.0 * b[k]).sum::<f32>()
+                    (0..3)
+                        .map(|k| f32::from(part.painted[t[k] as usize][d]) / 255.0 * b[k])
+                        .sum::<f32>()
                 });
             } else if inside && !part.uv.is_empty() {
                 color = [color[1] * 0.5, color[2] * 0.5, color[0] * 0.5];
             } else if !part.uv.is_empty() {
                 let t = part.faces[own];
-                let at = |d: usize| (0..3).map(|k| part.uv[t[k] as usize][d] * b[k]).sum::<f32>();
+                let at = |d: usize| {
+                    (0..3)
+                        .map(|k| part.uv[t[k] as usize][d] * b[k])
+                        .sum::<f32>()
+                };
                 let odd = ((at(0) / 0.04).floor() + (at(1) / 0.04).floor()).rem_euclid(2.0);
                 color = color.map(|c| c * (0.88 + 0.12 * odd));
             }
             let shade = 0.3 + 0.7 * n.dot(&light).max(0.0);
             for k in 0..3 {
-                out[(v * w + u) as usize * 3 + k] = (color[k] * shade * 255.0).clamp(0.0, 255.0) as u8;
+                out[(v * w + u) as usize * 3 + k] =
+                    (color[k] * shade * 255.0).clamp(0.0, 255.0) as u8;
             }
         }
     }

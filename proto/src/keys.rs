@@ -7,12 +7,16 @@ pub const MAX_NAME: usize = 64;
 pub fn is_name(s: &str) -> bool {
     !s.is_empty()
         && s.len() <= MAX_NAME
-        && s.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_' || b == b'-')
+        && s.bytes()
+            .all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_' || b == b'-')
 }
 
 /// A session id: 1 to 64 characters of `[A-Za-z0-9_-]`.
 pub fn is_session_id(s: &str) -> bool {
-    !s.is_empty() && s.len() <= MAX_NAME && s.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-')
+    !s.is_empty()
+        && s.len() <= MAX_NAME
+        && s.bytes()
+            .all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-')
 }
 
 /// Which camera: the two variable parts of its bus keys. Holds checked names only.
@@ -25,7 +29,10 @@ pub struct CameraKey {
 impl CameraKey {
     /// `None` when either name has characters that a key must not have.
     pub fn new(store: &str, camera: &str) -> Option<Self> {
-        (is_name(store) && is_name(camera)).then(|| Self { store: store.into(), camera: camera.into() })
+        (is_name(store) && is_name(camera)).then(|| Self {
+            store: store.into(),
+            camera: camera.into(),
+        })
     }
     /// Store name.
     pub fn store(&self) -> &str {
@@ -61,7 +68,10 @@ mod tests {
 
     #[test]
     fn names_that_would_change_a_key_are_refused() {
-        assert_eq!(CameraKey::new("store", "front").expect("fine").rgbd(), "tryon/store/front/rgbd");
+        assert_eq!(
+            CameraKey::new("store", "front").expect("fine").rgbd(),
+            "tryon/store/front/rgbd"
+        );
         for bad in ["", "a/b", "*", "$*", "a b", "A", &"x".repeat(65)] {
             assert!(CameraKey::new(bad, "front").is_none(), "{bad}");
             assert!(CameraKey::new("store", bad).is_none(), "{bad}");

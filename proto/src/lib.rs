@@ -10,7 +10,13 @@ pub mod keys;
 pub use prost::Message;
 
 /// Messages, clients and servers of package `tryon.v1`.
-#[allow(missing_docs, unreachable_pub, clippy::all, clippy::unwrap_used, rustdoc::all)]
+#[allow(
+    missing_docs,
+    unreachable_pub,
+    clippy::all,
+    clippy::unwrap_used,
+    rustdoc::all
+)]
 pub mod v1 {
     include!("gen/tryon.v1.rs");
 }

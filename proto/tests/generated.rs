@@ -8,6 +8,9 @@ fn checked_in_code_is_up_to_date() {
     for name in ["tryon.v1.rs", "descriptor.bin"] {
         let new = std::fs::read(fresh.path().join(name)).expect("generated");
         let old = std::fs::read(root.join("src/gen").join(name)).expect("checked in");
-        assert!(new == old, "src/gen/{name} differs: run `cargo run -p tryon-proto-generate`");
+        assert!(
+            new == old,
+            "src/gen/{name} differs: run `cargo run -p tryon-proto-generate`"
+        );
     }
 }

@@ -24,15 +24,28 @@ const KNEE_FLEXION: f64 = 2.53;
 /// Names the array, joint or vertex that does not fit.
 pub fn template_from_smpl(name: &str, arrays: &SmplArrays) -> Result<Template, BodyError> {
     let (n, j) = (arrays.vertices.len(), arrays.parents.len());
-    let array = |array: &str, why: String| BodyError::Array { array: array.into(), why };
+    let array = |array: &str, why: String| BodyError::Array {
+        array: array.into(),
+        why,
+    };
     if arrays.joints.len() != j || arrays.joint_names.len() != j || j == 0 {
         return Err(array(
             "J",
-            format!("{} joints and {} names for {j}", arrays.joints.len(), arrays.joint_names.len()),
+            format!(
+                "{} joints and {} names for {j}",
+                arrays.joints.len(),
+                arrays.joint_names.len()
+            ),
         ));
     }
     if arrays.weights.len() != n * j {
-        return Err(array("weights", format!("{} values for {n} vertices and {j} joints", arrays.weights.len())));
+        return Err(array(
+            "weights",
+            format!(
+                "{} values for {n} vertices and {j} joints",
+                arrays.weights.len()
+            ),
+        ));
     }
     if !arrays.shape_directions.is_empty() && arrays.joint_regressor.len() != n * j {
         return Err(array(
@@ -40,10 +53,16 @@ pub fn template_from_smpl(name: &str, arrays: &SmplArrays) -> Result<Template, B
             "missing or of the wrong size; `shapedirs` needs it to move the joints".into(),
         ));
     }
-    let weights = SkinWeights::from_rows(
-        arrays.weights.chunks_exact(j).map(|row| row.iter().enumerate().map(|(k, w)| (k, f64::from(*w))).collect()),
+    let weights = SkinWeights::from_rows(arrays.weights.chunks_exact(j).map(|row| {
+        row.iter()
+            .enumerate()
+            .map(|(k, w)| (k, f64::from(*w)))
+            .collect()
+    }))?;
+    let mesh = TriMesh::new(
+        arrays.vertices.iter().map(|v| P3::from(*v)).collect(),
+        arrays.faces.clone(),
     )?;
-    let mesh = TriMesh::new(arrays.vertices.iter().map(|v| P3::from(*v)).collect(), arrays.faces.clone())?;
 
     let rest: Vec<Point3<f64>> = arrays.joints.iter().map(|p| Point3::from(*p)).collect();
     let mut joints: Vec<Joint> = (0..j)
@@ -79,15 +98,25 @@ fn end_points(arrays: &SmplArrays, weights: &SkinWeights, mesh: &TriMesh) -> Vec
         ("head_end", ["head", "head"], Some(Vector3::y())),
         ("left_hand_end", ["left_hand", "left_wrist"], None),
         ("right_hand_end", ["right_hand", "right_wrist"], None),
-        ("left_foot_end", ["left_foot", "left_ankle"], Some(Vector3::z())),
-        ("right_foot_end", ["right_foot", "right_ankle"], Some(Vector3::z())),
+        (
+            "left_foot_end",
+            ["left_foot", "left_ankle"],
+            Some(Vector3::z()),
+        ),
+        (
+            "right_foot_end",
+            ["right_foot", "right_ankle"],
+            Some(Vector3::z()),
+        ),
     ];
     let mut ends = Vec::new();
     for (name, parents, direction) in wanted {
         if index(name).is_some() {
             continue;
         }
-        let Some(parent) = parents.iter().find_map(|p| index(p)) else { continue };
+        let Some(parent) = parents.iter().find_map(|p| index(p)) else {
+            continue;
+        };
         let origin = Point3::from(arrays.joints[parent]);
         let along = direction.or_else(|| {
             let before = arrays.parents[parent].map(|p| Point3::from(arrays.joints[p]))?;
@@ -109,7 +138,11 @@ fn end_points(arrays: &SmplArrays, weights: &SkinWeights, mesh: &TriMesh) -> Vec
             .filter(|&i| below(weights.dominant(i)))
             .max_by(|&a, &b| reach(a).total_cmp(&reach(b)).then(b.cmp(&a)));
         if let Some(vertex) = vertex {
-            ends.push(EndPoint { name, parent, vertex });
+            ends.push(EndPoint {
+                name,
+                parent,
+                vertex,
+            });
         }
     }
     ends
@@ -119,12 +152,24 @@ fn end_points(arrays: &SmplArrays, weights: &SkinWeights, mesh: &TriMesh) -> Vec
 fn shape_space(arrays: &SmplArrays, ends: &[EndPoint]) -> ShapeSpace {
     let directions = &arrays.shape_directions;
     let joints = directions.iter().map(|d| {
-        let moved = regress(&arrays.joint_regressor, d).into_iter().map(Vector3::from);
-        moved.chain(ends.iter().map(|e| Vector3::from(d[e.vertex].map(f64::from)))).collect()
+        let moved = regress(&arrays.joint_regressor, d)
+            .into_iter()
+            .map(Vector3::from);
+        moved
+            .chain(
+                ends.iter()
+                    .map(|e| Vector3::from(d[e.vertex].map(f64::from))),
+            )
+            .collect()
     });
     ShapeSpace {
-        names: (0..directions.len()).map(|d| format!("shape_{d}")).collect(),
-        vertices: directions.iter().map(|d| d.iter().map(|o| V3::from(*o)).collect()).collect(),
+        names: (0..directions.len())
+            .map(|d| format!("shape_{d}"))
+            .collect(),
+        vertices: directions
+            .iter()
+            .map(|d| d.iter().map(|o| V3::from(*o)).collect())
+            .collect(),
         joints: joints.collect(),
     }
 }
@@ -140,7 +185,9 @@ fn motion(k: usize, arrays: &SmplArrays, rest: &[Point3<f64>]) -> JointMotion {
         _ => (1.0, name),
     };
     let mirrored = |l: [f64; 2]| if side > 0.0 { l } else { [-l[1], -l[0]] };
-    let ball = |x: [f64; 2], y: [f64; 2], z: [f64; 2]| JointMotion::Ball { limits: [x, mirrored(y), mirrored(z)] };
+    let ball = |x: [f64; 2], y: [f64; 2], z: [f64; 2]| JointMotion::Ball {
+        limits: [x, mirrored(y), mirrored(z)],
+    };
     let even = |r: f64| [-r, r];
     match part {
         "pelvis" => JointMotion::Fixed,
@@ -148,7 +195,10 @@ fn motion(k: usize, arrays: &SmplArrays, rest: &[Point3<f64>]) -> JointMotion {
         "hip" => ball([-2.3, 0.8], even(1.0), [-0.7, 1.2]),
         "knee" => hinge(k, arrays, rest, -Vector3::z(), KNEE_FLEXION),
         "ankle" => ball([-0.7, 1.0], even(0.6), even(0.6)),
-        "foot" => JointMotion::Hinge { axis: [1.0, 0.0, 0.0], limits: [-1.0, 0.5] },
+        "foot" => JointMotion::Hinge {
+            axis: [1.0, 0.0, 0.0],
+            limits: [-1.0, 0.5],
+        },
         "spine1" | "spine2" | "spine3" => ball([-0.4, 0.7], even(0.5), even(0.45)),
         "neck" | "head" => ball(even(0.7), even(0.8), even(0.6)),
         "collar" => ball(even(0.3), even(0.5), even(0.6)),
@@ -161,16 +211,33 @@ fn motion(k: usize, arrays: &SmplArrays, rest: &[Point3<f64>]) -> JointMotion {
 }
 
 /// A hinge that bends the limb towards `front` at positive angles, from straight to `flexion`.
-fn hinge(k: usize, arrays: &SmplArrays, rest: &[Point3<f64>], front: Vector3<f64>, flexion: f64) -> JointMotion {
+fn hinge(
+    k: usize,
+    arrays: &SmplArrays,
+    rest: &[Point3<f64>],
+    front: Vector3<f64>,
+    flexion: f64,
+) -> JointMotion {
     let child = (k + 1..rest.len()).find(|&c| arrays.parents[c] == Some(k));
     let upper = arrays.parents[k].and_then(|p| (rest[k] - rest[p]).try_normalize(0.0));
     let lower = child.and_then(|c| (rest[c] - rest[k]).try_normalize(0.0));
-    let (Some(upper), Some(lower)) = (upper, lower) else { return JointMotion::Fixed };
+    let (Some(upper), Some(lower)) = (upper, lower) else {
+        return JointMotion::Fixed;
+    };
     let bend = upper.cross(&lower);
-    let axis = if bend.norm() > BENT.sin() { bend } else { upper.cross(&front) };
-    let Some(axis) = axis.try_normalize(f64::EPSILON) else { return JointMotion::Fixed };
+    let axis = if bend.norm() > BENT.sin() {
+        bend
+    } else {
+        upper.cross(&front)
+    };
+    let Some(axis) = axis.try_normalize(f64::EPSILON) else {
+        return JointMotion::Fixed;
+    };
     let at_rest = bend.dot(&axis).atan2(upper.dot(&lower));
-    JointMotion::Hinge { axis: axis.into(), limits: [(-at_rest - OVERSTRETCH).min(0.0), flexion - at_rest] }
+    JointMotion::Hinge {
+        axis: axis.into(),
+        limits: [(-at_rest - OVERSTRETCH).min(0.0), flexion - at_rest],
+    }
 }
 
 #[cfg(test)]
@@ -182,30 +249,54 @@ mod tests {
     use std::path::PathBuf;
 
     fn makehuman(file: &str) -> Option<PathBuf> {
-        let root = std::env::var_os("TRYON_SHARED")
-            .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
+        let root = std::env::var_os("TRYON_SHARED").map_or_else(
+            || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"),
+            PathBuf::from,
+        );
         let path = root.join("data/body/makehuman_smpl_layout").join(file);
         if path.exists() {
             return Some(path);
         }
-        assert!(std::env::var_os("TRYON_REQUIRE_ALL").is_none(), "{} is missing", path.display());
+        assert!(
+            std::env::var_os("TRYON_REQUIRE_ALL").is_none(),
+            "{} is missing",
+            path.display()
+        );
         eprintln!("SKIPPED: {} is missing", path.display());
         None
     }
 
     #[test]
     fn the_makehuman_template_has_its_documented_numbers() {
-        let Some(path) = makehuman("template.npz") else { return };
+        let Some(path) = makehuman("template.npz") else {
+            return;
+        };
         let arrays = read_smpl(path).expect("readable");
-        assert_eq!((arrays.vertices.len(), arrays.faces.len(), arrays.joints.len()), (13_380, 26_756, 22));
+        assert_eq!(
+            (
+                arrays.vertices.len(),
+                arrays.faces.len(),
+                arrays.joints.len()
+            ),
+            (13_380, 26_756, 22)
+        );
         assert_eq!(arrays.shape_directions.len(), 20);
         let t = template_from_smpl("makehuman", &arrays).expect("valid");
         let s = t.skeleton();
         assert_eq!(s.len(), 22 + 5);
         let (lo, hi) = t.mesh().bounds().expect("vertices");
-        assert!((hi.y - lo.y - 1.693).abs() < 1e-3, "stature of the mean body");
+        assert!(
+            (hi.y - lo.y - 1.693).abs() < 1e-3,
+            "stature of the mean body"
+        );
         assert!(t.topology().is_closed());
-        for end in ["head_end", "left_hand_end", "right_hand_end", "left_foot_end", "right_foot_end"] {
+        for end in [
+            "head_end",
+            "left_hand_end",
+            "right_hand_end",
+            "left_foot_end",
+            "right_foot_end",
+        ] {
             assert!(s.index(end).is_some(), "{end}");
         }
         let at = |n: &str| s.joints()[s.index(n).expect("joint")].rest;
@@ -221,9 +312,19 @@ mod tests {
         // A coefficient moves joints with the surface: the taller body has longer legs and a higher head.
         let mut coefficients = vec![0.0; 20];
         coefficients[0] = 2.0;
-        let (a, b) =
-            (t.personalise(&BodyShape::default()), t.personalise(&BodyShape { coefficients, ..Default::default() }));
-        let moved = a.joints.iter().zip(&b.joints).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
+        let (a, b) = (
+            t.personalise(&BodyShape::default()),
+            t.personalise(&BodyShape {
+                coefficients,
+                ..Default::default()
+            }),
+        );
+        let moved = a
+            .joints
+            .iter()
+            .zip(&b.joints)
+            .map(|(p, q)| (p - q).norm())
+            .fold(0.0, f64::max);
         assert!(moved > 0.01, "{moved}");
         let head = s.index("head_end").expect("head_end");
         let top = b.vertices.iter().map(|v| v.y).fold(f32::MIN, f32::max);
@@ -232,17 +333,30 @@ mod tests {
 
     #[test]
     fn subjects_without_shape_space_read_too() {
-        for file in ["subject_f_avg", "subject_f_short_heavy", "subject_m_heavy", "subject_m_tall"] {
-            let Some(path) = makehuman(&format!("{file}.npz")) else { return };
+        for file in [
+            "subject_f_avg",
+            "subject_f_short_heavy",
+            "subject_m_heavy",
+            "subject_m_tall",
+        ] {
+            let Some(path) = makehuman(&format!("{file}.npz")) else {
+                return;
+            };
             let t = template_from_smpl(file, &read_smpl(path).expect("readable")).expect("valid");
-            assert!(t.shape_space().is_none() && t.mesh().volume() > 0.03, "{file}");
+            assert!(
+                t.shape_space().is_none() && t.mesh().volume() > 0.03,
+                "{file}"
+            );
         }
     }
 
     #[test]
     fn elbows_and_knees_bend_the_human_way() {
-        let Some(path) = makehuman("template.npz") else { return };
-        let t = template_from_smpl("makehuman", &read_smpl(path).expect("readable")).expect("valid");
+        let Some(path) = makehuman("template.npz") else {
+            return;
+        };
+        let t =
+            template_from_smpl("makehuman", &read_smpl(path).expect("readable")).expect("valid");
         let (s, rest) = (t.skeleton(), t.personalise(&BodyShape::default()));
         let tip = |pose: &Pose<Body>, name: &str| {
             let mut bones = Default::default();
@@ -257,8 +371,14 @@ mod tests {
         }
         for side in ["left", "right"] {
             let (wrist, ankle) = (format!("{side}_wrist"), format!("{side}_ankle"));
-            assert!(tip(&bent, &wrist).z > tip(&neutral, &wrist).z + 0.02, "{wrist} comes forward");
-            assert!(tip(&bent, &ankle).z < tip(&neutral, &ankle).z - 0.2, "{ankle} goes back");
+            assert!(
+                tip(&bent, &wrist).z > tip(&neutral, &wrist).z + 0.02,
+                "{wrist} comes forward"
+            );
+            assert!(
+                tip(&bent, &ankle).z < tip(&neutral, &ankle).z - 0.2,
+                "{ankle} goes back"
+            );
         }
     }
 }

@@ -93,7 +93,10 @@ pub fn section(vertices: &[P3], faces: &[Face], origin: &P3d, normal: &V3d, u: &
         }
     }
     let point = |(a, b): (u32, u32)| {
-        let (p, q) = (vertices[a as usize].cast::<f64>(), vertices[b as usize].cast::<f64>());
+        let (p, q) = (
+            vertices[a as usize].cast::<f64>(),
+            vertices[b as usize].cast::<f64>(),
+        );
         let (da, db) = ((p - origin).dot(normal), (q - origin).dot(normal));
         let x = p + (q - p) * (da / (da - db)) - origin;
         Point2::new(x.dot(u), x.dot(&v))
@@ -116,10 +119,14 @@ impl Section {
     /// The outline around (u, v) = 0, or else the one whose middle is nearest to it.
     fn central(&self) -> Option<&Vec<Point2<f64>>> {
         let off = |o: &Vec<Point2<f64>>| {
-            let sum = o.iter().fold(nalgebra::Vector2::zeros(), |s, p| s + p.coords);
+            let sum = o
+                .iter()
+                .fold(nalgebra::Vector2::zeros(), |s, p| s + p.coords);
             sum.norm() / o.len() as f64
         };
-        self.outlines.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
+        self.outlines
+            .iter()
+            .min_by(|a, b| off(a).total_cmp(&off(b)))
     }
     /// As a tape around the central outline: the length of its convex hull.
     pub fn girth(&self) -> Option<f64> {
@@ -164,12 +171,26 @@ impl<'a> Levels<'a> {
             let (a, b) = (y[0].min(y[1]).min(y[2]), y[0].max(y[1]).max(y[2]));
             slabs[slab(a)..=slab(b)].iter_mut().for_each(|s| s.push(*f));
         }
-        Self { vertices, low, slabs }
+        Self {
+            vertices,
+            low,
+            slabs,
+        }
     }
     fn cut(&self, origin: P3d) -> Section {
         let k = ((origin.y - self.low) / SLICE).floor();
-        let faces = if k < 0.0 { None } else { self.slabs.get(k as usize) };
-        section(self.vertices, faces.map_or(&[], Vec::as_slice), &origin, &V3d::y(), &V3d::x())
+        let faces = if k < 0.0 {
+            None
+        } else {
+            self.slabs.get(k as usize)
+        };
+        section(
+            self.vertices,
+            faces.map_or(&[], Vec::as_slice),
+            &origin,
+            &V3d::y(),
+            &V3d::x(),
+        )
     }
 }
 
@@ -178,21 +199,40 @@ impl<'a> Levels<'a> {
 /// # Errors
 /// Names the joint or the section that is missing.
 pub fn measure(template: &Template, body: &RestBody) -> Result<Measurements, MeasureError> {
-    let joint =
-        |name: &'static str| template.skeleton().index(name).map(|j| body.joints[j]).ok_or(MeasureError::Joint(name));
+    let joint = |name: &'static str| {
+        template
+            .skeleton()
+            .index(name)
+            .map(|j| body.joints[j])
+            .ok_or(MeasureError::Joint(name))
+    };
     let (v, faces) = (body.vertices.as_slice(), template.mesh().faces());
-    let (hip, knee, ankle) = (joint("left_hip")?, joint("left_knee")?, joint("left_ankle")?);
-    let (shoulder, elbow, wrist) = (joint("left_shoulder")?, joint("left_elbow")?, joint("left_wrist")?);
+    let (hip, knee, ankle) = (
+        joint("left_hip")?,
+        joint("left_knee")?,
+        joint("left_ankle")?,
+    );
+    let (shoulder, elbow, wrist) = (
+        joint("left_shoulder")?,
+        joint("left_elbow")?,
+        joint("left_wrist")?,
+    );
     let (neck, head) = (joint("neck")?, joint("head")?);
     let right_shoulder = joint("right_shoulder")?;
     let middle = nalgebra::center(&hip, &joint("right_hip")?);
-    let (low, high) =
-        v.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(f64::from(p.y)), h.max(f64::from(p.y))));
+    let (low, high) = v
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| {
+            (l.min(f64::from(p.y)), h.max(f64::from(p.y)))
+        });
     let levels = Levels::new(v, faces, low, high);
     let level = |p: P3d| levels.cut(p);
     let across = |a: &P3d, b: &P3d, t: f64| {
         let n = (b - a).normalize();
-        let u = n.cross(&V3d::z()).try_normalize(f64::EPSILON).unwrap_or_else(Vector3::x);
+        let u = n
+            .cross(&V3d::z())
+            .try_normalize(f64::EPSILON)
+            .unwrap_or_else(Vector3::x);
         section(v, faces, &(a + (b - a) * t), &n, &u)
     };
     // The trunk at a height, and the largest girth between two heights.
@@ -202,9 +242,13 @@ pub fn measure(template: &Template, body: &RestBody) -> Result<Measurements, Mea
         (0..=n).map(move |k| from + (to - from) * k as f64 / n as f64)
     };
     let missing = |what: &'static str| move || MeasureError::Section(what);
-    let straddles =
-        |s: &Section| s.central().is_some_and(|o| o.iter().any(|p| p.x < 0.0) && o.iter().any(|p| p.x > 0.0));
-    let below = steps(hip.y, knee.y).find(|&y| !straddles(&trunk(y))).ok_or_else(missing("crotch"))?;
+    let straddles = |s: &Section| {
+        s.central()
+            .is_some_and(|o| o.iter().any(|p| p.x < 0.0) && o.iter().any(|p| p.x > 0.0))
+    };
+    let below = steps(hip.y, knee.y)
+        .find(|&y| !straddles(&trunk(y)))
+        .ok_or_else(missing("crotch"))?;
     let crotch = (0..HALVINGS)
         .fold([below, below + SLICE], |[l, h], _| {
             let m = 0.5 * (l + h);
@@ -214,16 +258,29 @@ pub fn measure(template: &Template, body: &RestBody) -> Result<Measurements, Mea
         .sum::<f64>()
         * 0.5;
     // Under the armpit the trunk is apart from the arms: its outline ends inside the shoulder joints' breadth.
-    let apart = |s: &Section| s.central().is_some_and(|o| o.iter().all(|p| p.x.abs() < 1.25 * (shoulder.x - middle.x)));
+    let apart = |s: &Section| {
+        s.central()
+            .is_some_and(|o| o.iter().all(|p| p.x.abs() < 1.25 * (shoulder.x - middle.x)))
+    };
     let lower_chest = middle.y + 0.55 * (neck.y - middle.y);
-    let chest =
-        steps(lower_chest, shoulder.y).map(trunk).take_while(apart).filter_map(|s| s.girth()).fold(0.0, f64::max);
-    let waist = trunk(middle.y + NAVEL * (neck.y - middle.y)).girth().ok_or_else(missing("waist"))?;
-    let natural =
-        steps(middle.y + WAIST_BETWEEN[0] * (neck.y - middle.y), middle.y + WAIST_BETWEEN[1] * (neck.y - middle.y))
-            .filter_map(|y| trunk(y).girth())
-            .fold(waist, f64::min);
-    let seat = steps(crotch + 2.0 * SLICE, middle.y + 0.06).map(trunk).filter_map(|s| s.girth()).fold(0.0, f64::max);
+    let chest = steps(lower_chest, shoulder.y)
+        .map(trunk)
+        .take_while(apart)
+        .filter_map(|s| s.girth())
+        .fold(0.0, f64::max);
+    let waist = trunk(middle.y + NAVEL * (neck.y - middle.y))
+        .girth()
+        .ok_or_else(missing("waist"))?;
+    let natural = steps(
+        middle.y + WAIST_BETWEEN[0] * (neck.y - middle.y),
+        middle.y + WAIST_BETWEEN[1] * (neck.y - middle.y),
+    )
+    .filter_map(|y| trunk(y).girth())
+    .fold(waist, f64::min);
+    let seat = steps(crotch + 2.0 * SLICE, middle.y + 0.06)
+        .map(trunk)
+        .filter_map(|s| s.girth())
+        .fold(0.0, f64::max);
     let leg = |y: f64| {
         let t = ((hip.y - y) / (hip.y - knee.y)).clamp(0.0, 1.0);
         let x = if y > knee.y {
@@ -234,9 +291,13 @@ pub fn measure(template: &Template, body: &RestBody) -> Result<Measurements, Mea
         level(P3d::new(x.x, y, x.z))
     };
     let thigh = leg(crotch - 0.02).girth().ok_or_else(missing("thigh"))?;
-    let calf = steps(knee.y - 0.05, ankle.y + 0.1).filter_map(|y| leg(y).girth()).fold(0.0, f64::max);
-    let neck_girth =
-        [0.35, 0.5, 0.65].iter().filter_map(|&t| across(&neck, &head, t).girth()).fold(f64::INFINITY, f64::min);
+    let calf = steps(knee.y - 0.05, ankle.y + 0.1)
+        .filter_map(|y| leg(y).girth())
+        .fold(0.0, f64::max);
+    let neck_girth = [0.35, 0.5, 0.65]
+        .iter()
+        .filter_map(|&t| across(&neck, &head, t).girth())
+        .fold(f64::INFINITY, f64::min);
     if !neck_girth.is_finite() {
         return Err(MeasureError::Section("neck"));
     }
@@ -245,18 +306,28 @@ pub fn measure(template: &Template, body: &RestBody) -> Result<Measurements, Mea
         farthest_along(v, faces, j, &d).map(|t| j + d * t)
     };
     let (a, b) = (acromion(&shoulder, 1.0), acromion(&right_shoulder, -1.0));
-    let (Some(a), Some(b)) = (a, b) else { return Err(MeasureError::Section("shoulder")) };
+    let (Some(a), Some(b)) = (a, b) else {
+        return Err(MeasureError::Section("shoulder"));
+    };
     Ok(Measurements {
         stature: high - low,
-        chest: if chest > 0.0 { chest } else { return Err(MeasureError::Section("chest")) },
+        chest: if chest > 0.0 {
+            chest
+        } else {
+            return Err(MeasureError::Section("chest"));
+        },
         waist,
         natural_waist: natural,
         hip: seat,
         neck: neck_girth,
         thigh,
         calf,
-        upper_arm: across(&shoulder, &elbow, 0.55).girth().ok_or_else(missing("upper arm"))?,
-        wrist: across(&elbow, &wrist, 0.97).girth().ok_or_else(missing("wrist"))?,
+        upper_arm: across(&shoulder, &elbow, 0.55)
+            .girth()
+            .ok_or_else(missing("upper arm"))?,
+        wrist: across(&elbow, &wrist, 0.97)
+            .girth()
+            .ok_or_else(missing("wrist"))?,
         shoulder_width: (a - b).norm(),
         inseam: crotch - low,
         arm_length: (elbow - shoulder).norm() + (wrist - elbow).norm(),
@@ -315,18 +386,35 @@ mod tests {
         assert!((girth - 0.4 * PI).abs() < 2e-4, "{girth}");
         // 45°: an ellipse with half axes r and r√2; Ramanujan's second formula.
         let n = V3d::new(0.0, 1.0, 1.0).normalize();
-        let girth = section(&v, &f, &P3d::new(0.0, 0.5, 0.0), &n, &V3d::x()).girth().expect("closed");
+        let girth = section(&v, &f, &P3d::new(0.0, 0.5, 0.0), &n, &V3d::x())
+            .girth()
+            .expect("closed");
         let (a, b) = (0.2 * 2f64.sqrt(), 0.2);
         let h = ((a - b) / (a + b)).powi(2);
         let expected = PI * (a + b) * (1.0 + 3.0 * h / (10.0 + (4.0 - 3.0 * h).sqrt()));
-        assert!((girth - expected).abs() < 3e-4, "{girth} against {expected}");
-        assert!(section(&v, &f, &P3d::new(0.0, 2.0, 0.0), &V3d::y(), &V3d::x()).girth().is_none());
+        assert!(
+            (girth - expected).abs() < 3e-4,
+            "{girth} against {expected}"
+        );
+        assert!(
+            section(&v, &f, &P3d::new(0.0, 2.0, 0.0), &V3d::y(), &V3d::x())
+                .girth()
+                .is_none()
+        );
     }
 
     #[test]
     fn a_tape_bridges_hollows() {
         // An L: the hull cuts the corner.
-        let l = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]].map(Point2::from);
+        let l = [
+            [0.0, 0.0],
+            [2.0, 0.0],
+            [2.0, 1.0],
+            [1.0, 1.0],
+            [1.0, 2.0],
+            [0.0, 2.0],
+        ]
+        .map(Point2::from);
         assert!((hull_length(&l) - (6.0 + 2f64.sqrt())).abs() < 1e-12);
     }
 
@@ -335,6 +423,9 @@ mod tests {
         let (v, f) = cylinder(256);
         let t = farthest_along(&v, &f, &P3d::new(0.0, 0.5, 0.0), &V3d::x());
         assert!((t.expect("hit") - 0.2).abs() < 1e-4);
-        assert_eq!(farthest_along(&v, &f, &P3d::new(0.0, 0.5, 0.0), &V3d::y()), None);
+        assert_eq!(
+            farthest_along(&v, &f, &P3d::new(0.0, 0.5, 0.0), &V3d::y()),
+            None
+        );
     }
 }

@@ -17,7 +17,10 @@ pub struct Pose<F = Camera> {
 
 impl<F> Clone for Pose<F> {
     fn clone(&self) -> Self {
-        Self { root: self.root, angles: self.angles.clone() }
+        Self {
+            root: self.root,
+            angles: self.angles.clone(),
+        }
     }
 }
 impl<F> PartialEq for Pose<F> {
@@ -27,7 +30,10 @@ impl<F> PartialEq for Pose<F> {
 }
 impl<F> std::fmt::Debug for Pose<F> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Pose").field("root", &self.root).field("angles", &self.angles).finish()
+        f.debug_struct("Pose")
+            .field("root", &self.root)
+            .field("angles", &self.angles)
+            .finish()
     }
 }
 
@@ -43,7 +49,10 @@ pub struct BoneTransforms {
 impl<F> Pose<F> {
     /// The rest pose at `root`.
     pub fn rest(skeleton: &Skeleton, root: Rigid<F, Body>) -> Self {
-        Self { root, angles: vec![0.0; skeleton.dofs()] }
+        Self {
+            root,
+            angles: vec![0.0; skeleton.dofs()],
+        }
     }
     /// Local rotation vector of a joint (axis × angle, rest frame).
     pub fn rotation_vector(&self, skeleton: &Skeleton, joint: usize) -> Vector3<f64> {
@@ -51,7 +60,9 @@ impl<F> Pose<F> {
         match &skeleton.joints()[joint].motion {
             JointMotion::Fixed => Vector3::zeros(),
             JointMotion::Hinge { axis, .. } => Vector3::from(*axis) * self.angles[at],
-            JointMotion::Ball { .. } => Vector3::new(self.angles[at], self.angles[at + 1], self.angles[at + 2]),
+            JointMotion::Ball { .. } => {
+                Vector3::new(self.angles[at], self.angles[at + 1], self.angles[at + 2])
+            }
         }
     }
     /// Forward kinematics (eq. 2): transforms of all bones of the personalised rest body.
@@ -63,7 +74,10 @@ impl<F> Pose<F> {
             let pivot = rest.joints[j];
             let rotation = exp_so3(&self.rotation_vector(skeleton, j));
             // T(p) R T(−p): rotates about the joint's rest position, so no inverse bind matrix is needed.
-            let local = Isometry3::from_parts(Translation3::from(pivot.coords - rotation * pivot.coords), rotation);
+            let local = Isometry3::from_parts(
+                Translation3::from(pivot.coords - rotation * pivot.coords),
+                rotation,
+            );
             out.bones.push(parent * local);
             out.joints.push(parent * pivot);
         }

@@ -1,6 +1,8 @@
 //! A skeleton for a bare mesh: joints and skinning weights from a template that has been fitted to it.
 
-use super::{BodyError, BoneTransforms, Joint, JointMotion, RestBody, Skeleton, SkinWeights, Template};
+use super::{
+    BodyError, BoneTransforms, Joint, JointMotion, RestBody, Skeleton, SkinWeights, Template,
+};
 use crate::math::P3;
 use crate::mesh::{Topology, TriMesh, vertex_normals};
 use crate::par::Par;
@@ -41,7 +43,11 @@ pub fn rig(
         return Err(array("bones", bones.joints.len(), joints.len()));
     }
     if fitted.vertices.len() != template.mesh().vertices().len() {
-        return Err(array("fitted", fitted.vertices.len(), template.mesh().vertices().len()));
+        return Err(array(
+            "fitted",
+            fitted.vertices.len(),
+            template.mesh().vertices().len(),
+        ));
     }
     let skeleton = Skeleton::new(
         joints
@@ -56,16 +62,36 @@ pub fn rig(
     )?;
     let topology = Topology::new(&mesh)?;
     let (mut own, mut theirs) = (Vec::new(), Vec::new());
-    vertex_normals(Par::Seq, mesh.vertices(), mesh.faces(), topology.vertex_faces(), &mut own);
+    vertex_normals(
+        Par::Seq,
+        mesh.vertices(),
+        mesh.faces(),
+        topology.vertex_faces(),
+        &mut own,
+    );
     let t = template.mesh();
-    vertex_normals(Par::Seq, &fitted.vertices, t.faces(), template.topology().vertex_faces(), &mut theirs);
+    vertex_normals(
+        Par::Seq,
+        &fitted.vertices,
+        t.faces(),
+        template.topology().vertex_faces(),
+        &mut theirs,
+    );
     // Six numbers would need another tree; a step back along the normal keeps the other side of a limb further away.
-    let shifted: Vec<P3> = fitted.vertices.iter().zip(&theirs).map(|(p, n)| p + n * (REACH * SAME_SIDE)).collect();
+    let shifted: Vec<P3> = fitted
+        .vertices
+        .iter()
+        .zip(&theirs)
+        .map(|(p, n)| p + n * (REACH * SAME_SIDE))
+        .collect();
     let tree = PointTree::new(&shifted);
     let mut rows = Vec::with_capacity(own.len());
     for (vertex, (p, n)) in mesh.vertices().iter().zip(&own).enumerate() {
         let Some((near, _)) = tree.nearest(&(p + n * (REACH * SAME_SIDE)), REACH) else {
-            return Err(BodyError::Vertex { vertex, why: "no part of the fitted template is near it".into() });
+            return Err(BodyError::Vertex {
+                vertex,
+                why: "no part of the fitted template is near it".into(),
+            });
         };
         let w = template.weights();
         let mut row = vec![0.0; joints.len()];
@@ -81,14 +107,19 @@ pub fn rig(
                 let share = 1.0 / (1 + around.len()) as f64;
                 let mut row = rows[i].clone();
                 for j in around {
-                    row.iter_mut().zip(&rows[*j as usize]).for_each(|(a, b)| *a += b);
+                    row.iter_mut()
+                        .zip(&rows[*j as usize])
+                        .for_each(|(a, b)| *a += b);
                 }
                 row.iter_mut().for_each(|a| *a *= share);
                 row
             })
             .collect();
     }
-    let weights = SkinWeights::from_rows(rows.into_iter().map(|row| row.into_iter().enumerate().collect()))?;
+    let weights = SkinWeights::from_rows(
+        rows.into_iter()
+            .map(|row| row.into_iter().enumerate().collect()),
+    )?;
     Template::new(name, mesh, skeleton, weights, None)
 }
 
@@ -96,9 +127,12 @@ pub fn rig(
 fn turned(motion: &JointMotion, q: &nalgebra::UnitQuaternion<f64>) -> JointMotion {
     match motion {
         JointMotion::Fixed => JointMotion::Fixed,
-        JointMotion::Hinge { axis, limits } => {
-            JointMotion::Hinge { axis: (q * Vector3::from(*axis)).normalize().into(), limits: *limits }
-        }
-        JointMotion::Ball { .. } => JointMotion::Ball { limits: [[-PI, PI]; 3] },
+        JointMotion::Hinge { axis, limits } => JointMotion::Hinge {
+            axis: (q * Vector3::from(*axis)).normalize().into(),
+            limits: *limits,
+        },
+        JointMotion::Ball { .. } => JointMotion::Ball {
+            limits: [[-PI, PI]; 3],
+        },
     }
 }

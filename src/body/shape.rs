@@ -49,26 +49,59 @@ impl Template {
         let all: Vec<u32> = (0..self.mesh().vertices().len() as u32).collect();
         let (mut vertices, joints) = self.personalise_some(shape, &all);
         let mut normals = Vec::new();
-        vertex_normals(Par::Rayon, &vertices, self.mesh().faces(), self.topology().vertex_faces(), &mut normals);
+        vertex_normals(
+            Par::Rayon,
+            &vertices,
+            self.mesh().faces(),
+            self.topology().vertex_faces(),
+            &mut normals,
+        );
         let base = vertices.clone();
-        for (p, (n, &d)) in vertices.iter_mut().zip(normals.iter().zip(&shape.displacements)) {
+        for (p, (n, &d)) in vertices
+            .iter_mut()
+            .zip(normals.iter().zip(&shape.displacements))
+        {
             *p += n * d;
         }
-        RestBody { vertices, base, normals, joints }
+        RestBody {
+            vertices,
+            base,
+            normals,
+            joints,
+        }
     }
 
     /// Some vertices of [`Template::personalise`]'s `base`, in the order of `which` (indices within the mesh), and all
     /// joints, metres.
-    pub fn personalise_some(&self, shape: &BodyShape, which: &[u32]) -> (Vec<P3>, Vec<Point3<f64>>) {
-        let mut vertices: Vec<P3> = which.iter().map(|&i| self.mesh().vertices()[i as usize]).collect();
-        let mut joints: Vec<Point3<f64>> = self.skeleton().joints().iter().map(|j| j.rest).collect();
+    pub fn personalise_some(
+        &self,
+        shape: &BodyShape,
+        which: &[u32],
+    ) -> (Vec<P3>, Vec<Point3<f64>>) {
+        let mut vertices: Vec<P3> = which
+            .iter()
+            .map(|&i| self.mesh().vertices()[i as usize])
+            .collect();
+        let mut joints: Vec<Point3<f64>> =
+            self.skeleton().joints().iter().map(|j| j.rest).collect();
         if let Some(space) = self.shape_space() {
-            for (d, &c) in shape.coefficients.iter().enumerate().take(space.vertices.len()) {
+            for (d, &c) in shape
+                .coefficients
+                .iter()
+                .enumerate()
+                .take(space.vertices.len())
+            {
                 if c != 0.0 {
                     let c32 = c as f32;
                     let offsets = which.iter().map(|&i| space.vertices[d][i as usize]);
-                    vertices.iter_mut().zip(offsets).for_each(|(p, o)| *p += o * c32);
-                    joints.iter_mut().zip(&space.joints[d]).for_each(|(p, o)| *p += o * c);
+                    vertices
+                        .iter_mut()
+                        .zip(offsets)
+                        .for_each(|(p, o)| *p += o * c32);
+                    joints
+                        .iter_mut()
+                        .zip(&space.joints[d])
+                        .for_each(|(p, o)| *p += o * c);
                 }
             }
         }
@@ -80,7 +113,13 @@ impl Template {
 
     /// Stretches each bone along itself. A vertex moves with the foot of its perpendicular on each controlling
     /// bone (γ of eq. 18), so that cross-sections keep their size.
-    fn scale_bones(&self, scales: &[f64], which: &[u32], vertices: &mut [P3], joints: &mut [Point3<f64>]) {
+    fn scale_bones(
+        &self,
+        scales: &[f64],
+        which: &[u32],
+        vertices: &mut [P3],
+        joints: &mut [Point3<f64>],
+    ) {
         let skeleton = self.skeleton();
         let scale = |j: usize| scales.get(j).copied().unwrap_or(1.0);
         let old = joints.to_vec();
@@ -103,8 +142,9 @@ impl Template {
                 if let Some(c) = skeleton.primary_child(j) {
                     let d = old[c] - old[j];
                     // Clamped: beyond its ends a bone carries its neighbourhood along rigidly.
-                    let t =
-                        ((v.cast::<f64>() - old[j]).dot(&d) / d.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+                    let t = ((v.cast::<f64>() - old[j]).dot(&d)
+                        / d.norm_squared().max(f64::MIN_POSITIVE))
+                    .clamp(0.0, 1.0);
                     foot += d * (t * (scale(c) - 1.0));
                 }
                 offset += foot * weight;

@@ -63,7 +63,10 @@ impl Skeleton {
     /// # Errors
     /// Names the joint that breaks the order, repeats a name, has no finite position or an empty limit interval.
     pub fn new(joints: Vec<Joint>) -> Result<Self, BodyError> {
-        let fault = |joint: &Joint, why: &str| BodyError::Joint { joint: joint.name.clone(), why: why.to_owned() };
+        let fault = |joint: &Joint, why: &str| BodyError::Joint {
+            joint: joint.name.clone(),
+            why: why.to_owned(),
+        };
         for (i, j) in joints.iter().enumerate() {
             match j.parent {
                 None if i != 0 => return Err(fault(j, "only joint 0 may be without parent")),
@@ -83,7 +86,10 @@ impl Skeleton {
                 JointMotion::Hinge { axis, limits } => {
                     let n = nalgebra::Vector3::from(*axis).norm();
                     if bad(limits) || !((n - 1.0).abs() < 1e-6) {
-                        return Err(fault(j, "a hinge needs a unit axis and ordered, finite limits"));
+                        return Err(fault(
+                            j,
+                            "a hinge needs a unit axis and ordered, finite limits",
+                        ));
                     }
                 }
                 JointMotion::Ball { limits } => {
@@ -106,7 +112,9 @@ impl Skeleton {
         // or at the root the first child named `spine…`, else the first child.
         let primary_child = (0..joints.len())
             .map(|i| {
-                let children: Vec<usize> = (i + 1..joints.len()).filter(|&c| joints[c].parent == Some(i)).collect();
+                let children: Vec<usize> = (i + 1..joints.len())
+                    .filter(|&c| joints[c].parent == Some(i))
+                    .collect();
                 let along = joints[i].parent.map(|p| joints[i].rest - joints[p].rest);
                 match along {
                     None => children
@@ -124,7 +132,12 @@ impl Skeleton {
                 }
             })
             .collect();
-        Ok(Self { joints, dof_offsets, dofs, primary_child })
+        Ok(Self {
+            joints,
+            dof_offsets,
+            dofs,
+            primary_child,
+        })
     }
     /// All joints, parents first.
     pub fn joints(&self) -> &[Joint] {

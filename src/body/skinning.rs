@@ -27,7 +27,10 @@ impl SkinWeights {
             row.truncate(4);
             let sum: f64 = row.iter().map(|(_, w)| w).sum();
             if sum <= 0.0 {
-                return Err(BodyError::Vertex { vertex, why: "it has no positive skinning weight".into() });
+                return Err(BodyError::Vertex {
+                    vertex,
+                    why: "it has no positive skinning weight".into(),
+                });
             }
             let (mut joints, mut weights) = ([0u8; 4], [0f32; 4]);
             for (k, (j, w)) in row.into_iter().enumerate() {
@@ -46,7 +49,13 @@ impl SkinWeights {
 }
 
 /// Poses `rest` vertices: `out[i] = Σ wᵢⱼ · boneⱼ · rest[i]`. Shapes `[vertices]`.
-pub fn skin(par: Par, rest: &[P3], weights: &SkinWeights, bones: &BoneTransforms, out: &mut Vec<P3>) {
+pub fn skin(
+    par: Par,
+    rest: &[P3],
+    weights: &SkinWeights,
+    bones: &BoneTransforms,
+    out: &mut Vec<P3>,
+) {
     // Columns of four lanes (the fourth is padding), so that a vertex is sixteen vector operations.
     let m: Vec<[[f32; 4]; 4]> = bones
         .bones

@@ -59,14 +59,24 @@ impl Template {
         shape_space: Option<ShapeSpace>,
     ) -> Result<Self, BodyError> {
         let (n, j) = (mesh.vertices().len(), skeleton.len());
-        let array = |array: &str, why: String| BodyError::Array { array: array.into(), why };
+        let array = |array: &str, why: String| BodyError::Array {
+            array: array.into(),
+            why,
+        };
         if j == 0 {
             return Err(array("joints", "a body needs at least a root joint".into()));
         }
         if weights.joints.len() != n || weights.weights.len() != n {
-            return Err(array("weights", format!("{} rows for {n} vertices", weights.joints.len())));
+            return Err(array(
+                "weights",
+                format!("{} rows for {n} vertices", weights.joints.len()),
+            ));
         }
-        if let Some(vertex) = weights.joints.iter().position(|r| r.iter().any(|&k| usize::from(k) >= j)) {
+        if let Some(vertex) = weights
+            .joints
+            .iter()
+            .position(|r| r.iter().any(|&k| usize::from(k) >= j))
+        {
             return Err(BodyError::Vertex {
                 vertex,
                 why: format!("its skinning joint is out of range (0 to {})", j - 1),
@@ -77,7 +87,11 @@ impl Template {
                 if v.len() != n || q.len() != j {
                     return Err(array(
                         "shapedirs",
-                        format!("direction {d} has {} vertices and {} joints", v.len(), q.len()),
+                        format!(
+                            "direction {d} has {} vertices and {} joints",
+                            v.len(),
+                            q.len()
+                        ),
                     ));
                 }
             }
@@ -89,7 +103,14 @@ impl Template {
             }
         }
         let topology = Topology::new(&mesh)?;
-        Ok(Self { name: name.into(), mesh, topology, skeleton, weights, shape_space })
+        Ok(Self {
+            name: name.into(),
+            mesh,
+            topology,
+            skeleton,
+            weights,
+            shape_space,
+        })
     }
     /// What it is called.
     pub fn name(&self) -> &str {

@@ -16,9 +16,25 @@ pub struct ImageError {
     pub got: usize,
 }
 
-fn check(what: &'static str, width: u32, height: u32, channels: usize, got: usize) -> Result<(), ImageError> {
+fn check(
+    what: &'static str,
+    width: u32,
+    height: u32,
+    channels: usize,
+    got: usize,
+) -> Result<(), ImageError> {
     let expected = width as usize * height as usize * channels;
-    if expected == got { Ok(()) } else { Err(ImageError { what, width, height, expected, got }) }
+    if expected == got {
+        Ok(())
+    } else {
+        Err(ImageError {
+            what,
+            width,
+            height,
+            expected,
+            got,
+        })
+    }
 }
 
 /// Depth along the optical axis, u16 millimetres, row-major, 0 = no reading.
@@ -36,11 +52,19 @@ impl DepthImage {
     /// When the number of values is not `width × height`.
     pub fn new(width: u32, height: u32, data: Vec<u16>) -> Result<Self, ImageError> {
         check("depth image", width, height, 1, data.len())?;
-        Ok(Self { width, height, data })
+        Ok(Self {
+            width,
+            height,
+            data,
+        })
     }
     /// An image without readings.
     pub fn empty(width: u32, height: u32) -> Self {
-        Self { width, height, data: vec![0; width as usize * height as usize] }
+        Self {
+            width,
+            height,
+            data: vec![0; width as usize * height as usize],
+        }
     }
     /// Columns.
     pub fn width(&self) -> u32 {
@@ -82,11 +106,19 @@ impl ColorImage {
     /// When the number of bytes is not `3 × width × height`.
     pub fn new(width: u32, height: u32, data: Vec<u8>) -> Result<Self, ImageError> {
         check("colour image", width, height, 3, data.len())?;
-        Ok(Self { width, height, data })
+        Ok(Self {
+            width,
+            height,
+            data,
+        })
     }
     /// One colour everywhere.
     pub fn filled(width: u32, height: u32, rgb: [u8; 3]) -> Self {
-        Self { width, height, data: rgb.repeat(width as usize * height as usize) }
+        Self {
+            width,
+            height,
+            data: rgb.repeat(width as usize * height as usize),
+        }
     }
     /// Columns.
     pub fn width(&self) -> u32 {

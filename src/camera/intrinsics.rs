@@ -38,7 +38,14 @@ const MAX_SIDE: u32 = 16_384;
 
 impl Intrinsics {
     /// The Kinect v1 at 640×480 (the paper's camera).
-    pub const KINECT_V1: Self = Self { width: 640, height: 480, fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5 };
+    pub const KINECT_V1: Self = Self {
+        width: 640,
+        height: 480,
+        fx: 525.0,
+        fy: 525.0,
+        cx: 319.5,
+        cy: 239.5,
+    };
 
     /// Checks every field.
     ///
@@ -47,17 +54,29 @@ impl Intrinsics {
     pub fn validated(self) -> Result<Self, IntrinsicsError> {
         for (field, side) in [("width", self.width), ("height", self.height)] {
             if side == 0 || side > MAX_SIDE {
-                return Err(IntrinsicsError { field, value: f64::from(side), why: "1 to 16384 pixels" });
+                return Err(IntrinsicsError {
+                    field,
+                    value: f64::from(side),
+                    why: "1 to 16384 pixels",
+                });
             }
         }
         for (field, value) in [("fx", self.fx), ("fy", self.fy)] {
             if !(value.is_finite() && value > 0.0) {
-                return Err(IntrinsicsError { field, value, why: "a positive number of pixels" });
+                return Err(IntrinsicsError {
+                    field,
+                    value,
+                    why: "a positive number of pixels",
+                });
             }
         }
         for (field, value) in [("cx", self.cx), ("cy", self.cy)] {
             if !value.is_finite() {
-                return Err(IntrinsicsError { field, value, why: "a finite number of pixels" });
+                return Err(IntrinsicsError {
+                    field,
+                    value,
+                    why: "a finite number of pixels",
+                });
             }
         }
         Ok(self)
@@ -68,15 +87,25 @@ impl Intrinsics {
     }
     /// Image coordinates of a camera-frame point; meaningless for z ≤ 0.
     pub fn project(&self, p: &P3) -> Point2<f32> {
-        Point2::new(p.x / p.z * self.fx as f32 + self.cx as f32, p.y / p.z * self.fy as f32 + self.cy as f32)
+        Point2::new(
+            p.x / p.z * self.fx as f32 + self.cx as f32,
+            p.y / p.z * self.fy as f32 + self.cy as f32,
+        )
     }
     /// Camera-frame point of a pixel at depth `z` metres.
     pub fn unproject(&self, u: f32, v: f32, z: f32) -> P3 {
-        P3::new((u - self.cx as f32) / self.fx as f32 * z, (v - self.cy as f32) / self.fy as f32 * z, z)
+        P3::new(
+            (u - self.cx as f32) / self.fx as f32 * z,
+            (v - self.cy as f32) / self.fy as f32 * z,
+            z,
+        )
     }
     /// The same view at another resolution.
     pub fn resized(&self, width: u32, height: u32) -> Self {
-        let (sx, sy) = (f64::from(width) / f64::from(self.width), f64::from(height) / f64::from(self.height));
+        let (sx, sy) = (
+            f64::from(width) / f64::from(self.width),
+            f64::from(height) / f64::from(self.height),
+        );
         // Pixel centres at integers: the image spans −0.5 … width − 0.5.
         Self {
             width,
@@ -105,8 +134,22 @@ mod tests {
 
     #[test]
     fn bad_fields_are_named() {
-        let e = Intrinsics { fx: f64::NAN, ..Intrinsics::KINECT_V1 }.validated().expect_err("NaN");
+        let e = Intrinsics {
+            fx: f64::NAN,
+            ..Intrinsics::KINECT_V1
+        }
+        .validated()
+        .expect_err("NaN");
         assert_eq!(e.field, "fx");
-        assert_eq!(Intrinsics { width: 0, ..Intrinsics::KINECT_V1 }.validated().expect_err("0").field, "width");
+        assert_eq!(
+            Intrinsics {
+                width: 0,
+                ..Intrinsics::KINECT_V1
+            }
+            .validated()
+            .expect_err("0")
+            .field,
+            "width"
+        );
     }
 }

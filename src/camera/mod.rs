@@ -6,7 +6,9 @@ mod noise;
 
 pub use image::{ColorImage, DepthImage, ImageError};
 pub use intrinsics::{Intrinsics, IntrinsicsError};
-pub use noise::{KINECT_V1_LATERAL_SIGMA, NoiseModel, kinect_v1_axial_sigma, time_of_flight_axial_sigma};
+pub use noise::{
+    KINECT_V1_LATERAL_SIGMA, NoiseModel, kinect_v1_axial_sigma, time_of_flight_axial_sigma,
+};
 
 use crate::math::{Camera, ColorCamera, Rigid};
 use serde::{Deserialize, Serialize};
@@ -25,7 +27,11 @@ pub struct Calibration {
 impl Calibration {
     /// Depth only, or colour registered pixel by pixel to depth.
     pub fn registered(depth: Intrinsics) -> Self {
-        Self { depth, color: None, color_from_depth: Rigid::identity() }
+        Self {
+            depth,
+            color: None,
+            color_from_depth: Rigid::identity(),
+        }
     }
 }
 

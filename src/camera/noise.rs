@@ -122,14 +122,20 @@ impl NoiseModel {
                 if self == Self::KinectV1 {
                     let du = i64::from(table[(bits & 0xff) as usize]);
                     let dv = i64::from(table[(bits >> 8 & 0xff) as usize]);
-                    let (x, y) = ((u as i64 + du).clamp(0, w as i64 - 1), (v as i64 + dv).clamp(0, h as i64 - 1));
+                    let (x, y) = (
+                        (u as i64 + du).clamp(0, w as i64 - 1),
+                        (v as i64 + dv).clamp(0, h as i64 - 1),
+                    );
                     at = y as usize * w + x as usize;
                 }
                 let z = clean[at];
                 if !(z > RANGE[0] && z < RANGE[1]) {
                     continue;
                 }
-                let (left, right) = (clean[v * w + u.saturating_sub(1)], clean[v * w + (u + 1).min(w - 1)]);
+                let (left, right) = (
+                    clean[v * w + u.saturating_sub(1)],
+                    clean[v * w + (u + 1).min(w - 1)],
+                );
                 let (above, below) = (clean[up + u], clean[down + u]);
                 let lo = left.min(right).min(above).min(below);
                 let hi = left.max(right).max(above).max(below);
@@ -137,7 +143,11 @@ impl NoiseModel {
                 // Slope of depth over metres on the surface; at an edge it means nothing.
                 let (gx, gy) = (right - left, below - above);
                 let slope2 = (gx * gx + gy * gy) * (half_f * half_f) / (z * z);
-                let theta = if edge || slope2 < FLAT * FLAT { 0.0 } else { small_atan(slope2.sqrt()) };
+                let theta = if edge || slope2 < FLAT * FLAT {
+                    0.0
+                } else {
+                    small_atan(slope2.sqrt())
+                };
                 let n = normal(bits >> 16);
                 *px = match self {
                     Self::None => millimetres(z),
@@ -178,13 +188,21 @@ fn uniform(bits: u64) -> f32 {
 fn small_atan(x: f32) -> f32 {
     const QUARTER: f32 = std::f32::consts::FRAC_PI_4;
     let poly = |t: f32| QUARTER * t + 0.273 * t * (1.0 - t);
-    if x <= 1.0 { poly(x) } else { FRAC_PI_2 - poly(1.0 / x) }
+    if x <= 1.0 {
+        poly(x)
+    } else {
+        FRAC_PI_2 - poly(1.0 / x)
+    }
 }
 
 /// Metres to whole millimetres; what 16 bits cannot hold is no reading.
 fn millimetres(z: f32) -> u16 {
     let mm = z * 1000.0 + 0.5;
-    if (1.0..65_536.0).contains(&mm) { mm as u16 } else { 0 }
+    if (1.0..65_536.0).contains(&mm) {
+        mm as u16
+    } else {
+        0
+    }
 }
 
 #[cfg(test)]
@@ -220,11 +238,21 @@ mod tests {
                 squares += weight * mm * mm;
             }
             let want = (squares / n - (sum / n).powi(2)).sqrt();
-            assert!((sigma / want - 1.0).abs() < 0.03, "{z} m: {sigma} against {want}");
-            assert!((mean - sum / n).abs() < 0.1 * want, "{z} m: mean {mean} against {}", sum / n);
+            assert!(
+                (sigma / want - 1.0).abs() < 0.03,
+                "{z} m: {sigma} against {want}"
+            );
+            assert!(
+                (mean - sum / n).abs() < 0.1 * want,
+                "{z} m: mean {mean} against {}",
+                sum / n
+            );
             let (_, sigma) = wall(NoiseModel::TimeOfFlight, z);
             let want = (f64::from(time_of_flight_axial_sigma(z, 0.0)).powi(2) + 1e-6 / 12.0).sqrt();
-            assert!((sigma / want - 1.0).abs() < 0.03, "{z} m: {sigma} against {want}");
+            assert!(
+                (sigma / want - 1.0).abs() < 0.03,
+                "{z} m: {sigma} against {want}"
+            );
         }
         // Table of the paper's formula, by hand: 0.0012 + 0.0019·2.6² = 0.014044 at 3 m.
         assert!((kinect_v1_axial_sigma(3.0, 0.0) - 0.014_044).abs() < 1e-6);
@@ -238,7 +266,13 @@ mod tests {
         levels.sort_unstable();
         levels.dedup();
         // 2 m is 157.5 eighths; its neighbours are 12.8 mm apart.
-        assert!(levels.len() < 8 && levels.windows(2).all(|w| (11..=15).contains(&(w[1] - w[0]))), "{levels:?}");
+        assert!(
+            levels.len() < 8
+                && levels
+                    .windows(2)
+                    .all(|w| (11..=15).contains(&(w[1] - w[0]))),
+            "{levels:?}"
+        );
     }
 
     #[test]
@@ -252,7 +286,9 @@ mod tests {
 
     #[test]
     fn edges_lose_pixels_and_frames_repeat() {
-        let clean: Vec<f32> = (0..K.pixels()).map(|i| if i % 640 < 320 { 1.5 } else { 3.0 }).collect();
+        let clean: Vec<f32> = (0..K.pixels())
+            .map(|i| if i % 640 < 320 { 1.5 } else { 3.0 })
+            .collect();
         for model in [NoiseModel::KinectV1, NoiseModel::TimeOfFlight] {
             let image = model.apply(&K, &clean, 5, 9);
             assert_eq!(image, model.apply(&K, &clean, 5, 9));
@@ -271,7 +307,10 @@ mod tests {
         clean[1] = 0.1;
         clean[2] = -3.0;
         for model in [NoiseModel::KinectV1, NoiseModel::TimeOfFlight] {
-            assert!(model.apply(&K, &clean, 0, 0).data().iter().all(|d| *d == 0), "{model:?}");
+            assert!(
+                model.apply(&K, &clean, 0, 0).data().iter().all(|d| *d == 0),
+                "{model:?}"
+            );
         }
         let exact = NoiseModel::None.apply(&K, &clean, 0, 0);
         assert_eq!(&exact.data()[..4], [0, 100, 0, 0]);

@@ -19,7 +19,13 @@ pub fn crossings(faces: &[Face], positions: &[P3]) -> Vec<Crossing> {
     let x: Vec<V3d> = positions.iter().map(|p| p.coords.cast()).collect();
     let mut finder = Finder::new(faces, &x);
     let found = finder.find(Par::Rayon, &x);
-    found.iter().map(|(e, face)| Crossing { edge: finder.edges[*e as usize], face: *face }).collect()
+    found
+        .iter()
+        .map(|(e, face)| Crossing {
+            edge: finder.edges[*e as usize],
+            face: *face,
+        })
+        .collect()
 }
 
 /// Triangles in a leaf of the tree, which are looked at together: as many numbers as a wide register holds.
@@ -69,7 +75,9 @@ impl Finder {
         let mut sides: Vec<([u32; 2], u32)> = faces
             .iter()
             .enumerate()
-            .flat_map(|(n, f)| [(0, 1), (1, 2), (2, 0)].map(|(i, j)| ([f[i].min(f[j]), f[i].max(f[j])], n as u32)))
+            .flat_map(|(n, f)| {
+                [(0, 1), (1, 2), (2, 0)].map(|(i, j)| ([f[i].min(f[j]), f[i].max(f[j])], n as u32))
+            })
             .collect();
         sides.sort_unstable();
         let (mut edges, mut beside): (Vec<[u32; 2]>, Vec<[u32; 2]>) = (Vec::new(), Vec::new());
@@ -88,7 +96,9 @@ impl Finder {
     /// The triangles for which `wanted` says so, as a sheet of their own, and the numbers that its edges and triangles
     /// have in this one.
     pub(crate) fn piece(&self, wanted: impl Fn(&Face) -> bool, x: &[V3d]) -> (Self, [Vec<u32>; 2]) {
-        let of: Vec<u32> = (0..self.faces.len() as u32).filter(|f| wanted(&self.faces[*f as usize])).collect();
+        let of: Vec<u32> = (0..self.faces.len() as u32)
+            .filter(|f| wanted(&self.faces[*f as usize]))
+            .collect();
         let mut number = vec![NONE; self.faces.len()];
         (0u32..).zip(&of).for_each(|(k, f)| number[*f as usize] = k);
         let (mut edges, mut beside, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
@@ -105,12 +115,24 @@ impl Finder {
     }
 
     fn with_tree(faces: Vec<Face>, edges: Vec<[u32; 2]>, beside: Vec<[u32; 2]>, x: &[V3d]) -> Self {
-        let middles: Vec<V3d> = faces.iter().map(|f| f.iter().map(|v| x[*v as usize]).sum()).collect();
-        let mut new = Self { faces, edges, beside, nodes: Vec::new(), leaves: Vec::new() };
+        let middles: Vec<V3d> = faces
+            .iter()
+            .map(|f| f.iter().map(|v| x[*v as usize]).sum())
+            .collect();
+        let mut new = Self {
+            faces,
+            edges,
+            beside,
+            nodes: Vec::new(),
+            leaves: Vec::new(),
+        };
         new.split(&middles, &mut (0..middles.len() as u32).collect::<Vec<_>>());
         let mut leaf = vec![0; middles.len()];
         for (k, l) in new.leaves.iter().enumerate() {
-            l.faces.iter().filter(|f| **f != NONE).for_each(|f| leaf[*f as usize] = k);
+            l.faces
+                .iter()
+                .filter(|f| **f != NONE)
+                .for_each(|f| leaf[*f as usize] = k);
         }
         for (e, faces) in new.beside.iter().enumerate() {
             new.leaves[leaf[faces[0] as usize]].edges.push(e as u32);
@@ -120,8 +142,17 @@ impl Finder {
 
     fn split(&mut self, middles: &[V3d], some: &mut [u32]) {
         let at = self.nodes.len();
-        let leaf = if some.len() <= LEAF { self.leaves.len() as u32 } else { NONE };
-        self.nodes.push(Node { low: [0.0; 4], high: [0.0; 4], skip: 0, leaf });
+        let leaf = if some.len() <= LEAF {
+            self.leaves.len() as u32
+        } else {
+            NONE
+        };
+        self.nodes.push(Node {
+            low: [0.0; 4],
+            high: [0.0; 4],
+            skip: 0,
+            leaf,
+        });
         if some.len() > LEAF {
             let (mut low, mut high) = (V3d::repeat(f64::INFINITY), V3d::repeat(f64::NEG_INFINITY));
             for f in some.iter() {
@@ -132,7 +163,9 @@ impl Finder {
             // Whole leaves on the left.
             let half = (some.len() / 2).next_multiple_of(LEAF);
             let by_axis = |f: &u32| middles[*f as usize][axis];
-            some.select_nth_unstable_by(half - 1, |a, b| by_axis(a).total_cmp(&by_axis(b)).then(a.cmp(b)));
+            some.select_nth_unstable_by(half - 1, |a, b| {
+                by_axis(a).total_cmp(&by_axis(b)).then(a.cmp(b))
+            });
             let (left, right) = some.split_at_mut(half);
             self.split(middles, left);
             self.split(middles, right);
@@ -140,7 +173,12 @@ impl Finder {
             let faces = std::array::from_fn(|l| some.get(l).copied().unwrap_or(NONE));
             // What no triangle fills meets nothing, not even a box without end.
             let nowhere = [[f32::NAN; LEAF]; 3];
-            self.leaves.push(Leaf { faces, low: nowhere, high: nowhere, edges: Vec::new() });
+            self.leaves.push(Leaf {
+                faces,
+                low: nowhere,
+                high: nowhere,
+                edges: Vec::new(),
+            });
         }
         self.nodes[at].skip = self.nodes.len() as u32;
     }
@@ -158,7 +196,9 @@ impl Finder {
             };
             if let Some(leaf) = self.leaves.get_mut(n.leaf as usize) {
                 for l in 0..LEAF {
-                    let Some(f) = self.faces.get(leaf.faces[l] as usize) else { break };
+                    let Some(f) = self.faces.get(leaf.faces[l] as usize) else {
+                        break;
+                    };
                     let [a, b, c] = f.map(|v| x[v as usize]);
                     let (from, to) = (below(&a.inf(&b).inf(&c)), above(&a.sup(&b).sup(&c)));
                     grow(&from, &to);
@@ -178,15 +218,21 @@ impl Finder {
     pub(crate) fn find(&mut self, par: Par, x: &[V3d]) -> Vec<(u32, u32)> {
         self.refit(x);
         let mut chunks: Vec<Vec<(u32, u32)>> = Vec::new();
-        par::map_into(par, self.leaves.len().div_ceil(CHUNK), 1, &mut chunks, |c| {
-            let (mut found, mut edges) = (Vec::new(), Vec::new());
-            for leaf in &self.leaves[c * CHUNK..((c + 1) * CHUNK).min(self.leaves.len())] {
-                edges.clear();
-                edges.extend(leaf.edges.iter().map(|e| (self.edge_box(*e, x), *e)));
-                self.of_edges(&edges, x, &mut found);
-            }
-            found
-        });
+        par::map_into(
+            par,
+            self.leaves.len().div_ceil(CHUNK),
+            1,
+            &mut chunks,
+            |c| {
+                let (mut found, mut edges) = (Vec::new(), Vec::new());
+                for leaf in &self.leaves[c * CHUNK..((c + 1) * CHUNK).min(self.leaves.len())] {
+                    edges.clear();
+                    edges.extend(leaf.edges.iter().map(|e| (self.edge_box(*e, x), *e)));
+                    self.of_edges(&edges, x, &mut found);
+                }
+                found
+            },
+        );
         let mut found = chunks.concat();
         // Whatever the tree.
         found.sort_unstable();
@@ -211,15 +257,25 @@ impl Finder {
                 continue;
             }
             k += 1;
-            let Some(leaf) = self.leaves.get(n.leaf as usize) else { continue };
-            for (b, e) in edges.iter().filter(|(b, _)| !apart(&n.low, &n.high, &b[0], &b[1])) {
+            let Some(leaf) = self.leaves.get(n.leaf as usize) else {
+                continue;
+            };
+            for (b, e) in edges
+                .iter()
+                .filter(|(b, _)| !apart(&n.low, &n.high, &b[0], &b[1]))
+            {
                 let mut near = leaf.meets(b);
                 while near != 0 {
                     let f = leaf.faces[near.trailing_zeros() as usize];
                     near &= near - 1;
                     let (edge, corners) = (self.edges[*e as usize], self.faces[f as usize]);
                     let shared = corners.iter().any(|v| edge.contains(v));
-                    if !shared && passes(&edge.map(|v| x[v as usize]), &corners.map(|v| x[v as usize])) {
+                    if !shared
+                        && passes(
+                            &edge.map(|v| x[v as usize]),
+                            &corners.map(|v| x[v as usize]),
+                        )
+                    {
                         found.push((*e, f));
                     }
                 }
@@ -245,11 +301,21 @@ fn apart(low: &[f32; 4], high: &[f32; 4], from: &[f32; 4], to: &[f32; 4]) -> boo
 }
 
 fn below(p: &V3d) -> [f32; 4] {
-    [(p.x as f32).next_down(), (p.y as f32).next_down(), (p.z as f32).next_down(), 0.0]
+    [
+        (p.x as f32).next_down(),
+        (p.y as f32).next_down(),
+        (p.z as f32).next_down(),
+        0.0,
+    ]
 }
 
 fn above(p: &V3d) -> [f32; 4] {
-    [(p.x as f32).next_up(), (p.y as f32).next_up(), (p.z as f32).next_up(), 0.0]
+    [
+        (p.x as f32).next_up(),
+        (p.y as f32).next_up(),
+        (p.z as f32).next_up(),
+        0.0,
+    ]
 }
 
 /// A segment passes through a triangle: its ends lie on both sides, and it turns the same way around all three sides.
@@ -280,8 +346,13 @@ mod tests {
         let mut found = Vec::new();
         for e in edges {
             for (n, f) in faces.iter().enumerate() {
-                if !f.iter().any(|v| e.contains(v)) && passes(&e.map(|v| x[v as usize]), &f.map(|v| x[v as usize])) {
-                    found.push(Crossing { edge: e, face: n as u32 });
+                if !f.iter().any(|v| e.contains(v))
+                    && passes(&e.map(|v| x[v as usize]), &f.map(|v| x[v as usize]))
+                {
+                    found.push(Crossing {
+                        edge: e,
+                        face: n as u32,
+                    });
                 }
             }
         }
@@ -292,19 +363,37 @@ mod tests {
     fn a_needle_through_a_triangle_is_seen_and_one_beside_it_is_not() {
         let faces = [[0, 1, 2], [3, 4, 5]];
         let at = |x: f32| {
-            let two =
-                [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [x, 0.2, -1.0], [x, 0.2, 1.0], [9.0, 0.2, 0.0]];
+            let two = [
+                [0.0, 0.0, 0.0],
+                [1.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0],
+                [x, 0.2, -1.0],
+                [x, 0.2, 1.0],
+                [9.0, 0.2, 0.0],
+            ];
             crossings(&faces, &two.map(P3::from))
         };
         // Both long edges of the needle pass through, and at 0.2 so does one side of the triangle through the needle's.
-        assert!(at(0.2).contains(&Crossing { edge: [3, 4], face: 0 }));
+        assert!(at(0.2).contains(&Crossing {
+            edge: [3, 4],
+            face: 0
+        }));
         assert_eq!(at(1.2), []);
         assert_eq!(crossings(&faces[..1], &[P3::origin(); 3]), []);
     }
 
     #[test]
     fn a_sheet_without_end_breaks_nothing() {
-        let far = |by: f32| [[-by; 3], [by; 3], [0.0, 0.0, 1.0], [0.1, 0.0, 0.0], [0.2, 0.1, 0.0], [0.1, 0.2, 0.1]];
+        let far = |by: f32| {
+            [
+                [-by; 3],
+                [by; 3],
+                [0.0, 0.0, 1.0],
+                [0.1, 0.0, 0.0],
+                [0.2, 0.1, 0.0],
+                [0.1, 0.2, 0.1],
+            ]
+        };
         for by in [f32::INFINITY, f32::MAX] {
             crossings(&[[0, 1, 2], [3, 4, 5]], &far(by).map(P3::from));
         }
@@ -313,22 +402,41 @@ mod tests {
     #[test]
     fn the_tree_finds_what_a_look_at_every_pair_finds_also_after_the_sheet_has_moved() {
         let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(3);
-        for (n, spread, size) in [(0, 1.0, 0.1), (1, 1.0, 0.1), (5, 0.1, 0.2), (300, 1.0, 0.3), (300, 0.0, 0.2)] {
+        for (n, spread, size) in [
+            (0, 1.0, 0.1),
+            (1, 1.0, 0.1),
+            (5, 0.1, 0.2),
+            (300, 1.0, 0.3),
+            (300, 0.0, 0.2),
+        ] {
             let mut points = |n: usize| -> Vec<P3> {
                 let mut out = Vec::new();
                 for _ in 0..n {
-                    let mut p = || std::array::from_fn::<f32, 3, _>(|_| random.random::<f32>() - 0.5);
+                    let mut p =
+                        || std::array::from_fn::<f32, 3, _>(|_| random.random::<f32>() - 0.5);
                     let middle = p().map(|c| c * spread);
                     for _ in 0..3 {
                         let c = p();
-                        out.push(P3::from(std::array::from_fn::<f32, 3, _>(|k| middle[k] + c[k] * size)));
+                        out.push(P3::from(std::array::from_fn::<f32, 3, _>(|k| {
+                            middle[k] + c[k] * size
+                        })));
                     }
                 }
                 out
             };
             // Some have a corner in common with the next one.
             let faces: Vec<Face> = (0..n as u32)
-                .map(|k| [3 * k, 3 * k + 1, if k % 3 == 0 { (3 * k + 3) % (3 * n as u32) } else { 3 * k + 2 }])
+                .map(|k| {
+                    [
+                        3 * k,
+                        3 * k + 1,
+                        if k % 3 == 0 {
+                            (3 * k + 3) % (3 * n as u32)
+                        } else {
+                            3 * k + 2
+                        },
+                    ]
+                })
                 .collect();
             let first = points(n);
             let d = |p: &[P3]| -> Vec<V3d> { p.iter().map(|p| p.coords.cast()).collect() };
@@ -343,7 +451,10 @@ mod tests {
                     let mut fast: Vec<Crossing> = finder
                         .find(Par::Rayon, &d(&x))
                         .iter()
-                        .map(|(e, f)| Crossing { edge: finder.edges[*e as usize], face: *f })
+                        .map(|(e, f)| Crossing {
+                            edge: finder.edges[*e as usize],
+                            face: *f,
+                        })
                         .collect();
                     fast.sort_by_key(key);
                     let slow = slowly(&faces, &x);

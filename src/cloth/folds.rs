@@ -59,14 +59,20 @@ impl FoldFrame {
     /// Calm velocity of a vertex, m/s.
     fn speed(&self, g: &SurfaceModel, v: u32) -> V3 {
         let calm = self.calm.get(v as usize).copied();
-        let [x, y, z, _] = calm.unwrap_or_else(|| calmed(g, &self.velocities, v, CALMING)).to_array();
+        let [x, y, z, _] = calm
+            .unwrap_or_else(|| calmed(g, &self.velocities, v, CALMING))
+            .to_array();
         V3::new(x, y, z)
     }
 }
 
 /// Velocity of a vertex after so many rounds of averaging over neighbours, m/s.
 fn calmed(g: &SurfaceModel, sharp: &[V3], v: u32, rounds: usize) -> f32x4 {
-    if rounds == 0 { lanes(&sharp[v as usize]) } else { mean(g, v, |w| calmed(g, sharp, w, rounds - 1)) }
+    if rounds == 0 {
+        lanes(&sharp[v as usize])
+    } else {
+        mean(g, v, |w| calmed(g, sharp, w, rounds - 1))
+    }
 }
 
 fn lanes(v: &V3) -> f32x4 {
@@ -100,8 +106,15 @@ impl FoldModel {
     pub(crate) fn new(surface: SurfaceModel, lengths: impl Iterator<Item = f32>) -> Self {
         let mut lengths: Vec<f32> = lengths.collect();
         lengths.sort_unstable_by(f32::total_cmp);
-        let edge = lengths.get(lengths.len() * 95 / 100).copied().unwrap_or(0.0);
-        Self { close: surface.second_neighbours(), surface, edge }
+        let edge = lengths
+            .get(lengths.len() * 95 / 100)
+            .copied()
+            .unwrap_or(0.0);
+        Self {
+            close: surface.second_neighbours(),
+            surface,
+            edge,
+        }
     }
     /// Length that 95 % of the edges do not exceed, metres.
     pub(crate) fn edge(&self) -> f32 {
@@ -109,23 +122,44 @@ impl FoldModel {
     }
     /// A search in worn garments, whose planes are kept for `span` seconds.
     pub(crate) fn search(&self, thickness: f32, span: f32) -> Search {
-        let reach = (thickness + CLOSING * span).min(MOST_REACH).min(REACH_EDGES * self.edge);
+        let reach = (thickness + CLOSING * span)
+            .min(MOST_REACH)
+            .min(REACH_EDGES * self.edge);
         // Half-way, a shirt that was being put on a heavy body stretched by 20 %, the limit of a test.
-        Search { halfway: false, ..self.looking(thickness, reach, CLOSING * span) }
+        Search {
+            halfway: false,
+            ..self.looking(thickness, reach, CLOSING * span)
+        }
     }
     /// A search where no two places of the sheet come together by more than `way` metres until the next one.
     pub(crate) fn search_all(&self, thickness: f32, way: f32) -> Search {
-        self.looking(thickness, (thickness + way).min(REACH_EDGES * self.edge), ROOM_EDGES * self.edge)
+        self.looking(
+            thickness,
+            (thickness + way).min(REACH_EDGES * self.edge),
+            ROOM_EDGES * self.edge,
+        )
     }
     fn looking(&self, thickness: f32, reach: f32, further: f32) -> Search {
         // The nearest corner of an even triangle is at most its circumradius beside the nearest point.
         let beside = self.edge / 3f32.sqrt();
         let thickness = thickness.min(THICKNESS_EDGES * self.edge);
-        Search { thickness, reach, needed: reach.hypot(beside), corner: (reach + further).hypot(beside), halfway: true }
+        Search {
+            thickness,
+            reach,
+            needed: reach.hypot(beside),
+            corner: (reach + further).hypot(beside),
+            halfway: true,
+        }
     }
     /// Prepares a frame whose positions and velocities have been set; with a search also for that. `touches`: how many
     /// planes are expected. For few of them normals and calm velocities are computed when they are wanted.
-    pub(crate) fn begin(&self, par: Par, frame: &mut FoldFrame, search: Option<&Search>, touches: usize) {
+    pub(crate) fn begin(
+        &self,
+        par: Par,
+        frame: &mut FoldFrame,
+        search: Option<&Search>,
+        touches: usize,
+    ) {
         frame.calm.clear();
         frame.surface.normals.clear();
         if touches * DEAR > self.surface.vertices() {
@@ -140,7 +174,9 @@ impl FoldModel {
             self.surface.update_normals(par, &mut frame.surface);
         }
         if let Some(search) = search {
-            frame.grid.fill(&frame.surface.vertices, 2.0 * search.corner);
+            frame
+                .grid
+                .fill(&frame.surface.vertices, 2.0 * search.corner);
         }
     }
     /// Nearest vertex to the place `x` of vertex `v` that is no neighbour on the sheet. `neighbour_of` holds for each
@@ -153,7 +189,10 @@ impl FoldModel {
         search: &Search,
         neighbour_of: &mut [u32],
     ) -> Option<(u32, f32)> {
-        self.close.row(v as usize).iter().for_each(|w| neighbour_of[*w as usize] = v);
+        self.close
+            .row(v as usize)
+            .iter()
+            .for_each(|w| neighbour_of[*w as usize] = v);
         let mut best = (search.corner * search.corner, u32::MAX);
         frame.grid.within(x, search.corner, |j, d| {
             if (d, j) < best && neighbour_of[j as usize] != v {
@@ -167,10 +206,18 @@ impl FoldModel {
         corner.map_or(search.corner, |c| c.1) - search.needed
     }
     /// Where the triangles around a corner of another fold are nearest to vertex `v` at `x`.
-    pub(crate) fn other_fold(&self, frame: &FoldFrame, v: u32, x: &P3, corner: u32) -> Option<Closest> {
+    pub(crate) fn other_fold(
+        &self,
+        frame: &FoldFrame,
+        v: u32,
+        x: &P3,
+        corner: u32,
+    ) -> Option<Closest> {
         let g = &self.surface;
         let hit = g.closest_around(&frame.surface, x, corner, u8::MAX);
-        let same = g.faces()[hit.face as usize].iter().any(|&c| c == v || g.neighbours(v).contains(&c));
+        let same = g.faces()[hit.face as usize]
+            .iter()
+            .any(|&c| c == v || g.neighbours(v).contains(&c));
         (!same && !g.on_rim(&hit)).then_some(hit)
     }
     /// What holds vertex `v` at `x` off the triangles around a corner of another fold, and how far they are, metres.
@@ -212,9 +259,18 @@ impl FoldModel {
 }
 
 /// The plane at a hit, `gap` away from it on its `side`, as fast as its corners.
-pub(crate) fn touching(g: &SurfaceModel, frame: &FoldFrame, i: usize, hit: &Closest, side: f32, gap: f32) -> Plane {
+pub(crate) fn touching(
+    g: &SurfaceModel,
+    frame: &FoldFrame,
+    i: usize,
+    hit: &Closest,
+    side: f32,
+    gap: f32,
+) -> Plane {
     let corners = g.faces()[hit.face as usize];
-    let speed = (0..3).fold(V3::zeros(), |a, k| a + frame.speed(g, corners[k]) * hit.weights[k]);
+    let speed = (0..3).fold(V3::zeros(), |a, k| {
+        a + frame.speed(g, corners[k]) * hit.weights[k]
+    });
     let n = hit.normal * side;
     Plane {
         vertex: i as u32,

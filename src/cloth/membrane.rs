@@ -23,7 +23,11 @@ impl Membrane {
     pub fn new(m: &crate::garment::Material) -> Self {
         let nu = m.coupling / (m.coupling + 2.0 * m.shear); // 2D: λ = 2μν/(1−ν)
         let plane = |k: f64| (k / (1.0 - nu * nu) - 2.0 * m.shear - m.coupling).max(0.0);
-        Self { mu: m.shear, lambda: m.coupling, along: [plane(m.stretch_weft), plane(m.stretch_warp)] }
+        Self {
+            mu: m.shear,
+            lambda: m.coupling,
+            along: [plane(m.stretch_weft), plane(m.stretch_warp)],
+        }
     }
     /// Largest curvature along u and v near rest: the weights of the constant matrix.
     pub fn stiffest(&self) -> [f64; 2] {
@@ -33,7 +37,8 @@ impl Membrane {
     pub fn value(&self, f: &Matrix3x2<f64>) -> f64 {
         let (r, s) = polar(f);
         let axis = |d: usize| self.along[d] * (f.column(d).norm() - 1.0).powi(2);
-        self.mu * (f - r).norm_squared() + 0.5 * (self.lambda * (s.trace() - 2.0).powi(2) + axis(0) + axis(1))
+        self.mu * (f - r).norm_squared()
+            + 0.5 * (self.lambda * (s.trace() - 2.0).powi(2) + axis(0) + axis(1))
     }
     /// Derivative of the value by F, N/m.
     pub fn gradient(&self, f: &Matrix3x2<f64>) -> Matrix3x2<f64> {
@@ -50,7 +55,12 @@ impl Membrane {
     }
     /// The second derivative applied to a direction `df`. With `convex`, directions of negative curvature
     /// (compressed fabric wants to buckle) count as flat, so that the operator is positive semidefinite.
-    pub fn hessian_apply(&self, f: &Matrix3x2<f64>, df: &Matrix3x2<f64>, convex: bool) -> Matrix3x2<f64> {
+    pub fn hessian_apply(
+        &self,
+        f: &Matrix3x2<f64>,
+        df: &Matrix3x2<f64>,
+        convex: bool,
+    ) -> Matrix3x2<f64> {
         let (r, s) = polar(f);
         let trace = s.trace();
         // dR: a turn within the plane and a tilt out of it.
@@ -83,7 +93,8 @@ impl Membrane {
                 let bend = 1.0 - 1.0 / len;
                 let bend = if convex { bend.max(0.0) } else { bend };
                 let along = u * u.dot(&dv);
-                h.column_mut(d).add_assign(&((along + (dv - along) * bend) * self.along[d]));
+                h.column_mut(d)
+                    .add_assign(&((along + (dv - along) * bend) * self.along[d]));
             }
         }
         h
@@ -103,10 +114,16 @@ pub fn polar(f: &Matrix3x2<f64>) -> (Matrix3x2<f64>, Matrix2<f64>) {
         let u: Vector3<f64> = f.column(0).into();
         let u = u.try_normalize(SHORTEST).unwrap_or_else(Vector3::x);
         let v: Vector3<f64> = f.column(1).into();
-        let v = (v - u * u.dot(&v)).try_normalize(SHORTEST).unwrap_or_else(|| {
-            let other = if u.y.abs() < 0.9 { Vector3::y() } else { Vector3::z() };
-            (other - u * u.dot(&other)).normalize()
-        });
+        let v = (v - u * u.dot(&v))
+            .try_normalize(SHORTEST)
+            .unwrap_or_else(|| {
+                let other = if u.y.abs() < 0.9 {
+                    Vector3::y()
+                } else {
+                    Vector3::z()
+                };
+                (other - u * u.dot(&other)).normalize()
+            });
         let r = Matrix3x2::from_columns(&[u, v]);
         return (r, r.transpose() * f);
     }
@@ -131,21 +148,35 @@ mod tests {
 
     #[test]
     fn value_gradient_and_hessian_agree_with_finite_differences() {
-        let m = Membrane { mu: 400.0, lambda: 266.0, along: [120.0, 900.0] };
+        let m = Membrane {
+            mu: 400.0,
+            lambda: 266.0,
+            along: [120.0, 900.0],
+        };
         let d = Matrix3x2::new(0.3, -0.4, 0.2, 0.5, -0.6, 0.1);
         let h = 1e-6;
         for f in cases() {
             let slope = (m.value(&(f + d * h)) - m.value(&(f - d * h))) / (2.0 * h);
-            assert!((slope - m.gradient(&f).dot(&d)).abs() < 1e-4 * (1.0 + slope.abs()), "{slope}");
+            assert!(
+                (slope - m.gradient(&f).dot(&d)).abs() < 1e-4 * (1.0 + slope.abs()),
+                "{slope}"
+            );
             let change = (m.gradient(&(f + d * h)) - m.gradient(&(f - d * h))) / (2.0 * h);
             let exact = m.hessian_apply(&f, &d, false);
-            assert!((change - exact).norm() < 1e-4 * (1.0 + change.norm()), "{change} {exact}");
+            assert!(
+                (change - exact).norm() < 1e-4 * (1.0 + change.norm()),
+                "{change} {exact}"
+            );
         }
     }
 
     #[test]
     fn the_convex_hessian_has_no_negative_curvature_and_equals_the_true_one_under_tension() {
-        let m = Membrane { mu: 400.0, lambda: 266.0, along: [120.0, 900.0] };
+        let m = Membrane {
+            mu: 400.0,
+            lambda: 266.0,
+            along: [120.0, 900.0],
+        };
         let mut seed = 1u32;
         let mut random = || {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -164,12 +195,21 @@ mod tests {
 
     #[test]
     fn uniform_stretch_has_its_closed_form_and_turning_costs_nothing() {
-        let m = Membrane { mu: 400.0, lambda: 266.0, along: [0.0; 2] };
+        let m = Membrane {
+            mu: 400.0,
+            lambda: 266.0,
+            along: [0.0; 2],
+        };
         let f = Matrix3x2::new(1.02, 0.0, 0.0, 0.99, 0.0, 0.0);
         let expected = 400.0 * (0.02f64.powi(2) + 0.01f64.powi(2)) + 133.0 * 0.01f64.powi(2);
         assert!((m.value(&f) - expected).abs() < 1e-12);
         let turned = nalgebra::Rotation3::from_euler_angles(0.4, 1.2, -2.0) * f;
         assert!((m.value(&turned) - expected).abs() < 1e-10);
-        assert!(m.gradient(&Matrix3x2::zeros()).iter().all(|c| c.is_finite()), "a collapsed triangle");
+        assert!(
+            m.gradient(&Matrix3x2::zeros())
+                .iter()
+                .all(|c| c.is_finite()),
+            "a collapsed triangle"
+        );
     }
 }

@@ -20,7 +20,10 @@ pub(crate) fn cut<'a>(
     multiple: usize,
 ) -> Pieces {
     let (most, multiple) = (most.max(1), multiple.max(1));
-    let mut pieces = Pieces { order: Vec::with_capacity(set.len()), starts: vec![0] };
+    let mut pieces = Pieces {
+        order: Vec::with_capacity(set.len()),
+        starts: vec![0],
+    };
     // In which part each vertex is, and how often it was met.
     let (mut part, mut met) = (vec![0u32; vertices], vec![0u32; vertices]);
     let (mut parts, mut walks) = (0, 0);
@@ -41,7 +44,9 @@ pub(crate) fn cut<'a>(
                     let v = order[next];
                     next += 1;
                     for w in near(v) {
-                        if part[*w as usize] == parts && std::mem::replace(&mut met[*w as usize], walks) != walks {
+                        if part[*w as usize] == parts
+                            && std::mem::replace(&mut met[*w as usize], walks) != walks
+                        {
                             order.push(*w);
                         }
                     }
@@ -80,7 +85,9 @@ impl Pieces {
     pub(crate) fn of(&self, vertices: usize) -> Vec<u32> {
         let mut of = vec![0; vertices];
         for p in 0..self.len() {
-            self.members(p).iter().for_each(|v| of[*v as usize] = p as u32);
+            self.members(p)
+                .iter()
+                .for_each(|v| of[*v as usize] = p as u32);
         }
         of
     }
@@ -97,25 +104,52 @@ mod tests {
             .map(|v| {
                 let (i, j) = ((v % n) as i32, (v / n) as i32);
                 let beside = [(1, 0), (-1, 0), (0, 1), (0, -1)].map(|(a, b)| (i + a, j + b));
-                let inside = beside.iter().filter(|(a, b)| (0..n as i32).contains(a) && (0..n as i32).contains(b));
+                let inside = beside
+                    .iter()
+                    .filter(|(a, b)| (0..n as i32).contains(a) && (0..n as i32).contains(b));
                 inside.map(|(a, b)| (b * n as i32 + a) as u32).collect()
             })
             .collect();
-        let p = cut((n * n) as usize, |v| &near[v as usize], (0..n * n).collect(), 128, 8);
+        let p = cut(
+            (n * n) as usize,
+            |v| &near[v as usize],
+            (0..n * n).collect(),
+            128,
+            8,
+        );
         let mut all = p.order.clone();
         all.sort_unstable();
         assert_eq!(all, (0..n * n).collect::<Vec<_>>());
-        assert!(p.starts[..p.len()].iter().all(|s| s % 8 == 0) && p.starts.last() == Some(&1600), "{:?}", p.starts);
+        assert!(
+            p.starts[..p.len()].iter().all(|s| s % 8 == 0) && p.starts.last() == Some(&1600),
+            "{:?}",
+            p.starts
+        );
         let of = p.of(1600);
         for k in 0..p.len() {
             let members = p.members(k);
-            assert!(members.len() <= 128 && members.len() > 32, "{}", members.len());
+            assert!(
+                members.len() <= 128 && members.len() > 32,
+                "{}",
+                members.len()
+            );
             // Few of its neighbours are elsewhere: a band one vertex wide would have all of them there.
-            let outside = members.iter().flat_map(|v| &near[*v as usize]).filter(|w| of[**w as usize] != k as u32);
+            let outside = members
+                .iter()
+                .flat_map(|v| &near[*v as usize])
+                .filter(|w| of[**w as usize] != k as u32);
             let outside = outside.count();
-            assert!(outside < members.len(), "piece {k}: {outside} edges leave {} vertices", members.len());
+            assert!(
+                outside < members.len(),
+                "piece {k}: {outside} edges leave {} vertices",
+                members.len()
+            );
         }
-        assert_eq!(cut(3, |_| &[], vec![2, 0, 1], 2, 1).order.len(), 3, "what hangs together by nothing");
+        assert_eq!(
+            cut(3, |_| &[], vec![2, 0, 1], 2, 1).order.len(),
+            3,
+            "what hangs together by nothing"
+        );
         assert_eq!(cut(0, |_| &[], vec![], 2, 1).len(), 0);
     }
 }

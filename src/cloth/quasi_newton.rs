@@ -76,7 +76,8 @@ impl QuasiNewton {
         }));
         sheet.add_gradient(x, &mut self.gradient);
         self.rhs.clear();
-        self.rhs.extend(self.gradient.iter().map(|g| [g.x, g.y, g.z]));
+        self.rhs
+            .extend(self.gradient.iter().map(|g| [g.x, g.y, g.z]));
         self.factor.solve(&mut self.rhs);
         let mut sum = 0.0;
         for (x, d) in x.iter_mut().zip(&self.rhs) {
@@ -90,7 +91,9 @@ impl QuasiNewton {
 
 /// Typical diagonal of the sheet's matrix at each vertex, N/m: the natural unit of a hold's stiffness.
 pub fn hold_unit(sheet: &Sheet, h: f64) -> Vec<f64> {
-    (0..sheet.mass.len()).map(|i| sheet.mass[i] / (h * h) + sheet.stiffness[sheet.pattern.diagonal_slot(i)]).collect()
+    (0..sheet.mass.len())
+        .map(|i| sheet.mass[i] / (h * h) + sheet.stiffness[sheet.pattern.diagonal_slot(i)])
+        .collect()
 }
 
 #[cfg(test)]
@@ -117,17 +120,29 @@ mod tests {
             (n + 1) * (n + 1),
             &faces,
             &rest,
-            &Material { damping: 0.0, ..Material::preset("cotton").expect("preset") },
+            &Material {
+                damping: 0.0,
+                ..Material::preset("cotton").expect("preset")
+            },
             None,
         )
         .expect("sheet");
-        let x = (0..(n + 1) * (n + 1)).map(|v| flat(v as u32)).map(|p| V3d::new(p[0], 0.0, p[1])).collect();
+        let x = (0..(n + 1) * (n + 1))
+            .map(|v| flat(v as u32))
+            .map(|p| V3d::new(p[0], 0.0, p[1]))
+            .collect();
         (sheet, x)
     }
 
     fn wavy(x: &[V3d], a: f64) -> Vec<V3d> {
         x.iter()
-            .map(|p| p + V3d::new((p.z * 31.0).sin(), (p.x * 17.0).cos(), (p.x * 23.0 + p.z * 9.0).sin()) * a)
+            .map(|p| {
+                p + V3d::new(
+                    (p.z * 31.0).sin(),
+                    (p.x * 17.0).cos(),
+                    (p.x * 23.0 + p.z * 9.0).sin(),
+                ) * a
+            })
             .collect()
     }
 
@@ -141,15 +156,30 @@ mod tests {
             .map(|(a, p)| a + V3d::new(p.z * 50.0, p.x * 40.0, 0.2))
             .collect::<Vec<_>>();
         let h = 1e-7;
-        let moved = |s: f64| x.iter().zip(&d).map(|(p, d)| p + d * (s * h)).collect::<Vec<_>>();
+        let moved = |s: f64| {
+            x.iter()
+                .zip(&d)
+                .map(|(p, d)| p + d * (s * h))
+                .collect::<Vec<_>>()
+        };
         let mut g = vec![V3d::zeros(); x.len()];
         sheet.add_gradient(&x, &mut g);
         let slope = (sheet.energy(&moved(1.0)) - sheet.energy(&moved(-1.0))) / (2.0 * h);
         let exact: f64 = g.iter().zip(&d).map(|(g, d)| g.dot(d)).sum();
-        assert!((slope - exact).abs() < 1e-5 * exact.abs(), "{slope} {exact}");
+        assert!(
+            (slope - exact).abs() < 1e-5 * exact.abs(),
+            "{slope} {exact}"
+        );
         // Internal forces move no centre of mass and turn nothing.
         assert!(g.iter().sum::<V3d>().norm() < 1e-9);
-        assert!(x.iter().zip(&g).map(|(p, g)| p.cross(g)).sum::<V3d>().norm() < 1e-9);
+        assert!(
+            x.iter()
+                .zip(&g)
+                .map(|(p, g)| p.cross(g))
+                .sum::<V3d>()
+                .norm()
+                < 1e-9
+        );
     }
 
     #[test]
@@ -164,7 +194,9 @@ mod tests {
         let holds = vec![Hold::default(); x.len()];
         let objective = |x: &[V3d]| {
             sheet.energy(x)
-                + (0..x.len()).map(|i| 0.5 * sheet.mass[i] / (h * h) * (x[i] - y[i]).norm_squared()).sum::<f64>()
+                + (0..x.len())
+                    .map(|i| 0.5 * sheet.mass[i] / (h * h) * (x[i] - y[i]).norm_squared())
+                    .sum::<f64>()
         };
         let mut last = objective(&x);
         for i in 0..20 {
@@ -185,7 +217,11 @@ mod tests {
         let g = V3d::new(0.0, -9.81, 0.0);
         let (mut x, mut v) = (x0.clone(), vec![V3d::zeros(); x0.len()]);
         for _ in 0..60 {
-            let y: Vec<V3d> = x.iter().zip(&v).map(|(p, v)| p + v * h + g * (h * h)).collect();
+            let y: Vec<V3d> = x
+                .iter()
+                .zip(&v)
+                .map(|(p, v)| p + v * h + g * (h * h))
+                .collect();
             let before = x.clone();
             for _ in 0..3 {
                 q.iterate(&sheet, &y, &holds, &mut x);
@@ -194,14 +230,28 @@ mod tests {
         }
         // Implicit Euler falls g h² n(n+1)/2.
         let fall = 9.81 * h * h * 60.0 * 61.0 / 2.0;
-        assert!(x.iter().zip(&x0).all(|(a, b)| (a - b + V3d::new(0.0, fall, 0.0)).norm() < 1e-9));
+        assert!(
+            x.iter()
+                .zip(&x0)
+                .all(|(a, b)| (a - b + V3d::new(0.0, fall, 0.0)).norm() < 1e-9)
+        );
     }
 
     #[test]
     fn a_triangle_without_area_is_refused_by_number() {
         let faces = [[0, 1, 2], [0, 2, 3]];
-        let rest = [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], [[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]];
-        let e = Sheet::new(4, &faces, &rest, &Material::preset("silk").expect("preset"), None).expect_err("flat");
+        let rest = [
+            [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]],
+            [[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]],
+        ];
+        let e = Sheet::new(
+            4,
+            &faces,
+            &rest,
+            &Material::preset("silk").expect("preset"),
+            None,
+        )
+        .expect_err("flat");
         assert!(matches!(e, ClothError::ZeroArea { face: 1, .. }));
     }
 }

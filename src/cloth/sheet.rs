@@ -84,14 +84,21 @@ impl Sheet {
     ) -> Result<Self, ClothError> {
         material.check()?;
         if rest.len() != faces.len() {
-            return Err(ClothError::Count { what: "rest triangles", got: rest.len(), expected: faces.len() });
+            return Err(ClothError::Count {
+                what: "rest triangles",
+                got: rest.len(),
+                expected: faces.len(),
+            });
         }
         let mesh = TriMesh::new(vec![P3::origin(); vertices], faces.to_vec())?;
         let topology = Topology::new(&mesh)?;
         let mut mass = vec![0.0; vertices];
         let mut elements = Vec::with_capacity(faces.len());
         for (face, (f, t)) in faces.iter().zip(rest).enumerate() {
-            let (e1, e2) = ([t[1][0] - t[0][0], t[1][1] - t[0][1]], [t[2][0] - t[0][0], t[2][1] - t[0][1]]);
+            let (e1, e2) = (
+                [t[1][0] - t[0][0], t[1][1] - t[0][1]],
+                [t[2][0] - t[0][0], t[2][1] - t[0][1]],
+            );
             let det = e1[0] * e2[1] - e1[1] * e2[0];
             let area = 0.5 * det;
             if !(area > SMALLEST_AREA) {
@@ -99,7 +106,11 @@ impl Sheet {
             }
             let (b1, b2) = ([e2[1] / det, -e2[0] / det], [-e1[1] / det, e1[0] / det]);
             let b0 = [-b1[0] - b2[0], -b1[1] - b2[1]];
-            elements.push(Element { v: *f, b: [b0, b1, b2], area });
+            elements.push(Element {
+                v: *f,
+                b: [b0, b1, b2],
+                area,
+            });
             for v in f {
                 mass[*v as usize] += area * material.area_density / 3.0;
             }
@@ -126,8 +137,13 @@ impl Sheet {
             if let (Some(twin), [Some(c), Some(d)]) = (e.twin, e.opposite) {
                 // Cotangents at the edge's ends in both triangles.
                 let cot = |face: u32, apex: u32, at: u32, other: u32| {
-                    let (pa, po, lo) = (length(face, at, apex), length(face, other, apex), length(face, at, other));
-                    let cos = (pa * pa + lo * lo - po * po) / (2.0 * pa * lo).max(f64::MIN_POSITIVE);
+                    let (pa, po, lo) = (
+                        length(face, at, apex),
+                        length(face, other, apex),
+                        length(face, at, other),
+                    );
+                    let cos =
+                        (pa * pa + lo * lo - po * po) / (2.0 * pa * lo).max(f64::MIN_POSITIVE);
                     cos / (1.0 - cos * cos).max(1e-12).sqrt()
                 };
                 let (c1, c2) = (cot(e.face, c, a, b), cot(e.face, c, b, a));
@@ -136,12 +152,24 @@ impl Sheet {
                 let c = [c2 + c4, c1 + c3, -c1 - c2, -c3 - c4];
                 let v = [a, b, e.opposite[0].unwrap_or(a), e.opposite[1].unwrap_or(a)];
                 let at_rest = curved_rest.map_or(0.0, |p| {
-                    (0..4).fold(V3d::zeros(), |s, k| s + p[v[k] as usize].coords.cast::<f64>() * c[k]).norm()
+                    (0..4)
+                        .fold(V3d::zeros(), |s, k| {
+                            s + p[v[k] as usize].coords.cast::<f64>() * c[k]
+                        })
+                        .norm()
                 });
-                hinges.push(Hinge { v, c, w: 3.0 * material.bending / area, rest: at_rest });
+                hinges.push(Hinge {
+                    v,
+                    c,
+                    w: 3.0 * material.bending / area,
+                    rest: at_rest,
+                });
             }
         }
-        let pairs = edges.iter().map(|(v, _)| (v[0], v[1])).chain(hinges.iter().map(|h| (h.v[2], h.v[3])));
+        let pairs = edges
+            .iter()
+            .map(|(v, _)| (v[0], v[1]))
+            .chain(hinges.iter().map(|h| (h.v[2], h.v[3])));
         let pattern = Arc::new(SymmetricPattern::new(vertices, pairs)?);
         let membrane = Membrane::new(material);
         let mut stiffness = vec![0.0; pattern.entries()];
@@ -154,7 +182,11 @@ impl Sheet {
         for e in &elements {
             for i in 0..3 {
                 for j in 0..=i {
-                    add(e.v[i], e.v[j], e.area * (k[0] * e.b[i][0] * e.b[j][0] + k[1] * e.b[i][1] * e.b[j][1]));
+                    add(
+                        e.v[i],
+                        e.v[j],
+                        e.area * (k[0] * e.b[i][0] * e.b[j][0] + k[1] * e.b[i][1] * e.b[j][1]),
+                    );
                 }
             }
         }
@@ -186,7 +218,11 @@ impl Sheet {
     }
     /// Elastic energy, J.
     pub fn energy(&self, x: &[V3d]) -> f64 {
-        let membrane: f64 = self.elements.iter().map(|e| e.area * self.membrane.value(&e.gradient(x))).sum();
+        let membrane: f64 = self
+            .elements
+            .iter()
+            .map(|e| e.area * self.membrane.value(&e.gradient(x)))
+            .sum();
         let bending: f64 = self
             .hinges
             .iter()
@@ -220,7 +256,10 @@ impl Sheet {
     /// Adds the (positive semidefinite) second derivative at `x` times `d` to `out`, N.
     pub fn add_hessian_product(&self, x: &[V3d], d: &[V3d], out: &mut [V3d]) {
         for e in &self.elements {
-            let h = self.membrane.hessian_apply(&e.gradient(x), &e.gradient(d), true) * e.area;
+            let h = self
+                .membrane
+                .hessian_apply(&e.gradient(x), &e.gradient(d), true)
+                * e.area;
             let (u, v): (V3d, V3d) = (h.column(0).into(), h.column(1).into());
             for k in 0..3 {
                 out[e.v[k] as usize] += u * e.b[k][0] + v * e.b[k][1];
@@ -235,10 +274,16 @@ impl Sheet {
     }
     /// Largest and 99th-percentile stretch of the edges (length over rest length, minus one).
     pub fn strain(&self, x: &[V3d]) -> (f64, f64) {
-        let mut all: Vec<f64> =
-            self.edges.iter().map(|(v, l)| (x[v[0] as usize] - x[v[1] as usize]).norm() / l - 1.0).collect();
+        let mut all: Vec<f64> = self
+            .edges
+            .iter()
+            .map(|(v, l)| (x[v[0] as usize] - x[v[1] as usize]).norm() / l - 1.0)
+            .collect();
         all.sort_unstable_by(f64::total_cmp);
-        let at = |q: f64| all.get(((all.len() as f64 * q) as usize).min(all.len().saturating_sub(1))).copied();
+        let at = |q: f64| {
+            all.get(((all.len() as f64 * q) as usize).min(all.len().saturating_sub(1)))
+                .copied()
+        };
         (at(1.0).unwrap_or(0.0), at(0.99).unwrap_or(0.0))
     }
 }

@@ -67,11 +67,18 @@ impl Hot {
     /// The triangles of `whole` with a corner that is `near`, at `x`.
     fn new(whole: &Finder, near: &[bool], x: &[V3d]) -> Self {
         let (finder, [edges, faces]) = whole.piece(|f| f.iter().any(|v| near[*v as usize]), x);
-        Self { finder, edges, faces }
+        Self {
+            finder,
+            edges,
+            faces,
+        }
     }
     fn find(&mut self, par: Par, x: &[V3d]) -> Vec<(u32, u32)> {
         let found = self.finder.find(par, x);
-        found.into_iter().map(|(e, f)| (self.edges[e as usize], self.faces[f as usize])).collect()
+        found
+            .into_iter()
+            .map(|(e, f)| (self.edges[e as usize], self.faces[f as usize]))
+            .collect()
     }
 }
 
@@ -121,7 +128,9 @@ impl Untangler {
         for (e, f) in &found {
             let ends = self.finder.edges[*e as usize].map(|v| self.wrong[v as usize]);
             let corners = self.finder.faces[*f as usize].map(|v| self.wrong[v as usize]);
-            let Some(mut m) = self.meeting(x, *e as usize, *f as usize) else { continue };
+            let Some(mut m) = self.meeting(x, *e as usize, *f as usize) else {
+                continue;
+            };
             if ends[0] != ends[1] {
                 m.bring_back(x, usize::from(ends[1]), step, gap);
             } else if ends[0] || corners.contains(&true) {
@@ -133,13 +142,22 @@ impl Untangler {
             self.push(&m, &weights);
         }
         for (push, n) in &mut self.pushes {
-            *push = if push.iter().all(|c| c.is_finite()) { *push / n.max(1.0) } else { V3d::zeros() };
+            *push = if push.iter().all(|c| c.is_finite()) {
+                *push / n.max(1.0)
+            } else {
+                V3d::zeros()
+            };
         }
         if astray > 0 {
             (0..FOLLOWING).for_each(|_| self.follow());
         }
-        x.iter_mut().zip(&self.pushes).for_each(|(x, (push, _))| *x += *push);
-        Round { crossings: found.len(), astray }
+        x.iter_mut()
+            .zip(&self.pushes)
+            .for_each(|(x, (push, _))| *x += *push);
+        Round {
+            crossings: found.len(),
+            astray,
+        }
     }
     /// The next round looks for crossings everywhere: the sheet was moved by others.
     pub(crate) fn look_anew(&mut self) {
@@ -150,11 +168,22 @@ impl Untangler {
         self.pushes.iter().map(|p| p.1 > 0.0)
     }
     /// Draws cloth within `rings` of what is `near` to the mean of its neighbours.
-    pub(crate) fn iron(&self, x: &mut [V3d], mut near: Vec<bool>, movable: impl Fn(usize) -> bool, rings: usize) {
+    pub(crate) fn iron(
+        &self,
+        x: &mut [V3d],
+        mut near: Vec<bool>,
+        movable: impl Fn(usize) -> bool,
+        rings: usize,
+    ) {
         let n = x.len();
         for _ in 0..rings {
-            let ring: Vec<[u32; 2]> =
-                self.finder.edges.iter().filter(|e| e.iter().any(|v| near[*v as usize])).copied().collect();
+            let ring: Vec<[u32; 2]> = self
+                .finder
+                .edges
+                .iter()
+                .filter(|e| e.iter().any(|v| near[*v as usize]))
+                .copied()
+                .collect();
             ring.iter().flatten().for_each(|v| near[*v as usize] = true);
         }
         for _ in 0..IRONED {
@@ -185,11 +214,15 @@ impl Untangler {
             let mut near = vec![false; x.len()];
             for (e, f) in &found {
                 let corners = self.finder.faces[*f as usize];
-                self.finder.edges[*e as usize].iter().chain(&corners).for_each(|v| near[*v as usize] = true);
+                self.finder.edges[*e as usize]
+                    .iter()
+                    .chain(&corners)
+                    .for_each(|v| near[*v as usize] = true);
             }
             for _ in 0..AROUND {
                 let touches = |e: &&[u32; 2]| e.iter().any(|v| near[*v as usize]);
-                let ring: Vec<[u32; 2]> = self.finder.edges.iter().filter(touches).copied().collect();
+                let ring: Vec<[u32; 2]> =
+                    self.finder.edges.iter().filter(touches).copied().collect();
                 ring.iter().flatten().for_each(|v| near[*v as usize] = true);
             }
             self.hot = Some(Hot::new(&self.finder, &near, x));
@@ -201,7 +234,10 @@ impl Untangler {
         let mut told: Vec<(u32, V3d)> = Vec::new();
         for e in &self.finder.edges {
             for [a, b] in [[e[0], e[1]], [e[1], e[0]]] {
-                if self.wrong[a as usize] && self.pushes[a as usize].1 == 0.0 && self.pushes[b as usize].1 > 0.0 {
+                if self.wrong[a as usize]
+                    && self.pushes[a as usize].1 == 0.0
+                    && self.pushes[b as usize].1 > 0.0
+                {
                     told.push((a, self.pushes[b as usize].0));
                 }
             }
@@ -231,7 +267,11 @@ impl Untangler {
             }
             let [a, b] = self.finder.edges[k].map(|v| self.root(v));
             if a != b {
-                let (small, large) = if self.size[a as usize] < self.size[b as usize] { (a, b) } else { (b, a) };
+                let (small, large) = if self.size[a as usize] < self.size[b as usize] {
+                    (a, b)
+                } else {
+                    (b, a)
+                };
                 self.part[small as usize] = large;
                 self.size[large as usize] += self.size[small as usize];
             }
@@ -247,10 +287,17 @@ impl Untangler {
     fn part(&mut self, n: usize, found: &[(u32, u32)]) -> usize {
         self.odd.clear();
         self.odd.resize(self.finder.edges.len(), false);
-        found.iter().for_each(|(e, _)| self.odd[*e as usize] ^= true);
+        found
+            .iter()
+            .for_each(|(e, _)| self.odd[*e as usize] ^= true);
         let parts = self.parts(n, true);
         self.wrong.clear();
-        self.wrong.extend(parts.iter().zip(&self.whole).map(|(p, w)| f64::from(*p) < SMALL * f64::from(*w)));
+        self.wrong.extend(
+            parts
+                .iter()
+                .zip(&self.whole)
+                .map(|(p, w)| f64::from(*p) < SMALL * f64::from(*w)),
+        );
         self.wrong.iter().filter(|w| **w).count()
     }
     fn push(&mut self, m: &Meeting, weights: &impl Fn(usize) -> f64) {
@@ -282,16 +329,28 @@ impl Untangler {
         let mut way = V3d::zeros();
         for n in self.finder.beside[e].into_iter().filter(|n| *n != NONE) {
             let face = self.finder.faces[n as usize].map(|v| v as usize);
-            let Some(tip) = face.into_iter().find(|v| !ends.contains(v)) else { continue };
+            let Some(tip) = face.into_iter().find(|v| !ends.contains(v)) else {
+                continue;
+            };
             // Into the triangle beside the edge, away from the edge.
             let inwards = (x[tip] - p) - along * along.dot(&(x[tip] - p));
-            let Some(line) = normal.cross(&along.cross(&inwards)).try_normalize(0.0) else { continue };
-            let line = if line.dot(&inwards) < 0.0 { -line } else { line };
+            let Some(line) = normal.cross(&along.cross(&inwards)).try_normalize(0.0) else {
+                continue;
+            };
+            let line = if line.dot(&inwards) < 0.0 {
+                -line
+            } else {
+                line
+            };
             way += line - normal * (STEEP * along.dot(&line) / steep);
         }
         let weights = [1.0 - t, t, -share(&b, &c), -share(&c, &a), -share(&a, &b)];
         let good = weights.iter().chain(&way).all(|c| c.is_finite());
-        good.then_some(Meeting { vertices: [ends[0], ends[1], corners[0], corners[1], corners[2]], weights, way })
+        good.then_some(Meeting {
+            vertices: [ends[0], ends[1], corners[0], corners[1], corners[2]],
+            weights,
+            way,
+        })
     }
 }
 
@@ -300,8 +359,15 @@ impl Meeting {
     fn bring_back(&mut self, x: &[V3d], astray: usize, step: f64, gap: f64) {
         let [p, q] = [self.vertices[astray], self.vertices[1 - astray]].map(|v| x[v]);
         let [a, b, c] = [self.vertices[2], self.vertices[3], self.vertices[4]].map(|v| x[v]);
-        let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(V3d::zeros);
-        let out = if normal.dot(&(q - p)) < 0.0 { -normal } else { normal };
+        let normal = (b - a)
+            .cross(&(c - a))
+            .try_normalize(0.0)
+            .unwrap_or_else(V3d::zeros);
+        let out = if normal.dot(&(q - p)) < 0.0 {
+            -normal
+        } else {
+            normal
+        };
         self.way = out * (out.dot(&(a - p)) + gap).min(step);
         self.weights[astray] = 1.0;
         self.weights[1 - astray] = 0.0;
@@ -314,7 +380,12 @@ mod tests {
     use crate::mesh::Face;
 
     /// Rows and columns of points; `at(u, v)` in cells.
-    fn grid(nu: usize, nv: usize, first: usize, at: impl Fn(f64, f64) -> [f64; 3]) -> (Vec<V3d>, Vec<Face>) {
+    fn grid(
+        nu: usize,
+        nv: usize,
+        first: usize,
+        at: impl Fn(f64, f64) -> [f64; 3],
+    ) -> (Vec<V3d>, Vec<Face>) {
         let mut x = Vec::new();
         for i in 0..=nu {
             for j in 0..=nv {
@@ -337,10 +408,19 @@ mod tests {
     }
 
     /// Rounds until nothing crosses, at most `most`.
-    fn rounds((mut x, faces): (Vec<V3d>, Vec<Face>), step: f64, most: usize) -> (Vec<usize>, Vec<V3d>) {
+    fn rounds(
+        (mut x, faces): (Vec<V3d>, Vec<Face>),
+        step: f64,
+        most: usize,
+    ) -> (Vec<usize>, Vec<V3d>) {
         let mut u = Untangler::new(&faces, &x);
         let mut seen = Vec::new();
-        let rest: Vec<f64> = u.finder.edges.iter().map(|e| (x[e[0] as usize] - x[e[1] as usize]).norm()).collect();
+        let rest: Vec<f64> = u
+            .finder
+            .edges
+            .iter()
+            .map(|e| (x[e[0] as usize] - x[e[1] as usize]).norm())
+            .collect();
         for _ in 0..most {
             let r = u.round(Par::Seq, &mut x, |_| 1.0, step, 0.001);
             for _ in 0..4 {
@@ -384,7 +464,11 @@ mod tests {
             let tube = grid(20, 8, n, |u, v| {
                 let (s, c) = (u * std::f64::consts::TAU / 20.0).sin_cos();
                 // Lies along x, its lowest line below the sheet.
-                [(v - 4.0) * CELL, 0.05 * c + 0.035 + sag * ((v - 4.0) * CELL).powi(2), 0.05 * s]
+                [
+                    (v - 4.0) * CELL,
+                    0.05 * c + 0.035 + sag * ((v - 4.0) * CELL).powi(2),
+                    0.05 * s,
+                ]
             });
             let (mut x, mut faces) = two(flat, tube);
             // Closed: the last column is the first.
@@ -405,8 +489,11 @@ mod tests {
     fn a_fold_that_a_bump_goes_through_is_freed() {
         let strip = grid(24, 8, 0, |u, v| {
             let along = u.min(24.0 - u) * CELL;
-            let bump =
-                if u > 12.0 { 0.009 * (-(((u - 19.2) / 1.6).powi(2) + ((v - 4.1) / 1.6).powi(2))).exp() } else { 0.0 };
+            let bump = if u > 12.0 {
+                0.009 * (-(((u - 19.2) / 1.6).powi(2) + ((v - 4.1) / 1.6).powi(2))).exp()
+            } else {
+                0.0
+            };
             [along, if u > 12.0 { 0.004 - bump } else { 0.0 }, v * CELL]
         });
         let (seen, _) = rounds(strip, 0.002, 60);
@@ -423,7 +510,8 @@ mod tests {
             f64::from(seed >> 8) / f64::from(1u32 << 24)
         };
         let (mut x, faces) = grid(20, 20, 0, |u, v| [(u % 7.0) * CELL, 0.0, (v % 5.0) * CELL]);
-        x.iter_mut().for_each(|p| *p += V3d::new(random(), random(), random()) * CELL);
+        x.iter_mut()
+            .for_each(|p| *p += V3d::new(random(), random(), random()) * CELL);
         let mut whole = Finder::new(&faces, &x);
         let all = whole.find(Par::Seq, &x);
         assert!(all.len() > 100, "{}", all.len());
@@ -431,9 +519,15 @@ mod tests {
             let near: Vec<bool> = (0..x.len()).map(|_| random() < share).collect();
             let hot = |corners: &[u32]| corners.iter().any(|v| near[*v as usize]);
             let beside = |e: u32| whole.beside[e as usize].into_iter().filter(|f| *f != NONE);
-            let inside = |(e, f): &&(u32, u32)| hot(&faces[*f as usize]) && beside(*e).any(|f| hot(&faces[f as usize]));
+            let inside = |(e, f): &&(u32, u32)| {
+                hot(&faces[*f as usize]) && beside(*e).any(|f| hot(&faces[f as usize]))
+            };
             let wanted: Vec<(u32, u32)> = all.iter().filter(inside).copied().collect();
-            assert_eq!(Hot::new(&whole, &near, &x).find(Par::Seq, &x), wanted, "{share}");
+            assert_eq!(
+                Hot::new(&whole, &near, &x).find(Par::Seq, &x),
+                wanted,
+                "{share}"
+            );
             assert_eq!(wanted.len() == all.len(), share == 1.0);
         }
     }
@@ -455,7 +549,12 @@ mod tests {
         u.iron(&mut x, u.crossed().collect(), |v| v != tip, 2);
         assert_eq!(x[tip], before[tip], "it may not move");
         u.iron(&mut x, u.crossed().collect(), |_| true, 2);
-        assert!(x[tip].y > before[tip].y + 0.01, "{} {}", x[tip].y, before[tip].y);
+        assert!(
+            x[tip].y > before[tip].y + 0.01,
+            "{} {}",
+            x[tip].y,
+            before[tip].y
+        );
         // Three cells from the spike, of which one is an edge that crossed.
         let near = |v: usize| [0, 2].iter().all(|k| before[v][*k].abs() < 3.5 * CELL);
         assert!((0..x.len()).all(|v| near(v) || x[v] == before[v]));
@@ -488,7 +587,12 @@ mod tests {
         assert!(x.iter().zip(&before).all(|(a, b)| a == b || b.x.is_nan()));
         u.round(Par::Seq, &mut x, |_| 1.0, 0.01, 0.001);
         let bound = 0.1;
-        assert!(x.iter().zip(&before).all(|(a, b)| (a - b).norm() < bound || b.x.is_nan()), "{x:?}");
+        assert!(
+            x.iter()
+                .zip(&before)
+                .all(|(a, b)| (a - b).norm() < bound || b.x.is_nan()),
+            "{x:?}"
+        );
         assert_ne!(x[0], before[0]);
     }
 }

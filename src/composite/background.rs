@@ -39,7 +39,9 @@ pub(crate) fn captured(par: Par, input: &Input<'_>, stage: &Stage) -> ColorImage
         let mut line = vec![0u16; stride + 3];
         for (k, row) in chunk.chunks_mut(row_bytes).enumerate() {
             let v = (start / row_bytes + k) as u32;
-            let Some((i, w)) = tap(stage.color_at(1, v), source.height()) else { continue };
+            let Some((i, w)) = tap(stage.color_at(1, v), source.height()) else {
+                continue;
+            };
             let upper = &source.data()[i * stride..(i + 1) * stride];
             let next = (i + 1).min(source.height() as usize - 1);
             let lower = &source.data()[next * stride..(next + 1) * stride];
@@ -75,11 +77,22 @@ fn tap(x: f64, side: u32) -> Option<(usize, u32)> {
 fn grey_depth(depth: &DepthImage, stage: &Stage) -> ColorImage {
     let mut out = ColorImage::filled(stage.color[0], stage.color[1], [0; 3]);
     let (w, h) = (depth.width() as usize, depth.height() as usize);
-    for (v, row) in out.data_mut().chunks_exact_mut(3 * stage.color[0] as usize).enumerate() {
+    for (v, row) in out
+        .data_mut()
+        .chunks_exact_mut(3 * stage.color[0] as usize)
+        .enumerate()
+    {
         for (u, pixel) in row.chunks_exact_mut(3).enumerate() {
-            let (x, y) = (u * w / stage.color[0] as usize, v * h / stage.color[1] as usize);
+            let (x, y) = (
+                u * w / stage.color[0] as usize,
+                v * h / stage.color[1] as usize,
+            );
             let mm = depth.data()[y * w + x];
-            pixel.fill(if mm == 0 { 0 } else { (220 - (u32::from(mm) / 25).min(180)) as u8 });
+            pixel.fill(if mm == 0 {
+                0
+            } else {
+                (220 - (u32::from(mm) / 25).min(180)) as u8
+            });
         }
     }
     out
@@ -88,12 +101,17 @@ fn grey_depth(depth: &DepthImage, stage: &Stage) -> ColorImage {
 /// Depth as the picture's camera sees it, millimetres: the sensor's own, or resampled when the colour camera
 /// stands elsewhere. A reading lands on the pixels its own footprint covers; the nearest wins.
 pub(crate) fn depth_from_picture<'a>(input: &Input<'a>, stage: &Stage) -> Cow<'a, [u16]> {
-    let Some(color) = &input.calibration.color else { return Cow::Borrowed(input.frame.depth.data()) };
+    let Some(color) = &input.calibration.color else {
+        return Cow::Borrowed(input.frame.depth.data());
+    };
     let target = stage.depth_camera(color);
     let [width, height] = stage.depth;
     let mut out = vec![0; width as usize * height as usize];
     let depth = &input.frame.depth;
-    let source = input.calibration.depth.resized(depth.width(), depth.height());
+    let source = input
+        .calibration
+        .depth
+        .resized(depth.width(), depth.height());
     let iso: nalgebra::Isometry3<f32> = input.calibration.color_from_depth.iso().cast();
     let rotation = iso.rotation.to_rotation_matrix().into_inner();
     let shift: V3 = iso.translation.vector;
@@ -105,7 +123,13 @@ pub(crate) fn depth_from_picture<'a>(input: &Input<'a>, stage: &Stage) -> Cow<'a
             if mm == 0 {
                 continue;
             }
-            let p = P3::from(rotation * source.unproject(u as f32, v as f32, f32::from(mm) * 1e-3).coords + shift);
+            let p = P3::from(
+                rotation
+                    * source
+                        .unproject(u as f32, v as f32, f32::from(mm) * 1e-3)
+                        .coords
+                    + shift,
+            );
             if p.z <= 0.0 {
                 continue;
             }
@@ -140,7 +164,9 @@ const MEASURE_STEP: usize = 4;
 
 /// How bright the room is: garments are lit by this factor. From the captured pixels that have depth.
 pub(crate) fn brightness(input: &Input<'_>) -> f32 {
-    let Some(color) = &input.frame.color else { return 1.0 };
+    let Some(color) = &input.frame.color else {
+        return 1.0;
+    };
     let depth = &input.frame.depth;
     let mut histogram = [0u32; 256];
     let (dw, dh) = (depth.width() as usize, depth.height() as usize);
@@ -149,7 +175,8 @@ pub(crate) fn brightness(input: &Input<'_>) -> f32 {
         for u in (0..w).step_by(MEASURE_STEP) {
             if depth.data()[(v * dh / h) * dw + u * dw / w] != 0 {
                 let c = &color.data()[3 * (v * w + u)..][..3];
-                let luma = (u32::from(c[0]) * 54 + u32::from(c[1]) * 183 + u32::from(c[2]) * 19) >> 8;
+                let luma =
+                    (u32::from(c[0]) * 54 + u32::from(c[1]) * 183 + u32::from(c[2]) * 19) >> 8;
                 histogram[luma.min(255) as usize] += 1;
             }
         }
@@ -166,7 +193,9 @@ pub(crate) fn brightness(input: &Input<'_>) -> f32 {
             below as f32 >= BRIGHT_PERCENTILE * total as f32
         })
         .unwrap_or(255);
-    (linear(level as u8) / WELL_EXPOSED).sqrt().clamp(BRIGHTNESS_RANGE[0], BRIGHTNESS_RANGE[1])
+    (linear(level as u8) / WELL_EXPOSED)
+        .sqrt()
+        .clamp(BRIGHTNESS_RANGE[0], BRIGHTNESS_RANGE[1])
 }
 
 #[cfg(test)]
@@ -179,7 +208,9 @@ mod tests {
     #[test]
     fn upscaling_keeps_a_ramp_and_crops_about_the_centre() {
         let k = Intrinsics::KINECT_V1.resized(64, 48);
-        let data = (0..48).flat_map(|v| (0..64).flat_map(move |u| [2 * u as u8, 4 * v as u8, 77])).collect();
+        let data = (0..48)
+            .flat_map(|v| (0..64).flat_map(move |u| [2 * u as u8, 4 * v as u8, 77]))
+            .collect();
         let frame = RgbdFrame {
             sequence: 0,
             time_ns: 0,
@@ -187,10 +218,18 @@ mod tests {
             color: Some(ColorImage::new(64, 48, data).expect("size")),
         };
         let calibration = Calibration::registered(k);
-        for (framing, size) in [(Framing::Cover, [128, 72]), (Framing::Contain, [90, 120]), (Framing::Cover, [30, 60])]
-        {
-            let input =
-                Input { frame: &frame, calibration: &calibration, garments: &[], body: None, output: Some(size) };
+        for (framing, size) in [
+            (Framing::Cover, [128, 72]),
+            (Framing::Contain, [90, 120]),
+            (Framing::Cover, [30, 60]),
+        ] {
+            let input = Input {
+                frame: &frame,
+                calibration: &calibration,
+                garments: &[],
+                body: None,
+                output: Some(size),
+            };
             let stage = Stage::new(&input, framing);
             let out = captured(Par::Seq, &input, &stage);
             let mut seen = 0;
@@ -201,7 +240,10 @@ mod tests {
                         continue;
                     }
                     let c = out.at(u, v);
-                    assert!((f64::from(c[0]) - 2.0 * x).abs() < 1.1, "{u} {v}: {c:?} {x}");
+                    assert!(
+                        (f64::from(c[0]) - 2.0 * x).abs() < 1.1,
+                        "{u} {v}: {c:?} {x}"
+                    );
                     assert!((f64::from(c[1]) - 4.0 * y).abs() < 1.1 && c[2] == 77);
                     // The camera moved along: a point seen at (x, y) is drawn at (u, v).
                     let p = k.unproject(x as f32, y as f32, 2.0);
@@ -228,12 +270,21 @@ mod tests {
             depth: DepthImage::new(160, 120, vec![2000; 160 * 120]).expect("size"),
             color: Some(ColorImage::filled(640, 480, [9; 3])),
         };
-        let input = Input { frame: &frame, calibration: &calibration, garments: &[], body: None, output: None };
+        let input = Input {
+            frame: &frame,
+            calibration: &calibration,
+            garments: &[],
+            body: None,
+            output: None,
+        };
         let stage = Stage::new(&input, Framing::Cover);
         assert_eq!(stage.depth, [160, 120]);
         let seen = depth_from_picture(&input, &stage);
         // 5 cm at 2 m are 3.3 of these pixels: the wall moves right, no gaps inside.
         let row = &seen[60 * 160..61 * 160];
-        assert!(row[..2].iter().all(|d| *d == 0) && row[5..].iter().all(|d| *d == 2000), "{row:?}");
+        assert!(
+            row[..2].iter().all(|d| *d == 0) && row[5..].iter().all(|d| *d == 2000),
+            "{row:?}"
+        );
     }
 }

@@ -37,7 +37,15 @@ fn tube(from: P3, to: P3, across: V3, toward: V3, rings: u32, around: u32, out: 
 fn trunk() -> Mesh {
     let mut m = Mesh::default();
     let (a, b) = (V3::new(-0.17, 0.0, 0.0), V3::new(0.0, 0.0, -0.11));
-    tube(P3::new(0.0, -0.45, DISTANCE), P3::new(0.0, 0.6, DISTANCE), a, b, 30, 48, &mut m);
+    tube(
+        P3::new(0.0, -0.45, DISTANCE),
+        P3::new(0.0, 0.6, DISTANCE),
+        a,
+        b,
+        30,
+        48,
+        &mut m,
+    );
     m
 }
 
@@ -55,14 +63,24 @@ fn capture(
     let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
     let (mut depth, mut color, mut arm) = (Vec::new(), Vec::new(), Vec::new());
     for (z, f) in seen.depth.iter().zip(&seen.face) {
-        let (front, base) = if *f == VisibilityBuffer::NONE { (false, [110, 115, 120]) } else { look(*f as usize) };
+        let (front, base) = if *f == VisibilityBuffer::NONE {
+            (false, [110, 115, 120])
+        } else {
+            look(*f as usize)
+        };
         arm.push(front);
         let z = if z.is_finite() { *z } else { 3.0 };
         // Sum of uniforms: near enough to a normal distribution.
         let unit: f32 = (0..6).map(|_| rng.random_range(-1.0f32..1.0)).sum::<f32>() / 2f32.sqrt();
         let hole = rng.random_range(0.0..1.0) < 0.01;
-        depth.push(if hole { 0 } else { ((z + noise(z) * unit) * 1e3) as u16 });
-        color.extend(base.map(|c: u8| ((f32::from(c) * light) as u8).saturating_add(rng.random_range(0..9))));
+        depth.push(if hole {
+            0
+        } else {
+            ((z + noise(z) * unit) * 1e3) as u16
+        });
+        color.extend(
+            base.map(|c: u8| ((f32::from(c) * light) as u8).saturating_add(rng.random_range(0..9))),
+        );
     }
     let frame = RgbdFrame {
         sequence: 0,
@@ -101,7 +119,15 @@ impl Scenery {
         tube(start, start + axis, s, t, 16, 24, &mut body);
         let mut shirt = Mesh::default();
         let (a, b) = (V3::new(-0.182, 0.0, 0.0), V3::new(0.0, 0.0, -0.122));
-        tube(P3::new(0.0, -0.35, DISTANCE), P3::new(0.0, 0.42, DISTANCE), a, b, 40, 60, &mut shirt);
+        tube(
+            P3::new(0.0, -0.35, DISTANCE),
+            P3::new(0.0, 0.42, DISTANCE),
+            a,
+            b,
+            40,
+            60,
+            &mut shirt,
+        );
         let uv = shirt.0.iter().map(|p| [p.x + p.z, p.y]).collect();
 
         // What the camera sees of the trunk: own clothes, 1 to 3 cm thick, so that in places they are in front of the
@@ -114,10 +140,19 @@ impl Scenery {
         }
         let mut seen = VisibilityBuffer::default();
         rasterise(&view, &dressed, &body.1, &mut seen);
-        let (frame, arm) =
-            capture(&seen, camera, seed, 1.0, |f| if f < trunk_faces { (false, [150, 30, 40]) } else { (true, SKIN) });
+        let (frame, arm) = capture(&seen, camera, seed, 1.0, |f| {
+            if f < trunk_faces {
+                (false, [150, 30, 40])
+            } else {
+                (true, SKIN)
+            }
+        });
         rasterise(&view, &shirt.0, &shirt.1, &mut seen);
-        let shirt_seen = seen.face.iter().map(|f| *f != VisibilityBuffer::NONE).collect();
+        let shirt_seen = seen
+            .face
+            .iter()
+            .map(|f| *f != VisibilityBuffer::NONE)
+            .collect();
         Self {
             calibration: Calibration::registered(camera),
             frame,
@@ -125,7 +160,10 @@ impl Scenery {
             limbs: Limbs::default(),
             shirt,
             uv,
-            look: Look { base: [30, 90, 60], ..Look::default() },
+            look: Look {
+                base: [30, 90, 60],
+                ..Look::default()
+            },
             arm,
             shirt_seen,
         }
@@ -139,26 +177,57 @@ impl Scenery {
         let trunk_vertices = body.0.len() as u32;
         let trunk_faces = body.1.len();
         let (a, b) = (V3::new(-0.08, 0.0, 0.0), V3::new(0.0, 0.0, -0.09));
-        tube(P3::new(0.0, -0.72, DISTANCE), P3::new(0.0, -0.48, DISTANCE), a, b, 8, 24, &mut body);
+        tube(
+            P3::new(0.0, -0.72, DISTANCE),
+            P3::new(0.0, -0.48, DISTANCE),
+            a,
+            b,
+            8,
+            24,
+            &mut body,
+        );
         let (face_vertices, face_faces) = (body.0.len() as u32, body.1.len());
         // Elbow, wrist, and knuckles along the trunk.
-        let on = |x: f32, y: f32| P3::new(x, y, DISTANCE - 0.11 * (1.0 - (x / 0.17).powi(2)).max(0.0).sqrt() - 0.01);
-        let bones =
-            [P3::new(-0.38, 0.0, DISTANCE - 0.01), on(-0.16, 0.16), on(-0.125, 0.18), on(-0.08, 0.2), on(-0.01, 0.22)];
+        let on = |x: f32, y: f32| {
+            P3::new(
+                x,
+                y,
+                DISTANCE - 0.11 * (1.0 - (x / 0.17).powi(2)).max(0.0).sqrt() - 0.01,
+            )
+        };
+        let bones = [
+            P3::new(-0.38, 0.0, DISTANCE - 0.01),
+            on(-0.16, 0.16),
+            on(-0.125, 0.18),
+            on(-0.08, 0.2),
+            on(-0.01, 0.22),
+        ];
         let mut starts = Vec::new();
         for (k, pair) in bones.windows(2).enumerate() {
             let axis = (pair[1] - pair[0]).normalize();
             let s = axis.cross(&V3::z()).normalize();
             let (wide, thick) = if k == 0 { (0.035, 0.03) } else { (0.04, 0.01) };
             starts.push(body.0.len() as u32);
-            tube(pair[0], pair[1], s * wide, s.cross(&axis) * thick, 8, 24, &mut body);
+            tube(
+                pair[0],
+                pair[1],
+                s * wide,
+                s.cross(&axis) * thick,
+                8,
+                24,
+                &mut body,
+            );
         }
         let end = body.0.len() as u32;
         let forearm_faces = 2 * 8 * 24;
         let arm = Arm::new(
             (starts[0]..starts[1]).collect(),
             (starts[1]..end).collect(),
-            [(starts[0]..starts[0] + 24).collect(), (starts[1]..starts[1] + 24).collect(), (end - 24..end).collect()],
+            [
+                (starts[0]..starts[0] + 24).collect(),
+                (starts[1]..starts[1] + 24).collect(),
+                (end - 24..end).collect(),
+            ],
         );
         let limbs = Limbs::new(
             [arm, Arm::default()],
@@ -168,7 +237,15 @@ impl Scenery {
         );
         let mut shirt = Mesh::default();
         let (a, b) = (V3::new(-0.205, 0.0, 0.0), V3::new(0.0, 0.0, -0.145));
-        tube(P3::new(0.0, -0.35, DISTANCE), P3::new(0.0, 0.42, DISTANCE), a, b, 40, 60, &mut shirt);
+        tube(
+            P3::new(0.0, -0.35, DISTANCE),
+            P3::new(0.0, 0.42, DISTANCE),
+            a,
+            b,
+            40,
+            60,
+            &mut shirt,
+        );
         let uv = shirt.0.iter().map(|p| [p.x + p.z, p.y]).collect();
         let mut seen = VisibilityBuffer::default();
         rasterise(&view, &body.0, &body.1, &mut seen);
@@ -179,10 +256,27 @@ impl Scenery {
             _ => (true, SKIN),
         });
         rasterise(&view, &shirt.0, &shirt.1, &mut seen);
-        let shirt_seen = seen.face.iter().map(|f| *f != VisibilityBuffer::NONE).collect();
+        let shirt_seen = seen
+            .face
+            .iter()
+            .map(|f| *f != VisibilityBuffer::NONE)
+            .collect();
         let calibration = Calibration::registered(camera);
-        let look = Look { base: [20, 220, 60], ..Look::default() };
-        Self { calibration, frame, body, limbs, shirt, uv, look, arm, shirt_seen }
+        let look = Look {
+            base: [20, 220, 60],
+            ..Look::default()
+        };
+        Self {
+            calibration,
+            frame,
+            body,
+            limbs,
+            shirt,
+            uv,
+            look,
+            arm,
+            shirt_seen,
+        }
     }
     /// Shares of arm pixels painted over and of shirt pixels with a hole, away from outlines by `border` pixels.
     pub(crate) fn mistakes(&self, image: &ColorImage, border: i32) -> [f32; 2] {
@@ -199,7 +293,10 @@ impl Scenery {
         let (mut counts, mut wrong) = ([0f32; 2], [0f32; 2]);
         for y in 0..h {
             for x in 0..w {
-                let (a, b) = (image.at(x as u32, y as u32), captured.at(x as u32, y as u32));
+                let (a, b) = (
+                    image.at(x as u32, y as u32),
+                    captured.at(x as u32, y as u32),
+                );
                 let like_captured = (0..3).all(|k| a[k].abs_diff(b[k]) < 40);
                 if inside(&|i| self.arm[i] && self.shirt_seen[i], x, y) {
                     counts[0] += 1.0;
@@ -214,12 +311,32 @@ impl Scenery {
         [wrong[0] / counts[0], wrong[1] / counts[1]]
     }
     pub(crate) fn garment(&self) -> GarmentView<'_> {
-        GarmentView { vertices: &self.shirt.0, faces: &self.shirt.1, uv: &self.uv, normals: &[], look: &self.look }
+        GarmentView {
+            vertices: &self.shirt.0,
+            faces: &self.shirt.1,
+            uv: &self.uv,
+            normals: &[],
+            look: &self.look,
+        }
     }
     pub(crate) fn body_view(&self) -> BodyView<'_> {
-        BodyView { vertices: &self.body.0, faces: &self.body.1, limbs: &self.limbs }
+        BodyView {
+            vertices: &self.body.0,
+            faces: &self.body.1,
+            limbs: &self.limbs,
+        }
     }
-    pub(crate) fn input<'a>(&'a self, garments: &'a [GarmentView<'a>], output: Option<[u32; 2]>) -> Input<'a> {
-        Input { frame: &self.frame, calibration: &self.calibration, garments, body: Some(self.body_view()), output }
+    pub(crate) fn input<'a>(
+        &'a self,
+        garments: &'a [GarmentView<'a>],
+        output: Option<[u32; 2]>,
+    ) -> Input<'a> {
+        Input {
+            frame: &self.frame,
+            calibration: &self.calibration,
+            garments,
+            body: Some(self.body_view()),
+            output,
+        }
     }
 }

@@ -34,14 +34,19 @@ impl Stage {
         let [width, height] = input.output_size();
         let depth = [input.frame.depth.width(), input.frame.depth.height()];
         let base = input.calibration.color.unwrap_or(input.calibration.depth);
-        let color = input.frame.color.as_ref().map_or([base.width, base.height], |c| [c.width(), c.height()]);
+        let color = input
+            .frame
+            .color
+            .as_ref()
+            .map_or([base.width, base.height], |c| [c.width(), c.height()]);
         let base = base.resized(color[0], color[1]);
         let ratio = [0, 1].map(|k| f64::from([width, height][k]) / f64::from(color[k]));
         let scale = match framing {
             Framing::Cover => ratio[0].max(ratio[1]),
             Framing::Contain => ratio[0].min(ratio[1]),
         };
-        let shift = [0, 1].map(|k| (f64::from([width, height][k]) - scale * f64::from(color[k])) * 0.5);
+        let shift =
+            [0, 1].map(|k| (f64::from([width, height][k]) - scale * f64::from(color[k])) * 0.5);
         let camera = Intrinsics {
             width,
             height,
@@ -57,7 +62,13 @@ impl Stage {
         } else {
             depth
         };
-        Self { camera, color, depth, scale, shift }
+        Self {
+            camera,
+            color,
+            depth,
+            scale,
+            shift,
+        }
     }
     /// Position on the colour image (pixel centres at integers) of an output column (axis 0) or row (axis 1).
     pub(crate) fn color_at(&self, axis: usize, out: u32) -> f64 {
@@ -65,7 +76,8 @@ impl Stage {
     }
     /// Nearest depth column or row, if there is one.
     pub(crate) fn depth_at(&self, axis: usize, out: u32) -> Option<u32> {
-        let x = (self.color_at(axis, out) + 0.5) * f64::from(self.depth[axis]) / f64::from(self.color[axis]);
+        let x = (self.color_at(axis, out) + 0.5) * f64::from(self.depth[axis])
+            / f64::from(self.color[axis]);
         (x >= 0.0 && x < f64::from(self.depth[axis])).then_some(x as u32)
     }
     /// Output pixels per depth pixel.

@@ -51,7 +51,9 @@ impl Seen<'_> {
     /// Captured depth at a pixel, metres; 0 = none.
     fn metres(&self, u: u32, v: u32) -> f32 {
         match (self.stage.depth_at(0, u), self.stage.depth_at(1, v)) {
-            (Some(x), Some(y)) => f32::from(self.depth[(y * self.stage.depth[0] + x) as usize]) * 1e-3,
+            (Some(x), Some(y)) => {
+                f32::from(self.depth[(y * self.stage.depth[0] + x) as usize]) * 1e-3
+            }
             _ => 0.0,
         }
     }
@@ -67,21 +69,36 @@ impl Seen<'_> {
             return None;
         }
         let fits = |dx: f32, dy: f32| {
-            let z = self.metres((q.x + dx * away + 0.5) as u32, (q.y + dy * away + 0.5) as u32);
+            let z = self.metres(
+                (q.x + dx * away + 0.5) as u32,
+                (q.y + dy * away + 0.5) as u32,
+            );
             z > 0.0 && (z - p.z).abs() < fit + noise(z)
         };
-        let all = [(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)].iter().all(|&(x, y)| fits(x, y));
+        let all = [(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)]
+            .iter()
+            .all(|&(x, y)| fits(x, y));
         all.then(|| self.image.at((q.x + 0.5) as u32, (q.y + 0.5) as u32))
     }
 }
 
 /// Takes this picture's colours and makes a model of them.
-fn learn(state: &mut State, seen: &Seen<'_>, body: &Body<'_>, bones: &[Option<Bones>; 2]) -> Option<Skin> {
+fn learn(
+    state: &mut State,
+    seen: &Seen<'_>,
+    body: &Body<'_>,
+    bones: &[Option<Bones>; 2],
+) -> Option<Skin> {
     let mut put = |source: Source, vertices: &[u32], fit: f32| {
         let due: Vec<(usize, u32)> = state.due(source, vertices).collect();
         for (slot, v) in due {
             let p = &body.vertices[v as usize];
-            let by_arm = || bones.iter().flatten().any(|b| b.place(p).away < CLEAR_OF_ARM);
+            let by_arm = || {
+                bones
+                    .iter()
+                    .flatten()
+                    .any(|b| b.place(p).away < CLEAR_OF_ARM)
+            };
             if source == Source::Trunk && by_arm() {
                 continue;
             }
@@ -91,7 +108,11 @@ fn learn(state: &mut State, seen: &Seen<'_>, body: &Body<'_>, bones: &[Option<Bo
         }
     };
     let both = |part: fn(&super::limbs::Arm) -> &Vec<u32>| -> Vec<u32> {
-        body.limbs.arms.iter().flat_map(|a| part(a).iter().copied()).collect()
+        body.limbs
+            .arms
+            .iter()
+            .flat_map(|a| part(a).iter().copied())
+            .collect()
     };
     put(Source::Forearm, &both(|a| &a.forearm), FIT);
     put(Source::Hand, &both(|a| &a.hand), FIT);
@@ -188,18 +209,29 @@ impl Hands {
         let width = area.width as usize;
         let grids = bones.map(|b| {
             let grid = Grid::around(&b?, seen.stage, area)?;
-            grid.pixels().any(|(x, y)| marks[y * width + x] != says::OUTSIDE).then_some(grid)
+            grid.pixels()
+                .any(|(x, y)| marks[y * width + x] != says::OUTSIDE)
+                .then_some(grid)
         });
         report.skipped = grids.iter().filter(|g| g.is_none()).count();
         if report.skipped == grids.len() {
             return report;
         }
         report.looked = grids.len() - report.skipped;
-        let Some(skin) = learn(state, seen, body, &bones) else { return report };
+        let Some(skin) = learn(state, seen, body, &bones) else {
+            return report;
+        };
         report.known = true;
-        let arms = bones.map(|b| b.map(|bones| Bare { bones, bare: bones.bare_from(garments).max(ELBOW) }));
+        let arms = bones.map(|b| {
+            b.map(|bones| Bare {
+                bones,
+                bare: bones.bare_from(garments).max(ELBOW),
+            })
+        });
         for (side, grid) in grids.iter().enumerate() {
-            let (Some(grid), Some(arm), other) = (grid, &arms[side], &arms[1 - side]) else { continue };
+            let (Some(grid), Some(arm), other) = (grid, &arms[side], &arms[1 - side]) else {
+                continue;
+            };
             self.look(grid, arm, other, &skin, seen, area);
             let pixels = self.take(grid, width, seen, marks, &behind);
             report.pixels += pixels;
@@ -211,7 +243,15 @@ impl Hands {
     }
 
     /// Which cells are skin that may belong to the arm.
-    fn look(&mut self, grid: &Grid, arm: &Bare, other: &Option<Bare>, skin: &Skin, seen: &Seen<'_>, area: &Area) {
+    fn look(
+        &mut self,
+        grid: &Grid,
+        arm: &Bare,
+        other: &Option<Bare>,
+        skin: &Skin,
+        seen: &Seen<'_>,
+        area: &Area,
+    ) {
         let bones = &arm.bones;
         let n = grid.size[0] * grid.size[1];
         self.cells.clear();
@@ -220,7 +260,9 @@ impl Hands {
         self.cells.resize(n, NO);
         self.depth.resize(n, 0.0);
         self.far.resize(n, false);
-        let nearest = (bones.elbow.z - FOREARM).min(bones.wrist.z - HAND).max(NEAR);
+        let nearest = (bones.elbow.z - FOREARM)
+            .min(bones.wrist.z - HAND)
+            .max(NEAR);
         let farthest = (bones.elbow.z + FOREARM).max(bones.wrist.z + HAND);
         for (i, (x, y)) in grid.pixels().enumerate() {
             let (u, v) = (area.left + x as u32, area.top + y as u32);
@@ -306,7 +348,11 @@ impl Hands {
             if 2 * front < covered {
                 continue;
             }
-            for (x, y) in self.region.iter().flat_map(|&i| grid.cell_pixels(i as usize)) {
+            for (x, y) in self
+                .region
+                .iter()
+                .flat_map(|&i| grid.cell_pixels(i as usize))
+            {
                 let mark = &mut marks[y * width + x];
                 if *mark != says::OUTSIDE {
                     *mark = says::LIMB;
@@ -322,7 +368,9 @@ impl Hands {
 fn fill(grid: &Grid, width: usize, skin: &Skin, image: &ColorImage, area: &Area, marks: &mut [u8]) {
     for (x, y) in (0..grid.size[0] * grid.size[1]).flat_map(|i| grid.cell_pixels(i)) {
         let mark = &mut marks[y * width + x];
-        if *mark == says::UNKNOWN && !skin.likes(&tone(image.at(area.left + x as u32, area.top + y as u32))) {
+        if *mark == says::UNKNOWN
+            && !skin.likes(&tone(image.at(area.left + x as u32, area.top + y as u32)))
+        {
             *mark = says::GARMENT;
         }
     }
@@ -351,7 +399,12 @@ impl Grid {
         let from = [0, 1].map(|k| clip(lo[k], k));
         let size = [0, 1].map(|k| (clip(hi[k], k) - from[k]) / step);
         let cell = pixel[0] * pixel[1] * (step * step) as f32;
-        (size[0] > 0 && size[1] > 0).then_some(Self { from, size, step, cell })
+        (size[0] > 0 && size[1] > 0).then_some(Self {
+            from,
+            size,
+            step,
+            cell,
+        })
     }
 
     /// The pixel that stands for a cell.
@@ -369,7 +422,10 @@ impl Grid {
 
     /// All pixels of a cell.
     fn cell_pixels(&self, cell: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let (x, y) = (cell % self.size[0] * self.step + self.from[0], cell / self.size[0] * self.step + self.from[1]);
+        let (x, y) = (
+            cell % self.size[0] * self.step + self.from[0],
+            cell / self.size[0] * self.step + self.from[1],
+        );
         let step = self.step;
         (0..step * step).map(move |k| (x + k % step, y + k / step))
     }
@@ -386,20 +442,37 @@ mod tests {
     /// With the limbs of `s`, others, or no body at all.
     fn draw(s: &Scenery, state: &mut State, limbs: Option<&Limbs>) -> (ColorImage, RenderReport) {
         let garments = [s.garment()];
-        let body = limbs.map(|limbs| BodyView { limbs, ..s.body_view() });
-        let input = Input { body, ..s.input(&garments, None) };
+        let body = limbs.map(|limbs| BodyView {
+            limbs,
+            ..s.body_view()
+        });
+        let input = Input {
+            body,
+            ..s.input(&garments, None)
+        };
         render(&Model::default(), state, &input, &mut Workspace::default()).expect("drawn")
     }
 
     #[test]
     fn a_flat_hand_is_in_front_of_a_loose_shirt() {
-        for (own, light) in [(RED, 1.0), (RED, 0.3), ([40, 60, 120], 1.0), ([200, 200, 205], 0.5), ([25, 25, 27], 1.0)]
-        {
+        for (own, light) in [
+            (RED, 1.0),
+            (RED, 0.3),
+            ([40, 60, 120], 1.0),
+            ([200, 200, 205], 0.5),
+            ([25, 25, 27], 1.0),
+        ] {
             let s = Scenery::resting(5, own, SKIN, light);
             let (image, report) = draw(&s, &mut State::default(), Some(&s.limbs));
             let [arm, shirt] = s.mistakes(&image, 2);
-            assert!(report.hands.known && report.hands.pixels > 800, "{own:?} {light}: {report:?}");
-            assert!(arm < 0.02 && shirt < 0.002, "{own:?} {light}: arm {arm}, shirt {shirt}");
+            assert!(
+                report.hands.known && report.hands.pixels > 800,
+                "{own:?} {light}: {report:?}"
+            );
+            assert!(
+                arm < 0.02 && shirt < 0.002,
+                "{own:?} {light}: arm {arm}, shirt {shirt}"
+            );
             // Without the body's parts it is painted over, or this proves nothing.
             let none = Limbs::default();
             let (image, report) = draw(&s, &mut State::default(), Some(&none));
@@ -409,11 +482,18 @@ mod tests {
 
     #[test]
     fn where_colour_cannot_tell_nothing_changes() {
-        let cases = [("own sleeve", RED, RED), ("other sleeve", RED, [60, 70, 120]), ("skin-coloured", SKIN, SKIN)];
+        let cases = [
+            ("own sleeve", RED, RED),
+            ("other sleeve", RED, [60, 70, 120]),
+            ("skin-coloured", SKIN, SKIN),
+        ];
         for (name, own, sleeve) in cases {
             let s = Scenery::resting(6, own, sleeve, 1.0);
             let (image, report) = draw(&s, &mut State::default(), Some(&s.limbs));
-            assert!(!report.hands.known && report.hands.looked == 1, "{name}: {report:?}");
+            assert!(
+                !report.hands.known && report.hands.looked == 1,
+                "{name}: {report:?}"
+            );
             let none = Limbs::default();
             let before = draw(&s, &mut State::default(), Some(&none));
             assert!(image == before.0, "{name}");
@@ -427,7 +507,10 @@ mod tests {
         draw(&s, &mut state, Some(&s.limbs));
         assert_ne!(state, State::default());
         let (_, report) = draw(&s, &mut state, None);
-        assert_eq!((report.hands, state), (HandReport::default(), State::default()));
+        assert_eq!(
+            (report.hands, state),
+            (HandReport::default(), State::default())
+        );
         let first = s.limbs.arms[0].hand[0] as usize;
         s.body.0[first].x = f32::NAN;
         let (_, report) = draw(&s, &mut State::default(), Some(&s.limbs));
@@ -446,8 +529,15 @@ mod tests {
             let (image, report) = draw(&s, &mut state, Some(&s.limbs));
             assert!(report.hands.known);
             let captured = s.frame.color.as_ref().expect("colour");
-            let open: Vec<bool> = image.data().chunks(3).zip(captured.data().chunks(3)).map(|(a, b)| a == b).collect();
-            let arm: Vec<usize> = (0..open.len()).filter(|&i| s.arm[i] && s.shirt_seen[i]).collect();
+            let open: Vec<bool> = image
+                .data()
+                .chunks(3)
+                .zip(captured.data().chunks(3))
+                .map(|(a, b)| a == b)
+                .collect();
+            let arm: Vec<usize> = (0..open.len())
+                .filter(|&i| s.arm[i] && s.shirt_seen[i])
+                .collect();
             if let Some(last) = last.replace(open.clone()) {
                 let flips = arm.iter().filter(|&&i| last[i] != open[i]).count();
                 assert!(flips * 20 < arm.len(), "{flips} of {}", arm.len());
@@ -467,7 +557,9 @@ mod tests {
         let sleeve: Vec<P3> = (0..160)
             .map(|k| {
                 let a = 0.7 * k as f32;
-                bones.elbow + axis * (k as f32 / 160.0 * 0.58) + (side * a.cos() + other * a.sin()) * 0.06
+                bones.elbow
+                    + axis * (k as f32 / 160.0 * 0.58)
+                    + (side * a.cos() + other * a.sin()) * 0.06
             })
             .collect();
         assert_eq!(bones.bare_from(&sleeve), 0.6);
@@ -476,7 +568,11 @@ mod tests {
     #[test]
     fn places_on_the_arm() {
         let at = |x: f32| P3::new(x, 0.0, 2.0);
-        let bones = Bones { elbow: at(0.0), wrist: at(0.25), tip: at(0.45) };
+        let bones = Bones {
+            elbow: at(0.0),
+            wrist: at(0.25),
+            tip: at(0.45),
+        };
         let place = bones.place(&P3::new(0.125, 0.03, 2.0));
         assert!((place.along - 0.5).abs() < 1e-6 && (place.away - 0.03).abs() < 1e-6);
         let place = bones.place(&P3::new(0.35, 0.0, 2.04));

@@ -107,7 +107,10 @@ pub struct Model {
 impl Model {
     /// A model with these settings.
     pub fn new(config: Config) -> Self {
-        Self { config, ..Self::default() }
+        Self {
+            config,
+            ..Self::default()
+        }
     }
 }
 
@@ -190,11 +193,12 @@ const MAX_SIDE: u32 = 8192;
 impl Input<'_> {
     /// Size of the picture.
     pub fn output_size(&self) -> [u32; 2] {
-        self.output.unwrap_or_else(|| match (&self.frame.color, &self.calibration.color) {
-            (Some(c), _) => [c.width(), c.height()],
-            (None, Some(k)) => [k.width, k.height],
-            (None, None) => [self.frame.depth.width(), self.frame.depth.height()],
-        })
+        self.output
+            .unwrap_or_else(|| match (&self.frame.color, &self.calibration.color) {
+                (Some(c), _) => [c.width(), c.height()],
+                (None, Some(k)) => [k.width, k.height],
+                (None, None) => [self.frame.depth.width(), self.frame.depth.height()],
+            })
     }
     /// Checks everything a renderer relies on.
     ///
@@ -206,25 +210,48 @@ impl Input<'_> {
             if usable.contains(&width) && usable.contains(&height) {
                 Ok(())
             } else {
-                Err(RenderError::Size { what, width, height })
+                Err(RenderError::Size {
+                    what,
+                    width,
+                    height,
+                })
             }
         };
         size("output", self.output_size())?;
-        size("depth image", [self.frame.depth.width(), self.frame.depth.height()])?;
+        size(
+            "depth image",
+            [self.frame.depth.width(), self.frame.depth.height()],
+        )?;
         if let Some(c) = &self.frame.color {
             size("colour image", [c.width(), c.height()])?;
         }
         for (garment, g) in self.garments.iter().enumerate() {
             let n = g.vertices.len();
-            for (what, got) in [("texture coordinates", g.uv.len()), ("normals", g.normals.len())] {
+            for (what, got) in [
+                ("texture coordinates", g.uv.len()),
+                ("normals", g.normals.len()),
+            ] {
                 if got != 0 && got != n {
-                    return Err(RenderError::Length { garment, what, got, vertices: n });
+                    return Err(RenderError::Length {
+                        garment,
+                        what,
+                        got,
+                        vertices: n,
+                    });
                 }
             }
-            if let Some(vertex) = g.vertices.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+            if let Some(vertex) = g
+                .vertices
+                .iter()
+                .position(|p| !p.iter().all(|c| c.is_finite()))
+            {
                 return Err(RenderError::NotFinite { garment, vertex });
             }
-            if let Some(face) = g.faces.iter().position(|f| f.iter().any(|&i| i as usize >= n)) {
+            if let Some(face) = g
+                .faces
+                .iter()
+                .position(|f| f.iter().any(|&i| i as usize >= n))
+            {
                 return Err(RenderError::Face { garment, face });
             }
         }

@@ -63,10 +63,16 @@ impl Limbs {
         };
         let rest = template.mesh().vertices();
         let owner = |v: usize| template.weights().dominant(v);
-        let mut out = Self { is_arm: vec![false; rest.len()], ..Self::default() };
+        let mut out = Self {
+            is_arm: vec![false; rest.len()],
+            ..Self::default()
+        };
         for (side, arm) in ["left", "right"].into_iter().zip(&mut out.arms) {
-            let [shoulder, elbow, wrist] = ["shoulder", "elbow", "wrist"].map(|n| index(format!("{side}_{n}")));
-            let (Some(shoulder), Some(elbow), Some(wrist)) = (shoulder, elbow, wrist) else { return Self::default() };
+            let [shoulder, elbow, wrist] =
+                ["shoulder", "elbow", "wrist"].map(|n| index(format!("{side}_{n}")));
+            let (Some(shoulder), Some(elbow), Some(wrist)) = (shoulder, elbow, wrist) else {
+                return Self::default();
+            };
             let mut along = Vec::new();
             let mut reach: f64 = 0.0;
             let (e, w) = (joints[elbow].rest, joints[wrist].rest);
@@ -79,21 +85,35 @@ impl Limbs {
                 let t = (rest[v].cast::<f64>() - e).dot(&axis) / axis.norm_squared();
                 reach = reach.max(t);
                 along.push((v as u32, t));
-                let part = if below(owner(v), wrist) { &mut arm.hand } else { &mut arm.forearm };
+                let part = if below(owner(v), wrist) {
+                    &mut arm.hand
+                } else {
+                    &mut arm.forearm
+                };
                 part.push(v as u32);
             }
             for (ring, at) in arm.rings.iter_mut().zip([0.0, 1.0, reach]) {
-                ring.extend(along.iter().filter(|(_, t)| (t - at).abs() < RING).map(|(v, _)| *v));
+                ring.extend(
+                    along
+                        .iter()
+                        .filter(|(_, t)| (t - at).abs() < RING)
+                        .map(|(v, _)| *v),
+                );
             }
         }
         let head: Vec<u32> = match index("head".into()) {
-            Some(head) => (0..rest.len()).filter(|&v| below(owner(v), head)).map(|v| v as u32).collect(),
+            Some(head) => (0..rest.len())
+                .filter(|&v| below(owner(v), head))
+                .map(|v| v as u32)
+                .collect(),
             None => Vec::new(),
         };
         let extent = |axis: usize| {
             head.iter()
                 .map(|&v| rest[v as usize][axis])
-                .fold([f32::INFINITY, f32::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)])
+                .fold([f32::INFINITY, f32::NEG_INFINITY], |[lo, hi], x| {
+                    [lo.min(x), hi.max(x)]
+                })
         };
         let ([y0, y1], [z0, z1]) = (extent(1), extent(2));
         out.face.extend(head.iter().copied().filter(|&v| {
@@ -101,8 +121,20 @@ impl Limbs {
             let up = (p.y - y0) / (y1 - y0);
             (FACE[0]..FACE[1]).contains(&up) && p.z - z0 > FACE_FRONT * (z1 - z0)
         }));
-        let trunk = ["pelvis", "spine1", "spine2", "spine3", "left_hip", "right_hip"].map(|n| index(n.into()));
-        out.trunk.extend((0..rest.len()).filter(|&v| trunk.contains(&Some(owner(v)))).map(|v| v as u32));
+        let trunk = [
+            "pelvis",
+            "spine1",
+            "spine2",
+            "spine3",
+            "left_hip",
+            "right_hip",
+        ]
+        .map(|n| index(n.into()));
+        out.trunk.extend(
+            (0..rest.len())
+                .filter(|&v| trunk.contains(&Some(owner(v))))
+                .map(|v| v as u32),
+        );
         out
     }
 
@@ -120,14 +152,23 @@ impl Limbs {
 #[cfg(test)]
 impl Limbs {
     pub(super) fn new(arms: [Arm; 2], face: Vec<u32>, trunk: Vec<u32>, is_arm: Vec<bool>) -> Self {
-        Self { arms, face, trunk, is_arm }
+        Self {
+            arms,
+            face,
+            trunk,
+            is_arm,
+        }
     }
 }
 
 #[cfg(test)]
 impl Arm {
     pub(super) fn new(forearm: Vec<u32>, hand: Vec<u32>, rings: [Vec<u32>; 3]) -> Self {
-        Self { forearm, hand, rings }
+        Self {
+            forearm,
+            hand,
+            rings,
+        }
     }
 }
 
@@ -140,7 +181,11 @@ impl Arm {
             p.iter().all(|c| c.is_finite()).then_some(p)
         };
         let [elbow, wrist, tip] = self.rings.each_ref().map(|r| middle(r));
-        Some(Bones { elbow: elbow?, wrist: wrist?, tip: tip? })
+        Some(Bones {
+            elbow: elbow?,
+            wrist: wrist?,
+            tip: tip?,
+        })
     }
 }
 
@@ -155,14 +200,26 @@ impl Bones {
         };
         let (s, ds) = along(&self.elbow, &self.wrist, 1.0);
         let (t, dt) = along(&self.wrist, &self.tip, 1.0);
-        if dt <= ds { Place { along: 1.0 + t, away: dt.sqrt() } } else { Place { along: s, away: ds.sqrt() } }
+        if dt <= ds {
+            Place {
+                along: 1.0 + t,
+                away: dt.sqrt(),
+            }
+        } else {
+            Place {
+                along: s,
+                away: ds.sqrt(),
+            }
+        }
     }
 
     /// From where on the arm is bare: 0 the whole forearm, 1 the hand only. A sleeve goes round the arm; a shirt that
     /// an arm lies on is on one side of it.
     pub(super) fn bare_from(&self, garments: &[P3]) -> f32 {
         let axis = (self.wrist - self.elbow).normalize();
-        let side = axis.cross(&if axis.x.abs() < 0.6 { V3::x() } else { V3::y() }).normalize();
+        let side = axis
+            .cross(&if axis.x.abs() < 0.6 { V3::x() } else { V3::y() })
+            .normalize();
         let other = axis.cross(&side);
         let mut seen = [0u8; SLICES];
         for p in garments {
@@ -170,7 +227,9 @@ impl Bones {
             let t = d.dot(&axis) / (self.wrist - self.elbow).norm();
             let (x, y) = (d.dot(&side), d.dot(&other));
             if (0.0..1.0).contains(&t) && x * x + y * y < SLEEVE * SLEEVE {
-                let octant = usize::from(x < 0.0) * 4 + usize::from(y < 0.0) * 2 + usize::from(x.abs() < y.abs());
+                let octant = usize::from(x < 0.0) * 4
+                    + usize::from(y < 0.0) * 2
+                    + usize::from(x.abs() < y.abs());
                 seen[(t * SLICES as f32) as usize] |= 1 << octant;
             }
         }

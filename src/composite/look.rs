@@ -50,14 +50,23 @@ pub enum Print {
 
 impl Default for Look {
     fn default() -> Self {
-        Self { base: [52, 92, 150], pattern: Print::Solid, roughness: 0.8, metres_per_uv: 1.0 }
+        Self {
+            base: [52, 92, 150],
+            pattern: Print::Solid,
+            roughness: 0.8,
+            metres_per_uv: 1.0,
+        }
     }
 }
 
 /// sRGB byte to linear light (IEC 61966-2-1).
 pub(crate) fn linear(c: u8) -> f32 {
     let c = f32::from(c) / 255.0;
-    if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+    if c <= 0.040_45 {
+        c / 12.92
+    } else {
+        ((c + 0.055) / 1.055).powf(2.4)
+    }
 }
 
 /// Linear light to sRGB, 0 to 255, by table: 4096 steps leave less than half a byte of error above black.
@@ -66,9 +75,20 @@ pub(crate) struct ToSrgb(Vec<f32>);
 
 impl Default for ToSrgb {
     fn default() -> Self {
-        let encode = |l: f32| 255.0 * if l <= 0.003_130_8 { 12.92 * l } else { 1.055 * l.powf(1.0 / 2.4) - 0.055 };
+        let encode = |l: f32| {
+            255.0
+                * if l <= 0.003_130_8 {
+                    12.92 * l
+                } else {
+                    1.055 * l.powf(1.0 / 2.4) - 0.055
+                }
+        };
         // Indexed by the square root of the light, so that dark tones get as many steps as bright ones.
-        Self((0..=4096).map(|i| encode((i as f32 / 4096.0).powi(2))).collect())
+        Self(
+            (0..=4096)
+                .map(|i| encode((i as f32 / 4096.0).powi(2)))
+                .collect(),
+        )
     }
 }
 
@@ -118,7 +138,9 @@ impl Fabric {
     /// averaged over the pixel, so they fade instead of shimmering.
     #[inline]
     pub(crate) fn albedo(&self, uv: [f32; 2], footprint: f32) -> [f32; 3] {
-        let mix = |t: f32| -> [f32; 3] { std::array::from_fn(|k| self.base[k] + (self.other[k] - self.base[k]) * t) };
+        let mix = |t: f32| -> [f32; 3] {
+            std::array::from_fn(|k| self.base[k] + (self.other[k] - self.base[k]) * t)
+        };
         let at = |k: usize, period: f32| uv[k] * self.metres_per_uv / period;
         match self.print {
             Print::Solid => self.base,
@@ -137,11 +159,16 @@ impl Fabric {
                 let slant = ((x - x.floor()) - 0.5).abs();
                 let s = y + slant;
                 let ridge = 1.0 - 2.0 * ((s - s.floor()) - 0.5).abs();
-                let groove = 1.0 - 0.35 * visible * (1.0 - ridge) - 0.2 * visible * (2.0 * slant).powi(4);
+                let groove =
+                    1.0 - 0.35 * visible * (1.0 - ridge) - 0.2 * visible * (2.0 * slant).powi(4);
                 self.base.map(|c| c * groove)
             }
             Print::Scale { .. } => {
-                let (to, t) = if uv[0] < 0.0 { (&self.low, -uv[0]) } else { (&self.other, uv[0]) };
+                let (to, t) = if uv[0] < 0.0 {
+                    (&self.low, -uv[0])
+                } else {
+                    (&self.other, uv[0])
+                };
                 std::array::from_fn(|k| self.base[k] + (to[k] - self.base[k]) * t.min(1.0))
             }
         }
@@ -163,16 +190,29 @@ mod tests {
     #[test]
     fn a_scale_goes_from_low_over_the_base_to_high() {
         let (low, high) = ([0, 0, 255], [255, 0, 0]);
-        let look = Look { pattern: Print::Scale { low, high }, base: [0, 255, 0], ..Look::default() };
+        let look = Look {
+            pattern: Print::Scale { low, high },
+            base: [0, 255, 0],
+            ..Look::default()
+        };
         let fabric = Fabric::new(&look);
         let at = |u: f32| fabric.albedo([u, 0.3], 0.01);
-        assert_eq!((at(-1.0), at(0.0), at(1.0)), ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]));
+        assert_eq!(
+            (at(-1.0), at(0.0), at(1.0)),
+            ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
+        );
         assert_eq!((at(-7.0), at(0.5)), ([0.0, 0.0, 1.0], [0.5, 0.5, 0.0]));
     }
 
     #[test]
     fn a_pattern_averages_instead_of_shimmering() {
-        let look = Look { pattern: Print::Stripes { color: [255, 255, 255], period: 0.02 }, ..Look::default() };
+        let look = Look {
+            pattern: Print::Stripes {
+                color: [255, 255, 255],
+                period: 0.02,
+            },
+            ..Look::default()
+        };
         let fabric = Fabric::new(&look);
         let near = |v: f32| fabric.albedo([0.0, v], 1e-5);
         for k in 0..3 {

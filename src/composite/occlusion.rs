@@ -31,7 +31,15 @@ pub struct Margins {
 
 impl Default for Margins {
     fn default() -> Self {
-        Self { plain: 0.012, limb: 0.004, covered: 0.035, inner: 0.004, clear: 0.012, step: 0.012, patch: 6e-4 }
+        Self {
+            plain: 0.012,
+            limb: 0.004,
+            covered: 0.035,
+            inner: 0.004,
+            clear: 0.012,
+            step: 0.012,
+            patch: 6e-4,
+        }
     }
 }
 
@@ -84,7 +92,11 @@ pub(crate) fn evidence(m: &Margins, s: &Seen) -> u8 {
     let limb = s.body < s.garment - LIMB_GAP;
     if s.captured <= 0.0 {
         // The far side of a sleeve's end lies behind the tracked arm and beside the real one: colours decide there.
-        return if limb && !s.inner { says::LIMB } else { says::UNKNOWN };
+        return if limb && !s.inner {
+            says::LIMB
+        } else {
+            says::UNKNOWN
+        };
     }
     let margin = if s.inner {
         m.inner
@@ -150,7 +162,14 @@ impl Matte {
 
     /// Removes connected patches of front pixels that are too small, nowhere clearly in front, or that run smoothly
     /// into what the garment covers: an arm ends in a step of depth, a bulging belly does not.
-    fn drop_specks(&mut self, width: usize, smallest: usize, step: usize, jump: f32, depth: &[f32]) -> usize {
+    fn drop_specks(
+        &mut self,
+        width: usize,
+        smallest: usize,
+        step: usize,
+        jump: f32,
+        depth: &[f32],
+    ) -> usize {
         let n = self.says.len();
         self.visited.clear();
         self.visited.resize(n, false);
@@ -177,7 +196,11 @@ impl Matte {
                     i.checked_sub(width),
                     (i + width < n).then(|| i + width),
                 ];
-                for (side, j) in beside.into_iter().enumerate().filter_map(|(s, j)| Some((s, j?))) {
+                for (side, j) in beside
+                    .into_iter()
+                    .enumerate()
+                    .filter_map(|(s, j)| Some((s, j?)))
+                {
                     if self.says[j] == says::GARMENT {
                         // Compare a little away from the edge on both sides: the sensor blurs it.
                         let away = if side < 2 { step } else { step * width };
@@ -186,11 +209,14 @@ impl Matte {
                         } else {
                             (j.checked_add(away), i.checked_sub(away))
                         };
-                        let at = |k: Option<usize>| k.and_then(|k| depth.get(k)).copied().unwrap_or(0.0);
+                        let at =
+                            |k: Option<usize>| k.and_then(|k| depth.get(k)).copied().unwrap_or(0.0);
                         let (behind, front) = (at(out), at(inward));
                         edges += 1;
                         // No reading beside the edge is the shadow that a step throws.
-                        steps += usize::from(behind == 0.0 || (front > 0.0 && behind - front > jump + noise(behind)));
+                        steps += usize::from(
+                            behind == 0.0 || (front > 0.0 && behind - front > jump + noise(behind)),
+                        );
                     }
                     if self.says[j] >= says::FRONT && !self.visited[j] {
                         self.visited[j] = true;
@@ -198,7 +224,8 @@ impl Matte {
                     }
                 }
             }
-            let smooth = (steps as f32) < SMOOTH_SHARE * edges as f32 && 3 * limb < self.patch.len();
+            let smooth =
+                (steps as f32) < SMOOTH_SHARE * edges as f32 && 3 * limb < self.patch.len();
             if !clear || smooth || self.patch.len() < smallest {
                 dropped += self.patch.len();
                 for &i in &self.patch {
@@ -215,7 +242,9 @@ impl Matte {
         let step = if radius > DENSE_RADIUS { 2 } else { 1 };
         let (width, height) = (area.width as i32, area.height as i32);
         let says = &self.says;
-        let table: Vec<f32> = (0..=765).map(|d| (-(d as f32 / COLOR_SCALE).powi(2)).exp()).collect();
+        let table: Vec<f32> = (0..=765)
+            .map(|d| (-(d as f32 / COLOR_SCALE).powi(2)).exp())
+            .collect();
         let any_front = says.iter().any(|s| *s >= says::FRONT);
         self.alpha.clear();
         self.alpha.resize(says.len(), 0.0);
@@ -223,61 +252,80 @@ impl Matte {
             return;
         }
         let color = |x: i32, y: i32| {
-            let i = 3 * ((y + area.top as i32) as usize * guide.width() as usize + (x + area.left as i32) as usize);
+            let i = 3
+                * ((y + area.top as i32) as usize * guide.width() as usize
+                    + (x + area.left as i32) as usize);
             let c = &guide.data()[i..i + 3];
             [i32::from(c[0]), i32::from(c[1]), i32::from(c[2])]
         };
-        par::for_chunks(par, &mut self.alpha, area.width as usize * 8, |start, chunk| {
-            for (k, alpha) in chunk.iter_mut().enumerate() {
-                let i = start + k;
-                if says[i] == says::OUTSIDE {
-                    continue;
-                }
-                let (x, y) = (i as i32 % width, i as i32 / width);
-                // Corners and centre of the window first: most windows agree, and then that is the answer.
-                let at = |dx: i32, dy: i32| {
-                    let (u, v) = ((x + dx).clamp(0, width - 1), (y + dy).clamp(0, height - 1));
-                    says[(v * width + u) as usize]
-                };
-                let (mut front, mut garment) = (false, false);
-                for (dx, dy) in [(0, 0), (-1, -1), (1, -1), (-1, 1), (1, 1), (0, -1), (0, 1), (-1, 0), (1, 0)] {
-                    let s = at(dx * radius, dy * radius);
-                    front |= s >= says::FRONT;
-                    garment |= s == says::GARMENT;
-                }
-                if !(front && (garment || says[i] == says::UNKNOWN)) {
-                    *alpha = if says[i] >= says::FRONT { 1.0 } else { 0.0 };
-                    continue;
-                }
-                let here = color(x, y);
-                let (mut sum, mut total) = (0.0, 0.0);
-                let mut dy = -radius;
-                while dy <= radius {
-                    let mut dx = -radius;
-                    while dx <= radius {
-                        let (u, v) = (x + dx, y + dy);
-                        dx += step;
-                        if u < 0 || v < 0 || u >= width || v >= height {
-                            continue;
-                        }
-                        let s = says[(v * width + u) as usize];
-                        if s < says::GARMENT {
-                            continue;
-                        }
-                        let c = color(u, v);
-                        let d = (c[0] - here[0]).abs() + (c[1] - here[1]).abs() + (c[2] - here[2]).abs();
-                        let w = table[d as usize];
-                        total += w;
-                        if s >= says::FRONT {
-                            sum += w;
-                        }
+        par::for_chunks(
+            par,
+            &mut self.alpha,
+            area.width as usize * 8,
+            |start, chunk| {
+                for (k, alpha) in chunk.iter_mut().enumerate() {
+                    let i = start + k;
+                    if says[i] == says::OUTSIDE {
+                        continue;
                     }
-                    dy += step;
+                    let (x, y) = (i as i32 % width, i as i32 / width);
+                    // Corners and centre of the window first: most windows agree, and then that is the answer.
+                    let at = |dx: i32, dy: i32| {
+                        let (u, v) = ((x + dx).clamp(0, width - 1), (y + dy).clamp(0, height - 1));
+                        says[(v * width + u) as usize]
+                    };
+                    let (mut front, mut garment) = (false, false);
+                    for (dx, dy) in [
+                        (0, 0),
+                        (-1, -1),
+                        (1, -1),
+                        (-1, 1),
+                        (1, 1),
+                        (0, -1),
+                        (0, 1),
+                        (-1, 0),
+                        (1, 0),
+                    ] {
+                        let s = at(dx * radius, dy * radius);
+                        front |= s >= says::FRONT;
+                        garment |= s == says::GARMENT;
+                    }
+                    if !(front && (garment || says[i] == says::UNKNOWN)) {
+                        *alpha = if says[i] >= says::FRONT { 1.0 } else { 0.0 };
+                        continue;
+                    }
+                    let here = color(x, y);
+                    let (mut sum, mut total) = (0.0, 0.0);
+                    let mut dy = -radius;
+                    while dy <= radius {
+                        let mut dx = -radius;
+                        while dx <= radius {
+                            let (u, v) = (x + dx, y + dy);
+                            dx += step;
+                            if u < 0 || v < 0 || u >= width || v >= height {
+                                continue;
+                            }
+                            let s = says[(v * width + u) as usize];
+                            if s < says::GARMENT {
+                                continue;
+                            }
+                            let c = color(u, v);
+                            let d = (c[0] - here[0]).abs()
+                                + (c[1] - here[1]).abs()
+                                + (c[2] - here[2]).abs();
+                            let w = table[d as usize];
+                            total += w;
+                            if s >= says::FRONT {
+                                sum += w;
+                            }
+                        }
+                        dy += step;
+                    }
+                    // Sharpened: half-way votes are edges, not half-transparent arms.
+                    let t: f32 = if total > 0.0 { sum / total } else { 0.0 };
+                    *alpha = ((t - 0.25) * 2.0).clamp(0.0, 1.0);
                 }
-                // Sharpened: half-way votes are edges, not half-transparent arms.
-                let t: f32 = if total > 0.0 { sum / total } else { 0.0 };
-                *alpha = ((t - 0.25) * 2.0).clamp(0.0, 1.0);
-            }
-        });
+            },
+        );
     }
 }

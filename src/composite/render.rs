@@ -61,10 +61,14 @@ pub fn render(
     let config = &model.config;
     state.keep_if(input.body.is_some());
     let mut scene = Scene::begin(model, input, work)?;
-    let Some(area) = scene.area else { return Ok(scene.end(work)) };
+    let Some(area) = scene.area else {
+        return Ok(scene.end(work));
+    };
     let samples = config.samples.clamp(1, 4);
     scene.report.faces_hidden = work.surface.rasterise(config, &scene.stage, &area, samples);
-    work.surface.seen.reset(work.surface.faces.len(), !config.skip_unseen);
+    work.surface
+        .seen
+        .reset(work.surface.faces.len(), !config.skip_unseen);
     resolve(config.par, &work.surface, &area, samples, &mut work.pixels);
     scene.report.garments_hidden = work.surface.garments_hidden();
     scene.lap("garments");
@@ -72,9 +76,23 @@ pub fn render(
     scene.lap("normals");
 
     let look_up = scene.judge(model, state, input, work, &area);
-    let shader =
-        Shader::new(&work.surface, scene.stage.camera, &model.to_srgb, &config.lights, scene.report.brightness);
-    blend(config.par, &shader, work, &area, samples, config.lights.contact, &look_up, &mut scene.image);
+    let shader = Shader::new(
+        &work.surface,
+        scene.stage.camera,
+        &model.to_srgb,
+        &config.lights,
+        scene.report.brightness,
+    );
+    blend(
+        config.par,
+        &shader,
+        work,
+        &area,
+        samples,
+        config.lights.contact,
+        &look_up,
+        &mut scene.image,
+    );
     scene.lap("shading");
     Ok(scene.end(work))
 }
@@ -95,7 +113,11 @@ pub(crate) struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    pub(crate) fn begin(model: &Model, input: &Input<'a>, work: &mut Workspace) -> Result<Self, RenderError> {
+    pub(crate) fn begin(
+        model: &Model,
+        input: &Input<'a>,
+        work: &mut Workspace,
+    ) -> Result<Self, RenderError> {
         input.check()?;
         let clock = Instant::now();
         let config = &model.config;
@@ -103,7 +125,10 @@ impl<'a> Scene<'a> {
         let mut scene = Self {
             image: captured(config.par, input, &stage),
             depth: depth_from_picture(input, &stage),
-            report: RenderReport { brightness: brightness(input), ..RenderReport::default() },
+            report: RenderReport {
+                brightness: brightness(input),
+                ..RenderReport::default()
+            },
             area: None,
             reach: 0.0,
             samples: config.samples.clamp(1, 4),
@@ -118,7 +143,9 @@ impl<'a> Scene<'a> {
     }
 
     pub(crate) fn lap(&mut self, stage: &'static str) {
-        self.report.stages_ms.push((stage, self.clock.elapsed().as_secs_f32() * 1e3));
+        self.report
+            .stages_ms
+            .push((stage, self.clock.elapsed().as_secs_f32() * 1e3));
         self.clock = Instant::now();
     }
 
@@ -132,7 +159,14 @@ impl<'a> Scene<'a> {
         area: &Area,
     ) -> DepthLookUp {
         let config = &model.config;
-        let tracked = draw_body(config.par, input, &self.stage, area, &mut work.body, &mut work.body_vertices);
+        let tracked = draw_body(
+            config.par,
+            input,
+            &self.stage,
+            area,
+            &mut work.body,
+            &mut work.body_vertices,
+        );
         let look_up = DepthLookUp::new(&self.stage, area, &self.depth);
         collect_evidence(model, work, area, &look_up, tracked);
         self.lap("evidence");
@@ -151,30 +185,72 @@ impl<'a> Scene<'a> {
         );
         self.lap("visibility");
         let full = 1.0 / (self.samples * self.samples) as f32;
-        let covered = work.pixels.iter().map(|p| [f32::from(p.covered) * full, p.depth]);
-        work.shade.cast(covered, &work.matte.alpha, area, self.reach);
+        let covered = work
+            .pixels
+            .iter()
+            .map(|p| [f32::from(p.covered) * full, p.depth]);
+        work.shade
+            .cast(covered, &work.matte.alpha, area, self.reach);
         self.lap("shadows");
         look_up
     }
 
     /// Bare hands and forearms in front of loose cloth, by their colour.
-    fn find_hands(&self, state: &mut State, input: &Input<'_>, work: &mut Workspace, area: &Area) -> HandReport {
-        let (Some(body), Some(_)) = (input.body, &input.frame.color) else { return HandReport::default() };
-        let vertices = if input.calibration.color.is_some() { &work.body_vertices } else { body.vertices };
-        let seen = hand::Seen { stage: &self.stage, image: &self.image, depth: &self.depth };
+    fn find_hands(
+        &self,
+        state: &mut State,
+        input: &Input<'_>,
+        work: &mut Workspace,
+        area: &Area,
+    ) -> HandReport {
+        let (Some(body), Some(_)) = (input.body, &input.frame.color) else {
+            return HandReport::default();
+        };
+        let vertices = if input.calibration.color.is_some() {
+            &work.body_vertices
+        } else {
+            body.vertices
+        };
+        let seen = hand::Seen {
+            stage: &self.stage,
+            image: &self.image,
+            depth: &self.depth,
+        };
         let (pixels, drawn, width) = (&work.pixels, &work.body, area.width as usize);
         let behind = |x: usize, y: usize| {
             let at = y / BODY_STEP as usize * drawn.width as usize + x / BODY_STEP as usize;
-            let trunk = body.faces.get(drawn.face[at] as usize).is_some_and(|f| !body.limbs.is_arm(f[0]));
-            let trunk = if trunk { drawn.depth[at] } else { f32::INFINITY };
-            Behind { garment: pixels[y * width + x].depth, trunk }
+            let trunk = body
+                .faces
+                .get(drawn.face[at] as usize)
+                .is_some_and(|f| !body.limbs.is_arm(f[0]));
+            let trunk = if trunk {
+                drawn.depth[at]
+            } else {
+                f32::INFINITY
+            };
+            Behind {
+                garment: pixels[y * width + x].depth,
+                trunk,
+            }
         };
-        let body = hand::Body { limbs: body.limbs, vertices };
-        work.hands.mark(state, &seen, &body, &work.surface.vertices, area, &mut work.matte.says, behind)
+        let body = hand::Body {
+            limbs: body.limbs,
+            vertices,
+        };
+        work.hands.mark(
+            state,
+            &seen,
+            &body,
+            &work.surface.vertices,
+            area,
+            &mut work.matte.says,
+            behind,
+        )
     }
 
     pub(crate) fn end(mut self, work: &Workspace) -> (ColorImage, RenderReport) {
-        let tiles = (self.stage.camera.width.div_ceil(TILE) * self.stage.camera.height.div_ceil(TILE)) as usize;
+        let tiles = (self.stage.camera.width.div_ceil(TILE)
+            * self.stage.camera.height.div_ceil(TILE)) as usize;
         match &self.area {
             Some(area) => count(work, area, self.samples, tiles, &mut self.report),
             None => self.report.tiles_skipped = tiles,
@@ -195,11 +271,19 @@ fn resolve(par: Par, surface: &Surface, area: &Area, n: u32, out: &mut Vec<Pixel
         for (k, row) in chunk.chunks_mut(width).enumerate() {
             let y = start / width + k;
             for (x, pixel) in row.iter_mut().enumerate() {
-                let mut p = Pixel { depth: f32::INFINITY, face: u32::MAX, covered: 0, simple: true };
+                let mut p = Pixel {
+                    depth: f32::INFINITY,
+                    face: u32::MAX,
+                    covered: 0,
+                    simple: true,
+                };
                 let first = y * n as usize * stride + x * n as usize;
                 let id = samples.face[first];
-                if (0..n as usize).all(|sy| samples.face[first + sy * stride..][..n as usize].iter().all(|f| *f == id))
-                {
+                if (0..n as usize).all(|sy| {
+                    samples.face[first + sy * stride..][..n as usize]
+                        .iter()
+                        .all(|f| *f == id)
+                }) {
                     if id != VisibilityBuffer::NONE {
                         if id != last {
                             surface.seen.set(id);
@@ -218,18 +302,23 @@ fn resolve(par: Par, surface: &Surface, area: &Area, n: u32, out: &mut Vec<Pixel
                 let mut far = 0f32;
                 for sy in 0..n as usize {
                     let at = (y * n as usize + sy) * stride + x * n as usize;
-                    for (d, f) in samples.depth[at..at + n as usize].iter().zip(&samples.face[at..]) {
+                    for (d, f) in samples.depth[at..at + n as usize]
+                        .iter()
+                        .zip(&samples.face[at..])
+                    {
                         if *f != VisibilityBuffer::NONE {
                             surface.seen.set(*f);
                             p.covered += 1;
                             far = far.max(*d);
                             if *d < p.depth {
                                 if p.face != u32::MAX {
-                                    p.simple &= surface.garment[p.face as usize] == surface.garment[*f as usize];
+                                    p.simple &= surface.garment[p.face as usize]
+                                        == surface.garment[*f as usize];
                                 }
                                 (p.depth, p.face) = (*d, *f);
                             } else {
-                                p.simple &= surface.garment[p.face as usize] == surface.garment[*f as usize];
+                                p.simple &= surface.garment[p.face as usize]
+                                    == surface.garment[*f as usize];
                             }
                         }
                     }
@@ -255,15 +344,33 @@ fn draw_body(
     let Some(body) = input.body else { return false };
     let vertices = match input.calibration.color {
         Some(_) => {
-            input.calibration.color_from_depth.points_f32(body.vertices, moved);
+            input
+                .calibration
+                .color_from_depth
+                .points_f32(body.vertices, moved);
             &moved[..]
         }
         None => body.vertices,
     };
-    let crate::raster::View::Perspective { camera, near } = part_of(stage, area, 1) else { return false };
-    let camera = camera.resized(area.width.div_ceil(BODY_STEP), area.height.div_ceil(BODY_STEP));
+    let crate::raster::View::Perspective { camera, near } = part_of(stage, area, 1) else {
+        return false;
+    };
+    let camera = camera.resized(
+        area.width.div_ceil(BODY_STEP),
+        area.height.div_ceil(BODY_STEP),
+    );
     let view = crate::raster::View::Perspective { camera, near };
-    rasterise_with(Options { par, cull: Cull::Back, ..Options::default() }, &view, vertices, body.faces, out);
+    rasterise_with(
+        Options {
+            par,
+            cull: Cull::Back,
+            ..Options::default()
+        },
+        &view,
+        vertices,
+        body.faces,
+        out,
+    );
     true
 }
 
@@ -276,18 +383,27 @@ pub(crate) struct DepthLookUp {
 impl DepthLookUp {
     fn new(stage: &Stage, area: &Area, depth: &[u16]) -> Self {
         let width = stage.depth[0] as usize;
-        let columns: Vec<Option<u32>> = (0..area.width).map(|x| stage.depth_at(0, area.left + x)).collect();
+        let columns: Vec<Option<u32>> = (0..area.width)
+            .map(|x| stage.depth_at(0, area.left + x))
+            .collect();
         let mut metres = Vec::with_capacity(area.len());
         for y in 0..area.height {
             match stage.depth_at(1, area.top + y) {
                 Some(v) => {
                     let row = &depth[v as usize * width..(v as usize + 1) * width];
-                    metres.extend(columns.iter().map(|c| c.map_or(0.0, |c| f32::from(row[c as usize]) * 1e-3)));
+                    metres.extend(
+                        columns
+                            .iter()
+                            .map(|c| c.map_or(0.0, |c| f32::from(row[c as usize]) * 1e-3)),
+                    );
                 }
                 None => metres.resize(metres.len() + area.width as usize, 0.0),
             }
         }
-        Self { metres, width: area.width as usize }
+        Self {
+            metres,
+            width: area.width as usize,
+        }
     }
     #[inline]
     fn at(&self, x: usize, y: usize) -> f32 {
@@ -295,20 +411,45 @@ impl DepthLookUp {
     }
 }
 
-fn collect_evidence(model: &Model, work: &mut Workspace, area: &Area, depth: &DepthLookUp, tracked: bool) {
+fn collect_evidence(
+    model: &Model,
+    work: &mut Workspace,
+    area: &Area,
+    depth: &DepthLookUp,
+    tracked: bool,
+) {
     let width = area.width as usize;
     let (pixels, surface, body) = (&work.pixels, &work.surface, &work.body);
-    par::map_into(model.config.par, pixels.len(), width * ROWS, &mut work.matte.says, |i| {
-        let p = &pixels[i];
-        if p.covered == 0 {
-            return says::OUTSIDE;
-        }
-        let (x, y) = (i % width, i / width);
-        let step = BODY_STEP as usize;
-        let body = if tracked { body.depth[y / step * body.width as usize + x / step] } else { f32::INFINITY };
-        let inner = surface.inner[p.face as usize];
-        evidence(&model.config.margins, &Seen { garment: p.depth, inner, captured: depth.at(x, y), body, tracked })
-    });
+    par::map_into(
+        model.config.par,
+        pixels.len(),
+        width * ROWS,
+        &mut work.matte.says,
+        |i| {
+            let p = &pixels[i];
+            if p.covered == 0 {
+                return says::OUTSIDE;
+            }
+            let (x, y) = (i % width, i / width);
+            let step = BODY_STEP as usize;
+            let body = if tracked {
+                body.depth[y / step * body.width as usize + x / step]
+            } else {
+                f32::INFINITY
+            };
+            let inner = surface.inner[p.face as usize];
+            evidence(
+                &model.config.margins,
+                &Seen {
+                    garment: p.depth,
+                    inner,
+                    captured: depth.at(x, y),
+                    body,
+                    tracked,
+                },
+            )
+        },
+    );
 }
 
 /// Pass two: garments over the captured picture, by coverage and visibility.
@@ -328,36 +469,45 @@ fn blend(
     let full = 1.0 / (n * n) as f32;
     let first = area.top as usize * row_bytes;
     let last = first + area.height as usize * row_bytes;
-    par::for_chunks(par, &mut image.data_mut()[first..last], row_bytes * ROWS, |start, chunk| {
-        let mut cache = Cache::default();
-        for (k, row) in chunk.chunks_mut(row_bytes).enumerate() {
-            let y = start / row_bytes + k;
-            let row = &mut row[3 * area.left as usize..3 * (area.left as usize + width)];
-            for (x, out) in row.chunks_exact_mut(3).enumerate() {
-                let i = y * width + x;
-                let p = &work.pixels[i];
-                if p.covered == 0 && work.shade.is_far(x, y) {
-                    continue;
-                }
-                let around = work.shade.at(x, y);
-                let cover = f32::from(p.covered) * full * (1.0 - work.matte.alpha[i]);
-                let mut behind = [f32::from(out[0]), f32::from(out[1]), f32::from(out[2])];
-                if cover < 1.0 {
-                    let dark = around.on_captured(contact, depth.at(x, y), work.matte.alpha[i]);
-                    behind = behind.map(|c| c * dark);
-                }
-                let mut color = [0.0; 3];
-                if cover > 0.0 {
-                    let shadow = contact * around.front;
-                    let (u, v) = ((area.left as usize + x) as f32, (area.top as usize + y) as f32);
-                    color = garment_color(shader, &mut cache, p, [x, y], [u, v], n, width, shadow);
-                }
-                for c in 0..3 {
-                    out[c] = (behind[c] + (color[c] - behind[c]) * cover + 0.5) as u8;
+    par::for_chunks(
+        par,
+        &mut image.data_mut()[first..last],
+        row_bytes * ROWS,
+        |start, chunk| {
+            let mut cache = Cache::default();
+            for (k, row) in chunk.chunks_mut(row_bytes).enumerate() {
+                let y = start / row_bytes + k;
+                let row = &mut row[3 * area.left as usize..3 * (area.left as usize + width)];
+                for (x, out) in row.chunks_exact_mut(3).enumerate() {
+                    let i = y * width + x;
+                    let p = &work.pixels[i];
+                    if p.covered == 0 && work.shade.is_far(x, y) {
+                        continue;
+                    }
+                    let around = work.shade.at(x, y);
+                    let cover = f32::from(p.covered) * full * (1.0 - work.matte.alpha[i]);
+                    let mut behind = [f32::from(out[0]), f32::from(out[1]), f32::from(out[2])];
+                    if cover < 1.0 {
+                        let dark = around.on_captured(contact, depth.at(x, y), work.matte.alpha[i]);
+                        behind = behind.map(|c| c * dark);
+                    }
+                    let mut color = [0.0; 3];
+                    if cover > 0.0 {
+                        let shadow = contact * around.front;
+                        let (u, v) = (
+                            (area.left as usize + x) as f32,
+                            (area.top as usize + y) as f32,
+                        );
+                        color =
+                            garment_color(shader, &mut cache, p, [x, y], [u, v], n, width, shadow);
+                    }
+                    for c in 0..3 {
+                        out[c] = (behind[c] + (color[c] - behind[c]) * cover + 0.5) as u8;
+                    }
                 }
             }
-        }
-    });
+        },
+    );
 }
 
 /// Mean sRGB of the garment samples of a pixel.
@@ -431,16 +581,39 @@ mod tests {
                 if !body {
                     input.body = None;
                 }
-                let (image, report) =
-                    render(&Model::default(), &mut State::default(), &input, &mut Workspace::default()).expect("drawn");
+                let (image, report) = render(
+                    &Model::default(),
+                    &mut State::default(),
+                    &input,
+                    &mut Workspace::default(),
+                )
+                .expect("drawn");
                 let [arm, shirt] = s.mistakes(&image, 3);
-                assert!(arm < 0.01 && shirt < 0.001, "body {body}: arm {arm}, shirt {shirt}, {report:?}");
+                assert!(
+                    arm < 0.01 && shirt < 0.001,
+                    "body {body}: arm {arm}, shirt {shirt}, {report:?}"
+                );
                 // What the plain test makes of it: the oracle must see holes, or this test proves nothing.
-                let plain =
-                    Margins { plain: 0.0, limb: 0.0, covered: 0.0, inner: 0.0, clear: 0.0, step: 0.0, patch: 0.0 };
-                let naive = Model::new(Config { margins: plain, ..Config::default() });
-                let (image, _) =
-                    render(&naive, &mut State::default(), &input, &mut Workspace::default()).expect("drawn");
+                let plain = Margins {
+                    plain: 0.0,
+                    limb: 0.0,
+                    covered: 0.0,
+                    inner: 0.0,
+                    clear: 0.0,
+                    step: 0.0,
+                    patch: 0.0,
+                };
+                let naive = Model::new(Config {
+                    margins: plain,
+                    ..Config::default()
+                });
+                let (image, _) = render(
+                    &naive,
+                    &mut State::default(),
+                    &input,
+                    &mut Workspace::default(),
+                )
+                .expect("drawn");
                 assert!(s.mistakes(&image, 3)[1] > 0.01);
             }
         }
@@ -451,21 +624,39 @@ mod tests {
         let s = Scenery::new(320, 240, 3);
         let captured = s.frame.color.as_ref().expect("colour");
         let none = s.input(&[], None);
-        let (image, report) =
-            render(&Model::default(), &mut State::default(), &none, &mut Workspace::default()).expect("drawn");
-        assert_eq!((&image, report.tiles_drawn, report.tiles_skipped), (captured, 0, 80));
+        let (image, report) = render(
+            &Model::default(),
+            &mut State::default(),
+            &none,
+            &mut Workspace::default(),
+        )
+        .expect("drawn");
+        assert_eq!(
+            (&image, report.tiles_drawn, report.tiles_skipped),
+            (captured, 0, 80)
+        );
         let garments = [s.garment()];
-        let (image, report) =
-            render(&Model::default(), &mut State::default(), &s.input(&garments, None), &mut Workspace::default())
-                .expect("drawn");
+        let (image, report) = render(
+            &Model::default(),
+            &mut State::default(),
+            &s.input(&garments, None),
+            &mut Workspace::default(),
+        )
+        .expect("drawn");
         // The shirt spans about 87 columns; far from it every byte is the captured one.
         for y in 0..240 {
             for x in (0..60).chain(260..320) {
                 assert_eq!(image.at(x, y), captured.at(x, y));
             }
         }
-        assert!(report.tiles_drawn < 50 && report.tiles_drawn + report.tiles_skipped == 80, "{report:?}");
-        assert!(report.pixels_drawn > 3000 && report.pixels_occluded > 300, "{report:?}");
+        assert!(
+            report.tiles_drawn < 50 && report.tiles_drawn + report.tiles_skipped == 80,
+            "{report:?}"
+        );
+        assert!(
+            report.pixels_drawn > 3000 && report.pixels_occluded > 300,
+            "{report:?}"
+        );
     }
 
     #[test]
@@ -474,13 +665,27 @@ mod tests {
         let garments = [s.garment(), s.garment()];
         let input = s.input(&garments, Some([400, 300]));
         let with = |par, work: &mut Workspace| {
-            render(&Model::new(Config { par, ..Config::default() }), &mut State::default(), &input, work)
-                .expect("drawn")
-                .0
+            render(
+                &Model::new(Config {
+                    par,
+                    ..Config::default()
+                }),
+                &mut State::default(),
+                &input,
+                work,
+            )
+            .expect("drawn")
+            .0
         };
         let alone = with(Par::Seq, &mut Workspace::default());
         let mut used = Workspace::default();
-        render(&Model::default(), &mut State::default(), &s.input(&garments[..1], None), &mut used).expect("drawn");
+        render(
+            &Model::default(),
+            &mut State::default(),
+            &s.input(&garments[..1], None),
+            &mut used,
+        )
+        .expect("drawn");
         for threads in [1, 3] {
             let got = par::with_threads(threads, || with(Par::Rayon, &mut used)).expect("pool");
             assert!(got == alone, "{threads} threads");
@@ -492,7 +697,11 @@ mod tests {
         let s = Scenery::new(320, 240, 6);
         // The shirt twice, and one inside the body's outline that no sample sees.
         let mut under = s.garment();
-        let small: Vec<_> = under.vertices.iter().map(|p| crate::math::P3::new(0.5 * p.x, 0.5 * p.y, p.z)).collect();
+        let small: Vec<_> = under
+            .vertices
+            .iter()
+            .map(|p| crate::math::P3::new(0.5 * p.x, 0.5 * p.y, p.z))
+            .collect();
         under.vertices = &small;
         let garments = [under, s.garment(), s.garment()];
         let vertices: usize = garments.iter().map(|g| g.vertices.len()).sum();
@@ -500,18 +709,45 @@ mod tests {
         for par in [Par::Seq, Par::Rayon] {
             for samples in [1, 2, 3] {
                 let with = |skip_hidden, skip_unseen| {
-                    let config = Config { skip_hidden, skip_unseen, par, samples, ..Config::default() };
+                    let config = Config {
+                        skip_hidden,
+                        skip_unseen,
+                        par,
+                        samples,
+                        ..Config::default()
+                    };
                     let work = &mut Workspace::default();
-                    render(&Model::new(config), &mut State::default(), &s.input(&garments, None), work).expect("drawn")
+                    render(
+                        &Model::new(config),
+                        &mut State::default(),
+                        &s.input(&garments, None),
+                        work,
+                    )
+                    .expect("drawn")
                 };
                 let (all, plain) = with(false, false);
-                assert_eq!([plain.faces_hidden, plain.normals_skipped, plain.garments_hidden], [0; 3]);
+                assert_eq!(
+                    [
+                        plain.faces_hidden,
+                        plain.normals_skipped,
+                        plain.garments_hidden
+                    ],
+                    [0; 3]
+                );
                 for switches in [[true, false], [false, true], [true, true]] {
                     let (image, report) = with(switches[0], switches[1]);
                     assert!(image == all, "{switches:?}");
                     // Five of six walls lie behind the nearest; faces between samples and at outlines do not count.
-                    assert_eq!(report.faces_hidden > faces * 2 / 5, switches[0], "{report:?} of {faces}");
-                    assert_eq!(report.normals_skipped > vertices * 3 / 5, switches[1], "{report:?} of {vertices}");
+                    assert_eq!(
+                        report.faces_hidden > faces * 2 / 5,
+                        switches[0],
+                        "{report:?} of {faces}"
+                    );
+                    assert_eq!(
+                        report.normals_skipped > vertices * 3 / 5,
+                        switches[1],
+                        "{report:?} of {vertices}"
+                    );
                     assert_eq!(report.garments_hidden, 2 * usize::from(switches[1]));
                     assert_eq!(report.pixels_drawn, plain.pixels_drawn);
                 }
@@ -527,18 +763,39 @@ mod tests {
         let n = shirt.vertices.len() as u32;
         let nearer = shirt.vertices.iter().map(|p| p * (1.0 - 5e-3 / p.z));
         let vertices: Vec<_> = shirt.vertices.iter().copied().chain(nearer).collect();
-        let front = |f: &&Face| face_normal(shirt.vertices, f).dot(&shirt.vertices[f[0] as usize].coords) < 0.0;
-        let through = shirt.faces.iter().filter(front).map(|f| [f[0] + n, f[2] + n, f[1] + n]);
+        let front = |f: &&Face| {
+            face_normal(shirt.vertices, f).dot(&shirt.vertices[f[0] as usize].coords) < 0.0
+        };
+        let through = shirt
+            .faces
+            .iter()
+            .filter(front)
+            .map(|f| [f[0] + n, f[2] + n, f[1] + n]);
         let faces: Vec<_> = shirt.faces.iter().copied().chain(through).collect();
         let uv = shirt.uv.repeat(2);
-        let folded = GarmentView { vertices: &vertices, faces: &faces, uv: &uv, normals: &[], ..shirt };
+        let folded = GarmentView {
+            vertices: &vertices,
+            faces: &faces,
+            uv: &uv,
+            normals: &[],
+            ..shirt
+        };
         for skip_hidden in [true, false] {
             let changed = |inside_offset: f32| {
-                let model = Model::new(Config { inside_offset, skip_hidden, ..Config::default() });
+                let model = Model::new(Config {
+                    inside_offset,
+                    skip_hidden,
+                    ..Config::default()
+                });
                 let [a, b] = [s.garment(), folded].map(|g| {
-                    render(&model, &mut State::default(), &s.input(&[g], None), &mut Workspace::default())
-                        .expect("drawn")
-                        .0
+                    render(
+                        &model,
+                        &mut State::default(),
+                        &s.input(&[g], None),
+                        &mut Workspace::default(),
+                    )
+                    .expect("drawn")
+                    .0
                 });
                 (0..240)
                     .flat_map(|y| (0..320).map(move |x| (x, y)))
@@ -554,26 +811,54 @@ mod tests {
     fn faults_are_named() {
         let s = Scenery::new(160, 120, 5);
         let draw = |g: GarmentView<'_>| {
-            render(&Model::default(), &mut State::default(), &s.input(&[g], None), &mut Workspace::default()).err()
+            render(
+                &Model::default(),
+                &mut State::default(),
+                &s.input(&[g], None),
+                &mut Workspace::default(),
+            )
+            .err()
         };
         let mut g = s.garment();
         let uv = [[0.0; 2]; 3];
         g.uv = &uv;
         let what = "texture coordinates";
-        assert_eq!(draw(g), Some(RenderError::Length { garment: 0, what, got: 3, vertices: s.shirt.0.len() }));
+        assert_eq!(
+            draw(g),
+            Some(RenderError::Length {
+                garment: 0,
+                what,
+                got: 3,
+                vertices: s.shirt.0.len()
+            })
+        );
         let mut g = s.garment();
         let faces = [[0, 1, 2], [0, 1, 99_999]];
         g.faces = &faces;
-        assert_eq!(draw(g), Some(RenderError::Face { garment: 0, face: 1 }));
+        assert_eq!(
+            draw(g),
+            Some(RenderError::Face {
+                garment: 0,
+                face: 1
+            })
+        );
         // Degenerate, behind the camera, beside the picture: nothing is drawn, nothing breaks.
-        for points in [[[0.0, 0.0, 2.0]; 3], [[0.1, 0.0, -1.0], [0.0, 0.1, -1.0], [0.0; 3]], [[9.0, 0.0, 1.0]; 3]] {
+        for points in [
+            [[0.0, 0.0, 2.0]; 3],
+            [[0.1, 0.0, -1.0], [0.0, 0.1, -1.0], [0.0; 3]],
+            [[9.0, 0.0, 1.0]; 3],
+        ] {
             let points = points.map(crate::math::P3::from);
             let mut g = s.garment();
             (g.vertices, g.uv, g.faces) = (&points, &[], &[[0, 1, 2]]);
             let garments = [g];
-            let (_, r) =
-                render(&Model::default(), &mut State::default(), &s.input(&garments, None), &mut Workspace::default())
-                    .expect("fine");
+            let (_, r) = render(
+                &Model::default(),
+                &mut State::default(),
+                &s.input(&garments, None),
+                &mut Workspace::default(),
+            )
+            .expect("fine");
             assert_eq!(r.pixels_drawn, 0);
         }
     }

@@ -69,7 +69,11 @@ pub(crate) struct Cache {
 
 impl Default for Cache {
     fn default() -> Self {
-        Self { face: u32::MAX, gradient: [V3::zeros(); 3], corners: [[0.0; 8]; 3] }
+        Self {
+            face: u32::MAX,
+            gradient: [V3::zeros(); 3],
+            corners: [[0.0; 8]; 3],
+        }
     }
 }
 
@@ -81,7 +85,11 @@ impl<'a> Shader<'a> {
         lights: &Lights,
         brightness: f32,
     ) -> Self {
-        let unit = |d: [f32; 3]| V3::from(d).try_normalize(0.0).unwrap_or_else(|| V3::new(0.0, -1.0, 0.0));
+        let unit = |d: [f32; 3]| {
+            V3::from(d)
+                .try_normalize(0.0)
+                .unwrap_or_else(|| V3::new(0.0, -1.0, 0.0))
+        };
         Self {
             surface,
             camera,
@@ -95,13 +103,23 @@ impl<'a> Shader<'a> {
 
     /// sRGB (0 to 255) of a face seen at picture position (u, v); `shadow` is the share of light taken away.
     #[inline]
-    pub(crate) fn color(&self, cache: &mut Cache, face: u32, u: f32, v: f32, shadow: f32) -> [f32; 3] {
+    pub(crate) fn color(
+        &self,
+        cache: &mut Cache,
+        face: u32,
+        u: f32,
+        v: f32,
+        shadow: f32,
+    ) -> [f32; 3] {
         let s = self.surface;
         if cache.face != face {
             let f = s.faces[face as usize].map(|i| i as usize);
             let [a, b, c] = f.map(|i| s.vertices[i].coords);
-            *cache =
-                Cache { face, gradient: [b.cross(&c), c.cross(&a), a.cross(&b)], corners: f.map(|i| s.attributes[i]) };
+            *cache = Cache {
+                face,
+                gradient: [b.cross(&c), c.cross(&a), a.cross(&b)],
+                corners: f.map(|i| s.attributes[i]),
+            };
         }
         let ray = self.camera.unproject(u, v, 1.0).coords;
         let w = cache.gradient.map(|g| g.dot(&ray));
@@ -109,15 +127,24 @@ impl<'a> Shader<'a> {
         let sum = w[0] + w[1] + w[2];
         let w = w.map(|w| (w / sum).max(0.0));
         let sum = w[0] + w[1] + w[2];
-        let w = if sum > 0.0 { w.map(|w| w / sum) } else { [1.0, 0.0, 0.0] };
+        let w = if sum > 0.0 {
+            w.map(|w| w / sum)
+        } else {
+            [1.0, 0.0, 0.0]
+        };
 
         let k = &cache.corners;
-        let mixed: [f32; 8] = std::array::from_fn(|i| k[0][i] * w[0] + k[1][i] * w[1] + k[2][i] * w[2]);
+        let mixed: [f32; 8] =
+            std::array::from_fn(|i| k[0][i] * w[0] + k[1][i] * w[1] + k[2][i] * w[2]);
         let [nx, ny, nz, open, tu, tv, z, _] = mixed;
         let eye = ray * -ray.norm_squared().sqrt().recip();
         let n = V3::new(nx, ny, nz);
         let length = n.norm_squared().sqrt();
-        let n = if length > 0.0 { n * length.recip() } else { eye };
+        let n = if length > 0.0 {
+            n * length.recip()
+        } else {
+            eye
+        };
         let inner = s.inner[face as usize];
         let n = if inner { -n } else { n };
 

@@ -46,7 +46,13 @@ impl Around {
 
 impl Shadows {
     /// From coverage and depth of each pixel of `area`; `reach` in pixels.
-    pub(crate) fn cast(&mut self, pixels: impl Iterator<Item = [f32; 2]>, alpha: &[f32], area: &Area, reach: f32) {
+    pub(crate) fn cast(
+        &mut self,
+        pixels: impl Iterator<Item = [f32; 2]>,
+        alpha: &[f32],
+        area: &Area,
+        reach: f32,
+    ) {
         let width = area.width as usize;
         (self.width, self.height) = (width.div_ceil(2), area.height.div_ceil(2) as usize);
         self.around.clear();
@@ -74,9 +80,15 @@ impl Shadows {
     #[inline]
     pub(crate) fn at(&self, x: usize, y: usize) -> Around {
         // Odd pixels lie a quarter past their cell's centre, even ones a quarter before it.
-        let (x0, y0) = ((x / 2 + x % 2).saturating_sub(1), (y / 2 + y % 2).saturating_sub(1));
+        let (x0, y0) = (
+            (x / 2 + x % 2).saturating_sub(1),
+            (y / 2 + y % 2).saturating_sub(1),
+        );
         let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(self.height - 1));
-        let (wx, wy) = (if x % 2 == 1 { 0.25 } else { 0.75 }, if y % 2 == 1 { 0.25 } else { 0.75 });
+        let (wx, wy) = (
+            if x % 2 == 1 { 0.25 } else { 0.75 },
+            if y % 2 == 1 { 0.25 } else { 0.75 },
+        );
         let (row0, row1) = (y0 * self.width, y1 * self.width);
         let corners = [
             (&self.around[row0 + x0], (1.0 - wx) * (1.0 - wy)),
@@ -91,7 +103,11 @@ impl Shadows {
             }
         }
         let [garment, depth, front, _] = sum;
-        Around { garment, depth, front }
+        Around {
+            garment,
+            depth,
+            front,
+        }
     }
 }
 
@@ -119,17 +135,23 @@ fn blur(image: &mut [[f32; 4]], scratch: &mut Vec<[f32; 4]>, width: usize, radiu
     let mut sums = vec![[0.0; 4]; width];
     let row = |y: usize| &scratch[y * width..(y + 1) * width];
     for y in 0..radius.min(height) {
-        sums.iter_mut().zip(row(y)).for_each(|(s, v)| add(s, v, 1.0));
+        sums.iter_mut()
+            .zip(row(y))
+            .for_each(|(s, v)| add(s, v, 1.0));
     }
     for y in 0..height {
         if y + radius < height {
-            sums.iter_mut().zip(row(y + radius)).for_each(|(s, v)| add(s, v, 1.0));
+            sums.iter_mut()
+                .zip(row(y + radius))
+                .for_each(|(s, v)| add(s, v, 1.0));
         }
         for (o, s) in image[y * width..(y + 1) * width].iter_mut().zip(&sums) {
             *o = s.map(|s| (s * scale).max(0.0));
         }
         if y >= radius {
-            sums.iter_mut().zip(row(y - radius)).for_each(|(s, v)| add(s, v, -1.0));
+            sums.iter_mut()
+                .zip(row(y - radius))
+                .for_each(|(s, v)| add(s, v, -1.0));
         }
     }
 }
@@ -141,7 +163,9 @@ mod tests {
     #[test]
     fn the_running_blur_is_the_obvious_one() {
         let (w, h, r) = (13usize, 9usize, 3usize);
-        let image: Vec<[f32; 4]> = (0..w * h).map(|i| [(i * 7 % 11) as f32, 1.0, (i % 3) as f32, 0.0]).collect();
+        let image: Vec<[f32; 4]> = (0..w * h)
+            .map(|i| [(i * 7 % 11) as f32, 1.0, (i % 3) as f32, 0.0])
+            .collect();
         let mut fast = image.clone();
         blur(&mut fast, &mut Vec::new(), w, r);
         for y in 0..h {
@@ -152,7 +176,9 @@ mod tests {
                         (0..4).for_each(|k| sum[k] += image[v * w + u][k] / 49.0);
                     }
                 }
-                (0..4).for_each(|k| assert!((sum[k] - fast[y * w + x][k]).abs() < 1e-4, "{x} {y} {k}"));
+                (0..4).for_each(|k| {
+                    assert!((sum[k] - fast[y * w + x][k]).abs() < 1e-4, "{x} {y} {k}")
+                });
             }
         }
     }

@@ -48,7 +48,9 @@ impl State {
     ) -> impl Iterator<Item = (usize, u32)> + use<'a> {
         let slots = SLOTS[source as usize].min(vertices.len());
         let (first, turn) = (self.pictures == 0, self.pictures as usize % TURNS);
-        (0..slots).filter(move |s| first || s % TURNS == turn).map(move |s| (s, vertices[s * vertices.len() / slots]))
+        (0..slots)
+            .filter(move |s| first || s % TURNS == turn)
+            .map(move |s| (s, vertices[s * vertices.len() / slots]))
     }
 
     /// Remembers the sRGB colour of a place.
@@ -63,16 +65,30 @@ impl State {
     /// The model of what was seen, if it can tell skin from clothes. One call a picture, after its colours are in.
     pub(super) fn learn(&mut self) -> Option<Skin> {
         self.pictures = self.pictures.saturating_add(1);
-        let seen = |s: Source| self.colors[s as usize].iter().flatten().copied().collect::<Vec<_>>();
+        let seen = |s: Source| {
+            self.colors[s as usize]
+                .iter()
+                .flatten()
+                .copied()
+                .collect::<Vec<_>>()
+        };
         let (arms, trunk) = (seen(Source::Forearm), seen(Source::Trunk));
         let skin = Skin::fit(&arms, &trunk);
         let usable = skin.as_ref().is_some_and(|skin| {
             let share = |s: Source| {
                 let colors = seen(s);
                 let like = colors.iter().filter(|c| skin.likes(c)).count();
-                if colors.len() < FEW { 0.0 } else { like as f32 / colors.len() as f32 }
+                if colors.len() < FEW {
+                    0.0
+                } else {
+                    like as f32 / colors.len() as f32
+                }
             };
-            let (agree, mixed) = if self.usable { (AGREE[1], MIXED[1]) } else { (AGREE[0], MIXED[0]) };
+            let (agree, mixed) = if self.usable {
+                (AGREE[1], MIXED[1])
+            } else {
+                (AGREE[0], MIXED[0])
+            };
             share(Source::Forearm) >= agree
                 && share(Source::Face).max(share(Source::Hand)) >= agree
                 && share(Source::Trunk) <= mixed
@@ -121,7 +137,10 @@ const ROUNDS: usize = 6;
 impl Normal {
     fn of(colors: &[[f32; 3]], weight: f32) -> Self {
         let n = colors.len().max(1) as f32;
-        let mean = colors.iter().fold([0.0; 3], |s, c| [s[0] + c[0], s[1] + c[1], s[2] + c[2]]).map(|s| s / n);
+        let mean = colors
+            .iter()
+            .fold([0.0; 3], |s, c| [s[0] + c[0], s[1] + c[1], s[2] + c[2]])
+            .map(|s| s / n);
         let mut s = [0.0f32; 6];
         for c in colors {
             let d = [c[0] - mean[0], c[1] - mean[1], c[2] - mean[2]];
@@ -133,7 +152,11 @@ impl Normal {
                 }
             }
         }
-        (s[0], s[2], s[5]) = (s[0] + FLOOR[0].powi(2), s[2] + FLOOR[1].powi(2), s[5] + FLOOR[2].powi(2));
+        (s[0], s[2], s[5]) = (
+            s[0] + FLOOR[0].powi(2),
+            s[2] + FLOOR[1].powi(2),
+            s[5] + FLOOR[2].powi(2),
+        );
         // Cholesky; the floors keep the pivots positive.
         let l00 = s[0].sqrt();
         let (l10, l20) = (s[1] / l00, s[3] / l00);
@@ -142,14 +165,29 @@ impl Normal {
         let l22 = (s[5] - l20 * l20 - l21 * l21).max(1.0).sqrt();
         let (i0, i1, i2) = (1.0 / l00, 1.0 / l11, 1.0 / l22);
         let i10 = -l10 * i0 * i1;
-        let factor = [i0, i10, i1, -(l20 * i0 + l21 * i10) * i2, -l21 * i1 * i2, i2];
-        Self { mean, factor, log: (weight * i0 * i1 * i2).ln() }
+        let factor = [
+            i0,
+            i10,
+            i1,
+            -(l20 * i0 + l21 * i10) * i2,
+            -l21 * i1 * i2,
+            i2,
+        ];
+        Self {
+            mean,
+            factor,
+            log: (weight * i0 * i1 * i2).ln(),
+        }
     }
 
     /// Logarithm of the density.
     #[inline]
     fn log(&self, c: &[f32; 3]) -> f32 {
-        let d = [c[0] - self.mean[0], c[1] - self.mean[1], c[2] - self.mean[2]];
+        let d = [
+            c[0] - self.mean[0],
+            c[1] - self.mean[1],
+            c[2] - self.mean[2],
+        ];
         let f = &self.factor;
         let a = f[0] * d[0];
         let b = f[1] * d[0] + f[2] * d[1];
@@ -182,7 +220,10 @@ impl Skin {
         let mut kept = skin.to_vec();
         kept.sort_by(|a, b| off(a).total_cmp(&off(b)));
         kept.truncate(skin.len() * 9 / 10);
-        Some(Self { skin: Normal::of(&kept, 1.0), clothes: kinds(clothes) })
+        Some(Self {
+            skin: Normal::of(&kept, 1.0),
+            clothes: kinds(clothes),
+        })
     }
 
     /// This tone is rather skin than anything else.
@@ -201,23 +242,37 @@ fn kinds(colors: &[[f32; 3]]) -> Vec<Normal> {
     let mut middles = vec![colors[0]];
     let mut nearest: Vec<f32> = colors.iter().map(|c| far(c, &middles[0])).collect();
     while middles.len() < KINDS {
-        let Some(k) = (0..colors.len()).max_by(|&a, &b| nearest[a].total_cmp(&nearest[b])) else { break };
+        let Some(k) = (0..colors.len()).max_by(|&a, &b| nearest[a].total_cmp(&nearest[b])) else {
+            break;
+        };
         middles.push(colors[k]);
-        nearest.iter_mut().zip(colors).for_each(|(n, c)| *n = n.min(far(c, &colors[k])));
+        nearest
+            .iter_mut()
+            .zip(colors)
+            .for_each(|(n, c)| *n = n.min(far(c, &colors[k])));
     }
     let mut members = vec![Vec::new(); middles.len()];
     for _ in 0..ROUNDS {
         members.iter_mut().for_each(Vec::clear);
         for c in colors {
-            let best = (0..middles.len()).min_by(|&a, &b| far(c, &middles[a]).total_cmp(&far(c, &middles[b])));
+            let best = (0..middles.len())
+                .min_by(|&a, &b| far(c, &middles[a]).total_cmp(&far(c, &middles[b])));
             members[best.unwrap_or(0)].push(*c);
         }
-        for (m, of) in middles.iter_mut().zip(&members).filter(|(_, of)| !of.is_empty()) {
+        for (m, of) in middles
+            .iter_mut()
+            .zip(&members)
+            .filter(|(_, of)| !of.is_empty())
+        {
             *m = Normal::of(of, 1.0).mean;
         }
     }
     let share = |of: &Vec<[f32; 3]>| of.len() as f32 / colors.len() as f32;
-    members.iter().filter(|of| of.len() >= SPECK).map(|of| Normal::of(of, share(of))).collect()
+    members
+        .iter()
+        .filter(|of| of.len() >= SPECK)
+        .map(|of| Normal::of(of, share(of)))
+        .collect()
 }
 
 /// A kind with fewer tones is a speck or a finger that lay where it was not expected.

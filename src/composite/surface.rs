@@ -120,7 +120,11 @@ impl Surface {
             self.vertices.extend(g.vertices.iter().map(|p| {
                 let p = P3::from(rotation * p.coords + iso.translation.vector);
                 // Along the line of sight, so that the outline stays where it is.
-                if p.z > NEAR { p * (1.0 - nearer / p.z) } else { p }
+                if p.z > NEAR {
+                    p * (1.0 - nearer / p.z)
+                } else {
+                    p
+                }
             }));
             self.normals.extend(g.normals.iter().map(|n| rotation * n));
             self.normals.resize(self.vertices.len(), V3::zeros());
@@ -130,7 +134,8 @@ impl Surface {
             } else {
                 self.uv.extend_from_slice(g.uv);
             }
-            self.faces.extend(g.faces.iter().map(|f| f.map(|i| i + base)));
+            self.faces
+                .extend(g.faces.iter().map(|f| f.map(|i| i + base)));
             self.garment.resize(self.faces.len(), number as u8);
             self.layers.push(first..self.faces.len());
             self.corners.push(base as usize..self.vertices.len());
@@ -143,7 +148,10 @@ impl Surface {
 
     /// Garments of which nothing is seen.
     pub(crate) fn garments_hidden(&self) -> usize {
-        self.layers.iter().filter(|l| !self.seen.of((*l).clone()).any(|s| s)).count()
+        self.layers
+            .iter()
+            .filter(|l| !self.seen.of((*l).clone()).any(|s| s))
+            .count()
     }
 
     /// Normals, light in folds and sides of the seen faces; returns how many vertices needed none. The sums run over the
@@ -152,10 +160,16 @@ impl Surface {
         self.wanted.clear();
         self.wanted.resize(self.vertices.len(), false);
         self.inner.resize(self.faces.len(), false);
-        for ((f, seen), inner) in self.faces.iter().zip(self.seen.of(0..self.faces.len())).zip(&mut self.inner) {
+        for ((f, seen), inner) in self
+            .faces
+            .iter()
+            .zip(self.seen.of(0..self.faces.len()))
+            .zip(&mut self.inner)
+        {
             if seen {
                 f.iter().for_each(|i| self.wanted[*i as usize] = true);
-                *inner = face_normal(&self.vertices, f).dot(&self.vertices[f[0] as usize].coords) > 0.0;
+                *inner =
+                    face_normal(&self.vertices, f).dot(&self.vertices[f[0] as usize].coords) > 0.0;
             }
         }
         self.near.clear();
@@ -168,8 +182,17 @@ impl Surface {
                 }
             }
         }
-        for (own, _) in self.corners.iter().zip(&self.given).filter(|(_, given)| !**given) {
-            for (n, _) in self.normals[own.clone()].iter_mut().zip(&self.wanted[own.clone()]).filter(|(_, w)| **w) {
+        for (own, _) in self
+            .corners
+            .iter()
+            .zip(&self.given)
+            .filter(|(_, given)| !**given)
+        {
+            for (n, _) in self.normals[own.clone()]
+                .iter_mut()
+                .zip(&self.wanted[own.clone()])
+                .filter(|(_, w)| **w)
+            {
                 *n = n.try_normalize(0.0).unwrap_or_else(V3::zeros);
             }
         }
@@ -179,7 +202,16 @@ impl Surface {
         for (i, out) in self.attributes.iter_mut().enumerate() {
             if self.wanted[i] {
                 let (n, uv) = (&self.normals[i], &self.uv[i]);
-                *out = [n.x, n.y, n.z, self.openness[i], uv[0], uv[1], self.vertices[i].z, 0.0];
+                *out = [
+                    n.x,
+                    n.y,
+                    n.z,
+                    self.openness[i],
+                    uv[0],
+                    uv[1],
+                    self.vertices[i].z,
+                    0.0,
+                ];
             } else {
                 skipped += 1;
             }
@@ -240,21 +272,47 @@ impl Surface {
     }
 
     /// Fills `samples` over `area`, `n` samples along each side of a pixel; returns how many faces were left out as hidden.
-    pub(crate) fn rasterise(&mut self, config: &Config, stage: &Stage, area: &Area, n: u32) -> usize {
+    pub(crate) fn rasterise(
+        &mut self,
+        config: &Config,
+        stage: &Stage,
+        area: &Area,
+        n: u32,
+    ) -> usize {
         let view = part_of(stage, area, n);
         if config.skip_hidden {
             let (x, f, of) = (&self.vertices, &self.faces, &self.layers);
-            return rasterise_layers(config.par, config.inside_offset, &view, x, f, of, &mut self.samples);
+            return rasterise_layers(
+                config.par,
+                config.inside_offset,
+                &view,
+                x,
+                f,
+                of,
+                &mut self.samples,
+            );
         }
-        let options = Options { par: config.par, cull: Cull::None, behind: config.inside_offset };
-        rasterise_with(options, &view, &self.vertices, &self.faces, &mut self.samples);
+        let options = Options {
+            par: config.par,
+            cull: Cull::None,
+            behind: config.inside_offset,
+        };
+        rasterise_with(
+            options,
+            &view,
+            &self.vertices,
+            &self.faces,
+            &mut self.samples,
+        );
         0
     }
 }
 
 /// The view of `area` alone with `n` samples a pixel along each side (n may be a fraction: fewer than one).
 pub(crate) fn part_of(stage: &Stage, area: &Area, n: u32) -> View {
-    let full = stage.camera.resized(stage.camera.width * n, stage.camera.height * n);
+    let full = stage
+        .camera
+        .resized(stage.camera.width * n, stage.camera.height * n);
     let camera = crate::camera::Intrinsics {
         width: area.width * n,
         height: area.height * n,

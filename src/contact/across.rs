@@ -42,7 +42,11 @@ impl<T: Copy + Default + Send + Sync> Across<T> {
         }
         let way = |v: usize| (self.before[v] - frame.vertices[v]).norm();
         let ways = farthest(model, others, way);
-        let starts = if first { model.starts(par, frame, &frame.vertices, others.iter()) } else { Vec::new() };
+        let starts = if first {
+            model.starts(par, frame, &frame.vertices, others.iter())
+        } else {
+            Vec::new()
+        };
         par::for_chunks(par, &mut self.seen, 256, |start, chunk| {
             for (k, s) in chunk.iter_mut().enumerate() {
                 let (v, mask) = (start + k, others[start + k]);
@@ -59,7 +63,11 @@ impl<T: Copy + Default + Send + Sync> Across<T> {
                     s.nearest = *start;
                 }
                 let (near, hit) = model.closest_within(frame, p, s.nearest, mask, reach);
-                *s = Seen { nearest: near, room: hit.err().unwrap_or(0.0), found: judge(v, near, &hit) };
+                *s = Seen {
+                    nearest: near,
+                    room: hit.err().unwrap_or(0.0),
+                    found: judge(v, near, &hit),
+                };
             }
         });
         self.before.clone_from(&frame.vertices);
@@ -67,15 +75,24 @@ impl<T: Copy + Default + Send + Sync> Across<T> {
 }
 
 /// The longest way of a vertex in the parts of each mask. Skin that is not looked for is not found either.
-fn farthest(model: &SurfaceModel, others: &[Part], way: impl Fn(usize) -> f32) -> [f32; 1 << Part::BITS] {
+fn farthest(
+    model: &SurfaceModel,
+    others: &[Part],
+    way: impl Fn(usize) -> f32,
+) -> [f32; 1 << Part::BITS] {
     let mut of_part = [0.0f32; 1 << Part::BITS];
     for v in (0..others.len()).filter(|v| others[*v] != 0) {
         let most = &mut of_part[usize::from(model.part(v as u32))];
         *most = most.max(way(v));
     }
-    let moved: Vec<usize> = (0..of_part.len()).filter(|part| of_part[*part] > 0.0).collect();
+    let moved: Vec<usize> = (0..of_part.len())
+        .filter(|part| of_part[*part] > 0.0)
+        .collect();
     std::array::from_fn(|mask| {
-        moved.iter().filter(|part| *part & mask != 0).fold(0.0, |most: f32, part| most.max(of_part[*part]))
+        moved
+            .iter()
+            .filter(|part| *part & mask != 0)
+            .fold(0.0, |most: f32, part| most.max(of_part[*part]))
     })
 }
 
@@ -96,7 +113,8 @@ mod tests {
                 0.0
             }
         };
-        let ways = |others: &[Part]| [1usize, 2, 3, 4, 6].map(|mask| farthest(&model, others, way)[mask]);
+        let ways =
+            |others: &[Part]| [1usize, 2, 3, 4, 6].map(|mask| farthest(&model, others, way)[mask]);
         let mut others = vec![2; n];
         others.resize(frame.vertices.len(), 1);
         assert_eq!(ways(&others), [0.1, 0.3, 0.3, 0.0, 0.3]);
@@ -110,7 +128,10 @@ mod tests {
         let looks = std::sync::atomic::AtomicUsize::new(0);
         let mut across = Across::<()>::default();
         let mut look = |others: &[Part], shift: f32| {
-            let mut moved = SurfaceFrame { vertices: frame.vertices.clone(), normals: Vec::new() };
+            let mut moved = SurfaceFrame {
+                vertices: frame.vertices.clone(),
+                normals: Vec::new(),
+            };
             moved.vertices[n..].iter_mut().for_each(|p| p.x += shift);
             across.look(Par::Seq, &model, others, &moved, 0.0, |_, _, _| {
                 looks.fetch_add(1, std::sync::atomic::Ordering::Relaxed);

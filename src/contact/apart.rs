@@ -35,13 +35,24 @@ impl Apart {
         // Few of them are wanted.
         frame.normals.clear();
         let still = &*frame;
-        self.0.look(par, model, pressing, still, room, |v, near, hit| match hit {
-            Ok(c) if !c.rim && pressing[near as usize] != 0 && c.signed < room => {
-                let facing = c.normal.dot(&model.normal(still, v as u32)) < 0.0;
-                if facing { c.normal * (0.5 * (room - c.signed)).min(MOST) } else { V3::zeros() }
-            }
-            _ => V3::zeros(),
-        });
+        self.0.look(
+            par,
+            model,
+            pressing,
+            still,
+            room,
+            |v, near, hit| match hit {
+                Ok(c) if !c.rim && pressing[near as usize] != 0 && c.signed < room => {
+                    let facing = c.normal.dot(&model.normal(still, v as u32)) < 0.0;
+                    if facing {
+                        c.normal * (0.5 * (room - c.signed)).min(MOST)
+                    } else {
+                        V3::zeros()
+                    }
+                }
+                _ => V3::zeros(),
+            },
+        );
         let goes = |v: &u32| self.0.seen[*v as usize].found != V3::zeros();
         let must: Vec<u32> = (0..frame.vertices.len() as u32).filter(goes).collect();
         for (v, way) in self.eased(model, &must) {
@@ -72,14 +83,22 @@ impl Apart {
         for _ in 0..ROUNDS {
             for (to, &v) in next.iter_mut().zip(&all) {
                 let around = model.neighbours(v);
-                let sum = around.iter().fold(ways[v as usize], |s, w| s + ways[*w as usize]);
+                let sum = around
+                    .iter()
+                    .fold(ways[v as usize], |s, w| s + ways[*w as usize]);
                 let mean = sum / (1 + around.len()) as f32;
                 // What must go goes all its way, and takes what is beside it along a little.
                 let own = self.0.seen[v as usize].found;
                 let (most, far) = (own.norm() + BESIDE, mean.norm());
-                *to = if far <= own.norm() { own } else { mean * (most / far).min(1.0) };
+                *to = if far <= own.norm() {
+                    own
+                } else {
+                    mean * (most / far).min(1.0)
+                };
             }
-            all.iter().zip(&next).for_each(|(v, way)| ways[*v as usize] = *way);
+            all.iter()
+                .zip(&next)
+                .for_each(|(v, way)| ways[*v as usize] = *way);
         }
         all.into_iter().map(|v| (v, ways[v as usize])).collect()
     }
@@ -109,18 +128,28 @@ mod tests {
             assert!(count > 0 && count < n / 4, "{count}");
             // The poles lie opposite of each other, so each goes half of what is lacking.
             let (low, high) = (frame.vertices[0].x, frame.vertices[n + 1].x);
-            assert!((high - low - ROOM).abs() < 1e-3, "{} m between the poles", high - low);
+            assert!(
+                (high - low - ROOM).abs() < 1e-3,
+                "{} m between the poles",
+                high - low
+            );
             for (i, (a, b)) in before.iter().zip(&frame.vertices).enumerate() {
                 let other = P3::new(if i < n { d } else { 0.0 }, 0.0, 0.0);
                 let way = (a - b).norm();
                 assert!(way <= MOST + 1e-6);
                 // Three rounds of averaging reach three edges (6 cm each) further.
-                assert!(way < 1e-6 || (a - other).norm() < 1.0 + 0.2, "vertex {i} moved by {way} m");
+                assert!(
+                    way < 1e-6 || (a - other).norm() < 1.0 + 0.2,
+                    "vertex {i} moved by {way} m"
+                );
             }
         }
         let (model, mut frame, pressing, _) = two(2.1);
         let before = frame.vertices.clone();
-        assert_eq!(Apart::default().make_room(Par::Seq, &model, &pressing, &mut frame, ROOM), 0);
+        assert_eq!(
+            Apart::default().make_room(Par::Seq, &model, &pressing, &mut frame, ROOM),
+            0
+        );
         assert_eq!(frame.vertices, before);
     }
 
@@ -129,10 +158,18 @@ mod tests {
         let mut known = Apart::default();
         for d in [2.1, 2.0, 1.97, 2.004, 2.2] {
             let (model, mut frame, pressing, _) = two(d);
-            let mut anew = SurfaceFrame { vertices: frame.vertices.clone(), normals: Vec::new() };
+            let mut anew = SurfaceFrame {
+                vertices: frame.vertices.clone(),
+                normals: Vec::new(),
+            };
             known.make_room(Par::Seq, &model, &pressing, &mut frame, 0.013);
             Apart::default().make_room(Par::Rayon, &model, &pressing, &mut anew, 0.013);
-            let far = frame.vertices.iter().zip(&anew.vertices).map(|(a, b)| (a - b).norm()).fold(0.0, f32::max);
+            let far = frame
+                .vertices
+                .iter()
+                .zip(&anew.vertices)
+                .map(|(a, b)| (a - b).norm())
+                .fold(0.0, f32::max);
             assert!(far < 1e-6, "{d}: {far} m");
         }
     }
@@ -142,7 +179,10 @@ mod tests {
         let (model, mut frame, mut pressing, n) = two(1.99);
         pressing[n..].fill(0);
         let before = frame.vertices.clone();
-        assert_eq!(Apart::default().make_room(Par::Seq, &model, &pressing, &mut frame, 0.013), 0);
+        assert_eq!(
+            Apart::default().make_room(Par::Seq, &model, &pressing, &mut frame, 0.013),
+            0
+        );
         assert_eq!(frame.vertices, before);
     }
 }

@@ -24,8 +24,15 @@ impl SurfaceModel {
         if !walked.1.is_ok_and(|c| c.signed < -ASTRAY) {
             return walked;
         }
-        let far = |found: &(u32, Result<Closest, f32>)| found.1.map_or(f32::INFINITY, |c| c.signed.abs());
-        others.map(from).fold(walked, |best, other| if far(&other) < far(&best) { other } else { best })
+        let far =
+            |found: &(u32, Result<Closest, f32>)| found.1.map_or(f32::INFINITY, |c| c.signed.abs());
+        others.map(from).fold(walked, |best, other| {
+            if far(&other) < far(&best) {
+                other
+            } else {
+                best
+            }
+        })
     }
 }
 
@@ -45,16 +52,28 @@ mod tests {
             surface.closest_unless_astray(&frame, x, start, 1, reach, others.iter().copied())
         };
         let lost = ask(&x, 0, 0.04, &[]).1.expect("skin");
-        assert!((lost.signed + 0.022).abs() < 1e-3 && lost.vertex < n, "{lost:?}");
+        assert!(
+            (lost.signed + 0.022).abs() < 1e-3 && lost.vertex < n,
+            "{lost:?}"
+        );
         let (vertex, found) = ask(&x, 0, 0.04, &[1, n + 3, 2]);
         let found = found.expect("skin");
-        assert!((found.signed - 0.002).abs() < 1e-3 && vertex >= n && found.vertex == vertex, "{found:?}");
+        assert!(
+            (found.signed - 0.002).abs() < 1e-3 && vertex >= n && found.vertex == vertex,
+            "{found:?}"
+        );
         // Where no neighbour knows better, the walk stands.
-        assert_eq!(ask(&x, 0, 0.04, &[1, 2]).1.map(|c| c.vertex), Ok(lost.vertex));
+        assert_eq!(
+            ask(&x, 0, 0.04, &[1, 2]).1.map(|c| c.vertex),
+            Ok(lost.vertex)
+        );
         // 5 mm deep is what contact is for: nobody is asked.
         let shallow = P3::new(-0.045, 0.0, 0.0);
         let none = std::iter::from_fn(|| -> Option<u32> { panic!("asked") });
-        let stays = surface.closest_unless_astray(&frame, &shallow, 0, 1, 0.04, none).1.expect("skin");
+        let stays = surface
+            .closest_unless_astray(&frame, &shallow, 0, 1, 0.04, none)
+            .1
+            .expect("skin");
         assert!((stays.signed + 0.005).abs() < 1e-3, "{stays:?}");
         // Nor where skin is beyond reach.
         let far = P3::new(-0.3, 0.0, 0.0);

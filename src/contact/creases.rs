@@ -56,7 +56,12 @@ impl Reach {
     fn at(&self, slice: f32) -> Option<f32> {
         let from = (slice - 0.5).max(0.0);
         let low = self.0.get(from as usize).copied().flatten()?;
-        let high = self.0.get(from as usize + 1).copied().flatten().unwrap_or(low);
+        let high = self
+            .0
+            .get(from as usize + 1)
+            .copied()
+            .flatten()
+            .unwrap_or(low);
         Some(low + (high - low) * from.fract())
     }
 }
@@ -67,9 +72,17 @@ impl Crease {
         let mut of = vec![0u8; surface.vertices()];
         upper.iter().for_each(|v| of[*v as usize] = 1);
         lower.iter().for_each(|v| of[*v as usize] = 2);
-        let meets = |v: &&u32| surface.neighbours(**v).iter().any(|w| of[*w as usize] + of[**v as usize] == 3);
+        let meets = |v: &&u32| {
+            surface
+                .neighbours(**v)
+                .iter()
+                .any(|w| of[*w as usize] + of[**v as usize] == 3)
+        };
         let ring: Vec<u32> = upper.iter().chain(&lower).filter(meets).copied().collect();
-        (!ring.is_empty()).then_some(Self { limbs: [upper, lower], ring })
+        (!ring.is_empty()).then_some(Self {
+            limbs: [upper, lower],
+            ring,
+        })
     }
     /// Moves skin of a body back until `room` metres are left between the limbs in front of the joint, half of what is lacking
     /// on either side. Vertices in any frame, metres.
@@ -80,7 +93,9 @@ impl Crease {
             for p in limb.iter().map(|v| *v as usize) {
                 let (slice, across) = bend.place(&body[p]);
                 let share = bend.share * (slice * SLICE / FRONT).clamp(0.0, 1.0);
-                let (true, Some(upper), Some(lower)) = (share > 0.0, reach[0].at(slice), reach[1].at(slice)) else {
+                let (true, Some(upper), Some(lower)) =
+                    (share > 0.0, reach[0].at(slice), reach[1].at(slice))
+                else {
                     continue;
                 };
                 let room = room.min(TOUCHING + (upper + lower).max(0.0));
@@ -95,14 +110,28 @@ impl Crease {
     }
     /// How it is bent; `None` where it is not, or has no direction.
     fn bend(&self, body: &[P3]) -> Option<Bend> {
-        let middle =
-            |of: &[u32]| of.iter().fold(V3::zeros(), |s, v| s + body[*v as usize].coords) / of.len().max(1) as f32;
+        let middle = |of: &[u32]| {
+            of.iter()
+                .fold(V3::zeros(), |s, v| s + body[*v as usize].coords)
+                / of.len().max(1) as f32
+        };
         let joint = middle(&self.ring);
-        let [upper, lower] = self.limbs.each_ref().map(|limb| (middle(limb) - joint).try_normalize(0.0));
+        let [upper, lower] = self
+            .limbs
+            .each_ref()
+            .map(|limb| (middle(limb) - joint).try_normalize(0.0));
         let (upper, lower) = (upper?, lower?);
         let share = ((upper.dot(&lower) - BENT[0]) / (BENT[1] - BENT[0])).clamp(0.0, 1.0);
-        let (front, across) = ((upper + lower).try_normalize(0.0)?, (lower - upper).try_normalize(0.0)?);
-        (share > 0.0).then_some(Bend { joint, front, across, share })
+        let (front, across) = (
+            (upper + lower).try_normalize(0.0)?,
+            (lower - upper).try_normalize(0.0)?,
+        );
+        (share > 0.0).then_some(Bend {
+            joint,
+            front,
+            across,
+            share,
+        })
     }
     fn reach(&self, body: &[P3], bend: &Bend, limb: usize) -> Reach {
         let mut reach = [None; SLICES];
@@ -145,16 +174,32 @@ mod tests {
             }
         }
         let mesh = TriMesh::new(vertices.clone(), faces.clone()).expect("a tube");
-        let model = SurfaceModel::new(faces, Topology::new(&mesh).expect("topology"), vec![1; vertices.len()]);
+        let model = SurfaceModel::new(
+            faces,
+            Topology::new(&mesh).expect("topology"),
+            vec![1; vertices.len()],
+        );
         let half = (ALONG / 2 * AROUND) as u32;
-        let crease = Crease::new(&model, (0..half).collect(), (half..vertices.len() as u32).collect());
-        assert!(Crease::new(&model, vec![0], vec![half * 2]).is_none(), "they are far apart");
+        let crease = Crease::new(
+            &model,
+            (0..half).collect(),
+            (half..vertices.len() as u32).collect(),
+        );
+        assert!(
+            Crease::new(&model, vec![0], vec![half * 2]).is_none(),
+            "they are far apart"
+        );
         (vertices, crease.expect("they meet"))
     }
     /// Least distance of the limbs along the way from one to the other, in front of the joint, m.
     fn gap(crease: &Crease, body: &[P3]) -> f32 {
         let bend = crease.bend(body).expect("bent");
-        let place = |v: &u32| (body[*v as usize].coords - bend.joint, bend.place(&body[*v as usize]));
+        let place = |v: &u32| {
+            (
+                body[*v as usize].coords - bend.joint,
+                bend.place(&body[*v as usize]),
+            )
+        };
         let mut least = f32::INFINITY;
         for (a, (slice, upper)) in crease.limbs[0].iter().map(place) {
             for (b, (other, lower)) in crease.limbs[1].iter().map(place) {
@@ -180,14 +225,28 @@ mod tests {
             assert!(is > 0.99 * TOUCHING && is < ROOM, "bent by {angle}: {is} m");
             let bend = crease.bend(&before).expect("bent");
             let moved = |v: &usize| before[*v] != body[*v];
-            assert!((0..body.len()).filter(moved).all(|v| bend.place(&before[v]).0 > 0.0), "only in front");
+            assert!(
+                (0..body.len())
+                    .filter(moved)
+                    .all(|v| bend.place(&before[v]).0 > 0.0),
+                "only in front"
+            );
             assert!((0..body.len()).filter(moved).count() < body.len() / 3);
             // Elsewhere and otherwise turned it is the same.
-            let there =
-                |p: &P3| P3::from(Rotation3::from_euler_angles(0.4, -1.0, 2.0) * p.coords + V3::new(1.0, 2.0, 3.0));
+            let there = |p: &P3| {
+                P3::from(
+                    Rotation3::from_euler_angles(0.4, -1.0, 2.0) * p.coords
+                        + V3::new(1.0, 2.0, 3.0),
+                )
+            };
             let mut turned: Vec<P3> = before.iter().map(there).collect();
             crease.make_room(&mut turned, ROOM);
-            assert!(turned.iter().zip(&body).all(|(a, b)| (a - there(b)).norm() < 1e-4));
+            assert!(
+                turned
+                    .iter()
+                    .zip(&body)
+                    .all(|(a, b)| (a - there(b)).norm() < 1e-4)
+            );
         }
     }
 

@@ -42,10 +42,28 @@ impl MapView {
     /// looks along, in the world.
     pub fn around(toward: [f32; 2], detail: MapDetail) -> [Self; 4] {
         let n = toward[0].hypot(toward[1]);
-        let (x, z) = if n > 1e-6 { (toward[0] / n, toward[1] / n) } else { (0.0, -1.0) };
-        let front = if detail == MapDetail::Nowhere { COARSE } else { FINE };
-        let others = if detail == MapDetail::Everywhere { FINE } else { COARSE };
-        [(x, z, front), (-x, -z, others), (-z, x, others), (z, -x, others)].map(|(fx, fz, pixels_per_metre)| Self {
+        let (x, z) = if n > 1e-6 {
+            (toward[0] / n, toward[1] / n)
+        } else {
+            (0.0, -1.0)
+        };
+        let front = if detail == MapDetail::Nowhere {
+            COARSE
+        } else {
+            FINE
+        };
+        let others = if detail == MapDetail::Everywhere {
+            FINE
+        } else {
+            COARSE
+        };
+        [
+            (x, z, front),
+            (-x, -z, others),
+            (-z, x, others),
+            (z, -x, others),
+        ]
+        .map(|(fx, fz, pixels_per_metre)| Self {
             // forward f, down −y, right = down × forward.
             axes: [[-fz, 0.0, fx], [0.0, -1.0, 0.0], [fx, 0.0, fz]],
             pixels_per_metre,
@@ -85,11 +103,13 @@ impl DepthMaps {
             m.axes = v.axes;
             m.points.clear();
             m.points.extend(vertices.iter().map(|p| turn(&v.axes, p)));
-            let (lo, hi) = m
-                .points
-                .iter()
-                .fold((P3::from([f32::MAX; 3]), P3::from([f32::MIN; 3])), |(lo, hi), p| (lo.inf(p), hi.sup(p)));
-            let side = |k: usize| ((hi[k] - lo[k] + 2.0 * BORDER) * v.pixels_per_metre).clamp(1.0, LARGEST) as u32;
+            let (lo, hi) = m.points.iter().fold(
+                (P3::from([f32::MAX; 3]), P3::from([f32::MIN; 3])),
+                |(lo, hi), p| (lo.inf(p), hi.sup(p)),
+            );
+            let side = |k: usize| {
+                ((hi[k] - lo[k] + 2.0 * BORDER) * v.pixels_per_metre).clamp(1.0, LARGEST) as u32
+            };
             let view = View::Orthographic {
                 width: side(0),
                 height: side(1),
@@ -98,7 +118,11 @@ impl DepthMaps {
                 pixels_per_metre: v.pixels_per_metre,
             };
             rasterise_with(
-                Options { par: Par::Seq, cull: Cull::Back, ..Options::default() },
+                Options {
+                    par: Par::Seq,
+                    cull: Cull::Back,
+                    ..Options::default()
+                },
                 &view,
                 &m.points,
                 faces,
@@ -128,8 +152,9 @@ mod tests {
     #[test]
     fn each_map_shows_the_side_it_looks_at() {
         // A box of 0.2 m: eight corners, twelve faces, two a side.
-        let v: Vec<P3> =
-            (0..8).map(|i| P3::new((i & 1) as f32, ((i >> 1) & 1) as f32, ((i >> 2) & 1) as f32) * 0.2).collect();
+        let v: Vec<P3> = (0..8)
+            .map(|i| P3::new((i & 1) as f32, ((i >> 1) & 1) as f32, ((i >> 2) & 1) as f32) * 0.2)
+            .collect();
         let f: Vec<Face> = vec![
             [4, 5, 7],
             [4, 7, 6], // z = 0.2
@@ -145,7 +170,12 @@ mod tests {
             [0, 5, 4],
         ];
         let mut maps = DepthMaps::default();
-        maps.render(Par::Seq, &MapView::around([0.0, -1.0], MapDetail::InView), &v, &f);
+        maps.render(
+            Par::Seq,
+            &MapView::around([0.0, -1.0], MapDetail::InView),
+            &v,
+            &f,
+        );
         let p = P3::new(0.11, 0.08, 0.09);
         let got: Vec<u32> = maps.proposals(&p).map(|f| f / 2).collect();
         // Camera looks along −z: front map sees z = 0.2, then back, then the two sides.
@@ -159,7 +189,10 @@ mod tests {
     fn misses(detail: MapDetail) -> [[f32; 2]; 2] {
         let (rings, around) = (140u32, 120u32);
         let surface = |y: f32, t: f32, off: f32| {
-            let r = [0.16 + 0.03 * (5.0 * y).sin() + off, 0.11 + 0.02 * (7.0 * y).cos() + off];
+            let r = [
+                0.16 + 0.03 * (5.0 * y).sin() + off,
+                0.11 + 0.02 * (7.0 * y).cos() + off,
+            ];
             P3::new(r[0] * t.cos(), y, r[1] * t.sin())
         };
         let angle = |j: f32| std::f32::consts::TAU * j / around as f32;
@@ -183,7 +216,9 @@ mod tests {
                 let (j, k) = (j as f32 + 0.37, k as f32 + 0.41);
                 let p = surface(height(k), angle(j), 0.005);
                 let nearest = v.iter().map(|q| (q - p).norm()).fold(f32::MAX, f32::min);
-                let best = maps.proposals(&p).map(|face| (v[f[face as usize][0] as usize] - p).norm());
+                let best = maps
+                    .proposals(&p)
+                    .map(|face| (v[f[face as usize][0] as usize] - p).norm());
                 let miss = best.fold(f32::MAX, f32::min) - nearest;
                 let side = usize::from(p.z < 0.0);
                 counts[side] += 1;
@@ -195,15 +230,28 @@ mod tests {
 
     #[test]
     fn what_the_camera_sees_is_proposed_as_well_as_with_fine_maps_everywhere() {
-        let [all, view, none] = [MapDetail::Everywhere, MapDetail::InView, MapDetail::Nowhere].map(misses);
+        let [all, view, none] =
+            [MapDetail::Everywhere, MapDetail::InView, MapDetail::Nowhere].map(misses);
         eprintln!("excess distance of proposals, mm: front mean, worst; back mean, worst");
         for (name, m) in [("everywhere", all), ("in view", view), ("nowhere", none)] {
-            eprintln!("{name}: {:.2} {:.2}; {:.2} {:.2}", m[0][0] * 1e3, m[0][1] * 1e3, m[1][0] * 1e3, m[1][1] * 1e3);
+            eprintln!(
+                "{name}: {:.2} {:.2}; {:.2} {:.2}",
+                m[0][0] * 1e3,
+                m[0][1] * 1e3,
+                m[1][0] * 1e3,
+                m[1][1] * 1e3
+            );
         }
         // In view (flanks too): within a millimetre of fine maps everywhere. Elsewhere: within a coarse pixel of the nearest.
         assert!(view[0][0] < all[0][0] + 1e-3, "{view:?} {all:?}");
-        assert!(view[1][1] < 1.0 / COARSE && none[0][1] < 1.0 / COARSE, "{view:?} {none:?}");
+        assert!(
+            view[1][1] < 1.0 / COARSE && none[0][1] < 1.0 / COARSE,
+            "{view:?} {none:?}"
+        );
         // And the switch does something.
-        assert!(none[0][0] > view[0][0] && view[1][0] > all[1][0], "{none:?} {view:?} {all:?}");
+        assert!(
+            none[0][0] > view[0][0] && view[1][0] > all[1][0],
+            "{none:?} {view:?} {all:?}"
+        );
     }
 }

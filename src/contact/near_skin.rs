@@ -25,7 +25,13 @@ impl NearSkin {
         self.grid.fill(&frame.vertices, 2.0 * UNDER);
     }
     /// Of two kinds of parts the skin near `x`.
-    pub fn around(&self, surface: &SurfaceModel, frame: &SurfaceFrame, x: &P3, masks: [Part; 2]) -> [Near; 2] {
+    pub fn around(
+        &self,
+        surface: &SurfaceModel,
+        frame: &SurfaceFrame,
+        x: &P3,
+        masks: [Part; 2],
+    ) -> [Near; 2] {
         let mut found = [[(NEAREST * NEAREST, None), (UNDER * UNDER, None)]; 2];
         self.grid.within(x, UNDER, |v, d| {
             let part = surface.part(v);
@@ -36,7 +42,9 @@ impl NearSkin {
                 if (d, Some(v)) < *any {
                     *any = (d, Some(v));
                 }
-                if (d, Some(v)) < *above && (x - frame.vertices[v as usize]).dot(&surface.normal(frame, v)) < 0.0 {
+                if (d, Some(v)) < *above
+                    && (x - frame.vertices[v as usize]).dot(&surface.normal(frame, v)) < 0.0
+                {
                     *above = (d, Some(v));
                 }
             }
@@ -74,7 +82,11 @@ impl Near {
             }
             let other = surface.closest_around(frame, x, *v, mask);
             let nearer = best.is_none_or(|b| other.signed.abs() < b.signed.abs());
-            if nearer && !other.rim { Some(other) } else { best }
+            if nearer && !other.rim {
+                Some(other)
+            } else {
+                best
+            }
         })
     }
 }
@@ -98,17 +110,31 @@ mod tests {
         let walked = surface.closest(&frame, &x, 0, 1);
         assert!(walked.signed > 0.0 && walked.vertex < n, "{walked:?}");
         let [own, other] = near.around(&surface, &frame, &x, [1, 2]);
-        assert!(own.0.iter().all(|v| v.is_some_and(|v| v >= n)) && other == Near::default(), "{own:?} {other:?}");
-        let found = own.or_nearer(&surface, &frame, &x, Some(walked), 1).expect("skin");
+        assert!(
+            own.0.iter().all(|v| v.is_some_and(|v| v >= n)) && other == Near::default(),
+            "{own:?} {other:?}"
+        );
+        let found = own
+            .or_nearer(&surface, &frame, &x, Some(walked), 1)
+            .expect("skin");
         assert!((found.signed + 0.002).abs() < 3e-4, "{}", found.signed);
         assert!(own.seen() && own.under() && !other.seen() && !other.under());
         // Nothing within reach, or nothing nearer: the walk stands.
         let far = P3::new(0.1, 0.0, 0.0);
-        assert_eq!(near.around(&surface, &frame, &far, [1, 1]), [Near::default(); 2]);
+        assert_eq!(
+            near.around(&surface, &frame, &far, [1, 1]),
+            [Near::default(); 2]
+        );
         let walked = surface.closest(&frame, &far, n, 1);
-        assert_eq!(Near::default().or_nearer(&surface, &frame, &far, None, 1), None);
+        assert_eq!(
+            Near::default().or_nearer(&surface, &frame, &far, None, 1),
+            None
+        );
         for near in [Near::default(), Near([Some(0), Some(1)])] {
-            assert_eq!(near.or_nearer(&surface, &frame, &far, Some(walked), 1), Some(walked));
+            assert_eq!(
+                near.or_nearer(&surface, &frame, &far, Some(walked), 1),
+                Some(walked)
+            );
         }
     }
 
@@ -117,9 +143,17 @@ mod tests {
         let (surface, frame, _) = two_spheres(4, 0.1, [-0.15, 0.15], [1, 1]);
         let mut near = NearSkin::default();
         near.fill(&frame);
-        for (height, seen, under) in [(0.05, false, false), (0.005, true, false), (-0.002, true, true)] {
+        for (height, seen, under) in [
+            (0.05, false, false),
+            (0.005, true, false),
+            (-0.002, true, true),
+        ] {
             let [own, _] = near.around(&surface, &frame, &P3::new(0.15, 0.1 + height, 0.0), [1, 0]);
-            assert_eq!((own.seen(), own.under()), (seen, under), "{height} m: {own:?}");
+            assert_eq!(
+                (own.seen(), own.under()),
+                (seen, under),
+                "{height} m: {own:?}"
+            );
         }
     }
 
@@ -128,25 +162,41 @@ mod tests {
         // A ball of 5 mm in front of a flat piece of skin with corners 17 mm apart, and a place between, under the skin.
         let ball = sphere(2);
         let n = ball.vertices().len() as u32;
-        let mut places: Vec<P3> = ball.vertices().iter().map(|p| P3::from(p.coords * 0.005)).collect();
+        let mut places: Vec<P3> = ball
+            .vertices()
+            .iter()
+            .map(|p| P3::from(p.coords * 0.005))
+            .collect();
         let turn = |k: f32| (k * std::f32::consts::TAU / 3.0).sin_cos();
         places.extend([0.0, 1.0, 2.0].map(|k| P3::new(0.011, 0.01 * turn(k).0, 0.01 * turn(k).1)));
         let mut faces = ball.faces().to_vec();
         faces.push([n, n + 1, n + 2]);
         let mesh = TriMesh::new(places, faces).expect("a ball and a triangle");
         let parts = vec![1; mesh.vertices().len()];
-        let surface = SurfaceModel::new(mesh.faces().to_vec(), Topology::new(&mesh).expect("topology"), parts);
-        let mut frame = SurfaceFrame { vertices: mesh.vertices().to_vec(), normals: Vec::new() };
+        let surface = SurfaceModel::new(
+            mesh.faces().to_vec(),
+            Topology::new(&mesh).expect("topology"),
+            parts,
+        );
+        let mut frame = SurfaceFrame {
+            vertices: mesh.vertices().to_vec(),
+            normals: Vec::new(),
+        };
         surface.update_normals(Par::Seq, &mut frame);
         let side = frame.normals[n as usize].x.signum();
         let x = P3::new(0.011 - 0.002 * side, 0.0, 0.0);
         let mut near = NearSkin::default();
         near.fill(&frame);
         let [own, _] = near.around(&surface, &frame, &x, [1, 0]);
-        assert!(own.0[0].is_some_and(|v| v < n) && own.0[1].is_some_and(|v| v >= n), "{own:?}");
+        assert!(
+            own.0[0].is_some_and(|v| v < n) && own.0[1].is_some_and(|v| v >= n),
+            "{own:?}"
+        );
         let walked = surface.closest(&frame, &x, 0, 1);
         assert!(walked.signed > 0.0035 && walked.vertex < n, "{walked:?}");
-        let found = own.or_nearer(&surface, &frame, &x, Some(walked), 1).expect("skin");
+        let found = own
+            .or_nearer(&surface, &frame, &x, Some(walked), 1)
+            .expect("skin");
         assert!((found.signed + 0.002).abs() < 1e-5, "{found:?}");
     }
 }

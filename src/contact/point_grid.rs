@@ -45,9 +45,12 @@ impl PointGrid {
         let mut keys = std::mem::take(&mut self.keys);
         keys.clear();
         let [narrow, wide] = [NARROW / self.cell, 1.0 / self.cell];
-        keys.extend(
-            points.iter().map(|p| bucket(below(p.x * narrow), row(below(p.y * wide), below(p.z * wide))) as u32),
-        );
+        keys.extend(points.iter().map(|p| {
+            bucket(
+                below(p.x * narrow),
+                row(below(p.y * wide), below(p.z * wide)),
+            ) as u32
+        }));
         self.keys = keys;
         self.first.clear();
         self.first.resize(BUCKETS + 1, 0);
@@ -83,7 +86,10 @@ impl PointGrid {
         let beside = |v: f32| {
             let t = v * wide;
             let i = below(t);
-            [i, i.saturating_add(if t - (i as f32) < 0.5 { -1 } else { 1 })]
+            [
+                i,
+                i.saturating_add(if t - (i as f32) < 0.5 { -1 } else { 1 }),
+            ]
         };
         let (ys, zs) = (beside(p.y), beside(p.z));
         let most = f32x8::splat(reach * reach);
@@ -105,12 +111,18 @@ impl PointGrid {
         let (mut from, to) = (from as usize, to as usize);
         let [x, y, z] = &self.places;
         while from < to {
-            let (Some(x), Some(y), Some(z)) =
-                (x[from..].first_chunk::<LANES>(), y[from..].first_chunk::<LANES>(), z[from..].first_chunk::<LANES>())
-            else {
+            let (Some(x), Some(y), Some(z)) = (
+                x[from..].first_chunk::<LANES>(),
+                y[from..].first_chunk::<LANES>(),
+                z[from..].first_chunk::<LANES>(),
+            ) else {
                 break;
             };
-            let d = [f32x8::from(*x) - at[0], f32x8::from(*y) - at[1], f32x8::from(*z) - at[2]];
+            let d = [
+                f32x8::from(*x) - at[0],
+                f32x8::from(*y) - at[1],
+                f32x8::from(*z) - at[2],
+            ];
             let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
             let mut near = square.simd_le(most).to_bitmask();
             if near != 0 {
@@ -138,7 +150,9 @@ mod tests {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (seed >> 8) as f32 / (1u32 << 24) as f32 - 0.5
         };
-        let points: Vec<P3> = (0..3000).map(|_| P3::new(random(), random(), random())).collect();
+        let points: Vec<P3> = (0..3000)
+            .map(|_| P3::new(random(), random(), random()))
+            .collect();
         let mut grid = PointGrid::default();
         grid.fill(&points, 0.08);
         for q in points.iter().step_by(97) {
@@ -150,11 +164,18 @@ mod tests {
             }
         }
         // Far away, and not a number: found or not, but nothing breaks.
-        grid.fill(&[P3::new(1e30, 0.0, -1e30), P3::new(1e30, f32::NAN, -1e30)], 0.08);
+        grid.fill(
+            &[P3::new(1e30, 0.0, -1e30), P3::new(1e30, f32::NAN, -1e30)],
+            0.08,
+        );
         let mut got = Vec::new();
         grid.within(&P3::new(1e30, 0.0, -1e30), 0.04, |i, _| got.push(i));
         assert!(got.contains(&0) && !got.contains(&1), "{got:?}");
-        grid.within(&P3::new(1e30, f32::NAN, -1e30), 0.04, |_, _| unreachable!("it is nowhere"));
-        PointGrid::default().within(&P3::origin(), 1.0, |_, _| unreachable!("an empty grid has no points"));
+        grid.within(&P3::new(1e30, f32::NAN, -1e30), 0.04, |_, _| {
+            unreachable!("it is nowhere")
+        });
+        PointGrid::default().within(&P3::origin(), 1.0, |_, _| {
+            unreachable!("an empty grid has no points")
+        });
     }
 }

@@ -63,10 +63,27 @@ impl SurfaceModel {
     /// Takes connectivity and the parts of each vertex.
     pub fn new(faces: Vec<Face>, topology: Topology, mut parts: Vec<Part>) -> Self {
         parts.resize(topology.vertex_neighbours().rows(), Part::MAX);
-        let of = |f: &u32| faces[*f as usize].iter().fold(Part::MAX, |all, c| all & parts[*c as usize]);
-        let around = |v: usize| topology.vertex_faces().row(v).iter().map(of).fold(Part::MAX, |a, b| a & b);
+        let of = |f: &u32| {
+            faces[*f as usize]
+                .iter()
+                .fold(Part::MAX, |all, c| all & parts[*c as usize])
+        };
+        let around = |v: usize| {
+            topology
+                .vertex_faces()
+                .row(v)
+                .iter()
+                .map(of)
+                .fold(Part::MAX, |a, b| a & b)
+        };
         let shared = (0..parts.len()).map(around).collect();
-        Self { rim: topology.boundary_vertices(), shared, faces, topology, parts }
+        Self {
+            rim: topology.boundary_vertices(),
+            shared,
+            faces,
+            topology,
+            parts,
+        }
     }
     /// Number of vertices.
     pub fn vertices(&self) -> usize {
@@ -82,7 +99,13 @@ impl SurfaceModel {
     }
     /// Fills the normals of a frame from its vertices.
     pub fn update_normals(&self, par: Par, frame: &mut SurfaceFrame) {
-        vertex_normals(par, &frame.vertices, &self.faces, self.topology.vertex_faces(), &mut frame.normals);
+        vertex_normals(
+            par,
+            &frame.vertices,
+            &self.faces,
+            self.topology.vertex_faces(),
+            &mut frame.normals,
+        );
     }
     /// Unit normal at a vertex.
     pub(super) fn normal(&self, frame: &SurfaceFrame, vertex: u32) -> V3 {
@@ -145,7 +168,9 @@ impl SurfaceModel {
             .collect();
         let mut found = Vec::new();
         par::map_into(par, points.len().min(masks.len()), 256, &mut found, |i| {
-            let near = trees.get(&masks[i]).and_then(|(of, tree)| Some(of[tree.nearest(&points[i], f32::MAX)?.0]));
+            let near = trees
+                .get(&masks[i])
+                .and_then(|(of, tree)| Some(of[tree.nearest(&points[i], f32::MAX)?.0]));
             near.unwrap_or(0)
         });
         found
@@ -173,7 +198,11 @@ impl SurfaceModel {
     /// The nearest point on the faces around a vertex.
     pub fn closest_around(&self, frame: &SurfaceFrame, p: &P3, vertex: u32, mask: Part) -> Closest {
         let around = self.topology.vertex_faces().row(vertex as usize);
-        let outside = |f: &u32| self.faces[*f as usize].iter().any(|&c| self.parts[c as usize] & mask == 0);
+        let outside = |f: &u32| {
+            self.faces[*f as usize]
+                .iter()
+                .any(|&c| self.parts[c as usize] & mask == 0)
+        };
         let rim = self.shared[vertex as usize] & mask == 0 && around.iter().any(outside);
         let mut best: Option<(f32, u32, [f32; 2])> = None;
         for some in around.chunks(LANES) {
@@ -181,7 +210,8 @@ impl SurfaceModel {
             for (l, f) in some.iter().enumerate() {
                 let [a, b, c] = self.faces[*f as usize].map(|i| frame.vertices[i as usize]);
                 for d in 0..3 {
-                    (fan.ab[d][l], fan.ac[d][l], fan.ap[d][l]) = (b[d] - a[d], c[d] - a[d], p[d] - a[d]);
+                    (fan.ab[d][l], fan.ac[d][l], fan.ap[d][l]) =
+                        (b[d] - a[d], c[d] - a[d], p[d] - a[d]);
                 }
             }
             let (weights, square) = fan.nearest();
@@ -207,7 +237,9 @@ impl SurfaceModel {
         let [a, b, c] = self.faces[face as usize].map(|i| frame.vertices[i as usize].coords);
         let point = P3::from(a * weights[0] + b * v + c * w);
         let n = self.faces[face as usize];
-        let smooth = (0..3).fold(V3::zeros(), |s, k| s + self.normal(frame, n[k]) * weights[k]);
+        let smooth = (0..3).fold(V3::zeros(), |s, k| {
+            s + self.normal(frame, n[k]) * weights[k]
+        });
         let mut normal = smooth.try_normalize(0.0).unwrap_or_else(V3::y);
         let outside = (p - point).dot(&normal) >= 0.0;
         let distance = d.sqrt();
@@ -218,7 +250,15 @@ impl SurfaceModel {
                 normal = along;
             }
         }
-        Closest { vertex, face, weights, point, normal, signed: if outside { distance } else { -distance }, rim }
+        Closest {
+            vertex,
+            face,
+            weights,
+            point,
+            normal,
+            signed: if outside { distance } else { -distance },
+            rim,
+        }
     }
     /// The nearest point lies on the edge of an open surface: which side it is on means nothing.
     pub fn on_rim(&self, c: &Closest) -> bool {
@@ -227,7 +267,13 @@ impl SurfaceModel {
     }
     /// What keeps `p` under an open surface that others are worn over, from its nearest point `hit`: that point, or, where
     /// it lies on a hem at most `reach` away, a point as far off the hem's surface as `p` is beyond it.
-    pub fn under(&self, frame: &SurfaceFrame, p: &P3, hit: &Closest, reach: f32) -> Option<Closest> {
+    pub fn under(
+        &self,
+        frame: &SurfaceFrame,
+        p: &P3,
+        hit: &Closest,
+        reach: f32,
+    ) -> Option<Closest> {
         if hit.rim {
             return None;
         }
@@ -235,13 +281,20 @@ impl SurfaceModel {
             return Some(*hit);
         }
         let corners = self.faces[hit.face as usize];
-        let normal = (0..3).fold(V3::zeros(), |s, k| s + self.normal(frame, corners[k]) * hit.weights[k]);
+        let normal = (0..3).fold(V3::zeros(), |s, k| {
+            s + self.normal(frame, corners[k]) * hit.weights[k]
+        });
         let normal = normal.try_normalize(0.0)?;
         let height = normal.dot(&(p - hit.point));
         let beyond = (p - hit.point - normal * height).norm();
         (beyond < reach).then(|| {
             let point = hit.point + normal * beyond;
-            Closest { point, normal, signed: normal.dot(&(p - point)), ..*hit }
+            Closest {
+                point,
+                normal,
+                signed: normal.dot(&(p - point)),
+                ..*hit
+            }
         })
     }
     /// Vertices one edge away.
@@ -283,7 +336,14 @@ impl SurfaceModel {
     /// `vertex` stays within the parts.
     pub fn closest_beyond(&self, frame: &SurfaceFrame, p: &P3, start: u32, mask: Part) -> Closest {
         let own = self.closest(frame, p, start, mask);
-        if own.rim { Closest { vertex: own.vertex, ..self.closest(frame, p, own.vertex, Part::MAX) } } else { own }
+        if own.rim {
+            Closest {
+                vertex: own.vertex,
+                ..self.closest(frame, p, own.vertex, Part::MAX)
+            }
+        } else {
+            own
+        }
     }
     /// Walk and nearest point in one.
     pub fn closest(&self, frame: &SurfaceFrame, p: &P3, start: u32, mask: Part) -> Closest {
@@ -318,8 +378,11 @@ impl Fan {
     fn nearest(&self) -> ([[f32; LANES]; 2], [f32; LANES]) {
         let (mut weights, mut square) = ([[0.0; LANES]; 2], [0.0; LANES]);
         for l in 0..LANES {
-            let (ab, ac, ap) =
-                (self.ab.each_ref().map(|a| a[l]), self.ac.each_ref().map(|a| a[l]), self.ap.each_ref().map(|a| a[l]));
+            let (ab, ac, ap) = (
+                self.ab.each_ref().map(|a| a[l]),
+                self.ac.each_ref().map(|a| a[l]),
+                self.ap.each_ref().map(|a| a[l]),
+            );
             let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
             let (d1, d2, across) = (dot(ab, ap), dot(ac, ap), dot(ab, ac));
             let (d3, d4, d5, d6) = (d1 - dot(ab, ab), d2 - across, d1 - across, d2 - dot(ac, ac));
@@ -331,9 +394,17 @@ impl Fan {
             // The later, the stronger.
             let t = share(d4 - d3, (d4 - d3) + (d5 - d6));
             at = choose((va <= 0.0) & (d4 >= d3) & (d5 >= d6), [1.0 - t, t], at);
-            at = choose((vb <= 0.0) & (d2 >= 0.0) & (d6 <= 0.0), [0.0, share(d2, d2 - d6)], at);
+            at = choose(
+                (vb <= 0.0) & (d2 >= 0.0) & (d6 <= 0.0),
+                [0.0, share(d2, d2 - d6)],
+                at,
+            );
             at = choose((d6 >= 0.0) & (d5 <= d6), [0.0, 1.0], at);
-            at = choose((vc <= 0.0) & (d1 >= 0.0) & (d3 <= 0.0), [share(d1, d1 - d3), 0.0], at);
+            at = choose(
+                (vc <= 0.0) & (d1 >= 0.0) & (d3 <= 0.0),
+                [share(d1, d1 - d3), 0.0],
+                at,
+            );
             at = choose((d3 >= 0.0) & (d4 <= d3), [1.0, 0.0], at);
             at = choose((d1 <= 0.0) & (d2 <= 0.0), [0.0, 0.0], at);
             let r: [f32; 3] = std::array::from_fn(|d| ap[d] - ab[d] * at[0] - ac[d] * at[1]);
@@ -350,11 +421,26 @@ pub(super) mod tests {
 
     /// A sphere from a subdivided octahedron.
     pub(in crate::contact) fn sphere(levels: usize) -> TriMesh {
-        let mut v: Vec<P3> = [[1., 0., 0.], [-1., 0., 0.], [0., 1., 0.], [0., -1., 0.], [0., 0., 1.], [0., 0., -1.]]
-            .map(P3::from)
-            .to_vec();
-        let mut f: Vec<Face> =
-            vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+        let mut v: Vec<P3> = [
+            [1., 0., 0.],
+            [-1., 0., 0.],
+            [0., 1., 0.],
+            [0., -1., 0.],
+            [0., 0., 1.],
+            [0., 0., -1.],
+        ]
+        .map(P3::from)
+        .to_vec();
+        let mut f: Vec<Face> = vec![
+            [0, 2, 4],
+            [2, 1, 4],
+            [1, 3, 4],
+            [3, 0, 4],
+            [2, 0, 5],
+            [1, 2, 5],
+            [3, 1, 5],
+            [0, 3, 5],
+        ];
         for _ in 0..levels {
             let mut middle = std::collections::BTreeMap::new();
             let mut next = Vec::new();
@@ -362,11 +448,18 @@ pub(super) mod tests {
                 let m: [u32; 3] = std::array::from_fn(|k| {
                     let (a, b) = (t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3]));
                     *middle.entry((a, b)).or_insert_with(|| {
-                        v.push(P3::from((v[a as usize].coords + v[b as usize].coords).normalize()));
+                        v.push(P3::from(
+                            (v[a as usize].coords + v[b as usize].coords).normalize(),
+                        ));
                         v.len() as u32 - 1
                     })
                 });
-                next.extend([[t[0], m[0], m[2]], [m[0], t[1], m[1]], [m[2], m[1], t[2]], [m[0], m[1], m[2]]]);
+                next.extend([
+                    [t[0], m[0], m[2]],
+                    [m[0], t[1], m[1]],
+                    [m[2], m[1], t[2]],
+                    [m[0], m[1], m[2]],
+                ]);
             }
             f = next;
         }
@@ -383,13 +476,32 @@ pub(super) mod tests {
     ) -> (SurfaceModel, SurfaceFrame, usize) {
         let one = sphere(levels);
         let n = one.vertices().len();
-        let at = |x: f32| one.vertices().iter().map(move |p| P3::from(p.coords * radius + V3::x() * x));
+        let at = |x: f32| {
+            one.vertices()
+                .iter()
+                .map(move |p| P3::from(p.coords * radius + V3::x() * x))
+        };
         let vertices: Vec<P3> = centres.into_iter().flat_map(at).collect();
-        let faces = one.faces().iter().copied().chain(one.faces().iter().map(|f| f.map(|v| v + n as u32))).collect();
+        let faces = one
+            .faces()
+            .iter()
+            .copied()
+            .chain(one.faces().iter().map(|f| f.map(|v| v + n as u32)))
+            .collect();
         let mesh = TriMesh::new(vertices.clone(), faces).expect("two spheres");
-        let parts = parts.into_iter().flat_map(|p| std::iter::repeat_n(p, n)).collect();
-        let model = SurfaceModel::new(mesh.faces().to_vec(), Topology::new(&mesh).expect("topology"), parts);
-        let mut frame = SurfaceFrame { vertices, normals: Vec::new() };
+        let parts = parts
+            .into_iter()
+            .flat_map(|p| std::iter::repeat_n(p, n))
+            .collect();
+        let model = SurfaceModel::new(
+            mesh.faces().to_vec(),
+            Topology::new(&mesh).expect("topology"),
+            parts,
+        );
+        let mut frame = SurfaceFrame {
+            vertices,
+            normals: Vec::new(),
+        };
         model.update_normals(Par::Seq, &mut frame);
         (model, frame, n)
     }
@@ -402,7 +514,10 @@ pub(super) mod tests {
             Topology::new(&mesh).expect("topology"),
             vec![1; mesh.vertices().len()],
         );
-        let mut frame = SurfaceFrame { vertices: mesh.vertices().to_vec(), normals: Vec::new() };
+        let mut frame = SurfaceFrame {
+            vertices: mesh.vertices().to_vec(),
+            normals: Vec::new(),
+        };
         model.update_normals(Par::Seq, &mut frame);
         for i in 0..200 {
             let t = i as f32 * 0.7;
@@ -412,7 +527,12 @@ pub(super) mod tests {
             let walked = model.closest(&frame, &p, 0, 1);
             let scan = model.nearest_vertex(&frame, &p, 1);
             assert_eq!(walked.vertex, scan, "point {i}");
-            assert!((walked.signed - (r - 1.0)).abs() < 4e-3, "{} {}", walked.signed, r - 1.0);
+            assert!(
+                (walked.signed - (r - 1.0)).abs() < 4e-3,
+                "{} {}",
+                walked.signed,
+                r - 1.0
+            );
             assert!(walked.normal.dot(&dir) > 0.99 && !walked.rim);
         }
     }
@@ -420,11 +540,16 @@ pub(super) mod tests {
     #[test]
     fn under_a_sheet_and_below_its_hem() {
         // A sheet at z = 0 over x in 0..1, its hem at x = 1; what lies under it has z < 0.
-        let v: Vec<P3> = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]].map(P3::from).to_vec();
+        let v: Vec<P3> = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]]
+            .map(P3::from)
+            .to_vec();
         let f: Vec<Face> = vec![[0, 1, 2], [0, 2, 3]];
         let mesh = TriMesh::new(v.clone(), f.clone()).expect("a sheet");
         let model = SurfaceModel::new(f, Topology::new(&mesh).expect("topology"), vec![1; 4]);
-        let mut frame = SurfaceFrame { vertices: v, normals: Vec::new() };
+        let mut frame = SurfaceFrame {
+            vertices: v,
+            normals: Vec::new(),
+        };
         model.update_normals(Par::Seq, &mut frame);
         let signed = |x: f32, z: f32| {
             let p = P3::new(x, 0.4, z);
@@ -439,7 +564,10 @@ pub(super) mod tests {
         assert!(close(signed(1.04, 0.04), 0.0), "{:?}", signed(1.04, 0.04));
         assert!(close(signed(1.04, 0.07), 0.03), "{:?}", signed(1.04, 0.07));
         assert_eq!(signed(1.2, 0.0), None, "too far below");
-        let rim = Closest { rim: true, ..model.closest_around(&frame, &P3::origin(), 0, 1) };
+        let rim = Closest {
+            rim: true,
+            ..model.closest_around(&frame, &P3::origin(), 0, 1)
+        };
         assert_eq!(model.under(&frame, &P3::origin(), &rim, 0.1), None);
     }
 
@@ -456,7 +584,13 @@ pub(super) mod tests {
                 fan.ab[axis] = std::array::from_fn(|_| random());
                 // Every fourth time without area, every fourth time a point.
                 let thin = [random(), 0.5, 0.0, random()][round % 4];
-                fan.ac[axis] = fan.ab[axis].map(|a| if round % 4 == 1 || round % 4 == 2 { thin * a } else { random() });
+                fan.ac[axis] = fan.ab[axis].map(|a| {
+                    if round % 4 == 1 || round % 4 == 2 {
+                        thin * a
+                    } else {
+                        random()
+                    }
+                });
                 fan.ap[axis] = std::array::from_fn(|_| 2.0 * random());
             }
             let (weights, square) = fan.nearest();
@@ -464,10 +598,19 @@ pub(super) mod tests {
                 let of = |a: &[[f32; LANES]; 3]| P3::new(a[0][l], a[1][l], a[2][l]);
                 let (b, c, p) = (of(&fan.ab), of(&fan.ac), of(&fan.ap));
                 let w = closest_on_triangle(&p, &P3::origin(), &b, &c);
-                let alone = (p - (b.coords * w[1] + c.coords * w[2])).coords.norm_squared();
+                let alone = (p - (b.coords * w[1] + c.coords * w[2]))
+                    .coords
+                    .norm_squared();
                 let sum = weights[0][l] + weights[1][l];
-                assert!((square[l] - alone).abs() < 1e-4, "{round} {l}: {} {alone}", square[l]);
-                assert!(weights[0][l] >= -1e-3 && weights[1][l] >= -1e-3 && sum <= 1.001, "{round} {l}");
+                assert!(
+                    (square[l] - alone).abs() < 1e-4,
+                    "{round} {l}: {} {alone}",
+                    square[l]
+                );
+                assert!(
+                    weights[0][l] >= -1e-3 && weights[1][l] >= -1e-3 && sum <= 1.001,
+                    "{round} {l}"
+                );
             }
         }
     }

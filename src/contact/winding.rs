@@ -22,7 +22,9 @@ pub(super) struct Winding<'a> {
 impl<'a> Winding<'a> {
     /// Sorts the faces; outward means counter-clockwise.
     pub(super) fn new(vertices: &'a [P3], faces: &'a [Face]) -> Self {
-        let (low, high) = vertices.iter().fold((f32::MAX, f32::MIN), |(l, h), p| (l.min(p.y), h.max(p.y)));
+        let (low, high) = vertices
+            .iter()
+            .fold((f32::MAX, f32::MIN), |(l, h), p| (l.min(p.y), h.max(p.y)));
         let bands = (((high - low).max(0.0) / BAND) as usize + 1).min(MOST_BANDS);
         let span = |f: &Face| {
             let y = f.map(|v| vertices[v as usize].y);
@@ -39,7 +41,13 @@ impl<'a> Winding<'a> {
                 next[b] += 1;
             }
         }
-        Self { vertices, faces, low, first, of }
+        Self {
+            vertices,
+            faces,
+            low,
+            first,
+            of,
+        }
     }
     /// The surface goes around the point at least once.
     pub(super) fn holds(&self, p: &P3) -> bool {
@@ -48,7 +56,11 @@ impl<'a> Winding<'a> {
             return false;
         }
         let [from, to] = [0, 1].map(|k| self.first[band as usize + k] as usize);
-        self.of[from..to].iter().map(|f| self.crossing(*f, p)).sum::<i32>() > 0
+        self.of[from..to]
+            .iter()
+            .map(|f| self.crossing(*f, p))
+            .sum::<i32>()
+            > 0
     }
     /// +1 where the ray from `p` along +z leaves through the face, −1 where it enters. Edges are half-open, so that
     /// between two faces a ray crosses one of them.
@@ -66,10 +78,16 @@ impl<'a> Winding<'a> {
                 cut[usize::from(!left)] = Some((a.y + t * d.y, a.z + t * d.z));
             }
         }
-        let [Some((y0, z0)), Some((y1, z1))] = cut else { return 0 };
+        let [Some((y0, z0)), Some((y1, z1))] = cut else {
+            return 0;
+        };
         let y = f64::from(p.y);
         let sign = i32::from(y0 <= y && y < y1) - i32::from(y1 <= y && y < y0);
-        if sign != 0 && z0 + (z1 - z0) * (y - y0) / (y1 - y0) > f64::from(p.z) { sign } else { 0 }
+        if sign != 0 && z0 + (z1 - z0) * (y - y0) / (y1 - y0) > f64::from(p.z) {
+            sign
+        } else {
+            0
+        }
     }
 }
 
@@ -85,7 +103,9 @@ mod tests {
         // The faces of a subdivided octahedron lie between 0.97 and 1 from the middle.
         let mut seen = [0; 2];
         for i in 0..4000u32 {
-            let at = |k: u32| (i.wrapping_mul(2_654_435_761 - 17_386 * k) >> 12 & 0xfff) as f32 / 2048.0 - 1.0;
+            let at = |k: u32| {
+                (i.wrapping_mul(2_654_435_761 - 17_386 * k) >> 12 & 0xfff) as f32 / 2048.0 - 1.0
+            };
             let p = P3::new(at(1) * 1.3, at(2) * 1.3, at(3) * 1.3);
             let r = p.coords.norm();
             if !(0.96..=1.0).contains(&r) {
@@ -96,7 +116,9 @@ mod tests {
         assert!(seen.iter().all(|n| *n > 300), "{seen:?}");
         // Rays through corners and along edges cross once.
         assert!(
-            mesh.vertices().iter().all(|v| w.holds(&P3::from(v.coords * 0.5)) && !w.holds(&P3::from(v.coords * 1.5)))
+            mesh.vertices()
+                .iter()
+                .all(|v| w.holds(&P3::from(v.coords * 0.5)) && !w.holds(&P3::from(v.coords * 1.5)))
         );
     }
 

@@ -12,15 +12,24 @@ const LEGS_OUT: f64 = 0.10;
 /// Joint angles of the canonical pose, in the template's own frame (root identity).
 pub(super) fn canonical_pose(template: &Template, rest: &RestBody) -> Pose<Body> {
     let skeleton = template.skeleton();
-    let mut pose = Pose { root: Rigid::<Body, Body>::identity(), angles: vec![0.0; skeleton.dofs()] };
+    let mut pose = Pose {
+        root: Rigid::<Body, Body>::identity(),
+        angles: vec![0.0; skeleton.dofs()],
+    };
     let mut aim = |joint: &str, child: &str, wanted: Vector3<f64>| {
-        let (Some(j), Some(c)) = (skeleton.index(joint), skeleton.index(child)) else { return };
+        let (Some(j), Some(c)) = (skeleton.index(joint), skeleton.index(child)) else {
+            return;
+        };
         let now = rest.joints[c] - rest.joints[j];
-        let Some(turn) = UnitQuaternion::rotation_between(&now, &wanted) else { return };
+        let Some(turn) = UnitQuaternion::rotation_between(&now, &wanted) else {
+            return;
+        };
         let at = skeleton.dof_offset(j);
         match &skeleton.joints()[j].motion {
             JointMotion::Fixed => {}
-            JointMotion::Ball { .. } => pose.angles[at..at + 3].copy_from_slice(log_so3(&turn).as_slice()),
+            JointMotion::Ball { .. } => {
+                pose.angles[at..at + 3].copy_from_slice(log_so3(&turn).as_slice())
+            }
             JointMotion::Hinge { axis, .. } => {
                 // The angle about the axis that brings the bone nearest to the wanted direction.
                 let a = Unit::new_normalize(Vector3::from(*axis));
@@ -35,14 +44,27 @@ pub(super) fn canonical_pose(template: &Template, rest: &RestBody) -> Pose<Body>
         let upper = format!("{side}_shoulder");
         aim(&upper, &format!("{side}_elbow"), arm);
         // The forearm's local frame is turned by the shoulder: straight means in line with the upper arm at rest.
-        if let (Some(sh), Some(el)) = (skeleton.index(&upper), skeleton.index(&format!("{side}_elbow"))) {
-            aim(&format!("{side}_elbow"), &format!("{side}_wrist"), rest.joints[el] - rest.joints[sh]);
+        if let (Some(sh), Some(el)) = (
+            skeleton.index(&upper),
+            skeleton.index(&format!("{side}_elbow")),
+        ) {
+            aim(
+                &format!("{side}_elbow"),
+                &format!("{side}_wrist"),
+                rest.joints[el] - rest.joints[sh],
+            );
         }
         let leg = Vector3::new(s * LEGS_OUT.sin(), -LEGS_OUT.cos(), 0.0);
         aim(&format!("{side}_hip"), &format!("{side}_knee"), leg);
-        if let (Some(hi), Some(kn)) = (skeleton.index(&format!("{side}_hip")), skeleton.index(&format!("{side}_knee")))
-        {
-            aim(&format!("{side}_knee"), &format!("{side}_ankle"), rest.joints[kn] - rest.joints[hi]);
+        if let (Some(hi), Some(kn)) = (
+            skeleton.index(&format!("{side}_hip")),
+            skeleton.index(&format!("{side}_knee")),
+        ) {
+            aim(
+                &format!("{side}_knee"),
+                &format!("{side}_ankle"),
+                rest.joints[kn] - rest.joints[hi],
+            );
         }
     }
     pose
@@ -61,18 +83,38 @@ fn around(rest: Vector3<f64>, to: Vector3<f64>, q: UnitQuaternion<f64>) -> Rigid
 }
 
 /// Pose `t` of the way from `a` to `b`: rotations along the shortest arc joint by joint, the pelvis straight.
-pub(super) fn between(template: &Template, rest: &RestBody, a: &Pose<World>, b: &Pose<World>, t: f64) -> Pose<World> {
+pub(super) fn between(
+    template: &Template,
+    rest: &RestBody,
+    a: &Pose<World>,
+    b: &Pose<World>,
+    t: f64,
+) -> Pose<World> {
     use crate::math::exp_so3;
     let skeleton = template.skeleton();
     let pelvis = rest.joints[0];
-    let slerp = |p: &UnitQuaternion<f64>, q: &UnitQuaternion<f64>| p * exp_so3(&(log_so3(&(p.inverse() * q)) * t));
+    let slerp = |p: &UnitQuaternion<f64>, q: &UnitQuaternion<f64>| {
+        p * exp_so3(&(log_so3(&(p.inverse() * q)) * t))
+    };
     let (pa, pb) = (a.root.point(&pelvis).coords, b.root.point(&pelvis).coords);
-    let root = around(pelvis.coords, pa + (pb - pa) * t, slerp(&a.root.iso().rotation, &b.root.iso().rotation));
-    let mut angles: Vec<f64> = a.angles.iter().zip(&b.angles).map(|(x, y)| x + (y - x) * t).collect();
+    let root = around(
+        pelvis.coords,
+        pa + (pb - pa) * t,
+        slerp(&a.root.iso().rotation, &b.root.iso().rotation),
+    );
+    let mut angles: Vec<f64> = a
+        .angles
+        .iter()
+        .zip(&b.angles)
+        .map(|(x, y)| x + (y - x) * t)
+        .collect();
     for (j, joint) in skeleton.joints().iter().enumerate() {
         if matches!(joint.motion, JointMotion::Ball { .. }) {
             let at = skeleton.dof_offset(j);
-            let q = slerp(&exp_so3(&a.rotation_vector(skeleton, j)), &exp_so3(&b.rotation_vector(skeleton, j)));
+            let q = slerp(
+                &exp_so3(&a.rotation_vector(skeleton, j)),
+                &exp_so3(&b.rotation_vector(skeleton, j)),
+            );
             angles[at..at + 3].copy_from_slice(log_so3(&q).as_slice());
         }
     }

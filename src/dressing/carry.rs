@@ -45,24 +45,49 @@ impl Carrier {
         let source = &*made_on.template;
         let bones = bones(source, template, figure);
         let n = source.mesh().vertices().len();
-        let mut out = Self { bones, rest: vec![V3d::zeros(); n] };
+        let mut out = Self {
+            bones,
+            rest: vec![V3d::zeros(); n],
+        };
         let parts = body_parts(source);
         let mut normals = Vec::new();
         let faces = template.mesh().faces();
-        vertex_normals(Par::Rayon, &figure.vertices, faces, template.topology().vertex_faces(), &mut normals);
-        let skins: Vec<(Region, Vec<usize>, PointTree)> =
-            [Region::TRUNK, Region::LEFT_ARM, Region::RIGHT_ARM, Region::LEFT_LEG, Region::RIGHT_LEG]
-                .into_iter()
-                .map(|part| {
-                    let own: Vec<usize> = (0..figure.parts.len()).filter(|i| figure.parts[*i] & part.0 != 0).collect();
-                    let points: Vec<P3> = own.iter().map(|i| figure.vertices[*i] + normals[*i] * STEP).collect();
-                    (part, own, PointTree::new(&points))
-                })
+        vertex_normals(
+            Par::Rayon,
+            &figure.vertices,
+            faces,
+            template.topology().vertex_faces(),
+            &mut normals,
+        );
+        let skins: Vec<(Region, Vec<usize>, PointTree)> = [
+            Region::TRUNK,
+            Region::LEFT_ARM,
+            Region::RIGHT_ARM,
+            Region::LEFT_LEG,
+            Region::RIGHT_LEG,
+        ]
+        .into_iter()
+        .map(|part| {
+            let own: Vec<usize> = (0..figure.parts.len())
+                .filter(|i| figure.parts[*i] & part.0 != 0)
                 .collect();
+            let points: Vec<P3> = own
+                .iter()
+                .map(|i| figure.vertices[*i] + normals[*i] * STEP)
+                .collect();
+            (part, own, PointTree::new(&points))
+        })
+        .collect();
         for rounds in SMOOTHING {
             let carried: Vec<P3> = (0..n).map(|i| out.skin_vertex(source, i)).collect();
             let mut own = Vec::new();
-            vertex_normals(Par::Rayon, &carried, source.mesh().faces(), source.topology().vertex_faces(), &mut own);
+            vertex_normals(
+                Par::Rayon,
+                &carried,
+                source.mesh().faces(),
+                source.topology().vertex_faces(),
+                &mut own,
+            );
             let mut more: Vec<Option<V3d>> = (0..n)
                 .map(|i| {
                     let (_, index, tree) = skins.iter().find(|(p, ..)| parts[i] & p.0 != 0)?;
@@ -75,14 +100,23 @@ impl Carrier {
             for _ in 0..rounds {
                 more = (0..n)
                     .map(|i| {
-                        let around = source.topology().vertex_neighbours().row(i).iter().map(|v| *v as usize);
+                        let around = source
+                            .topology()
+                            .vertex_neighbours()
+                            .row(i)
+                            .iter()
+                            .map(|v| *v as usize);
                         let known = around.chain([i]).filter_map(|v| more[v]);
-                        let (sum, count) = known.fold((V3d::zeros(), 0.0), |(s, c), d| (s + d, c + 1.0));
+                        let (sum, count) =
+                            known.fold((V3d::zeros(), 0.0), |(s, c), d| (s + d, c + 1.0));
                         (count > 0.0).then(|| sum / count)
                     })
                     .collect();
             }
-            out.rest.iter_mut().zip(&more).for_each(|(r, m)| *r += m.unwrap_or_else(V3d::zeros));
+            out.rest
+                .iter_mut()
+                .zip(&more)
+                .for_each(|(r, m)| *r += m.unwrap_or_else(V3d::zeros));
         }
         out
     }
@@ -93,15 +127,22 @@ impl Carrier {
     }
     fn by_bones(&self, p: &P3, weights: impl Iterator<Item = (usize, f64)>) -> V3d {
         let p: P3d = p.cast();
-        weights.filter(|w| w.1 > 0.0).fold(V3d::zeros(), |s, (j, w)| {
-            let b = &self.bones[j];
-            s + (b.to.coords + b.m * (p - b.from)) * w
-        })
+        weights
+            .filter(|w| w.1 > 0.0)
+            .fold(V3d::zeros(), |s, (j, w)| {
+                let b = &self.bones[j];
+                s + (b.to.coords + b.m * (p - b.from)) * w
+            })
     }
     /// Where a point goes that hangs on bones with these weights and over these vertices of the first skin.
     pub(super) fn point(&self, p: &P3, weights: &[f32], over: &[(u32, f32)]) -> P3 {
-        let moved = self.by_bones(p, weights.iter().enumerate().map(|(j, w)| (j, f64::from(*w))));
-        let rest = over.iter().fold(V3d::zeros(), |s, (v, w)| s + self.rest[*v as usize] * f64::from(*w));
+        let moved = self.by_bones(
+            p,
+            weights.iter().enumerate().map(|(j, w)| (j, f64::from(*w))),
+        );
+        let rest = over.iter().fold(V3d::zeros(), |s, (v, w)| {
+            s + self.rest[*v as usize] * f64::from(*w)
+        });
         P3::from((moved + rest).cast::<f32>())
     }
 }
@@ -112,7 +153,10 @@ fn bones(source: &Template, template: &Template, figure: &Figure) -> Vec<Bone> {
     let from = |n: &str| sk.index(n).map(|j| sk.joints()[j].rest);
     let to = |n: &str| template.skeleton().index(n).map(|j| figure.joints[j]);
     let middle = |at: &dyn Fn(&str) -> Option<P3d>, n: &str| {
-        Some(nalgebra::center(&at(&format!("left_{n}"))?, &at(&format!("right_{n}"))?))
+        Some(nalgebra::center(
+            &at(&format!("left_{n}"))?,
+            &at(&format!("right_{n}"))?,
+        ))
     };
     let apart = |at: &dyn Fn(&str) -> Option<P3d>, n: &str| {
         Some((at(&format!("left_{n}"))? - at(&format!("right_{n}"))?).norm())
@@ -123,10 +167,15 @@ fn bones(source: &Template, template: &Template, figure: &Figure) -> Vec<Bone> {
         _ => 1.0,
     };
     // The trunk is one bone: where its joints sit along the spine differs between skeletons, hips and shoulders don't.
-    let (hips, shoulders) =
-        ([middle(&from, "hip"), middle(&to, "hip")], [middle(&from, "shoulder"), middle(&to, "shoulder")]);
+    let (hips, shoulders) = (
+        [middle(&from, "hip"), middle(&to, "hip")],
+        [middle(&from, "shoulder"), middle(&to, "shoulder")],
+    );
     let height = |k: usize| Some((shoulders[k]? - hips[k]?).y);
-    let (wide, high) = (ratio(apart(&from, "shoulder"), apart(&to, "shoulder")), ratio(height(0), height(1)));
+    let (wide, high) = (
+        ratio(apart(&from, "shoulder"), apart(&to, "shoulder")),
+        ratio(height(0), height(1)),
+    );
     let trunk = Bone {
         m: Matrix3::from_diagonal(&V3d::new(wide, high, wide)),
         from: hips[0].unwrap_or_else(P3d::origin),
@@ -148,7 +197,11 @@ fn bones(source: &Template, template: &Template, figure: &Figure) -> Vec<Bone> {
         let tall = |at: &dyn Fn(&str) -> Option<P3d>| Some((at("head_end")? - at("head")?).norm());
         let s = ratio(tall(&from), tall(&to));
         let neck = from("head").zip(to("head"));
-        neck.map(|(from, to)| Bone { m: Matrix3::identity() * s, from, to })
+        neck.map(|(from, to)| Bone {
+            m: Matrix3::identity() * s,
+            from,
+            to,
+        })
     };
     let mut out: Vec<Bone> = Vec::with_capacity(sk.len());
     for joint in sk.joints() {
@@ -158,8 +211,11 @@ fn bones(source: &Template, template: &Template, figure: &Figure) -> Vec<Bone> {
         let part = name.split_once('_').map_or("", |(_, p)| p);
         let bone = match part {
             "shoulder" | "elbow" | "hip" | "knee" => {
-                let next = ["elbow", "wrist", "knee", "ankle"]
-                    [["shoulder", "elbow", "hip", "knee"].iter().position(|p| *p == part).unwrap_or(0)];
+                let next =
+                    ["elbow", "wrist", "knee", "ankle"][["shoulder", "elbow", "hip", "knee"]
+                        .iter()
+                        .position(|p| *p == part)
+                        .unwrap_or(0)];
                 let end = format!("{side}_{next}");
                 (|| {
                     let (a, b) = (from(name)?, from(&end)?);
@@ -171,22 +227,44 @@ fn bones(source: &Template, template: &Template, figure: &Figure) -> Vec<Bone> {
                         girth(template, &figure.vertices, name, c, d),
                     );
                     let q = UnitQuaternion::rotation_between(&u, &v)?.to_rotation_matrix();
-                    let stretch = Matrix3::identity() * around + u * u.transpose() * (along - around);
-                    Some(Bone { m: q.matrix() * stretch, from: a, to: c })
+                    let stretch =
+                        Matrix3::identity() * around + u * u.transpose() * (along - around);
+                    Some(Bone {
+                        m: q.matrix() * stretch,
+                        from: a,
+                        to: c,
+                    })
                 })()
             }
             // Hands keep their size and turn with the forearm; feet stand as they stood.
             "wrist" => from(name).zip(to(name)).zip(above).map(|((from, to), b)| {
                 let turn = UnitQuaternion::from_matrix(&b.m).to_rotation_matrix();
-                Bone { m: *turn.matrix(), from, to }
+                Bone {
+                    m: *turn.matrix(),
+                    from,
+                    to,
+                }
             }),
             "ankle" => (|| {
                 let foot = format!("{side}_foot");
-                let s = ratio(Some((from(&foot)? - from(name)?).norm()), Some((to(&foot)? - to(name)?).norm()));
-                Some(Bone { m: Matrix3::identity() * s, from: from(name)?, to: to(name)? })
+                let s = ratio(
+                    Some((from(&foot)? - from(name)?).norm()),
+                    Some((to(&foot)? - to(name)?).norm()),
+                );
+                Some(Bone {
+                    m: Matrix3::identity() * s,
+                    from: from(name)?,
+                    to: to(name)?,
+                })
             })(),
             _ if name == "head" => head,
-            _ if name == "neck" || part == "collar" || name.starts_with("spine") || joint.parent.is_none() => None,
+            _ if name == "neck"
+                || part == "collar"
+                || name.starts_with("spine")
+                || joint.parent.is_none() =>
+            {
+                None
+            }
             _ => above,
         };
         out.push(bone.unwrap_or(trunk));
@@ -218,10 +296,20 @@ const LOOSE: f32 = 0.04;
 const LOOSE_ROUNDS: usize = 30;
 
 /// Binds garment vertices (frame of the body, metres) to a body; `neighbours` along the garment's edges.
-pub(super) fn bind(template: &Template, points: &[P3], neighbours: impl Fn(usize) -> Vec<u32>) -> Bound {
+pub(super) fn bind(
+    template: &Template,
+    points: &[P3],
+    neighbours: impl Fn(usize) -> Vec<u32>,
+) -> Bound {
     let body = template.mesh().vertices();
     let mut normals = Vec::new();
-    vertex_normals(Par::Rayon, body, template.mesh().faces(), template.topology().vertex_faces(), &mut normals);
+    vertex_normals(
+        Par::Rayon,
+        body,
+        template.mesh().faces(),
+        template.topology().vertex_faces(),
+        &mut normals,
+    );
     let tree = PointTree::new(body);
     let joints = template.skeleton().len();
     let mut out = Bound::default();
@@ -247,18 +335,26 @@ pub(super) fn bind(template: &Template, points: &[P3], neighbours: impl Fn(usize
                 }
                 let share = 0.5 / around[i].len() as f32;
                 let mut row: Vec<f32> = out.weights[i].iter().map(|w| 0.5 * w).collect();
-                let mut over: std::collections::BTreeMap<u32, f32> = std::collections::BTreeMap::new();
-                out.over[i].iter().for_each(|(v, w)| *over.entry(*v).or_default() += 0.5 * w);
+                let mut over: std::collections::BTreeMap<u32, f32> =
+                    std::collections::BTreeMap::new();
+                out.over[i]
+                    .iter()
+                    .for_each(|(v, w)| *over.entry(*v).or_default() += 0.5 * w);
                 for n in around[i].iter().map(|n| *n as usize) {
-                    row.iter_mut().zip(&out.weights[n]).for_each(|(a, b)| *a += share * b);
-                    out.over[n].iter().for_each(|(v, w)| *over.entry(*v).or_default() += share * w);
+                    row.iter_mut()
+                        .zip(&out.weights[n])
+                        .for_each(|(a, b)| *a += share * b);
+                    out.over[n]
+                        .iter()
+                        .for_each(|(v, w)| *over.entry(*v).or_default() += share * w);
                 }
                 // Few enough to stay cheap: the heaviest, made to sum to one.
                 let mut over: Vec<(u32, f32)> = over.into_iter().collect();
                 over.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
                 over.truncate(MOST_OVER);
                 let sum: f32 = over.iter().map(|o| o.1).sum();
-                over.iter_mut().for_each(|o| o.1 /= sum.max(f32::MIN_POSITIVE));
+                over.iter_mut()
+                    .for_each(|o| o.1 /= sum.max(f32::MIN_POSITIVE));
                 Some((row, over))
             })
             .collect();

@@ -89,15 +89,36 @@ impl Layers {
                 frame: SurfaceFrame::default(),
             })
         };
-        Ok(Self { covers: meshes.iter().map(cover).collect::<Result<_, GarmentError>>()?, drapes })
+        Ok(Self {
+            covers: meshes
+                .iter()
+                .map(cover)
+                .collect::<Result<_, GarmentError>>()?,
+            drapes,
+        })
     }
     /// Does the same to all garments, the outermost first; `offsets` from the skin, metres.
-    pub(super) fn each(&mut self, skin: &Skin<'_>, offsets: &[f64], mut f: impl FnMut(usize, &mut Drape, &On<'_>)) {
+    pub(super) fn each(
+        &mut self,
+        skin: &Skin<'_>,
+        offsets: &[f64],
+        mut f: impl FnMut(usize, &mut Drape, &On<'_>),
+    ) {
         for (k, drape) in self.drapes.iter_mut().enumerate().rev() {
             let (under, over) = self.covers.split_at_mut(k + 1);
-            f(k, drape, &On { skin, offset: offsets[k], over });
+            f(
+                k,
+                drape,
+                &On {
+                    skin,
+                    offset: offsets[k],
+                    over,
+                },
+            );
             under[k].frame.vertices = drape.positions();
-            under[k].model.update_normals(Par::Rayon, &mut under[k].frame);
+            under[k]
+                .model
+                .update_normals(Par::Rayon, &mut under[k].frame);
         }
     }
 }
@@ -190,20 +211,40 @@ impl Drape {
         let by_height = |v: &[u32; 2]| x[v[0] as usize].y + x[v[1] as usize].y;
         let mut order: Vec<usize> = (0..sheet.edges.len()).collect();
         // From top to bottom, so that one pass hands a pull down the whole garment.
-        order.sort_by(|a, b| by_height(&sheet.edges[*b].0).total_cmp(&by_height(&sheet.edges[*a].0)).then(a.cmp(b)));
+        order.sort_by(|a, b| {
+            by_height(&sheet.edges[*b].0)
+                .total_cmp(&by_height(&sheet.edges[*a].0))
+                .then(a.cmp(b))
+        });
         let membrane = LATTICE * (mesh.material.stretch_warp * mesh.material.stretch_weft).sqrt();
-        let edges = order.iter().map(|k| (sheet.edges[*k].0, sheet.edges[*k].1, 1.0 / membrane)).collect();
+        let edges = order
+            .iter()
+            .map(|k| (sheet.edges[*k].0, sheet.edges[*k].1, 1.0 / membrane))
+            .collect();
         let own: Vec<u8> = mesh.regions.iter().map(|r| r.decisive().0).collect();
-        let from_sleeve = distances(n, &sheet.edges, SLEEVE, |i| mesh.regions[i].meets(Region::ARMS));
-        let soft = mesh.anchors.iter().filter(|a| a.strength < 1.0).flat_map(|a| &a.vertices);
+        let from_sleeve = distances(n, &sheet.edges, SLEEVE, |i| {
+            mesh.regions[i].meets(Region::ARMS)
+        });
+        let soft = mesh
+            .anchors
+            .iter()
+            .filter(|a| a.strength < 1.0)
+            .flat_map(|a| &a.vertices);
         let tops: std::collections::BTreeSet<u32> = soft.copied().collect();
         let from_top = distances(n, &sheet.edges, TOP, |i| tops.contains(&(i as u32)));
         Self {
-            held_down: (0..n).map(|i| own[i] == AROUND.0 && from_sleeve[i] > SLEEVE && from_top[i] > TOP).collect(),
+            held_down: (0..n)
+                .map(|i| own[i] == AROUND.0 && from_sleeve[i] > SLEEVE && from_top[i] > TOP)
+                .collect(),
             velocity: vec![V3d::zeros(); n],
             inverse_mass: sheet.mass.iter().map(|m| 1.0 / m).collect(),
             edges,
-            hinges: sheet.hinges.iter().filter(|h| h.w > 0.0).map(|h| (h.v, h.c, 1.0 / h.w)).collect(),
+            hinges: sheet
+                .hinges
+                .iter()
+                .filter(|h| h.w > 0.0)
+                .map(|h| (h.v, h.c, 1.0 / h.w))
+                .collect(),
             own,
             sleeves: Sleeve::of(mesh, &sheet.edges),
             nearest: vec![[u32::MAX; 2]; n],
@@ -223,7 +264,11 @@ impl Drape {
         }
     }
     /// From now on the sheet is taken out of itself, and a hood held off it.
-    pub(super) fn untangled(mut self, mesh: &GarmentMesh, sheet: &Sheet) -> Result<Self, GarmentError> {
+    pub(super) fn untangled(
+        mut self,
+        mesh: &GarmentMesh,
+        sheet: &Sheet,
+    ) -> Result<Self, GarmentError> {
         self.sheet = Some(Untangler::new(&mesh.faces, &self.x));
         self.hood = Hood::of(mesh, sheet)?;
         Ok(self)
@@ -234,21 +279,43 @@ impl Drape {
     }
     /// First search: all body vertices.
     pub(super) fn find_all(&mut self, skin: &Skin<'_>) {
-        let (points, other) = (self.positions(), self.own.iter().map(|o| Region::ALL.0 & !o).collect::<Vec<_>>());
-        let of = |masks: &[u8]| skin.model.nearest_vertices(Par::Rayon, skin.frame(), &points, masks.iter());
-        self.nearest = of(&self.own).into_iter().zip(of(&other)).map(|(own, other)| [own, other]).collect();
+        let (points, other) = (
+            self.positions(),
+            self.own
+                .iter()
+                .map(|o| Region::ALL.0 & !o)
+                .collect::<Vec<_>>(),
+        );
+        let of = |masks: &[u8]| {
+            skin.model
+                .nearest_vertices(Par::Rayon, skin.frame(), &points, masks.iter())
+        };
+        self.nearest = of(&self.own)
+            .into_iter()
+            .zip(of(&other))
+            .map(|(own, other)| [own, other])
+            .collect();
     }
     /// Starts from the nearest body vertices of a coarser drape of the same garment.
     pub(super) fn find_from(&mut self, skin: &Skin<'_>, coarse: &Self) {
         self.fine = true;
         for (i, near) in self.nearest.iter_mut().enumerate() {
             let d = |k: usize| (coarse.x[k] - self.x[i]).norm_squared();
-            let k = (0..coarse.x.len()).min_by(|a, b| d(*a).total_cmp(&d(*b))).unwrap_or(0);
+            let k = (0..coarse.x.len())
+                .min_by(|a, b| d(*a).total_cmp(&d(*b)))
+                .unwrap_or(0);
             *near = coarse.nearest[k];
             // A walk may not leave its parts: where the coarse vertex belongs to others, all are looked at.
-            for (slot, mask) in near.iter_mut().zip([self.own[i], Region::ALL.0 & !self.own[i]]) {
+            for (slot, mask) in near
+                .iter_mut()
+                .zip([self.own[i], Region::ALL.0 & !self.own[i]])
+            {
                 if skin.model.part(*slot) & mask == 0 {
-                    *slot = skin.model.nearest_vertex(skin.frame(), &P3::from(self.x[i].cast::<f32>()), mask);
+                    *slot = skin.model.nearest_vertex(
+                        skin.frame(),
+                        &P3::from(self.x[i].cast::<f32>()),
+                        mask,
+                    );
                 }
             }
         }
@@ -259,7 +326,10 @@ impl Drape {
         for a in anchors.iter().filter(|a| a.strength >= 1.0) {
             let [p, q, r] = a.body.map(|v| frame.vertices[v as usize].coords);
             let on = p * a.weights[0] + q * a.weights[1] + r * a.weights[2];
-            let normal = (q - p).cross(&(r - p)).try_normalize(0.0).unwrap_or_else(V3::zeros);
+            let normal = (q - p)
+                .cross(&(r - p))
+                .try_normalize(0.0)
+                .unwrap_or_else(V3::zeros);
             self.pinned[a.vertex as usize] = Some((on + normal * a.height).cast());
         }
     }
@@ -268,7 +338,11 @@ impl Drape {
         for ((x, near), own) in self.x.iter_mut().zip(&self.nearest).zip(&self.own) {
             let v = near[0] as usize;
             let d = (from[v].coords.cast::<f64>() - *x).norm();
-            let within = if on_arms(*own) { CARRIED_SLEEVE } else { CARRIED };
+            let within = if on_arms(*own) {
+                CARRIED_SLEEVE
+            } else {
+                CARRIED
+            };
             let share = (2.0 - d / within).clamp(0.0, 1.0);
             *x += (to[v] - from[v]).cast::<f64>() * share;
         }
@@ -322,13 +396,18 @@ impl Drape {
             }
             self.lift(0.0);
             let anew = s % LOOK_EVERY == 0;
-            if (weight >= 1.0 || self.hood.is_some()) && (anew || self.crossings > 0 && s % 2 == 0) {
+            if (weight >= 1.0 || self.hood.is_some()) && (anew || self.crossings > 0 && s % 2 == 0)
+            {
                 self.untangle(anew);
             }
             for i in 0..self.x.len() {
                 let v = (self.x[i] - self.before[i]) / h;
                 let speed = v.norm();
-                self.velocity[i] = if speed > FASTEST { v * (FASTEST / speed) } else { v };
+                self.velocity[i] = if speed > FASTEST {
+                    v * (FASTEST / speed)
+                } else {
+                    v
+                };
             }
         }
     }
@@ -337,10 +416,18 @@ impl Drape {
         let Some(hood) = &mut self.hood else { return };
         if anew {
             let pushes = self.sheet.as_ref().map_or(&[][..], |s| &s.pushes);
-            hood.look(&self.x, |v| pushes.get(v as usize).is_some_and(|p| p.1 > 0.0));
+            hood.look(&self.x, |v| {
+                pushes.get(v as usize).is_some_and(|p| p.1 > 0.0)
+            });
         }
         let (pinned, inverse) = (&self.pinned, &self.inverse_mass);
-        let weight = |v: u32| if pinned[v as usize].is_some() { 0.0 } else { inverse[v as usize] };
+        let weight = |v: u32| {
+            if pinned[v as usize].is_some() {
+                0.0
+            } else {
+                inverse[v as usize]
+            }
+        };
         hood.hold(&mut self.x, &self.before, weight, h);
     }
     /// One round of taking the sheet out of itself, which gives no speed; `anew` looks everywhere, else where it crossed
@@ -356,7 +443,11 @@ impl Drape {
         self.crossings = r.crossings;
         for (i, (push, n)) in sheet.pushes.iter().enumerate() {
             self.before[i] += push;
-            self.slack[i] = if *n > 0.0 { (self.slack[i] + SLACK_STEP).min(SLACK) } else { self.slack[i] * SLACK_KEPT };
+            self.slack[i] = if *n > 0.0 {
+                (self.slack[i] + SLACK_STEP).min(SLACK)
+            } else {
+                self.slack[i] * SLACK_KEPT
+            };
         }
     }
     /// Nothing moves further than `most` in this substep, metres.
@@ -413,18 +504,31 @@ impl Drape {
         for i in 0..self.x.len() {
             let p = P3::from(self.x[i].cast::<f32>());
             let c = skin.closest(&p, self.nearest[i][0], self.own[i]);
-            if f64::from(c.signed) < -DEEP && !c.rim && !skin.holds_nothing(&c) && self.pinned[i].is_none() {
+            if f64::from(c.signed) < -DEEP
+                && !c.rim
+                && !skin.holds_nothing(&c)
+                && self.pinned[i].is_none()
+            {
                 self.x[i] = c.point.coords.cast();
             }
         }
     }
     /// Where it passed through itself in the last round there is cloth that is on no arm.
     pub(super) fn crosses_off_arms(&self) -> bool {
-        let crosses = |s: &Untangler| s.pushes.iter().zip(&self.own).any(|((_, n), own)| *n > 0.0 && !on_arms(*own));
+        let crosses = |s: &Untangler| {
+            s.pushes
+                .iter()
+                .zip(&self.own)
+                .any(|((_, n), own)| *n > 0.0 && !on_arms(*own))
+        };
         self.crossings > 0 && self.sheet.as_ref().is_some_and(crosses)
     }
     fn weight(&self, i: u32) -> f64 {
-        if self.pinned[i as usize].is_some() { 0.0 } else { self.inverse_mass[i as usize] }
+        if self.pinned[i as usize].is_some() {
+            0.0
+        } else {
+            self.inverse_mass[i as usize]
+        }
     }
     /// Edges keep their lengths; every other sweep runs backwards, so that no direction is preferred.
     fn stretch(&mut self, h: f64, backwards: bool) {
@@ -489,7 +593,12 @@ impl Drape {
     fn out_of(&mut self, i: usize, p: &Plane, sunk: f64) -> f64 {
         let d = self.x[i] - p.point;
         let slack = self.slack[i];
-        let height = p.height - if slack > 0.0 { (slack + sunk).min((p.height + sunk).max(0.0)) } else { 0.0 };
+        let height = p.height
+            - if slack > 0.0 {
+                (slack + sunk).min((p.height + sunk).max(0.0))
+            } else {
+                0.0
+            };
         let gap = p.normal.dot(&d) - height;
         if p.near && gap < 0.0 && d.norm_squared() < PLANE_SIZE * PLANE_SIZE {
             let push = (-gap).min(LIFT);
@@ -505,7 +614,8 @@ impl Drape {
             let near = &mut self.nearest[i];
             let masks = [self.own[i], Region::ALL.0 & !self.own[i]];
             let mut found = [
-                skin.model.closest_beyond(skin.frame(), &p, near[0], masks[0]),
+                skin.model
+                    .closest_beyond(skin.frame(), &p, near[0], masks[0]),
                 skin.model.closest(skin.frame(), &p, near[1], masks[1]),
             ];
             if self.fine {
@@ -513,18 +623,25 @@ impl Drape {
             }
             *near = found.map(|c| c.vertex);
             // Where the body closes on itself its own part decides, and skin inside the body holds nothing.
-            let facing = found[0].room(&found[1]).filter(|_| !found[1].rim).map(f64::from);
+            let facing = found[0]
+                .room(&found[1])
+                .filter(|_| !found[1].rim)
+                .map(f64::from);
             let room = facing.unwrap_or(f64::INFINITY);
             for (plane, c) in self.planes[i].iter_mut().zip(&found) {
                 *plane = Plane {
                     point: c.point.coords.cast(),
                     normal: c.normal.cast(),
                     height: on.offset,
-                    near: room >= 0.0 && !c.rim && !skin.holds_nothing(c) && f64::from(c.signed) < REACH,
+                    near: room >= 0.0
+                        && !c.rim
+                        && !skin.holds_nothing(c)
+                        && f64::from(c.signed) < REACH,
                 };
             }
             let [own, other] = &mut self.planes[i];
-            if self.fine && self.sheet.is_some() && (-CLOSED..0.0).contains(&room) && !found[0].rim {
+            if self.fine && self.sheet.is_some() && (-CLOSED..0.0).contains(&room) && !found[0].rim
+            {
                 // No deeper than half-way into skin that lies in other skin; coarse cloth needs its way out through it.
                 let held = !skin.holds_nothing(&found[0]);
                 (own.near, own.height) = (held && f64::from(found[0].signed) < REACH, 0.5 * room);
@@ -541,18 +658,35 @@ impl Drape {
         self.covers.clear();
         for (k, cover) in over.iter().enumerate() {
             if self.nearest_cover.len() <= k {
-                let nearest =
-                    |(x, own): (&V3d, &u8)| cover.model.nearest_vertex(&cover.frame, &P3::from(x.cast::<f32>()), *own);
-                self.nearest_cover.push(self.x.iter().zip(&self.own).map(nearest).collect());
+                let nearest = |(x, own): (&V3d, &u8)| {
+                    cover
+                        .model
+                        .nearest_vertex(&cover.frame, &P3::from(x.cast::<f32>()), *own)
+                };
+                self.nearest_cover
+                    .push(self.x.iter().zip(&self.own).map(nearest).collect());
             }
             for (i, near) in self.nearest_cover[k].iter_mut().enumerate() {
                 let p = P3::from(self.x[i].cast::<f32>());
                 let c = cover.model.closest(&cover.frame, &p, *near, self.own[i]);
                 *near = c.vertex;
-                let Some(c) = cover.model.under(&cover.frame, &p, &c, HEM) else { continue };
-                if c.signed < COVER_REACH && -f64::from(c.signed) < REACH && self.pinned[i].is_none() {
+                let Some(c) = cover.model.under(&cover.frame, &p, &c, HEM) else {
+                    continue;
+                };
+                if c.signed < COVER_REACH
+                    && -f64::from(c.signed) < REACH
+                    && self.pinned[i].is_none()
+                {
                     let (point, normal) = (c.point.coords.cast(), -c.normal.cast::<f64>());
-                    self.covers.push((i as u32, Plane { point, normal, height: UNDER, near: true }));
+                    self.covers.push((
+                        i as u32,
+                        Plane {
+                            point,
+                            normal,
+                            height: UNDER,
+                            near: true,
+                        },
+                    ));
                 }
             }
         }
@@ -574,7 +708,11 @@ impl Drape {
             .map(|([a, b], l, _)| (self.x[*a as usize] - self.x[*b as usize]).norm() / l - 1.0)
             .collect();
         strain.sort_unstable_by(f64::total_cmp);
-        let at = |q: f64| strain.get(((strain.len() as f64 * q) as usize).min(strain.len().saturating_sub(1))).copied();
+        let at = |q: f64| {
+            strain
+                .get(((strain.len() as f64 * q) as usize).min(strain.len().saturating_sub(1)))
+                .copied()
+        };
         (deepest, at(0.99).unwrap_or(0.0), at(1.0).unwrap_or(0.0))
     }
 }

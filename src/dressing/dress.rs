@@ -55,7 +55,12 @@ pub struct DressOptions {
 
 impl Default for DressOptions {
     fn default() -> Self {
-        Self { triangulation: Triangulation::default(), config: Config::default(), any_size: false, untangle: true }
+        Self {
+            triangulation: Triangulation::default(),
+            config: Config::default(),
+            any_size: false,
+            untangle: true,
+        }
     }
 }
 
@@ -218,8 +223,14 @@ pub fn dress_all(
     let timer = Instant::now();
     let fine = options.triangulation;
     // The coarse mesh may have slimmer triangles: nothing is simulated on it later.
-    let length = (fine.edge_length * COARSER).min(COARSEST).max(fine.edge_length);
-    let coarse = Triangulation { edge_length: length, hood_length: fine.hood_length * HOOD_COARSER, min_angle: 0.0 };
+    let length = (fine.edge_length * COARSER)
+        .min(COARSEST)
+        .max(fine.edge_length);
+    let coarse = Triangulation {
+        edge_length: length,
+        hood_length: fine.hood_length * HOOD_COARSER,
+        min_angle: 0.0,
+    };
     let mut sheets: Vec<Sheeted> = Vec::new();
     for w in order {
         match w {
@@ -229,13 +240,19 @@ pub fn dress_all(
                 }
                 let rough = GarmentMesh::sew(p, &coarse)?;
                 let placed = place(template, &figure, p, &rough);
-                sheets.push(Sheeted { fine: GarmentMesh::sew(p, &fine)?, coarse: Some(rough), placed });
+                sheets.push(Sheeted {
+                    fine: GarmentMesh::sew(p, &fine)?,
+                    coarse: Some(rough),
+                    placed,
+                });
             }
-            Wear::Mesh(m) => sheets.extend(m.put_on(template, &figure).into_iter().map(|(fine, placed)| Sheeted {
-                fine,
-                coarse: None,
-                placed,
-            })),
+            Wear::Mesh(m) => sheets.extend(m.put_on(template, &figure).into_iter().map(
+                |(fine, placed)| Sheeted {
+                    fine,
+                    coarse: None,
+                    placed,
+                },
+            )),
         }
     }
     // Hats and shoes press nothing: cloth goes over them.
@@ -244,7 +261,10 @@ pub fn dress_all(
     report.stages_ms.sew = ms(timer);
 
     let root = upright_root(rest, &pose.root);
-    let start = Pose { root, angles: canonical_pose(template, rest).angles };
+    let start = Pose {
+        root,
+        angles: canonical_pose(template, rest).angles,
+    };
     let coarse: Vec<GarmentMesh> = sheets.iter().map(|s| s.first().clone()).collect();
     let own: Vec<bool> = sheets.iter().map(|s| s.coarse.is_none()).collect();
     let (mut meshes, mut placed) = (Vec::new(), Vec::new());
@@ -256,17 +276,29 @@ pub fn dress_all(
     }
 
     let timer = Instant::now();
-    let outfit = Outfit { anchors: vec![Vec::new(); meshes.len()], garments: meshes };
+    let outfit = Outfit {
+        anchors: vec![Vec::new(); meshes.len()],
+        garments: meshes,
+    };
     let mut model = Model::new(template, outfit, options.config.clone())?;
     report.stages_ms.model = ms(timer);
 
     let timer = Instant::now();
-    let [follow, following] = if options.untangle { UNTANGLED_BODIES } else { [FOLLOW_BODIES, FOLLOWING] };
+    let [follow, following] = if options.untangle {
+        UNTANGLED_BODIES
+    } else {
+        [FOLLOW_BODIES, FOLLOWING]
+    };
     let bodies: Vec<Vec<P3>> = (0..=follow)
         .map(|i| {
             let t = i as f64 / follow as f64;
             let mut body = Vec::new();
-            pose_body(template, rest, &between(template, rest, &start, pose, t * t * (3.0 - 2.0 * t)), &mut body);
+            pose_body(
+                template,
+                rest,
+                &between(template, rest, &start, pose, t * t * (3.0 - 2.0 * t)),
+                &mut body,
+            );
             body
         })
         .collect();
@@ -280,7 +312,11 @@ pub fn dress_all(
         let mut d = Drape::new(mesh, &sheet, placed);
         d.find_all(&skin);
         ties.push(fasten(&skin, mesh, &d, *offset)?);
-        drapes.push(if options.untangle { d.untangled(mesh, &sheet)? } else { d });
+        drapes.push(if options.untangle {
+            d.untangled(mesh, &sheet)?
+        } else {
+            d
+        });
     }
     let mut rough = Layers::new(&coarse, drapes)?;
     rough.each(&skin, &offsets, |k, d, on| {
@@ -310,7 +346,15 @@ pub fn dress_all(
         });
         report.stages_ms.coarse += ms(timer);
         let timer = Instant::now();
-        fine = refine(&model, &coarse, &rough, &own, &skin, &offsets, options.untangle)?;
+        fine = refine(
+            &model,
+            &coarse,
+            &rough,
+            &own,
+            &skin,
+            &offsets,
+            options.untangle,
+        )?;
         report.stages_ms.fine += ms(timer);
         report.steps += fine.drapes.iter().map(|d| d.steps).sum::<usize>();
         if !fine.drapes.iter().any(Drape::crosses_off_arms) {
@@ -325,7 +369,14 @@ pub fn dress_all(
         report.penetration = report.penetration.max(deepest);
         report.p99_strain = report.p99_strain.max(p99);
         report.crossings += crossings(&mesh.faces, &d.positions()).len();
-        anchors.push(bind(skin.model, skin.frame(), mesh, &d.positions(), offsets[k], false));
+        anchors.push(bind(
+            skin.model,
+            skin.frame(),
+            mesh,
+            &d.positions(),
+            offsets[k],
+            false,
+        ));
         positions.push(d.positions());
     }
     report.stages_ms.fine += ms(timer);
@@ -336,7 +387,11 @@ pub fn dress_all(
     let state = State::new(&model, positions, &body)?.on_skin(buried, apart);
     report.stages_ms.model += ms(timer);
     report.ms = ms(started);
-    Ok(Dressed { model, state, report })
+    Ok(Dressed {
+        model,
+        state,
+        report,
+    })
 }
 
 /// Drapes the garments of `model` from coarse ones; those that are their `own` coarse ones start from where those are.
@@ -351,12 +406,24 @@ fn refine(
 ) -> Result<Layers, DressError> {
     let mut drapes = Vec::new();
     for (k, mesh) in model.outfit.garments.iter().enumerate() {
-        let x = if own[k] { rough.drapes[k].x.clone() } else { prolong(&coarse[k], mesh, &rough.drapes[k].x) };
+        let x = if own[k] {
+            rough.drapes[k].x.clone()
+        } else {
+            prolong(&coarse[k], mesh, &rough.drapes[k].x)
+        };
         let sheet = Sheet::of_garment(mesh)?;
-        let mut d = Drape::new(mesh, &sheet, x.iter().map(|p| P3::from(p.cast::<f32>())).collect());
+        let mut d = Drape::new(
+            mesh,
+            &sheet,
+            x.iter().map(|p| P3::from(p.cast::<f32>())).collect(),
+        );
         d.find_from(skin, &rough.drapes[k]);
         d.pin(&fasten(skin, mesh, &d, offsets[k])?, skin.frame());
-        drapes.push(if untangle { d.untangled(mesh, &sheet)? } else { d });
+        drapes.push(if untangle {
+            d.untangled(mesh, &sheet)?
+        } else {
+            d
+        });
     }
     let mut fine = Layers::new(&model.outfit.garments, drapes)?;
     fine.each(skin, offsets, |_, d, on| {
@@ -384,10 +451,29 @@ fn pose_body(template: &Template, rest: &RestBody, pose: &Pose<World>, out: &mut
 }
 
 /// Ties the anchors of a garment to the skin, `offset` metres off, waistbands evenly stretched.
-fn fasten(skin: &Skin<'_>, mesh: &GarmentMesh, drape: &Drape, offset: f64) -> Result<Vec<AnchorBinding>, DressError> {
+fn fasten(
+    skin: &Skin<'_>,
+    mesh: &GarmentMesh,
+    drape: &Drape,
+    offset: f64,
+) -> Result<Vec<AnchorBinding>, DressError> {
     let mut positions = drape.positions();
-    spread(mesh, &Sheet::of_garment(mesh)?.edges, skin.model, skin.frame(), offset, &mut positions);
-    Ok(bind(skin.model, skin.frame(), mesh, &positions, offset, true))
+    spread(
+        mesh,
+        &Sheet::of_garment(mesh)?.edges,
+        skin.model,
+        skin.frame(),
+        offset,
+        &mut positions,
+    );
+    Ok(bind(
+        skin.model,
+        skin.frame(),
+        mesh,
+        &positions,
+        offset,
+        true,
+    ))
 }
 
 /// Ties the anchors of a garment to the body below them; `hug` puts them at `offset` metres from the skin instead of
@@ -414,7 +500,11 @@ fn bind(
                 vertex,
                 body: surface.faces()[c.face as usize],
                 weights: c.weights,
-                height: if hug { offset as f32 } else { c.signed.max(offset as f32) },
+                height: if hug {
+                    offset as f32
+                } else {
+                    c.signed.max(offset as f32)
+                },
                 strength: set.strength,
             });
         }
@@ -428,6 +518,15 @@ fn exactly(vertex: u32, at: &P3, body: [u32; 3], frame: &SurfaceFrame) -> Anchor
     let (u, v, d) = (q - p, r - p, at - p);
     let normal = u.cross(&v);
     let square = normal.norm_squared().max(f32::MIN_POSITIVE);
-    let (b, c) = (d.cross(&v).dot(&normal) / square, u.cross(&d).dot(&normal) / square);
-    AnchorBinding { vertex, body, weights: [1.0 - b - c, b, c], height: d.dot(&normal) / square.sqrt(), strength: 1.0 }
+    let (b, c) = (
+        d.cross(&v).dot(&normal) / square,
+        u.cross(&d).dot(&normal) / square,
+    );
+    AnchorBinding {
+        vertex,
+        body,
+        weights: [1.0 - b - c, b, c],
+        height: d.dot(&normal) / square.sqrt(),
+        strength: 1.0,
+    }
 }

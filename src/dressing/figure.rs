@@ -34,10 +34,15 @@ impl Slices {
     /// Cuts the faces whose three corners belong to `mask`.
     pub(super) fn cut(vertices: &[P3], faces: &[Face], parts: &[u8], mask: Region) -> Self {
         let keep = |f: &&Face| f.iter().all(|v| parts[*v as usize] & mask.0 != 0);
-        let (lo, hi) = faces.iter().filter(keep).flatten().fold((f32::MAX, f32::MIN), |(lo, hi), v| {
-            let y = vertices[*v as usize].y;
-            (lo.min(y), hi.max(y))
-        });
+        let (lo, hi) =
+            faces
+                .iter()
+                .filter(keep)
+                .flatten()
+                .fold((f32::MAX, f32::MIN), |(lo, hi), v| {
+                    let y = vertices[*v as usize].y;
+                    (lo.min(y), hi.max(y))
+                });
         if lo > hi {
             return Self::default();
         }
@@ -53,7 +58,11 @@ impl Slices {
                     if y > b.y {
                         break;
                     }
-                    let t = if b.y > a.y { (y - a.y) / (b.y - a.y) } else { 0.0 };
+                    let t = if b.y > a.y {
+                        (y - a.y) / (b.y - a.y)
+                    } else {
+                        0.0
+                    };
                     slot.push([a.x + (b.x - a.x) * t, a.z + (b.z - a.z) * t]);
                 }
             }
@@ -63,9 +72,14 @@ impl Slices {
             .map(|p| {
                 let hull = convex_hull(p);
                 let first = *hull.first()?;
-                let (x, z) = hull.iter().fold(([first[0]; 2], [first[1]; 2]), |(x, z), q| {
-                    ([x[0].min(q[0]), x[1].max(q[0])], [z[0].min(q[1]), z[1].max(q[1])])
-                });
+                let (x, z) = hull
+                    .iter()
+                    .fold(([first[0]; 2], [first[1]; 2]), |(x, z), q| {
+                        (
+                            [x[0].min(q[0]), x[1].max(q[0])],
+                            [z[0].min(q[1]), z[1].max(q[1])],
+                        )
+                    });
                 let girth = (0..hull.len())
                     .map(|i| {
                         let (a, b) = (hull[i], hull[(i + 1) % hull.len()]);
@@ -82,7 +96,9 @@ impl Slices {
         let last = self.slices.len().saturating_sub(1);
         let i = (((y - self.bottom) / STEP).round().max(0.0) as usize).min(last);
         let found = self.slices.get(i).copied().flatten();
-        found.or_else(|| self.slices.iter().flatten().copied().next()).unwrap_or_default()
+        found
+            .or_else(|| self.slices.iter().flatten().copied().next())
+            .unwrap_or_default()
     }
     /// Height between two bounds where `key` of the cross-section is smallest.
     pub(super) fn lowest(&self, from: f32, to: f32, key: impl Fn(&Slice) -> f32) -> f32 {
@@ -101,7 +117,9 @@ fn convex_hull(mut p: Vec<[f32; 2]>) -> Vec<[f32; 2]> {
     if p.len() < 3 {
         return p;
     }
-    let cross = |o: [f32; 2], a: [f32; 2], b: [f32; 2]| (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
+    let cross = |o: [f32; 2], a: [f32; 2], b: [f32; 2]| {
+        (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0])
+    };
     let chain = |points: &mut dyn Iterator<Item = [f32; 2]>| {
         let mut h: Vec<[f32; 2]> = Vec::new();
         for q in points {
@@ -140,21 +158,38 @@ pub(super) struct Figure {
 }
 
 impl Figure {
-    pub(super) fn new(template: &Template, rest: &RestBody, measures: Option<&Measurements>) -> Self {
+    pub(super) fn new(
+        template: &Template,
+        rest: &RestBody,
+        measures: Option<&Measurements>,
+    ) -> Self {
         let pose = super::canonical::canonical_pose(template, rest);
         let mut bones = BoneTransforms::default();
         pose.bones(template.skeleton(), rest, &mut bones);
         let mut vertices = Vec::new();
-        skin(Par::Rayon, &rest.vertices, template.weights(), &bones, &mut vertices);
+        skin(
+            Par::Rayon,
+            &rest.vertices,
+            template.weights(),
+            &bones,
+            &mut vertices,
+        );
         let parts = body_parts(template);
         let faces = template.mesh().faces();
         let lower_mask = Region::TRUNK.with(Region::LEFT_LEG).with(Region::RIGHT_LEG);
         let trunk = Slices::cut(&vertices, faces, &parts, Region::TRUNK);
         let lower = Slices::cut(&vertices, faces, &parts, lower_mask);
-        let legs = [Region::LEFT_LEG, Region::RIGHT_LEG].map(|m| Slices::cut(&vertices, faces, &parts, m));
-        let joint =
-            |names: &[&str]| names.iter().find_map(|n| template.skeleton().index(n)).map(|j| bones.joints[j].y as f32);
-        let (lo, hi) = vertices.iter().fold((f32::MAX, f32::MIN), |(lo, hi), p| (lo.min(p.y), hi.max(p.y)));
+        let legs =
+            [Region::LEFT_LEG, Region::RIGHT_LEG].map(|m| Slices::cut(&vertices, faces, &parts, m));
+        let joint = |names: &[&str]| {
+            names
+                .iter()
+                .find_map(|n| template.skeleton().index(n))
+                .map(|j| bones.joints[j].y as f32)
+        };
+        let (lo, hi) = vertices.iter().fold((f32::MAX, f32::MIN), |(lo, hi), p| {
+            (lo.min(p.y), hi.max(p.y))
+        });
         let stature = hi - lo;
         let pelvis = joint(&["left_hip", "pelvis"]).unwrap_or(lo + 0.52 * stature);
         let shoulder = joint(&["left_shoulder", "neck"]).unwrap_or(lo + 0.8 * stature);
@@ -162,17 +197,38 @@ impl Figure {
         let crotch = vertices
             .iter()
             .zip(&parts)
-            .filter(|(p, q)| p.x.abs() < 0.012 && *q & lower_mask.0 != 0 && p.y > lo + 0.3 * stature)
+            .filter(|(p, q)| {
+                p.x.abs() < 0.012 && *q & lower_mask.0 != 0 && p.y > lo + 0.3 * stature
+            })
             .map(|(p, _)| p.y)
             .fold(f32::MAX, f32::min);
         let crotch = if crotch < hi { crotch } else { pelvis - 0.08 };
         let trunk_length = shoulder - crotch;
         let hip = lower.lowest(crotch + 0.02, crotch + 0.32 * trunk_length, |s| -s.girth);
-        let waist = lower.lowest(crotch + 0.30 * trunk_length, crotch + 0.62 * trunk_length, |s| s.girth);
+        let waist = lower.lowest(
+            crotch + 0.30 * trunk_length,
+            crotch + 0.62 * trunk_length,
+            |s| s.girth,
+        );
         // Legs turn about the hips: the crotch stays where it is.
         let low = rest.vertices.iter().map(|p| p.y).fold(f32::MAX, f32::min);
-        let fork = measures.map_or(crotch, |m| crotch + UP * (low + m.inseam as f32 - crotch).max(0.0));
-        let levels = Levels { waist, hip, crotch, fork };
-        Self { vertices, joints: bones.joints, trunk, lower, legs, parts, levels }
+        let fork = measures.map_or(crotch, |m| {
+            crotch + UP * (low + m.inseam as f32 - crotch).max(0.0)
+        });
+        let levels = Levels {
+            waist,
+            hip,
+            crotch,
+            fork,
+        };
+        Self {
+            vertices,
+            joints: bones.joints,
+            trunk,
+            lower,
+            legs,
+            parts,
+            levels,
+        }
     }
 }

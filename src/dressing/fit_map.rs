@@ -70,9 +70,15 @@ pub const FIT_COLORS: [[u8; 3]; 3] = [[58, 104, 190], [96, 168, 96], [206, 58, 4
 impl VertexFit {
     /// From −1 (loose) by 0 (follows the body) to 1 (tight).
     pub fn tightness(&self) -> f32 {
-        let tight = (self.stretch / TIGHT_STRETCH as f32).max(self.pressure / TIGHT_PRESSURE as f32).clamp(0.0, 1.0);
+        let tight = (self.stretch / TIGHT_STRETCH as f32)
+            .max(self.pressure / TIGHT_PRESSURE as f32)
+            .clamp(0.0, 1.0);
         let loose = (self.gap / LOOSE_GAP as f32).clamp(0.0, 1.0);
-        if tight >= loose { tight } else { -loose * (1.0 - tight) }
+        if tight >= loose {
+            tight
+        } else {
+            -loose * (1.0 - tight)
+        }
     }
     /// Blue where loose, green where fitted, red where tight, sRGB.
     pub fn color(&self) -> [u8; 3] {
@@ -102,14 +108,26 @@ const REGIONS: [(&str, &[&str]); 15] = [
     ("chest", &["spine3", "spine2"]),
     ("left upper arm", &["left_shoulder"]),
     ("right upper arm", &["right_shoulder"]),
-    ("left forearm", &["left_elbow", "left_wrist", "left_hand", "left_hand_end"]),
-    ("right forearm", &["right_elbow", "right_wrist", "right_hand", "right_hand_end"]),
+    (
+        "left forearm",
+        &["left_elbow", "left_wrist", "left_hand", "left_hand_end"],
+    ),
+    (
+        "right forearm",
+        &["right_elbow", "right_wrist", "right_hand", "right_hand_end"],
+    ),
     ("waist", &["spine1"]),
     ("hip", &["pelvis"]),
     ("left thigh", &["left_hip"]),
     ("right thigh", &["right_hip"]),
-    ("left lower leg", &["left_knee", "left_ankle", "left_foot", "left_foot_end"]),
-    ("right lower leg", &["right_knee", "right_ankle", "right_foot", "right_foot_end"]),
+    (
+        "left lower leg",
+        &["left_knee", "left_ankle", "left_foot", "left_foot_end"],
+    ),
+    (
+        "right lower leg",
+        &["right_knee", "right_ankle", "right_foot", "right_foot_end"],
+    ),
 ];
 
 impl FitProbe {
@@ -135,8 +153,15 @@ impl FitProbe {
             .collect();
         let n = template.mesh().vertices().len();
         Ok(Self {
-            sheets: model.outfit.garments.iter().map(Sheet::of_garment).collect::<Result<_, _>>()?,
-            region: (0..n).map(|v| by_joint[template.weights().dominant(v)]).collect(),
+            sheets: model
+                .outfit
+                .garments
+                .iter()
+                .map(Sheet::of_garment)
+                .collect::<Result<_, _>>()?,
+            region: (0..n)
+                .map(|v| by_joint[template.weights().dominant(v)])
+                .collect(),
             nearest: vec![Vec::new(); model.outfit.garments.len()],
             frame: SurfaceFrame::default(),
         })
@@ -145,13 +170,24 @@ impl FitProbe {
     ///
     /// # Errors
     /// When the state or the body is not of this outfit.
-    pub fn measure(&mut self, model: &Model, state: &State, body: &[P3]) -> Result<Vec<FitMap>, ClothError> {
-        let count = |what, got, expected| ClothError::Count { what, got, expected };
+    pub fn measure(
+        &mut self,
+        model: &Model,
+        state: &State,
+        body: &[P3],
+    ) -> Result<Vec<FitMap>, ClothError> {
+        let count = |what, got, expected| ClothError::Count {
+            what,
+            got,
+            expected,
+        };
         let surface = model.surface();
         if body.len() != surface.vertices() || body.len() != self.region.len() {
             return Err(count("body vertices", body.len(), self.region.len()));
         }
-        if state.garments.len() != self.sheets.len() || model.outfit.garments.len() != self.sheets.len() {
+        if state.garments.len() != self.sheets.len()
+            || model.outfit.garments.len() != self.sheets.len()
+        {
             return Err(count("garments", state.garments.len(), self.sheets.len()));
         }
         self.frame.vertices.clear();
@@ -165,7 +201,15 @@ impl FitProbe {
             }
             let offset = model.offset(k) as f32;
             let near = &mut self.nearest[k];
-            let vertices = feel(&self.sheets[k], mesh, &g.positions, surface, &self.frame, offset, near);
+            let vertices = feel(
+                &self.sheets[k],
+                mesh,
+                &g.positions,
+                surface,
+                &self.frame,
+                offset,
+                near,
+            );
             let regions = summarise(&self.sheets[k], mesh, &vertices, near, &self.region);
             out.push(FitMap { vertices, regions });
         }
@@ -202,7 +246,13 @@ fn feel(
     }
     if near.len() != n {
         *near = (0..n)
-            .map(|i| surface.nearest_vertex(frame, &positions[i], mesh.regions.get(i).map_or(Region::ALL.0, |r| r.0)))
+            .map(|i| {
+                surface.nearest_vertex(
+                    frame,
+                    &positions[i],
+                    mesh.regions.get(i).map_or(Region::ALL.0, |r| r.0),
+                )
+            })
             .collect();
     }
     (0..n)
@@ -214,26 +264,46 @@ fn feel(
             let gap = c.signed.max(0.0);
             let pressure = if gap < offset + TOUCH {
                 // −gradient + weight + skin = 0 along the normal.
-                c.normal.cast::<f64>().dot(&(pull[i] - GRAVITY * sheet.mass[i])).max(0.0) / a
+                c.normal
+                    .cast::<f64>()
+                    .dot(&(pull[i] - GRAVITY * sheet.mass[i]))
+                    .max(0.0)
+                    / a
             } else {
                 0.0
             };
-            VertexFit { stretch: (stretch[i] / a) as f32, pressure: pressure as f32, gap }
+            VertexFit {
+                stretch: (stretch[i] / a) as f32,
+                pressure: pressure as f32,
+                gap,
+            }
         })
         .collect()
 }
 
-fn summarise(sheet: &Sheet, mesh: &GarmentMesh, vertices: &[VertexFit], near: &[u32], region: &[u8]) -> Vec<RegionFit> {
+fn summarise(
+    sheet: &Sheet,
+    mesh: &GarmentMesh,
+    vertices: &[VertexFit],
+    near: &[u32],
+    region: &[u8],
+) -> Vec<RegionFit> {
     let mut area = vec![0.0f64; vertices.len()];
     for e in &sheet.elements {
         e.v.iter().for_each(|v| area[*v as usize] += e.area / 3.0);
     }
     // Edges that are tied to the body stretch where they are held; they are told by their pressure.
-    let held: std::collections::BTreeSet<u32> =
-        mesh.anchors.iter().filter(|a| a.strength >= 1.0).flat_map(|a| a.vertices.iter().copied()).collect();
+    let held: std::collections::BTreeSet<u32> = mesh
+        .anchors
+        .iter()
+        .filter(|a| a.strength >= 1.0)
+        .flat_map(|a| a.vertices.iter().copied())
+        .collect();
     let mut out = Vec::new();
     for (r, (name, _)) in REGIONS.iter().enumerate() {
-        let own: Vec<usize> = (0..vertices.len()).filter(|i| usize::from(region[near[*i] as usize]) == r).collect();
+        let own: Vec<usize> = (0..vertices.len())
+            .filter(|i| usize::from(region[near[*i] as usize]) == r)
+            .collect();
         let total: f64 = own.iter().map(|i| area[*i]).sum();
         /// Less cloth than this says nothing about a region, m²: a hand's breadth square.
         const LEAST: f64 = 0.006;
@@ -241,17 +311,28 @@ fn summarise(sheet: &Sheet, mesh: &GarmentMesh, vertices: &[VertexFit], near: &[
             continue;
         }
         let percentile = |value: &dyn Fn(&VertexFit) -> f32| {
-            let mut all: Vec<f32> =
-                own.iter().filter(|i| !held.contains(&(**i as u32))).map(|i| value(&vertices[*i])).collect();
+            let mut all: Vec<f32> = own
+                .iter()
+                .filter(|i| !held.contains(&(**i as u32)))
+                .map(|i| value(&vertices[*i]))
+                .collect();
             all.sort_unstable_by(f32::total_cmp);
-            all.get((all.len() * 95 / 100).min(all.len().saturating_sub(1))).map_or(0.0, |v| f64::from(*v))
+            all.get((all.len() * 95 / 100).min(all.len().saturating_sub(1)))
+                .map_or(0.0, |v| f64::from(*v))
         };
         let mean = |value: &dyn Fn(&VertexFit) -> f32| {
-            own.iter().map(|i| f64::from(value(&vertices[*i])) * area[*i]).sum::<f64>() / total
+            own.iter()
+                .map(|i| f64::from(value(&vertices[*i])) * area[*i])
+                .sum::<f64>()
+                / total
         };
         let touching = mean(&|v| f32::from(u8::from(v.pressure > 0.0)));
         let stretch = [mean(&|v| v.stretch), percentile(&|v| v.stretch)];
-        let on_skin = if touching > 0.0 { mean(&|v| v.pressure) / touching } else { 0.0 };
+        let on_skin = if touching > 0.0 {
+            mean(&|v| v.pressure) / touching
+        } else {
+            0.0
+        };
         let pressure = [on_skin, percentile(&|v| v.pressure)];
         let gap = mean(&|v| v.gap);
         let fit = if stretch[1] > TIGHT_STRETCH || pressure[0] > TIGHT_PRESSURE {
@@ -261,7 +342,15 @@ fn summarise(sheet: &Sheet, mesh: &GarmentMesh, vertices: &[VertexFit], near: &[
         } else {
             Fit::Fitted
         };
-        out.push(RegionFit { name: (*name).to_owned(), area: total, stretch, pressure, touching, gap, fit });
+        out.push(RegionFit {
+            name: (*name).to_owned(),
+            area: total,
+            stretch,
+            pressure,
+            touching,
+            gap,
+            fit,
+        });
     }
     out
 }
@@ -280,12 +369,19 @@ mod tests {
         for j in 0..=m {
             for i in 0..n {
                 let a = TAU * f64::from(i) / f64::from(n);
-                v.push(P3::new((r * a.sin()) as f32, 0.3 * j as f32 / m as f32, (r * a.cos()) as f32));
+                v.push(P3::new(
+                    (r * a.sin()) as f32,
+                    0.3 * j as f32 / m as f32,
+                    (r * a.cos()) as f32,
+                ));
             }
         }
         let f = (0..m).flat_map(|j| {
             (0..n).flat_map(move |i| {
-                [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
+                [
+                    [at(i, j), at(i + 1, j), at(i + 1, j + 1)],
+                    [at(i, j), at(i + 1, j + 1), at(i, j + 1)],
+                ]
             })
         });
         (v, f.collect())
@@ -296,14 +392,24 @@ mod tests {
         let (n, m) = (64, 20);
         let (body, body_faces) = tube(0.1, 96, 30);
         let mesh = TriMesh::new(body.clone(), body_faces.clone()).expect("mesh");
-        let surface = SurfaceModel::new(body_faces, Topology::new(&mesh).expect("topology"), vec![1; body.len()]);
-        let mut frame = SurfaceFrame { vertices: body, normals: Vec::new() };
+        let surface = SurfaceModel::new(
+            body_faces,
+            Topology::new(&mesh).expect("topology"),
+            vec![1; body.len()],
+        );
+        let mut frame = SurfaceFrame {
+            vertices: body,
+            normals: Vec::new(),
+        };
         surface.update_normals(Par::Seq, &mut frame);
         let (x, faces) = tube(r, n, m);
         let flat = |v: u32, wrap: bool| {
             let (i, j) = (v % n, v / n);
             let i = if wrap && i == 0 { n } else { i };
-            [girth * f64::from(i) / f64::from(n), 0.3 * f64::from(j) / f64::from(m)]
+            [
+                girth * f64::from(i) / f64::from(n),
+                0.3 * f64::from(j) / f64::from(m),
+            ]
         };
         let rest: Vec<[[f64; 2]; 3]> = faces
             .iter()
@@ -312,7 +418,11 @@ mod tests {
                 f.map(|v| flat(v, wrap))
             })
             .collect();
-        let material = Material { coupling: 0.0, area_density: 1e-9, ..Material::preset("jersey").expect("preset") };
+        let material = Material {
+            coupling: 0.0,
+            area_density: 1e-9,
+            ..Material::preset("jersey").expect("preset")
+        };
         let sheet = Sheet::new(x.len(), &faces, &rest, &material, None).expect("sheet");
         let garment = GarmentMesh {
             name: "tube".into(),
@@ -334,7 +444,15 @@ mod tests {
             render: RenderMesh::default(),
             min_angle: 45.0,
         };
-        feel(&sheet, &garment, &x, &surface, &frame, 0.005, &mut Vec::new())
+        feel(
+            &sheet,
+            &garment,
+            &x,
+            &surface,
+            &frame,
+            0.005,
+            &mut Vec::new(),
+        )
     }
 
     #[test]
@@ -345,19 +463,34 @@ mod tests {
         let expected = m.stretch_weft * strain / r; // Laplace: p = T/r
         // Rows away from the rims.
         let middle: Vec<&VertexFit> = fit.iter().skip(64 * 5).take(64 * 10).collect();
-        let mean =
-            |f: &dyn Fn(&VertexFit) -> f32| middle.iter().map(|v| f64::from(f(v))).sum::<f64>() / middle.len() as f64;
-        assert!((mean(&|v| v.stretch) - strain).abs() < 2e-3, "{}", mean(&|v| v.stretch));
+        let mean = |f: &dyn Fn(&VertexFit) -> f32| {
+            middle.iter().map(|v| f64::from(f(v))).sum::<f64>() / middle.len() as f64
+        };
+        assert!(
+            (mean(&|v| v.stretch) - strain).abs() < 2e-3,
+            "{}",
+            mean(&|v| v.stretch)
+        );
         let p = mean(&|v| v.pressure);
-        assert!((p - expected).abs() < 0.05 * expected, "{p} Pa, {expected} expected");
-        assert!(middle.iter().all(|v| v.tightness() > 0.5 && v.color()[0] > v.color()[2]));
+        assert!(
+            (p - expected).abs() < 0.05 * expected,
+            "{p} Pa, {expected} expected"
+        );
+        assert!(
+            middle
+                .iter()
+                .all(|v| v.tightness() > 0.5 && v.color()[0] > v.color()[2])
+        );
     }
 
     #[test]
     fn a_tube_off_the_body_presses_nowhere_and_its_gap_is_the_distance() {
         let fit = worn(TAU * 0.15, 0.15);
         for v in fit.iter().skip(64 * 5).take(64 * 10) {
-            assert!(v.pressure == 0.0 && (v.gap - 0.05).abs() < 1e-3 && v.stretch.abs() < 2e-3, "{v:?}");
+            assert!(
+                v.pressure == 0.0 && (v.gap - 0.05).abs() < 1e-3 && v.stretch.abs() < 2e-3,
+                "{v:?}"
+            );
             assert!(v.tightness() < -0.9 && v.color()[2] > v.color()[0]);
         }
     }

@@ -48,8 +48,17 @@ struct Touch {
 impl Hood {
     /// `None` where a garment has no hood.
     pub(super) fn of(mesh: &GarmentMesh, sheet: &Sheet) -> Result<Option<Self>, GarmentError> {
-        let on_hood = |c: &(u16, [f64; 2])| matches!(mesh.placements.get(usize::from(c.0)), Some(Placement::Hood(_)));
-        let of: Vec<u32> = (0u32..).zip(&mesh.corners).filter(|(_, c)| c.iter().any(on_hood)).map(|(v, _)| v).collect();
+        let on_hood = |c: &(u16, [f64; 2])| {
+            matches!(
+                mesh.placements.get(usize::from(c.0)),
+                Some(Placement::Hood(_))
+            )
+        };
+        let of: Vec<u32> = (0u32..)
+            .zip(&mesh.corners)
+            .filter(|(_, c)| c.iter().any(on_hood))
+            .map(|(v, _)| v)
+            .collect();
         if of.is_empty() {
             return Ok(None);
         }
@@ -69,15 +78,23 @@ impl Hood {
     pub(super) fn look(&mut self, x: &[V3d], passing: impl Fn(u32) -> bool) {
         let frame = &mut self.frame;
         frame.surface.vertices.clear();
-        frame.surface.vertices.extend(x.iter().map(|p| P3::from(p.cast::<f32>())));
+        frame
+            .surface
+            .vertices
+            .extend(x.iter().map(|p| P3::from(p.cast::<f32>())));
         frame.velocities.resize(x.len(), V3::zeros());
-        self.model.begin(Par::Seq, frame, Some(&self.search), x.len());
+        self.model
+            .begin(Par::Seq, frame, Some(&self.search), x.len());
         self.touches.clear();
         self.neighbour_of.fill(u32::MAX);
         for &v in self.of.iter().filter(|v| !passing(**v)) {
             let p = frame.surface.vertices[v as usize];
-            let corner = self.model.corner(frame, v, &p, &self.search, &mut self.neighbour_of);
-            let Some(hit) = corner.and_then(|(c, _)| self.model.other_fold(frame, v, &p, c)) else { continue };
+            let corner = self
+                .model
+                .corner(frame, v, &p, &self.search, &mut self.neighbour_of);
+            let Some(hit) = corner.and_then(|(c, _)| self.model.other_fold(frame, v, &p, c)) else {
+                continue;
+            };
             let [a, b, c] = self.model.surface.faces()[hit.face as usize];
             let far = f64::from(hit.signed.abs());
             if far < f64::from(REACH) && ![a, b, c].into_iter().any(&passing) {
@@ -95,7 +112,9 @@ impl Hood {
     /// masses.
     pub(super) fn hold(&self, x: &mut [V3d], before: &[V3d], weight: impl Fn(u32) -> f64, h: f64) {
         for t in &self.touches {
-            let far: f64 = (0..4).map(|k| t.weights[k] * t.normal.dot(&x[t.vertices[k] as usize])).sum();
+            let far: f64 = (0..4)
+                .map(|k| t.weights[k] * t.normal.dot(&x[t.vertices[k] as usize]))
+                .sum();
             let w = t.vertices.map(&weight);
             let mass: f64 = (0..4).map(|k| w[k] * t.weights[k] * t.weights[k]).sum();
             if far < t.apart && mass > 0.0 {
@@ -116,7 +135,11 @@ mod tests {
 
     fn sewn(name: &str) -> (GarmentMesh, Option<Hood>) {
         let pattern = library::pattern(name, Size::M).expect("pattern");
-        let how = Triangulation { hood_length: 0.028, min_angle: 0.0, ..Triangulation::default() };
+        let how = Triangulation {
+            hood_length: 0.028,
+            min_angle: 0.0,
+            ..Triangulation::default()
+        };
         let mesh = GarmentMesh::sew(&pattern, &how).expect("sewn");
         let sheet = Sheet::of_garment(&mesh).expect("sheet");
         let hood = Hood::of(&mesh, &sheet).expect("manifold");
@@ -142,7 +165,12 @@ mod tests {
         assert!(sewn("longsleeve").1.is_none());
         let (mesh, hood) = sewn("hoodie");
         let hood = hood.expect("a hood");
-        assert!(hood.of.len() > 100 && hood.of.len() < mesh.vertices / 2, "{} of {}", hood.of.len(), mesh.vertices);
+        assert!(
+            hood.of.len() > 100 && hood.of.len() < mesh.vertices / 2,
+            "{} of {}",
+            hood.of.len(),
+            mesh.vertices
+        );
     }
 
     #[test]
@@ -153,14 +181,26 @@ mod tests {
         hood.look(&before, |_| false);
         assert!(hood.touches.len() > 50, "{}", hood.touches.len());
         // Pressed to a quarter of the way.
-        let pressed: Vec<V3d> =
-            before.iter().map(|p| V3d::new(p.x, p.y, if p.z < 1.0 { 0.25 * p.z } else { p.z })).collect();
-        let far =
-            |x: &[V3d], t: &Touch| (0..4).map(|k| t.weights[k] * t.normal.dot(&x[t.vertices[k] as usize])).sum::<f64>();
-        let mean = |x: &[V3d]| hood.touches.iter().map(|t| far(x, t)).sum::<f64>() / hood.touches.len() as f64;
+        let pressed: Vec<V3d> = before
+            .iter()
+            .map(|p| V3d::new(p.x, p.y, if p.z < 1.0 { 0.25 * p.z } else { p.z }))
+            .collect();
+        let far = |x: &[V3d], t: &Touch| {
+            (0..4)
+                .map(|k| t.weights[k] * t.normal.dot(&x[t.vertices[k] as usize]))
+                .sum::<f64>()
+        };
+        let mean = |x: &[V3d]| {
+            hood.touches.iter().map(|t| far(x, t)).sum::<f64>() / hood.touches.len() as f64
+        };
         let mut x = pressed.clone();
         hood.hold(&mut x, &before, |_| 1.0, 1.0);
-        assert!(mean(&x) > 3.0 * mean(&pressed), "{} to {} m", mean(&pressed), mean(&x));
+        assert!(
+            mean(&x) > 3.0 * mean(&pressed),
+            "{} to {} m",
+            mean(&pressed),
+            mean(&x)
+        );
         let sum: V3d = x.iter().zip(&pressed).map(|(a, b)| a - b).sum();
         assert!(sum.norm() < 1e-8, "moved as a whole by {sum}");
         // What is pinned stays.
@@ -179,7 +219,11 @@ mod tests {
         let mut x: Vec<V3d> = before.iter().map(|p| p + V3d::new(0.1, 0.0, 0.0)).collect();
         hood.hold(&mut x, &before, |_| 1.0, 2e-3);
         for (v, (x, before)) in x.iter().zip(&before).enumerate() {
-            let most = if hood.of.contains(&(v as u32)) { FASTEST * 2e-3 } else { 0.1 };
+            let most = if hood.of.contains(&(v as u32)) {
+                FASTEST * 2e-3
+            } else {
+                0.1
+            };
             assert!(((x - before).norm() - most).abs() < 1e-12, "vertex {v}");
         }
         // A place that is none breaks nothing.

@@ -69,14 +69,24 @@ impl MeshWear {
     ///
     /// # Errors
     /// A fault of one of the files, by its edge, face or vertex.
-    pub fn read(path: &Path, body: Option<&Path>, material: &Material, edge: f64) -> Result<Self, WearError> {
+    pub fn read(
+        path: &Path,
+        body: Option<&Path>,
+        material: &Material,
+        edge: f64,
+    ) -> Result<Self, WearError> {
         Self::on(path, body.map(MadeOn::read).transpose()?, material, edge)
     }
     /// As [`Self::read`], on a body that has been read.
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn on(path: &Path, body: Option<MadeOn>, material: &Material, edge: f64) -> Result<Self, WearError> {
+    pub fn on(
+        path: &Path,
+        body: Option<MadeOn>,
+        material: &Material,
+        edge: f64,
+    ) -> Result<Self, WearError> {
         let file = read_mesh(path, body.as_ref().map(|b| b.file.as_slice()))?;
         let mut sewn = file.sewn;
         let is_bound = path.extension().is_some_and(|e| e == "mhclo");
@@ -97,22 +107,36 @@ impl MeshWear {
         sewn.obj.uv.iter_mut().flatten().for_each(|c| *c *= unit);
         let mut notes = vec![format!("made on {}", made_on.said)];
         if file.turned > 0 {
-            notes.push(format!("{} faces turned over to agree with their neighbours", file.turned));
+            notes.push(format!(
+                "{} faces turned over to agree with their neighbours",
+                file.turned
+            ));
         }
         let template = made_on.template.clone();
         let judge = Judge::new(&template);
         let (mut cloth, mut carried) = (Vec::new(), Vec::new());
         for piece in split(&sewn) {
-            if judge.is_cloth(&piece) { cloth.push(piece) } else { carried.push(piece) }
+            if judge.is_cloth(&piece) {
+                cloth.push(piece)
+            } else {
+                carried.push(piece)
+            }
         }
         let mut parts = Vec::new();
         for (piece, mut s) in cloth.into_iter().enumerate() {
             if s.stitches.is_empty() && s.obj.face_uv.is_empty() || !panels_in_metres(&s) {
                 let mesh = remesh(&s.obj.mesh, edge);
-                s = SewnObj { obj: ObjMesh { mesh, uv: Vec::new(), face_uv: Vec::new() }, stitches: Vec::new() };
+                s = SewnObj {
+                    obj: ObjMesh {
+                        mesh,
+                        uv: Vec::new(),
+                        face_uv: Vec::new(),
+                    },
+                    stitches: Vec::new(),
+                };
             }
-            let part =
-                Part::cloth(&judge, &s, &file.name, material, edge).map_err(|why| WearError::Piece { piece, why })?;
+            let part = Part::cloth(&judge, &s, &file.name, material, edge)
+                .map_err(|why| WearError::Piece { piece, why })?;
             let g = &part.0.garment;
             let what = match (g.kind, part.1) {
                 (GarmentKind::Top, _) => "top",
@@ -120,22 +144,35 @@ impl MeshWear {
                 (GarmentKind::Trousers, _) => "trousers",
                 (GarmentKind::Dress, _) => "dress or suit",
             };
-            let rest = if part.0.as_cut { "panels graded to the body" } else { "fitted to the body" };
-            notes.push(format!("piece {piece}: {what}, {} vertices, {rest}{}", g.vertices, part.2));
+            let rest = if part.0.as_cut {
+                "panels graded to the body"
+            } else {
+                "fitted to the body"
+            };
+            notes.push(format!(
+                "piece {piece}: {what}, {} vertices, {rest}{}",
+                g.vertices, part.2
+            ));
             parts.push(part.0);
         }
         parts = by_layer(parts);
         if let Some(merged) = merge(&carried) {
             let areas: Vec<usize> = (0..merged.obj.mesh.faces().len())
                 .filter(|f| {
-                    0.5 * f64::from(face_normal(merged.obj.mesh.vertices(), &merged.obj.mesh.faces()[*f]).norm())
-                        > NO_AREA
+                    0.5 * f64::from(
+                        face_normal(merged.obj.mesh.vertices(), &merged.obj.mesh.faces()[*f])
+                            .norm(),
+                    ) > NO_AREA
                 })
                 .collect();
             if let Some(kept) = some_faces(&merged, &areas) {
                 let n = carried.len();
-                let part = Part::carried(&judge, &kept, &file.name, material)
-                    .map_err(|why| WearError::Piece { piece: parts.len(), why })?;
+                let part = Part::carried(&judge, &kept, &file.name, material).map_err(|why| {
+                    WearError::Piece {
+                        piece: parts.len(),
+                        why,
+                    }
+                })?;
                 notes.push(format!(
                     "{n} {} of {} vertices carried by the skin: no cloth that falls",
                     if n == 1 { "part" } else { "parts" },
@@ -145,18 +182,31 @@ impl MeshWear {
             }
         }
         if parts.is_empty() {
-            return Err(WearError::Nothing(format!("{}: no piece with an area", path.display())));
+            return Err(WearError::Nothing(format!(
+                "{}: no piece with an area",
+                path.display()
+            )));
         }
         for (layer, p) in parts.iter_mut().enumerate() {
             p.garment.layer = layer.min(255) as u8;
         }
-        Ok(Self { name: file.name, notes, made_on: Arc::new(made_on), parts })
+        Ok(Self {
+            name: file.name,
+            notes,
+            made_on: Arc::new(made_on),
+            parts,
+        })
     }
     /// The same under another name, which its garments carry too.
     #[must_use]
     pub fn named(mut self, name: &str) -> Self {
-        self.parts.iter_mut().for_each(|p| p.garment.name = name.to_owned());
-        Self { name: name.to_owned(), ..self }
+        self.parts
+            .iter_mut()
+            .for_each(|p| p.garment.name = name.to_owned());
+        Self {
+            name: name.to_owned(),
+            ..self
+        }
     }
     /// Its place among other garments: that of what its outermost part is.
     pub fn layer(&self) -> u8 {
@@ -168,15 +218,27 @@ impl MeshWear {
         self.parts.iter().map(|p| p.garment.vertices).sum()
     }
     /// The parts on another body, innermost first: meshes and where their vertices lie in the canonical pose, metres.
-    pub(super) fn put_on(&self, template: &Template, figure: &super::figure::Figure) -> Vec<(GarmentMesh, Vec<P3>)> {
+    pub(super) fn put_on(
+        &self,
+        template: &Template,
+        figure: &super::figure::Figure,
+    ) -> Vec<(GarmentMesh, Vec<P3>)> {
         let carrier = Carrier::new(&self.made_on, template, figure);
         let mut normals = Vec::new();
         let faces = template.mesh().faces();
-        vertex_normals(Par::Rayon, &figure.vertices, faces, template.topology().vertex_faces(), &mut normals);
+        vertex_normals(
+            Par::Rayon,
+            &figure.vertices,
+            faces,
+            template.topology().vertex_faces(),
+            &mut normals,
+        );
         let tree = PointTree::new(&figure.vertices);
         // Rest shapes are taken above the skin: cloth that starts below it would be too tight for good.
         let above = |p: P3| match tree.nearest(&p, NEAR) {
-            Some((i, _)) => p + normals[i] * (ABOVE - normals[i].dot(&(p - figure.vertices[i]))).max(0.0),
+            Some((i, _)) => {
+                p + normals[i] * (ABOVE - normals[i].dot(&(p - figure.vertices[i]))).max(0.0)
+            }
             None => p,
         };
         self.parts
@@ -185,17 +247,28 @@ impl MeshWear {
                 let carried = p.garment.anchors.iter().any(|a| a.name == CARRIED);
                 let x: Vec<P3> = (0..p.positions.len())
                     .map(|i| {
-                        let q = carrier.point(&p.positions[i], &p.bound.weights[i], &p.bound.over[i]);
+                        let q =
+                            carrier.point(&p.positions[i], &p.bound.weights[i], &p.bound.over[i]);
                         if carried { q } else { above(q) }
                     })
                     .collect();
                 let mut garment = p.garment.clone();
                 if p.as_cut {
                     // Graded: all lengths by what the body is larger.
-                    let area =
-                        |x: &[P3]| garment.faces.iter().map(|f| f64::from(face_normal(x, f).norm())).sum::<f64>();
+                    let area = |x: &[P3]| {
+                        garment
+                            .faces
+                            .iter()
+                            .map(|f| f64::from(face_normal(x, f).norm()))
+                            .sum::<f64>()
+                    };
                     let grade = (area(&x) / area(&p.positions).max(f64::MIN_POSITIVE)).sqrt();
-                    garment.rest.iter_mut().flatten().flatten().for_each(|c| *c *= grade);
+                    garment
+                        .rest
+                        .iter_mut()
+                        .flatten()
+                        .flatten()
+                        .for_each(|c| *c *= grade);
                 } else {
                     for (rest, f) in garment.rest.iter_mut().zip(&garment.faces) {
                         let t = unfold(f.map(|v| x[v as usize].coords.cast()));
@@ -214,7 +287,10 @@ impl MeshWear {
 /// Several pieces as one.
 fn merge(pieces: &[SewnObj]) -> Option<SewnObj> {
     let mut out = pieces.first()?.clone();
-    let (mut vertices, mut faces) = (out.obj.mesh.vertices().to_vec(), out.obj.mesh.faces().to_vec());
+    let (mut vertices, mut faces) = (
+        out.obj.mesh.vertices().to_vec(),
+        out.obj.mesh.faces().to_vec(),
+    );
     for p in &pieces[1..] {
         let first = vertices.len() as u32;
         vertices.extend(p.obj.mesh.vertices());
@@ -243,7 +319,11 @@ impl<'a> Judge<'a> {
         let ends: Vec<bool> = sk
             .joints()
             .iter()
-            .map(|j| ["head", "wrist", "hand", "ankle", "foot", "toe", "jaw"].iter().any(|w| j.name.contains(w)))
+            .map(|j| {
+                ["head", "wrist", "hand", "ankle", "foot", "toe", "jaw"]
+                    .iter()
+                    .any(|w| j.name.contains(w))
+            })
             .collect();
         let body = template.mesh().vertices();
         let at = |n: &str| sk.index(n).map(|j| sk.joints()[j].rest.y as f32);
@@ -251,16 +331,23 @@ impl<'a> Judge<'a> {
         Self {
             parts: body_parts(template),
             tree: PointTree::new(body),
-            end: (0..body.len()).map(|i| ends[template.weights().dominant(i)]).collect(),
+            end: (0..body.len())
+                .map(|i| ends[template.weights().dominant(i)])
+                .collect(),
             shoulder,
             knee: at("left_knee").unwrap_or(f32::MIN),
             template,
         }
     }
     fn is_cloth(&self, s: &SewnObj) -> bool {
-        let Some((lo, hi)) = s.obj.mesh.bounds() else { return false };
+        let Some((lo, hi)) = s.obj.mesh.bounds() else {
+            return false;
+        };
         let v = s.obj.mesh.vertices();
-        let over = v.iter().filter(|p| self.tree.nearest(p, 10.0).is_some_and(|(i, _)| self.end[i])).count();
+        let over = v
+            .iter()
+            .filter(|p| self.tree.nearest(p, 10.0).is_some_and(|(i, _)| self.end[i]))
+            .count();
         // Socks go with the feet.
         (hi - lo).amax() > SMALL && hi.y > self.knee && (over as f64) < MOSTLY * v.len() as f64
     }
@@ -304,42 +391,59 @@ impl Part {
         let (mut g, mut x) = (made.garment, made.positions);
         let mut more = String::new();
         if made.open + made.closed > 0 {
-            more = format!(", {} stitches open, {} triangles closed", made.open, made.closed);
+            more = format!(
+                ", {} stitches open, {} triangles closed",
+                made.open, made.closed
+            );
         }
         if made.flat && median_edge(&g) < FINER * edge {
             more += &format!(", {} in the file", g.vertices);
             (g, x) = coarsen(&g, &x, edge);
         }
         let topology = g.topology()?;
-        let mut bound = bind(judge.template, &x, |i| topology.vertex_neighbours().row(i).to_vec());
+        let mut bound = bind(judge.template, &x, |i| {
+            topology.vertex_neighbours().row(i).to_vec()
+        });
         outside_out(&mut g, &x, &bound);
         if !made.flat {
             unroll(&mut g, &x);
         }
         // The part of the body that each vertex lies over: what its heaviest joints belong to.
-        let part: Vec<u8> =
-            (0..x.len()).map(|i| judge.parts[bound.over[i].first().map_or(0, |o| o.0 as usize)]).collect();
-        let share = |mask: Region| part.iter().filter(|p| **p & mask.0 != 0).count() as f64 / part.len().max(1) as f64;
+        let part: Vec<u8> = (0..x.len())
+            .map(|i| judge.parts[bound.over[i].first().map_or(0, |o| o.0 as usize)])
+            .collect();
+        let share = |mask: Region| {
+            part.iter().filter(|p| **p & mask.0 != 0).count() as f64 / part.len().max(1) as f64
+        };
         let legs = Region::LEFT_LEG.with(Region::RIGHT_LEG);
         let top = x.iter().map(|p| p.y).fold(f32::MIN, f32::max);
         let length = |l: &[u32]| {
-            let (lo, hi) = l
-                .iter()
-                .map(|v| x[*v as usize])
-                .fold((P3::from([f32::MAX; 3]), P3::from([f32::MIN; 3])), |(lo, hi), p| (lo.inf(&p), hi.sup(&p)));
+            let (lo, hi) = l.iter().map(|v| x[*v as usize]).fold(
+                (P3::from([f32::MAX; 3]), P3::from([f32::MIN; 3])),
+                |(lo, hi), p| (lo.inf(&p), hi.sup(&p)),
+            );
             (hi - lo).norm()
         };
         /// An opening smaller than this across is a slit, metres.
         const OPENING: f32 = 0.06;
-        let rims: Vec<Vec<u32>> = openings(&topology).into_iter().filter(|l| length(l) > OPENING).collect();
+        let rims: Vec<Vec<u32>> = openings(&topology)
+            .into_iter()
+            .filter(|l| length(l) > OPENING)
+            .collect();
         let around_one = |leg: Region| {
-            rims.iter().any(|l| l.iter().filter(|v| part[**v as usize] & leg.0 != 0).count() * 10 > l.len() * 9)
+            rims.iter().any(|l| {
+                l.iter().filter(|v| part[**v as usize] & leg.0 != 0).count() * 10 > l.len() * 9
+            })
         };
         // Trousers end in a leg each; a skirt ends around both.
         let two_legs = around_one(Region::LEFT_LEG) && around_one(Region::RIGHT_LEG);
         /// Cloth that reaches this close to the shoulders' height hangs from them, metres.
         const NEAR_SHOULDER: f32 = 0.02;
-        let hangs = if top > judge.shoulder - NEAR_SHOULDER { Hangs::Shoulders } else { Hangs::Opening };
+        let hangs = if top > judge.shoulder - NEAR_SHOULDER {
+            Hangs::Shoulders
+        } else {
+            Hangs::Opening
+        };
         g.kind = match hangs {
             Hangs::Shoulders if share(legs) > 0.25 => GarmentKind::Dress,
             Hangs::Shoulders => GarmentKind::Top,
@@ -364,16 +468,35 @@ impl Part {
             if p.meets(Region::TRUNK) && hangs == Hangs::Shoulders || x[i].x.abs() < MIDDLE {
                 trunk.with(legs)
             } else {
-                trunk.with(if x[i].x > 0.0 { Region::LEFT_LEG } else { Region::RIGHT_LEG })
+                trunk.with(if x[i].x > 0.0 {
+                    Region::LEFT_LEG
+                } else {
+                    Region::RIGHT_LEG
+                })
             }
         };
         let alone: Vec<Region> = (0..x.len()).map(own).collect();
         // Where a sleeve meets the trunk both decide.
         g.regions = (0..x.len())
-            .map(|i| topology.vertex_neighbours().row(i).iter().fold(alone[i], |r, n| r.with(alone[*n as usize])))
+            .map(|i| {
+                topology
+                    .vertex_neighbours()
+                    .row(i)
+                    .iter()
+                    .fold(alone[i], |r, n| r.with(alone[*n as usize]))
+            })
             .collect();
         g.anchors = anchors(judge, &rims, &x, hangs);
-        Ok((Self { garment: g, positions: x, bound, as_cut: made.flat }, hangs, more))
+        Ok((
+            Self {
+                garment: g,
+                positions: x,
+                bound,
+                as_cut: made.flat,
+            },
+            hangs,
+            more,
+        ))
     }
     fn carried(
         judge: &Judge<'_>,
@@ -384,8 +507,17 @@ impl Part {
         let made = from_mesh(s, name, GarmentKind::Top, material.clone())?;
         let (mut g, x) = (made.garment, made.positions);
         let bound = bind(judge.template, &x, |_| Vec::new());
-        g.anchors = vec![AnchorSet { name: CARRIED.into(), vertices: (0..x.len() as u32).collect(), strength: 1.0 }];
-        Ok(Self { garment: g, positions: x, bound, as_cut: false })
+        g.anchors = vec![AnchorSet {
+            name: CARRIED.into(),
+            vertices: (0..x.len() as u32).collect(),
+            strength: 1.0,
+        }];
+        Ok(Self {
+            garment: g,
+            positions: x,
+            bound,
+            as_cut: false,
+        })
     }
 }
 
@@ -401,32 +533,53 @@ fn anchors(judge: &Judge<'_>, rims: &[Vec<u32>], x: &[P3], hangs: Hangs) -> Vec<
         /// What has no opening at the top is held by this much of it, metres.
         const RING: f32 = 0.025;
         let top = x.iter().map(|p| p.y).fold(f32::MIN, f32::max);
-        (0..x.len() as u32).filter(|v| x[*v as usize].y > top - RING).collect()
+        (0..x.len() as u32)
+            .filter(|v| x[*v as usize].y > top - RING)
+            .collect()
     };
     match hangs {
         Hangs::Opening => {
-            let height = |l: &[u32]| l.iter().map(|v| x[*v as usize].y).sum::<f32>() / l.len().max(1) as f32;
+            let height =
+                |l: &[u32]| l.iter().map(|v| x[*v as usize].y).sum::<f32>() / l.len().max(1) as f32;
             let highest = rims.iter().max_by(|a, b| height(a).total_cmp(&height(b)));
             let vertices = highest.cloned().unwrap_or_else(ring);
-            vec![AnchorSet { name: "opening".into(), vertices, strength: 1.0 }]
+            vec![AnchorSet {
+                name: "opening".into(),
+                vertices,
+                strength: 1.0,
+            }]
         }
         Hangs::Shoulders => {
             let sk = judge.template.skeleton();
             let at = |n: &str| sk.index(n).map(|j| sk.joints()[j].rest.cast::<f32>());
-            let Some([neck, tip]) = at("neck").zip(at("left_shoulder")).map(|(a, b)| [a, b]) else { return vec![] };
+            let Some([neck, tip]) = at("neck").zip(at("left_shoulder")).map(|(a, b)| [a, b]) else {
+                return vec![];
+            };
             /// Half width of what lies on a shoulder, metres.
             const HALF: f32 = 0.012;
             let inner = 0.3 * (tip.x - neck.x).abs();
             let on = |p: &P3| {
-                p.y > tip.y && (p.z - tip.z).abs() < HALF && (inner..(tip.x - neck.x).abs() + HALF).contains(&p.x.abs())
+                p.y > tip.y
+                    && (p.z - tip.z).abs() < HALF
+                    && (inner..(tip.x - neck.x).abs() + HALF).contains(&p.x.abs())
             };
-            let vertices: Vec<u32> = (0..x.len() as u32).filter(|v| on(&x[*v as usize])).collect();
+            let vertices: Vec<u32> = (0..x.len() as u32)
+                .filter(|v| on(&x[*v as usize]))
+                .collect();
             if !vertices.is_empty() {
                 // Firmly: a jacket that is open in front would slide off a body without friction.
-                return vec![AnchorSet { name: SHOULDERS.into(), vertices, strength: 1.0 }];
+                return vec![AnchorSet {
+                    name: SHOULDERS.into(),
+                    vertices,
+                    strength: 1.0,
+                }];
             }
             // A shirt front or a collar: it hangs from its top.
-            vec![AnchorSet { name: SHOULDERS.into(), vertices: ring(), strength: 1.0 }]
+            vec![AnchorSet {
+                name: SHOULDERS.into(),
+                vertices: ring(),
+                strength: 1.0,
+            }]
         }
     }
 }
@@ -437,21 +590,38 @@ fn one_tube(template: &Template, x: &[P3], bound: &mut Bound) {
     let sk = template.skeleton();
     let at = |n: &str| sk.index(n).map(|j| (j, sk.joints()[j].rest.cast::<f32>()));
     let side = |s: &str| Some([at(&format!("{s}_hip"))?, at(&format!("{s}_knee"))?]);
-    let (Some(left), Some(right)) = (side("left"), side("right")) else { return };
-    let arms: Vec<bool> =
-        sk.joints().iter().map(|j| ["shoulder", "elbow", "wrist", "hand"].iter().any(|w| j.name.contains(w))).collect();
+    let (Some(left), Some(right)) = (side("left"), side("right")) else {
+        return;
+    };
+    let arms: Vec<bool> = sk
+        .joints()
+        .iter()
+        .map(|j| {
+            ["shoulder", "elbow", "wrist", "hand"]
+                .iter()
+                .any(|w| j.name.contains(w))
+        })
+        .collect();
     /// From the hip joints down to where legs alone decide, metres.
     const FADE: f32 = 0.12;
     /// Height over which a knee bends cloth, metres.
     const KNEE: f32 = 0.10;
     let smooth = |t: f32| t.clamp(0.0, 1.0).powi(2) * (3.0 - 2.0 * t.clamp(0.0, 1.0));
     for (p, row) in x.iter().zip(&mut bound.weights) {
-        let arm: f32 = row.iter().zip(&arms).filter(|(_, a)| **a).map(|(w, _)| w).sum();
+        let arm: f32 = row
+            .iter()
+            .zip(&arms)
+            .filter(|(_, a)| **a)
+            .map(|(w, _)| w)
+            .sum();
         let legs = smooth((left[0].1.y - p.y) / FADE) * (1.0 - arm);
         if legs <= 0.0 {
             continue;
         }
-        row.iter_mut().zip(&arms).filter(|(_, a)| !**a).for_each(|(w, _)| *w *= (1.0 - arm - legs) / (1.0 - arm));
+        row.iter_mut()
+            .zip(&arms)
+            .filter(|(_, a)| !**a)
+            .for_each(|(w, _)| *w *= (1.0 - arm - legs) / (1.0 - arm));
         let share = smooth(0.5 + 0.5 * p.x / left[0].1.x.abs().max(0.05));
         for ([hip, knee], w) in [(left, legs * share), (right, legs * (1.0 - share))] {
             let below = smooth(0.5 + (knee.1.y - p.y) / KNEE);
@@ -467,7 +637,9 @@ fn outside_out(g: &mut GarmentMesh, x: &[P3], bound: &Bound) {
         .faces
         .iter()
         .map(|f| {
-            let skin = f.iter().fold(V3::zeros(), |s, v| s + bound.normal[*v as usize]);
+            let skin = f
+                .iter()
+                .fold(V3::zeros(), |s, v| s + bound.normal[*v as usize]);
             face_normal(x, f).dot(&skin)
         })
         .sum();
@@ -481,7 +653,10 @@ fn outside_out(g: &mut GarmentMesh, x: &[P3], bound: &Bound) {
         // Seen from the other side of the paper.
         *r = [r[0], r[2], r[1]].map(|p| [-p[0], p[1]]);
     }
-    g.corners.iter_mut().flatten().for_each(|c| c.1[0] = -c.1[0]);
+    g.corners
+        .iter_mut()
+        .flatten()
+        .for_each(|c| c.1[0] = -c.1[0]);
 }
 
 /// Texture coordinates around the vertical, metres: a mesh that is no flat panels has none that mean lengths.
@@ -490,7 +665,12 @@ fn unroll(g: &mut GarmentMesh, x: &[P3]) {
     const RADIUS: f32 = 0.15;
     let at = |p: &P3| [p.x.atan2(p.z) * RADIUS, p.y];
     g.uv = x.iter().map(at).collect();
-    g.render.uv = g.render.vertex.iter().map(|v| at(&x[*v as usize])).collect();
+    g.render.uv = g
+        .render
+        .vertex
+        .iter()
+        .map(|v| at(&x[*v as usize]))
+        .collect();
 }
 
 /// Innermost first: by how far two pieces are from the skin that both cover.
@@ -509,11 +689,17 @@ fn by_layer(parts: Vec<Part>) -> Vec<Part> {
         })
         .collect();
     let above = |a: usize, b: usize| -> f32 {
-        height[a].iter().filter_map(|(v, p)| height[b].get(v).map(|q| p.0 / p.1 - q.0 / q.1)).sum()
+        height[a]
+            .iter()
+            .filter_map(|(v, p)| height[b].get(v).map(|q| p.0 / p.1 - q.0 / q.1))
+            .sum()
     };
     let mut order: Vec<usize> = Vec::new();
     for k in 0..parts.len() {
-        let at = order.iter().position(|o| above(*o, k) > 0.0).unwrap_or(order.len());
+        let at = order
+            .iter()
+            .position(|o| above(*o, k) > 0.0)
+            .unwrap_or(order.len());
         order.insert(at, k);
     }
     order.into_iter().map(|k| parts[k].clone()).collect()

@@ -14,13 +14,24 @@ const ROOM: f32 = 0.015;
 const SHOULDER_ROUND: f32 = 0.10;
 
 /// Start positions of the simulation vertices, frame of the canonical body (root identity), metres.
-pub(super) fn place(template: &Template, figure: &Figure, pattern: &Pattern, mesh: &GarmentMesh) -> Vec<P3> {
-    let charts: Vec<Chart> = pattern.panels.iter().map(|p| Chart::new(template, figure, pattern, p)).collect();
+pub(super) fn place(
+    template: &Template,
+    figure: &Figure,
+    pattern: &Pattern,
+    mesh: &GarmentMesh,
+) -> Vec<P3> {
+    let charts: Vec<Chart> = pattern
+        .panels
+        .iter()
+        .map(|p| Chart::new(template, figure, pattern, p))
+        .collect();
     mesh.corners
         .iter()
         .map(|c| {
             let sum = c.iter().fold(nalgebra::Vector3::zeros(), |s, (panel, q)| {
-                s + charts[usize::from(*panel)].at([q[0] as f32, q[1] as f32]).coords
+                s + charts[usize::from(*panel)]
+                    .at([q[0] as f32, q[1] as f32])
+                    .coords
             });
             P3::from(sum / c.len() as f32)
         })
@@ -52,9 +63,7 @@ enum Kind {
         half_angle: f32,
     },
     /// Rows are level.
-    Band {
-        waist: f32,
-    },
+    Band { waist: f32 },
     Hood {
         top: f32,
         nape: f32,
@@ -77,8 +86,14 @@ enum Kind {
 }
 
 fn ellipse(slice: &Slice, girth: f32) -> ([f32; 2], [f32; 2]) {
-    let c = [(slice.x[0] + slice.x[1]) / 2.0, (slice.z[0] + slice.z[1]) / 2.0];
-    let (mut a, mut b) = ((slice.x[1] - slice.x[0]) / 2.0 + ROOM, (slice.z[1] - slice.z[0]) / 2.0 + ROOM);
+    let c = [
+        (slice.x[0] + slice.x[1]) / 2.0,
+        (slice.z[0] + slice.z[1]) / 2.0,
+    ];
+    let (mut a, mut b) = (
+        (slice.x[1] - slice.x[0]) / 2.0 + ROOM,
+        (slice.z[1] - slice.z[0]) / 2.0 + ROOM,
+    );
     // Ramanujan's perimeter; a wider garment starts wider, so that nothing is crumpled to begin with.
     let h = ((a - b) / (a + b)).powi(2);
     let around = std::f32::consts::PI * (a + b) * (1.0 + 3.0 * h / (10.0 + (4.0 - 3.0 * h).sqrt()));
@@ -99,12 +114,21 @@ fn round(slice: &Slice, girth: f32) -> ([f32; 2], [f32; 2]) {
 }
 
 impl<'a> Chart<'a> {
-    fn new(template: &Template, figure: &'a Figure, pattern: &Pattern, panel: &crate::garment::Panel) -> Self {
+    fn new(
+        template: &Template,
+        figure: &'a Figure,
+        pattern: &Pattern,
+        panel: &crate::garment::Panel,
+    ) -> Self {
         let outline: Vec<[f32; 2]> = (0..panel.edges.len())
             .flat_map(|i| panel.edges[i].sample(panel.end(i), 12).into_iter().take(12))
             .map(|p| [p[0] as f32, p[1] as f32])
             .collect();
-        let corner = |name: &str| panel.edge(name).map(|i| (panel.edges[i].from, panel.end(i)));
+        let corner = |name: &str| {
+            panel
+                .edge(name)
+                .map(|i| (panel.edges[i].from, panel.end(i)))
+        };
         let kind = match panel.placement {
             Placement::TrunkFront | Placement::TrunkBack => {
                 let [neck, tip] = shoulder_ends(pattern).unwrap_or([[0.08, 0.0], [0.2, -0.04]]);
@@ -112,7 +136,9 @@ impl<'a> Chart<'a> {
                 let armpit = corner("armhole_right").map(|c| c.0).unwrap_or_else(|| {
                     let outside = panel.edges.iter().map(|e| [e.from[0].abs(), e.from[1]]);
                     let outside = outside.filter(|p| p[0] > tip[0] + 0.01 && p[1] < tip[1] - 0.05);
-                    outside.max_by(|a, b| a[1].total_cmp(&b[1])).unwrap_or([0.26, -0.22])
+                    outside
+                        .max_by(|a, b| a[1].total_cmp(&b[1]))
+                        .unwrap_or([0.26, -0.22])
                 });
                 let (top, shoulder_z) = seam_line(template, figure, pattern);
                 Kind::Trunk {
@@ -130,25 +156,44 @@ impl<'a> Chart<'a> {
                     .filter(|i| panel.edges[*i].name.starts_with("waist"))
                     .flat_map(|i| panel.edges[i].sample(panel.end(i), 8))
                     .collect();
-                let end = points.iter().copied().fold([0.0, 0.02], |e, p| if p[0] > e[0] { p } else { e });
+                let end = points
+                    .iter()
+                    .copied()
+                    .fold([0.0, 0.02], |e, p| if p[0] > e[0] { p } else { e });
                 let middle = points.iter().map(|p| p[1]).fold(end[1], f64::min);
-                let curved = panel.edge("hem").is_some_and(|i| panel.edges[i].curve != crate::garment::Curve::Line);
+                let curved = panel
+                    .edge("hem")
+                    .is_some_and(|i| panel.edges[i].curve != crate::garment::Curve::Line);
                 let sag = (end[1] - middle).max(1e-4);
                 let apex = ((end[0] * end[0] + sag * sag) / (2.0 * sag)) as f32;
                 let half_angle = (end[0] as f32).atan2(apex - sag as f32);
-                let girth = if pattern.finished[1] > 0.0 { pattern.finished[1] as f32 } else { 4.0 * end[0] as f32 };
+                let girth = if pattern.finished[1] > 0.0 {
+                    pattern.finished[1] as f32
+                } else {
+                    4.0 * end[0] as f32
+                };
                 let waist = match sewn_waist(template, figure, pattern) {
                     Some(waist) => waist,
                     None => {
                         // As high as it goes: at the waist, or where the hip becomes as wide as the waistband.
                         let mut waist = figure.levels.waist;
-                        while waist > figure.levels.hip + 0.05 && figure.lower.at(waist).girth < girth - 0.01 {
+                        while waist > figure.levels.hip + 0.05
+                            && figure.lower.at(waist).girth < girth - 0.01
+                        {
                             waist -= 0.01;
                         }
                         waist
                     }
                 };
-                if curved { Kind::Skirt { waist, apex, half_angle } } else { Kind::Band { waist } }
+                if curved {
+                    Kind::Skirt {
+                        waist,
+                        apex,
+                        half_angle,
+                    }
+                } else {
+                    Kind::Band { waist }
+                }
             }
             Placement::Hood(_) => {
                 let (top, _) = seam_line(template, figure, pattern);
@@ -157,7 +202,12 @@ impl<'a> Chart<'a> {
                     .flat_map(|i| panel.edges[i].sample(panel.end(i), 24))
                     .collect();
                 // The head: everything well above the shoulders.
-                let width = figure.vertices.iter().filter(|p| p.y > top + 0.10).map(|p| p.x.abs()).fold(0.0, f32::max);
+                let width = figure
+                    .vertices
+                    .iter()
+                    .filter(|p| p.y > top + 0.10)
+                    .map(|p| p.x.abs())
+                    .fold(0.0, f32::max);
                 Kind::Hood {
                     top,
                     nape: figure.trunk.at(top + 0.01).z[0] - ROOM,
@@ -180,11 +230,20 @@ impl<'a> Chart<'a> {
             }
             Placement::Sleeve(side) => {
                 let bicep = outline.iter().map(|p| p[0].abs()).fold(0.0, f32::max);
-                let cap = outline.iter().filter(|p| p[0].abs() > 0.97 * bicep).map(|p| p[1]).fold(f32::MIN, f32::max);
+                let cap = outline
+                    .iter()
+                    .filter(|p| p[0].abs() > 0.97 * bicep)
+                    .map(|p| p[1])
+                    .fold(f32::MIN, f32::max);
                 sleeve(template, figure, pattern, side, bicep, cap)
             }
         };
-        Self { figure, placement: panel.placement, outline, kind }
+        Self {
+            figure,
+            placement: panel.placement,
+            outline,
+            kind,
+        }
     }
     /// Leftmost and rightmost x of the outline at a height of the panel.
     fn span(&self, y: f32) -> [f32; 2] {
@@ -199,8 +258,16 @@ impl<'a> Chart<'a> {
         }
         if span[0] > span[1] {
             // At the very top or bottom: the corner itself.
-            let nearest = self.outline.iter().map(|p| (p[1] - y).abs()).fold(f32::MAX, f32::min);
-            for p in self.outline.iter().filter(|p| (p[1] - y).abs() <= nearest + 1e-4) {
+            let nearest = self
+                .outline
+                .iter()
+                .map(|p| (p[1] - y).abs())
+                .fold(f32::MAX, f32::min);
+            for p in self
+                .outline
+                .iter()
+                .filter(|p| (p[1] - y).abs() <= nearest + 1e-4)
+            {
                 span = [span[0].min(p[0]), span[1].max(p[0])];
             }
         }
@@ -211,18 +278,40 @@ impl<'a> Chart<'a> {
         let front = matches!(self.placement, Placement::SkirtFront);
         let (c, [a, b]) = round(&self.figure.lower.at(y), girth);
         let side = if front { 1.0 } else { -1.0 };
-        P3::new(c[0] + side * a * turn.sin(), y, c[1] + side * b * turn.cos())
+        P3::new(
+            c[0] + side * a * turn.sin(),
+            y,
+            c[1] + side * b * turn.cos(),
+        )
     }
     fn at(&self, p: [f32; 2]) -> P3 {
         use std::f32::consts::{FRAC_PI_2, PI};
         match &self.kind {
-            Kind::Trunk { top, shoulder_z, half, armpit, tip, neck, fall } => {
+            Kind::Trunk {
+                top,
+                shoulder_z,
+                half,
+                armpit,
+                tip,
+                neck,
+                fall,
+            } => {
                 let front = self.placement == Placement::TrunkFront;
                 let x = if front { p[0] } else { -p[0] };
                 let y = top + p[1];
-                let width =
-                    if p[1] < *armpit { self.span(p[1]).map(f32::abs).into_iter().fold(0.05, f32::max) } else { *half };
-                let slice = if p[1] < *armpit - 0.05 { self.figure.lower.at(y) } else { self.figure.trunk.at(y) };
+                let width = if p[1] < *armpit {
+                    self.span(p[1])
+                        .map(f32::abs)
+                        .into_iter()
+                        .fold(0.05, f32::max)
+                } else {
+                    *half
+                };
+                let slice = if p[1] < *armpit - 0.05 {
+                    self.figure.lower.at(y)
+                } else {
+                    self.figure.trunk.at(y)
+                };
                 let (c, [a, b]) = ellipse(&slice, 4.0 * width);
                 let angle = FRAC_PI_2 * (x / width).clamp(-1.0, 1.0);
                 let up = ((p[1] - armpit) / (-fall - armpit)).clamp(0.0, 1.0);
@@ -233,18 +322,42 @@ impl<'a> Chart<'a> {
                 let round = (1.0 - (1.0 - below).powi(2)).sqrt();
                 P3::new(wx, y, shoulder_z + (ellipse_z - shoulder_z) * round)
             }
-            Kind::Skirt { waist, apex, half_angle } => {
+            Kind::Skirt {
+                waist,
+                apex,
+                half_angle,
+            } => {
                 let (r, angle) = (p[0].hypot(apex - p[1]), p[0].atan2(apex - p[1]));
                 let turn = (angle / half_angle).clamp(-1.0, 1.0) * FRAC_PI_2;
                 self.around(waist - (r - apex) * 0.97, turn, 4.0 * half_angle * r)
             }
             Kind::Band { waist } => {
-                let half = self.span(p[1]).map(f32::abs).into_iter().fold(0.02, f32::max);
-                self.around(waist + p[1], (p[0] / half).clamp(-1.0, 1.0) * FRAC_PI_2, 4.0 * half)
+                let half = self
+                    .span(p[1])
+                    .map(f32::abs)
+                    .into_iter()
+                    .fold(0.02, f32::max);
+                self.around(
+                    waist + p[1],
+                    (p[0] / half).clamp(-1.0, 1.0) * FRAC_PI_2,
+                    4.0 * half,
+                )
             }
-            Kind::Hood { top, nape, width, crown } => {
-                let side = if self.placement == Placement::Hood(Side::Left) { 1.0 } else { -1.0 };
-                let far = crown.iter().map(|c| (c[0] - p[0]).hypot(c[1] - p[1])).fold(f32::MAX, f32::min);
+            Kind::Hood {
+                top,
+                nape,
+                width,
+                crown,
+            } => {
+                let side = if self.placement == Placement::Hood(Side::Left) {
+                    1.0
+                } else {
+                    -1.0
+                };
+                let far = crown
+                    .iter()
+                    .map(|c| (c[0] - p[0]).hypot(c[1] - p[1]))
+                    .fold(f32::MAX, f32::min);
                 /// How far a hood lies back, radians.
                 const BACK: f32 = 2.5;
                 /// Height of cloth over which it folds back, metres.
@@ -260,15 +373,27 @@ impl<'a> Chart<'a> {
                 let up = (p[1] / FOLD).clamp(0.0, 1.0);
                 let (sin, cos) = (BACK * up * up * (3.0 - 2.0 * up)).sin_cos();
                 let (y, z) = (p[1] - RISE, -side * p[0]);
-                P3::new(side * out, top + 0.01 + RISE + y * cos + z * sin, nape + z * cos - y * sin)
+                P3::new(
+                    side * out,
+                    top + 0.01 + RISE + y * cos + z * sin,
+                    nape + z * cos - y * sin,
+                )
             }
-            Kind::Leg { waist, rise, hip_line, garment_half } => {
+            Kind::Leg {
+                waist,
+                rise,
+                hip_line,
+                garment_half,
+            } => {
                 let (side, front) = match self.placement {
                     Placement::LegFront(s) => (s, true),
                     Placement::LegBack(s) => (s, false),
                     _ => (Side::Left, true),
                 };
-                let (left, z_sign) = (if side == Side::Left { 1.0 } else { -1.0 }, if front { 1.0 } else { -1.0 });
+                let (left, z_sign) = (
+                    if side == Side::Left { 1.0 } else { -1.0 },
+                    if front { 1.0 } else { -1.0 },
+                );
                 // Share of the way from the inner to the outer side.
                 let [lo, hi] = self.span(p[1]);
                 let outer_is_high = (side == Side::Left) == front;
@@ -276,22 +401,43 @@ impl<'a> Chart<'a> {
                 let t = if outer_is_high { t } else { 1.0 - t };
                 let y = waist + p[1];
                 let (c, [a, b]) = ellipse(
-                    &self.figure.legs[usize::from(side == Side::Right)].at(y.min(self.figure.levels.crotch - 0.04)),
+                    &self.figure.legs[usize::from(side == Side::Right)]
+                        .at(y.min(self.figure.levels.crotch - 0.04)),
                     2.0 * (hi - lo).min(2.0 * garment_half),
                 );
-                let leg = [c[0] - left * a * (PI * t).cos(), c[1] + z_sign * b * (PI * t).sin()];
+                let leg = [
+                    c[0] - left * a * (PI * t).cos(),
+                    c[1] + z_sign * b * (PI * t).sin(),
+                ];
                 let share = ((p[1] - rise) / (hip_line - rise)).clamp(0.0, 1.0);
                 let share = share * share * (3.0 - 2.0 * share);
                 let (c, [a, b]) = ellipse(&self.figure.lower.at(y), 4.0 * (hi - lo));
-                let hip = [c[0] + left * a * (FRAC_PI_2 * t).sin(), c[1] + z_sign * b * (FRAC_PI_2 * t).cos()];
+                let hip = [
+                    c[0] + left * a * (FRAC_PI_2 * t).sin(),
+                    c[1] + z_sign * b * (FRAC_PI_2 * t).cos(),
+                ];
                 let mix = |k: usize| leg[k] + (hip[k] - leg[k]) * share;
                 // Where the thighs touch each leg of the trousers stays on its own side.
                 P3::new(left * (left * mix(0)).max(APART), y, mix(1))
             }
-            Kind::Sleeve { axis, start, bicep, cap, radius } => {
-                let Placement::Sleeve(side) = self.placement else { return P3::origin() };
-                let half =
-                    if p[1] > *cap { *bicep } else { self.span(p[1]).map(f32::abs).into_iter().fold(0.02, f32::max) };
+            Kind::Sleeve {
+                axis,
+                start,
+                bicep,
+                cap,
+                radius,
+            } => {
+                let Placement::Sleeve(side) = self.placement else {
+                    return P3::origin();
+                };
+                let half = if p[1] > *cap {
+                    *bicep
+                } else {
+                    self.span(p[1])
+                        .map(f32::abs)
+                        .into_iter()
+                        .fold(0.02, f32::max)
+                };
                 let s = start - p[1];
                 // Along the polyline shoulder, elbow, wrist.
                 let (mut k, mut from) = (0, 0.0);
@@ -303,10 +449,18 @@ impl<'a> Chart<'a> {
                 let centre = axis[k] + u * (s - from);
                 let front = nalgebra::Vector3::z();
                 let front = (front - u * u.dot(&front)).normalize();
-                let up = if side == Side::Left { front.cross(&u) } else { u.cross(&front) };
+                let up = if side == Side::Left {
+                    front.cross(&u)
+                } else {
+                    u.cross(&front)
+                };
                 let i = ((s / STATION).max(0.0) as usize).min(radius.len().saturating_sub(1));
                 let wide = half / PI; // radius of a round tube of the sleeve's girth
-                let r = radius.get(i).copied().unwrap_or([0.05; 2]).map(|r| (r + ROOM).max(wide));
+                let r = radius
+                    .get(i)
+                    .copied()
+                    .unwrap_or([0.05; 2])
+                    .map(|r| (r + ROOM).max(wide));
                 let angle = PI * p[0] / half;
                 let sign = if side == Side::Left { -1.0 } else { 1.0 };
                 centre + up * (r[0] * angle.cos()) + front * (sign * r[1] * angle.sin())
@@ -318,9 +472,21 @@ impl<'a> Chart<'a> {
 /// Distance between the places where an arm is measured, metres.
 const STATION: f32 = 0.01;
 
-fn sleeve(template: &Template, figure: &Figure, pattern: &Pattern, side: Side, bicep: f32, cap: f32) -> Kind {
+fn sleeve(
+    template: &Template,
+    figure: &Figure,
+    pattern: &Pattern,
+    side: Side,
+    bicep: f32,
+    cap: f32,
+) -> Kind {
     let name = if side == Side::Left { "left" } else { "right" };
-    let joint = |n: &str| template.skeleton().index(&format!("{name}_{n}")).map(|j| figure.joints[j].cast::<f32>());
+    let joint = |n: &str| {
+        template
+            .skeleton()
+            .index(&format!("{name}_{n}"))
+            .map(|j| figure.joints[j].cast::<f32>())
+    };
     let sign = if side == Side::Left { 1.0 } else { -1.0 };
     let shoulder = joint("shoulder").unwrap_or(P3::new(sign * 0.17, 1.35, 0.0));
     let elbow = joint("elbow").unwrap_or(shoulder + nalgebra::Vector3::new(sign * 0.25, -0.1, 0.0));
@@ -331,7 +497,11 @@ fn sleeve(template: &Template, figure: &Figure, pattern: &Pattern, side: Side, b
     let u = (elbow - shoulder).normalize();
     let start = (sign * tip - shoulder.x) * u.x;
     // Half sizes of the arm, up-down and front-back, at stations along it.
-    let mask = if side == Side::Left { Region::LEFT_ARM } else { Region::RIGHT_ARM };
+    let mask = if side == Side::Left {
+        Region::LEFT_ARM
+    } else {
+        Region::RIGHT_ARM
+    };
     let lengths = [(elbow - shoulder).norm(), (wrist - elbow).norm()];
     let n = ((lengths[0] + lengths[1]) / STATION) as usize + 1;
     let mut radius = vec![[0.0f32; 2]; n];
@@ -341,7 +511,14 @@ fn sleeve(template: &Template, figure: &Figure, pattern: &Pattern, side: Side, b
         }
         let (s, k) = {
             let s = (p - shoulder).dot(&u);
-            if s <= lengths[0] { (s, 0) } else { (lengths[0] + (p - elbow).dot(&(wrist - elbow).normalize()), 1) }
+            if s <= lengths[0] {
+                (s, 0)
+            } else {
+                (
+                    lengths[0] + (p - elbow).dot(&(wrist - elbow).normalize()),
+                    1,
+                )
+            }
         };
         let i = (s / STATION).floor();
         if i < 0.0 || i as usize >= n {
@@ -359,17 +536,28 @@ fn sleeve(template: &Template, figure: &Figure, pattern: &Pattern, side: Side, b
     let (first, inner) = (radius.clone(), (0.07 / STATION) as usize);
     for (i, r) in radius.iter_mut().enumerate() {
         let around = |k: usize| {
-            (i.max(inner).saturating_sub(2)..(i.max(inner) + 3).min(n)).map(|j| first[j][k]).fold(0.0, f32::max)
+            (i.max(inner).saturating_sub(2)..(i.max(inner) + 3).min(n))
+                .map(|j| first[j][k])
+                .fold(0.0, f32::max)
         };
         *r = [around(0), around(1)];
     }
-    Kind::Sleeve { axis, start, bicep, cap, radius }
+    Kind::Sleeve {
+        axis,
+        start,
+        bicep,
+        cap,
+        radius,
+    }
 }
 
 /// Neck and tip end of the shoulder seam on the wearer's left, panel coordinates, from the first panel that has one.
 fn shoulder_ends(pattern: &Pattern) -> Option<[[f64; 2]; 2]> {
     pattern.panels.iter().find_map(|p| {
-        let i = p.edges.iter().position(|e| e.name.starts_with("shoulder"))?;
+        let i = p
+            .edges
+            .iter()
+            .position(|e| e.name.starts_with("shoulder"))?;
         let [a, b] = [p.end(i), p.edges[i].from].map(|q| [q[0].abs(), q[1]]);
         Some(if a[0] < b[0] { [a, b] } else { [b, a] })
     })
@@ -377,12 +565,19 @@ fn shoulder_ends(pattern: &Pattern) -> Option<[[f64; 2]; 2]> {
 
 /// Height of y = 0 of the trunk's panels and the z of the shoulder seams.
 fn seam_line(template: &Template, figure: &Figure, pattern: &Pattern) -> (f32, f32) {
-    shoulder_line(template, figure, shoulder_ends(pattern).unwrap_or([[0.08, 0.0], [0.2, -0.04]]))
+    shoulder_line(
+        template,
+        figure,
+        shoulder_ends(pattern).unwrap_or([[0.08, 0.0], [0.2, -0.04]]),
+    )
 }
 
 /// Height of the waist of a bodice that a skirt is sewn to.
 fn sewn_waist(template: &Template, figure: &Figure, pattern: &Pattern) -> Option<f32> {
-    let bodice = pattern.panels.iter().find(|p| p.placement == Placement::TrunkFront)?;
+    let bodice = pattern
+        .panels
+        .iter()
+        .find(|p| p.placement == Placement::TrunkFront)?;
     let waist = bodice.edges.iter().map(|e| e.from[1]).reduce(f64::min)?;
     Some(seam_line(template, figure, pattern).0 + waist as f32)
 }
@@ -391,8 +586,12 @@ fn sewn_waist(template: &Template, figure: &Figure, pattern: &Pattern) -> Option
 fn shoulder_line(template: &Template, figure: &Figure, seam: [[f64; 2]; 2]) -> (f32, f32) {
     /// Clearance of the shoulder seam, metres.
     const CLEAR: f32 = 0.008;
-    let head: Vec<bool> =
-        template.skeleton().joints().iter().map(|j| j.name.contains("head") || j.name.contains("jaw")).collect();
+    let head: Vec<bool> = template
+        .skeleton()
+        .joints()
+        .iter()
+        .map(|j| j.name.contains("head") || j.name.contains("jaw"))
+        .collect();
     let (x0, x1) = (seam[0][0] as f32, seam[1][0] as f32);
     let mut top = f32::MIN;
     let bins = 12;
@@ -417,5 +616,8 @@ fn shoulder_line(template: &Template, figure: &Figure, seam: [[f64; 2]; 2]) -> (
         top = top.max(y + CLEAR - panel_y);
         z = (z.0 + pz, z.1 + 1.0);
     }
-    (if top == f32::MIN { 1.4 } else { top }, if z.1 > 0.0 { z.0 / z.1 } else { 0.0 })
+    (
+        if top == f32::MIN { 1.4 } else { top },
+        if z.1 > 0.0 { z.0 / z.1 } else { 0.0 },
+    )
 }

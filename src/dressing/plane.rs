@@ -21,7 +21,13 @@ pub(super) struct Plane {
 impl Plane {
     /// Between skins that face each other with `room` between them, `far` metres from `x`, cloth stays on its own half:
     /// sleeves and the trunk of a shirt press on each other as the arms go down. Says whether that is so.
-    pub(super) fn keep_half(&mut self, other: &mut Self, x: &V3d, far: [f64; 2], room: f64) -> bool {
+    pub(super) fn keep_half(
+        &mut self,
+        other: &mut Self,
+        x: &V3d,
+        far: [f64; 2],
+        room: f64,
+    ) -> bool {
         let away = other.normal - self.normal;
         let steep = away.norm();
         let facing = steep > FACING && far[0] < HALVED && far[1] < 2.0 * HALVED;

@@ -14,7 +14,9 @@ pub(super) fn prolong(coarse: &GarmentMesh, fine: &GarmentMesh, x: &[V3d]) -> Ve
         .iter()
         .map(|corners| {
             let sum = corners.iter().fold(V3d::zeros(), |s, (panel, q)| {
-                s + by_panel.get(usize::from(*panel)).map_or_else(V3d::zeros, |faces| at(coarse, faces, x, *q))
+                s + by_panel
+                    .get(usize::from(*panel))
+                    .map_or_else(V3d::zeros, |faces| at(coarse, faces, x, *q))
             });
             sum / corners.len().max(1) as f64
         })
@@ -40,9 +42,15 @@ fn at(mesh: &GarmentMesh, faces: &[usize], x: &[V3d], q: [f64; 2]) -> V3d {
 
 /// Barycentric weights of a point of the plane.
 fn weights(t: &[[f64; 2]; 3], q: [f64; 2]) -> [f64; 3] {
-    let cross = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    let cross = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    };
     let area = cross(t[0], t[1], t[2]);
-    [cross(q, t[1], t[2]) / area, cross(t[0], q, t[2]) / area, cross(t[0], t[1], q) / area]
+    [
+        cross(q, t[1], t[2]) / area,
+        cross(t[0], q, t[2]) / area,
+        cross(t[0], t[1], q) / area,
+    ]
 }
 
 #[cfg(test)]
@@ -53,7 +61,11 @@ mod tests {
     #[test]
     fn a_linear_map_of_the_panels_is_reproduced() {
         let p = library::pattern("skirt", Size::M).expect("pattern");
-        let how = |edge_length| Triangulation { edge_length, min_angle: 0.0, ..Triangulation::default() };
+        let how = |edge_length| Triangulation {
+            edge_length,
+            min_angle: 0.0,
+            ..Triangulation::default()
+        };
         let sew = |edge_length| GarmentMesh::sew(&p, &how(edge_length)).expect("sewn");
         let (coarse, fine) = (sew(0.05), sew(0.02));
         // Inner vertices only: seams average two panels that a linear map pulls apart.
@@ -63,7 +75,12 @@ mod tests {
         // A panel without its seams: vertices far from any seam vertex.
         let seam_free = |q: [f64; 2]| q[0].abs() < 0.1;
         let mut seen = 0;
-        for (c, y) in fine.corners.iter().zip(&y).filter(|(c, _)| c.len() == 1 && seam_free(c[0].1)) {
+        for (c, y) in fine
+            .corners
+            .iter()
+            .zip(&y)
+            .filter(|(c, _)| c.len() == 1 && seam_free(c[0].1))
+        {
             assert!((y - map(c[0].1)).norm() < 1e-9, "{:?}", c[0]);
             seen += 1;
         }

@@ -42,10 +42,19 @@ impl<'a> Skin<'a> {
     pub(super) fn show(&mut self, body: &[P3]) {
         self.frame.vertices.clear();
         self.frame.vertices.extend_from_slice(body);
-        self.apart.make_room(Par::Rayon, self.model, self.pressing, &mut self.frame, self.room);
-        self.creases.iter().for_each(|c| c.make_room(&mut self.frame.vertices, self.room));
+        self.apart.make_room(
+            Par::Rayon,
+            self.model,
+            self.pressing,
+            &mut self.frame,
+            self.room,
+        );
+        self.creases
+            .iter()
+            .for_each(|c| c.make_room(&mut self.frame.vertices, self.room));
         self.model.update_normals(Par::Rayon, &mut self.frame);
-        self.buried.update(Par::Rayon, self.model, self.opposite, &self.frame);
+        self.buried
+            .update(Par::Rayon, self.model, self.opposite, &self.frame);
         self.near.fill(&self.frame);
     }
     pub(super) fn frame(&self) -> &SurfaceFrame {
@@ -57,13 +66,15 @@ impl<'a> Skin<'a> {
     }
     /// Skin that lies in other skin, which it faces.
     pub(super) fn holds_nothing(&self, c: &Closest) -> bool {
-        self.buried.holds_nothing(self.model.faces()[c.face as usize])
+        self.buried
+            .holds_nothing(self.model.faces()[c.face as usize])
     }
     /// The nearest point of some parts to `p`: where a walk from `start` leads, or a nearer one that no walk led to.
     pub(super) fn closest(&self, p: &P3, start: u32, mask: Part) -> Closest {
         let walked = self.model.closest(&self.frame, p, start, mask);
         let [near, _] = self.near.around(self.model, &self.frame, p, [mask, 0]);
-        near.or_nearer(self.model, &self.frame, p, Some(walked), mask).unwrap_or(walked)
+        near.or_nearer(self.model, &self.frame, p, Some(walked), mask)
+            .unwrap_or(walked)
     }
     /// Of two kinds of parts the nearest points to `p` where walks led, or nearer ones that no walk led to.
     pub(super) fn nearer(&self, p: &P3, walked: [Closest; 2], masks: [Part; 2]) -> [Closest; 2] {

@@ -97,7 +97,9 @@ pub fn rooms(pattern: &Pattern, body: &Measurements) -> Vec<Room> {
 pub fn hem_height(pattern: &Pattern, body: &Measurements) -> f64 {
     let lowest = |wanted: &dyn Fn(Placement) -> bool| {
         let panels = pattern.panels.iter().filter(|p| wanted(p.placement));
-        panels.flat_map(|p| p.edges.iter().map(|e| e.from[1])).reduce(f64::min)
+        panels
+            .flat_map(|p| p.edges.iter().map(|e| e.from[1]))
+            .reduce(f64::min)
     };
     let trunk = lowest(&|p| matches!(p, Placement::TrunkFront | Placement::TrunkBack));
     let skirt = lowest(&|p| matches!(p, Placement::SkirtFront | Placement::SkirtBack));
@@ -112,7 +114,10 @@ pub fn hem_height(pattern: &Pattern, body: &Measurements) -> f64 {
             let crotch = pattern
                 .panels
                 .iter()
-                .filter_map(|p| p.edge("inseam").map(|i| p.edges[i].from[1].max(p.end(i)[1])))
+                .filter_map(|p| {
+                    p.edge("inseam")
+                        .map(|i| p.edges[i].from[1].max(p.end(i)[1]))
+                })
                 .fold(f64::MIN, f64::max);
             body.inseam - CROTCH_ROOM + l - if crotch > f64::MIN { crotch } else { -0.29 }
         }
@@ -185,7 +190,10 @@ pub enum Misfit {
 }
 
 fn advice(better: Option<Size>) -> String {
-    better.map_or_else(|| "; no size of it can be worn".to_owned(), |s| format!("; {s} can be worn"))
+    better.map_or_else(
+        || "; no size of it can be worn".to_owned(),
+        |s| format!("; {s} can be worn"),
+    )
 }
 
 /// A waistband that lacks this much still closes: it sits lower, or the button moves, metres.
@@ -198,11 +206,20 @@ const SITS_LOWER: f64 = 0.03;
 pub fn wearable(pattern: &Pattern, body: &Measurements) -> Result<(), Misfit> {
     let fault = misfit(pattern, body);
     fault.map_or(Ok(()), |mut m| {
-        let wears = |s: &Size| library::pattern(&pattern.name, *s).is_ok_and(|p| misfit(&p, body).is_none());
+        let wears = |s: &Size| {
+            library::pattern(&pattern.name, *s).is_ok_and(|p| misfit(&p, body).is_none())
+        };
         // The nearest in the direction that is needed.
         let found = match m {
-            Misfit::TooSmall { .. } => Size::ALL.into_iter().filter(|s| *s > pattern.size).find(wears),
-            Misfit::TooLarge { .. } => Size::ALL.into_iter().rev().filter(|s| *s < pattern.size).find(wears),
+            Misfit::TooSmall { .. } => Size::ALL
+                .into_iter()
+                .filter(|s| *s > pattern.size)
+                .find(wears),
+            Misfit::TooLarge { .. } => Size::ALL
+                .into_iter()
+                .rev()
+                .filter(|s| *s < pattern.size)
+                .find(wears),
         };
         let (Misfit::TooSmall { better, .. } | Misfit::TooLarge { better, .. }) = &mut m;
         *better = found;
@@ -217,7 +234,11 @@ fn misfit(pattern: &Pattern, body: &Measurements) -> Option<Misfit> {
         .into_iter()
         .map(|r| {
             let gives = r.garment * pattern.material.give();
-            let lower = if held && r.place == "waist" { SITS_LOWER } else { 0.0 };
+            let lower = if held && r.place == "waist" {
+                SITS_LOWER
+            } else {
+                0.0
+            };
             (r.body - r.garment - gives - lower, gives, r)
         })
         .filter(|(lacks, ..)| *lacks > 0.0)
@@ -238,16 +259,29 @@ fn misfit(pattern: &Pattern, body: &Measurements) -> Option<Misfit> {
         });
     }
     let (body, girth) = (body.hip, pattern.finished[1]);
-    (held && girth > body).then_some(Misfit::TooLarge { garment, size, body, girth, better: None })
+    (held && girth > body).then_some(Misfit::TooLarge {
+        garment,
+        size,
+        body,
+        girth,
+        better: None,
+    })
 }
 
 /// How one pattern fits a body, in numbers and in a sentence.
 pub fn judge(pattern: &Pattern, body: &Measurements) -> Suggestion {
     let rooms = rooms(pattern, body);
     let girths = [body.chest, body.natural_waist, body.hip];
-    let ease: [f64; 3] =
-        std::array::from_fn(|k| if pattern.finished[k] > 0.0 { pattern.finished[k] - girths[k] } else { f64::NAN });
-    let tightest = rooms.iter().min_by(|a, b| (a.ease() - a.needed).total_cmp(&(b.ease() - b.needed)));
+    let ease: [f64; 3] = std::array::from_fn(|k| {
+        if pattern.finished[k] > 0.0 {
+            pattern.finished[k] - girths[k]
+        } else {
+            f64::NAN
+        }
+    });
+    let tightest = rooms
+        .iter()
+        .min_by(|a, b| (a.ease() - a.needed).total_cmp(&(b.ease() - b.needed)));
     let (what, leaves) = match pattern.kind {
         GarmentKind::Top => ("top", "leaves"),
         GarmentKind::Skirt => ("skirt", "leaves"),
@@ -262,7 +296,12 @@ pub fn judge(pattern: &Pattern, body: &Measurements) -> Suggestion {
         GarmentKind::Trousers => (hem, "the floor"),
     };
     let room = tightest.map_or_else(String::new, |r| {
-        format!("the {what} {leaves} {:+.0} cm at the {} of {:.0} cm; ", r.ease() * 100.0, r.place, r.body * 100.0)
+        format!(
+            "the {what} {leaves} {:+.0} cm at the {} of {:.0} cm; ",
+            r.ease() * 100.0,
+            r.place,
+            r.body * 100.0
+        )
     });
     Suggestion {
         size: pattern.size,
@@ -270,7 +309,11 @@ pub fn judge(pattern: &Pattern, body: &Measurements) -> Suggestion {
         rooms,
         hem,
         length,
-        reason: format!("{}: {room}the hem ends {}", pattern.size, relative(length.0, length.1)),
+        reason: format!(
+            "{}: {room}the hem ends {}",
+            pattern.size,
+            relative(length.0, length.1)
+        ),
     }
 }
 
@@ -279,7 +322,10 @@ fn relative(above: f64, mark: &str) -> String {
     if cm < 1.0 {
         format!("at {mark}")
     } else {
-        format!("{cm:.0} cm {} {mark}", if above > 0.0 { "above" } else { "below" })
+        format!(
+            "{cm:.0} cm {} {mark}",
+            if above > 0.0 { "above" } else { "below" }
+        )
     }
 }
 
@@ -301,16 +347,30 @@ mod tests {
     #[test]
     fn a_fuller_body_gets_a_larger_size_with_the_reason_named() {
         for garment in library::names() {
-            let sizes: Vec<Size> =
-                [0.85, 1.0, 1.2, 2.0].iter().map(|g| suggest(garment, &body(*g)).expect("size").size).collect();
-            assert!(sizes.windows(2).all(|w| w[0] <= w[1]), "{garment} {sizes:?}");
+            let sizes: Vec<Size> = [0.85, 1.0, 1.2, 2.0]
+                .iter()
+                .map(|g| suggest(garment, &body(*g)).expect("size").size)
+                .collect();
+            assert!(
+                sizes.windows(2).all(|w| w[0] <= w[1]),
+                "{garment} {sizes:?}"
+            );
             assert_eq!(sizes[3], Size::Xxl);
         }
         let s = suggest("tshirt", &body(1.0)).expect("size");
         let tightest = s.rooms.iter().map(|r| r.place).collect::<Vec<_>>();
         assert_eq!(tightest, ["chest", "hip"]);
-        assert!(s.reason.contains("cm at the") && s.reason.contains("the crotch"), "{}", s.reason);
-        assert!(suggest("tshirt", &body(2.0)).expect("size").reason.contains("our largest"));
+        assert!(
+            s.reason.contains("cm at the") && s.reason.contains("the crotch"),
+            "{}",
+            s.reason
+        );
+        assert!(
+            suggest("tshirt", &body(2.0))
+                .expect("size")
+                .reason
+                .contains("our largest")
+        );
     }
 
     #[test]
@@ -319,7 +379,10 @@ mod tests {
         let s = judge(&p, &body(1.0));
         assert!((s.ease[0] - (p.finished[0] - 0.88)).abs() < 1e-12 && s.ease[1].is_nan());
         let fit = |g: f64| judge(&p, &body(g)).rooms[0].fit;
-        assert_eq!([fit(1.3), fit(1.1), fit(0.8)], [Fit::Tight, Fit::Fitted, Fit::Loose]);
+        assert_eq!(
+            [fit(1.3), fit(1.1), fit(0.8)],
+            [Fit::Tight, Fit::Fitted, Fit::Loose]
+        );
     }
 
     #[test]
@@ -334,7 +397,8 @@ mod tests {
         let e = wearable(&p, &b).expect_err("too small");
         let text = e.to_string();
         assert!(
-            text.contains("tshirt S cannot be closed: at the chest it lacks 5 cm") && text.contains("M can"),
+            text.contains("tshirt S cannot be closed: at the chest it lacks 5 cm")
+                && text.contains("M can"),
             "{text}"
         );
         // A waistband closes with less than its hips, and slides off if it is wider than these.
@@ -342,8 +406,11 @@ mod tests {
         let slim = body(0.9);
         let e = wearable(&skirt, &slim).expect_err("too large").to_string();
         assert!(e.contains("slide off") && e.contains("can be worn"), "{e}");
-        let none =
-            wearable(&library::pattern("skirt", Size::Xxl).expect("pattern"), &body(2.0)).expect_err("too small");
+        let none = wearable(
+            &library::pattern("skirt", Size::Xxl).expect("pattern"),
+            &body(2.0),
+        )
+        .expect_err("too small");
         assert!(none.to_string().contains("no size"), "{none}");
         // A knit gives more than denim.
         let give = |n: &str| crate::garment::Material::preset(n).expect("preset").give();

@@ -21,7 +21,11 @@ pub(super) fn spread(
     offset: f64,
     positions: &mut [P3],
 ) {
-    for set in mesh.anchors.iter().filter(|s| s.strength >= 1.0 && ![CARRIED, SHOULDERS].contains(&s.name.as_str())) {
+    for set in mesh
+        .anchors
+        .iter()
+        .filter(|s| s.strength >= 1.0 && ![CARRIED, SHOULDERS].contains(&s.name.as_str()))
+    {
         let held: std::collections::BTreeSet<u32> = set.vertices.iter().copied().collect();
         let mut around = std::collections::BTreeMap::<u32, Vec<(u32, f32)>>::new();
         for ([a, b], rest) in edges {
@@ -32,8 +36,10 @@ pub(super) fn spread(
         }
         // What is no band, and the ends of an open one, stays.
         around.retain(|_, n| n.len() == 2);
-        let mut near: Vec<u32> =
-            around.keys().map(|v| surface.nearest_vertex(frame, &positions[*v as usize], HIPS.0)).collect();
+        let mut near: Vec<u32> = around
+            .keys()
+            .map(|v| surface.nearest_vertex(frame, &positions[*v as usize], HIPS.0))
+            .collect();
         for _ in 0..ROUNDS {
             for ((v, n), near) in around.iter().zip(&mut near) {
                 let (v, [(p, before), (q, after)]) = (*v as usize, [n[0], n[1]]);
@@ -62,21 +68,33 @@ mod tests {
         let (around, up) = (180u32, 40u32);
         let at = |i: u32, j: u32| j * around + i % around;
         let place = |k: u32| {
-            let (a, y) = (std::f32::consts::TAU * (k % around) as f32 / around as f32, (k / around) as f32 * 0.01);
+            let (a, y) = (
+                std::f32::consts::TAU * (k % around) as f32 / around as f32,
+                (k / around) as f32 * 0.01,
+            );
             P3::new(r * a.sin(), y, r * a.cos())
         };
         let cell = |k: u32| -> [Face; 2] {
             let (i, j) = (k % around, k / around);
-            [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
+            [
+                [at(i, j), at(i + 1, j), at(i + 1, j + 1)],
+                [at(i, j), at(i + 1, j + 1), at(i, j + 1)],
+            ]
         };
-        TriMesh::new((0..around * up).map(place).collect(), (0..around * (up - 1)).flat_map(cell).collect())
-            .expect("a tube")
+        TriMesh::new(
+            (0..around * up).map(place).collect(),
+            (0..around * (up - 1)).flat_map(cell).collect(),
+        )
+        .expect("a tube")
     }
 
     #[test]
     fn a_waistband_put_on_unevenly_ends_evenly_stretched() {
-        let mesh = GarmentMesh::sew(&library::pattern("skirt", Size::M).expect("a skirt"), &Triangulation::default())
-            .expect("a mesh");
+        let mesh = GarmentMesh::sew(
+            &library::pattern("skirt", Size::M).expect("a skirt"),
+            &Triangulation::default(),
+        )
+        .expect("a mesh");
         let edges = Sheet::of_garment(&mesh).expect("a sheet").edges;
         let band = &mesh.anchors[0].vertices;
         let solid = tube(0.13);
@@ -85,7 +103,10 @@ mod tests {
             Topology::new(&solid).expect("topology"),
             vec![u8::MAX; solid.vertices().len()],
         );
-        let mut frame = SurfaceFrame { vertices: solid.vertices().to_vec(), normals: Vec::new() };
+        let mut frame = SurfaceFrame {
+            vertices: solid.vertices().to_vec(),
+            normals: Vec::new(),
+        };
         surface.update_normals(Par::Seq, &mut frame);
         // Around the band in order, three times as dense in front as behind.
         let mut order = vec![band[0]];
@@ -120,7 +141,10 @@ mod tests {
                 .map(|(v, l)| f64::from((x[v[0] as usize] - x[v[1] as usize]).norm()) / l)
                 .collect()
         };
-        let range = |s: &[f64]| s.iter().fold([f64::MAX, f64::MIN], |[a, b], v| [a.min(*v), b.max(*v)]);
+        let range = |s: &[f64]| {
+            s.iter()
+                .fold([f64::MAX, f64::MIN], |[a, b], v| [a.min(*v), b.max(*v)])
+        };
         let [low, high] = range(&stretch(&x));
         assert!(high / low > 2.0, "{low} {high}");
         spread(&mesh, &edges, &surface, &frame, 0.005, &mut x);
@@ -128,7 +152,10 @@ mod tests {
         assert!(high / low < 1.05, "{low} {high}");
         for v in band {
             let p = x[*v as usize];
-            assert!((p.x.hypot(p.z) - 0.135).abs() < 2e-4 && (p.y - 0.2).abs() < 1e-6, "{p}");
+            assert!(
+                (p.x.hypot(p.z) - 0.135).abs() < 2e-4 && (p.y - 0.2).abs() < 1e-6,
+                "{p}"
+            );
         }
     }
 }

@@ -59,14 +59,20 @@ pub fn variants() -> Vec<Variant> {
     let mut add = |method, value: &str, change: &dyn Fn(&mut TrackerConfig)| {
         let mut config = TrackerConfig::default();
         change(&mut config);
-        out.push(Variant { method, value: value.to_owned(), config });
+        out.push(Variant {
+            method,
+            value: value.to_owned(),
+            config,
+        });
     };
     add("default", "", &|_| {});
     for n in [1usize, 2, 4, 8, 16] {
         add("iterations", &n.to_string(), &|c| c.iterations = n);
     }
     for mm in [0.8, 1.5, 3.0, 6.0] {
-        add("converged, mm", &mm.to_string(), &|c| c.converged = mm * 1e-3);
+        add("converged, mm", &mm.to_string(), &|c| {
+            c.converged = mm * 1e-3
+        });
     }
     for n in [250usize, 500, 1000, 2000, 4000] {
         add("samples", &n.to_string(), &|c| c.samples = n);
@@ -77,13 +83,21 @@ pub fn variants() -> Vec<Variant> {
     for n in [2u32, 4, 8] {
         add("pixels per cell", &n.to_string(), &|c| c.stride = Some(n));
     }
-    add("association", "projective", &|c| c.association = Association::Projective);
-    add("association", "kd-tree", &|c| c.association = Association::KdTree);
+    add("association", "projective", &|c| {
+        c.association = Association::Projective
+    });
+    add("association", "kd-tree", &|c| {
+        c.association = Association::KdTree
+    });
     add("association", "kd-tree, one way", &|c| c.both_ways = false);
     add("metric", "symmetric + 0.05 point", &|_| {});
     add("metric", "symmetric", &|c| c.point_to_point = 0.0);
-    add("metric", "plane + 0.05 point", &|c| c.normals = Normals::Model);
-    add("metric", "point", &|c| (c.point_to_point, c.point_to_plane) = (1.0, 0.0));
+    add("metric", "plane + 0.05 point", &|c| {
+        c.normals = Normals::Model
+    });
+    add("metric", "point", &|c| {
+        (c.point_to_point, c.point_to_plane) = (1.0, 0.0)
+    });
     add("robust kernel", "off", &|c| c.robust = false);
     for damping in [1e-6, 1e-5, 1e-3] {
         add("damping", &format!("{damping:e}"), &|c| c.damping = damping);
@@ -102,11 +116,17 @@ pub fn variants() -> Vec<Variant> {
     add("free space", "0.1", &|c| c.free_space = 0.1);
     add("prediction", "off", &|c| c.predict = false);
     add("pull", "off", &|c| c.pull = false);
-    add("skipping", "nothing", &|c| (c.skip_coarse, c.skip_settled, c.skip_unchanged) = (false, false, false));
+    add("skipping", "nothing", &|c| {
+        (c.skip_coarse, c.skip_settled, c.skip_unchanged) = (false, false, false)
+    });
     add("size", "off", &|c| c.adapt_size = false);
     add("displacements", "off", &|c| c.displacements = false);
     add("displacements", "in the pose", &|c| c.displaced_pose = true);
-    out.push(Variant { method: "the paper's form", value: String::new(), config: TrackerConfig::paper() });
+    out.push(Variant {
+        method: "the paper's form",
+        value: String::new(),
+        config: TrackerConfig::paper(),
+    });
     out
 }
 
@@ -118,9 +138,15 @@ pub fn variants() -> Vec<Variant> {
 pub fn plan(data: Option<&Path>, extent: Extent) -> Result<Plan, EvaluateError> {
     let (template, mut sources) = match data {
         Some(data) => {
-            let folders = ["charleston_m_heavy_tof_room", "jacks_f_avg_kinect1_room", "sword_m_tall_tof_noroom_upper"];
-            let mut sources: Vec<Source> =
-                folders.iter().map(|f| Source::Folder(data.join("sequences").join(f))).collect();
+            let folders = [
+                "charleston_m_heavy_tof_room",
+                "jacks_f_avg_kinect1_room",
+                "sword_m_tall_tof_noroom_upper",
+            ];
+            let mut sources: Vec<Source> = folders
+                .iter()
+                .map(|f| Source::Folder(data.join("sequences").join(f)))
+                .collect();
             sources.extend(scenes::unseen_names().map(|n| Source::Unseen(data.to_owned(), n)));
             (scenes::subject(data, "template")?, sources)
         }
@@ -136,7 +162,12 @@ pub fn plan(data: Option<&Path>, extent: Extent) -> Result<Plan, EvaluateError> 
         frames = QUICK_FRAMES;
         variants.retain(|v| ["default", "iterations", "association"].contains(&v.method));
     }
-    Ok(Plan { template, sources, variants, frames })
+    Ok(Plan {
+        template,
+        sources,
+        variants,
+        frames,
+    })
 }
 
 impl Source {
@@ -145,10 +176,18 @@ impl Source {
             Self::Folder(path) => Scene::open(path),
             Self::Unseen(data, name) => scenes::unseen(data, name),
             Self::Embedded(noise) => {
-                let setting =
-                    Setting { noise: *noise, color: false, room: Some(Room::default()), ..Setting::default() };
+                let setting = Setting {
+                    noise: *noise,
+                    color: false,
+                    room: Some(Room::default()),
+                    ..Setting::default()
+                };
                 let sequence = Sequence::new(Shopper::default(), setting);
-                let name = if *noise == NoiseModel::KinectV1 { "synthetic_kinect1" } else { "synthetic_tof" };
+                let name = if *noise == NoiseModel::KinectV1 {
+                    "synthetic_kinect1"
+                } else {
+                    "synthetic_tof"
+                };
                 Ok(Scene::synthetic(name, &sequence, EMBEDDED_FRAMES))
             }
         }
@@ -188,7 +227,14 @@ mod tests {
         let all = variants();
         assert_eq!(all[0].config, TrackerConfig::default());
         for (i, a) in all.iter().enumerate() {
-            assert!(all[..i].iter().all(|b| (a.method, &a.value) != (b.method, &b.value)), "{} {}", a.method, a.value);
+            assert!(
+                all[..i]
+                    .iter()
+                    .all(|b| (a.method, &a.value) != (b.method, &b.value)),
+                "{} {}",
+                a.method,
+                a.value
+            );
         }
     }
 

@@ -19,8 +19,18 @@ pub struct ClothBench {
 
 impl Default for ClothBench {
     fn default() -> Self {
-        let scenes = ["A_pin_1k", "A_pin_5k", "B_sphere_1k", "C_skirt_1k", "C_skirt_5k", "C_skirt_10k"];
-        Self { scenes: scenes.map(str::to_owned).to_vec(), full: false }
+        let scenes = [
+            "A_pin_1k",
+            "A_pin_5k",
+            "B_sphere_1k",
+            "C_skirt_1k",
+            "C_skirt_5k",
+            "C_skirt_10k",
+        ];
+        Self {
+            scenes: scenes.map(str::to_owned).to_vec(),
+            full: false,
+        }
     }
 }
 
@@ -62,7 +72,11 @@ pub fn method_name(m: Method) -> &'static str {
 ///
 /// # Errors
 /// A scene that cannot be read. A method that diverges is a row with error `diverged` 1.
-pub fn cloth(folder: &Path, bench: &ClothBench, mut progress: impl FnMut(&Row)) -> Result<Table, EvaluateError> {
+pub fn cloth(
+    folder: &Path,
+    bench: &ClothBench,
+    mut progress: impl FnMut(&Row),
+) -> Result<Table, EvaluateError> {
     let mut table = Table {
         name: "cloth".into(),
         command: "evaluate::cloth::cloth".into(),
@@ -70,14 +84,23 @@ pub fn cloth(folder: &Path, bench: &ClothBench, mut progress: impl FnMut(&Row)) 
         rows: Vec::new(),
     };
     for name in &bench.scenes {
-        let fault = |e: SceneError| EvaluateError::Scene { scene: name.clone(), why: e.to_string() };
+        let fault = |e: SceneError| EvaluateError::Scene {
+            scene: name.clone(),
+            why: e.to_string(),
+        };
         let scene = load(&folder.join(format!("{name}.json"))).map_err(fault)?;
         let reference = reference(folder, name, &scene);
         for (method, substeps, iterations, patches) in SETTINGS {
             if scene.start.len() > LARGE && method != Method::SmallSteps && !bench.full {
                 continue;
             }
-            let config = RunConfig { method, substeps, iterations, patches, ..RunConfig::default() };
+            let config = RunConfig {
+                method,
+                substeps,
+                iterations,
+                patches,
+                ..RunConfig::default()
+            };
             let mut frames = Vec::new();
             let result = run(&scene, &config, |_, p| {
                 frames.push(p.to_vec());
@@ -98,7 +121,13 @@ pub fn cloth(folder: &Path, bench: &ClothBench, mut progress: impl FnMut(&Row)) 
     Ok(table)
 }
 
-fn measured(name: &str, config: &RunConfig, r: &RunReport, frames: &[Vec<P3>], reference: Option<&[Vec<P3>]>) -> Row {
+fn measured(
+    name: &str,
+    config: &RunConfig,
+    r: &RunReport,
+    frames: &[Vec<P3>],
+    reference: Option<&[Vec<P3>]>,
+) -> Row {
     let mut row = Row::new(name, method_name(config.method), r.ms_median)
         .with("steps", r.substeps)
         .with("iterations", r.iterations)
@@ -110,12 +139,17 @@ fn measured(name: &str, config: &RunConfig, r: &RunReport, frames: &[Vec<P3>], r
     }
     if let Some(reference) = reference {
         let n = reference.len().min(frames.len());
-        let sum: f64 = (0..n).map(|k| (centre(&frames[k]) - centre(&reference[k])).norm_squared()).sum();
+        let sum: f64 = (0..n)
+            .map(|k| (centre(&frames[k]) - centre(&reference[k])).norm_squared())
+            .sum();
         row = row.error("com_rms_mm", (sum / n.max(1) as f64).sqrt() * 1e3);
         /// Half a second at 60 frames a second: later the swing is chaotic.
         const HALF: usize = 30;
         if n > HALF {
-            let apart = frames[HALF].iter().zip(&reference[HALF]).map(|(a, b)| f64::from((a - b).norm_squared()));
+            let apart = frames[HALF]
+                .iter()
+                .zip(&reference[HALF])
+                .map(|(a, b)| f64::from((a - b).norm_squared()));
             let rms = (apart.sum::<f64>() / frames[HALF].len().max(1) as f64).sqrt();
             row = row.error("vertices_rms_mm", rms * 1e3);
         }
@@ -124,7 +158,10 @@ fn measured(name: &str, config: &RunConfig, r: &RunReport, frames: &[Vec<P3>], r
 }
 
 fn centre(p: &[P3]) -> nalgebra::Vector3<f64> {
-    p.iter().map(|p| p.coords.cast::<f64>()).sum::<nalgebra::Vector3<f64>>() / p.len().max(1) as f64
+    p.iter()
+        .map(|p| p.coords.cast::<f64>())
+        .sum::<nalgebra::Vector3<f64>>()
+        / p.len().max(1) as f64
 }
 
 fn reference(folder: &Path, name: &str, scene: &Scene) -> Option<Vec<Vec<P3>>> {
@@ -135,7 +172,11 @@ fn reference(folder: &Path, name: &str, scene: &Scene) -> Option<Vec<Vec<P3>>> {
     Some(
         values
             .chunks_exact(3 * scene.start.len())
-            .map(|f| f.chunks_exact(3).map(|p| P3::new(p[0], p[1], p[2])).collect())
+            .map(|f| {
+                f.chunks_exact(3)
+                    .map(|p| P3::new(p[0], p[1], p[2]))
+                    .collect()
+            })
             .collect(),
     )
 }

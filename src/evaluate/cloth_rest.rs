@@ -73,19 +73,36 @@ impl Standing {
     /// # Errors
     /// A garment that is not known or cannot be put on.
     pub fn new(wearing: &Wearing) -> Result<Self, EvaluateError> {
-        let fault = |why: String| EvaluateError::Scene { scene: "standing".into(), why };
+        let fault = |why: String| EvaluateError::Scene {
+            scene: "standing".into(),
+            why,
+        };
         let template = crate::body::embedded::template();
         let rest = template.personalise(&BodyShape::default());
-        let patterns = wearing.garments.iter().map(|g| library::pattern(g, Size::M));
-        let patterns = patterns.collect::<Result<Vec<_>, _>>().map_err(|e| fault(e.to_string()))?;
-        let mut options = DressOptions { config: wearing.config.clone(), ..DressOptions::default() };
+        let patterns = wearing
+            .garments
+            .iter()
+            .map(|g| library::pattern(g, Size::M));
+        let patterns = patterns
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(|e| fault(e.to_string()))?;
+        let mut options = DressOptions {
+            config: wearing.config.clone(),
+            ..DressOptions::default()
+        };
         options.triangulation.edge_length = wearing.edge;
         let mut standing = Pose::rest(template.skeleton(), Rigid::<World, Body>::identity());
         if let Some(angle) = wearing.arms {
             lower_arms(&template, &rest, angle, &mut standing);
         }
-        let dressed = dress(&template, &rest, &standing, &patterns, &options).map_err(|e| fault(e.to_string()))?;
-        Ok(Self { template, rest, standing, dressed })
+        let dressed = dress(&template, &rest, &standing, &patterns, &options)
+            .map_err(|e| fault(e.to_string()))?;
+        Ok(Self {
+            template,
+            rest,
+            standing,
+            dressed,
+        })
     }
     /// Her skin at a time since she began doing something, s, in world coordinates, metres.
     pub fn body(&self, doing: Doing, time: f64) -> Vec<P3> {
@@ -99,15 +116,27 @@ impl Standing {
         };
         for (joint, turn) in ["left_shoulder", "left_elbow"].iter().zip(turns) {
             // The last angle: about z of the shoulder, the only one of the elbow.
-            let last = |j: usize| (skeleton.dof_offset(j) + skeleton.joints()[j].motion.dofs()).checked_sub(1);
-            if let Some(angle) = skeleton.index(joint).and_then(last).and_then(|k| pose.angles.get_mut(k)) {
+            let last = |j: usize| {
+                (skeleton.dof_offset(j) + skeleton.joints()[j].motion.dofs()).checked_sub(1)
+            };
+            if let Some(angle) = skeleton
+                .index(joint)
+                .and_then(last)
+                .and_then(|k| pose.angles.get_mut(k))
+            {
                 *angle += turn;
             }
         }
         let mut bones = BoneTransforms::default();
         pose.bones(skeleton, &self.rest, &mut bones);
         let mut body = Vec::new();
-        skin(Par::Rayon, &self.rest.vertices, self.template.weights(), &bones, &mut body);
+        skin(
+            Par::Rayon,
+            &self.rest.vertices,
+            self.template.weights(),
+            &bones,
+            &mut body,
+        );
         if doing == Doing::WalkingOff {
             let by = V3::new(0.0, 0.0, (0.6 * time.max(0.0)) as f32);
             body.iter_mut().for_each(|p| *p += by);
@@ -126,7 +155,10 @@ impl Standing {
         calls: usize,
         noise: f32,
     ) -> Result<RestReport, EvaluateError> {
-        let fault = |why: String| EvaluateError::Scene { scene: "standing".into(), why };
+        let fault = |why: String| EvaluateError::Scene {
+            scene: "standing".into(),
+            why,
+        };
         let before = std::mem::replace(&mut self.dressed.model.config, config.clone());
         let mut state: State = self.dressed.state.clone();
         let (mut work, mut report) = (Workspace::default(), RestReport::default());
@@ -135,16 +167,26 @@ impl Standing {
         for call in 0..QUIET + calls {
             let mut body = self.body(doing, (call as f64 - QUIET as f64) * DT);
             let mut some = || noise * rng.random_range(-1.0f32..1.0);
-            let (whole, wave) = (V3::new(some(), some(), some()), V3::new(some(), some(), some()));
-            body.iter_mut().for_each(|p| *p += whole + wave * (7.0 * p.y).sin());
+            let (whole, wave) = (
+                V3::new(some(), some(), some()),
+                V3::new(some(), some(), some()),
+            );
+            body.iter_mut()
+                .for_each(|p| *p += whole + wave * (7.0 * p.y).sin());
             let started = Instant::now();
-            let input = Input { body: &body, dt: DT };
-            let r = step(&self.dressed.model, &mut state, &input, &mut work).map_err(|e| fault(e.to_string()))?;
+            let input = Input {
+                body: &body,
+                dt: DT,
+            };
+            let r = step(&self.dressed.model, &mut state, &input, &mut work)
+                .map_err(|e| fault(e.to_string()))?;
             if call >= QUIET {
                 report.ms.push(started.elapsed().as_secs_f64() * 1e3);
                 report.asleep.push(r.sleeping as f64 / total.max(1) as f64);
                 report.penetration = report.penetration.max(r.penetration_left);
-                report.positions.push(state.garments.iter().map(|g| g.positions.clone()).collect());
+                report
+                    .positions
+                    .push(state.garments.iter().map(|g| g.positions.clone()).collect());
             }
             report.last = r;
         }
@@ -157,10 +199,14 @@ impl Standing {
 pub fn lower_arms(template: &Template, rest: &RestBody, angle: f64, pose: &mut Pose<World>) {
     let skeleton = template.skeleton();
     for (side, s) in [("left", 1.0), ("right", -1.0)] {
-        let [shoulder, elbow] = ["shoulder", "elbow"].map(|n| skeleton.index(&format!("{side}_{n}")));
-        let (Some(shoulder), Some(elbow)) = (shoulder, elbow) else { continue };
+        let [shoulder, elbow] =
+            ["shoulder", "elbow"].map(|n| skeleton.index(&format!("{side}_{n}")));
+        let (Some(shoulder), Some(elbow)) = (shoulder, elbow) else {
+            continue;
+        };
         let down = V3d::new(s * angle.cos(), -angle.sin(), 0.0);
-        let turn = UnitQuaternion::rotation_between(&(rest.joints[elbow] - rest.joints[shoulder]), &down);
+        let turn =
+            UnitQuaternion::rotation_between(&(rest.joints[elbow] - rest.joints[shoulder]), &down);
         let at = skeleton.dof_offset(shoulder);
         if let (Some(turn), Some(angles)) = (turn, pose.angles.get_mut(at..at + 3)) {
             angles.copy_from_slice(log_so3(&turn).as_slice());
@@ -185,12 +231,22 @@ impl RestReport {
     }
     /// How far the cloth of two runs is apart after the last call: root mean square, 99th percentile and most, metres.
     pub fn apart(&self, other: &Self) -> [f64; 3] {
-        let (Some(a), Some(b)) = (self.positions.last(), other.positions.last()) else { return [0.0; 3] };
-        let mut far: Vec<f64> =
-            a.iter().flatten().zip(b.iter().flatten()).map(|(p, q)| f64::from((p - q).norm())).collect();
+        let (Some(a), Some(b)) = (self.positions.last(), other.positions.last()) else {
+            return [0.0; 3];
+        };
+        let mut far: Vec<f64> = a
+            .iter()
+            .flatten()
+            .zip(b.iter().flatten())
+            .map(|(p, q)| f64::from((p - q).norm()))
+            .collect();
         far.sort_unstable_by(f64::total_cmp);
         let n = far.len().max(1);
         let rms = (far.iter().map(|d| d * d).sum::<f64>() / n as f64).sqrt();
-        [rms, far.get(far.len() * 99 / 100).copied().unwrap_or(0.0), far.last().copied().unwrap_or(0.0)]
+        [
+            rms,
+            far.get(far.len() * 99 / 100).copied().unwrap_or(0.0),
+            far.last().copied().unwrap_or(0.0),
+        ]
     }
 }

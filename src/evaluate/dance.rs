@@ -92,7 +92,10 @@ impl DanceReport {
 
 fn percentile(values: &mut [f64], share: f64) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
-    values.get(((values.len() as f64 * share) as usize).min(values.len().saturating_sub(1))).copied().unwrap_or(0.0)
+    values
+        .get(((values.len() as f64 * share) as usize).min(values.len().saturating_sub(1)))
+        .copied()
+        .unwrap_or(0.0)
 }
 
 /// Reads the dance and finds a skeleton for its body: the embedded template is tracked onto a picture of it.
@@ -100,24 +103,50 @@ fn percentile(values: &mut [f64], share: f64) -> f64 {
 /// # Errors
 /// A file that is missing or does not fit the others.
 pub fn load(folder: &Path) -> Result<Dance, EvaluateError> {
-    let fault = |why: String| EvaluateError::Scene { scene: "dance".into(), why };
-    let faces = read_obj(&folder.join(FACES)).map_err(|e| fault(e.to_string()))?.mesh;
+    let fault = |why: String| EvaluateError::Scene {
+        scene: "dance".into(),
+        why,
+    };
+    let faces = read_obj(&folder.join(FACES))
+        .map_err(|e| fault(e.to_string()))?
+        .mesh;
     let mut bytes = Vec::new();
     std::fs::File::open(folder.join(BODIES))
         .and_then(|f| flate2::read::GzDecoder::new(f).read_to_end(&mut bytes))
         .map_err(|e| fault(format!("{BODIES}: {e}")))?;
     let n = faces.vertices().len();
-    let numbers: Vec<f32> = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    let numbers: Vec<f32> = bytes
+        .chunks_exact(4)
+        .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        .collect();
     if n == 0 || !numbers.len().is_multiple_of(3 * n) || numbers.iter().any(|x| !x.is_finite()) {
-        return Err(fault(format!("{BODIES}: {} numbers are no bodies of {n} vertices", numbers.len())));
+        return Err(fault(format!(
+            "{BODIES}: {} numbers are no bodies of {n} vertices",
+            numbers.len()
+        )));
     }
-    let bodies: Vec<Vec<P3>> =
-        numbers.chunks_exact(3 * n).map(|b| b.chunks_exact(3).map(|p| P3::new(p[0], p[1], p[2])).collect()).collect();
-    let first = bodies.first().ok_or_else(|| fault(format!("{BODIES}: empty")))?;
-    let mesh = faces.with_vertices(first.clone()).map_err(|e| fault(e.to_string()))?;
+    let bodies: Vec<Vec<P3>> = numbers
+        .chunks_exact(3 * n)
+        .map(|b| {
+            b.chunks_exact(3)
+                .map(|p| P3::new(p[0], p[1], p[2]))
+                .collect()
+        })
+        .collect();
+    let first = bodies
+        .first()
+        .ok_or_else(|| fault(format!("{BODIES}: empty")))?;
+    let mesh = faces
+        .with_vertices(first.clone())
+        .map_err(|e| fault(e.to_string()))?;
     let (template, fit) = rig_standing(mesh).map_err(fault)?;
     let rest = template.personalise(&BodyShape::default());
-    Ok(Dance { template: Arc::new(template), rest, bodies, fit })
+    Ok(Dance {
+        template: Arc::new(template),
+        rest,
+        bodies,
+        fit,
+    })
 }
 
 impl Dance {
@@ -126,7 +155,11 @@ impl Dance {
         let at = (time / INTERVAL).clamp(0.0, (self.bodies.len() - 1) as f64);
         let (i, share) = (at as usize, at.fract() as f32);
         let next = &self.bodies[(i + 1).min(self.bodies.len() - 1)];
-        self.bodies[i].iter().zip(next).map(|(a, b)| a + (b - a) * share).collect()
+        self.bodies[i]
+            .iter()
+            .zip(next)
+            .map(|(a, b)| a + (b - a) * share)
+            .collect()
     }
     /// Length of the dance, s.
     pub fn seconds(&self) -> f64 {
@@ -137,20 +170,30 @@ impl Dance {
     /// # Errors
     /// A garment that is not known or cannot be put on.
     pub fn dress(&self, outfit: &Outfit) -> Result<Dressed, EvaluateError> {
-        let fault = |why: String| EvaluateError::Scene { scene: "dance".into(), why };
-        let measures = measure::measure(&self.template, &self.rest).map_err(|e| fault(e.to_string()))?;
+        let fault = |why: String| EvaluateError::Scene {
+            scene: "dance".into(),
+            why,
+        };
+        let measures =
+            measure::measure(&self.template, &self.rest).map_err(|e| fault(e.to_string()))?;
         let patterns = outfit
             .garments
             .iter()
             .map(|g| {
-                let size = suggest(g, &measures).map_err(|e| fault(e.to_string()))?.size;
+                let size = suggest(g, &measures)
+                    .map_err(|e| fault(e.to_string()))?
+                    .size;
                 library::pattern(g, size).map_err(|e| fault(e.to_string()))
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let mut options = DressOptions { config: outfit.config.clone(), ..DressOptions::default() };
+        let mut options = DressOptions {
+            config: outfit.config.clone(),
+            ..DressOptions::default()
+        };
         options.triangulation.edge_length = outfit.edge;
         let standing = Pose::rest(self.template.skeleton(), Rigid::<World, Body>::identity());
-        dress(&self.template, &self.rest, &standing, &patterns, &options).map_err(|e| fault(e.to_string()))
+        dress(&self.template, &self.rest, &standing, &patterns, &options)
+            .map_err(|e| fault(e.to_string()))
     }
     /// Dances in an outfit; `frame` sees time, body and garments after each call.
     ///
@@ -161,26 +204,45 @@ impl Dance {
         outfit: &Outfit,
         mut frame: impl FnMut(f64, &[P3], &Dressed),
     ) -> Result<DanceReport, EvaluateError> {
-        let fault = |why: String| EvaluateError::Scene { scene: "dance".into(), why };
+        let fault = |why: String| EvaluateError::Scene {
+            scene: "dance".into(),
+            why,
+        };
         let mut dressed = self.dress(outfit)?;
         let mut report = DanceReport {
-            vertices: dressed.state.garments.iter().map(|g| g.positions.len()).sum(),
+            vertices: dressed
+                .state
+                .garments
+                .iter()
+                .map(|g| g.positions.len())
+                .sum(),
             dressing_ms: dressed.report.ms,
             softened: 1.0,
             ..DanceReport::default()
         };
-        let (mut work, mut depths, mut single, mut strain) = (Workspace::default(), Vec::new(), Vec::new(), Vec::new());
+        let (mut work, mut depths, mut single, mut strain) =
+            (Workspace::default(), Vec::new(), Vec::new(), Vec::new());
         let calls = (outfit.seconds.min(self.seconds()) / CALL) as usize;
         for call in 1..=calls {
             let time = call as f64 * CALL;
             let body = self.body(time);
             let started = Instant::now();
-            let r = step(&dressed.model, &mut dressed.state, &Input { body: &body, dt: CALL }, &mut work)
-                .map_err(|e| fault(e.to_string()))?;
+            let r = step(
+                &dressed.model,
+                &mut dressed.state,
+                &Input {
+                    body: &body,
+                    dt: CALL,
+                },
+                &mut work,
+            )
+            .map_err(|e| fault(e.to_string()))?;
             report.ms.push(started.elapsed().as_secs_f64() * 1e3);
-            for (sum, part) in
-                report.stages_ms.iter_mut().zip([r.stages_ms.maps, r.stages_ms.contact, r.stages_ms.solve])
-            {
+            for (sum, part) in report.stages_ms.iter_mut().zip([
+                r.stages_ms.maps,
+                r.stages_ms.contact,
+                r.stages_ms.solve,
+            ]) {
                 *sum += part / calls as f64;
             }
             strain.push(r.p99_strain);
@@ -188,7 +250,13 @@ impl Dance {
             report.softened = report.softened.min(r.softened);
             report.faults += usize::from(r.kept_last_good.is_some());
             if call % LOOK_EVERY == 0 {
-                look(&dressed.state, &body, self.template.mesh().faces(), &mut depths, &mut single);
+                look(
+                    &dressed.state,
+                    &body,
+                    self.template.mesh().faces(),
+                    &mut depths,
+                    &mut single,
+                );
             }
             frame(time, &body, &dressed);
         }

@@ -27,7 +27,8 @@ impl<'a> Solid<'a> {
                 high[k] = high[k].max(p[k]);
             }
         }
-        let size: [usize; 2] = std::array::from_fn(|k| ((high[k] - low[k]).max(0.0) / COLUMN) as usize + 1);
+        let size: [usize; 2] =
+            std::array::from_fn(|k| ((high[k] - low[k]).max(0.0) / COLUMN) as usize + 1);
         let mut columns = vec![Vec::new(); size[0] * size[1]];
         let mut balls = Vec::with_capacity(faces.len());
         for (i, f) in faces.iter().enumerate() {
@@ -42,9 +43,19 @@ impl<'a> Solid<'a> {
                 }
             }
             let middle = P3::from((c[0].coords + c[1].coords + c[2].coords) / 3.0);
-            balls.push((middle, c.iter().map(|p| (p - middle).norm()).fold(0.0, f32::max)));
+            balls.push((
+                middle,
+                c.iter().map(|p| (p - middle).norm()).fold(0.0, f32::max),
+            ));
         }
-        Self { vertices, faces, low, size, columns, balls }
+        Self {
+            vertices,
+            faces,
+            low,
+            size,
+            columns,
+            balls,
+        }
     }
     /// How often the surface goes around a point: 1 inside, 0 outside, 2 where two limbs lie in each other.
     pub fn winding(&self, p: &P3) -> i32 {
@@ -72,12 +83,18 @@ impl<'a> Solid<'a> {
     fn crossing(&self, face: u32, p: &P3) -> i32 {
         let [a, b, c] = self.faces[face as usize].map(|v| self.vertices[v as usize].cast::<f64>());
         let (x, y) = (f64::from(p.x), f64::from(p.y));
-        let twice =
-            |a: &nalgebra::Point3<f64>, b: &nalgebra::Point3<f64>| (a.x - x) * (b.y - y) - (b.x - x) * (a.y - y);
+        let twice = |a: &nalgebra::Point3<f64>, b: &nalgebra::Point3<f64>| {
+            (a.x - x) * (b.y - y) - (b.x - x) * (a.y - y)
+        };
         let w = [twice(&b, &c), twice(&c, &a), twice(&a, &b)];
         let area: f64 = w.iter().sum();
-        let inside = if area > 0.0 { w.iter().all(|w| *w >= 0.0) } else { w.iter().all(|w| *w <= 0.0) };
-        if area == 0.0 || !inside || (w[0] * a.z + w[1] * b.z + w[2] * c.z) / area <= f64::from(p.z) {
+        let inside = if area > 0.0 {
+            w.iter().all(|w| *w >= 0.0)
+        } else {
+            w.iter().all(|w| *w <= 0.0)
+        };
+        if area == 0.0 || !inside || (w[0] * a.z + w[1] * b.z + w[2] * c.z) / area <= f64::from(p.z)
+        {
             return 0;
         }
         if area > 0.0 { 1 } else { -1 }
@@ -95,7 +112,9 @@ fn distance(p: &P3, t: [P3; 3]) -> f32 {
         let s = ((p - a).dot(&d) / d.norm_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
         (p - (a + d * s)).norm()
     };
-    (0..3).map(|k| to_edge(&t[k], t[(k + 1) % 3] - t[k])).fold(f32::MAX, f32::min)
+    (0..3)
+        .map(|k| to_edge(&t[k], t[(k + 1) % 3] - t[k]))
+        .fold(f32::MAX, f32::min)
 }
 
 #[cfg(test)]
@@ -106,10 +125,19 @@ mod tests {
     fn cuboid(low: [f32; 3], high: [f32; 3], vertices: &mut Vec<P3>, faces: &mut Vec<Face>) {
         let first = vertices.len() as u32;
         for i in 0..8 {
-            vertices.push(P3::from(std::array::from_fn(|k| if i >> k & 1 == 1 { high[k] } else { low[k] })));
+            vertices.push(P3::from(std::array::from_fn(|k| {
+                if i >> k & 1 == 1 { high[k] } else { low[k] }
+            })));
         }
-        for [a, b, c, d] in [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
-            .map(|q| q.map(|v| v + first))
+        for [a, b, c, d] in [
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+        ]
+        .map(|q| q.map(|v| v + first))
         {
             faces.extend([[a, b, c], [a, c, d]]);
         }
@@ -123,8 +151,20 @@ mod tests {
         let solid = Solid::new(&v, &f);
         assert!((solid.depth(&P3::new(0.5, 0.151, 0.12)) - 0.049).abs() < 1e-6);
         assert_eq!(solid.winding(&P3::new(0.901, 0.103, 0.15)), 2);
-        assert_eq!((solid.winding(&P3::new(1.21, 0.33, 0.15)), solid.winding(&P3::new(0.5, 0.1, 0.31))), (1, 0));
-        for outside in [[0.5, 0.1, 0.31], [0.5, 0.1, -0.01], [-3.0, 0.1, 0.1], [0.5, 0.3, 0.1], [1.51, 0.1, 0.1]] {
+        assert_eq!(
+            (
+                solid.winding(&P3::new(1.21, 0.33, 0.15)),
+                solid.winding(&P3::new(0.5, 0.1, 0.31))
+            ),
+            (1, 0)
+        );
+        for outside in [
+            [0.5, 0.1, 0.31],
+            [0.5, 0.1, -0.01],
+            [-3.0, 0.1, 0.1],
+            [0.5, 0.3, 0.1],
+            [1.51, 0.1, 0.1],
+        ] {
             assert_eq!(solid.depth(&P3::from(outside)), 0.0, "{outside:?}");
         }
     }

@@ -18,12 +18,20 @@ const LEAST: f64 = 1e-3;
 pub fn run_time_against_error(table: &Table, error: &str) -> Result<Option<String>, EvaluateError> {
     let mut series: Vec<(String, Vec<(f64, f64)>)> = Vec::new();
     for row in &table.rows {
-        let Some(value) = row.get(error).filter(|v| v.is_finite() && row.run_ms.is_finite()) else { continue };
+        let Some(value) = row
+            .get(error)
+            .filter(|v| v.is_finite() && row.run_ms.is_finite())
+        else {
+            continue;
+        };
         let name = format!("{} · {}", row.scene, row.method);
-        let at = series.iter().position(|(n, _)| *n == name).unwrap_or_else(|| {
-            series.push((name, Vec::new()));
-            series.len() - 1
-        });
+        let at = series
+            .iter()
+            .position(|(n, _)| *n == name)
+            .unwrap_or_else(|| {
+                series.push((name, Vec::new()));
+                series.len() - 1
+            });
         series[at].1.push((row.run_ms.max(LEAST), value.max(LEAST)));
     }
     let all: Vec<(f64, f64)> = series.iter().flat_map(|(_, p)| p.iter().copied()).collect();
@@ -36,8 +44,18 @@ pub fn run_time_against_error(table: &Table, error: &str) -> Result<Option<Strin
         lo..hi
     };
     let mut svg = String::new();
-    draw(&mut svg, table, error, &series, span(|p| p.0), span(|p| p.1))
-        .map_err(|e| EvaluateError::Plot { error: error.to_owned(), why: e.to_string() })?;
+    draw(
+        &mut svg,
+        table,
+        error,
+        &series,
+        span(|p| p.0),
+        span(|p| p.1),
+    )
+    .map_err(|e| EvaluateError::Plot {
+        error: error.to_owned(),
+        why: e.to_string(),
+    })?;
     Ok(Some(svg))
 }
 
@@ -57,7 +75,13 @@ fn draw(
         .x_label_area_size(42)
         .y_label_area_size(64)
         .build_cartesian_2d(x.log_scale(), y.log_scale())?;
-    let tick = |v: &f64| if *v >= 10.0 { format!("{v:.0}") } else { format!("{v:.2}") };
+    let tick = |v: &f64| {
+        if *v >= 10.0 {
+            format!("{v:.0}")
+        } else {
+            format!("{v:.2}")
+        }
+    };
     chart
         .configure_mesh()
         .x_desc(format!("run time, ms ({})", table.run_time))
@@ -69,7 +93,10 @@ fn draw(
     for (i, (name, points)) in series.iter().enumerate() {
         let color = Palette99::pick(i).to_rgba();
         chart
-            .draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2)))?
+            .draw_series(LineSeries::new(
+                points.iter().copied(),
+                color.stroke_width(2),
+            ))?
             .label(name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
         chart.draw_series(points.iter().map(|p| Circle::new(*p, 3, color.filled())))?;
@@ -92,13 +119,25 @@ mod tests {
     #[test]
     fn a_plot_names_its_methods_and_survives_zeros_and_nan() {
         let mut t = Table::new("trial", "", "one frame");
-        assert!(run_time_against_error(&t, "mm").expect("no fault").is_none());
+        assert!(
+            run_time_against_error(&t, "mm")
+                .expect("no fault")
+                .is_none()
+        );
         for (ms, mm) in [(1.0, 0.0), (2.0, 5.0), (4.0, f64::NAN), (8.0, 4.0)] {
             t.rows.push(Row::new("walk", "kd-tree", ms).error("mm", mm));
         }
-        let svg = run_time_against_error(&t, "mm").expect("draws").expect("three values");
-        assert!(svg.starts_with("<svg") && svg.contains("walk · kd-tree") && svg.contains("one frame"));
+        let svg = run_time_against_error(&t, "mm")
+            .expect("draws")
+            .expect("three values");
+        assert!(
+            svg.starts_with("<svg") && svg.contains("walk · kd-tree") && svg.contains("one frame")
+        );
         assert_eq!(svg.matches("<circle").count(), 3);
-        assert!(run_time_against_error(&t, "other").expect("no fault").is_none());
+        assert!(
+            run_time_against_error(&t, "other")
+                .expect("no fault")
+                .is_none()
+        );
     }
 }

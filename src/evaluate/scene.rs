@@ -50,35 +50,73 @@ impl Scene {
     /// # Errors
     /// Names the file and what is wrong with it.
     pub fn open(folder: &Path) -> Result<Self, EvaluateError> {
-        let name = folder.file_name().map_or_else(|| "scene".to_owned(), |n| n.to_string_lossy().into_owned());
-        let fault = |why: String| EvaluateError::Scene { scene: name.clone(), why };
+        let name = folder
+            .file_name()
+            .map_or_else(|| "scene".to_owned(), |n| n.to_string_lossy().into_owned());
+        let fault = |why: String| EvaluateError::Scene {
+            scene: name.clone(),
+            why,
+        };
         let mut source = open_recording(folder).map_err(|e| fault(e.to_string()))?;
         let calibration = source.calibration().clone();
         let mut frames = Vec::new();
         while let Some(frame) = source.next_frame().map_err(|e| fault(e.to_string()))? {
-            frames.push(RgbdFrame { color: None, ..frame });
+            frames.push(RgbdFrame {
+                color: None,
+                ..frame
+            });
         }
-        let mut scene =
-            Self { name: name.clone(), calibration, joint_names: vec![], faces: vec![], frames, truth: vec![] };
-        let Ok(text) = std::fs::read_to_string(folder.join("truth.json")) else { return Ok(scene) };
-        let file: TruthFile = serde_json::from_str(&text).map_err(|e| fault(format!("truth.json: {e}")))?;
-        if file.joints.len() != scene.frames.len() || file.joints.iter().any(|j| j.len() != file.joint_names.len()) {
-            return Err(fault(format!("truth.json: {} frames for {}", file.joints.len(), scene.frames.len())));
+        let mut scene = Self {
+            name: name.clone(),
+            calibration,
+            joint_names: vec![],
+            faces: vec![],
+            frames,
+            truth: vec![],
+        };
+        let Ok(text) = std::fs::read_to_string(folder.join("truth.json")) else {
+            return Ok(scene);
+        };
+        let file: TruthFile =
+            serde_json::from_str(&text).map_err(|e| fault(format!("truth.json: {e}")))?;
+        if file.joints.len() != scene.frames.len()
+            || file
+                .joints
+                .iter()
+                .any(|j| j.len() != file.joint_names.len())
+        {
+            return Err(fault(format!(
+                "truth.json: {} frames for {}",
+                file.joints.len(),
+                scene.frames.len()
+            )));
         }
         scene.joint_names = file.joint_names;
         scene.truth = file
             .joints
             .iter()
-            .map(|j| SceneTruth { joints: j.iter().map(|p| P3d::from(*p)).collect(), vertices: vec![] })
+            .map(|j| SceneTruth {
+                joints: j.iter().map(|p| P3d::from(*p)).collect(),
+                vertices: vec![],
+            })
             .collect();
         let path = folder.join("truth_vertices.npy");
         if path.exists() {
             let (shape, values) = read_npy(&path).map_err(|e| fault(e.to_string()))?;
-            let [_, n, 3] = shape[..] else { return Err(fault(format!("truth_vertices.npy: shape {shape:?}"))) };
+            let [_, n, 3] = shape[..] else {
+                return Err(fault(format!("truth_vertices.npy: shape {shape:?}")));
+            };
             for (k, block) in values.chunks_exact(3 * n.max(1) as usize).enumerate() {
-                let Some(truth) = scene.truth.get_mut(k * VERTEX_INTERVAL) else { break };
-                let Some(origin) = truth.joints.first().map(|p| p.coords.cast::<f32>()) else { continue };
-                truth.vertices = block.chunks_exact(3).map(|v| P3::new(v[0], v[1], v[2]) + origin).collect();
+                let Some(truth) = scene.truth.get_mut(k * VERTEX_INTERVAL) else {
+                    break;
+                };
+                let Some(origin) = truth.joints.first().map(|p| p.coords.cast::<f32>()) else {
+                    continue;
+                };
+                truth.vertices = block
+                    .chunks_exact(3)
+                    .map(|v| P3::new(v[0], v[1], v[2]) + origin)
+                    .collect();
             }
         }
         Ok(scene)
@@ -88,14 +126,23 @@ impl Scene {
     pub fn synthetic(name: impl Into<String>, sequence: &Sequence, frames: u64) -> Self {
         let template = &sequence.shopper().template;
         let joints = template.skeleton().joints();
-        let compared: Vec<usize> = (0..joints.len()).filter(|&j| !joints[j].name.ends_with("_end")).collect();
+        let compared: Vec<usize> = (0..joints.len())
+            .filter(|&j| !joints[j].name.ends_with("_end"))
+            .collect();
         let (mut images, mut truths) = (Vec::new(), Vec::new());
         for i in 0..frames {
             let (frame, truth) = sequence.frame(i);
-            images.push(RgbdFrame { color: None, ..frame });
+            images.push(RgbdFrame {
+                color: None,
+                ..frame
+            });
             let keep = truth.present && (i as usize).is_multiple_of(VERTEX_INTERVAL);
             truths.push(SceneTruth {
-                joints: if truth.present { compared.iter().map(|&j| truth.joints[j]).collect() } else { vec![] },
+                joints: if truth.present {
+                    compared.iter().map(|&j| truth.joints[j]).collect()
+                } else {
+                    vec![]
+                },
                 vertices: if keep { truth.vertices } else { vec![] },
             });
         }

@@ -17,7 +17,10 @@ use std::sync::Arc;
 /// # Errors
 /// When the body cannot be read.
 pub fn hard(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
-    let shopper = Shopper { template: subject(data, "subject_f_avg")?, ..Shopper::default() };
+    let shopper = Shopper {
+        template: subject(data, "subject_f_avg")?,
+        ..Shopper::default()
+    };
     let setting = |height: f64, away: f64, routine| Setting {
         world_from_camera: Setting::tilted(height, 0.0, 0.0),
         home: P3d::new(0.0, 0.0, -away),
@@ -33,12 +36,22 @@ pub fn hard(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
     let turn = Scene::synthetic("turn_upper", &upper, frames);
     let whole = Sequence::new(shopper.clone(), setting(1.0, 2.4, Routine::TryOn));
     let arm = Scene::synthetic("arm_without_return", &whole, frames);
-    let arm = arm.without_return("left_shoulder", "left_elbow", 0.10).without_return("left_elbow", "left_wrist", 0.09);
+    let arm = arm
+        .without_return("left_shoulder", "left_elbow", 0.10)
+        .without_return("left_elbow", "left_wrist", 0.09);
     // The same before a wall: there the arm leaves a hole.
-    let walled = Setting { room: Some(Room::default()), ..setting(1.0, 2.4, Routine::TryOn) };
-    let hole = Scene::synthetic("arm_without_return_room", &Sequence::new(shopper, walled), frames);
-    let hole =
-        hole.without_return("left_shoulder", "left_elbow", 0.10).without_return("left_elbow", "left_wrist", 0.09);
+    let walled = Setting {
+        room: Some(Room::default()),
+        ..setting(1.0, 2.4, Routine::TryOn)
+    };
+    let hole = Scene::synthetic(
+        "arm_without_return_room",
+        &Sequence::new(shopper, walled),
+        frames,
+    );
+    let hole = hole
+        .without_return("left_shoulder", "left_elbow", 0.10)
+        .without_return("left_elbow", "left_wrist", 0.09);
     Ok(vec![turn, arm, hole])
 }
 
@@ -47,17 +60,36 @@ pub fn hard(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
 /// # Errors
 /// When the body cannot be read.
 pub fn idle(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
-    let shopper = Shopper { template: subject(data, "subject_m_heavy")?, ..Shopper::default() };
+    let shopper = Shopper {
+        template: subject(data, "subject_m_heavy")?,
+        ..Shopper::default()
+    };
     let scene = |name: &str, routine| {
-        let setting = Setting { routine, color: false, seed: 5, ..Setting::default() };
+        let setting = Setting {
+            routine,
+            color: false,
+            seed: 5,
+            ..Setting::default()
+        };
         Scene::synthetic(name, &Sequence::new(shopper.clone(), setting), 150)
     };
-    Ok(vec![scene("still", Routine::Still), scene("empty", Routine::Empty)])
+    Ok(vec![
+        scene("still", Routine::Still),
+        scene("empty", Routine::Empty),
+    ])
 }
 
 /// Name, body of `body/makehuman_smpl_layout`, motion clip of `motion` (the try-on routine without one), noise, room,
 /// camera height (metres) and tilt (degrees), distance (metres), frames.
-type Spec = (&'static str, &'static str, Option<&'static str>, NoiseModel, bool, [f64; 3], u64);
+type Spec = (
+    &'static str,
+    &'static str,
+    Option<&'static str>,
+    NoiseModel,
+    bool,
+    [f64; 3],
+    u64,
+);
 
 const UNSEEN: [Spec; 6] = [
     (
@@ -69,7 +101,15 @@ const UNSEEN: [Spec; 6] = [
         [1.0, 3.0, 2.4],
         210,
     ),
-    ("tryon_m_heavy_tof_noroom", "subject_m_heavy", None, NoiseModel::TimeOfFlight, false, [1.2, 5.0, 2.6], 210),
+    (
+        "tryon_m_heavy_tof_noroom",
+        "subject_m_heavy",
+        None,
+        NoiseModel::TimeOfFlight,
+        false,
+        [1.2, 5.0, 2.6],
+        210,
+    ),
     (
         "clip_m_tall_kinect1_noroom",
         "subject_m_tall",
@@ -97,7 +137,15 @@ const UNSEEN: [Spec; 6] = [
         [1.0, 3.0, 2.6],
         180,
     ),
-    ("upper_m_tall_kinect1_noroom", "subject_m_tall", None, NoiseModel::KinectV1, false, [1.45, 0.0, 1.25], 210),
+    (
+        "upper_m_tall_kinect1_noroom",
+        "subject_m_tall",
+        None,
+        NoiseModel::KinectV1,
+        false,
+        [1.45, 0.0, 1.25],
+        210,
+    ),
 ];
 
 /// Names for [`unseen`].
@@ -110,10 +158,17 @@ pub fn unseen_names() -> impl Iterator<Item = &'static str> {
 /// # Errors
 /// Names the file's array, joint or vertex at fault.
 pub fn subject(data: &Path, name: &str) -> Result<Arc<Template>, EvaluateError> {
-    let fault = |why: String| EvaluateError::Scene { scene: name.to_owned(), why };
-    let path = data.join("body/makehuman_smpl_layout").join(format!("{name}.npz"));
+    let fault = |why: String| EvaluateError::Scene {
+        scene: name.to_owned(),
+        why,
+    };
+    let path = data
+        .join("body/makehuman_smpl_layout")
+        .join(format!("{name}.npz"));
     let arrays = read_smpl(&path).map_err(|e| fault(e.to_string()))?;
-    Ok(Arc::new(template_from_smpl(name, &arrays).map_err(|e| fault(e.to_string()))?))
+    Ok(Arc::new(
+        template_from_smpl(name, &arrays).map_err(|e| fault(e.to_string()))?,
+    ))
 }
 
 /// A scene that nothing was tuned on: `data` is the folder with the shared bodies and motions.
@@ -121,11 +176,19 @@ pub fn subject(data: &Path, name: &str) -> Result<Arc<Template>, EvaluateError> 
 /// # Errors
 /// When there is no scene of that name, or its body or motion cannot be read.
 pub fn unseen(data: &Path, name: &str) -> Result<Scene, EvaluateError> {
-    let fault = |why: String| EvaluateError::Scene { scene: name.to_owned(), why };
-    let Some(&(_, body, clip, noise, room, [height, down, away], frames)) = UNSEEN.iter().find(|s| s.0 == name) else {
+    let fault = |why: String| EvaluateError::Scene {
+        scene: name.to_owned(),
+        why,
+    };
+    let Some(&(_, body, clip, noise, room, [height, down, away], frames)) =
+        UNSEEN.iter().find(|s| s.0 == name)
+    else {
         return Err(fault("no such scene".into()));
     };
-    let shopper = Shopper { template: subject(data, body)?, ..Shopper::default() };
+    let shopper = Shopper {
+        template: subject(data, body)?,
+        ..Shopper::default()
+    };
     let setting = Setting {
         world_from_camera: Setting::tilted(height, down, 0.0),
         home: P3d::new(0.0, 0.0, -away),
@@ -138,8 +201,11 @@ pub fn unseen(data: &Path, name: &str) -> Result<Scene, EvaluateError> {
     };
     let mut sequence = Sequence::new(shopper, setting);
     if let Some(clip) = clip {
-        let motion = read_motion(&data.join("motion").join(clip)).map_err(|e| fault(e.to_string()))?;
-        sequence = sequence.with_clip(motion.at_cmu_rate()).map_err(|e| fault(e.to_string()))?;
+        let motion =
+            read_motion(&data.join("motion").join(clip)).map_err(|e| fault(e.to_string()))?;
+        sequence = sequence
+            .with_clip(motion.at_cmu_rate())
+            .map_err(|e| fault(e.to_string()))?;
     }
     Ok(Scene::synthetic(name, &sequence, frames))
 }

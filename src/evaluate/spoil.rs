@@ -11,7 +11,11 @@ impl Scene {
     fn each_pixel(&mut self, mut f: impl FnMut(&mut rand_pcg::Pcg32, &mut u16)) {
         for (i, frame) in self.frames.iter_mut().enumerate() {
             let mut rng = rand_pcg::Pcg32::new(SEED, i as u64);
-            frame.depth.data_mut().iter_mut().for_each(|d| f(&mut rng, d));
+            frame
+                .depth
+                .data_mut()
+                .iter_mut()
+                .for_each(|d| f(&mut rng, d));
         }
     }
     /// A share of all pixels becomes random, saturated, very near or missing, in equal parts.
@@ -68,16 +72,27 @@ impl Scene {
     #[must_use]
     pub fn without_return(mut self, from: &str, to: &str, radius: f32) -> Self {
         let find = |n: &str| self.joint_names.iter().position(|m| m == n);
-        let (Some(a), Some(b)) = (find(from), find(to)) else { return self };
+        let (Some(a), Some(b)) = (find(from), find(to)) else {
+            return self;
+        };
         let camera = self.calibration.depth;
         for (frame, truth) in self.frames.iter_mut().zip(&self.truth) {
-            let (Some(a), Some(b)) = (truth.joints.get(a), truth.joints.get(b)) else { continue };
+            let (Some(a), Some(b)) = (truth.joints.get(a), truth.joints.get(b)) else {
+                continue;
+            };
             let (a, b) = (a.cast::<f32>(), b.cast::<f32>());
             let along = b - a;
-            for (k, d) in frame.depth.data_mut().iter_mut().enumerate().filter(|(_, d)| **d > 0) {
+            for (k, d) in frame
+                .depth
+                .data_mut()
+                .iter_mut()
+                .enumerate()
+                .filter(|(_, d)| **d > 0)
+            {
                 let (u, v) = (k as u32 % camera.width, k as u32 / camera.width);
                 let p = camera.unproject(u as f32, v as f32, f32::from(*d) * 1e-3);
-                let t = ((p - a).dot(&along) / along.norm_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+                let t = ((p - a).dot(&along) / along.norm_squared().max(f32::MIN_POSITIVE))
+                    .clamp(0.0, 1.0);
                 if (p - (a + along * t)).norm() < radius {
                     *d = 0;
                 }
@@ -91,7 +106,11 @@ impl Scene {
         for frame in self.frames.iter_mut().skip(first) {
             let w = frame.depth.width() as usize;
             let from = (share.clamp(0.0, 1.0) * w as f64) as usize;
-            frame.depth.data_mut().chunks_exact_mut(w).for_each(|row| row[from..].fill(0));
+            frame
+                .depth
+                .data_mut()
+                .chunks_exact_mut(w)
+                .for_each(|row| row[from..].fill(0));
         }
         self
     }
@@ -111,14 +130,21 @@ impl Scene {
     /// the scene lacks the joint.
     #[must_use]
     pub fn holding(mut self, joint: &str, radius: f64) -> Self {
-        let Some(j) = self.joint_names.iter().position(|m| m == joint) else { return self };
+        let Some(j) = self.joint_names.iter().position(|m| m == joint) else {
+            return self;
+        };
         let camera = self.calibration.depth;
         for (frame, truth) in self.frames.iter_mut().zip(&self.truth) {
-            let Some(hand) = truth.joints.get(j) else { continue };
+            let Some(hand) = truth.joints.get(j) else {
+                continue;
+            };
             let centre = hand.coords - hand.coords.normalize() * radius;
             for (k, d) in frame.depth.data_mut().iter_mut().enumerate() {
                 let (u, v) = (k as u32 % camera.width, k as u32 / camera.width);
-                let ray = camera.unproject(u as f32, v as f32, 1.0).coords.cast::<f64>();
+                let ray = camera
+                    .unproject(u as f32, v as f32, 1.0)
+                    .coords
+                    .cast::<f64>();
                 // Nearer root of |t ray − centre| = radius; t is the depth, as the ray has z = 1.
                 let (a, b) = (ray.norm_squared(), ray.dot(&centre));
                 let disc = b * b - a * (centre.norm_squared() - radius * radius);
@@ -151,25 +177,63 @@ mod tests {
 
     #[test]
     fn shares_are_kept_and_truth_goes_along() {
-        let setting = Setting { routine: Routine::Still, color: false, ..Setting::default() };
+        let setting = Setting {
+            routine: Routine::Still,
+            color: false,
+            ..Setting::default()
+        };
         let scene = Scene::synthetic("still", &Sequence::new(Shopper::default(), setting), 5);
-        let readings = |s: &Scene| s.frames[1].depth.data().iter().filter(|d| **d > 0).count() as f64;
+        let readings =
+            |s: &Scene| s.frames[1].depth.data().iter().filter(|d| **d > 0).count() as f64;
         let all = readings(&scene);
         assert!((readings(&scene.clone().thinned(0.9)) / all - 0.1).abs() < 0.01);
         let spoilt = scene.clone().corrupted(0.1);
-        let changed = spoilt.frames[0].depth.data().iter().zip(scene.frames[0].depth.data()).filter(|(a, b)| a != b);
+        let changed = spoilt.frames[0]
+            .depth
+            .data()
+            .iter()
+            .zip(scene.frames[0].depth.data())
+            .filter(|(a, b)| a != b);
         assert!((changed.count() as f64 / (640.0 * 480.0) - 0.098).abs() < 0.02);
         let halved = scene.clone().every(2);
-        assert_eq!((halved.frames.len(), halved.truth.len(), halved.frames[1].sequence), (3, 3, 2));
+        assert_eq!(
+            (
+                halved.frames.len(),
+                halved.truth.len(),
+                halved.frames[1].sequence
+            ),
+            (3, 3, 2)
+        );
         let blind = scene.clone().blind(1..3);
-        assert!(readings(&blind) == 0.0 && blind.truth[1].joints.is_empty() && !blind.truth[3].joints.is_empty());
+        assert!(
+            readings(&blind) == 0.0
+                && blind.truth[1].joints.is_empty()
+                && !blind.truth[3].joints.is_empty()
+        );
         let held = scene.clone().holding("left_wrist", 0.1);
-        let new = held.frames[0].depth.data().iter().zip(scene.frames[0].depth.data()).filter(|(a, b)| a != b).count();
-        assert!((1_000..5_000).contains(&new), "a ball of 20 cm at 2.4 m covers some 1,900 pixels: {new}");
+        let new = held.frames[0]
+            .depth
+            .data()
+            .iter()
+            .zip(scene.frames[0].depth.data())
+            .filter(|(a, b)| a != b)
+            .count();
+        assert!(
+            (1_000..5_000).contains(&new),
+            "a ball of 20 cm at 2.4 m covers some 1,900 pixels: {new}"
+        );
         let both = scene.clone().with(&held);
-        assert_eq!(both.frames[0].depth.data(), held.frames[0].depth.data(), "what is nearer hides what is behind");
+        assert_eq!(
+            both.frames[0].depth.data(),
+            held.frames[0].depth.data(),
+            "what is nearer hides what is behind"
+        );
         let beside = scene.clone().cut_beside(0.5, 1);
         assert!(readings(&beside) < 0.7 * all && beside.frames[0].depth == scene.frames[0].depth);
-        assert!(scene.cut_below(0.5).frames[0].depth.data()[640 * 400..].iter().all(|d| *d == 0));
+        assert!(
+            scene.cut_below(0.5).frames[0].depth.data()[640 * 400..]
+                .iter()
+                .all(|d| *d == 0)
+        );
     }
 }

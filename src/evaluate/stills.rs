@@ -25,7 +25,10 @@ const NAMES: [(&str, &[&str]); 15] = [
     ("L Elbow", &["left_elbow"]),
     ("R Hand", &["right_wrist", "right_hand_end"]),
     ("L Hand", &["left_wrist", "left_hand_end"]),
-    ("Torso", &["left_shoulder", "right_shoulder", "left_hip", "right_hip"]),
+    (
+        "Torso",
+        &["left_shoulder", "right_shoulder", "left_hip", "right_hip"],
+    ),
     ("R Hip", &["right_hip"]),
     ("L Hip", &["left_hip"]),
     ("R Knee", &["right_knee"]),
@@ -74,9 +77,14 @@ pub fn stills(
     mut each: impl FnMut(usize, &TrackerModel, &TrackerState, &mut Workspace, &RgbdFrame, f64),
 ) -> Result<StillsOutcome, EvaluateError> {
     let scene = super::Scene::open(folder)?;
-    let fault = |why: String| EvaluateError::Scene { scene: scene.name.clone(), why };
-    let text = std::fs::read_to_string(folder.join("joints.json")).map_err(|e| fault(format!("joints.json: {e}")))?;
-    let truth: TruthFile = serde_json::from_str(&text).map_err(|e| fault(format!("joints.json: {e}")))?;
+    let fault = |why: String| EvaluateError::Scene {
+        scene: scene.name.clone(),
+        why,
+    };
+    let text = std::fs::read_to_string(folder.join("joints.json"))
+        .map_err(|e| fault(format!("joints.json: {e}")))?;
+    let truth: TruthFile =
+        serde_json::from_str(&text).map_err(|e| fault(format!("joints.json: {e}")))?;
     let skeleton = template.skeleton();
     let ours: Vec<Option<Vec<usize>>> = truth
         .joint_names
@@ -93,11 +101,17 @@ pub fn stills(
     let mut biases = vec![(Vector3::zeros(), 0.0); ours.len()];
     let clock = Instant::now();
     for t in &truth.frames {
-        let Some(picture) = scene.frames.get(t.frame) else { return Err(fault(format!("no picture {}", t.frame))) };
+        let Some(picture) = scene.frames.get(t.frame) else {
+            return Err(fault(format!("no picture {}", t.frame)));
+        };
         let mut state = TrackerState::new(&model);
         let start = thread_ms(clock);
         for i in 0..steps.max(1) {
-            let frame = RgbdFrame { sequence: i, time_ns: i * 33_333_333, ..picture.clone() };
+            let frame = RgbdFrame {
+                sequence: i,
+                time_ns: i * 33_333_333,
+                ..picture.clone()
+            };
             step(&model, &mut state, &frame, &mut workspace).map_err(|e| fault(e.to_string()))?;
             if i == 0 {
                 out.start_ms.push(thread_ms(clock) - start);
@@ -121,7 +135,10 @@ pub fn stills(
                 })
                 .collect();
             let n = pairs.len().max(1) as f64;
-            let offset = pairs.iter().fold(Vector3::zeros(), |s, (_, p, t)| s + (p - t)) / n;
+            let offset = pairs
+                .iter()
+                .fold(Vector3::zeros(), |s, (_, p, t)| s + (p - t))
+                / n;
             for (k, p, t) in &pairs {
                 let off = p - t - offset;
                 if off.norm() < 2.0 * WITHIN {
@@ -137,7 +154,15 @@ pub fn stills(
         each(t.frame, &model, &state, &mut workspace, picture, share);
     }
     let n = truth.frames.len().max(1) as f64;
-    out.per_joint = truth.joint_names.iter().zip(hits).map(|(n_, h)| (n_.clone(), h / n)).collect();
-    out.bias = biases.into_iter().map(|(sum, n): (Vector3<f64>, f64)| sum / n.max(1.0)).collect();
+    out.per_joint = truth
+        .joint_names
+        .iter()
+        .zip(hits)
+        .map(|(n_, h)| (n_.clone(), h / n))
+        .collect();
+    out.bias = biases
+        .into_iter()
+        .map(|(sum, n): (Vector3<f64>, f64)| sum / n.max(1.0))
+        .collect();
     Ok(out)
 }

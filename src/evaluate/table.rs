@@ -23,7 +23,12 @@ pub struct Row {
 impl Row {
     /// A row without parameters and errors.
     pub fn new(scene: impl Into<String>, method: impl Into<String>, run_ms: f64) -> Self {
-        Self { scene: scene.into(), method: method.into(), run_ms, ..Self::default() }
+        Self {
+            scene: scene.into(),
+            method: method.into(),
+            run_ms,
+            ..Self::default()
+        }
     }
     /// Adds a parameter.
     #[must_use]
@@ -98,26 +103,52 @@ fn names<'a>(pairs: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 
 /// A field of a CSV file (RFC 4180).
 fn field(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
 }
 
 impl Table {
     /// An empty table.
-    pub fn new(name: impl Into<String>, command: impl Into<String>, run_time: impl Into<String>) -> Self {
-        Self { name: name.into(), command: command.into(), run_time: run_time.into(), rows: Vec::new() }
+    pub fn new(
+        name: impl Into<String>,
+        command: impl Into<String>,
+        run_time: impl Into<String>,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            command: command.into(),
+            run_time: run_time.into(),
+            rows: Vec::new(),
+        }
     }
     /// Names of all errors, in the order of their first use.
     pub fn errors(&self) -> Vec<&str> {
-        names(self.rows.iter().flat_map(|r| r.errors.iter().map(|(n, _)| n.as_str())))
+        names(
+            self.rows
+                .iter()
+                .flat_map(|r| r.errors.iter().map(|(n, _)| n.as_str())),
+        )
     }
     fn parameters(&self) -> Vec<&str> {
-        names(self.rows.iter().flat_map(|r| r.parameters.iter().map(|(n, _)| n.as_str())))
+        names(
+            self.rows
+                .iter()
+                .flat_map(|r| r.parameters.iter().map(|(n, _)| n.as_str())),
+        )
     }
     /// Comma-separated values: scene, method, parameters, `run_ms`, errors; missing values are empty.
     pub fn to_csv(&self) -> String {
         let (parameters, errors) = (self.parameters(), self.errors());
         let mut out = String::from("scene,method");
-        for p in parameters.iter().copied().chain(["run_ms"]).chain(errors.iter().copied()) {
+        for p in parameters
+            .iter()
+            .copied()
+            .chain(["run_ms"])
+            .chain(errors.iter().copied())
+        {
             out.push(',');
             out += &field(p);
         }
@@ -128,7 +159,11 @@ impl Table {
             out += &field(&row.method);
             for p in &parameters {
                 out.push(',');
-                out += &row.parameters.iter().find(|(n, _)| n == p).map_or(String::new(), |(_, v)| field(v));
+                out += &row
+                    .parameters
+                    .iter()
+                    .find(|(n, _)| n == p)
+                    .map_or(String::new(), |(_, v)| field(v));
             }
             out += &format!(",{:.4}", row.run_ms);
             for e in &errors {
@@ -167,10 +202,19 @@ impl Table {
         let mut out = format!("| {} |\n|{}\n", head.join(" | "), "---|".repeat(head.len()));
         for r in &self.rows {
             let mut cells = vec![r.scene.clone(), r.method.clone()];
-            let value = |p: &&str| r.parameters.iter().find(|(n, _)| n == p).map_or(String::new(), |(_, v)| v.clone());
+            let value = |p: &&str| {
+                r.parameters
+                    .iter()
+                    .find(|(n, _)| n == p)
+                    .map_or(String::new(), |(_, v)| v.clone())
+            };
             cells.extend(parameters.iter().map(value));
             cells.push(format!("{:.2}", r.run_ms));
-            cells.extend(errors.iter().map(|e| r.get(e).map_or(String::new(), |v| format!("{v:.2}"))));
+            cells.extend(
+                errors
+                    .iter()
+                    .map(|e| r.get(e).map_or(String::new(), |v| format!("{v:.2}"))),
+            );
             out += &format!("| {} |\n", cells.join(" | "));
         }
         out
@@ -194,7 +238,10 @@ impl Table {
             Ok::<(), EvaluateError>(())
         };
         save(format!("{}.csv", self.name), self.to_csv())?;
-        save(format!("{}.json", self.name), format!("{:#}\n", self.to_json()))?;
+        save(
+            format!("{}.json", self.name),
+            format!("{:#}\n", self.to_json()),
+        )?;
         for error in self.errors() {
             if let Some(svg) = run_time_against_error(self, error)? {
                 save(format!("{}-{error}.svg", self.name), svg)?;
@@ -210,9 +257,21 @@ mod tests {
 
     fn table() -> Table {
         let mut t = Table::new("trial", "tryon bench trial", "one step");
-        t.rows.push(Row::new("walk, fast", "plane", 1.5).with("iterations", 2).error("joints_mm", 9.0));
-        t.rows.push(Row::new("walk, fast", "plane", 3.0).with("iterations", 8).error("joints_mm", 5.0));
-        t.rows.push(Row::new("walk, fast", "said \"point\"", 4.0).error("joints_mm", f64::NAN).error("lost", 2.0));
+        t.rows.push(
+            Row::new("walk, fast", "plane", 1.5)
+                .with("iterations", 2)
+                .error("joints_mm", 9.0),
+        );
+        t.rows.push(
+            Row::new("walk, fast", "plane", 3.0)
+                .with("iterations", 8)
+                .error("joints_mm", 5.0),
+        );
+        t.rows.push(
+            Row::new("walk, fast", "said \"point\"", 4.0)
+                .error("joints_mm", f64::NAN)
+                .error("lost", 2.0),
+        );
         t
     }
 
@@ -222,7 +281,10 @@ mod tests {
         let lines: Vec<&str> = csv.lines().collect();
         assert_eq!(lines[0], "scene,method,iterations,run_ms,joints_mm,lost");
         assert_eq!(lines[1], "\"walk, fast\",plane,2,1.5000,9.0000,");
-        assert_eq!(lines[3], "\"walk, fast\",\"said \"\"point\"\"\",,4.0000,NaN,2.0000");
+        assert_eq!(
+            lines[3],
+            "\"walk, fast\",\"said \"\"point\"\"\",,4.0000,NaN,2.0000"
+        );
     }
 
     #[test]
@@ -230,18 +292,34 @@ mod tests {
         let v = table().to_json();
         assert_eq!(v["rows"][1]["errors"]["joints_mm"], 5.0);
         assert!(v["rows"][2]["errors"]["joints_mm"].is_null());
-        assert!(table().to_markdown().lines().all(|l| l.matches('|').count() == 7));
+        assert!(
+            table()
+                .to_markdown()
+                .lines()
+                .all(|l| l.matches('|').count() == 7)
+        );
     }
 
     #[test]
     fn files_are_written_and_a_bad_folder_is_named() {
         let dir = tempfile::tempdir().expect("folder");
         let files = table().write(&dir.path().join("new")).expect("written");
-        assert_eq!(files.len(), 3, "{files:?}: `lost` has a single value and no plot");
+        assert_eq!(
+            files.len(),
+            3,
+            "{files:?}: `lost` has a single value and no plot"
+        );
         let blocked = dir.path().join("file");
         std::fs::write(&blocked, "x").expect("file");
-        let error = table().write(&blocked).expect_err("a file is no folder").to_string();
+        let error = table()
+            .write(&blocked)
+            .expect_err("a file is no folder")
+            .to_string();
         assert!(error.contains("file"), "{error}");
-        assert_eq!(Table::default().to_csv().lines().count(), 1, "an empty table has a head only");
+        assert_eq!(
+            Table::default().to_csv().lines().count(),
+            1,
+            "an empty table has a head only"
+        );
     }
 }

@@ -7,7 +7,9 @@ use crate::math::{P3, P3d};
 use crate::mesh::Face;
 use crate::raster::{View, VisibilityBuffer, rasterise};
 use crate::spatial::PointTree;
-use crate::tracking::{StagesMs, StepReport, TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+use crate::tracking::{
+    StagesMs, StepReport, TrackerConfig, TrackerModel, TrackerState, Workspace, step,
+};
 use nalgebra::Vector3;
 use std::sync::Arc;
 use std::time::Instant;
@@ -87,7 +89,10 @@ impl Outcome {
     pub fn row(&self, scene: &Scene, method: &str) -> Row {
         Row::new(&scene.name, method, self.steady_ms())
             .error("joints_mm", mean(&self.joints_mm))
-            .error("worst_frame_mm", self.joints_mm.iter().copied().fold(f64::NAN, f64::max))
+            .error(
+                "worst_frame_mm",
+                self.joints_mm.iter().copied().fold(f64::NAN, f64::max),
+            )
             .error("visible_mm", self.visible_mm)
             .error("whole_mm", self.whole_mm)
             .error("vertices_mm", self.vertices_mm)
@@ -101,7 +106,11 @@ impl Outcome {
 /// does not tell.
 pub fn thread_ms(start: Instant) -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    let on_processor = text.split_whitespace().next().and_then(|n| n.parse::<f64>().ok()).map(|ns| ns * 1e-6);
+    let on_processor = text
+        .split_whitespace()
+        .next()
+        .and_then(|n| n.parse::<f64>().ok())
+        .map(|ns| ns * 1e-6);
     on_processor.unwrap_or_else(|| start.elapsed().as_secs_f64() * 1e3)
 }
 
@@ -116,14 +125,23 @@ pub fn follow(
     let mut state = TrackerState::new(&model);
     let mut workspace = Workspace::default();
     let skeleton = template.skeleton();
-    let joints: Vec<Option<usize>> = scene.joint_names.iter().map(|n| skeleton.index(n)).collect();
-    let mut out = Outcome { per_joint_mm: vec![0.0; joints.len()], ..Outcome::default() };
+    let joints: Vec<Option<usize>> = scene
+        .joint_names
+        .iter()
+        .map(|n| skeleton.index(n))
+        .collect();
+    let mut out = Outcome {
+        per_joint_mm: vec![0.0; joints.len()],
+        ..Outcome::default()
+    };
     let clock = Instant::now();
     let (mut visible, mut whole, mut vertices) = (vec![], vec![], vec![]);
     let mut last_joints: Vec<P3d> = vec![];
     for (i, frame) in scene.frames.iter().enumerate() {
         let start = thread_ms(clock);
-        let Ok(report) = step(&model, &mut state, frame, &mut workspace) else { continue };
+        let Ok(report) = step(&model, &mut state, frame, &mut workspace) else {
+            continue;
+        };
         let stepped = thread_ms(clock);
         let (posed, bones): (&[P3], BoneTransforms) = workspace.posed(&model, &state);
         out.skin_ms.push(thread_ms(clock) - stepped);
@@ -144,14 +162,27 @@ pub fn follow(
                 .map(|(j, t)| j.map_or(f64::NAN, |j| (bones.joints[j] - t).norm() * 1e3))
                 .collect();
             out.joints_mm.push(mean(&off));
-            out.per_joint_mm.iter_mut().zip(&off).for_each(|(s, o)| *s += o);
+            out.per_joint_mm
+                .iter_mut()
+                .zip(&off)
+                .for_each(|(s, o)| *s += o);
             if !truth.vertices.is_empty() && live {
-                let faces = if scene.faces.is_empty() { template.mesh().faces() } else { &scene.faces };
-                let (v, w) = surface_errors(&scene.calibration.depth, truth, faces, posed, template);
+                let faces = if scene.faces.is_empty() {
+                    template.mesh().faces()
+                } else {
+                    &scene.faces
+                };
+                let (v, w) =
+                    surface_errors(&scene.calibration.depth, truth, faces, posed, template);
                 visible.push(v);
                 whole.push(w);
                 if truth.vertices.len() == posed.len() && faces == template.mesh().faces() {
-                    let off: f64 = truth.vertices.iter().zip(posed).map(|(a, b)| f64::from((a - b).norm())).sum();
+                    let off: f64 = truth
+                        .vertices
+                        .iter()
+                        .zip(posed)
+                        .map(|(a, b)| f64::from((a - b).norm()))
+                        .sum();
                     vertices.push(off / posed.len() as f64 * 1e3);
                 }
             }
@@ -162,14 +193,17 @@ pub fn follow(
     }
     let frames = out.joints_mm.len().max(1) as f64;
     out.per_joint_mm.iter_mut().for_each(|s| *s /= frames);
-    (out.visible_mm, out.whole_mm, out.vertices_mm) = (mean(&visible), mean(&whole), mean(&vertices));
+    (out.visible_mm, out.whole_mm, out.vertices_mm) =
+        (mean(&visible), mean(&whole), mean(&vertices));
     out.bones_percent = bone_error(template, scene, &joints, &last_joints);
     out
 }
 
 /// Mean relative error of the lengths of all bones between compared joints, per cent.
 fn bone_error(template: &Template, scene: &Scene, joints: &[Option<usize>], ours: &[P3d]) -> f64 {
-    let Some(truth) = scene.truth.iter().rev().find(|t| !t.joints.is_empty()) else { return f64::NAN };
+    let Some(truth) = scene.truth.iter().rev().find(|t| !t.joints.is_empty()) else {
+        return f64::NAN;
+    };
     let skeleton = template.skeleton().joints();
     let off: Vec<f64> = joints
         .iter()
@@ -193,14 +227,19 @@ fn surface_errors(
     posed: &[P3],
     template: &Template,
 ) -> (f64, f64) {
-    let view = View::Perspective { camera: *camera, near: 0.1 };
+    let view = View::Perspective {
+        camera: *camera,
+        near: 0.1,
+    };
     let mut buffer = VisibilityBuffer::default();
     rasterise(&view, &truth.vertices, truth_faces, &mut buffer);
     let tree = PointTree::new(posed);
     let (faces, around) = (template.mesh().faces(), template.topology().vertex_faces());
     let (mut visible, mut seen, mut whole) = (0.0, 0usize, 0.0);
     for p in &truth.vertices {
-        let Some((k, _)) = tree.nearest(p, f32::INFINITY) else { return (f64::NAN, f64::NAN) };
+        let Some((k, _)) = tree.nearest(p, f32::INFINITY) else {
+            return (f64::NAN, f64::NAN);
+        };
         // The nearest point of the surface lies on a face of the nearest vertex, but for needles.
         let d = around
             .row(k)
@@ -211,7 +250,8 @@ fn surface_errors(
         whole += d;
         let in_view = view.project(p).is_some_and(|[u, v, z]| {
             let (u, v) = (u.round(), v.round());
-            let inside = u >= 0.0 && v >= 0.0 && u < buffer.width as f32 && v < buffer.height as f32;
+            let inside =
+                u >= 0.0 && v >= 0.0 && u < buffer.width as f32 && v < buffer.height as f32;
             inside && z < buffer.depth[v as usize * buffer.width as usize + u as usize] + VISIBLE
         });
         if in_view {
@@ -262,13 +302,28 @@ mod tests {
 
     #[test]
     fn triangles_are_near_at_face_edge_and_corner() {
-        let t = [P3::new(0.0, 0.0, 0.0), P3::new(1.0, 0.0, 0.0), P3::new(0.0, 1.0, 0.0)];
-        let cases = [([0.2, 0.2, 0.5], 0.5), ([0.5, -0.3, 0.4], 0.5), ([-0.3, -0.4, 0.0], 0.5), ([2.0, 0.0, 0.0], 1.0)];
+        let t = [
+            P3::new(0.0, 0.0, 0.0),
+            P3::new(1.0, 0.0, 0.0),
+            P3::new(0.0, 1.0, 0.0),
+        ];
+        let cases = [
+            ([0.2, 0.2, 0.5], 0.5),
+            ([0.5, -0.3, 0.4], 0.5),
+            ([-0.3, -0.4, 0.0], 0.5),
+            ([2.0, 0.0, 0.0], 1.0),
+        ];
         for (p, d) in cases {
-            assert!((distance_to_triangle(&P3::from(p), t) - d).abs() < 1e-6, "{p:?}");
+            assert!(
+                (distance_to_triangle(&P3::from(p), t) - d).abs() < 1e-6,
+                "{p:?}"
+            );
         }
         let flat = [t[0], t[0], t[0]];
-        assert!(distance_to_triangle(&P3::new(0.0, 3.0, 4.0), flat) == 5.0, "a degenerate triangle is a point");
+        assert!(
+            distance_to_triangle(&P3::new(0.0, 3.0, 4.0), flat) == 5.0,
+            "a degenerate triangle is a point"
+        );
     }
 
     #[test]

@@ -58,7 +58,12 @@ fn axis_of(letter: Option<u8>) -> Option<usize> {
 }
 
 fn parse_asf(text: &str, path: &Path) -> Result<Skeleton, FormatError> {
-    let mut s = Skeleton { bones: Vec::new(), root: Vec::new(), scale: INCH, degrees: true };
+    let mut s = Skeleton {
+        bones: Vec::new(),
+        root: Vec::new(),
+        scale: INCH,
+        degrees: true,
+    };
     let blank = |name: &str| Bone {
         name: name.into(),
         parent: 0,
@@ -84,7 +89,11 @@ fn parse_asf(text: &str, path: &Path) -> Result<Skeleton, FormatError> {
             ("units", "length") => {
                 let length = number(path, n, "length", words.next())?;
                 if length <= 0.0 {
-                    return Err(fault(path, n, format!("length {length}, expected a positive number")));
+                    return Err(fault(
+                        path,
+                        n,
+                        format!("length {length}, expected a positive number"),
+                    ));
                 }
                 s.scale = INCH / length;
             }
@@ -92,41 +101,61 @@ fn parse_asf(text: &str, path: &Path) -> Result<Skeleton, FormatError> {
             ("root", "order") => {
                 for word in words {
                     let axis = axis_of(word.as_bytes().get(1).copied());
-                    let axis = axis.ok_or_else(|| fault(path, n, format!("root: no channel `{word}`")))?;
+                    let axis =
+                        axis.ok_or_else(|| fault(path, n, format!("root: no channel `{word}`")))?;
                     s.root.push((word.starts_with(['T', 't']), axis));
                 }
             }
             ("bonedata", "begin") => bone = Some((blank(""), V3d::zeros(), 0.0)),
             ("bonedata", "end") => {
-                let (mut b, direction, length) = bone.take().ok_or_else(|| fault(path, n, "`end` without `begin`"))?;
+                let (mut b, direction, length) = bone
+                    .take()
+                    .ok_or_else(|| fault(path, n, "`end` without `begin`"))?;
                 b.along = direction * (length * s.scale);
                 if b.name.is_empty() || s.bones.iter().any(|o| o.name == b.name) {
-                    return Err(fault(path, n, format!("bone `{}`: its name is missing or used twice", b.name)));
+                    return Err(fault(
+                        path,
+                        n,
+                        format!("bone `{}`: its name is missing or used twice", b.name),
+                    ));
                 }
                 s.bones.push(b);
             }
             ("bonedata", _) => {
-                let Some((b, direction, length)) = &mut bone else { continue };
+                let Some((b, direction, length)) = &mut bone else {
+                    continue;
+                };
                 match key {
                     "name" => b.name = words.next().unwrap_or_default().into(),
                     "direction" => {
                         for c in direction.iter_mut() {
-                            *c = number(path, n, &format!("bone `{}`: direction", b.name), words.next())?;
+                            *c = number(
+                                path,
+                                n,
+                                &format!("bone `{}`: direction", b.name),
+                                words.next(),
+                            )?;
                         }
                     }
-                    "length" => *length = number(path, n, &format!("bone `{}`: length", b.name), words.next())?,
+                    "length" => {
+                        *length =
+                            number(path, n, &format!("bone `{}`: length", b.name), words.next())?
+                    }
                     "axis" => {
                         let mut a = V3d::zeros();
                         for c in a.iter_mut() {
-                            *c = number(path, n, &format!("bone `{}`: axis", b.name), words.next())?;
+                            *c =
+                                number(path, n, &format!("bone `{}`: axis", b.name), words.next())?;
                         }
                         b.axis = euler(if s.degrees { a.map(f64::to_radians) } else { a });
                     }
                     "dof" => {
                         for word in words {
-                            let axis = axis_of(word.as_bytes().get(1).copied()).filter(|_| word.starts_with('r'));
-                            let axis =
-                                axis.ok_or_else(|| fault(path, n, format!("bone `{}`: no dof `{word}`", b.name)))?;
+                            let axis = axis_of(word.as_bytes().get(1).copied())
+                                .filter(|_| word.starts_with('r'));
+                            let axis = axis.ok_or_else(|| {
+                                fault(path, n, format!("bone `{}`: no dof `{word}`", b.name))
+                            })?;
                             b.dof.push(axis);
                         }
                     }
@@ -148,15 +177,27 @@ fn parse_asf(text: &str, path: &Path) -> Result<Skeleton, FormatError> {
         }
     }
     if !seen || s.bones.len() < 2 {
-        return Err(FormatError::field(path, "hierarchy", "no bones: not an ASF file, or cut short"));
+        return Err(FormatError::field(
+            path,
+            "hierarchy",
+            "no bones: not an ASF file, or cut short",
+        ));
     }
     // Bones in an order in which parents come first.
     let mut order = vec![0];
     let mut at = 0;
     while at < order.len() {
-        let children = parents.iter().filter(|(_, p, _)| *p == order[at]).map(|(c, ..)| *c).collect::<Vec<_>>();
+        let children = parents
+            .iter()
+            .filter(|(_, p, _)| *p == order[at])
+            .map(|(c, ..)| *c)
+            .collect::<Vec<_>>();
         if let Some(&c) = children.iter().find(|c| order.contains(c)) {
-            return Err(FormatError::field(path, "hierarchy", format!("bone `{}` has two parents", s.bones[c].name)));
+            return Err(FormatError::field(
+                path,
+                "hierarchy",
+                format!("bone `{}` has two parents", s.bones[c].name),
+            ));
         }
         order.extend(children);
         at += 1;
@@ -165,8 +206,14 @@ fn parse_asf(text: &str, path: &Path) -> Result<Skeleton, FormatError> {
     let bones = order
         .iter()
         .map(|&o| {
-            let parent = parents.iter().find(|(c, ..)| *c == o).map_or(0, |(_, p, _)| place(*p));
-            Bone { parent, ..s.bones[o].clone() }
+            let parent = parents
+                .iter()
+                .find(|(c, ..)| *c == o)
+                .map_or(0, |(_, p, _)| place(*p));
+            Bone {
+                parent,
+                ..s.bones[o].clone()
+            }
         })
         .collect();
     Ok(Skeleton { bones, ..s })
@@ -178,7 +225,8 @@ fn parse_asf(text: &str, path: &Path) -> Result<Skeleton, FormatError> {
 /// # Errors
 /// Names file, line and bone.
 pub fn read_asf_amc(asf: &Path, amc: &Path) -> Result<MotionClip, FormatError> {
-    let text = |p: &Path| read_limited(p, MAX_BYTES).map(|b| String::from_utf8_lossy(&b).into_owned());
+    let text =
+        |p: &Path| read_limited(p, MAX_BYTES).map(|b| String::from_utf8_lossy(&b).into_owned());
     parse_asf_amc(&text(asf)?, asf, &text(amc)?, amc)
 }
 
@@ -186,14 +234,30 @@ pub fn read_asf_amc(asf: &Path, amc: &Path) -> Result<MotionClip, FormatError> {
 ///
 /// # Errors
 /// As [`read_asf_amc`].
-pub fn parse_asf_amc(asf: &str, asf_path: &Path, amc: &str, amc_path: &Path) -> Result<MotionClip, FormatError> {
+pub fn parse_asf_amc(
+    asf: &str,
+    asf_path: &Path,
+    amc: &str,
+    amc_path: &Path,
+) -> Result<MotionClip, FormatError> {
     let s = parse_asf(asf, asf_path)?;
-    let index: BTreeMap<&str, usize> = s.bones.iter().enumerate().map(|(i, b)| (b.name.as_str(), i)).collect();
+    let index: BTreeMap<&str, usize> = s
+        .bones
+        .iter()
+        .enumerate()
+        .map(|(i, b)| (b.name.as_str(), i))
+        .collect();
     let mut names: Vec<String> = s.bones.iter().map(|b| b.name.clone()).collect();
-    let last: Vec<usize> = (1..s.bones.len()).filter(|i| s.bones.iter().skip(1).all(|b| b.parent != *i)).collect();
+    let last: Vec<usize> = (1..s.bones.len())
+        .filter(|i| s.bones.iter().skip(1).all(|b| b.parent != *i))
+        .collect();
     names.extend(last.iter().map(|&i| format!("{}_end", s.bones[i].name)));
 
-    let mut clip = MotionClip { names, frames: Vec::new(), period: PERIOD };
+    let mut clip = MotionClip {
+        names,
+        frames: Vec::new(),
+        period: PERIOD,
+    };
     let mut turns: Vec<V3d> = Vec::new();
     let mut origin = V3d::zeros();
     let mut open = false;
@@ -212,9 +276,15 @@ pub fn parse_asf_amc(asf: &str, asf_path: &Path, amc: &str, amc_path: &Path) -> 
             continue;
         }
         if !open {
-            return Err(fault(amc_path, n, format!("`{key}` before the first frame number")));
+            return Err(fault(
+                amc_path,
+                n,
+                format!("`{key}` before the first frame number"),
+            ));
         }
-        let &bone = index.get(key).ok_or_else(|| fault(amc_path, n, format!("no bone `{key}` in the skeleton")))?;
+        let &bone = index
+            .get(key)
+            .ok_or_else(|| fault(amc_path, n, format!("no bone `{key}` in the skeleton")))?;
         let what = format!("frame {}, bone `{key}`", clip.frames.len() + 1);
         let angle = |v: f64| if s.degrees { v.to_radians() } else { v };
         if bone == 0 {
@@ -236,7 +306,11 @@ pub fn parse_asf_amc(asf: &str, asf_path: &Path, amc: &str, amc_path: &Path) -> 
         clip.frames.push(positions(&s, &last, &turns, origin));
     }
     if clip.frames.is_empty() {
-        return Err(FormatError::field(amc_path, "frames", "none: not an AMC file, or cut short"));
+        return Err(FormatError::field(
+            amc_path,
+            "frames",
+            "none: not an AMC file, or cut short",
+        ));
     }
     Ok(clip)
 }
@@ -248,8 +322,11 @@ fn positions(s: &Skeleton, last: &[usize], turns: &[V3d], origin: V3d) -> Vec<P3
     let mut out = Vec::with_capacity(s.bones.len() + last.len());
     for (i, b) in s.bones.iter().enumerate() {
         let local = b.axis * euler(turns[i]) * b.axis.inverse();
-        let (turn, start) =
-            if i == 0 { (local, P3d::from(origin)) } else { (global[b.parent] * local, ends[b.parent]) };
+        let (turn, start) = if i == 0 {
+            (local, P3d::from(origin))
+        } else {
+            (global[b.parent] * local, ends[b.parent])
+        };
         global.push(turn);
         ends.push(start + turn * b.along);
         out.push(start);
@@ -275,7 +352,8 @@ mod tests {
         let amc = ":DEGREES\n1\nroot 1 2 3 0 0 0\nthigh 0\nshin 90\n2\nroot 0 0 0 0 90 0\nthigh 90\nshin 0\n";
         let clip = parse(ASF, amc).expect("reads");
         assert_eq!(clip.names, ["root", "thigh", "shin", "shin_end"]);
-        let near = |p: P3d, x: f64, y: f64, z: f64| assert!((p - P3d::new(x, y, z)).norm() < 1e-9, "{p}");
+        let near =
+            |p: P3d, x: f64, y: f64, z: f64| assert!((p - P3d::new(x, y, z)).norm() < 1e-9, "{p}");
         near(clip.frames[0][2], 1.0, 0.0, 3.0);
         near(clip.frames[0][3], 2.0, 0.0, 3.0);
         // The thigh's own x axis is the global y axis: it does not swing, only twists.
@@ -284,42 +362,71 @@ mod tests {
 
     #[test]
     fn faults_name_line_and_bone() {
-        let fault = |asf: &str, amc: &str| parse(asf, amc).expect_err("must be refused").to_string();
+        let fault =
+            |asf: &str, amc: &str| parse(asf, amc).expect_err("must be refused").to_string();
         let e = fault(ASF, "1\nroot 0 0 0 0 0 0\nthigh x\n");
-        assert!(e.contains("s.amc") && e.contains("line 3") && e.contains("`thigh`"), "{e}");
+        assert!(
+            e.contains("s.amc") && e.contains("line 3") && e.contains("`thigh`"),
+            "{e}"
+        );
         assert!(fault(ASF, "1\narm 3\n").contains("no bone `arm`"));
         assert!(fault(ASF, "1\nroot 0 0\n").contains("missing"));
         assert!(fault(ASF, "").contains("`frames`"));
-        assert!(fault(&ASF.replace("thigh shin\n", "thigh arm\n"), "1\n").contains("no bone `arm`"));
+        assert!(
+            fault(&ASF.replace("thigh shin\n", "thigh arm\n"), "1\n").contains("no bone `arm`")
+        );
         assert!(fault(&ASF.replace("length 2", "length NaN"), "1\n").contains("`thigh`"));
         assert!(fault(&ASF[..ASF.find(":root").expect("there")], "1\n").contains("`hierarchy`"));
-        assert!(fault(&ASF.replace("  thigh shin\n", "  thigh shin thigh\n"), "1\n").contains("two parents"));
+        assert!(
+            fault(
+                &ASF.replace("  thigh shin\n", "  thigh shin thigh\n"),
+                "1\n"
+            )
+            .contains("two parents")
+        );
     }
 
     #[test]
     fn shared_clips_are_people() {
         let root = std::env::var_os("TRYON_SHARED")
-            .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from)
+            .map_or_else(
+                || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"),
+                PathBuf::from,
+            )
             .join("data/motion");
         if !root.exists() {
-            assert!(std::env::var_os("TRYON_REQUIRE_ALL").is_none(), "{} is missing", root.display());
+            assert!(
+                std::env::var_os("TRYON_REQUIRE_ALL").is_none(),
+                "{} is missing",
+                root.display()
+            );
             eprintln!("SKIPPED: {} is missing", root.display());
             return;
         }
         for (file, frames, names) in [
             ("cmu_asf_amc/02_07.amc", 0, ["lfemur", "ltibia", "lfoot"]),
             ("cmu_asf_amc/93_04.amc", 0, ["lfemur", "ltibia", "lfoot"]),
-            ("cmu_bvh/02_02_makehuman.bvh", 299, ["lThigh", "lShin", "lFoot"]),
+            (
+                "cmu_bvh/02_02_makehuman.bvh",
+                299,
+                ["lThigh", "lShin", "lFoot"],
+            ),
             ("cmu_bvh/02_03.bvh", 174, ["lhip", "lknee", "lfoot"]),
         ] {
             let clip = read_motion(&root.join(file)).expect(file);
-            assert!(clip.frames.len() == frames || frames == 0 && clip.frames.len() > 100, "{file}");
+            assert!(
+                clip.frames.len() == frames || frames == 0 && clip.frames.len() > 100,
+                "{file}"
+            );
             let [hip, knee, ankle] = names.map(|n| clip.joint(&[n]).expect(n));
             for f in clip.frames.iter().step_by(20) {
                 // Bones keep their lengths, and the shank is about as long as the thigh.
                 let (a, b) = ((f[hip] - f[knee]).norm(), (f[knee] - f[ankle]).norm());
                 let first = &clip.frames[0];
-                assert!(((first[hip] - first[knee]).norm() - a).abs() < 1e-6 * a, "{file}");
+                assert!(
+                    ((first[hip] - first[knee]).norm() - a).abs() < 1e-6 * a,
+                    "{file}"
+                );
                 assert!((0.8..1.4).contains(&(a / b)), "{file}: {a} {b}");
             }
         }

@@ -49,7 +49,11 @@ impl<'a> Words<'a> {
     }
     fn expect(&mut self, word: &str) -> Result<(), FormatError> {
         let got = self.next(&format!("`{word}`"))?;
-        if got.eq_ignore_ascii_case(word) { Ok(()) } else { Err(self.fault(format!("`{got}`, expected `{word}`"))) }
+        if got.eq_ignore_ascii_case(word) {
+            Ok(())
+        } else {
+            Err(self.fault(format!("`{got}`, expected `{word}`")))
+        }
     }
     fn number(&mut self, what: &str) -> Result<f64, FormatError> {
         let word = self.next(what)?;
@@ -58,7 +62,8 @@ impl<'a> Words<'a> {
     }
     fn count(&mut self, what: &str) -> Result<usize, FormatError> {
         let word = self.next(what)?;
-        word.parse().map_err(|_| self.fault(format!("{what}: `{word}` is no count")))
+        word.parse()
+            .map_err(|_| self.fault(format!("{what}: `{word}` is no count")))
     }
 }
 
@@ -67,7 +72,10 @@ impl<'a> Words<'a> {
 /// # Errors
 /// Names the line and the joint at fault.
 pub fn read_bvh(path: &Path) -> Result<MotionClip, FormatError> {
-    parse_bvh(&String::from_utf8_lossy(&read_limited(path, MAX_BYTES)?), path)
+    parse_bvh(
+        &String::from_utf8_lossy(&read_limited(path, MAX_BYTES)?),
+        path,
+    )
 }
 
 /// Reads BVH text; `origin` is named in errors.
@@ -75,8 +83,15 @@ pub fn read_bvh(path: &Path) -> Result<MotionClip, FormatError> {
 /// # Errors
 /// As [`read_bvh`].
 pub fn parse_bvh(text: &str, origin: &Path) -> Result<MotionClip, FormatError> {
-    let words = text.lines().enumerate().flat_map(|(n, l)| l.split_whitespace().map(move |w| (n + 1, w)));
-    let mut w = Words { path: origin, words: Box::new(words), line: 1 };
+    let words = text
+        .lines()
+        .enumerate()
+        .flat_map(|(n, l)| l.split_whitespace().map(move |w| (n + 1, w)));
+    let mut w = Words {
+        path: origin,
+        words: Box::new(words),
+        line: 1,
+    };
     w.expect("HIERARCHY")?;
     w.expect("ROOT")?;
     let joints = hierarchy(&mut w)?;
@@ -87,7 +102,9 @@ pub fn parse_bvh(text: &str, origin: &Path) -> Result<MotionClip, FormatError> {
     w.expect("Time:")?;
     let period = w.number("frame time")?;
     if period <= 0.0 {
-        return Err(w.fault(format!("frame time {period}, expected a positive number of seconds")));
+        return Err(w.fault(format!(
+            "frame time {period}, expected a positive number of seconds"
+        )));
     }
     let mut frames = Vec::new();
     let mut global: Vec<Isometry3<f64>> = Vec::new();
@@ -115,9 +132,18 @@ pub fn parse_bvh(text: &str, origin: &Path) -> Result<MotionClip, FormatError> {
             let local = Isometry3::from_parts(Translation3::from(at), turn);
             global.push(j.parent.map_or(local, |p| global[p] * local));
         }
-        frames.push(global.iter().map(|g| P3d::from(g.translation.vector)).collect());
+        frames.push(
+            global
+                .iter()
+                .map(|g| P3d::from(g.translation.vector))
+                .collect(),
+        );
     }
-    Ok(MotionClip { names: joints.into_iter().map(|j| j.name).collect(), frames, period })
+    Ok(MotionClip {
+        names: joints.into_iter().map(|j| j.name).collect(),
+        frames,
+        period,
+    })
 }
 
 fn hierarchy(w: &mut Words<'_>) -> Result<Vec<Joint>, FormatError> {
@@ -128,15 +154,26 @@ fn hierarchy(w: &mut Words<'_>) -> Result<Vec<Joint>, FormatError> {
         // `name` has just been read: its block follows.
         w.expect("{")?;
         w.expect("OFFSET")?;
-        let offset = V3d::new(w.number("offset")?, w.number("offset")?, w.number("offset")?);
+        let offset = V3d::new(
+            w.number("offset")?,
+            w.number("offset")?,
+            w.number("offset")?,
+        );
         if joints.len() == MAX_JOINTS {
             return Err(w.fault(format!("more than {MAX_JOINTS} joints")));
         }
-        joints.push(Joint { name, parent: open.last().copied(), offset, channels: Vec::new() });
+        joints.push(Joint {
+            name,
+            parent: open.last().copied(),
+            offset,
+            channels: Vec::new(),
+        });
         open.push(joints.len() - 1);
         name = loop {
             let word = w.next("`JOINT`, `End`, `CHANNELS` or `}`")?;
-            let Some(&at) = open.last() else { return Err(w.fault("a `}` too many")) };
+            let Some(&at) = open.last() else {
+                return Err(w.fault("a `}` too many"));
+            };
             match word.to_ascii_uppercase().as_str() {
                 "CHANNELS" => {
                     for _ in 0..w.count("number of channels")?.min(7) {
@@ -145,12 +182,22 @@ fn hierarchy(w: &mut Words<'_>) -> Result<Vec<Joint>, FormatError> {
                             Some(b'x') => 0,
                             Some(b'y') => 1,
                             Some(b'z') => 2,
-                            _ => return Err(w.fault(format!("joint `{}`: no channel `{word}`", joints[at].name))),
+                            _ => {
+                                return Err(w.fault(format!(
+                                    "joint `{}`: no channel `{word}`",
+                                    joints[at].name
+                                )));
+                            }
                         };
                         let channel = match word.get(1..).map(str::to_ascii_lowercase).as_deref() {
                             Some("position") => Channel::Position(axis),
                             Some("rotation") => Channel::Rotation(axis),
-                            _ => return Err(w.fault(format!("joint `{}`: no channel `{word}`", joints[at].name))),
+                            _ => {
+                                return Err(w.fault(format!(
+                                    "joint `{}`: no channel `{word}`",
+                                    joints[at].name
+                                )));
+                            }
                         };
                         joints[at].channels.push(channel);
                     }
@@ -183,7 +230,8 @@ mod tests {
     fn turns_are_applied_in_the_order_of_the_channels() {
         let clip = parse_bvh(ARM, Path::new("a.bvh")).expect("reads");
         assert_eq!(clip.names, ["hip", "arm", "arm_end"]);
-        let near = |p: P3d, x: f64, y: f64, z: f64| assert!((p - P3d::new(x, y, z)).norm() < 1e-12, "{p}");
+        let near =
+            |p: P3d, x: f64, y: f64, z: f64| assert!((p - P3d::new(x, y, z)).norm() < 1e-12, "{p}");
         near(clip.frames[0][1], 1.0, 1.0, 0.0);
         near(clip.frames[0][2], 1.0, 3.0, 0.0);
         // The root's quarter turn about z carries the arm up; its own turn about x leaves a bone along x alone.
@@ -194,10 +242,22 @@ mod tests {
 
     #[test]
     fn faults_name_line_and_joint() {
-        let fault = |text: &str| parse_bvh(text, Path::new("a.bvh")).expect_err("must be refused").to_string();
+        let fault = |text: &str| {
+            parse_bvh(text, Path::new("a.bvh"))
+                .expect_err("must be refused")
+                .to_string()
+        };
         let e = fault(&ARM.replace("0 1 0 90 0 0 0 90 0", "0 1 0 90 0 0 0 x 0"));
-        assert!(e.contains("a.bvh") && e.contains("line 20") && e.contains("`arm`") && e.contains("frame 1"), "{e}");
-        assert!(fault(&ARM.replace("Yrotation\n  End", "Wrotation\n  End")).contains("`Wrotation`"));
+        assert!(
+            e.contains("a.bvh")
+                && e.contains("line 20")
+                && e.contains("`arm`")
+                && e.contains("frame 1"),
+            "{e}"
+        );
+        assert!(
+            fault(&ARM.replace("Yrotation\n  End", "Wrotation\n  End")).contains("`Wrotation`")
+        );
         assert!(fault(&ARM[..ARM.find("CHANNELS").expect("there")]).contains("ends where"));
         assert!(fault(&ARM.replace("Time: 0.01", "Time: 0")).contains("frame time"));
         assert!(fault(&ARM.replace("Frames: 2", "Frames: 4000000000")).contains("ends where"));

@@ -28,10 +28,17 @@ pub enum FormatError {
 impl FormatError {
     /// An error of the operating system on `file`.
     pub fn io(file: &Path, source: std::io::Error) -> Self {
-        Self::Io { file: file.to_owned(), why: source }
+        Self::Io {
+            file: file.to_owned(),
+            why: source,
+        }
     }
     /// A bad field of `file`.
     pub fn field(file: &Path, field: impl Into<String>, why: impl Into<String>) -> Self {
-        Self::Field { file: file.to_owned(), field: field.into(), why: why.into() }
+        Self::Field {
+            file: file.to_owned(),
+            field: field.into(),
+            why: why.into(),
+        }
     }
 }

@@ -28,7 +28,8 @@ pub struct MeasuredFabric {
 /// As [`parse_fabric`], or when the file cannot be read.
 pub fn read_fabric(path: &Path) -> Result<MeasuredFabric, FormatError> {
     let bytes = read_limited(path, MAX_BYTES)?;
-    let text = String::from_utf8(bytes).map_err(|_| FormatError::field(path, "text", "it is not UTF-8"))?;
+    let text = String::from_utf8(bytes)
+        .map_err(|_| FormatError::field(path, "text", "it is not UTF-8"))?;
     parse_fabric(&text, path)
 }
 
@@ -37,19 +38,31 @@ pub fn read_fabric(path: &Path) -> Result<MeasuredFabric, FormatError> {
 /// # Errors
 /// Names the field, row or value at fault.
 pub fn parse_fabric(text: &str, origin: &Path) -> Result<MeasuredFabric, FormatError> {
-    let f: MeasuredFabric =
-        serde_json::from_str(text).map_err(|e| FormatError::field(origin, "fabric", e.to_string()))?;
+    let f: MeasuredFabric = serde_json::from_str(text)
+        .map_err(|e| FormatError::field(origin, "fabric", e.to_string()))?;
     if !(f.density > 0.0 && f.density < 100.0) {
-        return Err(FormatError::field(origin, "density", format!("{} kg/m² is no fabric", f.density)));
+        return Err(FormatError::field(
+            origin,
+            "density",
+            format!("{} kg/m² is no fabric", f.density),
+        ));
     }
     for ((field, rows, columns), table) in SHAPES.into_iter().zip([&f.stretching, &f.bending]) {
         if table.len() != rows {
-            return Err(FormatError::field(origin, field, format!("{} rows, {rows} are needed", table.len())));
+            return Err(FormatError::field(
+                origin,
+                field,
+                format!("{} rows, {rows} are needed", table.len()),
+            ));
         }
         for (k, row) in table.iter().enumerate() {
             let at = format!("{field}[{k}]");
             if row.len() != columns {
-                return Err(FormatError::field(origin, at, format!("{} values, {columns} are needed", row.len())));
+                return Err(FormatError::field(
+                    origin,
+                    at,
+                    format!("{} values, {columns} are needed", row.len()),
+                ));
             }
             if let Some(v) = row.iter().find(|v| !v.is_finite()) {
                 return Err(FormatError::field(origin, at, format!("{v} is not finite")));
@@ -72,7 +85,11 @@ mod tests {
         assert_eq!(parse(FABRIC).expect("valid").stretching[0][2], 2.0);
         let e = parse(&FABRIC.replace("[1,0,2,3]", "[1,0,2]")).expect_err("short row");
         assert!(e.contains("stretching[0]") && e.contains("3 values"), "{e}");
-        assert!(parse(&FABRIC.replace("0.2", "-1")).expect_err("mass").contains("density"));
+        assert!(
+            parse(&FABRIC.replace("0.2", "-1"))
+                .expect_err("mass")
+                .contains("density")
+        );
         for cut in 0..FABRIC.len() {
             assert!(parse(&FABRIC[..cut]).is_err());
         }

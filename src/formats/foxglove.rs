@@ -4,12 +4,17 @@
 
 use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
-use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet, Timestamp};
+use prost_types::{
+    DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet, Timestamp,
+};
 
 /// Nanoseconds since the epoch as a protobuf timestamp.
 pub(super) fn timestamp(time_ns: u64) -> Option<Timestamp> {
     const SECOND: u64 = 1_000_000_000;
-    Some(Timestamp { seconds: (time_ns / SECOND) as i64, nanos: (time_ns % SECOND) as i32 })
+    Some(Timestamp {
+        seconds: (time_ns / SECOND) as i64,
+        nanos: (time_ns % SECOND) as i32,
+    })
 }
 
 /// `foxglove.CameraCalibration`.
@@ -136,7 +141,12 @@ const COMPRESSED_IMAGE: &[Field] = &[
     ("format", 3, "string"),
 ];
 const VECTOR3: &[Field] = &[("x", 1, "double"), ("y", 2, "double"), ("z", 3, "double")];
-const QUATERNION: &[Field] = &[("x", 1, "double"), ("y", 2, "double"), ("z", 3, "double"), ("w", 4, "double")];
+const QUATERNION: &[Field] = &[
+    ("x", 1, "double"),
+    ("y", 2, "double"),
+    ("z", 3, "double"),
+    ("w", 4, "double"),
+];
 const FRAME_TRANSFORM: &[Field] = &[
     ("timestamp", 1, ".google.protobuf.Timestamp"),
     ("parent_frame_id", 2, "string"),
@@ -146,7 +156,13 @@ const FRAME_TRANSFORM: &[Field] = &[
 ];
 const TIMESTAMP: &[Field] = &[("seconds", 1, "int64"), ("nanos", 2, "int32")];
 
-fn file(name: &str, package: &str, message: &str, fields: &[Field], imports: &[&str]) -> FileDescriptorProto {
+fn file(
+    name: &str,
+    package: &str,
+    message: &str,
+    fields: &[Field],
+    imports: &[&str],
+) -> FileDescriptorProto {
     let field = |(name, number, kind): &Field| {
         let (kind, label) = match *kind {
             "doubles" => (Type::Double, Label::Repeated),
@@ -182,7 +198,10 @@ fn file(name: &str, package: &str, message: &str, fields: &[Field], imports: &[&
 }
 
 fn fields_type(fields: &[Field], name: &str) -> String {
-    fields.iter().find(|f| f.0 == name).map_or(String::new(), |f| f.2.to_owned())
+    fields
+        .iter()
+        .find(|f| f.0 == name)
+        .map_or(String::new(), |f| f.2.to_owned())
 }
 
 /// The schema of a message as MCAP wants it: a FileDescriptorSet with everything that it needs.
@@ -201,7 +220,13 @@ pub(super) fn schema(message: &str) -> Vec<u8> {
             (FRAME_TRANSFORM, &[TIME, VECTOR, TURN])
         }
     };
-    files.push(file(&format!("foxglove/{message}.proto"), "foxglove", message, fields, imports));
+    files.push(file(
+        &format!("foxglove/{message}.proto"),
+        "foxglove",
+        message,
+        fields,
+        imports,
+    ));
     FileDescriptorSet { file: files }.encode_to_vec()
 }
 
@@ -226,8 +251,15 @@ mod tests {
     #[test]
     fn bytes_are_those_of_the_schema() {
         // Hand-encoded: field 3 (fixed32) height = 2, field 4 string "16UC1", field 6 bytes.
-        let m = RawImage { height: 2, encoding: "16UC1".into(), data: vec![7, 8], ..Default::default() };
-        let want = [0x1d, 2, 0, 0, 0, 0x22, 5, b'1', b'6', b'U', b'C', b'1', 0x32, 2, 7, 8];
+        let m = RawImage {
+            height: 2,
+            encoding: "16UC1".into(),
+            data: vec![7, 8],
+            ..Default::default()
+        };
+        let want = [
+            0x1d, 2, 0, 0, 0, 0x22, 5, b'1', b'6', b'U', b'C', b'1', 0x32, 2, 7, 8,
+        ];
         assert_eq!(encode(&m), want);
         assert_eq!(decode::<RawImage>(&want), Some(m));
         assert_eq!(decode::<RawImage>(&[0x32, 200]), None);
@@ -235,13 +267,23 @@ mod tests {
 
     #[test]
     fn descriptors_hold_what_they_import() {
-        for name in ["CameraCalibration", "RawImage", "CompressedImage", "FrameTransform"] {
+        for name in [
+            "CameraCalibration",
+            "RawImage",
+            "CompressedImage",
+            "FrameTransform",
+        ] {
             let set = FileDescriptorSet::decode(schema(name).as_slice()).expect("decodes");
             let names: Vec<_> = set.file.iter().filter_map(|f| f.name.clone()).collect();
             let last = set.file.last().expect("files");
             assert!(last.dependency.iter().all(|d| names.contains(d)), "{name}");
             assert_eq!(last.message_type[0].name.as_deref(), Some(name));
-            assert!(last.message_type[0].field.iter().all(|f| f.r#type() != Type::Message || f.type_name.is_some()));
+            assert!(
+                last.message_type[0]
+                    .field
+                    .iter()
+                    .all(|f| f.r#type() != Type::Message || f.type_name.is_some())
+            );
         }
     }
 }

@@ -98,13 +98,17 @@ struct JsonStitch {
 /// As [`parse_garmentcode`], or when the file cannot be read.
 pub fn read_garmentcode(path: &Path) -> Result<RawPattern, FormatError> {
     let bytes = read_limited(path, MAX_BYTES)?;
-    let text = String::from_utf8(bytes).map_err(|_| FormatError::field(path, "text", "it is not UTF-8"))?;
+    let text = String::from_utf8(bytes)
+        .map_err(|_| FormatError::field(path, "text", "it is not UTF-8"))?;
     parse_garmentcode(&text, path)
 }
 
 /// Whether a JSON text looks like a GarmentCode pattern (and not like ours).
 pub fn is_garmentcode(text: &str) -> bool {
-    serde_json::from_str::<Value>(text).is_ok_and(|v| v.get("pattern").is_some_and(|p| p.get("stitches").is_some()))
+    serde_json::from_str::<Value>(text).is_ok_and(|v| {
+        v.get("pattern")
+            .is_some_and(|p| p.get("stitches").is_some())
+    })
 }
 
 /// Reads pattern text; `origin` is named in errors.
@@ -112,14 +116,26 @@ pub fn is_garmentcode(text: &str) -> bool {
 /// # Errors
 /// Syntax errors name line and column; faults name panel, edge or stitch.
 pub fn parse_garmentcode(text: &str, origin: &Path) -> Result<RawPattern, FormatError> {
-    let file: File = serde_json::from_str(text).map_err(|e| FormatError::field(origin, "pattern", e.to_string()))?;
+    let file: File = serde_json::from_str(text)
+        .map_err(|e| FormatError::field(origin, "pattern", e.to_string()))?;
     let units = file.properties.units_in_meter;
     if !(units.is_finite() && units > 0.0) {
-        return Err(FormatError::field(origin, "properties.units_in_meter", format!("{units} is no scale")));
+        return Err(FormatError::field(
+            origin,
+            "properties.units_in_meter",
+            format!("{units} is no scale"),
+        ));
     }
     if file.properties.curvature_coords != "relative" {
-        let why = format!("`{}`; only relative curvature is read", file.properties.curvature_coords);
-        return Err(FormatError::field(origin, "properties.curvature_coords", why));
+        let why = format!(
+            "`{}`; only relative curvature is read",
+            file.properties.curvature_coords
+        );
+        return Err(FormatError::field(
+            origin,
+            "properties.curvature_coords",
+            why,
+        ));
     }
     let mut panels = Vec::new();
     for (name, p) in file.pattern.panels {
@@ -131,7 +147,11 @@ pub fn parse_garmentcode(text: &str, origin: &Path) -> Result<RawPattern, Format
         // A third entry says which sides of the fabric meet; it does not matter here.
         let mut pair = [(0, 0); 2];
         if sides.len() < 2 {
-            return Err(FormatError::field(origin, field(""), format!("{} sides; 2 are sewn", sides.len())));
+            return Err(FormatError::field(
+                origin,
+                field(""),
+                format!("{} sides; 2 are sewn", sides.len()),
+            ));
         }
         for (i, (slot, side)) in pair.iter_mut().zip(sides).enumerate() {
             let at = |why: String| FormatError::field(origin, field(&format!("[{i}]")), why);
@@ -142,7 +162,10 @@ pub fn parse_garmentcode(text: &str, origin: &Path) -> Result<RawPattern, Format
                 .ok_or_else(|| at(format!("there is no panel `{}`", s.panel)))?;
             if s.edge >= panels[p].edges.len() {
                 let n = panels[p].edges.len();
-                return Err(at(format!("panel `{}` has no edge {} (it has {n})", s.panel, s.edge)));
+                return Err(at(format!(
+                    "panel `{}` has no edge {} (it has {n})",
+                    s.panel, s.edge
+                )));
             }
             *slot = (p, s.edge);
         }
@@ -152,36 +175,65 @@ pub fn parse_garmentcode(text: &str, origin: &Path) -> Result<RawPattern, Format
 }
 
 fn panel(name: String, p: JsonPanel, units: f64, origin: &Path) -> Result<RawPanel, FormatError> {
-    let fault = |what: String, why: String| FormatError::field(origin, format!("pattern.panels.{name}{what}"), why);
+    let fault = |what: String, why: String| {
+        FormatError::field(origin, format!("pattern.panels.{name}{what}"), why)
+    };
     let metres = |v: f64| v / units;
     let good = |v: f64| v.abs() <= MAX_COORDINATE;
     let translation = p.translation.map(metres);
     if !translation.iter().all(|v| good(*v)) || !p.rotation.iter().all(|a| a.is_finite()) {
-        return Err(fault(".translation".into(), "not finite or too far away".into()));
+        return Err(fault(
+            ".translation".into(),
+            "not finite or too far away".into(),
+        ));
     }
     let vertices: Vec<[f64; 2]> = p.vertices.iter().map(|v| v.map(metres)).collect();
     if let Some(k) = vertices.iter().position(|v| !v.iter().all(|c| good(*c))) {
-        return Err(fault(format!(".vertices[{k}]"), format!("{:?} is not within {MAX_COORDINATE} m", vertices[k])));
+        return Err(fault(
+            format!(".vertices[{k}]"),
+            format!("{:?} is not within {MAX_COORDINATE} m", vertices[k]),
+        ));
     }
     let n = p.edges.len();
     if n < 3 {
-        return Err(fault(".edges".into(), format!("{n} edges; an outline needs at least 3")));
+        return Err(fault(
+            ".edges".into(),
+            format!("{n} edges; an outline needs at least 3"),
+        ));
     }
     let mut edges: Vec<RawEdge> = Vec::with_capacity(n);
     for (k, e) in p.edges.iter().enumerate() {
         let at = |why: String| fault(format!(".edges[{k}]"), why);
         if let Some(v) = e.endpoints.iter().find(|v| **v >= vertices.len()) {
-            return Err(at(format!("vertex {v} does not exist (there are {})", vertices.len())));
+            return Err(at(format!(
+                "vertex {v} does not exist (there are {})",
+                vertices.len()
+            )));
         }
         let next = &p.edges[(k + 1) % n];
         if e.endpoints[1] != next.endpoints[0] {
             let (a, b) = (e.endpoints[1], next.endpoints[0]);
-            return Err(at(format!("it ends in vertex {a}, but the next edge starts in vertex {b}")));
+            return Err(at(format!(
+                "it ends in vertex {a}, but the next edge starts in vertex {b}"
+            )));
         }
-        let curve = e.curvature.as_ref().map_or(Ok(RawCurve::Line), |c| curve(c, units)).map_err(at)?;
-        edges.push(RawEdge { ends: e.endpoints, curve });
+        let curve = e
+            .curvature
+            .as_ref()
+            .map_or(Ok(RawCurve::Line), |c| curve(c, units))
+            .map_err(at)?;
+        edges.push(RawEdge {
+            ends: e.endpoints,
+            curve,
+        });
     }
-    Ok(RawPanel { translation, rotation: p.rotation, vertices, edges, name })
+    Ok(RawPanel {
+        translation,
+        rotation: p.rotation,
+        vertices,
+        edges,
+        name,
+    })
 }
 
 fn curve(value: &Value, units: f64) -> Result<RawCurve, String> {
@@ -189,16 +241,24 @@ fn curve(value: &Value, units: f64) -> Result<RawCurve, String> {
         return Ok(RawCurve::Line);
     }
     let point = |v: &Value| -> Result<[f64; 2], String> {
-        let p: [f64; 2] = serde_json::from_value(v.clone()).map_err(|e| format!("curvature: {e}"))?;
+        let p: [f64; 2] =
+            serde_json::from_value(v.clone()).map_err(|e| format!("curvature: {e}"))?;
         // Control points further away than this are no edge of a garment.
-        if p.iter().all(|c| c.abs() < 100.0) { Ok(p) } else { Err(format!("control point {p:?} is out of range")) }
+        if p.iter().all(|c| c.abs() < 100.0) {
+            Ok(p)
+        } else {
+            Err(format!("control point {p:?} is out of range"))
+        }
     };
     // The old form: a bare control point.
     if value.is_array() {
         return point(value).map(RawCurve::Quadratic);
     }
     let kind = value.get("type").and_then(Value::as_str).unwrap_or("");
-    let params = value.get("params").and_then(Value::as_array).ok_or("curvature has no params")?;
+    let params = value
+        .get("params")
+        .and_then(Value::as_array)
+        .ok_or("curvature has no params")?;
     let number = |k: usize| params.get(k).and_then(Value::as_f64);
     match (kind, params.as_slice()) {
         ("quadratic", [a]) => point(a).map(RawCurve::Quadratic),
@@ -209,7 +269,10 @@ fn curve(value: &Value, units: f64) -> Result<RawCurve, String> {
             }
             _ => Err("a circle needs a radius and two flags".into()),
         },
-        _ => Err(format!("curvature `{kind}` with {} parameters is not known", params.len())),
+        _ => Err(format!(
+            "curvature `{kind}` with {} parameters is not known",
+            params.len()
+        )),
     }
 }
 
@@ -231,7 +294,10 @@ mod tests {
     fn centimetres_become_metres_and_curves_are_read() {
         let p = parse(SQUARE).expect("valid");
         assert_eq!(p.panels[0].vertices[2], [0.5, 0.5]);
-        assert_eq!(p.panels[0].edges[1].curve, RawCurve::Circle(0.3, false, true));
+        assert_eq!(
+            p.panels[0].edges[1].curve,
+            RawCurve::Circle(0.3, false, true)
+        );
         assert_eq!(p.panels[0].edges[2].curve, RawCurve::Quadratic([0.5, 0.1]));
         assert_eq!(p.stitches, [[(0, 1), (0, 3)]]);
         assert!(is_garmentcode(SQUARE) && !is_garmentcode("{}"));
@@ -240,11 +306,20 @@ mod tests {
     #[test]
     fn faults_name_panel_edge_and_stitch() {
         let e = parse(&SQUARE.replace("[2,3]", "[2,9]")).expect_err("vertex");
-        assert!(e.contains("panels.a.edges[2]") && e.contains("vertex 9"), "{e}");
+        assert!(
+            e.contains("panels.a.edges[2]") && e.contains("vertex 9"),
+            "{e}"
+        );
         let e = parse(&SQUARE.replace("[2,3]", "[3,2]")).expect_err("loop");
-        assert!(e.contains("edges[1]") && e.contains("next edge starts in vertex 3"), "{e}");
+        assert!(
+            e.contains("edges[1]") && e.contains("next edge starts in vertex 3"),
+            "{e}"
+        );
         let e = parse(&SQUARE.replace(r#""edge":3"#, r#""edge":7"#)).expect_err("stitch");
-        assert!(e.contains("stitches[0][1]") && e.contains("no edge 7"), "{e}");
+        assert!(
+            e.contains("stitches[0][1]") && e.contains("no edge 7"),
+            "{e}"
+        );
         let e = parse(&SQUARE.replace("[50,50]", "[50,5e9]")).expect_err("far");
         assert!(e.contains("vertices[2]"), "{e}");
         for cut in 0..SQUARE.len() {

@@ -54,7 +54,10 @@ pub struct Mhclo {
 /// # Errors
 /// As [`parse_mhclo`], or when the file cannot be read.
 pub fn read_mhclo(path: &Path) -> Result<Mhclo, FormatError> {
-    parse_mhclo(&String::from_utf8_lossy(&read_limited(path, MAX_BYTES)?), path)
+    parse_mhclo(
+        &String::from_utf8_lossy(&read_limited(path, MAX_BYTES)?),
+        path,
+    )
 }
 
 /// Reads `.mhclo` text; `origin` is named in errors.
@@ -80,10 +83,19 @@ pub fn parse_mhclo(text: &str, origin: &Path) -> Result<Mhclo, FormatError> {
     }
     let mut part = Part::Head;
     for (number, line) in text.lines().enumerate() {
-        let at = |what: &str, why: String| FormatError::field(origin, format!("line {}: {what}", number + 1), why);
+        let at = |what: &str, why: String| {
+            FormatError::field(origin, format!("line {}: {what}", number + 1), why)
+        };
         let words: Vec<&str> = line.split_whitespace().collect();
-        let Some(first) = words.first().copied().filter(|w| !w.starts_with('#')) else { continue };
-        let rest = || line.split_once(char::is_whitespace).map_or("", |(_, r)| r).trim().to_owned();
+        let Some(first) = words.first().copied().filter(|w| !w.starts_with('#')) else {
+            continue;
+        };
+        let rest = || {
+            line.split_once(char::is_whitespace)
+                .map_or("", |(_, r)| r)
+                .trim()
+                .to_owned()
+        };
         match first {
             "name" => out.name = rest(),
             "obj_file" => out.obj_file = rest(),
@@ -93,16 +105,32 @@ pub fn parse_mhclo(text: &str, origin: &Path) -> Result<Mhclo, FormatError> {
             "x_scale" | "y_scale" | "z_scale" => {
                 let axis = usize::from(first.as_bytes()[0] - b'x');
                 let (a, b) = (vertex(&words, 1), vertex(&words, 2));
-                let length = words.get(3).and_then(|w| w.parse::<f32>().ok()).filter(|l| l.is_finite() && *l > 0.0);
+                let length = words
+                    .get(3)
+                    .and_then(|w| w.parse::<f32>().ok())
+                    .filter(|l| l.is_finite() && *l > 0.0);
                 match (a, b, length) {
-                    (Ok(a), Ok(b), Some(length)) => out.scales[axis] = Some(Scale { vertices: [a, b], length }),
-                    _ => return Err(at(first, "two body vertices and a positive length are needed".into())),
+                    (Ok(a), Ok(b), Some(length)) => {
+                        out.scales[axis] = Some(Scale {
+                            vertices: [a, b],
+                            length,
+                        })
+                    }
+                    _ => {
+                        return Err(at(
+                            first,
+                            "two body vertices and a positive length are needed".into(),
+                        ));
+                    }
                 }
             }
             "verts" => part = Part::Vertices,
             "delete_verts" => part = Part::Deleted,
             _ if part == Part::Vertices && first.starts_with(|c: char| c.is_ascii_digit()) => {
-                out.bindings.push(binding(&words).map_err(|why| at(&format!("vertex {}", out.bindings.len()), why))?);
+                out.bindings.push(
+                    binding(&words)
+                        .map_err(|why| at(&format!("vertex {}", out.bindings.len()), why))?,
+                );
             }
             _ if part == Part::Deleted => {
                 deleted(&words, &mut out.deleted).map_err(|why| at("delete_verts", why))?;
@@ -114,7 +142,11 @@ pub fn parse_mhclo(text: &str, origin: &Path) -> Result<Mhclo, FormatError> {
         return Err(FormatError::field(origin, "obj_file", "it is missing"));
     }
     if out.bindings.is_empty() {
-        return Err(FormatError::field(origin, "verts", "no vertex is bound to the body"));
+        return Err(FormatError::field(
+            origin,
+            "verts",
+            "no vertex is bound to the body",
+        ));
     }
     Ok(out)
 }
@@ -126,12 +158,21 @@ fn vertex(words: &[&str], k: usize) -> Result<u32, String> {
 
 fn binding(words: &[&str]) -> Result<Binding, String> {
     let float = |k: usize| {
-        let w = words.get(k).ok_or_else(|| format!("{} numbers; 1 or 9 are needed", words.len()))?;
-        w.parse::<f32>().ok().filter(|x| x.is_finite()).ok_or_else(|| format!("`{w}` is no finite number"))
+        let w = words
+            .get(k)
+            .ok_or_else(|| format!("{} numbers; 1 or 9 are needed", words.len()))?;
+        w.parse::<f32>()
+            .ok()
+            .filter(|x| x.is_finite())
+            .ok_or_else(|| format!("`{w}` is no finite number"))
     };
     if words.len() == 1 {
         let v = vertex(words, 0)?;
-        return Ok(Binding { vertices: [v; 3], weights: [1.0, 0.0, 0.0], offset: [0.0; 3] });
+        return Ok(Binding {
+            vertices: [v; 3],
+            weights: [1.0, 0.0, 0.0],
+            offset: [0.0; 3],
+        });
     }
     Ok(Binding {
         vertices: [vertex(words, 0)?, vertex(words, 1)?, vertex(words, 2)?],
@@ -170,7 +211,11 @@ impl Mhclo {
     pub fn fit(&self, body: &[P3], origin: &Path) -> Result<Vec<P3>, FormatError> {
         let n = body.len();
         let missing = |what: String, v: u32| {
-            FormatError::field(origin, what, format!("body vertex {v} does not exist (the body has {n})"))
+            FormatError::field(
+                origin,
+                what,
+                format!("body vertex {v} does not exist (the body has {n})"),
+            )
         };
         let mut scale = [1.0f32; 3];
         for (axis, s) in self.scales.iter().enumerate() {
@@ -188,8 +233,16 @@ impl Mhclo {
                 if let Some(v) = b.vertices.iter().find(|v| **v as usize >= n) {
                     return Err(missing(format!("vertex {i}"), *v));
                 }
-                let on = (0..3).fold(V3::zeros(), |s, k| s + body[b.vertices[k] as usize].coords * b.weights[k]);
-                Ok(P3::from(on + V3::new(b.offset[0] * scale[0], b.offset[1] * scale[1], b.offset[2] * scale[2])))
+                let on = (0..3).fold(V3::zeros(), |s, k| {
+                    s + body[b.vertices[k] as usize].coords * b.weights[k]
+                });
+                Ok(P3::from(
+                    on + V3::new(
+                        b.offset[0] * scale[0],
+                        b.offset[1] * scale[1],
+                        b.offset[2] * scale[2],
+                    ),
+                ))
             })
             .collect()
     }
@@ -205,20 +258,31 @@ mod tests {
     #[test]
     fn bound_vertices_follow_the_body_and_offsets_scale_with_it() {
         let m = parse_mhclo(TEXT, Path::new("hat.mhclo")).expect("valid");
-        assert_eq!((m.deleted.as_slice(), m.z_depth, m.base.as_str()), (&[0, 1, 2][..], 50, "hm08"));
+        assert_eq!(
+            (m.deleted.as_slice(), m.z_depth, m.base.as_str()),
+            (&[0, 1, 2][..], 50, "hm08")
+        );
         let body = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]].map(P3::from);
         let p = m.fit(&body, Path::new("hat.mhclo")).expect("fits");
         // The x distance is twice what it was: the x offset doubles.
         assert_eq!(p[0], P3::new(1.0 + 0.2, 1.0 + 0.2, 0.3));
         assert_eq!(p[1], body[2]);
-        let e = m.fit(&body[..2], Path::new("hat.mhclo")).expect_err("short body").to_string();
+        let e = m
+            .fit(&body[..2], Path::new("hat.mhclo"))
+            .expect_err("short body")
+            .to_string();
         assert!(e.contains("vertex 0") && e.contains("body vertex 2"), "{e}");
     }
 
     #[test]
     fn faults_name_line_and_vertex() {
-        let e = parse_mhclo(&TEXT.replace("0.25 0.25", "0.25 x"), Path::new("h.mhclo")).expect_err("x").to_string();
-        assert!(e.contains("line 8") && e.contains("vertex 0") && e.contains("`x`"), "{e}");
+        let e = parse_mhclo(&TEXT.replace("0.25 0.25", "0.25 x"), Path::new("h.mhclo"))
+            .expect_err("x")
+            .to_string();
+        assert!(
+            e.contains("line 8") && e.contains("vertex 0") && e.contains("`x`"),
+            "{e}"
+        );
         assert!(parse_mhclo("verts 0\n1\n", Path::new("h.mhclo")).is_err());
         for cut in 0..TEXT.len() {
             let _ = parse_mhclo(&TEXT[..cut], Path::new("h.mhclo"));

@@ -21,7 +21,9 @@ const CMU_PERIOD: f64 = 1.0 / 120.0;
 impl MotionClip {
     /// Index of the first of these names that the clip has, upper and lower case alike.
     pub fn joint(&self, names: &[&str]) -> Option<usize> {
-        names.iter().find_map(|n| self.names.iter().position(|m| m.eq_ignore_ascii_case(n)))
+        names
+            .iter()
+            .find_map(|n| self.names.iter().position(|m| m.eq_ignore_ascii_case(n)))
     }
     /// Length, seconds.
     pub fn seconds(&self) -> f64 {
@@ -30,7 +32,10 @@ impl MotionClip {
     /// The clip played at the CMU database's 120 frames a second: some conversions claim 25 and hold every frame.
     #[must_use]
     pub fn at_cmu_rate(self) -> Self {
-        Self { period: CMU_PERIOD, ..self }
+        Self {
+            period: CMU_PERIOD,
+            ..self
+        }
     }
 }
 
@@ -39,14 +44,25 @@ impl MotionClip {
 /// # Errors
 /// Names the file, line and joint at fault.
 pub fn read_motion(path: &Path) -> Result<MotionClip, FormatError> {
-    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let ending = path
+        .extension()
+        .and_then(|e| e.to_str())
+        .unwrap_or_default()
+        .to_ascii_lowercase();
     match ending.as_str() {
         "bvh" => super::bvh::read_bvh(path),
         "amc" => {
-            let stem = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default();
+            let stem = path
+                .file_stem()
+                .and_then(|s| s.to_str())
+                .unwrap_or_default();
             let subject = stem.split('_').next().unwrap_or(stem);
             super::asf_amc::read_asf_amc(&path.with_file_name(format!("{subject}.asf")), path)
         }
-        _ => Err(FormatError::field(path, "motion", "expected a file ending in .bvh or .amc")),
+        _ => Err(FormatError::field(
+            path,
+            "motion",
+            "expected a file ending in .bvh or .amc",
+        )),
     }
 }

@@ -10,14 +10,27 @@ use std::path::Path;
 ///
 /// # Errors
 /// When the shape does not hold the data, or the file cannot be written.
-pub fn write_npy(path: &Path, shape: &[u64], data: impl ExactSizeIterator<Item = f32>) -> Result<(), FormatError> {
+pub fn write_npy(
+    path: &Path,
+    shape: &[u64],
+    data: impl ExactSizeIterator<Item = f32>,
+) -> Result<(), FormatError> {
     let expected: u64 = shape.iter().product();
     if expected != data.len() as u64 {
-        return Err(FormatError::field(path, "shape", format!("{shape:?} does not hold {} values", data.len())));
+        return Err(FormatError::field(
+            path,
+            "shape",
+            format!("{shape:?} does not hold {} values", data.len()),
+        ));
     }
     let io = |e| FormatError::io(path, e);
     let file = BufWriter::new(File::create(path).map_err(io)?);
-    let mut writer = npyz::WriteOptions::new().default_dtype().shape(shape).writer(file).begin_nd().map_err(io)?;
+    let mut writer = npyz::WriteOptions::new()
+        .default_dtype()
+        .shape(shape)
+        .writer(file)
+        .begin_nd()
+        .map_err(io)?;
     writer.extend(data).map_err(io)?;
     writer.finish().map_err(io)
 }
@@ -36,22 +49,57 @@ pub fn read_npy(path: &Path) -> Result<(Vec<u64>, Vec<f32>), FormatError> {
         "<f2" => 2,
         "<f4" => 4,
         "<f8" => 8,
-        other => return Err(FormatError::field(path, "descr", format!("{other}: expected <f2, <f4 or <f8"))),
+        other => {
+            return Err(FormatError::field(
+                path,
+                "descr",
+                format!("{other}: expected <f2, <f4 or <f8"),
+            ));
+        }
     };
     if header.order() != npyz::Order::C {
-        return Err(FormatError::field(path, "fortran_order", "expected C order"));
+        return Err(FormatError::field(
+            path,
+            "fortran_order",
+            "expected C order",
+        ));
     }
-    let wanted = shape.iter().try_fold(width as u64, |n, s| n.checked_mul(*s)).and_then(|n| usize::try_from(n).ok());
+    let wanted = shape
+        .iter()
+        .try_fold(width as u64, |n, s| n.checked_mul(*s))
+        .and_then(|n| usize::try_from(n).ok());
     // NPY: magic (6), version (2), length of the header (2 bytes in version 1, 4 later), header, values.
-    let length = |at: usize, n: usize| bytes[at..at + n].iter().rev().fold(0usize, |s, b| s << 8 | usize::from(*b));
-    let start = if bytes[6] == 1 { 10 + length(8, 2) } else { 12 + length(8, 4) };
+    let length = |at: usize, n: usize| {
+        bytes[at..at + n]
+            .iter()
+            .rev()
+            .fold(0usize, |s, b| s << 8 | usize::from(*b))
+    };
+    let start = if bytes[6] == 1 {
+        10 + length(8, 2)
+    } else {
+        12 + length(8, 4)
+    };
     let Some(data) = wanted.and_then(|n| bytes.get(start..start.checked_add(n)?)) else {
-        return Err(FormatError::field(path, "shape", format!("{shape:?} is more than the file holds")));
+        return Err(FormatError::field(
+            path,
+            "shape",
+            format!("{shape:?} is more than the file holds"),
+        ));
     };
     let values = match width {
-        2 => data.chunks_exact(2).map(|b| half(u16::from_le_bytes([b[0], b[1]]))).collect(),
-        4 => data.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect(),
-        _ => data.chunks_exact(8).map(|b| f64::from_le_bytes(std::array::from_fn(|i| b[i])) as f32).collect(),
+        2 => data
+            .chunks_exact(2)
+            .map(|b| half(u16::from_le_bytes([b[0], b[1]])))
+            .collect(),
+        4 => data
+            .chunks_exact(4)
+            .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+            .collect(),
+        _ => data
+            .chunks_exact(8)
+            .map(|b| f64::from_le_bytes(std::array::from_fn(|i| b[i])) as f32)
+            .collect(),
     };
     Ok((shape, values))
 }
@@ -59,7 +107,10 @@ pub fn read_npy(path: &Path) -> Result<(Vec<u64>, Vec<f32>), FormatError> {
 /// IEEE 754 binary16.
 fn half(bits: u16) -> f32 {
     let sign = if bits & 0x8000 == 0 { 1.0 } else { -1.0 };
-    let (exponent, fraction) = (i32::from(bits >> 10 & 0x1f), f32::from(bits & 0x3ff) / 1024.0);
+    let (exponent, fraction) = (
+        i32::from(bits >> 10 & 0x1f),
+        f32::from(bits & 0x3ff) / 1024.0,
+    );
     match exponent {
         0 => sign * fraction * 2f32.powi(-14),
         31 if fraction == 0.0 => sign * f32::INFINITY,
@@ -80,7 +131,10 @@ mod tests {
         let bytes = std::fs::read(&path).expect("read");
         let back = npyz::NpyFile::new(&bytes[..]).expect("a header");
         assert_eq!(back.shape(), [2, 1, 3]);
-        assert_eq!(back.into_vec::<f32>().expect("values"), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(
+            back.into_vec::<f32>().expect("values"),
+            [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+        );
         assert!(write_npy(&path, &[2, 2], (0..6).map(|i| i as f32)).is_err());
     }
 
@@ -90,13 +144,21 @@ mod tests {
         let path = dir.path().join("a.npy");
         write_npy(&path, &[2, 3], (0..6).map(|i| i as f32 - 2.5)).expect("written");
         let (shape, values) = read_npy(&path).expect("read");
-        assert_eq!((shape, values), (vec![2, 3], vec![-2.5, -1.5, -0.5, 0.5, 1.5, 2.5]));
+        assert_eq!(
+            (shape, values),
+            (vec![2, 3], vec![-2.5, -1.5, -0.5, 0.5, 1.5, 2.5])
+        );
         let mut bytes = std::fs::read(&path).expect("read");
         bytes.truncate(bytes.len() - 1);
         std::fs::write(&path, bytes).expect("written");
         assert!(read_npy(&path).is_err(), "a cut file");
-        for (bits, value) in [(0x3c00, 1.0), (0xc000, -2.0), (0x3555, 0.333_251_95), (0x0001, 5.960_464_5e-8), (0, 0.0)]
-        {
+        for (bits, value) in [
+            (0x3c00, 1.0),
+            (0xc000, -2.0),
+            (0x3555, 0.333_251_95),
+            (0x0001, 5.960_464_5e-8),
+            (0, 0.0),
+        ] {
             assert_eq!(half(bits), value);
         }
         assert!(half(0x7e00).is_nan() && half(0x7c00) == f32::INFINITY);

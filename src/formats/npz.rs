@@ -91,14 +91,21 @@ impl Archive<'_> {
         if !zip.file_names().any(|n| n == file) {
             return Ok(None);
         }
-        let entry = zip.by_name(&file).map_err(|e| fault(format!("the zip entry cannot be opened ({e})")))?;
+        let entry = zip
+            .by_name(&file)
+            .map_err(|e| fault(format!("the zip entry cannot be opened ({e})")))?;
         let size = entry.size();
         if size > MAX_ARRAY_BYTES {
-            return Err(fault(format!("{size} bytes, but no body array is larger than {MAX_ARRAY_BYTES}")));
+            return Err(fault(format!(
+                "{size} bytes, but no body array is larger than {MAX_ARRAY_BYTES}"
+            )));
         }
         // `take` and growing as bytes arrive: the stated size alone allocates nothing.
         let mut bytes = Vec::new();
-        let read = entry.take(size + 1).read_to_end(&mut bytes).map_err(|e| fault(format!("cannot be read ({e})")))?;
+        let read = entry
+            .take(size + 1)
+            .read_to_end(&mut bytes)
+            .map_err(|e| fault(format!("cannot be read ({e})")))?;
         if read as u64 != size {
             return Err(fault(format!("{read} bytes found, {size} announced")));
         }
@@ -111,15 +118,21 @@ impl Archive<'_> {
         if header_end > size {
             return Err(fault("its header is longer than the array".into()));
         }
-        let header = NpyHeader::from_reader(&bytes[..]).map_err(|e| fault(format!("is not a numpy array ({e})")))?;
+        let header = NpyHeader::from_reader(&bytes[..])
+            .map_err(|e| fault(format!("is not a numpy array ({e})")))?;
         let item = match header.dtype() {
             DType::Plain(t) => t.num_bytes(),
             _ => None,
         };
         let Some(item) = item.filter(|i| *i > 0) else {
-            return Err(fault("is a pickled or structured object; save it as a plain dense array".into()));
+            return Err(fault(
+                "is a pickled or structured object; save it as a plain dense array".into(),
+            ));
         };
-        let count = header.shape().iter().try_fold(1u64, |n, d| n.checked_mul(*d));
+        let count = header
+            .shape()
+            .iter()
+            .try_fold(1u64, |n, d| n.checked_mul(*d));
         let payload = bytes.split_off(header_end as usize);
         if count.and_then(|n| n.checked_mul(item as u64)) != Some(payload.len() as u64) {
             return Err(fault(format!(
@@ -133,11 +146,18 @@ impl Archive<'_> {
 
     /// Numbers of any plain type as f64.
     fn numbers(&mut self, name: &str) -> Result<Option<Array<f64>>, FormatError> {
-        let Some((header, bytes)) = self.raw(name)? else { return Ok(None) };
-        let DType::Plain(t) = header.dtype() else { return Err(self.fault(name, "not a plain array")) };
+        let Some((header, bytes)) = self.raw(name)? else {
+            return Ok(None);
+        };
+        let DType::Plain(t) = header.dtype() else {
+            return Err(self.fault(name, "not a plain array"));
+        };
         let item = t.num_bytes().unwrap_or(0);
         if t.endianness() == npyz::Endianness::Big {
-            return Err(self.fault(name, "big-endian numbers are not supported; save it little-endian"));
+            return Err(self.fault(
+                name,
+                "big-endian numbers are not supported; save it little-endian",
+            ));
         }
         /// The little-endian numbers of one type.
         fn parse<const N: usize>(bytes: &[u8], f: impl Fn([u8; N]) -> f64) -> Vec<f64> {
@@ -150,34 +170,53 @@ impl Archive<'_> {
             (TypeChar::Int, 8) => parse(&bytes, |b| i64::from_le_bytes(b) as f64),
             (TypeChar::Uint, 4) => parse(&bytes, |b| f64::from(u32::from_le_bytes(b))),
             (TypeChar::Uint, 8) => parse(&bytes, |b| u64::from_le_bytes(b) as f64),
-            (c, n) => return Err(self.fault(name, format!("type {c:?} of {n} bytes is not supported"))),
+            (c, n) => {
+                return Err(self.fault(name, format!("type {c:?} of {n} bytes is not supported")));
+            }
         };
         if let Some(i) = data.iter().position(|v| !v.is_finite()) {
             return Err(self.fault(name, format!("value {i} is not finite")));
         }
         let shape: Vec<usize> = header.shape().iter().map(|d| *d as usize).collect();
-        let data = if header.order() == Order::Fortran { to_c_order(&shape, &data) } else { data };
+        let data = if header.order() == Order::Fortran {
+            to_c_order(&shape, &data)
+        } else {
+            data
+        };
         Ok(Some(Array { shape, data }))
     }
 
     fn required(&mut self, name: &str) -> Result<Array<f64>, FormatError> {
-        self.numbers(name)?.ok_or_else(|| self.fault(name, "missing; an SMPL-layout body needs it"))
+        self.numbers(name)?
+            .ok_or_else(|| self.fault(name, "missing; an SMPL-layout body needs it"))
     }
 
     /// A numpy array of unicode strings (`<U`).
     fn strings(&mut self, name: &str) -> Result<Option<Vec<String>>, FormatError> {
-        let Some((header, bytes)) = self.raw(name)? else { return Ok(None) };
-        let DType::Plain(t) = header.dtype() else { return Err(self.fault(name, "not a plain array")) };
+        let Some((header, bytes)) = self.raw(name)? else {
+            return Ok(None);
+        };
+        let DType::Plain(t) = header.dtype() else {
+            return Err(self.fault(name, "not a plain array"));
+        };
         let width = match t.type_char() {
             TypeChar::UnicodeStr => t.num_bytes().unwrap_or(4),
             c => return Err(self.fault(name, format!("type {c:?}; unicode strings were expected"))),
         };
         let text = |item: &[u8]| {
-            let codes = item.as_chunks::<4>().0.iter().map(|c| u32::from_le_bytes(*c));
-            codes.take_while(|c| *c != 0).map(char::from_u32).collect::<Option<String>>()
+            let codes = item
+                .as_chunks::<4>()
+                .0
+                .iter()
+                .map(|c| u32::from_le_bytes(*c));
+            codes
+                .take_while(|c| *c != 0)
+                .map(char::from_u32)
+                .collect::<Option<String>>()
         };
         let all: Option<Vec<String>> = bytes.chunks_exact(width).map(text).collect();
-        all.map(Some).ok_or_else(|| self.fault(name, "holds characters that are not unicode"))
+        all.map(Some)
+            .ok_or_else(|| self.fault(name, "holds characters that are not unicode"))
     }
 }
 
@@ -190,7 +229,13 @@ fn to_c_order(shape: &[usize], data: &[f64]) -> Vec<f64> {
     }
     let mut out = Vec::with_capacity(data.len());
     for _ in 0..data.len() {
-        out.push(data[index.iter().zip(&strides).map(|(i, s)| i * s).sum::<usize>()]);
+        out.push(
+            data[index
+                .iter()
+                .zip(&strides)
+                .map(|(i, s)| i * s)
+                .sum::<usize>()],
+        );
         for k in (0..shape.len()).rev() {
             index[k] += 1;
             if index[k] < shape[k] {
@@ -215,7 +260,11 @@ pub fn read_smpl(path: impl AsRef<Path>) -> Result<SmplArrays, FormatError> {
         if shape == wanted {
             return Ok(());
         }
-        Err(FormatError::field(path, name, format!("shape {shape:?}, expected {wanted:?}")))
+        Err(FormatError::field(
+            path,
+            name,
+            format!("shape {shape:?}, expected {wanted:?}"),
+        ))
     };
     let triple = |c: &[f64; 3]| c.map(|x| x as f32);
 
@@ -227,21 +276,36 @@ pub fn read_smpl(path: impl AsRef<Path>) -> Result<SmplArrays, FormatError> {
     let f = a.required("f")?;
     expect("f", &f.shape, &[f.shape.first().copied().unwrap_or(0), 3])?;
     if let Some(i) = f.data.iter().position(|&i| i < 0.0 || i >= n as f64) {
-        return Err(a.fault("f", format!("face {} names vertex {} of {n}", i / 3, f.data[i])));
+        return Err(a.fault(
+            "f",
+            format!("face {} names vertex {} of {n}", i / 3, f.data[i]),
+        ));
     }
-    let faces = f.data.as_chunks::<3>().0.iter().map(|c| c.map(|i| i as u32)).collect();
+    let faces = f
+        .data
+        .as_chunks::<3>()
+        .0
+        .iter()
+        .map(|c| c.map(|i| i as u32))
+        .collect();
 
     let tree = a.required("kintree_table")?;
     let j = tree.shape.get(1).copied().unwrap_or(0);
     expect("kintree_table", &tree.shape, &[2, j])?;
     if j == 0 || j > usize::from(u8::MAX) {
-        return Err(a.fault("kintree_table", format!("{j} joints; 1 to 255 are supported")));
+        return Err(a.fault(
+            "kintree_table",
+            format!("{j} joints; 1 to 255 are supported"),
+        ));
     }
     let parents = (0..j)
         .map(|k| match tree.data[k] as i64 {
             NO_PARENT | -1 if k == 0 => Ok(None),
             p if k > 0 && (0..k as i64).contains(&p) => Ok(Some(p as usize)),
-            p => Err(a.fault("kintree_table", format!("joint {k} has parent {p}; parents come before children"))),
+            p => Err(a.fault(
+                "kintree_table",
+                format!("joint {k} has parent {p}; parents come before children"),
+            )),
         })
         .collect::<Result<Vec<_>, _>>()?;
 
@@ -261,7 +325,9 @@ pub fn read_smpl(path: impl AsRef<Path>) -> Result<SmplArrays, FormatError> {
             expect("J", &q.shape, &[j, 3])?;
             q.data.as_chunks::<3>().0.to_vec()
         }
-        None if joint_regressor.is_empty() => return Err(a.fault("J", "neither `J` nor `J_regressor` is there")),
+        None if joint_regressor.is_empty() => {
+            return Err(a.fault("J", "neither `J` nor `J_regressor` is there"));
+        }
         None => regress(&joint_regressor, &vertices),
     };
     let shape_directions = match a.numbers("shapedirs")? {
@@ -270,15 +336,37 @@ pub fn read_smpl(path: impl AsRef<Path>) -> Result<SmplArrays, FormatError> {
             let b = s.shape.get(2).copied().unwrap_or(0);
             expect("shapedirs", &s.shape, &[n, 3, b])?;
             let at = |d: usize, i: usize, c: usize| s.data[(i * 3 + c) * b + d] as f32;
-            (0..b).map(|d| (0..n).map(|i| [0, 1, 2].map(|c| at(d, i, c))).collect()).collect()
+            (0..b)
+                .map(|d| (0..n).map(|i| [0, 1, 2].map(|c| at(d, i, c))).collect())
+                .collect()
         }
     };
     let joint_names = match a.strings("joint_names")? {
         Some(names) if names.len() == j => names,
-        Some(names) => return Err(a.fault("joint_names", format!("{} names for {j} joints", names.len()))),
-        None => (0..j).map(|k| SMPL_JOINT_NAMES.get(k).map_or_else(|| format!("joint_{k}"), |s| (*s).into())).collect(),
+        Some(names) => {
+            return Err(a.fault(
+                "joint_names",
+                format!("{} names for {j} joints", names.len()),
+            ));
+        }
+        None => (0..j)
+            .map(|k| {
+                SMPL_JOINT_NAMES
+                    .get(k)
+                    .map_or_else(|| format!("joint_{k}"), |s| (*s).into())
+            })
+            .collect(),
     };
-    Ok(SmplArrays { vertices, faces, weights, parents, joints, joint_regressor, shape_directions, joint_names })
+    Ok(SmplArrays {
+        vertices,
+        faces,
+        weights,
+        parents,
+        joints,
+        joint_regressor,
+        shape_directions,
+        joint_names,
+    })
 }
 
 /// `regressor · points`, shape `[J]` for a row-major regressor of shape `[J][points]`.
@@ -292,7 +380,10 @@ pub fn regress(regressor: &[f32], points: &[[f32; 3]]) -> Vec<[f64; 3]> {
         }
         sum
     };
-    regressor.chunks_exact(points.len().max(1)).map(row).collect()
+    regressor
+        .chunks_exact(points.len().max(1))
+        .map(row)
+        .collect()
 }
 
 #[cfg(test)]
@@ -305,14 +396,22 @@ mod tests {
         let path = dir.join(format!("{replace}.npz"));
         let mut z = npyz::npz::NpzWriter::create(&path).expect("create");
         let arrays: [(&str, &[u64], &[f64]); 5] = [
-            ("v_template", &[3, 3], &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
+            (
+                "v_template",
+                &[3, 3],
+                &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+            ),
             ("f", &[1, 3], &[0.0, 1.0, 2.0]),
             ("weights", &[3, 1], &[1.0, 1.0, 1.0]),
             ("kintree_table", &[2, 1], &[4_294_967_295.0, 0.0]),
             ("J", &[1, 3], &[0.0, 0.5, 0.0]),
         ];
         for (name, s, d) in arrays {
-            let (s, d) = if name == replace { (shape, data) } else { (s, d) };
+            let (s, d) = if name == replace {
+                (shape, data)
+            } else {
+                (s, d)
+            };
             let mut w = z
                 .array::<f64>(name, Default::default())
                 .expect("entry")
@@ -330,7 +429,10 @@ mod tests {
     fn a_small_body_reads_and_faults_are_named() {
         let dir = tempfile::tempdir().expect("dir");
         let ok = read_smpl(write(dir.path(), "none", &[], &[])).expect("valid");
-        assert_eq!((ok.faces, ok.parents, ok.joint_names), (vec![[0, 1, 2]], vec![None], vec!["pelvis".to_owned()]));
+        assert_eq!(
+            (ok.faces, ok.parents, ok.joint_names),
+            (vec![[0, 1, 2]], vec![None], vec!["pelvis".to_owned()])
+        );
         for (name, shape, data) in [
             ("f", vec![1, 3], vec![0.0, 1.0, 3.0]),
             ("f", vec![1, 3], vec![0.0, -1.0, 2.0]),
@@ -340,7 +442,9 @@ mod tests {
             ("kintree_table", vec![2, 1], vec![7.0, 0.0]),
             ("J", vec![2, 3], vec![0.0; 6]),
         ] {
-            let e = read_smpl(write(dir.path(), name, &shape, &data)).expect_err("must be refused").to_string();
+            let e = read_smpl(write(dir.path(), name, &shape, &data))
+                .expect_err("must be refused")
+                .to_string();
             assert!(e.contains(&format!("`{name}`")), "{name}: {e}");
         }
     }
@@ -361,11 +465,17 @@ mod tests {
             std::fs::write(&path, &b).expect("write");
             let _ = read_smpl(&path);
         }
-        assert!(matches!(read_smpl(dir.path().join("absent.npz")), Err(FormatError::Io { .. })));
+        assert!(matches!(
+            read_smpl(dir.path().join("absent.npz")),
+            Err(FormatError::Io { .. })
+        ));
     }
 
     #[test]
     fn fortran_order_is_undone() {
-        assert_eq!(to_c_order(&[2, 3], &[1.0, 4.0, 2.0, 5.0, 3.0, 6.0]), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(
+            to_c_order(&[2, 3], &[1.0, 4.0, 2.0, 5.0, 3.0, 6.0]),
+            [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+        );
     }
 }

@@ -57,9 +57,15 @@ impl ObjMesh {
 /// Names the line and what is wrong on it: a number that is none, an index outside the file's vertices, a polygon
 /// with fewer than three corners or a repeated one.
 pub fn read_obj(path: &Path) -> Result<ObjMesh, FormatError> {
-    let size = std::fs::metadata(path).map_err(|e| FormatError::io(path, e))?.len();
+    let size = std::fs::metadata(path)
+        .map_err(|e| FormatError::io(path, e))?
+        .len();
     if size > MAX_BYTES {
-        return Err(FormatError::field(path, "size", format!("{size} bytes; at most {MAX_BYTES} are read")));
+        return Err(FormatError::field(
+            path,
+            "size",
+            format!("{size} bytes; at most {MAX_BYTES} are read"),
+        ));
     }
     let text = std::fs::read_to_string(path).map_err(|e| FormatError::io(path, e))?;
     parse_obj(&text, path)
@@ -74,7 +80,9 @@ pub fn parse_obj(text: &str, origin: &Path) -> Result<ObjMesh, FormatError> {
     let (mut faces, mut face_uv) = (Vec::<Face>::new(), Vec::<Face>::new());
     let mut all_textured = true;
     for (number, line) in text.lines().enumerate() {
-        let at = |what: &str, why: String| FormatError::field(origin, format!("line {}: {what}", number + 1), why);
+        let at = |what: &str, why: String| {
+            FormatError::field(origin, format!("line {}: {what}", number + 1), why)
+        };
         let mut words = line.split_whitespace();
         match words.next() {
             Some("v") => {
@@ -87,15 +95,23 @@ pub fn parse_obj(text: &str, origin: &Path) -> Result<ObjMesh, FormatError> {
                 let (mut corner, mut texture) = (Vec::new(), Vec::new());
                 for word in words.take_while(|w| !w.starts_with('#')) {
                     let mut parts = word.split('/');
-                    corner.push(index(parts.next(), vertices.len()).map_err(|why| at(&name, format!("vertex {why}")))?);
+                    corner.push(
+                        index(parts.next(), vertices.len())
+                            .map_err(|why| at(&name, format!("vertex {why}")))?,
+                    );
                     match parts.next().filter(|p| !p.is_empty()) {
                         None => all_textured = false,
-                        part => texture
-                            .push(index(part, uv.len()).map_err(|why| at(&name, format!("texture coordinate {why}")))?),
+                        part => texture.push(
+                            index(part, uv.len())
+                                .map_err(|why| at(&name, format!("texture coordinate {why}")))?,
+                        ),
                     }
                 }
                 if corner.len() < 3 {
-                    return Err(at(&name, format!("{} corners; a face needs at least 3", corner.len())));
+                    return Err(at(
+                        &name,
+                        format!("{} corners; a face needs at least 3", corner.len()),
+                    ));
                 }
                 for k in 1..corner.len() - 1 {
                     let f = [corner[0], corner[k], corner[k + 1]];
@@ -114,7 +130,8 @@ pub fn parse_obj(text: &str, origin: &Path) -> Result<ObjMesh, FormatError> {
     if !all_textured {
         face_uv.clear();
     }
-    let mesh = TriMesh::new(vertices, faces).map_err(|e| FormatError::field(origin, "mesh", e.to_string()))?;
+    let mesh = TriMesh::new(vertices, faces)
+        .map_err(|e| FormatError::field(origin, "mesh", e.to_string()))?;
     Ok(ObjMesh { mesh, uv, face_uv })
 }
 
@@ -122,7 +139,9 @@ fn numbers<'a, const N: usize>(words: impl Iterator<Item = &'a str>) -> Result<[
     let mut out = [0.0; N];
     let mut words = words;
     for (k, slot) in out.iter_mut().enumerate() {
-        let word = words.next().ok_or_else(|| format!("{k} numbers; {N} are needed"))?;
+        let word = words
+            .next()
+            .ok_or_else(|| format!("{k} numbers; {N} are needed"))?;
         let value: f32 = word.parse().map_err(|_| format!("`{word}` is no number"))?;
         if !value.is_finite() {
             return Err(format!("`{word}` is not finite"));
@@ -135,10 +154,14 @@ fn numbers<'a, const N: usize>(words: impl Iterator<Item = &'a str>) -> Result<[
 /// OBJ counts from 1; negative numbers count back from the last element so far.
 fn index(word: Option<&str>, count: usize) -> Result<u32, String> {
     let word = word.unwrap_or("");
-    let i: i64 = word.parse().map_err(|_| format!("index `{word}` is no whole number"))?;
+    let i: i64 = word
+        .parse()
+        .map_err(|_| format!("index `{word}` is no whole number"))?;
     let at = if i < 0 { count as i64 + i } else { i - 1 };
     if i == 0 || at < 0 || at >= count as i64 {
-        return Err(format!("index {i} is out of range (the file has {count} so far, counted from 1)"));
+        return Err(format!(
+            "index {i} is out of range (the file has {count} so far, counted from 1)"
+        ));
     }
     u32::try_from(at).map_err(|_| format!("index {i} is too large"))
 }
@@ -147,7 +170,12 @@ fn index(word: Option<&str>, count: usize) -> Result<u32, String> {
 ///
 /// # Errors
 /// When the file cannot be written.
-pub fn write_obj(path: &Path, vertices: &[P3], faces: &[Face], uv: Option<&[[f32; 2]]>) -> Result<(), FormatError> {
+pub fn write_obj(
+    path: &Path,
+    vertices: &[P3],
+    faces: &[Face],
+    uv: Option<&[[f32; 2]]>,
+) -> Result<(), FormatError> {
     let mut text = String::with_capacity(vertices.len() * 32 + faces.len() * 24);
     for p in vertices {
         let _ = writeln!(text, "v {} {} {}", p.x, p.y, p.z);
@@ -185,7 +213,10 @@ mod tests {
 
     #[test]
     fn seams_in_texture_space_split_vertices() {
-        let m = parse(&format!("{QUAD}vt 0 0\nvt 1 0\nvt 1 1\nvt 5 5\nf 1/1 2/2 3/3\nf 1/4 3/3 4/1")).expect("valid");
+        let m = parse(&format!(
+            "{QUAD}vt 0 0\nvt 1 0\nvt 1 1\nvt 5 5\nf 1/1 2/2 3/3\nf 1/4 3/3 4/1"
+        ))
+        .expect("valid");
         let (v, uv, f, under) = m.unwelded();
         assert_eq!((v.len(), f.len()), (5, 2));
         assert_eq!(uv[f[1][0] as usize], [5.0, 5.0]);
@@ -195,12 +226,31 @@ mod tests {
     #[test]
     fn faults_name_line_face_and_index() {
         let e = parse(&format!("{QUAD}f 1 2 9")).expect_err("hole");
-        assert!(e.contains("line 5: face 0") && e.contains("index 9 is out of range"), "{e}");
-        assert!(parse("v 1 2").expect_err("short").contains("line 1: vertex"));
+        assert!(
+            e.contains("line 5: face 0") && e.contains("index 9 is out of range"),
+            "{e}"
+        );
+        assert!(
+            parse("v 1 2")
+                .expect_err("short")
+                .contains("line 1: vertex")
+        );
         assert!(parse("v 1 2 nan").expect_err("nan").contains("not finite"));
-        assert!(parse(&format!("{QUAD}f 1 2")).expect_err("two corners").contains("2 corners"));
-        assert!(parse(&format!("{QUAD}f 1 2 0")).expect_err("zero").contains("index 0"));
-        assert!(parse(&format!("{QUAD}f 1 2 2")).expect_err("twice").contains("twice"));
+        assert!(
+            parse(&format!("{QUAD}f 1 2"))
+                .expect_err("two corners")
+                .contains("2 corners")
+        );
+        assert!(
+            parse(&format!("{QUAD}f 1 2 0"))
+                .expect_err("zero")
+                .contains("index 0")
+        );
+        assert!(
+            parse(&format!("{QUAD}f 1 2 2"))
+                .expect_err("twice")
+                .contains("twice")
+        );
     }
 
     #[test]

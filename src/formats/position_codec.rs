@@ -37,14 +37,20 @@ impl PositionCoder {
     /// For a mesh of `vertices` vertices; faces with an index beyond them are ignored.
     pub fn new(vertices: usize, faces: &[Face]) -> Self {
         let mut neighbour: Vec<u32> = (0..vertices as u32).collect();
-        for f in faces.iter().filter(|f| f.iter().all(|&i| (i as usize) < vertices)) {
+        for f in faces
+            .iter()
+            .filter(|f| f.iter().all(|&i| (i as usize) < vertices))
+        {
             for (a, b) in [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])] {
                 let (low, high) = (a.min(b), a.max(b));
                 let n = &mut neighbour[high as usize];
                 *n = (*n).min(low);
             }
         }
-        Self { neighbour, past: Vec::new() }
+        Self {
+            neighbour,
+            past: Vec::new(),
+        }
     }
 
     /// Number of vertices.
@@ -59,14 +65,22 @@ impl PositionCoder {
     pub fn encode(&mut self, positions: &[P3]) -> Result<Vec<u8>, FormatError> {
         let fault = |field: String, why: String| FormatError::field(Path::new(BYTES), field, why);
         if positions.len() != self.vertices() {
-            return Err(fault("vertices".into(), format!("{} for a mesh of {}", positions.len(), self.vertices())));
+            return Err(fault(
+                "vertices".into(),
+                format!("{} for a mesh of {}", positions.len(), self.vertices()),
+            ));
         }
         let mut steps = Vec::with_capacity(positions.len());
         for (i, p) in positions.iter().enumerate() {
             if !p.iter().all(|c| c.abs() <= FARTHEST) {
-                return Err(fault(format!("vertex {i}"), format!("{p}: not within {FARTHEST} m")));
+                return Err(fault(
+                    format!("vertex {i}"),
+                    format!("{p}: not within {FARTHEST} m"),
+                ));
             }
-            steps.push(std::array::from_fn(|k| (f64::from(p[k]) / STEP).round() as i32));
+            steps.push(std::array::from_fn(|k| {
+                (f64::from(p[k]) / STEP).round() as i32
+            }));
         }
         let (order, differences) = (0..=self.past.len())
             .map(|order| (order, self.differences(&steps, order)))
@@ -96,10 +110,15 @@ impl PositionCoder {
     /// Damaged or missing data, or data that builds on positions that were never received; the stream cannot go on.
     pub fn decode(&mut self, bytes: &[u8]) -> Result<Vec<P3>, FormatError> {
         let fault = |field: &str, why: String| FormatError::field(Path::new(BYTES), field, why);
-        let Some((&order, data)) = bytes.split_first() else { return Err(fault("order", "is missing".into())) };
+        let Some((&order, data)) = bytes.split_first() else {
+            return Err(fault("order", "is missing".into()));
+        };
         let order = usize::from(order);
         if order > self.past.len() {
-            let why = format!("{order} earlier positions are needed, {} are known", self.past.len());
+            let why = format!(
+                "{order} earlier positions are needed, {} are known",
+                self.past.len()
+            );
             return Err(fault("order", why));
         }
         let n = self.vertices();
@@ -111,17 +130,25 @@ impl PositionCoder {
         let mut off = vec![[0i32; 3]; n];
         for k in 0..3 {
             for i in 0..n {
-                let z = leb128(&mut numbers).ok_or_else(|| fault("data", format!("vertex {i}: no number")))?;
+                let z = leb128(&mut numbers)
+                    .ok_or_else(|| fault("data", format!("vertex {i}: no number")))?;
                 let d = (z >> 1) as i32 ^ -((z & 1) as i32);
                 let nb = self.neighbour[i] as usize;
-                off[i][k] = if nb == i { d } else { d.wrapping_add(off[nb][k]) };
+                off[i][k] = if nb == i {
+                    d
+                } else {
+                    d.wrapping_add(off[nb][k])
+                };
                 steps[i][k] = off[i][k].wrapping_add(self.expected(i, k, order));
             }
         }
         if numbers.next().is_some() {
             return Err(fault("data", format!("more than {n} vertices")));
         }
-        let positions = steps.iter().map(|s| P3::from(s.map(|c| (f64::from(c) * STEP) as f32))).collect();
+        let positions = steps
+            .iter()
+            .map(|s| P3::from(s.map(|c| (f64::from(c) * STEP) as f32)))
+            .collect();
         self.remember(steps);
         Ok(positions)
     }
@@ -140,7 +167,11 @@ impl PositionCoder {
         for k in 0..3 {
             for (i, &nb) in self.neighbour.iter().enumerate() {
                 let nb = nb as usize;
-                out.push(if nb == i { off(i, k) } else { off(i, k).wrapping_sub(off(nb, k)) });
+                out.push(if nb == i {
+                    off(i, k)
+                } else {
+                    off(i, k).wrapping_sub(off(nb, k))
+                });
             }
         }
         out
@@ -171,13 +202,24 @@ mod tests {
 
     /// A strip of two rows.
     fn strip(n: u32) -> Vec<Face> {
-        (0..n - 1).flat_map(|i| [[2 * i, 2 * i + 1, 2 * i + 2], [2 * i + 1, 2 * i + 3, 2 * i + 2]]).collect()
+        (0..n - 1)
+            .flat_map(|i| {
+                [
+                    [2 * i, 2 * i + 1, 2 * i + 2],
+                    [2 * i + 1, 2 * i + 3, 2 * i + 2],
+                ]
+            })
+            .collect()
     }
 
     fn waving(n: u32, t: f64) -> Vec<P3> {
         let point = |i: u32| {
             let (u, v) = (f64::from(i / 2) * 0.02, f64::from(i % 2) * 0.02);
-            P3::new(u as f32, (v + 1.0) as f32, (0.1 * (7.0 * u - 4.0 * t).sin()) as f32)
+            P3::new(
+                u as f32,
+                (v + 1.0) as f32,
+                (0.1 * (7.0 * u - 4.0 * t).sin()) as f32,
+            )
         };
         (0..2 * n).map(point).collect()
     }
@@ -185,19 +227,33 @@ mod tests {
     #[test]
     fn what_arrives_is_within_half_a_step_and_small() {
         let (n, faces) = (500, strip(500));
-        let (mut tx, mut rx) = (PositionCoder::new(1000, &faces), PositionCoder::new(1000, &faces));
+        let (mut tx, mut rx) = (
+            PositionCoder::new(1000, &faces),
+            PositionCoder::new(1000, &faces),
+        );
         let mut sizes = Vec::new();
         for frame in 0..60 {
             let p = waving(n, f64::from(frame) / 30.0);
             let bytes = tx.encode(&p).expect("coded");
             let q = rx.decode(&bytes).expect("decoded");
-            let worst = p.iter().zip(&q).map(|(p, q)| (p - q).amax()).fold(0.0, f32::max);
-            assert!(f64::from(worst) <= 0.5 * STEP + 1e-6, "frame {frame}: {worst} m");
+            let worst = p
+                .iter()
+                .zip(&q)
+                .map(|(p, q)| (p - q).amax())
+                .fold(0.0, f32::max);
+            assert!(
+                f64::from(worst) <= 0.5 * STEP + 1e-6,
+                "frame {frame}: {worst} m"
+            );
             sizes.push(bytes.len());
         }
         assert_eq!(tx, rx, "both ends know the same");
         let later = sizes[2..].iter().sum::<usize>() as f64 / (58.0 * 1000.0);
-        assert!(later < 2.0 && sizes[0] < 4000, "{later} bytes a vertex, the first {}", sizes[0]);
+        assert!(
+            later < 2.0 && sizes[0] < 4000,
+            "{later} bytes a vertex, the first {}",
+            sizes[0]
+        );
         // Who stands still costs next to nothing.
         let p = waving(n, 2.0);
         tx.encode(&p).expect("coded");
@@ -208,17 +264,38 @@ mod tests {
     fn faults_are_named() {
         let mut c = PositionCoder::new(2, &[]);
         let far = [P3::origin(), P3::new(0.0, f32::NAN, 0.0)];
-        assert!(c.encode(&far).expect_err("refused").to_string().contains("vertex 1"));
-        assert!(c.encode(&far[..1]).expect_err("refused").to_string().contains("vertices"));
+        assert!(
+            c.encode(&far)
+                .expect_err("refused")
+                .to_string()
+                .contains("vertex 1")
+        );
+        assert!(
+            c.encode(&far[..1])
+                .expect_err("refused")
+                .to_string()
+                .contains("vertices")
+        );
         let (mut tx, mut late) = (PositionCoder::new(2, &[]), PositionCoder::new(2, &[]));
         let p = [P3::origin(), P3::new(0.5, 0.5, 0.5)];
         let first = tx.encode(&p).expect("coded");
         let second = tx.encode(&p).expect("coded");
-        assert!(late.decode(&second).expect_err("no keyframe").to_string().contains("order"));
+        assert!(
+            late.decode(&second)
+                .expect_err("no keyframe")
+                .to_string()
+                .contains("order")
+        );
         assert!(late.decode(&first[..first.len() - 2]).is_err());
         assert!(late.decode(&[]).is_err());
-        assert!(PositionCoder::new(1, &[]).decode(&first).is_err(), "too many numbers");
-        assert!(PositionCoder::new(3, &[]).decode(&first).is_err(), "too few numbers");
+        assert!(
+            PositionCoder::new(1, &[]).decode(&first).is_err(),
+            "too many numbers"
+        );
+        assert!(
+            PositionCoder::new(3, &[]).decode(&first).is_err(),
+            "too few numbers"
+        );
     }
 
     proptest! {

@@ -35,8 +35,15 @@ pub fn open_recording(path: &Path) -> Result<Box<dyn RgbdSource>, FormatError> {
     if kind.is_dir() {
         return Ok(Box::new(RgbdFolder::open(path)?));
     }
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
+    if path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
+    {
         return Ok(Box::new(McapReader::open(path)?));
     }
-    Err(FormatError::field(path, "recording", "expected a folder with camera.json, or a file ending in .mcap"))
+    Err(FormatError::field(
+        path,
+        "recording",
+        "expected a folder with camera.json, or a file ending in .mcap",
+    ))
 }

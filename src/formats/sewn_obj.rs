@@ -34,7 +34,10 @@ pub struct SewnObj {
 /// # Errors
 /// As [`parse_sewn_obj`], or when the file cannot be read.
 pub fn read_sewn_obj(path: &Path) -> Result<SewnObj, FormatError> {
-    parse_sewn_obj(&String::from_utf8_lossy(&read_limited(path, MAX_BYTES)?), path)
+    parse_sewn_obj(
+        &String::from_utf8_lossy(&read_limited(path, MAX_BYTES)?),
+        path,
+    )
 }
 
 /// Reads OBJ text with its stitches; `origin` is named in errors.
@@ -45,20 +48,33 @@ pub fn parse_sewn_obj(text: &str, origin: &Path) -> Result<SewnObj, FormatError>
     let obj = parse_obj(text, origin)?;
     let n = obj.mesh.vertices().len();
     let mut stitches = Vec::new();
-    for (number, line) in text.lines().enumerate().filter(|(_, l)| l.starts_with("stitch")) {
+    for (number, line) in text
+        .lines()
+        .enumerate()
+        .filter(|(_, l)| l.starts_with("stitch"))
+    {
         let name = format!("line {}: stitch {}", number + 1, stitches.len());
         let at = |why: String| FormatError::field(origin, name.clone(), why);
         let words: Vec<&str> = line.split_whitespace().skip(1).collect();
         let [v, a, b, t] = words.as_slice() else {
-            return Err(at(format!("{} numbers; a vertex, an edge's two ends and a share are needed", words.len())));
+            return Err(at(format!(
+                "{} numbers; a vertex, an edge's two ends and a share are needed",
+                words.len()
+            )));
         };
         let vertex = |w: &str| match w.parse::<usize>() {
             Ok(k) if k < n => Ok(k as u32),
-            _ => Err(at(format!("vertex `{w}` does not exist (the file has {n}, in stitches counted from 0)"))),
+            _ => Err(at(format!(
+                "vertex `{w}` does not exist (the file has {n}, in stitches counted from 0)"
+            ))),
         };
         let share = t.parse::<f32>().ok().filter(|t| (0.0..=1.0).contains(t));
         let share = share.ok_or_else(|| at(format!("`{t}` is no share between 0 and 1")))?;
-        stitches.push(Stitch { vertex: vertex(v)?, edge: [vertex(a)?, vertex(b)?], at: share });
+        stitches.push(Stitch {
+            vertex: vertex(v)?,
+            edge: [vertex(a)?, vertex(b)?],
+            at: share,
+        });
     }
     Ok(SewnObj { obj, stitches })
 }
@@ -72,10 +88,21 @@ mod tests {
     #[test]
     fn stitches_are_read_and_faults_named() {
         let parse = |t: &str| parse_sewn_obj(t, Path::new("d.obj")).map_err(|e| e.to_string());
-        assert_eq!(parse(TEXT).expect("valid").stitches, [Stitch { vertex: 3, edge: [0, 1], at: 0.25 }]);
+        assert_eq!(
+            parse(TEXT).expect("valid").stitches,
+            [Stitch {
+                vertex: 3,
+                edge: [0, 1],
+                at: 0.25
+            }]
+        );
         let e = parse(&TEXT.replace("stitch 3", "stitch 9")).expect_err("vertex");
         assert!(e.contains("line 9: stitch 0") && e.contains("`9`"), "{e}");
-        assert!(parse(&TEXT.replace("0.25", "1.5")).expect_err("share").contains("1.5"));
+        assert!(
+            parse(&TEXT.replace("0.25", "1.5"))
+                .expect_err("share")
+                .contains("1.5")
+        );
         for cut in 0..TEXT.len() {
             let _ = parse(&TEXT[..cut]);
         }

@@ -37,11 +37,27 @@ const CIPC: &str = "Codim-IPC fabric table (ipc-sim/Codim-IPC, FEMDiscreteShellB
 
 impl Material {
     /// Names of the presets.
-    pub const PRESETS: [&'static str; 9] =
-        ["jersey", "cotton", "denim", "twill", "fleece", "wool", "polyester", "canvas", "silk"];
+    pub const PRESETS: [&'static str; 9] = [
+        "jersey",
+        "cotton",
+        "denim",
+        "twill",
+        "fleece",
+        "wool",
+        "polyester",
+        "canvas",
+        "silk",
+    ];
 
     /// An isotropic sheet of Young's modulus `young` (Pa), Poisson ratio, volume density (kg/m³) and thickness (m).
-    pub fn isotropic(name: &str, young: f64, poisson: f64, density: f64, thickness: f64, source: &str) -> Self {
+    pub fn isotropic(
+        name: &str,
+        young: f64,
+        poisson: f64,
+        density: f64,
+        thickness: f64,
+        source: &str,
+    ) -> Self {
         let membrane = young * thickness;
         Self {
             name: name.to_owned(),
@@ -75,7 +91,14 @@ impl Material {
             },
             "cotton" => Self {
                 bending: 1e-5, // KES-F, shirting: 4e-6 to 1.5e-5 N·m
-                ..Self::isotropic("cotton", 821_000.0 * 4.0, 0.243, 472.641_509, 0.000_318, CIPC)
+                ..Self::isotropic(
+                    "cotton",
+                    821_000.0 * 4.0,
+                    0.243,
+                    472.641_509,
+                    0.000_318,
+                    CIPC,
+                )
             },
             // Stored base modulus 2.448 MPa with weft and warp at 4.793 and 9.029 MPa.
             "denim" => Self {
@@ -135,7 +158,10 @@ impl Material {
             other => {
                 return Err(GarmentError::Field {
                     field: "material".into(),
-                    why: format!("`{other}` is not known; presets are {}", Self::PRESETS.join(", ")),
+                    why: format!(
+                        "`{other}` is not known; presets are {}",
+                        Self::PRESETS.join(", ")
+                    ),
                 });
             }
         })
@@ -150,12 +176,23 @@ impl Material {
     pub fn from_measured(name: &str, m: &MeasuredFabric) -> Result<Self, GarmentError> {
         /// Least stiffness of a woven or knitted sheet, N/m: fits of weak fabrics go negative at rest.
         const LEAST: f64 = 5.0;
-        let at = |row: usize, column: usize| m.stretching.get(row).and_then(|r| r.get(column)).copied().unwrap_or(0.0);
+        let at = |row: usize, column: usize| {
+            m.stretching
+                .get(row)
+                .and_then(|r| r.get(column))
+                .copied()
+                .unwrap_or(0.0)
+        };
         let mean = |row: usize, column: usize| (0.5 * (at(0, column) + at(row, column))).max(LEAST);
         let (weft, warp, shear) = (mean(1, 0), mean(5, 2), mean(3, 3));
         // A coupling beyond the geometric mean would make the sheet unstable.
         let coupling = (0.5 * (at(0, 1) + at(3, 1))).clamp(0.0, 0.9 * (weft * warp).sqrt());
-        let first: Vec<f64> = m.bending.iter().filter_map(|r| r.first()).map(|b| b.max(0.0)).collect();
+        let first: Vec<f64> = m
+            .bending
+            .iter()
+            .filter_map(|r| r.first())
+            .map(|b| b.max(0.0))
+            .collect();
         let material = Self {
             name: name.to_owned(),
             area_density: m.density,
@@ -200,8 +237,10 @@ impl Material {
             ("damping", self.damping),
             ("thickness", self.thickness),
         ];
-        for (field, v, ok) in
-            positive.iter().map(|(f, v)| (f, v, *v > 0.0)).chain(not_negative.iter().map(|(f, v)| (f, v, *v >= 0.0)))
+        for (field, v, ok) in positive
+            .iter()
+            .map(|(f, v)| (f, v, *v > 0.0))
+            .chain(not_negative.iter().map(|(f, v)| (f, v, *v >= 0.0)))
         {
             if !ok || !v.is_finite() {
                 return Err(GarmentError::Field {
@@ -221,11 +260,19 @@ mod tests {
     #[test]
     fn presets_are_sheets_and_faults_are_named() {
         for n in Material::PRESETS {
-            Material::preset(n).expect("preset").check().expect("usable");
+            Material::preset(n)
+                .expect("preset")
+                .check()
+                .expect("usable");
         }
         assert!(Material::preset("chainmail").is_err());
         let mut m = Material::preset("silk").expect("preset");
         m.shear = f64::NAN;
-        assert!(m.check().expect_err("NaN").to_string().contains("material.shear"));
+        assert!(
+            m.check()
+                .expect_err("NaN")
+                .to_string()
+                .contains("material.shear")
+        );
     }
 }

@@ -20,7 +20,11 @@ pub struct Triangulation {
 impl Default for Triangulation {
     fn default() -> Self {
         // 21 mm gives a T-shirt or a skirt about 2,000 vertices; the library's panels stay above 20°.
-        Self { edge_length: 0.021, hood_length: 0.014, min_angle: 12.0 }
+        Self {
+            edge_length: 0.021,
+            hood_length: 0.014,
+            min_angle: 12.0,
+        }
     }
 }
 
@@ -56,19 +60,28 @@ impl Region {
     /// The parts whose skin decides for cloth that touches these: where a sleeve meets the trunk, the trunk. Its arm
     /// counts as another part there, so that an armpit that closes is known to be closed.
     pub fn decisive(self) -> Self {
-        if self.meets(Self::TRUNK) { Self(self.0 & !Self::ARMS.0) } else { self }
+        if self.meets(Self::TRUNK) {
+            Self(self.0 & !Self::ARMS.0)
+        } else {
+            self
+        }
     }
     /// What a panel wraps.
     pub fn of(p: Placement) -> Self {
         match p {
-            Placement::TrunkFront | Placement::TrunkBack | Placement::SkirtFront | Placement::SkirtBack => {
-                Self::TRUNK.with(Self::LEFT_LEG).with(Self::RIGHT_LEG)
-            }
+            Placement::TrunkFront
+            | Placement::TrunkBack
+            | Placement::SkirtFront
+            | Placement::SkirtBack => Self::TRUNK.with(Self::LEFT_LEG).with(Self::RIGHT_LEG),
             Placement::Hood(_) => Self::TRUNK,
             Placement::Sleeve(Side::Left) => Self::LEFT_ARM,
             Placement::Sleeve(Side::Right) => Self::RIGHT_ARM,
-            Placement::LegFront(Side::Left) | Placement::LegBack(Side::Left) => Self::LEFT_LEG.with(Self::TRUNK),
-            Placement::LegFront(Side::Right) | Placement::LegBack(Side::Right) => Self::RIGHT_LEG.with(Self::TRUNK),
+            Placement::LegFront(Side::Left) | Placement::LegBack(Side::Left) => {
+                Self::LEFT_LEG.with(Self::TRUNK)
+            }
+            Placement::LegFront(Side::Right) | Placement::LegBack(Side::Right) => {
+                Self::RIGHT_LEG.with(Self::TRUNK)
+            }
         }
     }
 }
@@ -143,10 +156,16 @@ impl GarmentMesh {
     /// Faults of the pattern or of its triangulation, naming panel, edge or seam.
     pub fn sew(pattern: &Pattern, how: &Triangulation) -> Result<Self, GarmentError> {
         pattern.check()?;
-        for (field, length) in [("edge_length", how.edge_length), ("hood_length", how.hood_length)] {
+        for (field, length) in [
+            ("edge_length", how.edge_length),
+            ("hood_length", how.hood_length),
+        ] {
             if !(length > 1e-3 && length < 0.5) {
                 let why = format!("{length} m is not between 0.001 and 0.5");
-                return Err(GarmentError::Field { field: field.into(), why });
+                return Err(GarmentError::Field {
+                    field: field.into(),
+                    why,
+                });
             }
         }
         let meshes = triangulate_all(pattern, how)?;
@@ -193,13 +212,22 @@ impl GarmentMesh {
             uv: vec![[0.0; 2]; vertices],
             regions: vec![Region::default(); vertices],
             anchors: Vec::new(),
-            seams: stitched.into_iter().map(|(a, b)| [welded[a], welded[b]]).collect(),
-            render: RenderMesh { vertex: welded.clone(), ..RenderMesh::default() },
+            seams: stitched
+                .into_iter()
+                .map(|(a, b)| [welded[a], welded[b]])
+                .collect(),
+            render: RenderMesh {
+                vertex: welded.clone(),
+                ..RenderMesh::default()
+            },
             min_angle: meshes.iter().map(|m| m.min_angle).fold(180.0, f64::min),
         };
         let mut offset = 0.0;
         for (k, m) in meshes.iter().enumerate() {
-            let lo = m.points.iter().fold([f64::MAX; 2], |l, p| [l[0].min(p[0]), l[1].min(p[1])]);
+            let lo = m
+                .points
+                .iter()
+                .fold([f64::MAX; 2], |l, p| [l[0].min(p[0]), l[1].min(p[1])]);
             let hi = m.points.iter().map(|p| p[0]).fold(f64::MIN, f64::max);
             for (i, p) in m.points.iter().enumerate() {
                 let w = welded[first[k] + i] as usize;
@@ -215,7 +243,9 @@ impl GarmentMesh {
             const GAP: f64 = 0.02;
             offset += hi - lo[0] + GAP;
             for f in &m.faces {
-                out.render.faces.push(f.map(|i| (first[k] + i as usize) as u32));
+                out.render
+                    .faces
+                    .push(f.map(|i| (first[k] + i as usize) as u32));
                 out.faces.push(f.map(|i| welded[first[k] + i as usize]));
                 out.rest.push(f.map(|i| m.points[i as usize]));
                 out.face_panel.push(k as u16);
@@ -231,7 +261,11 @@ impl GarmentMesh {
                 .collect();
             vertices.sort_unstable();
             vertices.dedup();
-            out.anchors.push(AnchorSet { name: a.name.clone(), vertices, strength: a.strength });
+            out.anchors.push(AnchorSet {
+                name: a.name.clone(),
+                vertices,
+                strength: a.strength,
+            });
         }
         out.topology()?;
         Ok(out)
@@ -241,7 +275,10 @@ impl GarmentMesh {
     /// # Errors
     /// When seams make it non-manifold or turn a panel inside out.
     pub fn topology(&self) -> Result<Topology, GarmentError> {
-        Ok(Topology::new(&TriMesh::new(vec![P3::origin(); self.vertices], self.faces.clone())?)?)
+        Ok(Topology::new(&TriMesh::new(
+            vec![P3::origin(); self.vertices],
+            self.faces.clone(),
+        )?)?)
     }
     /// Positions of the render vertices from those of the simulation vertices. Metres.
     pub fn render_positions(&self, simulated: &[P3], out: &mut Vec<P3>) {
@@ -260,7 +297,9 @@ fn triangulate_all(pattern: &Pattern, how: &Triangulation) -> Result<Vec<PanelMe
         .panels
         .iter()
         .map(|p| {
-            (0..p.edges.len()).map(|i| ((p.edges[i].length(p.end(i)) / length(p)).round() as usize).max(1)).collect()
+            (0..p.edges.len())
+                .map(|i| ((p.edges[i].length(p.end(i)) / length(p)).round() as usize).max(1))
+                .collect()
         })
         .collect();
     for ((pa, ea), (pb, eb), _) in pattern.sewn() {
@@ -276,7 +315,10 @@ fn triangulate_all(pattern: &Pattern, how: &Triangulation) -> Result<Vec<PanelMe
             if m.min_angle < how.min_angle {
                 return Err(GarmentError::Panel {
                     panel: p.name.clone(),
-                    why: format!("its smallest angle is {:.1}°, below the {}° asked for", m.min_angle, how.min_angle),
+                    why: format!(
+                        "its smallest angle is {:.1}°, below the {}° asked for",
+                        m.min_angle, how.min_angle
+                    ),
                 });
             }
             Ok(m)

@@ -32,7 +32,10 @@ impl PanelEdge {
             Curve::Cubic(a, b) => {
                 let s = 1.0 - t;
                 std::array::from_fn(|d| {
-                    s * s * s * self.from[d] + 3.0 * s * s * t * a[d] + 3.0 * s * t * t * b[d] + t * t * t * to[d]
+                    s * s * s * self.from[d]
+                        + 3.0 * s * s * t * a[d]
+                        + 3.0 * s * t * t * b[d]
+                        + t * t * t * to[d]
                 })
             }
         }
@@ -83,10 +86,17 @@ mod tests {
     #[test]
     fn a_bezier_quarter_circle_has_its_length() {
         const K: f64 = 0.552_284_749_8; // the usual control length of a quarter circle
-        let e = PanelEdge { name: "q".into(), from: [1.0, 0.0], curve: Curve::Cubic([1.0, K], [K, 1.0]) };
+        let e = PanelEdge {
+            name: "q".into(),
+            from: [1.0, 0.0],
+            curve: Curve::Cubic([1.0, K], [K, 1.0]),
+        };
         assert!((e.length([0.0, 1.0]) - std::f64::consts::FRAC_PI_2).abs() < 1e-3);
         let p = e.sample([0.0, 1.0], 8);
-        let gaps: Vec<f64> = p.windows(2).map(|w| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1])).collect();
+        let gaps: Vec<f64> = p
+            .windows(2)
+            .map(|w| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1]))
+            .collect();
         assert_eq!(p.len(), 9);
         assert!(gaps.iter().all(|g| (g - gaps[0]).abs() < 1e-3));
     }

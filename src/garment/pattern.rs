@@ -149,8 +149,10 @@ impl Pattern {
     /// # Errors
     /// Syntax errors name line and column; faults name panel, edge or seam.
     pub fn from_json(text: &str) -> Result<Self, GarmentError> {
-        let p: Self = serde_json::from_str(text)
-            .map_err(|e| GarmentError::Field { field: "pattern".into(), why: e.to_string() })?;
+        let p: Self = serde_json::from_str(text).map_err(|e| GarmentError::Field {
+            field: "pattern".into(),
+            why: e.to_string(),
+        })?;
         p.check()?;
         Ok(p)
     }
@@ -160,9 +162,18 @@ impl Pattern {
     }
     /// Everything that is sewn, seams then darts.
     pub(super) fn sewn(&self) -> Vec<Stitch> {
-        let seams = self.seams.iter().filter_map(|s| Some((self.find(&s.a)?, self.find(&s.b)?, s.reversed)));
+        let seams = self
+            .seams
+            .iter()
+            .filter_map(|s| Some((self.find(&s.a)?, self.find(&s.b)?, s.reversed)));
         let dart = |d: &Dart, k: usize| self.find(&[d.panel.clone(), d.edges[k].clone()]);
-        seams.chain(self.darts.iter().filter_map(|d| Some((dart(d, 0)?, dart(d, 1)?, true)))).collect()
+        seams
+            .chain(
+                self.darts
+                    .iter()
+                    .filter_map(|d| Some((dart(d, 0)?, dart(d, 1)?, true))),
+            )
+            .collect()
     }
     /// Panel and edge numbers of a `[panel, edge]` reference.
     pub(super) fn find(&self, reference: &[String; 2]) -> Option<(usize, usize)> {
@@ -176,11 +187,17 @@ impl Pattern {
     pub fn check(&self) -> Result<(), GarmentError> {
         self.material.check()?;
         if self.panels.is_empty() {
-            return Err(GarmentError::Field { field: "panels".into(), why: "a garment needs at least one".into() });
+            return Err(GarmentError::Field {
+                field: "panels".into(),
+                why: "a garment needs at least one".into(),
+            });
         }
         for (i, p) in self.panels.iter().enumerate() {
             if self.panels[..i].iter().any(|o| o.name == p.name) {
-                return Err(GarmentError::Panel { panel: p.name.clone(), why: "the name is used twice".into() });
+                return Err(GarmentError::Panel {
+                    panel: p.name.clone(),
+                    why: "the name is used twice".into(),
+                });
             }
             check_outline(p)?;
         }
@@ -218,12 +235,18 @@ impl Pattern {
             if (at[0].1 + 1) % p.edges.len() != at[1].1 {
                 return Err(fault(
                     &d.edges[1],
-                    &format!("a dart's second edge must follow its first, `{}`", d.edges[0]),
+                    &format!(
+                        "a dart's second edge must follow its first, `{}`",
+                        d.edges[0]
+                    ),
                 ));
             }
             let [a, b] = [at[0].1, at[1].1].map(|i| p.edges[i].length(p.end(i)));
             if (a - b).abs() > DART_MISMATCH * a.max(b) {
-                return Err(fault(&d.edges[1], &format!("the dart's sides are {a:.3} and {b:.3} m long")));
+                return Err(fault(
+                    &d.edges[1],
+                    &format!("the dart's sides are {a:.3} and {b:.3} m long"),
+                ));
             }
         }
         for a in &self.anchors {
@@ -254,8 +277,15 @@ const SHORTEST_EDGE: f64 = 1e-3;
 const LARGEST_COORDINATE: f64 = 10.0;
 
 fn check_outline(p: &Panel) -> Result<(), GarmentError> {
-    let panel = |why: &str| GarmentError::Panel { panel: p.name.clone(), why: why.to_owned() };
-    let edge = |i: usize, why: String| GarmentError::Edge { panel: p.name.clone(), edge: p.edges[i].name.clone(), why };
+    let panel = |why: &str| GarmentError::Panel {
+        panel: p.name.clone(),
+        why: why.to_owned(),
+    };
+    let edge = |i: usize, why: String| GarmentError::Edge {
+        panel: p.name.clone(),
+        edge: p.edges[i].name.clone(),
+        why,
+    };
     if p.edges.len() < 3 {
         return Err(panel("an outline needs at least three edges"));
     }
@@ -265,8 +295,15 @@ fn check_outline(p: &Panel) -> Result<(), GarmentError> {
             return Err(edge(i, "the name is used twice".into()));
         }
         let points = e.sample(p.end(i), if e.curve == super::Curve::Line { 1 } else { 24 });
-        if points.iter().flatten().any(|c| !(c.abs() <= LARGEST_COORDINATE)) {
-            return Err(edge(i, format!("a coordinate is not finite or beyond {LARGEST_COORDINATE} m")));
+        if points
+            .iter()
+            .flatten()
+            .any(|c| !(c.abs() <= LARGEST_COORDINATE))
+        {
+            return Err(edge(
+                i,
+                format!("a coordinate is not finite or beyond {LARGEST_COORDINATE} m"),
+            ));
         }
         if e.length(p.end(i)) < SHORTEST_EDGE {
             return Err(edge(i, format!("it is shorter than {SHORTEST_EDGE} m")));
@@ -274,7 +311,9 @@ fn check_outline(p: &Panel) -> Result<(), GarmentError> {
         outline.extend(points[..points.len() - 1].iter().map(|q| (i, *q)));
     }
     let n = outline.len();
-    let cross = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    let cross = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    };
     for i in 0..n {
         let ((ei, a), (_, b)) = (outline[i], outline[(i + 1) % n]);
         for j in i + 2..n {
@@ -282,8 +321,12 @@ fn check_outline(p: &Panel) -> Result<(), GarmentError> {
                 continue;
             }
             let ((ej, c), (_, d)) = (outline[j], outline[(j + 1) % n]);
-            let apart = (0..2).any(|k| a[k].max(b[k]) < c[k].min(d[k]) || c[k].max(d[k]) < a[k].min(b[k]));
-            if !apart && cross(a, b, c) * cross(a, b, d) <= 0.0 && cross(c, d, a) * cross(c, d, b) <= 0.0 {
+            let apart =
+                (0..2).any(|k| a[k].max(b[k]) < c[k].min(d[k]) || c[k].max(d[k]) < a[k].min(b[k]));
+            if !apart
+                && cross(a, b, c) * cross(a, b, d) <= 0.0
+                && cross(c, d, a) * cross(c, d, b) <= 0.0
+            {
                 return Err(edge(ei, format!("it crosses edge `{}`", p.edges[ej].name)));
             }
         }

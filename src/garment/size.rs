@@ -88,18 +88,35 @@ pub struct SizeRow {
 pub fn size_table() -> [SizeRow; 6] {
     // chest, waist, hip, stature, shoulders, neck, arm, upper arm, trunk, rise, inseam
     const CM: [[f64; 11]; 6] = [
-        [80.0, 66.0, 87.0, 162.0, 37.0, 35.0, 55.5, 25.5, 58.5, 26.0, 72.0],
-        [88.0, 74.0, 94.0, 165.0, 39.0, 36.5, 56.5, 27.5, 60.5, 27.0, 73.0],
-        [96.0, 82.0, 101.0, 168.0, 41.0, 38.0, 57.5, 29.5, 62.5, 28.0, 74.0],
-        [104.5, 90.5, 108.5, 171.0, 43.0, 39.5, 58.5, 32.0, 64.5, 29.0, 75.0],
-        [114.0, 100.0, 117.0, 174.0, 45.0, 41.5, 59.5, 35.0, 66.5, 30.2, 76.0],
-        [125.0, 111.0, 126.5, 177.0, 47.0, 43.5, 60.5, 38.5, 68.5, 31.5, 77.0],
+        [
+            80.0, 66.0, 87.0, 162.0, 37.0, 35.0, 55.5, 25.5, 58.5, 26.0, 72.0,
+        ],
+        [
+            88.0, 74.0, 94.0, 165.0, 39.0, 36.5, 56.5, 27.5, 60.5, 27.0, 73.0,
+        ],
+        [
+            96.0, 82.0, 101.0, 168.0, 41.0, 38.0, 57.5, 29.5, 62.5, 28.0, 74.0,
+        ],
+        [
+            104.5, 90.5, 108.5, 171.0, 43.0, 39.5, 58.5, 32.0, 64.5, 29.0, 75.0,
+        ],
+        [
+            114.0, 100.0, 117.0, 174.0, 45.0, 41.5, 59.5, 35.0, 66.5, 30.2, 76.0,
+        ],
+        [
+            125.0, 111.0, 126.5, 177.0, 47.0, 43.5, 60.5, 38.5, 68.5, 31.5, 77.0,
+        ],
     ];
     std::array::from_fn(|i| {
         let v = CM[i].map(|c| c / 100.0);
         SizeRow {
             size: Size::ALL[i],
-            body: BodyMeasures { chest: v[0], waist: v[1], hip: v[2], stature: v[3] },
+            body: BodyMeasures {
+                chest: v[0],
+                waist: v[1],
+                hip: v[2],
+                stature: v[3],
+            },
             shoulders: v[4],
             neck: v[5],
             arm: v[6],
@@ -118,7 +135,10 @@ mod tests {
     #[test]
     fn sizes_grow_and_parse() {
         let t = size_table();
-        assert!(t.windows(2).all(|w| w[0].body.chest < w[1].body.chest && w[0].inseam < w[1].inseam));
+        assert!(
+            t.windows(2)
+                .all(|w| w[0].body.chest < w[1].body.chest && w[0].inseam < w[1].inseam)
+        );
         assert_eq!("xl".parse::<Size>(), Ok(Size::Xl));
         assert!("huge".parse::<Size>().is_err());
     }

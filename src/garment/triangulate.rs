@@ -21,8 +21,15 @@ const FLAT: f64 = 1e-6;
 /// Rounds of moving inner points to the middle of their neighbours.
 const SMOOTHING: usize = 4;
 
-pub(super) fn triangulate(panel: &Panel, pieces: &[usize], length: f64) -> Result<PanelMesh, GarmentError> {
-    let fault = |why: String| GarmentError::Panel { panel: panel.name.clone(), why };
+pub(super) fn triangulate(
+    panel: &Panel,
+    pieces: &[usize],
+    length: f64,
+) -> Result<PanelMesh, GarmentError> {
+    let fault = |why: String| GarmentError::Panel {
+        panel: panel.name.clone(),
+        why,
+    };
     let mut points: Vec<[f64; 2]> = Vec::new();
     let mut edges = Vec::new();
     for (i, e) in panel.edges.iter().enumerate() {
@@ -36,16 +43,24 @@ pub(super) fn triangulate(panel: &Panel, pieces: &[usize], length: f64) -> Resul
         *last = 0;
     }
     let outline = points.clone();
-    let (lo, hi) = outline.iter().fold(([f64::MAX; 2], [f64::MIN; 2]), |(lo, hi), p| {
-        ([lo[0].min(p[0]), lo[1].min(p[1])], [hi[0].max(p[0]), hi[1].max(p[1])])
-    });
+    let (lo, hi) = outline
+        .iter()
+        .fold(([f64::MAX; 2], [f64::MIN; 2]), |(lo, hi), p| {
+            (
+                [lo[0].min(p[0]), lo[1].min(p[1])],
+                [hi[0].max(p[0]), hi[1].max(p[1])],
+            )
+        });
     let step_y = length * 3f64.sqrt() / 2.0;
     // Centred on x = 0, so that symmetric panels get symmetric triangles.
     let columns = ((hi[0].abs().max(lo[0].abs())) / length).ceil() as i64 + 1;
     let rows = ((hi[1] - lo[1]) / step_y).ceil() as i64 + 1;
     for r in 0..rows {
         for c in -columns..=columns {
-            let p = [(c as f64 + if r % 2 == 0 { 0.0 } else { 0.5 }) * length, lo[1] + (r as f64 + 0.5) * step_y];
+            let p = [
+                (c as f64 + if r % 2 == 0 { 0.0 } else { 0.5 }) * length,
+                lo[1] + (r as f64 + 0.5) * step_y,
+            ];
             if inside(&outline, p) && distance(&outline, p) > CLEARANCE * length {
                 points.push(p);
             }
@@ -75,18 +90,33 @@ pub(super) fn triangulate(panel: &Panel, pieces: &[usize], length: f64) -> Resul
             }
         }
     }
-    let min_angle = faces.iter().map(|f| smallest_angle(f.map(|i| points[i as usize]))).fold(180.0, f64::min);
+    let min_angle = faces
+        .iter()
+        .map(|f| smallest_angle(f.map(|i| points[i as usize])))
+        .fold(180.0, f64::min);
     let mut used = vec![false; points.len()];
-    faces.iter().flatten().for_each(|&i| used[i as usize] = true);
+    faces
+        .iter()
+        .flatten()
+        .for_each(|&i| used[i as usize] = true);
     if let Some(vertex) = used.iter().position(|u| !u) {
         return Err(fault(format!(
             "point {vertex} of its triangulation has no triangle; the edge length is too coarse"
         )));
     }
-    Ok(PanelMesh { points, faces, edges, min_angle })
+    Ok(PanelMesh {
+        points,
+        faces,
+        edges,
+        min_angle,
+    })
 }
 
-fn delaunay(points: &[[f64; 2]], boundary: usize, outline: &[[f64; 2]]) -> Result<Vec<[u32; 3]>, String> {
+fn delaunay(
+    points: &[[f64; 2]],
+    boundary: usize,
+    outline: &[[f64; 2]],
+) -> Result<Vec<[u32; 3]>, String> {
     let vertices = points.iter().map(|p| Point2::new(p[0], p[1])).collect();
     let edges = (0..boundary).map(|i| [i, (i + 1) % boundary]).collect();
     let cdt = ConstrainedDelaunayTriangulation::<Point2<f64>>::bulk_load_cdt(vertices, edges)
@@ -100,8 +130,15 @@ fn delaunay(points: &[[f64; 2]], boundary: usize, outline: &[[f64; 2]]) -> Resul
         .filter(|f| {
             let c = f.map(|i| points[i as usize]);
             // Samples of a straight edge are collinear but for rounding: the slivers between them and the hull lie outside.
-            super::mesh_area(&c) > FLAT * (c[1][0] - c[0][0]).powi(2).max((c[1][1] - c[0][1]).powi(2))
-                && inside(outline, [(c[0][0] + c[1][0] + c[2][0]) / 3.0, (c[0][1] + c[1][1] + c[2][1]) / 3.0])
+            super::mesh_area(&c)
+                > FLAT * (c[1][0] - c[0][0]).powi(2).max((c[1][1] - c[0][1]).powi(2))
+                && inside(
+                    outline,
+                    [
+                        (c[0][0] + c[1][0] + c[2][0]) / 3.0,
+                        (c[0][1] + c[1][1] + c[2][1]) / 3.0,
+                    ],
+                )
         })
         .collect();
     faces.sort_unstable();
@@ -112,7 +149,9 @@ fn inside(outline: &[[f64; 2]], p: [f64; 2]) -> bool {
     let mut odd = false;
     for i in 0..outline.len() {
         let (a, b) = (outline[i], outline[(i + 1) % outline.len()]);
-        if (a[1] > p[1]) != (b[1] > p[1]) && p[0] < (b[0] - a[0]) * (p[1] - a[1]) / (b[1] - a[1]) + a[0] {
+        if (a[1] > p[1]) != (b[1] > p[1])
+            && p[0] < (b[0] - a[0]) * (p[1] - a[1]) / (b[1] - a[1]) + a[0]
+        {
             odd = !odd;
         }
     }
@@ -124,7 +163,8 @@ fn distance(outline: &[[f64; 2]], p: [f64; 2]) -> f64 {
         .map(|i| {
             let (a, b) = (outline[i], outline[(i + 1) % outline.len()]);
             let d = [b[0] - a[0], b[1] - a[1]];
-            let t = ((p[0] - a[0]) * d[0] + (p[1] - a[1]) * d[1]) / (d[0] * d[0] + d[1] * d[1]).max(f64::MIN_POSITIVE);
+            let t = ((p[0] - a[0]) * d[0] + (p[1] - a[1]) * d[1])
+                / (d[0] * d[0] + d[1] * d[1]).max(f64::MIN_POSITIVE);
             let t = t.clamp(0.0, 1.0);
             (p[0] - a[0] - t * d[0]).hypot(p[1] - a[1] - t * d[1])
         })
@@ -136,7 +176,10 @@ fn smallest_angle(p: [[f64; 2]; 3]) -> f64 {
         .map(|k| {
             let (a, b, c) = (p[k], p[(k + 1) % 3], p[(k + 2) % 3]);
             let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
-            (u[0] * v[1] - u[1] * v[0]).abs().atan2(u[0] * v[0] + u[1] * v[1]).to_degrees()
+            (u[0] * v[1] - u[1] * v[0])
+                .abs()
+                .atan2(u[0] * v[0] + u[1] * v[1])
+                .to_degrees()
         })
         .fold(180.0, f64::min)
 }

@@ -24,7 +24,13 @@ pub(super) struct SceneData {
 }
 
 impl SceneData {
-    pub(super) fn new(stage: &Stage, area: &Area, samples: u32, behind: f32, shader: &Shader<'_>) -> Self {
+    pub(super) fn new(
+        stage: &Stage,
+        area: &Area,
+        samples: u32,
+        behind: f32,
+        shader: &Shader<'_>,
+    ) -> Self {
         let mut lens = [0.0; 4];
         if let View::Perspective { camera: k, .. } = part_of(stage, area, samples) {
             lens = [k.fx, k.fy, k.cx + 0.5, k.cy + 0.5].map(|v| v as f32);
@@ -33,9 +39,19 @@ impl SceneData {
         let around = [area.width.div_ceil(2), area.height.div_ceil(2)];
         Self {
             lens,
-            size: [(area.width * samples) as f32, (area.height * samples) as f32, NEAR, samples as f32],
+            size: [
+                (area.width * samples) as f32,
+                (area.height * samples) as f32,
+                NEAR,
+                samples as f32,
+            ],
             camera: [k.fx, k.fy, k.cx, k.cy].map(|v| v as f32),
-            area: [area.left as f32, area.top as f32, around[0] as f32, around[1] as f32],
+            area: [
+                area.left as f32,
+                area.top as f32,
+                around[0] as f32,
+                around[1] as f32,
+            ],
             up: [shader.up.x, shader.up.y, shader.up.z, l.sky],
             key: [shader.key.x, shader.key.y, shader.key.z, l.key],
             light: [l.ground, l.inside, l.contact, shader.brightness],
@@ -72,9 +88,17 @@ impl From<&Fabric> for FabricData {
 
 /// Bytes of the five storage buffers, in the order of their bindings.
 pub(super) fn geometry(surface: &Surface) -> [Vec<u8>; 5] {
-    let points: Vec<[f32; 4]> = surface.vertices.iter().map(|p| [p.x, p.y, p.z, 1.0]).collect();
-    let owners: Vec<u32> =
-        surface.garment.iter().zip(&surface.inner).map(|(g, i)| u32::from(*g) + if *i { 256 } else { 0 }).collect();
+    let points: Vec<[f32; 4]> = surface
+        .vertices
+        .iter()
+        .map(|p| [p.x, p.y, p.z, 1.0])
+        .collect();
+    let owners: Vec<u32> = surface
+        .garment
+        .iter()
+        .zip(&surface.inner)
+        .map(|(g, i)| u32::from(*g) + if *i { 256 } else { 0 })
+        .collect();
     let fabrics: Vec<FabricData> = surface.fabrics.iter().map(FabricData::from).collect();
     [
         bytemuck::cast_slice(&points).to_vec(),

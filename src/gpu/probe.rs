@@ -42,7 +42,9 @@ pub enum GpuError {
 }
 
 /// The GL backend cannot write the depth textures used here, so it is left out.
-const BACKENDS: wgpu::Backends = wgpu::Backends::VULKAN.union(wgpu::Backends::METAL).union(wgpu::Backends::DX12);
+const BACKENDS: wgpu::Backends = wgpu::Backends::VULKAN
+    .union(wgpu::Backends::METAL)
+    .union(wgpu::Backends::DX12);
 
 /// All adapters, the best first: real before software, discrete before integrated.
 pub(super) fn found() -> Vec<wgpu::Adapter> {

@@ -45,7 +45,8 @@ impl Targets {
         let buffer = |label, bytes: u32| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
-                size: u64::from((size[0] * bytes).div_ceil(ROW_ALIGN) * ROW_ALIGN) * u64::from(size[1]),
+                size: u64::from((size[0] * bytes).div_ceil(ROW_ALIGN) * ROW_ALIGN)
+                    * u64::from(size[1]),
                 usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
                 mapped_at_creation: false,
             })
@@ -60,7 +61,12 @@ impl Targets {
             pixels: texture("pixels", [1, 1], Format::Rgba32Uint, drawn | U::COPY_SRC),
             marks: texture("marks", [1, 1], Format::Rg32Float, given),
             around: texture("around", [1, 2], Format::Rgba32Float, given),
-            picture: texture("picture", [1, 1], Format::Rgba8Unorm, U::RENDER_ATTACHMENT | U::COPY_DST | U::COPY_SRC),
+            picture: texture(
+                "picture",
+                [1, 1],
+                Format::Rgba8Unorm,
+                U::RENDER_ATTACHMENT | U::COPY_DST | U::COPY_SRC,
+            ),
             pixels_out: buffer("pixels out", 16),
             picture_out: buffer("picture out", 4),
         }
@@ -76,12 +82,27 @@ pub(super) fn padded_row(width: u32, bytes: u32) -> u32 {
 }
 
 /// Writes the upper left `width × height` texels.
-pub(super) fn write(queue: &wgpu::Queue, texture: &wgpu::Texture, width: u32, height: u32, bytes: u32, data: &[u8]) {
+pub(super) fn write(
+    queue: &wgpu::Queue,
+    texture: &wgpu::Texture,
+    width: u32,
+    height: u32,
+    bytes: u32,
+    data: &[u8],
+) {
     queue.write_texture(
         texture.as_image_copy(),
         data,
-        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(width * bytes), rows_per_image: None },
-        wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(width * bytes),
+            rows_per_image: None,
+        },
+        wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: 1,
+        },
     );
 }
 
@@ -104,6 +125,10 @@ pub(super) fn read(
                 rows_per_image: None,
             },
         },
-        wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: 1,
+        },
     );
 }

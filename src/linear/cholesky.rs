@@ -2,7 +2,9 @@
 
 use super::{LinearError, SymmetricPattern};
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
+use faer::sparse::linalg::cholesky::{
+    LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 use std::sync::Arc;
@@ -20,11 +22,24 @@ impl SymbolicFactor {
     /// # Errors
     /// When the factor would not fit 32-bit indices or the memory.
     pub fn new(pattern: Arc<SymmetricPattern>) -> Result<Self, LinearError> {
-        let structure =
-            SymbolicSparseColMatRef::new_checked(pattern.size(), pattern.size(), &pattern.columns, None, &pattern.rows);
-        let symbolic = factorize_symbolic_cholesky(structure, Side::Lower, SymmetricOrdering::Amd, Default::default())
-            .map_err(|e| LinearError::TooLarge(e.to_string()))?;
-        Ok(Self { pattern, symbolic: Arc::new(symbolic) })
+        let structure = SymbolicSparseColMatRef::new_checked(
+            pattern.size(),
+            pattern.size(),
+            &pattern.columns,
+            None,
+            &pattern.rows,
+        );
+        let symbolic = factorize_symbolic_cholesky(
+            structure,
+            Side::Lower,
+            SymmetricOrdering::Amd,
+            Default::default(),
+        )
+        .map_err(|e| LinearError::TooLarge(e.to_string()))?;
+        Ok(Self {
+            pattern,
+            symbolic: Arc::new(symbolic),
+        })
     }
     /// The pattern it was made for.
     pub fn pattern(&self) -> &SymmetricPattern {
@@ -47,7 +62,10 @@ pub struct Factor {
 
 impl std::fmt::Debug for Factor {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Factor").field("size", &self.symbolic.pattern.size()).field("fill", &self.values.len()).finish()
+        f.debug_struct("Factor")
+            .field("size", &self.symbolic.pattern.size())
+            .field("fill", &self.values.len())
+            .finish()
     }
 }
 
@@ -71,7 +89,8 @@ impl Factor {
     /// [`LinearError::NotPositiveDefinite`] names the pivot; the factor must not be used then.
     pub fn refactor(&mut self, values: &[f64]) -> Result<(), LinearError> {
         let p = &self.symbolic.pattern;
-        let structure = SymbolicSparseColMatRef::new_checked(p.size(), p.size(), &p.columns, None, &p.rows);
+        let structure =
+            SymbolicSparseColMatRef::new_checked(p.size(), p.size(), &p.columns, None, &p.rows);
         self.symbolic
             .symbolic
             .factorize_numeric_llt(
@@ -119,7 +138,8 @@ mod tests {
     #[test]
     fn solves_and_refactors() {
         let n = 200;
-        let pattern = Arc::new(SymmetricPattern::new(n, (1..n as u32).map(|i| (i - 1, i))).expect("pattern"));
+        let pattern =
+            Arc::new(SymmetricPattern::new(n, (1..n as u32).map(|i| (i - 1, i))).expect("pattern"));
         let mut factor = Factor::new(SymbolicFactor::new(pattern.clone()).expect("symbolic"));
         for shift in [1.0, 1e-3] {
             let mut values = vec![0.0; pattern.entries()];
@@ -130,22 +150,33 @@ mod tests {
                 values[pattern.slot(i, i - 1).expect("in pattern")] = -1.0;
             }
             factor.refactor(&values).expect("positive definite");
-            let b: Vec<[f64; 3]> = (0..n).map(|i| [(i as f64).sin(), 1.0, (i % 7) as f64]).collect();
+            let b: Vec<[f64; 3]> = (0..n)
+                .map(|i| [(i as f64).sin(), 1.0, (i % 7) as f64])
+                .collect();
             let mut x = b.clone();
             factor.solve(&mut x);
             let mut back = Vec::new();
             pattern.multiply(&values, &x, &mut back);
-            let worst =
-                b.iter().zip(&back).flat_map(|(p, q)| (0..3).map(move |d| (p[d] - q[d]).abs())).fold(0.0, f64::max);
+            let worst = b
+                .iter()
+                .zip(&back)
+                .flat_map(|(p, q)| (0..3).map(move |d| (p[d] - q[d]).abs()))
+                .fold(0.0, f64::max);
             assert!(worst < 1e-9, "{worst}");
         }
     }
 
     #[test]
     fn faults_are_named() {
-        assert!(matches!(SymmetricPattern::new(2, [(0, 5)]), Err(LinearError::OutOfRange { column: 5, .. })));
+        assert!(matches!(
+            SymmetricPattern::new(2, [(0, 5)]),
+            Err(LinearError::OutOfRange { column: 5, .. })
+        ));
         let pattern = Arc::new(SymmetricPattern::new(2, [(1, 0)]).expect("pattern"));
         let mut factor = Factor::new(SymbolicFactor::new(pattern).expect("symbolic"));
-        assert!(matches!(factor.refactor(&[1.0, 2.0, 1.0]), Err(LinearError::NotPositiveDefinite { .. })));
+        assert!(matches!(
+            factor.refactor(&[1.0, 2.0, 1.0]),
+            Err(LinearError::NotPositiveDefinite { .. })
+        ));
     }
 }

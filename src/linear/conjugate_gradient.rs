@@ -23,7 +23,9 @@ pub fn conjugate_gradient(
     most: usize,
 ) -> CgReport {
     let n = b.len();
-    let dot = |p: &[Vector3<f64>], q: &[Vector3<f64>]| p.iter().zip(q).map(|(a, b)| a.dot(b)).sum::<f64>();
+    let dot = |p: &[Vector3<f64>], q: &[Vector3<f64>]| {
+        p.iter().zip(q).map(|(a, b)| a.dot(b)).sum::<f64>()
+    };
     let mut ap = vec![Vector3::zeros(); n];
     apply(x, &mut ap);
     let mut r: Vec<_> = b.iter().zip(&ap).map(|(b, a)| b - a).collect();
@@ -52,7 +54,10 @@ pub fn conjugate_gradient(
             p[i] = z[i] + p[i] * beta;
         }
     }
-    CgReport { iterations, relative_residual: dot(&r, &r).sqrt() / norm_b }
+    CgReport {
+        iterations,
+        relative_residual: dot(&r, &r).sqrt() / norm_b,
+    }
 }
 
 #[cfg(test)]
@@ -75,8 +80,18 @@ mod tests {
         };
         let b: Vec<_> = (0..n).map(|i| Vector3::new(1.0, i as f64, -0.5)).collect();
         let mut x = vec![Vector3::zeros(); n];
-        let report = conjugate_gradient(apply, &vec![Matrix3::identity() / 2.5; n], &b, &mut x, 1e-12, 3 * n);
-        assert!(report.relative_residual < 1e-11 && report.iterations <= 3 * n, "{report:?}");
+        let report = conjugate_gradient(
+            apply,
+            &vec![Matrix3::identity() / 2.5; n],
+            &b,
+            &mut x,
+            1e-12,
+            3 * n,
+        );
+        assert!(
+            report.relative_residual < 1e-11 && report.iterations <= 3 * n,
+            "{report:?}"
+        );
         let mut back = vec![Vector3::zeros(); n];
         apply(&x, &mut back);
         assert!(b.iter().zip(&back).all(|(p, q)| (p - q).norm() < 1e-9));

@@ -15,11 +15,18 @@ impl SymmetricPattern {
     ///
     /// # Errors
     /// An index beyond `size`, or more entries than 32 bits count.
-    pub fn new(size: usize, entries: impl IntoIterator<Item = (u32, u32)>) -> Result<Self, LinearError> {
+    pub fn new(
+        size: usize,
+        entries: impl IntoIterator<Item = (u32, u32)>,
+    ) -> Result<Self, LinearError> {
         let mut all: Vec<(u32, u32)> = (0..size as u32).map(|i| (i, i)).collect();
         for (r, c) in entries {
             if r as usize >= size || c as usize >= size {
-                return Err(LinearError::OutOfRange { row: r as usize, column: c as usize, size });
+                return Err(LinearError::OutOfRange {
+                    row: r as usize,
+                    column: c as usize,
+                    size,
+                });
             }
             all.push((r.min(c), r.max(c))); // (column, row) of the lower triangle
         }
@@ -35,7 +42,11 @@ impl SymmetricPattern {
         for i in 0..size {
             columns[i + 1] += columns[i];
         }
-        Ok(Self { columns, rows: all.into_iter().map(|(_, r)| r).collect(), size })
+        Ok(Self {
+            columns,
+            rows: all.into_iter().map(|(_, r)| r).collect(),
+            size,
+        })
     }
     /// Rows (and columns).
     pub fn size(&self) -> usize {

@@ -56,11 +56,17 @@ impl<A, B> Rigid<A, B> {
     }
     /// Wraps a bare isometry; the caller vouches for the frames.
     pub fn new(iso: Isometry3<f64>) -> Self {
-        Self { iso, frames: PhantomData }
+        Self {
+            iso,
+            frames: PhantomData,
+        }
     }
     /// From a translation (metres) and a unit quaternion.
     pub fn from_parts(translation: Vector3<f64>, rotation: UnitQuaternion<f64>) -> Self {
-        Self::new(Isometry3::from_parts(Translation3::from(translation), rotation))
+        Self::new(Isometry3::from_parts(
+            Translation3::from(translation),
+            rotation,
+        ))
     }
     /// The bare isometry, for inner loops.
     pub fn iso(&self) -> &Isometry3<f64> {

@@ -18,7 +18,10 @@ pub struct Twist {
 impl Twist {
     /// The rotation about `axis` (unit length) through `point`: ξ = (p × ω, ω).
     pub fn revolute(axis: Vector3<f64>, point: Vector3<f64>) -> Self {
-        Self { linear: point.cross(&axis), angular: axis }
+        Self {
+            linear: point.cross(&axis),
+            angular: axis,
+        }
     }
     /// Velocity of a point under this twist: v + ω × p.
     pub fn velocity_at(&self, p: &Vector3<f64>) -> Vector3<f64> {
@@ -88,7 +91,10 @@ pub fn log_se3(iso: &Isometry3<f64>) -> Twist {
     };
     let k = skew(&angular);
     let inverse = Matrix3::identity() - k * 0.5 + k * k * c;
-    Twist { linear: inverse * iso.translation.vector, angular }
+    Twist {
+        linear: inverse * iso.translation.vector,
+        angular,
+    }
 }
 
 #[cfg(test)]
@@ -132,7 +138,15 @@ mod tests {
 
     #[test]
     fn small_and_half_turns_round_trip() {
-        for angle in [0.0, 1e-12, 1e-8, 9.9e-5, 1.01e-4, 3.0, std::f64::consts::PI - 1e-9] {
+        for angle in [
+            0.0,
+            1e-12,
+            1e-8,
+            9.9e-5,
+            1.01e-4,
+            3.0,
+            std::f64::consts::PI - 1e-9,
+        ] {
             let w = Vector3::new(0.6, -0.48, 0.64) * angle;
             assert!((log_so3(&exp_so3(&w)) - w).norm() < 1e-9, "angle {angle}");
         }
@@ -143,8 +157,10 @@ mod tests {
         let iso = Isometry3::new(Vector3::new(0.3, -0.2, 1.0), Vector3::new(0.1, 0.7, -0.4));
         let (axis, point) = (Vector3::z(), Vector3::new(0.2, 0.1, 0.0));
         let moved = Twist::revolute(axis, point).transformed(&iso);
-        let expected =
-            Twist::revolute(iso.rotation * axis, iso * nalgebra::Point3::from(point) - nalgebra::Point3::origin());
+        let expected = Twist::revolute(
+            iso.rotation * axis,
+            iso * nalgebra::Point3::from(point) - nalgebra::Point3::origin(),
+        );
         assert!((moved.linear - expected.linear).norm() < 1e-12);
         assert!((moved.angular - expected.angular).norm() < 1e-12);
     }

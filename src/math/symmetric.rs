@@ -23,7 +23,10 @@ pub fn principal_axes(points: &[Point3<f32>]) -> Option<(Point3<f64>, Matrix3<f6
         return None;
     }
     let n = points.len() as f64;
-    let mean = points.iter().fold(Vector3::zeros(), |a, p| a + p.coords.cast::<f64>()) / n;
+    let mean = points
+        .iter()
+        .fold(Vector3::zeros(), |a, p| a + p.coords.cast::<f64>())
+        / n;
     let cov = points.iter().fold(Matrix3::zeros(), |a, p| {
         let d = p.coords.cast::<f64>() - mean;
         a + d * d.transpose()
@@ -55,7 +58,9 @@ mod tests {
 
     #[test]
     fn axes_of_a_stretched_cloud() {
-        let pts: Vec<_> = (0..100).map(|i| Point3::new(0.01 * (i % 3) as f32, i as f32 * 0.02, 0.0)).collect();
+        let pts: Vec<_> = (0..100)
+            .map(|i| Point3::new(0.01 * (i % 3) as f32, i as f32 * 0.02, 0.0))
+            .collect();
         let (_, axes, var) = principal_axes(&pts).expect("points given");
         assert!(axes.column(0).y.abs() > 0.999 && var[0] > var[1] && var[1] >= var[2]);
         assert!(principal_axes(&[]).is_none());

@@ -2,8 +2,15 @@
 
 /// Shortest way along edges (ends, length) from each of `n` vertices to the nearest of some others, metres; infinite where
 /// there is none, and far beyond `up_to`.
-pub fn distances(n: usize, edges: &[([u32; 2], f64)], up_to: f64, from: impl Fn(usize) -> bool) -> Vec<f64> {
-    let mut far: Vec<f64> = (0..n).map(|i| if from(i) { 0.0 } else { f64::INFINITY }).collect();
+pub fn distances(
+    n: usize,
+    edges: &[([u32; 2], f64)],
+    up_to: f64,
+    from: impl Fn(usize) -> bool,
+) -> Vec<f64> {
+    let mut far: Vec<f64> = (0..n)
+        .map(|i| if from(i) { 0.0 } else { f64::INFINITY })
+        .collect();
     loop {
         let mut moved = false;
         for ([a, b], l) in edges.iter().map(|(v, l)| (v.map(|v| v as usize), l)) {

@@ -69,12 +69,19 @@ impl TriMesh {
         if u32::try_from(vertices.len()).is_err() {
             return Err(MeshError::TooLarge(vertices.len()));
         }
-        if let Some(vertex) = vertices.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+        if let Some(vertex) = vertices
+            .iter()
+            .position(|p| !p.iter().all(|c| c.is_finite()))
+        {
             return Err(MeshError::NotFinite { vertex });
         }
         for (face, f) in faces.iter().enumerate() {
             if let Some(&index) = f.iter().find(|&&i| i as usize >= vertices.len()) {
-                return Err(MeshError::IndexOutOfRange { face, index, vertices: vertices.len() });
+                return Err(MeshError::IndexOutOfRange {
+                    face,
+                    index,
+                    vertices: vertices.len(),
+                });
             }
             if f[0] == f[1] || f[0] == f[2] {
                 return Err(MeshError::RepeatedCorner { face, index: f[0] });
@@ -104,14 +111,20 @@ impl TriMesh {
     /// When a position is not finite; a wrong count names the first missing or extra vertex.
     pub fn with_vertices(&self, vertices: Vec<P3>) -> Result<Self, MeshError> {
         if vertices.len() != self.vertices.len() {
-            return Err(MeshError::NotFinite { vertex: vertices.len().min(self.vertices.len()) });
+            return Err(MeshError::NotFinite {
+                vertex: vertices.len().min(self.vertices.len()),
+            });
         }
         Self::new(vertices, self.faces.clone())
     }
     /// Axis-aligned bounds, or `None` for a mesh without vertices.
     pub fn bounds(&self) -> Option<(P3, P3)> {
         let first = *self.vertices.first()?;
-        Some(self.vertices.iter().fold((first, first), |(lo, hi), p| (lo.inf(p), hi.sup(p))))
+        Some(
+            self.vertices
+                .iter()
+                .fold((first, first), |(lo, hi), p| (lo.inf(p), hi.sup(p))),
+        )
     }
     /// Signed volume (m³) of a closed mesh; positive when faces point outward.
     pub fn volume(&self) -> f64 {
@@ -140,7 +153,13 @@ mod tests {
 
     /// A regular tetrahedron, outward faces.
     pub(crate) fn tetrahedron() -> TriMesh {
-        let v = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(P3::from);
+        let v = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+        ]
+        .map(P3::from);
         TriMesh::new(v.to_vec(), vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).expect("valid")
     }
 
@@ -149,12 +168,22 @@ mod tests {
         let v = vec![P3::origin(); 3];
         assert_eq!(
             TriMesh::new(v.clone(), vec![[0, 1, 2], [0, 1, 7]]),
-            Err(MeshError::IndexOutOfRange { face: 1, index: 7, vertices: 3 })
+            Err(MeshError::IndexOutOfRange {
+                face: 1,
+                index: 7,
+                vertices: 3
+            })
         );
-        assert_eq!(TriMesh::new(v.clone(), vec![[0, 2, 2]]), Err(MeshError::RepeatedCorner { face: 0, index: 2 }));
+        assert_eq!(
+            TriMesh::new(v.clone(), vec![[0, 2, 2]]),
+            Err(MeshError::RepeatedCorner { face: 0, index: 2 })
+        );
         let mut bad = v;
         bad[1].y = f32::NAN;
-        assert_eq!(TriMesh::new(bad, vec![]), Err(MeshError::NotFinite { vertex: 1 }));
+        assert_eq!(
+            TriMesh::new(bad, vec![]),
+            Err(MeshError::NotFinite { vertex: 1 })
+        );
     }
 
     #[test]

@@ -23,15 +23,22 @@ pub fn vertex_normals(
 ) {
     // Each is wanted by three vertices.
     let mut normals = Vec::new();
-    par::map_into(par, faces.len(), 2048, &mut normals, |f| face_normal(vertices, &faces[f]));
+    par::map_into(par, faces.len(), 2048, &mut normals, |f| {
+        face_normal(vertices, &faces[f])
+    });
     par::map_into(par, vertices.len(), 1024, out, |i| {
-        let sum = vertex_faces.row(i).iter().fold(V3::zeros(), |s, &f| s + normals[f as usize]);
+        let sum = vertex_faces
+            .row(i)
+            .iter()
+            .fold(V3::zeros(), |s, &f| s + normals[f as usize]);
         sum.try_normalize(0.0).unwrap_or_else(V3::zeros)
     });
 }
 
 /// As [`vertex_normals`], of the vertex that has these `faces` around it.
 pub fn vertex_normal(vertices: &[P3], faces: &[Face], around: &[u32]) -> V3 {
-    let sum = around.iter().fold(V3::zeros(), |s, &f| s + face_normal(vertices, &faces[f as usize]));
+    let sum = around.iter().fold(V3::zeros(), |s, &f| {
+        s + face_normal(vertices, &faces[f as usize])
+    });
     sum.try_normalize(0.0).unwrap_or_else(V3::zeros)
 }

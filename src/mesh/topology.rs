@@ -73,7 +73,11 @@ impl Topology {
         for (fi, f) in mesh.faces().iter().enumerate() {
             for k in 0..3 {
                 let (a, b) = (f[k], f[(k + 1) % 3]);
-                let (key, forward) = if a < b { ((a, b), true) } else { ((b, a), false) };
+                let (key, forward) = if a < b {
+                    ((a, b), true)
+                } else {
+                    ((b, a), false)
+                };
                 match edges.get_mut(&key) {
                     None => {
                         let edge = Edge {
@@ -106,10 +110,21 @@ impl Topology {
         }
         let edges: Vec<Edge> = edges.into_values().map(|(_, e)| e).collect();
         let n = mesh.vertices().len();
-        let vf: Vec<(u32, u32)> =
-            mesh.faces().iter().enumerate().flat_map(|(fi, f)| f.map(|v| (v, fi as u32))).collect();
-        let vn: Vec<(u32, u32)> = edges.iter().flat_map(|e| [(e.v[0], e.v[1]), (e.v[1], e.v[0])]).collect();
-        Ok(Self { edges, vertex_faces: Csr::from_pairs(n, &vf), vertex_neighbours: Csr::from_pairs(n, &vn) })
+        let vf: Vec<(u32, u32)> = mesh
+            .faces()
+            .iter()
+            .enumerate()
+            .flat_map(|(fi, f)| f.map(|v| (v, fi as u32)))
+            .collect();
+        let vn: Vec<(u32, u32)> = edges
+            .iter()
+            .flat_map(|e| [(e.v[0], e.v[1]), (e.v[1], e.v[0])])
+            .collect();
+        Ok(Self {
+            edges,
+            vertex_faces: Csr::from_pairs(n, &vf),
+            vertex_neighbours: Csr::from_pairs(n, &vn),
+        })
     }
     /// All edges.
     pub fn edges(&self) -> &[Edge] {
@@ -169,16 +184,33 @@ mod tests {
 
     #[test]
     fn hinge_orientation_and_faults() {
-        let v = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]].map(P3::from).to_vec();
+        let v = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [1.0, 1.0, 0.0],
+        ]
+        .map(P3::from)
+        .to_vec();
         let m = TriMesh::new(v.clone(), vec![[0, 1, 2], [2, 1, 3]]).expect("valid");
         let t = Topology::new(&m).expect("manifold");
-        let hinge = t.edges().iter().find(|e| e.twin.is_some()).expect("one hinge");
+        let hinge = t
+            .edges()
+            .iter()
+            .find(|e| e.twin.is_some())
+            .expect("one hinge");
         assert_eq!((hinge.v, hinge.face, hinge.twin), ([1, 2], 0, Some(1)));
         assert_eq!(hinge.opposite, [Some(0), Some(3)]);
         assert!(!t.is_closed() && t.boundary_vertices().iter().all(|b| *b));
         let flipped = TriMesh::new(v.clone(), vec![[0, 1, 2], [1, 2, 3]]).expect("valid");
-        assert_eq!(Topology::new(&flipped).err(), Some(MeshError::FlippedFace(1, 2)));
+        assert_eq!(
+            Topology::new(&flipped).err(),
+            Some(MeshError::FlippedFace(1, 2))
+        );
         let fan = TriMesh::new(v, vec![[0, 1, 2], [1, 0, 3], [0, 1, 3]]).expect("valid");
-        assert_eq!(Topology::new(&fan).err(), Some(MeshError::NonManifoldEdge(0, 1)));
+        assert_eq!(
+            Topology::new(&fan).err(),
+            Some(MeshError::NonManifoldEdge(0, 1))
+        );
     }
 }

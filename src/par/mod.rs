@@ -24,7 +24,10 @@ pub enum Par {
 /// # Errors
 /// When the operating system refuses the threads.
 pub fn with_threads<R: Send>(threads: usize, f: impl FnOnce() -> R + Send) -> Result<R, PoolError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| PoolError(e.to_string()))?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| PoolError(e.to_string()))?;
     Ok(pool.install(f))
 }
 
@@ -34,11 +37,22 @@ pub fn with_threads<R: Send>(threads: usize, f: impl FnOnce() -> R + Send) -> Re
 pub struct PoolError(String);
 
 /// Calls `f(start_index, chunk)` on fixed-size chunks of `items`.
-pub fn for_chunks<T: Send>(par: Par, items: &mut [T], chunk: usize, f: impl Fn(usize, &mut [T]) + Sync) {
+pub fn for_chunks<T: Send>(
+    par: Par,
+    items: &mut [T],
+    chunk: usize,
+    f: impl Fn(usize, &mut [T]) + Sync,
+) {
     let chunk = chunk.max(1);
     match par {
-        Par::Seq => items.chunks_mut(chunk).enumerate().for_each(|(i, c)| f(i * chunk, c)),
-        Par::Rayon => items.par_chunks_mut(chunk).enumerate().for_each(|(i, c)| f(i * chunk, c)),
+        Par::Seq => items
+            .chunks_mut(chunk)
+            .enumerate()
+            .for_each(|(i, c)| f(i * chunk, c)),
+        Par::Rayon => items
+            .par_chunks_mut(chunk)
+            .enumerate()
+            .for_each(|(i, c)| f(i * chunk, c)),
     }
 }
 
@@ -70,13 +84,21 @@ pub fn reduce_chunks<A: Send>(
     let ranges = (0..n.div_ceil(chunk)).map(|c| c * chunk..((c + 1) * chunk).min(n));
     let parts: Vec<A> = match par {
         Par::Seq => ranges.map(map).collect(),
-        Par::Rayon => ranges.collect::<Vec<_>>().into_par_iter().map(map).collect(),
+        Par::Rayon => ranges
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map(map)
+            .collect(),
     };
     parts.into_iter().reduce(combine)
 }
 
 /// Runs two closures, in parallel when allowed, and returns both results.
-pub fn join<A: Send, B: Send>(par: Par, a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
+pub fn join<A: Send, B: Send>(
+    par: Par,
+    a: impl FnOnce() -> A + Send,
+    b: impl FnOnce() -> B + Send,
+) -> (A, B) {
     match par {
         Par::Seq => (a(), b()),
         Par::Rayon => rayon::join(a, b),
@@ -89,8 +111,18 @@ mod tests {
 
     #[test]
     fn sums_have_the_same_bits_at_any_thread_count() {
-        let v: Vec<f32> = (0..100_001).map(|i| ((i * 7919) % 1013) as f32 * 1e-3 + 1e-7).collect();
-        let sum = |par| reduce_chunks(par, v.len(), 512, |r| v[r].iter().sum::<f32>(), |a, b| a + b);
+        let v: Vec<f32> = (0..100_001)
+            .map(|i| ((i * 7919) % 1013) as f32 * 1e-3 + 1e-7)
+            .collect();
+        let sum = |par| {
+            reduce_chunks(
+                par,
+                v.len(),
+                512,
+                |r| v[r].iter().sum::<f32>(),
+                |a, b| a + b,
+            )
+        };
         let seq = sum(Par::Seq).map(f32::to_bits);
         for threads in [1, 2, 5] {
             let got = with_threads(threads, || sum(Par::Rayon)).expect("pool");

@@ -24,17 +24,32 @@ struct Crew<'a, T, F> {
 /// Calls `f(round, index, item)` for every item in every round; no item begins a round before all have ended the last.
 /// A thread prefers the items it had, and takes over those whose thread is late. Threads that come late or never cost
 /// time only, as the calling thread does what nobody else does.
-pub fn rounds<T: Send>(par: Par, items: &mut [T], rounds: usize, f: impl Fn(usize, usize, &mut T) + Sync) {
-    let threads = if par == Par::Seq { 1 } else { rayon::current_num_threads().min(items.len()) };
+pub fn rounds<T: Send>(
+    par: Par,
+    items: &mut [T],
+    rounds: usize,
+    f: impl Fn(usize, usize, &mut T) + Sync,
+) {
+    let threads = if par == Par::Seq {
+        1
+    } else {
+        rayon::current_num_threads().min(items.len())
+    };
     if threads <= 1 {
         for r in 0..rounds {
-            items.iter_mut().enumerate().for_each(|(i, item)| f(r, i, item));
+            items
+                .iter_mut()
+                .enumerate()
+                .for_each(|(i, item)| f(r, i, item));
         }
         return;
     }
     let crew = Crew {
         left: AtomicUsize::new(items.len()),
-        items: items.iter_mut().map(|i| (AtomicUsize::new(0), Mutex::new(i))).collect(),
+        items: items
+            .iter_mut()
+            .map(|i| (AtomicUsize::new(0), Mutex::new(i)))
+            .collect(),
         rounds,
         round: AtomicUsize::new(0),
         broken: AtomicBool::new(false),
@@ -69,7 +84,10 @@ impl<T: Send, F: Fn(usize, usize, &mut T) + Sync> Crew<'_, T, F> {
             for k in 0..n {
                 let i = (first + k) % n;
                 let (next, item) = &self.items[i];
-                if next.compare_exchange(round, round + 1, Ordering::AcqRel, Ordering::Relaxed).is_err() {
+                if next
+                    .compare_exchange(round, round + 1, Ordering::AcqRel, Ordering::Relaxed)
+                    .is_err()
+                {
                     continue;
                 }
                 let Ok(mut item) = item.lock() else { return };
@@ -108,7 +126,9 @@ mod tests {
 
     /// Every item adds up what its neighbour published in the round before.
     fn relay(threads: usize, items: usize, n: usize) -> Vec<u64> {
-        let published: Vec<[Mutex<u64>; 2]> = (0..items).map(|i| [Mutex::new(i as u64), Mutex::new(0)]).collect();
+        let published: Vec<[Mutex<u64>; 2]> = (0..items)
+            .map(|i| [Mutex::new(i as u64), Mutex::new(0)])
+            .collect();
         let mut all = vec![0u64; items];
         with_threads(threads, || {
             rounds(Par::Rayon, &mut all, n, |r, i, mine| {
@@ -126,7 +146,11 @@ mod tests {
         for items in [1, 2, 3, 7] {
             let one = relay(1, items, 500);
             for threads in [2, 3, 8] {
-                assert_eq!(relay(threads, items, 500), one, "{threads} threads, {items} items");
+                assert_eq!(
+                    relay(threads, items, 500),
+                    one,
+                    "{threads} threads, {items} items"
+                );
             }
         }
         rounds(Par::Rayon, &mut [0u8; 0], 3, |_, _, _| unreachable!());
@@ -136,7 +160,11 @@ mod tests {
     #[test]
     fn a_panic_in_one_ends_all() {
         let caught = std::panic::catch_unwind(|| {
-            with_threads(2, || rounds(Par::Rayon, &mut [0u8; 4], 9, |r, i, _| assert!(r < 3 || i != 2, "one")))
+            with_threads(2, || {
+                rounds(Par::Rayon, &mut [0u8; 4], 9, |r, i, _| {
+                    assert!(r < 3 || i != 2, "one")
+                })
+            })
         });
         assert!(caught.is_err());
     }

@@ -18,8 +18,13 @@ pub(super) fn clip(view: &Projector, corners: [P3; 3], mut draw: impl FnMut([Cor
     let mut polygon = [[0.0; 4]; MAX_CORNERS + 1];
     let mut n = 3;
     for (slot, p) in polygon.iter_mut().zip(&corners) {
-        let w = if view.perspective { f64::from(p.z) } else { 1.0 };
-        let axis = |k: usize| f64::from(p[k]) * f64::from(view.scale[k]) + f64::from(view.offset[k]) * w;
+        let w = if view.perspective {
+            f64::from(p.z)
+        } else {
+            1.0
+        };
+        let axis =
+            |k: usize| f64::from(p[k]) * f64::from(view.scale[k]) + f64::from(view.offset[k]) * w;
         *slot = [axis(0), axis(1), w, f64::from(p.z)];
     }
     // A hair inside the band, so that rounding to f32 and snapping cannot leave it.
@@ -69,7 +74,11 @@ fn cut(polygon: &mut [Hom; MAX_CORNERS + 1], n: usize, inside: impl Fn(&Hom) -> 
         }
         if (da >= 0.0) != (db >= 0.0) {
             // Always from the inner end: two faces sharing the edge get the same bits, hence no crack.
-            let (p, q, dp, dq) = if da >= 0.0 { (a, b, da, db) } else { (b, a, db, da) };
+            let (p, q, dp, dq) = if da >= 0.0 {
+                (a, b, da, db)
+            } else {
+                (b, a, db, da)
+            };
             let t = dp / (dp - dq);
             push(std::array::from_fn(|k| p[k] + (q[k] - p[k]) * t));
         }

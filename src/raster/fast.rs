@@ -55,11 +55,26 @@ pub(super) struct Scratch {
 /// Draws all faces, both sides, on the calling thread: the pixels of [`super::rasterise_reference`], faster.
 /// Points in the view's frame; faces out of range or with corners that are not finite are left out.
 pub fn rasterise(view: &View, vertices: &[P3], faces: &[Face], out: &mut VisibilityBuffer) {
-    rasterise_with(Options { par: Par::Seq, ..Options::default() }, view, vertices, faces, out);
+    rasterise_with(
+        Options {
+            par: Par::Seq,
+            ..Options::default()
+        },
+        view,
+        vertices,
+        faces,
+        out,
+    );
 }
 
 /// [`rasterise`] with threads and culling. The bits do not depend on the thread count.
-pub fn rasterise_with(options: Options, view: &View, vertices: &[P3], faces: &[Face], out: &mut VisibilityBuffer) {
+pub fn rasterise_with(
+    options: Options,
+    view: &View,
+    vertices: &[P3],
+    faces: &[Face],
+    out: &mut VisibilityBuffer,
+) {
     draw(options, view, vertices, faces, &[], out);
 }
 
@@ -76,7 +91,18 @@ pub fn rasterise_layers(
     layers: &[Range<usize>],
     out: &mut VisibilityBuffer,
 ) -> usize {
-    draw(Options { par, behind, cull: Cull::None }, view, vertices, faces, layers, out)
+    draw(
+        Options {
+            par,
+            behind,
+            cull: Cull::None,
+        },
+        view,
+        vertices,
+        faces,
+        layers,
+        out,
+    )
 }
 
 fn draw(
@@ -108,14 +134,25 @@ fn draw(
             }
         });
     }
-    let job = Job { projector, cull: options.cull, vertices, corners: &corners, faces, layers, ranges: &ranges };
+    let job = Job {
+        projector,
+        cull: options.cull,
+        vertices,
+        corners: &corners,
+        faces,
+        layers,
+        ranges: &ranges,
+    };
     let mut coarse = std::mem::take(&mut out.scratch.coarse);
     coarse.resize_with(BANDS, Coarse::default);
     let mut afar = coarse.iter_mut();
     let mut depth = out.depth.chunks_mut(rows * width.max(1));
     let mut face = out.face.chunks_mut(rows * width.max(1));
     let mut parts: [Option<Band<'_>>; BANDS] = std::array::from_fn(|k| {
-        let (depth, face) = (depth.next().unwrap_or_default(), face.next().unwrap_or_default());
+        let (depth, face) = (
+            depth.next().unwrap_or_default(),
+            face.next().unwrap_or_default(),
+        );
         let coarse = afar.next()?;
         coarse.hidden = 0;
         Some(Band {
@@ -163,10 +200,17 @@ impl Job<'_> {
     /// The corners of a face that may touch a band; `None` when it does not, or is no face.
     #[inline(always)]
     pub(super) fn corners(&self, id: usize, number: u8) -> Option<[Corner; 3]> {
-        if self.ranges.get(id).is_some_and(|r| number < r[0] || r[1] < number) {
+        if self
+            .ranges
+            .get(id)
+            .is_some_and(|r| number < r[0] || r[1] < number)
+        {
             return None;
         }
-        let [Some(a), Some(b), Some(c)] = self.faces[id].map(|i| self.corners.get(i as usize)) else { return None };
+        let [Some(a), Some(b), Some(c)] = self.faces[id].map(|i| self.corners.get(i as usize))
+        else {
+            return None;
+        };
         Some([*a, *b, *c])
     }
     /// Whether a face begins in this band.
@@ -195,18 +239,25 @@ impl Job<'_> {
 
 /// First and last band a face may touch.
 fn band_range(corners: &[Corner], f: &Face, cull: Cull, rows: i32) -> [u8; 2] {
-    let [Some(a), Some(b), Some(c)] = f.map(|i| corners.get(i as usize)) else { return NOWHERE };
+    let [Some(a), Some(b), Some(c)] = f.map(|i| corners.get(i as usize)) else {
+        return NOWHERE;
+    };
     if a.is_outside() | b.is_outside() | c.is_outside() {
         return [0, BANDS as u8 - 1];
     }
     // Rounding differs from the exact sign only near zero, where the exact test in the band decides.
-    let area = f64::from(b.x - a.x) * f64::from(c.y - a.y) - f64::from(b.y - a.y) * f64::from(c.x - a.x);
+    let area =
+        f64::from(b.x - a.x) * f64::from(c.y - a.y) - f64::from(b.y - a.y) * f64::from(c.x - a.x);
     if (cull == Cull::Back && area > 0.0) || (cull == Cull::Front && area < 0.0) {
         return NOWHERE;
     }
     let first = (a.y.min(b.y).min(c.y) >> SUB_BITS) / rows;
     let last = (a.y.max(b.y).max(c.y) >> SUB_BITS) / rows;
-    if last < 0 || first >= BANDS as i32 { NOWHERE } else { [first.max(0) as u8, last.min(BANDS as i32 - 1) as u8] }
+    if last < 0 || first >= BANDS as i32 {
+        NOWHERE
+    } else {
+        [first.max(0) as u8, last.min(BANDS as i32 - 1) as u8]
+    }
 }
 
 #[inline(always)]
@@ -261,10 +312,19 @@ mod tests {
     use rand::{Rng, SeedableRng};
 
     fn pinhole() -> View {
-        View::Perspective { camera: Intrinsics::KINECT_V1.resized(160, 120), near: 0.3 }
+        View::Perspective {
+            camera: Intrinsics::KINECT_V1.resized(160, 120),
+            near: 0.3,
+        }
     }
     fn parallel() -> View {
-        View::Orthographic { width: 150, height: 130, left: -1.0, top: -0.9, pixels_per_metre: 70.0 }
+        View::Orthographic {
+            width: 150,
+            height: 130,
+            left: -1.0,
+            top: -0.9,
+            pixels_per_metre: 70.0,
+        }
     }
     /// Triangles of all sizes, some behind the camera, some crossing the near plane, some degenerate or huge.
     fn soup(seed: u64, n: usize) -> (Vec<P3>, Vec<Face>) {
@@ -272,10 +332,17 @@ mod tests {
         let mut v = Vec::new();
         for i in 0..n {
             let size = [0.002, 0.02, 0.3, 3.0, 4e3][i % 5];
-            let centre = P3::new(rng.random_range(-1.5..1.5), rng.random_range(-1.0..1.0), rng.random_range(0.1..4.0));
+            let centre = P3::new(
+                rng.random_range(-1.5..1.5),
+                rng.random_range(-1.0..1.0),
+                rng.random_range(0.1..4.0),
+            );
             for _ in 0..3 {
                 let mut r = || rng.random_range(-size..size);
-                v.push(centre + crate::math::V3::new(r(), r(), if size > 1.0 { r() * 0.3 } else { r() }));
+                v.push(
+                    centre
+                        + crate::math::V3::new(r(), r(), if size > 1.0 { r() * 0.3 } else { r() }),
+                );
             }
             let last = v.len() - 1;
             match i % 23 {
@@ -287,7 +354,9 @@ mod tests {
                 _ => {}
             }
         }
-        let mut f: Vec<Face> = (0..n as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let mut f: Vec<Face> = (0..n as u32)
+            .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
+            .collect();
         f.push([0, 1, 4_000_000]);
         (v, f)
     }
@@ -295,9 +364,9 @@ mod tests {
     fn close(view: &View, v: &[P3], face: &Face, a: f32, b: f32) -> bool {
         let reach = match view {
             View::Perspective { .. } => 0.0,
-            View::Orthographic { .. } => {
-                face.iter().fold(0f32, |m, &i| m.max(v.get(i as usize).map_or(0.0, |p| p.z.abs())))
-            }
+            View::Orthographic { .. } => face.iter().fold(0f32, |m, &i| {
+                m.max(v.get(i as usize).map_or(0.0, |p| p.z.abs()))
+            }),
         };
         a == b || (a - b).abs() < 2e-5 * a.abs() + 1e-6 * reach
     }
@@ -316,7 +385,15 @@ mod tests {
                 let mut slow = VisibilityBuffer::default();
                 for face in &f {
                     rasterise_reference(&view, &v, std::slice::from_ref(face), &mut slow);
-                    let fast = drawn(Options { par: Par::Seq, ..Options::default() }, &view, &v, &[*face]);
+                    let fast = drawn(
+                        Options {
+                            par: Par::Seq,
+                            ..Options::default()
+                        },
+                        &view,
+                        &v,
+                        &[*face],
+                    );
                     assert_eq!(slow.face, fast.face, "coverage of {face:?}, seed {seed}");
                     for (a, b) in slow.depth.iter().zip(&fast.depth) {
                         assert!(close(&view, &v, face, *a, *b), "{a} {b} {face:?}");
@@ -324,12 +401,26 @@ mod tests {
                 }
                 // And all together: only ties within rounding may fall differently.
                 rasterise_reference(&view, &v, &f, &mut slow);
-                let fast = drawn(Options { par: Par::Seq, ..Options::default() }, &view, &v, &f);
+                let fast = drawn(
+                    Options {
+                        par: Par::Seq,
+                        ..Options::default()
+                    },
+                    &view,
+                    &v,
+                    &f,
+                );
                 assert!(slow.face.iter().any(|&id| id != VisibilityBuffer::NONE));
                 for i in 0..slow.face.len() {
                     let (a, b) = (slow.depth[i], fast.depth[i]);
-                    let near = |id: u32| f.get(id as usize).is_some_and(|face| close(&view, &v, face, a, b));
-                    assert!(a == b || near(slow.face[i]) || near(fast.face[i]), "{a} {b}");
+                    let near = |id: u32| {
+                        f.get(id as usize)
+                            .is_some_and(|face| close(&view, &v, face, a, b))
+                    };
+                    assert!(
+                        a == b || near(slow.face[i]) || near(fast.face[i]),
+                        "{a} {b}"
+                    );
                 }
             }
         }
@@ -340,11 +431,29 @@ mod tests {
         for view in [pinhole(), parallel()] {
             let (v, f) = soup(9, 400);
             for cull in [Cull::None, Cull::Back, Cull::Front] {
-                let seq = drawn(Options { par: Par::Seq, cull, ..Options::default() }, &view, &v, &f);
+                let seq = drawn(
+                    Options {
+                        par: Par::Seq,
+                        cull,
+                        ..Options::default()
+                    },
+                    &view,
+                    &v,
+                    &f,
+                );
                 for threads in [1, 2, 5] {
-                    let got =
-                        par::with_threads(threads, || drawn(Options { cull, ..Options::default() }, &view, &v, &f))
-                            .expect("pool");
+                    let got = par::with_threads(threads, || {
+                        drawn(
+                            Options {
+                                cull,
+                                ..Options::default()
+                            },
+                            &view,
+                            &v,
+                            &f,
+                        )
+                    })
+                    .expect("pool");
                     assert!(seq == got, "{threads} threads, {cull:?}");
                 }
             }
@@ -354,7 +463,9 @@ mod tests {
     #[test]
     fn a_face_crossing_the_near_plane_is_cut_where_rays_say() {
         let view = pinhole();
-        let View::Perspective { camera, near } = view else { unreachable!() };
+        let View::Perspective { camera, near } = view else {
+            unreachable!()
+        };
         // A floor from behind the camera to 6 m ahead, 1 m below.
         let v = [[-9.0, 1.0, -3.0], [9.0, 1.0, -3.0], [0.0, 1.0, 6.0]].map(P3::from);
         let out = drawn(Options::default(), &view, &v, &[[0, 1, 2]]);
@@ -367,7 +478,11 @@ mod tests {
                 let half = 9.0 * (6.0 - z) / 9.0;
                 let i = (row * camera.width + col) as usize;
                 if d.y > 0.0 && z > near + inside_margin && x.abs() < half - inside_margin {
-                    assert!((out.depth[i] - z).abs() < 2e-3 * z, "({col},{row}) {} {z}", out.depth[i]);
+                    assert!(
+                        (out.depth[i] - z).abs() < 2e-3 * z,
+                        "({col},{row}) {} {z}",
+                        out.depth[i]
+                    );
                     covered += 1;
                 } else if d.y <= 0.0 || z < near - inside_margin || x.abs() > half + inside_margin {
                     assert_eq!(out.face[i], VisibilityBuffer::NONE);
@@ -398,18 +513,36 @@ mod tests {
         // Counter-clockwise seen from the camera, so turned to it.
         let v = [[-0.5, 0.5, 2.0], [0.5, 0.5, 2.0], [0.0, -0.5, 2.0]].map(P3::from);
         let count = |cull, f: Face| {
-            let b = drawn(Options { par: Par::Seq, cull, ..Options::default() }, &pinhole(), &v, &[f]);
+            let b = drawn(
+                Options {
+                    par: Par::Seq,
+                    cull,
+                    ..Options::default()
+                },
+                &pinhole(),
+                &v,
+                &[f],
+            );
             b.face.iter().filter(|&&id| id == 0).count()
         };
         let front = [0, 1, 2];
-        assert!(crate::mesh::face_normal(&v, &front).z < 0.0, "towards the camera");
+        assert!(
+            crate::mesh::face_normal(&v, &front).z < 0.0,
+            "towards the camera"
+        );
         assert!(count(Cull::Back, front) > 100 && count(Cull::Front, front) == 0);
         assert!(count(Cull::Front, [0, 2, 1]) > 100 && count(Cull::Back, [0, 2, 1]) == 0);
         // Reuse at another size, empty mesh, empty picture.
         let mut out = drawn(Options::default(), &pinhole(), &v, &[front]);
         rasterise(&parallel(), &[], &[], &mut out);
         assert_eq!((out.width, out.depth.len()), (150, 150 * 130));
-        let empty = View::Orthographic { width: 0, height: 0, left: 0.0, top: 0.0, pixels_per_metre: 1.0 };
+        let empty = View::Orthographic {
+            width: 0,
+            height: 0,
+            left: 0.0,
+            top: 0.0,
+            pixels_per_metre: 1.0,
+        };
         rasterise_with(Options::default(), &empty, &v, &[front], &mut out);
         assert!(out.face.is_empty());
     }
@@ -420,12 +553,28 @@ mod tests {
         for view in [pinhole(), parallel()] {
             for (face, farther) in [([0, 1, 2], 0.0), ([0, 2, 1], 0.01)] {
                 let there = drawn(Options::default(), &view, &v, &[face]);
-                let moved = drawn(Options { behind: 0.01, ..Options::default() }, &view, &v, &[face]);
+                let moved = drawn(
+                    Options {
+                        behind: 0.01,
+                        ..Options::default()
+                    },
+                    &view,
+                    &v,
+                    &[face],
+                );
                 assert_eq!(there.face, moved.face);
-                let seen = there.depth.iter().zip(&moved.depth).filter(|(a, _)| a.is_finite());
+                let seen = there
+                    .depth
+                    .iter()
+                    .zip(&moved.depth)
+                    .filter(|(a, _)| a.is_finite());
                 // Between the corners 1/z is no longer quite that of a flat face.
                 assert!(seen.clone().count() > 100);
-                assert!(seen.into_iter().all(|(a, b)| (b - a - farther).abs() < 2e-5 + 0.05 * farther), "{farther}");
+                assert!(
+                    seen.into_iter()
+                        .all(|(a, b)| (b - a - farther).abs() < 2e-5 + 0.05 * farther),
+                    "{farther}"
+                );
             }
         }
     }
@@ -439,7 +588,9 @@ mod tests {
             let mut seen = 0;
             for row in 0..out.height {
                 for col in 0..out.width {
-                    let Some((_, w)) = interpolate(&view, &v, &faces, &out, col, row) else { continue };
+                    let Some((_, w)) = interpolate(&view, &v, &faces, &out, col, row) else {
+                        continue;
+                    };
                     let p = P3::from(v[0].coords * w[0] + v[1].coords * w[1] + v[2].coords * w[2]);
                     let z = out.depth[(row * out.width + col) as usize];
                     let q = view.project(&p).expect("in front");

@@ -30,8 +30,14 @@ impl Coarse {
     fn look(&mut self, depth: &[f32], width: usize) {
         self.across = width.div_ceil(TILE);
         self.far.clear();
-        self.far.resize(self.across * (depth.len() / width.max(1)).div_ceil(TILE), 0.0);
-        for (rows, far) in depth.chunks(TILE * width).zip(self.far.chunks_mut(self.across)) {
+        self.far.resize(
+            self.across * (depth.len() / width.max(1)).div_ceil(TILE),
+            0.0,
+        );
+        for (rows, far) in depth
+            .chunks(TILE * width)
+            .zip(self.far.chunks_mut(self.across))
+        {
             for row in rows.chunks_exact(width) {
                 for (pixels, far) in row.chunks(TILE).zip(far.iter_mut()) {
                     let farthest = |m: f32, d: &f32| if *d > m { *d } else { m };
@@ -51,13 +57,23 @@ impl Band<'_> {
     /// Every pixel the triangle may touch is nearer already.
     #[inline(always)]
     fn hides<const PERSPECTIVE: bool>(&self, corners: &[Corner; 3]) -> bool {
-        let Some(span) = self.span(corners) else { return false };
+        let Some(span) = self.span(corners) else {
+            return false;
+        };
         let q = corners.map(|c| c.q);
         // The kernel keeps depths of a face between those of its corners, so this is exact.
-        let nearest = if PERSPECTIVE { 1.0 / q[0].max(q[1]).max(q[2]) } else { q[0].min(q[1]).min(q[2]) };
+        let nearest = if PERSPECTIVE {
+            1.0 / q[0].max(q[1]).max(q[2])
+        } else {
+            q[0].min(q[1]).min(q[2])
+        };
         let [left, right] = span.columns.map(|x| x as usize >> TILE_BITS);
         let [top, bottom] = span.rows.map(|y| (y - self.top) as usize >> TILE_BITS);
-        (top..=bottom).all(|y| self.coarse.far[y * self.coarse.across..][left..=right].iter().all(|far| nearest > *far))
+        (top..=bottom).all(|y| {
+            self.coarse.far[y * self.coarse.across..][left..=right]
+                .iter()
+                .all(|far| nearest > *far)
+        })
     }
 }
 
@@ -72,13 +88,16 @@ pub(super) fn draw_layers<const PERSPECTIVE: bool>(job: &Job<'_>, number: u8, ba
             band.look();
         }
         for id in layer.clone() {
-            let Some(corners) = job.corners(id, number) else { continue };
+            let Some(corners) = job.corners(id, number) else {
+                continue;
+            };
             if corners.iter().any(Corner::is_outside) {
                 job.draw::<PERSPECTIVE, true>(id, corners, band);
                 continue;
             }
             let [a, b, c] = corners;
-            let area = i64::from(b.x - a.x) * i64::from(c.y - a.y) - i64::from(b.y - a.y) * i64::from(c.x - a.x);
+            let area = i64::from(b.x - a.x) * i64::from(c.y - a.y)
+                - i64::from(b.y - a.y) * i64::from(c.x - a.x);
             if area > 0 {
                 later.push(id as u32);
             } else if order > 0 && band.hides::<PERSPECTIVE>(&corners) {
@@ -91,7 +110,9 @@ pub(super) fn draw_layers<const PERSPECTIVE: bool>(job: &Job<'_>, number: u8, ba
     band.look();
     for &id in &later {
         let id = id as usize;
-        let Some(corners) = job.corners(id, number) else { continue };
+        let Some(corners) = job.corners(id, number) else {
+            continue;
+        };
         if band.hides::<PERSPECTIVE>(&corners.map(|c| c.farther::<PERSPECTIVE>(band.behind))) {
             hidden += usize::from(job.begins(id, number));
         } else {
@@ -124,7 +145,11 @@ mod tests {
                 for j in 0..around {
                     let t = std::f32::consts::TAU * j as f32 / around as f32;
                     let r = radius + rng.random_range(-0.02..0.02);
-                    v.push(P3::new(r * t.cos(), -0.5 + 0.04 * k as f32, 1.6 - r * t.sin()));
+                    v.push(P3::new(
+                        r * t.cos(),
+                        -0.5 + 0.04 * k as f32,
+                        1.6 - r * t.sin(),
+                    ));
                 }
             }
             for k in 0..rings {
@@ -156,10 +181,26 @@ mod tests {
 
     #[test]
     fn the_picture_is_the_same_in_any_order_and_hidden_faces_are_counted() {
-        let k = Intrinsics { width: 203, height: 317, fx: 260.0, fy: 260.0, cx: 101.0, cy: 150.0 };
+        let k = Intrinsics {
+            width: 203,
+            height: 317,
+            fx: 260.0,
+            fy: 260.0,
+            cx: 101.0,
+            cy: 150.0,
+        };
         let views = [
-            View::Perspective { camera: k, near: 0.1 },
-            View::Orthographic { width: 190, height: 205, left: -0.4, top: -0.5, pixels_per_metre: 230.0 },
+            View::Perspective {
+                camera: k,
+                near: 0.1,
+            },
+            View::Orthographic {
+                width: 190,
+                height: 205,
+                left: -0.4,
+                top: -0.5,
+                pixels_per_metre: 230.0,
+            },
         ];
         for seed in 0..8 {
             let (v, mut f, layers) = clothes(seed);
@@ -170,20 +211,33 @@ mod tests {
             for view in &views {
                 let behind = if seed % 4 < 2 { 0.0 } else { 0.03 };
                 let mut plain = VisibilityBuffer::default();
-                let options = Options { par: Par::Seq, behind, ..Options::default() };
+                let options = Options {
+                    par: Par::Seq,
+                    behind,
+                    ..Options::default()
+                };
                 rasterise_with(options, view, &v, &f, &mut plain);
                 let mut out = VisibilityBuffer::default();
                 let hidden = rasterise_layers(Par::Seq, behind, view, &v, &f, &layers, &mut out);
                 assert!(out == plain, "seed {seed}");
                 // Six walls, one of them seen: five of six minus what stands out.
-                assert!(seed % 2 == 1 || hidden > f.len() / 3, "{hidden} of {}", f.len());
+                assert!(
+                    seed % 2 == 1 || hidden > f.len() / 3,
+                    "{hidden} of {}",
+                    f.len()
+                );
                 for threads in [1, 3] {
                     let mut banded = VisibilityBuffer::default();
                     let counts = par::with_threads(threads, || {
-                        [0, 1].map(|_| rasterise_layers(Par::Rayon, behind, view, &v, &f, &layers, &mut banded))
+                        [0, 1].map(|_| {
+                            rasterise_layers(Par::Rayon, behind, view, &v, &f, &layers, &mut banded)
+                        })
                     });
                     let counts = counts.expect("pool");
-                    assert!(banded == plain && counts[0] == counts[1], "{threads} threads, seed {seed}");
+                    assert!(
+                        banded == plain && counts[0] == counts[1],
+                        "{threads} threads, seed {seed}"
+                    );
                 }
             }
         }
@@ -191,18 +245,47 @@ mod tests {
 
     #[test]
     fn nothing_is_hidden_by_nothing() {
-        let view = View::Orthographic { width: 64, height: 64, left: 0.0, top: 0.0, pixels_per_metre: 64.0 };
-        let v = [[0.1, 0.1, 1.0], [0.9, 0.1, 1.0], [0.1, 0.9, 1.0], [0.9, 0.9, 2.0]].map(P3::from);
+        let view = View::Orthographic {
+            width: 64,
+            height: 64,
+            left: 0.0,
+            top: 0.0,
+            pixels_per_metre: 64.0,
+        };
+        let v = [
+            [0.1, 0.1, 1.0],
+            [0.9, 0.1, 1.0],
+            [0.1, 0.9, 1.0],
+            [0.9, 0.9, 2.0],
+        ]
+        .map(P3::from);
         let mut out = VisibilityBuffer::default();
         assert_eq!(
-            rasterise_layers(Par::Seq, 0.0, &view, &v, &[[0, 1, 2]], std::slice::from_ref(&(0..1)), &mut out),
+            rasterise_layers(
+                Par::Seq,
+                0.0,
+                &view,
+                &v,
+                &[[0, 1, 2]],
+                std::slice::from_ref(&(0..1)),
+                &mut out
+            ),
             0
         );
         // The second lies beside the first, both sides of both.
         let faces = [[0, 1, 2], [1, 2, 3], [0, 2, 1], [1, 3, 2]];
         rasterise_layers(Par::Seq, 0.0, &view, &v, &faces, &[0..2, 2..4], &mut out);
         assert!(out.face.contains(&0) && out.face.contains(&1));
-        let empty = View::Orthographic { width: 0, height: 0, left: 0.0, top: 0.0, pixels_per_metre: 1.0 };
-        assert_eq!(rasterise_layers(Par::Seq, 0.0, &empty, &v, &faces, &[0..2, 2..4], &mut out), 0);
+        let empty = View::Orthographic {
+            width: 0,
+            height: 0,
+            left: 0.0,
+            top: 0.0,
+            pixels_per_metre: 1.0,
+        };
+        assert_eq!(
+            rasterise_layers(Par::Seq, 0.0, &empty, &v, &faces, &[0..2, 2..4], &mut out),
+            0
+        );
     }
 }

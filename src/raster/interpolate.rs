@@ -11,9 +11,18 @@ pub fn barycentrics(view: &View, corners: [P3; 3], u: f32, v: f32) -> Option<[f3
     let w = match *view {
         View::Perspective { camera, .. } => {
             let d = camera.unproject(u, v, 1.0).coords;
-            [d.dot(&b.coords.cross(&c.coords)), d.dot(&c.coords.cross(&a.coords)), d.dot(&a.coords.cross(&b.coords))]
+            [
+                d.dot(&b.coords.cross(&c.coords)),
+                d.dot(&c.coords.cross(&a.coords)),
+                d.dot(&a.coords.cross(&b.coords)),
+            ]
         }
-        View::Orthographic { left, top, pixels_per_metre, .. } => {
+        View::Orthographic {
+            left,
+            top,
+            pixels_per_metre,
+            ..
+        } => {
             let (x, y) = (u / pixels_per_metre + left, v / pixels_per_metre + top);
             let edge = |p: &P3, q: &P3| (q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x);
             [edge(&b, &c), edge(&c, &a), edge(&a, &b)]
@@ -44,7 +53,18 @@ pub fn interpolate(
 }
 
 /// Looks `label` up for the face of every pixel: an image of part, panel or garment numbers, `none` where nothing is.
-pub fn id_image<T: Copy>(buffer: &VisibilityBuffer, none: T, label: impl Fn(u32) -> T, out: &mut Vec<T>) {
+pub fn id_image<T: Copy>(
+    buffer: &VisibilityBuffer,
+    none: T,
+    label: impl Fn(u32) -> T,
+    out: &mut Vec<T>,
+) {
     out.clear();
-    out.extend(buffer.face.iter().map(|&f| if f == VisibilityBuffer::NONE { none } else { label(f) }));
+    out.extend(buffer.face.iter().map(|&f| {
+        if f == VisibilityBuffer::NONE {
+            none
+        } else {
+            label(f)
+        }
+    }));
 }

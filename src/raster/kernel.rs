@@ -37,7 +37,11 @@ pub(super) struct Span {
 /// or with `TIES` the one of the lowest number, whatever the order.
 #[inline(always)]
 fn wins<const TIES: bool>(z: f32, id: u32, depth: f32, face: u32) -> bool {
-    if TIES { (z < depth) | ((z == depth) & (id < face)) } else { z < depth }
+    if TIES {
+        (z < depth) | ((z == depth) & (id < face))
+    } else {
+        z < depth
+    }
 }
 
 /// The plane of the affine quantity q over the picture, anchored at pixel (x0, y0).
@@ -71,7 +75,11 @@ impl Band<'_> {
         let max_x = a.x.max(b.x).max(c.x);
         let x0 = ((min_x + (ONE - 1)) >> SUB_BITS).max(0);
         let x1 = (max_x >> SUB_BITS).min(self.width - 1);
-        (first <= last && x0 <= x1).then_some(Span { columns: [x0, x1], rows: [first, last], top: y0 })
+        (first <= last && x0 <= x1).then_some(Span {
+            columns: [x0, x1],
+            rows: [first, last],
+            top: y0,
+        })
     }
 
     /// Draws the part of a triangle that lies in the band.
@@ -82,7 +90,14 @@ impl Band<'_> {
         id: u32,
         cull: Cull,
     ) {
-        let Some(Span { columns: [x0, x1], rows: [first, last], top: y0 }) = self.span(&corners) else { return };
+        let Some(Span {
+            columns: [x0, x1],
+            rows: [first, last],
+            top: y0,
+        }) = self.span(&corners)
+        else {
+            return;
+        };
         let [mut a, mut b, mut c] = corners;
         let [min_x, max_x] = [a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x)];
         let [min_y, max_y] = [a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y)];
@@ -90,7 +105,8 @@ impl Band<'_> {
         let area = if small {
             i64::from((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x))
         } else {
-            i64::from(b.x - a.x) * i64::from(c.y - a.y) - i64::from(b.y - a.y) * i64::from(c.x - a.x)
+            i64::from(b.x - a.x) * i64::from(c.y - a.y)
+                - i64::from(b.y - a.y) * i64::from(c.x - a.x)
         };
         // In a picture with y down, a face seen from outside (counter-clockwise) has negative area.
         let dropped = match cull {
@@ -111,9 +127,18 @@ impl Band<'_> {
         let gx = (f64::from(c.y - a.y) * db - f64::from(b.y - a.y) * dc) * scale;
         let gy = (f64::from(b.x - a.x) * dc - f64::from(c.x - a.x) * db) * scale;
         let unit = 1.0 / f64::from(ONE);
-        let q0 =
-            f64::from(a.q) + (gx * f64::from((x0 << SUB_BITS) - a.x) + gy * f64::from((y0 << SUB_BITS) - a.y)) * unit;
-        let plane = Plane { x0, y0, q0, gx, gy, lo: a.q.min(b.q).min(c.q), hi: a.q.max(b.q).max(c.q) };
+        let q0 = f64::from(a.q)
+            + (gx * f64::from((x0 << SUB_BITS) - a.x) + gy * f64::from((y0 << SUB_BITS) - a.y))
+                * unit;
+        let plane = Plane {
+            x0,
+            y0,
+            q0,
+            gx,
+            gy,
+            lo: a.q.min(b.q).min(c.q),
+            hi: a.q.max(b.q).max(c.q),
+        };
         if small {
             self.boxed::<PERSPECTIVE, TIES>([a, b, c], id, &plane, [first, last], x1);
         } else {
@@ -176,7 +201,8 @@ impl Band<'_> {
             for (p, q) in [(&b, &c), (&c, &a), (&a, &b)] {
                 // Inside where e + x·d >= 0, x in pixels.
                 let d = i64::from(p.y - q.y) << SUB_BITS;
-                let e = i64::from(q.x - p.x) * (y - i64::from(p.y)) + i64::from(q.y - p.y) * i64::from(p.x);
+                let e = i64::from(q.x - p.x) * (y - i64::from(p.y))
+                    + i64::from(q.y - p.y) * i64::from(p.x);
                 match d.signum() {
                     1 => lo = lo.max(-e.div_euclid(d)),
                     -1 => hi = hi.min(e.div_euclid(-d)),
@@ -191,7 +217,11 @@ impl Band<'_> {
             let (from, to) = (start + lo as usize, start + hi as usize + 1);
             let skip = (lo - i64::from(plane.x0)) as usize;
             let base = plane.row(row);
-            for (i, (d, f)) in self.depth[from..to].iter_mut().zip(&mut self.face[from..to]).enumerate() {
+            for (i, (d, f)) in self.depth[from..to]
+                .iter_mut()
+                .zip(&mut self.face[from..to])
+                .enumerate()
+            {
                 let q = (base + gx * (skip + i) as f32).max(plane.lo).min(plane.hi);
                 let z = if PERSPECTIVE { 1.0 / q } else { q };
                 let win = wins::<TIES>(z, id, *d, *f);

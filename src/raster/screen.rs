@@ -24,14 +24,22 @@ pub(super) struct Corner {
 
 impl Corner {
     /// Behind the near plane, beyond the guard band or not finite.
-    pub(super) const OUTSIDE: Self = Self { x: i32::MIN, y: 0, q: 0.0 };
+    pub(super) const OUTSIDE: Self = Self {
+        x: i32::MIN,
+        y: 0,
+        q: 0.0,
+    };
 
     /// Snaps image coordinates.
     pub(super) fn snap(x: f32, y: f32, q: f32) -> Self {
         // NaN fails both comparisons.
         if x.abs() <= GUARD && y.abs() <= GUARD && q.is_finite() {
             let s = ONE as f32;
-            Self { x: (x * s + 0.5).floor() as i32, y: (y * s + 0.5).floor() as i32, q }
+            Self {
+                x: (x * s + 0.5).floor() as i32,
+                y: (y * s + 0.5).floor() as i32,
+                q,
+            }
         } else {
             Self::OUTSIDE
         }
@@ -39,7 +47,14 @@ impl Corner {
     /// The same so many metres behind.
     #[inline(always)]
     pub(super) fn farther<const PERSPECTIVE: bool>(self, by: f32) -> Self {
-        Self { q: if PERSPECTIVE { self.q / (1.0 + by * self.q) } else { self.q + by }, ..self }
+        Self {
+            q: if PERSPECTIVE {
+                self.q / (1.0 + by * self.q)
+            } else {
+                self.q + by
+            },
+            ..self
+        }
     }
     pub(super) fn is_outside(&self) -> bool {
         self.x == i32::MIN
@@ -64,9 +79,17 @@ impl Projector {
                 offset: [camera.cx as f32, camera.cy as f32],
                 near: near.max(f32::MIN_POSITIVE),
             },
-            View::Orthographic { left, top, pixels_per_metre: s, .. } => {
-                Self { perspective: false, scale: [s, s], offset: [-left * s, -top * s], near: f32::NEG_INFINITY }
-            }
+            View::Orthographic {
+                left,
+                top,
+                pixels_per_metre: s,
+                ..
+            } => Self {
+                perspective: false,
+                scale: [s, s],
+                offset: [-left * s, -top * s],
+                near: f32::NEG_INFINITY,
+            },
         }
     }
     /// A point of the view's frame on the pixel grid.
@@ -83,7 +106,11 @@ impl Projector {
             }
             Corner::OUTSIDE
         } else {
-            Corner::snap(p.x * self.scale[0] + self.offset[0], p.y * self.scale[1] + self.offset[1], p.z)
+            Corner::snap(
+                p.x * self.scale[0] + self.offset[0],
+                p.y * self.scale[1] + self.offset[1],
+                p.z,
+            )
         }
     }
     /// Depth from the affine quantity.

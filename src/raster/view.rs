@@ -44,9 +44,16 @@ impl View {
                 let q = camera.project(p);
                 [q.x, q.y, p.z]
             }),
-            Self::Orthographic { left, top, pixels_per_metre, .. } => {
-                Some([(p.x - left) * pixels_per_metre, (p.y - top) * pixels_per_metre, p.z])
-            }
+            Self::Orthographic {
+                left,
+                top,
+                pixels_per_metre,
+                ..
+            } => Some([
+                (p.x - left) * pixels_per_metre,
+                (p.y - top) * pixels_per_metre,
+                p.z,
+            ]),
         }
     }
 }
@@ -68,7 +75,9 @@ pub struct VisibilityBuffer {
 
 impl PartialEq for VisibilityBuffer {
     fn eq(&self, other: &Self) -> bool {
-        (self.width, self.height) == (other.width, other.height) && self.depth == other.depth && self.face == other.face
+        (self.width, self.height) == (other.width, other.height)
+            && self.depth == other.depth
+            && self.face == other.face
     }
 }
 

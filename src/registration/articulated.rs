@@ -57,15 +57,22 @@ impl<T: RealField + Copy> BoneSums<T> {
         let d = metric.direction;
         let m = p.cross(&d);
         let s = Vector6::new(d.x, d.y, d.z, m.x, m.y, m.z);
-        self.hessian.ger(metric.directional * weight, &s, &s, T::one());
+        self.hessian
+            .ger(metric.directional * weight, &s, &s, T::one());
         let g = metric.apply(r) * weight;
         let t = p.cross(&g);
         self.gradient += Vector6::new(g.x, g.y, g.z, t.x, t.y, t.z);
         let w = metric.isotropic * weight;
         self.mass += w;
         self.first += p * w;
-        for (slot, v) in self.second.iter_mut().zip([p.x * p.x, p.x * p.y, p.x * p.z, p.y * p.y, p.y * p.z, p.z * p.z])
-        {
+        for (slot, v) in self.second.iter_mut().zip([
+            p.x * p.x,
+            p.x * p.y,
+            p.x * p.z,
+            p.y * p.y,
+            p.y * p.z,
+            p.z * p.z,
+        ]) {
             *slot += v * w;
         }
     }
@@ -76,7 +83,8 @@ impl<T: RealField + Copy> BoneSums<T> {
         let zero = T::zero();
         let k = nalgebra::Matrix3::new(zero, -f.z, f.y, f.z, zero, -f.x, -f.y, f.x, zero);
         let [xx, xy, xz, yy, yz, zz] = self.second;
-        let inertia = nalgebra::Matrix3::new(yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy);
+        let inertia =
+            nalgebra::Matrix3::new(yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy);
         for i in 0..3 {
             self.hessian[(i, i)] += self.mass;
             for j in 0..3 {
@@ -180,17 +188,33 @@ mod tests {
     #[test]
     fn aggregated_equals_dense() {
         let mut rng = rand_pcg::Pcg32::seed_from_u64(11);
-        let mut v3 = || Vector3::new(rng.random::<f64>() - 0.5, rng.random::<f64>() - 0.5, rng.random::<f64>() - 0.5);
+        let mut v3 = || {
+            Vector3::new(
+                rng.random::<f64>() - 0.5,
+                rng.random::<f64>() - 0.5,
+                rng.random::<f64>() - 0.5,
+            )
+        };
         let parents = [None, Some(0), Some(1), Some(0), Some(3), Some(3)];
         let mut dofs: Vec<Dof> = (0..6)
             .map(|i| {
                 let e = |k: usize| Vector3::from_fn(|r, _| f64::from(u8::from(r == k)));
-                let (linear, angular) = if i < 3 { (e(i), Vector3::zeros()) } else { (Vector3::zeros(), e(i - 3)) };
-                Dof { bone: 0, twist: Twist { linear, angular } }
+                let (linear, angular) = if i < 3 {
+                    (e(i), Vector3::zeros())
+                } else {
+                    (Vector3::zeros(), e(i - 3))
+                };
+                Dof {
+                    bone: 0,
+                    twist: Twist { linear, angular },
+                }
             })
             .collect();
         for bone in [1, 1, 2, 3, 4, 5, 5] {
-            dofs.push(Dof { bone, twist: Twist::revolute(v3().normalize(), v3()) });
+            dofs.push(Dof {
+                bone,
+                twist: Twist::revolute(v3().normalize(), v3()),
+            });
         }
         let mut sums = ArticulatedSums::default();
         sums.reset(6);

@@ -51,8 +51,12 @@ pub fn pair_edges(
         if n.dot(&p.coords) >= 0.0 {
             continue;
         }
-        let Some((u, v)) = grid.cell_of(p) else { continue };
-        let Some(home) = grid.cell(u, v) else { continue };
+        let Some((u, v)) = grid.cell_of(p) else {
+            continue;
+        };
+        let Some(home) = grid.cell(u, v) else {
+            continue;
+        };
         if p.z > image.depth[home] + STEP {
             continue;
         }
@@ -62,7 +66,10 @@ pub fn pair_edges(
             Label::Floor | Label::Other => grid.depth[home] > p.z + STEP,
             Label::Person | Label::Unknown => false,
         };
-        let open = |du: i32, dv: i32| grid.cell(u + du, v + dv).is_some_and(|k| image.depth[k] > p.z + STEP);
+        let open = |du: i32, dv: i32| {
+            grid.cell(u + du, v + dv)
+                .is_some_and(|k| image.depth[k] > p.z + STEP)
+        };
         let outline = side == EdgeSide::Outline;
         if !(outside || outline && (open(2, 0) || open(-2, 0) || open(0, 2) || open(0, -2))) {
             continue;
@@ -87,7 +94,9 @@ fn nearest_edge(
     let mut bound = distance * distance;
     let mut seen = 0;
     let mut visit = |x: i32, y: i32| {
-        let Some(k) = grid.cell(x, y).filter(|&k| on_contour[k]) else { return 0 };
+        let Some(k) = grid.cell(x, y).filter(|&k| on_contour[k]) else {
+            return 0;
+        };
         let outward = outward(grid, x, y);
         if outward[0] * normal[0] + outward[1] * normal[1] < 0.0 {
             return 0;
@@ -104,7 +113,10 @@ fn nearest_edge(
             seen += visit(u, v);
         } else {
             for t in -r..r {
-                seen += visit(u + t, v - r) + visit(u + r, v + t) + visit(u - t, v + r) + visit(u - r, v - t);
+                seen += visit(u + t, v - r)
+                    + visit(u + r, v + t)
+                    + visit(u - t, v + r)
+                    + visit(u - r, v - t);
             }
         }
         if seen >= NEAREST_IN_IMAGE {
@@ -118,9 +130,19 @@ fn nearest_edge(
 fn outward(grid: &OrganisedCloud, x: i32, y: i32) -> [f32; 2] {
     let mut sum = [0.0f32; 2];
     let z = grid.cell(x, y).map_or(0.0, |k| grid.depth[k]);
-    for (du, dv) in [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)] {
-        let open =
-            grid.cell(x + du, y + dv).is_none_or(|k| grid.labels[k] != Label::Person || grid.depth[k] > z + STEP);
+    for (du, dv) in [
+        (1, 0),
+        (-1, 0),
+        (0, 1),
+        (0, -1),
+        (1, 1),
+        (-1, 1),
+        (1, -1),
+        (-1, -1),
+    ] {
+        let open = grid
+            .cell(x + du, y + dv)
+            .is_none_or(|k| grid.labels[k] != Label::Person || grid.depth[k] > z + STEP);
         if open {
             sum[0] += du as f32;
             sum[1] += dv as f32;

@@ -27,7 +27,8 @@ impl<T: RealField + Copy> Metric<T> {
     }
     /// The matrix of the form.
     pub fn matrix(&self) -> Matrix3<T> {
-        Matrix3::identity() * self.isotropic + self.direction * self.direction.transpose() * self.directional
+        Matrix3::identity() * self.isotropic
+            + self.direction * self.direction.transpose() * self.directional
     }
 }
 
@@ -79,7 +80,11 @@ mod tests {
 
     #[test]
     fn metric_gradient_and_matrix_agree() {
-        let m: Metric = Metric { isotropic: 0.1, directional: 1.0, direction: Vector3::new(0.6, 0.0, 0.8) };
+        let m: Metric = Metric {
+            isotropic: 0.1,
+            directional: 1.0,
+            direction: Vector3::new(0.6, 0.0, 0.8),
+        };
         let r = Vector3::new(0.02, -0.01, 0.03);
         assert!((m.matrix() * r - m.apply(&r)).norm() < 1e-15);
         assert!((r.dot(&m.apply(&r)) - m.squared(&r)).abs() < 1e-15);

@@ -133,14 +133,18 @@ pub fn pair_surfaces(
 ) -> PairingStats {
     let mut stats = PairingStats::default();
     pairs.clear();
-    scratch.image.draw(grid, model.positions, model.normals, model.spacing);
+    scratch
+        .image
+        .draw(grid, model.positions, model.normals, model.spacing);
     let (columns, rows) = grid.size();
     let focal = grid.focal()[0].max(grid.focal()[1]);
     let window = |z: f32| ((config.distance * focal / z.max(0.1)).ceil() as i32).clamp(1, 12);
     let exact = tree.filter(|_| config.association == Association::KdTree);
 
     let near = |a: &P3, b: &P3| (a - b).norm_squared() <= config.reuse * config.reuse;
-    scratch.asked.resize(model.positions.len(), (P3::origin(), UNASKED));
+    scratch
+        .asked
+        .resize(model.positions.len(), (P3::origin(), UNASKED));
 
     // From the model to the data.
     scratch.facing.clear();
@@ -152,8 +156,12 @@ pub fn pair_surfaces(
         }
         scratch.facing.push(i as u32);
         scratch.facing_points.push(*p);
-        let Some((u, v)) = grid.cell_of(p) else { continue };
-        let Some(home) = grid.cell(u, v) else { continue };
+        let Some((u, v)) = grid.cell_of(p) else {
+            continue;
+        };
+        let Some(home) = grid.cell(u, v) else {
+            continue;
+        };
         if p.z > scratch.image.depth[home] + RELAXED_VISIBILITY {
             continue;
         }
@@ -167,10 +175,14 @@ pub fn pair_surfaces(
                 if cell != UNASKED && near(&at, p) {
                     stats.reused += 1;
                 } else {
-                    cell = tree.nearest(p, f32::INFINITY).map_or(UNASKED, |(k, _)| cells[k]);
+                    cell = tree
+                        .nearest(p, f32::INFINITY)
+                        .map_or(UNASKED, |(k, _)| cells[k]);
                     scratch.asked[i] = (*p, cell);
                 }
-                let within = |k: &usize| (grid.points[*k] - p).norm_squared() < config.distance * config.distance;
+                let within = |k: &usize| {
+                    (grid.points[*k] - p).norm_squared() < config.distance * config.distance
+                };
                 (cell != UNASKED)
                     .then_some(cell as usize)
                     .filter(within)
@@ -189,7 +201,10 @@ pub fn pair_surfaces(
                         let k = y as usize * columns + x as usize;
                         if grid.labels[k] == Label::Person {
                             let d = (grid.points[k] - p).norm_squared();
-                            if d < bound && grid.normals[k].dot(n) >= config.cos_normal && !false_edges[k] {
+                            if d < bound
+                                && grid.normals[k].dot(n) >= config.cos_normal
+                                && !false_edges[k]
+                            {
                                 bound = d;
                                 best = Some(k);
                             }
@@ -206,12 +221,18 @@ pub fn pair_surfaces(
             continue;
         };
         let back = scratch.image.index[cell];
-        if back != IndexImage::NONE && !consistent(model.parents, model.bones[i], model.bones[back as usize]) {
+        if back != IndexImage::NONE
+            && !consistent(model.parents, model.bones[i], model.bones[back as usize])
+        {
             stats.inconsistent += 1;
             continue;
         }
         stats.from_model += 1;
-        pairs.push(Pair { model: i as u32, cell: cell as u32, from_data: false });
+        pairs.push(Pair {
+            model: i as u32,
+            cell: cell as u32,
+            from_data: false,
+        });
     }
     stats.hidden = model.positions.len() - stats.visible;
 
@@ -225,7 +246,9 @@ pub fn pair_surfaces(
         then.clear();
         then.extend_from_slice(model.positions);
     }
-    let model_tree = exact.filter(|_| !same).map(|_| PointTree::new(&scratch.facing_points));
+    let model_tree = exact
+        .filter(|_| !same)
+        .map(|_| PointTree::new(&scratch.facing_points));
     let mut unexplained = 0usize;
     for &cell in cells.iter().step_by(config.data_step.max(1)) {
         let k = cell as usize;
@@ -238,7 +261,9 @@ pub fn pair_surfaces(
             Some(_) => {
                 let i = match &model_tree {
                     Some(tree) => {
-                        let i = tree.nearest(&c, f32::INFINITY).map_or(UNASKED, |(i, _)| scratch.facing[i]);
+                        let i = tree
+                            .nearest(&c, f32::INFINITY)
+                            .map_or(UNASKED, |(i, _)| scratch.facing[i]);
                         answers.push(i);
                         i
                     }
@@ -247,8 +272,10 @@ pub fn pair_surfaces(
                         answers.get(stats.readings - 1).copied().unwrap_or(UNASKED)
                     }
                 };
-                let within =
-                    |i: &u32| (model.positions[*i as usize] - c).norm_squared() < config.distance * config.distance;
+                let within = |i: &u32| {
+                    (model.positions[*i as usize] - c).norm_squared()
+                        < config.distance * config.distance
+                };
                 (i != UNASKED)
                     .then_some(i)
                     .filter(within)
@@ -282,7 +309,11 @@ pub fn pair_surfaces(
         if let Some(i) = best {
             stats.explained += 1;
             if !false_edges[k] {
-                pairs.push(Pair { model: i, cell, from_data: true });
+                pairs.push(Pair {
+                    model: i,
+                    cell,
+                    from_data: true,
+                });
             }
         } else if config.pull > 0.0 {
             // A coarse pull towards what nothing explains: every third such reading looks at all facing points.
@@ -290,7 +321,11 @@ pub fn pair_surfaces(
             if unexplained.is_multiple_of(3)
                 && let Some(i) = pull_target(model, scratch, &c, &n, config.pull)
             {
-                pairs.push(Pair { model: i, cell, from_data: true });
+                pairs.push(Pair {
+                    model: i,
+                    cell,
+                    from_data: true,
+                });
             }
         }
     }
@@ -299,7 +334,13 @@ pub fn pair_surfaces(
 }
 
 /// The nearest model point that faces the camera and does not look the other way.
-fn pull_target(model: &ModelPoints<'_>, scratch: &PairingScratch, c: &P3, n: &V3, reach: f32) -> Option<u32> {
+fn pull_target(
+    model: &ModelPoints<'_>,
+    scratch: &PairingScratch,
+    c: &P3,
+    n: &V3,
+    reach: f32,
+) -> Option<u32> {
     let mut best = None;
     let mut bound = reach * reach;
     for (p, &i) in scratch.facing_points.iter().zip(&scratch.facing) {
@@ -319,19 +360,39 @@ mod tests {
 
     /// A sphere of 0.3 m at 2 m, as depth image and as model points shifted by `shift`.
     fn sphere(shift: V3) -> (OrganisedCloud, Vec<u32>, Vec<P3>, Vec<V3>) {
-        let k = Intrinsics { width: 320, height: 240, fx: 262.5, fy: 262.5, cx: 159.5, cy: 119.5 };
+        let k = Intrinsics {
+            width: 320,
+            height: 240,
+            fx: 262.5,
+            fy: 262.5,
+            cx: 159.5,
+            cy: 119.5,
+        };
         let centre = V3::new(0.0, 0.0, 2.0);
         let data = (0..k.pixels()).map(|i| {
             let d = k.unproject((i % 320) as f32, (i / 320) as f32, 1.0).coords;
-            let (a, b, c) = (d.norm_squared(), d.dot(&centre), centre.norm_squared() - 0.09);
+            let (a, b, c) = (
+                d.norm_squared(),
+                d.dot(&centre),
+                centre.norm_squared() - 0.09,
+            );
             let disc = b * b - a * c;
-            if disc < 0.0 { 0 } else { ((b - disc.sqrt()) / a * 1000.0).round() as u16 }
+            if disc < 0.0 {
+                0
+            } else {
+                ((b - disc.sqrt()) / a * 1000.0).round() as u16
+            }
         });
         let image = DepthImage::new(320, 240, data.collect()).expect("sizes agree");
         let mut cloud = OrganisedCloud::new(&k, Some(2));
         cloud.sample(&image, 8.0);
-        let cells: Vec<u32> = (0..cloud.depth.len()).filter(|&i| cloud.depth[i] > 0.0).map(|i| i as u32).collect();
-        cells.iter().for_each(|&c| cloud.labels[c as usize] = Label::Person);
+        let cells: Vec<u32> = (0..cloud.depth.len())
+            .filter(|&i| cloud.depth[i] > 0.0)
+            .map(|i| i as u32)
+            .collect();
+        cells
+            .iter()
+            .for_each(|&c| cloud.labels[c as usize] = Label::Person);
         cloud.refine(&image, &cells);
         let (mut positions, mut normals) = (vec![], vec![]);
         for i in 0..1500 {
@@ -350,19 +411,44 @@ mod tests {
         let shift = V3::new(0.03, -0.02, 0.02);
         let (cloud, cells, positions, normals) = sphere(shift);
         let bones = vec![0u8; positions.len()];
-        let model =
-            ModelPoints { positions: &positions, normals: &normals, bones: &bones, parents: &[None], spacing: 0.028 };
+        let model = ModelPoints {
+            positions: &positions,
+            normals: &normals,
+            bones: &bones,
+            parents: &[None],
+            spacing: 0.028,
+        };
         let points: Vec<P3> = cells.iter().map(|&c| cloud.points[c as usize]).collect();
         let tree = PointTree::new(&points);
         let no_edges = vec![false; cloud.depth.len()];
         for association in [Association::Projective, Association::KdTree] {
-            let config =
-                PairingConfig { association, distance: 0.1, cos_normal: 0.5, pull: 0.0, data_step: 1, reuse: 0.0 };
+            let config = PairingConfig {
+                association,
+                distance: 0.1,
+                cos_normal: 0.5,
+                pull: 0.0,
+                data_step: 1,
+                reuse: 0.0,
+            };
             let (mut scratch, mut pairs) = (PairingScratch::default(), vec![]);
-            let stats =
-                pair_surfaces(&model, &cloud, &cells, &no_edges, Some(&tree), &config, &mut scratch, &mut pairs);
-            assert!(stats.visible > 500 && stats.from_model * 10 > stats.visible * 8, "{association:?} {stats:?}");
-            assert!(stats.explained * 10 > stats.readings * 8, "{association:?} {stats:?}");
+            let stats = pair_surfaces(
+                &model,
+                &cloud,
+                &cells,
+                &no_edges,
+                Some(&tree),
+                &config,
+                &mut scratch,
+                &mut pairs,
+            );
+            assert!(
+                stats.visible > 500 && stats.from_model * 10 > stats.visible * 8,
+                "{association:?} {stats:?}"
+            );
+            assert!(
+                stats.explained * 10 > stats.readings * 8,
+                "{association:?} {stats:?}"
+            );
             for p in &pairs {
                 let d = cloud.points[p.cell as usize] - positions[p.model as usize];
                 assert!(d.norm() < 0.1);
@@ -375,22 +461,47 @@ mod tests {
     fn windows_find_what_the_tree_finds() {
         let (cloud, cells, positions, normals) = sphere(V3::new(0.01, 0.0, 0.0));
         let bones = vec![0u8; positions.len()];
-        let model =
-            ModelPoints { positions: &positions, normals: &normals, bones: &bones, parents: &[None], spacing: 0.028 };
+        let model = ModelPoints {
+            positions: &positions,
+            normals: &normals,
+            bones: &bones,
+            parents: &[None],
+            spacing: 0.028,
+        };
         let points: Vec<P3> = cells.iter().map(|&c| cloud.points[c as usize]).collect();
         let tree = PointTree::new(&points);
         let no_edges = vec![false; cloud.depth.len()];
         let mean = |association| {
-            let config =
-                PairingConfig { association, distance: 0.05, cos_normal: 0.5, pull: 0.0, data_step: 1, reuse: 0.0 };
+            let config = PairingConfig {
+                association,
+                distance: 0.05,
+                cos_normal: 0.5,
+                pull: 0.0,
+                data_step: 1,
+                reuse: 0.0,
+            };
             let (mut scratch, mut pairs) = (PairingScratch::default(), vec![]);
-            pair_surfaces(&model, &cloud, &cells, &no_edges, Some(&tree), &config, &mut scratch, &mut pairs);
-            let d: f32 =
-                pairs.iter().map(|p| (cloud.points[p.cell as usize] - positions[p.model as usize]).norm()).sum();
+            pair_surfaces(
+                &model,
+                &cloud,
+                &cells,
+                &no_edges,
+                Some(&tree),
+                &config,
+                &mut scratch,
+                &mut pairs,
+            );
+            let d: f32 = pairs
+                .iter()
+                .map(|p| (cloud.points[p.cell as usize] - positions[p.model as usize]).norm())
+                .sum();
             d / pairs.len() as f32
         };
         let (window, exact) = (mean(Association::Projective), mean(Association::KdTree));
-        assert!(window < exact + 0.005, "mean pair length {window} against {exact}");
+        assert!(
+            window < exact + 0.005,
+            "mean pair length {window} against {exact}"
+        );
     }
 
     #[test]
@@ -402,42 +513,84 @@ mod tests {
         let tree = PointTree::new(&points);
         let no_edges = vec![false; cloud.depth.len()];
         let ask = |positions: &[P3], reuse, scratch: &mut PairingScratch| {
-            let model = ModelPoints { positions, normals: &normals, bones: &bones, parents: &[None], spacing: 0.028 };
+            let model = ModelPoints {
+                positions,
+                normals: &normals,
+                bones: &bones,
+                parents: &[None],
+                spacing: 0.028,
+            };
             let association = Association::KdTree;
-            let config = PairingConfig { association, distance: 0.1, cos_normal: 0.5, pull: 0.0, data_step: 1, reuse };
+            let config = PairingConfig {
+                association,
+                distance: 0.1,
+                cos_normal: 0.5,
+                pull: 0.0,
+                data_step: 1,
+                reuse,
+            };
             let mut pairs = vec![];
             let tree = Some(&tree);
-            let stats = pair_surfaces(&model, &cloud, &cells, &no_edges, tree, &config, scratch, &mut pairs);
+            let stats = pair_surfaces(
+                &model, &cloud, &cells, &no_edges, tree, &config, scratch, &mut pairs,
+            );
             (stats, pairs)
         };
         let mut scratch = PairingScratch::default();
         let (stats, first) = ask(&positions, REUSE, &mut scratch);
         assert_eq!(stats.reused, 0, "nothing was asked before");
         let (stats, again) = ask(&positions, REUSE, &mut scratch);
-        assert_eq!((stats.reused, &again), (stats.visible + stats.readings, &first), "all of it is known");
-        let shifted = |x: f32| positions.iter().map(|p| p + V3::new(x, 0.0, 0.0)).collect::<Vec<_>>();
+        assert_eq!(
+            (stats.reused, &again),
+            (stats.visible + stats.readings, &first),
+            "all of it is known"
+        );
+        let shifted = |x: f32| {
+            positions
+                .iter()
+                .map(|p| p + V3::new(x, 0.0, 0.0))
+                .collect::<Vec<_>>()
+        };
         let near = shifted(0.8 * REUSE);
         let (stats, kept) = ask(&near, REUSE, &mut scratch);
         assert!(stats.reused > stats.visible, "{stats:?}");
         let (_, shortest) = ask(&near, 0.0, &mut PairingScratch::default());
-        let length = |pair: &Pair| (cloud.points[pair.cell as usize] - near[pair.model as usize]).norm();
-        let of_model =
-            |pairs: &[Pair]| pairs.iter().filter(|p| !p.from_data).map(|p| (p.model, length(p))).collect::<Vec<_>>();
+        let length =
+            |pair: &Pair| (cloud.points[pair.cell as usize] - near[pair.model as usize]).norm();
+        let of_model = |pairs: &[Pair]| {
+            pairs
+                .iter()
+                .filter(|p| !p.from_data)
+                .map(|p| (p.model, length(p)))
+                .collect::<Vec<_>>()
+        };
         let best: std::collections::BTreeMap<u32, f32> = of_model(&shortest).into_iter().collect();
-        let worst = of_model(&kept).iter().filter_map(|(i, d)| Some(d - best.get(i)?)).fold(0.0, f32::max);
+        let worst = of_model(&kept)
+            .iter()
+            .filter_map(|(i, d)| Some(d - best.get(i)?))
+            .fold(0.0, f32::max);
         assert!(worst <= 2.0 * REUSE, "{worst} m longer than the shortest");
         let (stats, _) = ask(&shifted(3.0 * REUSE), REUSE, &mut scratch);
         assert_eq!(stats.reused, 0, "too far");
         scratch.forget();
-        assert_eq!(ask(&shifted(3.0 * REUSE), REUSE, &mut scratch).0.reused, 0, "readings changed");
+        assert_eq!(
+            ask(&shifted(3.0 * REUSE), REUSE, &mut scratch).0.reused,
+            0,
+            "readings changed"
+        );
     }
 
     #[test]
     fn nothing_pairs_with_nothing() {
         let (cloud, _, positions, normals) = sphere(V3::zeros());
         let bones = vec![0u8; positions.len()];
-        let model =
-            ModelPoints { positions: &positions, normals: &normals, bones: &bones, parents: &[None], spacing: 0.028 };
+        let model = ModelPoints {
+            positions: &positions,
+            normals: &normals,
+            bones: &bones,
+            parents: &[None],
+            spacing: 0.028,
+        };
         let config = PairingConfig {
             association: Association::KdTree,
             distance: 0.1,
@@ -449,10 +602,31 @@ mod tests {
         let (mut scratch, mut pairs) = (PairingScratch::default(), vec![]);
         let no_edges = vec![false; cloud.depth.len()];
         let tree = PointTree::new(&[]);
-        let stats = pair_surfaces(&model, &cloud, &[], &no_edges, Some(&tree), &config, &mut scratch, &mut pairs);
+        let stats = pair_surfaces(
+            &model,
+            &cloud,
+            &[],
+            &no_edges,
+            Some(&tree),
+            &config,
+            &mut scratch,
+            &mut pairs,
+        );
         assert_eq!((stats.readings, pairs.len()), (0, 0));
         let nan = vec![P3::new(f32::NAN, f32::NAN, f32::NAN); positions.len()];
-        let model = ModelPoints { positions: &nan, ..model };
-        pair_surfaces(&model, &cloud, &[], &no_edges, None, &config, &mut scratch, &mut pairs);
+        let model = ModelPoints {
+            positions: &nan,
+            ..model
+        };
+        pair_surfaces(
+            &model,
+            &cloud,
+            &[],
+            &no_edges,
+            None,
+            &config,
+            &mut scratch,
+            &mut pairs,
+        );
     }
 }

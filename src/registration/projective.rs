@@ -33,8 +33,14 @@ impl IndexImage {
             if n.dot(&p.coords) >= 0.0 {
                 continue;
             }
-            let Some((u, v)) = grid.cell_of(p) else { continue };
-            if u < -MAX_RADIUS || v < -MAX_RADIUS || u > columns as i32 + MAX_RADIUS || v > rows as i32 + MAX_RADIUS {
+            let Some((u, v)) = grid.cell_of(p) else {
+                continue;
+            };
+            if u < -MAX_RADIUS
+                || v < -MAX_RADIUS
+                || u > columns as i32 + MAX_RADIUS
+                || v > rows as i32 + MAX_RADIUS
+            {
                 continue;
             }
             let radius = ((0.5 * DISC * spacing * focal / p.z).round() as i32).clamp(0, MAX_RADIUS);

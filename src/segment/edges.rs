@@ -28,7 +28,9 @@ pub fn contour(cloud: &OrganisedCloud, cells: &[u32], out: &mut Contour) {
         let (u, v) = ((i % columns) as i32, (i / columns) as i32);
         let (mut real, mut hidden) = (false, cloud.on_rim(i) || z <= 0.0);
         for (du, dv) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-            let Some(k) = cloud.cell(u + du, v + dv) else { continue };
+            let Some(k) = cloud.cell(u + du, v + dv) else {
+                continue;
+            };
             match cloud.labels[k] {
                 Label::Person if cloud.depth[k] > 0.0 => {
                     real |= cloud.depth[k] > z + OCCLUDER;
@@ -77,8 +79,21 @@ mod tests {
         let inner = |c: &&u32| found.cells.contains(&(**c + 1)) && found.cells.contains(&(**c - 1));
         let inside: Vec<&u32> = edges.true_edges.iter().filter(inner).collect();
         let on = |r: usize| inside.iter().filter(|c| row(c) == r).count();
-        assert!(on(middle) > 10 && on(middle + 3) > 10, "the arm's own edges are true");
-        assert_eq!(on(middle - 1) + on(middle + 4), 0, "the chest goes on behind the arm");
-        assert!(found.cells.iter().filter(|c| row(c) == middle - 1).all(|c| edges.false_edges[*c as usize]));
+        assert!(
+            on(middle) > 10 && on(middle + 3) > 10,
+            "the arm's own edges are true"
+        );
+        assert_eq!(
+            on(middle - 1) + on(middle + 4),
+            0,
+            "the chest goes on behind the arm"
+        );
+        assert!(
+            found
+                .cells
+                .iter()
+                .filter(|c| row(c) == middle - 1)
+                .all(|c| edges.false_edges[*c as usize])
+        );
     }
 }

@@ -59,12 +59,22 @@ impl PartialOrd for Front {
 
 /// Up to `most` ends of the body whose refined cells are `cells`, the farthest first, seen from the cell nearest to
 /// `torso` (camera frame, metres). What is cut off from the torso has no end.
-pub fn extremities(cloud: &OrganisedCloud, cells: &[u32], torso: &P3, most: usize) -> Vec<Extremity> {
+pub fn extremities(
+    cloud: &OrganisedCloud,
+    cells: &[u32],
+    torso: &P3,
+    most: usize,
+) -> Vec<Extremity> {
     let columns = cloud.size().0;
     let point = |c: u32| cloud.points[c as usize];
     let off = |c: u32| (point(c) - torso).norm_squared();
     let usable = |c: &u32| cloud.depth[*c as usize] > 0.0;
-    let Some(source) = cells.iter().copied().filter(usable).min_by(|a, b| off(*a).total_cmp(&off(*b))) else {
+    let Some(source) = cells
+        .iter()
+        .copied()
+        .filter(usable)
+        .min_by(|a, b| off(*a).total_cmp(&off(*b)))
+    else {
         return Vec::new();
     };
     let mut distance = vec![f32::NAN; cloud.depth.len()];
@@ -81,12 +91,18 @@ pub fn extremities(cloud: &OrganisedCloud, cells: &[u32], torso: &P3, most: usiz
             if d > distance[c as usize] {
                 continue;
             }
-            let (u, v, p) = ((c as usize % columns) as i32, (c as usize / columns) as i32, point(c));
+            let (u, v, p) = (
+                (c as usize % columns) as i32,
+                (c as usize / columns) as i32,
+                point(c),
+            );
             let reach = JUMP + JUMP_SLOPE * p.z;
             for dv in -NEIGHBOURS..=NEIGHBOURS {
                 for du in -NEIGHBOURS..=NEIGHBOURS {
                     // Cells that are not the person have no distance at all, and no comparison with it holds.
-                    let Some(k) = cloud.cell(u + du, v + dv) else { continue };
+                    let Some(k) = cloud.cell(u + du, v + dv) else {
+                        continue;
+                    };
                     let step = (cloud.points[k] - p).norm();
                     if step < reach && d + step < distance[k] {
                         distance[k] = d + step;
@@ -97,12 +113,13 @@ pub fn extremities(cloud: &OrganisedCloud, cells: &[u32], torso: &P3, most: usiz
             }
         }
         let reached = |c: &u32| distance[*c as usize].is_finite();
-        let farthest = cells
-            .iter()
-            .copied()
-            .filter(reached)
-            .max_by(|a, b| distance[*a as usize].total_cmp(&distance[*b as usize]).then(b.cmp(a)));
-        let Some(end) = farthest.filter(|e| distance[*e as usize] >= SHORTEST && out.len() < most) else {
+        let farthest = cells.iter().copied().filter(reached).max_by(|a, b| {
+            distance[*a as usize]
+                .total_cmp(&distance[*b as usize])
+                .then(b.cmp(a))
+        });
+        let Some(end) = farthest.filter(|e| distance[*e as usize] >= SHORTEST && out.len() < most)
+        else {
             return out;
         };
         let length = distance[end as usize];
@@ -119,7 +136,11 @@ pub fn extremities(cloud: &OrganisedCloud, cells: &[u32], torso: &P3, most: usiz
             }
             at = next;
         }
-        out.push(Extremity { point: point(end), length, path });
+        out.push(Extremity {
+            point: point(end),
+            length,
+            path,
+        });
     }
 }
 
@@ -130,7 +151,14 @@ mod tests {
 
     /// A flat figure 2 m away: trunk, two arms of different lengths, a stick that lies 30 cm before the trunk.
     fn figure() -> (OrganisedCloud, Vec<u32>) {
-        let camera = Intrinsics { width: 120, height: 100, fx: 100.0, fy: 100.0, cx: 60.0, cy: 50.0 };
+        let camera = Intrinsics {
+            width: 120,
+            height: 100,
+            fx: 100.0,
+            fy: 100.0,
+            cx: 60.0,
+            cy: 50.0,
+        };
         let mut depth = DepthImage::empty(120, 100);
         let mut fill = |u: std::ops::Range<u32>, v: std::ops::Range<u32>, mm: u16| {
             for (u, v) in u.flat_map(|u| v.clone().map(move |v| (u, v))) {
@@ -144,7 +172,9 @@ mod tests {
         fill(60..64, 50..70, 1700);
         let mut cloud = OrganisedCloud::new(&camera, Some(1));
         cloud.sample(&depth, 8.0);
-        let cells: Vec<u32> = (0..cloud.depth.len() as u32).filter(|c| cloud.depth[*c as usize] > 0.0).collect();
+        let cells: Vec<u32> = (0..cloud.depth.len() as u32)
+            .filter(|c| cloud.depth[*c as usize] > 0.0)
+            .collect();
         cloud.refine(&depth, &cells);
         (cloud, cells)
     }
@@ -154,20 +184,46 @@ mod tests {
         let (cloud, cells) = figure();
         let ends = extremities(&cloud, &cells, &P3::new(0.0, 0.0, 2.0), 8);
         assert!(ends.len() >= 3, "{}", ends.len());
-        assert!(ends.windows(2).all(|w| w[0].length >= w[1].length), "farthest first");
-        let at =
-            |k: usize| [(ends[k].point.x * 50.0 + 60.0).round() as i32, (ends[k].point.y * 50.0 + 50.0).round() as i32];
+        assert!(
+            ends.windows(2).all(|w| w[0].length >= w[1].length),
+            "farthest first"
+        );
+        let at = |k: usize| {
+            [
+                (ends[k].point.x * 50.0 + 60.0).round() as i32,
+                (ends[k].point.y * 50.0 + 50.0).round() as i32,
+            ]
+        };
         assert!(at(0)[0] >= 108, "the longer arm: {:?}", at(0));
         let others = [at(1), at(2)];
-        assert!(others.iter().any(|p| p[0] <= 22), "the shorter arm: {others:?}");
-        assert!(others.iter().any(|p| p[1] <= 6), "what stands up: {others:?}");
-        assert!(ends.iter().all(|e| e.point.z > 1.9), "what lies before the trunk is not joined to it");
+        assert!(
+            others.iter().any(|p| p[0] <= 22),
+            "the shorter arm: {others:?}"
+        );
+        assert!(
+            others.iter().any(|p| p[1] <= 6),
+            "what stands up: {others:?}"
+        );
+        assert!(
+            ends.iter().all(|e| e.point.z > 1.9),
+            "what lies before the trunk is not joined to it"
+        );
         // The long arm is straight: half a metre from its end lies half a metre towards the trunk.
         let along = ends[0].along(0.5);
-        assert!((along.x - (ends[0].point.x - 0.5)).abs() < 0.03, "{} {}", along.x, ends[0].point.x);
-        let length = ends[0].path.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f32>();
         assert!(
-            (length - ends[0].length).abs() < 1e-3 && (ends[0].along(9.0) - ends[0].path.last().unwrap()).norm() == 0.0
+            (along.x - (ends[0].point.x - 0.5)).abs() < 0.03,
+            "{} {}",
+            along.x,
+            ends[0].point.x
+        );
+        let length = ends[0]
+            .path
+            .windows(2)
+            .map(|w| (w[1] - w[0]).norm())
+            .sum::<f32>();
+        assert!(
+            (length - ends[0].length).abs() < 1e-3
+                && (ends[0].along(9.0) - ends[0].path.last().unwrap()).norm() == 0.0
         );
     }
 
@@ -176,8 +232,14 @@ mod tests {
         let (mut cloud, cells) = figure();
         assert!(extremities(&cloud, &[], &P3::origin(), 4).is_empty());
         assert!(extremities(&cloud, &cells, &P3::origin(), 0).is_empty());
-        assert!(extremities(&cloud, &cells[..1], &P3::origin(), 4).is_empty(), "a single cell");
+        assert!(
+            extremities(&cloud, &cells[..1], &P3::origin(), 4).is_empty(),
+            "a single cell"
+        );
         cloud.depth.fill(0.0);
-        assert!(extremities(&cloud, &cells, &P3::origin(), 4).is_empty(), "no reading");
+        assert!(
+            extremities(&cloud, &cells, &P3::origin(), 4).is_empty(),
+            "no reading"
+        );
     }
 }

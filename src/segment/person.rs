@@ -123,7 +123,10 @@ pub fn find_person(
 ) -> PersonSearch {
     let mut out = PersonSearch::default();
     let (columns, rows) = cloud.size();
-    let up = scene.floor.map_or_else(|| Vector3::new(0.0, -1.0, 0.0), |f| f.normal).cast::<f32>();
+    let up = scene
+        .floor
+        .map_or_else(|| Vector3::new(0.0, -1.0, 0.0), |f| f.normal)
+        .cast::<f32>();
     scratch.bands.update(scene, cloud);
     out.candidates = classify(cloud, &scratch.bands);
     let mut dark = false;
@@ -144,8 +147,15 @@ pub fn find_person(
     }
     let components = connect(cloud, &up, scratch);
     out.components = components.len();
-    let cut = || components.iter().filter(|c| prior.is_none() && is_cut(c, cloud, scratch)).min_by(nearer);
-    let Some(main) = choose(&components, prior).or_else(cut) else { return out };
+    let cut = || {
+        components
+            .iter()
+            .filter(|c| prior.is_none() && is_cut(c, cloud, scratch))
+            .min_by(nearer)
+    };
+    let Some(main) = choose(&components, prior).or_else(cut) else {
+        return out;
+    };
     // The main part, and what its own limbs cut off: parts beside it in the image and near it in depth.
     let mut belongs = vec![false; components.len()];
     belongs[main.id as usize] = true;
@@ -205,7 +215,11 @@ fn classify(cloud: &mut OrganisedCloud, bands: &Bands) -> usize {
 }
 
 /// Connected components of [`Label::Other`] cells.
-fn connect(cloud: &OrganisedCloud, up: &Vector3<f32>, scratch: &mut SegmentScratch) -> Vec<Component> {
+fn connect(
+    cloud: &OrganisedCloud,
+    up: &Vector3<f32>,
+    scratch: &mut SegmentScratch,
+) -> Vec<Component> {
     let (columns, rows) = cloud.size();
     let focal = cloud.focal();
     scratch.component.clear();
@@ -245,7 +259,9 @@ fn connect(cloud: &OrganisedCloud, up: &Vector3<f32>, scratch: &mut SegmentScrat
             (first_row, last_row) = (first_row.min(v), last_row.max(v));
             let link = LINK + LINK_SLOPE * z;
             for (du, dv) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-                let Some(k) = cloud.cell(u as i32 + du, v as i32 + dv) else { continue };
+                let Some(k) = cloud.cell(u as i32 + du, v as i32 + dv) else {
+                    continue;
+                };
                 let open = cloud.labels[k] == Label::Other && scratch.component[k] == u32::MAX;
                 if open && (cloud.depth[k] - z).abs() < link {
                     scratch.component[k] = id;
@@ -278,12 +294,23 @@ fn choose(components: &[Component], prior: Option<Prior>) -> Option<&Component> 
     }
     // What hangs on a side or on the top is more likely a wall, a door or a shelf, unless nothing else is there.
     let rank = |c: &Component| {
-        let side = if c.side_rows > HANGING { SIDE_COST } else { 0.0 };
+        let side = if c.side_rows > HANGING {
+            SIDE_COST
+        } else {
+            0.0
+        };
         let top = if c.top_cells > HANGING { TOP_COST } else { 0.0 };
-        let low = if c.hi.y - c.lo.y < UPRIGHT { LOW_COST } else { 0.0 };
+        let low = if c.hi.y - c.lo.y < UPRIGHT {
+            LOW_COST
+        } else {
+            0.0
+        };
         c.centre.z + side + top + low
     };
-    components.iter().filter(sized).min_by(|a, b| rank(a).total_cmp(&rank(b)).then(a.id.cmp(&b.id)))
+    components
+        .iter()
+        .filter(sized)
+        .min_by(|a, b| rank(a).total_cmp(&rank(b)).then(a.id.cmp(&b.id)))
 }
 
 /// Hands beyond sleeves that give no return: small things at the end of a hole that begins on the person. Their middles,
@@ -309,7 +336,9 @@ fn hands(
     // Fingers are things of their own.
     let mut groups: Vec<(usize, Vector3<f32>, Vec<u32>)> = Vec::new();
     for c in components.iter().filter(small) {
-        let near = |g: &&mut (usize, Vector3<f32>, Vec<u32>)| (g.1 / g.0 as f32 - c.centre.coords).norm() < HAND_LENGTH;
+        let near = |g: &&mut (usize, Vector3<f32>, Vec<u32>)| {
+            (g.1 / g.0 as f32 - c.centre.coords).norm() < HAND_LENGTH
+        };
         match groups.iter_mut().find(near) {
             Some(g) => {
                 g.0 += c.cells;
@@ -326,12 +355,18 @@ fn hands(
     }
     let columns = cloud.size().0;
     // A hand that hangs beside the hip counts as a part of the body already.
-    let part = |id: u32| id != u32::MAX && belongs[id as usize] && components[id as usize].area >= MOST_HAND;
+    let part = |id: u32| {
+        id != u32::MAX && belongs[id as usize] && components[id as usize].area >= MOST_HAND
+    };
     let own = |i: &usize| part(scratch.component[*i]);
-    let body: Vec<usize> = (0..scratch.component.len()).filter(own).step_by(HAND_STEP).collect();
+    let body: Vec<usize> = (0..scratch.component.len())
+        .filter(own)
+        .step_by(HAND_STEP)
+        .collect();
     // A picture full of pores is a bad picture, not one of sleeves.
-    let inside =
-        |i: usize, step: usize| i >= step && i + step < cloud.depth.len() && own(&(i - step)) && own(&(i + step));
+    let inside = |i: usize, step: usize| {
+        i >= step && i + step < cloud.depth.len() && own(&(i - step)) && own(&(i + step))
+    };
     let pore = |i: &usize| cloud.depth[*i] <= 0.0 && (inside(*i, 1) || inside(*i, columns));
     let pores = (0..cloud.depth.len()).filter(pore).count();
     if pores as f32 > MOST_PORES * (HAND_STEP * body.len()) as f32 {
@@ -348,7 +383,9 @@ fn hands(
             let steps = du.abs().max(dv.abs());
             let (mut empty, mut between) = (0, 0);
             for s in 1..steps {
-                let Some(at) = cloud.cell(u + du * s / steps, v + dv * s / steps) else { return false };
+                let Some(at) = cloud.cell(u + du * s / steps, v + dv * s / steps) else {
+                    return false;
+                };
                 let id = scratch.component[at];
                 if ids.contains(&id) || part(id) {
                     continue;
@@ -377,7 +414,11 @@ fn is_cut(c: &Component, cloud: &OrganisedCloud, scratch: &SegmentScratch) -> bo
         && size.z < CUT_DEPTH
         && c.top_cells <= HANGING;
     let points = || {
-        let own = scratch.component.iter().enumerate().filter(|(_, id)| **id == c.id);
+        let own = scratch
+            .component
+            .iter()
+            .enumerate()
+            .filter(|(_, id)| **id == c.id);
         own.map(|(i, _)| cloud.centre(i)).collect::<Vec<P3>>()
     };
     fits && principal_axes(&points()).is_some_and(|(_, _, variance)| variance[2].sqrt() > ROUND)
@@ -390,7 +431,12 @@ fn above_or_below(c: &Component, main: &Component) -> bool {
     overlap > 0.5 * (c.hi.x - c.lo.x) && c.hi.x - c.lo.x < MOST_WIDTH * 0.5
 }
 
-fn touches(cloud: &OrganisedCloud, scratch: &SegmentScratch, belongs: &[bool], cell: usize) -> bool {
+fn touches(
+    cloud: &OrganisedCloud,
+    scratch: &SegmentScratch,
+    belongs: &[bool],
+    cell: usize,
+) -> bool {
     let columns = cloud.size().0;
     let (u, v) = ((cell % columns) as i32, (cell / columns) as i32);
     (-PART_GAP..=PART_GAP).any(|dv| {
@@ -416,26 +462,52 @@ mod tests {
         let found = find_person(&mut cloud, &scene, None, &mut SegmentScratch::default());
         // 0.4 × 1.7 m at 2.5 m with a focal length of 131 cells, less 20 mm of floor.
         let expected = 0.4 * 1.68 * (131.25f32 / 2.5).powi(2);
-        assert!((found.cells.len() as f32 / expected - 1.0).abs() < 0.1, "{} of {expected}", found.cells.len());
+        assert!(
+            (found.cells.len() as f32 / expected - 1.0).abs() < 0.1,
+            "{} of {expected}",
+            found.cells.len()
+        );
         assert!(!found.cut_below);
-        let prior = Prior { centre: P3::new(0.0, 0.2, 2.5), reach: 0.5 };
+        let prior = Prior {
+            centre: P3::new(0.0, 0.2, 2.5),
+            reach: 0.5,
+        };
         cloud.labels.fill(Label::Unknown);
-        let again = find_person(&mut cloud, &scene, Some(prior), &mut SegmentScratch::default());
+        let again = find_person(
+            &mut cloud,
+            &scene,
+            Some(prior),
+            &mut SegmentScratch::default(),
+        );
         assert_eq!(again.cells, found.cells);
     }
 
     /// Half a figure at the right rim at 2 m, 1.5 m tall: a half cylinder of 0.3 m, or a board that is turned by 30°.
     fn at_the_rim(round: bool) -> OrganisedCloud {
         use crate::camera::{DepthImage, Intrinsics};
-        let k = Intrinsics { width: 320, height: 240, fx: 262.5, fy: 262.5, cx: 159.5, cy: 119.5 };
+        let k = Intrinsics {
+            width: 320,
+            height: 240,
+            fx: 262.5,
+            fy: 262.5,
+            cx: 159.5,
+            cy: 119.5,
+        };
         let edge = 160.5 / 262.5 * 2.0;
         let data = (0..k.pixels()).map(|i| {
-            let (x, y) = (((i % 320) as f64 - k.cx) / k.fx * 2.0, ((i / 320) as f64 - k.cy) / k.fy * 2.0);
+            let (x, y) = (
+                ((i % 320) as f64 - k.cx) / k.fx * 2.0,
+                ((i / 320) as f64 - k.cy) / k.fy * 2.0,
+            );
             let across = edge - x;
             if across > 0.3 || y.abs() > 0.75 {
                 return 0;
             }
-            let z = if round { 2.0 - (0.09 - across * across).max(0.0).sqrt() } else { 2.0 + 0.58 * across };
+            let z = if round {
+                2.0 - (0.09 - across * across).max(0.0).sqrt()
+            } else {
+                2.0 + 0.58 * across
+            };
             (z * 1000.0) as u16
         });
         let image = DepthImage::new(320, 240, data.collect()).expect("sizes agree");
@@ -447,19 +519,43 @@ mod tests {
     #[test]
     fn half_a_person_at_the_rim_is_found_and_half_a_door_is_not() {
         let mut scratch = SegmentScratch::default();
-        let found = find_person(&mut at_the_rim(true), &ScenePlanes::default(), None, &mut scratch);
+        let found = find_person(
+            &mut at_the_rim(true),
+            &ScenePlanes::default(),
+            None,
+            &mut scratch,
+        );
         assert!(found.cells.len() > 500, "{} cells", found.cells.len());
-        let door = find_person(&mut at_the_rim(false), &ScenePlanes::default(), None, &mut scratch);
-        assert!(door.cells.is_empty() && door.components == 1, "{} cells", door.cells.len());
+        let door = find_person(
+            &mut at_the_rim(false),
+            &ScenePlanes::default(),
+            None,
+            &mut scratch,
+        );
+        assert!(
+            door.cells.is_empty() && door.components == 1,
+            "{} cells",
+            door.cells.len()
+        );
     }
 
     /// A box of 0.4 × 1.4 m at 2 m before a wall at 4 m, a hand of 6 × 10 cm half a metre to its right, and between them
     /// `hole` or the wall.
     fn sleeve(hole: bool) -> OrganisedCloud {
         use crate::camera::{DepthImage, Intrinsics};
-        let k = Intrinsics { width: 320, height: 240, fx: 262.5, fy: 262.5, cx: 159.5, cy: 119.5 };
+        let k = Intrinsics {
+            width: 320,
+            height: 240,
+            fx: 262.5,
+            fy: 262.5,
+            cx: 159.5,
+            cy: 119.5,
+        };
         let data = (0..k.pixels()).map(|i| {
-            let (x, y) = (((i % 320) as f64 - k.cx) / k.fx * 2.0, ((i / 320) as f64 - k.cy) / k.fy * 2.0);
+            let (x, y) = (
+                ((i % 320) as f64 - k.cx) / k.fx * 2.0,
+                ((i / 320) as f64 - k.cy) / k.fy * 2.0,
+            );
             let body = x.abs() < 0.2 && y.abs() < 0.7;
             let hand = (0.7..0.76).contains(&x) && y.abs() < 0.05;
             let arm = (0.2..0.7).contains(&x) && y.abs() < 0.05;
@@ -483,7 +579,11 @@ mod tests {
             let mut cloud = sleeve(hole);
             let scene = find_planes(&cloud);
             let found = find_person(&mut cloud, &scene, None, &mut SegmentScratch::default());
-            assert!(!found.cells.is_empty() && found.hands.len() == usize::from(hole), "{hole}: {:?}", found.hands);
+            assert!(
+                !found.cells.is_empty() && found.hands.len() == usize::from(hole),
+                "{hole}: {:?}",
+                found.hands
+            );
             for hand in found.hands {
                 assert!((hand - P3::new(0.73, 0.0, 2.0)).norm() < 0.02, "{hand}");
             }
@@ -495,8 +595,16 @@ mod tests {
         let (mut cloud, _) = room(0.0, false);
         let scene = find_planes(&cloud);
         let mut scratch = SegmentScratch::default();
-        assert!(find_person(&mut cloud, &scene, None, &mut scratch).cells.is_empty());
+        assert!(
+            find_person(&mut cloud, &scene, None, &mut scratch)
+                .cells
+                .is_empty()
+        );
         cloud.depth.fill(0.0);
-        assert!(find_person(&mut cloud, &ScenePlanes::default(), None, &mut scratch).cells.is_empty());
+        assert!(
+            find_person(&mut cloud, &ScenePlanes::default(), None, &mut scratch)
+                .cells
+                .is_empty()
+        );
     }
 }

@@ -67,7 +67,8 @@ const TRIPLE_REACH: i32 = 20;
 /// How far a point of a plane may seem away from it.
 pub(super) fn tolerance(plane: &Plane, p: &P3) -> f32 {
     // Depth noise acts along the ray; only its part along the normal leaves the plane.
-    let along = (plane.normal.cast::<f32>().dot(&p.coords) / p.coords.norm().max(f32::MIN_POSITIVE)).abs();
+    let along =
+        (plane.normal.cast::<f32>().dot(&p.coords) / p.coords.norm().max(f32::MIN_POSITIVE)).abs();
     FLOOR_TOLERANCE + NOISE_PER_SQUARE_METRE * p.z * p.z * along
 }
 
@@ -92,11 +93,22 @@ impl Bands {
         }
         let all = |plane: &Plane, extra: f64| -> Vec<[f32; 2]> {
             let (columns, rows) = cloud.size();
-            let ray = |i: usize| cloud.unproject((i % columns) as f32, (i / columns) as f32, 1.0).coords.cast::<f64>();
-            (0..columns * rows).map(|i| band(plane, &ray(i), extra)).collect()
+            let ray = |i: usize| {
+                cloud
+                    .unproject((i % columns) as f32, (i / columns) as f32, 1.0)
+                    .coords
+                    .cast::<f64>()
+            };
+            (0..columns * rows)
+                .map(|i| band(plane, &ray(i), extra))
+                .collect()
         };
         self.floor = scene.floor.map_or(vec![], |f| all(&f, 0.0));
-        self.background = scene.background.iter().map(|b| all(b, f64::from(BACKGROUND_TOLERANCE))).collect();
+        self.background = scene
+            .background
+            .iter()
+            .map(|b| all(b, f64::from(BACKGROUND_TOLERANCE)))
+            .collect();
         (self.scene, self.layout) = (scene.clone(), layout);
     }
 }
@@ -113,8 +125,15 @@ fn band(plane: &Plane, ray: &Vector3<f64>, extra: f64) -> [f32; 2] {
     // o − slope z = c + k z² in front of the plane, = −(c + k z²) behind it.
     let near = (-slope + (slope * slope + 4.0 * k * (o - c)).max(0.0).sqrt()) / (2.0 * k);
     let inner = slope * slope - 4.0 * k * (o + c);
-    let far = if inner < 0.0 { f64::INFINITY } else { (slope - inner.sqrt()) / (2.0 * k) };
-    [near.min((o - extra) / slope) as f32, far.max((o + extra) / slope) as f32]
+    let far = if inner < 0.0 {
+        f64::INFINITY
+    } else {
+        (slope - inner.sqrt()) / (2.0 * k)
+    };
+    [
+        near.min((o - extra) / slope) as f32,
+        far.max((o + extra) / slope) as f32,
+    ]
 }
 
 /// Looks for the floor and for background planes in a sampled cloud. Deterministic: the same cloud gives the same planes.
@@ -140,18 +159,26 @@ pub fn find_planes(cloud: &OrganisedCloud) -> ScenePlanes {
         if points.len() < wanted.max(3) {
             break;
         }
-        let Some(plane) = largest_plane(cloud, &cells, &points, &mut rng) else { break };
-        let (inliers, rest): (Vec<P3>, Vec<P3>) =
-            points.iter().partition(|p| plane.distance(p).abs() < tolerance(&plane, p));
+        let Some(plane) = largest_plane(cloud, &cells, &points, &mut rng) else {
+            break;
+        };
+        let (inliers, rest): (Vec<P3>, Vec<P3>) = points
+            .iter()
+            .partition(|p| plane.distance(p).abs() < tolerance(&plane, p));
         if inliers.len() < wanted {
             break;
         }
         points = rest;
-        let Some((_, _, variance)) = principal_axes(&inliers) else { break };
+        let Some((_, _, variance)) = principal_axes(&inliers) else {
+            break;
+        };
         if variance[1].sqrt() < SPREAD {
             continue;
         }
-        let behind = all.iter().filter(|p| plane.distance(p) < -2.0 * tolerance(&plane, p)).count();
+        let behind = all
+            .iter()
+            .filter(|p| plane.distance(p) < -2.0 * tolerance(&plane, p))
+            .count();
         if behind as f64 > BEHIND * total as f64 || area(cloud, &inliers) < LEAST_BACKGROUND {
             continue;
         }
@@ -162,7 +189,12 @@ pub fn find_planes(cloud: &OrganisedCloud) -> ScenePlanes {
     }
     // Where a wall stands on the floor its lowest readings pull the floor up: once more without them.
     if let Some(floor) = scene.floor.as_mut() {
-        let on_wall = |p: &P3| scene.background.iter().any(|b| b.distance(p).abs() < tolerance(b, p));
+        let on_wall = |p: &P3| {
+            scene
+                .background
+                .iter()
+                .any(|b| b.distance(p).abs() < tolerance(b, p))
+        };
         let free: Vec<P3> = all.iter().filter(|p| !on_wall(p)).copied().collect();
         for _ in 0..2 {
             *floor = polish(floor, &free, wanted / 2).unwrap_or(*floor);
@@ -174,7 +206,10 @@ pub fn find_planes(cloud: &OrganisedCloud) -> ScenePlanes {
 /// Area of the view that points in every second cell stand for, as if they faced the camera, m².
 fn area(cloud: &OrganisedCloud, points: &[P3]) -> f64 {
     let [fx, fy] = cloud.focal();
-    points.iter().map(|p| f64::from(4.0 * p.z * p.z / (fx * fy))).sum()
+    points
+        .iter()
+        .map(|p| f64::from(4.0 * p.z * p.z / (fx * fy)))
+        .sum()
 }
 
 /// The floor: of all planes that face up and have hardly anything below them, the one that holds the most points.
@@ -187,18 +222,31 @@ fn find_floor(all: &[P3], wanted: usize) -> Option<Plane> {
     let (pitch, roll, _) = vote(&some, PITCHES, ROLLS, HEIGHTS, least)?;
     let around = |at: f64, [_, _, by]: [f64; 3]| [at - by, at + by, by / FINER];
     let fine = [HEIGHTS[0], HEIGHTS[1], HEIGHTS[2] * 0.5];
-    let (_, _, mut plane) = vote(&some, around(pitch, PITCHES), around(roll, ROLLS), fine, least / 2)?;
+    let (_, _, mut plane) = vote(
+        &some,
+        around(pitch, PITCHES),
+        around(roll, ROLLS),
+        fine,
+        least / 2,
+    )?;
     for _ in 0..4 {
         plane = polish(&plane, all, wanted)?;
     }
-    let behind = all.iter().filter(|p| plane.distance(p) < -2.0 * tolerance(&plane, p)).count();
+    let behind = all
+        .iter()
+        .filter(|p| plane.distance(p) < -2.0 * tolerance(&plane, p))
+        .count();
     let up = -plane.normal.y > FLOOR_TILT.cos();
     (up && behind as f64 <= BEHIND * all.len() as f64).then_some(plane)
 }
 
 /// The plane of least squares through the points near `plane`; `None` when they are too few or lie along a line.
 fn polish(plane: &Plane, points: &[P3], wanted: usize) -> Option<Plane> {
-    let inliers: Vec<P3> = points.iter().filter(|p| plane.distance(p).abs() < tolerance(plane, p)).copied().collect();
+    let inliers: Vec<P3> = points
+        .iter()
+        .filter(|p| plane.distance(p).abs() < tolerance(plane, p))
+        .copied()
+        .collect();
     let (centroid, axes, variance) = principal_axes(&inliers)?;
     if inliers.len() < wanted || variance[1].sqrt() < SPREAD {
         return None;
@@ -217,12 +265,18 @@ fn vote(
 ) -> Option<(f64, f64, Plane)> {
     let below = (BEHIND * points.len() as f64) as usize;
     let bins = ((heights[1] - heights[0]) / heights[2]) as usize;
-    let range = |[from, to, by]: [f64; 3]| (0..=((to - from) / by).round() as usize).map(move |i| from + by * i as f64);
+    let range = |[from, to, by]: [f64; 3]| {
+        (0..=((to - from) / by).round() as usize).map(move |i| from + by * i as f64)
+    };
     let mut best: Option<(usize, f64, f64, Plane)> = None;
     let mut counts = vec![0usize; bins];
     for pitch in range(pitches) {
         for roll in range(rolls) {
-            let normal = Vector3::new(roll.sin(), -roll.cos() * pitch.cos(), -roll.cos() * pitch.sin());
+            let normal = Vector3::new(
+                roll.sin(),
+                -roll.cos() * pitch.cos(),
+                -roll.cos() * pitch.sin(),
+            );
             let n = normal.cast::<f32>();
             counts.fill(0);
             let mut deeper = 0;
@@ -253,23 +307,38 @@ fn vote(
 }
 
 /// Best plane of random neighbouring triples, polished twice by least squares on its inliers.
-fn largest_plane(cloud: &OrganisedCloud, cells: &[usize], points: &[P3], rng: &mut rand_pcg::Pcg32) -> Option<Plane> {
+fn largest_plane(
+    cloud: &OrganisedCloud,
+    cells: &[usize],
+    points: &[P3],
+    rng: &mut rand_pcg::Pcg32,
+) -> Option<Plane> {
     let columns = cloud.size().0;
     let count = |plane: &Plane, step: usize| {
-        points.iter().step_by(step).filter(|p| plane.distance(p).abs() < tolerance(plane, p)).count()
+        points
+            .iter()
+            .step_by(step)
+            .filter(|p| plane.distance(p).abs() < tolerance(plane, p))
+            .count()
     };
     let mut best: Option<(usize, Plane)> = None;
     for _ in 0..TRIALS {
         let at = cells[rng.random_range(0..cells.len())];
         let mut near = || {
-            let (du, dv) =
-                (rng.random_range(-TRIPLE_REACH..=TRIPLE_REACH), rng.random_range(-TRIPLE_REACH..=TRIPLE_REACH));
+            let (du, dv) = (
+                rng.random_range(-TRIPLE_REACH..=TRIPLE_REACH),
+                rng.random_range(-TRIPLE_REACH..=TRIPLE_REACH),
+            );
             let cell = cloud.cell((at % columns) as i32 + du, (at / columns) as i32 + dv)?;
             (cloud.depth[cell] > 0.0).then(|| cloud.centre(cell).cast::<f64>())
         };
-        let (Some(b), Some(c)) = (near(), near()) else { continue };
+        let (Some(b), Some(c)) = (near(), near()) else {
+            continue;
+        };
         let a = cloud.centre(at).cast::<f64>();
-        let Some(plane) = through(&a, &(b - a).cross(&(c - a))) else { continue };
+        let Some(plane) = through(&a, &(b - a).cross(&(c - a))) else {
+            continue;
+        };
         let score = count(&plane, 4);
         if best.is_none_or(|(s, _)| score > s) {
             best = Some((score, plane));
@@ -277,8 +346,11 @@ fn largest_plane(cloud: &OrganisedCloud, cells: &[usize], points: &[P3], rng: &m
     }
     let (_, mut plane) = best?;
     for _ in 0..2 {
-        let inliers: Vec<P3> =
-            points.iter().filter(|p| plane.distance(p).abs() < tolerance(&plane, p)).copied().collect();
+        let inliers: Vec<P3> = points
+            .iter()
+            .filter(|p| plane.distance(p).abs() < tolerance(&plane, p))
+            .copied()
+            .collect();
         let (centroid, axes, _) = principal_axes(&inliers)?;
         plane = through(&centroid, &axes.column(2).into_owned())?;
     }
@@ -288,14 +360,23 @@ fn largest_plane(cloud: &OrganisedCloud, cells: &[usize], points: &[P3], rng: &m
 fn through(p: &Point3<f64>, normal: &Vector3<f64>) -> Option<Plane> {
     let n = normal.try_normalize(f64::EPSILON)?;
     let offset = -n.dot(&p.coords);
-    Some(if offset < 0.0 { Plane { normal: -n, offset: -offset } } else { Plane { normal: n, offset } })
+    Some(if offset < 0.0 {
+        Plane {
+            normal: -n,
+            offset: -offset,
+        }
+    } else {
+        Plane { normal: n, offset }
+    })
 }
 
 impl ScenePlanes {
     /// The world's upright frame: floor at y = 0 below the camera, −z where the camera looks. Without a floor the
     /// camera counts as level at `height` metres.
     pub fn world_from_camera(&self, height: f64) -> Rigid<World, Camera> {
-        let Some(floor) = self.floor else { return Rigid::level(height) };
+        let Some(floor) = self.floor else {
+            return Rigid::level(height);
+        };
         let up = floor.normal;
         let forward = Vector3::z();
         let Some(back) = (-(forward - up * up.dot(&forward))).try_normalize(f64::EPSILON) else {
@@ -303,8 +384,10 @@ impl ScenePlanes {
         };
         let right = up.cross(&back);
         // Rows are the world's axes in camera coordinates.
-        let rotation = nalgebra::Matrix3::from_rows(&[right.transpose(), up.transpose(), back.transpose()]);
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        let rotation =
+            nalgebra::Matrix3::from_rows(&[right.transpose(), up.transpose(), back.transpose()]);
+        let rotation =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
         Rigid::from_parts(Vector3::new(0.0, floor.offset, 0.0), rotation)
     }
 }
@@ -317,10 +400,20 @@ pub(super) mod tests {
     /// A room seen from 1.1 m, pitched down by `pitch`: floor and a wall at 4 m, with a box of 0.4 × 1.7 × 0.25 m
     /// standing at 2.5 m when `person`.
     pub(crate) fn room(pitch: f64, person: bool) -> (OrganisedCloud, DepthImage) {
-        let k = Intrinsics { width: 320, height: 240, fx: 262.5, fy: 262.5, cx: 159.5, cy: 119.5 };
+        let k = Intrinsics {
+            width: 320,
+            height: 240,
+            fx: 262.5,
+            fy: 262.5,
+            cx: 159.5,
+            cy: 119.5,
+        };
         let (sin, cos) = pitch.sin_cos();
         let data = (0..k.pixels()).map(|i| {
-            let (x, y) = (((i % 320) as f64 - k.cx) / k.fx, ((i / 320) as f64 - k.cy) / k.fy);
+            let (x, y) = (
+                ((i % 320) as f64 - k.cx) / k.fx,
+                ((i / 320) as f64 - k.cy) / k.fy,
+            );
             // Ray in a level frame (y down).
             let d = Vector3::new(x, y * cos + sin, cos - y * sin);
             let mut z = f64::INFINITY;
@@ -348,7 +441,9 @@ pub(super) mod tests {
         for pitch in [0.0, 0.2, -0.05] {
             let (cloud, _) = room(pitch, true);
             let scene = find_planes(&cloud);
-            let floor = scene.floor.unwrap_or_else(|| panic!("no floor at pitch {pitch}"));
+            let floor = scene
+                .floor
+                .unwrap_or_else(|| panic!("no floor at pitch {pitch}"));
             assert!((floor.offset - 1.1).abs() < 0.01, "height {}", floor.offset);
             assert_eq!(scene.background.len(), 1, "the wall");
             let world = scene.world_from_camera(0.0);
@@ -373,12 +468,17 @@ pub(super) mod tests {
                 let p = cloud.unproject(u, v, z);
                 let inside = |[lo, hi]: [f32; 2]| z > lo && z < hi;
                 let on_floor = floor.distance(&p).abs() < tolerance(&floor, &p);
-                let on_wall = wall.distance(&p).abs() < tolerance(&wall, &p).max(BACKGROUND_TOLERANCE);
+                let on_wall =
+                    wall.distance(&p).abs() < tolerance(&wall, &p).max(BACKGROUND_TOLERANCE);
                 differ += usize::from(inside(bands.floor[i]) != on_floor);
                 differ += usize::from(inside(bands.background[0][i]) != on_wall);
             }
         }
-        assert!(differ < cloud.depth.len() * 40 / 10_000, "{differ} of {}", cloud.depth.len() * 40);
+        assert!(
+            differ < cloud.depth.len() * 40 / 10_000,
+            "{differ} of {}",
+            cloud.depth.len() * 40
+        );
     }
 
     #[test]
@@ -393,6 +493,12 @@ pub(super) mod tests {
         assert_eq!(find_planes(&cloud), ScenePlanes::default());
         cloud.depth.fill(0.0);
         assert_eq!(find_planes(&cloud), ScenePlanes::default());
-        assert!(ScenePlanes::default().world_from_camera(1.3).point(&Point3::origin()).y == 1.3);
+        assert!(
+            ScenePlanes::default()
+                .world_from_camera(1.3)
+                .point(&Point3::origin())
+                .y
+                == 1.3
+        );
     }
 }

@@ -20,7 +20,11 @@ impl Default for Limits {
     /// camera for the camera, which may skip on exposure changes; half of that for garments, for at 250 ms a shirt
     /// visibly trails its wearer.
     fn default() -> Self {
-        Self { camera_silence_ns: 500_000_000, tracking_silence_ns: 700_000_000, garments_age_ns: 250_000_000 }
+        Self {
+            camera_silence_ns: 500_000_000,
+            tracking_silence_ns: 700_000_000,
+            garments_age_ns: 250_000_000,
+        }
     }
 }
 
@@ -39,7 +43,8 @@ impl Ages {
     /// The fault that silence amounts to at `now_ns`, the most upstream one; `None` while all is fresh.
     /// What has never spoken is not late: opening has its own deadline.
     pub fn overdue(&self, now_ns: u64, limits: &Limits) -> Option<Reason> {
-        let late = |at: Option<u64>, limit: u64| at.is_some_and(|t| now_ns.saturating_sub(t) > limit);
+        let late =
+            |at: Option<u64>, limit: u64| at.is_some_and(|t| now_ns.saturating_sub(t) > limit);
         if late(self.frame_ns, limits.camera_silence_ns) {
             return Some(Reason::CameraSilent);
         }
@@ -56,13 +61,27 @@ mod tests {
 
     #[test]
     fn silence_is_blamed_on_the_first_silent_part() {
-        let limits = Limits { camera_silence_ns: 50, tracking_silence_ns: 70, garments_age_ns: 25 };
-        let ages = Ages { frame_ns: Some(100), body_ns: Some(95), garments_ns: Some(90) };
+        let limits = Limits {
+            camera_silence_ns: 50,
+            tracking_silence_ns: 70,
+            garments_age_ns: 25,
+        };
+        let ages = Ages {
+            frame_ns: Some(100),
+            body_ns: Some(95),
+            garments_ns: Some(90),
+        };
         assert_eq!(ages.overdue(110, &limits), None);
         assert_eq!(ages.overdue(120, &limits), Some(Reason::GarmentsLate));
         assert_eq!(ages.overdue(151, &limits), Some(Reason::CameraSilent));
-        let frames = Ages { frame_ns: Some(200), ..ages };
-        assert_eq!(frames.overdue(200, &limits), Some(Reason::TrackingUnavailable));
+        let frames = Ages {
+            frame_ns: Some(200),
+            ..ages
+        };
+        assert_eq!(
+            frames.overdue(200, &limits),
+            Some(Reason::TrackingUnavailable)
+        );
         assert_eq!(Ages::default().overdue(u64::MAX, &limits), None);
         // A clock that runs backwards is no reason to panic.
         assert_eq!(frames.overdue(0, &limits), None);

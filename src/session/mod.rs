@@ -83,7 +83,9 @@ impl Reason {
     pub fn part(self) -> Part {
         match self {
             Self::CameraSilent => Part::Camera,
-            Self::TrackingUnavailable | Self::NoPerson | Self::PersonLeft | Self::TrackingLost => Part::Tracking,
+            Self::TrackingUnavailable | Self::NoPerson | Self::PersonLeft | Self::TrackingLost => {
+                Part::Tracking
+            }
             Self::ClothUnavailable | Self::GarmentsLate => Part::Cloth,
             Self::StepFailed => Part::Picture,
         }
@@ -144,19 +146,36 @@ pub enum Event {
 impl Event {
     /// All of them.
     pub fn all() -> impl Iterator<Item = Self> {
-        use Event::{CameraBack, Close, Drain, Drained, GarmentsOn, Opened, OutfitChanged, PersonFound};
-        [Opened, CameraBack, PersonFound, GarmentsOn, OutfitChanged, Drain, Drained, Close]
-            .into_iter()
-            .chain(Reason::ALL.map(Self::Failed))
+        use Event::{
+            CameraBack, Close, Drain, Drained, GarmentsOn, Opened, OutfitChanged, PersonFound,
+        };
+        [
+            Opened,
+            CameraBack,
+            PersonFound,
+            GarmentsOn,
+            OutfitChanged,
+            Drain,
+            Drained,
+            Close,
+        ]
+        .into_iter()
+        .chain(Reason::ALL.map(Self::Failed))
     }
 }
 
 impl State {
     /// All of them.
     pub fn all() -> impl Iterator<Item = Self> {
-        [Self::Opening, Self::Calibrating, Self::Live, Self::Draining, Self::Closed]
-            .into_iter()
-            .chain(Reason::ALL.map(Self::Degraded))
+        [
+            Self::Opening,
+            Self::Calibrating,
+            Self::Live,
+            Self::Draining,
+            Self::Closed,
+        ]
+        .into_iter()
+        .chain(Reason::ALL.map(Self::Degraded))
     }
     /// Garments may be shown; in every other state a picture is the plain camera picture.
     pub fn shows_garments(self) -> bool {
@@ -168,7 +187,11 @@ impl State {
     }
     /// Why it is less than live, if something failed.
     pub fn reason(self) -> Option<Reason> {
-        if let Self::Degraded(why) = self { Some(why) } else { None }
+        if let Self::Degraded(why) = self {
+            Some(why)
+        } else {
+            None
+        }
     }
 }
 

@@ -9,7 +9,13 @@ pub fn transition(state: State, event: Event) -> (State, Vec<Effect>) {
     use State::{Calibrating, Closed, Degraded, Draining, Live, Opening};
     let to = |next: State, effects: &[Effect]| {
         let announce = (next != state).then_some(Announce(next));
-        (next, announce.into_iter().chain(effects.iter().copied()).collect())
+        (
+            next,
+            announce
+                .into_iter()
+                .chain(effects.iter().copied())
+                .collect(),
+        )
     };
     match (state, event) {
         (Closed, _) => to(Closed, &[]),
@@ -34,15 +40,21 @@ pub fn transition(state: State, event: Event) -> (State, Vec<Effect>) {
         (_, Event::Failed(why)) => match after_fault(state, why) {
             next if next == state => to(state, &[]),
             next @ Degraded(why) => match why {
-                Reason::TrackingUnavailable => to(next, &[ForgetGarments, Effect::Reopen(Part::Tracking)]),
-                Reason::ClothUnavailable => to(next, &[ForgetGarments, Effect::Reopen(Part::Cloth)]),
+                Reason::TrackingUnavailable => {
+                    to(next, &[ForgetGarments, Effect::Reopen(Part::Tracking)])
+                }
+                Reason::ClothUnavailable => {
+                    to(next, &[ForgetGarments, Effect::Reopen(Part::Cloth)])
+                }
                 // One late or refused frame costs no state: the garments go on from where they are.
                 Reason::GarmentsLate | Reason::StepFailed => to(next, &[]),
                 _ => to(next, &[ForgetGarments]),
             },
             next => to(next, &[]),
         },
-        (_, Event::Opened | Event::CameraBack | Event::PersonFound | Event::GarmentsOn) => to(state, &[]),
+        (_, Event::Opened | Event::CameraBack | Event::PersonFound | Event::GarmentsOn) => {
+            to(state, &[])
+        }
     }
 }
 
@@ -51,7 +63,10 @@ fn is_service(why: Reason) -> bool {
 }
 
 fn is_person(why: Reason) -> bool {
-    matches!(why, Reason::NoPerson | Reason::PersonLeft | Reason::TrackingLost)
+    matches!(
+        why,
+        Reason::NoPerson | Reason::PersonLeft | Reason::TrackingLost
+    )
 }
 
 /// Where a fault leads: upstream faults hide downstream ones, and a part corrects its own word.
@@ -72,8 +87,13 @@ fn after_fault(state: State, why: Reason) -> State {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use Event::{CameraBack, Close, Drain, Drained, Failed, GarmentsOn, Opened, OutfitChanged, PersonFound};
-    use Reason::{CameraSilent, ClothUnavailable, NoPerson, PersonLeft, StepFailed, TrackingLost, TrackingUnavailable};
+    use Event::{
+        CameraBack, Close, Drain, Drained, Failed, GarmentsOn, Opened, OutfitChanged, PersonFound,
+    };
+    use Reason::{
+        CameraSilent, ClothUnavailable, NoPerson, PersonLeft, StepFailed, TrackingLost,
+        TrackingUnavailable,
+    };
     use State::{Calibrating, Closed, Degraded, Draining, Live, Opening};
 
     /// The whole table as text, written independently of the code: one row a state, one column an event.
@@ -130,13 +150,27 @@ mod tests {
         for state in State::all() {
             for event in Event::all() {
                 let (next, effects) = transition(state, event);
-                let announced = effects.iter().filter(|e| matches!(e, Effect::Announce(_))).count();
-                assert_eq!(announced, usize::from(next != state), "{state:?} × {event:?}: a change is told once");
+                let announced = effects
+                    .iter()
+                    .filter(|e| matches!(e, Effect::Announce(_)))
+                    .count();
+                assert_eq!(
+                    announced,
+                    usize::from(next != state),
+                    "{state:?} × {event:?}: a change is told once"
+                );
                 if next == Closed && state != Closed {
-                    assert!(effects.contains(&Effect::CloseUpstream) && effects.contains(&Effect::EndStreams));
+                    assert!(
+                        effects.contains(&Effect::CloseUpstream)
+                            && effects.contains(&Effect::EndStreams)
+                    );
                 }
                 let reopens = effects.iter().any(|e| matches!(e, Effect::Reopen(_)));
-                assert_eq!(reopens, next != state && next.reason().is_some_and(is_service), "{state:?} × {event:?}");
+                assert_eq!(
+                    reopens,
+                    next != state && next.reason().is_some_and(is_service),
+                    "{state:?} × {event:?}"
+                );
                 if effects.contains(&Effect::Dress) {
                     assert!(state.accepts_work() && matches!(event, Opened | OutfitChanged));
                 }
@@ -145,7 +179,9 @@ mod tests {
     }
 
     fn run(events: &[Event]) -> State {
-        events.iter().fold(State::default(), |s, e| transition(s, *e).0)
+        events
+            .iter()
+            .fold(State::default(), |s, e| transition(s, *e).0)
     }
 
     #[test]
@@ -155,14 +191,31 @@ mod tests {
         assert_eq!(run(&left), Degraded(PersonLeft));
         assert_eq!(run(&[&left[..], &[PersonFound, GarmentsOn]].concat()), Live);
         // Tracking dies, its sessions come back empty, and nobody is there any more.
-        let died = [Opened, GarmentsOn, Failed(TrackingUnavailable), Failed(ClothUnavailable)];
+        let died = [
+            Opened,
+            GarmentsOn,
+            Failed(TrackingUnavailable),
+            Failed(ClothUnavailable),
+        ];
         assert_eq!(run(&died), Degraded(TrackingUnavailable));
-        assert_eq!(run(&[&died[..], &[Opened, Failed(NoPerson)]].concat()), Degraded(NoPerson));
+        assert_eq!(
+            run(&[&died[..], &[Opened, Failed(NoPerson)]].concat()),
+            Degraded(NoPerson)
+        );
         // A silent camera explains everything after it.
-        let silent = [Opened, GarmentsOn, Failed(TrackingLost), Failed(CameraSilent), Failed(StepFailed)];
+        let silent = [
+            Opened,
+            GarmentsOn,
+            Failed(TrackingLost),
+            Failed(CameraSilent),
+            Failed(StepFailed),
+        ];
         assert_eq!(run(&silent), Degraded(CameraSilent));
         assert_eq!(run(&[&silent[..], &[CameraBack]].concat()), Calibrating);
-        assert_eq!(run(&[Opened, OutfitChanged, GarmentsOn, OutfitChanged]), Calibrating);
+        assert_eq!(
+            run(&[Opened, OutfitChanged, GarmentsOn, OutfitChanged]),
+            Calibrating
+        );
         assert_eq!(run(&[Opened, Drain, GarmentsOn, Opened]), Draining);
         assert_eq!(run(&[Opened, Drain, Drained]), Closed);
         assert_eq!(run(&[Close, Opened, GarmentsOn]), Closed);

@@ -13,12 +13,20 @@ impl PointTree {
     pub fn new(points: &[P3]) -> Self {
         let entries: Vec<[f32; 3]> = points.iter().map(|p| [p.x, p.y, p.z]).collect();
         let usable = !entries.is_empty() && entries.iter().flatten().all(|c| c.is_finite());
-        Self { tree: usable.then(|| ImmutableKdTree::new_from_slice(&entries).ok()).flatten() }
+        Self {
+            tree: usable
+                .then(|| ImmutableKdTree::new_from_slice(&entries).ok())
+                .flatten(),
+        }
     }
     /// Index and squared distance of the point nearest to `query`, if it is nearer than `radius`.
     pub fn nearest(&self, query: &P3, radius: f32) -> Option<(usize, f32)> {
-        let found =
-            self.tree.as_ref()?.query(&[query.x, query.y, query.z]).nearest_one::<SquaredEuclidean<f32>>().execute();
+        let found = self
+            .tree
+            .as_ref()?
+            .query(&[query.x, query.y, query.z])
+            .nearest_one::<SquaredEuclidean<f32>>()
+            .execute();
         (found.distance < radius * radius).then_some((found.item as usize, found.distance))
     }
 }
@@ -38,7 +46,10 @@ mod tests {
         for _ in 0..300 {
             let q = point();
             for radius in [0.02, 0.1, 2.0] {
-                let (a, b) = (tree.nearest(&q, radius), nearest_brute_force(&points, &q, radius));
+                let (a, b) = (
+                    tree.nearest(&q, radius),
+                    nearest_brute_force(&points, &q, radius),
+                );
                 assert_eq!(a.map(|x| x.0), b.map(|x| x.0));
             }
         }
@@ -47,7 +58,11 @@ mod tests {
     #[test]
     fn degenerate_clouds_answer_none_or_a_copy() {
         assert!(PointTree::new(&[]).nearest(&P3::origin(), 1.0).is_none());
-        assert!(PointTree::new(&[P3::new(f32::NAN, 0.0, 0.0)]).nearest(&P3::origin(), 1.0).is_none());
+        assert!(
+            PointTree::new(&[P3::new(f32::NAN, 0.0, 0.0)])
+                .nearest(&P3::origin(), 1.0)
+                .is_none()
+        );
         let same = vec![P3::new(0.5, 0.5, 0.5); 500];
         assert!(PointTree::new(&same).nearest(&P3::origin(), 2.0).is_some());
     }

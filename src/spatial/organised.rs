@@ -59,7 +59,11 @@ fn supported(readings: [u16; 4]) -> u16 {
         let a = readings[*i];
         a > 0 && (0..4).any(|j| j != *i && agree(a, readings[j]))
     };
-    (0..4).find(backed).map(|i| readings[i]).or_else(|| readings.into_iter().find(|d| *d > 0)).unwrap_or(0)
+    (0..4)
+        .find(backed)
+        .map(|i| readings[i])
+        .or_else(|| readings.into_iter().find(|d| *d > 0))
+        .unwrap_or(0)
 }
 
 /// A decimated depth image with points, normals and labels; all arrays are row-major, shape `[rows × columns]`.
@@ -104,18 +108,29 @@ impl OrganisedCloud {
     /// This grid was made for that camera and stride.
     pub fn fits(&self, camera: &Intrinsics, stride: Option<u32>) -> bool {
         let (s, focal) = Self::layout(camera, stride);
-        self.stride == s && self.f == focal.0 && self.c == focal.1 && (self.columns, self.rows) == focal.2
+        self.stride == s
+            && self.f == focal.0
+            && self.c == focal.1
+            && (self.columns, self.rows) == focal.2
     }
     /// Stride, and focal lengths, centre and size in cells.
     #[allow(clippy::type_complexity)] // three pairs of numbers, used twice below
     fn layout(camera: &Intrinsics, stride: Option<u32>) -> (u32, ([f32; 2], [f32; 2], (u32, u32))) {
         let focal = camera.fx.min(camera.fy);
         let automatic = (focal / CELLS_PER_FOCAL_LENGTH).round().clamp(1.0, 16.0) as u32;
-        let stride = stride.unwrap_or(automatic).clamp(1, camera.width.min(camera.height).max(1));
+        let stride = stride
+            .unwrap_or(automatic)
+            .clamp(1, camera.width.min(camera.height).max(1));
         let s = f64::from(stride);
         let f = [(camera.fx / s) as f32, (camera.fy / s) as f32];
-        let c = [((camera.cx + 0.5) / s - 0.5) as f32, ((camera.cy + 0.5) / s - 0.5) as f32];
-        (stride, (f, c, (camera.width / stride, camera.height / stride)))
+        let c = [
+            ((camera.cx + 0.5) / s - 0.5) as f32,
+            ((camera.cy + 0.5) / s - 0.5) as f32,
+        ];
+        (
+            stride,
+            (f, c, (camera.width / stride, camera.height / stride)),
+        )
     }
     /// Columns and rows.
     pub fn size(&self) -> (usize, usize) {
@@ -131,12 +146,18 @@ impl OrganisedCloud {
     }
     /// Row-major index of a cell; `None` outside.
     pub fn cell(&self, column: i32, row: i32) -> Option<usize> {
-        let inside = column >= 0 && row >= 0 && column < self.columns as i32 && row < self.rows as i32;
+        let inside =
+            column >= 0 && row >= 0 && column < self.columns as i32 && row < self.rows as i32;
         inside.then(|| row as usize * self.columns as usize + column as usize)
     }
     /// Column and row, in cells, of a camera-frame point; `None` behind the camera or for NaN.
     pub fn project(&self, p: &P3) -> Option<[f32; 2]> {
-        (p.z > f32::MIN_POSITIVE).then(|| [p.x / p.z * self.f[0] + self.c[0], p.y / p.z * self.f[1] + self.c[1]])
+        (p.z > f32::MIN_POSITIVE).then(|| {
+            [
+                p.x / p.z * self.f[0] + self.c[0],
+                p.y / p.z * self.f[1] + self.c[1],
+            ]
+        })
     }
     /// Column and row of the cell that holds a point; may lie outside the grid.
     pub fn cell_of(&self, p: &P3) -> Option<(i32, i32)> {
@@ -148,7 +169,11 @@ impl OrganisedCloud {
     }
     /// Camera-frame point of a cell at depth `z`.
     pub fn unproject(&self, column: f32, row: f32, z: f32) -> P3 {
-        P3::new((column - self.c[0]) / self.f[0] * z, (row - self.c[1]) / self.f[1] * z, z)
+        P3::new(
+            (column - self.c[0]) / self.f[0] * z,
+            (row - self.c[1]) / self.f[1] * z,
+            z,
+        )
     }
     /// Point of a cell at its own depth.
     pub fn centre(&self, cell: usize) -> P3 {
@@ -168,7 +193,12 @@ impl OrganisedCloud {
         let limit = (farthest * 1000.0).clamp(0.0, f32::from(u16::MAX - 1)) as u16;
         let data = image.data();
         // The middle and three others, so that one missing pixel leaves no hole.
-        let offsets = [(s / 2, s / 2), (s / 4, s / 4), (3 * s / 4, s / 4), (s / 4, 3 * s / 4)];
+        let offsets = [
+            (s / 2, s / 2),
+            (s / 4, s / 4),
+            (3 * s / 4, s / 4),
+            (s / 4, 3 * s / 4),
+        ];
         let probes = if s > 1 { 4 } else { 1 };
         let (mut filled, mut mixed) = (0, 0);
         self.labels.fill(Label::Unknown);
@@ -176,7 +206,10 @@ impl OrganisedCloud {
             for column in 0..self.columns as usize {
                 let at = |k: usize| {
                     let (dx, dy) = offsets[k];
-                    let d = data.get((row * s + dy) * w + column * s + dx).copied().unwrap_or(0);
+                    let d = data
+                        .get((row * s + dy) * w + column * s + dx)
+                        .copied()
+                        .unwrap_or(0);
                     if d <= limit { d } else { 0 }
                 };
                 let first = at(0);
@@ -207,7 +240,10 @@ impl OrganisedCloud {
             if self.depth[cell] > 0.0 {
                 continue;
             }
-            let (u0, v0) = ((cell % self.columns as usize) * s, (cell / self.columns as usize) * s);
+            let (u0, v0) = (
+                (cell % self.columns as usize) * s,
+                (cell / self.columns as usize) * s,
+            );
             let pixels = (0..s * s).map(|k| data[(v0 + k / s) * w + u0 + k % s]);
             if let Some(d) = pixels.into_iter().find(|d| *d > 0 && *d <= limit) {
                 self.depth[cell] = f32::from(d) * 1e-3;
@@ -223,15 +259,24 @@ impl OrganisedCloud {
         let (s, w) = (self.stride as usize, image.width() as usize);
         let data = image.data();
         // A quarter of the pixels must agree; a single pixel is all there is at stride 1.
-        let support = if self.thin { 1 } else { (s * s / 4).max(1) as u32 };
+        let support = if self.thin {
+            1
+        } else {
+            (s * s / 4).max(1) as u32
+        };
         let mut kept = 0;
         for &cell in cells {
             let cell = cell as usize;
-            let (u0, v0) = ((cell % self.columns as usize) * s, (cell / self.columns as usize) * s);
+            let (u0, v0) = (
+                (cell % self.columns as usize) * s,
+                (cell / self.columns as usize) * s,
+            );
             let mean_about = |reference: f32| {
                 let tolerance = SAME_SURFACE + SAME_SURFACE_SLOPE * reference;
-                let (lo, hi) =
-                    (((reference - tolerance) * 1e3).max(1.0) as u16, ((reference + tolerance) * 1e3) as u16);
+                let (lo, hi) = (
+                    ((reference - tolerance) * 1e3).max(1.0) as u16,
+                    ((reference + tolerance) * 1e3) as u16,
+                );
                 let (mut n, mut sum, mut su, mut sv) = (0u32, 0u32, 0u32, 0u32);
                 for dv in 0..s {
                     let start = (v0 + dv) * w + u0;
@@ -288,11 +333,15 @@ impl OrganisedCloud {
         if z <= 0.0 || self.labels[cell] != Label::Person {
             return V3::zeros();
         }
-        let (u, v) = ((cell % self.columns as usize) as i32, (cell / self.columns as usize) as i32);
+        let (u, v) = (
+            (cell % self.columns as usize) as i32,
+            (cell / self.columns as usize) as i32,
+        );
         let at = |du: i32, dv: i32| {
             let k = self.cell(u + du, v + dv)?;
-            let same =
-                self.labels[k] == Label::Person && self.depth[k] > 0.0 && (self.depth[k] - z).abs() < DISCONTINUITY;
+            let same = self.labels[k] == Label::Person
+                && self.depth[k] > 0.0
+                && (self.depth[k] - z).abs() < DISCONTINUITY;
             same.then(|| self.points[k])
         };
         let here = self.points[cell];
@@ -302,7 +351,10 @@ impl OrganisedCloud {
             (None, Some(b)) => Some(b - here),
             (None, None) => None,
         };
-        let (Some(du), Some(dv)) = (difference(at(-1, 0), at(1, 0)), difference(at(0, -1), at(0, 1))) else {
+        let (Some(du), Some(dv)) = (
+            difference(at(-1, 0), at(1, 0)),
+            difference(at(0, -1), at(0, 1)),
+        ) else {
             return V3::zeros();
         };
         // x right, y down, z forward: dv × du points at the camera.
@@ -317,12 +369,22 @@ mod tests {
 
     /// A plane z = 2 + 0.3 x seen by a small camera, every pixel.
     fn slanted() -> (Intrinsics, DepthImage) {
-        let k = Intrinsics { width: 64, height: 48, fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5 };
+        let k = Intrinsics {
+            width: 64,
+            height: 48,
+            fx: 60.0,
+            fy: 60.0,
+            cx: 31.5,
+            cy: 23.5,
+        };
         let data = (0..48 * 64).map(|i| {
             let x = (f64::from(i % 64) - k.cx) / k.fx;
             (2.0 / (1.0 - 0.3 * x) * 1000.0).round() as u16
         });
-        (k, DepthImage::new(64, 48, data.collect()).expect("sizes agree"))
+        (
+            k,
+            DepthImage::new(64, 48, data.collect()).expect("sizes agree"),
+        )
     }
 
     fn person_everywhere(cloud: &mut OrganisedCloud) -> Vec<u32> {
@@ -374,7 +436,14 @@ mod tests {
 
     #[test]
     fn degenerate_images_leave_empty_grids() {
-        let k = Intrinsics { width: 3, height: 2, fx: 500.0, fy: 500.0, cx: 1.0, cy: 0.5 };
+        let k = Intrinsics {
+            width: 3,
+            height: 2,
+            fx: 500.0,
+            fy: 500.0,
+            cx: 1.0,
+            cy: 0.5,
+        };
         let mut cloud = OrganisedCloud::new(&k, None);
         assert_eq!(cloud.sample(&DepthImage::empty(3, 2), 8.0), 0);
         let saturated = DepthImage::new(3, 2, vec![u16::MAX; 6]).expect("sizes agree");

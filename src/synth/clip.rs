@@ -36,7 +36,9 @@ pub(super) struct Performance {
 
 /// A clip that cannot be played on a body.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("motion clip: no joint for `{0}`; looked for names of the CMU, MakeHuman and Mixamo skeletons")]
+#[error(
+    "motion clip: no joint for `{0}`; looked for names of the CMU, MakeHuman and Mixamo skeletons"
+)]
 pub struct ClipError(
     /// The landmark that was not found.
     pub String,
@@ -51,7 +53,10 @@ const NAMES: [(&str, &[&str]); 8] = [
     ("shoulder", &["?humerus", "?Shldr", "?shoulder", "*Arm"]),
     ("elbow", &["?radius", "?ForeArm", "?elbow", "*ForeArm"]),
     ("wrist", &["?wrist", "?hand", "*Hand"]),
-    ("hand", &["?fingers", "?Mid1", "finger3-1.?", "*HandMiddle1"]),
+    (
+        "hand",
+        &["?fingers", "?Mid1", "finger3-1.?", "*HandMiddle1"],
+    ),
 ];
 
 /// Held at the start, then blended into the clip, seconds: time for a tracker to measure the body.
@@ -63,7 +68,9 @@ fn basis(left: V3d, up: V3d) -> Option<UnitQuaternion<f64>> {
     let x = left.try_normalize(0.0)?;
     let z = x.cross(&up).try_normalize(0.0)?;
     let m = Matrix3::from_columns(&[x, z.cross(&x), z]);
-    Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(m)))
+    Some(UnitQuaternion::from_rotation_matrix(
+        &Rotation3::from_matrix_unchecked(m),
+    ))
 }
 
 impl Performance {
@@ -72,7 +79,10 @@ impl Performance {
         let find = |what: &str| -> [Option<usize>; 2] {
             let names = NAMES.iter().find(|n| n.0 == what).map_or(&[][..], |n| n.1);
             [["l", "Left"], ["r", "Right"]].map(|[short, long]| {
-                let names: Vec<String> = names.iter().map(|n| n.replace('?', short).replace('*', long)).collect();
+                let names: Vec<String> = names
+                    .iter()
+                    .map(|n| n.replace('?', short).replace('*', long))
+                    .collect();
                 clip.joint(&names.iter().map(String::as_str).collect::<Vec<_>>())
             })
         };
@@ -81,7 +91,9 @@ impl Performance {
             [None, _] => Err(ClipError(format!("left {what}"))),
             _ => Err(ClipError(format!("right {what}"))),
         };
-        let neck = clip.joint(&["lowerneck", "neck"]).ok_or_else(|| ClipError("neck".into()))?;
+        let neck = clip
+            .joint(&["lowerneck", "neck"])
+            .ok_or_else(|| ClipError("neck".into()))?;
         let at = Landmarks {
             hip: both("hip")?,
             knee: both("knee")?,
@@ -92,20 +104,38 @@ impl Performance {
             wrist: both("wrist")?,
             hand: find("hand"),
             neck,
-            head: clip.joint(&["head"]).zip(clip.joint(&["head_end"])).map(|(a, b)| [a, b]),
+            head: clip
+                .joint(&["head"])
+                .zip(clip.joint(&["head_end"]))
+                .map(|(a, b)| [a, b]),
         };
-        let first = clip.frames.first().ok_or_else(|| ClipError("frames".into()))?;
+        let first = clip
+            .frames
+            .first()
+            .ok_or_else(|| ClipError("frames".into()))?;
         let middle = |f: &[P3d]| nalgebra::center(&f[at.hip[0]], &f[at.hip[1]]);
         let start = middle(first);
         let left = first[at.hip[0]] - first[at.hip[1]];
         let ahead = V3d::new(left.x, 0.0, left.z).cross(&V3d::y());
         let facing = UnitQuaternion::from_axis_angle(&V3d::y_axis(), -ahead.x.atan2(ahead.z));
-        let floor = clip.frames.iter().flat_map(|f| at.ankle.map(|a| f[a].y)).fold(f64::INFINITY, f64::min);
-        let leg = (first[at.hip[0]] - first[at.knee[0]]).norm() + (first[at.knee[0]] - first[at.ankle[0]]).norm();
+        let floor = clip
+            .frames
+            .iter()
+            .flat_map(|f| at.ankle.map(|a| f[a].y))
+            .fold(f64::INFINITY, f64::min);
+        let leg = (first[at.hip[0]] - first[at.knee[0]]).norm()
+            + (first[at.knee[0]] - first[at.ankle[0]]).norm();
         if leg.is_nan() || leg <= 0.0 {
             return Err(ClipError("a leg with a length".into()));
         }
-        Ok(Self { start, floor, facing, leg, at, clip })
+        Ok(Self {
+            start,
+            floor,
+            facing,
+            leg,
+            at,
+            clip,
+        })
     }
 
     /// Length with the calibration pose before it, seconds.
@@ -121,7 +151,11 @@ impl Performance {
         }
         let clip = self.clip_stance(rig, home, t - HOLD - BLEND);
         let s = ease((t - HOLD) / BLEND);
-        if s < 1.0 { still().blend(&clip, s) } else { clip }
+        if s < 1.0 {
+            still().blend(&clip, s)
+        } else {
+            clip
+        }
     }
 
     fn clip_stance(&self, rig: &Rig, home: P3d, t: f64) -> Stance {
@@ -130,7 +164,8 @@ impl Performance {
         let (i, s) = (place as usize, place.fract());
         let (a, b) = (&self.clip.frames[i], &self.clip.frames[(i + 1).min(n - 1)]);
         let p = |j: usize| self.facing * (a[j] + (b[j] - a[j]) * s);
-        let toward = |from: usize, to: usize| (p(to) - p(from)).try_normalize(0.0).unwrap_or(-V3d::y());
+        let toward =
+            |from: usize, to: usize| (p(to) - p(from)).try_normalize(0.0).unwrap_or(-V3d::y());
         let hips = nalgebra::center(&p(at.hip[0]), &p(at.hip[1]));
         let up = p(at.neck) - hips;
         let heading = basis(p(at.hip[0]) - p(at.hip[1]), up).unwrap_or_default();
@@ -143,15 +178,26 @@ impl Performance {
         let arm = |side: usize| -> Limb {
             let fore = toward(at.elbow[side], at.wrist[side]);
             let hand = at.hand[side].map_or(fore, |h| toward(at.wrist[side], h));
-            [from_chest * toward(at.shoulder[side], at.elbow[side]), from_chest * fore, from_chest * hand]
+            [
+                from_chest * toward(at.shoulder[side], at.elbow[side]),
+                from_chest * fore,
+                from_chest * hand,
+            ]
         };
         let foot = |side: usize| {
             let ahead = at.toe[side].map_or(heading * V3d::z(), |toe| toward(at.ankle[side], toe));
             UnitQuaternion::from_axis_angle(&V3d::y_axis(), ahead.x.atan2(ahead.z))
         };
         let leg = |side: usize| -> Limb {
-            let (thigh, shank) = (toward(at.hip[side], at.knee[side]), toward(at.knee[side], at.ankle[side]));
-            [from_pelvis * thigh, from_pelvis * shank, from_pelvis * (foot(side) * V3d::z())]
+            let (thigh, shank) = (
+                toward(at.hip[side], at.knee[side]),
+                toward(at.knee[side], at.ankle[side]),
+            );
+            [
+                from_pelvis * thigh,
+                from_pelvis * shank,
+                from_pelvis * (foot(side) * V3d::z()),
+            ]
         };
         let scale = rig.leg_length() / self.leg;
         let moved = (hips - self.facing * self.start) * scale;
@@ -166,7 +212,8 @@ impl Performance {
         };
         let height = (hips.y - self.floor) * scale + rig.ankle_height();
         let hip_offset = rig.hip_center(&stance.heading);
-        stance.pelvis = P3d::new(home.x + moved.x, height, home.z + moved.z) - V3d::new(0.0, hip_offset.y, 0.0);
+        stance.pelvis =
+            P3d::new(home.x + moved.x, height, home.z + moved.z) - V3d::new(0.0, hip_offset.y, 0.0);
         stance
     }
 }
@@ -179,10 +226,17 @@ mod tests {
 
     fn shared(name: &str) -> Option<MotionClip> {
         let root = std::env::var_os("TRYON_SHARED")
-            .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from)
+            .map_or_else(
+                || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"),
+                PathBuf::from,
+            )
             .join("data/motion");
         if !root.exists() {
-            assert!(std::env::var_os("TRYON_REQUIRE_ALL").is_none(), "{} is missing", root.display());
+            assert!(
+                std::env::var_os("TRYON_REQUIRE_ALL").is_none(),
+                "{} is missing",
+                root.display()
+            );
             eprintln!("SKIPPED: {} is missing", root.display());
             return None;
         }
@@ -191,21 +245,36 @@ mod tests {
 
     #[test]
     fn a_clip_without_joints_is_refused() {
-        let clip = MotionClip { names: vec!["root".into()], frames: vec![], period: 0.01 };
-        let e = Sequence::new(Shopper::default(), Setting::default()).with_clip(clip).expect_err("no joints");
+        let clip = MotionClip {
+            names: vec!["root".into()],
+            frames: vec![],
+            period: 0.01,
+        };
+        let e = Sequence::new(Shopper::default(), Setting::default())
+            .with_clip(clip)
+            .expect_err("no joints");
         assert!(e.to_string().contains("neck"), "{e}");
     }
 
     #[test]
     fn bones_point_where_the_clip_points() {
         for (file, names) in [
-            ("cmu_asf_amc/02_07.amc", ["lhumerus", "lradius", "rfemur", "rtibia"]),
-            ("cmu_bvh/02_02_makehuman.bvh", ["lShldr", "lForeArm", "rThigh", "rShin"]),
+            (
+                "cmu_asf_amc/02_07.amc",
+                ["lhumerus", "lradius", "rfemur", "rtibia"],
+            ),
+            (
+                "cmu_bvh/02_02_makehuman.bvh",
+                ["lShldr", "lForeArm", "rThigh", "rShin"],
+            ),
         ] {
             let Some(clip) = shared(file) else { return };
-            let s = Sequence::new(Shopper::default(), Setting::default()).with_clip(clip.clone()).expect("plays");
+            let s = Sequence::new(Shopper::default(), Setting::default())
+                .with_clip(clip.clone())
+                .expect("plays");
             let skeleton = s.shopper().template.skeleton().clone();
-            let ours = ["left_shoulder", "left_elbow", "right_hip", "right_knee"].map(|n| skeleton.index(n).expect(n));
+            let ours = ["left_shoulder", "left_elbow", "right_hip", "right_knee"]
+                .map(|n| skeleton.index(n).expect(n));
             let theirs = names.map(|n| clip.joint(&[n]).expect(n));
             let mut worst = 0.0f64;
             for i in (60..200).step_by(7) {
@@ -224,23 +293,33 @@ mod tests {
     /// Writes pictures for eyes into the folder named by `TRYON_LOOK`.
     #[test]
     fn look() {
-        let Some(dir) = std::env::var_os("TRYON_LOOK").map(PathBuf::from) else { return };
-        for (n, file) in
-            ["cmu_asf_amc/02_07.amc", "cmu_bvh/02_02_makehuman.bvh", "cmu_bvh/02_03.bvh", "cmu_asf_amc/13_29.amc"]
-                .into_iter()
-                .enumerate()
+        let Some(dir) = std::env::var_os("TRYON_LOOK").map(PathBuf::from) else {
+            return;
+        };
+        for (n, file) in [
+            "cmu_asf_amc/02_07.amc",
+            "cmu_bvh/02_02_makehuman.bvh",
+            "cmu_bvh/02_03.bvh",
+            "cmu_asf_amc/13_29.amc",
+        ]
+        .into_iter()
+        .enumerate()
         {
             let Some(clip) = shared(file) else { return };
-            let s = Sequence::new(Shopper::default(), Setting::default()).with_clip(clip.at_cmu_rate()).expect("plays");
+            let s = Sequence::new(Shopper::default(), Setting::default())
+                .with_clip(clip.at_cmu_rate())
+                .expect("plays");
             let mut sheet = crate::camera::ColorImage::filled(4 * 640, 480, [0; 3]);
             for (k, i) in [50u64, 66, 80, 95].into_iter().enumerate() {
                 let color = s.frame(i).0.color.expect("colour");
                 for v in 0..480 {
                     let at = 3 * (v * 4 * 640 + k * 640);
-                    sheet.data_mut()[at..at + 3 * 640].copy_from_slice(&color.data()[3 * v * 640..3 * (v + 1) * 640]);
+                    sheet.data_mut()[at..at + 3 * 640]
+                        .copy_from_slice(&color.data()[3 * v * 640..3 * (v + 1) * 640]);
                 }
             }
-            crate::formats::image::write_png_rgb(&dir.join(format!("clip_{n}.png")), &sheet).expect("written");
+            crate::formats::image::write_png_rgb(&dir.join(format!("clip_{n}.png")), &sheet)
+                .expect("written");
         }
     }
 }

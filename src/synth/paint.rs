@@ -14,7 +14,12 @@ pub(super) struct Colors {
 }
 
 /// Skins, hair, shirts and leggings to choose from.
-const SKIN: [[u8; 3]; 4] = [[226, 180, 152], [198, 146, 112], [146, 98, 70], [104, 68, 48]];
+const SKIN: [[u8; 3]; 4] = [
+    [226, 180, 152],
+    [198, 146, 112],
+    [146, 98, 70],
+    [104, 68, 48],
+];
 const HAIR: [[u8; 3]; 4] = [[58, 40, 30], [28, 24, 22], [120, 84, 48], [90, 60, 42]];
 const SHIRT: [[u8; 3]; 3] = [[150, 154, 160], [126, 140, 150], [168, 160, 150]];
 const LEGS: [[u8; 3]; 3] = [[46, 48, 56], [54, 58, 78], [62, 54, 50]];
@@ -22,7 +27,8 @@ const LEGS: [[u8; 3]; 3] = [[46, 48, 56], [54, 58, 78], [62, 54, 50]];
 impl Colors {
     /// One of the looks, the same for the same number.
     pub(super) fn pick(seed: u64) -> Self {
-        let at = |n: u64, len: usize| (seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> n) as usize % len;
+        let at =
+            |n: u64, len: usize| (seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> n) as usize % len;
         Self {
             skin: SKIN[at(60, SKIN.len())],
             hair: HAIR[at(50, HAIR.len())],
@@ -67,11 +73,23 @@ const EAR: f32 = 0.074;
 const HEAD_LENGTH: f32 = 0.162;
 
 impl Paint {
-    pub(super) fn new(skeleton: &Skeleton, weights: &SkinWeights, rest: &RestBody, colors: Colors) -> Self {
-        let joint = |name: &str| skeleton.index(name).map_or(V3::zeros(), |j| rest.joints[j].coords.cast::<f32>());
+    pub(super) fn new(
+        skeleton: &Skeleton,
+        weights: &SkinWeights,
+        rest: &RestBody,
+        colors: Colors,
+    ) -> Self {
+        let joint = |name: &str| {
+            skeleton
+                .index(name)
+                .map_or(V3::zeros(), |j| rest.joints[j].coords.cast::<f32>())
+        };
         let region = |i: usize| {
             let name = skeleton.joints()[weights.dominant(i)].name.as_str();
-            match name.trim_start_matches("left_").trim_start_matches("right_") {
+            match name
+                .trim_start_matches("left_")
+                .trim_start_matches("right_")
+            {
                 "neck" | "head" | "head_end" | "jaw" => Region::Head,
                 "shoulder" => Region::UpperArm,
                 "elbow" | "wrist" | "hand" | "hand_end" => Region::LowerArm,
@@ -82,7 +100,13 @@ impl Paint {
         };
         let regions: Vec<Region> = (0..rest.vertices.len()).map(region).collect();
         let head = joint("head");
-        let of_head = || rest.vertices.iter().zip(&regions).filter(|(_, r)| **r == Region::Head).map(|(v, _)| v.coords);
+        let of_head = || {
+            rest.vertices
+                .iter()
+                .zip(&regions)
+                .filter(|(_, r)| **r == Region::Head)
+                .map(|(v, _)| v.coords)
+        };
         let top = of_head().map(|v| v.y).fold(head.y, f32::max);
         let front = |a: V3, b: V3| if b.z > a.z { b } else { a };
         Self {
@@ -133,9 +157,16 @@ impl Paint {
     fn head_color(&self, p: &P3) -> [u8; 3] {
         let c = &self.colors;
         // Face coordinates in units of the embedded head: x sideways, y up from the base of the skull, z from the nose.
-        let (x, y) = ((p.x - self.head.x).abs() / self.size, (p.y - self.head.y) / self.size);
+        let (x, y) = (
+            (p.x - self.head.x).abs() / self.size,
+            (p.y - self.head.y) / self.size,
+        );
         let z = (p.z - self.nose.z) / self.size;
-        let hairline = if z > -0.085 { 0.118 - 0.35 * x } else { 0.118 - 0.35 * x - 1.9 * (-0.085 - z) };
+        let hairline = if z > -0.085 {
+            0.118 - 0.35 * x
+        } else {
+            0.118 - 0.35 * x - 1.9 * (-0.085 - z)
+        };
         // Ears stand out of the hair.
         if y > hairline.max(-0.035) && x < EAR {
             return c.hair;
@@ -143,7 +174,9 @@ impl Paint {
         if z < -0.07 {
             return c.skin;
         }
-        let spot = |at: [f32; 2], r: [f32; 2]| ((x - at[0]) / r[0]).powi(2) + ((y - at[1]) / r[1]).powi(2) < 1.0;
+        let spot = |at: [f32; 2], r: [f32; 2]| {
+            ((x - at[0]) / r[0]).powi(2) + ((y - at[1]) / r[1]).powi(2) < 1.0
+        };
         let eye_y = (self.nose.y - self.head.y) / self.size + 0.030;
         if spot([0.031, eye_y], [0.006, 0.006]) {
             return [46, 34, 30];
@@ -155,7 +188,11 @@ impl Paint {
             return c.hair;
         }
         if spot([0.0, eye_y - 0.068], [0.024, 0.007]) {
-            return [c.skin[0] - c.skin[0] / 8, c.skin[1] / 2 + 12, c.skin[2] / 2 + 14];
+            return [
+                c.skin[0] - c.skin[0] / 8,
+                c.skin[1] / 2 + 12,
+                c.skin[2] / 2 + 14,
+            ];
         }
         c.skin
     }

@@ -18,7 +18,12 @@ pub struct Room {
 
 impl Default for Room {
     fn default() -> Self {
-        Self { back_z: -3.9, left_x: -2.1, wall: [196, 194, 188], floor: [150, 112, 76] }
+        Self {
+            back_z: -3.9,
+            left_x: -2.1,
+            wall: [196, 194, 188],
+            floor: [150, 112, 76],
+        }
     }
 }
 
@@ -41,7 +46,8 @@ const PICTURE: [f64; 4] = [0.75, 1.30, 1.15, 1.85];
 
 /// A number in [0, 1) that looks random, for boards and plaster.
 fn speckle(a: i64, b: i64) -> f64 {
-    let mut x = (a as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (b as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
+    let mut x = (a as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+        ^ (b as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
     x = (x ^ (x >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     ((x ^ (x >> 32)) & 0xffff) as f64 / 65_536.0
 }
@@ -54,19 +60,38 @@ impl Room {
         world_from_camera: &Rigid<World, Camera>,
     ) -> Background {
         let n = camera.pixels();
-        let mut out = Background { depth: vec![f32::INFINITY; n], color: vec![24; 3 * n], floor: Vec::new() };
+        let mut out = Background {
+            depth: vec![f32::INFINITY; n],
+            color: vec![24; 3 * n],
+            floor: Vec::new(),
+        };
         let Some(room) = room else { return out };
         let eye = world_from_camera.point(&P3d::origin());
         for i in 0..n {
-            let (u, v) = ((i % camera.width as usize) as f64, (i / camera.width as usize) as f64);
-            let ray = V3d::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
+            let (u, v) = (
+                (i % camera.width as usize) as f64,
+                (i / camera.width as usize) as f64,
+            );
+            let ray = V3d::new(
+                (u - camera.cx) / camera.fx,
+                (v - camera.cy) / camera.fy,
+                1.0,
+            );
             let d = world_from_camera.vector(&ray);
             // The ray has z = 1 in the camera, so its parameter is the depth.
             let hit = |distance: f64, speed: f64| {
                 let t = distance / speed;
-                if t.is_finite() && t > 0.0 { t } else { f64::INFINITY }
+                if t.is_finite() && t > 0.0 {
+                    t
+                } else {
+                    f64::INFINITY
+                }
             };
-            let (floor, back, left) = (hit(-eye.y, d.y), hit(room.back_z - eye.z, d.z), hit(room.left_x - eye.x, d.x));
+            let (floor, back, left) = (
+                hit(-eye.y, d.y),
+                hit(room.back_z - eye.z, d.z),
+                hit(room.left_x - eye.x, d.x),
+            );
             let t = floor.min(back).min(left);
             if !t.is_finite() {
                 continue;
@@ -78,9 +103,15 @@ impl Room {
                 out.floor.push((i as u32, [p.x as f32, p.z as f32]));
                 (room.floor, room.floor_shade(&p, pixel))
             } else if t == back {
-                (room.wall_color(&p), wall_shade(p.x, p.y, p.x - room.left_x, pixel))
+                (
+                    room.wall_color(&p),
+                    wall_shade(p.x, p.y, p.x - room.left_x, pixel),
+                )
             } else {
-                (room.wall, 0.86 * wall_shade(p.z, p.y, p.z - room.back_z, pixel))
+                (
+                    room.wall,
+                    0.86 * wall_shade(p.z, p.y, p.z - room.back_z, pixel),
+                )
             };
             out.depth[i] = t as f32;
             for (c, b) in out.color[3 * i..3 * i + 3].iter_mut().zip(base) {
@@ -95,7 +126,11 @@ impl Room {
         let inside = |m: f64| (x0 + m..x1 - m).contains(&p.x) && (y0 + m..y1 - m).contains(&p.y);
         if inside(0.05) {
             let s = (p.y - y0) / (y1 - y0) + 0.12 * (9.0 * p.x).sin();
-            return if s > 0.55 { [170, 196, 210] } else { [92, 128, 104] };
+            return if s > 0.55 {
+                [170, 196, 210]
+            } else {
+                [92, 128, 104]
+            };
         }
         if inside(0.025) {
             return [236, 234, 228];
@@ -110,23 +145,30 @@ impl Room {
         let row = (p.x / BOARD).floor();
         let end = ((p.z + 1.7 * speckle(row as i64, 5)) / 1.1).floor();
         let tint = 0.90 + 0.16 * speckle(row as i64, end as i64);
-        let grain = 0.04 * ((p.x * 310.0 + 3.0 * (p.z * 4.0).sin()).sin()) * (1.0 - pixel / 0.01).max(0.0);
+        let grain =
+            0.04 * ((p.x * 310.0 + 3.0 * (p.z * 4.0).sin()).sin()) * (1.0 - pixel / 0.01).max(0.0);
         let from_edge = (p.x / BOARD - row).min(row + 1.0 - p.x / BOARD) * BOARD;
         let gap = 0.35 * (1.0 - from_edge / 0.004).max(0.0) * (1.0 - pixel / 0.012).max(0.0);
         // Darker in the corners of the room, where less light comes from.
-        let corner = 0.25 * (-(p.z - self.back_z) / 0.35).exp() + 0.2 * (-(p.x - self.left_x) / 0.35).exp();
+        let corner =
+            0.25 * (-(p.z - self.back_z) / 0.35).exp() + 0.2 * (-(p.x - self.left_x) / 0.35).exp();
         (tint + grain - gap) * (1.0 - corner) * 0.95
     }
 }
 
 fn wall_shade(along: f64, y: f64, to_corner: f64, pixel: f64) -> f64 {
-    let plaster = 0.03 * (speckle((along / 0.012).floor() as i64, (y / 0.012).floor() as i64) - 0.5);
+    let plaster =
+        0.03 * (speckle((along / 0.012).floor() as i64, (y / 0.012).floor() as i64) - 0.5);
     let plaster = plaster * (1.0 - pixel / 0.012).max(0.0);
     let light = 0.80 + 0.12 * (y / 2.4).clamp(0.0, 1.0);
     let corner = 0.18 * (-to_corner.max(0.0) / 0.4).exp() + 0.15 * (-y.max(0.0) / 0.25).exp();
     if y < SKIRTING {
         // A lighter board with a dark line above.
-        return if y > SKIRTING - 0.008 { 0.70 } else { 1.05 - corner };
+        return if y > SKIRTING - 0.008 {
+            0.70
+        } else {
+            1.05 - corner
+        };
     }
     light + plaster - corner
 }
@@ -139,13 +181,21 @@ mod tests {
     fn planes_are_where_they_are_said_to_be() {
         let k = Intrinsics::KINECT_V1;
         let world_from_camera = Rigid::<World, Camera>::level(1.0);
-        let room = Room { left_x: f64::NEG_INFINITY, ..Room::default() };
+        let room = Room {
+            left_x: f64::NEG_INFINITY,
+            ..Room::default()
+        };
         let b = Room::draw(Some(&room), &k, &world_from_camera);
         assert!((b.depth[240 * 640 + 320] - 3.9).abs() < 1e-5);
         // Row 479 looks down at (479 − 239.5)/525: the floor one metre below is at 525/239.5.
         assert!((f64::from(b.depth[479 * 640 + 320]) - 525.0 / 239.5).abs() < 1e-4);
         assert!(b.depth.iter().all(|d| d.is_finite()));
         assert!(!b.floor.is_empty());
-        assert!(Room::draw(None, &k, &world_from_camera).depth.iter().all(|d| d.is_infinite()));
+        assert!(
+            Room::draw(None, &k, &world_from_camera)
+                .depth
+                .iter()
+                .all(|d| d.is_infinite())
+        );
     }
 }

@@ -43,45 +43,182 @@ const fn v(x: f64, y: f64, z: f64) -> V3d {
 }
 
 /// The calibration pose: arms 45° down with elbows almost straight.
-const A: Limb = [v(0.72, -0.69, 0.0), v(0.68, -0.70, 0.18), v(0.66, -0.70, 0.18)];
+const A: Limb = [
+    v(0.72, -0.69, 0.0),
+    v(0.68, -0.70, 0.18),
+    v(0.66, -0.70, 0.18),
+];
 /// Hanging loosely, clear of the hips.
-const DOWN: Limb = [v(0.34, -0.93, -0.06), v(0.24, -0.93, 0.24), v(0.12, -0.95, 0.26)];
+const DOWN: Limb = [
+    v(0.34, -0.93, -0.06),
+    v(0.24, -0.93, 0.24),
+    v(0.12, -0.95, 0.26),
+];
 /// Straight out to the side.
-const SIDE: Limb = [v(0.99, -0.02, 0.04), v(0.97, 0.02, 0.22), v(0.98, 0.0, 0.18)];
+const SIDE: Limb = [
+    v(0.99, -0.02, 0.04),
+    v(0.97, 0.02, 0.22),
+    v(0.98, 0.0, 0.18),
+];
 /// Up and out.
-const UP: Limb = [v(0.62, 0.76, 0.12), v(0.40, 0.88, 0.22), v(0.36, 0.92, 0.14)];
+const UP: Limb = [
+    v(0.62, 0.76, 0.12),
+    v(0.40, 0.88, 0.22),
+    v(0.36, 0.92, 0.14),
+];
 /// Hand on the hip, elbow out.
-const HIP: Limb = [v(0.66, -0.72, -0.22), v(-0.52, -0.64, 0.56), v(-0.25, -0.55, 0.79)];
+const HIP: Limb = [
+    v(0.66, -0.72, -0.22),
+    v(-0.52, -0.64, 0.56),
+    v(-0.25, -0.55, 0.79),
+];
 /// Forearm across the belly, a hand's breadth in front of it.
-const ACROSS: Limb = [v(0.26, -0.88, 0.40), v(-0.72, 0.16, 0.67), v(-0.97, 0.16, 0.16)];
+const ACROSS: Limb = [
+    v(0.26, -0.88, 0.40),
+    v(-0.72, 0.16, 0.67),
+    v(-0.97, 0.16, 0.16),
+];
 /// Hand at the hem of the shirt.
-const HEM: Limb = [v(0.44, -0.88, -0.10), v(-0.30, -0.66, 0.68), v(-0.40, -0.84, 0.36)];
+const HEM: Limb = [
+    v(0.44, -0.88, -0.10),
+    v(-0.30, -0.66, 0.68),
+    v(-0.40, -0.84, 0.36),
+];
 
-const REST: Key = Key { t: 0.0, place: [0.0, 0.0], yaw: 0.0, chest: [0.0; 3], head: [0.0; 2], arms: [A, A] };
+const REST: Key = Key {
+    t: 0.0,
+    place: [0.0, 0.0],
+    yaw: 0.0,
+    chest: [0.0; 3],
+    head: [0.0; 2],
+    arms: [A, A],
+};
 
 /// The try-on routine of the demo.
 const TRY_ON: [Key; 22] = [
     REST,
     Key { t: 1.6, ..REST },
-    Key { t: 2.6, arms: [DOWN, DOWN], ..REST },
-    Key { t: 3.6, yaw: 22.0, chest: [0.0, 16.0, 0.0], head: [4.0, 8.0], arms: [DOWN, DOWN], ..REST },
-    Key { t: 4.1, yaw: 22.0, chest: [0.0, 16.0, 0.0], head: [4.0, 8.0], arms: [DOWN, DOWN], ..REST },
-    Key { t: 5.9, yaw: -22.0, chest: [0.0, -16.0, 0.0], head: [4.0, -8.0], arms: [DOWN, DOWN], ..REST },
-    Key { t: 6.9, arms: [DOWN, DOWN], ..REST },
-    Key { t: 7.9, arms: [SIDE, SIDE], ..REST },
-    Key { t: 8.8, chest: [-3.0, 0.0, 0.0], head: [-6.0, 0.0], arms: [UP, UP], ..REST },
-    Key { t: 10.2, arms: [DOWN, DOWN], ..REST },
-    Key { t: 11.2, chest: [0.0, -4.0, 4.0], head: [0.0, 6.0], arms: [DOWN, HIP], ..REST },
-    Key { t: 12.4, yaw: 12.0, chest: [0.0, 4.0, 4.0], head: [0.0, -6.0], arms: [DOWN, HIP], ..REST },
-    Key { t: 13.4, arms: [DOWN, DOWN], ..REST },
-    Key { t: 14.8, place: [0.35, 0.05], arms: [DOWN, DOWN], ..REST },
-    Key { t: 16.4, place: [-0.25, 0.0], yaw: -6.0, arms: [DOWN, DOWN], ..REST },
-    Key { t: 17.4, arms: [DOWN, DOWN], ..REST },
-    Key { t: 18.2, chest: [10.0, 0.0, 0.0], head: [32.0, 0.0], arms: [HEM, HEM], ..REST },
-    Key { t: 19.2, chest: [10.0, 4.0, 0.0], head: [30.0, 5.0], arms: [HEM, HEM], ..REST },
-    Key { t: 20.2, chest: [0.0, 5.0, 0.0], arms: [ACROSS, DOWN], ..REST },
-    Key { t: 21.2, chest: [0.0, -8.0, 0.0], yaw: -8.0, arms: [ACROSS, DOWN], ..REST },
-    Key { t: 22.4, arms: [DOWN, DOWN], ..REST },
+    Key {
+        t: 2.6,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 3.6,
+        yaw: 22.0,
+        chest: [0.0, 16.0, 0.0],
+        head: [4.0, 8.0],
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 4.1,
+        yaw: 22.0,
+        chest: [0.0, 16.0, 0.0],
+        head: [4.0, 8.0],
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 5.9,
+        yaw: -22.0,
+        chest: [0.0, -16.0, 0.0],
+        head: [4.0, -8.0],
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 6.9,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 7.9,
+        arms: [SIDE, SIDE],
+        ..REST
+    },
+    Key {
+        t: 8.8,
+        chest: [-3.0, 0.0, 0.0],
+        head: [-6.0, 0.0],
+        arms: [UP, UP],
+        ..REST
+    },
+    Key {
+        t: 10.2,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 11.2,
+        chest: [0.0, -4.0, 4.0],
+        head: [0.0, 6.0],
+        arms: [DOWN, HIP],
+        ..REST
+    },
+    Key {
+        t: 12.4,
+        yaw: 12.0,
+        chest: [0.0, 4.0, 4.0],
+        head: [0.0, -6.0],
+        arms: [DOWN, HIP],
+        ..REST
+    },
+    Key {
+        t: 13.4,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 14.8,
+        place: [0.35, 0.05],
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 16.4,
+        place: [-0.25, 0.0],
+        yaw: -6.0,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 17.4,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 18.2,
+        chest: [10.0, 0.0, 0.0],
+        head: [32.0, 0.0],
+        arms: [HEM, HEM],
+        ..REST
+    },
+    Key {
+        t: 19.2,
+        chest: [10.0, 4.0, 0.0],
+        head: [30.0, 5.0],
+        arms: [HEM, HEM],
+        ..REST
+    },
+    Key {
+        t: 20.2,
+        chest: [0.0, 5.0, 0.0],
+        arms: [ACROSS, DOWN],
+        ..REST
+    },
+    Key {
+        t: 21.2,
+        chest: [0.0, -8.0, 0.0],
+        yaw: -8.0,
+        arms: [ACROSS, DOWN],
+        ..REST
+    },
+    Key {
+        t: 22.4,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
     Key { t: 24.0, ..REST },
 ];
 
@@ -89,11 +226,35 @@ const TRY_ON: [Key; 22] = [
 const TURN: [Key; 8] = [
     REST,
     Key { t: 1.0, ..REST },
-    Key { t: 2.0, arms: [DOWN, DOWN], ..REST },
-    Key { t: 3.0, yaw: 40.0, arms: [DOWN, DOWN], ..REST },
-    Key { t: 3.6, yaw: 40.0, arms: [DOWN, DOWN], ..REST },
-    Key { t: 5.2, yaw: -40.0, arms: [DOWN, DOWN], ..REST },
-    Key { t: 5.8, yaw: -40.0, arms: [DOWN, DOWN], ..REST },
+    Key {
+        t: 2.0,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 3.0,
+        yaw: 40.0,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 3.6,
+        yaw: 40.0,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 5.2,
+        yaw: -40.0,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 5.8,
+        yaw: -40.0,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
     Key { t: 7.2, ..REST },
 ];
 
@@ -101,11 +262,37 @@ const TURN: [Key; 8] = [
 const LEAVE: [Key; 8] = [
     REST,
     Key { t: 2.0, ..REST },
-    Key { t: 2.6, yaw: 80.0, arms: [DOWN, DOWN], ..REST },
-    Key { t: 5.0, place: [3.6, 0.2], yaw: 80.0, arms: [DOWN, DOWN], ..REST },
-    Key { t: 7.0, place: [3.6, 0.2], yaw: -80.0, arms: [DOWN, DOWN], ..REST },
-    Key { t: 9.4, yaw: -80.0, arms: [DOWN, DOWN], ..REST },
-    Key { t: 10.2, arms: [A, A], ..REST },
+    Key {
+        t: 2.6,
+        yaw: 80.0,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 5.0,
+        place: [3.6, 0.2],
+        yaw: 80.0,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 7.0,
+        place: [3.6, 0.2],
+        yaw: -80.0,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 9.4,
+        yaw: -80.0,
+        arms: [DOWN, DOWN],
+        ..REST
+    },
+    Key {
+        t: 10.2,
+        arms: [A, A],
+        ..REST
+    },
     Key { t: 12.0, ..REST },
 ];
 
@@ -156,14 +343,20 @@ impl Routine {
         let t = t.rem_euclid(self.period());
         let next = keys.partition_point(|k| k.t <= t).min(keys.len() - 1);
         let (a, b) = (&keys[next.saturating_sub(1)], &keys[next]);
-        let s = if b.t > a.t { ease((t - a.t) / (b.t - a.t)) } else { 0.0 };
+        let s = if b.t > a.t {
+            ease((t - a.t) / (b.t - a.t))
+        } else {
+            0.0
+        };
         Key {
             t,
             place: lerp(a.place, b.place, s),
             yaw: a.yaw + (b.yaw - a.yaw) * s,
             chest: lerp(a.chest, b.chest, s),
             head: lerp(a.head, b.head, s),
-            arms: std::array::from_fn(|side| std::array::from_fn(|i| toward(&a.arms[side][i], &b.arms[side][i], s))),
+            arms: std::array::from_fn(|side| {
+                std::array::from_fn(|i| toward(&a.arms[side][i], &b.arms[side][i], s))
+            }),
         }
     }
 
@@ -176,13 +369,23 @@ impl Routine {
             let k = self.key(((round + 0.5 * (1.0 + SWING) + 0.5 * side as f64) * CYCLE).max(0.0));
             let yaw = k.yaw.to_radians();
             let out = if side == 0 { HALF_STANCE } else { -HALF_STANCE };
-            (P3d::new(k.place[0] + out * yaw.cos(), 0.0, k.place[1] - out * yaw.sin()), yaw)
+            (
+                P3d::new(
+                    k.place[0] + out * yaw.cos(),
+                    0.0,
+                    k.place[1] - out * yaw.sin(),
+                ),
+                yaw,
+            )
         };
         let (from, to) = (planted(round - 1.0), planted(round));
         let s = ease(part / SWING);
         let step = (to.0 - from.0).norm() + 0.1 * (to.1 - from.1).abs();
         let lift = (LIFT[0] * step).min(LIFT[1]) * 4.0 * s * (1.0 - s);
-        (from.0 + (to.0 - from.0) * s + V3d::y() * lift, from.1 + (to.1 - from.1) * s)
+        (
+            from.0 + (to.0 - from.0) * s + V3d::y() * lift,
+            from.1 + (to.1 - from.1) * s,
+        )
     }
 
     /// The stance at `t` seconds; `home` is where the routine starts, on the floor.
@@ -190,14 +393,25 @@ impl Routine {
         let k = self.key(t);
         // Nobody stands like a statue: breath and sway, a few millimetres and tenths of a degree.
         let sway = [(0.9 * t).sin(), (1.3 * t + 1.0).sin(), (1.57 * t).sin()];
-        let heading = UnitQuaternion::from_axis_angle(&V3d::y_axis(), (k.yaw + 0.6 * sway[0]).to_radians());
+        let heading =
+            UnitQuaternion::from_axis_angle(&V3d::y_axis(), (k.yaw + 0.6 * sway[0]).to_radians());
         let side = |s: usize| {
             let mirror = if s == 0 { 1.0 } else { -1.0 };
             k.arms[s].map(|d| v(mirror * d.x, d.y, d.z).normalize())
         };
-        let chest = v(k.chest[0] + 0.5 * sway[2], k.chest[1] + 0.5 * sway[1], -k.chest[2]).map(f64::to_radians);
-        let head = v(k.head[0] + 0.7 * sway[1], k.head[1] + 0.8 * sway[0], 0.0).map(f64::to_radians);
-        let pelvis = P3d::new(home.x + k.place[0] + 0.004 * sway[0], 0.9, home.z + k.place[1] + 0.003 * sway[1]);
+        let chest = v(
+            k.chest[0] + 0.5 * sway[2],
+            k.chest[1] + 0.5 * sway[1],
+            -k.chest[2],
+        )
+        .map(f64::to_radians);
+        let head =
+            v(k.head[0] + 0.7 * sway[1], k.head[1] + 0.8 * sway[0], 0.0).map(f64::to_radians);
+        let pelvis = P3d::new(
+            home.x + k.place[0] + 0.004 * sway[0],
+            0.9,
+            home.z + k.place[1] + 0.003 * sway[1],
+        );
         let down = [-V3d::y(), -V3d::y(), V3d::z()];
         let mut stance = Stance {
             pelvis,
@@ -238,7 +452,10 @@ mod tests {
     fn standing_feet_stay_where_they_are() {
         for i in 0..45 {
             let (p, _) = Routine::TryOn.sole(1, f64::from(i) / 30.0);
-            assert!((p - P3d::new(-HALF_STANCE, 0.0, 0.0)).norm() < 1e-9, "frame {i}: {p}");
+            assert!(
+                (p - P3d::new(-HALF_STANCE, 0.0, 0.0)).norm() < 1e-9,
+                "frame {i}: {p}"
+            );
         }
     }
 }

@@ -29,7 +29,11 @@ pub struct Shopper {
 impl Default for Shopper {
     /// The embedded body as it is.
     fn default() -> Self {
-        Self { template: crate::body::embedded::template(), shape: BodyShape::default(), look: 0 }
+        Self {
+            template: crate::body::embedded::template(),
+            shape: BodyShape::default(),
+            look: 0,
+        }
     }
 }
 
@@ -86,7 +90,14 @@ impl Setting {
     #[must_use]
     pub fn portrait(self) -> Self {
         let k = self.camera;
-        let camera = Intrinsics { width: k.height, height: k.width, fx: k.fy, fy: k.fx, cx: k.cy, cy: k.cx };
+        let camera = Intrinsics {
+            width: k.height,
+            height: k.width,
+            fx: k.fy,
+            fy: k.fx,
+            cx: k.cy,
+            cy: k.cx,
+        };
         Self { camera, ..self }
     }
 }
@@ -133,7 +144,11 @@ impl Sequence {
         Self {
             rig: Rig::new(t.skeleton(), &rest),
             paint: Paint::new(t.skeleton(), t.weights(), &rest, Colors::pick(shopper.look)),
-            background: Room::draw(setting.room.as_ref(), &setting.camera, &setting.world_from_camera),
+            background: Room::draw(
+                setting.room.as_ref(),
+                &setting.camera,
+                &setting.world_from_camera,
+            ),
             calibration: Calibration::registered(setting.camera),
             rest,
             performance: None,
@@ -168,7 +183,10 @@ impl Sequence {
     }
     /// Frames in one round of the routine, or in the clip.
     pub fn round(&self) -> u64 {
-        let seconds = self.performance.as_ref().map_or(self.setting.routine.period(), |p| p.seconds());
+        let seconds = self
+            .performance
+            .as_ref()
+            .map_or(self.setting.routine.period(), |p| p.seconds());
         (seconds * self.setting.rate).round() as u64
     }
 
@@ -182,15 +200,29 @@ impl Sequence {
             None => self.setting.routine.stance(&self.rig, home, time),
         };
         let in_world = self.rig.pose(&stance);
-        let pose = Pose { root: camera_from_world * in_world.root, angles: in_world.angles };
+        let pose = Pose {
+            root: camera_from_world * in_world.root,
+            angles: in_world.angles,
+        };
         let mut bones = BoneTransforms::default();
         pose.bones(t.skeleton(), &self.rest, &mut bones);
         let present = self.performance.is_some() || self.setting.routine.has_person();
         let mut vertices = Vec::new();
         if present {
-            skin(Par::Seq, &self.rest.vertices, t.weights(), &bones, &mut vertices);
+            skin(
+                Par::Seq,
+                &self.rest.vertices,
+                t.weights(),
+                &bones,
+                &mut vertices,
+            );
         }
-        Truth { present, pose, joints: bones.joints, vertices }
+        Truth {
+            present,
+            pose,
+            joints: bones.joints,
+            vertices,
+        }
     }
 
     /// Frame `i` and its truth.
@@ -205,20 +237,38 @@ impl Sequence {
             }
             self.draw(&truth, &mut depth, color.as_deref_mut());
         }
-        let depth: DepthImage = self.setting.noise.apply(camera, &depth, self.setting.seed, i);
+        let depth: DepthImage = self
+            .setting
+            .noise
+            .apply(camera, &depth, self.setting.seed, i);
         // The buffer has the background's size, which is the camera's.
         let color = color.and_then(|c| ColorImage::new(camera.width, camera.height, c).ok());
         let time_ns = (i as f64 * 1e9 / self.setting.rate).round() as u64;
-        (RgbdFrame { sequence: i, time_ns, depth, color }, truth)
+        (
+            RgbdFrame {
+                sequence: i,
+                time_ns,
+                depth,
+                color,
+            },
+            truth,
+        )
     }
 
     fn draw(&self, truth: &Truth, depth: &mut [f32], color: Option<&mut [u8]>) {
         let t = &self.shopper.template;
         let faces = t.mesh().faces();
-        let view = View::Perspective { camera: self.setting.camera, near: NEAR };
+        let view = View::Perspective {
+            camera: self.setting.camera,
+            near: NEAR,
+        };
         let mut buffer = VisibilityBuffer::default();
         rasterise_with(
-            Options { par: Par::Seq, cull: Cull::Back, ..Options::default() },
+            Options {
+                par: Par::Seq,
+                cull: Cull::Back,
+                ..Options::default()
+            },
             &view,
             &truth.vertices,
             faces,
@@ -226,10 +276,21 @@ impl Sequence {
         );
         let mut normals = Vec::new();
         if color.is_some() {
-            vertex_normals(Par::Seq, &truth.vertices, faces, t.topology().vertex_faces(), &mut normals);
+            vertex_normals(
+                Par::Seq,
+                &truth.vertices,
+                faces,
+                t.topology().vertex_faces(),
+                &mut normals,
+            );
         }
         let camera_from_world = self.setting.world_from_camera.inverse();
-        let light = |d: [f64; 3]| camera_from_world.vector(&V3d::from(d)).normalize().cast::<f32>();
+        let light = |d: [f64; 3]| {
+            camera_from_world
+                .vector(&V3d::from(d))
+                .normalize()
+                .cast::<f32>()
+        };
         let (key, fill, up) = (light(KEY_LIGHT), light(FILL_LIGHT), light([0.0, 1.0, 0.0]));
         let mut color = color;
         let width = buffer.width as usize;
@@ -238,18 +299,28 @@ impl Sequence {
                 continue;
             }
             depth[i] = z;
-            let Some(color) = color.as_deref_mut() else { continue };
+            let Some(color) = color.as_deref_mut() else {
+                continue;
+            };
             let f = faces[id as usize];
             let corners = f.map(|k| truth.vertices[k as usize]);
-            let w = barycentrics(&view, corners, (i % width) as f32, (i / width) as f32).unwrap_or([1.0, 0.0, 0.0]);
+            let w = barycentrics(&view, corners, (i % width) as f32, (i / width) as f32)
+                .unwrap_or([1.0, 0.0, 0.0]);
             let mix = |a: V3, b: V3, c: V3| a * w[0] + b * w[1] + c * w[2];
             let [n0, n1, n2] = f.map(|k| normals[k as usize]);
             let [r0, r1, r2] = f.map(|k| self.rest.base[k as usize].coords);
             let (n, rest) = (mix(n0, n1, n2), mix(r0, r1, r2));
-            let nearest = if w[0] >= w[1] && w[0] >= w[2] { 0 } else { 1 + usize::from(w[2] > w[1]) };
+            let nearest = if w[0] >= w[1] && w[0] >= w[2] {
+                0
+            } else {
+                1 + usize::from(w[2] > w[1])
+            };
             let base = self.paint.color(f[nearest], &P3::from(rest));
             let n = n / n.norm().max(f32::EPSILON);
-            let shade = 0.42 + 0.10 * n.dot(&up) + 0.52 * n.dot(&key).max(0.0) + 0.14 * n.dot(&fill).max(0.0);
+            let shade = 0.42
+                + 0.10 * n.dot(&up)
+                + 0.52 * n.dot(&key).max(0.0)
+                + 0.14 * n.dot(&fill).max(0.0);
             for (c, b) in color[3 * i..3 * i + 3].iter_mut().zip(base) {
                 *c = (f32::from(b) * shade).min(255.0) as u8;
             }
@@ -260,7 +331,10 @@ impl Sequence {
     fn cast_shadow(&self, truth: &Truth, color: &mut [u8]) {
         let skeleton = self.shopper.template.skeleton();
         let over = |name: &str| {
-            let p = self.setting.world_from_camera.point(&truth.joints[skeleton.index(name).unwrap_or(0)]);
+            let p = self
+                .setting
+                .world_from_camera
+                .point(&truth.joints[skeleton.index(name).unwrap_or(0)]);
             [p.x as f32, p.z as f32]
         };
         let spots = [

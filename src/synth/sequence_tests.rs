@@ -2,7 +2,14 @@ use super::*;
 use crate::formats::image::write_png_rgb;
 
 fn sequence(routine: Routine, noise: NoiseModel) -> Sequence {
-    Sequence::new(Shopper::default(), Setting { routine, noise, ..Setting::default() })
+    Sequence::new(
+        Shopper::default(),
+        Setting {
+            routine,
+            noise,
+            ..Setting::default()
+        },
+    )
 }
 
 #[test]
@@ -22,8 +29,17 @@ fn depth_shows_the_true_surface() {
     for i in [0, 110, 260, 340, 550, 620] {
         let (frame, truth) = s.frame(i);
         let empty = &s.background.depth;
-        let body = frame.depth.data().iter().zip(empty).filter(|(d, e)| f32::from(**d) < *e * 1000.0 - 30.0).count();
-        assert!((20_000..60_000).contains(&body), "frame {i}: {body} pixels of body");
+        let body = frame
+            .depth
+            .data()
+            .iter()
+            .zip(empty)
+            .filter(|(d, e)| f32::from(**d) < *e * 1000.0 - 30.0)
+            .count();
+        assert!(
+            (20_000..60_000).contains(&body),
+            "frame {i}: {body} pixels of body"
+        );
         // No vertex is before the surface seen at its pixel, and many are on it.
         let mut on = 0;
         for v in &truth.vertices {
@@ -31,10 +47,17 @@ fn depth_shows_the_true_surface() {
             let d = f32::from(frame.depth.at(p.x.round() as i32, p.y.round() as i32)) * 1e-3;
             on += usize::from((v.z - d).abs() < 0.01);
         }
-        assert!(on * 4 > truth.vertices.len(), "frame {i}: {on} vertices on the surface");
+        assert!(
+            on * 4 > truth.vertices.len(),
+            "frame {i}: {on} vertices on the surface"
+        );
         // Feet on the floor: the lowest point of the body is at world height 0.
         let world = s.setting().world_from_camera;
-        let low = truth.vertices.iter().map(|v| world.point(&v.cast()).y).fold(f64::INFINITY, f64::min);
+        let low = truth
+            .vertices
+            .iter()
+            .map(|v| world.point(&v.cast()).y)
+            .fold(f64::INFINITY, f64::min);
         assert!(low.abs() < 0.03, "frame {i}: lowest point at {low}");
     }
 }
@@ -47,10 +70,18 @@ fn motion_is_human_and_smooth() {
     for i in 0..s.round() + 2 {
         let t = s.truth(i);
         for (d, (a, l)) in t.pose.angles.iter().zip(&limits).enumerate() {
-            assert!((l[0]..=l[1]).contains(a), "frame {i}: angle {d} is {a}, limits {l:?}");
+            assert!(
+                (l[0]..=l[1]).contains(a),
+                "frame {i}: angle {d} is {a}, limits {l:?}"
+            );
         }
         if let Some(l) = last {
-            let fastest = t.joints.iter().zip(&l.joints).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            let fastest = t
+                .joints
+                .iter()
+                .zip(&l.joints)
+                .map(|(a, b)| (a - b).norm())
+                .fold(0.0, f64::max);
             // A hand at 3.5 m/s is brisk; a jump would be far more.
             assert!(fastest < 3.5 / 30.0, "frame {i}: a joint moves {fastest} m");
         }
@@ -64,7 +95,9 @@ fn leaving_and_returning_and_an_empty_room() {
     let seen = |i: u64| {
         let (_, t) = s.frame(i);
         let k = s.setting().camera;
-        t.vertices.iter().any(|v| v.z > 0.0 && (0.0..640.0).contains(&k.project(v).x))
+        t.vertices
+            .iter()
+            .any(|v| v.z > 0.0 && (0.0..640.0).contains(&k.project(v).x))
     };
     assert!(seen(10) && !seen(180) && seen(345));
     let empty = sequence(Routine::Empty, NoiseModel::TimeOfFlight);
@@ -76,26 +109,37 @@ fn leaving_and_returning_and_an_empty_room() {
 fn a_rolled_camera_sees_the_same_world() {
     let upright = sequence(Routine::Still, NoiseModel::None);
     let world_from_camera = Setting::tilted(1.0, 3.0, 90.0);
-    let setting = Setting { world_from_camera, ..upright.setting().clone() }.portrait();
+    let setting = Setting {
+        world_from_camera,
+        ..upright.setting().clone()
+    }
+    .portrait();
     let rolled = Sequence::new(Shopper::default(), setting);
     let (a, b) = (upright.truth(0), rolled.truth(0));
     for (p, q) in a.joints.iter().zip(&b.joints) {
-        let (p, q) = (upright.setting().world_from_camera.point(p), rolled.setting().world_from_camera.point(q));
+        let (p, q) = (
+            upright.setting().world_from_camera.point(p),
+            rolled.setting().world_from_camera.point(q),
+        );
         assert!((p - q).norm() < 1e-9);
     }
     // The same picture, turned by a quarter.
     let (a, b) = (upright.frame(0).0.depth, rolled.frame(0).0.depth);
-    let same = (0..480).flat_map(|v| (0..640).map(move |u| (u, v))).filter(|&(u, v)| {
-        let (x, y) = (a.at(u, v), b.at(v, 639 - u));
-        x.abs_diff(y) <= 2
-    });
+    let same = (0..480)
+        .flat_map(|v| (0..640).map(move |u| (u, v)))
+        .filter(|&(u, v)| {
+            let (x, y) = (a.at(u, v), b.at(v, 639 - u));
+            x.abs_diff(y) <= 2
+        });
     assert!(same.count() > 300_000);
 }
 
 /// Writes pictures for eyes into the folder named by `TRYON_LOOK`.
 #[test]
 fn look() {
-    let Some(dir) = std::env::var_os("TRYON_LOOK").map(std::path::PathBuf::from) else { return };
+    let Some(dir) = std::env::var_os("TRYON_LOOK").map(std::path::PathBuf::from) else {
+        return;
+    };
     let s = sequence(Routine::TryOn, NoiseModel::KinectV1);
     let frames = [0u64, 110, 170, 240, 265, 340, 440, 560, 620];
     let (w, h) = (640usize, 480usize);
@@ -111,7 +155,11 @@ fn look() {
                 let d = frame.depth.at(u as i32, v as i32);
                 let t = (f32::from(d) - 1500.0) / 2700.0;
                 let ramp = |c: f32| (255.0 * (1.5 - (4.0 * t - c).abs()).clamp(0.0, 1.0)) as u8;
-                let false_color = if d == 0 { [0; 3] } else { [ramp(3.0), ramp(2.0), ramp(1.0)] };
+                let false_color = if d == 0 {
+                    [0; 3]
+                } else {
+                    [ramp(3.0), ramp(2.0), ramp(1.0)]
+                };
                 depths.data_mut()[at..at + 3].copy_from_slice(&false_color);
             }
         }
@@ -122,9 +170,16 @@ fn look() {
     for i in 0..60 {
         std::hint::black_box(s.frame(i * 11));
     }
-    eprintln!("{:.2} ms a frame", started.elapsed().as_secs_f64() * 1e3 / 60.0);
+    eprintln!(
+        "{:.2} ms a frame",
+        started.elapsed().as_secs_f64() * 1e3 / 60.0
+    );
     let clean: Vec<f32> = s.background.depth.clone();
-    for m in [NoiseModel::None, NoiseModel::KinectV1, NoiseModel::TimeOfFlight] {
+    for m in [
+        NoiseModel::None,
+        NoiseModel::KinectV1,
+        NoiseModel::TimeOfFlight,
+    ] {
         let t = std::time::Instant::now();
         for i in 0..30 {
             std::hint::black_box(m.apply(&s.setting().camera, &clean, 1, i));

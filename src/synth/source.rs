@@ -15,7 +15,11 @@ pub struct SynthSource {
 impl SynthSource {
     /// The first `frames` frames, or without end.
     pub fn new(sequence: Sequence, frames: Option<u64>) -> Self {
-        Self { sequence, frames, next: 0 }
+        Self {
+            sequence,
+            frames,
+            next: 0,
+        }
     }
     /// The sequence, for its truth.
     pub fn sequence(&self) -> &Sequence {
@@ -51,7 +55,11 @@ mod tests {
 
     #[test]
     fn it_ends_and_starts_again() {
-        let setting = Setting { routine: Routine::Empty, color: false, ..Setting::default() };
+        let setting = Setting {
+            routine: Routine::Empty,
+            color: false,
+            ..Setting::default()
+        };
         let mut s = SynthSource::new(Sequence::new(Shopper::default(), setting), Some(2));
         assert_eq!(s.len(), Some(2));
         let first = s.next_frame().expect("frame").expect("frame");

@@ -32,12 +32,18 @@ pub(super) struct Stance {
 impl Stance {
     /// Part of the way to another stance, 0 to 1.
     pub(super) fn blend(&self, to: &Self, s: f64) -> Self {
-        let turn = |a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>| a.try_slerp(b, s, f64::EPSILON).unwrap_or(*b);
+        let turn = |a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>| {
+            a.try_slerp(b, s, f64::EPSILON).unwrap_or(*b)
+        };
         let toward = |a: &V3d, b: &V3d| {
-            UnitQuaternion::rotation_between(a, b).map_or(*b, |q| UnitQuaternion::from_scaled_axis(log_so3(&q) * s) * a)
+            UnitQuaternion::rotation_between(a, b).map_or(*b, |q| {
+                UnitQuaternion::from_scaled_axis(log_so3(&q) * s) * a
+            })
         };
         let limbs = |a: &[Limb; 2], b: &[Limb; 2]| {
-            std::array::from_fn(|k| std::array::from_fn(|i| toward(&a[k][i].normalize(), &b[k][i].normalize())))
+            std::array::from_fn(|k| {
+                std::array::from_fn(|i| toward(&a[k][i].normalize(), &b[k][i].normalize()))
+            })
         };
         Self {
             pelvis: self.pelvis + (to.pelvis - self.pelvis) * s,
@@ -46,7 +52,10 @@ impl Stance {
             head: self.head + (to.head - self.head) * s,
             arms: limbs(&self.arms, &to.arms),
             legs: limbs(&self.legs, &to.legs),
-            feet: [turn(&self.feet[0], &to.feet[0]), turn(&self.feet[1], &to.feet[1])],
+            feet: [
+                turn(&self.feet[0], &to.feet[0]),
+                turn(&self.feet[1], &to.feet[1]),
+            ],
         }
     }
 }
@@ -88,7 +97,11 @@ const STRAIGHT: f64 = 0.05;
 impl Rig {
     pub(super) fn new(skeleton: &Skeleton, rest: &RestBody) -> Self {
         let at = |name: &str| skeleton.index(name);
-        let floor = rest.vertices.iter().map(|v| f64::from(v.y)).fold(f64::INFINITY, f64::min);
+        let floor = rest
+            .vertices
+            .iter()
+            .map(|v| f64::from(v.y))
+            .fold(f64::INFINITY, f64::min);
         let pelvis = rest.joints[0];
         let sides = ["left", "right"];
         let limb = |side: &str, names: [&str; 3], ends: &[&str]| -> Option<LimbRig> {
@@ -98,8 +111,10 @@ impl Rig {
                 at(&format!("{side}_{}", names[2]))?,
             ];
             let p = joints.map(|j| rest.joints[j]);
-            let end =
-                ends.iter().find_map(|e| at(&format!("{side}_{e}"))).map_or(p[2] + (p[2] - p[1]), |j| rest.joints[j]);
+            let end = ends
+                .iter()
+                .find_map(|e| at(&format!("{side}_{e}")))
+                .map_or(p[2] + (p[2] - p[1]), |j| rest.joints[j]);
             let bones = [p[1] - p[0], p[2] - p[1], end - p[2]];
             let rest_dirs = bones.map(|b| b.try_normalize(0.0).unwrap_or(-V3d::y()));
             let axis = match &skeleton.joints()[joints[1]].motion {
@@ -108,7 +123,12 @@ impl Rig {
             };
             let axis = axis - rest_dirs[0] * axis.dot(&rest_dirs[0]);
             let axis = axis.try_normalize(0.0).unwrap_or(V3d::x());
-            Some(LimbRig { joints, rest: rest_dirs, axis, length: [bones[0].norm(), bones[1].norm()] })
+            Some(LimbRig {
+                joints,
+                rest: rest_dirs,
+                axis,
+                length: [bones[0].norm(), bones[1].norm()],
+            })
         };
         let list = |names: &[&str]| names.iter().filter_map(|n| at(n)).collect();
         let ankles = sides.map(|s| at(&format!("{s}_ankle")));
@@ -118,7 +138,8 @@ impl Rig {
             neck: list(&["neck", "head"]),
             arms: sides.map(|s| limb(s, ["shoulder", "elbow", "wrist"], &["hand_end", "hand"])),
             legs: sides.map(|s| limb(s, ["hip", "knee", "ankle"], &["foot"])),
-            hips: sides.map(|s| at(&format!("{s}_hip")).map_or(V3d::zeros(), |j| rest.joints[j] - pelvis)),
+            hips: sides
+                .map(|s| at(&format!("{s}_hip")).map_or(V3d::zeros(), |j| rest.joints[j] - pelvis)),
             ankle_height: ankles[0].map_or(0.0, |j| rest.joints[j].y - floor),
             skeleton: skeleton.clone(),
         }
@@ -126,7 +147,9 @@ impl Rig {
 
     /// Thigh and shank together, metres; one without legs.
     pub(super) fn leg_length(&self) -> f64 {
-        self.legs[0].as_ref().map_or(1.0, |l| l.length[0] + l.length[1])
+        self.legs[0]
+            .as_ref()
+            .map_or(1.0, |l| l.length[0] + l.length[1])
     }
     /// Height of the ankle above the sole, metres.
     pub(super) fn ankle_height(&self) -> f64 {
@@ -146,7 +169,11 @@ impl Rig {
         for s in 0..2 {
             let Some(leg) = &self.legs[s] else { continue };
             let ankle = soles[s].0 + V3d::y() * self.ankle_height;
-            let across = V3d::new(stance.pelvis.x + hips[s].x - ankle.x, 0.0, stance.pelvis.z + hips[s].z - ankle.z);
+            let across = V3d::new(
+                stance.pelvis.x + hips[s].x - ankle.x,
+                0.0,
+                stance.pelvis.z + hips[s].z - ankle.z,
+            );
             let reach = (leg.length[0] + leg.length[1]) * SLACK;
             let up = (reach * reach - across.norm_squared()).max(0.0).sqrt();
             height = height.min(ankle.y + up - hips[s].y);
@@ -161,11 +188,15 @@ impl Rig {
             let hip = stance.pelvis + hips[s];
             let to = soles[s].0 + V3d::y() * self.ankle_height - hip;
             let [a, b] = leg.length;
-            let d = to.norm().clamp((a - b).abs() + f64::EPSILON, (a + b) * SLACK);
+            let d = to
+                .norm()
+                .clamp((a - b).abs() + f64::EPSILON, (a + b) * SLACK);
             let down = to.try_normalize(0.0).unwrap_or(-V3d::y());
             // The knee points where halfway between pelvis and foot points.
             let pole = stance.heading * V3d::z() + yaw * V3d::z();
-            let front = (pole - down * pole.dot(&down)).try_normalize(0.0).unwrap_or(V3d::z());
+            let front = (pole - down * pole.dot(&down))
+                .try_normalize(0.0)
+                .unwrap_or(V3d::z());
             let cos = ((a * a + d * d - b * b) / (2.0 * a * d)).clamp(-1.0, 1.0);
             let thigh = down * cos + front * (1.0 - cos * cos).sqrt();
             let shank = (down * d - thigh * a).try_normalize(0.0).unwrap_or(down);
@@ -176,24 +207,40 @@ impl Rig {
 
     /// Joint angles that take the stance, within the limits of the skeleton.
     pub(super) fn pose(&self, stance: &Stance) -> Pose<World> {
-        let root = Rigid::from_parts(stance.pelvis.coords - stance.heading * self.pelvis.coords, stance.heading);
+        let root = Rigid::from_parts(
+            stance.pelvis.coords - stance.heading * self.pelvis.coords,
+            stance.heading,
+        );
         let mut pose = Pose::rest(&self.skeleton, root);
         for &j in &self.spine {
-            self.set(&mut pose, j, &exp_so3(&(stance.chest / self.spine.len() as f64)));
+            self.set(
+                &mut pose,
+                j,
+                &exp_so3(&(stance.chest / self.spine.len() as f64)),
+            );
         }
         for &j in &self.neck {
-            self.set(&mut pose, j, &exp_so3(&(stance.head / self.neck.len() as f64)));
+            self.set(
+                &mut pose,
+                j,
+                &exp_so3(&(stance.head / self.neck.len() as f64)),
+            );
         }
         for s in 0..2 {
             if let Some(arm) = &self.arms[s] {
                 let lower = self.bend(&mut pose, arm, &stance.arms[s]);
                 let hand = lower.inverse() * stance.arms[s][2];
-                let turn = UnitQuaternion::rotation_between(&arm.rest[2], &hand).unwrap_or_default();
+                let turn =
+                    UnitQuaternion::rotation_between(&arm.rest[2], &hand).unwrap_or_default();
                 self.set(&mut pose, arm.joints[2], &turn);
             }
             if let Some(leg) = &self.legs[s] {
                 let lower = self.bend(&mut pose, leg, &stance.legs[s]);
-                self.set(&mut pose, leg.joints[2], &((stance.heading * lower).inverse() * stance.feet[s]));
+                self.set(
+                    &mut pose,
+                    leg.joints[2],
+                    &((stance.heading * lower).inverse() * stance.feet[s]),
+                );
             }
         }
         pose.clamp_to_limits(&self.skeleton);
@@ -204,10 +251,13 @@ impl Rig {
     fn bend(&self, pose: &mut Pose<World>, limb: &LimbRig, to: &Limb) -> UnitQuaternion<f64> {
         let [a, f, _] = limb.rest;
         let [d, e, _] = *to;
-        let least = UnitQuaternion::rotation_between(&a, &d)
-            .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Unit::new_normalize(limb.axis), std::f64::consts::PI));
+        let least = UnitQuaternion::rotation_between(&a, &d).unwrap_or_else(|| {
+            UnitQuaternion::from_axis_angle(&Unit::new_normalize(limb.axis), std::f64::consts::PI)
+        });
         let axis = d.cross(&e) + least * limb.axis * STRAIGHT;
-        let axis = (axis - d * axis.dot(&d)).try_normalize(0.0).unwrap_or(least * limb.axis);
+        let axis = (axis - d * axis.dot(&d))
+            .try_normalize(0.0)
+            .unwrap_or(least * limb.axis);
         let frame = |x: V3d, y: V3d| Matrix3::from_columns(&[x, y, x.cross(&y)]);
         let turn = frame(d, axis) * frame(a, limb.axis).transpose();
         let upper = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));

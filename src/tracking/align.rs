@@ -8,8 +8,8 @@ use super::{Normals, TrackerConfig};
 use crate::body::{BoneTransforms, JointMotion, Pose, RestBody};
 use crate::math::{P3, V3};
 use crate::registration::{
-    ArticulatedSums, Association, Dof, EdgePairs, EdgeSide, GemanMcClure, Metric, ModelPoints, Pair, PairingConfig,
-    PairingScratch, PairingStats, pair_edges, pair_surfaces, solve_damped,
+    ArticulatedSums, Association, Dof, EdgePairs, EdgeSide, GemanMcClure, Metric, ModelPoints,
+    Pair, PairingConfig, PairingScratch, PairingStats, pair_edges, pair_surfaces, solve_damped,
 };
 use crate::segment::Contour;
 use crate::spatial::{OrganisedCloud, PointTree};
@@ -97,11 +97,21 @@ impl Default for Terms {
 
 /// From frame to frame. The first reach is Table 1's 0.2 m less what prediction saves; the last is three times the
 /// residual of a wrong body.
-pub(super) const TRACK: Schedule =
-    Schedule { iterations: 8, ahead: 0, sigma: [0.08, 0.03], distance: [0.12, 0.06], pull: 0.35 };
+pub(super) const TRACK: Schedule = Schedule {
+    iterations: 8,
+    ahead: 0,
+    sigma: [0.08, 0.03],
+    distance: [0.12, 0.06],
+    pull: 0.35,
+};
 /// From a rough start.
-pub(super) const START: Schedule =
-    Schedule { iterations: 20, ahead: 0, sigma: [0.15, 0.04], distance: [0.20, 0.08], pull: 0.5 };
+pub(super) const START: Schedule = Schedule {
+    iterations: 20,
+    ahead: 0,
+    sigma: [0.15, 0.04],
+    distance: [0.20, 0.08],
+    pull: 0.5,
+};
 
 /// Iterations over which kernel and reach shrink.
 pub(super) const ANNEAL: usize = 4;
@@ -164,7 +174,11 @@ pub(super) struct AlignScratch {
 impl AlignScratch {
     /// What the last normal equations know of one unknown, per point (priors included); 0 before there were any.
     pub(super) fn information(&self, unknown: usize) -> f64 {
-        if unknown < self.hessian.nrows() { self.hessian[(unknown, unknown)] } else { 0.0 }
+        if unknown < self.hessian.nrows() {
+            self.hessian[(unknown, unknown)]
+        } else {
+            0.0
+        }
     }
     /// Share of an angle (0 to 1) that no reading held in the last normal equations.
     pub(super) fn unseen(&self, angle: usize) -> f64 {
@@ -179,7 +193,13 @@ impl AlignScratch {
     #[cfg(test)]
     pub(super) fn blank(&mut self, model: &TrackerModel, pose: &Pose) {
         let centre = self.bones.joints[0].coords;
-        linearise(model.template.skeleton(), &self.bones, pose, &centre, &mut self.dofs);
+        linearise(
+            model.template.skeleton(),
+            &self.bones,
+            pose,
+            &centre,
+            &mut self.dofs,
+        );
         self.hessian = DMatrix::zeros(self.dofs.len(), self.dofs.len());
         self.gradient = DVector::zeros(self.dofs.len());
     }
@@ -203,7 +223,11 @@ impl AlignScratch {
     }
     /// Number of residuals of the current pairs.
     pub(super) fn residuals(&self) -> usize {
-        let free = if self.terms.free_space > 0.0 { self.pairing.in_front.len() } else { 0 };
+        let free = if self.terms.free_space > 0.0 {
+            self.pairing.in_front.len()
+        } else {
+            0
+        };
         self.pairs.len() + self.edges.pairs.len() + free
     }
 }
@@ -214,7 +238,12 @@ pub(super) fn skin_samples(model: &TrackerModel, rest: &SampleRest, scratch: &mu
         .bones
         .bones
         .iter()
-        .map(|b| (b.rotation.to_rotation_matrix().into_inner().cast::<f32>(), b.translation.vector.cast::<f32>()))
+        .map(|b| {
+            (
+                b.rotation.to_rotation_matrix().into_inner().cast::<f32>(),
+                b.translation.vector.cast::<f32>(),
+            )
+        })
         .collect();
     scratch.positions.clear();
     scratch.normals.clear();
@@ -228,7 +257,9 @@ pub(super) fn skin_samples(model: &TrackerModel, rest: &SampleRest, scratch: &mu
             }
         }
         scratch.positions.push(P3::from(sum));
-        scratch.normals.push(m[usize::from(joints[0])].0 * rest.normals[i]);
+        scratch
+            .normals
+            .push(m[usize::from(joints[0])].0 * rest.normals[i]);
     }
 }
 
@@ -258,7 +289,11 @@ pub(super) fn pair(
         cos_normal: 0.5,
         pull: if model.config.pull { pull } else { 0.0 },
         data_step: model.config.data_step,
-        reuse: if model.config.skip_converged { REUSE } else { 0.0 },
+        reuse: if model.config.skip_converged {
+            REUSE
+        } else {
+            0.0
+        },
     };
     let false_edges = &seen.contour.false_edges;
     let stats = pair_surfaces(
@@ -274,8 +309,20 @@ pub(super) fn pair(
     let terms = scratch.terms;
     if terms.edge_weight > 0.0 || terms.free_space > 0.0 {
         let edges = &seen.contour.true_edges;
-        let side = if terms.edge_weight > 0.0 { EdgeSide::Outline } else { EdgeSide::Outside };
-        pair_edges(&points, seen.grid, edges, &scratch.pairing.image, 0.2, side, &mut scratch.edges);
+        let side = if terms.edge_weight > 0.0 {
+            EdgeSide::Outline
+        } else {
+            EdgeSide::Outside
+        };
+        pair_edges(
+            &points,
+            seen.grid,
+            edges,
+            &scratch.pairing.image,
+            0.2,
+            side,
+            &mut scratch.edges,
+        );
     } else {
         scratch.edges.pairs.clear();
     }
@@ -303,7 +350,11 @@ pub(super) fn for_residuals(
 ) -> (f64, f64, f64) {
     let (mut total, mut off, mut cost) = (0.0, 0.0, 0.0);
     let config = &model.config;
-    for pair in scratch.pairs.iter().filter(|p| config.both_ways || !p.from_data) {
+    for pair in scratch
+        .pairs
+        .iter()
+        .filter(|p| config.both_ways || !p.from_data)
+    {
         let i = pair.model as usize;
         let p = scratch.positions[i].coords.cast::<f64>();
         let r = seen.grid.points[pair.cell as usize].coords.cast::<f64>() - p;
@@ -312,26 +363,61 @@ pub(super) fn for_residuals(
             let both = direction + seen.grid.normals[pair.cell as usize].cast::<f64>();
             direction = both.try_normalize(f64::EPSILON).unwrap_or(direction);
         }
-        let metric = Metric { isotropic, directional: config.point_to_plane, direction };
+        let metric = Metric {
+            isotropic,
+            directional: config.point_to_plane,
+            direction,
+        };
         // A coarse pull is long by nature: the kernel widens with it so that it is not taken for an outlier.
         let far = r.norm() > 0.12;
-        let kernel = GemanMcClure { sigma: if far { sigma.max(0.12) } else { sigma } };
+        let kernel = GemanMcClure {
+            sigma: if far { sigma.max(0.12) } else { sigma },
+        };
         let e2 = r.norm_squared();
-        let weight = if config.robust { kernel.weight(e2) } else { 1.0 };
+        let weight = if config.robust {
+            kernel.weight(e2)
+        } else {
+            1.0
+        };
         cost += kernel.value(e2).min(UNEXPLAINED * UNEXPLAINED);
         total += weight;
         off += weight * direction.dot(&r).abs();
-        f(&Residual { sample: i, bone: usize::from(model.bones[i]), point: p, residual: r, metric, weight });
+        f(&Residual {
+            sample: i,
+            bone: usize::from(model.bones[i]),
+            point: p,
+            residual: r,
+            metric,
+            weight,
+        });
     }
     for &(i, cell) in &scratch.edges.pairs {
         let i = i as usize;
         let p = scratch.positions[i].coords.cast::<f64>();
-        let ray = seen.grid.points[cell as usize].coords.cast::<f64>().normalize();
+        let ray = seen.grid.points[cell as usize]
+            .coords
+            .cast::<f64>()
+            .normalize();
         let r = ray * ray.dot(&p) - p;
-        let metric = Metric { isotropic: 1.0, directional: -1.0, direction: ray };
+        let metric = Metric {
+            isotropic: 1.0,
+            directional: -1.0,
+            direction: ray,
+        };
         let weight = scratch.terms.edge_weight.max(scratch.terms.free_space);
-        let weight = weight * GemanMcClure { sigma: sigma.max(FREE_SIGMA) }.weight(r.norm_squared());
-        f(&Residual { sample: i, bone: usize::from(model.bones[i]), point: p, residual: r, metric, weight });
+        let weight = weight
+            * GemanMcClure {
+                sigma: sigma.max(FREE_SIGMA),
+            }
+            .weight(r.norm_squared());
+        f(&Residual {
+            sample: i,
+            bone: usize::from(model.bones[i]),
+            point: p,
+            residual: r,
+            metric,
+            weight,
+        });
     }
     if scratch.terms.free_space > 0.0 {
         for &(i, cell) in &scratch.pairing.in_front {
@@ -341,9 +427,20 @@ pub(super) fn for_residuals(
             // Back along the ray to what was measured there, a little at a time.
             let behind = f64::from(seen.grid.depth[cell as usize]) / ray.z - p.norm();
             let r = ray * behind.clamp(0.0, FREE_STEP);
-            let metric = Metric { isotropic: 0.0, directional: 1.0, direction: ray };
+            let metric = Metric {
+                isotropic: 0.0,
+                directional: 1.0,
+                direction: ray,
+            };
             let weight = scratch.terms.free_space;
-            f(&Residual { sample: i, bone: usize::from(model.bones[i]), point: p, residual: r, metric, weight });
+            f(&Residual {
+                sample: i,
+                bone: usize::from(model.bones[i]),
+                point: p,
+                residual: r,
+                metric,
+                weight,
+            });
         }
     }
     (total, off, cost)
@@ -359,7 +456,14 @@ pub(super) fn evaluate(
     scratch: &mut AlignScratch,
 ) -> Fit {
     let stats = pair(model, rest, pose, seen, distance, 0.0, scratch);
-    let sums = for_residuals(model, seen, scratch, 0.05, model.config.point_to_point, |_| {});
+    let sums = for_residuals(
+        model,
+        seen,
+        scratch,
+        0.05,
+        model.config.point_to_point,
+        |_| {},
+    );
     summary(stats, sums, 0)
 }
 
@@ -391,19 +495,33 @@ pub(super) fn align(
     for iteration in 0..schedule.iterations {
         let t = ((iteration + schedule.ahead) as f64 / ANNEAL as f64).min(1.0);
         let sigma = schedule.sigma[0] + (schedule.sigma[1] - schedule.sigma[0]) * t;
-        let distance = schedule.distance[0] + (schedule.distance[1] - schedule.distance[0]) * t as f32;
+        let distance =
+            schedule.distance[0] + (schedule.distance[1] - schedule.distance[0]) * t as f32;
         let pull = if t < 1.0 { schedule.pull } else { 0.0 };
         let stats = pair(model, rest, pose, seen, distance, pull, scratch);
-        let sums = assemble(model, pose, seen, sigma, model.config.point_to_point, scratch);
+        let sums = assemble(
+            model,
+            pose,
+            seen,
+            sigma,
+            model.config.point_to_point,
+            scratch,
+        );
         fit = summary(stats, sums, iteration + 1);
         if sums.0 < 1.0 {
             break;
         }
-        let Some(x) = solve_damped(&scratch.hessian, &scratch.gradient, &scratch.damping) else { break };
+        let Some(x) = solve_damped(&scratch.hessian, &scratch.gradient, &scratch.damping) else {
+            break;
+        };
         let centre = scratch.bones.joints[0].coords;
         apply(model.template.skeleton(), pose, &centre, &x);
         limit(model, pose);
-        let step = x.iter().enumerate().map(|(k, v)| if k < 3 { v.abs() } else { v.abs() * LEVER }).fold(0.0, f64::max);
+        let step = x
+            .iter()
+            .enumerate()
+            .map(|(k, v)| if k < 3 { v.abs() } else { v.abs() * LEVER })
+            .fold(0.0, f64::max);
         if t >= 1.0 && step < model.config.converged {
             fit.converged = true;
             break;
@@ -436,25 +554,41 @@ fn assemble(
     let totals = for_residuals(model, seen, scratch, sigma, isotropic, |r| {
         let p = r.point - centre;
         if single {
-            sums.single[r.bone].add(&p.cast(), &r.residual.cast(), &r.metric.cast(), r.weight as f32);
+            sums.single[r.bone].add(
+                &p.cast(),
+                &r.residual.cast(),
+                &r.metric.cast(),
+                r.weight as f32,
+            );
         } else {
             sums.bones[r.bone].add(&p, &r.residual, &r.metric, r.weight);
         }
     });
     let mut dofs = std::mem::take(&mut scratch.dofs);
     linearise(skeleton, &scratch.bones, pose, &centre, &mut dofs);
-    sums.assemble(&model.parents, &dofs, &mut scratch.hessian, &mut scratch.gradient);
+    sums.assemble(
+        &model.parents,
+        &dofs,
+        &mut scratch.hessian,
+        &mut scratch.gradient,
+    );
     scratch.dofs = dofs;
     scratch.sums = sums;
     let scale = 1.0 / scratch.residuals().max(1) as f64;
     scratch.hessian *= scale;
     scratch.gradient *= scale;
     scratch.damping.clear();
-    scratch.damping.resize(scratch.gradient.len(), model.config.damping);
+    scratch
+        .damping
+        .resize(scratch.gradient.len(), model.config.damping);
     let stays = planted(model, seen.grid, scratch);
     let leg_pull = |k: usize| {
         let of = |(leg, stays): (&super::stand::Leg, bool)| stays && leg.moves(k);
-        if model.standing.iter().zip(stays).any(of) { PLANTED_LEG_PULL } else { HIDDEN_LEG_PULL }
+        if model.standing.iter().zip(stays).any(of) {
+            PLANTED_LEG_PULL
+        } else {
+            HIDDEN_LEG_PULL
+        }
     };
     let mut hidden = std::mem::take(&mut scratch.unseen);
     hidden.clear();
@@ -462,10 +596,18 @@ fn assemble(
         // Whatever is seen of a joint outweighs the rest pose at once; a hidden leg stands.
         let unseen = (HIDDEN / (HIDDEN + scratch.hessian[(6 + k, 6 + k)])).powi(2);
         hidden.push((BARELY_SEEN / (BARELY_SEEN + scratch.hessian[(6 + k, 6 + k)])).powi(2));
-        let seen_share = if scratch.terms.eased { model.seen_shares[k] } else { 1.0 };
+        let seen_share = if scratch.terms.eased {
+            model.seen_shares[k]
+        } else {
+            1.0
+        };
         let share = seen_share + (1.0 - seen_share) * unseen;
-        let stiff =
-            stiff * scratch.terms.rest_weight * share + if model.below_knee[k] { leg_pull(k) * unseen } else { 0.0 };
+        let stiff = stiff * scratch.terms.rest_weight * share
+            + if model.below_knee[k] {
+                leg_pull(k) * unseen
+            } else {
+                0.0
+            };
         scratch.hessian[(6 + k, 6 + k)] += stiff;
         scratch.gradient[6 + k] -= stiff * angle;
     }
@@ -501,14 +643,20 @@ pub(super) fn aim(
     twist: f64,
 ) {
     let skeleton = model.template.skeleton();
-    let (Some(j), Some(c)) = (skeleton.index(joint), skeleton.index(child)) else { return };
+    let (Some(j), Some(c)) = (skeleton.index(joint), skeleton.index(child)) else {
+        return;
+    };
     if !matches!(skeleton.joints()[j].motion, JointMotion::Ball { .. }) {
         return;
     }
     let along = skeleton.joints()[c].rest - skeleton.joints()[j].rest;
     if let Some(turn) = nalgebra::UnitQuaternion::rotation_between(&along, &direction) {
         let about = nalgebra::UnitQuaternion::from_scaled_axis(direction * twist);
-        pose.set(skeleton, joint, crate::math::log_so3(&(about * turn)).as_slice());
+        pose.set(
+            skeleton,
+            joint,
+            crate::math::log_so3(&(about * turn)).as_slice(),
+        );
     }
 }
 

@@ -13,9 +13,12 @@ pub(super) const PARTS: usize = 5;
 /// The part of each joint; a limb begins at its ball, so that the shoulder's own angles are the arm's.
 pub(super) fn parts(template: &Template) -> Vec<usize> {
     let skeleton = template.skeleton();
-    let limbs = ["left_shoulder", "right_shoulder", "left_hip", "right_hip"].map(|n| skeleton.index(n));
+    let limbs =
+        ["left_shoulder", "right_shoulder", "left_hip", "right_hip"].map(|n| skeleton.index(n));
     let part = |j: usize| {
-        let of = limbs.iter().position(|l| l.is_some_and(|l| l == j || skeleton.is_ancestor(l, j)));
+        let of = limbs
+            .iter()
+            .position(|l| l.is_some_and(|l| l == j || skeleton.is_ancestor(l, j)));
         of.map_or(0, |k| k + 1)
     };
     (0..skeleton.len()).map(part).collect()
@@ -64,7 +67,8 @@ pub(super) fn calm(
     let (from, to) = (last.root.iso(), fitted.root.iso());
     // About the pelvis: a turn about the origin of the rest frame would move the body.
     let place = a.joints[0].coords + (b.joints[0] - a.joints[0]) * share[0];
-    let turn = exp_so3(&(log_so3(&(to.rotation * from.rotation.inverse())) * share[0])) * from.rotation;
+    let turn =
+        exp_so3(&(log_so3(&(to.rotation * from.rotation.inverse())) * share[0])) * from.rotation;
     let own = rest.joints[0].coords;
     out.root = Rigid::from_parts(place - turn * own, turn);
     for (j, joint) in skeleton.joints().iter().enumerate() {
@@ -75,9 +79,16 @@ pub(super) fn calm(
                 out.angles[at] = last.angles[at] + (fitted.angles[at] - last.angles[at]) * s;
             }
             JointMotion::Ball { .. } => {
-                let r = |p: &Pose| exp_so3(&Vector3::new(p.angles[at], p.angles[at + 1], p.angles[at + 2]));
+                let r = |p: &Pose| {
+                    exp_so3(&Vector3::new(
+                        p.angles[at],
+                        p.angles[at + 1],
+                        p.angles[at + 2],
+                    ))
+                };
                 let turn = log_so3(&(r(fitted) * r(last).inverse())) * s;
-                out.angles[at..at + 3].copy_from_slice(log_so3(&(exp_so3(&turn) * r(last))).as_slice());
+                out.angles[at..at + 3]
+                    .copy_from_slice(log_so3(&(exp_so3(&turn) * r(last))).as_slice());
             }
         }
     }
@@ -103,12 +114,20 @@ mod tests {
     }
 
     fn scene() -> Scene {
-        let config = TrackerConfig { samples: 50, ..TrackerConfig::default() };
+        let config = TrackerConfig {
+            samples: 50,
+            ..TrackerConfig::default()
+        };
         let calibration = Calibration::registered(Intrinsics::KINECT_V1);
         let model = TrackerModel::new(crate::body::embedded::template(), calibration, config);
         let rest = model.template.personalise(&Default::default());
         let pose = TrackerState::new(&model).pose;
-        Scene { model, rest, pose, drift: Vec::new() }
+        Scene {
+            model,
+            rest,
+            pose,
+            drift: Vec::new(),
+        }
     }
 
     impl Scene {
@@ -120,17 +139,32 @@ mod tests {
         /// Root mean square distance of all joints, metres.
         fn off(&self, a: &Pose, b: &Pose) -> f64 {
             let (a, b) = (self.joints(a), self.joints(b));
-            (a.iter().zip(&b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>() / a.len() as f64).sqrt()
+            (a.iter()
+                .zip(&b)
+                .map(|(a, b)| (a - b).norm_squared())
+                .sum::<f64>()
+                / a.len() as f64)
+                .sqrt()
         }
         fn see(&mut self, fitted: &Pose) -> Pose {
             let last = self.pose.clone();
-            self.pose = calm(&self.model, &self.rest, &last, fitted, UNCERTAINTY, &mut self.drift);
+            self.pose = calm(
+                &self.model,
+                &self.rest,
+                &last,
+                fitted,
+                UNCERTAINTY,
+                &mut self.drift,
+            );
             last
         }
     }
 
     fn moved(pose: &Pose, by: Vector3<f64>) -> Pose {
-        Pose { root: Rigid::new(Translation3::from(by) * pose.root.iso()), ..pose.clone() }
+        Pose {
+            root: Rigid::new(Translation3::from(by) * pose.root.iso()),
+            ..pose.clone()
+        }
     }
 
     #[test]
@@ -176,14 +210,28 @@ mod tests {
         let arm = s.model.arms[0].as_ref().expect("an arm").angles.clone();
         seen.angles[arm[2]] -= 0.3;
         s.see(&seen);
-        assert!((s.pose.angles[arm[2]] - seen.angles[arm[2]]).abs() < 2e-3, "the arm follows");
-        let shift = (s.pose.root.iso().translation.vector - truth.root.iso().translation.vector).norm();
+        assert!(
+            (s.pose.angles[arm[2]] - seen.angles[arm[2]]).abs() < 2e-3,
+            "the arm follows"
+        );
+        let shift =
+            (s.pose.root.iso().translation.vector - truth.root.iso().translation.vector).norm();
         assert!(shift < 0.3 * 3e-4, "the trunk stays: {shift}");
         let mut still = scene();
         let same = still.pose.clone();
         still.see(&same);
         assert!(still.off(&still.pose, &same) < 1e-12);
-        let quiet = calm(&still.model, &still.rest, &same, &seen, 0.0, &mut still.drift.clone());
-        assert!(still.off(&quiet, &seen) < 1e-9, "without uncertainty the frame decides");
+        let quiet = calm(
+            &still.model,
+            &still.rest,
+            &same,
+            &seen,
+            0.0,
+            &mut still.drift.clone(),
+        );
+        assert!(
+            still.off(&quiet, &seen) < 1e-9,
+            "without uncertainty the frame decides"
+        );
     }
 }

@@ -58,7 +58,9 @@ pub(super) fn confidence(
         if normal.dot(&p.coords) >= 0.0 {
             continue;
         }
-        let Some(cell) = seen.grid.cell_of(p).and_then(|(u, v)| seen.grid.cell(u, v)) else { continue };
+        let Some(cell) = seen.grid.cell_of(p).and_then(|(u, v)| seen.grid.cell(u, v)) else {
+            continue;
+        };
         if seen.grid.labels[cell] == Label::Unknown && p.z <= image.depth[cell] + HIDDEN {
             missing[usize::from(model.bones[i])] += 1;
         }
@@ -69,17 +71,28 @@ pub(super) fn confidence(
             let at = skeleton.dof_offset(j);
             let dofs = skeleton.joints()[j].motion.dofs();
             // End points and unskinned joints speak for the bone that carries them.
-            let bone = if matches!(skeleton.joints()[j].motion, JointMotion::Fixed) && readings[j] == 0 {
-                model.parents[j].unwrap_or(j)
-            } else {
-                j
-            };
+            let bone =
+                if matches!(skeleton.joints()[j].motion, JointMotion::Fixed) && readings[j] == 0 {
+                    model.parents[j].unwrap_or(j)
+                } else {
+                    j
+                };
             let seen_share = readings[bone] as f32 / (readings[bone] as f32 + HALF_SURE);
-            let least = (at..at + dofs).map(|k| scratch.information(6 + k)).fold(f64::INFINITY, f64::min);
-            let at_limit =
-                (at..at + dofs).any(|k| pose.angles[k] - limits[k][0] < LIMIT || limits[k][1] - pose.angles[k] < LIMIT);
+            let least = (at..at + dofs)
+                .map(|k| scratch.information(6 + k))
+                .fold(f64::INFINITY, f64::min);
+            let at_limit = (at..at + dofs).any(|k| {
+                pose.angles[k] - limits[k][0] < LIMIT || limits[k][1] - pose.angles[k] < LIMIT
+            });
             let (reason, value) = if readings[bone] == 0 {
-                (if missing[bone] > 0 { Reason::NoReturn } else { Reason::Unseen }, 0.0)
+                (
+                    if missing[bone] > 0 {
+                        Reason::NoReturn
+                    } else {
+                        Reason::Unseen
+                    },
+                    0.0,
+                )
             } else if missing[bone] > readings[bone] {
                 (Reason::NoReturn, 0.5 * seen_share)
             } else if dofs > 0 && least < AMBIGUOUS {

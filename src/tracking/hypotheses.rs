@@ -66,10 +66,15 @@ pub(super) fn choose_arm(
     ends: &[Extremity],
     scratch: &mut AlignScratch,
 ) -> Pose {
-    let Some(arm) = &model.arms[side] else { return pose.clone() };
+    let Some(arm) = &model.arms[side] else {
+        return pose.clone();
+    };
     let skeleton = model.template.skeleton();
     let sign = [1.0, -1.0][side];
-    let (shoulder, elbow) = (&skeleton.joints()[arm.root].name, &skeleton.joints()[arm.hinge].name);
+    let (shoulder, elbow) = (
+        &skeleton.joints()[arm.root].name,
+        &skeleton.joints()[arm.hinge].name,
+    );
     let mut tried: Vec<(f64, Option<Vector3<f64>>, Pose)> = Vec::new();
     for pose in at_ends(model, rest.0, pose, arm, ends) {
         let cost = evaluate(model, rest, &pose, seen, REACH, scratch).cost;
@@ -81,7 +86,10 @@ pub(super) fn choose_arm(
         guess.set(skeleton, elbow, &[bend]);
         guess.clamp_to_limits(skeleton);
         let effort = BEND_COST * bend * bend + TWIST_COST * twist * twist;
-        (evaluate(model, rest, &guess, seen, REACH, scratch).cost + effort, guess)
+        (
+            evaluate(model, rest, &guess, seen, REACH, scratch).cost + effort,
+            guess,
+        )
     };
     let outward = |d: [f64; 3]| Vector3::new(d[0] * sign, d[1], d[2]).normalize();
     let mut directions: Vec<Vector3<f64>> = UPPER_ARMS.into_iter().map(outward).collect();
@@ -110,7 +118,10 @@ pub(super) fn choose_arm(
             }
         }
     }
-    tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(|| pose.clone(), |t| t.2)
+    tried
+        .into_iter()
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or_else(|| pose.clone(), |t| t.2)
 }
 
 /// The leg pose of one side (0 left, 1 right) that explains the picture best: as it is, with the knee bent, with the foot
@@ -124,9 +135,14 @@ pub(super) fn choose_leg(
     ends: &[Extremity],
     scratch: &mut AlignScratch,
 ) -> Pose {
-    let Some(leg) = &model.legs[side] else { return pose.clone() };
+    let Some(leg) = &model.legs[side] else {
+        return pose.clone();
+    };
     let skeleton = model.template.skeleton();
-    let (hip, knee) = (&skeleton.joints()[leg.root].name, &skeleton.joints()[leg.hinge].name);
+    let (hip, knee) = (
+        &skeleton.joints()[leg.root].name,
+        &skeleton.joints()[leg.hinge].name,
+    );
     let mut guesses = at_ends(model, rest.0, pose, leg, ends);
     let directions = towards(model, rest.0, pose, leg, ends.iter().map(|e| e.point));
     for bend in MORE_BENDS {
@@ -143,9 +159,13 @@ pub(super) fn choose_leg(
             }
         }
     }
-    let mut best = (evaluate(model, rest, pose, seen, REACH, scratch).cost, pose.clone());
+    let mut best = (
+        evaluate(model, rest, pose, seen, REACH, scratch).cost,
+        pose.clone(),
+    );
     for pose in guesses {
-        let cost = evaluate(model, rest, &pose, seen, REACH, scratch).cost + effort(model, &pose, leg);
+        let cost =
+            evaluate(model, rest, &pose, seen, REACH, scratch).cost + effort(model, &pose, leg);
         if cost < best.0 {
             best = (cost, pose);
         }
@@ -156,10 +176,16 @@ pub(super) fn choose_leg(
 /// What the pose of a limb must earn; see [`BEND_COST`].
 fn effort(model: &TrackerModel, pose: &Pose, limb: &Limb) -> f64 {
     let joints = model.template.skeleton().joints();
-    let Some(child) = joints.iter().position(|j| j.parent == Some(limb.root)) else { return 0.0 };
+    let Some(child) = joints.iter().position(|j| j.parent == Some(limb.root)) else {
+        return 0.0;
+    };
     // The part of the root's turn that is about its own bone (swing and twist).
     let along = (joints[child].rest - joints[limb.root].rest).normalize();
-    let turn = Vector3::new(pose.angles[limb.angles[0]], pose.angles[limb.angles[1]], pose.angles[limb.angles[2]]);
+    let turn = Vector3::new(
+        pose.angles[limb.angles[0]],
+        pose.angles[limb.angles[1]],
+        pose.angles[limb.angles[2]],
+    );
     let turn = exp_so3(&turn);
     let twist = 2.0 * (turn.imag().dot(&along) / turn.w.abs().max(f64::MIN_POSITIVE)).atan();
     let bend = pose.angles[limb.angles[3]];
@@ -167,16 +193,28 @@ fn effort(model: &TrackerModel, pose: &Pose, limb: &Limb) -> f64 {
 }
 
 /// Where the root of a limb and its parent bone are.
-fn root_of(model: &TrackerModel, rest: &RestBody, pose: &Pose, limb: &Limb) -> (P3d, nalgebra::UnitQuaternion<f64>) {
+fn root_of(
+    model: &TrackerModel,
+    rest: &RestBody,
+    pose: &Pose,
+    limb: &Limb,
+) -> (P3d, nalgebra::UnitQuaternion<f64>) {
     let mut bones = BoneTransforms::default();
     pose.bones(model.template.skeleton(), rest, &mut bones);
-    let parent = model.parents[limb.root].map_or(pose.root.iso().rotation, |p| bones.bones[p].rotation);
+    let parent =
+        model.parents[limb.root].map_or(pose.root.iso().rotation, |p| bones.bones[p].rotation);
     (bones.joints[limb.root], parent)
 }
 
 /// Poses with the limb's end at each end that it can reach, its hinge where the way along the surface says. (Turned by
 /// right angles from there too, the real stills had 78.1 instead of 79.1 % of their joints within 10 cm.)
-fn at_ends(model: &TrackerModel, rest: &RestBody, pose: &Pose, limb: &Limb, ends: &[Extremity]) -> Vec<Pose> {
+fn at_ends(
+    model: &TrackerModel,
+    rest: &RestBody,
+    pose: &Pose,
+    limb: &Limb,
+    ends: &[Extremity],
+) -> Vec<Pose> {
     let (root, _) = root_of(model, rest, pose, limb);
     let lower = (rest.joints[limb.tip] - rest.joints[limb.hinge]).norm();
     let mut out = Vec::new();
@@ -187,7 +225,13 @@ fn at_ends(model: &TrackerModel, rest: &RestBody, pose: &Pose, limb: &Limb, ends
             continue;
         }
         let mut guess = pose.clone();
-        limb.reach(model, rest, &mut guess, &target, Some(&inside(&end.along(lower as f32))));
+        limb.reach(
+            model,
+            rest,
+            &mut guess,
+            &target,
+            Some(&inside(&end.along(lower as f32))),
+        );
         out.push(guess);
     }
     out
@@ -204,5 +248,9 @@ fn towards(
     let (root, parent) = root_of(model, rest, pose, limb);
     let upper = (rest.joints[limb.hinge] - rest.joints[limb.root]).norm();
     let near = |p: &P3d| (0.5..1.4).contains(&((p - root).norm() / upper));
-    points.map(|p| inside(&p)).filter(near).map(|p| (parent.inverse() * (p - root)).normalize()).collect()
+    points
+        .map(|p| inside(&p))
+        .filter(near)
+        .map(|p| (parent.inverse() * (p - root)).normalize())
+        .collect()
 }

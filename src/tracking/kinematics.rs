@@ -17,15 +17,34 @@ pub(super) fn linearise(
     out.clear();
     let axis = |k: usize| Vector3::from_fn(|r, _| if r == k { 1.0 } else { 0.0 });
     for k in 0..3 {
-        out.push(Dof { bone: 0, twist: Twist { linear: axis(k), angular: Vector3::zeros() } });
+        out.push(Dof {
+            bone: 0,
+            twist: Twist {
+                linear: axis(k),
+                angular: Vector3::zeros(),
+            },
+        });
     }
     for k in 0..3 {
-        out.push(Dof { bone: 0, twist: Twist { linear: Vector3::zeros(), angular: axis(k) } });
+        out.push(Dof {
+            bone: 0,
+            twist: Twist {
+                linear: Vector3::zeros(),
+                angular: axis(k),
+            },
+        });
     }
     for (j, joint) in skeleton.joints().iter().enumerate() {
-        let rotation = joint.parent.map_or(pose.root.iso().rotation, |p| bones.bones[p].rotation);
+        let rotation = joint
+            .parent
+            .map_or(pose.root.iso().rotation, |p| bones.bones[p].rotation);
         let pivot = bones.joints[j].coords - centre;
-        let mut push = |a: Vector3<f64>| out.push(Dof { bone: j, twist: Twist::revolute(rotation * a, pivot) });
+        let mut push = |a: Vector3<f64>| {
+            out.push(Dof {
+                bone: j,
+                twist: Twist::revolute(rotation * a, pivot),
+            })
+        };
         match &joint.motion {
             JointMotion::Fixed => {}
             JointMotion::Hinge { axis, .. } => push(Vector3::from(*axis)),
@@ -36,7 +55,10 @@ pub(super) fn linearise(
 
 /// Moves `pose` by the solution `x` of the normal equations.
 pub(super) fn apply(skeleton: &Skeleton, pose: &mut Pose, centre: &Vector3<f64>, x: &DVector<f64>) {
-    let xi = Twist { linear: Vector3::new(x[0], x[1], x[2]), angular: Vector3::new(x[3], x[4], x[5]) };
+    let xi = Twist {
+        linear: Vector3::new(x[0], x[1], x[2]),
+        angular: Vector3::new(x[3], x[4], x[5]),
+    };
     let shift = nalgebra::Translation3::from(*centre);
     let mut root = shift * exp_se3(&xi) * shift.inverse() * pose.root.iso();
     root.rotation.renormalize();
@@ -68,9 +90,17 @@ pub(super) fn extrapolate(skeleton: &Skeleton, before: &Pose, last: &Pose, ratio
         let at = skeleton.dof_offset(j);
         match &joint.motion {
             JointMotion::Fixed => {}
-            JointMotion::Hinge { .. } => next.angles[at] += (last.angles[at] - before.angles[at]) * ratio,
+            JointMotion::Hinge { .. } => {
+                next.angles[at] += (last.angles[at] - before.angles[at]) * ratio
+            }
             JointMotion::Ball { .. } => {
-                let r = |p: &Pose| exp_so3(&Vector3::new(p.angles[at], p.angles[at + 1], p.angles[at + 2]));
+                let r = |p: &Pose| {
+                    exp_so3(&Vector3::new(
+                        p.angles[at],
+                        p.angles[at + 1],
+                        p.angles[at + 2],
+                    ))
+                };
                 let turn = log_so3(&(r(last) * r(before).inverse())) * ratio;
                 let new = log_so3(&(exp_so3(&turn) * r(last)));
                 next.angles[at..at + 3].copy_from_slice(new.as_slice());
@@ -88,7 +118,12 @@ pub(super) fn motion(skeleton: &Skeleton, from: &Pose, to: &Pose) -> f64 {
     let root = skeleton.joints()[0].rest;
     let shift = (to.root.point(&root) - from.root.point(&root)).norm();
     let turn = (from.root.iso().rotation.inverse() * to.root.iso().rotation).angle();
-    let angles = from.angles.iter().zip(&to.angles).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let angles = from
+        .angles
+        .iter()
+        .zip(&to.angles)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
     shift.max(LEVER * turn.max(angles))
 }
 
@@ -99,8 +134,13 @@ mod tests {
     use nalgebra::{Point3, UnitQuaternion};
 
     fn arm() -> (Skeleton, RestBody, Pose) {
-        let ball = JointMotion::Ball { limits: [[-3.0, 3.0]; 3] };
-        let hinge = JointMotion::Hinge { axis: [0.0, 0.6, 0.8], limits: [-3.0, 3.0] };
+        let ball = JointMotion::Ball {
+            limits: [[-3.0, 3.0]; 3],
+        };
+        let hinge = JointMotion::Hinge {
+            axis: [0.0, 0.6, 0.8],
+            limits: [-3.0, 3.0],
+        };
         let joint = |name: &str, parent, x: f64, motion| Joint {
             name: name.into(),
             parent,
@@ -117,10 +157,20 @@ mod tests {
         let joints = skeleton.joints().iter().map(|j| j.rest).collect();
         let mut pose = Pose::rest(
             &skeleton,
-            Rigid::from_parts(Vector3::new(0.1, -0.2, 2.0), UnitQuaternion::from_euler_angles(0.3, 2.8, 0.1)),
+            Rigid::from_parts(
+                Vector3::new(0.1, -0.2, 2.0),
+                UnitQuaternion::from_euler_angles(0.3, 2.8, 0.1),
+            ),
         );
         pose.angles = vec![0.4, -0.7, 0.9, 0.5];
-        (skeleton, RestBody { joints, ..Default::default() }, pose)
+        (
+            skeleton,
+            RestBody {
+                joints,
+                ..Default::default()
+            },
+            pose,
+        )
     }
 
     #[test]
@@ -147,7 +197,10 @@ mod tests {
             apply(&skeleton, &mut moved, &centre, &x);
             let fd = (posed(&moved) - here) / h;
             let ours = dof.twist.velocity_at(&(here.coords - centre));
-            assert!((fd - ours).norm() < 1e-5, "unknown {k}: {fd} against {ours}");
+            assert!(
+                (fd - ours).norm() < 1e-5,
+                "unknown {k}: {fd} against {ours}"
+            );
         }
     }
 
@@ -160,7 +213,13 @@ mod tests {
         apply(&skeleton, &mut one, &c, &x);
         apply(&skeleton, &mut two, &c, &(&x * 2.0));
         let guess = extrapolate(&skeleton, &pose, &one, 1.0);
-        let off = |a: &Pose, b: &Pose| a.angles.iter().zip(&b.angles).map(|(p, q)| (p - q).abs()).fold(0.0, f64::max);
+        let off = |a: &Pose, b: &Pose| {
+            a.angles
+                .iter()
+                .zip(&b.angles)
+                .map(|(p, q)| (p - q).abs())
+                .fold(0.0, f64::max)
+        };
         assert!(off(&guess, &two) < 0.2 * off(&one, &two));
         // A rotation vector goes through a quaternion and back: equal to rounding, not to the bit.
         assert!(off(&extrapolate(&skeleton, &pose, &one, 0.0), &one) < 1e-12);

@@ -31,15 +31,37 @@ const FOOT: f64 = 0.5;
 
 /// The arms of a template, left and right; `None` for one without.
 pub(super) fn arms(template: &Template) -> [Option<Limb>; 2] {
-    ["left", "right"].map(|side| limb(template, side, ["shoulder", "elbow", "wrist"], ["hand_end", "hand"], HAND))
+    ["left", "right"].map(|side| {
+        limb(
+            template,
+            side,
+            ["shoulder", "elbow", "wrist"],
+            ["hand_end", "hand"],
+            HAND,
+        )
+    })
 }
 
 /// The legs of a template, left and right; `None` for one without.
 pub(super) fn legs(template: &Template) -> [Option<Limb>; 2] {
-    ["left", "right"].map(|side| limb(template, side, ["hip", "knee", "ankle"], ["foot", "foot_end"], FOOT))
+    ["left", "right"].map(|side| {
+        limb(
+            template,
+            side,
+            ["hip", "knee", "ankle"],
+            ["foot", "foot_end"],
+            FOOT,
+        )
+    })
 }
 
-fn limb(template: &Template, side: &str, joints: [&str; 3], tips: [&str; 2], middle: f64) -> Option<Limb> {
+fn limb(
+    template: &Template,
+    side: &str,
+    joints: [&str; 3],
+    tips: [&str; 2],
+    middle: f64,
+) -> Option<Limb> {
     let skeleton = template.skeleton();
     let at = |part: &str| skeleton.index(&format!("{side}_{part}"));
     let [root, hinge, end] = joints.map(at);
@@ -48,7 +70,15 @@ fn limb(template: &Template, side: &str, joints: [&str; 3], tips: [&str; 2], mid
     let ball = matches!(skeleton.joints()[root].motion, JointMotion::Ball { .. });
     let (s, bend) = (skeleton.dof_offset(root), skeleton.dof_offset(hinge));
     let tip = tips.into_iter().find_map(at).unwrap_or(end);
-    (hinged && ball).then(|| Limb { root, hinge, end, tip, angles: vec![s, s + 1, s + 2, bend], bend, middle })
+    (hinged && ball).then(|| Limb {
+        root,
+        hinge,
+        end,
+        tip,
+        angles: vec![s, s + 1, s + 2, bend],
+        bend,
+        middle,
+    })
 }
 
 impl Limb {
@@ -79,21 +109,32 @@ impl Limb {
         let upper = (bones.joints[self.hinge] - root).norm();
         let lower = (self.hand(&bones) - bones.joints[self.hinge]).norm();
         let far = (target - root).norm();
-        let cos = (upper * upper + lower * lower - far * far) / (2.0 * upper * lower).max(f64::MIN_POSITIVE);
+        let cos = (upper * upper + lower * lower - far * far)
+            / (2.0 * upper * lower).max(f64::MIN_POSITIVE);
         pose.angles[self.bend] = std::f64::consts::PI - cos.clamp(-1.0, 1.0).acos();
         pose.clamp_to_limits(skeleton);
         pose.bones(skeleton, rest, &mut bones);
         let (now, wanted) = (self.hand(&bones) - root, target - root);
-        let Some(mut turn) = UnitQuaternion::rotation_between(&now, &wanted) else { return };
+        let Some(mut turn) = UnitQuaternion::rotation_between(&now, &wanted) else {
+            return;
+        };
         if let (Some(hinge), Some(line)) = (hinge, wanted.try_normalize(f64::EPSILON)) {
             let across = |v: Vector3<f64>| v - line * line.dot(&v);
-            let (is, should) = (across(turn * (bones.joints[self.hinge] - root)), across(hinge - root));
+            let (is, should) = (
+                across(turn * (bones.joints[self.hinge] - root)),
+                across(hinge - root),
+            );
             let angle = line.dot(&is.cross(&should)).atan2(is.dot(&should));
             turn = UnitQuaternion::from_scaled_axis(line * angle) * turn;
         }
-        let parent = model.parents[self.root].map_or(pose.root.iso().rotation, |p| bones.bones[p].rotation);
+        let parent =
+            model.parents[self.root].map_or(pose.root.iso().rotation, |p| bones.bones[p].rotation);
         let at = self.angles[0];
-        let old = exp_so3(&Vector3::new(pose.angles[at], pose.angles[at + 1], pose.angles[at + 2]));
+        let old = exp_so3(&Vector3::new(
+            pose.angles[at],
+            pose.angles[at + 1],
+            pose.angles[at + 2],
+        ));
         let new = log_so3(&(parent.inverse() * turn * parent * old));
         pose.angles[at..at + 3].copy_from_slice(new.as_slice());
         pose.clamp_to_limits(skeleton);
@@ -108,7 +149,10 @@ mod tests {
 
     #[test]
     fn a_limb_reaches_its_target_with_its_hinge_on_the_side_asked_for() {
-        let config = TrackerConfig { samples: 50, ..TrackerConfig::default() };
+        let config = TrackerConfig {
+            samples: 50,
+            ..TrackerConfig::default()
+        };
         let calibration = Calibration::registered(Intrinsics::KINECT_V1);
         let model = TrackerModel::new(crate::body::embedded::template(), calibration, config);
         let rest = model.template.personalise(&Default::default());
@@ -120,10 +164,19 @@ mod tests {
             let root = bones.joints[limb.root];
             let outward = (root - bones.joints[0]).x.signum();
             let is_arm = root.y < bones.joints[0].y;
-            let offset = if is_arm { Vector3::new(outward * 0.35, 0.2, -0.2) } else { Vector3::new(0.0, 0.6, -0.3) };
+            let offset = if is_arm {
+                Vector3::new(outward * 0.35, 0.2, -0.2)
+            } else {
+                Vector3::new(0.0, 0.6, -0.3)
+            };
             let target = root + offset;
-            let asked =
-                root + offset * 0.5 + if is_arm { Vector3::new(0.0, 0.2, 0.1) } else { Vector3::new(0.0, 0.0, -0.3) };
+            let asked = root
+                + offset * 0.5
+                + if is_arm {
+                    Vector3::new(0.0, 0.2, 0.1)
+                } else {
+                    Vector3::new(0.0, 0.0, -0.3)
+                };
             let mut found = pose.clone();
             limb.reach(&model, &rest, &mut found, &target, Some(&asked));
             let mut now = BoneTransforms::default();
@@ -136,7 +189,12 @@ mod tests {
                 v - line * line.dot(&v)
             };
             let (is, should) = (across(now.joints[limb.hinge]), across(asked));
-            assert!(is.norm() > 0.02 && is.angle(&should) < 0.35, "{}: {} rad", limb.root, is.angle(&should));
+            assert!(
+                is.norm() > 0.02 && is.angle(&should) < 0.35,
+                "{}: {} rad",
+                limb.root,
+                is.angle(&should)
+            );
             // Out of reach: stretched towards it, nothing breaks.
             let far = root + offset * 5.0;
             limb.reach(&model, &rest, &mut found, &far, None);

@@ -66,18 +66,33 @@ impl TrackerModel {
         let samples = choose_samples(template.mesh().vertices(), config.samples);
         let pick = |i: &u32| *i as usize;
         let weights = SkinWeights {
-            joints: samples.iter().map(|i| template.weights().joints[pick(i)]).collect(),
-            weights: samples.iter().map(|i| template.weights().weights[pick(i)]).collect(),
+            joints: samples
+                .iter()
+                .map(|i| template.weights().joints[pick(i)])
+                .collect(),
+            weights: samples
+                .iter()
+                .map(|i| template.weights().weights[pick(i)])
+                .collect(),
         };
-        let bones = samples.iter().map(|i| template.weights().dominant(pick(i)) as u8).collect();
+        let bones = samples
+            .iter()
+            .map(|i| template.weights().dominant(pick(i)) as u8)
+            .collect();
         let spacing = (template.mesh().area() / samples.len().max(1) as f64).sqrt() as f32;
         let mut directions = Vec::new();
         if let Some(space) = template.shape_space() {
-            directions.extend(space.vertices.iter().zip(&space.joints).map(|(v, j)| Direction {
-                samples: samples.iter().map(|i| v[pick(i)]).collect(),
-                joints: j.clone(),
-                bone: None,
-            }));
+            directions.extend(
+                space
+                    .vertices
+                    .iter()
+                    .zip(&space.joints)
+                    .map(|(v, j)| Direction {
+                        samples: samples.iter().map(|i| v[pick(i)]).collect(),
+                        joints: j.clone(),
+                        bone: None,
+                    }),
+            );
         }
         let first = directions.len();
         directions.extend(bone_directions(&template, &samples, &weights));
@@ -88,9 +103,13 @@ impl TrackerModel {
         let legs = limb::legs(&template);
         let parts = calm::parts(&template);
         let below_knee = |name: &str| ["knee", "ankle", "foot"].iter().any(|s| name.contains(s));
-        let below_knee =
-            skeleton.joints().iter().flat_map(|j| std::iter::repeat_n(below_knee(&j.name), j.motion.dofs())).collect();
-        let share = |j: &crate::body::Joint| std::iter::repeat_n(seen_share(&j.name), j.motion.dofs());
+        let below_knee = skeleton
+            .joints()
+            .iter()
+            .flat_map(|j| std::iter::repeat_n(below_knee(&j.name), j.motion.dofs()))
+            .collect();
+        let share =
+            |j: &crate::body::Joint| std::iter::repeat_n(seen_share(&j.name), j.motion.dofs());
         let seen_shares = skeleton.joints().iter().flat_map(share).collect();
         Self {
             template,
@@ -135,7 +154,11 @@ fn choose_samples(vertices: &[P3], wanted: usize) -> Vec<u32> {
         let mut cells: BTreeMap<[i32; 3], (f32, u32)> = BTreeMap::new();
         for (i, v) in vertices.iter().enumerate() {
             let key = [v.x, v.y, v.z].map(|c| (c / size).floor() as i32);
-            let middle = P3::new(key[0] as f32 + 0.5, key[1] as f32 + 0.5, key[2] as f32 + 0.5) * size;
+            let middle = P3::new(
+                key[0] as f32 + 0.5,
+                key[1] as f32 + 0.5,
+                key[2] as f32 + 0.5,
+            ) * size;
             let d = (v - middle).norm_squared();
             let best = cells.entry(key).or_insert((d, i as u32));
             if d < best.0 {
@@ -147,7 +170,11 @@ fn choose_samples(vertices: &[P3], wanted: usize) -> Vec<u32> {
     let (mut fine, mut coarse) = (0.002f32, 0.2f32);
     for _ in 0..12 {
         let size = (fine * coarse).sqrt();
-        if pick(size).len() > wanted { fine = size } else { coarse = size }
+        if pick(size).len() > wanted {
+            fine = size
+        } else {
+            coarse = size
+        }
     }
     pick(coarse)
 }
@@ -160,15 +187,27 @@ fn bone_directions(template: &Template, samples: &[u32], weights: &SkinWeights) 
     let mut out = Vec::new();
     for (m, joint) in joints.iter().enumerate() {
         // End points have no skin of their own; their bones follow by displacement and shape.
-        let Some(parent) = joint.parent.filter(|_| joint.motion != JointMotion::Fixed) else { continue };
+        let Some(parent) = joint.parent.filter(|_| joint.motion != JointMotion::Fixed) else {
+            continue;
+        };
         let bone = rest[m] - rest[parent];
-        let moved: Vec<Vector3<f64>> =
-            (0..joints.len()).map(|j| if skeleton.is_ancestor(m, j) { bone } else { Vector3::zeros() }).collect();
+        let moved: Vec<Vector3<f64>> = (0..joints.len())
+            .map(|j| {
+                if skeleton.is_ancestor(m, j) {
+                    bone
+                } else {
+                    Vector3::zeros()
+                }
+            })
+            .collect();
         let offset = |s: usize| {
             let v = template.mesh().vertices()[samples[s] as usize].cast::<f64>();
             let mut sum = Vector3::zeros();
             for k in 0..4 {
-                let (j, w) = (usize::from(weights.joints[s][k]), f64::from(weights.weights[s][k]));
+                let (j, w) = (
+                    usize::from(weights.joints[s][k]),
+                    f64::from(weights.weights[s][k]),
+                );
                 let mut foot = moved[j];
                 if skeleton.primary_child(j) == Some(m) {
                     let t = (v - rest[j]).dot(&bone) / bone.norm_squared().max(f64::MIN_POSITIVE);
@@ -178,20 +217,31 @@ fn bone_directions(template: &Template, samples: &[u32], weights: &SkinWeights) 
             }
             sum.cast::<f32>()
         };
-        out.push(Direction { samples: (0..samples.len()).map(offset).collect(), joints: moved, bone: Some(m) });
+        out.push(Direction {
+            samples: (0..samples.len()).map(offset).collect(),
+            joints: moved,
+            bone: Some(m),
+        });
     }
     out
 }
 
 /// The pairs of eq. 23: left and right (1), and bones that follow each other in a limb (0.5).
-fn tied_bones(template: &Template, directions: &[Direction], first: usize) -> Vec<(usize, usize, f64)> {
+fn tied_bones(
+    template: &Template,
+    directions: &[Direction],
+    first: usize,
+) -> Vec<(usize, usize, f64)> {
     let joints = template.skeleton().joints();
     let of = |j: usize| directions.iter().position(|d| d.bone == Some(j));
     let mut out = Vec::new();
     for (i, d) in directions.iter().enumerate().skip(first) {
         let Some(j) = d.bone else { continue };
         if let Some(part) = joints[j].name.strip_prefix("left_") {
-            let twin = template.skeleton().index(&format!("right_{part}")).and_then(of);
+            let twin = template
+                .skeleton()
+                .index(&format!("right_{part}"))
+                .and_then(of);
             out.extend(twin.map(|k| (i, k, 1.0)));
         }
         out.extend(joints[j].parent.and_then(of).map(|k| (i, k, 0.5)));
@@ -219,7 +269,9 @@ fn stiffness(template: &Template) -> Vec<f64> {
     let mut out = Vec::new();
     for joint in template.skeleton().joints() {
         let name = joint.name.as_str();
-        let stiff = ["spine", "neck", "collar", "wrist", "foot", "hand"].iter().any(|s| name.contains(s));
+        let stiff = ["spine", "neck", "collar", "wrist", "foot", "hand"]
+            .iter()
+            .any(|s| name.contains(s));
         let ankle = name.contains("ankle");
         let weight = if stiff || name.contains("head") {
             2e-5

@@ -33,7 +33,12 @@ const TORSO_FINALISTS: usize = 2;
 
 /// Reads torso, crown and stature off the person's cells. `up` is the unit direction against gravity, `floor` the
 /// camera's height over the floor, metres, where one is known.
-pub(super) fn outline(seen: &Seen<'_>, up: &Vector3<f32>, cut_below: bool, floor: Option<f64>) -> Option<Outline> {
+pub(super) fn outline(
+    seen: &Seen<'_>,
+    up: &Vector3<f32>,
+    cut_below: bool,
+    floor: Option<f64>,
+) -> Option<Outline> {
     let grid = seen.grid;
     let (columns, rows) = grid.size();
     // Chessboard distance to the nearest cell that is not the person; the torso is where it is largest.
@@ -64,7 +69,13 @@ pub(super) fn outline(seen: &Seen<'_>, up: &Vector3<f32>, cut_below: bool, floor
         relax(c, [(1, 0), (0, 1), (1, 1), (-1, 1)]);
     }
     let usable = |c: usize| grid.depth[c] > 0.0;
-    let widest = seen.cells.iter().map(|&c| c as usize).filter(|&c| usable(c)).map(|c| inner[c]).max()?;
+    let widest = seen
+        .cells
+        .iter()
+        .map(|&c| c as usize)
+        .filter(|&c| usable(c))
+        .map(|c| inner[c])
+        .max()?;
     let (mut sum, mut n) = (Vector3::zeros(), 0.0f32);
     for &c in seen.cells {
         let c = c as usize;
@@ -76,22 +87,36 @@ pub(super) fn outline(seen: &Seen<'_>, up: &Vector3<f32>, cut_below: bool, floor
     let torso = P3::from(sum / n.max(1.0));
     let right = up.cross(&Vector3::z()).try_normalize(0.0)?;
     let height = |p: &P3| up.dot(&p.coords);
-    let points = || seen.cells.iter().map(|&c| c as usize).filter(|&c| usable(c)).map(|c| grid.points[c]);
+    let points = || {
+        seen.cells
+            .iter()
+            .map(|&c| c as usize)
+            .filter(|&c| usable(c))
+            .map(|c| grid.points[c])
+    };
     let crown = points()
         .filter(|p| right.dot(&(p - torso)).abs() < HEAD_BESIDE)
         .max_by(|a, b| height(a).total_cmp(&height(b)))?;
     let lowest = points().map(|p| height(&p)).fold(f32::INFINITY, f32::min);
     let seen_height = f64::from(height(&crown) - lowest) + SOLES;
-    let over_floor = floor.map(|f| f64::from(height(&crown)) + f).filter(|h| *h > seen_height - AFLOAT);
+    let over_floor = floor
+        .map(|f| f64::from(height(&crown)) + f)
+        .filter(|h| *h > seen_height - AFLOAT);
     let stature = over_floor.or((!cut_below).then_some(seen_height));
-    Some(Outline { torso, crown, stature })
+    Some(Outline {
+        torso,
+        crown,
+        stature,
+    })
 }
 
 /// Rotation of an upright body that faces the camera, turned by `yaw` about the vertical.
 fn upright(up: &Vector3<f64>, yaw: f64) -> UnitQuaternion<f64> {
     let back = Vector3::z();
     // The body's z points at the camera: camera −z, made level.
-    let z = (-(back - up * up.dot(&back))).try_normalize(f64::EPSILON).unwrap_or_else(|| -Vector3::z());
+    let z = (-(back - up * up.dot(&back)))
+        .try_normalize(f64::EPSILON)
+        .unwrap_or_else(|| -Vector3::z());
     let x = up.cross(&z);
     let m = Matrix3::from_columns(&[x, *up, z]);
     let facing = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(m));
@@ -108,7 +133,10 @@ pub(super) fn place(
     scratch: &mut AlignScratch,
 ) -> Option<(Pose, Fit)> {
     let skeleton = model.template.skeleton();
-    let crown = skeleton.index("head_end").or_else(|| skeleton.index("head")).unwrap_or(0);
+    let crown = skeleton
+        .index("head_end")
+        .or_else(|| skeleton.index("head"))
+        .unwrap_or(0);
     // A lean seen in the principal axes: only a clear one counts, as arms and a cut body bend the axes too.
     let mut best: Vec<(f64, Pose)> = Vec::new();
     for lean in leans(seen, up, outline) {
@@ -117,13 +145,21 @@ pub(super) fn place(
             // The crown fixes the height, the torso the place across, its front the depth.
             let at = |j: usize| rest.0.joints[j].coords;
             let chest = skeleton.index("spine3").unwrap_or(0);
-            let away = outline.torso.coords.cast::<f64>().try_normalize(0.0).unwrap_or_else(Vector3::z);
+            let away = outline
+                .torso
+                .coords
+                .cast::<f64>()
+                .try_normalize(0.0)
+                .unwrap_or_else(Vector3::z);
             let torso = outline.torso.coords.cast::<f64>() + away * HALF_DEPTH;
             let mut t = torso - rotation * at(chest);
             let placed = rotation * at(crown) + t;
             t += lean * (outline.crown.coords.cast::<f64>() - placed).dot(&lean);
             let mut pose = Pose::rest(skeleton, Rigid::from_parts(t, rotation));
-            let rough = Schedule { iterations: 3, ..START };
+            let rough = Schedule {
+                iterations: 3,
+                ..START
+            };
             align(model, rest, &mut pose, seen, &rough, scratch);
             let cost = evaluate(model, rest, &pose, seen, 0.15, scratch).cost;
             best.push((cost, pose));

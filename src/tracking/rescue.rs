@@ -37,7 +37,11 @@ impl Rescue {
     /// Takes note of a frame's fit; true when an arm should be looked for now.
     pub(super) fn due(&mut self, fit: &Fit) -> bool {
         self.wait = self.wait.saturating_sub(1);
-        self.poor = if fit.explained < POOR { self.poor.saturating_add(1) } else { 0 };
+        self.poor = if fit.explained < POOR {
+            self.poor.saturating_add(1)
+        } else {
+            0
+        };
         if self.poor == 0 && self.wait == 0 {
             self.interval = 0;
         }
@@ -61,12 +65,27 @@ impl Rescue {
         let chest = model.template.skeleton().index("spine3").unwrap_or(0);
         let torso = scratch.bones.joints[chest].cast::<f32>();
         let terms = scratch.terms;
-        scratch.terms = super::align::Terms { edge_weight: 0.0, ..START_TERMS };
+        scratch.terms = super::align::Terms {
+            edge_weight: 0.0,
+            ..START_TERMS
+        };
         let mut other = choose_arm(model, rest, pose, seen, side, &ends(seen, &torso), scratch);
         scratch.terms = terms;
-        align(model, rest, &mut other, seen, &Schedule { ahead: 0, ..*schedule }, scratch);
+        align(
+            model,
+            rest,
+            &mut other,
+            seen,
+            &Schedule {
+                ahead: 0,
+                ..*schedule
+            },
+            scratch,
+        );
         let fit = evaluate(model, rest, &other, seen, REACH, scratch);
-        let found = fit.cost < CHEAPER * now.cost && fit.explained > now.explained + EXPLAINS && other.is_finite();
+        let found = fit.cost < CHEAPER * now.cost
+            && fit.explained > now.explained + EXPLAINS
+            && other.is_finite();
         // Both sides have had their turn before the wait grows.
         self.interval = match (found, self.looks.is_multiple_of(2)) {
             (true, _) => WAIT[0],
@@ -87,13 +106,25 @@ mod tests {
 
     #[test]
     fn looks_come_when_needed_and_ever_more_rarely() {
-        let fit = |explained| Fit { explained, ..Fit::default() };
+        let fit = |explained| Fit {
+            explained,
+            ..Fit::default()
+        };
         let mut r = Rescue::default();
-        assert!((0..100).all(|_| !r.due(&fit(0.98))), "a good fit needs no look");
-        assert!(!r.due(&fit(0.9)) && !r.due(&fit(0.9)) && r.due(&fit(0.9)), "at the third poor frame");
+        assert!(
+            (0..100).all(|_| !r.due(&fit(0.98))),
+            "a good fit needs no look"
+        );
+        assert!(
+            !r.due(&fit(0.9)) && !r.due(&fit(0.9)) && r.due(&fit(0.9)),
+            "at the third poor frame"
+        );
         r.wait = 5;
         assert_eq!((0..10).filter(|_| r.due(&fit(0.9))).count(), 6);
         r.interval = 64;
-        assert!(!r.due(&fit(1.0)) && r.interval == 0, "a good frame forgets the waiting");
+        assert!(
+            !r.due(&fit(1.0)) && r.interval == 0,
+            "a good frame forgets the waiting"
+        );
     }
 }

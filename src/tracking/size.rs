@@ -57,9 +57,16 @@ impl SizeEstimate {
         if n == 0 {
             return 0.0;
         }
-        let (reach, sigma) = if keep && self.frames >= SEARCHING { LATER } else { START };
+        let (reach, sigma) = if keep && self.frames >= SEARCHING {
+            LATER
+        } else {
+            START
+        };
         pair(model, rest, pose, seen, reach, 0.0, scratch);
-        let Some((information, gradient)) = frame_information(model, pose, seen, sigma, scratch) else { return 0.0 };
+        let Some((information, gradient)) = frame_information(model, pose, seen, sigma, scratch)
+        else {
+            return 0.0;
+        };
         let now = current(model, shape);
         let evidence = &information * &now + gradient;
         let mut total = information;
@@ -69,7 +76,9 @@ impl SizeEstimate {
             sum += DVector::from_column_slice(&self.evidence) * FADE;
         }
         let frames = 1.0 + FADE * self.weight;
-        let Some(next) = solve(model, &total / frames, &sum / frames) else { return 0.0 };
+        let Some(next) = solve(model, &total / frames, &sum / frames) else {
+            return 0.0;
+        };
         if keep {
             self.frames += 1;
             self.weight = frames;
@@ -78,7 +87,14 @@ impl SizeEstimate {
         }
         store(model, &next, shape);
         (0..n)
-            .map(|d| (next[d] - now[d]).abs() * if model.directions[d].bone.is_some() { 10.0 } else { 1.0 })
+            .map(|d| {
+                (next[d] - now[d]).abs()
+                    * if model.directions[d].bone.is_some() {
+                        10.0
+                    } else {
+                        1.0
+                    }
+            })
             .fold(0.0, f64::max)
     }
 }
@@ -87,10 +103,14 @@ impl SizeEstimate {
 fn current(model: &TrackerModel, shape: &BodyShape) -> DVector<f64> {
     DVector::from_iterator(
         model.directions.len(),
-        model.directions.iter().enumerate().map(|(d, direction)| match direction.bone {
-            None => shape.coefficients.get(d).copied().unwrap_or(0.0),
-            Some(j) => shape.bone_scales.get(j).copied().unwrap_or(1.0) - 1.0,
-        }),
+        model
+            .directions
+            .iter()
+            .enumerate()
+            .map(|(d, direction)| match direction.bone {
+                None => shape.coefficients.get(d).copied().unwrap_or(0.0),
+                Some(j) => shape.bone_scales.get(j).copied().unwrap_or(1.0) - 1.0,
+            }),
     )
 }
 
@@ -113,7 +133,11 @@ fn solve(model: &TrackerModel, mut h: DMatrix<f64>, g: DVector<f64>) -> Option<D
     let deviation = model.config.scale_deviation[usize::from(!has_space)];
     let prior = model.config.shape_prior;
     for (d, direction) in model.directions.iter().enumerate() {
-        h[(d, d)] += if direction.bone.is_some() { prior / (deviation * deviation) } else { prior };
+        h[(d, d)] += if direction.bone.is_some() {
+            prior / (deviation * deviation)
+        } else {
+            prior
+        };
     }
     for &(a, b, weight) in &model.tied {
         let w = TIE * weight;
@@ -138,7 +162,10 @@ fn frame_information(
     let n = model.directions.len();
     let bones = &scratch.bones.bones;
     let centre = scratch.bones.joints[0].coords;
-    let rotations: Vec<_> = bones.iter().map(|b| b.rotation.to_rotation_matrix().into_inner()).collect();
+    let rotations: Vec<_> = bones
+        .iter()
+        .map(|b| b.rotation.to_rotation_matrix().into_inner())
+        .collect();
     // How each bone shifts per unit of each direction: dg_b − R_b dp_b.
     let mut shifts = vec![Vector3::zeros(); n * bones.len()];
     for (d, direction) in model.directions.iter().enumerate() {
@@ -214,30 +241,43 @@ fn frame_information(
     let factor = pp.cholesky()?;
     let reduced = hss * scale - hps.transpose() * factor.solve(&hps);
     let gradient = gs * scale - hps.transpose() * factor.solve(&gp);
-    gradient.iter().chain(reduced.iter()).all(|v| v.is_finite()).then_some((reduced, gradient))
+    gradient
+        .iter()
+        .chain(reduced.iter())
+        .all(|v| v.is_finite())
+        .then_some((reduced, gradient))
 }
 
 /// The most likely shape of a person of this stature (metres from sole to crown): along the shape space if there is
 /// one, else all bones alike.
 pub(super) fn from_stature(model: &TrackerModel, stature: f64) -> BodyShape {
     let template = &model.template;
-    let Some((lo, hi)) = template.mesh().bounds() else { return BodyShape::default() };
+    let Some((lo, hi)) = template.mesh().bounds() else {
+        return BodyShape::default();
+    };
     let own = f64::from(hi.y - lo.y);
     let wanted = stature.clamp(SCALES[0] * own, SCALES[1] * own);
     let mut shape = BodyShape::default();
     let vertices = template.mesh().vertices();
-    let extreme =
-        |sign: f32| (0..vertices.len()).max_by(|&a, &b| (sign * vertices[a].y).total_cmp(&(sign * vertices[b].y)));
+    let extreme = |sign: f32| {
+        (0..vertices.len())
+            .max_by(|&a, &b| (sign * vertices[a].y).total_cmp(&(sign * vertices[b].y)))
+    };
     let gain: Vec<f64> = match (template.shape_space(), extreme(1.0), extreme(-1.0)) {
-        (Some(space), Some(top), Some(sole)) => {
-            space.vertices.iter().map(|v| f64::from(v[top].y - v[sole].y)).collect()
-        }
+        (Some(space), Some(top), Some(sole)) => space
+            .vertices
+            .iter()
+            .map(|v| f64::from(v[top].y - v[sole].y))
+            .collect(),
         _ => Vec::new(),
     };
     let total: f64 = gain.iter().map(|g| g * g).sum();
     if total > f64::EPSILON {
         let factor = (wanted - own) / total;
-        shape.coefficients = gain.iter().map(|g| (g * factor).clamp(-MOST_DEVIATIONS, MOST_DEVIATIONS)).collect();
+        shape.coefficients = gain
+            .iter()
+            .map(|g| (g * factor).clamp(-MOST_DEVIATIONS, MOST_DEVIATIONS))
+            .collect();
     } else {
         shape.bone_scales = vec![wanted / own; model.parents.len()];
     }

@@ -28,9 +28,13 @@ impl Limb {
         let (from, to) = (bones.joints[self.hinge], self.hand(bones));
         let on = |k: &usize| {
             let p = from + (to - from) * (*k as f64 / (ALONG - 1) as f64);
-            let cell = seen.grid.cell_of(&p.cast()).and_then(|(u, v)| seen.grid.cell(u, v));
+            let cell = seen
+                .grid
+                .cell_of(&p.cast())
+                .and_then(|(u, v)| seen.grid.cell(u, v));
             cell.is_some_and(|c| {
-                seen.grid.labels[c] == Label::Person && (f64::from(seen.grid.depth[c]) - p.z).abs() < NEAR
+                seen.grid.labels[c] == Label::Person
+                    && (f64::from(seen.grid.depth[c]) - p.z).abs() < NEAR
             })
         };
         (0..ALONG).filter(on).count() >= SEEN_POINTS
@@ -52,7 +56,9 @@ pub(super) fn assign(
     let mut bones = BoneTransforms::default();
     pose.bones(model.template.skeleton(), rest, &mut bones);
     for (found, arm) in out.iter_mut().zip(&model.arms) {
-        let Some(arm) = arm.as_ref().filter(|a| !a.seen(&bones, seen)) else { continue };
+        let Some(arm) = arm.as_ref().filter(|a| !a.seen(&bones, seen)) else {
+            continue;
+        };
         let shoulder = bones.joints[arm.root];
         let length = arm.length(rest);
         // The other shoulder's hand is not this one's, unless this one's is nearer.
@@ -63,7 +69,11 @@ pub(super) fn assign(
             off < STRETCH * length && off < other
         };
         let near = |h: &P3d| (h - arm.hand(&bones)).norm();
-        let hand = hands.iter().map(|h| h.cast::<f64>()).filter(mine).min_by(|a, b| near(a).total_cmp(&near(b)));
+        let hand = hands
+            .iter()
+            .map(|h| h.cast::<f64>())
+            .filter(mine)
+            .min_by(|a, b| near(a).total_cmp(&near(b)));
         if let Some(hand) = hand {
             if near(&hand) > FOLLOWED {
                 arm.reach(model, rest, pose, &hand, None);
@@ -79,7 +89,9 @@ pub(super) fn hold(model: &TrackerModel, scratch: &mut AlignScratch) {
     let centre = scratch.bones.joints[0].coords;
     let hands = scratch.terms.hands;
     for (arm, hand) in model.arms.iter().zip(hands) {
-        let (Some(arm), Some(hand)) = (arm, hand) else { continue };
+        let (Some(arm), Some(hand)) = (arm, hand) else {
+            continue;
+        };
         let p = arm.hand(&scratch.bones).coords;
         for k in 0..3 {
             let slope = |&a: &usize| scratch.dofs[6 + a].twist.velocity_at(&(p - centre))[k];
@@ -99,14 +111,22 @@ mod tests {
 
     #[test]
     fn an_arm_reaches_for_a_lone_hand_and_leaves_those_of_others() {
-        let config = TrackerConfig { samples: 50, ..TrackerConfig::default() };
+        let config = TrackerConfig {
+            samples: 50,
+            ..TrackerConfig::default()
+        };
         let calibration = Calibration::registered(Intrinsics::KINECT_V1);
         let model = TrackerModel::new(crate::body::embedded::template(), calibration, config);
         let rest = model.template.personalise(&Default::default());
         let pose = TrackerState::new(&model).pose;
         let grid = OrganisedCloud::new(&model.calibration.depth, None);
         let contour = Contour::default();
-        let seen = Seen { grid: &grid, cells: &[], contour: &contour, tree: None };
+        let seen = Seen {
+            grid: &grid,
+            cells: &[],
+            contour: &contour,
+            tree: None,
+        };
         let mut bones = BoneTransforms::default();
         pose.bones(model.template.skeleton(), &rest, &mut bones);
         for side in 0..2 {
@@ -117,7 +137,10 @@ mod tests {
                 let hand = shoulder + Vector3::new(outward * offset[0], offset[1], offset[2]);
                 let mut found = pose.clone();
                 let hands = assign(&model, &rest, &mut found, &seen, &[hand.cast()]);
-                assert!(hands[side].is_some() && hands[1 - side].is_none(), "side {side}: {hands:?}");
+                assert!(
+                    hands[side].is_some() && hands[1 - side].is_none(),
+                    "side {side}: {hands:?}"
+                );
                 let mut now = BoneTransforms::default();
                 found.bones(model.template.skeleton(), &rest, &mut now);
                 let off = (arm.hand(&now) - hand).norm();
@@ -125,7 +148,10 @@ mod tests {
             }
             let far = shoulder + Vector3::new(outward * 1.2, 0.0, 0.0);
             let mut same = pose.clone();
-            assert_eq!(assign(&model, &rest, &mut same, &seen, &[far.cast()]), [None; 2]);
+            assert_eq!(
+                assign(&model, &rest, &mut same, &seen, &[far.cast()]),
+                [None; 2]
+            );
             assert_eq!(same, pose);
         }
     }

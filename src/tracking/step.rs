@@ -1,6 +1,9 @@
 //! One frame (Algorithm 1): segment, place or predict, pose, size, displacements, and what it all means.
 
-use super::align::{ANNEAL, Fit, START, START_TERMS, Schedule, Seen, TRACK, Terms, align, evaluate, limit, wants_tree};
+use super::align::{
+    ANNEAL, Fit, START, START_TERMS, Schedule, Seen, TRACK, Terms, align, evaluate, limit,
+    wants_tree,
+};
 use super::calm::calm;
 use super::confidence::confidence;
 use super::kinematics::{extrapolate, motion};
@@ -11,8 +14,8 @@ use super::sleeve::assign;
 use super::stand::{Feet, Ground, below, tallest, unfold};
 use super::unchanged::Reference;
 use super::{
-    LostReason, SizeEstimate, Skipped, StagesMs, Status, StepError, StepReport, TrackerModel, TrackerState, Workspace,
-    surface,
+    LostReason, SizeEstimate, Skipped, StagesMs, Status, StepError, StepReport, TrackerModel,
+    TrackerState, Workspace, surface,
 };
 use crate::body::{BodyShape, BoneTransforms, Pose};
 use crate::camera::RgbdFrame;
@@ -60,7 +63,10 @@ const ROUNDS: usize = 8;
 /// iterations tell as much as the twenty of a first placement (real still 122 → 95 ms for all of size, same winner).
 const TRIAL_ROUNDS: usize = 2;
 /// See [`TRIAL_ROUNDS`].
-const TRIAL: Schedule = Schedule { iterations: 8, ..START };
+const TRIAL: Schedule = Schedule {
+    iterations: 8,
+    ..START
+};
 const SETTLED: f64 = 0.05;
 /// A first fit with a larger residual (metres) is tried again from higher and lower by [`SHIFT`] (metres), and the best
 /// kept: along an upright body the surface hardly changes, so a fit a hand's width too high can settle there (6.6 mm of
@@ -97,13 +103,19 @@ pub fn step(
     workspace: &mut Workspace,
 ) -> Result<StepReport, StepError> {
     let camera = &model.calibration.depth;
-    let (got, expected) = ((frame.depth.width(), frame.depth.height()), (camera.width, camera.height));
+    let (got, expected) = (
+        (frame.depth.width(), frame.depth.height()),
+        (camera.width, camera.height),
+    );
     if got != expected {
         return Err(StepError::ImageSize { got, expected });
     }
     let dofs = model.template.skeleton().dofs();
     if state.pose.angles.len() != dofs {
-        return Err(StepError::ForeignState { got: state.pose.angles.len(), expected: dofs });
+        return Err(StepError::ForeignState {
+            got: state.pose.angles.len(),
+            expected: dofs,
+        });
     }
     let mut watch = Stopwatch::start();
     let mut stages = StagesMs::default();
@@ -112,7 +124,10 @@ pub fn step(
         return Ok(report);
     }
     state.unchanged = None;
-    let fresh = workspace.grid.take().filter(|g| g.fits(camera, model.config.stride));
+    let fresh = workspace
+        .grid
+        .take()
+        .filter(|g| g.fits(camera, model.config.stride));
     let mut grid = fresh.unwrap_or_else(|| OrganisedCloud::new(camera, model.config.stride));
     state.frames += 1;
     let person = segment(model, state, frame, &mut grid, workspace);
@@ -129,22 +144,39 @@ pub fn step(
         quality: 0.0,
         confidence: Vec::new(),
         pose_age: 0,
-        skipped: Skipped { cells: grid.depth.len() - person.cells.len(), ..Skipped::default() },
+        skipped: Skipped {
+            cells: grid.depth.len() - person.cells.len(),
+            ..Skipped::default()
+        },
         stages_ms: stages,
     };
     let nobody = person.cells.len() < LEAST_CELLS;
     if nobody {
         lose(state, LostReason::NoPerson);
     } else {
-        follow(model, state, frame, &grid, &person, workspace, &mut report, &mut watch);
+        follow(
+            model,
+            state,
+            frame,
+            &grid,
+            &person,
+            workspace,
+            &mut report,
+            &mut watch,
+        );
     }
     report.status = state.status;
     report.pose_age = state.pose_age;
     if model.config.skip_unchanged {
         state.unchanged = if nobody {
-            Some(Reference::of_all(&frame.depth, NOBODY_STEP * grid.stride(), &report))
+            Some(Reference::of_all(
+                &frame.depth,
+                NOBODY_STEP * grid.stride(),
+                &report,
+            ))
         } else {
-            still(model, state).then(|| Reference::of_cells(&frame.depth, &grid, &person.cells, &report))
+            still(model, state)
+                .then(|| Reference::of_cells(&frame.depth, &grid, &person.cells, &report))
         };
     }
     workspace.grid = Some(grid);
@@ -169,8 +201,14 @@ fn kept(state: &mut TrackerState, frame: &RgbdFrame) -> Option<StepReport> {
 
 /// The person stands still in a settled pose, so that a picture like this one would be answered by it. Counts for how long.
 fn still(model: &TrackerModel, state: &mut TrackerState) -> bool {
-    let moved = state.before.as_ref().map_or(f64::MAX, |b| motion(model.template.skeleton(), b, &state.pose));
-    state.still = if moved < RESTLESS { state.still.saturating_add(1) } else { 0 };
+    let moved = state.before.as_ref().map_or(f64::MAX, |b| {
+        motion(model.template.skeleton(), b, &state.pose)
+    });
+    state.still = if moved < RESTLESS {
+        state.still.saturating_add(1)
+    } else {
+        0
+    };
     state.status == Status::Tracking
         && state.calibrated(&model.config)
         && state.bad_frames == 0
@@ -197,7 +235,10 @@ fn segment(
             state.set_scene(scene);
         }
     }
-    let prior = state.status.is_live().then_some(Prior { centre: state.centre, reach: REACH });
+    let prior = state.status.is_live().then_some(Prior {
+        centre: state.centre,
+        reach: REACH,
+    });
     let mut person = find_person(grid, &state.scene, prior, &mut workspace.segment);
     if person.cells.len() >= LEAST_CELLS {
         grid.refine(&frame.depth, &person.cells);
@@ -229,17 +270,33 @@ fn follow(
     watch: &mut Stopwatch,
 ) {
     let skeleton = model.template.skeleton();
-    let points: Vec<P3> =
-        if wants_tree(model) { person.cells.iter().map(|&c| grid.points[c as usize]).collect() } else { Vec::new() };
+    let points: Vec<P3> = if wants_tree(model) {
+        person
+            .cells
+            .iter()
+            .map(|&c| grid.points[c as usize])
+            .collect()
+    } else {
+        Vec::new()
+    };
     let tree = wants_tree(model).then(|| PointTree::new(&points));
     let outline_of_person = std::mem::take(&mut workspace.contour);
-    let seen = Seen { grid, cells: &person.cells, contour: &outline_of_person, tree: tree.as_ref() };
+    let seen = Seen {
+        grid,
+        cells: &person.cells,
+        contour: &outline_of_person,
+        tree: tree.as_ref(),
+    };
     workspace.align.pairing.forget();
     let up = state.world_from_camera.inverse().vector(&Vector3::y());
     let searching = !state.status.is_live();
     let mut pose = state.pose.clone();
     let mut fine = false;
-    workspace.align.terms = if searching { START_TERMS } else { Terms::tracking(&model.config) };
+    workspace.align.terms = if searching {
+        START_TERMS
+    } else {
+        Terms::tracking(&model.config)
+    };
 
     if !searching && model.config.standing {
         workspace.rest_body(model, &state.shape);
@@ -248,22 +305,32 @@ fn follow(
         } else {
             state.tallest.and_then(|t| below(model, &workspace.rest, t))
         };
-        workspace.align.terms.ground = height.map(|height| Ground { up, height, feet: state.feet });
+        workspace.align.terms.ground = height.map(|height| Ground {
+            up,
+            height,
+            feet: state.feet,
+        });
     }
     if searching {
         if state.pose_age > FORGET {
             state.reset(model);
         }
         // Over a floor the crown tells the stature, whether the feet are in view or not.
-        let floor = state.floor_known.then(|| state.world_from_camera.iso().translation.vector.y);
+        let floor = state
+            .floor_known
+            .then(|| state.world_from_camera.iso().translation.vector.y);
         let first_look = outline(&seen, &up.cast(), person.cut_below, floor);
-        let stature = first_look.and_then(|o| o.stature).filter(|s| (1.3..2.2).contains(s));
-        if let Some(stature) = stature.filter(|_| state.size.frames == 0 && model.config.adapt_size) {
+        let stature = first_look
+            .and_then(|o| o.stature)
+            .filter(|s| (1.3..2.2).contains(s));
+        if let Some(stature) = stature.filter(|_| state.size.frames == 0 && model.config.adapt_size)
+        {
             state.shape = from_stature(model, stature);
         }
         workspace.rest_body(model, &state.shape);
         let rest = (&workspace.rest, &workspace.samples);
-        let placed = first_look.and_then(|o| place(model, rest, &seen, &o, &up, &mut workspace.align));
+        let placed =
+            first_look.and_then(|o| place(model, rest, &seen, &o, &up, &mut workspace.align));
         report.stages_ms.place = watch.lap();
         match placed {
             Some((p, fit)) if fit.explained >= LEAST_EXPLAINED => pose = p,
@@ -280,8 +347,16 @@ fn follow(
         let rest = (&workspace.rest, &workspace.samples);
         // Constant velocity, but only where it explains the frame as well as the last pose did its own, or better than
         // standing still.
-        let mut look =
-            |pose: &Pose<Camera>| evaluate(model, rest, pose, &seen, TRACK.distance[0], &mut workspace.align);
+        let mut look = |pose: &Pose<Camera>| {
+            evaluate(
+                model,
+                rest,
+                pose,
+                &seen,
+                TRACK.distance[0],
+                &mut workspace.align,
+            )
+        };
         let [explained, residual] = state.quality;
         let as_good = |fit: &Fit| {
             model.config.skip_coarse
@@ -290,9 +365,13 @@ fn follow(
                 && fit.residual < AS_GOOD_RESIDUAL[0] * residual + AS_GOOD_RESIDUAL[1]
         };
         let moving = |before: &&Pose<Camera>| motion(skeleton, before, &pose) > STILL;
-        let before = state.before.as_ref().filter(|_| model.config.predict && state.interval_ns > 0);
+        let before = state
+            .before
+            .as_ref()
+            .filter(|_| model.config.predict && state.interval_ns > 0);
         let guess = before.filter(moving).map(|before| {
-            let ahead = frame.time_ns.saturating_sub(state.time_ns) as f64 / state.interval_ns as f64;
+            let ahead =
+                frame.time_ns.saturating_sub(state.time_ns) as f64 / state.interval_ns as f64;
             extrapolate(skeleton, before, &pose, AHEAD * ahead.min(FARTHEST_AHEAD))
         });
         match guess {
@@ -311,7 +390,8 @@ fn follow(
 
     let expected = (!searching && model.config.calm > 0.0).then(|| state.pose.clone());
     if !person.hands.is_empty() {
-        workspace.align.terms.hands = assign(model, &workspace.rest, &mut pose, &seen, &person.hands);
+        workspace.align.terms.hands =
+            assign(model, &workspace.rest, &mut pose, &seen, &person.hands);
     }
 
     // Pose; at the start alternating with size until both have settled (Algorithm 1).
@@ -320,14 +400,34 @@ fn follow(
     schedule.ahead = if fine { ANNEAL } else { 0 };
     report.skipped.coarse_iterations = schedule.ahead;
     let rest = (&workspace.rest, &workspace.samples);
-    let mut fit =
-        align(model, rest, &mut pose, &seen, if searching { &START } else { &schedule }, &mut workspace.align);
+    let mut fit = align(
+        model,
+        rest,
+        &mut pose,
+        &seen,
+        if searching { &START } else { &schedule },
+        &mut workspace.align,
+    );
     if let Some(ground) = workspace.align.terms.ground {
-        unfold(model, &workspace.rest, grid, &ground, &workspace.align, &mut pose);
+        unfold(
+            model,
+            &workspace.rest,
+            grid,
+            &ground,
+            &workspace.align,
+            &mut pose,
+        );
     }
     report.stages_ms.pose = watch.lap();
     if model.config.rescue && !searching && state.rescue.due(&fit) {
-        let found = state.rescue.look(model, rest, &mut pose, &seen, &schedule, &mut workspace.align);
+        let found = state.rescue.look(
+            model,
+            rest,
+            &mut pose,
+            &seen,
+            &schedule,
+            &mut workspace.align,
+        );
         fit = found.unwrap_or(fit);
         report.stages_ms.place = watch.lap();
     }
@@ -335,7 +435,15 @@ fn follow(
     if good && !state.calibrated(&model.config) {
         if state.size.frames == 0 {
             let start = (state.size.clone(), state.shape.clone(), pose.clone());
-            let mut best = settle(model, start.clone(), &seen, &schedule, ROUNDS, person.cut_below, workspace);
+            let mut best = settle(
+                model,
+                start.clone(),
+                &seen,
+                &schedule,
+                ROUNDS,
+                person.cut_below,
+                workspace,
+            );
             if best.3.residual > WELL_FITTED {
                 let half = person.cut_below;
                 let trials = [-SHIFT, SHIFT].map(|shift| {
@@ -343,16 +451,35 @@ fn follow(
                     other.2.root = Rigid::new(Translation3::from(up * shift) * other.2.root.iso());
                     settle(model, other, &seen, &TRIAL, TRIAL_ROUNDS, half, workspace)
                 });
-                let better = trials.into_iter().filter(|t| t.4 < best.4).min_by(|a, b| a.4.total_cmp(&b.4));
+                let better = trials
+                    .into_iter()
+                    .filter(|t| t.4 < best.4)
+                    .min_by(|a, b| a.4.total_cmp(&b.4));
                 if let Some((size, shape, pose, ..)) = better {
-                    best = settle(model, (size, shape, pose), &seen, &schedule, ROUNDS, false, workspace);
+                    best = settle(
+                        model,
+                        (size, shape, pose),
+                        &seen,
+                        &schedule,
+                        ROUNDS,
+                        false,
+                        workspace,
+                    );
                 }
             }
             (state.size, state.shape, pose, fit, _) = best;
             workspace.rest_body(model, &state.shape);
         }
         let rest = (&workspace.rest, &workspace.samples);
-        state.size.observe(model, rest, &pose, &seen, &mut state.shape, &mut workspace.align, true);
+        state.size.observe(
+            model,
+            rest,
+            &pose,
+            &seen,
+            &mut state.shape,
+            &mut workspace.align,
+            true,
+        );
         workspace.rest_body(model, &state.shape);
         report.stages_ms.size = watch.lap();
     }
@@ -377,7 +504,14 @@ fn follow(
         return;
     }
     if let Some(expected) = expected.filter(|_| good) {
-        pose = calm(model, &workspace.rest, &expected, &pose, model.config.calm * fit.residual, &mut state.drift);
+        pose = calm(
+            model,
+            &workspace.rest,
+            &expected,
+            &pose,
+            model.config.calm * fit.residual,
+            &mut state.drift,
+        );
     }
     state.bad_frames = if good { 0 } else { state.bad_frames + 1 };
     if state.bad_frames > PATIENCE {
@@ -388,8 +522,16 @@ fn follow(
     let root = model.template.skeleton().joints()[0].rest;
     let moved = (pose.root.point(&root) - state.pose.root.point(&root)).norm();
     report.confidence = confidence(model, &pose, &seen, &workspace.align);
-    state.steady = if !searching && moved < STEADY_MOTION { state.steady.saturating_add(1) } else { 0 };
-    state.calibration_age = if searching { 0 } else { state.calibration_age.saturating_add(1) };
+    state.steady = if !searching && moved < STEADY_MOTION {
+        state.steady.saturating_add(1)
+    } else {
+        0
+    };
+    state.calibration_age = if searching {
+        0
+    } else {
+        state.calibration_age.saturating_add(1)
+    };
     state.before = (!searching).then(|| std::mem::replace(&mut state.pose, pose.clone()));
     state.pose = pose;
     state.interval_ns = frame.time_ns.saturating_sub(state.time_ns);
@@ -397,10 +539,15 @@ fn follow(
     state.pose_age = 0;
     state.centre = centre_of(grid, &person.cells);
     state.quality = [fit.explained, fit.residual];
-    let settling =
-        state.status != Status::Tracking && state.steady < STEADY_FRAMES && state.calibration_age < LONGEST_CALIBRATION;
+    let settling = state.status != Status::Tracking
+        && state.steady < STEADY_FRAMES
+        && state.calibration_age < LONGEST_CALIBRATION;
     let calibrating = model.config.adapt_size && (state.size.frames < CALIBRATING || settling);
-    state.status = if calibrating { Status::Calibrating } else { Status::Tracking };
+    state.status = if calibrating {
+        Status::Calibrating
+    } else {
+        Status::Tracking
+    };
 
     state.tallest = tallest(model, &up, state.tallest, &workspace.align);
     let mut bones = BoneTransforms::default();
@@ -413,7 +560,15 @@ fn follow(
     *interval = (*interval).max(model.config.displacement_interval.max(1));
     if good && model.config.displacements && !calibrating && *wait == 0 {
         let rest = (&workspace.rest, &workspace.samples);
-        super::align::pair(model, rest, &state.pose, &seen, 0.05, 0.0, &mut workspace.align);
+        super::align::pair(
+            model,
+            rest,
+            &state.pose,
+            &seen,
+            0.05,
+            0.0,
+            &mut workspace.align,
+        );
         let (updated, change) = surface::fit(
             model,
             &workspace.rest,
@@ -427,8 +582,11 @@ fn follow(
         report.skipped.displacements = state.shape.displacements.len() - updated;
         // What hardly changed is looked at half as often, what changed as often as configured.
         let settled = model.config.skip_settled && change < SETTLED_DISPLACEMENT;
-        *interval =
-            if settled { (*interval * 2).min(LONGEST_INTERVAL) } else { model.config.displacement_interval.max(1) };
+        *interval = if settled {
+            (*interval * 2).min(LONGEST_INTERVAL)
+        } else {
+            model.config.displacement_interval.max(1)
+        };
         *wait = *interval;
         report.stages_ms.surface = watch.lap();
     }
@@ -451,10 +609,21 @@ fn settle(
     let mut fit = align(model, rest, &mut pose, seen, schedule, &mut workspace.align);
     // Once size and pose know of each other, neither kernel nor reach need to shrink anew; but what is seen of half a
     // body says so little about size that its pose had better stay free (5 mm on waist-up scenes).
-    let near = Schedule { ahead: if half { schedule.ahead } else { ANNEAL }, ..*schedule };
+    let near = Schedule {
+        ahead: if half { schedule.ahead } else { ANNEAL },
+        ..*schedule
+    };
     for _ in 0..rounds {
         let rest = (&workspace.rest, &workspace.samples);
-        let change = size.observe(model, rest, &pose, seen, &mut shape, &mut workspace.align, false);
+        let change = size.observe(
+            model,
+            rest,
+            &pose,
+            seen,
+            &mut shape,
+            &mut workspace.align,
+            false,
+        );
         workspace.sketch(model, &shape);
         let rest = (&workspace.rest, &workspace.samples);
         fit = align(model, rest, &mut pose, seen, &near, &mut workspace.align);
@@ -464,11 +633,21 @@ fn settle(
     }
     workspace.rest_body(model, &shape);
     let rest = (&workspace.rest, &workspace.samples);
-    let cost = evaluate(model, rest, &pose, seen, TRACK.distance[0], &mut workspace.align).cost;
+    let cost = evaluate(
+        model,
+        rest,
+        &pose,
+        seen,
+        TRACK.distance[0],
+        &mut workspace.align,
+    )
+    .cost;
     (size, shape, pose, fit, cost)
 }
 
 fn centre_of(grid: &OrganisedCloud, cells: &[u32]) -> P3 {
-    let sum = cells.iter().fold(Vector3::zeros(), |s, &c| s + grid.points[c as usize].coords.cast::<f64>());
+    let sum = cells.iter().fold(Vector3::zeros(), |s, &c| {
+        s + grid.points[c as usize].coords.cast::<f64>()
+    });
     P3::from((sum / cells.len().max(1) as f64).cast::<f32>())
 }

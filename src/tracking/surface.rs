@@ -73,8 +73,11 @@ pub(super) fn fit(
     statistics.spread.resize(n, 0.0);
     let weights = template.weights();
     skin(Par::Seq, &rest.base, weights, bones, &mut s.posed);
-    let rotations: Vec<_> =
-        bones.bones.iter().map(|b| b.rotation.to_rotation_matrix().into_inner().cast::<f32>()).collect();
+    let rotations: Vec<_> = bones
+        .bones
+        .iter()
+        .map(|b| b.rotation.to_rotation_matrix().into_inner().cast::<f32>())
+        .collect();
     s.target.clear();
     s.target.resize(n, 0.0);
     s.weight.clear();
@@ -86,7 +89,13 @@ pub(super) fn fit(
         if normal.dot(&p.coords) > -GRAZING * p.coords.norm() {
             continue;
         }
-        let Some(cell) = seen.grid.cell_of(&p).and_then(|(u, v)| seen.grid.cell(u, v)) else { continue };
+        let Some(cell) = seen
+            .grid
+            .cell_of(&p)
+            .and_then(|(u, v)| seen.grid.cell(u, v))
+        else {
+            continue;
+        };
         let usable = seen.grid.labels[cell] == Label::Person && !seen.contour.false_edges[cell];
         if !usable || p.z > image.depth[cell] + HIDDEN {
             continue;
@@ -106,7 +115,11 @@ pub(super) fn fit(
     }
     s.before.clone_from(displacements);
     solve(model, rest, displacements, statistics, s);
-    let change: f32 = displacements.iter().zip(&s.before).map(|(a, b)| (a - b) * (a - b)).sum();
+    let change: f32 = displacements
+        .iter()
+        .zip(&s.before)
+        .map(|(a, b)| (a - b) * (a - b))
+        .sum();
     statistics.count += 1;
     let count = statistics.count as f32;
     for i in 0..n {
@@ -122,14 +135,21 @@ fn dot(a: &[f32], b: &[f32]) -> f64 {
     a.iter().zip(b).map(|(x, y)| f64::from(x * y)).sum()
 }
 
-fn solve(model: &TrackerModel, rest: &RestBody, d: &mut [f32], statistics: &SurfaceStatistics, s: &mut SurfaceScratch) {
+fn solve(
+    model: &TrackerModel,
+    rest: &RestBody,
+    d: &mut [f32],
+    statistics: &SurfaceStatistics,
+    s: &mut SurfaceScratch,
+) {
     let n = d.len();
     let neighbours = model.template.topology().vertex_neighbours();
     let temporal = |i: usize| {
         if statistics.count < TEMPORAL_FROM {
             return 0.0;
         }
-        let variance = statistics.spread[i] / statistics.count as f32 + LEAST_DEVIATION * LEAST_DEVIATION;
+        let variance =
+            statistics.spread[i] / statistics.count as f32 + LEAST_DEVIATION * LEAST_DEVIATION;
         TEMPORAL * UNIT_DEVIATION * UNIT_DEVIATION / variance
     };
     s.diagonal.clear();
@@ -137,21 +157,39 @@ fn solve(model: &TrackerModel, rest: &RestBody, d: &mut [f32], statistics: &Surf
         s.diagonal.push(s.weight[i] + temporal(i) + RIDGE);
     }
     // b = ω t + temporal μ; r = b − A d.
-    apply(neighbours, &rest.normals, &s.diagonal, d, &mut s.laplacian, &mut s.image);
+    apply(
+        neighbours,
+        &rest.normals,
+        &s.diagonal,
+        d,
+        &mut s.laplacian,
+        &mut s.image,
+    );
     s.residual.clear();
     for i in 0..n {
         let b = s.weight[i] * s.target[i] + temporal(i) * statistics.mean[i];
         s.residual.push(b - s.image[i]);
     }
     // Jacobi: the Laplacian's own diagonal is about 1 + 1/deg, the spatial term's is deg.
-    let jacobi: Vec<f32> =
-        (0..n).map(|i| 1.0 / (s.diagonal[i] + SPATIAL * neighbours.row(i).len() as f32 + LAPLACIAN * 1.17)).collect();
+    let jacobi: Vec<f32> = (0..n)
+        .map(|i| {
+            1.0 / (s.diagonal[i] + SPATIAL * neighbours.row(i).len() as f32 + LAPLACIAN * 1.17)
+        })
+        .collect();
     s.preconditioned.clear();
-    s.preconditioned.extend(s.residual.iter().zip(&jacobi).map(|(r, m)| r * m));
+    s.preconditioned
+        .extend(s.residual.iter().zip(&jacobi).map(|(r, m)| r * m));
     s.direction.clone_from(&s.preconditioned);
     let mut rz = dot(&s.residual, &s.preconditioned);
     for _ in 0..ITERATIONS {
-        apply(neighbours, &rest.normals, &s.diagonal, &s.direction, &mut s.laplacian, &mut s.image);
+        apply(
+            neighbours,
+            &rest.normals,
+            &s.diagonal,
+            &s.direction,
+            &mut s.laplacian,
+            &mut s.image,
+        );
         let curvature = dot(&s.direction, &s.image);
         if curvature <= 0.0 || rz <= 0.0 {
             break;

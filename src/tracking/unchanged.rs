@@ -45,35 +45,64 @@ impl Reference {
     }
 
     /// The blocks that hold any of a grid's `cells`, and those beside them.
-    pub(super) fn of_cells(image: &DepthImage, grid: &OrganisedCloud, cells: &[u32], report: &StepReport) -> Self {
+    pub(super) fn of_cells(
+        image: &DepthImage,
+        grid: &OrganisedCloud,
+        cells: &[u32],
+        report: &StepReport,
+    ) -> Self {
         let (step, grid_columns) = (grid.stride(), grid.size().0 as u32);
         let [columns, rows] = size(image, step);
         let mut counts = vec![false; (columns * rows) as usize];
         for &cell in cells {
-            let (c, r) = (cell % grid_columns / BLOCK as u32, cell / grid_columns / BLOCK as u32);
+            let (c, r) = (
+                cell % grid_columns / BLOCK as u32,
+                cell / grid_columns / BLOCK as u32,
+            );
             for r in r.saturating_sub(1)..(r + 2).min(rows) {
                 for c in c.saturating_sub(1)..(c + 2).min(columns) {
                     counts[(r * columns + c) as usize] = true;
                 }
             }
         }
-        let blocks = (0..columns * rows).filter(|b| counts[*b as usize]).collect();
+        let blocks = (0..columns * rows)
+            .filter(|b| counts[*b as usize])
+            .collect();
         Self::new(image, step, columns, blocks, report)
     }
 
-    fn new(image: &DepthImage, step: u32, columns: u32, blocks: Vec<u32>, report: &StepReport) -> Self {
+    fn new(
+        image: &DepthImage,
+        step: u32,
+        columns: u32,
+        blocks: Vec<u32>,
+        report: &StepReport,
+    ) -> Self {
         let mut readings = Vec::with_capacity(blocks.len() * AREA);
         for &block in &blocks {
             samples(image, step, columns, block, |d| readings.push(d));
         }
         // Times are of that frame alone, and no part of a state.
-        let report = StepReport { stages_ms: StagesMs::default(), ..report.clone() };
-        Self { step, columns, blocks, readings, kept: 0, report }
+        let report = StepReport {
+            stages_ms: StagesMs::default(),
+            ..report.clone()
+        };
+        Self {
+            step,
+            columns,
+            blocks,
+            readings,
+            kept: 0,
+            report,
+        }
     }
 
     /// The report of the frame this was made of, when `image` shows the same but for noise. Counts what it keeps.
     pub(super) fn keep(&mut self, image: &DepthImage) -> Option<&StepReport> {
-        if self.kept >= MOST_KEPT || self.columns != size(image, self.step)[0] || self.changed(image) {
+        if self.kept >= MOST_KEPT
+            || self.columns != size(image, self.step)[0]
+            || self.changed(image)
+        {
             return None;
         }
         self.kept += 1;
@@ -122,7 +151,10 @@ fn size(image: &DepthImage, step: u32) -> [u32; 2] {
 /// The readings of one block, millimetres, in the middle of their cells.
 fn samples(image: &DepthImage, step: u32, columns: u32, block: u32, mut f: impl FnMut(u16)) {
     let (step, width) = (step.max(1) as usize, image.width() as usize);
-    let (row, column) = ((block / columns) as usize * BLOCK, (block % columns) as usize * BLOCK);
+    let (row, column) = (
+        (block / columns) as usize * BLOCK,
+        (block % columns) as usize * BLOCK,
+    );
     for row in row..row + BLOCK {
         let start = (row * step + step / 2) * width + column * step + step / 2;
         let line = image.data().get(start..).unwrap_or_default();
@@ -165,9 +197,18 @@ mod tests {
         for v in 0..HEIGHT {
             for u in 0..WIDTH {
                 let body = (left..left + 60).contains(&u) && v > 10;
-                let z = if body { 2000.0 + nearer } else { 3000.0 + u as f32 };
-                let noise: f32 = (0..4).map(|_| rng.random_range(-1.0f32..1.0)).sum::<f32>() * (0.75f32).sqrt();
-                data.push(if rng.random_bool(lost) { 0 } else { (z + v as f32 + sigma * noise).round() as u16 });
+                let z = if body {
+                    2000.0 + nearer
+                } else {
+                    3000.0 + u as f32
+                };
+                let noise: f32 =
+                    (0..4).map(|_| rng.random_range(-1.0f32..1.0)).sum::<f32>() * (0.75f32).sqrt();
+                data.push(if rng.random_bool(lost) {
+                    0
+                } else {
+                    (z + v as f32 + sigma * noise).round() as u16
+                });
             }
         }
         DepthImage::new(WIDTH, HEIGHT, data).expect("size")
@@ -182,10 +223,17 @@ mod tests {
                 reference.changed(&picture(frame, sigma, lost, nearer, left))
             };
             let noisy = (1..40).filter(|f| seen(*f, 0.0, 40)).count();
-            assert!(noisy <= 1, "{noisy} of 39 pictures of a still body count as changed at {sigma} mm");
+            assert!(
+                noisy <= 1,
+                "{noisy} of 39 pictures of a still body count as changed at {sigma} mm"
+            );
             // As far as the spread of a block's mean lets a camera see it.
             let far = DEAD + 2.0 * sigma / BLOCK as f32;
-            assert!(seen(50, 3.0 * far, 40), "{} mm nearer at {sigma} mm", 3.0 * far);
+            assert!(
+                seen(50, 3.0 * far, 40),
+                "{} mm nearer at {sigma} mm",
+                3.0 * far
+            );
             let sides = (seen(51, 0.0, 44), seen(52, 0.0, 36));
             assert_eq!(sides, (true, true), "two cells to the side at {sigma} mm");
         }
@@ -208,16 +256,25 @@ mod tests {
     fn a_picture_is_gone_through_now_and_then_and_only_what_counts_is_compared() {
         let first = picture(0, 3.0, 0.0, 0.0, 40);
         let mut reference = Reference::of_all(&first, 2, &report());
-        let kept = (1..=MOST_KEPT + 3).filter(|_| reference.keep(&first).is_some()).count();
+        let kept = (1..=MOST_KEPT + 3)
+            .filter(|_| reference.keep(&first).is_some())
+            .count();
         assert_eq!(kept as u32, MOST_KEPT);
-        let camera = crate::camera::Intrinsics { width: WIDTH, height: HEIGHT, ..crate::camera::Intrinsics::KINECT_V1 };
+        let camera = crate::camera::Intrinsics {
+            width: WIDTH,
+            height: HEIGHT,
+            ..crate::camera::Intrinsics::KINECT_V1
+        };
         let grid = OrganisedCloud::new(&camera, Some(2));
         let cell = 30 * (WIDTH / 2) + 36;
         let of_person = Reference::of_cells(&first, &grid, &[cell], &report());
         assert_eq!(of_person.blocks.len(), 9, "a block and those beside it");
         let mut elsewhere = first.clone();
         elsewhere.data_mut()[..2000].fill(0);
-        assert!(Reference::of_all(&first, 2, &report()).changed(&elsewhere) && !of_person.changed(&elsewhere));
+        assert!(
+            Reference::of_all(&first, 2, &report()).changed(&elsewhere)
+                && !of_person.changed(&elsewhere)
+        );
         // Another size of picture, one without a reading, and one smaller than a block.
         assert!(reference.clone().keep(&DepthImage::empty(80, 60)).is_none());
         let dark = DepthImage::empty(WIDTH, HEIGHT);

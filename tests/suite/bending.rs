@@ -19,8 +19,13 @@ fn pose(template: &Template, rest: &RestBody, joints: &[(&str, f64)], call: usiz
     let mut pose = arms_down(template, rest);
     for side in ["left", "right"] {
         for (joint, most) in joints {
-            let bent = most * (0.5 - 0.5 * (std::f64::consts::TAU * call as f64 / CALLS as f64).cos());
-            pose.set(template.skeleton(), &format!("{side}_{joint}"), &[bent, 0.0, 0.0]);
+            let bent =
+                most * (0.5 - 0.5 * (std::f64::consts::TAU * call as f64 / CALLS as f64).cos());
+            pose.set(
+                template.skeleton(),
+                &format!("{side}_{joint}"),
+                &[bent, 0.0, 0.0],
+            );
         }
     }
     pose
@@ -28,12 +33,22 @@ fn pose(template: &Template, rest: &RestBody, joints: &[(&str, f64)], call: usiz
 
 /// Someone of average build in one garment bends and stands up again: the report and the crossings of each call, and
 /// where cloth was before and is now, metres.
-fn bend(garment: &str, joints: &[(&str, f64)], sharpest: f64) -> (Vec<StepReport>, Vec<usize>, [Vec<P3>; 2]) {
+fn bend(
+    garment: &str,
+    joints: &[(&str, f64)],
+    sharpest: f64,
+) -> (Vec<StepReport>, Vec<usize>, [Vec<P3>; 2]) {
     let t = embedded::template();
     let rest = t.personalise(&BodyShape::default());
     let options = DressOptions {
-        triangulation: Triangulation { edge_length: 0.018, ..Triangulation::default() },
-        config: Config { sharpest, ..Config::default() },
+        triangulation: Triangulation {
+            edge_length: 0.018,
+            ..Triangulation::default()
+        },
+        config: Config {
+            sharpest,
+            ..Config::default()
+        },
         ..DressOptions::default()
     };
     let pattern = library::pattern(garment, Size::M).expect("a pattern");
@@ -43,10 +58,31 @@ fn bend(garment: &str, joints: &[(&str, f64)], sharpest: f64) -> (Vec<StepReport
     let (mut reports, mut crossed) = (Vec::new(), Vec::new());
     for call in 1..=CALLS + STANDING {
         let body = posed(&t, &rest, &pose(&t, &rest, joints, call.min(CALLS)));
-        reports.push(step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step"));
-        crossed.push(crossings(&d.model.outfit.garments[0].faces, &state.garments[0].positions).len());
+        reports.push(
+            step(
+                &d.model,
+                &mut state,
+                &Input {
+                    body: &body,
+                    dt: DT,
+                },
+                &mut work,
+            )
+            .expect("a step"),
+        );
+        crossed.push(
+            crossings(
+                &d.model.outfit.garments[0].faces,
+                &state.garments[0].positions,
+            )
+            .len(),
+        );
     }
-    (reports, crossed, [before, state.garments[0].positions.clone()])
+    (
+        reports,
+        crossed,
+        [before, state.garments[0].positions.clone()],
+    )
 }
 
 #[test]
@@ -54,8 +90,14 @@ fn a_long_sleeve_stays_whole_around_an_elbow_that_folds() {
     // 137°: forearm and upper arm lie in each other.
     let (reports, _, _) = bend("longsleeve", &[("elbow", 2.4)], Config::default().sharpest);
     let worst = |of: fn(&StepReport) -> f64| reports.iter().map(of).fold(0.0, f64::max);
-    let (p99, put_back) = (worst(|r| r.p99_strain), reports.iter().map(|r| r.sleeves_put_back).sum::<usize>());
-    println!("p99 stretch {p99}, most {}, {put_back} rings put back", worst(|r| r.max_strain));
+    let (p99, put_back) = (
+        worst(|r| r.p99_strain),
+        reports.iter().map(|r| r.sleeves_put_back).sum::<usize>(),
+    );
+    println!(
+        "p99 stretch {p99}, most {}, {put_back} rings put back",
+        worst(|r| r.max_strain)
+    );
     // Without room inside the elbow 0.38, and torn for good.
     assert!(p99 < 0.18, "{p99}");
     assert!(reports.last().expect("calls").max_strain < 0.6);
@@ -71,7 +113,10 @@ fn trousers_of_someone_who_squats_come_down_again_and_pass_through_themselves_le
         let lowest = |x: &[P3]| x.iter().fold(f32::MAX, |l, p| l.min(p.y));
         let mean = crossed[..CALLS].iter().sum::<usize>() / CALLS;
         let p99 = reports.iter().map(|r| r.p99_strain).fold(0.0, f64::max);
-        println!("{sharpest}: {mean} crossings, p99 stretch {p99}, hem {} m up", lowest(&after) - lowest(&before));
+        println!(
+            "{sharpest}: {mean} crossings, p99 stretch {p99}, hem {} m up",
+            lowest(&after) - lowest(&before)
+        );
         assert!(lowest(&after) - lowest(&before) < 0.05);
         assert!(p99 < 0.3, "{p99}");
         mean
@@ -83,8 +128,15 @@ fn trousers_of_someone_who_squats_come_down_again_and_pass_through_themselves_le
 fn what_a_deep_squat_pushed_through_itself_is_ironed_out() {
     // Thighs on the belly, 126°. Without ironing 608, 189 and 187 crossings were left for good.
     let left = ["skirt", "shorts", "trousers"].map(|garment| {
-        let (_, crossed, _) = bend(garment, &[("hip", -2.2), ("knee", 2.2)], Config::default().sharpest);
-        let (most, left) = (crossed.iter().max().expect("calls"), crossed[crossed.len() - 1]);
+        let (_, crossed, _) = bend(
+            garment,
+            &[("hip", -2.2), ("knee", 2.2)],
+            Config::default().sharpest,
+        );
+        let (most, left) = (
+            crossed.iter().max().expect("calls"),
+            crossed[crossed.len() - 1],
+        );
         println!("{garment}: {most} crossings at most, {left} after a second of standing");
         left
     });
@@ -105,7 +157,10 @@ fn legs_that_swing_past_each_other_under_a_skirt_leave_no_cloth_in_them() {
         pose
     };
     let options = DressOptions {
-        triangulation: Triangulation { edge_length: 0.022, ..Triangulation::default() },
+        triangulation: Triangulation {
+            edge_length: 0.022,
+            ..Triangulation::default()
+        },
         ..DressOptions::default()
     };
     let pattern = library::pattern("skirt", Size::M).expect("a pattern");
@@ -113,10 +168,29 @@ fn legs_that_swing_past_each_other_under_a_skirt_leave_no_cloth_in_them() {
     let (mut state, mut work, mut deepest) = (d.state.clone(), Workspace::default(), 0.0f32);
     for call in 1..=60 {
         let body = posed(&t, &rest, &pose(call));
-        step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step");
+        step(
+            &d.model,
+            &mut state,
+            &Input {
+                body: &body,
+                dt: DT,
+            },
+            &mut work,
+        )
+        .expect("a step");
         let solid = Solid::new(&body, t.mesh().faces());
-        let depth = |p: &P3| if solid.winding(p) < 2 { solid.depth(p) } else { 0.0 };
-        deepest = state.garments[0].positions.iter().map(depth).fold(deepest, f32::max);
+        let depth = |p: &P3| {
+            if solid.winding(p) < 2 {
+                solid.depth(p)
+            } else {
+                0.0
+            }
+        };
+        deepest = state.garments[0]
+            .positions
+            .iter()
+            .map(depth)
+            .fold(deepest, f32::max);
     }
     println!("deepest {deepest} m");
     assert!(deepest < 3e-3);

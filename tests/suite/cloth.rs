@@ -29,16 +29,30 @@ fn dressed(config: &Config) -> Dressed {
     dressed_as(rest, &pose, Size::M, 0.035, config)
 }
 
-fn dressed_as(rest: &RestBody, pose: &Pose<World>, size: Size, edge_length: f64, config: &Config) -> Dressed {
+fn dressed_as(
+    rest: &RestBody,
+    pose: &Pose<World>,
+    size: Size,
+    edge_length: f64,
+    config: &Config,
+) -> Dressed {
     let template = tryon::body::embedded::template();
     let patterns = ["skirt", "tshirt"].map(|n| library::pattern(n, size).expect("a pattern"));
     let options = DressOptions {
-        triangulation: Triangulation { edge_length, min_angle: 8.0, ..Triangulation::default() },
+        triangulation: Triangulation {
+            edge_length,
+            min_angle: 8.0,
+            ..Triangulation::default()
+        },
         config: config.clone(),
         ..DressOptions::default()
     };
     let d = dress(&template, rest, pose, &patterns, &options).expect("dressed");
-    Dressed { model: d.model, state: d.state, body: posed(&template, rest, pose) }
+    Dressed {
+        model: d.model,
+        state: d.state,
+        body: posed(&template, rest, pose),
+    }
 }
 
 fn moved(body: &[P3], by: V3) -> Vec<P3> {
@@ -49,14 +63,20 @@ fn sane(state: &State, body: &[P3]) {
     let centre = body.iter().fold(V3::zeros(), |s, p| s + p.coords) / body.len() as f32;
     for g in &state.garments {
         for (i, p) in g.positions.iter().enumerate() {
-            assert!((p.coords - centre).norm() < 2.0, "vertex {i} of cloth is at {p}");
+            assert!(
+                (p.coords - centre).norm() < 2.0,
+                "vertex {i} of cloth is at {p}"
+            );
         }
     }
 }
 
 #[test]
 fn threads_and_restoring_change_no_bit() {
-    let d = dressed(&Config { sleep: false, ..Config::default() });
+    let d = dressed(&Config {
+        sleep: false,
+        ..Config::default()
+    });
     let run = |threads: usize, cut: bool| {
         with_threads(threads, || {
             let (mut state, mut work) = (d.state.clone(), Workspace::default());
@@ -66,7 +86,16 @@ fn threads_and_restoring_change_no_bit() {
                     work = Workspace::default();
                 }
                 let body = moved(&d.body, V3::new(0.02 * i as f32, 0.0, 0.01));
-                step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step");
+                step(
+                    &d.model,
+                    &mut state,
+                    &Input {
+                        body: &body,
+                        dt: DT,
+                    },
+                    &mut work,
+                )
+                .expect("a step");
             }
             state
         })
@@ -84,7 +113,16 @@ fn a_jump_of_thirty_centimetres_leaves_no_vertex_under_the_skin() {
     let body = moved(&d.body, V3::new(0.3, 0.0, 0.0));
     let mut last = StepReport::default();
     for i in 0..20 {
-        last = step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step");
+        last = step(
+            &d.model,
+            &mut state,
+            &Input {
+                body: &body,
+                dt: DT,
+            },
+            &mut work,
+        )
+        .expect("a step");
         assert_eq!(last.teleported, i == 0);
     }
     sane(&state, &body);
@@ -101,7 +139,16 @@ fn a_body_at_three_metres_a_second_keeps_its_clothes() {
         // Back and forth, 0.3 m each way: 3 m/s in the middle.
         let s = 0.3 * (10.0 * f64::from(i) * DT).sin() as f32;
         body = moved(&d.body, V3::new(s, 0.0, 0.0));
-        let r = step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step");
+        let r = step(
+            &d.model,
+            &mut state,
+            &Input {
+                body: &body,
+                dt: DT,
+            },
+            &mut work,
+        )
+        .expect("a step");
         worst = worst.max(r.penetration_left);
         assert!(r.kept_last_good.is_none());
     }
@@ -115,10 +162,41 @@ fn what_is_not_a_number_is_refused_and_nothing_moves() {
     let (mut state, mut work) = (d.state.clone(), Workspace::default());
     let mut body = d.body.clone();
     body[7].y = f32::NAN;
-    let e = step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect_err("NaN");
+    let e = step(
+        &d.model,
+        &mut state,
+        &Input {
+            body: &body,
+            dt: DT,
+        },
+        &mut work,
+    )
+    .expect_err("NaN");
     assert!(e.to_string().contains('7'), "{e}");
-    assert!(step(&d.model, &mut state, &Input { body: &d.body, dt: 0.0 }, &mut work).is_err());
-    assert!(step(&d.model, &mut state, &Input { body: &d.body[1..], dt: DT }, &mut work).is_err());
+    assert!(
+        step(
+            &d.model,
+            &mut state,
+            &Input {
+                body: &d.body,
+                dt: 0.0
+            },
+            &mut work
+        )
+        .is_err()
+    );
+    assert!(
+        step(
+            &d.model,
+            &mut state,
+            &Input {
+                body: &d.body[1..],
+                dt: DT
+            },
+            &mut work
+        )
+        .is_err()
+    );
     assert!(state == d.state);
 }
 
@@ -127,11 +205,29 @@ fn bodies_that_shrink_or_turn_inside_out_are_survived() {
     let d = dressed(&Config::default());
     let (mut state, mut work) = (d.state.clone(), Workspace::default());
     let centre = d.body.iter().fold(V3::zeros(), |s, p| s + p.coords) / d.body.len() as f32;
-    let scaled = |k: f32| d.body.iter().map(|p| P3::from(centre + (p.coords - centre) * k)).collect::<Vec<_>>();
-    let mirrored: Vec<P3> = d.body.iter().map(|p| P3::new(2.0 * centre.x - p.x, p.y, p.z)).collect();
+    let scaled = |k: f32| {
+        d.body
+            .iter()
+            .map(|p| P3::from(centre + (p.coords - centre) * k))
+            .collect::<Vec<_>>()
+    };
+    let mirrored: Vec<P3> = d
+        .body
+        .iter()
+        .map(|p| P3::new(2.0 * centre.x - p.x, p.y, p.z))
+        .collect();
     for body in [scaled(0.9), scaled(0.6), mirrored, d.body.clone()] {
         for _ in 0..5 {
-            step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step");
+            step(
+                &d.model,
+                &mut state,
+                &Input {
+                    body: &body,
+                    dt: DT,
+                },
+                &mut work,
+            )
+            .expect("a step");
         }
     }
     sane(&state, &d.body);
@@ -142,25 +238,60 @@ fn still_cloth_sleeps_and_wakes() {
     let d = dressed(&Config::default());
     let (mut state, mut work) = (d.state.clone(), Workspace::default());
     let asleep = (0..150).find(|_| {
-        let r = step(&d.model, &mut state, &Input { body: &d.body, dt: DT }, &mut work).expect("a step");
+        let r = step(
+            &d.model,
+            &mut state,
+            &Input {
+                body: &d.body,
+                dt: DT,
+            },
+            &mut work,
+        )
+        .expect("a step");
         r.sleeping > 0
     });
-    assert!(asleep.is_some(), "a still person's cloth is still within five seconds");
+    assert!(
+        asleep.is_some(),
+        "a still person's cloth is still within five seconds"
+    );
     // Awake, it would have stayed where it is to within a millimetre or two.
     let Dressed { mut model, .. } = d;
     let before = state.garments.clone();
     model.config.sleep = false;
     for _ in 0..30 {
-        step(&model, &mut state, &Input { body: &d.body, dt: DT }, &mut work).expect("a step");
+        step(
+            &model,
+            &mut state,
+            &Input {
+                body: &d.body,
+                dt: DT,
+            },
+            &mut work,
+        )
+        .expect("a step");
     }
     for (a, b) in before.iter().zip(&state.garments) {
-        let sum: f64 = a.positions.iter().zip(&b.positions).map(|(p, q)| f64::from((p - q).norm_squared())).sum();
+        let sum: f64 = a
+            .positions
+            .iter()
+            .zip(&b.positions)
+            .map(|(p, q)| f64::from((p - q).norm_squared()))
+            .sum();
         let rms = (sum / a.positions.len() as f64).sqrt();
         assert!(rms < 5e-3, "{rms}");
     }
     model.config.sleep = true;
     let body = moved(&d.body, V3::new(0.01, 0.0, 0.0));
-    let r = step(&model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step");
+    let r = step(
+        &model,
+        &mut state,
+        &Input {
+            body: &body,
+            dt: DT,
+        },
+        &mut work,
+    )
+    .expect("a step");
     assert_eq!(r.sleeping, 0, "a centimetre wakes it");
 }
 
@@ -172,19 +303,40 @@ fn cloth_on_a_body_that_trembles_sleeps_and_wakes() {
     // As a tracker's noise: 1.5 mm for the whole body, a wave of 1.5 mm along it.
     let mut trembling = || {
         let mut some = || 1.5e-3 * rng.random_range(-1.0f32..1.0);
-        let (whole, wave) = (V3::new(some(), some(), some()), V3::new(some(), some(), some()));
+        let (whole, wave) = (
+            V3::new(some(), some(), some()),
+            V3::new(some(), some(), some()),
+        );
         let moved = |p: &P3| p + whole + wave * (7.0 * p.y).sin();
         d.body.iter().map(moved).collect::<Vec<_>>()
     };
     let mut slept = 0;
     for _ in 0..150 {
-        let r = step(&d.model, &mut state, &Input { body: &trembling(), dt: DT }, &mut work).expect("a step");
+        let r = step(
+            &d.model,
+            &mut state,
+            &Input {
+                body: &trembling(),
+                dt: DT,
+            },
+            &mut work,
+        )
+        .expect("a step");
         slept += usize::from(r.sleeping > 0);
     }
     println!("slept {slept} of 150 calls");
     assert!(slept > 75, "{slept} of 150");
     let body = moved(&d.body, V3::new(0.01, 0.0, 0.0));
-    let r = step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step");
+    let r = step(
+        &d.model,
+        &mut state,
+        &Input {
+            body: &body,
+            dt: DT,
+        },
+        &mut work,
+    )
+    .expect("a step");
     assert_eq!(r.sleeping, 0, "a centimetre wakes it");
 }
 
@@ -198,28 +350,54 @@ fn cloth_on_a_body_that_sways_rides_asleep() {
         let t = i as f32 / 30.0;
         let by = V3::new(6e-3 * (0.9 * t).sin(), 0.0, 4e-3 * (1.3 * t).cos());
         // More at the head than at the feet.
-        body.iter().map(|p| p + by * (1.0 + 0.5 * p.y)).collect::<Vec<_>>()
+        body.iter()
+            .map(|p| p + by * (1.0 + 0.5 * p.y))
+            .collect::<Vec<_>>()
     };
     let mut run = |sleep: bool| {
         d.model.config.sleep = sleep;
         let (mut state, mut work, mut slept) = (d.state.clone(), Workspace::default(), 0);
         for i in 0..300 {
-            let r = step(&d.model, &mut state, &Input { body: &swaying(i), dt: DT }, &mut work).expect("a step");
+            let r = step(
+                &d.model,
+                &mut state,
+                &Input {
+                    body: &swaying(i),
+                    dt: DT,
+                },
+                &mut work,
+            )
+            .expect("a step");
             slept += usize::from(r.sleeping > 0);
         }
         (state, slept)
     };
     let ((asleep, slept), (awake, never)) = (run(true), run(false));
-    let off = asleep.garments.iter().zip(&awake.garments).flat_map(|(a, b)| a.positions.iter().zip(&b.positions));
-    let off: Vec<f64> = off.map(|(p, q)| f64::from((p - q).norm_squared())).collect();
+    let off = asleep
+        .garments
+        .iter()
+        .zip(&awake.garments)
+        .flat_map(|(a, b)| a.positions.iter().zip(&b.positions));
+    let off: Vec<f64> = off
+        .map(|(p, q)| f64::from((p - q).norm_squared()))
+        .collect();
     let rms = (off.iter().sum::<f64>() / off.len() as f64).sqrt() * 1e3;
     println!("slept {slept} of 300 calls, {rms:.1} mm from cloth that never did");
     assert!(slept > 200 && never == 0, "{slept}");
     assert!(rms < 5.0, "{rms} mm");
     let faces = tryon::body::embedded::template().mesh().faces().to_vec();
-    let deep =
-        |s: &State| s.garments.iter().map(|g| under_the_skin(&g.positions, &swaying(299), &faces)).sum::<usize>();
-    assert!(deep(&asleep) <= deep(&awake) + 2, "{} against {} vertices under the skin", deep(&asleep), deep(&awake));
+    let deep = |s: &State| {
+        s.garments
+            .iter()
+            .map(|g| under_the_skin(&g.positions, &swaying(299), &faces))
+            .sum::<usize>()
+    };
+    assert!(
+        deep(&asleep) <= deep(&awake) + 2,
+        "{} against {} vertices under the skin",
+        deep(&asleep),
+        deep(&awake)
+    );
 }
 
 /// Where a ray meets a triangle, in lengths of its direction (Möller and Trumbore).
@@ -238,7 +416,9 @@ fn under_the_skin(cloth: &[P3], body: &[P3], faces: &[[u32; 3]]) -> usize {
     let way = V3::new(0.21, 0.13, 0.97);
     let deep = |p: &&P3| body.iter().all(|v| (v - **p).norm() > 5e-3);
     let inside = |p: &&P3| {
-        let crossed = |f: &&[u32; 3]| crossing(p, &way, &f.map(|i| body[i as usize])).is_some_and(|t| t > 0.0);
+        let crossed = |f: &&[u32; 3]| {
+            crossing(p, &way, &f.map(|i| body[i as usize])).is_some_and(|t| t > 0.0)
+        };
         faces.iter().filter(crossed).count() % 2 == 1
     };
     cloth.iter().filter(deep).filter(inside).count()
@@ -270,16 +450,36 @@ fn a_skirt_stays_under_the_shirt() {
     for i in 0..30 {
         let s = 0.1 * (5.0 * f64::from(i) * DT).sin() as f32;
         let body = moved(&d.body, V3::new(s, 0.0, 0.0));
-        step(&d.model, &mut state, &Input { body: &body, dt: DT }, &mut work).expect("a step");
+        step(
+            &d.model,
+            &mut state,
+            &Input {
+                body: &body,
+                dt: DT,
+            },
+            &mut work,
+        )
+        .expect("a step");
         if i % 5 == 0 {
             let [skirt, shirt] = [&state.garments[0].positions, &state.garments[1].positions];
             let out = outside(skirt, shirt, &d.model.outfit.garments[1].faces);
             let through = out.iter().filter(|d| **d > 2e-3).count();
-            println!("frame {i}: {through} of {} skirt vertices outside the shirt", out.len());
+            println!(
+                "frame {i}: {through} of {} skirt vertices outside the shirt",
+                out.len()
+            );
             let faces = tryon::body::embedded::template();
             let sunken = under_the_skin(shirt, &body, faces.mesh().faces());
-            assert!(sunken * 100 <= shirt.len(), "frame {i}: {sunken} of {} under the skin", shirt.len());
-            assert!(out.len() > 100 && through * 100 <= 3 * out.len(), "frame {i}: {through} of {}", out.len());
+            assert!(
+                sunken * 100 <= shirt.len(),
+                "frame {i}: {sunken} of {} under the skin",
+                shirt.len()
+            );
+            assert!(
+                out.len() > 100 && through * 100 <= 3 * out.len(),
+                "frame {i}: {through} of {}",
+                out.len()
+            );
         }
     }
 }
@@ -287,7 +487,11 @@ fn a_skirt_stays_under_the_shirt() {
 #[test]
 fn a_hem_that_is_woven_through_itself_comes_loose() {
     let left_of = |untangle: f64, height: f32| {
-        let d = dressed(&Config { untangle, sleep: false, ..Config::default() });
+        let d = dressed(&Config {
+            untangle,
+            sleep: false,
+            ..Config::default()
+        });
         let (mut state, mut work) = (d.state.clone(), Workspace::default());
         let faces = &d.model.outfit.garments[0].faces;
         let hem = &mut state.garments[0].positions;
@@ -301,15 +505,30 @@ fn a_hem_that_is_woven_through_itself_comes_loose() {
         let pulled = crossings(faces, hem).len();
         assert!(pulled > 20, "{pulled}");
         for _ in 0..60 {
-            step(&d.model, &mut state, &Input { body: &d.body, dt: DT }, &mut work).expect("a step");
+            step(
+                &d.model,
+                &mut state,
+                &Input {
+                    body: &d.body,
+                    dt: DT,
+                },
+                &mut work,
+            )
+            .expect("a step");
         }
         let left = crossings(faces, &state.garments[0].positions).len();
-        println!("{untangle} s between looks, {height} m: {pulled} crossings, {left} two seconds later");
+        println!(
+            "{untangle} s between looks, {height} m: {pulled} crossings, {left} two seconds later"
+        );
         left
     };
     // Single hems are left with 70 to 120 crossings, without ironing with 140 to 290 and held as they are with up to 650.
-    let left =
-        [0.0, Config::default().untangle].map(|u| [0.10, 0.115, 0.13].map(|h| left_of(u, h)).iter().sum::<usize>());
+    let left = [0.0, Config::default().untangle].map(|u| {
+        [0.10, 0.115, 0.13]
+            .map(|h| left_of(u, h))
+            .iter()
+            .sum::<usize>()
+    });
     assert!(left[1] < left[0] && left[1] < 3 * 140, "{left:?}");
 }
 
@@ -318,14 +537,19 @@ fn a_heavy_body_with_its_arms_down_keeps_its_sleeves() {
     // Two standard deviations of girth: the upper arms lie centimetres deep in the trunk.
     let template = tryon::body::embedded::template();
     let coefficients = vec![0.3, 2.0, 1.2, -0.2, 0.2, 0.3, 0.0, 0.6, 0.0];
-    let rest = template.personalise(&BodyShape { coefficients, ..BodyShape::default() });
+    let rest = template.personalise(&BodyShape {
+        coefficients,
+        ..BodyShape::default()
+    });
     let skeleton = template.skeleton();
     let mut pose = Pose::rest(skeleton, Rigid::<World, Body>::identity());
     for (side, s) in [("left", 1.0), ("right", -1.0)] {
-        let (j, c) =
-            [format!("{side}_shoulder"), format!("{side}_elbow")].map(|n| skeleton.index(&n).expect("a joint")).into();
+        let (j, c) = [format!("{side}_shoulder"), format!("{side}_elbow")]
+            .map(|n| skeleton.index(&n).expect("a joint"))
+            .into();
         let down = V3d::new(s * 0.17, -0.98, 0.0);
-        let turn = UnitQuaternion::rotation_between(&(rest.joints[c] - rest.joints[j]), &down).expect("a turn");
+        let turn = UnitQuaternion::rotation_between(&(rest.joints[c] - rest.joints[j]), &down)
+            .expect("a turn");
         let at = skeleton.dof_offset(j);
         pose.angles[at..at + 3].copy_from_slice(log_so3(&turn).as_slice());
     }
@@ -335,10 +559,22 @@ fn a_heavy_body_with_its_arms_down_keeps_its_sleeves() {
         let (mut state, mut work) = (d.state.clone(), Workspace::default());
         let mut last = StepReport::default();
         for _ in 0..30 {
-            last = step(&d.model, &mut state, &Input { body: &d.body, dt: DT }, &mut work).expect("a step");
+            last = step(
+                &d.model,
+                &mut state,
+                &Input {
+                    body: &d.body,
+                    dt: DT,
+                },
+                &mut work,
+            )
+            .expect("a step");
             assert_eq!(last.kept_last_good, None);
         }
-        println!("stretch p99 {:.3} max {:.3}, {} buried", last.p99_strain, last.max_strain, last.buried);
+        println!(
+            "stretch p99 {:.3} max {:.3}, {} buried",
+            last.p99_strain, last.max_strain, last.buried
+        );
         assert!(last.buried > 50, "{}", last.buried);
         assert!(last.max_strain < 2.0, "{}", last.max_strain);
         assert!(last.penetration_left < 2e-3, "{}", last.penetration_left);

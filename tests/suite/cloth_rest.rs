@@ -10,9 +10,19 @@ fn her() -> MutexGuard<'static, Standing> {
     static HER: OnceLock<Mutex<Standing>> = OnceLock::new();
     let dressed = || {
         let garments = ["skirt", "tshirt"].map(str::to_owned).to_vec();
-        Mutex::new(Standing::new(&Wearing { garments, edge: 0.02, config: Config::default(), arms: None }).unwrap())
+        Mutex::new(
+            Standing::new(&Wearing {
+                garments,
+                edge: 0.02,
+                config: Config::default(),
+                arms: None,
+            })
+            .unwrap(),
+        )
     };
-    HER.get_or_init(dressed).lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    HER.get_or_init(dressed)
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
 fn run(config: &Config, doing: Doing, calls: usize, noise: f32) -> RestReport {
@@ -20,7 +30,10 @@ fn run(config: &Config, doing: Doing, calls: usize, noise: f32) -> RestReport {
 }
 
 fn never(base: Config) -> Config {
-    Config { sleep: false, ..base }
+    Config {
+        sleep: false,
+        ..base
+    }
 }
 
 /// As shoppers stand. Between arm and trunk cloth has two skins to lie on, and would jump from one to the other for ever.
@@ -28,11 +41,26 @@ fn never(base: Config) -> Config {
 fn clothes_of_someone_who_stands_with_hanging_arms_come_to_rest() {
     for garments in [vec!["skirt", "tshirt"], vec!["longsleeve"], vec!["hoodie"]] {
         let names = garments.iter().map(|g| (*g).to_owned()).collect();
-        let wearing = Wearing { garments: names, edge: 0.02, config: Config::default(), arms: Some(1.3) };
+        let wearing = Wearing {
+            garments: names,
+            edge: 0.02,
+            config: Config::default(),
+            arms: Some(1.3),
+        };
         let mut her = Standing::new(&wearing).unwrap();
-        let r = her.run(&Config::default(), Doing::Standing, 30, 0.0).unwrap();
-        println!("{garments:?}: {:?} asleep, deepest {:.2} mm", r.asleep, r.penetration * 1e3);
-        assert!(r.asleep.iter().all(|a| *a == 1.0), "{garments:?}: {:?}", r.asleep);
+        let r = her
+            .run(&Config::default(), Doing::Standing, 30, 0.0)
+            .unwrap();
+        println!(
+            "{garments:?}: {:?} asleep, deepest {:.2} mm",
+            r.asleep,
+            r.penetration * 1e3
+        );
+        assert!(
+            r.asleep.iter().all(|a| *a == 1.0),
+            "{garments:?}: {:?}",
+            r.asleep
+        );
         assert!(r.penetration < 2e-3, "{}", r.penetration);
     }
 }
@@ -40,7 +68,10 @@ fn clothes_of_someone_who_stands_with_hanging_arms_come_to_rest() {
 #[test]
 fn a_waving_arm_leaves_the_hem_asleep_and_cloth_near_where_it_would_be() {
     for (base, noise) in [(Config::default(), 0.0), (Config::tracked(), 1.5e-3)] {
-        let whole = Config { sleep_regions: false, ..base.clone() };
+        let whole = Config {
+            sleep_regions: false,
+            ..base.clone()
+        };
         let truth = run(&never(base.clone()), Doing::Waving, 90, noise);
         let outfit = run(&whole, Doing::Waving, 30, noise);
         let r = run(&base, Doing::Waving, 90, noise);
@@ -50,8 +81,16 @@ fn a_waving_arm_leaves_the_hem_asleep_and_cloth_near_where_it_would_be() {
             r.mean_asleep() * 100.0,
             outfit.mean_asleep() * 100.0
         );
-        assert!(truth.mean_asleep() == 0.0 && outfit.mean_asleep() < 0.2, "{}", outfit.mean_asleep());
-        assert!(r.mean_asleep() > 0.2 && r.asleep[10..].iter().all(|a| *a < 0.99), "{}", r.mean_asleep());
+        assert!(
+            truth.mean_asleep() == 0.0 && outfit.mean_asleep() < 0.2,
+            "{}",
+            outfit.mean_asleep()
+        );
+        assert!(
+            r.mean_asleep() > 0.2 && r.asleep[10..].iter().all(|a| *a < 0.99),
+            "{}",
+            r.mean_asleep()
+        );
         // A hem that creeps by a centimetre a second counts as still, and stays where it fell asleep.
         assert!(apart[0] < 14.0 && apart[1] < 75.0, "{apart:?}");
         assert!(r.penetration < 2e-3, "{}", r.penetration);
@@ -66,13 +105,27 @@ fn nothing_stays_behind_when_she_walks_off() {
     let mut mean = [0.0; 3];
     for edge in edges {
         let garments = ["skirt", "tshirt"].map(str::to_owned).to_vec();
-        let mut her = Standing::new(&Wearing { garments, edge, config: base.clone(), arms: None }).unwrap();
-        let truth = her.run(&never(base.clone()), Doing::WalkingOff, 30, 0.0).unwrap();
+        let mut her = Standing::new(&Wearing {
+            garments,
+            edge,
+            config: base.clone(),
+            arms: None,
+        })
+        .unwrap();
+        let truth = her
+            .run(&never(base.clone()), Doing::WalkingOff, 30, 0.0)
+            .unwrap();
         let r = her.run(&base, Doing::WalkingOff, 30, 0.0).unwrap();
         let apart = r.apart(&truth).map(|d| d * 1e3);
-        println!("asleep when she starts {:.2}, then {:?}; {apart:.1?} mm apart", r.asleep[0], &r.asleep[1..4]);
+        println!(
+            "asleep when she starts {:.2}, then {:?}; {apart:.1?} mm apart",
+            r.asleep[0],
+            &r.asleep[1..4]
+        );
         assert!(r.asleep[2..].iter().all(|a| *a == 0.0), "{:?}", r.asleep);
-        mean.iter_mut().zip(apart).for_each(|(m, a)| *m += a / edges.len() as f64);
+        mean.iter_mut()
+            .zip(apart)
+            .for_each(|(m, a)| *m += a / edges.len() as f64);
     }
     println!("mean {mean:.1?}");
     assert!(mean[0] < 15.0 && mean[2] < 100.0, "{mean:?}");
@@ -80,7 +133,12 @@ fn nothing_stays_behind_when_she_walks_off() {
 
 #[test]
 fn what_sleeps_does_not_depend_on_threads() {
-    let run = |threads| with_threads(threads, || run(&Config::tracked(), Doing::Waving, 30, 1.5e-3)).unwrap();
+    let run = |threads| {
+        with_threads(threads, || {
+            run(&Config::tracked(), Doing::Waving, 30, 1.5e-3)
+        })
+        .unwrap()
+    };
     let (one, two) = (run(1), run(2));
     assert!(one.positions == two.positions && one.asleep == two.asleep);
     assert!(one.mean_asleep() > 0.0);
@@ -90,14 +148,30 @@ fn what_sleeps_does_not_depend_on_threads() {
 #[test]
 fn searches_left_out_change_next_to_nothing() {
     let skip = never(Config::default());
-    let ask = Config { skip_far: false, ..skip.clone() };
-    let (r, truth) = (run(&skip, Doing::Lifting, 30, 0.0), run(&ask, Doing::Lifting, 30, 0.0));
+    let ask = Config {
+        skip_far: false,
+        ..skip.clone()
+    };
+    let (r, truth) = (
+        run(&skip, Doing::Lifting, 30, 0.0),
+        run(&ask, Doing::Lifting, 30, 0.0),
+    );
     let apart = r.apart(&truth).map(|d| d * 1e3);
     println!(
         "left out {} and {} in the last call, {apart:.3?} mm apart",
         r.last.searches_skipped, r.last.fold_searches_skipped
     );
-    assert!(r.last.searches_skipped > 100 && r.last.fold_searches_skipped > 100, "{:?}", r.last);
-    assert_eq!((truth.last.searches_skipped, truth.last.fold_searches_skipped), (0, 0));
+    assert!(
+        r.last.searches_skipped > 100 && r.last.fold_searches_skipped > 100,
+        "{:?}",
+        r.last
+    );
+    assert_eq!(
+        (
+            truth.last.searches_skipped,
+            truth.last.fold_searches_skipped
+        ),
+        (0, 0)
+    );
     assert!(apart[0] < 2.0, "{apart:?}");
 }

@@ -9,13 +9,19 @@ use tryon::par::Par;
 /// A path below `../shared/data` (or `$TRYON_SHARED/data`). When it is missing the test says so loudly and skips;
 /// with `TRYON_REQUIRE_ALL=1` it fails.
 pub(crate) fn shared(path: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("TRYON_SHARED")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
+    let root = std::env::var_os("TRYON_SHARED").map_or_else(
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"),
+        PathBuf::from,
+    );
     let full = root.join("data").join(path);
     if full.exists() {
         return Some(full);
     }
-    assert!(std::env::var_os("TRYON_REQUIRE_ALL").is_none(), "{} is missing", full.display());
+    assert!(
+        std::env::var_os("TRYON_REQUIRE_ALL").is_none(),
+        "{} is missing",
+        full.display()
+    );
     eprintln!("SKIPPED: {} is missing", full.display());
     None
 }
@@ -31,6 +37,12 @@ pub(crate) fn arms_down(template: &Template, rest: &RestBody) -> Pose<World> {
 pub(crate) fn posed(template: &Template, rest: &RestBody, pose: &Pose<World>) -> Vec<P3> {
     let (mut bones, mut body) = (BoneTransforms::default(), Vec::new());
     pose.bones(template.skeleton(), rest, &mut bones);
-    skin(Par::Rayon, &rest.vertices, template.weights(), &bones, &mut body);
+    skin(
+        Par::Rayon,
+        &rest.vertices,
+        template.weights(),
+        &bones,
+        &mut body,
+    );
     body
 }

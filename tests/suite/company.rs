@@ -13,29 +13,62 @@ use tryon::tracking::{Reason, TrackerConfig};
 
 /// The shopper that the embedded body can become, without colour and in the dark.
 fn alone() -> Setting {
-    Setting { room: None, noise: NoiseModel::KinectV1, color: false, seed: 3, ..Setting::default() }
+    Setting {
+        room: None,
+        noise: NoiseModel::KinectV1,
+        color: false,
+        seed: 3,
+        ..Setting::default()
+    }
 }
 
 fn scene(setting: Setting, frames: u64) -> (Arc<Template>, Scene) {
     let shopper = Shopper::default();
-    (shopper.template.clone(), Scene::synthetic("shopper", &Sequence::new(shopper, setting), frames))
+    (
+        shopper.template.clone(),
+        Scene::synthetic("shopper", &Sequence::new(shopper, setting), frames),
+    )
 }
 
 fn track(template: &Arc<Template>, scene: &Scene) -> Outcome {
-    follow(template, &TrackerConfig::default(), scene, |_, _, _, _, _| {})
+    follow(
+        template,
+        &TrackerConfig::default(),
+        scene,
+        |_, _, _, _, _| {},
+    )
 }
 
 fn error_of(out: &Outcome, scene: &Scene, parts: &[&str]) -> f64 {
-    let of = |part: &&str| out.per_joint_mm[scene.joint_names.iter().position(|n| n == part).expect("joint")];
+    let of = |part: &&str| {
+        out.per_joint_mm[scene
+            .joint_names
+            .iter()
+            .position(|n| n == part)
+            .expect("joint")]
+    };
     mean(&parts.iter().map(of).collect::<Vec<_>>())
 }
 
-const UPPER: [&str; 8] =
-    ["spine3", "neck", "head", "left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "pelvis"];
+const UPPER: [&str; 8] = [
+    "spine3",
+    "neck",
+    "head",
+    "left_shoulder",
+    "right_shoulder",
+    "left_elbow",
+    "right_elbow",
+    "pelvis",
+];
 
 /// Someone walks past, out to the side and back, at `z` metres from the camera.
 fn passer_by(z: f64, frames: u64) -> Scene {
-    let setting = Setting { routine: Routine::LeaveAndReturn, home: P3d::new(-1.7, 0.0, -z), seed: 9, ..alone() };
+    let setting = Setting {
+        routine: Routine::LeaveAndReturn,
+        home: P3d::new(-1.7, 0.0, -z),
+        seed: 9,
+        ..alone()
+    };
     scene(setting, frames).1
 }
 
@@ -45,21 +78,41 @@ fn a_passer_by_does_not_take_the_tracker_along() {
         let (template, mut own) = scene(alone(), 170);
         let clean = mean(&track(&template, &own).joints_mm);
         let passer = passer_by(z, 170);
-        let across: Vec<f64> = passer.truth.iter().filter_map(|t| t.joints.first()).map(|p| p.x).collect();
+        let across: Vec<f64> = passer
+            .truth
+            .iter()
+            .filter_map(|t| t.joints.first())
+            .map(|p| p.x)
+            .collect();
         let (from, to) = (across[0], across[across.len() - 1]);
-        assert!(from * to < 0.0, "the passer-by crosses the picture's middle: {from:.2} to {to:.2} m");
+        assert!(
+            from * to < 0.0,
+            "the passer-by crosses the picture's middle: {from:.2} to {to:.2} m"
+        );
         let seen = own.frames[112].depth.clone();
         own = own.with(&passer);
-        let hidden = seen.data().iter().zip(own.frames[112].depth.data()).filter(|(a, b)| **a > 0 && a != b).count();
+        let hidden = seen
+            .data()
+            .iter()
+            .zip(own.frames[112].depth.data())
+            .filter(|(a, b)| **a > 0 && a != b)
+            .count();
         let out = track(&template, &own);
-        let (all, end) = (mean(&out.joints_mm), mean(&out.joints_mm[out.joints_mm.len() - 10..]));
+        let (all, end) = (
+            mean(&out.joints_mm),
+            mean(&out.joints_mm[out.joints_mm.len() - 10..]),
+        );
         eprintln!(
             "someone passes at {z} m: {all:.1} mm ({clean:.1} alone), {end:.1} at the end, lost {}, {hidden} pixels hidden",
             out.lost
         );
         assert!(end < clean + 10.0, "at {z} m: {end:.1} mm at the end");
         if z > 2.4 {
-            assert!(all < most && out.lost == 0, "behind: {all:.1} mm, lost {}", out.lost);
+            assert!(
+                all < most && out.lost == 0,
+                "behind: {all:.1} mm, lost {}",
+                out.lost
+            );
         }
     }
 }
@@ -72,13 +125,18 @@ fn a_held_thing_costs_little() {
     let out = track(&template, &holding);
     let (all, body) = (mean(&out.joints_mm), error_of(&out, &holding, &UPPER));
     let arm = error_of(&out, &holding, &["left_elbow", "left_wrist"]);
-    eprintln!("a ball of 18 cm in the hand: {all:.1} mm ({clean:.1} without), upper body {body:.1}, its arm {arm:.1}");
+    eprintln!(
+        "a ball of 18 cm in the hand: {all:.1} mm ({clean:.1} without), upper body {body:.1}, its arm {arm:.1}"
+    );
     assert!(all < clean + 10.0 && body < 12.0 && arm < 75.0 && out.lost == 0);
 }
 
 #[test]
 fn black_trousers_leave_the_upper_body_alone() {
-    let setting = Setting { room: Some(Default::default()), ..alone() };
+    let setting = Setting {
+        room: Some(Default::default()),
+        ..alone()
+    };
     let (template, own) = scene(setting, 120);
     let mut bare = own;
     for side in ["left", "right"] {
@@ -87,11 +145,20 @@ fn black_trousers_leave_the_upper_body_alone() {
     }
     let knee = template.skeleton().index("left_knee").expect("joint");
     let mut flagged = 0;
-    let out = follow(&template, &TrackerConfig::default(), &bare, |i, _, state, report, _| {
-        let reason = report.confidence.get(knee).map(|c| c.reason);
-        flagged += usize::from(i >= 30 && state.status.is_live() && reason != Some(Reason::Measured));
-    });
-    let (upper, legs) = (error_of(&out, &bare, &UPPER), error_of(&out, &bare, &["left_knee", "right_knee"]));
+    let out = follow(
+        &template,
+        &TrackerConfig::default(),
+        &bare,
+        |i, _, state, report, _| {
+            let reason = report.confidence.get(knee).map(|c| c.reason);
+            flagged +=
+                usize::from(i >= 30 && state.status.is_live() && reason != Some(Reason::Measured));
+        },
+    );
+    let (upper, legs) = (
+        error_of(&out, &bare, &UPPER),
+        error_of(&out, &bare, &["left_knee", "right_knee"]),
+    );
     eprintln!(
         "black trousers: upper body {upper:.1} mm, knees {legs:.1}, knee flagged in {flagged} of 90, lost {}",
         out.lost
@@ -101,8 +168,14 @@ fn black_trousers_leave_the_upper_body_alone() {
 
 #[test]
 fn cameras_may_lean_and_stand_upright() {
-    let tilted = |down: f64, roll: f64| Setting { world_from_camera: Setting::tilted(1.1, down, roll), ..alone() };
-    let roomy = |s: Setting| Setting { room: Some(Default::default()), ..s };
+    let tilted = |down: f64, roll: f64| Setting {
+        world_from_camera: Setting::tilted(1.1, down, roll),
+        ..alone()
+    };
+    let roomy = |s: Setting| Setting {
+        room: Some(Default::default()),
+        ..s
+    };
     let cases = [
         ("level", roomy(tilted(0.0, 0.0))),
         ("rolled by 8°", roomy(tilted(3.0, 8.0))),
@@ -115,28 +188,68 @@ fn cameras_may_lean_and_stand_upright() {
         let (template, own) = scene(setting, 75);
         let out = track(&template, &own);
         let error = mean(&out.joints_mm);
-        eprintln!("{name}: {error:.1} mm, found {:?}, lost {}", out.found, out.lost);
-        assert!(error < 12.0 && out.lost == 0 && out.found.is_some_and(|f| f < 15), "{name}: {error:.1} mm");
+        eprintln!(
+            "{name}: {error:.1} mm, found {:?}, lost {}",
+            out.found, out.lost
+        );
+        assert!(
+            error < 12.0 && out.lost == 0 && out.found.is_some_and(|f| f < 15),
+            "{name}: {error:.1} mm"
+        );
     }
 }
 
 #[test]
 fn half_a_person_at_the_side_of_the_picture_is_enough() {
     // An arm out of the picture from the first frame on; and all right of the breastbone gone after the start.
-    let beside = scene(Setting { home: P3d::new(1.15, 0.0, -2.4), ..alone() }, 90);
-    let roomy = scene(Setting { room: Some(Default::default()), ..alone() }, 120);
-    for (name, (template, own), share) in [("arm", beside, 1.0), ("half", (roomy.0, roomy.1.cut_beside(0.5, 40)), 0.5)]
-    {
+    let beside = scene(
+        Setting {
+            home: P3d::new(1.15, 0.0, -2.4),
+            ..alone()
+        },
+        90,
+    );
+    let roomy = scene(
+        Setting {
+            room: Some(Default::default()),
+            ..alone()
+        },
+        120,
+    );
+    for (name, (template, own), share) in [
+        ("arm", beside, 1.0),
+        ("half", (roomy.0, roomy.1.cut_beside(0.5, 40)), 0.5),
+    ] {
         let camera = own.calibration.depth;
         let edge = share * f64::from(camera.width);
-        let always =
-            |j: usize| own.truth.iter().all(|t| t.joints[j].x / t.joints[j].z * camera.fx + camera.cx < edge - 10.0);
+        let always = |j: usize| {
+            own.truth
+                .iter()
+                .all(|t| t.joints[j].x / t.joints[j].z * camera.fx + camera.cx < edge - 10.0)
+        };
         let inside: Vec<usize> = (0..own.joint_names.len()).filter(|&j| always(j)).collect();
         let out = track(&template, &own);
-        let error = mean(&inside.iter().map(|&j| out.per_joint_mm[j]).collect::<Vec<_>>());
-        eprintln!("{name} out of view: {} of 22 joints inside, {error:.1} mm, lost {}", inside.len(), out.lost);
-        assert!((5..22).contains(&inside.len()), "{name}: the scene cuts the person: {}", inside.len());
-        assert!(error < 20.0 && out.lost == 0 && out.found == Some(0), "{name}: {error:.1} mm, lost {}", out.lost);
+        let error = mean(
+            &inside
+                .iter()
+                .map(|&j| out.per_joint_mm[j])
+                .collect::<Vec<_>>(),
+        );
+        eprintln!(
+            "{name} out of view: {} of 22 joints inside, {error:.1} mm, lost {}",
+            inside.len(),
+            out.lost
+        );
+        assert!(
+            (5..22).contains(&inside.len()),
+            "{name}: the scene cuts the person: {}",
+            inside.len()
+        );
+        assert!(
+            error < 20.0 && out.lost == 0 && out.found == Some(0),
+            "{name}: {error:.1} mm, lost {}",
+            out.lost
+        );
     }
 }
 
@@ -145,19 +258,45 @@ fn half_a_person_at_the_side_of_the_picture_is_enough() {
 #[test]
 fn a_person_cut_by_the_side_from_the_start_is_found() {
     for (name, room) in [("dark", None), ("room", Some(Default::default()))] {
-        let (template, own) = scene(Setting { home: P3d::new(1.42, 0.0, -2.4), room, ..alone() }, 75);
+        let (template, own) = scene(
+            Setting {
+                home: P3d::new(1.42, 0.0, -2.4),
+                room,
+                ..alone()
+            },
+            75,
+        );
         let camera = own.calibration.depth;
         let inside: Vec<usize> = (0..own.joint_names.len())
             .filter(|&j| {
                 let column = |p: &P3d| p.x / p.z * camera.fx + camera.cx;
-                own.truth.iter().all(|t| (10.0..f64::from(camera.width) - 10.0).contains(&column(&t.joints[j])))
+                own.truth
+                    .iter()
+                    .all(|t| (10.0..f64::from(camera.width) - 10.0).contains(&column(&t.joints[j])))
             })
             .collect();
         let out = track(&template, &own);
-        let error = mean(&inside.iter().map(|&j| out.per_joint_mm[j]).collect::<Vec<_>>());
-        eprintln!("half cut off, {name}: {} of 22 joints inside, {error:.1} mm, found {:?}", inside.len(), out.found);
-        assert!((5..18).contains(&inside.len()), "{name}: the scene cuts the person: {}", inside.len());
-        assert!(error < 8.0 && out.found == Some(0) && out.lost == 0, "{name}: {error:.1} mm, {:?}", out.found);
+        let error = mean(
+            &inside
+                .iter()
+                .map(|&j| out.per_joint_mm[j])
+                .collect::<Vec<_>>(),
+        );
+        eprintln!(
+            "half cut off, {name}: {} of 22 joints inside, {error:.1} mm, found {:?}",
+            inside.len(),
+            out.found
+        );
+        assert!(
+            (5..18).contains(&inside.len()),
+            "{name}: the scene cuts the person: {}",
+            inside.len()
+        );
+        assert!(
+            error < 8.0 && out.found == Some(0) && out.lost == 0,
+            "{name}: {error:.1} mm, {:?}",
+            out.found
+        );
     }
 }
 
@@ -166,49 +305,95 @@ fn a_person_cut_by_the_side_from_the_start_is_found() {
 #[test]
 fn each_skip_keeps_its_bound() {
     let all = TrackerConfig::default();
-    let coarse = TrackerConfig { skip_coarse: false, ..all.clone() };
-    let settled = TrackerConfig { skip_settled: false, ..all.clone() };
-    let converged = TrackerConfig { converged: 0.0, ..all };
-    let (template, calm) = scene(Setting { room: Some(Default::default()), ..alone() }, 160);
+    let coarse = TrackerConfig {
+        skip_coarse: false,
+        ..all.clone()
+    };
+    let settled = TrackerConfig {
+        skip_settled: false,
+        ..all.clone()
+    };
+    let converged = TrackerConfig {
+        converged: 0.0,
+        ..all
+    };
+    let (template, calm) = scene(
+        Setting {
+            room: Some(Default::default()),
+            ..alone()
+        },
+        160,
+    );
     compare_skips(
         &template,
         &calm,
-        &[("coarse iterations", coarse, 2.5, 3.0), ("settled displacements", settled, 1e-6, 0.5)],
+        &[
+            ("coarse iterations", coarse, 2.5, 3.0),
+            ("settled displacements", settled, 1e-6, 0.5),
+        ],
     );
-    let unchanged = TrackerConfig { skip_unchanged: false, ..TrackerConfig::default() };
-    let (template, still) = scene(Setting { routine: Routine::Still, room: Some(Default::default()), ..alone() }, 160);
-    compare_skips(&template, &still, &[("unchanged frames", unchanged, 2.0, 2.0)]);
-    let (Some(folder), Some(data)) = (shared("sequences/charleston_m_heavy_tof_room"), shared(".")) else { return };
+    let unchanged = TrackerConfig {
+        skip_unchanged: false,
+        ..TrackerConfig::default()
+    };
+    let (template, still) = scene(
+        Setting {
+            routine: Routine::Still,
+            room: Some(Default::default()),
+            ..alone()
+        },
+        160,
+    );
+    compare_skips(
+        &template,
+        &still,
+        &[("unchanged frames", unchanged, 2.0, 2.0)],
+    );
+    let (Some(folder), Some(data)) = (shared("sequences/charleston_m_heavy_tof_room"), shared("."))
+    else {
+        return;
+    };
     let template = scenes::subject(&data, "template").expect("template");
     let mut dance = Scene::open(&folder).expect("scene");
     dance.frames.truncate(110);
     dance.truth.truncate(110);
-    let searches = TrackerConfig { skip_converged: false, ..TrackerConfig::default() };
+    let searches = TrackerConfig {
+        skip_converged: false,
+        ..TrackerConfig::default()
+    };
     compare_skips(
         &template,
         &dance,
-        &[("converged iterations", converged, 3.0, 3.0), ("searches of converged bones", searches, 1.5, 1.5)],
+        &[
+            ("converged iterations", converged, 3.0, 3.0),
+            ("searches of converged bones", searches, 1.5, 1.5),
+        ],
     );
 }
 
 fn compare_skips(template: &Arc<Template>, own: &Scene, cases: &[(&str, TrackerConfig, f64, f64)]) {
     let run = |config: &TrackerConfig| {
         let (mut tracks, mut done) = (vec![], [0usize; 5]);
-        let out = follow(template, config, own, |i, model, state, report, workspace| {
-            let skipped = &report.skipped;
-            let counts = [
-                skipped.coarse_iterations,
-                skipped.displacements,
-                skipped.iterations,
-                skipped.frames,
-                skipped.searches,
-            ];
-            done.iter_mut().zip(counts).for_each(|(d, c)| *d += c);
-            if i >= 75 {
-                let (vertices, bones) = workspace.posed(model, state);
-                tracks.push((bones.joints, vertices.to_vec()));
-            }
-        });
+        let out = follow(
+            template,
+            config,
+            own,
+            |i, model, state, report, workspace| {
+                let skipped = &report.skipped;
+                let counts = [
+                    skipped.coarse_iterations,
+                    skipped.displacements,
+                    skipped.iterations,
+                    skipped.frames,
+                    skipped.searches,
+                ];
+                done.iter_mut().zip(counts).for_each(|(d, c)| *d += c);
+                if i >= 75 {
+                    let (vertices, bones) = workspace.posed(model, state);
+                    tracks.push((bones.joints, vertices.to_vec()));
+                }
+            },
+        );
         (tracks, done, mean(&out.joints_mm))
     };
     let (with, skipped, error) = run(&TrackerConfig::default());
@@ -217,27 +402,45 @@ fn compare_skips(template: &Arc<Template>, own: &Scene, cases: &[(&str, TrackerC
         let (mut joints, mut surface) = (vec![], vec![]);
         for (a, b) in with.iter().zip(&without) {
             joints.extend(a.0.iter().zip(&b.0).map(|(p, q)| (p - q).norm() * 1e3));
-            surface.extend(a.1.iter().zip(&b.1).map(|(p, q)| f64::from((p - q).norm()) * 1e3));
+            surface.extend(
+                a.1.iter()
+                    .zip(&b.1)
+                    .map(|(p, q)| f64::from((p - q).norm()) * 1e3),
+            );
         }
         let (joints, surface) = (mean(&joints), mean(&surface));
         eprintln!(
             "{name} skipped ({skipped:?} against {less:?}): joints {joints:.3} mm apart, surface {surface:.3}; error {error:.1} against {other:.1} mm"
         );
-        assert!(skipped.iter().zip(&less).any(|(a, b)| a > b), "{name}: something is left out");
-        assert!(joints <= *joints_bound && surface <= *surface_bound, "{name}: {joints:.2}, {surface:.2} mm");
+        assert!(
+            skipped.iter().zip(&less).any(|(a, b)| a > b),
+            "{name}: something is left out"
+        );
+        assert!(
+            joints <= *joints_bound && surface <= *surface_bound,
+            "{name}: {joints:.2}, {surface:.2} mm"
+        );
     }
 }
 
 #[test]
 fn an_arm_lost_at_low_rate_is_found_again() {
-    let (Some(folder), Some(data)) = (shared("sequences/jacks_f_avg_kinect1_room"), shared(".")) else { return };
+    let (Some(folder), Some(data)) = (shared("sequences/jacks_f_avg_kinect1_room"), shared("."))
+    else {
+        return;
+    };
     let template = scenes::subject(&data, "template").expect("template");
     let own = Scene::open(&folder).expect("scene").every(4);
     let error = |rescue| {
-        let config = TrackerConfig { rescue, ..TrackerConfig::default() };
+        let config = TrackerConfig {
+            rescue,
+            ..TrackerConfig::default()
+        };
         mean(&follow(&template, &config, &own, |_, _, _, _, _| {}).joints_mm)
     };
     let (without, with) = (error(false), error(true));
-    eprintln!("jumping jacks at 7.5 frames a second: {with:.1} mm, {without:.1} without looking for the arm");
+    eprintln!(
+        "jumping jacks at 7.5 frames a second: {with:.1} mm, {without:.1} without looking for the arm"
+    );
     assert!(with < 16.0 && with < without);
 }

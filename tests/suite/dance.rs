@@ -6,7 +6,9 @@ use tryon::evaluate::dance::{Outfit, load};
 
 #[test]
 fn an_outfit_survives_a_dance_outside_the_body_and_unstretched() {
-    let Some(folder) = shared("garments/cipc_apache2") else { return };
+    let Some(folder) = shared("garments/cipc_apache2") else {
+        return;
+    };
     let dance = load(&folder).unwrap();
     // The skeleton that was found for the bare mesh lies in it.
     assert!(dance.fit < 0.012, "{}", dance.fit);
@@ -14,7 +16,12 @@ fn an_outfit_survives_a_dance_outside_the_body_and_unstretched() {
     let parts = body_parts(&dance.template);
     assert_eq!(parts.iter().filter(|p| **p == 0).count(), 20);
     let garments = ["tshirt", "skirt"].map(str::to_owned).to_vec();
-    let outfit = Outfit { garments, edge: 0.022, config: Config::default(), seconds: 10.0 };
+    let outfit = Outfit {
+        garments,
+        edge: 0.022,
+        config: Config::default(),
+        seconds: 10.0,
+    };
     let report = dance.run(&outfit, |_, _, _| {}).unwrap();
     println!(
         "{} vertices, p99 strain {:.3}, penetration {:?} m",
@@ -28,5 +35,9 @@ fn an_outfit_survives_a_dance_outside_the_body_and_unstretched() {
     // Speeds of single vertices carried through contact tore the skirt apart: 0.7 to 2.4. Pegs taken for skin: 0.16.
     assert!(report.p99_strain < 0.12, "{}", report.p99_strain);
     // The deepest vertex hangs on roundings: 1.4 to 3.9 mm over six lengths of edges.
-    assert!(report.penetration[0] < 1e-3 && report.penetration[1] < 5e-3, "{:?}", report.penetration);
+    assert!(
+        report.penetration[0] < 1e-3 && report.penetration[1] < 5e-3,
+        "{:?}",
+        report.penetration
+    );
 }

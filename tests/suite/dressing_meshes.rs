@@ -4,7 +4,9 @@ use crate::common::{posed, shared};
 use std::path::{Path, PathBuf};
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
 use tryon::cloth::realtime::{Config, Input, Workspace, step};
-use tryon::dressing::{DressError, DressOptions, Dressed, MadeOn, MeshWear, Wear, dress, dress_all};
+use tryon::dressing::{
+    DressError, DressOptions, Dressed, MadeOn, MeshWear, Wear, dress, dress_all,
+};
 use tryon::formats::gltf::{GlbMesh, write_glb};
 use tryon::garment::{GarmentKind, Material, Size, library};
 use tryon::math::{Body, Rigid, World, log_so3};
@@ -14,7 +16,10 @@ const HEAVY: &[f64] = &[0.3, 2.0, 1.2, -0.2, 0.2, 0.3, 0.0, 0.6, 0.0];
 
 fn person(shape: &[f64]) -> (std::sync::Arc<Template>, RestBody) {
     let t = embedded::template();
-    let rest = t.personalise(&BodyShape { coefficients: shape.to_vec(), ..BodyShape::default() });
+    let rest = t.personalise(&BodyShape {
+        coefficients: shape.to_vec(),
+        ..BodyShape::default()
+    });
     (t, rest)
 }
 
@@ -26,7 +31,9 @@ fn standing(template: &Template, rest: &RestBody, down: f64) -> Pose<World> {
         let joint = |n: &str| sk.index(&format!("{side}_{n}")).expect("joint");
         let (j, c) = (joint("shoulder"), joint("elbow"));
         let wanted = nalgebra::Vector3::new(s * f64::cos(down), -f64::sin(down), 0.0);
-        let q = nalgebra::UnitQuaternion::rotation_between(&(rest.joints[c] - rest.joints[j]), &wanted).expect("turn");
+        let q =
+            nalgebra::UnitQuaternion::rotation_between(&(rest.joints[c] - rest.joints[j]), &wanted)
+                .expect("turn");
         p.set(sk, &format!("{side}_shoulder"), log_so3(&q).as_slice());
     }
     p
@@ -37,7 +44,13 @@ fn clothes(file: &str) -> Option<PathBuf> {
 }
 
 fn read(file: &Path, body: Option<MadeOn>) -> MeshWear {
-    let w = MeshWear::on(file, body, &Material::preset("cotton").expect("preset"), 0.021).expect("wearable");
+    let w = MeshWear::on(
+        file,
+        body,
+        &Material::preset("cotton").expect("preset"),
+        0.021,
+    )
+    .expect("wearable");
     println!("{}: {}", w.name, w.notes.join("; "));
     w
 }
@@ -45,7 +58,14 @@ fn read(file: &Path, body: Option<MadeOn>) -> MeshWear {
 fn worn(shape: &[f64], wear: &MeshWear) -> Dressed {
     let (t, rest) = person(shape);
     let pose = standing(&t, &rest, 1.3);
-    dress_all(&t, &rest, &pose, &[Wear::Mesh(wear)], &DressOptions::default()).expect("dressed")
+    dress_all(
+        &t,
+        &rest,
+        &pose,
+        &[Wear::Mesh(wear)],
+        &DressOptions::default(),
+    )
+    .expect("dressed")
 }
 
 /// Height of the lowest and highest vertex, area in space over area at rest.
@@ -57,25 +77,45 @@ fn look(d: &Dressed, k: usize) -> ([f32; 2], f64) {
         now += 0.5 * (p[1] - p[0]).cross(&(p[2] - p[0])).norm();
         flat += tryon::garment::mesh_area(r);
     }
-    (x.iter().fold([f32::MAX, f32::MIN], |[l, h], p| [l.min(p.y), h.max(p.y)]), now / flat)
+    (
+        x.iter()
+            .fold([f32::MAX, f32::MIN], |[l, h], p| [l.min(p.y), h.max(p.y)]),
+        now / flat,
+    )
 }
 
 fn shirt_and_trousers(body: Option<MadeOn>) {
-    let Some(file) = clothes("male_casualsuit02/male_casualsuit02") else { return };
+    let Some(file) = clothes("male_casualsuit02/male_casualsuit02") else {
+        return;
+    };
     let wear = read(&file, body);
     for (name, shape) in [("average", AVERAGE), ("heavy man", HEAVY)] {
         let d = worn(shape, &wear);
         let kinds: Vec<GarmentKind> = d.model.outfit.garments.iter().map(|g| g.kind).collect();
         assert_eq!(kinds.len(), 2, "{name}: {kinds:?}");
-        println!("{name}: p99 stretch {:.3}, {:.1} mm deep", d.report.p99_strain, d.report.penetration * 1e3);
-        assert!(d.report.p99_strain < 0.2 && d.report.penetration < 0.04, "{name}: {:?}", d.report);
+        println!(
+            "{name}: p99 stretch {:.3}, {:.1} mm deep",
+            d.report.p99_strain,
+            d.report.penetration * 1e3
+        );
+        assert!(
+            d.report.p99_strain < 0.2 && d.report.penetration < 0.04,
+            "{name}: {:?}",
+            d.report
+        );
         for (k, kind) in kinds.iter().enumerate() {
             let ([low, high], area) = look(&d, k);
             println!("  {kind:?}: from {low:.2} to {high:.2} m, area {area:.3}");
             assert!((0.93..1.08).contains(&area), "{name} {kind:?}: area {area}");
             match kind {
-                GarmentKind::Trousers => assert!(low < 0.2 && (0.85..1.2).contains(&high), "{name}: {low} {high}"),
-                _ => assert!((0.7..1.1).contains(&low) && high > 1.35, "{name}: {low} {high}"),
+                GarmentKind::Trousers => assert!(
+                    low < 0.2 && (0.85..1.2).contains(&high),
+                    "{name}: {low} {high}"
+                ),
+                _ => assert!(
+                    (0.7..1.1).contains(&low) && high > 1.35,
+                    "{name}: {low} {high}"
+                ),
             }
         }
     }
@@ -83,7 +123,9 @@ fn shirt_and_trousers(body: Option<MadeOn>) {
 
 #[test]
 fn makehuman_clothes_are_worn_by_bodies_of_ours() {
-    let Some(base) = shared("body/makehuman_hm08_cc0/makehuman_app/3dobjs/base.obj") else { return };
+    let Some(base) = shared("body/makehuman_hm08_cc0/makehuman_app/3dobjs/base.obj") else {
+        return;
+    };
     shirt_and_trousers(Some(MadeOn::read(&base).expect("a body")));
 }
 
@@ -94,9 +136,10 @@ fn without_the_body_it_was_made_on_a_guess_will_do() {
 
 #[test]
 fn hats_are_carried_by_the_head() {
-    let (Some(base), Some(hat)) =
-        (shared("body/makehuman_hm08_cc0/makehuman_app/3dobjs/base.obj"), clothes("fedora01/fedora"))
-    else {
+    let (Some(base), Some(hat)) = (
+        shared("body/makehuman_hm08_cc0/makehuman_app/3dobjs/base.obj"),
+        clothes("fedora01/fedora"),
+    ) else {
         return;
     };
     let wear = read(&hat, Some(MadeOn::read(&base).expect("a body")));
@@ -105,7 +148,10 @@ fn hats_are_carried_by_the_head() {
     let top = rest.vertices.iter().map(|p| p.y).fold(0.0, f32::max);
     let before = d.state.garments[0].positions.clone();
     let ([low, high], _) = look(&d, 0);
-    assert!(low > top - 0.2 && high > top, "{low} to {high} on a head that ends at {top}");
+    assert!(
+        low > top - 0.2 && high > top,
+        "{low} to {high} on a head that ends at {top}"
+    );
     // The person walks half a metre in half a second: the hat goes with the head and keeps its shape.
     let mut work = Workspace::default();
     for i in 1..=15 {
@@ -113,11 +159,23 @@ fn hats_are_carried_by_the_head() {
             .iter()
             .map(|p| p + nalgebra::Vector3::new(0.0, 0.0, 0.033 * i as f32))
             .collect();
-        step(&d.model, &mut d.state, &Input { body: &body, dt: 1.0 / 30.0 }, &mut work).expect("a step");
+        step(
+            &d.model,
+            &mut d.state,
+            &Input {
+                body: &body,
+                dt: 1.0 / 30.0,
+            },
+            &mut work,
+        )
+        .expect("a step");
     }
     for (a, b) in before.iter().zip(&d.state.garments[0].positions) {
         let moved = b - a;
-        assert!((moved - nalgebra::Vector3::new(0.0, 0.0, 0.495)).norm() < 3e-3, "{moved}");
+        assert!(
+            (moved - nalgebra::Vector3::new(0.0, 0.0, 0.495)).norm() < 3e-3,
+            "{moved}"
+        );
     }
 }
 
@@ -126,18 +184,32 @@ fn a_size_that_cannot_be_closed_is_refused_with_what_is_missing() {
     let (t, rest) = person(HEAVY);
     let pose = standing(&t, &rest, 1.3);
     let put_on = |size, any_size| {
-        let options = DressOptions { any_size, config: Config::default(), ..DressOptions::default() };
-        dress(&t, &rest, &pose, &[library::pattern("tshirt", size).expect("pattern")], &options)
+        let options = DressOptions {
+            any_size,
+            config: Config::default(),
+            ..DressOptions::default()
+        };
+        dress(
+            &t,
+            &rest,
+            &pose,
+            &[library::pattern("tshirt", size).expect("pattern")],
+            &options,
+        )
     };
     let e = put_on(Size::Xs, false).expect_err("far too small");
     assert!(matches!(e, DressError::Misfit(_)), "{e}");
     let text = e.to_string();
     println!("{text}");
     assert!(
-        text.contains("tshirt XS cannot be closed: at the chest it lacks") && text.contains("can be worn"),
+        text.contains("tshirt XS cannot be closed: at the chest it lacks")
+            && text.contains("can be worn"),
         "{text}"
     );
-    assert!(put_on(Size::Xs, true).is_ok(), "asked for, it is put on all the same");
+    assert!(
+        put_on(Size::Xs, true).is_ok(),
+        "asked for, it is put on all the same"
+    );
     // Worn tight: the hem stays where a hem is.
     let d = put_on(Size::M, false).expect("tight");
     let ([low, high], _) = look(&d, 0);
@@ -150,17 +222,38 @@ fn our_own_gltf_is_worn_wherever_its_person_stood() {
     let (t, rest) = person(AVERAGE);
     let pattern = library::pattern("tshirt", Size::M).expect("pattern");
     let pose = standing(&t, &rest, 0.9);
-    let first = dress(&t, &rest, &pose, std::slice::from_ref(&pattern), &DressOptions::default()).expect("dressed");
+    let first = dress(
+        &t,
+        &rest,
+        &pose,
+        std::slice::from_ref(&pattern),
+        &DressOptions::default(),
+    )
+    .expect("dressed");
     let g = &first.model.outfit.garments[0];
     let (mut drawn, folder) = (Vec::new(), tempfile::tempdir().expect("a folder"));
     g.render_positions(&first.state.garments[0].positions, &mut drawn);
     let worn_from = |aside: [f32; 3]| {
-        let vertices: Vec<_> = drawn.iter().map(|p| p + nalgebra::Vector3::from(aside)).collect();
+        let vertices: Vec<_> = drawn
+            .iter()
+            .map(|p| p + nalgebra::Vector3::from(aside))
+            .collect();
         let file = folder.path().join("shirt.glb");
         let color = [200, 40, 40];
-        let mesh = GlbMesh { name: "shirt", vertices: &vertices, faces: &g.render.faces, uv: &g.render.uv, color };
+        let mesh = GlbMesh {
+            name: "shirt",
+            vertices: &vertices,
+            faces: &g.render.faces,
+            uv: &g.render.uv,
+            color,
+        };
         write_glb(&file, &[mesh]).expect("written");
-        MeshWear::on(&file, None, &Material::preset("cotton").expect("preset"), 0.021)
+        MeshWear::on(
+            &file,
+            None,
+            &Material::preset("cotton").expect("preset"),
+            0.021,
+        )
     };
     let before = look(&first, 0).0;
     for aside in [[0.0; 3], [0.3, 0.0, -2.4]] {
@@ -169,7 +262,10 @@ fn our_own_gltf_is_worn_wherever_its_person_stood() {
         println!("{aside:?}: {before:?} before, {after:?} after, area {area:.3}");
         assert!((0.93..1.08).contains(&area), "{area}");
         for (a, b) in before.iter().zip(after) {
-            assert!((a - b).abs() < 0.06, "{aside:?}: {before:?} before, {after:?} after");
+            assert!(
+                (a - b).abs() < 0.06,
+                "{aside:?}: {before:?} before, {after:?} after"
+            );
         }
     }
     let high = worn_from([0.0, 4.0, 0.0]).expect_err("nobody is that tall");

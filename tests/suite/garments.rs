@@ -17,21 +17,36 @@ use tryon::math::log_so3;
 
 /// Stature, girth, sex and so on in standard deviations.
 const BODIES: [(&str, &[f64]); 3] = [
-    ("slim woman", &[-0.4, -1.0, -1.2, 0.2, 0.0, -0.2, 0.0, -0.3, 0.1]),
+    (
+        "slim woman",
+        &[-0.4, -1.0, -1.2, 0.2, 0.0, -0.2, 0.0, -0.3, 0.1],
+    ),
     ("average", &[]),
     ("heavy man", &[0.3, 2.0, 1.2, -0.2, 0.2, 0.3, 0.0, 0.6, 0.0]),
 ];
 
 fn wear(coefficients: &[f64], patterns: &dyn Fn(&Template, &RestBody) -> Vec<Pattern>) -> Dressed {
     let t = embedded::template();
-    let rest = t.personalise(&BodyShape { coefficients: coefficients.to_vec(), ..BodyShape::default() });
+    let rest = t.personalise(&BodyShape {
+        coefficients: coefficients.to_vec(),
+        ..BodyShape::default()
+    });
     let list = patterns(&t, &rest);
-    dress(&t, &rest, &arms_down(&t, &rest), &list, &DressOptions::default()).expect("dressed")
+    dress(
+        &t,
+        &rest,
+        &arms_down(&t, &rest),
+        &list,
+        &DressOptions::default(),
+    )
+    .expect("dressed")
 }
 
 fn suggested(name: &'static str) -> impl Fn(&Template, &RestBody) -> Vec<Pattern> {
     move |t, rest| {
-        let size = suggest(name, &measure(t, rest).expect("measurable")).expect("size").size;
+        let size = suggest(name, &measure(t, rest).expect("measurable"))
+            .expect("size")
+            .size;
         vec![library::pattern(name, size).expect("pattern")]
     }
 }
@@ -54,18 +69,37 @@ fn every_garment_hangs_on_three_bodies() {
                 short += usize::from(area < 0.5 * rest);
             }
             let (ratio, crumpled) = (now / flat, short as f64 / g.faces.len() as f64);
-            let (low, high) = x.iter().fold((f32::MAX, f32::MIN), |(l, h), p| (l.min(p.y), h.max(p.y)));
+            let (low, high) = x
+                .iter()
+                .fold((f32::MAX, f32::MIN), |(l, h), p| (l.min(p.y), h.max(p.y)));
             eprintln!(
                 "{name} {} on {body}: area {ratio:.3}, crumpled {crumpled:.4}, under the skin {:.1} mm, p99 stretch {:.3}, from {low:.2} to {high:.2} m",
                 g.size,
                 d.report.penetration * 1e3,
                 d.report.p99_strain
             );
-            assert!((0.93..1.10).contains(&ratio), "{name} on {body}: area {ratio}");
-            assert!(crumpled < 0.02, "{name} on {body}: {crumpled} of the triangles are crumpled");
-            assert_eq!(d.report.crossings, 0, "{name} on {body} passes through itself");
-            assert!(d.report.penetration < 0.004, "{name} on {body}: {} m under the skin", d.report.penetration);
-            assert!(d.report.p99_strain < 0.15, "{name} on {body}: stretch {}", d.report.p99_strain);
+            assert!(
+                (0.93..1.10).contains(&ratio),
+                "{name} on {body}: area {ratio}"
+            );
+            assert!(
+                crumpled < 0.02,
+                "{name} on {body}: {crumpled} of the triangles are crumpled"
+            );
+            assert_eq!(
+                d.report.crossings, 0,
+                "{name} on {body} passes through itself"
+            );
+            assert!(
+                d.report.penetration < 0.004,
+                "{name} on {body}: {} m under the skin",
+                d.report.penetration
+            );
+            assert!(
+                d.report.p99_strain < 0.15,
+                "{name} on {body}: stretch {}",
+                d.report.p99_strain
+            );
             let hem: std::ops::Range<f32> = match g.kind {
                 GarmentKind::Top => 0.60..1.0,
                 GarmentKind::Skirt | GarmentKind::Dress => 0.30..0.75,
@@ -76,15 +110,23 @@ fn every_garment_hangs_on_three_bodies() {
             // The suggestion's sentence says where the hem will be.
             if !matches!(g.kind, GarmentKind::Skirt) {
                 let t = embedded::template();
-                let rest = t.personalise(&BodyShape { coefficients: shape.to_vec(), ..BodyShape::default() });
-                let said = suggest(name, &measure(&t, &rest).expect("measurable")).expect("size").hem;
+                let rest = t.personalise(&BodyShape {
+                    coefficients: shape.to_vec(),
+                    ..BodyShape::default()
+                });
+                let said = suggest(name, &measure(&t, &rest).expect("measurable"))
+                    .expect("size")
+                    .hem;
                 // Over a belly or a bust a top hangs shorter than its back is long.
                 let off = match g.kind {
                     GarmentKind::Top => 0.13,
                     GarmentKind::Trousers => 0.05,
                     _ => 0.09,
                 };
-                assert!((said - f64::from(low)).abs() < off, "{name} on {body}: {said} said, {low} hangs");
+                assert!(
+                    (said - f64::from(low)).abs() < off,
+                    "{name} on {body}: {said} said, {low} hangs"
+                );
             }
         }
     }
@@ -94,42 +136,83 @@ fn every_garment_hangs_on_three_bodies() {
 fn a_shirt_that_is_taken_out_of_itself_crosses_itself_nowhere_and_is_not_torn() {
     let t = embedded::template();
     for (body, shape) in BODIES {
-        let rest = t.personalise(&BodyShape { coefficients: shape.to_vec(), ..BodyShape::default() });
+        let rest = t.personalise(&BodyShape {
+            coefficients: shape.to_vec(),
+            ..BodyShape::default()
+        });
         let shirt = suggested("tshirt")(&t, &rest);
         let worn = |untangle| {
-            let options = DressOptions { untangle, ..DressOptions::default() };
-            dress(&t, &rest, &arms_down(&t, &rest), &shirt, &options).expect("dressed").report
+            let options = DressOptions {
+                untangle,
+                ..DressOptions::default()
+            };
+            dress(&t, &rest, &arms_down(&t, &rest), &shirt, &options)
+                .expect("dressed")
+                .report
         };
         let (as_it_falls, free) = (worn(false), worn(true));
-        assert!(as_it_falls.crossings > 20, "{body}: {}", as_it_falls.crossings);
+        assert!(
+            as_it_falls.crossings > 20,
+            "{body}: {}",
+            as_it_falls.crossings
+        );
         assert_eq!(free.crossings, 0, "{body}");
-        assert!(free.p99_strain < as_it_falls.p99_strain + 0.015, "{body}: {}", free.p99_strain);
+        assert!(
+            free.p99_strain < as_it_falls.p99_strain + 0.015,
+            "{body}: {}",
+            free.p99_strain
+        );
     }
 }
 
 #[test]
 fn a_hood_of_fine_cloth_in_folds_on_a_thick_neck_passes_through_itself_nowhere() {
     let t = embedded::template();
-    let rest = t.personalise(&BodyShape { coefficients: BODIES[2].1.to_vec(), ..BodyShape::default() });
+    let rest = t.personalise(&BodyShape {
+        coefficients: BODIES[2].1.to_vec(),
+        ..BodyShape::default()
+    });
     let options = DressOptions {
-        triangulation: Triangulation { edge_length: 0.0155, ..Triangulation::default() },
+        triangulation: Triangulation {
+            edge_length: 0.0155,
+            ..Triangulation::default()
+        },
         ..DressOptions::default()
     };
-    let worn = dress(&t, &rest, &arms_down(&t, &rest), &suggested("hoodie")(&t, &rest), &options).expect("dressed");
+    let worn = dress(
+        &t,
+        &rest,
+        &arms_down(&t, &rest),
+        &suggested("hoodie")(&t, &rest),
+        &options,
+    )
+    .expect("dressed");
     assert!(worn.model.outfit.garments[0].corners.len() > 5000);
     assert_eq!(worn.report.crossings, 0);
-    assert!(worn.report.penetration < 0.004 && worn.report.p99_strain < 0.15, "{:?}", worn.report);
+    assert!(
+        worn.report.penetration < 0.004 && worn.report.p99_strain < 0.15,
+        "{:?}",
+        worn.report
+    );
 }
 
 #[test]
 fn wide_hoods_are_free_of_themselves_at_the_first_try() {
     let t = embedded::template();
     for (body, shape) in BODIES {
-        let rest = t.personalise(&BodyShape { coefficients: shape.to_vec(), ..BodyShape::default() });
+        let rest = t.personalise(&BodyShape {
+            coefficients: shape.to_vec(),
+            ..BodyShape::default()
+        });
         for size in [Size::L, Size::Xl] {
             let hoodie = [library::pattern("hoodie", size).expect("pattern")];
-            let options = DressOptions { any_size: true, ..DressOptions::default() };
-            let r = dress(&t, &rest, &arms_down(&t, &rest), &hoodie, &options).expect("dressed").report;
+            let options = DressOptions {
+                any_size: true,
+                ..DressOptions::default()
+            };
+            let r = dress(&t, &rest, &arms_down(&t, &rest), &hoodie, &options)
+                .expect("dressed")
+                .report;
             assert_eq!(r.crossings, 0, "{size} on {body}");
             // A second try would take 170 more.
             assert!(r.steps < 800, "{size} on {body}: {} substeps", r.steps);
@@ -152,8 +235,13 @@ fn bare(d: &Dressed, joints: [Point3<f64>; 2]) -> f64 {
         .map(|r| r.dot(&v).atan2(r.dot(&u)).to_degrees())
         .collect();
     turns.sort_unstable_by(f64::total_cmp);
-    let Some((first, last)) = turns.first().zip(turns.last()) else { return 360.0 };
-    turns.windows(2).map(|w| w[1] - w[0]).fold(first + 360.0 - last, f64::max)
+    let Some((first, last)) = turns.first().zip(turns.last()) else {
+        return 360.0;
+    };
+    turns
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .fold(first + 360.0 - last, f64::max)
 }
 
 #[test]
@@ -162,7 +250,10 @@ fn bent_arms_are_in_their_sleeves() {
     let sk = t.skeleton();
     let mut lost = Vec::new();
     for (body, shape) in &BODIES[1..] {
-        let rest = t.personalise(&BodyShape { coefficients: shape.to_vec(), ..BodyShape::default() });
+        let rest = t.personalise(&BodyShape {
+            coefficients: shape.to_vec(),
+            ..BodyShape::default()
+        });
         let pattern = suggested("longsleeve")(&t, &rest);
         for k in 0..9 {
             let mut pose = arms_down(&t, &rest);
@@ -175,8 +266,10 @@ fn bent_arms_are_in_their_sleeves() {
                 let wanted = Vector3::new(s * out.sin(), -out.cos(), 0.3);
                 let turn = UnitQuaternion::rotation_between(&arm, &wanted).expect("turn");
                 // The crook of the elbow to the front or outwards: inwards a forearm is in the belly.
-                let twist =
-                    UnitQuaternion::from_axis_angle(&Unit::new_normalize(arm), s * [0.0, -0.3, -0.6][(k + k / 3) % 3]);
+                let twist = UnitQuaternion::from_axis_angle(
+                    &Unit::new_normalize(arm),
+                    s * [0.0, -0.3, -0.6][(k + k / 3) % 3],
+                );
                 pose.angles[at..at + 3].copy_from_slice(log_so3(&(turn * twist)).as_slice());
                 pose.set(sk, &format!("{side}_elbow"), &[bend]);
             }
@@ -184,9 +277,13 @@ fn bent_arms_are_in_their_sleeves() {
             let mut bones = BoneTransforms::default();
             pose.bones(sk, &rest, &mut bones);
             for side in ["left", "right"] {
-                let at = ["elbow", "wrist"].map(|n| bones.joints[sk.index(&format!("{side}_{n}")).expect("joint")]);
+                let at = ["elbow", "wrist"]
+                    .map(|n| bones.joints[sk.index(&format!("{side}_{n}")).expect("joint")]);
                 let gap = bare(&d, at);
-                eprintln!("{body} {k} {side}: {gap:.0}°, stretch {:.3}", d.report.p99_strain);
+                eprintln!(
+                    "{body} {k} {side}: {gap:.0}°, stretch {:.3}",
+                    d.report.p99_strain
+                );
                 if gap > 90.0 {
                     lost.push(format!("{body} {k} {side}: {gap:.0}°"));
                 }
@@ -199,10 +296,20 @@ fn bent_arms_are_in_their_sleeves() {
 #[test]
 fn an_outer_layer_lies_outside_the_inner_one() {
     let untucked = |_: &Template, _: &RestBody| {
-        ["tshirt", "skirt"].map(|n| library::pattern(n, Size::M).expect("pattern")).to_vec()
+        ["tshirt", "skirt"]
+            .map(|n| library::pattern(n, Size::M).expect("pattern"))
+            .to_vec()
     };
     let d = wear(&[], &untucked);
-    assert_eq!(d.model.outfit.garments.iter().map(|g| g.name.as_str()).collect::<Vec<_>>(), ["skirt", "tshirt"]);
+    assert_eq!(
+        d.model
+            .outfit
+            .garments
+            .iter()
+            .map(|g| g.name.as_str())
+            .collect::<Vec<_>>(),
+        ["skirt", "tshirt"]
+    );
     let tucked = |t: &Template, r: &RestBody| {
         let mut p = untucked(t, r);
         p[0].layer = 0;
@@ -210,12 +317,24 @@ fn an_outer_layer_lies_outside_the_inner_one() {
         p
     };
     let d = wear(&[], &tucked);
-    assert_eq!(d.model.outfit.garments.iter().map(|g| g.name.as_str()).collect::<Vec<_>>(), ["tshirt", "skirt"]);
+    assert_eq!(
+        d.model
+            .outfit
+            .garments
+            .iter()
+            .map(|g| g.name.as_str())
+            .collect::<Vec<_>>(),
+        ["tshirt", "skirt"]
+    );
 }
 
 fn garmentcode() -> Option<Vec<std::path::PathBuf>> {
     let folder = crate::common::shared("garments/garmentcode_mit/Patterns")?;
-    let mut files: Vec<_> = std::fs::read_dir(folder).expect("a folder").flatten().map(|e| e.path()).collect();
+    let mut files: Vec<_> = std::fs::read_dir(folder)
+        .expect("a folder")
+        .flatten()
+        .map(|e| e.path())
+        .collect();
     files.sort();
     Some(files)
 }
@@ -226,13 +345,22 @@ fn every_garmentcode_pattern_is_imported_and_worn() {
     assert!(files.len() >= 4);
     for path in files {
         let raw = read_garmentcode(&path).expect("read");
-        let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or("garment");
+        let name = path
+            .file_stem()
+            .and_then(|s| s.to_str())
+            .unwrap_or("garment");
         let fabric = Material::preset("cotton").expect("preset");
-        let p = from_garmentcode(&raw, name, Size::M, fabric).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let p =
+            from_garmentcode(&raw, name, Size::M, fabric).unwrap_or_else(|e| panic!("{name}: {e}"));
         let round = Pattern::from_json(&p.to_json()).expect("our own JSON");
         assert_eq!(round.panels.len(), raw.panels.len());
         // Stitches between edges of a few millimetres are closed by leaving the edges out.
-        assert!(p.seams.len() + 10 >= raw.stitches.len(), "{name}: {} of {}", p.seams.len(), raw.stitches.len());
+        assert!(
+            p.seams.len() + 10 >= raw.stitches.len(),
+            "{name}: {} of {}",
+            p.seams.len(),
+            raw.stitches.len()
+        );
         let d = wear(&[], &|_, _| vec![p.clone()]);
         let (g, x) = (&d.model.outfit.garments[0], &d.state.garments[0].positions);
         let (mut flat, mut now) = (0.0, 0.0);
@@ -250,7 +378,11 @@ fn every_garmentcode_pattern_is_imported_and_worn() {
             p.kind,
             p.finished
         );
-        assert!((0.9..1.15).contains(&(now / flat)), "{name}: area {}", now / flat);
+        assert!(
+            (0.9..1.15).contains(&(now / flat)),
+            "{name}: area {}",
+            now / flat
+        );
     }
 }
 
@@ -260,18 +392,35 @@ fn damaged_garmentcode_files_are_refused_or_read_but_never_panic() {
     let text = std::fs::read_to_string(&files[0]).expect("text");
     let at = std::path::Path::new("p.json");
     // Cut at many places, and digits swapped for others: indices and coordinates that no longer fit.
-    for cut in (0..text.len()).step_by(97).filter(|c| text.is_char_boundary(*c)) {
+    for cut in (0..text.len())
+        .step_by(97)
+        .filter(|c| text.is_char_boundary(*c))
+    {
         assert!(parse_garmentcode(&text[..cut], at).is_err(), "cut at {cut}");
     }
-    let digits: Vec<usize> = text.bytes().enumerate().filter(|(_, b)| b.is_ascii_digit()).map(|(i, _)| i).collect();
+    let digits: Vec<usize> = text
+        .bytes()
+        .enumerate()
+        .filter(|(_, b)| b.is_ascii_digit())
+        .map(|(i, _)| i)
+        .collect();
     for k in 0..200 {
         let mut bytes = text.clone().into_bytes();
         bytes[digits[(k * 7919) % digits.len()]] = b'9';
         let damaged = String::from_utf8(bytes).expect("ASCII stays ASCII");
         if let Ok(raw) = parse_garmentcode(&damaged, at) {
-            let p = from_garmentcode(&raw, "damaged", Size::M, Material::preset("cotton").expect("preset"));
+            let p = from_garmentcode(
+                &raw,
+                "damaged",
+                Size::M,
+                Material::preset("cotton").expect("preset"),
+            );
             if let Ok(p) = p {
-                let how = Triangulation { edge_length: 0.05, min_angle: 0.0, ..Triangulation::default() };
+                let how = Triangulation {
+                    edge_length: 0.05,
+                    min_angle: 0.0,
+                    ..Triangulation::default()
+                };
                 let _ = tryon::garment::GarmentMesh::sew(&p, &how);
             }
         }
@@ -280,10 +429,18 @@ fn damaged_garmentcode_files_are_refused_or_read_but_never_panic() {
 
 #[test]
 fn the_stitched_dress_becomes_one_surface() {
-    let Some(path) = crate::common::shared("garments/cipc_apache2/dress_knife/stage.obj") else { return };
+    let Some(path) = crate::common::shared("garments/cipc_apache2/dress_knife/stage.obj") else {
+        return;
+    };
     let sewn = read_sewn_obj(&path).expect("read");
     assert_eq!(sewn.stitches.len(), 851);
-    let g = from_mesh(&sewn, "dress", GarmentKind::Dress, Material::preset("cotton").expect("preset")).expect("sewn");
+    let g = from_mesh(
+        &sewn,
+        "dress",
+        GarmentKind::Dress,
+        Material::preset("cotton").expect("preset"),
+    )
+    .expect("sewn");
     assert_eq!(g.garment.panels.len(), 14);
     let (flat, kept) = (sewn.obj.mesh.faces().len(), g.garment.faces.len());
     let open = g.open;
@@ -300,22 +457,45 @@ fn the_stitched_dress_becomes_one_surface() {
 #[test]
 fn a_fit_map_tells_a_tight_size_from_a_loose_one() {
     let worn = |size| {
-        let mut d = wear(&[], &|_, _| vec![library::pattern("tank", size).expect("pattern")]);
+        let mut d = wear(&[], &|_, _| {
+            vec![library::pattern("tank", size).expect("pattern")]
+        });
         let t = embedded::template();
         let rest = t.personalise(&BodyShape::default());
         let body = posed(&t, &rest, &arms_down(&t, &rest));
         // Forces at rest are read as pressure, and cloth that has just been put on is not.
         let mut work = Workspace::default();
         for _ in 0..30 {
-            step(&d.model, &mut d.state, &Input { body: &body, dt: 1.0 / 30.0 }, &mut work).expect("a step");
+            step(
+                &d.model,
+                &mut d.state,
+                &Input {
+                    body: &body,
+                    dt: 1.0 / 30.0,
+                },
+                &mut work,
+            )
+            .expect("a step");
         }
         let mut probe = FitProbe::new(&t, &d.model).expect("probe");
-        let map = probe.measure(&d.model, &d.state, &body).expect("fit").remove(0);
-        assert!(probe.measure(&d.model, &d.state, &body[1..]).is_err(), "a body of another size is refused");
+        let map = probe
+            .measure(&d.model, &d.state, &body)
+            .expect("fit")
+            .remove(0);
+        assert!(
+            probe.measure(&d.model, &d.state, &body[1..]).is_err(),
+            "a body of another size is refused"
+        );
         map
     };
     let (small, large) = (worn(Size::S), worn(Size::Xxl));
-    let chest = |m: &tryon::dressing::FitMap| m.regions.iter().find(|r| r.name == "chest").expect("a chest").clone();
+    let chest = |m: &tryon::dressing::FitMap| {
+        m.regions
+            .iter()
+            .find(|r| r.name == "chest")
+            .expect("a chest")
+            .clone()
+    };
     let (s, l) = (chest(&small), chest(&large));
     eprintln!("S {s:?}\nXXL {l:?}");
     assert!(s.stretch[0] > l.stretch[0] + 0.01 && s.gap < l.gap && s.pressure[0] > l.pressure[0]);
@@ -325,13 +505,18 @@ fn a_fit_map_tells_a_tight_size_from_a_loose_one() {
 
 #[test]
 fn measured_fabrics_become_materials() {
-    let Some(folder) = crate::common::shared("materials/wang2011_arcsim_NONCOMMERCIAL") else { return };
+    let Some(folder) = crate::common::shared("materials/wang2011_arcsim_NONCOMMERCIAL") else {
+        return;
+    };
     let mut seen = 0;
     for e in std::fs::read_dir(folder).expect("a folder").flatten() {
         if e.path().extension().is_some_and(|x| x == "json") {
             let f = read_fabric(&e.path()).expect("a fabric");
             let m = Material::from_measured("measured", &f).expect("usable");
-            assert!(m.area_density == f.density && m.stretch_warp > m.shear * 0.05 && m.bending < 1e-3, "{m:?}");
+            assert!(
+                m.area_density == f.density && m.stretch_warp > m.shear * 0.05 && m.bending < 1e-3,
+                "{m:?}"
+            );
             seen += 1;
         }
     }
@@ -348,18 +533,37 @@ fn makehuman_clothes_fit_their_base_mesh() {
     };
     let body = read_obj(&base).expect("base").mesh.vertices().to_vec();
     let mut seen = 0;
-    for dir in std::fs::read_dir(folder).expect("a folder").flatten().filter(|e| e.path().is_dir()) {
-        for file in std::fs::read_dir(dir.path()).expect("a folder").flatten().map(|e| e.path()) {
+    for dir in std::fs::read_dir(folder)
+        .expect("a folder")
+        .flatten()
+        .filter(|e| e.path().is_dir())
+    {
+        for file in std::fs::read_dir(dir.path())
+            .expect("a folder")
+            .flatten()
+            .map(|e| e.path())
+        {
             if file.extension().is_none_or(|x| x != "mhclo") {
                 continue;
             }
             let m = read_mhclo(&file).expect("read");
-            let mesh = read_obj(&file.with_file_name(&m.obj_file)).expect("its OBJ").mesh;
-            assert_eq!(m.bindings.len(), mesh.vertices().len(), "{}", file.display());
+            let mesh = read_obj(&file.with_file_name(&m.obj_file))
+                .expect("its OBJ")
+                .mesh;
+            assert_eq!(
+                m.bindings.len(),
+                mesh.vertices().len(),
+                "{}",
+                file.display()
+            );
             let fitted = m.fit(&body, &file).expect("fits");
             // Bound vertices lie near the body they hang on: within 3 dm, the unit of MakeHuman being dm.
             for (p, b) in fitted.iter().zip(&m.bindings) {
-                assert!((p - body[b.vertices[0] as usize]).norm() < 3.0, "{}", file.display());
+                assert!(
+                    (p - body[b.vertices[0] as usize]).norm() < 3.0,
+                    "{}",
+                    file.display()
+                );
             }
             seen += 1;
         }

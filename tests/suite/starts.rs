@@ -29,19 +29,43 @@ fn mean_error_mm(angles: &Angles<'_>, yaw: f64, of: &[&str]) -> f64 {
     let mut bones = BoneTransforms::default();
     pose.bones(skeleton, &rest, &mut bones);
     let mut vertices = Vec::new();
-    skin(Par::Seq, &rest.vertices, template.weights(), &bones, &mut vertices);
+    skin(
+        Par::Seq,
+        &rest.vertices,
+        template.weights(),
+        &bones,
+        &mut vertices,
+    );
     let camera = Intrinsics::KINECT_V1;
     let mut seen = VisibilityBuffer::default();
-    rasterise(&View::Perspective { camera, near: 0.1 }, &vertices, template.mesh().faces(), &mut seen);
+    rasterise(
+        &View::Perspective { camera, near: 0.1 },
+        &vertices,
+        template.mesh().faces(),
+        &mut seen,
+    );
     let mut depth = DepthImage::empty(camera.width, camera.height);
     for (d, z) in depth.data_mut().iter_mut().zip(&seen.depth) {
-        *d = if z.is_finite() { (z * 1e3).round() as u16 } else { 0 };
+        *d = if z.is_finite() {
+            (z * 1e3).round() as u16
+        } else {
+            0
+        };
     }
-    let model = TrackerModel::new(template.clone(), Calibration::registered(camera), TrackerConfig::default());
+    let model = TrackerModel::new(
+        template.clone(),
+        Calibration::registered(camera),
+        TrackerConfig::default(),
+    );
     let mut state = TrackerState::new(&model);
     let mut workspace = Workspace::default();
     for i in 0..3u64 {
-        let frame = RgbdFrame { sequence: i, time_ns: i * 33_333_333, depth: depth.clone(), color: None };
+        let frame = RgbdFrame {
+            sequence: i,
+            time_ns: i * 33_333_333,
+            depth: depth.clone(),
+            color: None,
+        };
         step(&model, &mut state, &frame, &mut workspace).expect("a step");
     }
     assert!(state.status.is_live(), "{:?}", state.status);
@@ -58,16 +82,45 @@ fn mean_error_mm(angles: &Angles<'_>, yaw: f64, of: &[&str]) -> f64 {
 /// a knee turned out on the far side).
 #[test]
 fn a_start_needs_no_calibration_pose() {
-    let legs = ["left_hip", "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle"];
-    let arms = ["left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist"];
+    let legs = [
+        "left_hip",
+        "right_hip",
+        "left_knee",
+        "right_knee",
+        "left_ankle",
+        "right_ankle",
+    ];
+    let arms = [
+        "left_shoulder",
+        "right_shoulder",
+        "left_elbow",
+        "right_elbow",
+        "left_wrist",
+        "right_wrist",
+    ];
     let scenes: [(&str, &Angles<'_>, &[&str]); 12] = [
-        ("knee lifted", &[("left_hip", &[-1.4, 0.0, 0.0]), ("left_knee", &[1.5])], &legs),
+        (
+            "knee lifted",
+            &[("left_hip", &[-1.4, 0.0, 0.0]), ("left_knee", &[1.5])],
+            &legs,
+        ),
         ("kick", &[("right_hip", &[-1.2, 0.0, 0.0])], &legs),
         ("leg aside", &[("right_hip", &[0.0, 0.0, -0.6])], &legs),
-        ("hand to the front", &[("left_shoulder", &[-1.2, 0.0, -0.5]), ("left_elbow", &[1.0])], &arms),
+        (
+            "hand to the front",
+            &[
+                ("left_shoulder", &[-1.2, 0.0, -0.5]),
+                ("left_elbow", &[1.0]),
+            ],
+            &arms,
+        ),
         ("high kick", &[("right_hip", &[-1.9, 0.0, 0.0])], &legs),
         ("leg far aside", &[("right_hip", &[0.0, 0.0, -1.2])], &legs),
-        ("foot behind", &[("right_hip", &[0.3, 0.0, 0.0]), ("right_knee", &[1.8])], &legs),
+        (
+            "foot behind",
+            &[("right_hip", &[0.3, 0.0, 0.0]), ("right_knee", &[1.8])],
+            &legs,
+        ),
         (
             "lunge",
             &[
@@ -88,7 +141,11 @@ fn a_start_needs_no_calibration_pose() {
             ],
             &legs,
         ),
-        ("flamingo", &[("left_hip", &[0.0, 0.8, 1.0]), ("left_knee", &[2.0])], &legs),
+        (
+            "flamingo",
+            &[("left_hip", &[0.0, 0.8, 1.0]), ("left_knee", &[2.0])],
+            &legs,
+        ),
         (
             "hands behind head",
             &[

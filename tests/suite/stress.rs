@@ -12,7 +12,9 @@ use tryon::evaluate::{Scene, scenes};
 use tryon::math::{P3d, Rigid};
 use tryon::raster::{View, VisibilityBuffer, rasterise};
 use tryon::synth::{Routine, Sequence, Setting, Shopper};
-use tryon::tracking::{LostReason, Reason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+use tryon::tracking::{
+    LostReason, Reason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace, step,
+};
 
 const CHARLESTON: &str = "sequences/charleston_m_heavy_tof_room";
 
@@ -36,13 +38,20 @@ fn recorded(frames: usize) -> Option<Scene> {
 }
 
 fn quiet(template: &Arc<Template>, scene: &Scene) -> Outcome {
-    follow(template, &TrackerConfig::default(), scene, |_, _, _, _, _| {})
+    follow(
+        template,
+        &TrackerConfig::default(),
+        scene,
+        |_, _, _, _, _| {},
+    )
 }
 
 fn joints(model: &TrackerModel, state: &TrackerState) -> Vec<P3d> {
     let rest = model.template().personalise(&state.shape);
     let mut bones = BoneTransforms::default();
-    state.pose.bones(model.template().skeleton(), &rest, &mut bones);
+    state
+        .pose
+        .bones(model.template().skeleton(), &rest, &mut bones);
     bones.joints
 }
 
@@ -50,37 +59,63 @@ fn joints(model: &TrackerModel, state: &TrackerState) -> Vec<P3d> {
 fn own_body(routine: Routine, noise: NoiseModel, frames: u64) -> (Arc<Template>, Scene) {
     let shopper = Shopper::default();
     let template = shopper.template.clone();
-    let setting = Setting { routine, noise, color: false, ..Setting::default() };
-    (template, Scene::synthetic("own", &Sequence::new(shopper, setting), frames))
+    let setting = Setting {
+        routine,
+        noise,
+        color: false,
+        ..Setting::default()
+    };
+    (
+        template,
+        Scene::synthetic("own", &Sequence::new(shopper, setting), frames),
+    )
 }
 
 fn fixed_size() -> TrackerConfig {
-    TrackerConfig { adapt_size: false, displacements: false, ..TrackerConfig::default() }
+    TrackerConfig {
+        adapt_size: false,
+        displacements: false,
+        ..TrackerConfig::default()
+    }
 }
 
 #[test]
 fn lost_and_corrupt_pixels_cost_little() {
-    let (Some(template), Some(scene)) = (template(), recorded(80)) else { return };
+    let (Some(template), Some(scene)) = (template(), recorded(80)) else {
+        return;
+    };
     let error = |s: &Scene| mean(&quiet(&template, s).joints_mm);
     let clean = error(&scene);
     let [half, most] = [0.5, 0.9].map(|share| error(&scene.clone().thinned(share)));
     let [few, tenth] = [0.02, 0.1].map(|share| error(&scene.clone().corrupted(share)));
-    eprintln!("clean {clean:.1} mm; lost 50 %: {half:.1}, 90 %: {most:.1}; corrupt 2 %: {few:.1}, 10 %: {tenth:.1}");
+    eprintln!(
+        "clean {clean:.1} mm; lost 50 %: {half:.1}, 90 %: {most:.1}; corrupt 2 %: {few:.1}, 10 %: {tenth:.1}"
+    );
     assert!(half <= 1.4 * clean && most <= 2.0 * clean);
-    assert!(few <= 1.2 * clean && tenth <= 1.2 * clean, "a start in a corrupt picture included");
+    assert!(
+        few <= 1.2 * clean && tenth <= 1.2 * clean,
+        "a start in a corrupt picture included"
+    );
 }
 
 #[test]
 fn almost_nothing_left_does_not_diverge() {
-    let (Some(template), Some(scene)) = (template(), recorded(75)) else { return };
+    let (Some(template), Some(scene)) = (template(), recorded(75)) else {
+        return;
+    };
     let mut spoilt = scene.clone().thinned(0.98);
     for i in (0..40).chain(60..75) {
         spoilt.frames[i] = scene.frames[i].clone();
     }
     let mut last = 0.0;
-    let out = follow(&template, &TrackerConfig::default(), &spoilt, |_, _, state, _, _| {
-        assert!(state.pose.is_finite());
-    });
+    let out = follow(
+        &template,
+        &TrackerConfig::default(),
+        &spoilt,
+        |_, _, state, _, _| {
+            assert!(state.pose.is_finite());
+        },
+    );
     if let Some(e) = out.joints_mm.get(70 - 30) {
         last = *e;
     }
@@ -90,20 +125,39 @@ fn almost_nothing_left_does_not_diverge() {
 
 #[test]
 fn empty_frames_lose_and_find_again() {
-    let (Some(template), Some(scene)) = (template(), recorded(105)) else { return };
+    let (Some(template), Some(scene)) = (template(), recorded(105)) else {
+        return;
+    };
     for gap in [1usize, 5, 15, 30] {
         let blind = scene.clone().blind(50..50 + gap);
         let mut kept: Option<Pose> = None;
-        let out = follow(&template, &TrackerConfig::default(), &blind, |i, _, state, _, _| {
-            if (50..50 + gap).contains(&i) {
-                assert_eq!(state.status, Status::Lost { reason: LostReason::NoPerson }, "frame {i}");
-                assert_eq!(kept.get_or_insert(state.pose.clone()), &state.pose, "the last good pose is kept");
-            }
-        });
+        let out = follow(
+            &template,
+            &TrackerConfig::default(),
+            &blind,
+            |i, _, state, _, _| {
+                if (50..50 + gap).contains(&i) {
+                    assert_eq!(
+                        state.status,
+                        Status::Lost {
+                            reason: LostReason::NoPerson
+                        },
+                        "frame {i}"
+                    );
+                    assert_eq!(
+                        kept.get_or_insert(state.pose.clone()),
+                        &state.pose,
+                        "the last good pose is kept"
+                    );
+                }
+            },
+        );
         // Blind frames have no truth, so the tenth frame after the gap stands ten after frame 50.
         let back = out.joints_mm[50 - 30 + 10];
         let usual = mean(&quiet(&template, &scene).joints_mm);
-        eprintln!("{gap} empty frames: {back:.1} mm ten frames later, {usual:.1} on average without");
+        eprintln!(
+            "{gap} empty frames: {back:.1} mm ten frames later, {usual:.1} on average without"
+        );
         assert!(back < 10.0 + usual, "{gap} empty frames: {back:.1} mm");
     }
 }
@@ -112,36 +166,67 @@ fn empty_frames_lose_and_find_again() {
 fn dropped_frames_cost_little() {
     let (template, scene) = own_body(Routine::TryOn, NoiseModel::KinectV1, 200);
     for (n, most) in [(2, 6.0), (3, 10.0), (4, 12.0)] {
-        let out = follow(&template, &fixed_size(), &scene.clone().every(n), |_, _, _, _, _| {});
+        let out = follow(
+            &template,
+            &fixed_size(),
+            &scene.clone().every(n),
+            |_, _, _, _, _| {},
+        );
         let error = mean(&out.joints_mm);
         eprintln!("every {n}. frame: {error:.1} mm, lost {}", out.lost);
-        assert!(error < most && out.lost == 0, "every {n}. frame: {error:.1} mm");
+        assert!(
+            error < most && out.lost == 0,
+            "every {n}. frame: {error:.1} mm"
+        );
     }
 }
 
 #[test]
 fn a_torso_turns_seen_from_the_waist_up() {
-    let (Some(data), Some(template)) = (data(), template()) else { return };
+    let (Some(data), Some(template)) = (data(), template()) else {
+        return;
+    };
     let scene = scenes::hard(&data).expect("scenes").swap_remove(0);
-    let at = |name: &str| scene.joint_names.iter().position(|n| n == name).expect("joint");
+    let at = |name: &str| {
+        scene
+            .joint_names
+            .iter()
+            .position(|n| n == name)
+            .expect("joint")
+    };
     let (left, right) = (at("left_shoulder"), at("right_shoulder"));
     let ours = |n: &str| template.skeleton().index(n).expect("joint");
     let (ours_left, ours_right) = (ours("left_shoulder"), ours("right_shoulder"));
     let mut worst = 0.0f64;
     let mut flagged = true;
-    let out = follow(&template, &TrackerConfig::default(), &scene, |i, model, state, report, _| {
-        if i < 30 {
-            return;
-        }
-        let j = joints(model, state);
-        let yaw = |d: nalgebra::Vector3<f64>| d.z.atan2(d.x);
-        let t = &scene.truth[i].joints;
-        let off = yaw(j[ours_left] - j[ours_right]) - yaw(t[left] - t[right]);
-        worst = worst.max(off.sin().abs().asin());
-        flagged &= report.confidence[ours("left_ankle")].reason != Reason::Measured;
-    });
-    let named: Vec<(String, f64)> = scene.joint_names.iter().cloned().zip(out.per_joint_mm.clone()).collect();
-    let of = |n: &str| named.iter().find(|(m, _)| m == n).map_or(f64::NAN, |(_, e)| *e);
+    let out = follow(
+        &template,
+        &TrackerConfig::default(),
+        &scene,
+        |i, model, state, report, _| {
+            if i < 30 {
+                return;
+            }
+            let j = joints(model, state);
+            let yaw = |d: nalgebra::Vector3<f64>| d.z.atan2(d.x);
+            let t = &scene.truth[i].joints;
+            let off = yaw(j[ours_left] - j[ours_right]) - yaw(t[left] - t[right]);
+            worst = worst.max(off.sin().abs().asin());
+            flagged &= report.confidence[ours("left_ankle")].reason != Reason::Measured;
+        },
+    );
+    let named: Vec<(String, f64)> = scene
+        .joint_names
+        .iter()
+        .cloned()
+        .zip(out.per_joint_mm.clone())
+        .collect();
+    let of = |n: &str| {
+        named
+            .iter()
+            .find(|(m, _)| m == n)
+            .map_or(f64::NAN, |(_, e)| *e)
+    };
     eprintln!(
         "pelvis {:.1}, spine {:.1} {:.1} {:.1} mm, yaw off by {:.1}° at most, lost {}",
         of("pelvis"),
@@ -151,7 +236,11 @@ fn a_torso_turns_seen_from_the_waist_up() {
         worst.to_degrees(),
         out.lost
     );
-    assert!(["pelvis", "spine1", "spine2", "spine3"].iter().all(|n| of(n) <= 20.0));
+    assert!(
+        ["pelvis", "spine1", "spine2", "spine3"]
+            .iter()
+            .all(|n| of(n) <= 20.0)
+    );
     assert!(worst.to_degrees() <= 15.0 && flagged && out.lost == 0);
 }
 
@@ -159,29 +248,63 @@ fn a_torso_turns_seen_from_the_waist_up() {
 /// and tells where the arm goes.
 #[test]
 fn an_arm_without_return_follows_its_hand() {
-    let (Some(template), Some(data)) = (template(), data()) else { return };
+    let (Some(template), Some(data)) = (template(), data()) else {
+        return;
+    };
     for mut scene in scenes::hard(&data).expect("scenes").split_off(1) {
         scene.frames.truncate(100);
         let out = quiet(&template, &scene);
-        let of = |joint: &str| out.per_joint_mm[scene.joint_names.iter().position(|n| n == joint).expect("joint")];
+        let of = |joint: &str| {
+            out.per_joint_mm[scene
+                .joint_names
+                .iter()
+                .position(|n| n == joint)
+                .expect("joint")]
+        };
         let (elbow, wrist, all) = (of("left_elbow"), of("left_wrist"), mean(&out.joints_mm));
-        eprintln!("{}: elbow {elbow:.0}, wrist {wrist:.0}, joints {all:.1} mm", scene.name);
-        assert!(elbow < 70.0 && wrist < 45.0 && all < 16.0 && out.lost == 0, "{}: {elbow} {wrist} {all}", scene.name);
+        eprintln!(
+            "{}: elbow {elbow:.0}, wrist {wrist:.0}, joints {all:.1} mm",
+            scene.name
+        );
+        assert!(
+            elbow < 70.0 && wrist < 45.0 && all < 16.0 && out.lost == 0,
+            "{}: {elbow} {wrist} {all}",
+            scene.name
+        );
     }
 }
 
 #[test]
 fn the_lower_half_may_be_missing() {
-    let (Some(template), Some(scene)) = (template(), recorded(100)) else { return };
+    let (Some(template), Some(scene)) = (template(), recorded(100)) else {
+        return;
+    };
     let cut = scene.cut_below(0.55);
     let limits = template.skeleton().limits();
-    let out = follow(&template, &TrackerConfig::default(), &cut, |i, _, state, _, _| {
-        for (a, l) in state.pose.angles.iter().zip(&limits) {
-            assert!(*a >= l[0] - 1e-9 && *a <= l[1] + 1e-9, "frame {i}: {a} beyond {l:?}");
-        }
-    });
-    let upper = ["spine3", "neck", "head", "left_shoulder", "right_shoulder", "left_elbow", "right_elbow"];
-    let of = |n: &&str| out.per_joint_mm[cut.joint_names.iter().position(|m| m == n).expect("joint")];
+    let out = follow(
+        &template,
+        &TrackerConfig::default(),
+        &cut,
+        |i, _, state, _, _| {
+            for (a, l) in state.pose.angles.iter().zip(&limits) {
+                assert!(
+                    *a >= l[0] - 1e-9 && *a <= l[1] + 1e-9,
+                    "frame {i}: {a} beyond {l:?}"
+                );
+            }
+        },
+    );
+    let upper = [
+        "spine3",
+        "neck",
+        "head",
+        "left_shoulder",
+        "right_shoulder",
+        "left_elbow",
+        "right_elbow",
+    ];
+    let of =
+        |n: &&str| out.per_joint_mm[cut.joint_names.iter().position(|m| m == n).expect("joint")];
     let error = mean(&upper.iter().map(of).collect::<Vec<_>>());
     eprintln!("upper joints {error:.1} mm, lost {}", out.lost);
     assert!(error < 10.0 && out.lost == 0, "{error:.1} mm");
@@ -193,10 +316,27 @@ fn picture(template: &Template, camera: Intrinsics, pose: &Pose) -> DepthImage {
     let mut bones = BoneTransforms::default();
     pose.bones(template.skeleton(), &rest, &mut bones);
     let mut vertices = Vec::new();
-    tryon::body::skin(tryon::par::Par::Seq, &rest.vertices, template.weights(), &bones, &mut vertices);
+    tryon::body::skin(
+        tryon::par::Par::Seq,
+        &rest.vertices,
+        template.weights(),
+        &bones,
+        &mut vertices,
+    );
     let mut buffer = VisibilityBuffer::default();
-    rasterise(&View::Perspective { camera, near: 0.2 }, &vertices, template.mesh().faces(), &mut buffer);
-    let mm = buffer.depth.iter().map(|z| if z.is_finite() { (z * 1e3).round() as u16 } else { 0 });
+    rasterise(
+        &View::Perspective { camera, near: 0.2 },
+        &vertices,
+        template.mesh().faces(),
+        &mut buffer,
+    );
+    let mm = buffer.depth.iter().map(|z| {
+        if z.is_finite() {
+            (z * 1e3).round() as u16
+        } else {
+            0
+        }
+    });
     DepthImage::new(camera.width, camera.height, mm.collect()).expect("size")
 }
 
@@ -205,32 +345,58 @@ fn straight_limbs_and_an_arm_along_the_view_are_steady() {
     let template = tryon::body::embedded::template();
     let skeleton = template.skeleton();
     let camera = Intrinsics::KINECT_V1;
-    let facing = nalgebra::UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), std::f64::consts::PI);
+    let facing = nalgebra::UnitQuaternion::from_axis_angle(
+        &nalgebra::Vector3::x_axis(),
+        std::f64::consts::PI,
+    );
     let pelvis = skeleton.joints()[0].rest.coords;
     let at = nalgebra::Vector3::new(0.0, 0.05, 2.4) - facing * pelvis;
     let mut pose: Pose = Pose::rest(skeleton, Rigid::from_parts(at, facing));
     // The left arm straight at the camera.
-    let (s, e) = (skeleton.index("left_shoulder").expect("joint"), skeleton.index("left_elbow").expect("joint"));
+    let (s, e) = (
+        skeleton.index("left_shoulder").expect("joint"),
+        skeleton.index("left_elbow").expect("joint"),
+    );
     let along = skeleton.joints()[e].rest - skeleton.joints()[s].rest;
-    let turn = nalgebra::UnitQuaternion::rotation_between(&along, &nalgebra::Vector3::z()).expect("a turn");
+    let turn = nalgebra::UnitQuaternion::rotation_between(&along, &nalgebra::Vector3::z())
+        .expect("a turn");
     pose.set(skeleton, "left_shoulder", turn.scaled_axis().as_slice());
     pose.clamp_to_limits(skeleton);
     let depth = picture(&template, camera, &pose);
-    let model = TrackerModel::new(template.clone(), Calibration::registered(camera), fixed_size());
+    let model = TrackerModel::new(
+        template.clone(),
+        Calibration::registered(camera),
+        fixed_size(),
+    );
     let mut state = TrackerState::new(&model);
     let mut workspace = Workspace::default();
     let mut before = None;
     let (mut jitter, mut turned) = (0.0f64, 0.0f64);
     for i in 0..40u64 {
-        let frame = RgbdFrame { sequence: i, time_ns: i * 33_333_333, depth: depth.clone(), color: None };
+        let frame = RgbdFrame {
+            sequence: i,
+            time_ns: i * 33_333_333,
+            depth: depth.clone(),
+            color: None,
+        };
         step(&model, &mut state, &frame, &mut workspace).expect("step");
         assert!(state.status.is_live());
         let now = joints(&model, &state);
         if let Some((old, angles)) = before {
             let old: Vec<P3d> = old;
             let angles: Vec<f64> = angles;
-            let moved = old.iter().zip(&now).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-            let angle = state.pose.angles.iter().zip(&angles).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let moved = old
+                .iter()
+                .zip(&now)
+                .map(|(a, b)| (a - b).norm())
+                .fold(0.0, f64::max);
+            let angle = state
+                .pose
+                .angles
+                .iter()
+                .zip(&angles)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
             turned = turned.max(angle);
             if i >= 20 {
                 jitter = jitter.max(moved);
@@ -238,15 +404,23 @@ fn straight_limbs_and_an_arm_along_the_view_are_steady() {
         }
         before = Some((now, state.pose.angles.clone()));
     }
-    eprintln!("static picture: {:.2} mm from frame to frame, {turned:.2} rad at most", jitter * 1e3);
+    eprintln!(
+        "static picture: {:.2} mm from frame to frame, {turned:.2} rad at most",
+        jitter * 1e3
+    );
     assert!(turned < 0.5 && jitter < 1e-3);
 }
 
 #[test]
 fn single_precision_sums_give_the_same_tracks() {
-    let (Some(template), Some(scene)) = (template(), recorded(80)) else { return };
+    let (Some(template), Some(scene)) = (template(), recorded(80)) else {
+        return;
+    };
     let run = |single_precision| {
-        let config = TrackerConfig { single_precision, ..TrackerConfig::default() };
+        let config = TrackerConfig {
+            single_precision,
+            ..TrackerConfig::default()
+        };
         let mut tracks = Vec::new();
         follow(&template, &config, &scene, |i, m, s, _, _| {
             if i < 60 {
@@ -280,15 +454,24 @@ fn a_rough_start_settles() {
         let root = scene.truth[0].joints[0].coords;
         let shift = nalgebra::Vector3::new(random(0.15), random(0.15), random(0.15)) / 3f64.sqrt();
         state.start_at(&model, root + shift, random(30f64.to_radians()));
-        state.pose.angles.iter_mut().for_each(|a| *a += random(20f64.to_radians()));
+        state
+            .pose
+            .angles
+            .iter_mut()
+            .for_each(|a| *a += random(20f64.to_radians()));
         state.pose.clamp_to_limits(template.skeleton());
         for frame in &scene.frames {
             step(&model, &mut state, frame, &mut workspace).expect("step");
         }
         let j = joints(&model, &state);
         let names = &scene.joint_names;
-        let ours = names.iter().map(|n| j[template.skeleton().index(n).expect("joint")]);
-        let off: Vec<f64> = ours.zip(&scene.truth[9].joints).map(|(a, b)| (a - b).norm() * 1e3).collect();
+        let ours = names
+            .iter()
+            .map(|n| j[template.skeleton().index(n).expect("joint")]);
+        let off: Vec<f64> = ours
+            .zip(&scene.truth[9].joints)
+            .map(|(a, b)| (a - b).norm() * 1e3)
+            .collect();
         good += u32::from(state.status.is_live() && mean(&off) < 10.0);
     }
     eprintln!("{good} of {seeds} rough starts are below 10 mm after ten frames");
@@ -311,16 +494,29 @@ fn drift(
 ) -> (f64, f64, f64) {
     let length = 2 * pictures.len() as u64;
     let rounds = frames / length;
-    assert!(rounds >= settle + 2 * ROUNDS_AVERAGED, "{rounds} rounds are too few");
+    assert!(
+        rounds >= settle + 2 * ROUNDS_AVERAGED,
+        "{rounds} rounds are too few"
+    );
     let mut state = TrackerState::new(model);
     let mut workspace = Workspace::default();
-    let (n, dofs) = (model.template().skeleton().len(), model.template().skeleton().dofs());
+    let (n, dofs) = (
+        model.template().skeleton().len(),
+        model.template().skeleton().dofs(),
+    );
     let zero = (vec![nalgebra::Vector3::zeros(); n], vec![0.0; dofs]);
-    let mut sums = [vec![zero.clone(); length as usize], vec![zero; length as usize]];
+    let mut sums = [
+        vec![zero.clone(); length as usize],
+        vec![zero; length as usize],
+    ];
     for i in 0..rounds * length {
         let (round, k) = (i / length, (i % length) as usize);
         let picture = &pictures[k.min(length as usize - 1 - k)];
-        let frame = RgbdFrame { sequence: i, time_ns: i * 33_333_333, ..picture.clone() };
+        let frame = RgbdFrame {
+            sequence: i,
+            time_ns: i * 33_333_333,
+            ..picture.clone()
+        };
         step(model, &mut state, &frame, &mut workspace).expect("step");
         creep(&mut state, i);
         let early = (settle..settle + ROUNDS_AVERAGED).contains(&round);
@@ -328,8 +524,14 @@ fn drift(
         if early || late {
             assert!(state.status.is_live(), "frame {i}: {:?}", state.status);
             let (joint_sums, angle_sums) = &mut sums[usize::from(late)][k];
-            joint_sums.iter_mut().zip(joints(model, &state)).for_each(|(s, j)| *s += j.coords);
-            angle_sums.iter_mut().zip(&state.pose.angles).for_each(|(s, a)| *s += a);
+            joint_sums
+                .iter_mut()
+                .zip(joints(model, &state))
+                .for_each(|(s, j)| *s += j.coords);
+            angle_sums
+                .iter_mut()
+                .zip(&state.pose.angles)
+                .for_each(|(s, a)| *s += a);
         }
     }
     let r = state.pose.root.iso().rotation.to_rotation_matrix();
@@ -337,10 +539,19 @@ fn drift(
     assert!(skew < 1e-12, "the root's rotation is off by {skew:.1e}");
     let (mut worst, mut all, mut turned) = (0.0f64, vec![], 0.0f64);
     for (early, late) in sums[0].iter().zip(&sums[1]) {
-        let joints = early.0.iter().zip(&late.0).map(|(a, b)| (a - b).norm() / ROUNDS_AVERAGED as f64);
+        let joints = early
+            .0
+            .iter()
+            .zip(&late.0)
+            .map(|(a, b)| (a - b).norm() / ROUNDS_AVERAGED as f64);
         all.extend(joints.clone());
         worst = joints.fold(worst, f64::max);
-        let turn = early.1.iter().zip(&late.1).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let turn = early
+            .1
+            .iter()
+            .zip(&late.1)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
         turned = turned.max(turn / ROUNDS_AVERAGED as f64);
     }
     (worst, mean(&all), turned)
@@ -356,7 +567,10 @@ fn long_sessions_do_not_drift() {
     let frames: u64 = if long() { 100_000 } else { 3_600 };
     let model = TrackerModel::new(template, scene.calibration.clone(), fixed_size());
     let (off, _, turned) = drift(&model, &scene.frames, frames, 10, |_, _| {});
-    eprintln!("{frames} frames back and forth: drift {:.4} mm, {turned:.1e} rad", off * 1e3);
+    eprintln!(
+        "{frames} frames back and forth: drift {:.4} mm, {turned:.1e} rad",
+        off * 1e3
+    );
     assert!(off < DRIFT, "{:.3} mm", off * 1e3);
 }
 
@@ -367,13 +581,26 @@ fn a_planted_creep_is_caught() {
     let (template, scene) = own_body(Routine::TryOn, NoiseModel::None, 30);
     let joints = template.skeleton().len();
     let model = TrackerModel::new(template, scene.calibration.clone(), fixed_size());
-    let grows = |state: &mut TrackerState, i: u64| state.shape.bone_scales = vec![1.0 + 2e-6 * i as f64; joints];
+    let grows = |state: &mut TrackerState, i: u64| {
+        state.shape.bone_scales = vec![1.0 + 2e-6 * i as f64; joints]
+    };
     let (off, ..) = drift(&model, &scene.frames, 2_400, 10, grows);
-    eprintln!("bones that grow by 2·10⁻⁶ a frame: {:.3} mm in 2,400 frames", off * 1e3);
-    assert!(off > DRIFT, "a creep of bones passes for none: {:.3} mm", off * 1e3);
-    let biased = |state: &mut TrackerState, _: u64| state.pose.angles.iter_mut().for_each(|a| *a += 1e-5);
+    eprintln!(
+        "bones that grow by 2·10⁻⁶ a frame: {:.3} mm in 2,400 frames",
+        off * 1e3
+    );
+    assert!(
+        off > DRIFT,
+        "a creep of bones passes for none: {:.3} mm",
+        off * 1e3
+    );
+    let biased =
+        |state: &mut TrackerState, _: u64| state.pose.angles.iter_mut().for_each(|a| *a += 1e-5);
     let (off, ..) = drift(&model, &scene.frames, 2_400, 10, biased);
-    eprintln!("every angle biased by 10⁻⁵ rad a frame: {:.4} mm", off * 1e3);
+    eprintln!(
+        "every angle biased by 10⁻⁵ rad a frame: {:.4} mm",
+        off * 1e3
+    );
     assert!(off < DRIFT, "a bias adds up: {:.3} mm", off * 1e3);
 }
 
@@ -382,13 +609,21 @@ fn a_planted_creep_is_caught() {
 /// several answers by millimetres: here the mean over joints and pictures is held to the bar.
 #[test]
 fn long_sessions_with_displacements_do_not_drift() {
-    let (Some(template), Some(scene)) = (template(), recorded(60)) else { return };
+    let (Some(template), Some(scene)) = (template(), recorded(60)) else {
+        return;
+    };
     let frames: u64 = if long() { 100_000 } else { 2_400 };
-    let model = TrackerModel::new(template, scene.calibration.clone(), TrackerConfig::default());
+    let model = TrackerModel::new(
+        template,
+        scene.calibration.clone(),
+        TrackerConfig::default(),
+    );
     // Size and shape are done after 60 frames, displacements have their temporal term after 20 updates.
     let (worst, off, turned) = drift(&model, &scene.frames[40..], frames, 30, |_, _| {});
     let (worst, off_mm) = (worst * 1e3, off * 1e3);
-    eprintln!("{frames} recorded frames back and forth: drift {off_mm:.4} mm, worst {worst:.3}, {turned:.1e} rad");
+    eprintln!(
+        "{frames} recorded frames back and forth: drift {off_mm:.4} mm, worst {worst:.3}, {turned:.1e} rad"
+    );
     assert!(off < DRIFT, "{off_mm:.3} mm");
 }
 
@@ -396,8 +631,19 @@ fn long_sessions_with_displacements_do_not_drift() {
 fn random_pictures_never_panic() {
     use rand::{Rng, SeedableRng};
     let template = tryon::body::embedded::template();
-    let camera = Intrinsics { width: 160, height: 120, fx: 131.0, fy: 131.0, cx: 79.5, cy: 59.5 };
-    let model = TrackerModel::new(template, Calibration::registered(camera), TrackerConfig::default());
+    let camera = Intrinsics {
+        width: 160,
+        height: 120,
+        fx: 131.0,
+        fy: 131.0,
+        cx: 79.5,
+        cy: 59.5,
+    };
+    let model = TrackerModel::new(
+        template,
+        Calibration::registered(camera),
+        TrackerConfig::default(),
+    );
     let mut state = TrackerState::new(&model);
     let mut workspace = Workspace::default();
     let mut rng = rand_pcg::Pcg32::seed_from_u64(3);
@@ -409,13 +655,22 @@ fn random_pictures_never_panic() {
             let (u, v) = (k % 160, k / 160);
             // Noise, or an upright block with a rough surface that may pass for somebody.
             if blob {
-                if u > u0 && u < u0 + 40 && v > v0 { 1500 + (k * u32::from(a) % 97) as u16 } else { 0 }
+                if u > u0 && u < u0 + 40 && v > v0 {
+                    1500 + (k * u32::from(a) % 97) as u16
+                } else {
+                    0
+                }
             } else {
                 (k.wrapping_mul(u32::from(a)) % u32::from(b)) as u16
             }
         };
         let depth = DepthImage::new(160, 120, (0..160 * 120).map(pixel).collect()).expect("size");
-        let frame = RgbdFrame { sequence: i, time_ns: i * 33_333_333, depth, color: None };
+        let frame = RgbdFrame {
+            sequence: i,
+            time_ns: i * 33_333_333,
+            depth,
+            color: None,
+        };
         step(&model, &mut state, &frame, &mut workspace).expect("step");
         assert!(state.pose.is_finite() && state.shape.coefficients.iter().all(|c| c.is_finite()));
     }

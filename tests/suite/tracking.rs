@@ -8,7 +8,9 @@ use tryon::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
 use tryon::formats::image::read_png_depth;
 use tryon::formats::npz::read_smpl;
 use tryon::par::with_threads;
-use tryon::tracking::{LostReason, Status, StepError, TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+use tryon::tracking::{
+    LostReason, Status, StepError, TrackerConfig, TrackerModel, TrackerState, Workspace, step,
+};
 
 #[derive(serde::Deserialize)]
 struct Truth {
@@ -26,9 +28,16 @@ impl Sequence {
     fn open(path: &str) -> Option<Self> {
         let folder = shared(path)?;
         let read = |f: &str| std::fs::read_to_string(folder.join(f));
-        let camera = serde_json::from_str(&read("camera.json").expect("camera.json")).expect("camera.json");
-        let truth = read("truth.json").ok().map(|t| serde_json::from_str(&t).expect("truth.json"));
-        Some(Self { folder, camera, truth })
+        let camera =
+            serde_json::from_str(&read("camera.json").expect("camera.json")).expect("camera.json");
+        let truth = read("truth.json")
+            .ok()
+            .map(|t| serde_json::from_str(&t).expect("truth.json"));
+        Some(Self {
+            folder,
+            camera,
+            truth,
+        })
     }
     fn depth(&self, i: usize) -> DepthImage {
         read_png_depth(&self.folder.join(format!("depth/{i:06}.png"))).expect("depth")
@@ -36,25 +45,40 @@ impl Sequence {
     /// Mean distance of the truth's joints, millimetres.
     fn error(&self, i: usize, template: &Template, joints: &[nalgebra::Point3<f64>]) -> f64 {
         let truth = self.truth.as_ref().expect("a sequence with truth");
-        let off = truth.joint_names.iter().zip(&truth.joints[i]).map(|(n, p)| {
-            let j = template.skeleton().index(n).expect("joint");
-            (joints[j] - nalgebra::Point3::from(*p)).norm()
-        });
+        let off = truth
+            .joint_names
+            .iter()
+            .zip(&truth.joints[i])
+            .map(|(n, p)| {
+                let j = template.skeleton().index(n).expect("joint");
+                (joints[j] - nalgebra::Point3::from(*p)).norm()
+            });
         off.sum::<f64>() / truth.joint_names.len() as f64 * 1e3
     }
 }
 
 fn frame(i: usize, depth: DepthImage) -> RgbdFrame {
-    RgbdFrame { sequence: i as u64, time_ns: i as u64 * 33_333_333, depth, color: None }
+    RgbdFrame {
+        sequence: i as u64,
+        time_ns: i as u64 * 33_333_333,
+        depth,
+        color: None,
+    }
 }
 
 fn template() -> Option<Arc<Template>> {
     let path = shared("body/makehuman_smpl_layout/template.npz")?;
-    Some(Arc::new(template_from_smpl("makehuman", &read_smpl(path).expect("body")).expect("body")))
+    Some(Arc::new(
+        template_from_smpl("makehuman", &read_smpl(path).expect("body")).expect("body"),
+    ))
 }
 
 fn tracker(template: &Arc<Template>, camera: Intrinsics) -> (TrackerModel, TrackerState) {
-    let model = TrackerModel::new(template.clone(), Calibration::registered(camera), TrackerConfig::default());
+    let model = TrackerModel::new(
+        template.clone(),
+        Calibration::registered(camera),
+        TrackerConfig::default(),
+    );
     let state = TrackerState::new(&model);
     (model, state)
 }
@@ -62,13 +86,24 @@ fn tracker(template: &Arc<Template>, camera: Intrinsics) -> (TrackerModel, Track
 fn joints(model: &TrackerModel, state: &TrackerState) -> Vec<nalgebra::Point3<f64>> {
     let rest = model.template().personalise(&state.shape);
     let mut bones = BoneTransforms::default();
-    state.pose.bones(model.template().skeleton(), &rest, &mut bones);
+    state
+        .pose
+        .bones(model.template().skeleton(), &rest, &mut bones);
     bones.joints
 }
 
 /// Tracks the frames of `which` and returns the mean error from frame 30 on; `change` may spoil a frame or drop it.
-fn follow(s: &Sequence, which: impl Iterator<Item = usize>, change: impl FnMut(usize, &mut DepthImage)) -> f64 {
-    follow_with(&template().expect("the sequences come with the body"), s, which, change)
+fn follow(
+    s: &Sequence,
+    which: impl Iterator<Item = usize>,
+    change: impl FnMut(usize, &mut DepthImage),
+) -> f64 {
+    follow_with(
+        &template().expect("the sequences come with the body"),
+        s,
+        which,
+        change,
+    )
 }
 
 fn follow_with(
@@ -103,7 +138,9 @@ const SEQUENCES: [(&str, usize, f64); 3] = [
 #[test]
 fn sequences_are_followed_to_the_end() {
     for (path, frames, bar) in SEQUENCES {
-        let Some(s) = Sequence::open(path) else { return };
+        let Some(s) = Sequence::open(path) else {
+            return;
+        };
         let mean = follow(&s, 0..frames, |_, _| {});
         eprintln!("{path}: mean joint error {mean:.1} mm");
         assert!(mean < bar, "{path}: {mean:.1} mm");
@@ -115,9 +152,15 @@ fn sequences_are_followed_to_the_end() {
 #[test]
 fn with_its_own_body_every_sequence_keeps_the_bar() {
     for ((path, frames, _), subject) in SEQUENCES.into_iter().zip(["m_heavy", "f_avg", "m_tall"]) {
-        let Some(s) = Sequence::open(path) else { return };
-        let Some(body) = shared(&format!("body/makehuman_smpl_layout/subject_{subject}.npz")) else { return };
-        let body = Arc::new(template_from_smpl(subject, &read_smpl(body).expect("body")).expect("body"));
+        let Some(s) = Sequence::open(path) else {
+            return;
+        };
+        let Some(body) = shared(&format!("body/makehuman_smpl_layout/subject_{subject}.npz"))
+        else {
+            return;
+        };
+        let body =
+            Arc::new(template_from_smpl(subject, &read_smpl(body).expect("body")).expect("body"));
         let mean = follow_with(&body, &s, 0..frames, |_, _| {});
         eprintln!("{path}, own body: mean joint error {mean:.1} mm");
         assert!(mean < 8.0, "{path}: {mean:.1} mm");
@@ -126,7 +169,9 @@ fn with_its_own_body_every_sequence_keeps_the_bar() {
 
 #[test]
 fn corrupt_pixels_and_dropped_frames_cost_little() {
-    let Some(s) = Sequence::open(SEQUENCES[0].0) else { return };
+    let Some(s) = Sequence::open(SEQUENCES[0].0) else {
+        return;
+    };
     let clean = follow(&s, 0..90, |_, _| {});
     let values = [0u16, u16::MAX, 500, 3100];
     let spoiled = follow(&s, 0..90, |i, d| {
@@ -138,14 +183,24 @@ fn corrupt_pixels_and_dropped_frames_cost_little() {
         }
     });
     let every_second = follow(&s, (0..90).step_by(2), |_, _| {});
-    eprintln!("clean {clean:.1}, a tenth corrupt {spoiled:.1}, every second frame {every_second:.1} mm");
-    assert!(spoiled < 1.2 * clean + 2.0, "a tenth corrupt: {spoiled:.1} mm against {clean:.1}");
-    assert!(every_second < 1.5 * clean + 3.0, "every second frame: {every_second:.1} mm against {clean:.1}");
+    eprintln!(
+        "clean {clean:.1}, a tenth corrupt {spoiled:.1}, every second frame {every_second:.1} mm"
+    );
+    assert!(
+        spoiled < 1.2 * clean + 2.0,
+        "a tenth corrupt: {spoiled:.1} mm against {clean:.1}"
+    );
+    assert!(
+        every_second < 1.5 * clean + 3.0,
+        "every second frame: {every_second:.1} mm against {clean:.1}"
+    );
 }
 
 #[test]
 fn a_person_leaves_and_comes_back() {
-    let Some(s) = Sequence::open(SEQUENCES[0].0) else { return };
+    let Some(s) = Sequence::open(SEQUENCES[0].0) else {
+        return;
+    };
     let template = template().expect("body");
     let (model, mut state) = tracker(&template, s.camera);
     let mut workspace = Workspace::default();
@@ -155,9 +210,24 @@ fn a_person_leaves_and_comes_back() {
     assert!(state.status.is_live());
     let kept = state.pose.clone();
     for i in 40..55 {
-        let report = step(&model, &mut state, &frame(i, DepthImage::empty(640, 480)), &mut workspace).expect("step");
-        assert_eq!(state.status, Status::Lost { reason: LostReason::NoPerson });
-        assert_eq!((report.pose_age, &state.pose), (i as u32 - 39, &kept), "the last good pose is kept, with its age");
+        let report = step(
+            &model,
+            &mut state,
+            &frame(i, DepthImage::empty(640, 480)),
+            &mut workspace,
+        )
+        .expect("step");
+        assert_eq!(
+            state.status,
+            Status::Lost {
+                reason: LostReason::NoPerson
+            }
+        );
+        assert_eq!(
+            (report.pose_age, &state.pose),
+            (i as u32 - 39, &kept),
+            "the last good pose is kept, with its age"
+        );
     }
     for i in 55..65 {
         step(&model, &mut state, &frame(i, s.depth(i)), &mut workspace).expect("step");
@@ -169,7 +239,9 @@ fn a_person_leaves_and_comes_back() {
 
 #[test]
 fn threads_and_restarts_change_no_bit() {
-    let Some(s) = Sequence::open(SEQUENCES[1].0) else { return };
+    let Some(s) = Sequence::open(SEQUENCES[1].0) else {
+        return;
+    };
     let template = template().expect("body");
     let run = |threads: usize, restore: bool| {
         let (model, mut state) = tracker(&template, s.camera);
@@ -180,7 +252,10 @@ fn threads_and_restarts_change_no_bit() {
                     // A saved session, with all caches gone. JSON text keeps f64 to the last bit but one only.
                     let bytes = serde_json::to_vec(&state).expect("serialises");
                     let read: TrackerState = serde_json::from_slice(&bytes).expect("deserialises");
-                    assert!(read.status == state.status && (read.pose.angles[3] - state.pose.angles[3]).abs() < 1e-12);
+                    assert!(
+                        read.status == state.status
+                            && (read.pose.angles[3] - state.pose.angles[3]).abs() < 1e-12
+                    );
                     state = state.clone();
                     workspace = Workspace::default();
                 }
@@ -202,19 +277,41 @@ fn degenerate_frames_are_answered_without_panic() {
     let (model, mut state) = tracker(&template, camera);
     let mut workspace = Workspace::default();
     let n = camera.pixels();
-    let noise = |seed: usize| (0..n).map(|i| ((i * 7919 + seed * 104_729) % 65_537) as u16).collect::<Vec<u16>>();
-    for (i, data) in
-        [vec![0; n], vec![u16::MAX; n], vec![1; n], vec![2000; n], noise(1), noise(2)].into_iter().enumerate()
+    let noise = |seed: usize| {
+        (0..n)
+            .map(|i| ((i * 7919 + seed * 104_729) % 65_537) as u16)
+            .collect::<Vec<u16>>()
+    };
+    for (i, data) in [
+        vec![0; n],
+        vec![u16::MAX; n],
+        vec![1; n],
+        vec![2000; n],
+        noise(1),
+        noise(2),
+    ]
+    .into_iter()
+    .enumerate()
     {
         let depth = DepthImage::new(640, 480, data).expect("size");
         step(&model, &mut state, &frame(i, depth), &mut workspace).expect("step");
         assert_eq!(state.status, Status::Searching, "frame {i}");
         assert!(state.pose.is_finite());
     }
-    let small = step(&model, &mut state, &frame(9, DepthImage::empty(64, 48)), &mut workspace);
-    assert!(matches!(small, Err(StepError::ImageSize { got: (64, 48), .. })));
+    let small = step(
+        &model,
+        &mut state,
+        &frame(9, DepthImage::empty(64, 48)),
+        &mut workspace,
+    );
+    assert!(matches!(
+        small,
+        Err(StepError::ImageSize { got: (64, 48), .. })
+    ));
     // A state that went bad is lost, never published.
-    let Some(s) = Sequence::open(SEQUENCES[0].0) else { return };
+    let Some(s) = Sequence::open(SEQUENCES[0].0) else {
+        return;
+    };
     let (model, mut state) = tracker(&template, s.camera);
     for i in 0..3 {
         step(&model, &mut state, &frame(i, s.depth(i)), &mut workspace).expect("step");
@@ -223,22 +320,35 @@ fn degenerate_frames_are_answered_without_panic() {
     for i in 3..20 {
         step(&model, &mut state, &frame(i, s.depth(i)), &mut workspace).expect("step");
     }
-    assert!(state.status.is_live() && state.pose.is_finite(), "{:?}", state.status);
+    assert!(
+        state.status.is_live() && state.pose.is_finite(),
+        "{:?}",
+        state.status
+    );
 }
 
 #[test]
 fn a_still_of_a_real_woman_fits() {
     let path = "rgbd/depthkit_still";
-    let Some(s) = Sequence::open(path) else { return };
+    let Some(s) = Sequence::open(path) else {
+        return;
+    };
     let template = template().expect("body");
     let (model, mut state) = tracker(&template, s.camera);
     let mut workspace = Workspace::default();
     let depth = read_png_depth(Path::new(&s.folder.join("depth/000000.png"))).expect("depth");
     let mut last = None;
     for i in 0..10 {
-        last = Some(step(&model, &mut state, &frame(i, depth.clone()), &mut workspace).expect("step"));
+        last =
+            Some(step(&model, &mut state, &frame(i, depth.clone()), &mut workspace).expect("step"));
     }
     let report = last.expect("ten steps");
-    eprintln!("residual {:.1} mm, explained {:.2}", report.residual_mm, report.explained);
-    assert!(state.status.is_live() && report.residual_mm < 8.0 && report.explained > 0.8, "{report:?}");
+    eprintln!(
+        "residual {:.1} mm, explained {:.2}",
+        report.residual_mm, report.explained
+    );
+    assert!(
+        state.status.is_live() && report.residual_mm < 8.0 && report.explained > 0.8,
+        "{report:?}"
+    );
 }

@@ -30,6 +30,9 @@ pub fn generate(root: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
         .compile_fds(set.clone())?;
     // Reflection needs no comments: without them the binary is a third of the size.
     set.file.iter_mut().for_each(|f| f.source_code_info = None);
-    std::fs::write(out.join("descriptor.bin"), prost::Message::encode_to_vec(&set))?;
+    std::fs::write(
+        out.join("descriptor.bin"),
+        prost::Message::encode_to_vec(&set),
+    )?;
     Ok(())
 }

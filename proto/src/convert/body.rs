@@ -3,7 +3,9 @@
 use super::{WireError, bulk, geometry, required};
 use crate::v1;
 use nalgebra::{Point3, Vector3};
-use tryon::body::{BodyShape, Joint, JointMotion, Pose, ShapeSpace, Skeleton, SkinWeights, Template};
+use tryon::body::{
+    BodyShape, Joint, JointMotion, Pose, ShapeSpace, Skeleton, SkinWeights, Template,
+};
 use tryon::math::{Camera, P3, V3};
 use tryon::mesh::TriMesh;
 
@@ -42,9 +44,11 @@ pub fn template_to_wire(t: &Template) -> v1::BodyTemplate {
 fn joint_to_wire(j: &Joint) -> v1::Joint {
     let (kind, axis, limits) = match &j.motion {
         JointMotion::Fixed => (v1::JointKind::Fixed, None, vec![]),
-        JointMotion::Hinge { axis, limits } => {
-            (v1::JointKind::Hinge, Some(geometry::vector_to_wire(&Vector3::from(*axis))), limits.to_vec())
-        }
+        JointMotion::Hinge { axis, limits } => (
+            v1::JointKind::Hinge,
+            Some(geometry::vector_to_wire(&Vector3::from(*axis))),
+            limits.to_vec(),
+        ),
         JointMotion::Ball { limits } => (v1::JointKind::Ball, None, limits.concat()),
     };
     v1::Joint {
@@ -73,14 +77,22 @@ fn joint(j: &v1::Joint, field: &str) -> Result<Joint, WireError> {
         0 => JointMotion::Fixed,
         1 => {
             let axis = geometry::vector_from_wire(j.axis.as_ref(), &format!("{field}.axis"))?;
-            JointMotion::Hinge { axis: axis.into(), limits: pair(0) }
+            JointMotion::Hinge {
+                axis: axis.into(),
+                limits: pair(0),
+            }
         }
-        _ => JointMotion::Ball { limits: [pair(0), pair(1), pair(2)] },
+        _ => JointMotion::Ball {
+            limits: [pair(0), pair(1), pair(2)],
+        },
     };
     Ok(Joint {
         name: j.name.clone(),
         parent: j.parent.map(|p| p as usize),
-        rest: Point3::from(geometry::vector_from_wire(j.rest.as_ref(), &format!("{field}.rest"))?),
+        rest: Point3::from(geometry::vector_from_wire(
+            j.rest.as_ref(),
+            &format!("{field}.rest"),
+        )?),
         motion,
     })
 }
@@ -93,15 +105,29 @@ pub fn template_from_wire(t: &v1::BodyTemplate) -> Result<Template, WireError> {
     let n = bulk::count("body_template.vertex_count", t.vertex_count, MAX_VERTICES)?;
     let m = bulk::count("body_template.face_count", t.face_count, MAX_FACES)?;
     if t.joints.len() > MAX_JOINTS {
-        return Err(WireError::new("body_template.joints", format!("at most {MAX_JOINTS}")));
+        return Err(WireError::new(
+            "body_template.joints",
+            format!("at most {MAX_JOINTS}"),
+        ));
     }
     if t.shape_directions.len() > MAX_DIRECTIONS {
-        return Err(WireError::new("body_template.shape_directions", format!("at most {MAX_DIRECTIONS}")));
+        return Err(WireError::new(
+            "body_template.shape_directions",
+            format!("at most {MAX_DIRECTIONS}"),
+        ));
     }
-    let vertices = bulk::read::<f32, 3>("body_template.vertices", n, &t.vertices)?.into_iter().map(P3::from).collect();
+    let vertices = bulk::read::<f32, 3>("body_template.vertices", n, &t.vertices)?
+        .into_iter()
+        .map(P3::from)
+        .collect();
     let faces = bulk::faces("body_template.faces", m, n, &t.faces)?;
-    let mesh = TriMesh::new(vertices, faces).map_err(|e| WireError::new("body_template.faces", e.to_string()))?;
-    let joints = t.joints.iter().enumerate().map(|(i, j)| joint(j, &format!("body_template.joints[{i}]")));
+    let mesh = TriMesh::new(vertices, faces)
+        .map_err(|e| WireError::new("body_template.faces", e.to_string()))?;
+    let joints = t
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(i, j)| joint(j, &format!("body_template.joints[{i}]")));
     let skeleton = Skeleton::new(joints.collect::<Result<_, _>>()?)
         .map_err(|e| WireError::new("body_template.joints", e.to_string()))?;
     let weights = SkinWeights {
@@ -115,7 +141,9 @@ pub fn template_from_wire(t: &v1::BodyTemplate) -> Result<Template, WireError> {
         let j = bulk::read::<f64, 3>(&format!("{field}.joints"), skeleton.len(), &s.joints)?;
         space.names.push(s.name.clone());
         space.vertices.push(v.into_iter().map(V3::from).collect());
-        space.joints.push(j.into_iter().map(Vector3::from).collect());
+        space
+            .joints
+            .push(j.into_iter().map(Vector3::from).collect());
     }
     let space = (!space.names.is_empty()).then_some(space);
     Template::new(t.name.clone(), mesh, skeleton, weights, space)
@@ -124,7 +152,10 @@ pub fn template_from_wire(t: &v1::BodyTemplate) -> Result<Template, WireError> {
 
 /// A pose for the wire.
 pub fn pose_to_wire(p: &Pose<Camera>) -> v1::BodyPose {
-    v1::BodyPose { camera_from_body: Some(geometry::rigid_to_wire(&p.root)), angles: bulk::write_flat(&p.angles) }
+    v1::BodyPose {
+        camera_from_body: Some(geometry::rigid_to_wire(&p.root)),
+        angles: bulk::write_flat(&p.angles),
+    }
 }
 
 /// A pose of a skeleton with `dofs` angles.
@@ -142,8 +173,11 @@ pub fn pose_from_wire(p: &v1::BodyPose, dofs: usize) -> Result<Pose<Camera>, Wir
 
 /// A shape for the wire; displacements are rounded to a tenth of a millimetre.
 pub fn shape_to_wire(s: &BodyShape) -> v1::BodyShape {
-    let quantised: Vec<i16> =
-        s.displacements.iter().map(|d| (d / DISPLACEMENT_UNIT).round().clamp(-32767.0, 32767.0) as i16).collect();
+    let quantised: Vec<i16> = s
+        .displacements
+        .iter()
+        .map(|d| (d / DISPLACEMENT_UNIT).round().clamp(-32767.0, 32767.0) as i16)
+        .collect();
     v1::BodyShape {
         coefficients: bulk::write_flat(&s.coefficients),
         bone_scales: bulk::write_flat(&s.bone_scales),
@@ -158,17 +192,32 @@ pub fn shape_to_wire(s: &BodyShape) -> v1::BodyShape {
 /// Names the field whose size does not fit the template or whose numbers are not finite.
 pub fn shape_from_wire(s: &v1::BodyShape, template: &Template) -> Result<BodyShape, WireError> {
     let directions = template.shape_space().map_or(0, |d| d.names.len());
-    let coefficients = bulk::read_flat::<f64>("body_shape.coefficients", directions, &s.coefficients)?;
-    let joints = if s.bone_scales.is_empty() { 0 } else { template.skeleton().len() };
+    let coefficients =
+        bulk::read_flat::<f64>("body_shape.coefficients", directions, &s.coefficients)?;
+    let joints = if s.bone_scales.is_empty() {
+        0
+    } else {
+        template.skeleton().len()
+    };
     let bone_scales = bulk::read::<f64, 1>("body_shape.bone_scales", joints, &s.bone_scales)?;
     if bone_scales.iter().any(|[b]| *b <= 0.0) {
-        return Err(WireError::new("body_shape.bone_scales", "a scale must be positive"));
+        return Err(WireError::new(
+            "body_shape.bone_scales",
+            "a scale must be positive",
+        ));
     }
-    let n = if s.displacements.is_empty() { 0 } else { template.mesh().vertices().len() };
+    let n = if s.displacements.is_empty() {
+        0
+    } else {
+        template.mesh().vertices().len()
+    };
     let steps = bulk::read::<i16, 1>("body_shape.displacements", n, &s.displacements)?;
     let unit = s.displacement_unit;
     if n > 0 && !(unit.is_finite() && unit > 0.0) {
-        return Err(WireError::new("body_shape.displacement_unit", "must be positive"));
+        return Err(WireError::new(
+            "body_shape.displacement_unit",
+            "must be positive",
+        ));
     }
     Ok(BodyShape {
         coefficients,
@@ -186,21 +235,47 @@ mod tests {
     pub(crate) fn small_template() -> Template {
         let p = |x: f32, y: f32, z: f32| P3::new(x, y, z);
         let mesh = TriMesh::new(
-            vec![p(0.0, 0.0, 0.0), p(1.0, 0.0, 0.0), p(0.0, 1.0, 0.0), p(0.0, 0.0, 1.0)],
+            vec![
+                p(0.0, 0.0, 0.0),
+                p(1.0, 0.0, 0.0),
+                p(0.0, 1.0, 0.0),
+                p(0.0, 0.0, 1.0),
+            ],
             vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
         )
         .expect("a tetrahedron");
         let at = |y: f64| Point3::new(0.0, y, 0.0);
-        let ball = JointMotion::Ball { limits: [[-1.0, 1.0]; 3] };
-        let hinge = JointMotion::Hinge { axis: [0.0, 0.0, 1.0], limits: [0.0, 2.0] };
+        let ball = JointMotion::Ball {
+            limits: [[-1.0, 1.0]; 3],
+        };
+        let hinge = JointMotion::Hinge {
+            axis: [0.0, 0.0, 1.0],
+            limits: [0.0, 2.0],
+        };
         let skeleton = Skeleton::new(vec![
-            Joint { name: "pelvis".into(), parent: None, rest: at(0.0), motion: JointMotion::Fixed },
-            Joint { name: "spine1".into(), parent: Some(0), rest: at(0.5), motion: ball },
-            Joint { name: "head".into(), parent: Some(1), rest: at(1.0), motion: hinge },
+            Joint {
+                name: "pelvis".into(),
+                parent: None,
+                rest: at(0.0),
+                motion: JointMotion::Fixed,
+            },
+            Joint {
+                name: "spine1".into(),
+                parent: Some(0),
+                rest: at(0.5),
+                motion: ball,
+            },
+            Joint {
+                name: "head".into(),
+                parent: Some(1),
+                rest: at(1.0),
+                motion: hinge,
+            },
         ])
         .expect("a chain");
         let weights =
-            SkinWeights::from_rows((0..4).map(|i| vec![(i % 3, 0.75), ((i + 1) % 3, 0.25)])).expect("weights");
+            SkinWeights::from_rows((0..4).map(|i| vec![(i % 3, 0.75), ((i + 1) % 3, 0.25)]))
+                .expect("weights");
         let space = ShapeSpace {
             names: vec!["stature".into()],
             vertices: vec![vec![V3::new(0.0, 0.1, 0.0); 4]],
@@ -217,7 +292,10 @@ mod tests {
         assert_eq!(back.skeleton(), t.skeleton());
         assert_eq!(back.weights(), t.weights());
         assert_eq!(back.shape_space(), t.shape_space());
-        let pose = Pose { angles: vec![0.1, 0.2, 0.3, 0.4], root: tryon::math::Rigid::identity() };
+        let pose = Pose {
+            angles: vec![0.1, 0.2, 0.3, 0.4],
+            root: tryon::math::Rigid::identity(),
+        };
         assert_eq!(pose_from_wire(&pose_to_wire(&pose), 4).expect("same"), pose);
         let shape = BodyShape {
             coefficients: vec![1.5],
@@ -225,7 +303,10 @@ mod tests {
             displacements: vec![0.0, 0.00123, -0.02, 0.004],
         };
         let s = shape_from_wire(&shape_to_wire(&shape), &t).expect("same");
-        assert_eq!((&s.coefficients, &s.bone_scales), (&shape.coefficients, &shape.bone_scales));
+        assert_eq!(
+            (&s.coefficients, &s.bone_scales),
+            (&shape.coefficients, &shape.bone_scales)
+        );
         for (a, b) in s.displacements.iter().zip(&shape.displacements) {
             assert!((a - b).abs() <= DISPLACEMENT_UNIT / 2.0 * 1.001);
         }
@@ -239,21 +320,56 @@ mod tests {
             change(&mut w);
             template_from_wire(&w).expect_err("must be refused").field
         };
-        assert_eq!(fault(&|w| w.vertex_count = u32::MAX), "body_template.vertex_count");
-        assert_eq!(fault(&|w| w.vertices = w.vertices.slice(..40)), "body_template.vertices");
+        assert_eq!(
+            fault(&|w| w.vertex_count = u32::MAX),
+            "body_template.vertex_count"
+        );
+        assert_eq!(
+            fault(&|w| w.vertices = w.vertices.slice(..40)),
+            "body_template.vertices"
+        );
         assert_eq!(fault(&|w| w.face_count = 5), "body_template.faces");
-        assert_eq!(fault(&|w| w.joints[1].kind = 77), "body_template.joints[1].kind");
-        assert_eq!(fault(&|w| w.joints[1].limits.clear()), "body_template.joints[1].limits");
-        assert_eq!(fault(&|w| w.joints[2].parent = Some(9)), "body_template.joints");
-        assert_eq!(fault(&|w| w.skin_joints = Bytes::from_static(&[9; 16])), "body_template");
-        assert_eq!(fault(&|w| w.shape_directions[0].joints = Bytes::new()), "body_template.shape_directions[0].joints");
+        assert_eq!(
+            fault(&|w| w.joints[1].kind = 77),
+            "body_template.joints[1].kind"
+        );
+        assert_eq!(
+            fault(&|w| w.joints[1].limits.clear()),
+            "body_template.joints[1].limits"
+        );
+        assert_eq!(
+            fault(&|w| w.joints[2].parent = Some(9)),
+            "body_template.joints"
+        );
+        assert_eq!(
+            fault(&|w| w.skin_joints = Bytes::from_static(&[9; 16])),
+            "body_template"
+        );
+        assert_eq!(
+            fault(&|w| w.shape_directions[0].joints = Bytes::new()),
+            "body_template.shape_directions[0].joints"
+        );
         let pose = v1::BodyPose {
-            camera_from_body: Some(geometry::rigid_to_wire(&tryon::math::Rigid::<Camera, Camera>::identity())),
+            camera_from_body: Some(geometry::rigid_to_wire(
+                &tryon::math::Rigid::<Camera, Camera>::identity(),
+            )),
             angles: bulk::write_flat(&[f64::NAN; 4]),
         };
-        assert_eq!(pose_from_wire(&pose, 4).expect_err("NaN").field, "body_pose.angles[0]");
-        assert_eq!(pose_from_wire(&pose, 5).expect_err("size").field, "body_pose.angles");
-        let s = v1::BodyShape { displacements: Bytes::from_static(&[0; 6]), ..Default::default() };
-        assert_eq!(shape_from_wire(&s, &t).expect_err("size").field, "body_shape.displacements");
+        assert_eq!(
+            pose_from_wire(&pose, 4).expect_err("NaN").field,
+            "body_pose.angles[0]"
+        );
+        assert_eq!(
+            pose_from_wire(&pose, 5).expect_err("size").field,
+            "body_pose.angles"
+        );
+        let s = v1::BodyShape {
+            displacements: Bytes::from_static(&[0; 6]),
+            ..Default::default()
+        };
+        assert_eq!(
+            shape_from_wire(&s, &t).expect_err("size").field,
+            "body_shape.displacements"
+        );
     }
 }

@@ -37,10 +37,18 @@ element!(f32, f32::is_finite);
 element!(f64, f64::is_finite);
 
 /// Reads `[rows][N]` elements; the byte length must be exactly that, and every number finite.
-pub(super) fn read<T: Element, const N: usize>(field: &str, rows: usize, b: &Bytes) -> Result<Vec<[T; N]>, WireError> {
+pub(super) fn read<T: Element, const N: usize>(
+    field: &str,
+    rows: usize,
+    b: &Bytes,
+) -> Result<Vec<[T; N]>, WireError> {
     let expected = rows.checked_mul(N * T::SIZE);
     if expected != Some(b.len()) {
-        let why = format!("{} bytes, but {rows} × {N} elements of {} bytes are needed", b.len(), T::SIZE);
+        let why = format!(
+            "{} bytes, but {rows} × {N} elements of {} bytes are needed",
+            b.len(),
+            T::SIZE
+        );
         return Err(WireError::new(field, why));
     }
     let mut out = Vec::with_capacity(rows);
@@ -55,19 +63,34 @@ pub(super) fn read<T: Element, const N: usize>(field: &str, rows: usize, b: &Byt
 }
 
 /// Reads a flat array of at most `limit` elements, however many there are.
-pub(super) fn read_flat<T: Element>(field: &str, limit: usize, b: &Bytes) -> Result<Vec<T>, WireError> {
+pub(super) fn read_flat<T: Element>(
+    field: &str,
+    limit: usize,
+    b: &Bytes,
+) -> Result<Vec<T>, WireError> {
     if !b.len().is_multiple_of(T::SIZE) {
-        return Err(WireError::new(field, format!("{} bytes are no multiple of {}", b.len(), T::SIZE)));
+        return Err(WireError::new(
+            field,
+            format!("{} bytes are no multiple of {}", b.len(), T::SIZE),
+        ));
     }
     let rows = b.len() / T::SIZE;
     if rows > limit {
-        return Err(WireError::new(field, format!("{rows} elements, at most {limit} make sense")));
+        return Err(WireError::new(
+            field,
+            format!("{rows} elements, at most {limit} make sense"),
+        ));
     }
-    Ok(read::<T, 1>(field, rows, b)?.into_iter().map(|[v]| v).collect())
+    Ok(read::<T, 1>(field, rows, b)?
+        .into_iter()
+        .map(|[v]| v)
+        .collect())
 }
 
 /// Packs rows.
-pub(super) fn write<T: Element, const N: usize>(rows: impl ExactSizeIterator<Item = [T; N]>) -> Bytes {
+pub(super) fn write<T: Element, const N: usize>(
+    rows: impl ExactSizeIterator<Item = [T; N]>,
+) -> Bytes {
     let mut out = BytesMut::with_capacity(rows.len() * N * T::SIZE);
     rows.for_each(|row| row.into_iter().for_each(|v| v.write(&mut out)));
     out.freeze()
@@ -81,13 +104,21 @@ pub(super) fn write_flat<T: Element>(values: &[T]) -> Bytes {
 /// Refuses a count beyond `limit`, before it sizes anything.
 pub(super) fn count(field: &str, n: u32, limit: u32) -> Result<usize, WireError> {
     if n > limit {
-        return Err(WireError::new(field, format!("{n} is too many, at most {limit}")));
+        return Err(WireError::new(
+            field,
+            format!("{n} is too many, at most {limit}"),
+        ));
     }
     Ok(n as usize)
 }
 
 /// Triangles whose indices are below `vertices`.
-pub(super) fn faces(field: &str, rows: usize, vertices: usize, b: &Bytes) -> Result<Vec<[u32; 3]>, WireError> {
+pub(super) fn faces(
+    field: &str,
+    rows: usize,
+    vertices: usize,
+    b: &Bytes,
+) -> Result<Vec<[u32; 3]>, WireError> {
     let faces = read::<u32, 3>(field, rows, b)?;
     for (i, f) in faces.iter().enumerate() {
         if let Some(&bad) = f.iter().find(|&&v| v as usize >= vertices) {
@@ -108,7 +139,10 @@ mod tests {
         let b = write(rows.iter().copied());
         assert_eq!(read::<f32, 3>("x", 2, &b).expect("same size"), rows);
         assert_eq!(read::<f32, 3>("x", 3, &b).expect_err("short").field, "x");
-        assert!(read::<f32, 3>("x", usize::MAX, &b).is_err(), "the product overflows and must not allocate");
+        assert!(
+            read::<f32, 3>("x", usize::MAX, &b).is_err(),
+            "the product overflows and must not allocate"
+        );
         let nan = write([[1.0f32, f32::NAN]].into_iter());
         assert_eq!(read::<f32, 2>("x", 1, &nan).expect_err("NaN").field, "x[0]");
         assert_eq!(count("n", u32::MAX, 10).expect_err("4 G").field, "n");

@@ -9,13 +9,15 @@ use tryon::formats::image;
 const BUS_JPEG_QUALITY: u8 = 80;
 
 pub(super) fn depth(b: &Bytes, k: &Intrinsics) -> Result<DepthImage, WireError> {
-    let img = image::decode_depth(b).map_err(|e| WireError::new("rgbd_frame.depth", e.to_string()))?;
+    let img =
+        image::decode_depth(b).map_err(|e| WireError::new("rgbd_frame.depth", e.to_string()))?;
     same_size("rgbd_frame.depth", (img.width(), img.height()), k)?;
     Ok(img)
 }
 
 pub(super) fn color(b: &Bytes, k: &Intrinsics) -> Result<ColorImage, WireError> {
-    let img = image::decode_jpeg(b).map_err(|e| WireError::new("rgbd_frame.color_jpeg", e.to_string()))?;
+    let img = image::decode_jpeg(b)
+        .map_err(|e| WireError::new("rgbd_frame.color_jpeg", e.to_string()))?;
     same_size("rgbd_frame.color_jpeg", (img.width(), img.height()), k)?;
     Ok(img)
 }
@@ -24,7 +26,10 @@ fn same_size(field: &str, (w, h): (u32, u32), k: &Intrinsics) -> Result<(), Wire
     if (w, h) == (k.width, k.height) {
         return Ok(());
     }
-    Err(WireError::new(field, format!("{w}×{h}, but the calibration says {}×{}", k.width, k.height)))
+    Err(WireError::new(
+        field,
+        format!("{w}×{h}, but the calibration says {}×{}", k.width, k.height),
+    ))
 }
 
 pub(super) fn depth_to_wire(d: &DepthImage) -> Bytes {
@@ -33,5 +38,7 @@ pub(super) fn depth_to_wire(d: &DepthImage) -> Bytes {
 
 pub(super) fn color_to_wire(c: &ColorImage) -> Result<Bytes, WireError> {
     let jpeg = image::encode_jpeg(c, BUS_JPEG_QUALITY);
-    Ok(jpeg.map_err(|e| WireError::new("rgbd_frame.color_jpeg", e.to_string()))?.into())
+    Ok(jpeg
+        .map_err(|e| WireError::new("rgbd_frame.color_jpeg", e.to_string()))?
+        .into())
 }

@@ -15,17 +15,26 @@ pub struct WireError {
 impl WireError {
     /// A fault at `field`.
     pub fn new(field: impl Into<String>, why: impl Into<String>) -> Self {
-        Self { field: field.into(), why: why.into() }
+        Self {
+            field: field.into(),
+            why: why.into(),
+        }
     }
     /// The same fault seen from the message that contains this one.
     pub fn within(self, parent: &str) -> Self {
-        Self { field: format!("{parent}.{}", self.field), why: self.why }
+        Self {
+            field: format!("{parent}.{}", self.field),
+            why: self.why,
+        }
     }
 }
 
 impl From<WireError> for tonic::Status {
     fn from(e: WireError) -> Self {
-        let details = ErrorDetails::with_bad_request(vec![FieldViolation::new(e.field.clone(), e.why.clone())]);
+        let details = ErrorDetails::with_bad_request(vec![FieldViolation::new(
+            e.field.clone(),
+            e.why.clone(),
+        )]);
         tonic::Status::with_error_details(tonic::Code::InvalidArgument, e.to_string(), details)
     }
 }
@@ -44,7 +53,9 @@ mod tests {
 
     #[test]
     fn a_fault_becomes_invalid_argument_with_its_path() {
-        let status = tonic::Status::from(WireError::new("depth.fx", "must be positive").within("calibration"));
+        let status = tonic::Status::from(
+            WireError::new("depth.fx", "must be positive").within("calibration"),
+        );
         assert_eq!(status.code(), tonic::Code::InvalidArgument);
         let details = status.get_error_details();
         let bad = details.bad_request().expect("details");

@@ -13,7 +13,12 @@ pub fn tightness(byte: u8) -> f32 {
 
 /// A fit map: its regions, and a byte for each vertex. `cut` is how the garment's pattern is cut for the body, which
 /// tells the room in metres; `None` for a garment without pattern.
-pub fn fit_to_wire(garment: &str, size: &str, map: &FitMap, cut: Option<&Suggestion>) -> GarmentFit {
+pub fn fit_to_wire(
+    garment: &str,
+    size: &str,
+    map: &FitMap,
+    cut: Option<&Suggestion>,
+) -> GarmentFit {
     let room = |place: &str| cut.and_then(|c| c.rooms.iter().find(|r| r.place == place));
     let regions = map.regions.iter().map(|r| RegionFit {
         region: r.name.clone(),
@@ -30,7 +35,11 @@ pub fn fit_to_wire(garment: &str, size: &str, map: &FitMap, cut: Option<&Suggest
         ease: room(&r.name).map(|r| r.ease() as f32),
         ease_needed: room(&r.name).map(|r| r.needed as f32),
     });
-    let tightness = map.vertices.iter().map(|v| (v.tightness() * TIGHTEST).round() as i8 as u8).collect();
+    let tightness = map
+        .vertices
+        .iter()
+        .map(|v| (v.tightness() * TIGHTEST).round() as i8 as u8)
+        .collect();
     GarmentFit {
         garment: garment.to_owned(),
         size: size.to_owned(),
@@ -59,21 +68,38 @@ mod tests {
             gap: 0.01,
             fit: Fit::Fitted,
         };
-        let map = FitMap { vertices: Vec::new(), regions: ["chest", "waist", "left thigh"].map(region).to_vec() };
+        let map = FitMap {
+            vertices: Vec::new(),
+            regions: ["chest", "waist", "left thigh"].map(region).to_vec(),
+        };
         let pattern = library::pattern("tshirt", Size::S).expect("pattern");
         // 2 cm more than the shirt is made for.
         let chest = pattern.finished[0] - 0.04 + 0.02;
-        let body =
-            Measurements { chest, natural_waist: 0.7, hip: 0.9, stature: 1.7, inseam: 0.8, ..Measurements::default() };
+        let body = Measurements {
+            chest,
+            natural_waist: 0.7,
+            hip: 0.9,
+            stature: 1.7,
+            inseam: 0.8,
+            ..Measurements::default()
+        };
         let cut = judge(&pattern, &body);
         let wire = fit_to_wire("tshirt", "S", &map, Some(&cut));
-        let [chest, waist, thigh] = &wire.regions[..] else { panic!("{wire:?}") };
+        let [chest, waist, thigh] = &wire.regions[..] else {
+            panic!("{wire:?}")
+        };
         let lacks = chest.ease_needed.expect("needed") - chest.ease.expect("ease");
         assert!((lacks - 0.02).abs() < 1e-6, "{chest:?}");
-        assert_eq!((waist.ease, thigh.ease), (None, None), "a T-shirt has no girth at the waist");
+        assert_eq!(
+            (waist.ease, thigh.ease),
+            (None, None),
+            "a T-shirt has no girth at the waist"
+        );
         assert_eq!(wire.hem_mark, "the crotch");
         assert!((f64::from(wire.hem_above.expect("hem")) - (cut.hem - 0.8)).abs() < 1e-6);
         let mesh = fit_to_wire("suit", "", &map, None);
-        assert!(mesh.hem_above.is_none() && mesh.hem_mark.is_empty() && mesh.regions[0].ease.is_none());
+        assert!(
+            mesh.hem_above.is_none() && mesh.hem_mark.is_empty() && mesh.regions[0].ease.is_none()
+        );
     }
 }

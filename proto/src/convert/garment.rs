@@ -35,7 +35,11 @@ pub struct WornGarment {
 impl WornGarment {
     /// One end of the stream of its positions.
     fn coder(&self) -> PositionCoder {
-        let faces: Vec<Face> = self.faces.iter().map(|f| f.map(|i| self.drawn[i as usize])).collect();
+        let faces: Vec<Face> = self
+            .faces
+            .iter()
+            .map(|f| f.map(|i| self.drawn[i as usize]))
+            .collect();
         PositionCoder::new(self.vertices, &faces)
     }
 }
@@ -60,15 +64,24 @@ pub fn topology_to_wire(g: &WornGarment) -> v1::GarmentTopology {
 /// # Errors
 /// Names the field of the wrong size or with an index out of range.
 pub fn topology_from_wire(t: &v1::GarmentTopology) -> Result<WornGarment, WireError> {
-    let vertices = bulk::count("garment_topology.vertex_count", t.vertex_count, MAX_VERTICES)?;
+    let vertices = bulk::count(
+        "garment_topology.vertex_count",
+        t.vertex_count,
+        MAX_VERTICES,
+    )?;
     let m = bulk::count("garment_topology.face_count", t.face_count, MAX_FACES)?;
     let look = required(t.look, "garment_topology.look")?;
     if !(look.stripe_width.is_finite() && look.stripe_width >= 0.0) {
-        return Err(WireError::new("garment_topology.look.stripe_width", "must be zero or positive"));
+        return Err(WireError::new(
+            "garment_topology.look.stripe_width",
+            "must be zero or positive",
+        ));
     }
     let k = bulk::count("garment_topology.drawn_count", t.drawn_count, MAX_DRAWN)?;
-    let drawn: Vec<u32> =
-        bulk::read::<u32, 1>("garment_topology.drawn", k, &t.drawn)?.into_iter().map(|[v]| v).collect();
+    let drawn: Vec<u32> = bulk::read::<u32, 1>("garment_topology.drawn", k, &t.drawn)?
+        .into_iter()
+        .map(|[v]| v)
+        .collect();
     if let Some(i) = drawn.iter().position(|&v| v as usize >= vertices) {
         let why = format!("{}, but there are {vertices} vertices", drawn[i]);
         return Err(WireError::new(format!("garment_topology.drawn[{i}]"), why));
@@ -109,21 +122,31 @@ impl GarmentWriter {
             self.coders = worn.iter().map(|w| w.coder()).collect();
         }
         if positions.len() != self.coders.len() {
-            let why = format!("positions of {} for an outfit of {}", positions.len(), self.coders.len());
+            let why = format!(
+                "positions of {} for an outfit of {}",
+                positions.len(),
+                self.coders.len()
+            );
             return Err(WireError::new("garment_frame.garments", why));
         }
         f.garments.clear();
         for (i, (p, coder)) in positions.iter().zip(&mut self.coders).enumerate() {
             let bytes = coder.encode(p).map_err(|e| at(i, &e))?;
             let topology = keyframe.map(|worn| topology_to_wire(&worn[i]));
-            f.garments.push(v1::GarmentMesh { topology, positions: bytes.into() });
+            f.garments.push(v1::GarmentMesh {
+                topology,
+                positions: bytes.into(),
+            });
         }
         Ok(())
     }
 }
 
 fn at(garment: usize, e: &FormatError) -> WireError {
-    WireError::new(format!("garment_frame.garments[{garment}].positions"), e.to_string())
+    WireError::new(
+        format!("garment_frame.garments[{garment}].positions"),
+        e.to_string(),
+    )
 }
 
 /// Reads one stream of garment frames: remembers topology between keyframes, and positions that others build on.
@@ -143,7 +166,10 @@ impl GarmentReader {
     /// Names the field at fault; positions without an earlier keyframe are one.
     pub fn read(&mut self, f: &v1::GarmentFrame) -> Result<PlacedGarments, WireError> {
         if f.garments.len() > MAX_GARMENTS {
-            return Err(WireError::new("garment_frame.garments", format!("at most {MAX_GARMENTS}")));
+            return Err(WireError::new(
+                "garment_frame.garments",
+                format!("at most {MAX_GARMENTS}"),
+            ));
         }
         let keyframe = f.garments.iter().any(|g| g.topology.is_some());
         if keyframe {
@@ -156,8 +182,13 @@ impl GarmentReader {
                 worn.push((Arc::new(garment), coder));
             }
             (self.revision, self.worn) = (f.outfit_revision, worn);
-        } else if !f.garments.is_empty() && (self.revision, self.worn.len()) != (f.outfit_revision, f.garments.len()) {
-            return Err(WireError::new("garment_frame.garments", "positions came before their topology"));
+        } else if !f.garments.is_empty()
+            && (self.revision, self.worn.len()) != (f.outfit_revision, f.garments.len())
+        {
+            return Err(WireError::new(
+                "garment_frame.garments",
+                "positions came before their topology",
+            ));
         }
         (self.worn.iter_mut().zip(&f.garments).enumerate())
             .map(|(i, ((worn, coder), g))| {
@@ -175,20 +206,36 @@ mod tests {
 
     /// Two triangles of two panels that share a seam: four simulated vertices, six drawn ones.
     fn flag() -> WornGarment {
-        let look = v1::GarmentLook { color_rgb: 0xff0000, accent_rgb: 0xff0000, stripe_width: 0.0 };
+        let look = v1::GarmentLook {
+            color_rgb: 0xff0000,
+            accent_rgb: 0xff0000,
+            stripe_width: 0.0,
+        };
         WornGarment {
             garment: "flag".into(),
             size: "M".into(),
             vertices: 4,
             drawn: vec![0, 1, 2, 1, 3, 2],
             faces: vec![[0, 1, 2], [3, 4, 5]],
-            uvs: vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [5.0, 0.0], [6.0, 1.0], [5.0, 1.0]],
+            uvs: vec![
+                [0.0, 0.0],
+                [1.0, 0.0],
+                [0.0, 1.0],
+                [5.0, 0.0],
+                [6.0, 1.0],
+                [5.0, 1.0],
+            ],
             look,
         }
     }
 
     fn wind(t: f32) -> Vec<P3> {
-        vec![P3::new(0.0, 0.0, t), P3::new(1.0, 0.0, t), P3::new(0.0, 1.0, t), P3::new(1.0, 1.0, t * t)]
+        vec![
+            P3::new(0.0, 0.0, t),
+            P3::new(1.0, 0.0, t),
+            P3::new(0.0, 1.0, t),
+            P3::new(1.0, 1.0, t * t),
+        ]
     }
 
     #[test]
@@ -196,11 +243,19 @@ mod tests {
         let worn = [Arc::new(flag())];
         let mut w = GarmentWriter::default();
         let mut frame = |keyframe: bool, revision, t| {
-            let mut f = v1::GarmentFrame { outfit_revision: revision, ..Default::default() };
-            w.write(&mut f, keyframe.then_some(&worn[..]), &[wind(t)]).expect("written");
+            let mut f = v1::GarmentFrame {
+                outfit_revision: revision,
+                ..Default::default()
+            };
+            w.write(&mut f, keyframe.then_some(&worn[..]), &[wind(t)])
+                .expect("written");
             f
         };
-        let (key, update, later) = (frame(true, 1, 0.0), frame(false, 1, 0.1), frame(false, 1, 0.2));
+        let (key, update, later) = (
+            frame(true, 1, 0.0),
+            frame(false, 1, 0.1),
+            frame(false, 1, 0.2),
+        );
         let mut r = GarmentReader::default();
         assert!(r.read(&update).is_err(), "no keyframe yet");
         assert_eq!(*r.read(&key).expect("keyframe")[0].0, flag());
@@ -210,10 +265,18 @@ mod tests {
         assert!((placed[4] - P3::new(1.0, 1.0, 0.01)).norm() < 2e-4);
         assert!((r.read(&later).expect("another")[0].1[0].z - 0.2).abs() < 2e-4);
         assert!(
-            r.read(&v1::GarmentFrame { outfit_revision: 2, ..later }).is_err(),
+            r.read(&v1::GarmentFrame {
+                outfit_revision: 2,
+                ..later
+            })
+            .is_err(),
             "another outfit needs its keyframe"
         );
-        assert!(r.read(&v1::GarmentFrame::default()).expect("nothing worn").is_empty());
+        assert!(
+            r.read(&v1::GarmentFrame::default())
+                .expect("nothing worn")
+                .is_empty()
+        );
     }
 
     #[test]
@@ -222,12 +285,32 @@ mod tests {
         let mut bad = wind(0.0);
         bad[2].y = f32::INFINITY;
         let worn = [Arc::new(flag())];
-        let e = GarmentWriter::default().write(&mut f, Some(&worn), &[bad]).expect_err("refused");
-        assert!(e.to_string().contains("garments[0].positions") && e.to_string().contains("vertex 2"), "{e}");
-        assert!(GarmentWriter::default().write(&mut f, None, &[wind(0.0)]).is_err(), "no outfit yet");
-        let t = v1::GarmentTopology { drawn: bulk::write_flat(&[0u32, 1, 2, 1, 9, 2]), ..topology_to_wire(&flag()) };
-        assert!(topology_from_wire(&t).expect_err("refused").to_string().contains("drawn[4]"));
-        GarmentWriter::default().write(&mut f, Some(&worn), &[wind(0.0)]).expect("written");
+        let e = GarmentWriter::default()
+            .write(&mut f, Some(&worn), &[bad])
+            .expect_err("refused");
+        assert!(
+            e.to_string().contains("garments[0].positions") && e.to_string().contains("vertex 2"),
+            "{e}"
+        );
+        assert!(
+            GarmentWriter::default()
+                .write(&mut f, None, &[wind(0.0)])
+                .is_err(),
+            "no outfit yet"
+        );
+        let t = v1::GarmentTopology {
+            drawn: bulk::write_flat(&[0u32, 1, 2, 1, 9, 2]),
+            ..topology_to_wire(&flag())
+        };
+        assert!(
+            topology_from_wire(&t)
+                .expect_err("refused")
+                .to_string()
+                .contains("drawn[4]")
+        );
+        GarmentWriter::default()
+            .write(&mut f, Some(&worn), &[wind(0.0)])
+            .expect("written");
         f.garments[0].positions = f.garments[0].positions.slice(..3);
         let e = GarmentReader::default().read(&f).expect_err("cut short");
         assert!(e.to_string().contains("garments[0].positions"), "{e}");

@@ -28,23 +28,36 @@ pub fn vector_from_wire(v: Option<&v1::Vector3>, field: &str) -> Result<Vector3<
 
 /// A vector for the wire.
 pub fn vector_to_wire(v: &Vector3<f64>) -> v1::Vector3 {
-    v1::Vector3 { x: v.x, y: v.y, z: v.z }
+    v1::Vector3 {
+        x: v.x,
+        y: v.y,
+        z: v.z,
+    }
 }
 
 /// A rigid transform; the caller names its frames.
 ///
 /// # Errors
 /// Names the part that is absent, not finite or no rotation.
-pub fn rigid_from_wire<A, B>(t: &v1::RigidTransform, field: &str) -> Result<Rigid<A, B>, WireError> {
+pub fn rigid_from_wire<A, B>(
+    t: &v1::RigidTransform,
+    field: &str,
+) -> Result<Rigid<A, B>, WireError> {
     let translation = vector_from_wire(t.translation.as_ref(), &format!("{field}.translation"))?;
     let q = required(t.rotation, &format!("{field}.rotation"))?;
     let q = Quaternion::new(q.w, q.x, q.y, q.z);
     let norm = q.norm();
     // Written so that NaN fails too.
     if !((norm - 1.0).abs() <= QUATERNION_NORM_TOLERANCE) {
-        return Err(WireError::new(format!("{field}.rotation"), format!("its norm is {norm}, not 1")));
+        return Err(WireError::new(
+            format!("{field}.rotation"),
+            format!("its norm is {norm}, not 1"),
+        ));
     }
-    Ok(Rigid::from_parts(translation, UnitQuaternion::from_quaternion(q)))
+    Ok(Rigid::from_parts(
+        translation,
+        UnitQuaternion::from_quaternion(q),
+    ))
 }
 
 /// A rigid transform for the wire.
@@ -52,18 +65,42 @@ pub fn rigid_to_wire<A, B>(t: &Rigid<A, B>) -> v1::RigidTransform {
     let q = t.iso().rotation.coords;
     v1::RigidTransform {
         translation: Some(vector_to_wire(&t.iso().translation.vector)),
-        rotation: Some(v1::Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }),
+        rotation: Some(v1::Quaternion {
+            x: q.x,
+            y: q.y,
+            z: q.z,
+            w: q.w,
+        }),
     }
 }
 
 fn intrinsics(k: &v1::Intrinsics, field: &str) -> Result<Intrinsics, WireError> {
-    Intrinsics { width: k.width, height: k.height, fx: k.fx, fy: k.fy, cx: k.cx, cy: k.cy }
-        .validated()
-        .map_err(|e| WireError::new(format!("{field}.{}", e.field), format!("{} is not usable ({})", e.value, e.why)))
+    Intrinsics {
+        width: k.width,
+        height: k.height,
+        fx: k.fx,
+        fy: k.fy,
+        cx: k.cx,
+        cy: k.cy,
+    }
+    .validated()
+    .map_err(|e| {
+        WireError::new(
+            format!("{field}.{}", e.field),
+            format!("{} is not usable ({})", e.value, e.why),
+        )
+    })
 }
 
 fn intrinsics_to_wire(k: &Intrinsics) -> v1::Intrinsics {
-    v1::Intrinsics { width: k.width, height: k.height, fx: k.fx, fy: k.fy, cx: k.cx, cy: k.cy }
+    v1::Intrinsics {
+        width: k.width,
+        height: k.height,
+        fx: k.fx,
+        fy: k.fy,
+        cx: k.cx,
+        cy: k.cy,
+    }
 }
 
 /// A usable calibration.
@@ -72,8 +109,15 @@ fn intrinsics_to_wire(k: &Intrinsics) -> v1::Intrinsics {
 /// Names the field that no camera can have.
 pub fn calibration_from_wire(c: &v1::Calibration) -> Result<Calibration, WireError> {
     Ok(Calibration {
-        depth: intrinsics(&required(c.depth, "calibration.depth")?, "calibration.depth")?,
-        color: c.color.as_ref().map(|k| intrinsics(k, "calibration.color")).transpose()?,
+        depth: intrinsics(
+            &required(c.depth, "calibration.depth")?,
+            "calibration.depth",
+        )?,
+        color: c
+            .color
+            .as_ref()
+            .map(|k| intrinsics(k, "calibration.color"))
+            .transpose()?,
         color_from_depth: match &c.color_from_depth {
             Some(t) => rigid_from_wire(t, "calibration.color_from_depth")?,
             None => Rigid::identity(),
@@ -101,8 +145,16 @@ mod tests {
         let mut w = calibration_to_wire(&c);
         assert_eq!(calibration_from_wire(&w).expect("same"), c);
         w.depth.as_mut().expect("there").fy = f64::NAN;
-        assert_eq!(calibration_from_wire(&w).expect_err("NaN").field, "calibration.depth.fy");
-        assert_eq!(calibration_from_wire(&v1::Calibration::default()).expect_err("empty").field, "calibration.depth");
+        assert_eq!(
+            calibration_from_wire(&w).expect_err("NaN").field,
+            "calibration.depth.fy"
+        );
+        assert_eq!(
+            calibration_from_wire(&v1::Calibration::default())
+                .expect_err("empty")
+                .field,
+            "calibration.depth"
+        );
     }
 
     #[test]
@@ -112,7 +164,12 @@ mod tests {
         let back: Rigid<World, Camera> = rigid_from_wire(&w, "t").expect("same");
         assert!((back.iso().translation.vector - t.iso().translation.vector).norm() < 1e-15);
         for bad in [0.0, 2.0, f64::NAN] {
-            w.rotation = Some(v1::Quaternion { x: bad, y: 0.0, z: 0.0, w: 0.0 });
+            w.rotation = Some(v1::Quaternion {
+                x: bad,
+                y: 0.0,
+                z: 0.0,
+                w: 0.0,
+            });
             let e = rigid_from_wire::<World, Camera>(&w, "t").expect_err("no rotation");
             assert_eq!(e.field, "t.rotation");
         }

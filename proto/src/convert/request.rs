@@ -13,7 +13,10 @@ pub fn session_id(field: &str, id: &str) -> Result<String, WireError> {
     if is_session_id(id) {
         return Ok(id.into());
     }
-    Err(WireError::new(field, "1 to 64 characters of [A-Za-z0-9_-] are needed"))
+    Err(WireError::new(
+        field,
+        "1 to 64 characters of [A-Za-z0-9_-] are needed",
+    ))
 }
 
 /// The bus keys of a camera.
@@ -32,13 +35,17 @@ pub fn camera_key(message: &str, store: &str, camera: &str) -> Result<CameraKey,
 ///
 /// # Errors
 /// Names the choice at fault.
-pub fn choices(message: &str, garments: &[v1::GarmentChoice]) -> Result<Vec<v1::GarmentChoice>, WireError> {
+pub fn choices(
+    message: &str,
+    garments: &[v1::GarmentChoice],
+) -> Result<Vec<v1::GarmentChoice>, WireError> {
     if garments.len() > MAX_GARMENTS {
         let why = format!("{} garments, at most {MAX_GARMENTS}", garments.len());
         return Err(WireError::new(format!("{message}.garments"), why));
     }
     for (i, g) in garments.iter().enumerate() {
-        let fault = |f: &str, why: &str| Err(WireError::new(format!("{message}.garments[{i}].{f}"), why));
+        let fault =
+            |f: &str, why: &str| Err(WireError::new(format!("{message}.garments[{i}].{f}"), why));
         if !is_name(&g.garment) {
             return fault("garment", "1 to 64 characters of [a-z0-9_-] are needed");
         }
@@ -99,18 +106,60 @@ mod tests {
 
     #[test]
     fn faults_are_named() {
-        assert_eq!(camera_key("m", "s", "*").expect_err("wild").field, "m.camera");
-        assert_eq!(camera_key("m", "", "c").expect_err("empty").field, "m.store");
+        assert_eq!(
+            camera_key("m", "s", "*").expect_err("wild").field,
+            "m.camera"
+        );
+        assert_eq!(
+            camera_key("m", "", "c").expect_err("empty").field,
+            "m.store"
+        );
         assert_eq!(session_id("m.id", "a/b").expect_err("slash").field, "m.id");
-        let shirt = v1::GarmentChoice { garment: "tshirt".into(), size: "M".into(), color_rgb: None };
-        let bad = v1::GarmentChoice { color_rgb: Some(0x1_00_00_00), ..shirt.clone() };
-        assert_eq!(choices("m", &[shirt.clone(), bad]).expect_err("colour").field, "m.garments[1].color_rgb");
-        assert_eq!(choices("m", &vec![shirt; 9]).expect_err("nine").field, "m.garments");
-        let r = v1::StreamFramesRequest { width: 640, height: 480, max_rate: f32::NAN, ..Default::default() };
-        assert_eq!(picture_format(&r).expect_err("NaN").field, "stream_frames_request.max_rate");
-        let r = v1::StreamFramesRequest { width: 640, ..Default::default() };
-        assert_eq!(picture_format(&r).expect_err("0").field, "stream_frames_request.height");
-        let r = v1::StreamFramesRequest { width: 4_000_000_000, height: 480, ..Default::default() };
-        assert_eq!(picture_format(&r).expect_err("4 G").field, "stream_frames_request.width");
+        let shirt = v1::GarmentChoice {
+            garment: "tshirt".into(),
+            size: "M".into(),
+            color_rgb: None,
+        };
+        let bad = v1::GarmentChoice {
+            color_rgb: Some(0x1_00_00_00),
+            ..shirt.clone()
+        };
+        assert_eq!(
+            choices("m", &[shirt.clone(), bad])
+                .expect_err("colour")
+                .field,
+            "m.garments[1].color_rgb"
+        );
+        assert_eq!(
+            choices("m", &vec![shirt; 9]).expect_err("nine").field,
+            "m.garments"
+        );
+        let r = v1::StreamFramesRequest {
+            width: 640,
+            height: 480,
+            max_rate: f32::NAN,
+            ..Default::default()
+        };
+        assert_eq!(
+            picture_format(&r).expect_err("NaN").field,
+            "stream_frames_request.max_rate"
+        );
+        let r = v1::StreamFramesRequest {
+            width: 640,
+            ..Default::default()
+        };
+        assert_eq!(
+            picture_format(&r).expect_err("0").field,
+            "stream_frames_request.height"
+        );
+        let r = v1::StreamFramesRequest {
+            width: 4_000_000_000,
+            height: 480,
+            ..Default::default()
+        };
+        assert_eq!(
+            picture_format(&r).expect_err("4 G").field,
+            "stream_frames_request.width"
+        );
     }
 }

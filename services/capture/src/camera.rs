@@ -28,7 +28,10 @@ pub(crate) enum Command {
     Start(Answer<v1::CameraInfo>),
     Stop(Answer<v1::CameraInfo>),
     Calibration(Answer<Calibration>),
-    Record { folder: PathBuf, answer: Answer<String> },
+    Record {
+        folder: PathBuf,
+        answer: Answer<String>,
+    },
     EndRecording(Answer<Recording>),
 }
 
@@ -50,13 +53,25 @@ pub(crate) fn spawn(config: CameraConfig, key: CameraKey, ctx: Context) -> Handl
     let (tell, info) = watch::channel(info);
     let (commands, inbox) = mpsc::channel(8);
     let recorder = Recorder::default();
-    tokio::spawn(Task { config, key, ctx, tell: Arc::new(tell), recorder, run: None }.serve(inbox));
+    tokio::spawn(
+        Task {
+            config,
+            key,
+            ctx,
+            tell: Arc::new(tell),
+            recorder,
+            run: None,
+        }
+        .serve(inbox),
+    );
     Handle { commands, info }
 }
 
 /// A recording is shown by its file name only: paths are nobody's business outside the box.
 fn shown(source: &str) -> String {
-    std::path::Path::new(source).file_name().map_or_else(|| source.into(), |n| n.to_string_lossy().into_owned())
+    std::path::Path::new(source)
+        .file_name()
+        .map_or_else(|| source.into(), |n| n.to_string_lossy().into_owned())
 }
 
 struct Run {
@@ -108,7 +123,10 @@ impl Task {
 
     async fn start(&mut self) -> Result<v1::CameraInfo, Status> {
         if self.run.as_ref().is_some_and(|r| !r.task.is_finished()) {
-            return Err(Status::failed_precondition(format!("camera `{}` is running", self.key.camera())));
+            return Err(Status::failed_precondition(format!(
+                "camera `{}` is running",
+                self.key.camera()
+            )));
         }
         self.stop().await;
         let source = match self.open().await {
@@ -147,7 +165,11 @@ impl Task {
                 () = stopped.cancelled() => {}
             }
         });
-        self.run = Some(Run { stop, task, calibration });
+        self.run = Some(Run {
+            stop,
+            task,
+            calibration,
+        });
         tracing::info!(camera = %self.key, epoch, "publishing");
         Ok(self.tell.borrow().clone())
     }
@@ -169,15 +191,28 @@ impl Task {
         if let Some(run) = &self.run {
             return Ok(run.calibration.clone());
         }
-        self.open().await.map(|s| s.calibration().clone()).map_err(|why| unavailable("capture", &why))
+        self.open()
+            .await
+            .map(|s| s.calibration().clone())
+            .map_err(|why| unavailable("capture", &why))
     }
 
     async fn record(&mut self, folder: PathBuf) -> Result<String, Status> {
         let Some(run) = self.run.as_ref().filter(|r| !r.task.is_finished()) else {
-            return Err(Status::failed_precondition(format!("camera `{}` does not run", self.key.camera())));
+            return Err(Status::failed_precondition(format!(
+                "camera `{}` does not run",
+                self.key.camera()
+            )));
         };
-        let name = format!("{}-{}-{}.mcap", self.key.store(), self.key.camera(), unix_ns() / 1_000_000_000);
-        self.recorder.begin(folder.join(&name), run.calibration.clone()).await?;
+        let name = format!(
+            "{}-{}-{}.mcap",
+            self.key.store(),
+            self.key.camera(),
+            unix_ns() / 1_000_000_000
+        );
+        self.recorder
+            .begin(folder.join(&name), run.calibration.clone())
+            .await?;
         self.tell.send_modify(|i| i.recording = true);
         Ok(name)
     }
@@ -215,7 +250,14 @@ struct Pace {
 impl Pace {
     fn new() -> Self {
         let begun = tokio::time::Instant::now();
-        Self { begun, first_ns: None, added_ns: 0, last_ns: 0, step_ns: 33_333_333, frames: 0 }
+        Self {
+            begun,
+            first_ns: None,
+            added_ns: 0,
+            last_ns: 0,
+            step_ns: 33_333_333,
+            frames: 0,
+        }
     }
     /// The frame's time on a clock that never runs back, and when to show it.
     fn next(&mut self, time_ns: u64, config: &CameraConfig) -> (u64, Option<tokio::time::Instant>) {
@@ -253,11 +295,15 @@ impl Reader {
 
     /// The next frame; rewinds at the end where that is wanted.
     async fn read(&mut self) -> Result<Option<RgbdFrame>, String> {
-        let Some(mut source) = self.source.take() else { return Err("the source was lost to a panic".into()) };
+        let Some(mut source) = self.source.take() else {
+            return Err("the source was lost to a panic".into());
+        };
         let looped = self.config.looped;
         let read = move || {
             let frame = match source.next_frame() {
-                Ok(None) if looped && !source.is_empty() => source.rewind().and_then(|()| source.next_frame()),
+                Ok(None) if looped && !source.is_empty() => {
+                    source.rewind().and_then(|()| source.next_frame())
+                }
                 other => other,
             };
             (source, frame)
@@ -291,10 +337,24 @@ impl Reader {
             if let Some(due) = due {
                 tokio::time::sleep_until(due).await;
             }
-            let id = v1::FrameId { epoch: self.epoch, sequence, capture_time_ns: time_ns, received_unix_ns: unix_ns() };
+            let id = v1::FrameId {
+                epoch: self.epoch,
+                sequence,
+                capture_time_ns: time_ns,
+                received_unix_ns: unix_ns(),
+            };
             sequence += 1;
-            let rgbd = RgbdFrame { sequence: id.sequence, time_ns, ..frame };
-            let exposure = Arc::new(Exposure { id, calibration: self.calibration.clone(), rgbd, stages: vec![read] });
+            let rgbd = RgbdFrame {
+                sequence: id.sequence,
+                time_ns,
+                ..frame
+            };
+            let exposure = Arc::new(Exposure {
+                id,
+                calibration: self.calibration.clone(),
+                rgbd,
+                stages: vec![read],
+            });
             self.recorder.offer(&exposure);
             if let Err(e) = publisher.send(exposure).await {
                 tracing::warn!(camera = self.config.name, error = %e, "a frame did not get out");
@@ -315,11 +375,26 @@ mod tests {
 
     #[test]
     fn time_never_runs_back_and_rounds_follow_each_other() {
-        let config = CameraConfig { rate: 0.0, ..CameraConfig::default() };
+        let config = CameraConfig {
+            rate: 0.0,
+            ..CameraConfig::default()
+        };
         let mut p = Pace::new();
-        let times: Vec<u64> =
-            [1000, 34_000_000, 67_000_000, 1000, 34_000_000].iter().map(|&t| p.next(t, &config).0).collect();
+        let times: Vec<u64> = [1000, 34_000_000, 67_000_000, 1000, 34_000_000]
+            .iter()
+            .map(|&t| p.next(t, &config).0)
+            .collect();
         assert!(times.windows(2).all(|w| w[0] < w[1]), "{times:?}");
-        assert!(p.next(67_000_000, &CameraConfig { fast: true, ..config }).1.is_none());
+        assert!(
+            p.next(
+                67_000_000,
+                &CameraConfig {
+                    fast: true,
+                    ..config
+                }
+            )
+            .1
+            .is_none()
+        );
     }
 }

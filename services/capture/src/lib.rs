@@ -26,7 +26,9 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         service.autostart(&camera.name).await;
     }
     let (mut routes, health) = server::routes()?;
-    routes.add_service(CaptureServiceServer::new(service).max_decoding_message_size(server::MAX_REQUEST_BYTES));
+    routes.add_service(
+        CaptureServiceServer::new(service).max_decoding_message_size(server::MAX_REQUEST_BYTES),
+    );
     let service = Service {
         name: "capture",
         grpc_name: SERVICE_NAME,

@@ -5,7 +5,10 @@ use std::process::ExitCode;
 use tryon_kit::process::{self, Args, BusRole};
 
 fn main() -> ExitCode {
-    process::run("capture", BusRole::Listen, Args::parse(), |config, ctx| async move {
-        tryon_capture::start(&config, ctx).await
-    })
+    process::run(
+        "capture",
+        BusRole::Listen,
+        Args::parse(),
+        |config, ctx| async move { tryon_capture::start(&config, ctx).await },
+    )
 }

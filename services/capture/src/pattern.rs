@@ -17,7 +17,10 @@ pub(crate) struct Pattern {
 impl Pattern {
     pub(crate) fn new() -> Self {
         let k = Intrinsics::KINECT_V1.resized(320, 240);
-        Self { calibration: Calibration::registered(k), next: 0 }
+        Self {
+            calibration: Calibration::registered(k),
+            next: 0,
+        }
     }
 }
 
@@ -38,7 +41,12 @@ impl RgbdSource for Pattern {
         }
         let mut depth = DepthImage::empty(k.width, k.height);
         depth.data_mut().fill(WALL_MM);
-        Ok(Some(RgbdFrame { sequence: i, time_ns: i * 1_000_000_000 / RATE, depth, color: Some(color) }))
+        Ok(Some(RgbdFrame {
+            sequence: i,
+            time_ns: i * 1_000_000_000 / RATE,
+            depth,
+            color: Some(color),
+        }))
     }
     fn rewind(&mut self) -> Result<(), FormatError> {
         self.next = 0;

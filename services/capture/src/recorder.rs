@@ -36,16 +36,30 @@ impl Recorder {
     }
 
     /// Begins a file.
-    pub(crate) async fn begin(&self, path: PathBuf, calibration: Calibration) -> Result<(), Status> {
+    pub(crate) async fn begin(
+        &self,
+        path: PathBuf,
+        calibration: Calibration,
+    ) -> Result<(), Status> {
         if self.with(|a| a.is_some()) {
             return Err(Status::failed_precondition("a recording is under way"));
         }
-        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = path
+            .file_name()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default();
         let (frames, inbox) = sync_channel(WAITING);
         let thread = std::thread::Builder::new().name("recorder".into());
         let writer = thread.spawn(move || write(&path, &calibration, &inbox));
         let writer = writer.map_err(|e| Status::internal(format!("recorder: {e}")))?;
-        self.with(|a| *a = Some(Active { name, frames, dropped: Arc::default(), writer }));
+        self.with(|a| {
+            *a = Some(Active {
+                name,
+                frames,
+                dropped: Arc::default(),
+                writer,
+            })
+        });
         Ok(())
     }
 
@@ -65,7 +79,12 @@ impl Recorder {
         let Some(a) = self.with(Option::take) else {
             return Err(Status::failed_precondition("nothing is being recorded"));
         };
-        let Active { name, frames, dropped, writer } = a;
+        let Active {
+            name,
+            frames,
+            dropped,
+            writer,
+        } = a;
         drop(frames);
         let done = tokio::task::spawn_blocking(move || writer.join()).await;
         let fault = |why: String| Status::data_loss(format!("{name}: {why}"));
@@ -74,11 +93,19 @@ impl Recorder {
             Ok(Ok(Err(why))) => return Err(fault(why)),
             _ => return Err(fault("the writer panicked".into())),
         };
-        Ok(Recording { file: name, frames, dropped: dropped.load(Ordering::Relaxed) })
+        Ok(Recording {
+            file: name,
+            frames,
+            dropped: dropped.load(Ordering::Relaxed),
+        })
     }
 }
 
-fn write(path: &Path, calibration: &Calibration, inbox: &Receiver<Arc<Exposure>>) -> Result<u64, String> {
+fn write(
+    path: &Path,
+    calibration: &Calibration,
+    inbox: &Receiver<Arc<Exposure>>,
+) -> Result<u64, String> {
     let mut file = McapWriter::create(path, calibration).map_err(|e| e.to_string())?;
     for e in inbox {
         file.write(&e.rgbd).map_err(|e| e.to_string())?;

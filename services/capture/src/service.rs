@@ -26,7 +26,10 @@ impl Capture {
             let key = CameraKey::new(&config.store, &c.name)?;
             Some((c.name.clone(), camera::spawn(c.clone(), key, ctx.clone())))
         };
-        Self { cameras: config.cameras.iter().filter_map(spawn).collect(), recordings: config.recordings.clone() }
+        Self {
+            cameras: config.cameras.iter().filter_map(spawn).collect(),
+            recordings: config.recordings.clone(),
+        }
     }
 
     pub(crate) async fn autostart(&self, name: &str) {
@@ -35,7 +38,9 @@ impl Capture {
     }
 
     fn find(&self, name: &str) -> Result<&Handle, Status> {
-        self.cameras.get(name).ok_or_else(|| not_found("camera", name))
+        self.cameras
+            .get(name)
+            .ok_or_else(|| not_found("camera", name))
     }
 
     async fn tell<T>(
@@ -45,15 +50,26 @@ impl Capture {
     ) -> Result<T, Status> {
         let (answer, heard) = oneshot::channel();
         let gone = |_| unavailable("capture", "shutting down");
-        self.find(name)?.commands.send(command(answer)).await.map_err(|_| unavailable("capture", "shutting down"))?;
+        self.find(name)?
+            .commands
+            .send(command(answer))
+            .await
+            .map_err(|_| unavailable("capture", "shutting down"))?;
         heard.await.map_err(gone)?
     }
 }
 
 #[tonic::async_trait]
 impl CaptureService for Capture {
-    async fn list_cameras(&self, _: Request<ListCamerasRequest>) -> Result<Response<ListCamerasResponse>, Status> {
-        let cameras = self.cameras.values().map(|h| h.info.borrow().clone()).collect();
+    async fn list_cameras(
+        &self,
+        _: Request<ListCamerasRequest>,
+    ) -> Result<Response<ListCamerasResponse>, Status> {
+        let cameras = self
+            .cameras
+            .values()
+            .map(|h| h.info.borrow().clone())
+            .collect();
         Ok(Response::new(ListCamerasResponse { cameras }))
     }
 
@@ -62,15 +78,23 @@ impl CaptureService for Capture {
         r: Request<GetCalibrationRequest>,
     ) -> Result<Response<GetCalibrationResponse>, Status> {
         let c = self.tell(&r.get_ref().camera, Command::Calibration).await?;
-        Ok(Response::new(GetCalibrationResponse { calibration: Some(calibration_to_wire(&c)) }))
+        Ok(Response::new(GetCalibrationResponse {
+            calibration: Some(calibration_to_wire(&c)),
+        }))
     }
 
-    async fn start_camera(&self, r: Request<StartCameraRequest>) -> Result<Response<StartCameraResponse>, Status> {
+    async fn start_camera(
+        &self,
+        r: Request<StartCameraRequest>,
+    ) -> Result<Response<StartCameraResponse>, Status> {
         let info = self.tell(&r.get_ref().camera, Command::Start).await?;
         Ok(Response::new(StartCameraResponse { info: Some(info) }))
     }
 
-    async fn stop_camera(&self, r: Request<StopCameraRequest>) -> Result<Response<StopCameraResponse>, Status> {
+    async fn stop_camera(
+        &self,
+        r: Request<StopCameraRequest>,
+    ) -> Result<Response<StopCameraResponse>, Status> {
         let info = self.tell(&r.get_ref().camera, Command::Stop).await?;
         Ok(Response::new(StopCameraResponse { info: Some(info) }))
     }
@@ -82,13 +106,19 @@ impl CaptureService for Capture {
         let r = r.get_ref();
         self.find(&r.camera)?;
         if !r.consent {
-            return Err(Status::failed_precondition("start_recording_request.consent: nobody is recorded without it"));
+            return Err(Status::failed_precondition(
+                "start_recording_request.consent: nobody is recorded without it",
+            ));
         }
         if self.recordings.as_os_str().is_empty() {
-            return Err(Status::failed_precondition("capture.recordings: no folder is configured"));
+            return Err(Status::failed_precondition(
+                "capture.recordings: no folder is configured",
+            ));
         }
         let folder = self.recordings.clone();
-        let file = self.tell(&r.camera, |answer| Command::Record { folder, answer }).await?;
+        let file = self
+            .tell(&r.camera, |answer| Command::Record { folder, answer })
+            .await?;
         Ok(Response::new(StartRecordingResponse { file }))
     }
 
@@ -96,7 +126,13 @@ impl CaptureService for Capture {
         &self,
         r: Request<StopRecordingRequest>,
     ) -> Result<Response<StopRecordingResponse>, Status> {
-        let done = self.tell(&r.get_ref().camera, Command::EndRecording).await?;
-        Ok(Response::new(StopRecordingResponse { file: done.file, frames: done.frames, dropped: done.dropped }))
+        let done = self
+            .tell(&r.get_ref().camera, Command::EndRecording)
+            .await?;
+        Ok(Response::new(StopRecordingResponse {
+            file: done.file,
+            frames: done.frames,
+            dropped: done.dropped,
+        }))
     }
 }

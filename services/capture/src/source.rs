@@ -23,7 +23,10 @@ pub struct SourceError {
 /// # Errors
 /// Names the source, and the file and field at fault.
 pub fn open(name: &str) -> Result<OpenSource, SourceError> {
-    let fault = |why: String| SourceError { source_name: name.into(), why };
+    let fault = |why: String| SourceError {
+        source_name: name.into(),
+        why,
+    };
     match name.split_once(':').unwrap_or((name, "")) {
         ("pattern", _) => Ok(Box::new(Pattern::new())),
         ("synth", clip) => synth(clip).map_err(fault),
@@ -38,9 +41,19 @@ fn synth(clip: &str) -> Result<OpenSource, String> {
         "leave" => Routine::LeaveAndReturn,
         "still" => Routine::Still,
         "empty" => Routine::Empty,
-        other => return Err(format!("`{other}` is no routine; there are try-on, leave, still and empty")),
+        other => {
+            return Err(format!(
+                "`{other}` is no routine; there are try-on, leave, still and empty"
+            ));
+        }
     };
-    let sequence = Sequence::new(Shopper::default(), Setting { routine, ..Setting::default() });
+    let sequence = Sequence::new(
+        Shopper::default(),
+        Setting {
+            routine,
+            ..Setting::default()
+        },
+    );
     Ok(Box::new(SynthSource::new(sequence, None)))
 }
 

@@ -5,7 +5,12 @@ use std::path::PathBuf;
 
 /// Live virtual try-on: a depth camera sees a shopper, the mirror shows her in garments she is not wearing.
 #[derive(Debug, Parser)]
-#[command(name = "tryon", version, propagate_version = true, max_term_width = 110)]
+#[command(
+    name = "tryon",
+    version,
+    propagate_version = true,
+    max_term_width = 110
+)]
 pub(crate) struct Cli {
     /// What to do.
     #[command(subcommand)]

@@ -36,9 +36,16 @@ impl Choice {
     ///
     /// # Errors
     /// Names the unknown garment or size, or what is wrong in a pattern file.
-    pub(crate) fn parse(names: &[String], size: Option<&str>, body: Option<&Path>) -> Result<Vec<Self>> {
+    pub(crate) fn parse(
+        names: &[String],
+        size: Option<&str>,
+        body: Option<&Path>,
+    ) -> Result<Vec<Self>> {
         let size = size.map(str::parse).transpose()?;
-        let body = body.map(MadeOn::read).transpose().context("--garment-body")?;
+        let body = body
+            .map(MadeOn::read)
+            .transpose()
+            .context("--garment-body")?;
         names
             .iter()
             .map(|name| {
@@ -46,10 +53,16 @@ impl Choice {
                     return Ok(Self::File(Box::new(input::pattern(Path::new(name))?)));
                 }
                 if input::is_mesh(name) {
-                    return Ok(Self::Mesh(Arc::new(input::mesh_garment(Path::new(name), body.clone())?)));
+                    return Ok(Self::Mesh(Arc::new(input::mesh_garment(
+                        Path::new(name),
+                        body.clone(),
+                    )?)));
                 }
                 library::pattern(name, size.unwrap_or_default())?;
-                Ok(Self::Library { name: name.clone(), size })
+                Ok(Self::Library {
+                    name: name.clone(),
+                    size,
+                })
             })
             .collect()
     }
@@ -105,7 +118,11 @@ pub(crate) struct Chain {
 
 impl Chain {
     /// A session in front of this camera.
-    pub(crate) fn new(template: Arc<Template>, calibration: &Calibration, choices: Vec<Choice>) -> Self {
+    pub(crate) fn new(
+        template: Arc<Template>,
+        calibration: &Calibration,
+        choices: Vec<Choice>,
+    ) -> Self {
         let limbs = composite::Limbs::of(&template);
         let tracker = TrackerModel::new(template, calibration.clone(), TrackerConfig::default());
         let tracked = TrackerState::new(&tracker);
@@ -145,11 +162,22 @@ impl Chain {
             stages.push((name, now.duration_since(clock).as_secs_f64() * 1e3));
             clock = now;
         };
-        let report = tracking::step(&self.tracker, &mut self.tracked, frame, &mut self.tracking_work)?;
+        let report = tracking::step(
+            &self.tracker,
+            &mut self.tracked,
+            frame,
+            &mut self.tracking_work,
+        )?;
         lap("tracking", &mut stages);
         let mut skipped = vec![
-            ("hidden template points", report.skipped.hidden_points as f64),
-            ("pictures that show nothing new", report.skipped.frames as f64),
+            (
+                "hidden template points",
+                report.skipped.hidden_points as f64,
+            ),
+            (
+                "pictures that show nothing new",
+                report.skipped.frames as f64,
+            ),
         ];
 
         let dt = self.time_step(frame.time_ns);
@@ -165,7 +193,9 @@ impl Chain {
             }
             if let Some(worn) = &mut self.worn {
                 let mut body = Vec::new();
-                self.tracked.world_from_camera.points_f32(&body_camera, &mut body);
+                self.tracked
+                    .world_from_camera
+                    .points_f32(&body_camera, &mut body);
                 let input = realtime::Input { body: &body, dt };
                 let r = realtime::step(&worn.model, &mut worn.state, &input, &mut worn.work)?;
                 penetration = r.penetration_left;
@@ -191,8 +221,14 @@ impl Chain {
 
     fn time_step(&mut self, time_ns: u64) -> f64 {
         let last = self.last_ns.replace(time_ns);
-        let dt = last.and_then(|l| time_ns.checked_sub(l)).map_or(FRAME_TIME, |ns| ns as f64 * 1e-9);
-        if dt > 0.0 && dt <= LONGEST_STEP { dt } else { FRAME_TIME }
+        let dt = last
+            .and_then(|l| time_ns.checked_sub(l))
+            .map_or(FRAME_TIME, |ns| ns as f64 * 1e-9);
+        if dt > 0.0 && dt <= LONGEST_STEP {
+            dt
+        } else {
+            FRAME_TIME
+        }
     }
 
     fn put_on(&mut self, template: &Template, rest: &RestBody) -> Result<Worn> {
@@ -206,13 +242,18 @@ impl Chain {
             chosen.push(match c {
                 Choice::File(pattern) => Chosen::Pattern(pattern.clone()),
                 Choice::Mesh(mesh) => {
-                    self.notes.extend(mesh.notes.iter().map(|n| format!("{}: {n}", mesh.name)));
+                    self.notes
+                        .extend(mesh.notes.iter().map(|n| format!("{}: {n}", mesh.name)));
                     Chosen::Mesh(mesh.clone())
                 }
-                Choice::Library { name, size: Some(size) } => Chosen::Pattern(Box::new(library::pattern(name, *size)?)),
+                Choice::Library {
+                    name,
+                    size: Some(size),
+                } => Chosen::Pattern(Box::new(library::pattern(name, *size)?)),
                 Choice::Library { name, size: None } => {
                     let s = suggest(name, &measures)?;
-                    self.notes.push(format!("{name}: {} ({})", s.size, s.reason));
+                    self.notes
+                        .push(format!("{name}: {} ({})", s.size, s.reason));
                     Chosen::Pattern(Box::new(library::pattern(name, s.size)?))
                 }
             });
@@ -230,10 +271,26 @@ impl Chain {
         };
         let config = realtime::Config::tracked().seen_from(&self.tracked.world_from_camera);
         let roomy = realtime::RoomyBody::new(template, &config)?;
-        let options = DressOptions { config, ..DressOptions::default() };
-        let dressed = dress_all(template, rest, &pose, &wear, &options).context("the garments cannot be put on")?;
-        let looks = dressed.model.outfit.garments.iter().map(|g| look(&g.name)).collect();
-        Ok(Worn { model: dressed.model, state: dressed.state, work: realtime::Workspace::default(), roomy, looks })
+        let options = DressOptions {
+            config,
+            ..DressOptions::default()
+        };
+        let dressed = dress_all(template, rest, &pose, &wear, &options)
+            .context("the garments cannot be put on")?;
+        let looks = dressed
+            .model
+            .outfit
+            .garments
+            .iter()
+            .map(|g| look(&g.name))
+            .collect();
+        Ok(Worn {
+            model: dressed.model,
+            state: dressed.state,
+            work: realtime::Workspace::default(),
+            roomy,
+            looks,
+        })
     }
 
     fn picture(
@@ -278,12 +335,19 @@ impl Chain {
             }),
             output: None,
         };
-        let (picture, report) =
-            composite::render(&self.compositor, &mut self.composite_state, &input, &mut self.composite_work)?;
+        let (picture, report) = composite::render(
+            &self.compositor,
+            &mut self.composite_state,
+            &input,
+            &mut self.composite_work,
+        )?;
         skipped.push(("picture tiles without garment", report.tiles_skipped as f64));
         skipped.push(("garment faces hidden by others", report.faces_hidden as f64));
         skipped.push(("garments hidden by others", report.garments_hidden as f64));
-        skipped.push(("normals of unseen garment vertices", report.normals_skipped as f64));
+        skipped.push((
+            "normals of unseen garment vertices",
+            report.normals_skipped as f64,
+        ));
         skipped.push(("hands away from garments", report.hands.skipped as f64));
         Ok(picture)
     }
@@ -297,5 +361,8 @@ fn pose_surface<F>(template: &Template, rest: &RestBody, pose: &Pose<F>, out: &m
 
 /// How a garment of the library is drawn.
 pub(crate) fn look(garment: &str) -> Look {
-    Look { base: library::dye(garment), ..Look::default() }
+    Look {
+        base: library::dye(garment),
+        ..Look::default()
+    }
 }

@@ -17,10 +17,15 @@ use tryon::garment::{Material, Pattern, Size, Triangulation};
 /// # Errors
 /// Names the array, joint or vertex of the file that is at fault.
 pub(crate) fn template(path: Option<&Path>) -> Result<Arc<Template>> {
-    let Some(path) = path else { return Ok(embedded::template()) };
-    let name = path.file_stem().map_or_else(|| "body".to_owned(), |s| s.to_string_lossy().into_owned());
+    let Some(path) = path else {
+        return Ok(embedded::template());
+    };
+    let name = path
+        .file_stem()
+        .map_or_else(|| "body".to_owned(), |s| s.to_string_lossy().into_owned());
     let arrays = read_smpl(path)?;
-    let template = template_from_smpl(&name, &arrays).with_context(|| format!("cannot use {}", path.display()))?;
+    let template = template_from_smpl(&name, &arrays)
+        .with_context(|| format!("cannot use {}", path.display()))?;
     Ok(Arc::new(template))
 }
 
@@ -29,10 +34,19 @@ pub(crate) fn template(path: Option<&Path>) -> Result<Arc<Template>> {
 /// # Errors
 /// Names the file and the panel, edge or seam at fault.
 pub(crate) fn pattern(path: &Path) -> Result<Pattern> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or("garment");
+    let text =
+        std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let name = path
+        .file_stem()
+        .and_then(|s| s.to_str())
+        .unwrap_or("garment");
     if is_garmentcode(&text) {
-        from_garmentcode(&parse_garmentcode(&text, path)?, name, Size::M, Material::preset("cotton")?)
+        from_garmentcode(
+            &parse_garmentcode(&text, path)?,
+            name,
+            Size::M,
+            Material::preset("cotton")?,
+        )
     } else {
         Pattern::from_json(&text)
     }
@@ -53,7 +67,8 @@ pub(crate) fn is_mesh(name: &str) -> bool {
 /// Names the file and the edge, face or vertex at fault.
 pub(crate) fn mesh_garment(path: &Path, body: Option<MadeOn>) -> Result<MeshWear> {
     let edge = Triangulation::default().edge_length;
-    MeshWear::on(path, body, &Material::preset("cotton")?, edge).with_context(|| path.display().to_string())
+    MeshWear::on(path, body, &Material::preset("cotton")?, edge)
+        .with_context(|| path.display().to_string())
 }
 
 /// A rough start in the camera's frame, as recordings with truth carry it.
@@ -70,21 +85,37 @@ pub(crate) struct RoughStart {
 /// # Errors
 /// When the file cannot be read, is no JSON of this form, or holds a number that is not finite.
 pub(crate) fn rough_start(path: &Path) -> Result<RoughStart> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let start: RoughStart =
-        serde_json::from_str(&text).with_context(|| format!("{} is no rough start", path.display()))?;
-    let finite = start.root_position.iter().chain([&start.facing_yaw_deg]).all(|v| v.is_finite());
-    anyhow::ensure!(finite, "{}: root_position and facing_yaw_deg must be finite", path.display());
+    let text =
+        std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let start: RoughStart = serde_json::from_str(&text)
+        .with_context(|| format!("{} is no rough start", path.display()))?;
+    let finite = start
+        .root_position
+        .iter()
+        .chain([&start.facing_yaw_deg])
+        .all(|v| v.is_finite());
+    anyhow::ensure!(
+        finite,
+        "{}: root_position and facing_yaw_deg must be finite",
+        path.display()
+    );
     Ok(start)
 }
 
 /// A progress bar over frames; silent when standard error is no terminal.
 pub(crate) fn progress(frames: Option<u64>, what: &'static str) -> ProgressBar {
     let (bar, template) = match frames {
-        Some(n) => (ProgressBar::new(n), "{prefix} {bar:32} {pos}/{len} frames, {per_sec}, {eta} left {msg}"),
-        None => (ProgressBar::new_spinner(), "{prefix} {spinner} {pos} frames, {per_sec} {msg}"),
+        Some(n) => (
+            ProgressBar::new(n),
+            "{prefix} {bar:32} {pos}/{len} frames, {per_sec}, {eta} left {msg}",
+        ),
+        None => (
+            ProgressBar::new_spinner(),
+            "{prefix} {spinner} {pos} frames, {per_sec} {msg}",
+        ),
     };
-    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style =
+        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
     bar.with_style(style).with_prefix(what)
 }
 
@@ -93,5 +124,6 @@ pub(crate) fn progress(frames: Option<u64>, what: &'static str) -> ProgressBar {
 /// # Errors
 /// When the system refuses.
 pub(crate) fn create_dir(dir: &Path) -> Result<()> {
-    std::fs::create_dir_all(dir).with_context(|| format!("cannot create the folder {}", dir.display()))
+    std::fs::create_dir_all(dir)
+        .with_context(|| format!("cannot create the folder {}", dir.display()))
 }

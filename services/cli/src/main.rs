@@ -1,5 +1,8 @@
 //! `tryon`: the whole product on the command line.
-#![allow(clippy::print_stdout, reason = "this is the one program whose standard output is for people and scripts")]
+#![allow(
+    clippy::print_stdout,
+    reason = "this is the one program whose standard output is for people and scripts"
+)]
 
 mod args;
 mod chain;

@@ -50,32 +50,72 @@ pub(crate) struct Received {
 ///
 /// # Errors
 /// When the compositor refuses or falls silent, or a picture cannot be read or written.
-pub(crate) async fn watch(address: SocketAddr, garments: &[String], time: Duration, out: &Path) -> Result<Received> {
+pub(crate) async fn watch(
+    address: SocketAddr,
+    garments: &[String],
+    time: Duration,
+    out: &Path,
+) -> Result<Received> {
     let channel = channel(&format!("http://{address}")).map_err(anyhow::Error::msg)?;
-    let mut client = CompositorServiceClient::new(channel).max_decoding_message_size(MAX_PICTURE_BYTES);
-    let choices = garments.iter().map(|g| v1::GarmentChoice { garment: g.clone(), ..Default::default() }).collect();
-    let open = v1::OpenTryOnRequest { garments: choices, ..Default::default() };
-    let id = client.open_try_on(request(open)).await.context("opening a try-on")?.into_inner().try_on_id;
-    let stream = v1::StreamFramesRequest { try_on_id: id.clone(), ..Default::default() };
-    let mut stream = client.stream_frames(stream).await.context("streaming pictures")?.into_inner();
+    let mut client =
+        CompositorServiceClient::new(channel).max_decoding_message_size(MAX_PICTURE_BYTES);
+    let choices = garments
+        .iter()
+        .map(|g| v1::GarmentChoice {
+            garment: g.clone(),
+            ..Default::default()
+        })
+        .collect();
+    let open = v1::OpenTryOnRequest {
+        garments: choices,
+        ..Default::default()
+    };
+    let id = client
+        .open_try_on(request(open))
+        .await
+        .context("opening a try-on")?
+        .into_inner()
+        .try_on_id;
+    let stream = v1::StreamFramesRequest {
+        try_on_id: id.clone(),
+        ..Default::default()
+    };
+    let mut stream = client
+        .stream_frames(stream)
+        .await
+        .context("streaming pictures")?
+        .into_inner();
     let started = Instant::now();
     let mut received = Received::default();
     let mut next_kept = 0.0;
     while started.elapsed() < time {
-        let message = tokio::time::timeout(SILENCE, stream.message()).await.context("the compositor fell silent")??;
-        let Some(event) = message.and_then(|m| m.event) else { break };
+        let message = tokio::time::timeout(SILENCE, stream.message())
+            .await
+            .context("the compositor fell silent")??;
+        let Some(event) = message.and_then(|m| m.event) else {
+            break;
+        };
         let at = started.elapsed().as_secs_f64();
         match event {
             v1::stream_frames_response::Event::Status(s) => {
-                *received.states.entry(s.state().as_str_name().to_owned()).or_default() += 1;
+                *received
+                    .states
+                    .entry(s.state().as_str_name().to_owned())
+                    .or_default() += 1;
             }
             v1::stream_frames_response::Event::Picture(p) => {
-                *received.states.entry(p.state().as_str_name().to_owned()).or_default() += 1;
+                *received
+                    .states
+                    .entry(p.state().as_str_name().to_owned())
+                    .or_default() += 1;
                 let live = p.state() == v1::TryOnState::Live && p.outfit_revision > 0;
                 if at >= next_kept {
                     next_kept = at + KEEP_EVERY;
                     let picture = decode_jpeg(&p.image)?;
-                    write_png_rgb(&out.join(format!("frame_{:04}.png", received.kept)), &picture)?;
+                    write_png_rgb(
+                        &out.join(format!("frame_{:04}.png", received.kept)),
+                        &picture,
+                    )?;
                     received.kept += 1;
                 }
                 received.pictures.push(Seen {
@@ -83,20 +123,29 @@ pub(crate) async fn watch(address: SocketAddr, garments: &[String], time: Durati
                     sequence: p.frame.as_ref().map_or(0, |f| f.sequence),
                     live,
                     latency_ms: f64::from(p.latency_ms),
-                    stages: p.stages.iter().map(|s| (s.stage.clone(), f64::from(s.ms))).collect(),
+                    stages: p
+                        .stages
+                        .iter()
+                        .map(|s| (s.stage.clone(), f64::from(s.ms)))
+                        .collect(),
                 });
             }
         }
     }
     drop(stream);
-    client.close_try_on(request(v1::CloseTryOnRequest { try_on_id: id })).await.context("closing the try-on")?;
+    client
+        .close_try_on(request(v1::CloseTryOnRequest { try_on_id: id }))
+        .await
+        .context("closing the try-on")?;
     received.counters = counters();
     Ok(received)
 }
 
 /// Counters and gauges of this process: the lines of the metrics page that are no histogram.
 fn counters() -> BTreeMap<String, f64> {
-    let Some(handle) = telemetry::metrics() else { return BTreeMap::new() };
+    let Some(handle) = telemetry::metrics() else {
+        return BTreeMap::new();
+    };
     handle
         .render()
         .lines()

@@ -19,10 +19,18 @@ type Start = fn(Arc<Config>, Context) -> Starting;
 
 /// Name and start of each service, upstream first.
 const SERVICES: [(&str, Start); 4] = [
-    ("capture", |c, x| Box::pin(async move { tryon_capture::start(&c, x).await })),
-    ("tracking", |c, x| Box::pin(async move { tryon_tracking::start(&c, x).await })),
-    ("cloth", |c, x| Box::pin(async move { tryon_cloth::start(&c, x).await })),
-    ("compositor", |c, x| Box::pin(async move { tryon_compositor::start(&c, x).await })),
+    ("capture", |c, x| {
+        Box::pin(async move { tryon_capture::start(&c, x).await })
+    }),
+    ("tracking", |c, x| {
+        Box::pin(async move { tryon_tracking::start(&c, x).await })
+    }),
+    ("cloth", |c, x| {
+        Box::pin(async move { tryon_cloth::start(&c, x).await })
+    }),
+    ("compositor", |c, x| {
+        Box::pin(async move { tryon_compositor::start(&c, x).await })
+    }),
 ];
 
 /// A running box.
@@ -40,20 +48,38 @@ impl OneBox {
     /// # Errors
     /// Names the service and the address or key at fault.
     pub(crate) async fn start(mut config: Config, bus: Option<Arc<dyn FrameBus>>) -> Result<Self> {
-        let pool = Pool::new(config.process.compute_threads).context("the compute threads cannot be started")?;
+        let pool = Pool::new(config.process.compute_threads)
+            .context("the compute threads cannot be started")?;
         let bus = bus.unwrap_or_else(|| LocalBus::new(Arc::clone(&pool)));
         let shutdown = CancellationToken::new();
         let grace = Duration::from_millis(config.process.grace_ms);
-        let ctx = Context { bus, pool, shutdown: shutdown.clone(), grace };
+        let ctx = Context {
+            bus,
+            pool,
+            shutdown: shutdown.clone(),
+            grace,
+        };
         let mut addresses = Vec::new();
         let mut tasks = JoinSet::new();
         for (name, start) in SERVICES {
-            let running = start(Arc::new(config.clone()), ctx.clone()).await.with_context(|| name.to_owned())?;
+            let running = start(Arc::new(config.clone()), ctx.clone())
+                .await
+                .with_context(|| name.to_owned())?;
             addresses.push((name, running.address, running.admin));
             pin_addresses(&mut config, name, &running);
-            tasks.spawn(supervise(name, start, Arc::new(config.clone()), ctx.clone(), running));
+            tasks.spawn(supervise(
+                name,
+                start,
+                Arc::new(config.clone()),
+                ctx.clone(),
+                running,
+            ));
         }
-        Ok(Self { addresses, shutdown, tasks })
+        Ok(Self {
+            addresses,
+            shutdown,
+            tasks,
+        })
     }
     /// gRPC address of a service.
     pub(crate) fn address(&self, name: &str) -> Option<SocketAddr> {
@@ -70,7 +96,9 @@ impl OneBox {
 fn pin_addresses(config: &mut Config, name: &str, running: &Running) {
     let url = format!("http://{}", running.address);
     match name {
-        "capture" => (config.capture.address, config.capture.admin) = (running.address, running.admin),
+        "capture" => {
+            (config.capture.address, config.capture.admin) = (running.address, running.admin)
+        }
         "tracking" => {
             (config.tracking.address, config.tracking.admin) = (running.address, running.admin);
             config.cloth.tracking = url.clone();
@@ -80,12 +108,20 @@ fn pin_addresses(config: &mut Config, name: &str, running: &Running) {
             (config.cloth.address, config.cloth.admin) = (running.address, running.admin);
             config.compositor.cloth = url;
         }
-        _ => (config.compositor.address, config.compositor.admin) = (running.address, running.admin),
+        _ => {
+            (config.compositor.address, config.compositor.admin) = (running.address, running.admin)
+        }
     }
 }
 
 /// Waits for the end of a service; one that broke is started again after a pause that grows with each failure.
-async fn supervise(name: &'static str, start: Start, config: Arc<Config>, ctx: Context, first: Running) {
+async fn supervise(
+    name: &'static str,
+    start: Start,
+    config: Arc<Config>,
+    ctx: Context,
+    first: Running,
+) {
     let mut running = Some(first);
     let mut waits = pauses();
     loop {

@@ -24,10 +24,18 @@ impl Summary {
     pub(crate) fn of(samples: &[f64]) -> Self {
         let mut v: Vec<f64> = samples.iter().copied().filter(|x| x.is_finite()).collect();
         v.sort_by(f64::total_cmp);
-        let Some(&max) = v.last() else { return Self::default() };
+        let Some(&max) = v.last() else {
+            return Self::default();
+        };
         // Nearest rank: the smallest value with at least the stated share of samples at or below it.
         let rank = |q: f64| v[((q * v.len() as f64).ceil() as usize).clamp(1, v.len()) - 1];
-        Self { count: v.len(), mean: v.iter().sum::<f64>() / v.len() as f64, p50: rank(0.5), p99: rank(0.99), max }
+        Self {
+            count: v.len(),
+            mean: v.iter().sum::<f64>() / v.len() as f64,
+            p50: rank(0.5),
+            p99: rank(0.99),
+            max,
+        }
     }
 }
 
@@ -48,7 +56,10 @@ impl Samples {
     }
     /// Summary of each name.
     pub(crate) fn summaries(&self) -> BTreeMap<String, Summary> {
-        self.0.iter().map(|(k, v)| (k.clone(), Summary::of(v))).collect()
+        self.0
+            .iter()
+            .map(|(k, v)| (k.clone(), Summary::of(v)))
+            .collect()
     }
 }
 
@@ -56,7 +67,11 @@ impl Samples {
 pub(crate) fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
+    line.split_whitespace()
+        .nth(1)?
+        .parse::<u64>()
+        .ok()
+        .map(|kib| kib * 1024)
 }
 
 /// Writes `report` as indented JSON.

@@ -37,15 +37,30 @@ pub(crate) struct Body {
 
 impl Body {
     /// The body of a state, in the world.
-    pub(crate) fn new(state: BodyState, shape: Arc<BodyShape>, template: Arc<Template>) -> Result<Self, String> {
+    pub(crate) fn new(
+        state: BodyState,
+        shape: Arc<BodyShape>,
+        template: Arc<Template>,
+    ) -> Result<Self, String> {
         let fault = |e: tryon_proto::convert::WireError| e.within("body_state").to_string();
-        let world = required(state.world_from_camera.as_ref(), "world_from_camera").map_err(fault)?;
-        let world: Rigid<World, Camera> = rigid_from_wire(world, "world_from_camera").map_err(fault)?;
+        let world =
+            required(state.world_from_camera.as_ref(), "world_from_camera").map_err(fault)?;
+        let world: Rigid<World, Camera> =
+            rigid_from_wire(world, "world_from_camera").map_err(fault)?;
         let pose = required(state.pose.as_ref(), "pose").map_err(fault)?;
         let pose = pose_from_wire(pose, template.skeleton().dofs()).map_err(fault)?;
         stages_from_wire(&state.stages, "stages").map_err(fault)?;
-        let pose = Pose { root: world * pose.root, angles: pose.angles };
-        Ok(Self { template, shape, pose, world_from_camera: world, state })
+        let pose = Pose {
+            root: world * pose.root,
+            angles: pose.angles,
+        };
+        Ok(Self {
+            template,
+            shape,
+            pose,
+            world_from_camera: world,
+            state,
+        })
     }
     fn time_ns(&self) -> u64 {
         self.state.frame.map_or(0, |f| f.capture_time_ns)
@@ -83,7 +98,10 @@ pub(crate) struct Said {
 
 impl From<v1::GarmentFrame> for Said {
     fn from(frame: v1::GarmentFrame) -> Self {
-        Self { frame, positions: Positions::default() }
+        Self {
+            frame,
+            positions: Positions::default(),
+        }
     }
 }
 
@@ -104,11 +122,18 @@ impl Chosen<'_> {
 
 /// How each pattern is cut for a body.
 fn cuts(patterns: &[Option<Pattern>], measures: &Measurements) -> Vec<Option<Suggestion>> {
-    patterns.iter().map(|p| p.as_ref().map(|p| dressing::judge(p, measures))).collect()
+    patterns
+        .iter()
+        .map(|p| p.as_ref().map(|p| dressing::judge(p, measures)))
+        .collect()
 }
 
 /// Puts garments on; takes about a second.
-pub(crate) fn dress(body: &Body, choices: &[GarmentChoice], library: &Library) -> Result<Worn, String> {
+pub(crate) fn dress(
+    body: &Body,
+    choices: &[GarmentChoice],
+    library: &Library,
+) -> Result<Worn, String> {
     let start = Instant::now();
     let rest = body.template.personalise(&body.shape);
     let measures = measure(&body.template, &rest).map_err(|e| e.to_string())?;
@@ -119,9 +144,15 @@ pub(crate) fn dress(body: &Body, choices: &[GarmentChoice], library: &Library) -
             (None, size) => {
                 let size = match size {
                     Some(s) => s,
-                    None => dressing::suggest(&c.garment, &measures).map_err(|e| e.to_string())?.size,
+                    None => {
+                        dressing::suggest(&c.garment, &measures)
+                            .map_err(|e| e.to_string())?
+                            .size
+                    }
                 };
-                Chosen::Cut(Box::new(patterns::pattern(&c.garment, size).map_err(|e| e.to_string())?))
+                Chosen::Cut(Box::new(
+                    patterns::pattern(&c.garment, size).map_err(|e| e.to_string())?,
+                ))
             }
         };
         worn.push((chosen, c));
@@ -135,18 +166,27 @@ pub(crate) fn dress(body: &Body, choices: &[GarmentChoice], library: &Library) -
         .collect();
     // A shopper may see herself in a size that does not fit; the fit says so.
     let config = realtime::Config::tracked().seen_from(&body.world_from_camera);
-    let options = DressOptions { config, any_size: true, ..DressOptions::default() };
+    let options = DressOptions {
+        config,
+        any_size: true,
+        ..DressOptions::default()
+    };
     let dressed = dressing::dress_all(&body.template, &rest, &body.pose, &list, &options);
     let dressed = dressed.map_err(|e| e.to_string())?;
     // The outfit comes back in the order of its layers, and a mesh may have become several garments.
     let (mut garments, mut patterns) = (Vec::new(), Vec::new());
     for g in &dressed.model.outfit.garments {
-        let (chosen, c) = worn.iter().find(|(w, _)| w.name() == g.name).ok_or("a garment has lost its name")?;
+        let (chosen, c) = worn
+            .iter()
+            .find(|(w, _)| w.name() == g.name)
+            .ok_or("a garment has lost its name")?;
         let (size, pattern) = match chosen {
             Chosen::Cut(p) => (g.size.to_string(), Some((**p).clone())),
             Chosen::Made(_) => (String::new(), None),
         };
-        let color = c.color_rgb.unwrap_or_else(|| library::own_color(&c.garment));
+        let color = c
+            .color_rgb
+            .unwrap_or_else(|| library::own_color(&c.garment));
         patterns.push(pattern);
         garments.push(Arc::new(WornGarment {
             garment: c.garment.clone(),
@@ -155,10 +195,15 @@ pub(crate) fn dress(body: &Body, choices: &[GarmentChoice], library: &Library) -
             drawn: g.render.vertex.clone(),
             faces: g.render.faces.clone(),
             uvs: g.render.uv.clone(),
-            look: v1::GarmentLook { color_rgb: color, accent_rgb: color, stripe_width: 0.0 },
+            look: v1::GarmentLook {
+                color_rgb: color,
+                accent_rgb: color,
+                stripe_width: 0.0,
+            },
         }));
     }
-    metrics::histogram!("tryon_stage_ms", "stage" => "cloth.dress").record(start.elapsed().as_secs_f64() * 1e3);
+    metrics::histogram!("tryon_stage_ms", "stage" => "cloth.dress")
+        .record(start.elapsed().as_secs_f64() * 1e3);
     Ok(Worn {
         garments: garments.into(),
         cuts: cuts(&patterns, &measures),
@@ -186,28 +231,50 @@ impl Worn {
             let measures = measure(&body.template, &self.rest).map_err(|e| e.to_string())?;
             self.cuts = cuts(&self.patterns, &measures);
         }
-        body.pose.bones(body.template.skeleton(), &self.rest, &mut self.bones);
-        skin(Par::Rayon, &self.rest.vertices, body.template.weights(), &self.bones, &mut self.posed);
+        body.pose
+            .bones(body.template.skeleton(), &self.rest, &mut self.bones);
+        skin(
+            Par::Rayon,
+            &self.rest.vertices,
+            body.template.weights(),
+            &self.bones,
+            &mut self.posed,
+        );
         let skinned = stage("cloth.body", start);
         let dt = body.time_ns().saturating_sub(self.last_ns) as f64 * 1e-9;
         self.last_ns = body.time_ns();
         let begun = Instant::now();
-        let input = Input { body: &self.posed, dt: dt.clamp(DT.0, DT.1) };
-        let report = realtime::step(&self.model, &mut self.state, &input, &mut self.work).map_err(|e| e.to_string())?;
-        let skipped = [("sleeping vertices", report.sleeping), ("contact searches", report.searches_skipped)];
+        let input = Input {
+            body: &self.posed,
+            dt: dt.clamp(DT.0, DT.1),
+        };
+        let report = realtime::step(&self.model, &mut self.state, &input, &mut self.work)
+            .map_err(|e| e.to_string())?;
+        let skipped = [
+            ("sleeping vertices", report.sleeping),
+            ("contact searches", report.searches_skipped),
+        ];
         record_skipped("cloth", skipped);
         let mut placed = self.placed(body);
         if let Some(why) = report.kept_last_good {
             placed.frame.detail = why;
         }
-        placed.frame.stages.extend([skinned, stage("cloth.step", begun)]);
+        placed
+            .frame
+            .stages
+            .extend([skinned, stage("cloth.step", begun)]);
         self.fit_age += dt;
         if self.fit_age >= FIT_EVERY {
             self.fit_age = 0.0;
             let begun = Instant::now();
-            let maps = self.fit.measure(&self.model, &self.state, &self.posed).map_err(|e| e.to_string())?;
+            let maps = self
+                .fit
+                .measure(&self.model, &self.state, &self.posed)
+                .map_err(|e| e.to_string())?;
             let named = self.garments.iter().zip(&maps).zip(&self.cuts);
-            placed.frame.fit = named.map(|((g, m), cut)| fit_to_wire(&g.garment, &g.size, m, cut.as_ref())).collect();
+            placed.frame.fit = named
+                .map(|((g, m), cut)| fit_to_wire(&g.garment, &g.size, m, cut.as_ref()))
+                .collect();
             placed.frame.stages.push(stage("cloth.fit", begun));
         }
         Ok(placed)
@@ -225,6 +292,15 @@ impl Worn {
             stages: body.state.stages.clone(),
             ..Default::default()
         };
-        Said { frame, positions: Arc::new(self.state.garments.iter().map(|g| g.positions.clone()).collect()) }
+        Said {
+            frame,
+            positions: Arc::new(
+                self.state
+                    .garments
+                    .iter()
+                    .map(|g| g.positions.clone())
+                    .collect(),
+            ),
+        }
     }
 }

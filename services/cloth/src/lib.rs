@@ -22,14 +22,20 @@ const MAX_REQUEST_BYTES: usize = 1024 * 1024 + 4096;
 /// When an address cannot be bound or the tracking URL is none.
 pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError> {
     let c = &config.cloth;
-    let tracking = tryon_kit::client::channel(&c.tracking)
-        .map_err(|why| StartError::Config { key: "cloth.tracking".into(), why })?;
+    let tracking = tryon_kit::client::channel(&c.tracking).map_err(|why| StartError::Config {
+        key: "cloth.tracking".into(),
+        why,
+    })?;
     let settings = c.clone();
     let offered = tokio::task::spawn_blocking(move || library::Library::read(&settings)).await;
-    let offered = offered.map_err(|e| StartError::Config { key: "cloth.garments".into(), why: e.to_string() })??;
+    let offered = offered.map_err(|e| StartError::Config {
+        key: "cloth.garments".into(),
+        why: e.to_string(),
+    })??;
     let service = service::Cloth::new(c, &ctx, tracking, offered);
     let (mut routes, health) = server::routes()?;
-    routes.add_service(ClothServiceServer::new(service).max_decoding_message_size(MAX_REQUEST_BYTES));
+    routes
+        .add_service(ClothServiceServer::new(service).max_decoding_message_size(MAX_REQUEST_BYTES));
     let service = Service {
         name: "cloth",
         grpc_name: SERVICE_NAME,

@@ -32,7 +32,9 @@ pub(crate) fn own_color(garment: &str) -> u32 {
 
 /// The size of that name, in any case.
 pub(crate) fn size(name: &str) -> Option<Size> {
-    Size::ALL.into_iter().find(|s| s.to_string().eq_ignore_ascii_case(name))
+    Size::ALL
+        .into_iter()
+        .find(|s| s.to_string().eq_ignore_ascii_case(name))
 }
 
 /// Everything that can be worn.
@@ -47,8 +49,12 @@ impl Library {
     /// # Errors
     /// A folder, body or material that cannot be used, by its key.
     pub(crate) fn read(config: &ClothConfig) -> Result<Self, StartError> {
-        let fault = |key: &str, why: String| StartError::Config { key: format!("cloth.{key}"), why };
-        let material = |key: &str, name: &str| Material::preset(name).map_err(|e| fault(key, e.to_string()));
+        let fault = |key: &str, why: String| StartError::Config {
+            key: format!("cloth.{key}"),
+            why,
+        };
+        let material =
+            |key: &str, name: &str| Material::preset(name).map_err(|e| fault(key, e.to_string()));
         let all = material("garments_material", &config.garments_material)?;
         let mut single = BTreeMap::new();
         for (garment, name) in &config.garment_materials {
@@ -59,26 +65,45 @@ impl Library {
         if config.garments.as_os_str().is_empty() {
             return Ok(found);
         }
-        let unreadable = |e: std::io::Error| fault("garments", format!("{}: {e}", config.garments.display()));
+        let unreadable =
+            |e: std::io::Error| fault("garments", format!("{}: {e}", config.garments.display()));
         let files = files(&config.garments).map_err(unreadable)?;
         let body = &config.garments_body;
-        let body = (!body.as_os_str().is_empty()).then(|| MadeOn::read(body)).transpose();
-        let body = body.map_err(|e| fault("garments_body", format!("{}: {e}", config.garments_body.display())))?;
+        let body = (!body.as_os_str().is_empty())
+            .then(|| MadeOn::read(body))
+            .transpose();
+        let body = body.map_err(|e| {
+            fault(
+                "garments_body",
+                format!("{}: {e}", config.garments_body.display()),
+            )
+        })?;
         for file in files {
             let name = name_of(&file);
             let material = single.get(name.as_str()).unwrap_or(&all);
             match found.add(&name, &file, body.clone(), material) {
-                Ok(notes) => tracing::info!(garment = name, file = %file.display(), notes, "offered"),
+                Ok(notes) => {
+                    tracing::info!(garment = name, file = %file.display(), notes, "offered")
+                }
                 Err(why) => tracing::error!(file = %file.display(), why, "a garment is left out"),
             }
         }
         if let Some(garment) = single.keys().find(|g| !found.meshes.contains_key(**g)) {
-            tracing::warn!(garment, "cloth.garment_materials names a garment that the folder does not offer");
+            tracing::warn!(
+                garment,
+                "cloth.garment_materials names a garment that the folder does not offer"
+            );
         }
         Ok(found)
     }
 
-    fn add(&mut self, name: &str, file: &Path, body: Option<MadeOn>, material: &Material) -> Result<String, String> {
+    fn add(
+        &mut self,
+        name: &str,
+        file: &Path,
+        body: Option<MadeOn>,
+        material: &Material,
+    ) -> Result<String, String> {
         if !is_name(name) {
             return Err("its name has none of [a-z0-9_-], or more than 64 characters".into());
         }
@@ -86,7 +111,9 @@ impl Library {
             return Err(format!("there is another garment named {name}"));
         }
         let edge = Triangulation::default().edge_length;
-        let wear = MeshWear::on(file, body, material, edge).map_err(|e| e.to_string())?.named(name);
+        let wear = MeshWear::on(file, body, material, edge)
+            .map_err(|e| e.to_string())?
+            .named(name);
         let notes = wear.notes.join("; ");
         self.meshes.insert(name.to_owned(), wear);
         Ok(notes)
@@ -112,7 +139,10 @@ impl Library {
             info(name, over, Size::ALL.iter().map(Size::to_string).collect())
         });
         // Meshes are fitted to the body: they come in one size.
-        let made = self.meshes.iter().map(|(name, m)| info(name, m.layer() > 0, Vec::new()));
+        let made = self
+            .meshes
+            .iter()
+            .map(|(name, m)| info(name, m.layer() > 0, Vec::new()));
         let mut all: Vec<GarmentInfo> = cut.chain(made).collect();
         all.sort_by(|a, b| a.name.cmp(&b.name));
         all
@@ -121,18 +151,36 @@ impl Library {
     /// Refuses what there is not.
     pub(crate) fn check(&self, choices: &[GarmentChoice]) -> Result<(), WireError> {
         for (i, c) in choices.iter().enumerate() {
-            let fault = |f: &str, why: String| Err(WireError::new(format!("dress_request.garments[{i}].{f}"), why));
+            let fault = |f: &str, why: String| {
+                Err(WireError::new(
+                    format!("dress_request.garments[{i}].{f}"),
+                    why,
+                ))
+            };
             let is_mesh = self.meshes.contains_key(&c.garment);
             if !is_mesh && !library::names().contains(&c.garment.as_str()) {
                 let all: Vec<String> = self.garments().into_iter().map(|g| g.name).collect();
-                return fault("garment", format!("`{}` is not known; there are {}", c.garment, all.join(", ")));
+                return fault(
+                    "garment",
+                    format!("`{}` is not known; there are {}", c.garment, all.join(", ")),
+                );
             }
             if is_mesh && !c.size.is_empty() {
-                return fault("size", format!("`{}` comes in one size; leave it empty", c.garment));
+                return fault(
+                    "size",
+                    format!("`{}` comes in one size; leave it empty", c.garment),
+                );
             }
             if !c.size.is_empty() && size(&c.size).is_none() {
-                let all = Size::ALL.iter().map(Size::to_string).collect::<Vec<_>>().join(", ");
-                return fault("size", format!("`{}` is not known; there are {all}", c.size));
+                let all = Size::ALL
+                    .iter()
+                    .map(Size::to_string)
+                    .collect::<Vec<_>>()
+                    .join(", ");
+                return fault(
+                    "size",
+                    format!("`{}` is not known; there are {all}", c.size),
+                );
             }
         }
         Ok(())
@@ -142,17 +190,30 @@ impl Library {
 /// The garments of a folder and of the folders in it, in the order of their paths. What an `.mhclo` binds is part of it.
 fn files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let list = |folder: &Path| -> std::io::Result<Vec<PathBuf>> {
-        std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect()
+        std::fs::read_dir(folder)?
+            .map(|entry| Ok(entry?.path()))
+            .collect()
     };
     let mut all = list(folder)?;
     for inner in all.clone().iter().filter(|p| p.is_dir()) {
         all.extend(list(inner)?);
     }
-    let kind = |p: &Path| p.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    let kind = |p: &Path| {
+        p.extension()
+            .and_then(|e| e.to_str())
+            .map(str::to_ascii_lowercase)
+    };
     all.retain(|p| p.is_file() && kind(p).is_some_and(|k| MESHES.contains(&k.as_str())));
-    let bound: Vec<PathBuf> = all.iter().filter(|p| kind(p).as_deref() == Some("mhclo")).cloned().collect();
+    let bound: Vec<PathBuf> = all
+        .iter()
+        .filter(|p| kind(p).as_deref() == Some("mhclo"))
+        .cloned()
+        .collect();
     all.retain(|p| {
-        kind(p).as_deref() == Some("mhclo") || !bound.iter().any(|b| b.with_extension("") == p.with_extension(""))
+        kind(p).as_deref() == Some("mhclo")
+            || !bound
+                .iter()
+                .any(|b| b.with_extension("") == p.with_extension(""))
     });
     all.sort();
     Ok(all)
@@ -160,8 +221,18 @@ fn files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
 
 /// What a file's garment is called.
 fn name_of(file: &Path) -> String {
-    let stem = file.file_stem().map_or_else(String::new, |s| s.to_string_lossy().to_lowercase());
-    stem.chars().map(|c| if c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' { c } else { '_' }).collect()
+    let stem = file
+        .file_stem()
+        .map_or_else(String::new, |s| s.to_string_lossy().to_lowercase());
+    stem.chars()
+        .map(|c| {
+            if c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' {
+                c
+            } else {
+                '_'
+            }
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -174,13 +245,30 @@ mod tests {
         let all = library.garments();
         assert!(all.windows(2).all(|w| w[0].name < w[1].name));
         for g in &all {
-            let choice = GarmentChoice { garment: g.name.clone(), size: g.sizes[0].clone(), color_rgb: None };
+            let choice = GarmentChoice {
+                garment: g.name.clone(),
+                size: g.sizes[0].clone(),
+                color_rgb: None,
+            };
             library.check(&[choice]).expect("listed, so known");
         }
-        let cape = GarmentChoice { garment: "cape".into(), ..Default::default() };
-        assert_eq!(library.check(&[cape]).expect_err("no cape").field, "dress_request.garments[0].garment");
-        let huge = GarmentChoice { garment: "tshirt".into(), size: "XXXXL".into(), color_rgb: None };
-        assert_eq!(library.check(&[huge]).expect_err("no such size").field, "dress_request.garments[0].size");
+        let cape = GarmentChoice {
+            garment: "cape".into(),
+            ..Default::default()
+        };
+        assert_eq!(
+            library.check(&[cape]).expect_err("no cape").field,
+            "dress_request.garments[0].garment"
+        );
+        let huge = GarmentChoice {
+            garment: "tshirt".into(),
+            size: "XXXXL".into(),
+            color_rgb: None,
+        };
+        assert_eq!(
+            library.check(&[huge]).expect_err("no such size").field,
+            "dress_request.garments[0].size"
+        );
     }
 
     /// A skirt-like tube around a standing person's hips, as OBJ; `broken` has a face beyond its vertices.
@@ -188,7 +276,10 @@ mod tests {
         let (rings, around) = (12, 36);
         let mut text = String::new();
         for k in 0..=rings {
-            let (y, r) = (0.55 + 0.45 * f64::from(k) / f64::from(rings), 0.24 - 0.04 * f64::from(k) / f64::from(rings));
+            let (y, r) = (
+                0.55 + 0.45 * f64::from(k) / f64::from(rings),
+                0.24 - 0.04 * f64::from(k) / f64::from(rings),
+            );
             for j in 0..around {
                 let t = std::f64::consts::TAU * f64::from(j) / f64::from(around);
                 text.push_str(&format!("v {} {y} {}\n", r * t.cos(), -r * t.sin()));
@@ -197,7 +288,12 @@ mod tests {
         for k in 0..rings {
             for j in 0..around {
                 let (a, b) = (k * around + j + 1, k * around + (j + 1) % around + 1);
-                text.push_str(&format!("f {a} {b} {}\nf {b} {} {}\n", a + around, b + around, a + around));
+                text.push_str(&format!(
+                    "f {a} {b} {}\nf {b} {} {}\n",
+                    a + around,
+                    b + around,
+                    a + around
+                ));
             }
         }
         if broken {
@@ -214,8 +310,13 @@ mod tests {
         std::fs::write(dir.join("more/torn.obj"), tube(true)).expect("written");
         std::fs::write(dir.join("tshirt.obj"), tube(false)).expect("written");
         std::fs::write(dir.join("notes.txt"), "no garment").expect("written");
-        let mut config = ClothConfig { garments: dir.clone(), ..ClothConfig::default() };
-        config.garment_materials.insert("tube_skirt".into(), "denim".into());
+        let mut config = ClothConfig {
+            garments: dir.clone(),
+            ..ClothConfig::default()
+        };
+        config
+            .garment_materials
+            .insert("tube_skirt".into(), "denim".into());
         let found = Library::read(&config);
         let torn = Library::default().add(
             "torn",
@@ -226,21 +327,45 @@ mod tests {
         std::fs::remove_dir_all(&dir).expect("removed");
         let library = found.expect("read");
         let names: Vec<&String> = library.meshes.keys().collect();
-        assert_eq!(names, ["tube_skirt"], "the torn one and the one named like ours are left out");
-        let info = library.garments().into_iter().find(|g| g.name == "tube_skirt").expect("listed");
+        assert_eq!(
+            names,
+            ["tube_skirt"],
+            "the torn one and the one named like ours are left out"
+        );
+        let info = library
+            .garments()
+            .into_iter()
+            .find(|g| g.name == "tube_skirt")
+            .expect("listed");
         assert_eq!((info.title.as_str(), info.sizes.len()), ("Tube skirt", 0));
-        let choice = GarmentChoice { garment: "tube_skirt".into(), ..Default::default() };
+        let choice = GarmentChoice {
+            garment: "tube_skirt".into(),
+            ..Default::default()
+        };
         library.check(std::slice::from_ref(&choice)).expect("known");
-        let sized = GarmentChoice { size: "M".into(), ..choice };
-        assert_eq!(library.check(&[sized]).expect_err("one size").field, "dress_request.garments[0].size");
+        let sized = GarmentChoice {
+            size: "M".into(),
+            ..choice
+        };
+        assert_eq!(
+            library.check(&[sized]).expect_err("one size").field,
+            "dress_request.garments[0].size"
+        );
         let why = torn.expect_err("a face beyond the vertices");
         assert!(why.contains("torn.obj") && why.contains("99999"), "{why}");
         // Settings that cannot be used stop the service, by their key.
         config.garments_material = "chainmail".into();
-        let e = Library::read(&config).expect_err("no such material").to_string();
-        assert!(e.contains("cloth.garments_material") && e.contains("denim"), "{e}");
+        let e = Library::read(&config)
+            .expect_err("no such material")
+            .to_string();
+        assert!(
+            e.contains("cloth.garments_material") && e.contains("denim"),
+            "{e}"
+        );
         config.garments_material = "cotton".into();
-        let e = Library::read(&config).expect_err("the folder is gone").to_string();
+        let e = Library::read(&config)
+            .expect_err("the folder is gone")
+            .to_string();
         assert!(e.contains("cloth.garments"), "{e}");
     }
 }

@@ -30,7 +30,12 @@ pub(crate) struct Cloth {
 }
 
 impl Cloth {
-    pub(crate) fn new(config: &ClothConfig, ctx: &Context, tracking: Channel, library: Library) -> Self {
+    pub(crate) fn new(
+        config: &ClothConfig,
+        ctx: &Context,
+        tracking: Channel,
+        library: Library,
+    ) -> Self {
         Self {
             sessions: Sessions::new(config.max_sessions),
             simulations: Simulations::new(config.max_simulations),
@@ -44,8 +49,13 @@ impl Cloth {
 
 #[tonic::async_trait]
 impl ClothService for Cloth {
-    async fn list_garments(&self, _: Request<ListGarmentsRequest>) -> Result<Response<ListGarmentsResponse>, Status> {
-        Ok(Response::new(ListGarmentsResponse { garments: self.library.garments() }))
+    async fn list_garments(
+        &self,
+        _: Request<ListGarmentsRequest>,
+    ) -> Result<Response<ListGarmentsResponse>, Status> {
+        Ok(Response::new(ListGarmentsResponse {
+            garments: self.library.garments(),
+        }))
     }
 
     async fn dress(&self, r: Request<DressRequest>) -> Result<Response<DressResponse>, Status> {
@@ -53,7 +63,11 @@ impl ClothService for Cloth {
         let id = request::session_id("dress_request.session_id", &r.session_id)?;
         let choices = request::choices("dress_request", &r.garments)?;
         self.library.check(&choices)?;
-        if self.sessions.get(&id).is_some_and(|h| h.commands.is_closed()) {
+        if self
+            .sessions
+            .get(&id)
+            .is_some_and(|h| h.commands.is_closed())
+        {
             self.sessions.remove(&id);
         }
         let setup = || Setup {
@@ -85,34 +99,55 @@ impl ClothService for Cloth {
         Ok(Response::new(DressResponse { outfit_revision }))
     }
 
-    async fn undress(&self, r: Request<UndressRequest>) -> Result<Response<UndressResponse>, Status> {
+    async fn undress(
+        &self,
+        r: Request<UndressRequest>,
+    ) -> Result<Response<UndressResponse>, Status> {
         if let Some(h) = self.sessions.remove(&r.get_ref().session_id) {
             let _ = h.commands.send(Command::Close).await;
         }
         Ok(Response::new(UndressResponse {}))
     }
 
-    type StreamGarmentsStream = Pin<Box<dyn Stream<Item = Result<StreamGarmentsResponse, Status>> + Send>>;
+    type StreamGarmentsStream =
+        Pin<Box<dyn Stream<Item = Result<StreamGarmentsResponse, Status>> + Send>>;
 
     async fn stream_garments(
         &self,
         r: Request<StreamGarmentsRequest>,
     ) -> Result<Response<Self::StreamGarmentsStream>, Status> {
         let id = &r.get_ref().session_id;
-        let handle: Arc<Handle> = self.sessions.get(id).ok_or_else(|| not_found("session", id))?;
+        let handle: Arc<Handle> = self
+            .sessions
+            .get(id)
+            .ok_or_else(|| not_found("session", id))?;
         let (tx, rx) = reader();
-        handle.commands.send(Command::Read(tx)).await.map_err(|_| not_found("session", id))?;
+        handle
+            .commands
+            .send(Command::Read(tx))
+            .await
+            .map_err(|_| not_found("session", id))?;
         // Coded here, behind the queue: positions build only on what this reader was really sent.
         let start = Some((rx, GarmentWriter::default()));
         let frames = futures::stream::unfold(start, |at| async move {
             let (mut rx, mut writer) = at?;
-            let Told { said: Said { mut frame, positions }, keyframe } = rx.recv().await?;
+            let Told {
+                said:
+                    Said {
+                        mut frame,
+                        positions,
+                    },
+                keyframe,
+            } = rx.recv().await?;
             if !positions.is_empty()
                 && let Err(e) = writer.write(&mut frame, keyframe.as_deref(), &positions)
             {
                 return Some((Err(Status::internal(e.to_string())), None));
             }
-            Some((Ok(StreamGarmentsResponse { frame: Some(frame) }), Some((rx, writer))))
+            Some((
+                Ok(StreamGarmentsResponse { frame: Some(frame) }),
+                Some((rx, writer)),
+            ))
         });
         Ok(Response::new(Box::pin(frames)))
     }
@@ -131,6 +166,8 @@ impl ClothService for Cloth {
         r: Request<FollowSimulationRequest>,
     ) -> Result<Response<Self::FollowSimulationStream>, Status> {
         let r = r.get_ref();
-        self.simulations.follow(&r.simulation_id, r.first_frame).map(Response::new)
+        self.simulations
+            .follow(&r.simulation_id, r.first_frame)
+            .map(Response::new)
     }
 }

@@ -13,7 +13,9 @@ use tryon_kit::server::Context;
 use tryon_kit::sessions::Sessions;
 use tryon_kit::telemetry::record_stages;
 use tryon_proto::convert::garment::{Positions, WornGarment};
-use tryon_proto::v1::{self, ClothStatus, DegradedReason, GarmentChoice, GarmentFrame, TrackingStatus};
+use tryon_proto::v1::{
+    self, ClothStatus, DegradedReason, GarmentChoice, GarmentFrame, TrackingStatus,
+};
 
 /// A reader hears something at least this often.
 const HEARTBEAT: Duration = Duration::from_millis(450);
@@ -64,7 +66,13 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
     tokio::spawn(async move {
         let (id, directory) = (setup.id.clone(), setup.directory.clone());
         let (tx, news) = latest::channel();
-        let following = follow(setup.tracking.clone(), id.clone(), None, setup.ctx.pool.clone(), tx);
+        let following = follow(
+            setup.tracking.clone(),
+            id.clone(),
+            None,
+            setup.ctx.pool.clone(),
+            tx,
+        );
         let following = tokio::spawn(following);
         let (dressed, ready) = mpsc::channel(1);
         let task = Task {
@@ -202,10 +210,16 @@ impl Task {
             match shown.filter(|g| !known(g)) {
                 Some(g) => {
                     r.has = Some(g.clone());
-                    r.queue.keyframe(Told { said: said.clone(), keyframe: Some(g.clone()) });
+                    r.queue.keyframe(Told {
+                        said: said.clone(),
+                        keyframe: Some(g.clone()),
+                    });
                 }
                 None => {
-                    r.queue.update(Told { said: said.clone(), keyframe: None });
+                    r.queue.update(Told {
+                        said: said.clone(),
+                        keyframe: None,
+                    });
                 }
             }
         }
@@ -214,7 +228,11 @@ impl Task {
     async fn hear(&mut self, news: News) -> Said {
         let (state, shape, template) = match news {
             News::Gone(why) => return waiting(DegradedReason::TrackingUnavailable, why).into(),
-            News::Body { state, shape, template } => (*state, shape, template),
+            News::Body {
+                state,
+                shape,
+                template,
+            } => (*state, shape, template),
         };
         let frame = state.frame;
         let said = |mut f: GarmentFrame| {
@@ -232,7 +250,10 @@ impl Task {
             (TrackingStatus::Calibrating, _) => {
                 // Another size, perhaps another person: what is on belongs to who was there before.
                 self.undress();
-                said(waiting(DegradedReason::Unspecified, "the body is being measured".into()))
+                said(waiting(
+                    DegradedReason::Unspecified,
+                    "the body is being measured".into(),
+                ))
             }
             (TrackingStatus::Lost, _) => {
                 let mut f = waiting(state.reason(), state.detail.clone());
@@ -282,7 +303,10 @@ impl Task {
             return live(bare.into(), wanted.revision);
         }
         let body = Arc::new(body);
-        if self.on != wanted.revision && self.failed != wanted.revision && self.dressing != Some(wanted.revision) {
+        if self.on != wanted.revision
+            && self.failed != wanted.revision
+            && self.dressing != Some(wanted.revision)
+        {
             self.put_on(body.clone(), wanted.clone());
         }
         let Some(mut worn) = self.worn.take() else {
@@ -321,16 +345,26 @@ impl Task {
         let (pool, done) = (self.setup.ctx.pool.clone(), self.dressed.clone());
         let library = self.setup.library.clone();
         tokio::spawn(async move {
-            let outcome = pool.run(move || dress(&body, &wanted.choices, &library)).await;
+            let outcome = pool
+                .run(move || dress(&body, &wanted.choices, &library))
+                .await;
             let outcome = outcome.map_err(|e| e.to_string()).and_then(|r| r);
             // The session may be gone by now.
-            let _ = done.send(Dressed { revision: wanted.revision, outcome }).await;
+            let _ = done
+                .send(Dressed {
+                    revision: wanted.revision,
+                    outcome,
+                })
+                .await;
         });
     }
 }
 
 fn dressing(body: &Body) -> GarmentFrame {
-    let mut f = waiting(DegradedReason::Unspecified, "garments are being put on".into());
+    let mut f = waiting(
+        DegradedReason::Unspecified,
+        "garments are being put on".into(),
+    );
     f.set_status(ClothStatus::Dressing);
     (f.frame, f.world_from_camera) = (body.state.frame, body.state.world_from_camera);
     f
@@ -343,14 +377,21 @@ fn live(mut said: Said, revision: u64) -> Said {
 }
 
 fn waiting(reason: DegradedReason, detail: String) -> GarmentFrame {
-    let mut f = v1::GarmentFrame { detail, ..Default::default() };
+    let mut f = v1::GarmentFrame {
+        detail,
+        ..Default::default()
+    };
     f.set_status(ClothStatus::Waiting);
     f.set_reason(reason);
     f
 }
 
 fn failed(revision: u64, detail: String) -> GarmentFrame {
-    let mut f = v1::GarmentFrame { detail, outfit_revision: revision, ..Default::default() };
+    let mut f = v1::GarmentFrame {
+        detail,
+        outfit_revision: revision,
+        ..Default::default()
+    };
     f.set_status(ClothStatus::Failed);
     f
 }

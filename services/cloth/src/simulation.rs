@@ -16,10 +16,13 @@ use tonic::Status;
 use tryon::cloth::scene::{self, RunConfig, Scene};
 use tryon_kit::status::{exhausted, not_found};
 use tryon_proto::convert::WireError;
-use tryon_proto::v1::{ClothSolver, FollowSimulationResponse, StartSimulationRequest, StartSimulationResponse};
+use tryon_proto::v1::{
+    ClothSolver, FollowSimulationResponse, StartSimulationRequest, StartSimulationResponse,
+};
 
 /// Frames of a simulation for one reader.
-pub(crate) type Frames = Pin<Box<dyn futures::Stream<Item = Result<FollowSimulationResponse, Status>> + Send>>;
+pub(crate) type Frames =
+    Pin<Box<dyn futures::Stream<Item = Result<FollowSimulationResponse, Status>> + Send>>;
 
 /// Largest scene text, bytes; as the contract says.
 const MAX_SCENE_BYTES: usize = 1024 * 1024;
@@ -47,17 +50,29 @@ type Directory = BTreeMap<String, (u32, watch::Receiver<Progress>)>;
 
 /// Drops what ended long ago.
 fn forget(all: &mut Directory) {
-    all.retain(|_, (_, p)| p.borrow().end.as_ref().is_none_or(|(at, _)| at.elapsed() < KEPT));
+    all.retain(|_, (_, p)| {
+        p.borrow()
+            .end
+            .as_ref()
+            .is_none_or(|(at, _)| at.elapsed() < KEPT)
+    });
 }
 
 impl Simulations {
     /// At most `limit` at a time, finished ones that are still kept not counted.
     pub(crate) fn new(limit: usize) -> Self {
-        Self { limit, started: AtomicU64::new(0), running: Mutex::new(BTreeMap::new()) }
+        Self {
+            limit,
+            started: AtomicU64::new(0),
+            running: Mutex::new(BTreeMap::new()),
+        }
     }
 
     /// Checks the scene and starts its simulation.
-    pub(crate) async fn start(&self, r: &StartSimulationRequest) -> Result<StartSimulationResponse, Status> {
+    pub(crate) async fn start(
+        &self,
+        r: &StartSimulationRequest,
+    ) -> Result<StartSimulationResponse, Status> {
         let scene = check(r)?;
         let config = match r.solver() {
             ClothSolver::Offline => RunConfig::offline(),
@@ -66,49 +81,80 @@ impl Simulations {
         let (tx, rx) = watch::channel(Progress::default());
         let frame_count = scene.frames() as u32;
         let vertex_count = scene.start.len() as u32;
-        let id = format!("simulation-{}", self.started.fetch_add(1, Ordering::Relaxed));
+        let id = format!(
+            "simulation-{}",
+            self.started.fetch_add(1, Ordering::Relaxed)
+        );
         {
             let mut all = self.running.lock().unwrap_or_else(PoisonError::into_inner);
             forget(&mut all);
-            if all.values().filter(|(_, p)| p.borrow().end.is_none()).count() >= self.limit {
+            if all
+                .values()
+                .filter(|(_, p)| p.borrow().end.is_none())
+                .count()
+                >= self.limit
+            {
                 return Err(exhausted("simulations", self.limit));
             }
             all.insert(id.clone(), (frame_count, rx));
         }
-        let spawned = std::thread::Builder::new().name(id.clone()).spawn(move || compute(&scene, &config, &tx));
+        let spawned = std::thread::Builder::new()
+            .name(id.clone())
+            .spawn(move || compute(&scene, &config, &tx));
         if let Err(e) = spawned {
-            self.running.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
+            self.running
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .remove(&id);
             return Err(Status::internal(format!("no thread for a simulation: {e}")));
         }
         tracing::info!(simulation = id, frame_count, vertex_count, "started");
-        Ok(StartSimulationResponse { simulation_id: id, frame_count, vertex_count })
+        Ok(StartSimulationResponse {
+            simulation_id: id,
+            frame_count,
+            vertex_count,
+        })
     }
 
     /// All frames from `first` on, then the end.
     pub(crate) fn follow(&self, id: &str, first: u32) -> Result<Frames, Status> {
         let mut all = self.running.lock().unwrap_or_else(PoisonError::into_inner);
         forget(&mut all);
-        let (frame_count, progress) = all.get(id).cloned().ok_or_else(|| not_found("simulation", id))?;
+        let (frame_count, progress) = all
+            .get(id)
+            .cloned()
+            .ok_or_else(|| not_found("simulation", id))?;
         if first >= frame_count {
             let why = format!("{first}: there are {frame_count} frames");
             return Err(WireError::new("follow_simulation_request.first_frame", why).into());
         }
-        Ok(Box::pin(futures::stream::unfold(Some((first, progress)), move |at| async move {
-            let (next, mut progress) = at?;
-            match wait(&mut progress, next).await {
-                Ok(Some((positions, ms))) => {
-                    let m = FollowSimulationResponse { frame: next, frame_count, positions, ms };
-                    Some((Ok(m), Some((next + 1, progress))))
+        Ok(Box::pin(futures::stream::unfold(
+            Some((first, progress)),
+            move |at| async move {
+                let (next, mut progress) = at?;
+                match wait(&mut progress, next).await {
+                    Ok(Some((positions, ms))) => {
+                        let m = FollowSimulationResponse {
+                            frame: next,
+                            frame_count,
+                            positions,
+                            ms,
+                        };
+                        Some((Ok(m), Some((next + 1, progress))))
+                    }
+                    Ok(None) => None,
+                    Err(status) => Some((Err(status), None)),
                 }
-                Ok(None) => None,
-                Err(status) => Some((Err(status), None)),
-            }
-        })))
+            },
+        )))
     }
 }
 
 /// The frame `next`, or the end.
-async fn wait(progress: &mut watch::Receiver<Progress>, next: u32) -> Result<Option<(Bytes, f32)>, Status> {
+async fn wait(
+    progress: &mut watch::Receiver<Progress>,
+    next: u32,
+) -> Result<Option<(Bytes, f32)>, Status> {
     let seen = progress
         .wait_for(|p| p.frames.len() > next as usize || p.end.is_some())
         .await
@@ -122,12 +168,17 @@ async fn wait(progress: &mut watch::Receiver<Progress>, next: u32) -> Result<Opt
 
 /// The scene of a request, or the field at fault.
 fn check(r: &StartSimulationRequest) -> Result<Scene, Status> {
-    let fault = |field: &str, why: &str| Status::from(WireError::new(format!("start_simulation_request.{field}"), why));
+    let fault = |field: &str, why: &str| {
+        Status::from(WireError::new(
+            format!("start_simulation_request.{field}"),
+            why,
+        ))
+    };
     if r.scene_json.len() > MAX_SCENE_BYTES {
         return Err(fault("scene_json", "at most 1 MiB"));
     }
-    let scene =
-        scene::parse(&r.scene_json, Path::new("scene_json"), None).map_err(|e| fault("scene_json", &e.to_string()))?;
+    let scene = scene::parse(&r.scene_json, Path::new("scene_json"), None)
+        .map_err(|e| fault("scene_json", &e.to_string()))?;
     let bytes = scene.frames() * scene.start.len() * size_of::<[f32; 3]>();
     if bytes > MAX_RESULT_BYTES {
         return Err(fault(
@@ -142,11 +193,19 @@ fn check(r: &StartSimulationRequest) -> Result<Scene, Status> {
 fn compute(scene: &Scene, config: &RunConfig, progress: &watch::Sender<Progress>) {
     let mut last = Instant::now();
     let result = scene::run(scene, config, |_, positions| {
-        let bytes: Vec<u8> = positions.iter().flat_map(|p| [p.x, p.y, p.z]).flat_map(f32::to_le_bytes).collect();
+        let bytes: Vec<u8> = positions
+            .iter()
+            .flat_map(|p| [p.x, p.y, p.z])
+            .flat_map(f32::to_le_bytes)
+            .collect();
         let ms = last.elapsed().as_secs_f32() * 1e3;
         progress.send_modify(|p| p.frames.push((bytes.into(), ms)));
         last = Instant::now();
-        if progress.receiver_count() == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if progress.receiver_count() == 0 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     });
     let end = result.map(|_| ()).map_err(|e| e.to_string());
     if let Err(why) = &end {

@@ -45,7 +45,10 @@ impl Card {
                     Ok(found) => put(&slot, found),
                     Err(e) => tracing::warn!(error = %e, "no graphics card"),
                 };
-                match std::thread::Builder::new().name("graphics".into()).spawn(search) {
+                match std::thread::Builder::new()
+                    .name("graphics".into())
+                    .spawn(search)
+                {
                     Ok(thread) => card.search = Some(Arc::new(Search(Some(thread)))),
                     Err(e) => tracing::warn!(error = %e, "no thread to look for a graphics card"),
                 }
@@ -66,7 +69,10 @@ impl Card {
         if let Some(renderer) = slot.as_mut() {
             match renderer.render(model, state, input, work) {
                 Err(RenderError::Graphics(why)) => {
-                    tracing::warn!(why, "the graphics card failed: drawing on the processor from now on");
+                    tracing::warn!(
+                        why,
+                        "the graphics card failed: drawing on the processor from now on"
+                    );
                     metrics::counter!("tryon_compositor_card_failures_total").increment(1);
                     *slot = None;
                 }
@@ -85,7 +91,11 @@ fn lock(slot: &Slot) -> MutexGuard<'_, Option<Renderer>> {
 
 fn put(slot: &Slot, found: Option<Renderer>) {
     match &found {
-        Some(r) => tracing::info!(adapter = r.adapter().name, backend = r.adapter().backend, "drawing on the card"),
+        Some(r) => tracing::info!(
+            adapter = r.adapter().name,
+            backend = r.adapter().backend,
+            "drawing on the card"
+        ),
         None => tracing::info!("no graphics card: drawing on the processor"),
     }
     *lock(slot) = found;
@@ -105,7 +115,10 @@ mod tests {
             wait.recv_timeout(std::time::Duration::from_millis(50)).ok();
             seen.store(true, Ordering::SeqCst);
         });
-        let card = Card { slot: Slot::default(), search: Some(Arc::new(Search(Some(slow)))) };
+        let card = Card {
+            slot: Slot::default(),
+            search: Some(Arc::new(Search(Some(slow)))),
+        };
         let other = card.clone();
         drop(card);
         assert!(!ended.load(Ordering::SeqCst), "only the last one waits");

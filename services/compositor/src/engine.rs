@@ -8,7 +8,9 @@ use std::time::Instant;
 use tryon::body::{BodyShape, BoneTransforms, RestBody, Template, skin};
 use tryon::camera::ColorImage;
 use tryon::cloth::realtime::{self, RoomyBody};
-use tryon::composite::{BodyView, Config, Framing, GarmentView, Input, Limbs, Look, Model, Print, State, Workspace};
+use tryon::composite::{
+    BodyView, Config, Framing, GarmentView, Input, Limbs, Look, Model, Print, State, Workspace,
+};
 use tryon::dressing::FIT_COLORS;
 use tryon::formats::image::{encode_jpeg, encode_png_rgb};
 use tryon::math::{Camera, P3, Rigid, World};
@@ -91,18 +93,32 @@ pub(crate) struct Engine {
 impl Engine {
     pub(crate) fn new(card: Card) -> Self {
         // The contract says letterboxed.
-        let config = Config { framing: Framing::Contain, ..Config::default() };
-        Self { card, model: Model::new(config), ..Self::default() }
+        let config = Config {
+            framing: Framing::Contain,
+            ..Config::default()
+        };
+        Self {
+            card,
+            model: Model::new(config),
+            ..Self::default()
+        }
     }
 
     /// Draws each size once and encodes each format once.
     pub(crate) fn draw(&mut self, job: &Job) -> Result<Drawn, String> {
         let start = Instant::now();
         let has_body = job.placed.is_some() && job.body.as_ref().is_some_and(|b| self.pose(b));
-        let mut stages = job.placed.as_ref().map_or_else(|| job.exposure.stages.clone(), |p| p.stages.clone());
-        let placed: &[(Arc<WornGarment>, Vec<P3>)] = job.placed.as_ref().map_or(&[], |p| &p.garments);
-        let scales: Vec<Option<Vec<[f32; 2]>>> =
-            placed.iter().enumerate().map(|(k, (w, _))| fit_scale(w, job.fit.as_ref()?.get(k)?)).collect();
+        let mut stages = job
+            .placed
+            .as_ref()
+            .map_or_else(|| job.exposure.stages.clone(), |p| p.stages.clone());
+        let placed: &[(Arc<WornGarment>, Vec<P3>)] =
+            job.placed.as_ref().map_or(&[], |p| &p.garments);
+        let scales: Vec<Option<Vec<[f32; 2]>>> = placed
+            .iter()
+            .enumerate()
+            .map(|(k, (w, _))| fit_scale(w, job.fit.as_ref()?.get(k)?))
+            .collect();
         let of = |(scale, (w, _)): (&Option<_>, &(Arc<WornGarment>, _))| {
             scale.as_ref().map_or(look(&w.look), |_| fit_look())
         };
@@ -114,18 +130,37 @@ impl Engine {
                 camera_from_world.points_f32(world, out);
             }
         }
-        let views: Vec<GarmentView<'_>> = (placed.iter().zip(&scales).zip(&self.garments).zip(&looks))
-            .map(|((((w, _), scale), vertices), look)| {
-                let uv = scale.as_ref().unwrap_or(&w.uvs);
-                GarmentView { vertices, faces: &w.faces, uv, normals: &[], look }
-            })
-            .collect();
-        let faces = job.body.as_ref().map_or(&[][..], |b| b.template.mesh().faces());
+        let views: Vec<GarmentView<'_>> =
+            (placed.iter().zip(&scales).zip(&self.garments).zip(&looks))
+                .map(|((((w, _), scale), vertices), look)| {
+                    let uv = scale.as_ref().unwrap_or(&w.uvs);
+                    GarmentView {
+                        vertices,
+                        faces: &w.faces,
+                        uv,
+                        normals: &[],
+                        look,
+                    }
+                })
+                .collect();
+        let faces = job
+            .body
+            .as_ref()
+            .map_or(&[][..], |b| b.template.mesh().faces());
         // Who wears nothing here needs no room for it.
-        let roomy = self.roomy.as_mut().and_then(|r| r.1.as_mut()).filter(|_| has_body && !views.is_empty());
+        let roomy = self
+            .roomy
+            .as_mut()
+            .and_then(|r| r.1.as_mut())
+            .filter(|_| has_body && !views.is_empty());
         let vertices = roomy.map_or(&self.posed[..], |r| r.make_room(Par::Rayon, &self.posed));
-        let body = has_body.then_some(BodyView { vertices, faces, limbs: &self.limbs });
-        let (mut pictures, mut drawn) = (Vec::new(), Vec::<(Option<(u32, u32)>, ColorImage)>::new());
+        let body = has_body.then_some(BodyView {
+            vertices,
+            faces,
+            limbs: &self.limbs,
+        });
+        let (mut pictures, mut drawn) =
+            (Vec::new(), Vec::<(Option<(u32, u32)>, ColorImage)>::new());
         for &(size, _) in &job.formats {
             if drawn.iter().any(|(s, _)| *s == size) {
                 continue;
@@ -137,8 +172,10 @@ impl Engine {
                 body,
                 output: size.map(|(w, h)| [w, h]),
             };
-            let (image, report) =
-                self.card.draw(&self.model, &mut self.state, &input, &mut self.work).map_err(|e| e.to_string())?;
+            let (image, report) = self
+                .card
+                .draw(&self.model, &mut self.state, &input, &mut self.work)
+                .map_err(|e| e.to_string())?;
             record_skipped(
                 "compositor",
                 [
@@ -154,13 +191,21 @@ impl Engine {
         stages.push(stage("compositor.render", start));
         let begun = Instant::now();
         for &(size, encoding) in &job.formats {
-            let Some((_, image)) = drawn.iter().find(|(s, _)| *s == size) else { continue };
+            let Some((_, image)) = drawn.iter().find(|(s, _)| *s == size) else {
+                continue;
+            };
             let bytes = match encoding {
                 Encoding::Jpeg(quality) => encode_jpeg(image, quality),
                 Encoding::Png => encode_png_rgb(image, Path::new("snapshot.png")),
             };
             let bytes = bytes.map_err(|e| e.to_string())?.into();
-            pictures.push(Encoded { size, encoding, width: image.width(), height: image.height(), bytes });
+            pictures.push(Encoded {
+                size,
+                encoding,
+                width: image.width(),
+                height: image.height(),
+                bytes,
+            });
         }
         stages.push(stage("compositor.encode", begun));
         Ok(Drawn { pictures, stages })
@@ -168,32 +213,60 @@ impl Engine {
 
     /// Poses the body; `false` when its numbers do not fit, which costs only the finer occlusion.
     fn pose(&mut self, b: &Body) -> bool {
-        let Some(Ok(pose)) = b.state.pose.as_ref().map(|p| pose_from_wire(p, b.template.skeleton().dofs())) else {
+        let Some(Ok(pose)) = b
+            .state
+            .pose
+            .as_ref()
+            .map(|p| pose_from_wire(p, b.template.skeleton().dofs()))
+        else {
             return false;
         };
-        if !self.rest_of.as_ref().is_some_and(|s| Arc::ptr_eq(s, &b.shape)) {
+        if !self
+            .rest_of
+            .as_ref()
+            .is_some_and(|s| Arc::ptr_eq(s, &b.shape))
+        {
             self.rest = b.template.personalise(&b.shape);
             self.rest_of = Some(b.shape.clone());
             self.limbs = Limbs::of(&b.template);
         }
-        if !self.roomy.as_ref().is_some_and(|(t, _)| Arc::ptr_eq(t, &b.template)) {
+        if !self
+            .roomy
+            .as_ref()
+            .is_some_and(|(t, _)| Arc::ptr_eq(t, &b.template))
+        {
             let made = RoomyBody::new(&b.template, &realtime::Config::tracked()).ok();
             self.roomy = Some((b.template.clone(), made));
         }
         pose.bones(b.template.skeleton(), &self.rest, &mut self.bones);
-        skin(Par::Rayon, &self.rest.vertices, b.template.weights(), &self.bones, &mut self.posed);
+        skin(
+            Par::Rayon,
+            &self.rest.vertices,
+            b.template.weights(),
+            &self.bones,
+            &mut self.posed,
+        );
         true
     }
 }
 
 /// Tightness of each drawn vertex as a texture coordinate; `None` when the bytes are those of another garment.
 fn fit_scale(w: &WornGarment, bytes: &[u8]) -> Option<Vec<[f32; 2]>> {
-    (bytes.len() == w.vertices).then(|| w.drawn.iter().map(|v| [tightness(bytes[*v as usize]), 0.0]).collect())
+    (bytes.len() == w.vertices).then(|| {
+        w.drawn
+            .iter()
+            .map(|v| [tightness(bytes[*v as usize]), 0.0])
+            .collect()
+    })
 }
 
 fn fit_look() -> Look {
     let [low, base, high] = FIT_COLORS;
-    Look { base, pattern: Print::Scale { low, high }, ..Look::default() }
+    Look {
+        base,
+        pattern: Print::Scale { low, high },
+        ..Look::default()
+    }
 }
 
 fn rgb(c: u32) -> [u8; 3] {
@@ -203,7 +276,17 @@ fn rgb(c: u32) -> [u8; 3] {
 
 fn look(l: &GarmentLook) -> Look {
     let stripes = l.stripe_width > 0.0 && l.accent_rgb != l.color_rgb;
-    let pattern =
-        if stripes { Print::Stripes { color: rgb(l.accent_rgb), period: 2.0 * l.stripe_width } } else { Print::Solid };
-    Look { base: rgb(l.color_rgb), pattern, ..Look::default() }
+    let pattern = if stripes {
+        Print::Stripes {
+            color: rgb(l.accent_rgb),
+            period: 2.0 * l.stripe_width,
+        }
+    } else {
+        Print::Solid
+    };
+    Look {
+        base: rgb(l.color_rgb),
+        pattern,
+        ..Look::default()
+    }
 }

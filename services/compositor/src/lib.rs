@@ -28,8 +28,13 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
     let c = &config.compositor;
     let service = service::Compositor::new(c, &ctx)?;
     let (mut routes, health) = server::routes()?;
-    routes.add_service(CompositorServiceServer::new(service).max_decoding_message_size(server::MAX_REQUEST_BYTES));
-    let grpc = routes.routes().into_axum_router().layer(GrpcWebLayer::new());
+    routes.add_service(
+        CompositorServiceServer::new(service).max_decoding_message_size(server::MAX_REQUEST_BYTES),
+    );
+    let grpc = routes
+        .routes()
+        .into_axum_router()
+        .layer(GrpcWebLayer::new());
     let routes = Routes::from(grpc.reset_fallback().merge(page::router()));
     let service = Service {
         name: "compositor",

@@ -5,7 +5,10 @@ use std::process::ExitCode;
 use tryon_kit::process::{self, Args, BusRole};
 
 fn main() -> ExitCode {
-    process::run("compositor", BusRole::Connect, Args::parse(), |config, ctx| async move {
-        tryon_compositor::start(&config, ctx).await
-    })
+    process::run(
+        "compositor",
+        BusRole::Connect,
+        Args::parse(),
+        |config, ctx| async move { tryon_compositor::start(&config, ctx).await },
+    )
 }

@@ -77,7 +77,9 @@ pub(crate) fn router<S: Clone + Send + Sync + 'static>() -> Router<S> {
 }
 
 fn answer(file: File, tag: &str, asked: &HeaderMap) -> Response<Body> {
-    let known = asked.get(header::IF_NONE_MATCH).is_some_and(|have| have.as_bytes() == tag.as_bytes());
+    let known = asked
+        .get(header::IF_NONE_MATCH)
+        .is_some_and(|have| have.as_bytes() == tag.as_bytes());
     let response = Response::builder()
         .header(header::ETAG, tag)
         // Ask each time, answer with 304: a new program must not meet the scripts of an old one.
@@ -88,9 +90,13 @@ fn answer(file: File, tag: &str, asked: &HeaderMap) -> Response<Body> {
         .header("permissions-policy", PERMISSIONS_POLICY)
         .header("cross-origin-opener-policy", "same-origin");
     let response = if known {
-        response.status(StatusCode::NOT_MODIFIED).body(Body::empty())
+        response
+            .status(StatusCode::NOT_MODIFIED)
+            .body(Body::empty())
     } else {
-        response.header(header::CONTENT_TYPE, file.content_type).body(Body::from(file.bytes))
+        response
+            .header(header::CONTENT_TYPE, file.content_type)
+            .body(Body::from(file.bytes))
     };
     response.expect("names and values are literals or hexadecimal")
 }
@@ -99,7 +105,9 @@ fn answer(file: File, tag: &str, asked: &HeaderMap) -> Response<Body> {
 fn entity_tag(bytes: &[u8]) -> String {
     const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
     const PRIME: u64 = 0x0000_0100_0000_01b3;
-    let hash = bytes.iter().fold(OFFSET, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(PRIME));
+    let hash = bytes.iter().fold(OFFSET, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(PRIME)
+    });
     format!("\"{hash:016x}\"")
 }
 
@@ -123,16 +131,34 @@ mod tests {
     #[test]
     fn every_file_of_the_folder_is_served() {
         let mut found = BTreeSet::new();
-        on_disk(&Path::new(env!("CARGO_MANIFEST_DIR")).join("web"), "", &mut found);
-        let served = FILES.iter().map(|f| f.path.to_owned()).collect::<BTreeSet<_>>();
+        on_disk(
+            &Path::new(env!("CARGO_MANIFEST_DIR")).join("web"),
+            "",
+            &mut found,
+        );
+        let served = FILES
+            .iter()
+            .map(|f| f.path.to_owned())
+            .collect::<BTreeSet<_>>();
         assert_eq!(found, served);
     }
 
     #[test]
     fn nothing_comes_from_another_host_and_nothing_is_inline() {
         for file in FILES {
-            let text = std::str::from_utf8(file.bytes).expect("UTF-8").replace("http://www.w3.org/2000/svg", "");
-            for foreign in ["http://", "https://", "url(//", "src=\"//", "@import", "style=\"", "onclick=\"", "eval("] {
+            let text = std::str::from_utf8(file.bytes)
+                .expect("UTF-8")
+                .replace("http://www.w3.org/2000/svg", "");
+            for foreign in [
+                "http://",
+                "https://",
+                "url(//",
+                "src=\"//",
+                "@import",
+                "style=\"",
+                "onclick=\"",
+                "eval(",
+            ] {
                 assert!(!text.contains(foreign), "{}: {foreign}", file.path);
             }
         }
@@ -147,7 +173,11 @@ mod tests {
         asked.insert(header::IF_NONE_MATCH, tag.parse().expect("ASCII"));
         let known = answer(file, &tag, &asked);
         assert_eq!(known.status(), StatusCode::NOT_MODIFIED);
-        assert!(known.headers().contains_key(header::CONTENT_SECURITY_POLICY));
+        assert!(
+            known
+                .headers()
+                .contains_key(header::CONTENT_SECURITY_POLICY)
+        );
         assert_ne!(tag, entity_tag(FILES[1].bytes));
     }
 }

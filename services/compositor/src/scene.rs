@@ -51,10 +51,18 @@ impl Scene {
     }
     /// The exposure of that id and when it arrived.
     pub(crate) fn find(&self, id: &FrameId) -> Option<(Instant, Arc<Exposure>)> {
-        self.frames.iter().rev().find(|(_, e)| same(&e.id, id)).cloned()
+        self.frames
+            .iter()
+            .rev()
+            .find(|(_, e)| same(&e.id, id))
+            .cloned()
     }
     /// The body measured from that exposure.
     pub(crate) fn find_body(&self, id: &FrameId) -> Option<Body> {
-        self.bodies.iter().rev().find(|b| b.state.frame.as_ref().is_some_and(|f| same(f, id))).cloned()
+        self.bodies
+            .iter()
+            .rev()
+            .find(|b| b.state.frame.as_ref().is_some_and(|f| same(f, id)))
+            .cloned()
     }
 }

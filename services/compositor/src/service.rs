@@ -41,17 +41,33 @@ impl Compositor {
         };
         channel(&config.tracking).map_err(fault("tracking"))?;
         let cloth = channel(&config.cloth).map_err(fault("cloth"))?;
-        let card = Card::open(config.renderer)
-            .map_err(|e| StartError::Config { key: "compositor.renderer".into(), why: e.to_string() })?;
-        Ok(Self { try_ons: Sessions::new(config.max_try_ons), config: config.clone(), ctx: ctx.clone(), cloth, card })
+        let card = Card::open(config.renderer).map_err(|e| StartError::Config {
+            key: "compositor.renderer".into(),
+            why: e.to_string(),
+        })?;
+        Ok(Self {
+            try_ons: Sessions::new(config.max_try_ons),
+            config: config.clone(),
+            ctx: ctx.clone(),
+            cloth,
+            card,
+        })
     }
 
     fn find(&self, id: &str) -> Result<Arc<Handle>, Status> {
-        self.try_ons.get(id).filter(|h| !h.commands.is_closed()).ok_or_else(|| not_found("try-on", id))
+        self.try_ons
+            .get(id)
+            .filter(|h| !h.commands.is_closed())
+            .ok_or_else(|| not_found("try-on", id))
     }
 
     /// Whether cloth accepts the outfit. That it does not answer is no fault of the outfit.
-    async fn dress(&self, id: &str, choices: &[GarmentChoice], message: &str) -> Result<(), Status> {
+    async fn dress(
+        &self,
+        id: &str,
+        choices: &[GarmentChoice],
+        message: &str,
+    ) -> Result<(), Status> {
         match upstream::dress(&mut upstream::client(self.cloth.clone()), id, choices).await {
             Ok(_) => Ok(()),
             Err(s) if s.code() == Code::InvalidArgument => Err(renamed(&s, message)),
@@ -62,27 +78,48 @@ impl Compositor {
 
 #[tonic::async_trait]
 impl CompositorService for Compositor {
-    async fn open_try_on(&self, r: Request<OpenTryOnRequest>) -> Result<Response<OpenTryOnResponse>, Status> {
+    async fn open_try_on(
+        &self,
+        r: Request<OpenTryOnRequest>,
+    ) -> Result<Response<OpenTryOnResponse>, Status> {
         let r = r.get_ref();
         let id = if r.try_on_id.is_empty() {
             random_id()
         } else {
             request::session_id("open_try_on_request.try_on_id", &r.try_on_id)?
         };
-        let or =
-            |given: &str, configured: &str| if given.is_empty() { configured.to_owned() } else { given.to_owned() };
-        let (store, camera) = (or(&r.store, &self.config.store), or(&r.camera, &self.config.camera));
+        let or = |given: &str, configured: &str| {
+            if given.is_empty() {
+                configured.to_owned()
+            } else {
+                given.to_owned()
+            }
+        };
+        let (store, camera) = (
+            or(&r.store, &self.config.store),
+            or(&r.camera, &self.config.camera),
+        );
         let key = request::camera_key("open_try_on_request", &store, &camera)?;
         let choices = request::choices("open_try_on_request", &r.garments)?;
-        if self.try_ons.get(&id).is_some_and(|h| h.commands.is_closed()) {
+        if self
+            .try_ons
+            .get(&id)
+            .is_some_and(|h| h.commands.is_closed())
+        {
             self.try_ons.remove(&id);
         }
         if let Some(h) = self.try_ons.get(&id) {
             if h.key != key {
-                return Err(Status::failed_precondition(format!("try-on `{id}` is open with camera {}", h.key)));
+                return Err(Status::failed_precondition(format!(
+                    "try-on `{id}` is open with camera {}",
+                    h.key
+                )));
             }
             let _ = h.commands.try_send(Command::Touch);
-            return Ok(Response::new(OpenTryOnResponse { try_on_id: id, created: false }));
+            return Ok(Response::new(OpenTryOnResponse {
+                try_on_id: id,
+                created: false,
+            }));
         }
         if !choices.is_empty()
             && let Err(s) = self.dress(&id, &choices, "open_try_on_request").await
@@ -108,10 +145,16 @@ impl CompositorService for Compositor {
             }
             Opened::Full => return Err(exhausted("try-ons", self.try_ons.limit())),
         };
-        Ok(Response::new(OpenTryOnResponse { try_on_id: id, created }))
+        Ok(Response::new(OpenTryOnResponse {
+            try_on_id: id,
+            created,
+        }))
     }
 
-    async fn close_try_on(&self, r: Request<CloseTryOnRequest>) -> Result<Response<CloseTryOnResponse>, Status> {
+    async fn close_try_on(
+        &self,
+        r: Request<CloseTryOnRequest>,
+    ) -> Result<Response<CloseTryOnResponse>, Status> {
         if let Some(h) = self.try_ons.remove(&r.get_ref().try_on_id) {
             let _ = h.commands.send(Command::Close).await;
         }
@@ -125,7 +168,9 @@ impl CompositorService for Compositor {
         let r = r.get_ref();
         let handle = self.find(&r.try_on_id)?;
         let choices = request::choices("choose_garments_request", &r.garments)?;
-        let accepted = self.dress(&r.try_on_id, &choices, "choose_garments_request").await;
+        let accepted = self
+            .dress(&r.try_on_id, &choices, "choose_garments_request")
+            .await;
         if let Err(s) = &accepted
             && s.code() != Code::Unavailable
         {
@@ -141,14 +186,23 @@ impl CompositorService for Compositor {
             changed
         });
         accepted?;
-        Ok(Response::new(ChooseGarmentsResponse { outfit_revision: handle.wanted.borrow().revision }))
+        Ok(Response::new(ChooseGarmentsResponse {
+            outfit_revision: handle.wanted.borrow().revision,
+        }))
     }
 
-    async fn show_fit(&self, r: Request<ShowFitRequest>) -> Result<Response<ShowFitResponse>, Status> {
+    async fn show_fit(
+        &self,
+        r: Request<ShowFitRequest>,
+    ) -> Result<Response<ShowFitResponse>, Status> {
         let r = r.get_ref();
         let handle = self.find(&r.try_on_id)?;
         let gone = |_| not_found("try-on", &r.try_on_id);
-        handle.commands.send(Command::ShowFit(r.show)).await.map_err(gone)?;
+        handle
+            .commands
+            .send(Command::ShowFit(r.show))
+            .await
+            .map_err(gone)?;
         Ok(Response::new(ShowFitResponse {}))
     }
 
@@ -158,35 +212,58 @@ impl CompositorService for Compositor {
     ) -> Result<Response<ListGarmentChoicesResponse>, Status> {
         let mut cloth = upstream::client(self.cloth.clone());
         let list = cloth.list_garments(call(ListGarmentsRequest {})).await;
-        let garments = list.map_err(|s| from_upstream("cloth", &s))?.into_inner().garments;
+        let garments = list
+            .map_err(|s| from_upstream("cloth", &s))?
+            .into_inner()
+            .garments;
         Ok(Response::new(ListGarmentChoicesResponse { garments }))
     }
 
     type StreamFramesStream = Pictures;
 
-    async fn stream_frames(&self, r: Request<StreamFramesRequest>) -> Result<Response<Pictures>, Status> {
+    async fn stream_frames(
+        &self,
+        r: Request<StreamFramesRequest>,
+    ) -> Result<Response<Pictures>, Status> {
         let r = r.get_ref();
         let format = request::picture_format(r)?;
         let handle = self.find(&r.try_on_id)?;
         let (viewer, reader) = viewer(format);
-        handle.commands.send(Command::View(viewer)).await.map_err(|_| not_found("try-on", &r.try_on_id))?;
+        handle
+            .commands
+            .send(Command::View(viewer))
+            .await
+            .map_err(|_| not_found("try-on", &r.try_on_id))?;
         Ok(Response::new(Box::pin(reader.stream())))
     }
 
-    async fn take_snapshot(&self, r: Request<TakeSnapshotRequest>) -> Result<Response<TakeSnapshotResponse>, Status> {
+    async fn take_snapshot(
+        &self,
+        r: Request<TakeSnapshotRequest>,
+    ) -> Result<Response<TakeSnapshotResponse>, Status> {
         let r = r.get_ref();
         let encoding = match PictureCodec::try_from(r.codec) {
             Ok(PictureCodec::Unspecified | PictureCodec::Png) => Encoding::Png,
             Ok(PictureCodec::Jpeg) => Encoding::Jpeg(95),
-            Err(_) => return Err(WireError::new("take_snapshot_request.codec", "JPEG or PNG").into()),
+            Err(_) => {
+                return Err(WireError::new("take_snapshot_request.codec", "JPEG or PNG").into());
+            }
         };
         let handle = self.find(&r.try_on_id)?;
         let (answer, heard) = oneshot::channel();
         let gone = || not_found("try-on", &r.try_on_id);
-        handle.commands.send(Command::Snapshot(encoding, answer)).await.map_err(|_| gone())?;
+        handle
+            .commands
+            .send(Command::Snapshot(encoding, answer))
+            .await
+            .map_err(|_| gone())?;
         let late = |_| unavailable("compositor", "the picture took too long");
-        let picture =
-            tokio::time::timeout(Duration::from_secs(2), heard).await.map_err(late)?.map_err(|_| gone())??;
-        Ok(Response::new(TakeSnapshotResponse { picture: Some(picture) }))
+        let picture = tokio::time::timeout(Duration::from_secs(2), heard)
+            .await
+            .map_err(late)?
+            .map_err(|_| gone())??;
+        Ok(Response::new(TakeSnapshotResponse {
+            picture: Some(picture),
+        }))
     }
 }

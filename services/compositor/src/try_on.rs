@@ -23,8 +23,8 @@ use tryon_kit::status::unavailable;
 use tryon_kit::telemetry::record_stages;
 use tryon_proto::v1::tracking_service_client::TrackingServiceClient;
 use tryon_proto::v1::{
-    BodyState, CloseSessionRequest, FrameId, GarmentChoice, GarmentFit, GarmentFrame, Picture, PictureCodec,
-    TrackingStatus, TryOnState, TryOnStatus, UndressRequest,
+    BodyState, CloseSessionRequest, FrameId, GarmentChoice, GarmentFit, GarmentFrame, Picture,
+    PictureCodec, TrackingStatus, TryOnState, TryOnStatus, UndressRequest,
 };
 
 /// How often silence is looked for.
@@ -69,7 +69,10 @@ pub(crate) struct Setup {
 pub(crate) fn spawn(mut setup: Setup) -> Handle {
     let (commands, inbox) = mpsc::channel(8);
     let choices = std::mem::take(&mut setup.choices);
-    let (wanted, outfit) = watch::channel(Wanted { revision: 1, choices });
+    let (wanted, outfit) = watch::channel(Wanted {
+        revision: 1,
+        choices,
+    });
     let key = setup.key.clone();
     tokio::spawn(async move {
         let (id, directory) = (setup.id.clone(), setup.directory.clone());
@@ -80,10 +83,18 @@ pub(crate) fn spawn(mut setup: Setup) -> Handle {
         metrics::gauge!("tryon_try_ons").set(directory.len() as f64);
         tracing::info!(try_on = id, why, "closed");
     });
-    Handle { key, commands, wanted }
+    Handle {
+        key,
+        commands,
+        wanted,
+    }
 }
 
-async fn open(setup: Setup, inbox: mpsc::Receiver<Command>, outfit: watch::Receiver<Wanted>) -> &'static str {
+async fn open(
+    setup: Setup,
+    inbox: mpsc::Receiver<Command>,
+    outfit: watch::Receiver<Wanted>,
+) -> &'static str {
     let frames = match setup.ctx.bus.subscribe(&setup.key).await {
         Ok(f) => f,
         Err(e) => {
@@ -92,14 +103,28 @@ async fn open(setup: Setup, inbox: mpsc::Receiver<Command>, outfit: watch::Recei
         }
     };
     // One connection for each stream; both URLs were checked at the start.
-    let (Ok(tracking), Ok(cloth)) = (channel(&setup.config.tracking), channel(&setup.config.cloth)) else {
+    let (Ok(tracking), Ok(cloth)) = (
+        channel(&setup.config.tracking),
+        channel(&setup.config.cloth),
+    ) else {
         return "a URL is none";
     };
     let (tx, bodies) = latest::channel();
     let pool = setup.ctx.pool.clone();
-    let a = tokio::spawn(bodies::follow(tracking.clone(), setup.id.clone(), Some(setup.key.clone()), pool, tx));
+    let a = tokio::spawn(bodies::follow(
+        tracking.clone(),
+        setup.id.clone(),
+        Some(setup.key.clone()),
+        pool,
+        tx,
+    ));
     let (tx, garments) = latest::channel();
-    let b = tokio::spawn(upstream::follow(cloth.clone(), setup.id.clone(), outfit, tx));
+    let b = tokio::spawn(upstream::follow(
+        cloth.clone(),
+        setup.id.clone(),
+        outfit,
+        tx,
+    ));
     let (done, drawn) = mpsc::channel(1);
     let (id, now, card) = (setup.id.clone(), Instant::now(), setup.card.clone());
     let limits = Limits {
@@ -133,14 +158,26 @@ async fn open(setup: Setup, inbox: mpsc::Receiver<Command>, outfit: watch::Recei
         pending: None,
         done,
     };
-    let why = task.run(Inputs { inbox, frames, bodies, garments, drawn }).await;
+    let why = task
+        .run(Inputs {
+            inbox,
+            frames,
+            bodies,
+            garments,
+            drawn,
+        })
+        .await;
     a.abort();
     b.abort();
     // The sessions behind it would end by themselves when idle; being polite must not hold anything up.
     let close = async {
         let session_id = id.clone();
-        let _ = TrackingServiceClient::new(tracking).close_session(request(CloseSessionRequest { session_id })).await;
-        let _ = upstream::client(cloth).undress(request(UndressRequest { session_id: id })).await;
+        let _ = TrackingServiceClient::new(tracking)
+            .close_session(request(CloseSessionRequest { session_id }))
+            .await;
+        let _ = upstream::client(cloth)
+            .undress(request(UndressRequest { session_id: id }))
+            .await;
     };
     let _ = tokio::time::timeout(CALL_DEADLINE, close).await;
     why
@@ -346,7 +383,8 @@ impl Task {
     fn opened(&mut self) {
         let service = matches!(
             self.state,
-            State::Opening | State::Degraded(Reason::TrackingUnavailable | Reason::ClothUnavailable)
+            State::Opening
+                | State::Degraded(Reason::TrackingUnavailable | Reason::ClothUnavailable)
         );
         if service && self.tracking_up && self.cloth_up {
             self.happen(Event::Opened);
@@ -361,7 +399,13 @@ impl Task {
         self.scene.frame(e.clone());
         // While live, pictures wait for their garments; otherwise the plain picture is the newest truth.
         if !self.state.shows_garments() {
-            self.draw(Job { exposure: e, placed: None, body: None, formats: Vec::new(), fit: None });
+            self.draw(Job {
+                exposure: e,
+                placed: None,
+                body: None,
+                formats: Vec::new(),
+                fit: None,
+            });
         }
     }
 
@@ -374,7 +418,11 @@ impl Task {
                 self.faults.tracking = Some((Reason::TrackingUnavailable, why));
                 return;
             }
-            bodies::News::Body { state, shape, template } => (*state, shape, template),
+            bodies::News::Body {
+                state,
+                shape,
+                template,
+            } => (*state, shape, template),
         };
         self.tracking_up = true;
         self.ages.body_ns = Some(self.now_ns(Instant::now()));
@@ -384,7 +432,11 @@ impl Task {
             TrackingStatus::Calibrating | TrackingStatus::Tracking => {
                 self.happen(Event::PersonFound);
                 if let Some(shape) = shape {
-                    self.scene.body(Body { state: Arc::new(state), shape, template });
+                    self.scene.body(Body {
+                        state: Arc::new(state),
+                        shape,
+                        template,
+                    });
                 }
             }
             _ => self.nobody(&state),
@@ -422,7 +474,10 @@ impl Task {
                 self.faults.cloth = None;
                 if !frame.fit.is_empty() || self.fit.0 != placed.revision {
                     let mut fit = frame.fit;
-                    self.tightness = fit.iter_mut().map(|f| std::mem::take(&mut f.tightness)).collect();
+                    self.tightness = fit
+                        .iter_mut()
+                        .map(|f| std::mem::take(&mut f.tightness))
+                        .collect();
                     self.fit = (placed.revision, fit);
                 }
                 if let Some(id) = frame.frame {
@@ -453,13 +508,23 @@ impl Task {
         if self.state.shows_garments() {
             let body = self.scene.find_body(id);
             let fit = self.show_fit.then(|| self.tightness.clone());
-            self.draw(Job { exposure, placed: Some(placed), body, formats: Vec::new(), fit });
+            self.draw(Job {
+                exposure,
+                placed: Some(placed),
+                body,
+                formats: Vec::new(),
+                fit,
+            });
         }
     }
 
     /// Draws for whoever wants a picture now; the newest job wins.
     fn draw(&mut self, mut job: Job) {
-        if self.shown.as_ref().is_some_and(|s| not_after(&job.exposure.id, s)) {
+        if self
+            .shown
+            .as_ref()
+            .is_some_and(|s| not_after(&job.exposure.id, s))
+        {
             return;
         }
         for v in self.viewers.iter().filter(|v| v.wants()) {
@@ -486,7 +551,9 @@ impl Task {
     }
 
     fn start(&mut self) {
-        let Some(mut engine) = self.engine.take() else { return };
+        let Some(mut engine) = self.engine.take() else {
+            return;
+        };
         let Some(p) = self.pending.take() else {
             self.engine = Some(engine);
             return;
@@ -503,19 +570,32 @@ impl Task {
                 Err(why) => (None, Err(why.to_string())),
             };
             // The try-on may be gone by now.
-            let _ = done.send(Done { engine, job: p.job, outcome, answer: p.answer }).await;
+            let _ = done
+                .send(Done {
+                    engine,
+                    job: p.job,
+                    outcome,
+                    answer: p.answer,
+                })
+                .await;
         });
     }
 
     fn drawn(&mut self, d: Done) {
         // Not the default: a new engine letterboxes, as the contract says.
-        self.engine = d.engine.or_else(|| Some(Engine::new(self.setup.card.clone())));
+        self.engine = d
+            .engine
+            .or_else(|| Some(Engine::new(self.setup.card.clone())));
         match d.outcome {
             Ok(drawn) => {
                 record_stages("compositor", &drawn.stages);
                 if let Some(answer) = d.answer {
-                    let picture = drawn.pictures.first().map(|p| self.picture(&d.job, &drawn, p));
-                    let _ = answer.send(picture.ok_or_else(|| unavailable("compositor", "no picture")));
+                    let picture = drawn
+                        .pictures
+                        .first()
+                        .map(|p| self.picture(&d.job, &drawn, p));
+                    let _ =
+                        answer.send(picture.ok_or_else(|| unavailable("compositor", "no picture")));
                 } else if d.job.placed.is_some() == self.state.shows_garments() {
                     self.deliver(&d.job, &drawn);
                 }
@@ -540,7 +620,11 @@ impl Task {
         let mut viewers = std::mem::take(&mut self.viewers);
         for v in viewers.iter_mut().filter(|v| v.wants()) {
             let (size, encoding) = Job::wants(&v.format);
-            if let Some(p) = drawn.pictures.iter().find(|p| (p.size, p.encoding) == (size, encoding)) {
+            if let Some(p) = drawn
+                .pictures
+                .iter()
+                .find(|p| (p.size, p.encoding) == (size, encoding))
+            {
                 v.picture(self.picture(job, drawn, p));
             }
         }
@@ -558,13 +642,25 @@ impl Task {
     fn picture(&self, job: &Job, drawn: &Drawn, p: &crate::engine::Encoded) -> Picture {
         let id = job.exposure.id;
         // A picture says what it shows, whatever has happened since.
-        let state = if job.placed.is_some() { TryOnState::Live } else { life::state(self.state) };
+        let state = if job.placed.is_some() {
+            TryOnState::Live
+        } else {
+            life::state(self.state)
+        };
         let degraded = state == TryOnState::Degraded;
         Picture {
             frame: Some(id),
             state: state.into(),
-            reason: if degraded { life::reason(self.state).into() } else { 0 },
-            degraded_age: if degraded { self.last_live.map_or(0.0, |t| t.elapsed().as_secs_f32()) } else { 0.0 },
+            reason: if degraded {
+                life::reason(self.state).into()
+            } else {
+                0
+            },
+            degraded_age: if degraded {
+                self.last_live.map_or(0.0, |t| t.elapsed().as_secs_f32())
+            } else {
+                0.0
+            },
             codec: match p.encoding {
                 Encoding::Jpeg(_) => PictureCodec::Jpeg.into(),
                 Encoding::Png => PictureCodec::Png.into(),
@@ -576,18 +672,34 @@ impl Task {
             latency_ms: unix_ns().saturating_sub(id.received_unix_ns) as f32 * 1e-6,
             stages: drawn.stages.clone(),
             dropped: 0,
-            fit: job.placed.as_ref().filter(|p| p.revision == self.fit.0).map_or(Vec::new(), |_| self.fit.1.clone()),
+            fit: job
+                .placed
+                .as_ref()
+                .filter(|p| p.revision == self.fit.0)
+                .map_or(Vec::new(), |_| self.fit.1.clone()),
         }
     }
 
     fn snapshot(&mut self, encoding: Encoding, answer: oneshot::Sender<Result<Picture, Status>>) {
-        let young = self.last.as_ref().filter(|(at, _)| at.elapsed() < SNAPSHOT_AGE);
+        let young = self
+            .last
+            .as_ref()
+            .filter(|(at, _)| at.elapsed() < SNAPSHOT_AGE);
         let Some((_, job)) = young else {
-            let _ = answer.send(Err(unavailable("compositor", "there is no picture younger than a second")));
+            let _ = answer.send(Err(unavailable(
+                "compositor",
+                "there is no picture younger than a second",
+            )));
             return;
         };
-        let job = Job { formats: vec![(None, encoding)], ..job.clone() };
-        self.pending = Some(Pending { job, answer: Some(answer) });
+        let job = Job {
+            formats: vec![(None, encoding)],
+            ..job.clone()
+        };
+        self.pending = Some(Pending {
+            job,
+            answer: Some(answer),
+        });
         self.start();
     }
 }

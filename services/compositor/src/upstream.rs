@@ -14,7 +14,9 @@ use tryon_proto::convert::garment::GarmentReader;
 use tryon_proto::convert::geometry::rigid_from_wire;
 use tryon_proto::convert::required;
 use tryon_proto::v1::cloth_service_client::ClothServiceClient;
-use tryon_proto::v1::{ClothStatus, DressRequest, GarmentChoice, GarmentFrame, StreamGarmentsRequest};
+use tryon_proto::v1::{
+    ClothStatus, DressRequest, GarmentChoice, GarmentFrame, StreamGarmentsRequest,
+};
 
 /// Eight garments of 260,000 vertices would be 40 MB; ours take a few hundred kB.
 const MAX_GARMENT_BYTES: usize = 16 * 1024 * 1024;
@@ -46,18 +48,34 @@ pub(crate) async fn dress(
     session: &str,
     choices: &[GarmentChoice],
 ) -> Result<u64, Status> {
-    let message = DressRequest { session_id: session.into(), garments: choices.to_vec() };
-    Ok(client.dress(request(message)).await?.into_inner().outfit_revision)
+    let message = DressRequest {
+        session_id: session.into(),
+        garments: choices.to_vec(),
+    };
+    Ok(client
+        .dress(request(message))
+        .await?
+        .into_inner()
+        .outfit_revision)
 }
 
 /// A fault of our own request to cloth, told with the field path of the request that caused it.
 pub(crate) fn renamed(s: &Status, message: &str) -> Status {
     let details = s.get_error_details();
-    let Some(bad) = details.bad_request() else { return s.clone() };
+    let Some(bad) = details.bad_request() else {
+        return s.clone();
+    };
     let rename = |text: &str| text.replacen("dress_request", message, 1);
-    let violations: Vec<FieldViolation> =
-        bad.field_violations.iter().map(|v| FieldViolation::new(rename(&v.field), v.description.clone())).collect();
-    Status::with_error_details(s.code(), rename(s.message()), ErrorDetails::with_bad_request(violations))
+    let violations: Vec<FieldViolation> = bad
+        .field_violations
+        .iter()
+        .map(|v| FieldViolation::new(rename(&v.field), v.description.clone()))
+        .collect();
+    Status::with_error_details(
+        s.code(),
+        rename(s.message()),
+        ErrorDetails::with_bad_request(violations),
+    )
 }
 
 /// Follows the garments of `session` until the receiver of `news` is gone, dressing it in whatever is wanted.
@@ -96,8 +114,15 @@ async fn one_stream(
     // Cloth counts anew after each restart: its revision to ours.
     let mut ours: Vec<(u64, u64)> = Vec::new();
     let w = wanted.borrow_and_update().clone();
-    ours.push((dress(client, session, &w.choices).await.map_err(said)?, w.revision));
-    let call = client.stream_garments(StreamGarmentsRequest { session_id: session.into() }).await;
+    ours.push((
+        dress(client, session, &w.choices).await.map_err(said)?,
+        w.revision,
+    ));
+    let call = client
+        .stream_garments(StreamGarmentsRequest {
+            session_id: session.into(),
+        })
+        .await;
     let mut frames = call.map_err(said)?.into_inner();
     let mut reader = GarmentReader::default();
     loop {
@@ -114,11 +139,19 @@ async fn one_stream(
                 continue;
             }
         };
-        let Some(message) = message else { return Ok(()) };
-        let frame = required(message.map_err(said)?.frame, "stream_garments_response.frame");
+        let Some(message) = message else {
+            return Ok(());
+        };
+        let frame = required(
+            message.map_err(said)?.frame,
+            "stream_garments_response.frame",
+        );
         let frame = frame.map_err(|e| e.to_string())?;
         *any = true;
-        let revision = ours.iter().find(|(t, _)| *t == frame.outfit_revision).map_or(0, |(_, o)| *o);
+        let revision = ours
+            .iter()
+            .find(|(t, _)| *t == frame.outfit_revision)
+            .map_or(0, |(_, o)| *o);
         if !news.send(read(&mut reader, frame, revision).map_err(|e| e.to_string())?) {
             return Ok(());
         }
@@ -135,7 +168,10 @@ fn read(
     if frame.status() != ClothStatus::Live || frame.frame.is_none() {
         return Ok(News::Status(Box::new(frame)));
     }
-    let world = required(frame.world_from_camera.as_ref(), "garment_frame.world_from_camera")?;
+    let world = required(
+        frame.world_from_camera.as_ref(),
+        "garment_frame.world_from_camera",
+    )?;
     let placed = Placed {
         garments,
         world_from_camera: rigid_from_wire(world, "garment_frame.world_from_camera")?,

@@ -30,7 +30,18 @@ pub(crate) struct Reader {
 pub(crate) fn viewer(format: PictureFormat) -> (Viewer, Reader) {
     let (pictures, p) = latest::channel();
     let (statuses, s) = mpsc::channel(STATUSES);
-    (Viewer { format, pictures, statuses, next: Instant::now() }, Reader { pictures: p, statuses: s })
+    (
+        Viewer {
+            format,
+            pictures,
+            statuses,
+            next: Instant::now(),
+        },
+        Reader {
+            pictures: p,
+            statuses: s,
+        },
+    )
 }
 
 impl Viewer {
@@ -79,17 +90,45 @@ mod tests {
 
     #[tokio::test]
     async fn a_slow_reader_gets_every_status_and_the_newest_picture() {
-        let (mut v, r) = viewer(PictureFormat { size: None, quality: 80, max_rate: None });
+        let (mut v, r) = viewer(PictureFormat {
+            size: None,
+            quality: 80,
+            max_rate: None,
+        });
         for i in 0..5 {
-            v.picture(Picture { width: i, ..Picture::default() });
-            assert!(v.status(TryOnStatus { age: i as f32, ..TryOnStatus::default() }));
+            v.picture(Picture {
+                width: i,
+                ..Picture::default()
+            });
+            assert!(v.status(TryOnStatus {
+                age: i as f32,
+                ..TryOnStatus::default()
+            }));
         }
         drop(v);
-        let all: Vec<_> = r.stream().map(|m| m.expect("fine").event.expect("something")).collect().await;
-        let ages: Vec<f32> =
-            all.iter().filter_map(|e| if let Event::Status(s) = e { Some(s.age) } else { None }).collect();
+        let all: Vec<_> = r
+            .stream()
+            .map(|m| m.expect("fine").event.expect("something"))
+            .collect()
+            .await;
+        let ages: Vec<f32> = all
+            .iter()
+            .filter_map(|e| {
+                if let Event::Status(s) = e {
+                    Some(s.age)
+                } else {
+                    None
+                }
+            })
+            .collect();
         assert_eq!(ages, [0.0, 1.0, 2.0, 3.0, 4.0]);
-        let last = all.iter().find_map(|e| if let Event::Picture(p) = e { Some((p.width, p.dropped)) } else { None });
+        let last = all.iter().find_map(|e| {
+            if let Event::Picture(p) = e {
+                Some((p.width, p.dropped))
+            } else {
+                None
+            }
+        });
         assert_eq!(last, Some((4, 4)));
     }
 }

@@ -10,7 +10,11 @@ use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
 async fn readyz(State(ready): State<watch::Receiver<bool>>) -> (StatusCode, &'static str) {
-    if *ready.borrow() { (StatusCode::OK, "ready\n") } else { (StatusCode::SERVICE_UNAVAILABLE, "not ready\n") }
+    if *ready.borrow() {
+        (StatusCode::OK, "ready\n")
+    } else {
+        (StatusCode::SERVICE_UNAVAILABLE, "not ready\n")
+    }
 }
 
 async fn metrics_page() -> (StatusCode, String) {
@@ -19,7 +23,10 @@ async fn metrics_page() -> (StatusCode, String) {
             handle.run_upkeep();
             (StatusCode::OK, handle.render())
         }
-        None => (StatusCode::SERVICE_UNAVAILABLE, "another recorder is installed\n".into()),
+        None => (
+            StatusCode::SERVICE_UNAVAILABLE,
+            "another recorder is installed\n".into(),
+        ),
     }
 }
 

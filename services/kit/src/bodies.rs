@@ -10,7 +10,9 @@ use tonic::transport::Channel;
 use tryon::body::{BodyShape, Template};
 use tryon_proto::convert::{body, required};
 use tryon_proto::v1::tracking_service_client::TrackingServiceClient;
-use tryon_proto::v1::{BodyState, GetBodyTemplateRequest, OpenSessionRequest, StreamBodyStatesRequest};
+use tryon_proto::v1::{
+    BodyState, GetBodyTemplateRequest, OpenSessionRequest, StreamBodyStatesRequest,
+};
 
 /// A template of 13,000 vertices with ten shape directions takes 2 MB.
 const MAX_TEMPLATE_BYTES: usize = 16 * 1024 * 1024;
@@ -39,14 +41,16 @@ pub async fn follow(
     pool: Arc<Pool>,
     news: latest::Sender<News>,
 ) {
-    let mut client = TrackingServiceClient::new(channel).max_decoding_message_size(MAX_TEMPLATE_BYTES);
+    let mut client =
+        TrackingServiceClient::new(channel).max_decoding_message_size(MAX_TEMPLATE_BYTES);
     let mut wait = pauses();
     while !news.is_closed() {
         let mut any = false;
-        let why = match one_stream(&mut client, &session, open.as_ref(), &pool, &news, &mut any).await {
-            Ok(()) => "the session was closed".into(),
-            Err(why) => why,
-        };
+        let why =
+            match one_stream(&mut client, &session, open.as_ref(), &pool, &news, &mut any).await {
+                Ok(()) => "the session was closed".into(),
+                Err(why) => why,
+            };
         if any {
             wait = pauses();
         }
@@ -67,31 +71,53 @@ async fn one_stream(
 ) -> Result<(), String> {
     let said = |s: tonic::Status| s.message().to_owned();
     if let Some(key) = open {
-        let message =
-            OpenSessionRequest { session_id: session.into(), store: key.store().into(), camera: key.camera().into() };
+        let message = OpenSessionRequest {
+            session_id: session.into(),
+            store: key.store().into(),
+            camera: key.camera().into(),
+        };
         client.open_session(request(message)).await.map_err(said)?;
     }
-    let template = client.get_body_template(request(GetBodyTemplateRequest::default())).await;
+    let template = client
+        .get_body_template(request(GetBodyTemplateRequest::default()))
+        .await;
     let template = template.map_err(said)?.into_inner().template;
     let unpack = move || {
         let wire = required(template, "get_body_template_response.template")?;
         body::template_from_wire(&wire)
     };
-    let template = pool.run(unpack).await.map_err(|e| e.to_string())?.map_err(|e| e.to_string())?;
+    let template = pool
+        .run(unpack)
+        .await
+        .map_err(|e| e.to_string())?
+        .map_err(|e| e.to_string())?;
     let template = Arc::new(template);
-    let call = client.stream_body_states(StreamBodyStatesRequest { session_id: session.into() }).await;
+    let call = client
+        .stream_body_states(StreamBodyStatesRequest {
+            session_id: session.into(),
+        })
+        .await;
     let mut states = call.map_err(said)?.into_inner();
     let (mut shape, mut version) = (None, 0);
     while let Some(message) = states.next().await {
-        let state = required(message.map_err(said)?.state, "stream_body_states_response.state");
+        let state = required(
+            message.map_err(said)?.state,
+            "stream_body_states_response.state",
+        );
         let mut state = state.map_err(|e| e.to_string())?;
         if let Some(s) = state.shape.take() {
-            shape = Some(Arc::new(body::shape_from_wire(&s, &template).map_err(|e| e.to_string())?));
+            shape = Some(Arc::new(
+                body::shape_from_wire(&s, &template).map_err(|e| e.to_string())?,
+            ));
             version = state.shape_version;
         }
         *any = true;
         let shape = shape.clone().filter(|_| version == state.shape_version);
-        if !news.send(News::Body { state: Box::new(state), shape, template: template.clone() }) {
+        if !news.send(News::Body {
+            state: Box::new(state),
+            shape,
+            template: template.clone(),
+        }) {
             break;
         }
     }

@@ -7,7 +7,9 @@
 
 use crate::compute::Pool;
 use crate::frames::exposure_to_wire;
-use crate::frames::{BoxFuture, BusError, CameraKey, Exposure, FrameBus, FramePublisher, FrameSubscription, Packet};
+use crate::frames::{
+    BoxFuture, BusError, CameraKey, Exposure, FrameBus, FramePublisher, FrameSubscription, Packet,
+};
 use crate::queue::latest;
 use bytes::Bytes;
 use std::sync::Arc;
@@ -43,11 +45,16 @@ impl ZenohBus {
     ///
     /// # Errors
     /// Names the endpoint that is malformed or cannot be listened on.
-    pub async fn open(listen: &[String], connect: &[String], pool: Arc<Pool>) -> Result<Arc<Self>, BusError> {
+    pub async fn open(
+        listen: &[String],
+        connect: &[String],
+        pool: Arc<Pool>,
+    ) -> Result<Arc<Self>, BusError> {
         let mut c = zenoh::Config::default();
         let list = |l: &[String]| format!("{l:?}");
         let (init, max) = RETRY_MS;
-        let retry = format!("{{period_init_ms: {init}, period_max_ms: {max}, period_increase_factor: 2}}");
+        let retry =
+            format!("{{period_init_ms: {init}, period_max_ms: {max}, period_increase_factor: 2}}");
         let settings = [
             ("mode", "\"peer\"".to_owned()),
             ("listen/endpoints", list(listen)),
@@ -58,10 +65,14 @@ impl ZenohBus {
             ("scouting/multicast/enabled", "false".into()),
             ("scouting/gossip/enabled", "false".into()),
             ("transport/link/tx/lease", LEASE_MS.to_string()),
-            ("transport/link/tx/queue/congestion_control/block/wait_before_close", WAIT_BEFORE_CLOSE_US.to_string()),
+            (
+                "transport/link/tx/queue/congestion_control/block/wait_before_close",
+                WAIT_BEFORE_CLOSE_US.to_string(),
+            ),
         ];
         for (key, value) in &settings {
-            c.insert_json5(key, value).map_err(|e| BusError(format!("{key} = {value}: {e}")))?;
+            c.insert_json5(key, value)
+                .map_err(|e| BusError(format!("{key} = {value}: {e}")))?;
         }
         let session = zenoh::open(c).await.map_err(fault)?;
         Ok(Arc::new(Self { session, pool }))
@@ -79,7 +90,9 @@ impl ZenohBus {
 /// # Errors
 /// When the system has no free port.
 pub fn free_tcp_endpoint() -> std::io::Result<String> {
-    let port = std::net::TcpListener::bind(("127.0.0.1", 0))?.local_addr()?.port();
+    let port = std::net::TcpListener::bind(("127.0.0.1", 0))?
+        .local_addr()?
+        .port();
     Ok(format!("tcp/127.0.0.1:{port}"))
 }
 
@@ -97,7 +110,10 @@ impl FramePublisher for ZenohPublisher {
             let bytes = self.pool.run(pack).await.map_err(fault)?.map_err(fault)?;
             let frames = self.frames.clone();
             // `put` may wait for a stalled peer: not on an async worker.
-            tokio::task::spawn_blocking(move || frames.put(bytes).wait()).await.map_err(fault)?.map_err(fault)
+            tokio::task::spawn_blocking(move || frames.put(bytes).wait())
+                .await
+                .map_err(fault)?
+                .map_err(fault)
         })
     }
 }
@@ -109,9 +125,13 @@ impl FrameBus for ZenohBus {
         calibration: &Calibration,
     ) -> BoxFuture<'_, Result<Box<dyn FramePublisher>, BusError>> {
         let key = key.clone();
-        let answer = tryon_proto::convert::geometry::calibration_to_wire(calibration).encode_to_vec();
+        let answer =
+            tryon_proto::convert::geometry::calibration_to_wire(calibration).encode_to_vec();
         Box::pin(async move {
-            let frames = self.session.declare_publisher(key.rgbd()).congestion_control(CongestionControl::Block);
+            let frames = self
+                .session
+                .declare_publisher(key.rgbd())
+                .congestion_control(CongestionControl::Block);
             let frames = Arc::new(frames.await.map_err(fault)?);
             let name = key.calibration();
             let reply = move |q: zenoh::query::Query| {
@@ -119,9 +139,24 @@ impl FrameBus for ZenohBus {
                     tracing::debug!(error = %e, "a calibration query went unanswered");
                 }
             };
-            let calibration = self.session.declare_queryable(name).callback(reply).await.map_err(fault)?;
-            let alive = self.session.liveliness().declare_token(key.alive()).await.map_err(fault)?;
-            let p = ZenohPublisher { frames, pool: self.pool.clone(), _calibration: calibration, _alive: alive };
+            let calibration = self
+                .session
+                .declare_queryable(name)
+                .callback(reply)
+                .await
+                .map_err(fault)?;
+            let alive = self
+                .session
+                .liveliness()
+                .declare_token(key.alive())
+                .await
+                .map_err(fault)?;
+            let p = ZenohPublisher {
+                frames,
+                pool: self.pool.clone(),
+                _calibration: calibration,
+                _alive: alive,
+            };
             Ok(Box::new(p) as Box<dyn FramePublisher>)
         })
     }
@@ -129,7 +164,12 @@ impl FrameBus for ZenohBus {
     fn subscribe(&self, key: &CameraKey) -> BoxFuture<'_, Result<FrameSubscription, BusError>> {
         let key = key.clone();
         Box::pin(async move {
-            let ring = self.session.declare_subscriber(key.rgbd()).with(RingChannel::new(1)).await.map_err(fault)?;
+            let ring = self
+                .session
+                .declare_subscriber(key.rgbd())
+                .with(RingChannel::new(1))
+                .await
+                .map_err(fault)?;
             let (tx, packets) = latest::channel();
             let pump = tokio::spawn(async move {
                 while let Ok(sample) = ring.recv_async().await {
@@ -143,10 +183,20 @@ impl FrameBus for ZenohBus {
             let hear = move |s: zenoh::sample::Sample| {
                 tell.send_replace(s.kind() == SampleKind::Put);
             };
-            let life = self.session.liveliness().declare_subscriber(key.alive()).history(true).callback(hear);
+            let life = self
+                .session
+                .liveliness()
+                .declare_subscriber(key.alive())
+                .history(true)
+                .callback(hear);
             let life = life.await.map_err(fault)?;
             let guard = Box::new((AbortOnDrop(pump), life));
-            Ok(FrameSubscription::new(packets, alive, self.pool.clone(), guard))
+            Ok(FrameSubscription::new(
+                packets,
+                alive,
+                self.pool.clone(),
+                guard,
+            ))
         })
     }
 }
@@ -167,7 +217,9 @@ mod tests {
     async fn frames_cross_processes_even_when_the_listener_comes_last() {
         let pool = Pool::new(1).expect("a thread");
         let endpoint = [free_tcp_endpoint().expect("a port")];
-        let late = ZenohBus::open(&[], &endpoint, pool.clone()).await.expect("opens before its peer");
+        let late = ZenohBus::open(&[], &endpoint, pool.clone())
+            .await
+            .expect("opens before its peer");
         let camera = ZenohBus::open(&endpoint, &[], pool).await.expect("listens");
         crate::frames::tests::carries(camera.as_ref(), late.as_ref()).await;
         late.close().await;

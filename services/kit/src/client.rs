@@ -56,7 +56,10 @@ mod tests {
     fn pauses_stay_short_and_never_end() {
         let all: Vec<Duration> = pauses().take(100).collect();
         assert_eq!(all.len(), 100);
-        assert!(all.iter().all(|d| *d <= Duration::from_millis(1000)), "{all:?}");
+        assert!(
+            all.iter().all(|d| *d <= Duration::from_millis(1000)),
+            "{all:?}"
+        );
     }
 
     #[tokio::test]

@@ -30,38 +30,55 @@ impl Pool {
     /// # Errors
     /// When the system refuses a thread.
     pub fn new(threads: usize) -> std::io::Result<Arc<Self>> {
-        let n = if threads == 0 { std::thread::available_parallelism().map_or(2, usize::from) } else { threads };
+        let n = if threads == 0 {
+            std::thread::available_parallelism().map_or(2, usize::from)
+        } else {
+            threads
+        };
         let (tx, rx) = mpsc::channel::<Job>();
         let rx = Arc::new(Mutex::new(rx));
         for i in 0..n {
             let rx = rx.clone();
-            std::thread::Builder::new().name(format!("compute-{i}")).spawn(move || {
-                loop {
-                    // The lock is held while waiting, which is fine: waiting threads have nothing else to do.
-                    let job = rx.lock().unwrap_or_else(PoisonError::into_inner).recv();
-                    match job {
-                        Ok(job) => job(),
-                        Err(mpsc::RecvError) => return,
+            std::thread::Builder::new()
+                .name(format!("compute-{i}"))
+                .spawn(move || {
+                    loop {
+                        // The lock is held while waiting, which is fine: waiting threads have nothing else to do.
+                        let job = rx.lock().unwrap_or_else(PoisonError::into_inner).recv();
+                        match job {
+                            Ok(job) => job(),
+                            Err(mpsc::RecvError) => return,
+                        }
                     }
-                }
-            })?;
+                })?;
         }
-        Ok(Arc::new(Self { jobs: Mutex::new(tx) }))
+        Ok(Arc::new(Self {
+            jobs: Mutex::new(tx),
+        }))
     }
 
     /// Runs `f` on the pool and waits for its answer. Dropping the future lets the job finish unheard.
     ///
     /// # Errors
     /// [`ComputeError`] when the job panicked or the pool is gone.
-    pub async fn run<T: Send + 'static>(&self, f: impl FnOnce() -> T + Send + 'static) -> Result<T, ComputeError> {
+    pub async fn run<T: Send + 'static>(
+        &self,
+        f: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, ComputeError> {
         let (tx, rx) = oneshot::channel();
         let job: Job = Box::new(move || {
             // A panic costs the job's own state, which moved in with it; nothing shared can be half changed.
             let answer = catch_unwind(AssertUnwindSafe(f));
             let _ = tx.send(answer);
         });
-        self.jobs.lock().unwrap_or_else(PoisonError::into_inner).send(job).map_err(|_| ComputeError::Gone)?;
-        rx.await.map_err(|_| ComputeError::Gone)?.map_err(|_| ComputeError::Panicked)
+        self.jobs
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .send(job)
+            .map_err(|_| ComputeError::Gone)?;
+        rx.await
+            .map_err(|_| ComputeError::Gone)?
+            .map_err(|_| ComputeError::Panicked)
     }
 }
 
@@ -73,7 +90,10 @@ mod tests {
     async fn jobs_answer_and_a_panic_costs_only_itself() {
         let pool = Pool::new(2).expect("threads");
         assert_eq!(pool.run(|| 6 * 7).await, Ok(42));
-        assert_eq!(pool.run(|| -> i32 { panic!("on purpose") }).await, Err(ComputeError::Panicked));
+        assert_eq!(
+            pool.run(|| -> i32 { panic!("on purpose") }).await,
+            Err(ComputeError::Panicked)
+        );
         assert_eq!(pool.run(|| 1).await, Ok(1));
     }
 }

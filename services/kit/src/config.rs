@@ -47,13 +47,17 @@ impl Config {
     pub fn load(file: Option<&Path>, flags: &[String]) -> Result<Self, ConfigError> {
         let mut layers = Figment::from(Serialized::defaults(Self::default()));
         if let Some(file) = file {
-            let text = std::fs::read_to_string(file).map_err(|e| ConfigError(format!("{}: {e}", file.display())))?;
+            let text = std::fs::read_to_string(file)
+                .map_err(|e| ConfigError(format!("{}: {e}", file.display())))?;
             layers = layers.merge(Toml::string(&text));
         }
         layers = layers.merge(Env::prefixed("TRYON_").ignore(&NOT_KEYS).split("__"));
         for flag in flags {
-            let fault =
-                || ConfigError(format!("--set {flag}: `key=value` is needed, such as capture.cameras.0.loop=true"));
+            let fault = || {
+                ConfigError(format!(
+                    "--set {flag}: `key=value` is needed, such as capture.cameras.0.loop=true"
+                ))
+            };
             let (key, value) = flag.split_once('=').ok_or_else(fault)?;
             let Ok(value) = value.parse::<Value>();
             layers = layers.merge(Serialized::default(key, value));
@@ -82,12 +86,21 @@ impl Config {
                 return fault(&format!("capture.cameras.{i}.name"), "is used twice");
             }
             if !(c.rate.is_finite() && (0.0..=1000.0).contains(&c.rate)) {
-                return fault(&format!("capture.cameras.{i}.rate"), "0 to 1000 frames a second");
+                return fault(
+                    &format!("capture.cameras.{i}.rate"),
+                    "0 to 1000 frames a second",
+                );
             }
         }
         for (key, ms) in [
-            ("compositor.camera_silence_ms", self.compositor.camera_silence_ms),
-            ("compositor.garments_late_ms", self.compositor.garments_late_ms),
+            (
+                "compositor.camera_silence_ms",
+                self.compositor.camera_silence_ms,
+            ),
+            (
+                "compositor.garments_late_ms",
+                self.compositor.garments_late_ms,
+            ),
         ] {
             if ms < 50 {
                 return fault(key, "at least 50 ms, or every hiccup is a fault");
@@ -123,26 +136,42 @@ mod tests {
     fn the_commented_default_file_is_the_default() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy/tryon.toml");
         let text = std::fs::read_to_string(file).expect("deploy/tryon.toml");
-        assert_eq!(toml::from_str::<Config>(&text).expect("parses"), Config::default());
+        assert_eq!(
+            toml::from_str::<Config>(&text).expect("parses"),
+            Config::default()
+        );
         // Every key is shown: taking the comments off must not add one, and no default may be missing.
         let shown: toml::Table = toml::from_str(&text).expect("parses");
         let all = toml::Table::try_from(Config::default()).expect("serialises");
-        assert_eq!(shown, all, "a key of Config::default() is missing from deploy/tryon.toml");
+        assert_eq!(
+            shown, all,
+            "a key of Config::default() is missing from deploy/tryon.toml"
+        );
     }
 
     #[test]
     fn flags_win_and_unknown_keys_are_refused() {
         let dir = tempfile::tempdir().expect("a folder");
         let file = dir.path().join("c.toml");
-        std::fs::write(&file, "[tracking]\nmax_sessions = 3\naddress = \"127.0.0.1:1\"\n").expect("written");
+        std::fs::write(
+            &file,
+            "[tracking]\nmax_sessions = 3\naddress = \"127.0.0.1:1\"\n",
+        )
+        .expect("written");
         let c = Config::load(Some(&file), &["tracking.address=127.0.0.1:7".into()]).expect("fine");
         assert_eq!((c.tracking.max_sessions, c.tracking.address.port()), (3, 7));
         std::fs::write(&file, "[tracking]\nmax_session = 3\n").expect("written");
-        let e = Config::load(Some(&file), &[]).expect_err("a typo").to_string();
+        let e = Config::load(Some(&file), &[])
+            .expect_err("a typo")
+            .to_string();
         assert!(e.contains("max_session"), "{e}");
-        let e = Config::load(None, &["tracking.adress=1".into()]).expect_err("a typo").to_string();
+        let e = Config::load(None, &["tracking.adress=1".into()])
+            .expect_err("a typo")
+            .to_string();
         assert!(e.contains("adress"), "{e}");
-        let e = Config::load(None, &["capture.store=a/b".into()]).expect_err("a slash").to_string();
+        let e = Config::load(None, &["capture.store=a/b".into()])
+            .expect_err("a slash")
+            .to_string();
         assert!(e.starts_with("capture.store"), "{e}");
     }
 }

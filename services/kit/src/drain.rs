@@ -40,7 +40,10 @@ pub async fn until_deadline<E>(
 /// When the system refuses a handler.
 pub async fn signal() -> std::io::Result<&'static str> {
     use tokio::signal::unix::{SignalKind, signal};
-    let (mut term, mut int) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
+    let (mut term, mut int) = (
+        signal(SignalKind::terminate())?,
+        signal(SignalKind::interrupt())?,
+    );
     Ok(tokio::select! {
         _ = term.recv() => "SIGTERM",
         _ = int.recv() => "SIGINT",
@@ -56,7 +59,12 @@ mod tests {
         let token = CancellationToken::new();
         token.cancel();
         let grace = Duration::from_millis(30);
-        let r = until_deadline(std::future::pending::<Result<(), ()>>(), token.clone(), grace).await;
+        let r = until_deadline(
+            std::future::pending::<Result<(), ()>>(),
+            token.clone(),
+            grace,
+        )
+        .await;
         assert_eq!(r, Ok(Drained::DeadlineHit));
         let r = until_deadline(async { Ok::<(), ()>(()) }, token, grace).await;
         assert_eq!(r, Ok(Drained::Clean));

@@ -66,7 +66,15 @@ impl FrameSubscription {
         pool: Arc<Pool>,
         guard: Box<dyn Any + Send>,
     ) -> Self {
-        Self { packets, alive, pool, unpacking: None, last: None, skipped: 0, _guard: guard }
+        Self {
+            packets,
+            alive,
+            pool,
+            unpacking: None,
+            last: None,
+            skipped: 0,
+            _guard: guard,
+        }
     }
 
     /// The newest exposure, waiting for one; `None` when the bus is gone. Broken ones are logged and left out.
@@ -93,7 +101,8 @@ impl FrameSubscription {
                     Packet::Ready(e) => e,
                     Packet::Packed(b) => {
                         let pool = self.pool.clone();
-                        self.unpacking = Some(Box::pin(async move { pool.run(move || unpack(b)).await }));
+                        self.unpacking =
+                            Some(Box::pin(async move { pool.run(move || unpack(b)).await }));
                         continue;
                     }
                 }
@@ -138,11 +147,24 @@ pub struct LocalBus {
 impl LocalBus {
     /// An empty bus.
     pub fn new(pool: Arc<Pool>) -> Arc<Self> {
-        Arc::new(Self { topics: Arc::default(), pool })
+        Arc::new(Self {
+            topics: Arc::default(),
+            pool,
+        })
     }
     fn topic(&self, key: &CameraKey) -> Arc<Topic> {
-        let fresh = || Arc::new(Topic { subscribers: Mutex::default(), alive: watch::Sender::new(false) });
-        self.topics.lock().unwrap_or_else(PoisonError::into_inner).entry(key.clone()).or_insert_with(fresh).clone()
+        let fresh = || {
+            Arc::new(Topic {
+                subscribers: Mutex::default(),
+                alive: watch::Sender::new(false),
+            })
+        };
+        self.topics
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .entry(key.clone())
+            .or_insert_with(fresh)
+            .clone()
     }
 }
 
@@ -156,22 +178,36 @@ impl Drop for LocalPublisher {
 
 impl FramePublisher for LocalPublisher {
     fn send(&mut self, exposure: Arc<Exposure>) -> BoxFuture<'_, Result<(), BusError>> {
-        let mut list = self.0.subscribers.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut list = self
+            .0
+            .subscribers
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         list.retain(|s| s.send(Packet::Ready(exposure.clone())));
         Box::pin(std::future::ready(Ok(())))
     }
 }
 
 impl FrameBus for LocalBus {
-    fn publish(&self, key: &CameraKey, _: &Calibration) -> BoxFuture<'_, Result<Box<dyn FramePublisher>, BusError>> {
+    fn publish(
+        &self,
+        key: &CameraKey,
+        _: &Calibration,
+    ) -> BoxFuture<'_, Result<Box<dyn FramePublisher>, BusError>> {
         let topic = self.topic(key);
         topic.alive.send_replace(true);
-        Box::pin(std::future::ready(Ok(Box::new(LocalPublisher(topic)) as Box<dyn FramePublisher>)))
+        Box::pin(std::future::ready(Ok(
+            Box::new(LocalPublisher(topic)) as Box<dyn FramePublisher>
+        )))
     }
     fn subscribe(&self, key: &CameraKey) -> BoxFuture<'_, Result<FrameSubscription, BusError>> {
         let topic = self.topic(key);
         let (tx, packets) = latest::channel();
-        topic.subscribers.lock().unwrap_or_else(PoisonError::into_inner).push(tx);
+        topic
+            .subscribers
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(tx);
         let alive = topic.alive.subscribe();
         let s = FrameSubscription::new(packets, alive, self.pool.clone(), Box::new(topic));
         Box::pin(std::future::ready(Ok(s)))
@@ -187,14 +223,24 @@ pub(crate) mod tests {
 
     pub(crate) fn exposure(sequence: u64) -> Arc<Exposure> {
         let k = Intrinsics::KINECT_V1.resized(320, 240);
-        let id = FrameId { epoch: 5, sequence, capture_time_ns: sequence, received_unix_ns: 1 };
+        let id = FrameId {
+            epoch: 5,
+            sequence,
+            capture_time_ns: sequence,
+            received_unix_ns: 1,
+        };
         let rgbd = RgbdFrame {
             sequence,
             time_ns: sequence,
             depth: DepthImage::empty(320, 240),
             color: Some(ColorImage::filled(320, 240, [9; 3])),
         };
-        Arc::new(Exposure { id, calibration: Arc::new(Calibration::registered(k)), rgbd, stages: vec![] })
+        Arc::new(Exposure {
+            id,
+            calibration: Arc::new(Calibration::registered(k)),
+            rgbd,
+            stages: vec![],
+        })
     }
 
     /// What every bus must do: the newest wins, losses are counted, life and death are seen.
@@ -202,7 +248,10 @@ pub(crate) mod tests {
         let key = CameraKey::new("store", "front").expect("names");
         let mut s = subscribing.subscribe(&key).await.expect("subscribed");
         assert!(!s.alive());
-        let mut p = publishing.publish(&key, &exposure(0).calibration).await.expect("published");
+        let mut p = publishing
+            .publish(&key, &exposure(0).calibration)
+            .await
+            .expect("published");
         // A peer that connects later misses what came before: send until something arrives.
         let mut sequence = 0;
         let first = loop {

@@ -70,7 +70,10 @@ where
         return ExitCode::SUCCESS;
     }
     let grace = Duration::from_millis(config.process.grace_ms);
-    let runtime = match tokio::runtime::Builder::new_multi_thread().enable_all().build() {
+    let runtime = match tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()
+    {
         Ok(r) => r,
         Err(e) => {
             complain(name, &e.to_string());
@@ -86,12 +89,18 @@ where
             ExitCode::SUCCESS
         }
         Ok(Drained::DeadlineHit) => {
-            say(&format!("{name}: ended at the deadline of {grace:?} with streams open"));
+            say(&format!(
+                "{name}: ended at the deadline of {grace:?} with streams open"
+            ));
             ExitCode::SUCCESS
         }
         Err(e) => {
             complain(name, &e.to_string());
-            ExitCode::from(if matches!(e, StartError::Config { .. }) { EXIT_USAGE } else { EXIT_BROKEN })
+            ExitCode::from(if matches!(e, StartError::Config { .. }) {
+                EXIT_USAGE
+            } else {
+                EXIT_BROKEN
+            })
         }
     }
 }
@@ -107,7 +116,10 @@ where
     F: FnOnce(Config, Context) -> Fut,
     Fut: Future<Output = Result<Running, StartError>>,
 {
-    let broken = |e: std::io::Error| StartError::Broken { service: name, why: e.to_string() };
+    let broken = |e: std::io::Error| StartError::Broken {
+        service: name,
+        why: e.to_string(),
+    };
     let pool = Pool::new(config.process.compute_threads).map_err(broken)?;
     let (listen, connect) = match role {
         BusRole::Listen => (&config.bus.listen[..], &[][..]),
@@ -115,9 +127,17 @@ where
     };
     let bus = ZenohBus::open(listen, connect, pool.clone()).await?;
     let shutdown = CancellationToken::new();
-    let ctx = Context { bus: bus.clone(), pool, shutdown: shutdown.clone(), grace };
+    let ctx = Context {
+        bus: bus.clone(),
+        pool,
+        shutdown: shutdown.clone(),
+        grace,
+    };
     let running = start(config, ctx).await?;
-    say(&format!("{name}: grpc {} admin {}", running.address, running.admin));
+    say(&format!(
+        "{name}: grpc {} admin {}",
+        running.address, running.admin
+    ));
     let watch = tokio::spawn(async move {
         if let Ok(which) = drain::signal().await {
             tracing::info!(signal = which, "draining");

@@ -99,7 +99,12 @@ impl Running {
     /// When it broke.
     pub async fn ended(self) -> Result<Outcome, StartError> {
         let name = self.name;
-        self.task.await.unwrap_or_else(|e| Err(StartError::Broken { service: name, why: e.to_string() }))
+        self.task.await.unwrap_or_else(|e| {
+            Err(StartError::Broken {
+                service: name,
+                why: e.to_string(),
+            })
+        })
     }
 }
 
@@ -113,7 +118,10 @@ pub fn routes() -> Result<(RoutesBuilder, HealthReporter), StartError> {
         .register_encoded_file_descriptor_set(tryon_proto::DESCRIPTOR)
         .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
         .build_v1()
-        .map_err(|e| StartError::Config { key: "reflection".into(), why: e.to_string() })?;
+        .map_err(|e| StartError::Config {
+            key: "reflection".into(),
+            why: e.to_string(),
+        })?;
     let mut builder = Routes::builder();
     builder.add_service(health).add_service(reflection);
     Ok((builder, reporter))
@@ -142,16 +150,35 @@ pub struct Service {
 /// # Errors
 /// When an address cannot be bound.
 pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartError> {
-    let Service { name, grpc_name, address, admin, routes, http1, health } = service;
-    let bind =
-        |key: &'static str, address| move |source| StartError::Bind { key: format!("{name}.{key}"), address, source };
-    let listener = TcpListener::bind(address).await.map_err(bind("address", address))?;
+    let Service {
+        name,
+        grpc_name,
+        address,
+        admin,
+        routes,
+        http1,
+        health,
+    } = service;
+    let bind = |key: &'static str, address| {
+        move |source| StartError::Bind {
+            key: format!("{name}.{key}"),
+            address,
+            source,
+        }
+    };
+    let listener = TcpListener::bind(address)
+        .await
+        .map_err(bind("address", address))?;
     let bound = listener.local_addr().map_err(bind("address", address))?;
     let (ready, is_ready) = watch::channel(true);
     // The admin port lives as long as the service itself, so that probes can watch it drain.
     let ended = CancellationToken::new();
-    let admin = crate::admin::serve(admin, is_ready, ended.clone()).await.map_err(bind("admin", admin))?;
-    health.set_service_status(grpc_name, ServingStatus::Serving).await;
+    let admin = crate::admin::serve(admin, is_ready, ended.clone())
+        .await
+        .map_err(bind("admin", admin))?;
+    health
+        .set_service_status(grpc_name, ServingStatus::Serving)
+        .await;
     let server = Server::builder()
         .accept_http1(http1)
         .timeout(CALL_TIMEOUT)
@@ -167,13 +194,23 @@ pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartErro
         let stop = async move {
             signalled.cancelled().await;
             ready.send_replace(false);
-            health.set_service_status(grpc_name, ServingStatus::NotServing).await;
+            health
+                .set_service_status(grpc_name, ServingStatus::NotServing)
+                .await;
         };
         let work = server.serve_with_incoming_shutdown(TcpListenerStream::new(listener), stop);
         let end = until_deadline(work, shutdown, grace + CUT).await;
         ended.cancel();
-        end.map_err(|e| StartError::Broken { service: name, why: format!("{e}: {:?}", std::error::Error::source(&e)) })
+        end.map_err(|e| StartError::Broken {
+            service: name,
+            why: format!("{e}: {:?}", std::error::Error::source(&e)),
+        })
     });
     tracing::info!(service = name, address = %bound, %admin, "serving");
-    Ok(Running { name, address: bound, admin, task })
+    Ok(Running {
+        name,
+        address: bound,
+        admin,
+        task,
+    })
 }

@@ -12,7 +12,10 @@ pub struct Sessions<H> {
 
 impl<H> Clone for Sessions<H> {
     fn clone(&self) -> Self {
-        Self { open: self.open.clone(), limit: self.limit }
+        Self {
+            open: self.open.clone(),
+            limit: self.limit,
+        }
     }
 }
 
@@ -29,7 +32,10 @@ pub enum Opened<H> {
 impl<H> Sessions<H> {
     /// An empty directory for at most `limit` sessions.
     pub fn new(limit: usize) -> Self {
-        Self { open: Arc::default(), limit }
+        Self {
+            open: Arc::default(),
+            limit,
+        }
     }
     fn with<R>(&self, f: impl FnOnce(&mut BTreeMap<String, Arc<H>>) -> R) -> R {
         f(&mut self.open.lock().unwrap_or_else(PoisonError::into_inner))
@@ -79,14 +85,20 @@ pub fn random_id() -> String {
 pub fn random_u64() -> u64 {
     use std::hash::{BuildHasher, Hasher, RandomState};
     let mut h = RandomState::new().build_hasher();
-    h.write_u128(std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |d| d.as_nanos()));
+    h.write_u128(
+        std::time::SystemTime::now()
+            .duration_since(std::time::UNIX_EPOCH)
+            .map_or(0, |d| d.as_nanos()),
+    );
     h.write_u32(std::process::id());
     h.finish().max(1)
 }
 
 /// Unix time, nanoseconds.
 pub fn unix_ns() -> u64 {
-    let d = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    let d = std::time::SystemTime::now()
+        .duration_since(std::time::UNIX_EPOCH)
+        .unwrap_or_default();
     u64::try_from(d.as_nanos()).unwrap_or(u64::MAX)
 }
 

@@ -18,7 +18,11 @@ pub fn unavailable(service: &str, why: &str) -> Status {
 /// RESOURCE_EXHAUSTED with RetryInfo: all `limit` places are taken.
 pub fn exhausted(what: &str, limit: usize) -> Status {
     let details = ErrorDetails::with_retry_info(Some(RETRY_LIMIT));
-    Status::with_error_details(Code::ResourceExhausted, format!("all {limit} {what} are in use"), details)
+    Status::with_error_details(
+        Code::ResourceExhausted,
+        format!("all {limit} {what} are in use"),
+        details,
+    )
 }
 
 /// NOT_FOUND naming what is not there.
@@ -30,7 +34,10 @@ pub fn not_found(what: &str, id: &str) -> Status {
 /// else is UNAVAILABLE.
 pub fn from_upstream(service: &str, s: &Status) -> Status {
     match s.code() {
-        Code::InvalidArgument | Code::NotFound | Code::FailedPrecondition | Code::ResourceExhausted => s.clone(),
+        Code::InvalidArgument
+        | Code::NotFound
+        | Code::FailedPrecondition
+        | Code::ResourceExhausted => s.clone(),
         _ => unavailable(service, s.message()),
     }
 }
@@ -43,10 +50,16 @@ mod tests {
     fn statuses_carry_their_details() {
         let s = unavailable("tracking", "connection refused");
         assert_eq!(s.code(), Code::Unavailable);
-        let delay = s.get_error_details().retry_info().and_then(|r| r.retry_delay);
+        let delay = s
+            .get_error_details()
+            .retry_info()
+            .and_then(|r| r.retry_delay);
         assert_eq!(delay, Some(RETRY_UPSTREAM));
         let inner = Status::internal("boom");
         assert_eq!(from_upstream("cloth", &inner).code(), Code::Unavailable);
-        assert_eq!(from_upstream("cloth", &Status::not_found("x")).code(), Code::NotFound);
+        assert_eq!(
+            from_upstream("cloth", &Status::not_found("x")).code(),
+            Code::NotFound
+        );
     }
 }

@@ -11,7 +11,9 @@ use tracing_subscriber::EnvFilter;
 /// When `log.level` is no filter.
 pub fn init_logs(config: &LogConfig) -> Result<(), String> {
     let filter = EnvFilter::try_new(&config.level).map_err(|e| format!("log.level: {e}"))?;
-    let builder = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let builder = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr);
     // A second subscriber is refused; the first one stays, which is what tests and `demo` want.
     let _ = match config.format {
         LogFormat::Json => builder.json().try_init(),
@@ -21,25 +23,37 @@ pub fn init_logs(config: &LogConfig) -> Result<(), String> {
 }
 
 /// Upper bounds of the histograms of times, milliseconds: fine below a frame at 30/s, coarse above.
-const MS_BUCKETS: [f64; 14] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 33.0, 66.0, 100.0, 150.0, 250.0, 500.0, 1000.0];
+const MS_BUCKETS: [f64; 14] = [
+    0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 33.0, 66.0, 100.0, 150.0, 250.0, 500.0, 1000.0,
+];
 
 /// The process's metrics; the first call installs the recorder.
 pub fn metrics() -> Option<&'static PrometheusHandle> {
     static HANDLE: OnceLock<Option<PrometheusHandle>> = OnceLock::new();
-    let install = || PrometheusBuilder::new().set_buckets(&MS_BUCKETS).ok()?.install_recorder().ok();
+    let install = || {
+        PrometheusBuilder::new()
+            .set_buckets(&MS_BUCKETS)
+            .ok()?
+            .install_recorder()
+            .ok()
+    };
     HANDLE.get_or_init(install).as_ref()
 }
 
 /// Counts work that a scene did not need as `tryon_skipped{service="…", what="…"}`.
 pub fn record_skipped<const N: usize>(service: &'static str, skipped: [(&'static str, usize); N]) {
     for (what, n) in skipped {
-        metrics::counter!("tryon_skipped", "service" => service, "what" => what).increment(n as u64);
+        metrics::counter!("tryon_skipped", "service" => service, "what" => what)
+            .increment(n as u64);
     }
 }
 
 /// Records stage times as `tryon_stage_ms{stage="…"}`, those whose name starts with `service.`.
 pub fn record_stages(service: &str, stages: &[tryon_proto::v1::StageTime]) {
-    for s in stages.iter().filter(|s| s.stage.split('.').next() == Some(service)) {
+    for s in stages
+        .iter()
+        .filter(|s| s.stage.split('.').next() == Some(service))
+    {
         metrics::histogram!("tryon_stage_ms", "stage" => s.stage.clone()).record(f64::from(s.ms));
     }
 }

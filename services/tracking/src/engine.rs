@@ -6,7 +6,9 @@ use std::time::Instant;
 use tryon::body::{BodyShape, Template, embedded, import};
 use tryon::camera::Calibration;
 use tryon::formats::npz;
-use tryon::tracking::{LostReason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+use tryon::tracking::{
+    LostReason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace, step,
+};
 use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::{body, geometry};
@@ -18,8 +20,11 @@ pub(crate) fn load_template(path: &Path) -> Result<Arc<Template>, String> {
         return Ok(embedded::template());
     }
     let arrays = npz::read_smpl(path).map_err(|e| e.to_string())?;
-    let name = path.file_stem().map_or_else(|| "body".into(), |n| n.to_string_lossy().into_owned());
-    let template = import::template_from_smpl(&name, &arrays).map_err(|e| format!("{}: {e}", path.display()))?;
+    let name = path
+        .file_stem()
+        .map_or_else(|| "body".into(), |n| n.to_string_lossy().into_owned());
+    let template = import::template_from_smpl(&name, &arrays)
+        .map_err(|e| format!("{}: {e}", path.display()))?;
     Ok(Arc::new(template))
 }
 
@@ -37,12 +42,30 @@ pub(crate) struct Engine {
 
 impl Engine {
     /// A tracker that has seen nobody. `shape_version` goes on from an earlier engine of the session.
-    pub(crate) fn new(template: Arc<Template>, calibration: Arc<Calibration>, epoch: u64, shape_version: u64) -> Self {
-        let model = TrackerModel::new(template, calibration.as_ref().clone(), TrackerConfig::default());
+    pub(crate) fn new(
+        template: Arc<Template>,
+        calibration: Arc<Calibration>,
+        epoch: u64,
+        shape_version: u64,
+    ) -> Self {
+        let model = TrackerModel::new(
+            template,
+            calibration.as_ref().clone(),
+            TrackerConfig::default(),
+        );
         let state = TrackerState::new(&model);
         let (shape, wire_shape) = (BodyShape::default(), v1::BodyShape::default());
         let work = Workspace::default();
-        Self { model, state, work, epoch, calibration, shape, wire_shape, shape_version }
+        Self {
+            model,
+            state,
+            work,
+            epoch,
+            calibration,
+            shape,
+            wire_shape,
+            shape_version,
+        }
     }
 
     /// Whether it can go on with this exposure: same run of the same camera.
@@ -65,17 +88,25 @@ impl Engine {
         let start = Instant::now();
         let report = step(&self.model, &mut self.state, &e.rgbd, &mut self.work);
         let mut stages = e.stages.clone();
-        let mut state = v1::BodyState { frame: Some(e.id), age_frames: self.state.pose_age, ..Default::default() };
+        let mut state = v1::BodyState {
+            frame: Some(e.id),
+            age_frames: self.state.pose_age,
+            ..Default::default()
+        };
         match report {
             Ok(r) => {
-                let of = |name: &str, ms: f64| v1::StageTime { stage: format!("tracking.{name}"), ms: ms as f32 };
+                let of = |name: &str, ms: f64| v1::StageTime {
+                    stage: format!("tracking.{name}"),
+                    ms: ms as f32,
+                };
                 let s = &r.stages_ms;
                 stages.extend([
                     of("segment", s.segment),
                     of("pose", s.place + s.pose),
                     of("shape", s.size + s.surface),
                 ]);
-                (state.residual_mm, state.visible_points) = (r.residual_mm as f32, r.visible_points as u32);
+                (state.residual_mm, state.visible_points) =
+                    (r.residual_mm as f32, r.visible_points as u32);
                 record_skipped("tracking", r.skipped.counts());
                 state.iterations = r.iterations as u32;
                 let (status, reason) = words(self.state.status);

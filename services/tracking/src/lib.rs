@@ -18,11 +18,20 @@ use tryon_proto::v1::tracking_service_server::{SERVICE_NAME, TrackingServiceServ
 pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError> {
     let c = &config.tracking;
     let body = c.body.clone();
-    let template = ctx.pool.run(move || engine::load_template(&body)).await.map_err(|e| e.to_string());
-    let template = template.and_then(|t| t).map_err(|why| StartError::Config { key: "tracking.body".into(), why })?;
+    let template = ctx
+        .pool
+        .run(move || engine::load_template(&body))
+        .await
+        .map_err(|e| e.to_string());
+    let template = template.and_then(|t| t).map_err(|why| StartError::Config {
+        key: "tracking.body".into(),
+        why,
+    })?;
     let service = service::Tracking::new(c, &ctx, template);
     let (mut routes, health) = server::routes()?;
-    routes.add_service(TrackingServiceServer::new(service).max_decoding_message_size(server::MAX_REQUEST_BYTES));
+    routes.add_service(
+        TrackingServiceServer::new(service).max_decoding_message_size(server::MAX_REQUEST_BYTES),
+    );
     let service = Service {
         name: "tracking",
         grpc_name: SERVICE_NAME,

@@ -37,13 +37,18 @@ impl Tracking {
         }
     }
     fn find(&self, id: &str) -> Result<Arc<Handle>, Status> {
-        self.sessions.get(id).ok_or_else(|| not_found("session", id))
+        self.sessions
+            .get(id)
+            .ok_or_else(|| not_found("session", id))
     }
 }
 
 #[tonic::async_trait]
 impl TrackingService for Tracking {
-    async fn open_session(&self, r: Request<OpenSessionRequest>) -> Result<Response<OpenSessionResponse>, Status> {
+    async fn open_session(
+        &self,
+        r: Request<OpenSessionRequest>,
+    ) -> Result<Response<OpenSessionResponse>, Status> {
         let r = r.get_ref();
         let id = if r.session_id.is_empty() {
             random_id()
@@ -59,7 +64,11 @@ impl TrackingService for Tracking {
             idle: self.idle,
             directory: self.sessions.clone(),
         };
-        if self.sessions.get(&id).is_some_and(|h| h.commands.is_closed()) {
+        if self
+            .sessions
+            .get(&id)
+            .is_some_and(|h| h.commands.is_closed())
+        {
             self.sessions.remove(&id);
         }
         let created = match self.sessions.open(&id, || session::spawn(setup())) {
@@ -69,7 +78,10 @@ impl TrackingService for Tracking {
                 true
             }
             Opened::Found(h) if h.key != key => {
-                return Err(Status::failed_precondition(format!("session `{id}` is open with camera {}", h.key)));
+                return Err(Status::failed_precondition(format!(
+                    "session `{id}` is open with camera {}",
+                    h.key
+                )));
             }
             Opened::Found(h) => {
                 let _ = h.commands.try_send(Command::Touch);
@@ -77,19 +89,33 @@ impl TrackingService for Tracking {
             }
             Opened::Full => return Err(exhausted("sessions", self.sessions.limit())),
         };
-        Ok(Response::new(OpenSessionResponse { session_id: id, created, template_name: self.template.name().into() }))
+        Ok(Response::new(OpenSessionResponse {
+            session_id: id,
+            created,
+            template_name: self.template.name().into(),
+        }))
     }
 
-    async fn close_session(&self, r: Request<CloseSessionRequest>) -> Result<Response<CloseSessionResponse>, Status> {
+    async fn close_session(
+        &self,
+        r: Request<CloseSessionRequest>,
+    ) -> Result<Response<CloseSessionResponse>, Status> {
         if let Some(h) = self.sessions.remove(&r.get_ref().session_id) {
             let _ = h.commands.send(Command::Close).await;
         }
         Ok(Response::new(CloseSessionResponse {}))
     }
 
-    async fn reset_session(&self, r: Request<ResetSessionRequest>) -> Result<Response<ResetSessionResponse>, Status> {
+    async fn reset_session(
+        &self,
+        r: Request<ResetSessionRequest>,
+    ) -> Result<Response<ResetSessionResponse>, Status> {
         let id = &r.get_ref().session_id;
-        self.find(id)?.commands.send(Command::Reset).await.map_err(|_| not_found("session", id))?;
+        self.find(id)?
+            .commands
+            .send(Command::Reset)
+            .await
+            .map_err(|_| not_found("session", id))?;
         Ok(Response::new(ResetSessionResponse {}))
     }
 
@@ -101,10 +127,13 @@ impl TrackingService for Tracking {
         if !name.is_empty() && name != self.template.name() {
             return Err(not_found("template", name));
         }
-        Ok(Response::new(GetBodyTemplateResponse { template: Some(self.wire_template.clone()) }))
+        Ok(Response::new(GetBodyTemplateResponse {
+            template: Some(self.wire_template.clone()),
+        }))
     }
 
-    type StreamBodyStatesStream = Pin<Box<dyn Stream<Item = Result<StreamBodyStatesResponse, Status>> + Send>>;
+    type StreamBodyStatesStream =
+        Pin<Box<dyn Stream<Item = Result<StreamBodyStatesResponse, Status>> + Send>>;
 
     async fn stream_body_states(
         &self,

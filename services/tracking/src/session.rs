@@ -56,7 +56,14 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
     let key = setup.key.clone();
     tokio::spawn(async move {
         let (id, directory) = (setup.id.clone(), setup.directory.clone());
-        let why = Task { setup, tell, engine: None, shape_version: 0 }.run(inbox).await;
+        let why = Task {
+            setup,
+            tell,
+            engine: None,
+            shape_version: 0,
+        }
+        .run(inbox)
+        .await;
         // Who asked for the end has taken it out already, and may have opened another of that id.
         if why != ASKED {
             directory.remove(&id);
@@ -64,7 +71,11 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
         metrics::gauge!("tryon_tracking_sessions").set(directory.len() as f64);
         tracing::info!(session = id, why, "closed");
     });
-    Handle { key, commands, states }
+    Handle {
+        key,
+        commands,
+        states,
+    }
 }
 
 struct Task {
@@ -124,7 +135,14 @@ impl Task {
         let engine = self.engine.take().filter(|e| e.fits(&exposure));
         let (template, version) = (self.setup.template.clone(), self.shape_version);
         let work = move || {
-            let fresh = || Engine::new(template, exposure.calibration.clone(), exposure.id.epoch, version);
+            let fresh = || {
+                Engine::new(
+                    template,
+                    exposure.calibration.clone(),
+                    exposure.id.epoch,
+                    version,
+                )
+            };
             let mut engine = engine.unwrap_or_else(fresh);
             let state = engine.step(&exposure);
             (engine, state)
@@ -148,8 +166,11 @@ impl Task {
     }
 
     fn silent(&mut self, frames: &FrameSubscription) {
-        let why =
-            if frames.alive() { "the camera is on the bus but sends nothing" } else { "the camera is not on the bus" };
+        let why = if frames.alive() {
+            "the camera is on the bus but sends nothing"
+        } else {
+            "the camera is not on the bus"
+        };
         self.fault(DegradedReason::CameraSilent, why.into());
     }
 

@@ -13,8 +13,17 @@ use crate::math::{P3d, V3, V3d};
 use crate::par::{self, Par};
 
 /// Names of the directions, in order; `sex` +1 is the mean man, −1 the mean woman.
-pub const DIRECTIONS: [&str; 9] =
-    ["stature", "girth", "sex", "limb_length", "torso_length", "shoulder_width", "chest", "waist", "hip"];
+pub const DIRECTIONS: [&str; 9] = [
+    "stature",
+    "girth",
+    "sex",
+    "limb_length",
+    "torso_length",
+    "shoulder_width",
+    "chest",
+    "waist",
+    "hip",
+];
 
 /// Coefficients of this size span 98.8 % of a normally distributed population; within them the surface stays sound.
 pub const RANGE: f64 = 2.5;
@@ -108,7 +117,8 @@ impl Source<'_> {
         };
         let offsets = self.mirrored(|i| {
             let p = self.points[i];
-            let carried = p + self.blend(i, |k| joints[k] - old[k] + (p - old[k]) * (size(k) - 1.0));
+            let carried =
+                p + self.blend(i, |k| joints[k] - old[k] + (p - old[k]) * (size(k) - 1.0));
             field.project(&P3d::new(carried.x.max(0.0), carried.y, carried.z), STEPS) - p
         });
         (offsets, joints)
@@ -117,7 +127,10 @@ impl Source<'_> {
     fn by_figure(&self, change: impl Fn(f64) -> Figure) -> Direction {
         let ((v1, j1), (v0, j0)) = (self.reshaped(&change(1.0)), self.reshaped(&change(-1.0)));
         let vertices = v1.iter().zip(&v0).map(|(a, b)| (a - b) * 0.5).collect();
-        (self.smoothed(vertices), j1.iter().zip(&j0).map(|(a, b)| (a - b) * 0.5).collect())
+        (
+            self.smoothed(vertices),
+            j1.iter().zip(&j0).map(|(a, b)| (a - b) * 0.5).collect(),
+        )
     }
 
     /// Stretches bones: `length(name)` is the growth of the bone that ends at a joint, `section(name)` that of the
@@ -135,7 +148,10 @@ impl Source<'_> {
             .enumerate()
             .map(|(k, j)| {
                 let child = self.skeleton().primary_child(k);
-                (child.map_or(0.0, |c| length(&joints[c].name)), section(&j.name))
+                (
+                    child.map_or(0.0, |c| length(&joints[c].name)),
+                    section(&j.name),
+                )
             })
             .collect();
         let mut vertices = self.mirrored(|i| {
@@ -144,14 +160,20 @@ impl Source<'_> {
                 let from = joints[k].rest;
                 let foot = self.skeleton().primary_child(k).map_or(from, |c| {
                     let d = joints[c].rest - from;
-                    from + d * ((p - from).dot(&d) / d.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
+                    from + d
+                        * ((p - from).dot(&d) / d.norm_squared().max(f64::MIN_POSITIVE))
+                            .clamp(0.0, 1.0)
                 });
                 moved[k] + (foot - from) * grow[k].0 + (p - foot) * grow[k].1
             })
         });
-        let lowest = (0..self.points.len()).min_by(|&a, &b| self.points[a].y.total_cmp(&self.points[b].y));
+        let lowest =
+            (0..self.points.len()).min_by(|&a, &b| self.points[a].y.total_cmp(&self.points[b].y));
         let floor = V3d::new(0.0, lowest.map_or(0.0, |i| vertices[i].y), 0.0);
-        vertices.iter_mut().chain(&mut moved).for_each(|v| *v -= floor);
+        vertices
+            .iter_mut()
+            .chain(&mut moved)
+            .for_each(|v| *v -= floor);
         (vertices, moved)
     }
 }
@@ -161,7 +183,10 @@ fn rest(j: &Joints) -> Vec<P3d> {
 }
 
 fn scaled((v, j): Direction, s: f64) -> Direction {
-    (v.into_iter().map(|o| o * s).collect(), j.into_iter().map(|o| o * s).collect())
+    (
+        v.into_iter().map(|o| o * s).collect(),
+        j.into_iter().map(|o| o * s).collect(),
+    )
 }
 
 /// All directions of the shape space.
@@ -202,11 +227,20 @@ pub(super) fn shape_space(source: &Source) -> Result<ShapeSpace, BodyError> {
         ),
         (
             source.by_lengths(|n| if spine(n) { 0.04 } else { 0.0 }, |_| 0.0),
-            Some((|m| m.torso_length, stat::SITTING.residual(stat::STATURE_SITTING))),
+            Some((
+                |m| m.torso_length,
+                stat::SITTING.residual(stat::STATURE_SITTING),
+            )),
         ),
         (
-            source.by_figure(|c| Figure { shoulder: c, ..none }),
-            Some((|m| m.shoulder_width, stat::SHOULDERS.residual(stat::STATURE_SHOULDERS))),
+            source.by_figure(|c| Figure {
+                shoulder: c,
+                ..none
+            }),
+            Some((
+                |m| m.shoulder_width,
+                stat::SHOULDERS.residual(stat::STATURE_SHOULDERS),
+            )),
         ),
         (
             source.by_figure(|c| Figure { chest: c, ..none }),
@@ -216,13 +250,17 @@ pub(super) fn shape_space(source: &Source) -> Result<ShapeSpace, BodyError> {
             source.by_figure(|c| Figure { waist: c, ..none }),
             Some((|m| m.waist, stat::WAIST.residual(stat::MASS_WAIST))),
         ),
-        (source.by_figure(|c| Figure { hip: c, ..none }), Some((|m| m.hip, stat::HIP.residual(stat::MASS_HIP)))),
+        (
+            source.by_figure(|c| Figure { hip: c, ..none }),
+            Some((|m| m.hip, stat::HIP.residual(stat::MASS_HIP))),
+        ),
     ];
     let mut space = ShapeSpace::default();
     let mut stature_unit = None;
     for (name, (mut direction, target)) in DIRECTIONS.iter().zip(raw) {
         if let Some((of, deviation)) = target {
-            let change = 0.5 * (of(&probe(source, &direction, 1.0)?) - of(&probe(source, &direction, -1.0)?));
+            let change = 0.5
+                * (of(&probe(source, &direction, 1.0)?) - of(&probe(source, &direction, -1.0)?));
             direction = scaled(direction, deviation / change);
         }
         if *name == "stature" {
@@ -230,12 +268,29 @@ pub(super) fn shape_space(source: &Source) -> Result<ShapeSpace, BodyError> {
         }
         if let ("sex", Some(unit)) = (*name, &stature_unit) {
             // Men are taller: the figure's sex is at equal stature, the direction's is not.
-            let taller = scaled(unit.clone(), stat::STATURE.sex() / stat::STATURE.deviation());
-            direction.0.iter_mut().zip(&taller.0).for_each(|(a, b)| *a += b);
-            direction.1.iter_mut().zip(&taller.1).for_each(|(a, b)| *a += b);
+            let taller = scaled(
+                unit.clone(),
+                stat::STATURE.sex() / stat::STATURE.deviation(),
+            );
+            direction
+                .0
+                .iter_mut()
+                .zip(&taller.0)
+                .for_each(|(a, b)| *a += b);
+            direction
+                .1
+                .iter_mut()
+                .zip(&taller.1)
+                .for_each(|(a, b)| *a += b);
         }
         space.names.push((*name).to_owned());
-        space.vertices.push(direction.0.iter().map(|o| V3::new(o.x as f32, o.y as f32, o.z as f32)).collect());
+        space.vertices.push(
+            direction
+                .0
+                .iter()
+                .map(|o| V3::new(o.x as f32, o.y as f32, o.z as f32))
+                .collect(),
+        );
         space.joints.push(direction.1);
     }
     Ok(space)
@@ -247,7 +302,16 @@ type Target = (fn(&Measurements) -> f64, f64);
 /// Measures the body moved by `c` units of a direction.
 fn probe(source: &Source, direction: &Direction, c: f64) -> Result<Measurements, BodyError> {
     let mut body = source.template.personalise(&BodyShape::default());
-    body.vertices.iter_mut().zip(&direction.0).for_each(|(p, o)| *p += (o * c).cast::<f32>());
-    body.joints.iter_mut().zip(&direction.1).for_each(|(p, o)| *p += o * c);
-    measure(source.template, &body).map_err(|e| BodyError::Array { array: "shapedirs".into(), why: e.to_string() })
+    body.vertices
+        .iter_mut()
+        .zip(&direction.0)
+        .for_each(|(p, o)| *p += (o * c).cast::<f32>());
+    body.joints
+        .iter_mut()
+        .zip(&direction.1)
+        .for_each(|(p, o)| *p += o * c);
+    measure(source.template, &body).map_err(|e| BodyError::Array {
+        array: "shapedirs".into(),
+        why: e.to_string(),
+    })
 }

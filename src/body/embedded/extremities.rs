@@ -51,20 +51,42 @@ pub(super) fn hand(f: &mut Field, fig: &Figure, j: &Joints) {
     let size = fig.hand();
     let at = |w: f64, u: f64, t: f64| frame.point(u * size, w * size, t * size);
     let palm = [
-        Station { t: -0.005, c: [0.000, 0.000, 0.0195, 0.0195, 0.0275, 0.0275, 0.1] },
-        Station { t: 0.020, c: [0.000, 0.000, 0.0180, 0.0190, 0.0310, 0.0290, 0.3] },
-        Station { t: 0.050, c: [0.000, 0.000, 0.0150, 0.0170, 0.0370, 0.0360, 0.4] },
-        Station { t: 0.075, c: [0.000, 0.000, 0.0125, 0.0140, 0.0390, 0.0385, 0.4] },
-        Station { t: 0.092, c: [0.000, -0.001, 0.0100, 0.0110, 0.0375, 0.0375, 0.4] },
+        Station {
+            t: -0.005,
+            c: [0.000, 0.000, 0.0195, 0.0195, 0.0275, 0.0275, 0.1],
+        },
+        Station {
+            t: 0.020,
+            c: [0.000, 0.000, 0.0180, 0.0190, 0.0310, 0.0290, 0.3],
+        },
+        Station {
+            t: 0.050,
+            c: [0.000, 0.000, 0.0150, 0.0170, 0.0370, 0.0360, 0.4],
+        },
+        Station {
+            t: 0.075,
+            c: [0.000, 0.000, 0.0125, 0.0140, 0.0390, 0.0385, 0.4],
+        },
+        Station {
+            t: 0.092,
+            c: [0.000, -0.001, 0.0100, 0.0110, 0.0375, 0.0375, 0.4],
+        },
     ]
-    .map(|s| Station { t: s.t * size, c: std::array::from_fn(|k| if k < 6 { s.c[k] * size } else { s.c[k] }) });
-    f.add(Solid::Loft(Loft::new(frame, palm.to_vec(), [0.02, 0.012])), 0.012);
+    .map(|s| Station {
+        t: s.t * size,
+        c: std::array::from_fn(|k| if k < 6 { s.c[k] * size } else { s.c[k] }),
+    });
+    f.add(
+        Solid::Loft(Loft::new(frame, palm.to_vec(), [0.02, 0.012])),
+        0.012,
+    );
     for finger in &FINGERS {
         let mut p = at(finger.root[0] * 0.9, finger.root[1], finger.root[2] - 0.012);
         let mut dir = (frame.a + frame.w * finger.spread - frame.u * 0.05).normalize();
         let total: f64 = finger.segments.iter().sum();
         let mut done = 0.0;
-        let radius = |d: f64| size * (finger.radii[0] + (finger.radii[1] - finger.radii[0]) * d / total);
+        let radius =
+            |d: f64| size * (finger.radii[0] + (finger.radii[1] - finger.radii[0]) * d / total);
         for (k, &l) in finger.segments.iter().enumerate() {
             let l = if k == 0 { l + 0.010 } else { l };
             let q = p + dir * (l * size);
@@ -78,22 +100,38 @@ pub(super) fn hand(f: &mut Field, fig: &Figure, j: &Joints) {
     // Thumb: from the root of the hand, forward and towards the palm.
     let mut p = at(0.020, -0.006, 0.018);
     let mut dir = (frame.a * 0.72 + frame.w * 0.66 - frame.u * 0.30).normalize();
-    for (l, r0, r1, blend) in
-        [(0.042, 0.0165, 0.0125, 0.014), (0.032, 0.0122, 0.0105, 0.005), (0.024, 0.0106, 0.0082, 0.004)]
-    {
+    for (l, r0, r1, blend) in [
+        (0.042, 0.0165, 0.0125, 0.014),
+        (0.032, 0.0122, 0.0105, 0.005),
+        (0.024, 0.0106, 0.0082, 0.004),
+    ] {
         let q = p + dir * (l * size);
         f.cone(p, q, r0 * size, r1 * size, blend);
         dir = (dir + frame.a * 0.14).normalize();
         p = q;
     }
     // Heel of the hand on the side of the little finger.
-    f.bump_in(Frame { origin: at(-0.024, -0.016, 0.035), ..frame }, [0.02 * size, 0.022 * size, 0.04 * size], 0.004);
+    f.bump_in(
+        Frame {
+            origin: at(-0.024, -0.016, 0.035),
+            ..frame
+        },
+        [0.02 * size, 0.022 * size, 0.04 * size],
+        0.004,
+    );
     // Knuckles and the head of the ulna.
     for finger in &FINGERS {
         let o = at(finger.root[0] * 0.95, 0.011, finger.root[2] - 0.006);
         f.bump_in(Frame { origin: o, ..frame }, [0.010, 0.010, 0.014], 0.0025);
     }
-    f.bump_in(Frame { origin: at(-0.022, 0.014, -0.014), ..frame }, [0.014, 0.014, 0.016], 0.004);
+    f.bump_in(
+        Frame {
+            origin: at(-0.022, 0.014, -0.014),
+            ..frame
+        },
+        [0.014, 0.014, 0.016],
+        0.004,
+    );
 }
 
 /// Foot sections: z from the ankle, half width, top, x offset, metres; the sole lies on y = 0.
@@ -126,23 +164,56 @@ pub(super) fn foot(f: &mut Field, fig: &Figure, j: &Joints) {
             let (hw, top, x) = (r[1] * size, r[2] * size, r[3] * size);
             // u = x outward, w = up; the section's middle is low, so the foot is wide at the sole.
             let mid = 0.38 * top;
-            Station { t: r[0] * size, c: [x, mid, hw, hw, top - mid, mid, 0.35] }
+            Station {
+                t: r[0] * size,
+                c: [x, mid, hw, hw, top - mid, mid, 0.35],
+            }
         })
         .collect();
-    let frame = Frame { origin: P3d::new(j.ankle.x, 0.0, j.ankle.z), u: V3d::x(), w: V3d::y(), a: V3d::z() };
-    f.add(Solid::Loft(Loft::new(frame, stations, [0.020, 0.012])), 0.022);
+    let frame = Frame {
+        origin: P3d::new(j.ankle.x, 0.0, j.ankle.z),
+        u: V3d::x(),
+        w: V3d::y(),
+        a: V3d::z(),
+    };
+    f.add(
+        Solid::Loft(Loft::new(frame, stations, [0.020, 0.012])),
+        0.022,
+    );
     for t in TOES {
         let x = j.ankle.x + (0.011 + t[0]) * size;
         let r = t[2] * size;
         let z = j.ankle.z + 0.128 * size;
         let turn = 0.05 * t[1];
-        f.cone(P3d::new(x, r + 0.002, z), P3d::new(x + turn, r * 0.95, z + t[1] * size - r), r * 1.02, r * 0.92, 0.006);
+        f.cone(
+            P3d::new(x, r + 0.002, z),
+            P3d::new(x + turn, r * 0.95, z + t[1] * size - r),
+            r * 1.02,
+            r * 0.92,
+            0.006,
+        );
     }
     // Malleoli, Achilles tendon hollows, arch.
-    f.bump(j.ankle + V3d::new(-0.034, 0.010, 0.006), [0.018, 0.020, 0.020], 0.006);
-    f.bump(j.ankle + V3d::new(0.034, -0.002, -0.004), [0.018, 0.020, 0.020], 0.006);
+    f.bump(
+        j.ankle + V3d::new(-0.034, 0.010, 0.006),
+        [0.018, 0.020, 0.020],
+        0.006,
+    );
+    f.bump(
+        j.ankle + V3d::new(0.034, -0.002, -0.004),
+        [0.018, 0.020, 0.020],
+        0.006,
+    );
     for side in [-1.0, 1.0] {
-        f.bump(j.ankle + V3d::new(0.026 * side, 0.006, -0.032), [0.020, 0.045, 0.020], -0.005);
+        f.bump(
+            j.ankle + V3d::new(0.026 * side, 0.006, -0.032),
+            [0.020, 0.045, 0.020],
+            -0.005,
+        );
     }
-    f.bump(P3d::new(j.ankle.x - 0.030, 0.008, j.ankle.z + 0.050), [0.026, 0.022, 0.050], -0.008);
+    f.bump(
+        P3d::new(j.ankle.x - 0.030, 0.008, j.ankle.z + 0.050),
+        [0.026, 0.022, 0.050],
+        -0.008,
+    );
 }

@@ -19,7 +19,10 @@ pub(super) struct Station {
 impl Station {
     /// An ellipse with half axes `ru`, `rw` around (cu, cw).
     pub(super) fn ellipse(t: f64, cu: f64, cw: f64, ru: f64, rw: f64) -> Self {
-        Self { t, c: [cu, cw, ru, ru, rw, rw, 0.0] }
+        Self {
+            t,
+            c: [cu, cw, ru, ru, rw, rw, 0.0],
+        }
     }
 }
 
@@ -37,11 +40,21 @@ impl Frame {
     pub(super) fn along(from: P3d, to: P3d, front: V3d) -> Self {
         let a = (to - from).normalize();
         let w = (front - a * front.dot(&a)).normalize();
-        Self { origin: from, u: w.cross(&a), w, a }
+        Self {
+            origin: from,
+            u: w.cross(&a),
+            w,
+            a,
+        }
     }
     /// The world's axes at a point, axis up: u = x, w = z, a = y.
     pub(super) fn upright(origin: P3d) -> Self {
-        Self { origin, u: V3d::x(), w: V3d::z(), a: V3d::y() }
+        Self {
+            origin,
+            u: V3d::x(),
+            w: V3d::z(),
+            a: V3d::y(),
+        }
     }
     /// Local coordinates (u, w, along the axis).
     pub(super) fn local(&self, p: &P3d) -> V3d {
@@ -68,19 +81,30 @@ impl Loft {
     /// Stations in order along the axis, at least two; heights of the caps before the first and after the last, metres.
     pub(super) fn new(frame: Frame, stations: Vec<Station>, caps: [f64; 2]) -> Self {
         let n = stations.len();
-        let secant =
-            |i: usize, k: usize| (stations[i + 1].c[k] - stations[i].c[k]) / (stations[i + 1].t - stations[i].t);
+        let secant = |i: usize, k: usize| {
+            (stations[i + 1].c[k] - stations[i].c[k]) / (stations[i + 1].t - stations[i].t)
+        };
         // Inside, the parabola through three points; at the ends, the chord.
         let slope = |i: usize, k: usize| match i {
             0 => secant(0, k),
             i if i + 1 == n => secant(i - 1, k),
             i => {
-                let (l, r) = (stations[i].t - stations[i - 1].t, stations[i + 1].t - stations[i].t);
+                let (l, r) = (
+                    stations[i].t - stations[i - 1].t,
+                    stations[i + 1].t - stations[i].t,
+                );
                 (secant(i - 1, k) * r + secant(i, k) * l) / (l + r)
             }
         };
-        let slopes = (0..n).map(|i| std::array::from_fn(|k| slope(i, k))).collect();
-        Self { frame, stations, slopes, caps }
+        let slopes = (0..n)
+            .map(|i| std::array::from_fn(|k| slope(i, k)))
+            .collect();
+        Self {
+            frame,
+            stations,
+            slopes,
+            caps,
+        }
     }
     /// Section at `t`: a cubic Hermite through the stations.
     fn section(&self, t: f64) -> [f64; CHANNELS] {
@@ -108,7 +132,9 @@ impl Loft {
         let r2 = (x2 + y2 + e2).sqrt();
         let r4 = (x2 * x2 + y2 * y2 + e2 * e2).sqrt().sqrt();
         let r = r2 + (r4 - r2) * c[6];
-        let g = ((x2 / (ru * ru) + y2 / (rw * rw) + e2 / (cap * cap)) / (r2 * r2).max(f64::MIN_POSITIVE)).sqrt();
+        let g = ((x2 / (ru * ru) + y2 / (rw * rw) + e2 / (cap * cap))
+            / (r2 * r2).max(f64::MIN_POSITIVE))
+        .sqrt();
         if r2 < CENTRE {
             return -ru.min(rw);
         }
@@ -121,7 +147,12 @@ impl Loft {
         for (i, s) in self.stations.iter().enumerate() {
             let t0 = s.t - if i == 0 { self.caps[0] } else { 0.0 };
             let t1 = s.t + if i == last { self.caps[1] } else { 0.0 };
-            for (u, w) in [(s.c[2], s.c[4]), (s.c[2], -s.c[5]), (-s.c[3], s.c[4]), (-s.c[3], -s.c[5])] {
+            for (u, w) in [
+                (s.c[2], s.c[4]),
+                (s.c[2], -s.c[5]),
+                (-s.c[3], s.c[4]),
+                (-s.c[3], -s.c[5]),
+            ] {
                 for t in [t0, t1] {
                     let q = self.frame.point(s.c[0] + u, s.c[1] + w, t);
                     lo = lo.inf(&q);
@@ -151,7 +182,11 @@ impl Solid {
                 let l = f.local(p).component_div(r);
                 let k0 = l.norm();
                 let k1 = l.component_div(r).norm();
-                if k0 < CENTRE { -r.min() } else { k0 * (k0 - 1.0) / k1 }
+                if k0 < CENTRE {
+                    -r.min()
+                } else {
+                    k0 * (k0 - 1.0) / k1
+                }
             }
             Self::Cone([a, b], [ra, rb]) => {
                 let d = b - a;
@@ -210,14 +245,21 @@ impl Field {
     /// Adds a solid, blended over `blend` metres.
     pub(super) fn add(&mut self, solid: Solid, blend: f64) {
         let bounds = solid.bounds();
-        self.parts.push(Part { solid, blend, bounds });
+        self.parts.push(Part {
+            solid,
+            blend,
+            bounds,
+        });
     }
     pub(super) fn cone(&mut self, a: P3d, b: P3d, ra: f64, rb: f64, blend: f64) {
         self.add(Solid::Cone([a, b], [ra, rb]), blend);
     }
     pub(super) fn ellipsoid(&mut self, c: impl Into<P3d>, r: [f64; 3], blend: f64) {
         // Frame::upright stores (u, w, a) = (x, z, y).
-        self.add(Solid::Ellipsoid(Frame::upright(c.into()), V3d::new(r[0], r[2], r[1])), blend);
+        self.add(
+            Solid::Ellipsoid(Frame::upright(c.into()), V3d::new(r[0], r[2], r[1])),
+            blend,
+        );
     }
     /// Raises the surface by about `height` metres at `c`, fading out at the radii (x, y, z).
     pub(super) fn bump(&mut self, c: impl Into<P3d>, r: [f64; 3], height: f64) {
@@ -226,7 +268,12 @@ impl Field {
     /// The same in a given frame, radii (u, w, along the axis).
     pub(super) fn bump_in(&mut self, frame: Frame, r: [f64; 3], height: f64) {
         let radii = V3d::from(r);
-        self.bumps.push(Bump { frame, radii, height, reach: radii.max() * radii.max() });
+        self.bumps.push(Bump {
+            frame,
+            radii,
+            height,
+            reach: radii.max() * radii.max(),
+        });
     }
     /// Signed distance estimate, metres; near the surface its gradient is about one.
     pub(super) fn value(&self, at: &P3d) -> f64 {
@@ -241,7 +288,11 @@ impl Field {
                 continue;
             }
             let e = part.solid.distance(&p);
-            d = if d == f64::INFINITY { e } else { smooth_min(d, e, part.blend) };
+            d = if d == f64::INFINITY {
+                e
+            } else {
+                smooth_min(d, e, part.blend)
+            };
         }
         for b in &self.bumps {
             if (p - b.frame.origin).norm_squared() > b.reach {

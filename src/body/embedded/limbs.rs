@@ -70,7 +70,13 @@ fn tube<const N: usize>(
             // Hips reach down to the middle of the thigh; a woman's thigh starts farther out.
             let high = hip * (1.0 - 2.0 * s[0].max(0.0)).max(0.0);
             let add = s[5] * fig.girth + high * fig.hip;
-            Station::ellipse(s[0] * length, s[1] - 0.8 * high * fig.sex, s[2], s[3] * grow + add, s[4] * grow + add)
+            Station::ellipse(
+                s[0] * length,
+                s[1] - 0.8 * high * fig.sex,
+                s[2],
+                s[3] * grow + add,
+                s[4] * grow + add,
+            )
         })
         .collect();
     Solid::Loft(Loft::new(frame, stations, caps))
@@ -78,21 +84,81 @@ fn tube<const N: usize>(
 
 pub(super) fn arm(f: &mut Field, fig: &Figure, j: &Joints) {
     let upper = Frame::along(j.shoulder, j.elbow, V3d::z());
-    f.add(tube(upper, (j.elbow - j.shoulder).norm(), &UPPER_ARM, fig, 0.055, 0.0, [0.03, 0.03]), 0.022);
+    f.add(
+        tube(
+            upper,
+            (j.elbow - j.shoulder).norm(),
+            &UPPER_ARM,
+            fig,
+            0.055,
+            0.0,
+            [0.03, 0.03],
+        ),
+        0.022,
+    );
     let fore = Frame::along(j.elbow, j.wrist, V3d::z());
-    f.add(tube(fore, (j.wrist - j.elbow).norm(), &FOREARM, fig, 0.065, 0.0, [0.03, 0.015]), 0.03);
+    f.add(
+        tube(
+            fore,
+            (j.wrist - j.elbow).norm(),
+            &FOREARM,
+            fig,
+            0.065,
+            0.0,
+            [0.03, 0.015],
+        ),
+        0.03,
+    );
     // Olecranon: the point of the elbow, behind.
-    f.bump(j.elbow + V3d::new(0.006, 0.0, -0.036), [0.030, 0.030, 0.030], 0.005);
+    f.bump(
+        j.elbow + V3d::new(0.006, 0.0, -0.036),
+        [0.030, 0.030, 0.030],
+        0.005,
+    );
 }
 
 pub(super) fn leg(f: &mut Field, fig: &Figure, j: &Joints) {
     let upper = Frame::along(j.hip, j.knee, V3d::z());
-    f.add(tube(upper, (j.knee - j.hip).norm(), &THIGH, fig, -0.012, 0.006, [0.04, 0.03]), 0.04);
+    f.add(
+        tube(
+            upper,
+            (j.knee - j.hip).norm(),
+            &THIGH,
+            fig,
+            -0.012,
+            0.006,
+            [0.04, 0.03],
+        ),
+        0.04,
+    );
     let lower = Frame::along(j.knee, j.ankle, V3d::z());
-    f.add(tube(lower, (j.ankle - j.knee).norm(), &SHANK, fig, 0.012, 0.0, [0.03, 0.02]), 0.038);
+    f.add(
+        tube(
+            lower,
+            (j.ankle - j.knee).norm(),
+            &SHANK,
+            fig,
+            0.012,
+            0.0,
+            [0.03, 0.02],
+        ),
+        0.038,
+    );
     // Kneecap and the hollow of the knee.
-    f.bump(j.knee + V3d::new(0.0, 0.012, 0.056), [0.032, 0.042, 0.035], 0.004);
-    f.bump(j.knee + V3d::new(0.0, 0.0, -0.058), [0.034, 0.055, 0.035], -0.005);
+    f.bump(
+        j.knee + V3d::new(0.0, 0.012, 0.056),
+        [0.032, 0.042, 0.035],
+        0.004,
+    );
+    f.bump(
+        j.knee + V3d::new(0.0, 0.0, -0.058),
+        [0.034, 0.055, 0.035],
+        -0.005,
+    );
     // Vastus medialis above the knee, inside.
-    f.bump(j.knee + V3d::new(-0.036, 0.070, 0.036), [0.035, 0.060, 0.045], 0.005);
+    f.bump(
+        j.knee + V3d::new(-0.036, 0.070, 0.036),
+        [0.035, 0.060, 0.045],
+        0.005,
+    );
 }

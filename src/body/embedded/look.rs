@@ -13,10 +13,26 @@ fn shade(t: &Template, vertices: &[P3], yaw: f32, view: (f32, f32, f32, u32, u32
     let (left, top, scale, w, h) = view;
     let rot = Rotation3::from_axis_angle(&Vector3::y_axis(), -yaw.to_radians());
     // View frame: x right as seen from the front = −body x; y down; z away from the viewer.
-    let seen: Vec<P3> = vertices.iter().map(|p| rot * p).map(|p| P3::new(p.x, -p.y, -p.z)).collect();
+    let seen: Vec<P3> = vertices
+        .iter()
+        .map(|p| rot * p)
+        .map(|p| P3::new(p.x, -p.y, -p.z))
+        .collect();
     let mut normals = Vec::new();
-    vertex_normals(Par::Rayon, &seen, t.mesh().faces(), t.topology().vertex_faces(), &mut normals);
-    let v = View::Orthographic { width: w, height: h, left, top: -top, pixels_per_metre: scale };
+    vertex_normals(
+        Par::Rayon,
+        &seen,
+        t.mesh().faces(),
+        t.topology().vertex_faces(),
+        &mut normals,
+    );
+    let v = View::Orthographic {
+        width: w,
+        height: h,
+        left,
+        top: -top,
+        pixels_per_metre: scale,
+    };
     let mut buffer = VisibilityBuffer::default();
     rasterise_reference(&v, &seen, t.mesh().faces(), &mut buffer);
     let light = V3::new(-0.45, -0.4, -0.8).normalize();
@@ -27,7 +43,10 @@ fn shade(t: &Template, vertices: &[P3], yaw: f32, view: (f32, f32, f32, u32, u32
                 return [40, 42, 48];
             }
             let f = t.mesh().faces()[buffer.face[i] as usize];
-            let (u, r) = ((i as u32 % w) as f32 / scale + left, (i as u32 / w) as f32 / scale - top);
+            let (u, r) = (
+                (i as u32 % w) as f32 / scale + left,
+                (i as u32 / w) as f32 / scale - top,
+            );
             let [a, b, c] = f.map(|k| seen[k as usize]);
             let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
             let e = |p: P3, q: P3| ((q.x - p.x) * (r - p.y) - (q.y - p.y) * (u - p.x)) / area;
@@ -45,7 +64,9 @@ fn sheet(dir: &str, name: &str, pictures: &[Vec<[u8; 3]>], w: u32, h: u32) {
     let mut bytes = format!("P6 {} {h} 255\n", w * pictures.len() as u32).into_bytes();
     for y in 0..h as usize {
         for p in pictures {
-            p[y * w as usize..(y + 1) * w as usize].iter().for_each(|c| bytes.extend(c));
+            p[y * w as usize..(y + 1) * w as usize]
+                .iter()
+                .for_each(|c| bytes.extend(c));
         }
     }
     std::fs::write(format!("{dir}/{name}.ppm"), bytes).expect("writable folder");
@@ -68,7 +89,10 @@ type Turns = Vec<(&'static str, [f64; 3])>;
 pub(super) fn poses() -> Vec<(&'static str, Turns)> {
     let q = std::f64::consts::FRAC_PI_4;
     let both = |j: [&'static str; 2], a: [f64; 3]| [(j[0], a), (j[1], [a[0], -a[1], -a[2]])];
-    let (sh, hip) = (["left_shoulder", "right_shoulder"], ["left_hip", "right_hip"]);
+    let (sh, hip) = (
+        ["left_shoulder", "right_shoulder"],
+        ["left_hip", "right_hip"],
+    );
     let hinge = |j: [&'static str; 2], a: f64| [(j[0], [a, 0.0, 0.0]), (j[1], [a, 0.0, 0.0])];
     let mut sit: Turns = both(hip, [-1.5, 0.0, 0.0]).to_vec();
     sit.extend(hinge(["left_knee", "right_knee"], 1.5));
@@ -90,7 +114,9 @@ pub(super) fn poses() -> Vec<(&'static str, Turns)> {
 
 #[test]
 fn pictures() {
-    let Ok(dir) = std::env::var("TRYON_LOOK") else { return };
+    let Ok(dir) = std::env::var("TRYON_LOOK") else {
+        return;
+    };
     let only = std::env::var("TRYON_LOOK_ONLY").unwrap_or_default();
     let start = std::time::Instant::now();
     let t = template();
@@ -101,7 +127,10 @@ fn pictures() {
         t.mesh().faces().len(),
         t.mesh().volume()
     );
-    eprintln!("generated {:#?}", crate::body::measure::measure(&t, &t.personalise(&BodyShape::default())));
+    eprintln!(
+        "generated {:#?}",
+        crate::body::measure::measure(&t, &t.personalise(&BodyShape::default()))
+    );
     let full = |w: f32| (-w / 2.0, 1.75, 420.0, (w * 420.0) as u32, 760);
     let shape = BodyShape::default();
     for (name, set) in poses() {
@@ -110,8 +139,15 @@ fn pictures() {
         }
         let v = posed(&t, &shape, &set);
         let width = if name == "t_pose" { 1.8 } else { 1.2 };
-        let view = if name == "raised" { (-0.6, 2.1, 380.0, 456, 820) } else { full(width) };
-        let pics: Vec<_> = [0.0, 40.0, 90.0, 180.0].iter().map(|&y| shade(&t, &v, y, view)).collect();
+        let view = if name == "raised" {
+            (-0.6, 2.1, 380.0, 456, 820)
+        } else {
+            full(width)
+        };
+        let pics: Vec<_> = [0.0, 40.0, 90.0, 180.0]
+            .iter()
+            .map(|&y| shade(&t, &v, y, view))
+            .collect();
         sheet(&dir, name, &pics, view.3, view.4);
     }
     if only.is_empty() || only.contains("shapes") {
@@ -119,7 +155,10 @@ fn pictures() {
         for (d, name) in DIRECTIONS.iter().enumerate() {
             let mut pics = Vec::new();
             for c in [-1.0, 1.0] {
-                let mut shape = BodyShape { coefficients: vec![0.0; DIRECTIONS.len()], ..BodyShape::default() };
+                let mut shape = BodyShape {
+                    coefficients: vec![0.0; DIRECTIONS.len()],
+                    ..BodyShape::default()
+                };
                 shape.coefficients[d] = c * if matches!(d, 0 | 2) { 1.0 } else { 2.0 };
                 let v = posed(&t, &shape, &[]);
                 pics.push(shade(&t, &v, 0.0, view));
@@ -128,7 +167,8 @@ fn pictures() {
                     pics.push(shade(&t, &v, 180.0, view));
                 }
                 shape.coefficients[d] = c;
-                let m = crate::body::measure::measure(&t, &t.personalise(&shape)).expect("measurable");
+                let m =
+                    crate::body::measure::measure(&t, &t.personalise(&shape)).expect("measurable");
                 eprintln!(
                     "generated {name} {c}: stature {:.3} chest {:.3} waist {:.3} hip {:.3} neck {:.3} thigh {:.3} calf {:.3} arm {:.3} wrist {:.3} shoulder {:.3} inseam {:.3} armlen {:.3} torso {:.3}",
                     m.stature,
@@ -152,16 +192,27 @@ fn pictures() {
     if only.is_empty() || only.contains("close") {
         let v = posed(&t, &shape, &[]);
         let trunk = (-0.34, 1.5, 720.0, 490, 560);
-        let pics: Vec<_> = [0.0, 40.0, 90.0, 180.0].iter().map(|&y| shade(&t, &v, y, trunk)).collect();
+        let pics: Vec<_> = [0.0, 40.0, 90.0, 180.0]
+            .iter()
+            .map(|&y| shade(&t, &v, y, trunk))
+            .collect();
         sheet(&dir, "close_trunk", &pics, 490, 560);
         let legs = (-0.3, 0.95, 620.0, 372, 600);
-        let pics: Vec<_> = [0.0, 40.0, 90.0, 180.0].iter().map(|&y| shade(&t, &v, y, legs)).collect();
+        let pics: Vec<_> = [0.0, 40.0, 90.0, 180.0]
+            .iter()
+            .map(|&y| shade(&t, &v, y, legs))
+            .collect();
         sheet(&dir, "close_legs", &pics, 372, 600);
         for (name, c) in [("man", 1.0), ("woman", -1.0)] {
-            let shape = BodyShape { coefficients: vec![0.0, 0.0, c], ..BodyShape::default() };
+            let shape = BodyShape {
+                coefficients: vec![0.0, 0.0, c],
+                ..BodyShape::default()
+            };
             let v = posed(&t, &shape, &poses()[2].1);
-            let pics: Vec<_> =
-                [0.0, 40.0, 90.0, 180.0].iter().map(|&y| shade(&t, &v, y, (-0.42, 1.8, 500.0, 420, 920))).collect();
+            let pics: Vec<_> = [0.0, 40.0, 90.0, 180.0]
+                .iter()
+                .map(|&y| shade(&t, &v, y, (-0.42, 1.8, 500.0, 420, 920)))
+                .collect();
             sheet(&dir, &format!("close_{name}"), &pics, 420, 920);
         }
         let v = posed(
@@ -178,11 +229,16 @@ fn pictures() {
                 ("right_shoulder", [0.0, 1.6, -0.9]),
             ],
         );
-        let pics: Vec<_> =
-            [20.0, 60.0, 90.0, 180.0].iter().map(|&y| shade(&t, &v, y, (-0.55, 1.65, 500.0, 560, 840))).collect();
+        let pics: Vec<_> = [20.0, 60.0, 90.0, 180.0]
+            .iter()
+            .map(|&y| shade(&t, &v, y, (-0.55, 1.65, 500.0, 560, 840)))
+            .collect();
         sheet(&dir, "close_bend", &pics, 560, 840);
         let face = (-0.16, 1.72, 1900.0, 608, 608);
-        let pics: Vec<_> = [0.0, 30.0, 60.0, 90.0].iter().map(|&y| shade(&t, &v, y, face)).collect();
+        let pics: Vec<_> = [0.0, 30.0, 60.0, 90.0]
+            .iter()
+            .map(|&y| shade(&t, &v, y, face))
+            .collect();
         sheet(&dir, "close_head", &pics, 608, 608);
         let hand = (0.46, 1.05, 2000.0, 560, 600);
         let pics = vec![

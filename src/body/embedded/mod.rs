@@ -48,10 +48,22 @@ fn edge_length(j: &Joints, p: &P3d) -> f64 {
     let ramp = |x: f64, a: f64, b: f64| ((x - a) / (b - a)).clamp(0.0, 1.0);
     let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
     let head = mix(EDGES[0], EDGES[1], ramp(p.y, 1.40, 1.48));
-    let face = mix(head, EDGES[2], ramp(p.z, 0.03, 0.07) * ramp(p.y, 1.44, 1.49) * (1.0 - ramp(p.y, 1.60, 1.64)));
-    let face = mix(face, EDGES[2], ramp(p.x, 0.066, 0.074) * ramp(p.y, 1.52, 1.54) * (1.0 - ramp(p.y, 1.61, 1.63)));
+    let face = mix(
+        head,
+        EDGES[2],
+        ramp(p.z, 0.03, 0.07) * ramp(p.y, 1.44, 1.49) * (1.0 - ramp(p.y, 1.60, 1.64)),
+    );
+    let face = mix(
+        face,
+        EDGES[2],
+        ramp(p.x, 0.066, 0.074) * ramp(p.y, 1.52, 1.54) * (1.0 - ramp(p.y, 1.61, 1.63)),
+    );
     let along = (p - j.wrist).dot(&(j.hand_end - j.wrist).normalize());
-    let hand = if p.x > 0.3 { mix(face, EDGES[3], ramp(along, -0.05, 0.03)) } else { face };
+    let hand = if p.x > 0.3 {
+        mix(face, EDGES[3], ramp(along, -0.05, 0.03))
+    } else {
+        face
+    };
     mix(hand, EDGES[4], 1.0 - ramp(p.y, 0.06, 0.14))
 }
 
@@ -66,7 +78,13 @@ fn whole(half: &[P3d], faces: &[Face]) -> (Vec<P3d>, Vec<Face>, Vec<u32>) {
         }
     }
     let mut all = faces.to_vec();
-    all.extend(faces.iter().map(|f| [twin[f[0] as usize], twin[f[2] as usize], twin[f[1] as usize]]));
+    all.extend(faces.iter().map(|f| {
+        [
+            twin[f[0] as usize],
+            twin[f[2] as usize],
+            twin[f[1] as usize],
+        ]
+    }));
     let mut mirror = twin.clone();
     mirror.resize(points.len(), 0);
     for (i, &t) in twin.iter().enumerate() {
@@ -83,19 +101,35 @@ pub fn generate() -> Result<Template, BodyError> {
     let fig = Figure::default();
     let j = fig.joints();
     let field = carve(&fig, &j);
-    let (points, faces) =
-        polygonise::polygonise(&field, P3d::new(0.0, -0.03, -0.25), P3d::new(0.75, STATURE + 0.05, 0.30));
+    let (points, faces) = polygonise::polygonise(
+        &field,
+        P3d::new(0.0, -0.03, -0.25),
+        P3d::new(0.75, STATURE + 0.05, 0.30),
+    );
     let target = |p: &P3d| edge_length(&j, p);
     let (half, half_faces) = remesh::Remesher::new(&field, &target, points, faces).run(ROUNDS);
     let (points, faces, mirror) = whole(&half, &half_faces);
     let joints = rig::joints(&j);
     let skeleton = Skeleton::new(joints)?;
-    let vertices = points.iter().map(|p| P3::new(p.x as f32, p.y as f32, p.z as f32)).collect();
+    let vertices = points
+        .iter()
+        .map(|p| P3::new(p.x as f32, p.y as f32, p.z as f32))
+        .collect();
     let mesh = TriMesh::new(vertices, faces)?;
     let weights = rig::skin_weights(&j, &points, &Topology::new(&mesh)?, &skeleton)?;
     let plain = Template::new(NAME, mesh, skeleton, weights, None)?;
-    let space = directions::shape_space(&directions::Source { template: &plain, points: &points, mirror: &mirror })?;
-    Template::new(NAME, plain.mesh().clone(), plain.skeleton().clone(), plain.weights().clone(), Some(space))
+    let space = directions::shape_space(&directions::Source {
+        template: &plain,
+        points: &points,
+        mirror: &mirror,
+    })?;
+    Template::new(
+        NAME,
+        plain.mesh().clone(),
+        plain.skeleton().clone(),
+        plain.weights().clone(),
+        Some(space),
+    )
 }
 
 /// The embedded body, generated on first use and shared.
@@ -104,8 +138,13 @@ pub fn generate() -> Result<Template, BodyError> {
 /// Never in a build that passes its tests: generation has no input.
 pub fn template() -> Arc<Template> {
     static TEMPLATE: OnceLock<Arc<Template>> = OnceLock::new();
-    #[expect(clippy::expect_used, reason = "generation has no input; a test generates it")]
-    TEMPLATE.get_or_init(|| Arc::new(generate().expect("the embedded body fits together"))).clone()
+    #[expect(
+        clippy::expect_used,
+        reason = "generation has no input; a test generates it"
+    )]
+    TEMPLATE
+        .get_or_init(|| Arc::new(generate().expect("the embedded body fits together")))
+        .clone()
 }
 
 #[cfg(test)]

@@ -13,13 +13,23 @@ const BLOCK: i32 = 4;
 /// Levels of blocks above the smallest; each level doubles the edge.
 const LEVELS: u32 = 3;
 /// The six tetrahedra around the diagonal of a cube; corners are bits x, y, z.
-const TETRAHEDRA: [[usize; 4]; 6] =
-    [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
+const TETRAHEDRA: [[usize; 4]; 6] = [
+    [0, 1, 3, 7],
+    [0, 3, 2, 7],
+    [0, 2, 6, 7],
+    [0, 6, 4, 7],
+    [0, 4, 5, 7],
+    [0, 5, 1, 7],
+];
 
 type Node = [i32; 3];
 
 fn position(n: &Node) -> P3d {
-    P3d::new(f64::from(n[0]) * CELL, f64::from(n[1]) * CELL, f64::from(n[2]) * CELL)
+    P3d::new(
+        f64::from(n[0]) * CELL,
+        f64::from(n[1]) * CELL,
+        f64::from(n[2]) * CELL,
+    )
 }
 
 /// Blocks (by their lowest node) that may hold a piece of the surface.
@@ -42,7 +52,12 @@ fn blocks(field: &Field, lo: Node, hi: Node) -> Vec<Node> {
             let c = position(&list[i]) + nalgebra::Vector3::repeat(half);
             field.value(&c).abs() < reach
         });
-        list = list.iter().zip(&keep).filter(|(_, k)| **k).map(|(b, _)| *b).collect();
+        list = list
+            .iter()
+            .zip(&keep)
+            .filter(|(_, k)| **k)
+            .map(|(b, _)| *b)
+            .collect();
         if edge == BLOCK {
             return list;
         }
@@ -50,7 +65,13 @@ fn blocks(field: &Field, lo: Node, hi: Node) -> Vec<Node> {
         list = list
             .iter()
             .flat_map(|b| {
-                (0..8).map(move |k| [b[0] + edge * (k & 1), b[1] + edge * (k >> 1 & 1), b[2] + edge * (k >> 2)])
+                (0..8).map(move |k| {
+                    [
+                        b[0] + edge * (k & 1),
+                        b[1] + edge * (k >> 1 & 1),
+                        b[2] + edge * (k >> 2),
+                    ]
+                })
             })
             .collect();
     }
@@ -59,8 +80,13 @@ fn blocks(field: &Field, lo: Node, hi: Node) -> Vec<Node> {
 /// The zero level of `field` for x ≥ 0 between `lo` and `hi` (metres): vertices and outward faces.
 /// The boundary lies exactly on x = 0.
 pub(super) fn polygonise(field: &Field, lo: P3d, hi: P3d) -> (Vec<P3d>, Vec<Face>) {
-    let node =
-        |p: &P3d| -> Node { [(p.x / CELL).floor() as i32, (p.y / CELL).floor() as i32, (p.z / CELL).floor() as i32] };
+    let node = |p: &P3d| -> Node {
+        [
+            (p.x / CELL).floor() as i32,
+            (p.y / CELL).floor() as i32,
+            (p.z / CELL).floor() as i32,
+        ]
+    };
     let blocks = blocks(field, node(&lo), node(&hi));
     let side = (BLOCK + 1) as usize;
     let mut values: Vec<Vec<f64>> = Vec::new();
@@ -84,7 +110,13 @@ pub(super) fn polygonise(field: &Field, lo: P3d, hi: P3d) -> (Vec<P3d>, Vec<Face
     for (b, v) in blocks.iter().zip(&values) {
         for cell in 0..BLOCK * BLOCK * BLOCK {
             let o = [cell % BLOCK, cell / BLOCK % BLOCK, cell / (BLOCK * BLOCK)];
-            let corner = |k: usize| [o[0] + (k & 1) as i32, o[1] + (k >> 1 & 1) as i32, o[2] + (k >> 2) as i32];
+            let corner = |k: usize| {
+                [
+                    o[0] + (k & 1) as i32,
+                    o[1] + (k >> 1 & 1) as i32,
+                    o[2] + (k >> 2) as i32,
+                ]
+            };
             let value = |k: usize| {
                 let c = corner(k).map(|x| x as usize);
                 v[(c[2] * side + c[1]) * side + c[0]]
@@ -116,16 +148,29 @@ pub(super) fn polygonise(field: &Field, lo: P3d, hi: P3d) -> (Vec<P3d>, Vec<Face
                 };
                 match ins.len() {
                     1 => {
-                        let f = [cut(ins[0], out[0]), cut(ins[0], out[1]), cut(ins[0], out[2])];
+                        let f = [
+                            cut(ins[0], out[0]),
+                            cut(ins[0], out[1]),
+                            cut(ins[0], out[2]),
+                        ];
                         push(f, ins[0], &vertices);
                     }
                     3 => {
-                        let f = [cut(ins[0], out[0]), cut(ins[1], out[0]), cut(ins[2], out[0])];
+                        let f = [
+                            cut(ins[0], out[0]),
+                            cut(ins[1], out[0]),
+                            cut(ins[2], out[0]),
+                        ];
                         // The plane separates the outer corner from any inner one.
                         push(f, ins[0], &vertices);
                     }
                     2 => {
-                        let q = [cut(ins[0], out[0]), cut(ins[0], out[1]), cut(ins[1], out[1]), cut(ins[1], out[0])];
+                        let q = [
+                            cut(ins[0], out[0]),
+                            cut(ins[0], out[1]),
+                            cut(ins[1], out[1]),
+                            cut(ins[1], out[0]),
+                        ];
                         push([q[0], q[1], q[2]], ins[0], &vertices);
                         push([q[0], q[2], q[3]], ins[0], &vertices);
                     }

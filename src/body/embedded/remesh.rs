@@ -39,7 +39,14 @@ impl<'a> Remesher<'a> {
             f.iter().for_each(|&v| around[v as usize].push(i as u32));
         }
         let sizes = points.iter().map(target).collect();
-        Self { field, target, points, sizes, faces: faces.into_iter().map(Some).collect(), around }
+        Self {
+            field,
+            target,
+            points,
+            sizes,
+            faces: faces.into_iter().map(Some).collect(),
+            around,
+        }
     }
 
     /// Runs `rounds` of all operations and returns the compacted mesh.
@@ -64,7 +71,12 @@ impl<'a> Remesher<'a> {
                 points.push(self.points[i]);
             }
         }
-        let faces = self.faces.iter().flatten().map(|f| f.map(|v| index[v as usize])).collect();
+        let faces = self
+            .faces
+            .iter()
+            .flatten()
+            .map(|f| f.map(|v| index[v as usize]))
+            .collect();
         (points, faces)
     }
 
@@ -117,13 +129,18 @@ impl<'a> Remesher<'a> {
     }
     fn unlink(&mut self, face: u32) {
         if let Some(f) = self.faces[face as usize] {
-            f.iter().for_each(|&v| self.around[v as usize].retain(|&g| g != face));
+            f.iter()
+                .for_each(|&v| self.around[v as usize].retain(|&g| g != face));
         }
     }
 
     fn split(&mut self) {
-        let mut long: Vec<(f64, (u32, u32))> =
-            self.edges().into_iter().map(|e| (self.stretch(e.0, e.1), e)).filter(|(s, _)| *s > SPLIT).collect();
+        let mut long: Vec<(f64, (u32, u32))> = self
+            .edges()
+            .into_iter()
+            .map(|e| (self.stretch(e.0, e.1), e))
+            .filter(|(s, _)| *s > SPLIT)
+            .collect();
         long.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         for (_, (a, b)) in long {
             let faces = self.edge_faces(a, b);
@@ -139,19 +156,26 @@ impl<'a> Remesher<'a> {
             self.sizes.push((self.target)(&p));
             self.around.push(Vec::new());
             for f in faces {
-                let Some(old) = self.faces[f as usize] else { continue };
+                let Some(old) = self.faces[f as usize] else {
+                    continue;
+                };
                 self.unlink(f);
                 self.faces[f as usize] = Some(old.map(|v| if v == b { m } else { v }));
                 self.link(f);
-                self.faces.push(Some(old.map(|v| if v == a { m } else { v })));
+                self.faces
+                    .push(Some(old.map(|v| if v == a { m } else { v })));
                 self.link((self.faces.len() - 1) as u32);
             }
         }
     }
 
     fn collapse(&mut self) {
-        let mut short: Vec<(f64, (u32, u32))> =
-            self.edges().into_iter().map(|e| (self.stretch(e.0, e.1), e)).filter(|(s, _)| *s < COLLAPSE).collect();
+        let mut short: Vec<(f64, (u32, u32))> = self
+            .edges()
+            .into_iter()
+            .map(|e| (self.stretch(e.0, e.1), e))
+            .filter(|(s, _)| *s < COLLAPSE)
+            .collect();
         short.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         for (_, (a, b)) in short {
             if self.around[a as usize].is_empty() || self.around[b as usize].is_empty() {
@@ -178,14 +202,22 @@ impl<'a> Remesher<'a> {
         }
         let both = self.on_cut(keep) == self.on_cut(drop);
         let old = self.points[keep as usize];
-        let p = if both { nalgebra::center(&old, &self.points[drop as usize]) } else { old };
+        let p = if both {
+            nalgebra::center(&old, &self.points[drop as usize])
+        } else {
+            old
+        };
         let size = (self.target)(&p);
         for v in rk.iter().chain(&rd).filter(|v| **v != keep && **v != drop) {
-            if (self.points[*v as usize] - p).norm() > SPLIT * 0.5 * (size + self.sizes[*v as usize]) {
+            if (self.points[*v as usize] - p).norm()
+                > SPLIT * 0.5 * (size + self.sizes[*v as usize])
+            {
                 return;
             }
             // Every vertex keeps at least three neighbours.
-            if shared.iter().any(|f| self.faces[*f as usize].is_some_and(|f| f.contains(v)))
+            if shared
+                .iter()
+                .any(|f| self.faces[*f as usize].is_some_and(|f| f.contains(v)))
                 && self.around[*v as usize].len() <= 3
             {
                 return;
@@ -196,9 +228,17 @@ impl<'a> Remesher<'a> {
                 if shared.contains(&f) {
                     continue;
                 }
-                let Some(face) = self.faces[f as usize] else { continue };
+                let Some(face) = self.faces[f as usize] else {
+                    continue;
+                };
                 let before = self.corners(&face);
-                let after = face.map(|v| if v == keep || v == drop { p } else { self.points[v as usize] });
+                let after = face.map(|v| {
+                    if v == keep || v == drop {
+                        p
+                    } else {
+                        self.points[v as usize]
+                    }
+                });
                 let (n0, n1) = (normal(before), normal(after));
                 if n0.norm() > 0.0 && n0.dot(&n1) < TURN * n0.norm() * n1.norm() {
                     return;
@@ -214,7 +254,8 @@ impl<'a> Remesher<'a> {
         }
         for f in self.around[drop as usize].clone() {
             self.unlink(f);
-            self.faces[f as usize] = self.faces[f as usize].map(|g| g.map(|v| if v == drop { keep } else { v }));
+            self.faces[f as usize] =
+                self.faces[f as usize].map(|g| g.map(|v| if v == drop { keep } else { v }));
             self.link(f);
         }
         self.points[keep as usize] = p;
@@ -226,9 +267,13 @@ impl<'a> Remesher<'a> {
         for (a, b) in self.edges() {
             let faces = self.edge_faces(a, b);
             let &[f, g] = faces.as_slice() else { continue };
-            let (Some(ff), Some(gg)) = (self.faces[f as usize], self.faces[g as usize]) else { continue };
+            let (Some(ff), Some(gg)) = (self.faces[f as usize], self.faces[g as usize]) else {
+                continue;
+            };
             let other = |t: &Face| t.iter().copied().find(|&v| v != a && v != b);
-            let (Some(c), Some(d)) = (other(&ff), other(&gg)) else { continue };
+            let (Some(c), Some(d)) = (other(&ff), other(&gg)) else {
+                continue;
+            };
             if !self.edge_faces(c, d).is_empty() || c == d {
                 continue;
             }
@@ -239,7 +284,9 @@ impl<'a> Remesher<'a> {
             let after = cost(a, -1) + cost(b, -1) + cost(c, 1) + cost(d, 1);
             let new_f = ff.map(|v| if v == b { d } else { v });
             let new_g = gg.map(|v| if v == a { c } else { v });
-            let worst = |x: &Face, y: &Face| smallest_angle(self.corners(x)).min(smallest_angle(self.corners(y)));
+            let worst = |x: &Face, y: &Face| {
+                smallest_angle(self.corners(x)).min(smallest_angle(self.corners(y)))
+            };
             let (q0, q1) = (worst(&ff, &gg), worst(&new_f, &new_g));
             // Cosines: larger is a smaller angle.
             let better = after < before && q1 > 0.6 * q0 || q0 < 0.3 && q1 > 1.3 * q0;
@@ -274,7 +321,9 @@ impl<'a> Remesher<'a> {
             let cut = self.on_cut(v);
             let (mut sum, mut weight, mut n) = (V3d::zeros(), 0.0, V3d::zeros());
             for &f in &self.around[i] {
-                let Some(face) = self.faces[f as usize] else { continue };
+                let Some(face) = self.faces[f as usize] else {
+                    continue;
+                };
                 let c = self.corners(&face);
                 let fn_ = normal(c);
                 n += fn_;
@@ -287,13 +336,21 @@ impl<'a> Remesher<'a> {
                 }
             }
             if cut {
-                for w in self.ring(v).into_iter().filter(|&w| self.on_cut(w) && self.edge_faces(v, w).len() == 1) {
+                for w in self
+                    .ring(v)
+                    .into_iter()
+                    .filter(|&w| self.on_cut(w) && self.edge_faces(v, w).len() == 1)
+                {
                     let s = 1.0 / self.sizes[w as usize];
                     sum += self.points[w as usize].coords * s;
                     weight += s;
                 }
             }
-            let mut step = if weight > 0.0 { (sum / weight - p.coords) * RELAX } else { V3d::zeros() };
+            let mut step = if weight > 0.0 {
+                (sum / weight - p.coords) * RELAX
+            } else {
+                V3d::zeros()
+            };
             if let Some(n) = n.try_normalize(0.0) {
                 step -= n * n.dot(&step);
             }
@@ -307,13 +364,19 @@ impl<'a> Remesher<'a> {
         });
         self.points = next;
         let target = self.target;
-        par::map_into(Par::Rayon, self.points.len(), 1024, &mut self.sizes, |i| target(&self.points[i]));
+        par::map_into(Par::Rayon, self.points.len(), 1024, &mut self.sizes, |i| {
+            target(&self.points[i])
+        });
     }
 }
 
 /// A measure of a triangle's smallest angle without trigonometry: its sine (area over the product of the two long sides).
 pub(super) fn smallest_angle(c: [P3d; 3]) -> f64 {
-    let l = [(c[1] - c[0]).norm(), (c[2] - c[1]).norm(), (c[0] - c[2]).norm()];
+    let l = [
+        (c[1] - c[0]).norm(),
+        (c[2] - c[1]).norm(),
+        (c[0] - c[2]).norm(),
+    ];
     let area = normal(c).norm();
     let product = (l[0] * l[1]).max(l[1] * l[2]).max(l[2] * l[0]);
     if product > 0.0 { area / product } else { 0.0 }

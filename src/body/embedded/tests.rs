@@ -12,7 +12,10 @@ use crate::par::with_threads;
 fn shape(direction: usize, c: f64) -> BodyShape {
     let mut coefficients = vec![0.0; DIRECTIONS.len()];
     coefficients[direction] = c;
-    BodyShape { coefficients, ..BodyShape::default() }
+    BodyShape {
+        coefficients,
+        ..BodyShape::default()
+    }
 }
 
 fn measured(s: &BodyShape) -> Measurements {
@@ -27,7 +30,11 @@ fn volume(t: &Template, v: &[P3]) -> f64 {
 #[test]
 fn one_closed_surface_of_the_promised_size() {
     let t = template();
-    let (n, f, e) = (t.mesh().vertices().len(), t.mesh().faces().len(), t.topology().edges().len());
+    let (n, f, e) = (
+        t.mesh().vertices().len(),
+        t.mesh().faces().len(),
+        t.topology().edges().len(),
+    );
     assert!((12_000..=14_000).contains(&n), "{n} vertices");
     assert!(t.topology().is_closed());
     assert_eq!(t.topology().components().1, 1);
@@ -46,7 +53,10 @@ fn one_closed_surface_of_the_promised_size() {
     assert!(lo.y.abs() < 0.003, "soles at {}", lo.y);
     assert!((f64::from(hi.y - lo.y) - stat::STATURE.mean()).abs() < 0.003);
     let j = |n: &str| t.skeleton().joints()[t.skeleton().index(n).expect("joint")].rest;
-    assert!(j("left_foot").z > j("left_ankle").z && j("left_hip").x > 0.0, "faces +z, left is +x");
+    assert!(
+        j("left_foot").z > j("left_ankle").z && j("left_hip").x > 0.0,
+        "faces +z, left is +x"
+    );
 }
 
 #[test]
@@ -54,24 +64,47 @@ fn triangles_are_fit_for_simulation() {
     let t = template();
     let sine = |i: usize| remesh::smallest_angle(t.mesh().corners(i).map(|p| p.cast::<f64>()));
     let worst = (0..t.mesh().faces().len()).map(sine).fold(1.0, f64::min);
-    let poor = (0..t.mesh().faces().len()).filter(|&i| sine(i) < 0.5).count();
+    let poor = (0..t.mesh().faces().len())
+        .filter(|&i| sine(i) < 0.5)
+        .count();
     // No angle under 25°, one face in two hundred under 30°.
-    assert!(worst > 0.4226, "smallest angle {:.1}°", worst.asin().to_degrees());
-    assert!(poor * 200 < t.mesh().faces().len(), "{poor} faces with an angle under 30°");
+    assert!(
+        worst > 0.4226,
+        "smallest angle {:.1}°",
+        worst.asin().to_degrees()
+    );
+    assert!(
+        poor * 200 < t.mesh().faces().len(),
+        "{poor} faces with an angle under 30°"
+    );
 }
 
 #[test]
 fn left_mirrors_right() {
     let t = template();
     let key = |p: &P3| [p.x.to_bits(), p.y.to_bits(), p.z.to_bits()];
-    let index: std::collections::BTreeMap<_, usize> =
-        t.mesh().vertices().iter().enumerate().map(|(i, p)| (key(p), i)).collect();
+    let index: std::collections::BTreeMap<_, usize> = t
+        .mesh()
+        .vertices()
+        .iter()
+        .enumerate()
+        .map(|(i, p)| (key(p), i))
+        .collect();
     let space = t.shape_space().expect("shape space");
     for (i, p) in t.mesh().vertices().iter().enumerate() {
-        let image = if p.x == 0.0 { *p } else { P3::new(-p.x, p.y, p.z) };
-        let m = *index.get(&key(&image)).unwrap_or_else(|| panic!("vertex {i} has no mirror image"));
+        let image = if p.x == 0.0 {
+            *p
+        } else {
+            P3::new(-p.x, p.y, p.z)
+        };
+        let m = *index
+            .get(&key(&image))
+            .unwrap_or_else(|| panic!("vertex {i} has no mirror image"));
         for d in &space.vertices {
-            assert!((d[i].x + d[m].x).abs() < 1e-6 && (d[i].yz() - d[m].yz()).norm() < 1e-6, "vertex {i}");
+            assert!(
+                (d[i].x + d[m].x).abs() < 1e-6 && (d[i].yz() - d[m].yz()).norm() < 1e-6,
+                "vertex {i}"
+            );
         }
         let weight = |v: usize, name: &str| {
             let (w, j) = (&t.weights().weights[v], &t.weights().joints[v]);
@@ -80,9 +113,15 @@ fn left_mirrors_right() {
                 .map(|k| w[k])
                 .sum::<f32>()
         };
-        for (l, r) in [("left_hip", "right_hip"), ("left_shoulder", "right_shoulder"), ("left_collar", "right_collar")]
-        {
-            assert!((weight(i, l) - weight(m, r)).abs() < 1e-5, "vertex {i}, {l}");
+        for (l, r) in [
+            ("left_hip", "right_hip"),
+            ("left_shoulder", "right_shoulder"),
+            ("left_collar", "right_collar"),
+        ] {
+            assert!(
+                (weight(i, l) - weight(m, r)).abs() < 1e-5,
+                "vertex {i}, {l}"
+            );
         }
     }
 }
@@ -91,13 +130,25 @@ fn left_mirrors_right() {
 fn weights_are_few_and_sum_to_one() {
     let t = template();
     for (i, w) in t.weights().weights.iter().enumerate() {
-        assert!((w.iter().sum::<f32>() - 1.0).abs() < 1e-5 && w.iter().all(|x| *x >= 0.0), "vertex {i}");
+        assert!(
+            (w.iter().sum::<f32>() - 1.0).abs() < 1e-5 && w.iter().all(|x| *x >= 0.0),
+            "vertex {i}"
+        );
     }
     // The middle of each bone belongs to it, and hands do not move with the other side.
-    for name in ["left_shoulder", "left_elbow", "left_hip", "left_knee", "right_knee", "head", "left_wrist"] {
+    for name in [
+        "left_shoulder",
+        "left_elbow",
+        "left_hip",
+        "left_knee",
+        "right_knee",
+        "head",
+        "left_wrist",
+    ] {
         let j = t.skeleton().index(name).expect("joint");
         assert!(
-            (0..t.mesh().vertices().len()).any(|v| t.weights().dominant(v) == j && t.weights().weights[v][0] > 0.99),
+            (0..t.mesh().vertices().len())
+                .any(|v| t.weights().dominant(v) == j && t.weights().weights[v][0] > 0.99),
             "{name}"
         );
     }
@@ -144,7 +195,10 @@ fn skeleton_has_the_agreed_joints() {
         let j = &s.joints()[s.index(n).expect("joint")];
         assert!(matches!(j.motion, JointMotion::Hinge { .. }), "{n}");
     }
-    assert!(s.limits().iter().all(|l| l[0] < 0.0 && l[1] > 0.0), "the rest pose is within the limits");
+    assert!(
+        s.limits().iter().all(|l| l[0] < 0.0 && l[1] > 0.0),
+        "the rest pose is within the limits"
+    );
 }
 
 #[test]
@@ -174,7 +228,10 @@ fn hinges_bend_the_right_way() {
         let mut bones = BoneTransforms::default();
         pose.bones(t.skeleton(), &rest, &mut bones);
         let e = t.skeleton().index(end).expect("joint");
-        assert!((bones.joints[e].z - rest.joints[e].z) * sign > 0.1, "{joint}");
+        assert!(
+            (bones.joints[e].z - rest.joints[e].z) * sign > 0.1,
+            "{joint}"
+        );
     }
 }
 
@@ -197,7 +254,11 @@ fn bends_without_collapsing() {
         let v = posed(&t, &BodyShape::default(), &set);
         let change = volume(&t, &v) / rest - 1.0;
         let bound = if name == "sitting" { 0.04 } else { 0.025 };
-        assert!(change.abs() < bound, "{name}: volume changes by {:.1} %", 100.0 * change);
+        assert!(
+            change.abs() < bound,
+            "{name}: volume changes by {:.1} %",
+            100.0 * change
+        );
     }
 }
 
@@ -217,11 +278,17 @@ fn no_face_turns_over() {
             .faces()
             .iter()
             .filter(|f| {
-                let b = bones.bones[t.weights().dominant(f[0] as usize)].rotation.cast::<f32>();
+                let b = bones.bones[t.weights().dominant(f[0] as usize)]
+                    .rotation
+                    .cast::<f32>();
                 (b * face_normal(t.mesh().vertices(), f)).dot(&face_normal(&v, f)) < 0.0
             })
             .count();
-        let allowed = if matches!(name, "rest" | "t_pose" | "arms_down") { 0 } else { t.mesh().faces().len() / 100 };
+        let allowed = if matches!(name, "rest" | "t_pose" | "arms_down") {
+            0
+        } else {
+            t.mesh().faces().len() / 100
+        };
         assert!(turned <= allowed, "{name}: {turned} faces turned over");
     }
 }
@@ -230,7 +297,10 @@ fn no_face_turns_over() {
 fn mean_body_has_the_published_measures() {
     let m = measured(&BodyShape::default());
     let check = |what: &str, got: f64, published: f64| {
-        assert!((got / published - 1.0).abs() < 0.03, "{what}: {got:.3} m, published {published:.3} m");
+        assert!(
+            (got / published - 1.0).abs() < 0.03,
+            "{what}: {got:.3} m, published {published:.3} m"
+        );
     };
     check("stature", m.stature, stat::STATURE.mean());
     check("chest", m.chest, stat::CHEST.mean());
@@ -249,7 +319,10 @@ fn sexes_have_their_published_measures() {
         let m = measured(&shape(2, c));
         let check = |what: &str, got: f64, s: stat::Statistic| {
             let published = [s.men[0], s.women[0]][pick];
-            assert!((got / published - 1.0).abs() < 0.04, "{what}: {got:.3} m, published {published:.3} m");
+            assert!(
+                (got / published - 1.0).abs() < 0.04,
+                "{what}: {got:.3} m, published {published:.3} m"
+            );
         };
         check("stature", m.stature, stat::STATURE);
         check("chest", m.chest, stat::CHEST);
@@ -295,10 +368,15 @@ fn whole_range_of_shapes_is_sound() {
                 .mesh()
                 .faces()
                 .iter()
-                .filter(|f| face_normal(t.mesh().vertices(), f).dot(&face_normal(&body.vertices, f)) <= 0.0)
+                .filter(|f| {
+                    face_normal(t.mesh().vertices(), f).dot(&face_normal(&body.vertices, f)) <= 0.0
+                })
                 .count();
             assert_eq!(turned, 0, "{name} {c}");
-            assert!((0.045..0.115).contains(&volume(&t, &body.vertices)), "{name} {c}");
+            assert!(
+                (0.045..0.115).contains(&volume(&t, &body.vertices)),
+                "{name} {c}"
+            );
             assert!(measure(&t, &body).is_ok(), "{name} {c}");
         }
     }
@@ -313,7 +391,10 @@ fn sides_stay_apart() {
             let body = t.personalise(&shape(d, c));
             for (i, p) in t.mesh().vertices().iter().enumerate() {
                 let q = body.vertices[i];
-                assert!(p.x <= 0.0 || q.x > 0.0, "{name} {c}: vertex {i} at {p} went to {q}");
+                assert!(
+                    p.x <= 0.0 || q.x > 0.0,
+                    "{name} {c}: vertex {i} at {p} went to {q}"
+                );
             }
         }
     }
@@ -324,14 +405,36 @@ fn sides_stay_apart() {
 fn linear_directions_stay_near_the_figure() {
     let t = template();
     for (d, fig) in [
-        (6, Figure { chest: 1.0, ..Figure::default() }),
-        (2, Figure { sex: 1.0, ..Figure::default() }),
-        (2, Figure { sex: -1.0, ..Figure::default() }),
+        (
+            6,
+            Figure {
+                chest: 1.0,
+                ..Figure::default()
+            },
+        ),
+        (
+            2,
+            Figure {
+                sex: 1.0,
+                ..Figure::default()
+            },
+        ),
+        (
+            2,
+            Figure {
+                sex: -1.0,
+                ..Figure::default()
+            },
+        ),
     ] {
         let field = carve(&fig, &fig.joints());
         let space = t.shape_space().expect("shape space");
         // The sex direction holds the taller stature; the figure is at equal stature.
-        let back = if d == 2 { stat::STATURE.sex() / stat::STATURE.deviation() } else { 0.0 };
+        let back = if d == 2 {
+            stat::STATURE.sex() / stat::STATURE.deviation()
+        } else {
+            0.0
+        };
         let c = if d == 2 { fig.sex as f32 } else { 1.0 };
         let mut worst: f64 = 0.0;
         let mut sum = 0.0;
@@ -342,7 +445,11 @@ fn linear_directions_stay_near_the_figure() {
             sum += v * v;
         }
         let rms = (sum / t.mesh().vertices().len() as f64).sqrt();
-        assert!(rms < 0.0015 && worst < 0.012, "{} {c}: rms {rms:.4} m, worst {worst:.4} m", DIRECTIONS[d]);
+        assert!(
+            rms < 0.0015 && worst < 0.012,
+            "{} {c}: rms {rms:.4} m, worst {worst:.4} m",
+            DIRECTIONS[d]
+        );
     }
 }
 
@@ -353,7 +460,12 @@ fn joints_lie_inside() {
     let field = carve(&fig, &fig.joints());
     for j in t.skeleton().joints() {
         if !j.name.ends_with("_end") {
-            assert!(field.value(&j.rest) < -0.005, "{} is at {:.4} m", j.name, field.value(&j.rest));
+            assert!(
+                field.value(&j.rest) < -0.005,
+                "{} is at {:.4} m",
+                j.name,
+                field.value(&j.rest)
+            );
         }
     }
 }

@@ -56,7 +56,9 @@ pub(super) fn sheets(model: &Model, patches: &[PatchScratch], span: f32, out: &m
                 s.velocities[v] = V3::new(u.0[0], u.0[1], u.0[2]);
             }
         }
-        let search = c.self_collision.then(|| g.folds.search(c.thickness as f32, span));
+        let search = c
+            .self_collision
+            .then(|| g.folds.search(c.thickness as f32, span));
         g.folds.begin(par::Par::Seq, s, search.as_ref(), n);
     });
 }
@@ -106,11 +108,17 @@ impl ClothTouch<'_> {
             // A skirt lies under the body of a shirt, never under its sleeves.
             let own = m.own[f.vertices[i] as usize];
             for outer in q.garment + 1..self.model.garments.len() {
-                let (g, s) = (&self.model.garments[outer].folds.surface, &self.sheets[outer]);
-                let (near, hit) = g.closest_within(&s.surface, &x, q.layers[outer][j], own, LAYER_DEPTH);
+                let (g, s) = (
+                    &self.model.garments[outer].folds.surface,
+                    &self.sheets[outer],
+                );
+                let (near, hit) =
+                    g.closest_within(&s.surface, &x, q.layers[outer][j], own, LAYER_DEPTH);
                 q.layers[outer][j] = near;
                 let Ok(hit) = hit else { continue };
-                let Some(hit) = g.under(&s.surface, &x, &hit, HEM) else { continue };
+                let Some(hit) = g.under(&s.surface, &x, &hit, HEM) else {
+                    continue;
+                };
                 let inside = -hit.signed;
                 if inside < LAYER_REACH && inside > -LAYER_DEPTH {
                     q.cloth.push(touching(g, s, i, &hit, -1.0, LAYER_GAP));

@@ -27,16 +27,31 @@ pub(super) fn finish(
     dt: f64,
     report: &mut StepReport,
 ) -> f32 {
-    let mut all: Vec<_> = state.garments.iter_mut().map(|g| (g, Outcome::default())).collect();
+    let mut all: Vec<_> = state
+        .garments
+        .iter_mut()
+        .map(|g| (g, Outcome::default()))
+        .collect();
     par::for_chunks(model.config.par, &mut all, 1, |k, one| {
         let (g, outcome) = &mut one[0];
-        *outcome = take_over(&model.garments[k], g, pieces.iter().filter(|q| q.garment == k), patches);
+        *outcome = take_over(
+            &model.garments[k],
+            g,
+            pieces.iter().filter(|q| q.garment == k),
+            patches,
+        );
     });
     let mut fastest = 0.0f32;
     for (k, (g, outcome)) in all.iter_mut().enumerate() {
         if let Some(index) = outcome.bad {
-            let fault = ClothError::NotFinite { what: "cloth vertex", index };
-            report.kept_last_good = Some(format!("garment `{}`: {fault}", model.outfit.garments[k].name));
+            let fault = ClothError::NotFinite {
+                what: "cloth vertex",
+                index,
+            };
+            report.kept_last_good = Some(format!(
+                "garment `{}`: {fault}",
+                model.outfit.garments[k].name
+            ));
             g.velocities.iter_mut().for_each(|v| *v = V3::zeros());
             continue;
         }
@@ -68,11 +83,24 @@ fn take_over<'a>(
 ) -> Outcome {
     let bad = pieces.clone().find_map(|q| {
         let (f, motion) = (&m.patches[q.patch], &patches[q.at].motion);
-        let wrong = |i: &usize| !motion.position(*i).0.iter().chain(&motion.velocity[*i].0).all(|c| c.is_finite());
-        q.owned(f).map(|(_, i)| i).find(wrong).map(|i| f.vertices[i] as usize)
+        let wrong = |i: &usize| {
+            !motion
+                .position(*i)
+                .0
+                .iter()
+                .chain(&motion.velocity[*i].0)
+                .all(|c| c.is_finite())
+        };
+        q.owned(f)
+            .map(|(_, i)| i)
+            .find(wrong)
+            .map(|i| f.vertices[i] as usize)
     });
     if bad.is_some() {
-        return Outcome { bad, ..Outcome::default() };
+        return Outcome {
+            bad,
+            ..Outcome::default()
+        };
     }
     let mut ways: Vec<f32> = Vec::with_capacity(g.positions.len());
     for q in pieces {
@@ -93,7 +121,12 @@ fn take_over<'a>(
         }
     }
     let length = |v: &[u32; 2]| (g.positions[v[0] as usize] - g.positions[v[1] as usize]).norm();
-    let mut strain: Vec<f32> = m.sheet.edges.iter().map(|(v, l)| length(v) / *l as f32 - 1.0).collect();
+    let mut strain: Vec<f32> = m
+        .sheet
+        .edges
+        .iter()
+        .map(|(v, l)| length(v) / *l as f32 - 1.0)
+        .collect();
     let largest = strain.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     Outcome {
         bad: None,

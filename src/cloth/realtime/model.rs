@@ -124,7 +124,10 @@ impl Config {
         /// A standing body trembles by 3 mm with a Kinect v1 at 2.4 m (95 % of its vertices, from call to call); at
         /// 5 mm twice as much of that was left, metres.
         const TREMBLE: f64 = 8e-3;
-        Self { steady: TREMBLE, ..Self::default() }
+        Self {
+            steady: TREMBLE,
+            ..Self::default()
+        }
     }
     /// The same for a camera that stands there. One that looks straight down or up leaves the direction as it is.
     #[must_use]
@@ -132,7 +135,14 @@ impl Config {
         let axis = world_from_camera.vector(&crate::math::V3d::z());
         /// Sine of the angle to the vertical below which a direction says nothing.
         const LEVEL: f64 = 1e-3;
-        if axis.x.hypot(axis.z) < LEVEL { self } else { Self { camera_toward: [axis.x as f32, axis.z as f32], ..self } }
+        if axis.x.hypot(axis.z) < LEVEL {
+            self
+        } else {
+            Self {
+                camera_toward: [axis.x as f32, axis.z as f32],
+                ..self
+            }
+        }
     }
 }
 
@@ -203,20 +213,43 @@ pub fn body_parts(template: &Template) -> Vec<u8> {
     let of = |name: &str| {
         let left = name.starts_with("left");
         let has = |words: &[&str]| words.iter().any(|w| name.contains(w));
-        if has(&["shoulder", "elbow", "wrist", "hand", "finger", "thumb", "arm"]) {
-            if left { Region::LEFT_ARM } else { Region::RIGHT_ARM }
+        if has(&[
+            "shoulder", "elbow", "wrist", "hand", "finger", "thumb", "arm",
+        ]) {
+            if left {
+                Region::LEFT_ARM
+            } else {
+                Region::RIGHT_ARM
+            }
         } else if has(&["hip", "knee", "ankle", "foot", "toe", "leg"]) {
-            if left { Region::LEFT_LEG } else { Region::RIGHT_LEG }
+            if left {
+                Region::LEFT_LEG
+            } else {
+                Region::RIGHT_LEG
+            }
         } else {
             Region::TRUNK
         }
     };
-    let by_joint: Vec<u8> = template.skeleton().joints().iter().map(|j| of(&j.name).0).collect();
+    let by_joint: Vec<u8> = template
+        .skeleton()
+        .joints()
+        .iter()
+        .map(|j| of(&j.name).0)
+        .collect();
     let (component, count) = template.topology().components();
     let mut sizes = vec![0usize; count];
     component.iter().for_each(|c| sizes[*c as usize] += 1);
-    let small = |i: usize| sizes[component[i] as usize] as f64 <= SMALLEST_COMPONENT * component.len() as f64;
-    let part = |i| if small(i) { 0 } else { by_joint[template.weights().dominant(i)] };
+    let small = |i: usize| {
+        sizes[component[i] as usize] as f64 <= SMALLEST_COMPONENT * component.len() as f64
+    };
+    let part = |i| {
+        if small(i) {
+            0
+        } else {
+            by_joint[template.weights().dominant(i)]
+        }
+    };
     (0..template.mesh().vertices().len()).map(part).collect()
 }
 
@@ -225,7 +258,12 @@ pub fn body_parts(template: &Template) -> Vec<u8> {
 pub(super) fn opposites(template: &Template, parts: &[u8]) -> Vec<u8> {
     let vertices = template.mesh().vertices();
     let mean = |part: Region| {
-        let of: Vec<_> = vertices.iter().zip(parts).filter(|(_, p)| **p == part.0).map(|(v, _)| v.coords).collect();
+        let of: Vec<_> = vertices
+            .iter()
+            .zip(parts)
+            .filter(|(_, p)| **p == part.0)
+            .map(|(v, _)| v.coords)
+            .collect();
         of.iter().sum::<V3>() / of.len().max(1) as f32
     };
     let (left, right) = (mean(Region::LEFT_ARM), mean(Region::RIGHT_ARM));
@@ -243,11 +281,17 @@ pub(super) fn opposites(template: &Template, parts: &[u8]) -> Vec<u8> {
 /// Elbows and knees, where both limbs are one part.
 pub(super) fn creases(template: &Template, surface: &SurfaceModel) -> Vec<Crease> {
     let joints = template.skeleton().joints();
-    let moved_by =
-        |j: usize| (0..surface.vertices()).filter(|v| template.weights().dominant(*v) == j).map(|v| v as u32).collect();
+    let moved_by = |j: usize| {
+        (0..surface.vertices())
+            .filter(|v| template.weights().dominant(*v) == j)
+            .map(|v| v as u32)
+            .collect()
+    };
     let of = |(j, joint): (usize, &crate::body::Joint)| {
         let bends = ["elbow", "knee"].iter().any(|n| joint.name.contains(n));
-        bends.then(|| Crease::new(surface, moved_by(joint.parent?), moved_by(j))).flatten()
+        bends
+            .then(|| Crease::new(surface, moved_by(joint.parent?), moved_by(j)))
+            .flatten()
     };
     joints.iter().enumerate().filter_map(of).collect()
 }
@@ -255,10 +299,22 @@ pub(super) fn creases(template: &Template, surface: &SurfaceModel) -> Vec<Crease
 /// Of these [`opposites`] those of thick parts: hands and forearms have cloth on one side only, and a hand in a hip does
 /// not know any more which one that is.
 pub(super) fn pressing(template: &Template, opposite: Vec<u8>) -> Vec<u8> {
-    const THIN: [&str; 9] = ["elbow", "wrist", "hand", "finger", "thumb", "knee", "ankle", "foot", "toe"];
-    let thin: Vec<bool> =
-        template.skeleton().joints().iter().map(|j| THIN.iter().any(|t| j.name.contains(t))).collect();
-    let of = |(v, part): (usize, u8)| if thin[template.weights().dominant(v)] { 0 } else { part };
+    const THIN: [&str; 9] = [
+        "elbow", "wrist", "hand", "finger", "thumb", "knee", "ankle", "foot", "toe",
+    ];
+    let thin: Vec<bool> = template
+        .skeleton()
+        .joints()
+        .iter()
+        .map(|j| THIN.iter().any(|t| j.name.contains(t)))
+        .collect();
+    let of = |(v, part): (usize, u8)| {
+        if thin[template.weights().dominant(v)] {
+            0
+        } else {
+            part
+        }
+    };
     opposite.into_iter().enumerate().map(of).collect()
 }
 
@@ -268,14 +324,21 @@ impl Model {
     /// # Errors
     /// Faults of the garments (triangle or edge named) or of the settings (field named).
     pub fn new(template: &Template, outfit: Outfit, config: Config) -> Result<Self, ClothError> {
-        let field = |field: &str, why: &str| ClothError::Field { field: field.to_owned(), why: why.to_owned() };
+        let field = |field: &str, why: &str| ClothError::Field {
+            field: field.to_owned(),
+            why: why.to_owned(),
+        };
         if config.most_steps == 0 || config.patch == 0 {
             return Err(field("most_steps, patch", "both must be at least 1"));
         }
         if !(config.ahead >= 0.0 && config.ahead <= 1.0) {
             return Err(field("ahead", "must be between 0 and 1 step"));
         }
-        if !(config.offset.is_finite() && config.teleport > 0.0 && config.steady >= 0.0 && config.untangle >= 0.0) {
+        if !(config.offset.is_finite()
+            && config.teleport > 0.0
+            && config.steady >= 0.0
+            && config.untangle >= 0.0)
+        {
             return Err(field(
                 "offset, teleport, steady, untangle",
                 "they must be finite, teleport positive, steady and untangle not negative",
@@ -294,10 +357,13 @@ impl Model {
         let body = template.mesh().vertices().len();
         let mut garments = Vec::new();
         for (order, (g, anchors)) in outfit.garments.iter().zip(&outfit.anchors).enumerate() {
-            if let Some(a) =
-                anchors.iter().find(|a| a.vertex as usize >= g.vertices || a.body.iter().any(|v| *v as usize >= body))
-            {
-                return Err(field(&format!("anchor of vertex {}", a.vertex), "it names a vertex that does not exist"));
+            if let Some(a) = anchors.iter().find(|a| {
+                a.vertex as usize >= g.vertices || a.body.iter().any(|v| *v as usize >= body)
+            }) {
+                return Err(field(
+                    &format!("anchor of vertex {}", a.vertex),
+                    "it names a vertex that does not exist",
+                ));
             }
             let sheet = Sheet::of_garment(g)?;
             // Of the second degree, layers and folds tore the dancer's clothes of 12 mm edges apart: finer garments are
@@ -305,12 +371,20 @@ impl Model {
             let (smooth, h) = {
                 let step = Plan::comfortable_steps(&sheet, config.ahead);
                 let plain = step(0);
-                let smoothed = (plain < LONG_ENOUGH).then(|| step(1)).filter(|h| *h >= LONG_ENOUGH);
+                let smoothed = (plain < LONG_ENOUGH)
+                    .then(|| step(1))
+                    .filter(|h| *h >= LONG_ENOUGH);
                 smoothed.map_or((0, plain), |h| (1, h))
             };
             let h = h.clamp(1.0 / (60.0 * config.most_steps as f64), 1e-3);
             let bend_every = Plan::bend_every(&sheet, h);
-            let fit = Fit { h, ahead: config.ahead, springs_only: false, bend_every, smooth };
+            let fit = Fit {
+                h,
+                ahead: config.ahead,
+                springs_only: false,
+                bend_every,
+                smooth,
+            };
             let plan = Plan::new(&sheet, &fit);
             // A step moves news by one ring and by one more for each degree, an evaluation of bending by one more.
             let patches = plan.patches(g.vertices.div_ceil(config.patch), 1 + smooth + 1, REGION);
@@ -339,8 +413,11 @@ impl Model {
         }
         let parts = body_parts(template);
         let opposite = opposites(template, &parts);
-        let surface =
-            SurfaceModel::new(template.mesh().faces().to_vec(), Topology::new(template.mesh())?, parts.clone());
+        let surface = SurfaceModel::new(
+            template.mesh().faces().to_vec(),
+            Topology::new(template.mesh())?,
+            parts.clone(),
+        );
         let mut model = Self {
             pressing: pressing(template, opposite.clone()),
             opposite,
@@ -374,19 +451,38 @@ impl Model {
                 .patches
                 .iter()
                 .map(|f| {
-                    let mut local: Vec<(u32, u32)> =
-                        f.vertices.iter().enumerate().map(|(i, v)| (*v, i as u32)).collect();
+                    let mut local: Vec<(u32, u32)> = f
+                        .vertices
+                        .iter()
+                        .enumerate()
+                        .map(|(i, v)| (*v, i as u32))
+                        .collect();
                     local.sort_unstable();
-                    let find = |v: u32| local.binary_search_by_key(&v, |l| l.0).ok().map(|k| local[k].1);
-                    anchors.iter().enumerate().filter_map(|(k, a)| Some((find(a.vertex)?, k))).collect()
+                    let find = |v: u32| {
+                        local
+                            .binary_search_by_key(&v, |l| l.0)
+                            .ok()
+                            .map(|k| local[k].1)
+                    };
+                    anchors
+                        .iter()
+                        .enumerate()
+                        .filter_map(|(k, a)| Some((find(a.vertex)?, k)))
+                        .collect()
                 })
                 .collect();
         }
     }
     /// Local vertex and binding of a patch's anchors.
-    pub(super) fn anchors_of(&self, garment: usize, patch: usize) -> impl Iterator<Item = (u32, &AnchorBinding)> {
+    pub(super) fn anchors_of(
+        &self,
+        garment: usize,
+        patch: usize,
+    ) -> impl Iterator<Item = (u32, &AnchorBinding)> {
         let bindings = &self.outfit.anchors[garment];
-        self.garments[garment].anchors[patch].iter().map(move |(i, k)| (*i, &bindings[*k]))
+        self.garments[garment].anchors[patch]
+            .iter()
+            .map(move |(i, k)| (*i, &bindings[*k]))
     }
     /// The body surface that garments touch.
     pub(crate) fn surface(&self) -> &SurfaceModel {
@@ -433,15 +529,22 @@ mod tests {
             let n = x.hypot(z);
             [x / n, z / n]
         };
-        let close = |a: [f32; 2], b: [f32; 2]| (a[0] - b[0]).abs() < 1e-6 && (a[1] - b[1]).abs() < 1e-6;
+        let close =
+            |a: [f32; 2], b: [f32; 2]| (a[0] - b[0]).abs() < 1e-6 && (a[1] - b[1]).abs() < 1e-6;
         // Tilted down or mounted upright it looks along −z all the same: that is what the default says.
         let default = Config::default().camera_toward;
         assert!(close(toward(turned(V3d::x_axis(), -0.3)), default));
-        assert!(close(toward(turned(V3d::z_axis(), std::f64::consts::FRAC_PI_2)), default));
+        assert!(close(
+            toward(turned(V3d::z_axis(), std::f64::consts::FRAC_PI_2)),
+            default
+        ));
         // Turned to its right (about its own axis down) it looks towards +x.
         let (sin, cos) = 0.5f32.sin_cos();
         assert!(close(toward(turned(V3d::y_axis(), 0.5)), [sin, -cos]));
         // Straight down: nothing is level, the default stays.
-        assert!(close(toward(turned(V3d::x_axis(), -std::f64::consts::FRAC_PI_2)), default));
+        assert!(close(
+            toward(turned(V3d::x_axis(), -std::f64::consts::FRAC_PI_2)),
+            default
+        ));
     }
 }

@@ -60,7 +60,11 @@ impl Piece {
             to.extend(all().filter_map(|v| from.get(v)));
         }
         self.passing.clear();
-        self.passing.extend(vertices.iter().map(|v| from.passing.binary_search(v).is_ok()));
+        self.passing.extend(
+            vertices
+                .iter()
+                .map(|v| from.passing.binary_search(v).is_ok()),
+        );
         for flags in [&mut self.alone, &mut self.free] {
             flags.clear();
             flags.resize(vertices.len(), false);
@@ -75,7 +79,9 @@ impl Piece {
 
 /// So many vertices in pieces.
 fn ranges(n: usize) -> impl Iterator<Item = Range<usize>> {
-    (0..n).step_by(VERTICES).map(move |first| first..(first + VERTICES).min(n))
+    (0..n)
+        .step_by(VERTICES)
+        .map(move |first| first..(first + VERTICES).min(n))
 }
 
 /// Cuts the patches of all garments into pieces, where they are at the beginning of a call.
@@ -108,7 +114,14 @@ mod tests {
 
     #[test]
     fn pieces_hold_every_vertex_once_and_in_order() {
-        for n in [0, 1, VERTICES - 1, VERTICES, VERTICES + 1, 10 * VERTICES + 7] {
+        for n in [
+            0,
+            1,
+            VERTICES - 1,
+            VERTICES,
+            VERTICES + 1,
+            10 * VERTICES + 7,
+        ] {
             assert!(ranges(n).flatten().eq(0..n), "{n}");
             assert!(ranges(n).all(|r| r.len() <= VERTICES));
         }

@@ -39,14 +39,28 @@ impl Piled {
     }
     /// The furthest that a garment keeps off the skin anywhere, metres.
     pub(super) fn most(&self, garment: usize, offset: f32) -> f32 {
-        if self.0.get(garment).is_some_and(|heights| !heights.is_empty()) { offset.max(MOST) } else { offset }
+        if self
+            .0
+            .get(garment)
+            .is_some_and(|heights| !heights.is_empty())
+        {
+            offset.max(MOST)
+        } else {
+            offset
+        }
     }
     /// How far a garment keeps off a triangle of the skin on which it alone would lie at `offset`, metres.
     pub(super) fn over(&self, garment: usize, corners: [u32; 3], offset: f32) -> f32 {
-        let Some(heights) = self.0.get(garment) else { return offset };
+        let Some(heights) = self.0.get(garment) else {
+            return offset;
+        };
         let height = |v: &u32| heights.get(*v as usize).copied().unwrap_or(0.0);
         let highest = corners.iter().map(height).fold(0.0, f32::max);
-        if highest > 0.0 { offset.max((highest + ABOVE).min(MOST)) } else { offset }
+        if highest > 0.0 {
+            offset.max((highest + ABOVE).min(MOST))
+        } else {
+            offset
+        }
     }
 }
 
@@ -54,7 +68,11 @@ impl Piled {
 fn add(skin: &SurfaceFrame, cloth: &[P3], nearest: &[[u32; 2]], heights: &mut [f32]) {
     for (x, near) in cloth.iter().zip(nearest) {
         let v = near[0] as usize;
-        let (Some(p), Some(n), Some(height)) = (skin.vertices.get(v), skin.normals.get(v), heights.get_mut(v)) else {
+        let (Some(p), Some(n), Some(height)) = (
+            skin.vertices.get(v),
+            skin.normals.get(v),
+            heights.get_mut(v),
+        ) else {
             continue;
         };
         let h = n.dot(&(x - p));
@@ -77,17 +95,37 @@ mod tests {
         };
         let at = |x: f32, h: f32| P3::new(x, 0.001, h);
         // A flat place, a fold in three layers, a bell, and what is under the skin or nowhere.
-        let cloth = [at(0.0, 0.0025), at(1.0, 0.003), at(1.0, 0.007), at(1.0, 0.005), at(2.0, 0.05), at(3.0, -0.001)];
+        let cloth = [
+            at(0.0, 0.0025),
+            at(1.0, 0.003),
+            at(1.0, 0.007),
+            at(1.0, 0.005),
+            at(2.0, 0.05),
+            at(3.0, -0.001),
+        ];
         let nearest = [0, 1, 1, 1, 2, 3].map(|v| [v, 0]);
         let mut heights = vec![0.0; 4];
         add(&skin, &cloth, &nearest, &mut heights);
         assert_eq!(heights, [0.0025, 0.007, 0.0, 0.0]);
-        add(&skin, &[at(0.0, f32::NAN), at(0.0, 0.001)], &[[0, 0], [u32::MAX; 2]], &mut heights);
+        add(
+            &skin,
+            &[at(0.0, f32::NAN), at(0.0, 0.001)],
+            &[[0, 0], [u32::MAX; 2]],
+            &mut heights,
+        );
         assert_eq!(heights, [0.0025, 0.007, 0.0, 0.0]);
 
         let piled = Piled(vec![Vec::new(), heights, vec![0.015; 4]]);
-        assert_eq!(piled.over(0, [0, 1, 2], 0.0025), 0.0025, "nothing is inside of the innermost");
-        assert_eq!(piled.over(1, [0, 2, 3], 0.005), 0.005, "it has room over flat cloth");
+        assert_eq!(
+            piled.over(0, [0, 1, 2], 0.0025),
+            0.0025,
+            "nothing is inside of the innermost"
+        );
+        assert_eq!(
+            piled.over(1, [0, 2, 3], 0.005),
+            0.005,
+            "it has room over flat cloth"
+        );
         assert_eq!(piled.over(1, [2, 3, 3], 0.002), 0.002, "nothing lies there");
         assert_eq!(piled.over(1, [0, 1, 2], 0.005), 0.007 + ABOVE);
         assert_eq!(piled.over(2, [0, 1, 2], 0.0075), MOST);

@@ -55,14 +55,26 @@ pub(super) struct Regions {
 }
 
 impl Regions {
-    pub(super) fn new(patches: &[Fabric], vertices: usize, edges: &[([u32; 2], f64)], edge: f32) -> Self {
+    pub(super) fn new(
+        patches: &[Fabric],
+        vertices: usize,
+        edges: &[([u32; 2], f64)],
+        edge: f32,
+    ) -> Self {
         let (mut members, mut first) = (Vec::new(), Vec::new());
         for f in patches {
             first.push(members.len());
-            members.extend(f.regions.windows(2).map(|r| f.vertices[r[0]..r[1]].to_vec()));
+            members.extend(
+                f.regions
+                    .windows(2)
+                    .map(|r| f.vertices[r[0]..r[1]].to_vec()),
+            );
         }
         let mut of = vec![0u32; vertices];
-        members.iter().enumerate().for_each(|(r, m)| m.iter().for_each(|v| of[*v as usize] = r as u32));
+        members
+            .iter()
+            .enumerate()
+            .for_each(|(r, m)| m.iter().for_each(|v| of[*v as usize] = r as u32));
         let mut beside = vec![Vec::new(); members.len()];
         let mut leaving = vec![Vec::new(); members.len()];
         for ([a, b], _) in edges {
@@ -78,14 +90,27 @@ impl Regions {
             b.sort_unstable();
             b.dedup();
         }
-        Self { members, of, beside, leaving, first, near: CLOTH.0 + CLOTH.1 * edge }
+        Self {
+            members,
+            of,
+            beside,
+            leaving,
+            first,
+            near: CLOTH.0 + CLOTH.1 * edge,
+        }
     }
 }
 
 /// The body's vertices in clusters.
 pub(super) fn clusters(surface: &SurfaceModel) -> Pieces {
     let n = surface.vertices();
-    cut(n, |v| surface.neighbours(v), (0..n as u32).collect(), CLUSTER, 1)
+    cut(
+        n,
+        |v| surface.neighbours(v),
+        (0..n as u32).collect(),
+        CLUSTER,
+        1,
+    )
 }
 
 /// One region.
@@ -127,9 +152,19 @@ impl Bounds {
     fn new(steady: f64) -> Self {
         let calm = stillness(steady)[0];
         if steady > 0.0 {
-            Self { slow: TREMBLING, calm, sway: RIDES[0] * calm, hop: RIDES[1] * calm }
+            Self {
+                slow: TREMBLING,
+                calm,
+                sway: RIDES[0] * calm,
+                hop: RIDES[1] * calm,
+            }
         } else {
-            Self { slow: SLOW, calm, sway: calm, hop: calm }
+            Self {
+                slow: SLOW,
+                calm,
+                sway: calm,
+                hop: calm,
+            }
         }
     }
 }
@@ -163,16 +198,27 @@ struct Moving {
 
 impl Moving {
     fn new(points: Vec<P3>, within: f32, cloth: Option<(usize, usize)>) -> Self {
-        Self { around: Around::of(points.iter().copied()), points, within, cloth }
+        Self {
+            around: Around::of(points.iter().copied()),
+            points,
+            within,
+            cloth,
+        }
     }
     fn touches(&self, cloth: &[P3], around: &Around) -> bool {
         if !self.around.meets(around, self.within) {
             return false;
         }
-        let here: Vec<&P3> = self.points.iter().filter(|p| around.holds(p, self.within)).collect();
+        let here: Vec<&P3> = self
+            .points
+            .iter()
+            .filter(|p| around.holds(p, self.within))
+            .collect();
         let there = cloth.iter().filter(|p| self.around.holds(p, self.within));
         let far = self.within * self.within;
-        there.into_iter().any(|p| here.iter().any(|q| (p - **q).norm_squared() < far))
+        there
+            .into_iter()
+            .any(|p| here.iter().any(|q| (p - **q).norm_squared() < far))
     }
 }
 
@@ -182,19 +228,33 @@ struct Disturbance(Vec<Moving>);
 impl Disturbance {
     fn by_cloth(&mut self, model: &Model, garments: &[GarmentState], rest: &Rest, slow: f32) {
         for (g, (m, s)) in model.garments.iter().zip(garments).enumerate() {
-            for (r, region) in rest.regions[g].iter().enumerate().filter(|r| !r.1.asleep && r.1.speed >= slow) {
-                let points = m.regions.members[r].iter().map(|v| s.positions[*v as usize]).collect();
+            for (r, region) in rest.regions[g]
+                .iter()
+                .enumerate()
+                .filter(|r| !r.1.asleep && r.1.speed >= slow)
+            {
+                let points = m.regions.members[r]
+                    .iter()
+                    .map(|v| s.positions[*v as usize])
+                    .collect();
                 debug_assert!(region.skin.is_empty());
-                self.0.push(Moving::new(points, m.regions.near, Some((g, r))));
+                self.0
+                    .push(Moving::new(points, m.regions.near, Some((g, r))));
             }
         }
     }
     /// Something moves near region `r` of garment `g`, beside what it is sewn to.
     fn reaches(&self, model: &Model, garments: &[GarmentState], g: usize, r: usize) -> bool {
         let regions = &model.garments[g].regions;
-        let own: Vec<P3> = regions.members[r].iter().map(|v| garments[g].positions[*v as usize]).collect();
+        let own: Vec<P3> = regions.members[r]
+            .iter()
+            .map(|v| garments[g].positions[*v as usize])
+            .collect();
         let around = Around::of(own.iter().copied());
-        let sewn = |m: &Moving| m.cloth.is_some_and(|(h, q)| h == g && regions.beside[r].contains(&(q as u32)));
+        let sewn = |m: &Moving| {
+            m.cloth
+                .is_some_and(|(h, q)| h == g && regions.beside[r].contains(&(q as u32)))
+        };
         self.0.iter().any(|m| !sewn(m) && m.touches(&own, &around))
     }
 }
@@ -209,14 +269,23 @@ impl Rest {
         }
     }
     fn forget(&mut self) {
-        self.regions.iter_mut().flatten().for_each(|r| *r = Region::default());
+        self.regions
+            .iter_mut()
+            .flatten()
+            .for_each(|r| *r = Region::default());
     }
     /// Nothing sleeps.
     fn awake(&self) -> bool {
         self.regions.iter().flatten().all(|r| !r.asleep)
     }
     /// Follows the body; returns skin that went far.
-    fn follow(&mut self, model: &Model, before: &[P3], body: &[P3], bounds: &Bounds) -> Disturbance {
+    fn follow(
+        &mut self,
+        model: &Model,
+        before: &[P3],
+        body: &[P3],
+        bounds: &Bounds,
+    ) -> Disturbance {
         let awake = self.awake();
         for ((at, calls), now) in self.calm.iter_mut().zip(body) {
             let still = (now - *at).norm_squared() < bounds.calm * bounds.calm;
@@ -248,14 +317,20 @@ impl Rest {
     /// Vertices that sleep.
     pub(super) fn sleeping(&self, model: &Model) -> usize {
         let of = |(m, r): (&super::model::GarmentModel, &Vec<Region>)| {
-            r.iter().zip(&m.regions.members).filter(|r| r.0.asleep).map(|r| r.1.len()).sum::<usize>()
+            r.iter()
+                .zip(&m.regions.members)
+                .filter(|r| r.0.asleep)
+                .map(|r| r.1.len())
+                .sum::<usize>()
         };
         model.garments.iter().zip(&self.regions).map(of).sum()
     }
     /// Whether a vertex sleeps.
     pub(super) fn sleeps(&self, model: &Model, garment: usize, vertex: u32) -> bool {
         let region = || model.garments[garment].regions.of[vertex as usize] as usize;
-        self.regions.get(garment).is_some_and(|r| r[region()].asleep)
+        self.regions
+            .get(garment)
+            .is_some_and(|r| r[region()].asleep)
     }
 }
 
@@ -267,7 +342,12 @@ pub(super) fn wake(model: &Model, state: &mut State, body: &[P3], dt: f64, jumpe
         state.rest = Rest::default();
         return;
     }
-    let State { garments, rest, body: before, .. } = state;
+    let State {
+        garments,
+        rest,
+        body: before,
+        ..
+    } = state;
     rest.fit(model, body);
     let bounds = Bounds::new(c.steady);
     let mut disturbance = rest.follow(model, before, body, &bounds);
@@ -283,18 +363,26 @@ pub(super) fn wake(model: &Model, state: &mut State, body: &[P3], dt: f64, jumpe
     for (g, (m, s)) in model.garments.iter().zip(garments.iter()).enumerate() {
         for (r, region) in rest.regions[g].iter().enumerate().filter(|r| r.1.asleep) {
             let skin = region.skin.iter().map(|(v, p)| (*v as usize, p));
-            let lies = skin.into_iter().all(|(v, p)| within(v, p, bounds.sway) && within(v, &before[v], bounds.hop));
-            let hangs = m.regions.leaving[r].iter().zip(&region.leaving).all(|([a, b], was)| {
-                let is = s.positions[*b as usize] - s.positions[*a as usize];
-                let length = was.norm();
-                (is.norm() - length).abs() <= PULLED.0 * length && (is - was).norm() <= PULLED.1 * length
-            });
+            let lies = skin
+                .into_iter()
+                .all(|(v, p)| within(v, p, bounds.sway) && within(v, &before[v], bounds.hop));
+            let hangs = m.regions.leaving[r]
+                .iter()
+                .zip(&region.leaving)
+                .all(|([a, b], was)| {
+                    let is = s.positions[*b as usize] - s.positions[*a as usize];
+                    let length = was.norm();
+                    (is.norm() - length).abs() <= PULLED.0 * length
+                        && (is - was).norm() <= PULLED.1 * length
+                });
             if !(lies && hangs) || disturbance.reaches(model, garments, g, r) {
                 woken.push((g, r));
             }
         }
     }
-    woken.iter().for_each(|(g, r)| rest.regions[*g][*r] = Region::default());
+    woken
+        .iter()
+        .for_each(|(g, r)| rest.regions[*g][*r] = Region::default());
     for (g, (m, s)) in model.garments.iter().zip(garments.iter_mut()).enumerate() {
         let rides = |v: usize| rest.sleeps(model, g, v as u32);
         if !rest.regions[g].iter().any(|r| r.asleep) {
@@ -303,9 +391,14 @@ pub(super) fn wake(model: &Model, state: &mut State, body: &[P3], dt: f64, jumpe
         if c.steady > 0.0 && before != body {
             let ways = ways(&m.sheet.edges, &s.nearest, before, body, rides);
             let all = s.velocities.iter_mut().zip(&ways).enumerate();
-            all.filter(|(v, _)| rides(*v)).for_each(|(_, (u, way))| *u = way / dt as f32);
+            all.filter(|(v, _)| rides(*v))
+                .for_each(|(_, (u, way))| *u = way / dt as f32);
         } else {
-            s.velocities.iter_mut().enumerate().filter(|(v, _)| rides(*v)).for_each(|(_, u)| *u = V3::zeros());
+            s.velocities
+                .iter_mut()
+                .enumerate()
+                .filter(|(v, _)| rides(*v))
+                .for_each(|(_, u)| *u = V3::zeros());
         }
     }
 }
@@ -318,7 +411,13 @@ pub(super) fn carry_on(p: &mut PatchScratch, dt: f64) {
 }
 
 /// Lets regions fall asleep after a call of `dt` seconds that ended on `body`.
-pub(super) fn fall_asleep(model: &Model, state: &mut State, patches: &[PatchScratch], body: &[P3], dt: f64) {
+pub(super) fn fall_asleep(
+    model: &Model,
+    state: &mut State,
+    patches: &[PatchScratch],
+    body: &[P3],
+    dt: f64,
+) {
     let c = &model.config;
     if !(c.sleep && c.sleep_regions) {
         return;
@@ -330,10 +429,21 @@ pub(super) fn fall_asleep(model: &Model, state: &mut State, patches: &[PatchScra
         for (f, first) in m.patches.iter().zip(&m.regions.first) {
             let Some(p) = patches.next() else { return };
             for (region, r) in regions[*first..].iter_mut().zip(f.regions.windows(2)) {
-                let mut ways: Vec<f32> = p.motion.moved[r[0]..r[1]].iter().map(|w| w.dot(*w)).collect();
+                let mut ways: Vec<f32> = p.motion.moved[r[0]..r[1]]
+                    .iter()
+                    .map(|w| w.dot(*w))
+                    .collect();
                 let way = percentile(&mut ways, MOST).unwrap_or(0.0);
-                region.speed = if region.asleep { 0.0 } else { way.sqrt() / dt as f32 };
-                region.slow_for = if region.speed < bounds.slow { region.slow_for + 1 } else { 0 };
+                region.speed = if region.asleep {
+                    0.0
+                } else {
+                    way.sqrt() / dt as f32
+                };
+                region.slow_for = if region.speed < bounds.slow {
+                    region.slow_for + 1
+                } else {
+                    0
+                };
             }
         }
     }
@@ -347,7 +457,10 @@ pub(super) fn fall_asleep(model: &Model, state: &mut State, patches: &[PatchScra
     for (g, (m, s)) in model.garments.iter().zip(garments.iter()).enumerate() {
         let all = &rest.regions[g];
         for (r, region) in all.iter().enumerate().filter(|r| awhile(r.1)) {
-            if m.regions.beside[r].iter().any(|q| all[*q as usize].speed >= bounds.slow) {
+            if m.regions.beside[r]
+                .iter()
+                .any(|q| all[*q as usize].speed >= bounds.slow)
+            {
                 continue;
             }
             let skin = skin_of(model, g, r, s, body);
@@ -364,19 +477,29 @@ pub(super) fn fall_asleep(model: &Model, state: &mut State, patches: &[PatchScra
                     slow_for: region.slow_for,
                     speed: 0.0,
                     skin: skin.into_iter().map(|v| (v, body[v as usize])).collect(),
-                    leaving: leaving.map(|[a, b]| s.positions[*b as usize] - s.positions[*a as usize]).collect(),
+                    leaving: leaving
+                        .map(|[a, b]| s.positions[*b as usize] - s.positions[*a as usize])
+                        .collect(),
                 },
             ));
         }
     }
     for (g, r, region) in tired {
-        model.garments[g].regions.members[r].iter().for_each(|v| garments[g].velocities[*v as usize] = V3::zeros());
+        model.garments[g].regions.members[r]
+            .iter()
+            .for_each(|v| garments[g].velocities[*v as usize] = V3::zeros());
         rest.regions[g][r] = region;
     }
 }
 
 /// Body vertices that a region lies on or is tied to.
-fn skin_of(model: &Model, garment: usize, region: usize, s: &GarmentState, body: &[P3]) -> Vec<u32> {
+fn skin_of(
+    model: &Model,
+    garment: usize,
+    region: usize,
+    s: &GarmentState,
+    body: &[P3],
+) -> Vec<u32> {
     let regions = &model.garments[garment].regions;
     let mut skin = Vec::new();
     for v in &regions.members[region] {

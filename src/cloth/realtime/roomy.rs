@@ -36,7 +36,11 @@ impl RoomyBody {
     pub fn new(template: &Template, config: &Config) -> Result<Self, ClothError> {
         let parts = body_parts(template);
         let pressing = pressing(template, opposites(template, &parts));
-        let surface = SurfaceModel::new(template.mesh().faces().to_vec(), Topology::new(template.mesh())?, parts);
+        let surface = SurfaceModel::new(
+            template.mesh().faces().to_vec(),
+            Topology::new(template.mesh())?,
+            parts,
+        );
         Ok(Self {
             pressing,
             creases: creases(template, &surface),
@@ -56,8 +60,16 @@ impl RoomyBody {
             self.frame.vertices.clone_from(&self.measured);
             let fits = body.len() == self.surface.vertices();
             if fits && body.iter().all(|p| p.iter().all(|c| c.is_finite())) {
-                self.apart.make_room(par, &self.surface, &self.pressing, &mut self.frame, self.room + SUNK);
-                self.creases.iter().for_each(|c| c.make_room(&mut self.frame.vertices, self.room));
+                self.apart.make_room(
+                    par,
+                    &self.surface,
+                    &self.pressing,
+                    &mut self.frame,
+                    self.room + SUNK,
+                );
+                self.creases
+                    .iter()
+                    .for_each(|c| c.make_room(&mut self.frame.vertices, self.room));
             } else {
                 self.apart = Apart::default();
             }
@@ -74,22 +86,40 @@ mod tests {
     #[test]
     fn arms_that_hang_in_the_trunk_are_moved_out_of_it_in_any_frame_and_nothing_else_is() {
         let template = embedded::template();
-        let heavy = BodyShape { coefficients: vec![0.3, 2.0, 1.2], ..BodyShape::default() };
+        let heavy = BodyShape {
+            coefficients: vec![0.3, 2.0, 1.2],
+            ..BodyShape::default()
+        };
         let rest = template.personalise(&heavy).vertices;
         // The upper half made narrower: arms come to lie in the trunk.
-        let body: Vec<P3> =
-            rest.iter().map(|p| P3::new(p.x * if p.x.abs() > 0.14 { 0.8 } else { 1.0 }, p.y, p.z)).collect();
+        let body: Vec<P3> = rest
+            .iter()
+            .map(|p| P3::new(p.x * if p.x.abs() > 0.14 { 0.8 } else { 1.0 }, p.y, p.z))
+            .collect();
         let mut roomy = RoomyBody::new(&template, &Config::default()).expect("a body");
-        let moved = |a: &[P3], b: &[P3]| a.iter().zip(b).filter(|(a, b)| (*a - *b).norm() > 1e-6).count();
+        let moved = |a: &[P3], b: &[P3]| {
+            a.iter()
+                .zip(b)
+                .filter(|(a, b)| (*a - *b).norm() > 1e-6)
+                .count()
+        };
         let once = roomy.make_room(Par::Seq, &body).to_vec();
         let count = moved(&once, &body);
-        assert!(count > 20 && count < body.len() / 4, "{count} of {}", body.len());
+        assert!(
+            count > 20 && count < body.len() / 4,
+            "{count} of {}",
+            body.len()
+        );
         assert!(once.iter().zip(&body).all(|(a, b)| (a - b).norm() < 0.041));
         assert_eq!(roomy.make_room(Par::Seq, &body), once);
         // Half a turn about the vertical: the same, turned.
         let turned: Vec<P3> = body.iter().map(|p| P3::new(-p.x, p.y, -p.z)).collect();
         let mut anew = RoomyBody::new(&template, &Config::default()).expect("a body");
-        let back: Vec<P3> = anew.make_room(Par::Rayon, &turned).iter().map(|p| P3::new(-p.x, p.y, -p.z)).collect();
+        let back: Vec<P3> = anew
+            .make_room(Par::Rayon, &turned)
+            .iter()
+            .map(|p| P3::new(-p.x, p.y, -p.z))
+            .collect();
         assert!(once.iter().zip(&back).all(|(a, b)| (a - b).norm() < 1e-5));
         // Bodies that are none.
         let mut broken = body.clone();

@@ -77,17 +77,39 @@ impl State {
             });
         }
         check_body(model, body)?;
-        let frame = SurfaceFrame { vertices: body.to_vec(), normals: Vec::new() };
+        let frame = SurfaceFrame {
+            vertices: body.to_vec(),
+            normals: Vec::new(),
+        };
         let mut garments = Vec::new();
-        for ((p, g), m) in positions.into_iter().zip(&model.outfit.garments).zip(&model.garments) {
+        for ((p, g), m) in positions
+            .into_iter()
+            .zip(&model.outfit.garments)
+            .zip(&model.garments)
+        {
             if p.len() != g.vertices {
-                return Err(ClothError::Count { what: "garment vertices", got: p.len(), expected: g.vertices });
+                return Err(ClothError::Count {
+                    what: "garment vertices",
+                    got: p.len(),
+                    expected: g.vertices,
+                });
             }
             if let Some(index) = p.iter().position(|q| !q.iter().all(|c| c.is_finite())) {
-                return Err(ClothError::NotFinite { what: "garment vertex", index });
+                return Err(ClothError::NotFinite {
+                    what: "garment vertex",
+                    index,
+                });
             }
-            let of = |masks: &[u8]| model.surface.nearest_vertices(model.config.par, &frame, &p, masks.iter());
-            let nearest = of(&m.own).into_iter().zip(of(&m.other)).map(|(own, other)| [own, other]).collect();
+            let of = |masks: &[u8]| {
+                model
+                    .surface
+                    .nearest_vertices(model.config.par, &frame, &p, masks.iter())
+            };
+            let nearest = of(&m.own)
+                .into_iter()
+                .zip(of(&m.other))
+                .map(|(own, other)| [own, other])
+                .collect();
             garments.push(GarmentState {
                 velocities: vec![V3::zeros(); p.len()],
                 positions: p,
@@ -97,8 +119,13 @@ impl State {
                 stuck: Vec::new(),
             });
         }
-        let all: Vec<SurfaceFrame> =
-            garments.iter().map(|g| SurfaceFrame { vertices: g.positions.clone(), normals: Vec::new() }).collect();
+        let all: Vec<SurfaceFrame> = garments
+            .iter()
+            .map(|g| SurfaceFrame {
+                vertices: g.positions.clone(),
+                normals: Vec::new(),
+            })
+            .collect();
         for (k, g) in garments.iter_mut().enumerate() {
             for (j, frame) in all.iter().enumerate() {
                 let (surface, own) = (&model.garments[j].folds.surface, &model.garments[k].own);
@@ -110,20 +137,36 @@ impl State {
                 g.layers.push(near);
             }
         }
-        Ok(Self { garments, body: body.to_vec(), awake_body: body.to_vec(), ..Self::default() })
+        Ok(Self {
+            garments,
+            body: body.to_vec(),
+            awake_body: body.to_vec(),
+            ..Self::default()
+        })
     }
     /// With what is known already about the skin of the body that the garments were put on.
     pub(crate) fn on_skin(self, buried: Buried, apart: Apart) -> Self {
-        Self { buried, apart, ..self }
+        Self {
+            buried,
+            apart,
+            ..self
+        }
     }
 }
 
 pub(super) fn check_body(model: &Model, body: &[P3]) -> Result<(), ClothError> {
     if body.len() != model.body_vertices() {
-        return Err(ClothError::Count { what: "body vertices", got: body.len(), expected: model.body_vertices() });
+        return Err(ClothError::Count {
+            what: "body vertices",
+            got: body.len(),
+            expected: model.body_vertices(),
+        });
     }
     match body.iter().position(|q| !q.iter().all(|c| c.is_finite())) {
-        Some(index) => Err(ClothError::NotFinite { what: "body vertex", index }),
+        Some(index) => Err(ClothError::NotFinite {
+            what: "body vertex",
+            index,
+        }),
         None => Ok(()),
     }
 }

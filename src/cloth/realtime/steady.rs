@@ -39,12 +39,22 @@ mod tests {
     #[test]
     fn noise_is_held_and_motion_is_followed() {
         let mut rng = rand_pcg::Pcg32::seed_from_u64(5);
-        let mut noise = || (0..3).map(|_| rng.random_range(-1.0f32..1.0)).collect::<Vec<_>>();
+        let mut noise = || {
+            (0..3)
+                .map(|_| rng.random_range(-1.0f32..1.0))
+                .collect::<Vec<_>>()
+        };
         let mut body = vec![P3::origin()];
         let (mut fastest, mut farthest) = (0.0f32, 0.0f32);
         for _ in 0..300 {
             let (n, before) = (noise(), body[0]);
-            follow(Par::Seq, &mut body, &[P3::new(1.5e-3 * n[0], 1.5e-3 * n[1], 1.5e-3 * n[2])], STEADY, DT);
+            follow(
+                Par::Seq,
+                &mut body,
+                &[P3::new(1.5e-3 * n[0], 1.5e-3 * n[1], 1.5e-3 * n[2])],
+                STEADY,
+                DT,
+            );
             fastest = fastest.max((body[0] - before).norm());
             farthest = farthest.max(body[0].coords.norm());
         }
@@ -63,12 +73,18 @@ mod tests {
 
     #[test]
     fn two_half_calls_are_one_and_zero_takes_the_measured_body() {
-        let (mut once, mut twice, mut plain) = (vec![P3::origin()], vec![P3::origin()], vec![P3::origin()]);
+        let (mut once, mut twice, mut plain) =
+            (vec![P3::origin()], vec![P3::origin()], vec![P3::origin()]);
         let at = [P3::new(1e-4, 0.0, 0.0)];
         follow(Par::Seq, &mut once, &at, STEADY, DT);
         follow(Par::Seq, &mut twice, &at, STEADY, DT / 2.0);
         follow(Par::Seq, &mut twice, &at, STEADY, DT / 2.0);
-        assert!((once[0].x - twice[0].x).abs() < 1e-3 * once[0].x, "{} {}", once[0].x, twice[0].x);
+        assert!(
+            (once[0].x - twice[0].x).abs() < 1e-3 * once[0].x,
+            "{} {}",
+            once[0].x,
+            twice[0].x
+        );
         follow(Par::Seq, &mut plain, &at, 0.0, DT);
         assert_eq!(plain, at);
     }

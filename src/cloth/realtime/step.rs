@@ -64,7 +64,10 @@ pub fn step(
 ) -> Result<StepReport, ClothError> {
     check_body(model, input.body)?;
     if !(input.dt > 0.0 && input.dt.is_finite()) {
-        return Err(ClothError::Field { field: "dt".into(), why: format!("{} s is not a positive time", input.dt) });
+        return Err(ClothError::Field {
+            field: "dt".into(),
+            why: format!("{} s is not a positive time", input.dt),
+        });
     }
     if state.garments.len() != model.garments.len() || state.body.len() != input.body.len() {
         return Err(ClothError::Count {
@@ -77,7 +80,13 @@ pub fn step(
     let mut followed = std::mem::take(&mut work.followed);
     let known = state.followed.len() == input.body.len();
     followed.clone_from(if known { &state.followed } else { &state.body });
-    follow(model.config.par, &mut followed, input.body, model.config.steady, input.dt);
+    follow(
+        model.config.par,
+        &mut followed,
+        input.body,
+        model.config.steady,
+        input.dt,
+    );
     let mut roomy = std::mem::take(&mut work.roomy);
     if let Some(mut report) = ride_asleep(model, state, &followed, &mut roomy.vertices) {
         std::mem::swap(&mut state.followed, &mut followed);
@@ -89,13 +98,30 @@ pub fn step(
         roomy.vertices.clone_from(&state.body);
     } else {
         roomy.vertices.clone_from(&followed);
-        state.apart.make_room(model.config.par, &model.surface, &model.pressing, &mut roomy, model.room());
-        model.creases.iter().for_each(|c| c.make_room(&mut roomy.vertices, model.room()));
+        state.apart.make_room(
+            model.config.par,
+            &model.surface,
+            &model.pressing,
+            &mut roomy,
+            model.room(),
+        );
+        model
+            .creases
+            .iter()
+            .for_each(|c| c.make_room(&mut roomy.vertices, model.room()));
         std::mem::swap(&mut state.followed, &mut followed);
     }
     work.followed = followed;
     let before = ms(started);
-    let mut report = step_on(model, state, &Input { body: &roomy.vertices, dt: input.dt }, work);
+    let mut report = step_on(
+        model,
+        state,
+        &Input {
+            body: &roomy.vertices,
+            dt: input.dt,
+        },
+        work,
+    );
     report.stages_ms.contact += before;
     report.stages_ms.total += before;
     work.roomy = roomy;
@@ -104,51 +130,97 @@ pub fn step(
 
 /// Cloth all of which sleeps rides on the body as it is `followed` now, if it sleeps on. Its body keeps the room that was
 /// made for the cloth when it fell asleep.
-fn ride_asleep(model: &Model, state: &mut State, followed: &[P3], body: &mut Vec<P3>) -> Option<StepReport> {
+fn ride_asleep(
+    model: &Model,
+    state: &mut State,
+    followed: &[P3],
+    body: &mut Vec<P3>,
+) -> Option<StepReport> {
     let config = &model.config;
     if !config.sleep || state.still < STILL_FRAMES || state.followed.len() != followed.len() {
         return None;
     }
     if *followed != *state.followed {
-        par::map_into(config.par, followed.len(), 4096, body, |v| state.body[v] + (followed[v] - state.followed[v]));
+        par::map_into(config.par, followed.len(), 4096, body, |v| {
+            state.body[v] + (followed[v] - state.followed[v])
+        });
         if !sleeps_on(config.steady, state, body) {
             return None;
         }
         let from = &state.body;
         par::for_chunks(config.par, &mut state.garments, 1, |k, g| {
             let g = &mut g[0];
-            ride(&model.garments[k].sheet.edges, &g.nearest, from, body, &mut g.positions);
+            ride(
+                &model.garments[k].sheet.edges,
+                &g.nearest,
+                from,
+                body,
+                &mut g.positions,
+            );
         });
         state.body.copy_from_slice(body);
     }
     state.frames += 1;
-    Some(StepReport { sleeping: state.garments.iter().map(|g| g.positions.len()).sum(), ..StepReport::default() })
+    Some(StepReport {
+        sleeping: state.garments.iter().map(|g| g.positions.len()).sum(),
+        ..StepReport::default()
+    })
 }
 
 /// As [`step`], on a body that fits the model, taken as it is, of someone whose cloth does not all sleep.
-fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Workspace) -> StepReport {
+fn step_on(
+    model: &Model,
+    state: &mut State,
+    input: &Input<'_>,
+    work: &mut Workspace,
+) -> StepReport {
     let started = Instant::now();
     let config = &model.config;
-    let moved =
-        |from: &[P3]| from.iter().zip(input.body).map(|(a, b)| (a - b).norm_squared()).fold(0.0, f32::max).sqrt();
+    let moved = |from: &[P3]| {
+        from.iter()
+            .zip(input.body)
+            .map(|(a, b)| (a - b).norm_squared())
+            .fold(0.0, f32::max)
+            .sqrt()
+    };
     state.frames += 1;
     // On this body, not the last one: who walks off shall find her cloth free.
     let quiet = is_quiet(config.steady, state, input.body);
     // The mean, not the farthest vertex: a waving hand is no teleport, and carrying cloth costs it its folds.
-    let sum: f64 = state.body.iter().zip(input.body).map(|(a, b)| f64::from((a - b).norm())).sum();
+    let sum: f64 = state
+        .body
+        .iter()
+        .zip(input.body)
+        .map(|(a, b)| f64::from((a - b).norm()))
+        .sum();
     let teleported = sum / input.body.len().max(1) as f64 > config.teleport;
     if teleported {
         for (g, m) in state.garments.iter_mut().zip(&model.garments) {
-            carry(model, &m.sheet.edges, &g.nearest, &state.body, input.body, &mut g.positions);
+            carry(
+                model,
+                &m.sheet.edges,
+                &g.nearest,
+                &state.body,
+                input.body,
+                &mut g.positions,
+            );
             g.velocities.iter_mut().for_each(|v| *v = V3::zeros());
         }
         state.body.copy_from_slice(input.body);
     }
     let dt = input.dt.clamp(DT_RANGE[0], DT_RANGE[1]);
     state.quiet_for = if quiet { state.quiet_for + dt } else { 0.0 };
-    let limit = if config.sleep { coming_to_rest(state.quiet_for) } else { None };
+    let limit = if config.sleep {
+        coming_to_rest(state.quiet_for)
+    } else {
+        None
+    };
     wake(model, state, input.body, dt, teleported);
-    let mut report = StepReport { teleported, softened: 1.0, ..StepReport::default() };
+    let mut report = StepReport {
+        teleported,
+        softened: 1.0,
+        ..StepReport::default()
+    };
     let timer = Instant::now();
     // The body at both ends of the call; in between it moves evenly.
     std::mem::swap(&mut work.before, &mut work.after);
@@ -158,12 +230,22 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
     }
     report.sleeves_put_back = put_back(model, state);
     // Some views in turn: a map only proposes where to begin looking, and all are wanted after a jump.
-    let wanted =
-        if teleported { model.views.len() } else { ((dt * VIEWS).round() as usize).clamp(1, model.views.len()) };
+    let wanted = if teleported {
+        model.views.len()
+    } else {
+        ((dt * VIEWS).round() as usize).clamp(1, model.views.len())
+    };
     let turns: Vec<_> = model.views.chunks(wanted).collect();
     let views = turns[state.frames as usize % turns.len()];
     let mut buried = std::mem::take(&mut state.buried);
-    let Workspace { maps, before, after, near_skin, untangle, .. } = work;
+    let Workspace {
+        maps,
+        before,
+        after,
+        near_skin,
+        untangle,
+        ..
+    } = work;
     ((report.stages_ms.maps, report.crossings), ()) = par::join(
         config.par,
         || {
@@ -192,7 +274,13 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
     let span = dt / rounds as f64;
     for r in 0..rounds {
         let timer = Instant::now();
-        lerp(config.par, &work.before, &work.after, r as f32 / rounds as f32, &mut work.now);
+        lerp(
+            config.par,
+            &work.before,
+            &work.after,
+            r as f32 / rounds as f32,
+            &mut work.now,
+        );
         let touch = Touch {
             model,
             buried: &state.buried,
@@ -208,14 +296,27 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         };
         let maps = (r == 0).then_some(&work.maps);
         sheets(model, &work.patches, span as f32, &mut work.sheets);
-        let cloth = ClothTouch { model, sheets: &work.sheets, span: span as f32 };
+        let cloth = ClothTouch {
+            model,
+            sheets: &work.sheets,
+            span: span as f32,
+        };
         for_patches(model, &mut work.patches, |g, k, p| {
             anchors(model, g, k, &touch, p);
             let fabric = &model.garments[g].patches[k];
             p.motion.overstretched(fabric, TORN, &mut p.torn);
             p.motion.overstretched(fabric, DRAWN, &mut p.drawn);
-            let excepted = Excepted { held: &p.tied, free: &p.drawn };
-            p.motion.short(fabric, config.sharpest as f32, span as f32, &excepted, &mut p.struts);
+            let excepted = Excepted {
+                held: &p.tied,
+                free: &p.drawn,
+            };
+            p.motion.short(
+                fabric,
+                config.sharpest as f32,
+                span as f32,
+                &excepted,
+                &mut p.struts,
+            );
         });
         let patches = &work.patches;
         par::for_chunks(config.par, &mut work.pieces, 1, |_, q| {
@@ -229,20 +330,31 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
         report.stages_ms.solve += ms(timer);
     }
     let timer = Instant::now();
-    let body = Settled { skin: &work.after, near: &work.near_skin, buried: &state.buried };
+    let body = Settled {
+        skin: &work.after,
+        near: &work.near_skin,
+        buried: &state.buried,
+    };
     let patches = &work.patches;
     par::for_chunks(config.par, &mut work.pieces, 1, |_, q| {
         let q = &mut q[0];
         settle(model, &body, &patches[q.at], q);
     });
     for q in &work.pieces {
-        q.lifted.iter().for_each(|(i, moved)| work.patches[q.at].motion.moved[*i as usize] = *moved);
+        q.lifted
+            .iter()
+            .for_each(|(i, moved)| work.patches[q.at].motion.moved[*i as usize] = *moved);
     }
     report.stages_ms.contact += ms(timer);
     let timer = Instant::now();
     for_patches(model, &mut work.patches, |_, _, p| carry_on(p, dt));
     let speed = finish(model, state, &work.patches, &work.pieces, dt, &mut report);
-    report.steps = model.garments.iter().map(|g| rounds * steps(g.h, span)).max().unwrap_or(0);
+    report.steps = model
+        .garments
+        .iter()
+        .map(|g| rounds * steps(g.h, span))
+        .max()
+        .unwrap_or(0);
     report.speed = f64::from(speed);
     report.sleeping = state.rest.sleeping(model);
     if report.kept_last_good.is_some() {
@@ -250,11 +362,20 @@ fn step_on(model: &Model, state: &mut State, input: &Input<'_>, work: &mut Works
     } else {
         fall_asleep(model, state, &work.patches, input.body, dt);
     }
-    state.stale = if report.kept_last_good.is_some() { state.stale + 1 } else { 0 };
+    state.stale = if report.kept_last_good.is_some() {
+        state.stale + 1
+    } else {
+        0
+    };
     if !quiet {
         state.awake_body.copy_from_slice(input.body);
     }
-    let slow = speed < if config.steady > 0.0 { TREMBLING_SPEED } else { STILL_SPEED };
+    let slow = speed
+        < if config.steady > 0.0 {
+            TREMBLING_SPEED
+        } else {
+            STILL_SPEED
+        };
     state.still = if quiet && slow { state.still + 1 } else { 0 };
     state.body.copy_from_slice(input.body);
     report.stages_ms.solve += ms(timer);
@@ -282,33 +403,72 @@ fn lerp(
 }
 
 /// Runs `f(garment, patch, scratch)` on every patch, each on its own thread when allowed.
-fn for_patches(model: &Model, all: &mut [PatchScratch], f: impl Fn(usize, usize, &mut PatchScratch) + Sync) {
-    let index: Vec<(usize, usize)> =
-        model.garments.iter().enumerate().flat_map(|(g, m)| (0..m.patches.len()).map(move |k| (g, k))).collect();
-    par::for_chunks(model.config.par, all, 1, |i, p| f(index[i].0, index[i].1, &mut p[0]));
+fn for_patches(
+    model: &Model,
+    all: &mut [PatchScratch],
+    f: impl Fn(usize, usize, &mut PatchScratch) + Sync,
+) {
+    let index: Vec<(usize, usize)> = model
+        .garments
+        .iter()
+        .enumerate()
+        .flat_map(|(g, m)| (0..m.patches.len()).map(move |k| (g, k)))
+        .collect();
+    par::for_chunks(model.config.par, all, 1, |i, p| {
+        f(index[i].0, index[i].1, &mut p[0])
+    });
 }
 
 fn begin(model: &Model, state: &State, all: &mut Vec<PatchScratch>) {
-    all.resize_with(model.garments.iter().map(|g| g.patches.len()).sum(), PatchScratch::default);
+    all.resize_with(
+        model.garments.iter().map(|g| g.patches.len()).sum(),
+        PatchScratch::default,
+    );
     for_patches(model, all, |g, k, p| {
         let (from, fabric) = (&state.garments[g], &model.garments[g].patches[k]);
         let local = || fabric.vertices.iter().map(|v| *v as usize);
         let v4 = |x: f32, y: f32, z: f32| V4::new(x, y, z);
         p.motion.begin(
-            local().map(|v| v4(from.positions[v].x, from.positions[v].y, from.positions[v].z)),
-            local().map(|v| v4(from.velocities[v].x, from.velocities[v].y, from.velocities[v].z)),
+            local().map(|v| {
+                v4(
+                    from.positions[v].x,
+                    from.positions[v].y,
+                    from.positions[v].z,
+                )
+            }),
+            local().map(|v| {
+                v4(
+                    from.velocities[v].x,
+                    from.velocities[v].y,
+                    from.velocities[v].z,
+                )
+            }),
         );
         p.asleep.clear();
-        p.asleep.extend(fabric.vertices.iter().map(|v| state.rest.sleeps(model, g, *v)));
+        p.asleep.extend(
+            fabric
+                .vertices
+                .iter()
+                .map(|v| state.rest.sleeps(model, g, *v)),
+        );
         p.motion.leave(fabric, &p.asleep);
     });
 }
 
 /// All patches through `span` seconds; what is neither held nor drawn is no faster than `limit` m/s if there is one. Garments
 /// do not wait for each other, patches of one garment do.
-fn advance(model: &Model, all: &mut [PatchScratch], pieces: &[Piece], span: f64, limit: Option<f32>) {
-    let gravity =
-        V4::new(model.config.gravity[0] as f32, model.config.gravity[1] as f32, model.config.gravity[2] as f32);
+fn advance(
+    model: &Model,
+    all: &mut [PatchScratch],
+    pieces: &[Piece],
+    span: f64,
+    limit: Option<f32>,
+) {
+    let gravity = V4::new(
+        model.config.gravity[0] as f32,
+        model.config.gravity[1] as f32,
+        model.config.gravity[2] as f32,
+    );
     let ahead = model.config.ahead as f32;
     let mut rest = all;
     let mut garments = Vec::with_capacity(model.garments.len());
@@ -337,9 +497,16 @@ fn advance(model: &Model, all: &mut [PatchScratch], pieces: &[Piece], span: f64,
                 found().for_each(|q| p.motion.within_reach(&q.cloth, t, alone, &mut p.near));
             }
             if s % m.bend_every == 0 {
-                p.motion.bend(f, h * m.bend_every.min(n - s) as f32 * 0.5, m.smooth);
+                p.motion
+                    .bend(f, h * m.bend_every.min(n - s) as f32 * 0.5, m.smooth);
             }
-            let step = Step { h, t, ahead, gravity, rings: 0 };
+            let step = Step {
+                h,
+                t,
+                ahead,
+                gravity,
+                rings: 0,
+            };
             p.motion.accelerate(f, &step, &p.near, &p.ties);
             p.motion.tie(&p.ties, t, h);
             p.motion.brace(&p.struts, h);
@@ -348,11 +515,20 @@ fn advance(model: &Model, all: &mut [PatchScratch], pieces: &[Piece], span: f64,
             p.motion.restrain(cloth, t, h, CLOTH_RECOVERY);
             p.contacts = p.motion.restrain(body, t, h, RECOVERY);
             if let Some(limit) = limit {
-                p.motion.slow_down(limit, &Excepted { held: &p.tied, free: &p.drawn });
+                p.motion.slow_down(
+                    limit,
+                    &Excepted {
+                        held: &p.tied,
+                        free: &p.drawn,
+                    },
+                );
             }
             p.motion.advance(f, &step, FASTEST);
             borders.tell(s, k, f, &p.motion);
         });
-        m.patches.iter().zip(patches.iter_mut()).for_each(|(f, p)| borders.hear(n - 1, f, &mut p.motion));
+        m.patches
+            .iter()
+            .zip(patches.iter_mut())
+            .for_each(|(f, p)| borders.hear(n - 1, f, &mut p.motion));
     });
 }

@@ -39,20 +39,35 @@ pub(super) fn is_quiet(steady: f64, state: &State, body: &[P3]) -> bool {
 pub(super) fn sleeps_on(steady: f64, state: &State, body: &[P3]) -> bool {
     let [worn, elsewhere] = stillness(steady);
     let [sway, hop] = if steady > 0.0 { SWAY } else { [1.0; 2] };
-    let within = |from: &[P3], v: usize, most: f32| (body[v] - from[v]).norm_squared() < most * most;
+    let within =
+        |from: &[P3], v: usize, most: f32| (body[v] - from[v]).norm_squared() < most * most;
     (0..body.len()).all(|v| within(&state.awake_body, v, sway * elsewhere))
-        && skin_worn(state).all(|v| within(&state.awake_body, v, sway * worn) && within(&state.body, v, hop * worn))
+        && skin_worn(state).all(|v| {
+            within(&state.awake_body, v, sway * worn) && within(&state.body, v, hop * worn)
+        })
 }
 
 /// How far skin under cloth, and any other, may be from where it last stirred, metres.
 pub(super) fn stillness(steady: f64) -> [f32; 2] {
     let still = STILL_BODY.max(0.5 * steady as f32);
-    [still, if steady > 0.0 { ELSEWHERE * still } else { still }]
+    [
+        still,
+        if steady > 0.0 {
+            ELSEWHERE * still
+        } else {
+            still
+        },
+    ]
 }
 
 /// Skin that cloth lies on.
 fn skin_worn(state: &State) -> impl Iterator<Item = usize> + '_ {
-    state.garments.iter().flat_map(|g| &g.nearest).flatten().map(|v| *v as usize)
+    state
+        .garments
+        .iter()
+        .flat_map(|g| &g.nearest)
+        .flatten()
+        .map(|v| *v as usize)
 }
 
 #[cfg(test)]
@@ -62,9 +77,14 @@ mod tests {
     #[test]
     fn cloth_swings_on_and_then_slows_down_to_a_creep() {
         assert!((0..=9).all(|i| coming_to_rest(f64::from(i) / 30.0).is_none()));
-        let speeds: Vec<f32> = (10..90).filter_map(|i| coming_to_rest(f64::from(i) / 30.0)).collect();
+        let speeds: Vec<f32> = (10..90)
+            .filter_map(|i| coming_to_rest(f64::from(i) / 30.0))
+            .collect();
         assert_eq!(speeds.len(), 80);
-        assert!(speeds.windows(2).all(|s| s[1] <= s[0]) && speeds[0] < 2.0 && speeds[79] == 0.01, "{speeds:?}");
+        assert!(
+            speeds.windows(2).all(|s| s[1] <= s[0]) && speeds[0] < 2.0 && speeds[79] == 0.01,
+            "{speeds:?}"
+        );
         let later = coming_to_rest(SWINGS_ON + 2.0 * EASED).expect("a limit");
         assert!((later - 0.5).abs() < 1e-6, "{later}");
     }

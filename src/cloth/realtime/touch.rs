@@ -86,12 +86,23 @@ impl Touch<'_> {
                 let wanted = (highest + reach + travel).min(REACH);
                 let around = g.folds.surface.neighbours(v).iter();
                 let told = around.map(|w| self.nearest[garment].nearest[*w as usize][k]);
-                let (near, c) = surface.closest_unless_astray(self.now, &x, q.nearest[j][k], masks[k], wanted, told);
+                let (near, c) = surface.closest_unless_astray(
+                    self.now,
+                    &x,
+                    q.nearest[j][k],
+                    masks[k],
+                    wanted,
+                    told,
+                );
                 q.nearest[j][k] = near;
                 match c {
                     Err(room) => q.clear[j][k] = room + wanted - highest - reach,
                     Ok(mut c) => {
-                        q.clear[j][k] = if c.rim { 0.0 } else { c.signed - highest - reach };
+                        q.clear[j][k] = if c.rim {
+                            0.0
+                        } else {
+                            c.signed - highest - reach
+                        };
                         if c.rim && k == 0 {
                             // Beyond the own parts: whatever is nearest.
                             c = surface.closest(self.now, &x, near, Region::ALL.0);
@@ -106,7 +117,11 @@ impl Touch<'_> {
             }
             let mut offsets = [offset; 2];
             if let Some(own) = &found[0] {
-                offsets[0] = self.piled.over(garment, self.model.surface.faces()[own.face as usize], offset);
+                offsets[0] = self.piled.over(
+                    garment,
+                    self.model.surface.faces()[own.face as usize],
+                    offset,
+                );
             }
             if let [Some(own), Some(other)] = &found {
                 // Between skins that face each other cloth stays on its own half, so that two layers pass each other
@@ -122,7 +137,12 @@ impl Touch<'_> {
                     offsets = [offset.min(half - gap), half + gap];
                 }
             }
-            for (c, offset) in found.iter().zip(offsets).rev().filter_map(|(c, o)| c.map(|c| (c, o))) {
+            for (c, offset) in found
+                .iter()
+                .zip(offsets)
+                .rev()
+                .filter_map(|(c, o)| c.map(|c| (c, o)))
+            {
                 let corners = self.model.surface.faces()[c.face as usize];
                 let speed = (0..3).fold(V3::zeros(), |s, k| {
                     let v = corners[k] as usize;
@@ -142,7 +162,9 @@ impl Touch<'_> {
     /// A walk may end on a finger that is not the nearest one, where no map sees the gap. Cloth beside it knows better.
     fn ask_neighbour(&self, garment: usize, v: u32, x: &P3, near: &mut [u32; 2]) {
         let around = self.model.garments[garment].folds.surface.neighbours(v);
-        let Some(&w) = around.get(self.turn as usize % around.len().max(1)) else { return };
+        let Some(&w) = around.get(self.turn as usize % around.len().max(1)) else {
+            return;
+        };
         for (k, &told) in self.nearest[garment].nearest[w as usize].iter().enumerate() {
             let far = |b: u32| (self.now.vertices[b as usize] - x).norm_squared();
             if told != near[k] && far(told) < far(near[k]) {
@@ -169,7 +191,13 @@ impl Touch<'_> {
 }
 
 /// Where a patch's anchors go during a round.
-pub(super) fn anchors(model: &Model, garment: usize, patch: usize, touch: &Touch<'_>, p: &mut PatchScratch) {
+pub(super) fn anchors(
+    model: &Model,
+    garment: usize,
+    patch: usize,
+    touch: &Touch<'_>,
+    p: &mut PatchScratch,
+) {
     p.ties.clear();
     p.tied.clear();
     let g = &model.garments[garment];
@@ -185,8 +213,11 @@ pub(super) fn anchors(model: &Model, garment: usize, patch: usize, touch: &Touch
             touch.now.vertices[v] + (touch.after[v] - touch.before[v]) * (touch.span / touch.dt)
         });
         let end = above(a, moving);
-        let firmness =
-            if a.strength >= 1.0 { 1.0 } else { 1.0 - (-g.h * ANCHOR_RATE * a.strength / (1.0 - a.strength)).exp() };
+        let firmness = if a.strength >= 1.0 {
+            1.0
+        } else {
+            1.0 - (-g.h * ANCHOR_RATE * a.strength / (1.0 - a.strength)).exp()
+        };
         p.tied[local as usize] = a.strength >= 1.0;
         p.ties.push(Tie {
             vertex: local,
@@ -203,7 +234,10 @@ fn place(a: &super::AnchorBinding, body: &[P3]) -> P3 {
 
 fn above(a: &super::AnchorBinding, [p, q, r]: [P3; 3]) -> P3 {
     let on = p.coords * a.weights[0] + q.coords * a.weights[1] + r.coords * a.weights[2];
-    let normal = (q - p).cross(&(r - p)).try_normalize(0.0).unwrap_or_else(V3::zeros);
+    let normal = (q - p)
+        .cross(&(r - p))
+        .try_normalize(0.0)
+        .unwrap_or_else(V3::zeros);
     P3::from(on + normal * a.height)
 }
 
@@ -246,7 +280,8 @@ pub(super) fn settle(model: &Model, body: &Settled<'_>, p: &PatchScratch, q: &mu
         for side in [1, 0].into_iter().filter(|s| masks[*s] != 0) {
             // Skin of other parts is far from most cloth.
             let reach = if side == 1 { OTHER_DEPTH } else { f32::MAX };
-            let (vertex, walked) = surface.closest_within(body.skin, &x, q.nearest[j][side], masks[side], reach);
+            let (vertex, walked) =
+                surface.closest_within(body.skin, &x, q.nearest[j][side], masks[side], reach);
             let found = near[side].or_nearer(surface, body.skin, &x, walked.ok(), masks[side]);
             q.nearest[j][side] = found.map_or(vertex, |c| c.vertex);
             let Some(c) = found else { continue };

@@ -46,7 +46,13 @@ pub(super) struct Untangle {
 impl Untangle {
     /// Looks at the garments whose turn it is in a call of `dt` seconds and that do not sleep, on the body of the last
     /// call. Says how many edges passed through triangles.
-    pub(super) fn look(&mut self, model: &Model, state: &mut State, body: &SurfaceFrame, dt: f64) -> usize {
+    pub(super) fn look(
+        &mut self,
+        model: &Model,
+        state: &mut State,
+        body: &SurfaceFrame,
+        dt: f64,
+    ) -> usize {
         let resting = model.config.sleep && state.quiet_for > LAST;
         if model.config.untangle <= 0.0 || resting {
             return 0;
@@ -61,30 +67,52 @@ impl Untangle {
             let State { garments, rest, .. } = state;
             let positions = &mut garments[k].positions;
             self.held.clear();
-            self.held.extend((0..positions.len() as u32).map(|v| rest.sleeps(model, k, v)));
+            self.held
+                .extend((0..positions.len() as u32).map(|v| rest.sleeps(model, k, v)));
             if self.held.iter().all(|h| *h) {
                 continue;
             }
             let anchors = &model.outfit.anchors[k];
-            anchors.iter().filter(|a| a.strength >= 1.0).for_each(|a| self.held[a.vertex as usize] = true);
+            anchors
+                .iter()
+                .filter(|a| a.strength >= 1.0)
+                .for_each(|a| self.held[a.vertex as usize] = true);
             self.x.clear();
-            self.x.extend(positions.iter().map(|p| p.coords.cast::<f64>()));
+            self.x
+                .extend(positions.iter().map(|p| p.coords.cast::<f64>()));
             for g in self.sheets.len()..=k {
-                let at: Vec<V3d> = garments[g].positions.iter().map(|p| p.coords.cast()).collect();
-                self.sheets.push(Untangler::new(&model.outfit.garments[g].faces, &at));
+                let at: Vec<V3d> = garments[g]
+                    .positions
+                    .iter()
+                    .map(|p| p.coords.cast())
+                    .collect();
+                self.sheets
+                    .push(Untangler::new(&model.outfit.garments[g].faces, &at));
             }
-            let weight = |v: usize| if self.held[v] { 0.0 } else { 1.0 / m.sheet.mass[v] };
+            let weight = |v: usize| {
+                if self.held[v] {
+                    0.0
+                } else {
+                    1.0 / m.sheet.mass[v]
+                }
+            };
             self.from.clone_from(&self.x);
             let sheet = &mut self.sheets[k];
             sheet.look_anew();
             let stuck = &mut garments[k].stuck;
             stuck.resize(self.x.len(), 0);
             for r in 0..ROUNDS {
-                let crossings = sheet.round(model.config.par, &mut self.x, weight, STEP, GAP).crossings;
+                let crossings = sheet
+                    .round(model.config.par, &mut self.x, weight, STEP, GAP)
+                    .crossings;
                 if r == 0 {
                     found += crossings;
                     let count = |(n, crossed): (&mut u8, bool)| {
-                        *n = if crossed { (*n + 1).min(STUCK[1]) } else { n.saturating_sub(1) };
+                        *n = if crossed {
+                            (*n + 1).min(STUCK[1])
+                        } else {
+                            n.saturating_sub(1)
+                        };
                     };
                     stuck.iter_mut().zip(sheet.crossed()).for_each(count);
                 }
@@ -94,7 +122,13 @@ impl Untangle {
             }
             let g = &mut garments[k];
             g.passing.clear();
-            for (v, (from, to)) in self.from.iter().zip(&self.x).enumerate().filter(|(_, w)| w.0 != w.1) {
+            for (v, (from, to)) in self
+                .from
+                .iter()
+                .zip(&self.x)
+                .enumerate()
+                .filter(|(_, w)| w.0 != w.1)
+            {
                 let way = (to - from).cap_magnitude(MOST);
                 g.go(v, from, way, body);
                 // What has further to go than that is still on the wrong side.
@@ -104,12 +138,21 @@ impl Untangle {
             }
             let stuck: Vec<bool> = g.stuck.iter().map(|n| *n >= STUCK[0]).collect();
             if stuck.contains(&true) {
-                self.from.iter_mut().zip(&g.positions).for_each(|(x, p)| *x = p.coords.cast());
+                self.from
+                    .iter_mut()
+                    .zip(&g.positions)
+                    .for_each(|(x, p)| *x = p.coords.cast());
                 self.x.clone_from(&self.from);
                 // A sleeve that was ironed left its cuff behind and turned inside out.
                 let movable = |v: usize| !self.held[v] && !Region(m.own[v]).meets(Region::ARMS);
                 sheet.iron(&mut self.x, stuck, movable, IRONED.0);
-                for (v, (from, to)) in self.from.iter().zip(&self.x).enumerate().filter(|(_, w)| w.0 != w.1) {
+                for (v, (from, to)) in self
+                    .from
+                    .iter()
+                    .zip(&self.x)
+                    .enumerate()
+                    .filter(|(_, w)| w.0 != w.1)
+                {
                     g.go(v, from, (to - from).cap_magnitude(IRONED.1), body);
                 }
             }
@@ -121,15 +164,23 @@ impl Untangle {
 impl GarmentState {
     /// Puts a vertex `way` from `from`, metres, but not into the skin.
     fn go(&mut self, v: usize, from: &V3d, way: V3d, body: &SurfaceFrame) {
-        self.positions[v] = P3::from((from + off_skin(from, way, self.nearest[v], body)).cast::<f32>());
+        self.positions[v] =
+            P3::from((from + off_skin(from, way, self.nearest[v], body)).cast::<f32>());
     }
 }
 
 /// A way from `x` without what of it goes into the skin at the two nearest vertices of the body.
 fn off_skin(x: &V3d, mut way: V3d, nearest: [u32; 2], body: &SurfaceFrame) -> V3d {
     for v in nearest {
-        let (Some(at), Some(normal)) = (body.vertices.get(v as usize), body.normals.get(v as usize)) else { continue };
-        let (normal, height) = (normal.cast::<f64>(), (x - at.coords.cast::<f64>()).dot(&normal.cast()));
+        let (Some(at), Some(normal)) =
+            (body.vertices.get(v as usize), body.normals.get(v as usize))
+        else {
+            continue;
+        };
+        let (normal, height) = (
+            normal.cast::<f64>(),
+            (x - at.coords.cast::<f64>()).dot(&normal.cast()),
+        );
         let lowest = ABOVE.min(height);
         let sinks = lowest - (height + way.dot(&normal));
         if height < NEAR && sinks > 0.0 {

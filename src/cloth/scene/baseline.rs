@@ -26,33 +26,69 @@ pub(super) fn run(
     let springs = config.method == Method::MassSpring;
     let n = scene.start.len();
     let dt = 1.0 / scene.rate;
-    let steps = if config.substeps == 0 { USUAL_SUBSTEPS[usize::from(springs)] } else { config.substeps };
+    let steps = if config.substeps == 0 {
+        USUAL_SUBSTEPS[usize::from(springs)]
+    } else {
+        config.substeps
+    };
     let h = dt / steps as f64;
-    let bend_every = if config.every[0] == 0 { BEND_EVERY } else { config.every[0] };
+    let bend_every = if config.every[0] == 0 {
+        BEND_EVERY
+    } else {
+        config.every[0]
+    };
     // A plan for a step so short that nothing is softened: both are stable at any step.
-    let fit = Fit { h: 1e-9, ahead: 0.0, springs_only: springs, bend_every, smooth: 0 };
+    let fit = Fit {
+        h: 1e-9,
+        ahead: 0.0,
+        springs_only: springs,
+        bend_every,
+        smooth: 0,
+    };
     let plan = Plan::new(&scene.sheet, &fit);
     let fabrics = plan.patches(1, 0, 0);
     let Some(f) = fabrics.first() else {
-        return Err(ClothError::Count { what: "vertices", got: 0, expected: 1 }.into());
+        return Err(ClothError::Count {
+            what: "vertices",
+            got: 0,
+            expected: 1,
+        }
+        .into());
     };
-    let mut solver = if springs { Solver::Springs(Springs::new(scene, f)) } else { Solver::Xpbd(blocks(scene, f, h)) };
+    let mut solver = if springs {
+        Solver::Springs(Springs::new(scene, f))
+    } else {
+        Solver::Xpbd(blocks(scene, f, h))
+    };
     let pins: Vec<(u32, u32)> = {
         let local = f.vertices.iter().enumerate();
-        local.filter(|(_, v)| scene.pins.contains(v)).map(|(i, v)| (i as u32, *v)).collect()
+        local
+            .filter(|(_, v)| scene.pins.contains(v))
+            .map(|(i, v)| (i as u32, *v))
+            .collect()
     };
     let local: Vec<V3d> = scene
         .start
         .iter()
         .map(|p| {
             let p: V3d = p.coords.cast();
-            scene.pinned_to.map_or(p, |c| (scene.colliders[c].placement(0.0).inverse() * Point3::from(p)).coords)
+            scene.pinned_to.map_or(p, |c| {
+                (scene.colliders[c].placement(0.0).inverse() * Point3::from(p)).coords
+            })
         })
         .collect();
-    let mut weight: Vec<f32> = f.vertices.iter().map(|v| (1.0 / scene.sheet.mass[*v as usize]) as f32).collect();
+    let mut weight: Vec<f32> = f
+        .vertices
+        .iter()
+        .map(|v| (1.0 / scene.sheet.mass[*v as usize]) as f32)
+        .collect();
     pins.iter().for_each(|(i, _)| weight[*i as usize] = 0.0);
     let mut m = Motion::default();
-    let mut x: Vec<V4> = f.vertices.iter().map(|v| v4(&scene.start[*v as usize].coords.cast())).collect();
+    let mut x: Vec<V4> = f
+        .vertices
+        .iter()
+        .map(|v| v4(&scene.start[*v as usize].coords.cast()))
+        .collect();
     let mut velocity = vec![V4::default(); n];
     let (mut planes, mut ties, mut aim) = (Vec::new(), Vec::<Tie>::new(), Vec::new());
     let mut clear = Vec::new();
@@ -76,7 +112,12 @@ pub(super) fn run(
                         (scene.colliders[c].placement(t) * Point3::from(local[p as usize])).coords
                     })
                 };
-                ties.push(Tie { vertex: i, place: v4(&at(t)), speed: v4(&((at(t + h) - at(t)) / h)), firmness: 1.0 });
+                ties.push(Tie {
+                    vertex: i,
+                    place: v4(&at(t)),
+                    speed: v4(&((at(t + h) - at(t)) / h)),
+                    firmness: 1.0,
+                });
             }
             match &mut solver {
                 Solver::Xpbd(blocks) => {
@@ -98,7 +139,14 @@ pub(super) fn run(
             }
             m.restrain(&planes, 0.0, hf, RECOVERY);
             m.tie(&ties, 0.0, hf);
-            m.advance(f, &Step { h: hf, ..Step::default() }, f32::INFINITY);
+            m.advance(
+                f,
+                &Step {
+                    h: hf,
+                    ..Step::default()
+                },
+                f32::INFINITY,
+            );
         }
         for i in 0..n {
             x[i] = m.position(i);
@@ -106,7 +154,11 @@ pub(super) fn run(
         velocity.clone_from(&m.velocity);
         times.push(started.elapsed().as_secs_f64() * 1e3);
         if let Some(index) = x.iter().position(|p| !p.0.iter().all(|c| c.is_finite())) {
-            return Err(ClothError::NotFinite { what: "cloth vertex", index }.into());
+            return Err(ClothError::NotFinite {
+                what: "cloth vertex",
+                index,
+            }
+            .into());
         }
         let ordered = in_order(f, &x);
         penetration = deepest(scene, index as f64 * dt, &ordered).max(penetration);
@@ -115,12 +167,22 @@ pub(super) fn run(
         finished += 1;
     }
     let report = RunReport::of(scene, times, &in_order(f, &x), &in_order(f, &velocity));
-    Ok(RunReport { frames: finished, substeps: steps, iterations: 1, penetration, softened: 1.0, ..report })
+    Ok(RunReport {
+        frames: finished,
+        substeps: steps,
+        iterations: 1,
+        penetration,
+        softened: 1.0,
+        ..report
+    })
 }
 
 fn in_order(f: &Fabric, x: &[V4]) -> Vec<V3d> {
     let mut out = vec![V3d::zeros(); x.len()];
-    f.vertices.iter().zip(x).for_each(|(v, p)| out[*v as usize] = v3d(*p));
+    f.vertices
+        .iter()
+        .zip(x)
+        .for_each(|(v, p)| out[*v as usize] = v3d(*p));
     out
 }
 
@@ -138,12 +200,19 @@ struct Block {
 
 fn blocks(scene: &Scene, f: &Fabric, h: f64) -> Vec<Block> {
     let mut local = vec![0u32; scene.start.len()];
-    f.vertices.iter().enumerate().for_each(|(i, v)| local[*v as usize] = i as u32);
+    f.vertices
+        .iter()
+        .enumerate()
+        .for_each(|(i, v)| local[*v as usize] = i as u32);
     triangles(&scene.sheet)
         .into_iter()
         .filter_map(|(v, k, rest)| {
             let compliance = (k.try_inverse()? / (h * h)).cast();
-            Some(Block { v: v.map(|v| local[v as usize]), rest: rest.map(|l| l as f32), compliance })
+            Some(Block {
+                v: v.map(|v| local[v as usize]),
+                rest: rest.map(|l| l as f32),
+                compliance,
+            })
         })
         .collect()
 }
@@ -170,7 +239,9 @@ fn project(b: &Block, weight: &[f32], x: &mut [V4]) {
         a[(k, j)] += shared;
         a[(j, k)] += shared;
     }
-    let Some(inverse) = a.try_inverse() else { return };
+    let Some(inverse) = a.try_inverse() else {
+        return;
+    };
     let l = -(inverse * c);
     for k in 0..3 {
         let (p, q) = ((k + 1) % 3, (k + 2) % 3);
@@ -189,7 +260,10 @@ impl Springs {
     fn new(scene: &Scene, f: &Fabric) -> Self {
         let sheet = &scene.sheet;
         let mut local = vec![0usize; scene.start.len()];
-        f.vertices.iter().enumerate().for_each(|(i, v)| local[*v as usize] = i);
+        f.vertices
+            .iter()
+            .enumerate()
+            .for_each(|(i, v)| local[*v as usize] = i);
         let mut stiff = std::collections::BTreeMap::<[u32; 2], f64>::new();
         for (v, k, _) in triangles(sheet) {
             for i in 0..3 {
@@ -202,7 +276,10 @@ impl Springs {
             .edges
             .iter()
             .map(|(v, l)| {
-                let k = stiff.get(&[v[0].min(v[1]), v[0].max(v[1])]).copied().unwrap_or(0.0);
+                let k = stiff
+                    .get(&[v[0].min(v[1]), v[0].max(v[1])])
+                    .copied()
+                    .unwrap_or(0.0);
                 ([at(v[0]), at(v[1])], *l, k)
             })
             .collect();
@@ -211,7 +288,10 @@ impl Springs {
             let l = (scene.start[a as usize] - scene.start[b as usize]).norm();
             ([at(a), at(b)], f64::from(l), h.w)
         }));
-        Self { springs, mass: f.vertices.iter().map(|v| sheet.mass[*v as usize]).collect() }
+        Self {
+            springs,
+            mass: f.vertices.iter().map(|v| sheet.mass[*v as usize]).collect(),
+        }
     }
 
     /// (M − h²K)Δv = h(f + hKv) (Baraff and Witkin 1998, eq. 6) by conjugate gradients.
@@ -222,7 +302,8 @@ impl Springs {
         let mut held = vec![false; n];
         ties.iter().for_each(|t| held[t.vertex as usize] = true);
         let mut right: Vec<V3d> = (0..n).map(|i| gravity * (self.mass[i] * h)).collect();
-        let mut blocks: Vec<Matrix3<f64>> = self.mass.iter().map(|m| Matrix3::identity() * *m).collect();
+        let mut blocks: Vec<Matrix3<f64>> =
+            self.mass.iter().map(|m| Matrix3::identity() * *m).collect();
         let mut terms = Vec::with_capacity(self.springs.len());
         for ([a, b], rest, k) in &self.springs {
             let d = x[*b] - x[*a];
@@ -241,8 +322,10 @@ impl Springs {
         for t in ties {
             right[t.vertex as usize] = V3d::zeros();
         }
-        let inverse: Vec<Matrix3<f64>> =
-            blocks.iter().map(|b| b.try_inverse().unwrap_or_else(Matrix3::identity)).collect();
+        let inverse: Vec<Matrix3<f64>> = blocks
+            .iter()
+            .map(|b| b.try_inverse().unwrap_or_else(Matrix3::identity))
+            .collect();
         let mut change = vec![V3d::zeros(); n];
         conjugate_gradient(
             |p, out| {

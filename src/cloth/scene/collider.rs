@@ -27,7 +27,10 @@ impl Primitive {
     pub fn fastest(&self, from: &Isometry3<f64>, to: &Isometry3<f64>) -> f64 {
         let size = match self {
             Self::Sphere { radius } => *radius,
-            Self::Capsule { radius, half_segment } => radius + half_segment,
+            Self::Capsule {
+                radius,
+                half_segment,
+            } => radius + half_segment,
         };
         let turn = from.rotation.angle_to(&to.rotation);
         (from.translation.vector - to.translation.vector).norm() + turn * size
@@ -36,9 +39,13 @@ impl Primitive {
     pub fn distance(&self, p: &V3d) -> (f64, V3d) {
         let (radius, axis_point) = match self {
             Self::Sphere { radius } => (*radius, V3d::zeros()),
-            Self::Capsule { radius, half_segment } => {
-                (*radius, V3d::new(0.0, p.y.clamp(-half_segment, *half_segment), 0.0))
-            }
+            Self::Capsule {
+                radius,
+                half_segment,
+            } => (
+                *radius,
+                V3d::new(0.0, p.y.clamp(-half_segment, *half_segment), 0.0),
+            ),
         };
         let d = p - axis_point;
         let n = d.norm();
@@ -88,24 +95,51 @@ impl Collider {
         }
         let shape = match c.kind.as_str() {
             "sphere" => Primitive::Sphere { radius: c.radius },
-            "capsule" if c.half_segment >= 0.0 => Primitive::Capsule { radius: c.radius, half_segment: c.half_segment },
+            "capsule" if c.half_segment >= 0.0 => Primitive::Capsule {
+                radius: c.radius,
+                half_segment: c.half_segment,
+            },
             "capsule" => return Err(format!("half_segment: {} is negative", c.half_segment)),
-            other => return Err(format!("type: `{other}` is not known; there are sphere and capsule")),
-        };
-        let motion = match (c.motion_csv.as_deref().and_then(|m| m.split_whitespace().next()), folder) {
-            (None, _) if c.motion.is_empty() => {
-                vec![(0.0, Isometry3::from_parts(Translation3::from(V3d::from(c.center)), UnitQuaternion::identity()))]
+            other => {
+                return Err(format!(
+                    "type: `{other}` is not known; there are sphere and capsule"
+                ));
             }
-            (None, _) => placements(&c.motion).map_err(|(row, why)| format!("motion[{row}]: {why}"))?,
+        };
+        let motion = match (
+            c.motion_csv
+                .as_deref()
+                .and_then(|m| m.split_whitespace().next()),
+            folder,
+        ) {
+            (None, _) if c.motion.is_empty() => {
+                vec![(
+                    0.0,
+                    Isometry3::from_parts(
+                        Translation3::from(V3d::from(c.center)),
+                        UnitQuaternion::identity(),
+                    ),
+                )]
+            }
+            (None, _) => {
+                placements(&c.motion).map_err(|(row, why)| format!("motion[{row}]: {why}"))?
+            }
             (Some(name), Some(folder)) => read_motion(&folder.join(name))?,
             (Some(_), None) => return Err("motion_csv: no files are read here: use motion".into()),
         };
-        Ok(Self { shape, friction: c.friction, motion })
+        Ok(Self {
+            shape,
+            friction: c.friction,
+            motion,
+        })
     }
     /// Where it is at time `t`, s; between samples by interpolation, beyond them as at the ends.
     pub fn placement(&self, t: f64) -> Isometry3<f64> {
         let after = self.motion.partition_point(|(time, _)| *time <= t);
-        match (after.checked_sub(1).map(|i| &self.motion[i]), self.motion.get(after)) {
+        match (
+            after.checked_sub(1).map(|i| &self.motion[i]),
+            self.motion.get(after),
+        ) {
             (Some((t0, a)), Some((t1, b))) => {
                 let s = (t - t0) / (t1 - t0);
                 a.try_lerp_slerp(b, s, f64::EPSILON).unwrap_or(*a)
@@ -118,14 +152,24 @@ impl Collider {
 
 /// t, position, quaternion x y z w; one header line.
 fn read_motion(path: &Path) -> Result<Vec<(f64, Isometry3<f64>)>, String> {
-    let text = std::fs::read_to_string(path).map_err(|e| format!("motion_csv: {}: {e}", path.display()))?;
+    let text = std::fs::read_to_string(path)
+        .map_err(|e| format!("motion_csv: {}: {e}", path.display()))?;
     let mut rows = Vec::new();
     let mut lines = Vec::new();
-    for (i, line) in text.lines().enumerate().skip(1).filter(|(_, l)| !l.trim().is_empty()) {
+    for (i, line) in text
+        .lines()
+        .enumerate()
+        .skip(1)
+        .filter(|(_, l)| !l.trim().is_empty())
+    {
         let fault = |why: &str| format!("motion_csv: {} line {}: {why}", path.display(), i + 1);
         let v: Vec<f64> = line
             .split(',')
-            .map(|w| w.trim().parse().map_err(|_| fault(&format!("`{w}` is no number"))))
+            .map(|w| {
+                w.trim()
+                    .parse()
+                    .map_err(|_| fault(&format!("`{w}` is no number")))
+            })
             .collect::<Result<_, _>>()?;
         rows.push(v.try_into().map_err(|_| fault("8 numbers are needed"))?);
         lines.push(i + 1);
@@ -133,7 +177,8 @@ fn read_motion(path: &Path) -> Result<Vec<(f64, Isometry3<f64>)>, String> {
     if rows.is_empty() {
         return Err(format!("motion_csv: {}: no samples", path.display()));
     }
-    placements(&rows).map_err(|(row, why)| format!("motion_csv: {} line {}: {why}", path.display(), lines[row]))
+    placements(&rows)
+        .map_err(|(row, why)| format!("motion_csv: {} line {}: {why}", path.display(), lines[row]))
 }
 
 /// Times (s) and placements, in order.
@@ -147,7 +192,8 @@ fn placements(rows: &[[f64; 8]]) -> Result<Motion, (usize, &'static str)> {
         if !v.iter().all(|x| x.is_finite()) || out.last().is_some_and(|(last, _)| *last >= t) {
             return Err((row, "times must rise and all numbers be finite"));
         }
-        let q = UnitQuaternion::try_new(Quaternion::new(qw, qx, qy, qz), 1e-6).ok_or((row, "no rotation"))?;
+        let q = UnitQuaternion::try_new(Quaternion::new(qw, qx, qy, qz), 1e-6)
+            .ok_or((row, "no rotation"))?;
         out.push((t, Isometry3::from_parts(Translation3::new(px, py, pz), q)));
     }
     Ok(out)
@@ -159,7 +205,10 @@ mod tests {
 
     #[test]
     fn distances_have_their_closed_form() {
-        let c = Primitive::Capsule { radius: 0.1, half_segment: 0.4 };
+        let c = Primitive::Capsule {
+            radius: 0.1,
+            half_segment: 0.4,
+        };
         let (d, n) = c.distance(&V3d::new(0.3, 0.2, 0.0));
         assert!((d - 0.2).abs() < 1e-12 && (n - V3d::x()).norm() < 1e-12);
         let (d, n) = c.distance(&V3d::new(0.0, 0.9, 0.0));

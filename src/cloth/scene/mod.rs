@@ -130,10 +130,16 @@ pub fn parse(text: &str, origin: &Path, folder: Option<&Path>) -> Result<Scene, 
     };
     let file: File = serde_json::from_str(text).map_err(|e| fault("json", e.to_string()))?;
     if !(file.duration_s > 0.0 && file.duration_s <= LONGEST) {
-        return Err(fault("duration_s", format!("{} is not in 0 to {LONGEST} s", file.duration_s)));
+        return Err(fault(
+            "duration_s",
+            format!("{} is not in 0 to {LONGEST} s", file.duration_s),
+        ));
     }
     if !(file.output_fps > 0.0 && file.output_fps <= HIGHEST_RATE) {
-        return Err(fault("output_fps", format!("{} is not in 0 to {HIGHEST_RATE}", file.output_fps)));
+        return Err(fault(
+            "output_fps",
+            format!("{} is not in 0 to {HIGHEST_RATE}", file.output_fps),
+        ));
     }
     if !file.gravity.iter().all(|g| g.is_finite()) {
         return Err(fault("gravity", "must be finite".into()));
@@ -141,22 +147,38 @@ pub fn parse(text: &str, origin: &Path, folder: Option<&Path>) -> Result<Scene, 
     let mesh = match (&file.mesh, &file.mesh_obj, folder) {
         (Some(name), None, Some(folder)) => read_obj(&folder.join(name))?.mesh,
         (None, Some(obj), _) => parse_obj(obj, &origin.join("mesh_obj"))?.mesh,
-        (Some(_), None, None) => return Err(fault("mesh", "no files are read here: use mesh_obj".into())),
+        (Some(_), None, None) => {
+            return Err(fault("mesh", "no files are read here: use mesh_obj".into()));
+        }
         _ => return Err(fault("mesh", "one of mesh and mesh_obj is needed".into())),
     };
-    if let Some(v) = file.pinned_vertices.iter().find(|v| **v as usize >= mesh.vertices().len()) {
-        return Err(fault("pinned_vertices", format!("{v}: the mesh has {} vertices", mesh.vertices().len())));
+    if let Some(v) = file
+        .pinned_vertices
+        .iter()
+        .find(|v| **v as usize >= mesh.vertices().len())
+    {
+        return Err(fault(
+            "pinned_vertices",
+            format!("{v}: the mesh has {} vertices", mesh.vertices().len()),
+        ));
     }
     let colliders = file
         .colliders
         .iter()
         .enumerate()
-        .map(|(i, c)| Collider::read(c, folder).map_err(|why| fault(&format!("colliders[{i}]"), why)))
+        .map(|(i, c)| {
+            Collider::read(c, folder).map_err(|why| fault(&format!("colliders[{i}]"), why))
+        })
         .collect::<Result<Vec<_>, _>>()?;
     let pinned_to = match file.pinned_to.as_deref() {
         None | Some("world") => None,
         Some("body") if !colliders.is_empty() => Some(0),
-        Some(other) => return Err(fault("pinned_to", format!("`{other}`: `body` needs a collider, else `world`"))),
+        Some(other) => {
+            return Err(fault(
+                "pinned_to",
+                format!("`{other}`: `body` needs a collider, else `world`"),
+            ));
+        }
     };
     let m = &file.material;
     // The membrane is given as force per width, so any thickness makes the same sheet.
@@ -169,8 +191,16 @@ pub fn parse(text: &str, origin: &Path, folder: Option<&Path>) -> Result<Scene, 
         "scene file",
     );
     (material.bending, material.friction, material.damping) = (m.bending_rigidity, m.friction, 0.0);
-    let rest: Vec<[[f64; 2]; 3]> = (0..mesh.faces().len()).map(|f| flat(&mesh.corners(f))).collect();
-    let sheet = Sheet::new(mesh.vertices().len(), mesh.faces(), &rest, &material, Some(mesh.vertices()))?;
+    let rest: Vec<[[f64; 2]; 3]> = (0..mesh.faces().len())
+        .map(|f| flat(&mesh.corners(f)))
+        .collect();
+    let sheet = Sheet::new(
+        mesh.vertices().len(),
+        mesh.faces(),
+        &rest,
+        &material,
+        Some(mesh.vertices()),
+    )?;
     Ok(Scene {
         sheet,
         faces: mesh.faces().to_vec(),

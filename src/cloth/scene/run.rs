@@ -153,7 +153,11 @@ pub struct RunReport {
 /// When the file cannot be written.
 pub fn write_positions(path: &Path, frames: &[Vec<P3>]) -> Result<(), FormatError> {
     let n = frames.first().map_or(0, Vec::len);
-    let flat: Vec<f32> = frames.iter().flatten().flat_map(|p| [p.x, p.y, p.z]).collect();
+    let flat: Vec<f32> = frames
+        .iter()
+        .flatten()
+        .flat_map(|p| [p.x, p.y, p.z])
+        .collect();
     write_npy(path, &[frames.len() as u64, n as u64, 3], flat.into_iter())
 }
 
@@ -183,10 +187,15 @@ fn quasi_newton(
 ) -> Result<RunReport, SceneError> {
     let sheet = &scene.sheet;
     let n = scene.start.len();
-    let substeps = if config.substeps == 0 { USUAL_SUBSTEPS } else { config.substeps };
+    let substeps = if config.substeps == 0 {
+        USUAL_SUBSTEPS
+    } else {
+        config.substeps
+    };
     let h = 1.0 / (scene.rate * substeps as f64);
     let unit = hold_unit(sheet, h);
-    let mut solver = QuasiNewton::new(SymbolicFactor::new(sheet.pattern.clone()).map_err(ClothError::from)?);
+    let mut solver =
+        QuasiNewton::new(SymbolicFactor::new(sheet.pattern.clone()).map_err(ClothError::from)?);
     let mut x: Vec<V3d> = scene.start.iter().map(|p| p.coords.cast()).collect();
     let mut v = vec![V3d::zeros(); n];
     // Positions and velocities one step earlier, for BDF2.
@@ -212,16 +221,29 @@ fn quasi_newton(
         let started = Instant::now();
         for s in 0..substeps {
             let t = ((index - 1) * substeps + s + 1) as f64 * h;
-            let solids: Vec<(Isometry3<f64>, Isometry3<f64>)> =
-                scene.colliders.iter().map(|c| (c.placement(t - h), c.placement(t))).collect();
+            let solids: Vec<(Isometry3<f64>, Isometry3<f64>)> = scene
+                .colliders
+                .iter()
+                .map(|c| (c.placement(t - h), c.placement(t)))
+                .collect();
             let before = x.clone();
             y.clear();
             // BDF2: 3x − 4x₋₁ + x₋₂ = 2h v, and the same for v: an implicit Euler step of 2h/3 from the extrapolation.
-            let hb = if second_order && earlier.is_some() { h * 2.0 / 3.0 } else { h };
+            let hb = if second_order && earlier.is_some() {
+                h * 2.0 / 3.0
+            } else {
+                h
+            };
             let (base, rate): (Vec<V3d>, Vec<V3d>) = match &earlier {
                 Some((x0, v0)) if second_order => (
-                    x.iter().zip(x0).map(|(x, x0)| (x * 4.0 - x0) / 3.0).collect(),
-                    v.iter().zip(v0).map(|(v, v0)| (v * 4.0 - v0) / 3.0).collect(),
+                    x.iter()
+                        .zip(x0)
+                        .map(|(x, x0)| (x * 4.0 - x0) / 3.0)
+                        .collect(),
+                    v.iter()
+                        .zip(v0)
+                        .map(|(v, v0)| (v * 4.0 - v0) / 3.0)
+                        .collect(),
                 ),
                 _ => (x.clone(), v.clone()),
             };
@@ -248,7 +270,10 @@ fn quasi_newton(
                     } else {
                         x[i]
                     };
-                    Hold { target, stiffness: stiffness[i] }
+                    Hold {
+                        target,
+                        stiffness: stiffness[i],
+                    }
                 }));
                 for &p in &scene.pins {
                     holds[p as usize].target = pin(scene, &solids, &local[p as usize]);
@@ -260,7 +285,11 @@ fn quasi_newton(
             }
             unconverged += usize::from(!converged);
             if let Some(index) = x.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
-                return Err(ClothError::NotFinite { what: "cloth vertex", index }.into());
+                return Err(ClothError::NotFinite {
+                    what: "cloth vertex",
+                    index,
+                }
+                .into());
             }
             for i in 0..n {
                 x[i] = outside(scene, &solids, config.offset, &before[i], &y[i], x[i]);
@@ -269,7 +298,9 @@ fn quasi_newton(
                 x[p as usize] = pin(scene, &solids, &local[p as usize]);
             }
             let old = v.clone();
-            v.iter_mut().zip(x.iter().zip(&base)).for_each(|(v, (x, b))| *v = (x - b) / hb);
+            v.iter_mut()
+                .zip(x.iter().zip(&base))
+                .for_each(|(v, (x, b))| *v = (x - b) / hb);
             earlier = Some((before, old));
         }
         times.push(started.elapsed().as_secs_f64() * 1e3);
@@ -294,7 +325,11 @@ impl RunReport {
     /// What every solver tells: times of the frames (ms) and the end.
     pub(super) fn of(scene: &Scene, mut times: Vec<f64>, x: &[V3d], v: &[V3d]) -> Self {
         times.sort_by(f64::total_cmp);
-        let kinetic: f64 = v.iter().zip(&scene.sheet.mass).map(|(v, m)| 0.5 * m * v.norm_squared()).sum();
+        let kinetic: f64 = v
+            .iter()
+            .zip(&scene.sheet.mass)
+            .map(|(v, m)| 0.5 * m * v.norm_squared())
+            .sum();
         Self {
             frames: scene.frames(),
             vertices: x.len(),
@@ -315,21 +350,30 @@ pub(super) fn deepest(scene: &Scene, t: f64, x: &[V3d]) -> f64 {
         .iter()
         .flat_map(|c| {
             let back = c.placement(t).inverse();
-            x.iter().map(move |p| -c.shape.distance(&(back * Point3::from(*p)).coords).0)
+            x.iter()
+                .map(move |p| -c.shape.distance(&(back * Point3::from(*p)).coords).0)
         })
         .fold(0.0, f64::max)
 }
 
 fn pin(scene: &Scene, solids: &[(Isometry3<f64>, Isometry3<f64>)], local: &V3d) -> V3d {
-    scene.pinned_to.map_or(*local, |c| (solids[c].1 * Point3::from(*local)).coords)
+    scene
+        .pinned_to
+        .map_or(*local, |c| (solids[c].1 * Point3::from(*local)).coords)
 }
 
-fn touches(scene: &Scene, solids: &[(Isometry3<f64>, Isometry3<f64>)], offset: f64, p: &V3d) -> bool {
-    scene
-        .colliders
-        .iter()
-        .zip(solids)
-        .any(|(c, (_, at))| c.shape.distance(&at.inverse_transform_point(&Point3::from(*p)).coords).0 < offset)
+fn touches(
+    scene: &Scene,
+    solids: &[(Isometry3<f64>, Isometry3<f64>)],
+    offset: f64,
+    p: &V3d,
+) -> bool {
+    scene.colliders.iter().zip(solids).any(|(c, (_, at))| {
+        c.shape
+            .distance(&at.inverse_transform_point(&Point3::from(*p)).coords)
+            .0
+            < offset
+    })
 }
 
 /// `x` pushed out of every solid, with Coulomb friction against the solid's own motion since `before`; how far inertia
@@ -343,13 +387,19 @@ fn outside(
     mut x: V3d,
 ) -> V3d {
     for (c, (was, at)) in scene.colliders.iter().zip(solids) {
-        let (d, n) = c.shape.distance(&at.inverse_transform_point(&Point3::from(x)).coords);
+        let (d, n) = c
+            .shape
+            .distance(&at.inverse_transform_point(&Point3::from(x)).coords);
         if d >= offset {
             continue;
         }
         let normal = at.rotation * n;
         x += normal * (offset - d);
-        let load = (offset - c.shape.distance(&at.inverse_transform_point(&Point3::from(*y)).coords).0).max(0.0);
+        let load = (offset
+            - c.shape
+                .distance(&at.inverse_transform_point(&Point3::from(*y)).coords)
+                .0)
+            .max(0.0);
         let carried = (at * was.inverse() * Point3::from(*before)).coords;
         let slip = x - carried;
         let slip = slip - normal * slip.dot(&normal);
@@ -379,7 +429,14 @@ mod tests {
         for i in 0..CELLS {
             for j in 0..CELLS {
                 let a = i * (CELLS + 1) + j + 1;
-                obj += &format!("f {a} {} {}\nf {} {} {}\n", a + 1, a + CELLS + 1, a + 1, a + CELLS + 2, a + CELLS + 1);
+                obj += &format!(
+                    "f {a} {} {}\nf {} {} {}\n",
+                    a + 1,
+                    a + CELLS + 1,
+                    a + 1,
+                    a + CELLS + 2,
+                    a + CELLS + 1
+                );
             }
         }
         let scene = serde_json::json!({
@@ -405,18 +462,29 @@ mod tests {
     }
 
     fn apart(a: &[P3], b: &[P3]) -> f64 {
-        let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from((a - b).norm_squared())).sum();
+        let sum: f64 = a
+            .iter()
+            .zip(b)
+            .map(|(a, b)| f64::from((a - b).norm_squared()))
+            .sum();
         (sum / a.len() as f64).sqrt()
     }
 
     #[test]
     fn patches_on_any_number_of_threads_give_the_same_bits() {
         for patches in [1, 2, 3] {
-            let c = RunConfig { patches, smooth: Some(2), ..RunConfig::default() };
+            let c = RunConfig {
+                patches,
+                smooth: Some(2),
+                ..RunConfig::default()
+            };
             let on = |threads| crate::par::with_threads(threads, || end(&c)).expect("threads");
             let one = on(1);
             assert!(one == on(2) && one == on(5), "{patches} patches");
-            assert!(apart(&one, &end(&RunConfig { patches: 1, ..c })) < 1e-4, "{patches} patches and one");
+            assert!(
+                apart(&one, &end(&RunConfig { patches: 1, ..c })) < 1e-4,
+                "{patches} patches and one"
+            );
         }
     }
 
@@ -426,7 +494,10 @@ mod tests {
         let mut obj = String::new();
         for i in 0..=CELLS[0] {
             for j in 0..=CELLS[1] {
-                let (x, z) = (0.3 * i as f64 / CELLS[0] as f64 - 0.145, 0.09 * j as f64 / CELLS[1] as f64 - 0.045);
+                let (x, z) = (
+                    0.3 * i as f64 / CELLS[0] as f64 - 0.145,
+                    0.09 * j as f64 / CELLS[1] as f64 - 0.045,
+                );
                 obj += &format!("v {x:.6} 0 {z:.6}\n");
             }
         }
@@ -434,8 +505,13 @@ mod tests {
             for j in 0..CELLS[1] {
                 let a = i * (CELLS[1] + 1) + j + 1;
                 let [b, c, d] = [a + 1, a + CELLS[1] + 1, a + CELLS[1] + 2];
-                let two = if (i + j) % 2 == 1 { [[a, b, c], [b, d, c]] } else { [[a, b, d], [a, d, c]] };
-                two.iter().for_each(|f| obj += &format!("f {} {} {}\n", f[0], f[1], f[2]));
+                let two = if (i + j) % 2 == 1 {
+                    [[a, b, c], [b, d, c]]
+                } else {
+                    [[a, b, d], [a, d, c]]
+                };
+                two.iter()
+                    .for_each(|f| obj += &format!("f {} {} {}\n", f[0], f[1], f[2]));
             }
         }
         let turned = std::f64::consts::FRAC_1_SQRT_2;
@@ -468,22 +544,52 @@ mod tests {
             (most, report.expect("a run"))
         };
         let (off, _) = most(&RunConfig::default());
-        let (on, report) = most(&RunConfig { self_collision: true, thickness: 0.005, ..RunConfig::default() });
+        let (on, report) = most(&RunConfig {
+            self_collision: true,
+            thickness: 0.005,
+            ..RunConfig::default()
+        });
         assert!(off > 20, "{off}: nothing would be tested");
         assert_eq!(on, 0, "{off} without");
-        assert!(report.fold_contacts > 0 && report.fold_searches_skipped > 0, "{report:?}");
-        assert!(report.energy_end < 0.1, "no energy is gained: {}", report.energy_end);
+        assert!(
+            report.fold_contacts > 0 && report.fold_searches_skipped > 0,
+            "{report:?}"
+        );
+        assert!(
+            report.energy_end < 0.1,
+            "no energy is gained: {}",
+            report.energy_end
+        );
     }
 
     #[test]
     fn the_offline_solver_is_of_second_order() {
-        let with = |substeps| end(&RunConfig { substeps, ..RunConfig::offline() });
+        let with = |substeps| {
+            end(&RunConfig {
+                substeps,
+                ..RunConfig::offline()
+            })
+        };
         let [coarse, middle, fine] = [16, 32, 64].map(with);
         let ratio = apart(&coarse, &middle) / apart(&middle, &fine);
-        assert!(ratio > 3.0, "halving the step divides the error by {ratio}, four in the limit");
-        assert!(apart(&coarse, &middle) < 1e-3, "{}", apart(&coarse, &middle));
+        assert!(
+            ratio > 3.0,
+            "halving the step divides the error by {ratio}, four in the limit"
+        );
+        assert!(
+            apart(&coarse, &middle) < 1e-3,
+            "{}",
+            apart(&coarse, &middle)
+        );
         // Another method on the same sheet comes to the same place.
-        let explicit = end(&RunConfig { substeps: 400, ..RunConfig::default() });
-        assert!(apart(&explicit, &fine) < 2e-3, "{}", apart(&explicit, &fine));
+        let explicit = end(&RunConfig {
+            substeps: 400,
+            ..RunConfig::default()
+        });
+        assert!(
+            apart(&explicit, &fine) < 2e-3,
+            "{}",
+            apart(&explicit, &fine)
+        );
     }
 }

@@ -51,10 +51,23 @@ pub(super) fn run(
         given => given,
     };
     let h = dt / substeps as f64;
-    let bend_every = if config.every[0] == 0 { Plan::bend_every(sheet, h) } else { config.every[0] };
+    let bend_every = if config.every[0] == 0 {
+        Plan::bend_every(sheet, h)
+    } else {
+        config.every[0]
+    };
     // Contacts are looked for again after so many evaluations of bending, where patches meet.
     let looks = config.every[1].max(1).div_ceil(bend_every);
-    let plan = Plan::new(sheet, &Fit { h, ahead: config.ahead, springs_only: false, bend_every, smooth });
+    let plan = Plan::new(
+        sheet,
+        &Fit {
+            h,
+            ahead: config.ahead,
+            springs_only: false,
+            bend_every,
+            smooth,
+        },
+    );
     // A step moves news by one ring and by one more for each degree, an evaluation of bending before it by one more.
     // Patches meet after every step: what ghosts cost is more than the meeting.
     let fabrics = plan.patches(config.patches, 1 + smooth + 1, 0);
@@ -63,7 +76,10 @@ pub(super) fn run(
     let local: Vec<V3d> = match scene.pinned_to {
         Some(c) => {
             let back = scene.colliders[c].placement(0.0).inverse();
-            start.iter().map(|p| (back * Point3::from(*p)).coords).collect()
+            start
+                .iter()
+                .map(|p| (back * Point3::from(*p)).coords)
+                .collect()
         }
         None => start,
     };
@@ -73,7 +89,10 @@ pub(super) fn run(
     let mut scratch: Vec<Scratch> = fabrics.iter().map(|_| Scratch::default()).collect();
     let mut x: Vec<V4> = scene.start.iter().map(|p| V4::new(p.x, p.y, p.z)).collect();
     let mut velocity = vec![V4::default(); n];
-    let mut folds = config.self_collision.then(|| Folds::new(scene, config, bend_every * looks, h)).transpose()?;
+    let mut folds = config
+        .self_collision
+        .then(|| Folds::new(scene, config, bend_every * looks, h))
+        .transpose()?;
     let gravity = v4(&scene.gravity);
     let (hf, ahead) = (h as f32, config.ahead as f32);
     let mut penetration: f64 = 0.0;
@@ -84,16 +103,23 @@ pub(super) fn run(
             break;
         }
         let started = Instant::now();
-        let par = if fabrics.len() > 1 { Par::Rayon } else { Par::Seq };
+        let par = if fabrics.len() > 1 {
+            Par::Rayon
+        } else {
+            Par::Seq
+        };
         let mut s0 = 0;
         while s0 < substeps {
-            let segment = folds.as_mut().map_or(substeps, |f| f.begin(par, &x, &velocity));
+            let segment = folds
+                .as_mut()
+                .map_or(substeps, |f| f.begin(par, &x, &velocity));
             let steps = segment.min(substeps - s0);
             par::rounds(par, &mut scratch, steps, |r, k, w| {
                 let f = &fabrics[k];
                 if r == 0 {
                     let all = || f.vertices.iter().map(|v| *v as usize);
-                    w.motion.begin(all().map(|v| x[v]), all().map(|v| velocity[v]));
+                    w.motion
+                        .begin(all().map(|v| x[v]), all().map(|v| velocity[v]));
                     if let Some(folds) = &folds {
                         folds.find(f, &pinned[k], w);
                     }
@@ -104,28 +130,52 @@ pub(super) fn run(
                 if since == 0 {
                     let t0 = (index - 1) as f64 * dt + (s0 + r) as f64 * h;
                     let span = (bend_every * looks).min(steps - r) as f64 * h;
-                    look(scene, config.offset, &w.motion, t0, span, &mut w.planes, &mut w.clear);
+                    look(
+                        scene,
+                        config.offset,
+                        &w.motion,
+                        t0,
+                        span,
+                        &mut w.planes,
+                        &mut w.clear,
+                    );
                     w.solid = w.planes.len();
                     let t = r as f32 * hf;
-                    w.motion.within_reach(&w.folds, t, span as f32, &mut w.planes);
+                    w.motion
+                        .within_reach(&w.folds, t, span as f32, &mut w.planes);
                     // Times count from the last look, for folds too.
-                    w.planes[w.solid..].iter_mut().for_each(|p| p.level += p.normal.dot(p.speed) * t);
+                    w.planes[w.solid..]
+                        .iter_mut()
+                        .for_each(|p| p.level += p.normal.dot(p.speed) * t);
                     w.ties.clear();
                     for &(i, p) in &pinned[k] {
                         let at = |t: f64| {
                             scene.pinned_to.map_or(local[p as usize], |c| {
-                                (scene.colliders[c].placement(t) * Point3::from(local[p as usize])).coords
+                                (scene.colliders[c].placement(t) * Point3::from(local[p as usize]))
+                                    .coords
                             })
                         };
                         let speed = (at(t0 + span) - at(t0)) / span;
-                        w.ties.push(Tie { vertex: i, place: v4(&at(t0)), speed: v4(&speed), firmness: 1.0 });
+                        w.ties.push(Tie {
+                            vertex: i,
+                            place: v4(&at(t0)),
+                            speed: v4(&speed),
+                            firmness: 1.0,
+                        });
                     }
                 }
                 if r % bend_every == 0 {
-                    w.motion.bend(f, hf * bend_every.min(steps - r) as f32 * 0.5, smooth);
+                    w.motion
+                        .bend(f, hf * bend_every.min(steps - r) as f32 * 0.5, smooth);
                 }
                 let t = since as f32 * hf;
-                let step = Step { h: hf, t, ahead, gravity, rings: 0 };
+                let step = Step {
+                    h: hf,
+                    t,
+                    ahead,
+                    gravity,
+                    rings: 0,
+                };
                 w.motion.accelerate(f, &step, &w.planes, &w.ties);
                 // In this order: a solid has the last word.
                 let (solid, cloth) = w.planes.split_at(w.solid);
@@ -149,7 +199,11 @@ pub(super) fn run(
         }
         times.push(started.elapsed().as_secs_f64() * 1e3);
         if let Some(index) = x.iter().position(|p| !p.0.iter().all(|c| c.is_finite())) {
-            return Err(ClothError::NotFinite { what: "cloth vertex", index }.into());
+            return Err(ClothError::NotFinite {
+                what: "cloth vertex",
+                index,
+            }
+            .into());
         }
         if !scene.colliders.is_empty() {
             let x: Vec<V3d> = x.iter().map(|p| v3d(*p)).collect();
@@ -207,9 +261,17 @@ fn rigid_part(x: &[P3], v: &[V3], rest: &mut Vec<f32>) -> f32 {
         momentum += r.cross(&(v - mean));
     }
     let turn = inertia.try_inverse().map_or(V3::zeros(), |i| i * momentum);
-    let turn = if turn.iter().all(|c| c.is_finite()) { turn } else { V3::zeros() };
+    let turn = if turn.iter().all(|c| c.is_finite()) {
+        turn
+    } else {
+        V3::zeros()
+    };
     rest.clear();
-    rest.extend(x.iter().zip(v).map(|(x, v)| (v - mean - turn.cross(&(x.coords - centre))).norm()));
+    rest.extend(
+        x.iter()
+            .zip(v)
+            .map(|(x, v)| (v - mean - turn.cross(&(x.coords - centre))).norm()),
+    );
     turn.norm()
 }
 
@@ -234,8 +296,13 @@ struct Folds {
 impl Folds {
     /// Searches after a whole number of `looks`, which are so many steps of `h` seconds.
     fn new(scene: &Scene, config: &RunConfig, looks: usize, h: f64) -> Result<Self, SceneError> {
-        let fault = |why: String| SceneError::Field { scene: "scene".into(), field: "mesh".into(), why };
-        let mesh = TriMesh::new(scene.start.clone(), scene.faces.clone()).map_err(|e| fault(e.to_string()))?;
+        let fault = |why: String| SceneError::Field {
+            scene: "scene".into(),
+            field: "mesh".into(),
+            why,
+        };
+        let mesh = TriMesh::new(scene.start.clone(), scene.faces.clone())
+            .map_err(|e| fault(e.to_string()))?;
         let topology = Topology::new(&mesh).map_err(|e| fault(e.to_string()))?;
         let surface = SurfaceModel::new(scene.faces.clone(), topology, vec![1; scene.start.len()]);
         let model = FoldModel::new(surface, scene.sheet.edges.iter().map(|e| e.1 as f32));
@@ -243,24 +310,44 @@ impl Folds {
         let thickness = config.thickness as f32;
         let search = model.search_all(thickness, 0.0);
         let (frame, speeds, h) = (FoldFrame::default(), Vec::new(), h as f32);
-        Ok(Self { model, frame, search, thickness, speeds, fastest: 0.0, span: 0.0, touches: 0, looks, h, most })
+        Ok(Self {
+            model,
+            frame,
+            search,
+            thickness,
+            speeds,
+            fastest: 0.0,
+            span: 0.0,
+            touches: 0,
+            looks,
+            h,
+            most,
+        })
     }
     /// The sheet is here now. Returns after how many steps it must be looked at again: none come together by more than
     /// their thickness before, if that can be.
     fn begin(&mut self, par: Par, x: &[V4], velocity: &[V4]) -> usize {
         let frame = &mut self.frame;
         frame.surface.vertices.clear();
-        frame.surface.vertices.extend(x.iter().map(|p| P3::new(p.0[0], p.0[1], p.0[2])));
+        frame
+            .surface
+            .vertices
+            .extend(x.iter().map(|p| P3::new(p.0[0], p.0[1], p.0[2])));
         frame.velocities.clear();
-        frame.velocities.extend(velocity.iter().map(|v| V3::new(v.0[0], v.0[1], v.0[2])));
+        frame
+            .velocities
+            .extend(velocity.iter().map(|v| V3::new(v.0[0], v.0[1], v.0[2])));
         let turn = rigid_part(&frame.surface.vertices, &frame.velocities, &mut self.speeds);
         self.fastest = self.speeds.iter().copied().fold(0.0, f32::max);
         let look = self.looks as f32 * self.h;
         let looks = ((self.thickness / (2.0 * self.fastest * look)) as usize).clamp(1, self.most);
         self.span = looks as f32 * look;
-        self.search = self.model.search_all(self.thickness, 2.0 * self.fastest * self.span);
+        self.search = self
+            .model
+            .search_all(self.thickness, 2.0 * self.fastest * self.span);
         self.fastest += turn * self.search.corner;
-        self.model.begin(par, frame, Some(&self.search), self.touches);
+        self.model
+            .begin(par, frame, Some(&self.search), self.touches);
         looks * self.looks
     }
     /// Planes between the vertices of a patch and other folds.
@@ -268,8 +355,11 @@ impl Folds {
         w.folds.clear();
         w.held_off = 0;
         w.room.resize(f.vertices.len(), 0.0);
-        w.neighbour_of.resize(self.frame.surface.vertices.len(), u32::MAX);
-        pinned.iter().for_each(|p| w.room[p.0 as usize] = f32::INFINITY);
+        w.neighbour_of
+            .resize(self.frame.surface.vertices.len(), u32::MAX);
+        pinned
+            .iter()
+            .for_each(|p| w.room[p.0 as usize] = f32::INFINITY);
         for (i, &v) in f.vertices.iter().enumerate() {
             let way = (self.speeds[v as usize] + self.fastest) * self.span;
             if w.room[i] > way {
@@ -278,10 +368,17 @@ impl Folds {
                 continue;
             }
             let x = self.frame.surface.vertices[v as usize];
-            let corner = self.model.corner(&self.frame, v, &x, &self.search, &mut w.neighbour_of);
+            let corner = self
+                .model
+                .corner(&self.frame, v, &x, &self.search, &mut w.neighbour_of);
             w.room[i] = FoldModel::room(&self.search, corner);
-            let Some((corner, _)) = corner.filter(|_| w.room[i] < 0.0) else { continue };
-            if let Some((plane, far)) = self.model.plane(&self.frame, i, v, &x, corner, &self.search) {
+            let Some((corner, _)) = corner.filter(|_| w.room[i] < 0.0) else {
+                continue;
+            };
+            if let Some((plane, far)) =
+                self.model
+                    .plane(&self.frame, i, v, &x, corner, &self.search)
+            {
                 w.folds.push(plane);
                 w.held_off += usize::from(i < f.owned && far <= self.search.thickness);
             }
@@ -292,7 +389,10 @@ impl Folds {
 /// Local and sheet numbers of a patch's pinned vertices.
 fn pins_of(scene: &Scene, f: &Fabric) -> Vec<(u32, u32)> {
     let local = f.vertices.iter().enumerate();
-    local.filter(|(_, v)| scene.pins.contains(v)).map(|(i, v)| (i as u32, *v)).collect()
+    local
+        .filter(|(_, v)| scene.pins.contains(v))
+        .map(|(i, v)| (i as u32, *v))
+        .collect()
 }
 
 /// Planes of the solids near each vertex, as they will move for `span` seconds from `t`. `clear` remembers how far

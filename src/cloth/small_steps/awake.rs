@@ -43,15 +43,25 @@ fn stretches(all: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
 impl Awake {
     fn new(f: &Fabric, asleep: &[bool]) -> Self {
         let n = f.vertices.len();
-        let asleep: Vec<bool> = (0..n).map(|i| asleep.get(i).copied().unwrap_or(false)).collect();
+        let asleep: Vec<bool> = (0..n)
+            .map(|i| asleep.get(i).copied().unwrap_or(false))
+            .collect();
         let moves = |v: &[At; 4]| v.iter().flatten().any(|p| !asleep[p.index()]);
         let mut seen = vec![false; n.div_ceil(GROUP)];
         let mut see = |i: usize| seen[i / GROUP] = true;
         (0..n).filter(|i| !asleep[*i]).for_each(&mut see);
         let quads: Vec<bool> = f.quads.iter().map(|q| moves(&q.v)).collect();
         let bent: Vec<bool> = f.bent.iter().map(|b| moves(&b.v)).collect();
-        let corners = f.quads.iter().map(|q| &q.v).zip(&quads).chain(f.bent.iter().map(|b| &b.v).zip(&bent));
-        corners.filter(|c| *c.1).flat_map(|c| c.0.iter().flatten()).for_each(|p| see(p.index()));
+        let corners = f
+            .quads
+            .iter()
+            .map(|q| &q.v)
+            .zip(&quads)
+            .chain(f.bent.iter().map(|b| &b.v).zip(&bent));
+        corners
+            .filter(|c| *c.1)
+            .flat_map(|c| c.0.iter().flatten())
+            .for_each(|p| see(p.index()));
         let mut rows = Vec::with_capacity(n);
         let mut offsets = Vec::with_capacity(n);
         let mut from = 0;
@@ -59,7 +69,8 @@ impl Awake {
             offsets.push(from);
             let row = &f.bend[from..from + usize::from(*count)];
             from += usize::from(*count);
-            let needed = !row.is_empty() && (!asleep[i] || row.iter().any(|(p, _)| !asleep[p.index()]));
+            let needed =
+                !row.is_empty() && (!asleep[i] || row.iter().any(|(p, _)| !asleep[p.index()]));
             if needed {
                 see(i);
                 row.iter().for_each(|(p, _)| see(p.index()));
@@ -74,14 +85,20 @@ impl Awake {
                 see(j);
             }
         }
-        let bend = stretches(rows.into_iter()).into_iter().map(|r| (r.clone(), offsets[r.start])).collect();
+        let bend = stretches(rows.into_iter())
+            .into_iter()
+            .map(|r| (r.clone(), offsets[r.start]))
+            .collect();
         Self {
             vertices: stretches(asleep.iter().map(|a| !a)),
             seen: stretches((0..n).map(|i| seen[i / GROUP])),
             quads: stretches(quads.into_iter()),
             bend,
             bent: stretches(bent.into_iter()),
-            rim: (0..n).filter(|i| asleep[*i] && seen[i / GROUP]).map(|i| i as u32).collect(),
+            rim: (0..n)
+                .filter(|i| asleep[*i] && seen[i / GROUP])
+                .map(|i| i as u32)
+                .collect(),
             asleep,
         }
     }
@@ -94,7 +111,9 @@ pub(super) fn part<'a>(
     whole: &'a Range<usize>,
     of: impl Fn(&'a Awake) -> &'a Vec<Range<usize>>,
 ) -> &'a [Range<usize>] {
-    awake.as_ref().map_or(std::slice::from_ref(whole), |a| of(a))
+    awake
+        .as_ref()
+        .map_or(std::slice::from_ref(whole), |a| of(a))
 }
 
 /// What lies before `end`.

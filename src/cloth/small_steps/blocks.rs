@@ -56,7 +56,9 @@ fn between(t: &Triangle, i: usize, j: usize) -> f32 {
 fn partners(all: &[Triangle]) -> Vec<Option<usize>> {
     let mut edges: Vec<([u32; 2], usize)> = Vec::with_capacity(3 * all.len());
     for (n, t) in all.iter().enumerate() {
-        edges.extend([(0, 1), (1, 2), (2, 0)].map(|(i, j)| ([t.v[i].min(t.v[j]), t.v[i].max(t.v[j])], n)));
+        edges.extend(
+            [(0, 1), (1, 2), (2, 0)].map(|(i, j)| ([t.v[i].min(t.v[j]), t.v[i].max(t.v[j])], n)),
+        );
     }
     edges.sort_unstable();
     let mut near = vec![Vec::new(); all.len()];
@@ -66,10 +68,15 @@ fn partners(all: &[Triangle]) -> Vec<Option<usize>> {
         }
     }
     let mut free: Vec<usize> = near.iter().map(Vec::len).collect();
-    let mut queue: BTreeSet<(usize, usize)> = free.iter().enumerate().map(|(t, f)| (*f, t)).collect();
+    let mut queue: BTreeSet<(usize, usize)> =
+        free.iter().enumerate().map(|(t, f)| (*f, t)).collect();
     let mut partner = vec![None; all.len()];
     while let Some((_, t)) = queue.pop_first() {
-        let Some(other) = near[t].iter().copied().filter(|o| queue.contains(&(free[*o], *o))).min_by_key(|o| free[*o])
+        let Some(other) = near[t]
+            .iter()
+            .copied()
+            .filter(|o| queue.contains(&(free[*o], *o)))
+            .min_by_key(|o| free[*o])
         else {
             continue;
         };
@@ -105,7 +112,19 @@ impl Quad {
         let mut quad = Self {
             v: [a, b, c, c],
             rest: [t.rest[i], t.rest[l], t.rest[j], t.rest[l], t.rest[j]],
-            k: [k(i, i), k(l, l), k(j, j), 0.0, 0.0, k(i, l), k(i, j), 0.0, 0.0, k(l, j), 0.0],
+            k: [
+                k(i, i),
+                k(l, l),
+                k(j, j),
+                0.0,
+                0.0,
+                k(i, l),
+                k(i, j),
+                0.0,
+                0.0,
+                k(l, j),
+                0.0,
+            ],
         };
         let corner = |v: u32| other.and_then(|o| o.v.iter().position(|w| *w == v));
         if let (Some(o), Some(p), Some(q)) = (other, corner(a), corner(b)) {
@@ -125,7 +144,9 @@ impl Quad {
 pub(super) fn quads(all: &[Triangle]) -> Vec<Quads> {
     let partner = partners(all);
     let firsts = (0..all.len()).filter(|t| partner[*t].is_none_or(|p| *t < p));
-    let mut quads: Vec<Quad> = firsts.map(|t| Quad::new(&all[t], partner[t].map(|p| &all[p]))).collect();
+    let mut quads: Vec<Quad> = firsts
+        .map(|t| Quad::new(&all[t], partner[t].map(|p| &all[p])))
+        .collect();
     quads.sort_by_key(|q| q.v.iter().min().copied());
     let block = |of: &[Quad]| {
         let mut out = Quads::default();
@@ -166,14 +187,21 @@ mod tests {
         for j in 0..9 {
             for i in 0..20 {
                 let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-                all.extend([[a, b, c], [a, c, d]].map(|v| Triangle { v, ..Triangle::default() }));
+                all.extend([[a, b, c], [a, c, d]].map(|v| Triangle {
+                    v,
+                    ..Triangle::default()
+                }));
             }
         }
         let partner = partners(&all);
         for (t, p) in partner.iter().enumerate() {
             let Some(p) = p else { continue };
             assert_eq!(partner[*p], Some(t));
-            assert_eq!(all[t].v.iter().filter(|v| all[*p].v.contains(v)).count(), 2, "{t} and {p} share an edge");
+            assert_eq!(
+                all[t].v.iter().filter(|v| all[*p].v.contains(v)).count(),
+                2,
+                "{t} and {p} share an edge"
+            );
         }
         let alone = partner.iter().filter(|p| p.is_none()).count();
         assert!(alone <= all.len() / 50, "{alone} of {} alone", all.len());

@@ -21,11 +21,17 @@ impl Borders {
         if f.border.is_empty() {
             return;
         }
-        let Ok(mut to) = self.0[p][round % 2].write() else { return };
+        let Ok(mut to) = self.0[p][round % 2].write() else {
+            return;
+        };
         to.clear();
         to.extend(f.border.iter().map(|i| {
             let i = *i as usize;
-            [motion.moved[i], motion.velocity[i], motion.work.ahead[i % MOST]]
+            [
+                motion.moved[i],
+                motion.velocity[i],
+                motion.work.ahead[i % MOST],
+            ]
         }));
     }
     /// Takes over for the ghosts of a patch what their owners told in a round.
@@ -35,8 +41,15 @@ impl Borders {
             if from != *q {
                 (from, open) = (*q, self.0[*q as usize][round % 2].read().ok());
             }
-            let (i, Some(told)) = (f.owned + k, open.as_ref().and_then(|o| o.get(*at as usize))) else { continue };
-            [motion.moved[i], motion.velocity[i], motion.work.ahead[i % MOST]] = *told;
+            let (i, Some(told)) = (f.owned + k, open.as_ref().and_then(|o| o.get(*at as usize)))
+            else {
+                continue;
+            };
+            [
+                motion.moved[i],
+                motion.velocity[i],
+                motion.work.ahead[i % MOST],
+            ] = *told;
         }
     }
 }

@@ -61,7 +61,11 @@ impl Motion {
                 let borne = least - toward;
                 let slip = v - p.speed - p.normal.scale(toward);
                 let speed = slip.dot(slip).sqrt();
-                let stopped = if speed > 0.0 { (p.friction * borne / speed).min(1.0) } else { 0.0 };
+                let stopped = if speed > 0.0 {
+                    (p.friction * borne / speed).min(1.0)
+                } else {
+                    0.0
+                };
                 push[i] = push[i] + (p.normal.scale(borne) - slip.scale(stopped)).scale(1.0 / h);
             }
         }
@@ -104,7 +108,11 @@ impl Motion {
                 let push = least - toward;
                 let slip = v - p.speed - p.normal.scale(toward);
                 let speed = slip.dot(slip).sqrt();
-                let kept = if speed > 0.0 { (1.0 - p.friction * push / speed).max(0.0) } else { 0.0 };
+                let kept = if speed > 0.0 {
+                    (1.0 - p.friction * push / speed).max(0.0)
+                } else {
+                    0.0
+                };
                 // `toward` is relative to the surface: its own speed comes back with the normal part.
                 self.velocity[i] = p.speed + p.normal.scale(least) + slip.scale(kept);
                 touched += 1;
@@ -144,7 +152,16 @@ mod tests {
         m.begin([V4::default()].into_iter(), [V4::default()].into_iter());
         for n in normals {
             let normal = V4::new(n[0], n[1], 0.0);
-            m.restrain(&[Plane { normal, level: 0.01, ..Plane::default() }], 0.0, 1e-3, 1.0);
+            m.restrain(
+                &[Plane {
+                    normal,
+                    level: 0.01,
+                    ..Plane::default()
+                }],
+                0.0,
+                1e-3,
+                1.0,
+            );
         }
         m.moved[0]
     }
@@ -157,7 +174,10 @@ mod tests {
             let V4([x, y, z, _]) = pushed(&[shirt, [1.0, 0.0]]);
             // The belly says how far out it goes; up, where the shirt leans to, it does not go.
             let out = way * (1.0 - angle.cos());
-            assert!((x - out).abs() < 1e-9 && y.abs() < 1e-9 && z == 0.0, "{angle}: {x} {y}");
+            assert!(
+                (x - out).abs() < 1e-9 && y.abs() < 1e-9 && z == 0.0,
+                "{angle}: {x} {y}"
+            );
         }
         let right = pushed(&[[0.0, 1.0], [1.0, 0.0]]);
         assert_eq!(right, V4::new(way, way, 0.0), "in a corner both push");

@@ -68,7 +68,10 @@ pub struct Fabric {
 impl Fabric {
     /// Vertices that are computed where what lies `rings` rings around the owned ones must be right.
     pub(super) fn reach(&self, rings: usize) -> usize {
-        self.within.get(rings).copied().unwrap_or(self.vertices.len())
+        self.within
+            .get(rings)
+            .copied()
+            .unwrap_or(self.vertices.len())
     }
 }
 
@@ -83,38 +86,76 @@ impl Plan {
             around[e[1] as usize].push(e[0]);
         }
         // A large patch leaves half of its room to ghosts.
-        let k = wanted.max(1).max(if n < MOST { 1 } else { n.div_ceil(MOST / 2) }).min(n.max(1));
-        let orders = if k > 1 { self.orders(&around) } else { vec![by_distance(&around)] };
-        let bands =
-            |order: Vec<u32>| -> Vec<Vec<u32>> { (0..k).map(|p| order[p * n / k..(p + 1) * n / k].to_vec()).collect() };
+        let k = wanted
+            .max(1)
+            .max(if n < MOST { 1 } else { n.div_ceil(MOST / 2) })
+            .min(n.max(1));
+        let orders = if k > 1 {
+            self.orders(&around)
+        } else {
+            vec![by_distance(&around)]
+        };
+        let bands = |order: Vec<u32>| -> Vec<Vec<u32>> {
+            (0..k)
+                .map(|p| order[p * n / k..(p + 1) * n / k].to_vec())
+                .collect()
+        };
         // The one whose patches have the fewest neighbours in others.
         let cut = |sets: &Vec<Vec<u32>>| {
             let mut of = vec![0usize; n];
             for (p, set) in sets.iter().enumerate() {
                 set.iter().for_each(|v| of[*v as usize] = p);
             }
-            self.ends.iter().filter(|e| of[e[0] as usize] != of[e[1] as usize]).count()
+            self.ends
+                .iter()
+                .filter(|e| of[e[0] as usize] != of[e[1] as usize])
+                .count()
         };
-        let sets = orders.into_iter().map(bands).min_by_key(cut).unwrap_or_default();
-        let whole = |set: Vec<u32>| pieces::Pieces { starts: vec![0, set.len()], order: set };
+        let sets = orders
+            .into_iter()
+            .map(bands)
+            .min_by_key(cut)
+            .unwrap_or_default();
+        let whole = |set: Vec<u32>| pieces::Pieces {
+            starts: vec![0, set.len()],
+            order: set,
+        };
         let in_regions = |set| pieces::cut(n, |v| &around[v as usize], set, region, LANES);
-        let sets: Vec<pieces::Pieces> =
-            sets.into_iter().map(|set| if region > 0 { in_regions(set) } else { whole(set) }).collect();
+        let sets: Vec<pieces::Pieces> = sets
+            .into_iter()
+            .map(|set| {
+                if region > 0 {
+                    in_regions(set)
+                } else {
+                    whole(set)
+                }
+            })
+            .collect();
         let mut owner = vec![[0u32; 2]; n];
         for (p, set) in sets.iter().enumerate() {
             for (i, v) in set.order.iter().enumerate() {
                 owner[*v as usize] = [p as u32, i as u32];
             }
         }
-        let mut all: Vec<Fabric> =
-            sets.into_iter().map(|set| self.patch(set, if k > 1 { rings } else { 0 }, &around, &owner)).collect();
+        let mut all: Vec<Fabric> = sets
+            .into_iter()
+            .map(|set| self.patch(set, if k > 1 { rings } else { 0 }, &around, &owner))
+            .collect();
         // Ghosts name the owner's vertex so far; now its place in the border.
         for q in 0..all.len() as u32 {
-            let wanted = all.iter().flat_map(|f| &f.ghosts).filter(|g| g[0] == q).map(|g| g[1]);
+            let wanted = all
+                .iter()
+                .flat_map(|f| &f.ghosts)
+                .filter(|g| g[0] == q)
+                .map(|g| g[1]);
             let mut border: Vec<u32> = wanted.collect();
             border.sort_unstable();
             border.dedup();
-            for g in all.iter_mut().flat_map(|f| &mut f.ghosts).filter(|g| g[0] == q) {
+            for g in all
+                .iter_mut()
+                .flat_map(|f| &mut f.ghosts)
+                .filter(|g| g[0] == q)
+            {
                 g[1] = border.binary_search(&g[1]).unwrap_or(0) as u32;
             }
             all[q as usize].border = border;
@@ -148,7 +189,9 @@ impl Plan {
         let mut edges: Vec<[u32; 2]> = self
             .triangles
             .iter()
-            .flat_map(|t| [(0, 1), (1, 2), (2, 0)].map(|(i, j)| [t.v[i].min(t.v[j]), t.v[i].max(t.v[j])]))
+            .flat_map(|t| {
+                [(0, 1), (1, 2), (2, 0)].map(|(i, j)| [t.v[i].min(t.v[j]), t.v[i].max(t.v[j])])
+            })
             .collect();
         edges.sort_unstable();
         let mut next = vec![Vec::new(); self.vertices()];
@@ -180,11 +223,22 @@ impl Plan {
         rims
     }
 
-    fn patch(&self, own: pieces::Pieces, rings: usize, around: &[Vec<u32>], owner: &[[u32; 2]]) -> Fabric {
-        let pieces::Pieces { order: mut set, starts: regions } = own;
+    fn patch(
+        &self,
+        own: pieces::Pieces,
+        rings: usize,
+        around: &[Vec<u32>],
+        owner: &[[u32; 2]],
+    ) -> Fabric {
+        let pieces::Pieces {
+            order: mut set,
+            starts: regions,
+        } = own;
         let owned = set.len();
         let mut local = vec![u32::MAX; self.vertices()];
-        set.iter().enumerate().for_each(|(i, v)| local[*v as usize] = i as u32);
+        set.iter()
+            .enumerate()
+            .for_each(|(i, v)| local[*v as usize] = i as u32);
         let (mut from, mut within) = (0, vec![owned]);
         for _ in 0..rings {
             let to = set.len();
@@ -227,10 +281,26 @@ impl Plan {
         let weight: Vec<f32> = edges.iter().map(|e| self.smooth[e.1]).collect();
         let ends: Vec<[u16; 2]> = edges.iter().map(|e| e.0.map(|v| v as u16)).collect();
         let (rows, far) = rows(&ends, &weight, &inverse_mass);
-        let triangles = self.triangles.iter().filter(|t| inside(&t.v)).map(|t| Triangle { v: t.v.map(at), ..*t });
-        let bent = self.bent.iter().filter(|b| inside(&b.v)).map(|b| Bent { v: b.v.map(at), ..*b });
-        let diagonals =
-            self.diagonals.iter().filter(|s| inside(&s.ends)).map(|s| Diagonal { ends: s.ends.map(at), ..*s });
+        let triangles = self
+            .triangles
+            .iter()
+            .filter(|t| inside(&t.v))
+            .map(|t| Triangle {
+                v: t.v.map(at),
+                ..*t
+            });
+        let bent = self.bent.iter().filter(|b| inside(&b.v)).map(|b| Bent {
+            v: b.v.map(at),
+            ..*b
+        });
+        let diagonals = self
+            .diagonals
+            .iter()
+            .filter(|s| inside(&s.ends))
+            .map(|s| Diagonal {
+                ends: s.ends.map(at),
+                ..*s
+            });
         Fabric {
             diagonals: diagonals.collect(),
             quads: quads(&triangles.collect::<Vec<_>>()),
@@ -241,7 +311,10 @@ impl Plan {
             ends,
             bend_count: counts(&mut bend.iter().map(|e| e.0[0])),
             rest: edges.iter().map(|e| self.rest[e.1]).collect(),
-            bend: bend.iter().map(|e| (Place::of(e.0[1] as usize), e.1)).collect(),
+            bend: bend
+                .iter()
+                .map(|e| (Place::of(e.0[1] as usize), e.1))
+                .collect(),
             bent: hinges(bent.collect()),
             inverse_mass,
             ghosts: set[owned..].iter().map(|v| owner[*v as usize]).collect(),
@@ -269,7 +342,11 @@ fn rows(ends: &[[u16; 2]], weight: &[f32], inverse_mass: &[f32]) -> (Vec<Rows>, 
                 (row.near[n][k], row.by[n / 2][n % 2][k]) = (near, by);
                 filled[i] += 1;
             } else {
-                far.push(Far { vertex: Place::of(i), near, by });
+                far.push(Far {
+                    vertex: Place::of(i),
+                    near,
+                    by,
+                });
             }
         }
     }
@@ -288,7 +365,11 @@ struct Ways {
 /// Ways from some vertices to all, sheet by sheet where there are several.
 fn ways(around: &[Vec<u32>], starts: &[u32]) -> Ways {
     let n = around.len();
-    let mut w = Ways { order: Vec::with_capacity(n), far: vec![u32::MAX; n], from: (0..n as u32).collect() };
+    let mut w = Ways {
+        order: Vec::with_capacity(n),
+        far: vec![u32::MAX; n],
+        from: (0..n as u32).collect(),
+    };
     let mut next = 0;
     let all = 0..n as u32;
     // The starts together, then whatever they do not reach.

@@ -58,7 +58,12 @@ pub(super) fn coefficients(degree: usize) -> Vec<f64> {
 impl Filter {
     /// `stiffness` of each edge says which neighbours it is coupled to, N/m. Places stiffer for their mass than most are
     /// normalised by themselves, so that one narrow triangle does not leave all others without a filter.
-    pub(super) fn new(ends: Vec<[u32; 2]>, stiffness: &[f64], inverse_mass: Vec<f64>, degree: usize) -> Self {
+    pub(super) fn new(
+        ends: Vec<[u32; 2]>,
+        stiffness: &[f64],
+        inverse_mass: Vec<f64>,
+        degree: usize,
+    ) -> Self {
         let mut around = vec![0.0; inverse_mass.len()];
         for (e, k) in ends.iter().zip(stiffness) {
             e.iter().for_each(|v| around[*v as usize] += k);
@@ -66,10 +71,19 @@ impl Filter {
         let rate = |v: u32| around[v as usize] * inverse_mass[v as usize];
         let mut all: Vec<f64> = (0..around.len() as u32).map(rate).collect();
         all.sort_unstable_by(f64::total_cmp);
-        let usual = all.get((all.len() as f64 * MOST) as usize).copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
+        let usual = all
+            .get((all.len() as f64 * MOST) as usize)
+            .copied()
+            .unwrap_or(0.0)
+            .max(f64::MIN_POSITIVE);
         let of = |(e, k): (&[u32; 2], &f64)| k / rate(e[0]).max(rate(e[1])).max(usual);
         let weight = ends.iter().zip(stiffness).map(of).collect();
-        let mut filter = Self { ends, weight, inverse_mass, w: coefficients(degree) };
+        let mut filter = Self {
+            ends,
+            weight,
+            inverse_mass,
+            w: coefficients(degree),
+        };
         if degree > 0 {
             let scale = 1.0 / (ROOM * filter.largest()).max(f64::MIN_POSITIVE);
             filter.weight.iter_mut().for_each(|w| *w *= scale);
@@ -78,7 +92,10 @@ impl Filter {
     }
     /// The identity on the same sheet.
     pub(super) fn without(&self) -> Self {
-        Self { w: vec![1.0], ..self.clone() }
+        Self {
+            w: vec![1.0],
+            ..self.clone()
+        }
     }
     /// Largest eigenvalue of M⁻¹L.
     fn largest(&self) -> f64 {
@@ -110,7 +127,9 @@ impl Filter {
     }
     /// W x.
     pub(super) fn apply(&self, x: &mut [Vector2<f64>]) {
-        let Some((last, lower)) = self.w.split_last() else { return };
+        let Some((last, lower)) = self.w.split_last() else {
+            return;
+        };
         if lower.is_empty() {
             return;
         }
@@ -127,7 +146,10 @@ impl Filter {
 pub(super) fn noise(n: usize) -> Vec<Vector2<f64>> {
     let of = |i: usize| {
         let r = (i as u32).wrapping_mul(2_654_435_761);
-        Vector2::new(f64::from(r & 0xffff) - 32_767.5, f64::from(r >> 16) - 32_767.5)
+        Vector2::new(
+            f64::from(r & 0xffff) - 32_767.5,
+            f64::from(r >> 16) - 32_767.5,
+        )
     };
     (0..n).map(of).collect()
 }
@@ -147,7 +169,10 @@ mod tests {
             assert!(all.clone().all(|s| at(s) > 0.02), "degree {degree}");
             let most = all.map(|s| s * at(s)).fold(0.0, f64::max);
             let n = (degree + 1) as f64;
-            assert!(degree == 0 || most < 1.25 / (n * n), "degree {degree}: {most}");
+            assert!(
+                degree == 0 || most < 1.25 / (n * n),
+                "degree {degree}: {most}"
+            );
         }
     }
 }

@@ -51,7 +51,12 @@ macro_rules! wide {
 
 /// 1 / length of edges and how much longer than at rest they are.
 #[inline(always)]
-fn spring<L: Lanes>(l: L, edge: [L::F; 3], rest: &[f32; lanes::LANES], shortest: L::F) -> (L::F, L::F) {
+fn spring<L: Lanes>(
+    l: L,
+    edge: [L::F; 3],
+    rest: &[f32; lanes::LANES],
+    shortest: L::F,
+) -> (L::F, L::F) {
     let square = l.max(dot(l, edge, edge), shortest);
     let inverse = inverse_root(l, square);
     (inverse, l.mul_sub(square, inverse, l.load(rest)))
@@ -61,8 +66,12 @@ fn spring<L: Lanes>(l: L, edge: [L::F; 3], rest: &[f32; lanes::LANES], shortest:
 #[inline(always)]
 fn laplacian<L: Lanes>(l: L, y: &[V4; MOST], r: &Rows, own: L::F) -> L::F {
     let [a, b, c, d, e, f] = r.near;
-    let [[p, q], [s, t], [u, v], [own_by, _]] =
-        [l.each(&r.by[0]), l.each(&r.by[1]), l.each(&r.by[2]), l.each(&r.by[3])];
+    let [[p, q], [s, t], [u, v], [own_by, _]] = [
+        l.each(&r.by[0]),
+        l.each(&r.by[1]),
+        l.each(&r.by[2]),
+        l.each(&r.by[3]),
+    ];
     let low = l.mul(l.pair(y, a), p);
     let low = l.mul_add(l.pair(y, b), q, low);
     let low = l.mul_add(l.pair(y, c), s, low);
@@ -99,7 +108,13 @@ impl Motion {
     }
     #[inline(always)]
     fn look_ahead(&mut self, time: f32) {
-        let all = self.work.ahead.iter_mut().zip(&self.start).zip(&self.moved).zip(&self.velocity);
+        let all = self
+            .work
+            .ahead
+            .iter_mut()
+            .zip(&self.start)
+            .zip(&self.moved)
+            .zip(&self.velocity);
         for (((a, s), m), v) in all {
             *a = *s + *m + v.scale(time);
         }
@@ -114,12 +129,23 @@ impl Motion {
     fn advance_kernel(&mut self, _: impl Lanes, f: &Fabric, step: &Step, fastest: f32) {
         let (h, ahead, most) = (step.h, step.h * step.ahead, fastest * fastest);
         let n = f.reach(step.rings);
-        let Work { ahead: look, awake, pressed, sunken, .. } = &mut self.work;
-        sunken.drain(..).for_each(|i| pressed[i as usize] = V4::default());
+        let Work {
+            ahead: look,
+            awake,
+            pressed,
+            sunken,
+            ..
+        } = &mut self.work;
+        sunken
+            .drain(..)
+            .for_each(|i| pressed[i as usize] = V4::default());
         let whole = 0..n;
         for r in part(awake, &whole, |a| &a.vertices) {
             let r = before(r, n);
-            let all = self.moved[r.clone()].iter_mut().zip(&mut self.velocity[r.clone()]).zip(&self.start[r.clone()]);
+            let all = self.moved[r.clone()]
+                .iter_mut()
+                .zip(&mut self.velocity[r.clone()])
+                .zip(&self.start[r.clone()]);
             for (((m, v), s), a) in all.zip(look[r].iter_mut()) {
                 let square = v.dot(*v);
                 if square > most {
@@ -141,7 +167,13 @@ impl Motion {
         if !self.work.looked {
             self.look_ahead(step.h * step.ahead);
         }
-        let Work { ahead, push, bending, awake, .. } = &mut self.work;
+        let Work {
+            ahead,
+            push,
+            bending,
+            awake,
+            ..
+        } = &mut self.work;
         let (x, push): (&[V4; MOST], &mut [V4; MOST]) = (ahead, push);
         let rings = step.rings.saturating_add(f.smoothing.len() - 1);
         let n = f.reach(rings);
@@ -166,12 +198,26 @@ impl Motion {
                 let (bc1, bc2) = spring(l, bc, &q.rest[2], shortest);
                 let (ad1, ad2) = spring(l, ad, &q.rest[3], shortest);
                 let (bd1, bd2) = spring(l, bd, &q.rest[4], shortest);
-                let [k0, k1, k2, k3, k4] =
-                    [l.load(&q.k[0]), l.load(&q.k[1]), l.load(&q.k[2]), l.load(&q.k[3]), l.load(&q.k[4])];
-                let [k01, k02, k03, k04] = [l.load(&q.k[5]), l.load(&q.k[6]), l.load(&q.k[7]), l.load(&q.k[8])];
+                let [k0, k1, k2, k3, k4] = [
+                    l.load(&q.k[0]),
+                    l.load(&q.k[1]),
+                    l.load(&q.k[2]),
+                    l.load(&q.k[3]),
+                    l.load(&q.k[4]),
+                ];
+                let [k01, k02, k03, k04] = [
+                    l.load(&q.k[5]),
+                    l.load(&q.k[6]),
+                    l.load(&q.k[7]),
+                    l.load(&q.k[8]),
+                ];
                 let [k12, k34] = [l.load(&q.k[9]), l.load(&q.k[10])];
                 // Tensions over lengths.
-                let t0 = l.mul_add(k04, bd2, l.mul_add(k03, ad2, dot(l, [k0, k01, k02], [ab2, ac2, bc2])));
+                let t0 = l.mul_add(
+                    k04,
+                    bd2,
+                    l.mul_add(k03, ad2, dot(l, [k0, k01, k02], [ab2, ac2, bc2])),
+                );
                 let t0 = l.mul(t0, ab1);
                 let t1 = l.mul(dot(l, [k01, k1, k12], [ab2, ac2, bc2]), ac1);
                 let t2 = l.mul(dot(l, [k02, k12, k2], [ab2, ac2, bc2]), bc1);
@@ -196,7 +242,10 @@ impl Motion {
             }
         }
         // What sleeps has no acceleration to be smoothed.
-        awake.iter().flat_map(|a| &a.rim).for_each(|i| push[*i as usize & MASK] = V4::default());
+        awake
+            .iter()
+            .flat_map(|a| &a.rim)
+            .for_each(|i| push[*i as usize & MASK] = V4::default());
     }
 
     /// Velocities under accelerations that are not smoothed.
@@ -217,8 +266,17 @@ impl Motion {
     /// W times `push` by Horner's scheme, and velocities under that.
     #[inline(always)]
     fn smooth_kernel<L: Lanes>(&mut self, l: L, f: &Fabric, step: &Step) {
-        let Work { push, smooth, smoother, held, awake, .. } = &mut self.work;
-        let Some((highest, lower)) = f.smoothing.split_last() else { return };
+        let Work {
+            push,
+            smooth,
+            smoother,
+            held,
+            awake,
+            ..
+        } = &mut self.work;
+        let Some((highest, lower)) = f.smoothing.split_last() else {
+            return;
+        };
         let rounds = lower.len();
         let keep = 1.0 / (1.0 + step.h * f.damping);
         for (round, c) in lower.iter().rev().enumerate() {
@@ -238,15 +296,21 @@ impl Motion {
                 for r in stretches {
                     // Two by two: stretches of what a patch owns begin at even places, and what others own they compute.
                     let r = even(r.start).min(n)..r.end.min(n);
-                    let pairs = f.rows[r.start / 2..]
-                        .iter()
-                        .zip(y[r.start..].as_chunks::<2>().0.iter().zip(push[r.start..].as_chunks::<2>().0));
+                    let pairs = f.rows[r.start / 2..].iter().zip(
+                        y[r.start..]
+                            .as_chunks::<2>()
+                            .0
+                            .iter()
+                            .zip(push[r.start..].as_chunks::<2>().0),
+                    );
                     // The velocity of an odd last vertex has no partner.
-                    let (both, last) = self.velocity[r.start..even(r.end).min(f.vertices.len())].as_chunks_mut::<2>();
+                    let (both, last) = self.velocity[r.start..even(r.end).min(f.vertices.len())]
+                        .as_chunks_mut::<2>();
                     let mut odd = [last.first().copied().unwrap_or_default(); 2];
                     for (v, (r, (own, first))) in both.iter_mut().chain([&mut odd]).zip(pairs) {
                         let own = l.load_pair(own);
-                        let a = l.mul_add(laplacian(l, y, r, own), wide, l.mul(l.load_pair(first), by));
+                        let a =
+                            l.mul_add(laplacian(l, y, r, own), wide, l.mul(l.load_pair(first), by));
                         l.store_pair(l.mul(l.mul_add(a, h, l.load_pair(v)), kept), v);
                     }
                     last.iter_mut().for_each(|v| *v = odd[0]);
@@ -265,9 +329,13 @@ impl Motion {
                 if r.is_empty() {
                     continue;
                 }
-                let pairs = f.rows[r.start / 2..]
-                    .iter()
-                    .zip(y[r.start..].as_chunks::<2>().0.iter().zip(push[r.start..].as_chunks::<2>().0));
+                let pairs = f.rows[r.start / 2..].iter().zip(
+                    y[r.start..]
+                        .as_chunks::<2>()
+                        .0
+                        .iter()
+                        .zip(push[r.start..].as_chunks::<2>().0),
+                );
                 for (o, (r, (own, first))) in out[r].as_chunks_mut::<2>().0.iter_mut().zip(pairs) {
                     let own = l.load_pair(own);
                     let a = l.mul_add(laplacian(l, y, r, own), wide, l.mul(l.load_pair(first), by));
@@ -278,7 +346,10 @@ impl Motion {
                 let i = e.vertex.index();
                 out[i] = out[i] - e.near.get(y).scale(e.by * scale);
             }
-            awake.iter().flat_map(|a| &a.rim).for_each(|i| out[*i as usize & MASK] = V4::default());
+            awake
+                .iter()
+                .flat_map(|a| &a.rim)
+                .for_each(|i| out[*i as usize & MASK] = V4::default());
             for i in held.iter() {
                 out[*i as usize & MASK] = V4::default();
             }
@@ -291,14 +362,23 @@ impl Motion {
     #[inline(always)]
     fn bend_kernel<L: Lanes>(&mut self, l: L, f: &Fabric, late: f32, rings: usize) {
         let end = f.reach(rings);
-        let Work { smoother, push, bending, awake, .. } = &mut self.work;
+        let Work {
+            smoother,
+            push,
+            bending,
+            awake,
+            ..
+        } = &mut self.work;
         let n = bending.len();
         let whole = 0..n;
         let seen = part(awake, &whole, |a| &a.seen);
         let out: &mut [V4; MOST] = push;
         for r in seen {
             let r = before(r, n);
-            let all = self.start[r.clone()].iter().zip(&self.moved[r.clone()]).zip(&self.velocity[r.clone()]);
+            let all = self.start[r.clone()]
+                .iter()
+                .zip(&self.moved[r.clone()])
+                .zip(&self.velocity[r.clone()]);
             for (a, ((s, m), v)) in smoother[r.clone()].iter_mut().zip(all) {
                 *a = *s + *m + v.scale(late);
             }
@@ -306,11 +386,16 @@ impl Motion {
         }
         let x: &[V4; MOST] = smoother;
         let rows = (0..end, 0);
-        for (r, from) in awake.as_ref().map_or(std::slice::from_ref(&rows), |a| &a.bend[..]) {
+        for (r, from) in awake
+            .as_ref()
+            .map_or(std::slice::from_ref(&rows), |a| &a.bend[..])
+        {
             let r = before(r, end);
             let mut rest = &f.bend[*from..];
             for (i, count) in r.clone().zip(&f.bend_count[r]) {
-                let Some((row, after)) = rest.split_at_checked(usize::from(*count)) else { break };
+                let Some((row, after)) = rest.split_at_checked(usize::from(*count)) else {
+                    break;
+                };
                 rest = after;
                 let here = x[i & MASK];
                 let mut sum = out[i & MASK];

@@ -31,13 +31,23 @@ impl Place {
     #[allow(unsafe_code)]
     #[inline(always)]
     pub(super) fn get(self, x: &[V4; MOST]) -> V4 {
-        unsafe { *x.as_ptr().cast::<u8>().add(8 * usize::from(self.0)).cast::<V4>() }
+        unsafe {
+            *x.as_ptr()
+                .cast::<u8>()
+                .add(8 * usize::from(self.0))
+                .cast::<V4>()
+        }
     }
     /// Replaces its vector.
     #[allow(unsafe_code)]
     #[inline(always)]
     pub(super) fn set(self, x: &mut [V4; MOST], to: V4) {
-        unsafe { *x.as_mut_ptr().cast::<u8>().add(8 * usize::from(self.0)).cast::<V4>() = to }
+        unsafe {
+            *x.as_mut_ptr()
+                .cast::<u8>()
+                .add(8 * usize::from(self.0))
+                .cast::<V4>() = to
+        }
     }
 }
 
@@ -96,7 +106,11 @@ pub(super) fn sub3<L: Lanes>(l: L, a: [L::F; 3], b: [L::F; 3]) -> [L::F; 3] {
 /// Vectors times numbers, added to others.
 #[inline(always)]
 pub(super) fn mul_add3<L: Lanes>(l: L, a: [L::F; 3], s: L::F, b: [L::F; 3]) -> [L::F; 3] {
-    [l.mul_add(a[0], s, b[0]), l.mul_add(a[1], s, b[1]), l.mul_add(a[2], s, b[2])]
+    [
+        l.mul_add(a[0], s, b[0]),
+        l.mul_add(a[1], s, b[1]),
+        l.mul_add(a[2], s, b[2]),
+    ]
 }
 
 /// Vectors times numbers.
@@ -112,8 +126,14 @@ pub(super) fn inverse_root<L: Lanes>(l: L, a: L::F) -> L::F {
     const MAGIC: u32 = 0x5F1F_FFF9;
     const FIRST: [f32; 2] = [0.703_952_25, 2.389_244_6];
     let y = l.guess(a, MAGIC);
-    let y = l.mul(l.mul(l.splat(FIRST[0]), y), l.sub_mul(l.mul(a, y), y, l.splat(FIRST[1])));
-    l.mul(y, l.sub_mul(l.mul(l.mul(l.splat(0.5), a), y), y, l.splat(1.5)))
+    let y = l.mul(
+        l.mul(l.splat(FIRST[0]), y),
+        l.sub_mul(l.mul(a, y), y, l.splat(FIRST[1])),
+    );
+    l.mul(
+        y,
+        l.sub_mul(l.mul(l.mul(l.splat(0.5), a), y), y, l.splat(1.5)),
+    )
 }
 
 /// Any processor.
@@ -209,15 +229,23 @@ mod avx2 {
     use std::arch::x86_64::*;
 
     pub(in super::super) fn detect() -> Option<Avx2> {
-        let can = std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma");
+        let can = std::arch::is_x86_feature_detected!("avx2")
+            && std::arch::is_x86_feature_detected!("fma");
         // Were these orders known to the compiler, it would take two instructions for each and not one.
-        can.then(|| Avx2(std::hint::black_box([[0, 0, 0, 0, 1, 1, 1, 1], [2, 2, 2, 2, 3, 3, 3, 3]])))
+        can.then(|| {
+            Avx2(std::hint::black_box([
+                [0, 0, 0, 0, 1, 1, 1, 1],
+                [2, 2, 2, 2, 3, 3, 3, 3],
+            ]))
+        })
     }
 
     /// Two vectors side by side.
     #[inline(always)]
     unsafe fn pair(x: &[V4; MOST], low: Place, high: Place) -> __m256 {
-        unsafe { _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(vector(x, low)), vector(x, high)) }
+        unsafe {
+            _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(vector(x, low)), vector(x, high))
+        }
     }
 
     #[inline(always)]
@@ -229,9 +257,19 @@ mod avx2 {
     #[inline(always)]
     unsafe fn columns(r: [__m256; 4]) -> [__m256; 3] {
         unsafe {
-            let (a, b) = (_mm256_unpacklo_ps(r[0], r[1]), _mm256_unpacklo_ps(r[2], r[3]));
-            let (c, d) = (_mm256_unpackhi_ps(r[0], r[1]), _mm256_unpackhi_ps(r[2], r[3]));
-            [_mm256_shuffle_ps::<0x44>(a, b), _mm256_shuffle_ps::<0xEE>(a, b), _mm256_shuffle_ps::<0x44>(c, d)]
+            let (a, b) = (
+                _mm256_unpacklo_ps(r[0], r[1]),
+                _mm256_unpacklo_ps(r[2], r[3]),
+            );
+            let (c, d) = (
+                _mm256_unpackhi_ps(r[0], r[1]),
+                _mm256_unpackhi_ps(r[2], r[3]),
+            );
+            [
+                _mm256_shuffle_ps::<0x44>(a, b),
+                _mm256_shuffle_ps::<0xEE>(a, b),
+                _mm256_shuffle_ps::<0x44>(c, d),
+            ]
         }
     }
 
@@ -240,8 +278,14 @@ mod avx2 {
     unsafe fn rows(c: [__m256; 3]) -> [__m256; 4] {
         unsafe {
             let zero = _mm256_setzero_ps();
-            let (a, b) = (_mm256_unpacklo_ps(c[0], c[1]), _mm256_unpacklo_ps(c[2], zero));
-            let (d, e) = (_mm256_unpackhi_ps(c[0], c[1]), _mm256_unpackhi_ps(c[2], zero));
+            let (a, b) = (
+                _mm256_unpacklo_ps(c[0], c[1]),
+                _mm256_unpacklo_ps(c[2], zero),
+            );
+            let (d, e) = (
+                _mm256_unpackhi_ps(c[0], c[1]),
+                _mm256_unpackhi_ps(c[2], zero),
+            );
             [
                 _mm256_shuffle_ps::<0x44>(a, b),
                 _mm256_shuffle_ps::<0xEE>(a, b),
@@ -347,7 +391,10 @@ mod avx2 {
             unsafe {
                 let four = _mm256_castps128_ps256(_mm_loadu_ps(a.as_ptr().cast()));
                 let of = |order: &[i32; LANES]| _mm256_loadu_si256(order.as_ptr().cast());
-                [_mm256_permutevar8x32_ps(four, of(&self.0[0])), _mm256_permutevar8x32_ps(four, of(&self.0[1]))]
+                [
+                    _mm256_permutevar8x32_ps(four, of(&self.0[0])),
+                    _mm256_permutevar8x32_ps(four, of(&self.0[1])),
+                ]
             }
         }
     }

@@ -37,7 +37,12 @@ impl std::ops::Add for V4 {
     type Output = Self;
     #[inline(always)]
     fn add(self, o: Self) -> Self {
-        Self([self.0[0] + o.0[0], self.0[1] + o.0[1], self.0[2] + o.0[2], self.0[3] + o.0[3]])
+        Self([
+            self.0[0] + o.0[0],
+            self.0[1] + o.0[1],
+            self.0[2] + o.0[2],
+            self.0[3] + o.0[3],
+        ])
     }
 }
 
@@ -45,7 +50,12 @@ impl std::ops::Sub for V4 {
     type Output = Self;
     #[inline(always)]
     fn sub(self, o: Self) -> Self {
-        Self([self.0[0] - o.0[0], self.0[1] - o.0[1], self.0[2] - o.0[2], self.0[3] - o.0[3]])
+        Self([
+            self.0[0] - o.0[0],
+            self.0[1] - o.0[1],
+            self.0[2] - o.0[2],
+            self.0[3] - o.0[3],
+        ])
     }
 }
 
@@ -64,7 +74,10 @@ impl Table {
     fn new(number: usize) -> Self {
         // Zeroed memory is lent page by page when it is touched, so a small patch does not cost what a large one does.
         let from = number * APART;
-        Self { all: vec![V4::default(); MOST + from], from }
+        Self {
+            all: vec![V4::default(); MOST + from],
+            from,
+        }
     }
 }
 
@@ -72,14 +85,18 @@ impl std::ops::Deref for Table {
     type Target = [V4; MOST];
     #[inline(always)]
     fn deref(&self) -> &[V4; MOST] {
-        self.all[self.from..].first_chunk().expect("it was made so long")
+        self.all[self.from..]
+            .first_chunk()
+            .expect("it was made so long")
     }
 }
 
 impl std::ops::DerefMut for Table {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut [V4; MOST] {
-        self.all[self.from..].first_chunk_mut().expect("it was made so long")
+        self.all[self.from..]
+            .first_chunk_mut()
+            .expect("it was made so long")
     }
 }
 
@@ -136,7 +153,11 @@ impl Default for Work {
 
 impl Motion {
     /// Begins an outer call.
-    pub fn begin(&mut self, positions: impl Iterator<Item = V4>, velocities: impl Iterator<Item = V4>) {
+    pub fn begin(
+        &mut self,
+        positions: impl Iterator<Item = V4>,
+        velocities: impl Iterator<Item = V4>,
+    ) {
         self.start.clear();
         self.start.extend(positions);
         self.velocity.clear();
@@ -181,7 +202,12 @@ impl Motion {
     pub fn fall(&mut self, f: &Fabric, h: f32, gravity: V4) {
         let keep = 1.0 / (1.0 + h * f.damping);
         let fall = gravity.scale(h);
-        for ((v, a), m) in self.velocity.iter_mut().zip(&self.work.bending).zip(&f.inverse_mass) {
+        for ((v, a), m) in self
+            .velocity
+            .iter_mut()
+            .zip(&self.work.bending)
+            .zip(&f.inverse_mass)
+        {
             *v = (*v + a.scale(m * h) + fall).scale(keep);
         }
     }
@@ -195,11 +221,26 @@ mod tests {
     fn only_what_is_fast_and_free_to_go_slower_is_slowed_down() {
         let v = |x: f32, y: f32| V4::new(x, y, 0.0);
         let mut motion = Motion {
-            velocity: vec![v(3.0, 4.0), v(0.3, 0.4), v(3.0, 4.0), v(3.0, 4.0), v(0.0, 0.0)],
+            velocity: vec![
+                v(3.0, 4.0),
+                v(0.3, 0.4),
+                v(3.0, 4.0),
+                v(3.0, 4.0),
+                v(0.0, 0.0),
+            ],
             ..Motion::default()
         };
-        let (held, free) = ([false, false, true, false, false], [false, false, false, true, false]);
-        motion.slow_down(0.5, &Excepted { held: &held, free: &free });
+        let (held, free) = (
+            [false, false, true, false, false],
+            [false, false, false, true, false],
+        );
+        motion.slow_down(
+            0.5,
+            &Excepted {
+                held: &held,
+                free: &free,
+            },
+        );
         let speeds: Vec<f32> = motion.velocity.iter().map(|v| v.dot(*v).sqrt()).collect();
         assert_eq!(speeds, [0.5, 0.5, 5.0, 5.0, 0.0]);
         // The way stays the same.

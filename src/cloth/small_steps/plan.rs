@@ -1,7 +1,9 @@
 //! A sheet as stiffness between the edges of its triangles, fitted to a step.
 
 use super::filter::Filter;
-use super::stability::{bending_eigenvalue, element_limits, laid_flat, membrane_eigenvalue, soften};
+use super::stability::{
+    bending_eigenvalue, element_limits, laid_flat, membrane_eigenvalue, soften,
+};
 use super::struts::{Diagonal, diagonals};
 use crate::cloth::{Element, Sheet};
 use nalgebra::{Matrix2, Matrix3, Vector2};
@@ -72,7 +74,10 @@ const FEW: f64 = 0.05;
 
 /// Hooke's law of a triangle as stiffness between lengthenings of its edges (edge k is opposite corner k), N/m, and the
 /// unit directions of these edges at rest.
-pub(super) fn edge_stiffness(sheet: &Sheet, e: &Element) -> Option<(Matrix3<f64>, [Vector2<f64>; 3])> {
+pub(super) fn edge_stiffness(
+    sheet: &Sheet,
+    e: &Element,
+) -> Option<(Matrix3<f64>, [Vector2<f64>; 3])> {
     let d = Matrix2::new(e.b[1][0], e.b[1][1], e.b[2][0], e.b[2][1]);
     let r = d.try_inverse()?;
     let (p, q) = (r.column(0).into_owned(), r.column(1).into_owned());
@@ -85,8 +90,17 @@ pub(super) fn edge_stiffness(sheet: &Sheet, e: &Element) -> Option<(Matrix3<f64>
     });
     let m = &sheet.membrane;
     let plane = 2.0 * m.mu + m.lambda;
-    let hooke =
-        Matrix3::new(plane + m.along[0], m.lambda, 0.0, m.lambda, plane + m.along[1], 0.0, 0.0, 0.0, 4.0 * m.mu);
+    let hooke = Matrix3::new(
+        plane + m.along[0],
+        m.lambda,
+        0.0,
+        m.lambda,
+        plane + m.along[1],
+        0.0,
+        0.0,
+        0.0,
+        4.0 * m.mu,
+    );
     let inverse = g.try_inverse()?;
     let directions = std::array::from_fn(|i| edges[i] / length[i]);
     Some((inverse.transpose() * hooke * inverse * e.area, directions))
@@ -98,7 +112,11 @@ pub fn triangles(sheet: &Sheet) -> Vec<([u32; 3], Matrix3<f64>, [f64; 3])> {
     let of = |e: &Element| {
         let r = Matrix2::new(e.b[1][0], e.b[1][1], e.b[2][0], e.b[2][1]).try_inverse()?;
         let (p, q) = (r.column(0).into_owned(), r.column(1).into_owned());
-        Some((e.v, edge_stiffness(sheet, e)?.0, [(q - p).norm(), q.norm(), p.norm()]))
+        Some((
+            e.v,
+            edge_stiffness(sheet, e)?.0,
+            [(q - p).norm(), q.norm(), p.norm()],
+        ))
     };
     sheet.elements.iter().filter_map(of).collect()
 }
@@ -106,16 +124,25 @@ pub fn triangles(sheet: &Sheet) -> Vec<([u32; 3], Matrix3<f64>, [f64; 3])> {
 impl Plan {
     /// Compiles a sheet for a step size.
     pub fn new(sheet: &Sheet, fit: &Fit) -> Self {
-        let mut edges: Vec<([u32; 2], f64)> =
-            sheet.edges.iter().map(|(v, l)| ([v[0].min(v[1]), v[0].max(v[1])], *l)).collect();
+        let mut edges: Vec<([u32; 2], f64)> = sheet
+            .edges
+            .iter()
+            .map(|(v, l)| ([v[0].min(v[1]), v[0].max(v[1])], *l))
+            .collect();
         edges.sort_unstable_by_key(|e| e.0);
-        let find = |a: u32, b: u32| edges.binary_search_by_key(&[a.min(b), a.max(b)], |k| k.0).unwrap_or(0);
+        let find = |a: u32, b: u32| {
+            edges
+                .binary_search_by_key(&[a.min(b), a.max(b)], |k| k.0)
+                .unwrap_or(0)
+        };
         // How much stiffness per inertia the step can carry: symplectic Euler ends at 4/h², looking ahead costs.
         let limit = 4.0 / (fit.h * fit.h * (1.0 + 2.0 * fit.ahead) * MARGIN);
         let filter = filter(sheet, edges.iter().map(|e| e.0).collect(), fit.smooth);
         let limits = element_limits(sheet, fit.springs_only);
         let flat = laid_flat(sheet);
-        let keep = soften(limit, &limits, |k| membrane_eigenvalue(&flat, k, fit.springs_only, &filter));
+        let keep = soften(limit, &limits, |k| {
+            membrane_eigenvalue(&flat, k, fit.springs_only, &filter)
+        });
         let area: f64 = sheet.elements.iter().map(|e| e.area).sum();
         let triangle = |(e, keep): (&Element, &f64)| {
             let (k, _) = edge_stiffness(sheet, e)?;
@@ -123,9 +150,18 @@ impl Plan {
             let rest = |i: usize| edges[find(e.v[(i + 1) % 3], e.v[(i + 2) % 3])].1 as f32;
             let own = [0, 1, 2].map(|i| (k[(i, i)] * keep) as f32);
             let k = [(1, 2), (2, 0), (0, 1)].map(|i| (k[i] * between) as f32);
-            Some(Triangle { v: e.v, rest: [rest(0), rest(1), rest(2)], k: [own[0], own[1], own[2], k[0], k[1], k[2]] })
+            Some(Triangle {
+                v: e.v,
+                rest: [rest(0), rest(1), rest(2)],
+                k: [own[0], own[1], own[2], k[0], k[1], k[2]],
+            })
         };
-        let triangles = sheet.elements.iter().zip(&keep).filter_map(triangle).collect();
+        let triangles = sheet
+            .elements
+            .iter()
+            .zip(&keep)
+            .filter_map(triangle)
+            .collect();
         let mut bending = std::collections::BTreeMap::<[u32; 2], f64>::new();
         let mut bent = Vec::new();
         // Bending is kept for several steps: its own limit is ω·(that time) ≤ 1.
@@ -137,7 +173,12 @@ impl Plan {
         for (h, keep) in sheet.hinges.iter().zip(&bend_keep) {
             let w = h.w * keep;
             if h.rest > FLAT * h.c.iter().map(|c| c.abs()).sum::<f64>() * length(h.v[0], h.v[1]) {
-                bent.push(Bent { v: h.v, c: h.c.map(|c| c as f32), w: w as f32, rest: h.rest as f32 });
+                bent.push(Bent {
+                    v: h.v,
+                    c: h.c.map(|c| c as f32),
+                    w: w as f32,
+                    rest: h.rest as f32,
+                });
                 continue;
             }
             for i in 0..4 {
@@ -148,7 +189,12 @@ impl Plan {
             }
         }
         Self {
-            softened: sheet.elements.iter().zip(&keep).map(|(e, k)| e.area * k).sum::<f64>()
+            softened: sheet
+                .elements
+                .iter()
+                .zip(&keep)
+                .map(|(e, k)| e.area * k)
+                .sum::<f64>()
                 / area.max(f64::MIN_POSITIVE),
             soft_elements: keep.iter().filter(|k| **k < 0.99).count(),
             inverse_mass: sheet.mass.iter().map(|m| (1.0 / m) as f32).collect(),
@@ -157,7 +203,12 @@ impl Plan {
             triangles,
             bend: bending.into_iter().map(|(v, w)| (v, w as f32)).collect(),
             bent,
-            diagonals: diagonals(sheet).map(|(ends, flat)| Diagonal { ends, flat: flat as f32 }).collect(),
+            diagonals: diagonals(sheet)
+                .map(|(ends, flat)| Diagonal {
+                    ends,
+                    flat: flat as f32,
+                })
+                .collect(),
             smooth: filter.weight.iter().map(|w| *w as f32).collect(),
             smoothing: filter.w.iter().map(|c| *c as f32).collect(),
             damping: sheet.damping as f32,
@@ -183,7 +234,9 @@ impl Plan {
         let usual = usual(&limits);
         let keep: Vec<f64> = limits.iter().map(|l| (usual / l).min(1.0)).collect();
         let plain = filter(sheet, sheet.edges.iter().map(|e| e.0).collect(), 0);
-        let fastest = bending_eigenvalue(sheet, &keep, &plain).max(f64::MIN_POSITIVE).sqrt();
+        let fastest = bending_eigenvalue(sheet, &keep, &plain)
+            .max(f64::MIN_POSITIVE)
+            .sqrt();
         ((1.0 / (fastest * h)) as usize).clamp(KEPT[0], KEPT[1])
     }
     /// Longest step at which all but a few small elements keep all their stiffness, s.
@@ -194,10 +247,17 @@ impl Plan {
     pub fn comfortable_steps(sheet: &Sheet, ahead: f64) -> impl Fn(usize) -> f64 {
         let limits = element_limits(sheet, false);
         let usual = usual(&limits);
-        let keep: Vec<f64> = limits.iter().map(|l| (usual / l.max(f64::MIN_POSITIVE)).min(1.0)).collect();
+        let keep: Vec<f64> = limits
+            .iter()
+            .map(|l| (usual / l.max(f64::MIN_POSITIVE)).min(1.0))
+            .collect();
         let flat = laid_flat(sheet);
         move |smooth| {
-            let ends = sheet.edges.iter().map(|(v, _)| [v[0].min(v[1]), v[0].max(v[1])]).collect();
+            let ends = sheet
+                .edges
+                .iter()
+                .map(|(v, _)| [v[0].min(v[1]), v[0].max(v[1])])
+                .collect();
             let fastest = membrane_eigenvalue(&flat, &keep, false, &filter(sheet, ends, smooth));
             (4.0 / (fastest.max(f64::MIN_POSITIVE) * MARGIN * (1.0 + 2.0 * ahead))).sqrt()
         }
@@ -209,7 +269,9 @@ fn usual(limits: &[f64]) -> f64 {
     let mut all = limits.to_vec();
     all.sort_unstable_by(f64::total_cmp);
     let n = all.len().max(1);
-    all.get(((n as f64 * (1.0 - FEW)) as usize).min(n - 1)).copied().unwrap_or(1.0)
+    all.get(((n as f64 * (1.0 - FEW)) as usize).min(n - 1))
+        .copied()
+        .unwrap_or(1.0)
 }
 
 /// For each hinge the most that one of its vertices has to bear of bending over its mass, 1/s²: a hinge's share of that is
@@ -218,9 +280,14 @@ fn hinge_limits(sheet: &Sheet) -> Vec<f64> {
     let mut borne = vec![0.0; sheet.mass.len()];
     for h in &sheet.hinges {
         let size = h.w * h.c.iter().map(|c| c * c).sum::<f64>();
-        h.v.iter().for_each(|v| borne[*v as usize] += size / sheet.mass[*v as usize]);
+        h.v.iter()
+            .for_each(|v| borne[*v as usize] += size / sheet.mass[*v as usize]);
     }
-    let worst = |h: &crate::cloth::Hinge| h.v.iter().map(|v| borne[*v as usize]).fold(f64::MIN_POSITIVE, f64::max);
+    let worst = |h: &crate::cloth::Hinge| {
+        h.v.iter()
+            .map(|v| borne[*v as usize])
+            .fold(f64::MIN_POSITIVE, f64::max)
+    };
     sheet.hinges.iter().map(worst).collect()
 }
 
@@ -238,7 +305,9 @@ pub(super) fn filter(sheet: &Sheet, ends: Vec<[u32; 2]>, degree: usize) -> Filte
     order.sort_unstable();
     let mut own = vec![0.0; ends.len()];
     for e in &sheet.elements {
-        let Some((k, _)) = edge_stiffness(sheet, e) else { continue };
+        let Some((k, _)) = edge_stiffness(sheet, e) else {
+            continue;
+        };
         for i in 0..3 {
             let (a, b) = (e.v[(i + 1) % 3], e.v[(i + 2) % 3]);
             if let Ok(at) = order.binary_search_by_key(&[a.min(b), a.max(b)], |o| o.0) {
@@ -246,5 +315,10 @@ pub(super) fn filter(sheet: &Sheet, ends: Vec<[u32; 2]>, degree: usize) -> Filte
             }
         }
     }
-    Filter::new(ends, &own, sheet.mass.iter().map(|m| 1.0 / m).collect(), degree)
+    Filter::new(
+        ends,
+        &own,
+        sheet.mass.iter().map(|m| 1.0 / m).collect(),
+        degree,
+    )
 }

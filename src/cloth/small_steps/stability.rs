@@ -18,7 +18,9 @@ pub(super) fn element_limits(sheet: &Sheet, springs_only: bool) -> Vec<f64> {
         .elements
         .iter()
         .map(|e| {
-            let Some((k, along)) = edge_stiffness(sheet, e) else { return 0.0 };
+            let Some((k, along)) = edge_stiffness(sheet, e) else {
+                return 0.0;
+            };
             let u: [Vector6<f64>; 3] = std::array::from_fn(|i| {
                 let (a, b) = ((i + 1) % 3, (i + 2) % 3);
                 let mut u = Vector6::zeros();
@@ -37,7 +39,8 @@ pub(super) fn element_limits(sheet: &Sheet, springs_only: bool) -> Vec<f64> {
                 }
             }
             // Each corner lends the element the share of its mass that the element's area has around it.
-            let share = e.v.map(|v| sheet.mass[v as usize] * e.area / around[v as usize]);
+            let share =
+                e.v.map(|v| sheet.mass[v as usize] * e.area / around[v as usize]);
             let scale = Vector6::from_fn(|i, _| 1.0 / share[i / 2].sqrt());
             let scaled = Matrix6::from_fn(|i, j| m[(i, j)] * scale[i] * scale[j]);
             scaled.symmetric_eigenvalues().max()
@@ -81,7 +84,10 @@ pub(super) fn soften(limit: f64, limits: &[f64], largest: impl Fn(&[f64]) -> f64
 
 /// Largest eigenvalue of W M⁻¹K by power iteration, 1/s², where `product` adds K x to its second argument. An estimate
 /// from below, by a few percent at most, which the margin covers.
-pub(super) fn largest_eigenvalue(filter: &Filter, product: impl Fn(&[Vector2<f64>], &mut [Vector2<f64>])) -> f64 {
+pub(super) fn largest_eigenvalue(
+    filter: &Filter,
+    product: impl Fn(&[Vector2<f64>], &mut [Vector2<f64>]),
+) -> f64 {
     /// Products; the estimate is a quotient of quadratic forms and so converges twice as fast as the vector.
     const PRODUCTS: usize = 40;
     let n = filter.inverse_mass.len();
@@ -121,7 +127,11 @@ type Edges = (Matrix3<f64>, [Vector2<f64>; 3]);
 
 /// The elements of a sheet laid flat.
 pub(super) fn laid_flat(sheet: &Sheet) -> Vec<Term> {
-    let own: Vec<Option<Edges>> = sheet.elements.iter().map(|e| edge_stiffness(sheet, e)).collect();
+    let own: Vec<Option<Edges>> = sheet
+        .elements
+        .iter()
+        .map(|e| edge_stiffness(sheet, e))
+        .collect();
     let turned = sheet.elements.iter().zip(&own).zip(frames(sheet, &own));
     turned
         .map(|((e, own), turn)| match own {
@@ -132,12 +142,21 @@ pub(super) fn laid_flat(sheet: &Sheet) -> Vec<Term> {
 }
 
 /// The same for the membrane of the sheet laid flat; `keep` is the share of its stiffness that each element has.
-pub(super) fn membrane_eigenvalue(flat: &[Term], keep: &[f64], springs_only: bool, filter: &Filter) -> f64 {
+pub(super) fn membrane_eigenvalue(
+    flat: &[Term],
+    keep: &[f64],
+    springs_only: bool,
+    filter: &Filter,
+) -> f64 {
     largest_eigenvalue(filter, |x, y| {
         for ((v, k, along), keep) in flat.iter().zip(keep) {
             let p = v.map(|v| x[v as usize]);
             let d = Vector3::from_fn(|i, _| along[i].dot(&(p[(i + 2) % 3] - p[(i + 1) % 3])));
-            let t = if springs_only { k.diagonal().component_mul(&d) } else { k * d } * *keep;
+            let t = if springs_only {
+                k.diagonal().component_mul(&d)
+            } else {
+                k * d
+            } * *keep;
             let pull: [Vector2<f64>; 3] = std::array::from_fn(|i| along[i] * t[i]);
             // Edge i runs from corner i + 1 to corner i + 2.
             for i in 0..3 {
@@ -161,7 +180,11 @@ fn frames(sheet: &Sheet, own: &[Option<Edges>]) -> Vec<Rotation2<f64>> {
     // Direction of edge `i` of an element from its lower to its higher vertex.
     let toward = |e: usize, i: usize| {
         let (_, along) = own[e]?;
-        Some(if all[e].v[(i + 1) % 3] < all[e].v[(i + 2) % 3] { along[i] } else { -along[i] })
+        Some(if all[e].v[(i + 1) % 3] < all[e].v[(i + 2) % 3] {
+            along[i]
+        } else {
+            -along[i]
+        })
     };
     let mut turn: Vec<Option<Rotation2<f64>>> = vec![None; all.len()];
     for start in 0..all.len() {
@@ -176,21 +199,26 @@ fn frames(sheet: &Sheet, own: &[Option<Edges>]) -> Vec<Rotation2<f64>> {
                 let key = [corner(e, i), other(e, i)];
                 let from = edges.partition_point(|x| x.0 < key);
                 for &(_, f, j) in edges[from..].iter().take_while(|x| x.0 == key) {
-                    let (None, Some(a), Some(b)) = (turn[f], toward(e, i), toward(f, j)) else { continue };
+                    let (None, Some(a), Some(b)) = (turn[f], toward(e, i), toward(f, j)) else {
+                        continue;
+                    };
                     turn[f] = Some(Rotation2::rotation_between(&b, &(here * a)));
                     queue.push_back(f);
                 }
             }
         }
     }
-    turn.into_iter().map(|t| t.unwrap_or_else(Rotation2::identity)).collect()
+    turn.into_iter()
+        .map(|t| t.unwrap_or_else(Rotation2::identity))
+        .collect()
 }
 
 /// The same for bending, which acts across the sheet. Without a filter, as held vertices would undo what it gains.
 pub(super) fn bending_eigenvalue(sheet: &Sheet, keep: &[f64], filter: &Filter) -> f64 {
     largest_eigenvalue(filter, |x, y| {
         for (h, keep) in sheet.hinges.iter().zip(keep) {
-            let q = (0..4).fold(Vector2::zeros(), |q, k| q + x[h.v[k] as usize] * h.c[k]) * (h.w * keep);
+            let q = (0..4).fold(Vector2::zeros(), |q, k| q + x[h.v[k] as usize] * h.c[k])
+                * (h.w * keep);
             for k in 0..4 {
                 y[h.v[k] as usize] += q * h.c[k];
             }

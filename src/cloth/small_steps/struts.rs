@@ -49,8 +49,11 @@ const WIDEST: f32 = 0.02;
 
 /// The corners across every hinge of a sheet and how far apart they are where it is flat, metres.
 pub(super) fn diagonals(sheet: &Sheet) -> impl Iterator<Item = ([u32; 2], f64)> {
-    let edges: HashMap<[u32; 2], f64> =
-        sheet.edges.iter().map(|(v, l)| ([v[0].min(v[1]), v[0].max(v[1])], *l)).collect();
+    let edges: HashMap<[u32; 2], f64> = sheet
+        .edges
+        .iter()
+        .map(|(v, l)| ([v[0].min(v[1]), v[0].max(v[1])], *l))
+        .collect();
     sheet.hinges.iter().filter_map(move |h| {
         let [a, b, c, d] = h.v;
         let length = |v: u32, w: u32| edges.get(&[v.min(w), v.max(w)]).copied();
@@ -67,7 +70,14 @@ pub(super) fn diagonals(sheet: &Sheet) -> impl Iterator<Item = ([u32; 2], f64)> 
 
 impl Motion {
     /// Struts that may become shorter than `limit` times their flat length within `span` seconds, none if that is 0.
-    pub fn short(&self, f: &Fabric, limit: f32, span: f32, except: &Excepted<'_>, out: &mut Vec<Strut>) {
+    pub fn short(
+        &self,
+        f: &Fabric,
+        limit: f32,
+        span: f32,
+        except: &Excepted<'_>,
+        out: &mut Vec<Strut>,
+    ) {
         out.clear();
         let all = if limit > 0.0 { &f.diagonals[..] } else { &[] };
         for s in all {
@@ -80,10 +90,20 @@ impl Motion {
             }
             let (length, least) = (square.sqrt().max(SHORTEST), (limit * s.flat).min(WIDEST));
             let opening = d.dot(self.velocity[b] - self.velocity[a]) / length;
-            let weight = [a, b].map(|v| if except.held[v] { 0.0 } else { f.inverse_mass[v] });
+            let weight = [a, b].map(|v| {
+                if except.held[v] {
+                    0.0
+                } else {
+                    f.inverse_mass[v]
+                }
+            });
             let both = weight[0] + weight[1];
             if both > 0.0 && length - least < span * (GAINED - opening) {
-                out.push(Strut { ends: s.ends, least, share: weight.map(|w| w / both) });
+                out.push(Strut {
+                    ends: s.ends,
+                    least,
+                    share: weight.map(|w| w / both),
+                });
             }
         }
     }
@@ -140,7 +160,13 @@ mod tests {
     fn clapped(limit: f32, held: Option<u32>) -> (f64, f64, f64) {
         let (x, faces, rest) = grid(20, 2, 0.012, 0.012);
         let s = sheet(&faces, &rest, x.len(), &cotton(1e-6));
-        let fit = Fit { h: H, ahead: 0.25, springs_only: false, bend_every: 3, smooth: 0 };
+        let fit = Fit {
+            h: H,
+            ahead: 0.25,
+            springs_only: false,
+            bend_every: 3,
+            smooth: 0,
+        };
         let f = &Plan::new(&s, &fit).patches(1, 0, 0)[0];
         let middle = 0.12;
         // A shallow roof whose eaves come down and together at 1.2 m/s.
@@ -161,19 +187,30 @@ mod tests {
                 let p = v3(m.velocity[i]) / f64::from(f.inverse_mass[i]);
                 (p, v3(m.position(i)).cross(&p))
             };
-            (0..x.len()).map(of).fold((V3d::zeros(), V3d::zeros()), |s, o| (s.0 + o.0, s.1 + o.1))
+            (0..x.len())
+                .map(of)
+                .fold((V3d::zeros(), V3d::zeros()), |s, o| (s.0 + o.0, s.1 + o.1))
         };
         let before = moments(&m);
         let (mut struts, mut sharpest) = (Vec::new(), f64::INFINITY);
         for k in 0..(0.1 / H) as usize {
             if k % 40 == 0 {
-                let except = Excepted { held: &held, free: &vec![false; x.len()] };
+                let except = Excepted {
+                    held: &held,
+                    free: &vec![false; x.len()],
+                };
                 m.short(f, limit, 40.0 * H as f32, &except, &mut struts);
             }
             if k % 3 == 0 {
                 m.bend(f, 1.5 * H as f32, usize::MAX);
             }
-            let step = Step { h: H as f32, t: 0.0, ahead: 0.25, gravity: V4::default(), rings: usize::MAX };
+            let step = Step {
+                h: H as f32,
+                t: 0.0,
+                ahead: 0.25,
+                gravity: V4::default(),
+                rings: usize::MAX,
+            };
             m.accelerate(f, &step, &[], &[]);
             m.brace(&struts, step.h);
             if let Some(i) = held.iter().position(|h| *h) {
@@ -189,8 +226,14 @@ mod tests {
             assert_eq!(m.moved[i], V4::default(), "nothing moves what is held");
         }
         let after = moments(&m);
-        let went_in: f64 = (0..x.len()).map(|i| v3(speed(&f.vertices[i])).norm() / f64::from(f.inverse_mass[i])).sum();
-        (sharpest, (after.0 - before.0).norm() / went_in, (after.1 - before.1).norm() / (0.1 * went_in))
+        let went_in: f64 = (0..x.len())
+            .map(|i| v3(speed(&f.vertices[i])).norm() / f64::from(f.inverse_mass[i]))
+            .sum();
+        (
+            sharpest,
+            (after.0 - before.0).norm() / went_in,
+            (after.1 - before.1).norm() / (0.1 * went_in),
+        )
     }
 
     #[test]
@@ -208,8 +251,23 @@ mod tests {
     #[test]
     fn corners_in_one_place_have_no_direction_and_stay_there() {
         let mut m = Motion::default();
-        m.begin([V4::default(); 2].into_iter(), [V4::default(); 2].into_iter());
-        m.brace(&[Strut { ends: [0, 1], least: 0.01, share: [0.5; 2] }], 1e-3);
-        assert!(m.velocity.iter().chain(&m.moved).all(|v| *v == V4::default()));
+        m.begin(
+            [V4::default(); 2].into_iter(),
+            [V4::default(); 2].into_iter(),
+        );
+        m.brace(
+            &[Strut {
+                ends: [0, 1],
+                least: 0.01,
+                share: [0.5; 2],
+            }],
+            1e-3,
+        );
+        assert!(
+            m.velocity
+                .iter()
+                .chain(&m.moved)
+                .all(|v| *v == V4::default())
+        );
     }
 }

@@ -14,19 +14,35 @@ pub(super) fn cotton(bending: f64) -> Material {
 }
 
 /// `nx` × `ny` cells in the x–z plane.
-pub(super) fn grid(nx: usize, ny: usize, dx: f64, dy: f64) -> (Vec<V3d>, Vec<Face>, Vec<[[f64; 2]; 3]>) {
+pub(super) fn grid(
+    nx: usize,
+    ny: usize,
+    dx: f64,
+    dy: f64,
+) -> (Vec<V3d>, Vec<Face>, Vec<[[f64; 2]; 3]>) {
     let at = |i: usize, j: usize| (j * (nx + 1) + i) as u32;
-    let flat = |v: u32| [(v as usize % (nx + 1)) as f64 * dx, (v as usize / (nx + 1)) as f64 * dy];
+    let flat = |v: u32| {
+        [
+            (v as usize % (nx + 1)) as f64 * dx,
+            (v as usize / (nx + 1)) as f64 * dy,
+        ]
+    };
     let mut faces = Vec::new();
     for j in 0..ny {
         for i in 0..nx {
             // Diagonals alternate, so that no direction is favoured.
             let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-            faces.extend(if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] });
+            faces.extend(if (i + j) % 2 == 0 {
+                [[a, b, c], [a, c, d]]
+            } else {
+                [[a, b, d], [b, c, d]]
+            });
         }
     }
     let rest = faces.iter().map(|f| f.map(flat)).collect();
-    let x = (0..((nx + 1) * (ny + 1)) as u32).map(|v| V3d::new(flat(v)[0], 0.0, flat(v)[1])).collect();
+    let x = (0..((nx + 1) * (ny + 1)) as u32)
+        .map(|v| V3d::new(flat(v)[0], 0.0, flat(v)[1]))
+        .collect();
     (x, faces, rest)
 }
 
@@ -47,16 +63,35 @@ impl Lab {
     }
     pub(super) fn smooth(sheet: Sheet, x: &[V3d], h: f64, patches: usize, smooth: usize) -> Self {
         let bend_every = Plan::bend_every(&sheet, h);
-        let plan = Plan::new(&sheet, &Fit { h, ahead: 0.25, springs_only: false, bend_every, smooth });
+        let plan = Plan::new(
+            &sheet,
+            &Fit {
+                h,
+                ahead: 0.25,
+                springs_only: false,
+                bend_every,
+                smooth,
+            },
+        );
         let fabrics = plan.patches(patches, 8 * (1 + smooth) + 8, 0);
         let gravity = V4::new(0.0, -9.81, 0.0);
-        let mut lab = Self { bend_every, sheet, plan, fabrics, motions: Vec::new(), h, ahead: 0.25, gravity };
+        let mut lab = Self {
+            bend_every,
+            sheet,
+            plan,
+            fabrics,
+            motions: Vec::new(),
+            h,
+            ahead: 0.25,
+            gravity,
+        };
         lab.place(x, &vec![V3d::zeros(); x.len()]);
         lab
     }
     pub(super) fn place(&mut self, x: &[V3d], v: &[V3d]) {
         let v4 = |p: &V3d| V4::new(p.x as f32, p.y as f32, p.z as f32);
-        self.motions.resize_with(self.fabrics.len(), Motion::default);
+        self.motions
+            .resize_with(self.fabrics.len(), Motion::default);
         for (m, f) in self.motions.iter_mut().zip(&self.fabrics) {
             let all = || f.vertices.iter().map(|i| *i as usize);
             m.begin(all().map(|i| v4(&x[i])), all().map(|i| v4(&v[i])));
@@ -66,7 +101,8 @@ impl Lab {
         let mut out = vec![V3d::zeros(); self.sheet.mass.len()];
         for (f, m) in self.fabrics.iter().zip(&self.motions) {
             for i in 0..f.owned {
-                out[f.vertices[i] as usize] = V3d::from([0, 1, 2].map(|k| f64::from(of(m, i).0[k])));
+                out[f.vertices[i] as usize] =
+                    V3d::from([0, 1, 2].map(|k| f64::from(of(m, i).0[k])));
             }
         }
         out
@@ -84,16 +120,31 @@ impl Lab {
     /// The same on planes, whose vertices are those of the one patch.
     fn run_on(&mut self, n: usize, held: &[u32], planes: &[Plane]) {
         let h = self.h as f32;
-        let ties: Vec<Vec<Tie>> = self.fabrics.iter().zip(&self.motions).map(|(f, m)| tied(f, m, held)).collect();
+        let ties: Vec<Vec<Tie>> = self
+            .fabrics
+            .iter()
+            .zip(&self.motions)
+            .map(|(f, m)| tied(f, m, held))
+            .collect();
         let mut done = 0;
         while done < n {
             let block = 8.min(n - done);
             for ((f, m), ties) in self.fabrics.iter().zip(&mut self.motions).zip(&ties) {
                 for s in 0..block {
                     if s % self.bend_every == 0 {
-                        m.bend(f, h * self.bend_every.min(block - s) as f32 * 0.5, usize::MAX);
+                        m.bend(
+                            f,
+                            h * self.bend_every.min(block - s) as f32 * 0.5,
+                            usize::MAX,
+                        );
                     }
-                    let step = Step { h, t: 0.0, ahead: self.ahead, gravity: self.gravity, rings: usize::MAX };
+                    let step = Step {
+                        h,
+                        t: 0.0,
+                        ahead: self.ahead,
+                        gravity: self.gravity,
+                        rings: usize::MAX,
+                    };
                     m.accelerate(f, &step, planes, ties);
                     m.restrain(planes, 0.0, h, 1.0);
                     m.tie(ties, 0.0, h);
@@ -104,7 +155,10 @@ impl Lab {
             for (p, (f, m)) in self.fabrics.iter().zip(&self.motions).enumerate() {
                 borders.tell(0, p, f, m);
             }
-            self.fabrics.iter().zip(&mut self.motions).for_each(|(f, m)| borders.hear(0, f, m));
+            self.fabrics
+                .iter()
+                .zip(&mut self.motions)
+                .for_each(|(f, m)| borders.hear(0, f, m));
             done += block;
         }
     }
@@ -118,8 +172,18 @@ impl Lab {
 }
 
 fn tied(f: &Fabric, m: &Motion, held: &[u32]) -> Vec<Tie> {
-    let all = f.vertices.iter().enumerate().filter(|(_, v)| held.contains(v));
-    all.map(|(i, _)| Tie { vertex: i as u32, place: m.position(i), speed: V4::default(), firmness: 1.0 }).collect()
+    let all = f
+        .vertices
+        .iter()
+        .enumerate()
+        .filter(|(_, v)| held.contains(v));
+    all.map(|(i, _)| Tie {
+        vertex: i as u32,
+        place: m.position(i),
+        speed: V4::default(),
+        firmness: 1.0,
+    })
+    .collect()
 }
 
 pub(super) fn sheet(faces: &[Face], rest: &[[[f64; 2]; 3]], n: usize, m: &Material) -> Sheet {
@@ -134,7 +198,12 @@ fn edge_stiffness_is_hookes_law() {
     m.stretch_warp *= 2.0;
     let s = sheet(&[[0, 1, 2]], &rest, 3, &m);
     let (v, k, length) = triangles(&s)[0];
-    for (xx, yy, xy) in [(1e-4, 0.0, 0.0), (0.0, 1e-4, 0.0), (0.0, 0.0, 1e-4), (2e-4, -1e-4, 5e-5)] {
+    for (xx, yy, xy) in [
+        (1e-4, 0.0, 0.0),
+        (0.0, 1e-4, 0.0),
+        (0.0, 0.0, 1e-4),
+        (2e-4, -1e-4, 5e-5),
+    ] {
         let p = rest[0].map(|p| [p[0] * (1.0 + xx) + p[1] * xy, p[1] * (1.0 + yy) + p[0] * xy]);
         let d = nalgebra::Vector3::from_fn(|i, _| {
             let (a, b) = (p[(i + 1) % 3], p[(i + 2) % 3]);
@@ -143,7 +212,10 @@ fn edge_stiffness_is_hookes_law() {
         let edges = 0.5 * d.dot(&(k * d));
         let x: Vec<V3d> = p.iter().map(|p| V3d::new(p[0], p[1], 0.0)).collect();
         let exact = s.energy(&x);
-        assert!((edges - exact).abs() < 2e-3 * exact, "{xx} {yy} {xy}: {edges:e} {exact:e}");
+        assert!(
+            (edges - exact).abs() < 2e-3 * exact,
+            "{xx} {yy} {xy}: {edges:e} {exact:e}"
+        );
     }
     assert_eq!(v, [0, 1, 2]);
 }
@@ -153,20 +225,39 @@ fn free_fall_and_momentum_hold_to_rounding() {
     let (x, faces, rest) = grid(8, 8, 0.02, 0.02);
     let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &cotton(1e-5)), &x, 2e-4, 1);
     // Crumpled and turning: inner forces must not move the centre of mass.
-    let wild: Vec<V3d> =
-        x.iter().map(|p| p + V3d::new(0.0, 0.004 * (p.x * 90.0).sin() * (p.z * 70.0).cos(), 0.0)).collect();
-    let spin: Vec<V3d> = wild.iter().map(|p| V3d::new(0.3, 2.0, -1.0).cross(p)).collect();
+    let wild: Vec<V3d> = x
+        .iter()
+        .map(|p| p + V3d::new(0.0, 0.004 * (p.x * 90.0).sin() * (p.z * 70.0).cos(), 0.0))
+        .collect();
+    let spin: Vec<V3d> = wild
+        .iter()
+        .map(|p| V3d::new(0.3, 2.0, -1.0).cross(p))
+        .collect();
     lab.place(&wild, &spin);
     let mass: f64 = lab.sheet.mass.iter().sum();
-    let mean = |v: &[V3d]| v.iter().zip(&lab.sheet.mass).map(|(v, m)| v * (m / mass)).sum::<V3d>();
+    let mean = |v: &[V3d]| {
+        v.iter()
+            .zip(&lab.sheet.mass)
+            .map(|(v, m)| v * (m / mass))
+            .sum::<V3d>()
+    };
     let (c0, v0) = (mean(&wild), mean(&spin));
     let n = 2000;
     lab.run(n, &[]);
-    let mean = |v: &[V3d]| v.iter().zip(&lab.sheet.mass).map(|(v, m)| v * (m / mass)).sum::<V3d>();
+    let mean = |v: &[V3d]| {
+        v.iter()
+            .zip(&lab.sheet.mass)
+            .map(|(v, m)| v * (m / mass))
+            .sum::<V3d>()
+    };
     let t = n as f64 * lab.h;
     // Symplectic Euler falls g h² n (n + 1) / 2.
     let fall = V3d::new(0.0, -9.81 * lab.h * lab.h * (n * (n + 1)) as f64 / 2.0, 0.0);
-    assert!((mean(&lab.positions()) - (c0 + v0 * t + fall)).norm() < 2e-5, "{}", mean(&lab.positions()));
+    assert!(
+        (mean(&lab.positions()) - (c0 + v0 * t + fall)).norm() < 2e-5,
+        "{}",
+        mean(&lab.positions())
+    );
     assert!((mean(&lab.velocities()) - v0 - V3d::new(0.0, -9.81 * t, 0.0)).norm() < 2e-4);
 }
 
@@ -199,8 +290,16 @@ fn a_heavy_chain_hangs_in_a_catenary() {
     let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &m), &x, 1e-4, 1);
     let length = ny as f64 * d;
     let span = 0.8 * length;
-    let start: Vec<V3d> =
-        x.iter().map(|p| V3d::new(p.x, -0.02 * (p.z / length * std::f64::consts::PI).sin(), p.z * 0.8)).collect();
+    let start: Vec<V3d> = x
+        .iter()
+        .map(|p| {
+            V3d::new(
+                p.x,
+                -0.02 * (p.z / length * std::f64::consts::PI).sin(),
+                p.z * 0.8,
+            )
+        })
+        .collect();
     lab.place(&start, &vec![V3d::zeros(); x.len()]);
     let last = x.len() as u32;
     lab.run(25_000, &[0, 1, last - 2, last - 1]);
@@ -208,7 +307,11 @@ fn a_heavy_chain_hangs_in_a_catenary() {
     let (mut lo, mut hi) = (0.05, 5.0);
     for _ in 0..80 {
         let a: f64 = 0.5 * (lo + hi);
-        if 2.0 * a * (span / (2.0 * a)).sinh() > length { lo = a } else { hi = a }
+        if 2.0 * a * (span / (2.0 * a)).sinh() > length {
+            lo = a
+        } else {
+            hi = a
+        }
     }
     let sag = lo * ((span / (2.0 * lo)).cosh() - 1.0);
     let deepest = lab.positions().iter().map(|p| -p.y).fold(0.0, f64::max);
@@ -246,16 +349,32 @@ fn a_block_slides_as_coulomb_says() {
     for (mu, expected) in [(0.7, 0.0), (0.3, 9.81 * (tilt.sin() - 0.3 * tilt.cos()))] {
         let s = sheet(&faces, &rest, x.len(), &cotton(1e-5));
         let mut lab = Lab::new(s, &x, 2e-4, 1);
-        let on: Vec<V3d> = x.iter().map(|p| down * p.x + V3d::new(0.0, 0.0, p.z)).collect();
+        let on: Vec<V3d> = x
+            .iter()
+            .map(|p| down * p.x + V3d::new(0.0, 0.0, p.z))
+            .collect();
         lab.place(&on, &vec![V3d::zeros(); x.len()]);
         let planes: Vec<Plane> = (0..x.len() as u32)
-            .map(|vertex| Plane { vertex, normal, level: 0.0, speed: V4::default(), friction: mu })
+            .map(|vertex| Plane {
+                vertex,
+                normal,
+                level: 0.0,
+                speed: V4::default(),
+                friction: mu,
+            })
             .collect();
         let n = 2500;
         lab.run_on(n, &[], &planes);
         let v = lab.velocities().iter().sum::<V3d>().dot(&down) / x.len() as f64;
-        assert!((v - expected * n as f64 * lab.h).abs() < 5e-3, "μ {mu}: {v}");
-        assert!(lab.positions().iter().all(|p| p.dot(&V3d::new(tilt.sin(), tilt.cos(), 0.0)) > -1e-5));
+        assert!(
+            (v - expected * n as f64 * lab.h).abs() < 5e-3,
+            "μ {mu}: {v}"
+        );
+        assert!(
+            lab.positions()
+                .iter()
+                .all(|p| p.dot(&V3d::new(tilt.sin(), tilt.cos(), 0.0)) > -1e-5)
+        );
     }
 }
 
@@ -263,12 +382,21 @@ fn a_block_slides_as_coulomb_says() {
 fn patches_give_the_same_motion_and_threads_the_same_bits() {
     let (x, faces, rest) = grid(24, 24, 0.02, 0.02);
     let make = |patches| {
-        let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &cotton(1e-5)), &x, 2e-4, patches);
+        let mut lab = Lab::new(
+            sheet(&faces, &rest, x.len(), &cotton(1e-5)),
+            &x,
+            2e-4,
+            patches,
+        );
         lab.run(800, &[0, 24]);
         lab.positions()
     };
     let (one, three) = (make(1), make(3));
-    let apart = one.iter().zip(&three).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    let apart = one
+        .iter()
+        .zip(&three)
+        .map(|(a, b)| (a - b).norm())
+        .fold(0.0, f64::max);
     assert!(apart < 1e-4, "rounding only: {apart}");
     let again = make(3);
     assert!(three.iter().zip(&again).all(|(a, b)| a == b));
@@ -287,7 +415,10 @@ fn slivers_and_stiffness_ratios_stay_stable() {
         assert!(lab.plan.softened < 1.0 && lab.plan.soft_elements > 0);
         lab.run(5000, &[0, 1]);
         let y = lab.positions();
-        assert!(y.iter().all(|p| p.norm() < 20.0), "it neither explodes nor becomes NaN");
+        assert!(
+            y.iter().all(|p| p.norm() < 20.0),
+            "it neither explodes nor becomes NaN"
+        );
     }
 }
 
@@ -299,7 +430,12 @@ fn a_sheet_at_rest_stays_and_a_swinging_one_gains_nothing() {
     let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &airy), &x, 2e-4, 1);
     lab.gravity = V4::default();
     lab.run(100_000, &[]);
-    let moved = lab.positions().iter().zip(&x).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    let moved = lab
+        .positions()
+        .iter()
+        .zip(&x)
+        .map(|(a, b)| (a - b).norm())
+        .fold(0.0, f64::max);
     assert!(moved < 2e-5, "drift {moved}");
     let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &cotton(1e-5)), &x, 2e-4, 1);
     // Pinned at two corners for 10 s: energy never rises above that of the start.
@@ -316,13 +452,21 @@ fn a_curved_rest_shape_keeps_its_bend() {
     // A cylinder segment stays when nothing pulls.
     let (flat, faces, rest) = grid(10, 4, 0.01, 0.01);
     let r = 0.05;
-    let x: Vec<V3d> = flat.iter().map(|p| V3d::new(r * (p.x / r).sin(), r * (p.x / r).cos(), p.z)).collect();
+    let x: Vec<V3d> = flat
+        .iter()
+        .map(|p| V3d::new(r * (p.x / r).sin(), r * (p.x / r).cos(), p.z))
+        .collect();
     let points: Vec<P3> = x.iter().map(|p| P3::from(p.cast::<f32>())).collect();
     let s = Sheet::new(x.len(), &faces, &rest, &cotton(1e-3), Some(&points)).expect("a sheet");
     let mut lab = Lab::new(s, &x, 1e-4, 1);
     lab.gravity = V4::default();
     lab.run(5000, &[]);
-    let moved = lab.positions().iter().zip(&x).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    let moved = lab
+        .positions()
+        .iter()
+        .zip(&x)
+        .map(|(a, b)| (a - b).norm())
+        .fold(0.0, f64::max);
     assert!(moved < 1e-3, "{moved}");
 }
 
@@ -330,8 +474,10 @@ fn a_curved_rest_shape_keeps_its_bend() {
 fn smoothing_is_the_filter_and_takes_nothing_from_momentum() {
     // One step from a crumpled, spinning state: what smoothing does to the accelerations against W in f64.
     let (x, faces, rest) = grid(9, 7, 0.02, 0.013);
-    let wild: Vec<V3d> =
-        x.iter().map(|p| p + V3d::new(0.0, 0.006 * (p.x * 190.0).sin() * (p.z * 170.0).cos(), 0.0)).collect();
+    let wild: Vec<V3d> = x
+        .iter()
+        .map(|p| p + V3d::new(0.0, 0.006 * (p.x * 190.0).sin() * (p.z * 170.0).cos(), 0.0))
+        .collect();
     let h = 1e-4;
     let accelerations = |degree| {
         let s = sheet(&faces, &rest, x.len(), &cotton(1e-5));
@@ -343,14 +489,24 @@ fn smoothing_is_the_filter_and_takes_nothing_from_momentum() {
     };
     let (plain, smooth) = (accelerations(0), accelerations(2));
     let s = sheet(&faces, &rest, x.len(), &cotton(1e-5));
-    let ends = s.edges.iter().map(|(v, _)| [v[0].min(v[1]), v[0].max(v[1])]).collect();
+    let ends = s
+        .edges
+        .iter()
+        .map(|(v, _)| [v[0].min(v[1]), v[0].max(v[1])])
+        .collect();
     let filter = super::plan::filter(&s, ends, 2);
     let most = plain.iter().map(|a| a.norm()).fold(0.0, f64::max);
     for pair in [[0, 1], [1, 2]] {
-        let mut expected: Vec<_> = plain.iter().map(|a| nalgebra::Vector2::new(a[pair[0]], a[pair[1]])).collect();
+        let mut expected: Vec<_> = plain
+            .iter()
+            .map(|a| nalgebra::Vector2::new(a[pair[0]], a[pair[1]]))
+            .collect();
         filter.apply(&mut expected);
         for (e, a) in expected.iter().zip(&smooth) {
-            assert!((e[0] - a[pair[0]]).abs() + (e[1] - a[pair[1]]).abs() < 2e-5 * most, "{e} {a} of {most}");
+            assert!(
+                (e[0] - a[pair[0]]).abs() + (e[1] - a[pair[1]]).abs() < 2e-5 * most,
+                "{e} {a} of {most}"
+            );
         }
     }
     let momentum = |a: &[V3d]| a.iter().zip(&s.mass).map(|(a, m)| a * *m).sum::<V3d>();
@@ -368,8 +524,17 @@ fn a_million_steps_at_rest_neither_drift_nor_gain() {
     let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &airy), &x, h, 1);
     lab.gravity = V4::default();
     lab.run(1_000_000, &[]);
-    let moved = lab.positions().iter().zip(&x).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-    assert!(moved < 1e-4 && lab.energy() < 1e-9, "drift {moved}, energy {}", lab.energy());
+    let moved = lab
+        .positions()
+        .iter()
+        .zip(&x)
+        .map(|(a, b)| (a - b).norm())
+        .fold(0.0, f64::max);
+    assert!(
+        moved < 1e-4 && lab.energy() < 1e-9,
+        "drift {moved}, energy {}",
+        lab.energy()
+    );
 }
 
 #[test]
@@ -391,23 +556,36 @@ fn a_swinging_sheet_gains_no_energy_at_the_step_that_is_called_comfortable() {
 fn wide_registers_change_no_bit_and_the_root_is_near() {
     use super::lanes::{LANES, Plain, inverse_root};
     let (x, faces, rest) = grid(9, 7, 0.02, 0.013);
-    let wild: Vec<V3d> =
-        x.iter().map(|p| p + V3d::new(0.0, 0.006 * (p.x * 190.0).sin() * (p.z * 170.0).cos(), 0.0)).collect();
+    let wild: Vec<V3d> = x
+        .iter()
+        .map(|p| p + V3d::new(0.0, 0.006 * (p.x * 190.0).sin() * (p.z * 170.0).cos(), 0.0))
+        .collect();
     let make = || {
         let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &cotton(1e-5)), &x, 1e-4, 1);
         lab.place(&wild, &vec![V3d::new(0.1, 0.0, 0.3); x.len()]);
         lab
     };
-    let step = Step { h: 1e-4, t: 0.0, ahead: 0.25, gravity: V4::default(), rings: 0 };
+    let step = Step {
+        h: 1e-4,
+        t: 0.0,
+        ahead: 0.25,
+        gravity: V4::default(),
+        rings: 0,
+    };
     let (mut plain, mut wide) = (make(), make());
     plain.motions[0].pull_kernel(Plain, &plain.fabrics[0], &step);
     wide.motions[0].accelerate(&wide.fabrics[0], &step, &[], &[]);
     let n = x.len();
-    let moved = plain.motions[0].work.push[..n].iter().any(|a| a.dot(*a) > 1.0);
+    let moved = plain.motions[0].work.push[..n]
+        .iter()
+        .any(|a| a.dot(*a) > 1.0);
     assert!(moved && plain.motions[0].work.push[..n] == wide.motions[0].work.push[..n]);
     let numbers: [f32; LANES] = [1e-12, 1e-7, 2.5e-4, 0.9, 1.0, 1.7, 4.1, 3e5];
     for (a, y) in numbers.iter().zip(inverse_root(Plain, numbers)) {
-        assert!((f64::from(y) * f64::from(*a).sqrt() - 1.0).abs() < 1e-6, "{a}: {y}");
+        assert!(
+            (f64::from(y) * f64::from(*a).sqrt() - 1.0).abs() < 1e-6,
+            "{a}: {y}"
+        );
     }
 }
 
@@ -417,7 +595,16 @@ fn cloth_beside_sleeping_cloth_moves_as_beside_held_cloth() {
     for smooth in 0..3 {
         let s = sheet(&faces, &rest, x.len(), &cotton(1e-5));
         let h = Plan::comfortable_step(&s, 0.25, smooth);
-        let plan = Plan::new(&s, &Fit { h, ahead: 0.25, springs_only: false, bend_every: 3, smooth });
+        let plan = Plan::new(
+            &s,
+            &Fit {
+                h,
+                ahead: 0.25,
+                springs_only: false,
+                bend_every: 3,
+                smooth,
+            },
+        );
         let f = &plan.patches(1, 0, 64)[0];
         let n = x.len();
         // The regions of one half.
@@ -427,8 +614,15 @@ fn cloth_beside_sleeping_cloth_moves_as_beside_held_cloth() {
         let v4 = |p: &V3d| V4::new(p.x as f32, p.y as f32, p.z as f32);
         let run = |sleeps: bool| {
             let mut m = Motion::default();
-            m.begin(f.vertices.iter().map(|v| v4(&x[*v as usize])), (0..n).map(|_| V4::default()));
-            let ties = if sleeps { Vec::new() } else { tied(f, &m, &held) };
+            m.begin(
+                f.vertices.iter().map(|v| v4(&x[*v as usize])),
+                (0..n).map(|_| V4::default()),
+            );
+            let ties = if sleeps {
+                Vec::new()
+            } else {
+                tied(f, &m, &held)
+            };
             if sleeps {
                 m.leave(f, &asleep);
             }
@@ -437,7 +631,13 @@ fn cloth_beside_sleeping_cloth_moves_as_beside_held_cloth() {
                     m.bend(f, 1.5 * h as f32, usize::MAX);
                 }
                 let gravity = V4::new(0.0, -9.81, 0.0);
-                let step = Step { h: h as f32, t: 0.0, ahead: 0.25, gravity, rings: usize::MAX };
+                let step = Step {
+                    h: h as f32,
+                    t: 0.0,
+                    ahead: 0.25,
+                    gravity,
+                    rings: usize::MAX,
+                };
                 m.accelerate(f, &step, &[], &ties);
                 m.tie(&ties, 0.0, h as f32);
                 m.advance(f, &step, f32::INFINITY);
@@ -448,12 +648,29 @@ fn cloth_beside_sleeping_cloth_moves_as_beside_held_cloth() {
         let fallen = (0..n).map(|i| -tied.moved[i].0[1]).fold(0.0, f32::max);
         assert!(fallen > 1e-3, "{fallen}");
         assert!((0..half).all(|i| sleeping.moved[i] == V4::default()));
-        let apart =
-            (half..n).map(|i| (sleeping.moved[i] - tied.moved[i]).0.iter().fold(0.0, |a: f32, c| a.max(c.abs())));
+        let apart = (half..n).map(|i| {
+            (sleeping.moved[i] - tied.moved[i])
+                .0
+                .iter()
+                .fold(0.0, |a: f32, c| a.max(c.abs()))
+        });
         let apart = apart.fold(0.0, f32::max);
-        assert!(apart < 1e-4 * fallen, "degree {smooth}: {apart} m apart, fallen by {fallen}");
-        let computed: usize = sleeping.work.awake.iter().flat_map(|a| &a.quads).map(|r| r.len()).sum();
-        assert!(computed * 10 < f.quads.len() * 8, "{computed} of {} blocks for half of the cloth", f.quads.len());
+        assert!(
+            apart < 1e-4 * fallen,
+            "degree {smooth}: {apart} m apart, fallen by {fallen}"
+        );
+        let computed: usize = sleeping
+            .work
+            .awake
+            .iter()
+            .flat_map(|a| &a.quads)
+            .map(|r| r.len())
+            .sum();
+        assert!(
+            computed * 10 < f.quads.len() * 8,
+            "{computed} of {} blocks for half of the cloth",
+            f.quads.len()
+        );
     }
 }
 
@@ -477,8 +694,20 @@ fn a_hanging_sheet_stays_where_it_hangs_for_a_million_steps() {
             lab.run(steps / 10, &held);
             most = most.max(lab.energy());
         }
-        let drift = lab.positions().iter().zip(&before).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-        let speed = lab.velocities().iter().map(|v| v.norm()).fold(0.0, f64::max);
-        assert!(drift < 1e-3 && speed < 1e-3 && most < energy + 1e-6, "{drift} {speed} {energy} {most}");
+        let drift = lab
+            .positions()
+            .iter()
+            .zip(&before)
+            .map(|(a, b)| (a - b).norm())
+            .fold(0.0, f64::max);
+        let speed = lab
+            .velocities()
+            .iter()
+            .map(|v| v.norm())
+            .fold(0.0, f64::max);
+        assert!(
+            drift < 1e-3 && speed < 1e-3 && most < energy + 1e-6,
+            "{drift} {speed} {energy} {most}"
+        );
     }
 }

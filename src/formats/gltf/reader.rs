@@ -52,9 +52,9 @@ pub fn parse_gltf(bytes: &[u8], origin: &Path) -> Result<GltfModel, FormatError>
     for b in document.buffers() {
         let field = format!("buffer {}", b.index());
         let data = match b.source() {
-            ::gltf::buffer::Source::Bin => {
-                blob.take().ok_or_else(|| FormatError::field(origin, &field, "the file has no binary chunk"))?
-            }
+            ::gltf::buffer::Source::Bin => blob.take().ok_or_else(|| {
+                FormatError::field(origin, &field, "the file has no binary chunk")
+            })?,
             ::gltf::buffer::Source::Uri(uri) => external(uri, origin, &field)?,
         };
         if data.len() < b.length() {
@@ -72,22 +72,35 @@ pub fn parse_gltf(bytes: &[u8], origin: &Path) -> Result<GltfModel, FormatError>
         parts: Vec::new(),
         nodes: 0,
     };
-    let scene = document.default_scene().or_else(|| document.scenes().next());
+    let scene = document
+        .default_scene()
+        .or_else(|| document.scenes().next());
     let scene = scene.ok_or_else(|| FormatError::field(origin, "scene", "none"))?;
     for node in scene.nodes() {
         file.node(&node, &Matrix4::identity(), 0)?;
     }
     if file.vertices.len() > MAX_VERTICES {
-        return Err(FormatError::field(origin, "meshes", format!("more than {MAX_VERTICES} vertices")));
+        return Err(FormatError::field(
+            origin,
+            "meshes",
+            format!("more than {MAX_VERTICES} vertices"),
+        ));
     }
     if file.faces.is_empty() {
         return Err(FormatError::field(origin, "meshes", "no triangles"));
     }
-    let File { vertices, faces, mut uv, parts, .. } = file;
+    let File {
+        vertices,
+        faces,
+        mut uv,
+        parts,
+        ..
+    } = file;
     if uv.len() != vertices.len() {
         uv.clear();
     }
-    let mesh = TriMesh::new(vertices, faces).map_err(|e| FormatError::field(origin, "mesh", e.to_string()))?;
+    let mesh = TriMesh::new(vertices, faces)
+        .map_err(|e| FormatError::field(origin, "mesh", e.to_string()))?;
     Ok(GltfModel { mesh, uv, parts })
 }
 
@@ -96,8 +109,18 @@ fn check_container(bytes: &[u8], origin: &Path) -> Result<(), FormatError> {
     if !bytes.starts_with(b"glTF") {
         return Ok(());
     }
-    let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
-    let cut = |field: &str| FormatError::field(origin, field, "longer than the file: it is cut short or damaged");
+    let word = |at: usize| {
+        bytes
+            .get(at..at + 4)
+            .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize)
+    };
+    let cut = |field: &str| {
+        FormatError::field(
+            origin,
+            field,
+            "longer than the file: it is cut short or damaged",
+        )
+    };
     let total = word(8).ok_or_else(|| cut("header"))?;
     if total > bytes.len() || total < 20 {
         return Err(cut("header length"));
@@ -122,16 +145,28 @@ fn check_positions(bytes: &[u8], origin: &Path) -> Result<(), FormatError> {
         }
         _ => bytes,
     };
-    let root: serde_json::Value =
-        serde_json::from_slice(text).map_err(|e| FormatError::field(origin, "json", e.to_string()))?;
-    let list = |v: &serde_json::Value, key: &str| v.get(key).and_then(|l| l.as_array()).cloned().unwrap_or_default();
+    let root: serde_json::Value = serde_json::from_slice(text)
+        .map_err(|e| FormatError::field(origin, "json", e.to_string()))?;
+    let list = |v: &serde_json::Value, key: &str| {
+        v.get(key)
+            .and_then(|l| l.as_array())
+            .cloned()
+            .unwrap_or_default()
+    };
     let accessors = list(&root, "accessors").len() as u64;
     for (m, mesh) in list(&root, "meshes").iter().enumerate() {
         for (k, p) in list(mesh, "primitives").iter().enumerate() {
-            let position = p.get("attributes").and_then(|a| a.get("POSITION")).and_then(|i| i.as_u64());
+            let position = p
+                .get("attributes")
+                .and_then(|a| a.get("POSITION"))
+                .and_then(|i| i.as_u64());
             if let Some(i) = position.filter(|i| *i >= accessors) {
                 let why = format!("accessor {i} of {accessors} does not exist");
-                return Err(FormatError::field(origin, format!("mesh {m}, primitive {k}: POSITION"), why));
+                return Err(FormatError::field(
+                    origin,
+                    format!("mesh {m}, primitive {k}: POSITION"),
+                    why,
+                ));
             }
         }
     }
@@ -142,11 +177,19 @@ fn external(uri: &str, origin: &Path, field: &str) -> Result<Vec<u8>, FormatErro
     if let Some(data) = uri.strip_prefix("data:") {
         let text = data.split_once(";base64,").map(|d| d.1);
         let bytes = text.and_then(base64);
-        return bytes.ok_or_else(|| FormatError::field(origin, field, "a data URI that is no base64"));
+        return bytes
+            .ok_or_else(|| FormatError::field(origin, field, "a data URI that is no base64"));
     }
     let relative = Path::new(uri);
-    if !relative.components().all(|c| matches!(c, Component::Normal(_))) {
-        return Err(FormatError::field(origin, field, format!("`{uri}` leads out of the folder")));
+    if !relative
+        .components()
+        .all(|c| matches!(c, Component::Normal(_)))
+    {
+        return Err(FormatError::field(
+            origin,
+            field,
+            format!("`{uri}` leads out of the folder"),
+        ));
     }
     read_limited(&origin.with_file_name("").join(relative), MAX_BYTES)
 }
@@ -176,7 +219,12 @@ fn base64(text: &str) -> Option<Vec<u8>> {
 }
 
 impl File<'_> {
-    fn node(&mut self, node: &Node<'_>, above: &Matrix4<f32>, depth: usize) -> Result<(), FormatError> {
+    fn node(
+        &mut self,
+        node: &Node<'_>,
+        above: &Matrix4<f32>,
+        depth: usize,
+    ) -> Result<(), FormatError> {
         self.nodes += 1;
         if depth > MAX_DEPTH || self.nodes > MAX_NODES || self.vertices.len() > MAX_VERTICES {
             return Err(FormatError::field(
@@ -191,7 +239,9 @@ impl File<'_> {
                 if self.vertices.len() > MAX_VERTICES {
                     break;
                 }
-                let name = mesh.name().map_or_else(|| format!("mesh {}", mesh.index()), str::to_owned);
+                let name = mesh
+                    .name()
+                    .map_or_else(|| format!("mesh {}", mesh.index()), str::to_owned);
                 if p.mode() == Mode::Triangles {
                     self.primitive(&name, k, &p, &here)?;
                 }
@@ -203,32 +253,59 @@ impl File<'_> {
         Ok(())
     }
 
-    fn primitive(&mut self, name: &str, k: usize, p: &Primitive<'_>, place: &Matrix4<f32>) -> Result<(), FormatError> {
+    fn primitive(
+        &mut self,
+        name: &str,
+        k: usize,
+        p: &Primitive<'_>,
+        place: &Matrix4<f32>,
+    ) -> Result<(), FormatError> {
         let path = self.path;
-        let fault = |field: &str, why: String| FormatError::field(path, format!("{name}, primitive {k}: {field}"), why);
-        let positions = p.get(&Semantic::Positions).ok_or_else(|| fault("POSITION", "missing".into()))?;
-        let positions: Vec<[f32; 3]> = self.floats(&positions).map_err(|why| fault("POSITION", why))?;
-        let vertices: Vec<P3> = positions.into_iter().map(|v| place.transform_point(&P3::from(v))).collect();
+        let fault = |field: &str, why: String| {
+            FormatError::field(path, format!("{name}, primitive {k}: {field}"), why)
+        };
+        let positions = p
+            .get(&Semantic::Positions)
+            .ok_or_else(|| fault("POSITION", "missing".into()))?;
+        let positions: Vec<[f32; 3]> = self
+            .floats(&positions)
+            .map_err(|why| fault("POSITION", why))?;
+        let vertices: Vec<P3> = positions
+            .into_iter()
+            .map(|v| place.transform_point(&P3::from(v)))
+            .collect();
         let uv = match p.get(&Semantic::TexCoords(0)) {
-            Some(a) if a.data_type() == DataType::F32 => self.floats(&a).map_err(|why| fault("TEXCOORD_0", why))?,
+            Some(a) if a.data_type() == DataType::F32 => {
+                self.floats(&a).map_err(|why| fault("TEXCOORD_0", why))?
+            }
             _ => Vec::new(),
         };
         if !uv.is_empty() && uv.len() != vertices.len() {
-            return Err(fault("TEXCOORD_0", format!("{} for {} vertices", uv.len(), vertices.len())));
+            return Err(fault(
+                "TEXCOORD_0",
+                format!("{} for {} vertices", uv.len(), vertices.len()),
+            ));
         }
         let corners: Vec<u32> = match p.indices() {
             Some(a) => self.indices(&a).map_err(|why| fault("indices", why))?,
             None => (0..vertices.len() as u32).collect(),
         };
         if !corners.len().is_multiple_of(3) {
-            return Err(fault("indices", format!("{} do not make triangles", corners.len())));
+            return Err(fault(
+                "indices",
+                format!("{} do not make triangles", corners.len()),
+            ));
         }
-        let faces: Vec<Face> = corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
+        let faces: Vec<Face> = corners
+            .chunks_exact(3)
+            .map(|c| [c[0], c[1], c[2]])
+            .collect();
         // Checked by itself first, so that a fault names the primitive's own face and vertex.
         let mesh = TriMesh::new(vertices, faces).map_err(|e| fault("mesh", e.to_string()))?;
         let (base, first) = (self.vertices.len() as u32, self.faces.len());
         self.vertices.extend(mesh.vertices());
-        self.faces.extend(mesh.faces().iter().map(|f| f.map(|i| i + base)));
+        self.faces
+            .extend(mesh.faces().iter().map(|f| f.map(|i| i + base)));
         self.uv.extend(uv);
         let material = p.material();
         self.parts.push(GltfPart {
@@ -247,38 +324,72 @@ impl File<'_> {
         }
         let view = a.view().ok_or("no buffer view")?;
         let stride = view.stride().unwrap_or(size).max(size);
-        let buffer = self.buffers.get(view.buffer().index()).ok_or("no such buffer")?;
-        let end = view.offset().checked_add(view.length()).filter(|e| *e <= buffer.len());
-        let data = &buffer[view.offset().min(buffer.len())..end.ok_or("the buffer view is longer than its buffer")?];
-        let data = data.get(a.offset()..).ok_or("it starts beyond its buffer view")?;
-        let need = a.count().checked_sub(1).and_then(|n| n.checked_mul(stride)).and_then(|n| n.checked_add(size));
+        let buffer = self
+            .buffers
+            .get(view.buffer().index())
+            .ok_or("no such buffer")?;
+        let end = view
+            .offset()
+            .checked_add(view.length())
+            .filter(|e| *e <= buffer.len());
+        let data = &buffer[view.offset().min(buffer.len())
+            ..end.ok_or("the buffer view is longer than its buffer")?];
+        let data = data
+            .get(a.offset()..)
+            .ok_or("it starts beyond its buffer view")?;
+        let need = a
+            .count()
+            .checked_sub(1)
+            .and_then(|n| n.checked_mul(stride))
+            .and_then(|n| n.checked_add(size));
         match need {
             None => Ok(Vec::new()),
-            Some(need) if need > data.len() => {
-                Err(format!("{} elements are more than its buffer view holds", a.count()))
-            }
-            Some(_) => Ok((0..a.count()).map(|i| &data[i * stride..i * stride + size]).collect()),
+            Some(need) if need > data.len() => Err(format!(
+                "{} elements are more than its buffer view holds",
+                a.count()
+            )),
+            Some(_) => Ok((0..a.count())
+                .map(|i| &data[i * stride..i * stride + size])
+                .collect()),
         }
     }
     fn floats<const N: usize>(&self, a: &Accessor<'_>) -> Result<Vec<[f32; N]>, String> {
         if a.data_type() != DataType::F32 || a.dimensions().multiplicity() != N {
-            return Err(format!("{:?} of {:?}, expected {N} floats", a.dimensions(), a.data_type()));
+            return Err(format!(
+                "{:?} of {:?}, expected {N} floats",
+                a.dimensions(),
+                a.data_type()
+            ));
         }
-        let float = |e: &[u8], k: usize| f32::from_le_bytes([e[4 * k], e[4 * k + 1], e[4 * k + 2], e[4 * k + 3]]);
-        Ok(self.elements(a, 4 * N)?.into_iter().map(|e| std::array::from_fn(|k| float(e, k))).collect())
+        let float = |e: &[u8], k: usize| {
+            f32::from_le_bytes([e[4 * k], e[4 * k + 1], e[4 * k + 2], e[4 * k + 3]])
+        };
+        Ok(self
+            .elements(a, 4 * N)?
+            .into_iter()
+            .map(|e| std::array::from_fn(|k| float(e, k)))
+            .collect())
     }
     fn indices(&self, a: &Accessor<'_>) -> Result<Vec<u32>, String> {
         if a.dimensions() != Dimensions::Scalar {
             return Err("expected scalars".into());
         }
         Ok(match a.data_type() {
-            DataType::U8 => self.elements(a, 1)?.into_iter().map(|e| u32::from(e[0])).collect(),
-            DataType::U16 => {
-                self.elements(a, 2)?.into_iter().map(|e| u16::from_le_bytes([e[0], e[1]]).into()).collect()
-            }
-            DataType::U32 => {
-                self.elements(a, 4)?.into_iter().map(|e| u32::from_le_bytes([e[0], e[1], e[2], e[3]])).collect()
-            }
+            DataType::U8 => self
+                .elements(a, 1)?
+                .into_iter()
+                .map(|e| u32::from(e[0]))
+                .collect(),
+            DataType::U16 => self
+                .elements(a, 2)?
+                .into_iter()
+                .map(|e| u16::from_le_bytes([e[0], e[1]]).into())
+                .collect(),
+            DataType::U32 => self
+                .elements(a, 4)?
+                .into_iter()
+                .map(|e| u32::from_le_bytes([e[0], e[1], e[2], e[3]]))
+                .collect(),
             other => return Err(format!("{other:?}, expected unsigned integers")),
         })
     }
@@ -290,7 +401,13 @@ mod tests {
 
     #[test]
     fn base64_of_the_rfc() {
-        for (text, want) in [("", ""), ("Zg==", "f"), ("Zm8=", "fo"), ("Zm9v", "foo"), ("Zm9vYmFy", "foobar")] {
+        for (text, want) in [
+            ("", ""),
+            ("Zg==", "f"),
+            ("Zm8=", "fo"),
+            ("Zm9v", "foo"),
+            ("Zm9vYmFy", "foobar"),
+        ] {
             assert_eq!(base64(text).as_deref(), Some(want.as_bytes()));
         }
         assert_eq!(base64("Zm9*"), None);

@@ -1,7 +1,12 @@
 use super::*;
 use std::path::Path;
 
-const CORNERS: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+const CORNERS: [[f32; 3]; 4] = [
+    [0.0, 0.0, 0.0],
+    [1.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0],
+    [0.0, 0.0, 1.0],
+];
 const FACES: [Face; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
 const UV: [[f32; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.25]];
 const AT: &str = "outfit.glb";
@@ -13,8 +18,18 @@ fn points() -> Vec<P3> {
 /// A shirt and a skirt, both tetrahedra.
 fn encoded(frames: &[Vec<Vec<P3>>]) -> Result<Vec<u8>, crate::formats::FormatError> {
     let p = points();
-    let shirt = GlbMesh { name: "shirt", vertices: &p, faces: &FACES, uv: &UV, color: [200, 10, 0] };
-    let skirt = GlbMesh { name: "skirt", color: [0, 0, 255], ..shirt };
+    let shirt = GlbMesh {
+        name: "shirt",
+        vertices: &p,
+        faces: &FACES,
+        uv: &UV,
+        color: [200, 10, 0],
+    };
+    let skirt = GlbMesh {
+        name: "skirt",
+        color: [0, 0, 255],
+        ..shirt
+    };
     encode_glb(&[shirt, skirt], frames, 0.04, Path::new(AT))
 }
 
@@ -23,21 +38,47 @@ fn what_is_written_is_read() {
     let bytes = encoded(&[]).expect("encodes");
     let m = parse_gltf(&bytes, Path::new(AT)).expect("reads");
     assert_eq!(m.mesh.vertices(), [points(), points()].concat());
-    assert_eq!((m.mesh.faces()[3], m.mesh.faces()[4], m.uv[6]), (FACES[3], [4, 6, 5], UV[2]));
-    assert_eq!((m.parts[1].name.as_str(), m.parts[1].faces.clone()), ("skirt", 4..8));
-    assert!((m.parts[0].color[0] - 0.577_58).abs() < 1e-4, "sRGB 200 is 0.578 linear");
+    assert_eq!(
+        (m.mesh.faces()[3], m.mesh.faces()[4], m.uv[6]),
+        (FACES[3], [4, 6, 5], UV[2])
+    );
+    assert_eq!(
+        (m.parts[1].name.as_str(), m.parts[1].faces.clone()),
+        ("skirt", 4..8)
+    );
+    assert!(
+        (m.parts[0].color[0] - 0.577_58).abs() < 1e-4,
+        "sRGB 200 is 0.578 linear"
+    );
     assert!(m.parts[0].double_sided);
 }
 
 #[test]
 fn motion_becomes_morph_targets() {
-    let up = |k: usize| points().iter().map(|p| p + nalgebra::Vector3::y() * k as f32).collect::<Vec<_>>();
+    let up = |k: usize| {
+        points()
+            .iter()
+            .map(|p| p + nalgebra::Vector3::y() * k as f32)
+            .collect::<Vec<_>>()
+    };
     let mut frames = vec![(0..3).map(up).collect::<Vec<_>>()];
     let bytes = encoded(&frames).expect("encodes");
     let g = ::gltf::Gltf::from_slice(&bytes).expect("valid glTF");
     let animation = g.animations().next().expect("an animation");
-    assert_eq!(animation.samplers().next().expect("a sampler").output().count(), 9);
-    let primitive = g.meshes().next().and_then(|m| m.primitives().next()).expect("a mesh");
+    assert_eq!(
+        animation
+            .samplers()
+            .next()
+            .expect("a sampler")
+            .output()
+            .count(),
+        9
+    );
+    let primitive = g
+        .meshes()
+        .next()
+        .and_then(|m| m.primitives().next())
+        .expect("a mesh");
     assert_eq!(primitive.morph_targets().count(), 3);
     frames[0][1].pop();
     let e = encoded(&frames).expect_err("short frame").to_string();
@@ -48,27 +89,53 @@ fn motion_becomes_morph_targets() {
 fn faults_name_mesh_and_index() {
     let bytes = encoded(&[]).expect("encodes");
     // The last index of the first mesh: after 4 positions, 4 normals, 4 uv and 11 indices.
-    let bin = bytes.windows(4).position(|w| w == b"BIN\0").expect("a chunk") + 4;
+    let bin = bytes
+        .windows(4)
+        .position(|w| w == b"BIN\0")
+        .expect("a chunk")
+        + 4;
     let mut bad = bytes.clone();
     let at = bin + 4 * 12 + 4 * 12 + 4 * 8 + 11 * 4;
     bad[at..at + 4].copy_from_slice(&77u32.to_le_bytes());
-    let e = parse_gltf(&bad, Path::new(AT)).expect_err("bad index").to_string();
-    assert!(e.contains(AT) && e.contains("shirt") && e.contains("face 3") && e.contains("77"), "{e}");
+    let e = parse_gltf(&bad, Path::new(AT))
+        .expect_err("bad index")
+        .to_string();
+    assert!(
+        e.contains(AT) && e.contains("shirt") && e.contains("face 3") && e.contains("77"),
+        "{e}"
+    );
     let mut nan = bytes.clone();
     nan[bin..bin + 4].copy_from_slice(&f32::NAN.to_le_bytes());
-    let e = parse_gltf(&nan, Path::new(AT)).expect_err("NaN").to_string();
+    let e = parse_gltf(&nan, Path::new(AT))
+        .expect_err("NaN")
+        .to_string();
     assert!(e.contains("vertex 0"), "{e}");
     for cut in 0..bytes.len() {
-        assert!(parse_gltf(&bytes[..cut], Path::new(AT)).is_err(), "cut at {cut}");
+        assert!(
+            parse_gltf(&bytes[..cut], Path::new(AT)).is_err(),
+            "cut at {cut}"
+        );
     }
-    let text =
-        r#"{"asset":{"version":"2.0"},"buffers":[{"byteLength":4,"uri":"../../etc/passwd"}],"scenes":[{"nodes":[]}]}"#;
-    let e = parse_gltf(text.as_bytes(), Path::new("a.gltf")).expect_err("outside").to_string();
+    let text = r#"{"asset":{"version":"2.0"},"buffers":[{"byteLength":4,"uri":"../../etc/passwd"}],"scenes":[{"nodes":[]}]}"#;
+    let e = parse_gltf(text.as_bytes(), Path::new("a.gltf"))
+        .expect_err("outside")
+        .to_string();
     assert!(e.contains("out of the folder"), "{e}");
     let p = points();
-    let hole = GlbMesh { name: "hole", vertices: &p, faces: &[[0, 1, 9]], uv: &[], color: [0; 3] };
-    let e = encode_glb(&[hole], &[], 1.0, Path::new(AT)).expect_err("hole").to_string();
-    assert!(e.contains("hole") && e.contains("face 0") && e.contains('9'), "{e}");
+    let hole = GlbMesh {
+        name: "hole",
+        vertices: &p,
+        faces: &[[0, 1, 9]],
+        uv: &[],
+        color: [0; 3],
+    };
+    let e = encode_glb(&[hole], &[], 1.0, Path::new(AT))
+        .expect_err("hole")
+        .to_string();
+    assert!(
+        e.contains("hole") && e.contains("face 0") && e.contains('9'),
+        "{e}"
+    );
 }
 
 #[test]

@@ -23,7 +23,8 @@ struct Builder {
 impl Builder {
     fn add(&mut self, data: &[u8], target: Option<u32>, mut accessor: Value) -> usize {
         // Everything is made of 4-byte values, so offsets stay aligned.
-        let mut view = json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": data.len()});
+        let mut view =
+            json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": data.len()});
         if let Some(t) = target {
             view["target"] = json!(t);
         }
@@ -33,7 +34,12 @@ impl Builder {
         self.accessors.push(accessor);
         self.accessors.len() - 1
     }
-    fn vectors<const N: usize>(&mut self, kind: &str, rows: impl Iterator<Item = [f32; N]>, target: bool) -> usize {
+    fn vectors<const N: usize>(
+        &mut self,
+        kind: &str,
+        rows: impl Iterator<Item = [f32; N]>,
+        target: bool,
+    ) -> usize {
         let (mut data, mut count) = (Vec::new(), 0usize);
         let (mut lo, mut hi) = ([f32::INFINITY; N], [f32::NEG_INFINITY; N]);
         for row in rows {
@@ -59,13 +65,19 @@ fn normals(m: &GlbMesh<'_>) -> Vec<V3> {
         let n = face_normal(m.vertices, f);
         f.iter().for_each(|&i| out[i as usize] += n);
     }
-    out.iter().map(|n| n.try_normalize(0.0).unwrap_or(V3::y())).collect()
+    out.iter()
+        .map(|n| n.try_normalize(0.0).unwrap_or(V3::y()))
+        .collect()
 }
 
 /// sRGB to linear (IEC 61966-2-1).
 fn linear(c: u8) -> f32 {
     let s = f32::from(c) / 255.0;
-    if s <= 0.040_45 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
+    if s <= 0.040_45 {
+        s / 12.92
+    } else {
+        ((s + 0.055) / 1.055).powf(2.4)
+    }
 }
 
 /// Meshes to the bytes of a `.glb`. `frames` holds positions of each mesh at later moments, shape
@@ -86,15 +98,23 @@ pub fn encode_glb(
         let vertices = m.vertices;
         let frames = frames.get(i).map_or(&[][..], Vec::as_slice);
         let finite = |f: &[P3]| f.iter().all(|p| p.iter().all(|c| c.is_finite()));
-        let fault = |field: &str, why: String| FormatError::field(origin, format!("mesh `{}`.{field}", m.name), why);
+        let fault = |field: &str, why: String| {
+            FormatError::field(origin, format!("mesh `{}`.{field}", m.name), why)
+        };
         let n = vertices.len();
         if m.faces.is_empty() {
             return Err(fault("faces", "none".into()));
         }
-        if let Some((f, k)) =
-            m.faces.iter().enumerate().find_map(|(i, f)| f.iter().find(|k| **k as usize >= n).map(|k| (i, k)))
+        if let Some((f, k)) = m
+            .faces
+            .iter()
+            .enumerate()
+            .find_map(|(i, f)| f.iter().find(|k| **k as usize >= n).map(|k| (i, k)))
         {
-            return Err(fault("faces", format!("face {f}: vertex index {k} is out of range ({n} vertices)")));
+            return Err(fault(
+                "faces",
+                format!("face {f}: vertex index {k} is out of range ({n} vertices)"),
+            ));
         }
         if !finite(vertices) {
             return Err(fault("vertices", "a position is not finite".into()));
@@ -103,15 +123,27 @@ pub fn encode_glb(
             return Err(fault("uv", format!("{} for {n} vertices", m.uv.len())));
         }
         if let Some(k) = frames.iter().position(|f| f.len() != n || !finite(f)) {
-            return Err(fault("frames", format!("frame {k} needs {n} finite positions")));
+            return Err(fault(
+                "frames",
+                format!("frame {k} needs {n} finite positions"),
+            ));
         }
         let position = b.vectors("VEC3", vertices.iter().map(|p| [p.x, p.y, p.z]), true);
-        let normal = b.vectors("VEC3", normals(m).into_iter().map(|n| [n.x, n.y, n.z]), true);
+        let normal = b.vectors(
+            "VEC3",
+            normals(m).into_iter().map(|n| [n.x, n.y, n.z]),
+            true,
+        );
         let mut attributes = json!({"POSITION": position, "NORMAL": normal});
         if !m.uv.is_empty() {
             attributes["TEXCOORD_0"] = json!(b.vectors("VEC2", m.uv.iter().copied(), true));
         }
-        let indices: Vec<u8> = m.faces.iter().flatten().flat_map(|i| i.to_le_bytes()).collect();
+        let indices: Vec<u8> = m
+            .faces
+            .iter()
+            .flatten()
+            .flat_map(|i| i.to_le_bytes())
+            .collect();
         let count = 3 * m.faces.len();
         let accessor = json!({"componentType": UNSIGNED, "type": "SCALAR", "count": count});
         let indices = b.add(&indices, Some(INDEX_BUFFER), accessor);
@@ -120,7 +152,11 @@ pub fn encode_glb(
         if !frames.is_empty() {
             // One target a frame, each fully on at its time: positions between frames are blended linearly.
             let off = |f: &Vec<P3>| {
-                let rows: Vec<[f32; 3]> = f.iter().zip(vertices).map(|(p, q)| (p - q).into()).collect();
+                let rows: Vec<[f32; 3]> = f
+                    .iter()
+                    .zip(vertices)
+                    .map(|(p, q)| (p - q).into())
+                    .collect();
                 b.vectors("VEC3", rows.into_iter(), true)
             };
             let targets: Vec<usize> = frames.iter().map(off).collect();
@@ -128,7 +164,11 @@ pub fn encode_glb(
             let k = frames.len();
             mesh["weights"] = json!(vec![0.0; k]);
             let times = b.vectors("SCALAR", (0..k).map(|t| [t as f32 * frame_seconds]), false);
-            let weights = b.vectors("SCALAR", (0..k * k).map(|w| [f32::from(u8::from(w / k == w % k))]), false);
+            let weights = b.vectors(
+                "SCALAR",
+                (0..k * k).map(|w| [f32::from(u8::from(w / k == w % k))]),
+                false,
+            );
             animations.push(json!({
                 "name": format!("{} motion", m.name),
                 "samplers": [{"input": times, "output": weights, "interpolation": "LINEAR"}],
@@ -193,5 +233,6 @@ pub fn write_glb_motion(
     frames: &[Vec<Vec<P3>>],
     frame_seconds: f32,
 ) -> Result<(), FormatError> {
-    std::fs::write(path, encode_glb(meshes, frames, frame_seconds, path)?).map_err(|e| FormatError::io(path, e))
+    std::fs::write(path, encode_glb(meshes, frames, frame_seconds, path)?)
+        .map_err(|e| FormatError::io(path, e))
 }

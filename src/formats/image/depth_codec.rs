@@ -33,7 +33,12 @@ pub fn encode_depth(image: &DepthImage) -> Vec<u8> {
     let mut planes = vec![0u8; 2 * n];
     let (low, high) = planes.split_at_mut(n);
     let width = (image.width() as usize).max(1);
-    for ((row, low), high) in image.data().chunks(width).zip(low.chunks_mut(width)).zip(high.chunks_mut(width)) {
+    for ((row, low), high) in image
+        .data()
+        .chunks(width)
+        .zip(low.chunks_mut(width))
+        .zip(high.chunks_mut(width))
+    {
         let mut left = 0u16;
         for ((&d, l), h) in row.iter().zip(low).zip(high) {
             let z = zigzag(d.wrapping_sub(left));
@@ -68,18 +73,34 @@ pub fn decode_depth(bytes: &[u8]) -> Result<DepthImage, FormatError> {
     check_size(at, width, height)?;
     let (payload, n) = (&bytes[HEADER..], width as usize * height as usize);
     if 2 * n as u64 > ZSTD_LIMIT * payload.len() as u64 {
-        return Err(fault("data", format!("{width}×{height} pixels cannot come from {} bytes", payload.len())));
+        return Err(fault(
+            "data",
+            format!(
+                "{width}×{height} pixels cannot come from {} bytes",
+                payload.len()
+            ),
+        ));
     }
     let mut planes = vec![0u8; 2 * n];
     let got = zstd::bulk::decompress_to_buffer(payload, &mut planes)
         .map_err(|e| fault("data", format!("damaged or cut short ({e})")))?;
     if got != 2 * n {
-        return Err(fault("data", format!("{got} bytes for {width}×{height} pixels, expected {}", 2 * n)));
+        return Err(fault(
+            "data",
+            format!(
+                "{got} bytes for {width}×{height} pixels, expected {}",
+                2 * n
+            ),
+        ));
     }
     let (low, high) = planes.split_at(n);
     let mut out = vec![0u16; n];
     let width_px = width as usize;
-    for ((row, low), high) in out.chunks_mut(width_px).zip(low.chunks(width_px)).zip(high.chunks(width_px)) {
+    for ((row, low), high) in out
+        .chunks_mut(width_px)
+        .zip(low.chunks(width_px))
+        .zip(high.chunks(width_px))
+    {
         let mut left = 0u16;
         for ((d, &l), &h) in row.iter_mut().zip(low).zip(high) {
             left = left.wrapping_add(unzigzag(u16::from_le_bytes([l, h])));
@@ -98,7 +119,11 @@ mod tests {
         let data = (0..64 * 48)
             .map(|i| {
                 let (u, v) = (i % 64, i / 64);
-                if (20..40).contains(&u) && v > 5 { 1500 + (u * u) as u16 } else { 3000 + v as u16 }
+                if (20..40).contains(&u) && v > 5 {
+                    1500 + (u * u) as u16
+                } else {
+                    3000 + v as u16
+                }
             })
             .collect();
         DepthImage::new(64, 48, data).expect("sizes")
@@ -106,7 +131,14 @@ mod tests {
 
     #[test]
     fn zigzag_is_its_own_story() {
-        for (d, z) in [(0u16, 0u16), (0xffff, 1), (1, 2), (0xfffe, 3), (0x7fff, 0xfffe), (0x8000, 0xffff)] {
+        for (d, z) in [
+            (0u16, 0u16),
+            (0xffff, 1),
+            (1, 2),
+            (0xfffe, 3),
+            (0x7fff, 0xfffe),
+            (0x8000, 0xffff),
+        ] {
             assert_eq!(zigzag(d), z);
             assert_eq!(unzigzag(z), d);
         }

@@ -21,9 +21,13 @@ const BYTES: &str = "jpeg bytes";
 pub fn encode_jpeg(image: &ColorImage, quality: u8) -> Result<Vec<u8>, FormatError> {
     let at = Path::new(BYTES);
     let side = |field: &str, n: u32| {
-        u16::try_from(n).map_err(|_| FormatError::field(at, field, format!("{n}, JPEG holds at most 65535")))
+        u16::try_from(n)
+            .map_err(|_| FormatError::field(at, field, format!("{n}, JPEG holds at most 65535")))
     };
-    let (width, height) = (side("width", image.width())?, side("height", image.height())?);
+    let (width, height) = (
+        side("width", image.width())?,
+        side("height", image.height())?,
+    );
     let mut out = Vec::with_capacity(image.data().len() / 16);
     let mut encoder = Encoder::new(&mut out, quality.clamp(1, 100));
     encoder.set_sampling_factor(SamplingFactor::F_2_2);
@@ -50,12 +54,21 @@ pub(super) fn decode_jpeg_from(bytes: &[u8], origin: &Path) -> Result<ColorImage
         .set_strict_mode(true)
         .jpeg_set_out_colorspace(ColorSpace::RGB);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
-    decoder.decode_headers().map_err(|e| fault(format!("{e:?}")))?;
-    let info = decoder.info().ok_or_else(|| fault("it has no header".into()))?;
+    decoder
+        .decode_headers()
+        .map_err(|e| fault(format!("{e:?}")))?;
+    let info = decoder
+        .info()
+        .ok_or_else(|| fault("it has no header".into()))?;
     let (width, height) = (u32::from(info.width), u32::from(info.height));
     check_size(origin, width, height)?;
     // The decoder fills what is missing with grey; a picture without its end marker was cut.
-    if !bytes.windows(2).rev().take(END_WINDOW).any(|w| w == [0xff, 0xd9]) {
+    if !bytes
+        .windows(2)
+        .rev()
+        .take(END_WINDOW)
+        .any(|w| w == [0xff, 0xd9])
+    {
         return Err(fault("the file is cut short".into()));
     }
     let data = decoder.decode().map_err(|e| fault(format!("{e:?}")))?;
@@ -71,7 +84,9 @@ mod tests {
     use proptest::prelude::*;
 
     fn picture() -> ColorImage {
-        let data = (0..64 * 48).flat_map(|i| [(i % 64 * 4) as u8, (i / 64 * 5) as u8, 90]).collect();
+        let data = (0..64 * 48)
+            .flat_map(|i| [(i % 64 * 4) as u8, (i / 64 * 5) as u8, 90])
+            .collect();
         ColorImage::new(64, 48, data).expect("sizes")
     }
 
@@ -81,7 +96,12 @@ mod tests {
         let bytes = encode_jpeg(&image, 90).expect("encodes");
         let back = decode_jpeg(&bytes).expect("decodes");
         assert_eq!((back.width(), back.height()), (64, 48));
-        let worst = image.data().iter().zip(back.data()).map(|(a, b)| a.abs_diff(*b)).max();
+        let worst = image
+            .data()
+            .iter()
+            .zip(back.data())
+            .map(|(a, b)| a.abs_diff(*b))
+            .max();
         assert!(worst.is_some_and(|w| w <= 12), "{worst:?}");
         assert!(bytes.len() < image.data().len() / 4);
     }
@@ -97,11 +117,19 @@ mod tests {
     #[test]
     fn a_huge_header_is_refused() {
         let mut bytes = encode_jpeg(&picture(), 80).expect("encodes");
-        let sof = bytes.windows(2).position(|w| w == [0xff, 0xc0]).expect("a frame header");
+        let sof = bytes
+            .windows(2)
+            .position(|w| w == [0xff, 0xc0])
+            .expect("a frame header");
         bytes[sof + 5..sof + 9].copy_from_slice(&[0xea, 0x60, 0xea, 0x60]);
         assert!(decode_jpeg(&bytes).is_err());
         bytes[sof + 5..sof + 9].copy_from_slice(&[0x3f, 0xff, 0x3f, 0xff]);
-        assert!(decode_jpeg(&bytes).expect_err("too many pixels").to_string().contains("pixels"));
+        assert!(
+            decode_jpeg(&bytes)
+                .expect_err("too many pixels")
+                .to_string()
+                .contains("pixels")
+        );
     }
 
     proptest! {

@@ -30,7 +30,11 @@ const MAX_FILE_BYTES: u64 = 4 * MAX_PIXELS;
 pub(super) fn check_size(origin: &Path, width: u32, height: u32) -> Result<(), FormatError> {
     for (field, side) in [("width", width), ("height", height)] {
         if side == 0 || side > MAX_SIDE {
-            return Err(FormatError::field(origin, field, format!("{side}, expected 1 to {MAX_SIDE} pixels")));
+            return Err(FormatError::field(
+                origin,
+                field,
+                format!("{side}, expected 1 to {MAX_SIDE} pixels"),
+            ));
         }
     }
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
@@ -46,7 +50,11 @@ pub(super) fn read_limited(path: &Path, limit: u64) -> Result<Vec<u8>, FormatErr
     let file = File::open(path).map_err(io)?;
     let size = file.metadata().map_err(io)?.len();
     if size > limit {
-        return Err(FormatError::field(path, "file size", format!("{size} bytes, expected at most {limit}")));
+        return Err(FormatError::field(
+            path,
+            "file size",
+            format!("{size} bytes, expected at most {limit}"),
+        ));
     }
     let mut bytes = Vec::with_capacity(size as usize);
     // `take`: the file may grow while it is read.
@@ -105,8 +113,18 @@ mod tests {
     fn sizes_are_refused_by_name() {
         let at = Path::new("x.png");
         assert!(check_size(at, 640, 480).is_ok());
-        assert!(check_size(at, 60_000, 2).expect_err("wide").to_string().contains("`width`"));
-        assert!(check_size(at, 2, 0).expect_err("flat").to_string().contains("`height`"));
+        assert!(
+            check_size(at, 60_000, 2)
+                .expect_err("wide")
+                .to_string()
+                .contains("`width`")
+        );
+        assert!(
+            check_size(at, 2, 0)
+                .expect_err("flat")
+                .to_string()
+                .contains("`height`")
+        );
         assert!(check_size(at, 16_384, 16_384).is_err());
     }
 

@@ -3,7 +3,10 @@
 use super::check_size;
 use crate::camera::{ColorImage, DepthImage};
 use crate::formats::FormatError;
-use png::{BitDepth, ColorType, Compression, Decoder, DecodingError, Encoder, Limits, Reader, Transformations};
+use png::{
+    BitDepth, ColorType, Compression, Decoder, DecodingError, Encoder, Limits, Reader,
+    Transformations,
+};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -22,15 +25,27 @@ fn fault(origin: &Path, e: &DecodingError) -> FormatError {
 }
 
 /// Header read and sizes checked; nothing of the image allocated yet.
-fn open<'a>(bytes: &'a [u8], origin: &Path, t: Transformations) -> Result<Reader<Cursor<&'a [u8]>>, FormatError> {
-    let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: DECODER_BYTES });
+fn open<'a>(
+    bytes: &'a [u8],
+    origin: &Path,
+    t: Transformations,
+) -> Result<Reader<Cursor<&'a [u8]>>, FormatError> {
+    let mut decoder = Decoder::new_with_limits(
+        Cursor::new(bytes),
+        Limits {
+            bytes: DECODER_BYTES,
+        },
+    );
     decoder.set_transformations(t);
     decoder.set_ignore_text_chunk(true);
     let info = decoder.read_header_info().map_err(|e| fault(origin, &e))?;
     let (width, height, raw) = (info.width, info.height, info.raw_bytes() as u64);
     check_size(origin, width, height)?;
     if raw > DEFLATE_LIMIT * bytes.len() as u64 {
-        let why = format!("{width}×{height} pixels cannot come from {} bytes; the file is cut short", bytes.len());
+        let why = format!(
+            "{width}×{height} pixels cannot come from {} bytes; the file is cut short",
+            bytes.len()
+        );
         return Err(FormatError::field(origin, "png", why));
     }
     decoder.read_info().map_err(|e| fault(origin, &e))
@@ -39,7 +54,9 @@ fn open<'a>(bytes: &'a [u8], origin: &Path, t: Transformations) -> Result<Reader
 fn pixels(reader: &mut Reader<Cursor<&[u8]>>, origin: &Path) -> Result<Vec<u8>, FormatError> {
     let too_large = || FormatError::field(origin, "png", "the image does not fit memory");
     let mut data = vec![0; reader.output_buffer_size().ok_or_else(too_large)?];
-    let out = reader.next_frame(&mut data).map_err(|e| fault(origin, &e))?;
+    let out = reader
+        .next_frame(&mut data)
+        .map_err(|e| fault(origin, &e))?;
     data.truncate(out.buffer_size());
     Ok(data)
 }
@@ -56,9 +73,13 @@ pub fn decode_png_depth(bytes: &[u8], origin: &Path) -> Result<DepthImage, Forma
         return Err(FormatError::field(origin, "depth format", why));
     }
     let data = pixels(&mut reader, origin)?;
-    let values = data.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect();
+    let values = data
+        .chunks_exact(2)
+        .map(|b| u16::from_be_bytes([b[0], b[1]]))
+        .collect();
     let (width, height) = (reader.info().width, reader.info().height);
-    DepthImage::new(width, height, values).map_err(|e| FormatError::field(origin, "png", e.to_string()))
+    DepthImage::new(width, height, values)
+        .map_err(|e| FormatError::field(origin, "png", e.to_string()))
 }
 
 /// PNG bytes to RGB; `origin` is named in errors.
@@ -71,16 +92,28 @@ pub fn decode_png_color(bytes: &[u8], origin: &Path) -> Result<ColorImage, Forma
     let data = pixels(&mut reader, origin)?;
     let rgb = match color {
         ColorType::Rgb => data,
-        ColorType::Rgba => data.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect(),
+        ColorType::Rgba => data
+            .chunks_exact(4)
+            .flat_map(|p| [p[0], p[1], p[2]])
+            .collect(),
         ColorType::Grayscale => data.iter().flat_map(|&g| [g; 3]).collect(),
         ColorType::GrayscaleAlpha => data.chunks_exact(2).flat_map(|p| [p[0]; 3]).collect(),
-        ColorType::Indexed => return Err(FormatError::field(origin, "png", "its palette is missing")),
+        ColorType::Indexed => {
+            return Err(FormatError::field(origin, "png", "its palette is missing"));
+        }
     };
     let (width, height) = (reader.info().width, reader.info().height);
-    ColorImage::new(width, height, rgb).map_err(|e| FormatError::field(origin, "png", e.to_string()))
+    ColorImage::new(width, height, rgb)
+        .map_err(|e| FormatError::field(origin, "png", e.to_string()))
 }
 
-fn encode(size: (u32, u32), color: ColorType, bits: BitDepth, data: &[u8], at: &Path) -> Result<Vec<u8>, FormatError> {
+fn encode(
+    size: (u32, u32),
+    color: ColorType,
+    bits: BitDepth,
+    data: &[u8],
+    at: &Path,
+) -> Result<Vec<u8>, FormatError> {
     let mut out = Vec::with_capacity(data.len() / 2);
     let mut encoder = Encoder::new(&mut out, size.0, size.1);
     encoder.set_color(color);
@@ -101,7 +134,13 @@ fn encode(size: (u32, u32), color: ColorType, bits: BitDepth, data: &[u8], at: &
 /// For an image without pixels.
 pub fn encode_png_depth(image: &DepthImage, origin: &Path) -> Result<Vec<u8>, FormatError> {
     let data: Vec<u8> = image.data().iter().flat_map(|d| d.to_be_bytes()).collect();
-    encode((image.width(), image.height()), ColorType::Grayscale, BitDepth::Sixteen, &data, origin)
+    encode(
+        (image.width(), image.height()),
+        ColorType::Grayscale,
+        BitDepth::Sixteen,
+        &data,
+        origin,
+    )
 }
 
 /// Colour as RGB PNG with fast compression; `origin` is named in errors.
@@ -109,7 +148,13 @@ pub fn encode_png_depth(image: &DepthImage, origin: &Path) -> Result<Vec<u8>, Fo
 /// # Errors
 /// For an image without pixels.
 pub fn encode_png_rgb(image: &ColorImage, origin: &Path) -> Result<Vec<u8>, FormatError> {
-    encode((image.width(), image.height()), ColorType::Rgb, BitDepth::Eight, image.data(), origin)
+    encode(
+        (image.width(), image.height()),
+        ColorType::Rgb,
+        BitDepth::Eight,
+        image.data(),
+        origin,
+    )
 }
 
 #[cfg(test)]
@@ -139,13 +184,17 @@ mod tests {
         bytes[16..20].copy_from_slice(&60_000u32.to_be_bytes());
         bytes[20..24].copy_from_slice(&60_000u32.to_be_bytes());
         fix_ihdr_checksum(&mut bytes);
-        let e = decode_png_depth(&bytes, Path::new(AT)).expect_err("huge").to_string();
+        let e = decode_png_depth(&bytes, Path::new(AT))
+            .expect_err("huge")
+            .to_string();
         assert!(e.contains("`width`") && e.contains("60000"), "{e}");
         // Within the limits, but not from so few bytes.
         bytes[16..20].copy_from_slice(&8_000u32.to_be_bytes());
         bytes[20..24].copy_from_slice(&8_000u32.to_be_bytes());
         fix_ihdr_checksum(&mut bytes);
-        let e = decode_png_depth(&bytes, Path::new(AT)).expect_err("bomb").to_string();
+        let e = decode_png_depth(&bytes, Path::new(AT))
+            .expect_err("bomb")
+            .to_string();
         assert!(e.contains("cannot come from"), "{e}");
     }
 
@@ -155,7 +204,11 @@ mod tests {
         for b in &bytes[12..29] {
             crc ^= u32::from(*b);
             for _ in 0..8 {
-                crc = if crc & 1 == 1 { 0xedb8_8320 ^ (crc >> 1) } else { crc >> 1 };
+                crc = if crc & 1 == 1 {
+                    0xedb8_8320 ^ (crc >> 1)
+                } else {
+                    crc >> 1
+                };
             }
         }
         bytes[29..33].copy_from_slice(&(!crc).to_be_bytes());
@@ -163,8 +216,11 @@ mod tests {
 
     #[test]
     fn a_colour_picture_is_no_depth() {
-        let rgb = encode_png_rgb(&ColorImage::filled(4, 4, [1, 2, 3]), Path::new(AT)).expect("encodes");
-        let e = decode_png_depth(&rgb, Path::new(AT)).expect_err("colour").to_string();
+        let rgb =
+            encode_png_rgb(&ColorImage::filled(4, 4, [1, 2, 3]), Path::new(AT)).expect("encodes");
+        let e = decode_png_depth(&rgb, Path::new(AT))
+            .expect_err("colour")
+            .to_string();
         assert!(e.contains("depth format") && e.contains("16-bit"), "{e}");
     }
 

@@ -6,10 +6,19 @@ use nalgebra::{UnitQuaternion, Vector3};
 use std::fs;
 use std::path::Path;
 
-const TINY: Intrinsics = Intrinsics { width: 32, height: 24, fx: 30.0, fy: 31.0, cx: 15.5, cy: 11.5 };
+const TINY: Intrinsics = Intrinsics {
+    width: 32,
+    height: 24,
+    fx: 30.0,
+    fy: 31.0,
+    cx: 15.5,
+    cy: 11.5,
+};
 
 fn frame(i: u64, color: bool) -> RgbdFrame {
-    let depth = (0..32 * 24).map(|k| ((k * 7 + i * 13) % 4000) as u16).collect();
+    let depth = (0..32 * 24)
+        .map(|k| ((k * 7 + i * 13) % 4000) as u16)
+        .collect();
     RgbdFrame {
         sequence: 100 + i,
         time_ns: 1_700_000_000_123_456_789 + i * 33_333_333,
@@ -43,19 +52,34 @@ fn what_is_written_is_read() {
     };
     let frames: Vec<_> = (0..5).map(|i| frame(i, i != 3)).collect();
     let path = written(dir.path(), &calibration, &frames);
-    assert!(McapWriter::create(&path, &calibration).is_err(), "never writes over a recording");
+    assert!(
+        McapWriter::create(&path, &calibration).is_err(),
+        "never writes over a recording"
+    );
     let r = open_recording(&path).expect("opens");
     let back = r.calibration().clone();
     assert_eq!((back.depth, back.color), (TINY, Some(TINY)));
-    let off = (back.color_from_depth.inverse() * calibration.color_from_depth).iso().translation.vector.norm();
+    let off = (back.color_from_depth.inverse() * calibration.color_from_depth)
+        .iso()
+        .translation
+        .vector
+        .norm();
     assert!(off < 1e-9, "{off}");
     let got = all(r);
     assert_eq!(got.len(), frames.len());
     for (g, f) in got.iter().zip(&frames) {
-        assert_eq!((g.sequence, g.time_ns, &g.depth), (f.sequence, f.time_ns, &f.depth));
+        assert_eq!(
+            (g.sequence, g.time_ns, &g.depth),
+            (f.sequence, f.time_ns, &f.depth)
+        );
         assert_eq!(g.color.is_some(), f.color.is_some());
         if let (Some(a), Some(b)) = (&g.color, &f.color) {
-            assert!(a.data().iter().zip(b.data()).all(|(x, y)| x.abs_diff(*y) < 8));
+            assert!(
+                a.data()
+                    .iter()
+                    .zip(b.data())
+                    .all(|(x, y)| x.abs_diff(*y) < 8)
+            );
         }
     }
 }
@@ -63,13 +87,21 @@ fn what_is_written_is_read() {
 #[test]
 fn registered_colour_needs_one_calibration_and_rewinding_works() {
     let dir = tempfile::tempdir().expect("temporary folder");
-    let path = written(dir.path(), &Calibration::registered(TINY), &[frame(0, true), frame(1, true)]);
+    let path = written(
+        dir.path(),
+        &Calibration::registered(TINY),
+        &[frame(0, true), frame(1, true)],
+    );
     let mut r = McapReader::open(&path).expect("opens");
     assert_eq!(r.calibration(), &Calibration::registered(TINY));
     let first = r.next_frame().expect("reads");
     r.rewind().expect("rewinds");
     assert_eq!(r.next_frame().expect("reads"), first);
-    assert!(r.next_frame().expect("reads").is_some() && r.next_frame().expect("ends").is_none() && !r.was_cut());
+    assert!(
+        r.next_frame().expect("reads").is_some()
+            && r.next_frame().expect("ends").is_none()
+            && !r.was_cut()
+    );
 }
 
 #[test]
@@ -84,7 +116,9 @@ fn a_cut_file_gives_every_frame_before_the_cut() {
         let sub = tempfile::tempdir().expect("temporary folder");
         let path = sub.path().join("p.mcap");
         let mut w = McapWriter::create(&path, &Calibration::registered(TINY)).expect("created");
-        frames[..n].iter().for_each(|f| w.write(f).expect("written"));
+        frames[..n]
+            .iter()
+            .for_each(|f| w.write(f).expect("written"));
         std::mem::forget(w.finish());
         let p = fs::read(&path).expect("read");
         ends.push(p.iter().zip(&bytes).take_while(|(a, b)| a == b).count());
@@ -94,10 +128,17 @@ fn a_cut_file_gives_every_frame_before_the_cut() {
         fs::write(&cut, &bytes[..at]).expect("written");
         let whole = ends.iter().filter(|e| **e <= at).count();
         match McapReader::open(&cut) {
-            Err(e) => assert!(whole == 0 && e.to_string().contains("cut.mcap"), "cut at {at}: {e}"),
+            Err(e) => assert!(
+                whole == 0 && e.to_string().contains("cut.mcap"),
+                "cut at {at}: {e}"
+            ),
             Ok(r) => {
                 let got = all(Box::new(r));
-                assert!(got.len() >= whole, "cut at {at}: {} of {whole} frames", got.len());
+                assert!(
+                    got.len() >= whole,
+                    "cut at {at}: {} of {whole} frames",
+                    got.len()
+                );
                 assert!(got.iter().zip(&frames).all(|(g, f)| g.depth == f.depth));
             }
         }
@@ -110,7 +151,9 @@ fn lies_and_noise_are_errors() {
     let path = dir.path().join("bad.mcap");
     let refuse = |bytes: &[u8]| {
         fs::write(&path, bytes).expect("written");
-        McapReader::open(&path).expect_err("must be refused").to_string()
+        McapReader::open(&path)
+            .expect_err("must be refused")
+            .to_string()
     };
     // A record of 4 GiB.
     let mut lie = mcap::MAGIC.to_vec();
@@ -120,7 +163,12 @@ fn lies_and_noise_are_errors() {
     assert!(e.contains("bad.mcap") && e.contains("exceeds limit"), "{e}");
     assert!(refuse(b"RIFFxxxx").contains("magic"));
     assert!(!refuse(b"").is_empty());
-    let good = fs::read(written(dir.path(), &Calibration::registered(TINY), &[frame(0, true)])).expect("read");
+    let good = fs::read(written(
+        dir.path(),
+        &Calibration::registered(TINY),
+        &[frame(0, true)],
+    ))
+    .expect("read");
     let mut x = 0x9e37_79b9u32;
     for _ in 0..300 {
         x ^= x << 13;
@@ -140,7 +188,9 @@ fn lies_and_noise_are_errors() {
 #[test]
 fn a_file_for_other_readers() {
     // Kept where tests/interop reads it: `TRYON_LOOK=DIR`.
-    let Some(dir) = std::env::var_os("TRYON_LOOK") else { return };
+    let Some(dir) = std::env::var_os("TRYON_LOOK") else {
+        return;
+    };
     let path = Path::new(&dir).join("interop.mcap");
     let _ = fs::remove_file(&path);
     let mut w = McapWriter::create(&path, &Calibration::registered(TINY)).expect("created");

@@ -3,7 +3,8 @@
 use super::{COLOR_FRAME, DEPTH_FRAME};
 use crate::camera::{Calibration, Intrinsics, RgbdFrame};
 use crate::formats::foxglove::{
-    CameraCalibration, CompressedImage, FrameTransform, Quaternion, RawImage, Vector3, encode, schema, timestamp,
+    CameraCalibration, CompressedImage, FrameTransform, Quaternion, RawImage, Vector3, encode,
+    schema, timestamp,
 };
 use crate::formats::{FormatError, image};
 use mcap::records::MessageHeader;
@@ -37,7 +38,10 @@ pub struct McapWriter {
 
 impl std::fmt::Debug for McapWriter {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("McapWriter").field("path", &self.path).field("frames", &self.frames).finish()
+        f.debug_struct("McapWriter")
+            .field("path", &self.path)
+            .field("frames", &self.frames)
+            .finish()
     }
 }
 
@@ -56,7 +60,8 @@ impl McapWriter {
             .profile("");
         let mut writer = options.create(BufWriter::new(file)).map_err(fault)?;
         let mut channel = |topic: &str, message: &str| {
-            let id = writer.add_schema(&format!("foxglove.{message}"), "protobuf", &schema(message))?;
+            let id =
+                writer.add_schema(&format!("foxglove.{message}"), "protobuf", &schema(message))?;
             writer.add_channel(id, topic, "protobuf", &BTreeMap::new())
         };
         let channels = Channels {
@@ -65,15 +70,32 @@ impl McapWriter {
             calibration: channel("/camera/calibration", "CameraCalibration").map_err(fault)?,
             transform: channel("/tf", "FrameTransform").map_err(fault)?,
         };
-        Ok(Self { path: path.to_owned(), writer, channels, calibration: calibration.clone(), frames: 0 })
+        Ok(Self {
+            path: path.to_owned(),
+            writer,
+            channels,
+            calibration: calibration.clone(),
+            frames: 0,
+        })
     }
     /// Frames written so far.
     pub fn frames(&self) -> usize {
         self.frames as usize
     }
 
-    fn put(&mut self, channel: u16, sequence: u32, time_ns: u64, data: &[u8]) -> Result<(), FormatError> {
-        let header = MessageHeader { channel_id: channel, sequence, log_time: time_ns, publish_time: time_ns };
+    fn put(
+        &mut self,
+        channel: u16,
+        sequence: u32,
+        time_ns: u64,
+        data: &[u8],
+    ) -> Result<(), FormatError> {
+        let header = MessageHeader {
+            channel_id: channel,
+            sequence,
+            log_time: time_ns,
+            publish_time: time_ns,
+        };
         self.writer
             .write_to_known_channel(&header, data)
             .map_err(|e| FormatError::field(&self.path, format!("frame {sequence}"), e.to_string()))
@@ -88,21 +110,37 @@ impl McapWriter {
             d: vec![0.0; 5],
             k: vec![k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0],
             r: vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-            p: vec![k.fx, 0.0, k.cx, 0.0, 0.0, k.fy, k.cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+            p: vec![
+                k.fx, 0.0, k.cx, 0.0, 0.0, k.fy, k.cy, 0.0, 0.0, 0.0, 1.0, 0.0,
+            ],
             frame_id: frame.into(),
         };
         let depth = encode(&message(&self.calibration.depth, DEPTH_FRAME));
         self.put(self.channels.calibration, 0, time_ns, &depth)?;
         if let Some(k) = self.calibration.color {
-            self.put(self.channels.calibration, 0, time_ns, &encode(&message(&k, COLOR_FRAME)))?;
+            self.put(
+                self.channels.calibration,
+                0,
+                time_ns,
+                &encode(&message(&k, COLOR_FRAME)),
+            )?;
             let pose = self.calibration.color_from_depth.inverse();
             let (t, q) = (pose.iso().translation.vector, pose.iso().rotation.coords);
             let transform = FrameTransform {
                 timestamp: timestamp(time_ns),
                 parent_frame_id: DEPTH_FRAME.into(),
                 child_frame_id: COLOR_FRAME.into(),
-                translation: Some(Vector3 { x: t.x, y: t.y, z: t.z }),
-                rotation: Some(Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }),
+                translation: Some(Vector3 {
+                    x: t.x,
+                    y: t.y,
+                    z: t.z,
+                }),
+                rotation: Some(Quaternion {
+                    x: q.x,
+                    y: q.y,
+                    z: q.z,
+                    w: q.w,
+                }),
             };
             self.put(self.channels.transform, 0, time_ns, &encode(&transform))?;
         }
@@ -123,9 +161,19 @@ impl McapWriter {
                 timestamp: timestamp(frame.time_ns),
                 data: image::encode_jpeg(color, JPEG_QUALITY)?,
                 format: "jpeg".into(),
-                frame_id: if self.calibration.color.is_some() { COLOR_FRAME } else { DEPTH_FRAME }.into(),
+                frame_id: if self.calibration.color.is_some() {
+                    COLOR_FRAME
+                } else {
+                    DEPTH_FRAME
+                }
+                .into(),
             };
-            self.put(self.channels.color, sequence, frame.time_ns, &encode(&message))?;
+            self.put(
+                self.channels.color,
+                sequence,
+                frame.time_ns,
+                &encode(&message),
+            )?;
         }
         let depth = &frame.depth;
         let message = RawImage {
@@ -138,15 +186,25 @@ impl McapWriter {
             frame_id: DEPTH_FRAME.into(),
         };
         // Depth last: it completes the frame for a reader.
-        self.put(self.channels.depth, sequence, frame.time_ns, &encode(&message))?;
+        self.put(
+            self.channels.depth,
+            sequence,
+            frame.time_ns,
+            &encode(&message),
+        )?;
         self.frames += 1;
-        self.writer.flush().map_err(|e| FormatError::field(&self.path, "mcap", e.to_string()))
+        self.writer
+            .flush()
+            .map_err(|e| FormatError::field(&self.path, "mcap", e.to_string()))
     }
     /// Writes the index and closes the file.
     ///
     /// # Errors
     /// When the file cannot be written.
     pub fn finish(mut self) -> Result<(), FormatError> {
-        self.writer.finish().map(|_| ()).map_err(|e| FormatError::field(&self.path, "mcap", e.to_string()))
+        self.writer
+            .finish()
+            .map(|_| ())
+            .map_err(|e| FormatError::field(&self.path, "mcap", e.to_string()))
     }
 }

@@ -36,7 +36,8 @@ impl CameraFile {
         if let Some(field) = not_a_number(&text) {
             return Err(FormatError::field(path, field, "not a finite number"));
         }
-        let value: Value = serde_json::from_str(&text).map_err(|e| FormatError::field(path, "json", e.to_string()))?;
+        let value: Value = serde_json::from_str(&text)
+            .map_err(|e| FormatError::field(path, "json", e.to_string()))?;
         let Value::Object(map) = &value else {
             return Err(FormatError::field(path, "json", "expected an object"));
         };
@@ -57,7 +58,8 @@ impl CameraFile {
         let color_from_depth = match map.get("color_from_depth") {
             None | Some(Value::Null) => Rigid::identity(),
             Some(v) => {
-                let t: [f64; 3] = numbers(path, "color_from_depth.translation", v.get("translation"))?;
+                let t: [f64; 3] =
+                    numbers(path, "color_from_depth.translation", v.get("translation"))?;
                 let q: [f64; 4] = numbers(path, "color_from_depth.rotation", v.get("rotation"))?;
                 let q = Quaternion::new(q[3], q[0], q[1], q[2]);
                 if (q.norm() - 1.0).abs() > UNIT_TOLERANCE {
@@ -67,7 +69,14 @@ impl CameraFile {
                 Rigid::from_parts(Vector3::from(t), UnitQuaternion::from_quaternion(q))
             }
         };
-        Ok(Self { calibration: Calibration { depth, color, color_from_depth }, depth_scale })
+        Ok(Self {
+            calibration: Calibration {
+                depth,
+                color,
+                color_from_depth,
+            },
+            depth_scale,
+        })
     }
 
     /// The file's text.
@@ -94,8 +103,15 @@ fn not_a_number(text: &str) -> Option<&str> {
     while let Some(colon) = rest.find(':') {
         let (before, after) = rest.split_at(colon);
         let value = after[1..].trim_start().trim_start_matches(['-', '+']);
-        if ["NaN", "nan", "Inf", "inf"].iter().any(|w| value.starts_with(w)) {
-            return before.trim_end().strip_suffix('"').and_then(|b| b.rsplit('"').next()).or(Some("json"));
+        if ["NaN", "nan", "Inf", "inf"]
+            .iter()
+            .any(|w| value.starts_with(w))
+        {
+            return before
+                .trim_end()
+                .strip_suffix('"')
+                .and_then(|b| b.rsplit('"').next())
+                .or(Some("json"));
         }
         rest = &after[1..];
     }
@@ -103,12 +119,18 @@ fn not_a_number(text: &str) -> Option<&str> {
 }
 
 fn number(path: &Path, field: &str, v: &Value) -> Result<f64, FormatError> {
-    v.as_f64().ok_or_else(|| FormatError::field(path, field, format!("{v}, expected a number")))
+    v.as_f64()
+        .ok_or_else(|| FormatError::field(path, field, format!("{v}, expected a number")))
 }
 
-fn numbers<const N: usize>(path: &Path, field: &str, v: Option<&Value>) -> Result<[f64; N], FormatError> {
+fn numbers<const N: usize>(
+    path: &Path,
+    field: &str,
+    v: Option<&Value>,
+) -> Result<[f64; N], FormatError> {
     let list = v.and_then(Value::as_array).filter(|a| a.len() == N);
-    let list = list.ok_or_else(|| FormatError::field(path, field, format!("expected {N} numbers")))?;
+    let list =
+        list.ok_or_else(|| FormatError::field(path, field, format!("expected {N} numbers")))?;
     let mut out = [0.0; N];
     for (o, v) in out.iter_mut().zip(list) {
         *o = number(path, field, v)?;
@@ -116,16 +138,26 @@ fn numbers<const N: usize>(path: &Path, field: &str, v: Option<&Value>) -> Resul
     Ok(out)
 }
 
-fn intrinsics(path: &Path, prefix: &str, map: &Map<String, Value>) -> Result<Intrinsics, FormatError> {
+fn intrinsics(
+    path: &Path,
+    prefix: &str,
+    map: &Map<String, Value>,
+) -> Result<Intrinsics, FormatError> {
     let get = |key: &str| {
         let field = format!("{prefix}{key}");
-        let v = map.get(key).ok_or_else(|| FormatError::field(path, &field, "missing"))?;
+        let v = map
+            .get(key)
+            .ok_or_else(|| FormatError::field(path, &field, "missing"))?;
         number(path, &field, v)
     };
     let side = |key: &str| {
         let v = get(key)?;
         if v.fract() != 0.0 || !(0.0..=f64::from(u32::MAX)).contains(&v) {
-            return Err(FormatError::field(path, format!("{prefix}{key}"), format!("{v}, expected a whole number")));
+            return Err(FormatError::field(
+                path,
+                format!("{prefix}{key}"),
+                format!("{v}, expected a whole number"),
+            ));
         }
         Ok(v as u32)
     };
@@ -138,6 +170,10 @@ fn intrinsics(path: &Path, prefix: &str, map: &Map<String, Value>) -> Result<Int
         cy: get("cy")?,
     };
     k.validated().map_err(|e| {
-        FormatError::field(path, format!("{prefix}{}", e.field), format!("{}, expected {}", e.value, e.why))
+        FormatError::field(
+            path,
+            format!("{prefix}{}", e.field),
+            format!("{}, expected {}", e.value, e.why),
+        )
     })
 }

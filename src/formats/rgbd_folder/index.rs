@@ -29,12 +29,20 @@ pub(super) struct Entry {
 pub(super) fn entries(folder: &Path) -> Result<Vec<Entry>, FormatError> {
     let depth = images(folder, "depth", &["png"])?;
     if depth.is_empty() {
-        return Err(FormatError::field(folder, "depth", "no depth images: expected depth/*.png and perhaps depth.txt"));
+        return Err(FormatError::field(
+            folder,
+            "depth",
+            "no depth images: expected depth/*.png and perhaps depth.txt",
+        ));
     }
     let color = images(folder, "rgb", &["png", "jpg", "jpeg"])?;
     Ok(depth
         .into_iter()
-        .map(|(time_ns, file)| Entry { time_ns, depth: file, color: nearest(&color, time_ns).map(str::to_owned) })
+        .map(|(time_ns, file)| Entry {
+            time_ns,
+            depth: file,
+            color: nearest(&color, time_ns).map(str::to_owned),
+        })
         .collect())
 }
 
@@ -42,7 +50,11 @@ fn nearest(list: &[(u64, String)], time_ns: u64) -> Option<&str> {
     let after = list.partition_point(|(t, _)| *t < time_ns);
     let candidates = [after.checked_sub(1), Some(after)];
     let gap = |i: &usize| list[*i].0.abs_diff(time_ns);
-    let best = candidates.into_iter().flatten().filter(|&i| i < list.len()).min_by_key(gap)?;
+    let best = candidates
+        .into_iter()
+        .flatten()
+        .filter(|&i| i < list.len())
+        .min_by_key(gap)?;
     (gap(&best) <= MAX_GAP_NS).then_some(list[best].1.as_str())
 }
 
@@ -59,7 +71,11 @@ fn images(folder: &Path, name: &str, endings: &[&str]) -> Result<Vec<(u64, Strin
     let mut files = Vec::new();
     for item in std::fs::read_dir(&dir).map_err(|e| FormatError::io(&dir, e))? {
         let path = item.map_err(|e| FormatError::io(&dir, e))?.path();
-        let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+        let ending = path
+            .extension()
+            .and_then(|e| e.to_str())
+            .unwrap_or_default()
+            .to_ascii_lowercase();
         if let Some(file) = path.file_name().and_then(|f| f.to_str())
             && endings.contains(&ending.as_str())
         {
@@ -67,7 +83,11 @@ fn images(folder: &Path, name: &str, endings: &[&str]) -> Result<Vec<(u64, Strin
         }
     }
     files.sort();
-    Ok(files.into_iter().enumerate().map(|(i, f)| (i as u64 * DEFAULT_PERIOD_NS, f)).collect())
+    Ok(files
+        .into_iter()
+        .enumerate()
+        .map(|(i, f)| (i as u64 * DEFAULT_PERIOD_NS, f))
+        .collect())
 }
 
 /// Lines of `timestamp path`, seconds with a fraction; `#` starts a comment.
@@ -81,11 +101,14 @@ fn time_list(path: &Path) -> Result<Vec<(u64, String)>, FormatError> {
             continue;
         }
         let fault = |why: String| FormatError::field(path, format!("line {}", n + 1), why);
-        let (time, file) =
-            line.split_once(char::is_whitespace).ok_or_else(|| fault("expected `timestamp path`".into()))?;
-        let time_ns = nanoseconds(time).ok_or_else(|| fault(format!("`{time}` is no time in seconds")))?;
+        let (time, file) = line
+            .split_once(char::is_whitespace)
+            .ok_or_else(|| fault("expected `timestamp path`".into()))?;
+        let time_ns =
+            nanoseconds(time).ok_or_else(|| fault(format!("`{time}` is no time in seconds")))?;
         let file = file.trim();
-        let inside = !Path::new(file).is_absolute() && !file.split(['/', '\\']).any(|part| part == "..");
+        let inside =
+            !Path::new(file).is_absolute() && !file.split(['/', '\\']).any(|part| part == "..");
         if !inside {
             return Err(fault(format!("`{file}` leads out of the folder")));
         }
@@ -102,8 +125,16 @@ fn nanoseconds(text: &str) -> Option<u64> {
     if whole.is_empty() || !digits(whole) || !digits(fraction) {
         return None;
     }
-    let nanos: String = fraction.chars().chain(std::iter::repeat('0')).take(9).collect();
-    whole.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(nanos.parse().ok()?)
+    let nanos: String = fraction
+        .chars()
+        .chain(std::iter::repeat('0'))
+        .take(9)
+        .collect();
+    whole
+        .parse::<u64>()
+        .ok()?
+        .checked_mul(1_000_000_000)?
+        .checked_add(nanos.parse().ok()?)
 }
 
 #[cfg(test)]
@@ -112,7 +143,10 @@ mod tests {
 
     #[test]
     fn seconds_keep_every_digit() {
-        assert_eq!(nanoseconds("1305031102.175304"), Some(1_305_031_102_175_304_000));
+        assert_eq!(
+            nanoseconds("1305031102.175304"),
+            Some(1_305_031_102_175_304_000)
+        );
         assert_eq!(nanoseconds("0.033333"), Some(33_333_000));
         assert_eq!(nanoseconds("7"), Some(7_000_000_000));
         for bad in ["", ".5", "-1", "nan", "1e3", "99999999999999"] {
@@ -122,7 +156,10 @@ mod tests {
 
     #[test]
     fn colour_is_the_nearest_in_time_or_none() {
-        let list: Vec<(u64, String)> = [0u64, 33, 66, 300].iter().map(|t| (t * 1_000_000, format!("{t}"))).collect();
+        let list: Vec<(u64, String)> = [0u64, 33, 66, 300]
+            .iter()
+            .map(|t| (t * 1_000_000, format!("{t}")))
+            .collect();
         assert_eq!(nearest(&list, 40_000_000), Some("33"));
         assert_eq!(nearest(&list, 52_000_000), Some("66"));
         assert_eq!(nearest(&list, 150_000_000), None);

@@ -42,7 +42,11 @@ pub fn depth_to_mm(image: &mut DepthImage, depth_scale: f64) {
     let factor = MM / depth_scale;
     for d in image.data_mut() {
         let mm = (f64::from(*d) * factor).round();
-        *d = if mm <= f64::from(u16::MAX) { mm as u16 } else { 0 };
+        *d = if mm <= f64::from(u16::MAX) {
+            mm as u16
+        } else {
+            0
+        };
     }
 }
 
@@ -54,7 +58,12 @@ impl RgbdFolder {
     pub fn open(folder: &Path) -> Result<Self, FormatError> {
         let camera = CameraFile::read(&folder.join("camera.json"))?;
         let entries = index::entries(folder)?;
-        Ok(Self { folder: folder.to_owned(), camera, entries, next: 0 })
+        Ok(Self {
+            folder: folder.to_owned(),
+            camera,
+            entries,
+            next: 0,
+        })
     }
 }
 
@@ -63,7 +72,10 @@ fn check(path: &Path, field: &str, got: (u32, u32), want: &Intrinsics) -> Result
     if got == (want.width, want.height) {
         return Ok(());
     }
-    let why = format!("{}×{}, but camera.json says {}×{}", got.0, got.1, want.width, want.height);
+    let why = format!(
+        "{}×{}, but camera.json says {}×{}",
+        got.0, got.1, want.width, want.height
+    );
     Err(FormatError::field(path, field, why))
 }
 
@@ -75,13 +87,20 @@ impl RgbdSource for RgbdFolder {
         Some(self.entries.len())
     }
     fn next_frame(&mut self) -> Result<Option<RgbdFrame>, FormatError> {
-        let Some(entry) = self.entries.get(self.next) else { return Ok(None) };
+        let Some(entry) = self.entries.get(self.next) else {
+            return Ok(None);
+        };
         let sequence = self.next as u64;
         self.next += 1;
         let path = self.folder.join(&entry.depth);
         let mut depth = read_png_depth(&path)?;
         let calibration = &self.camera.calibration;
-        check(&path, "depth size", (depth.width(), depth.height()), &calibration.depth)?;
+        check(
+            &path,
+            "depth size",
+            (depth.width(), depth.height()),
+            &calibration.depth,
+        )?;
         depth_to_mm(&mut depth, self.camera.depth_scale);
         let color = match &entry.color {
             None => None,
@@ -89,11 +108,21 @@ impl RgbdSource for RgbdFolder {
                 let path = self.folder.join(file);
                 let color = read_color(&path)?;
                 let camera = calibration.color.as_ref().unwrap_or(&calibration.depth);
-                check(&path, "colour size", (color.width(), color.height()), camera)?;
+                check(
+                    &path,
+                    "colour size",
+                    (color.width(), color.height()),
+                    camera,
+                )?;
                 Some(color)
             }
         };
-        Ok(Some(RgbdFrame { sequence, time_ns: entry.time_ns, depth, color }))
+        Ok(Some(RgbdFrame {
+            sequence,
+            time_ns: entry.time_ns,
+            depth,
+            color,
+        }))
     }
     fn rewind(&mut self) -> Result<(), FormatError> {
         self.next = 0;

@@ -5,12 +5,25 @@ use crate::math::Rigid;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::fs;
 
-const TINY: Intrinsics = Intrinsics { width: 4, height: 3, fx: 5.0, fy: 5.5, cx: 1.5, cy: 1.0 };
+const TINY: Intrinsics = Intrinsics {
+    width: 4,
+    height: 3,
+    fx: 5.0,
+    fy: 5.5,
+    cx: 1.5,
+    cy: 1.0,
+};
 
 fn frame(i: u64, color: bool) -> RgbdFrame {
-    let depth = DepthImage::new(4, 3, (0..12).map(|k| 1000 + k + i as u16).collect()).expect("sizes");
+    let depth =
+        DepthImage::new(4, 3, (0..12).map(|k| 1000 + k + i as u16).collect()).expect("sizes");
     let color = color.then(|| ColorImage::filled(4, 3, [i as u8, 40, 200]));
-    RgbdFrame { sequence: i, time_ns: 1_700_000_000_000_000_000 + i * 33_333_333, depth, color }
+    RgbdFrame {
+        sequence: i,
+        time_ns: 1_700_000_000_000_000_000 + i * 33_333_333,
+        depth,
+        color,
+    }
 }
 
 fn all(source: &mut dyn RgbdSource) -> Vec<RgbdFrame> {
@@ -53,7 +66,14 @@ fn what_is_written_is_read() {
     assert_eq!(r.len(), Some(4));
     let k = r.calibration();
     assert_eq!((k.depth, k.color), (TINY, Some(TINY)));
-    assert!((k.color_from_depth.inverse() * calibration.color_from_depth).iso().translation.vector.norm() < 1e-12);
+    assert!(
+        (k.color_from_depth.inverse() * calibration.color_from_depth)
+            .iso()
+            .translation
+            .vector
+            .norm()
+            < 1e-12
+    );
     let got = all(r.as_mut());
     assert_eq!(got[0], frames[0]);
     assert_eq!(got[3], frames[3]);
@@ -61,7 +81,10 @@ fn what_is_written_is_read() {
     assert!(got[2].color.is_some() && got[2].depth == frames[2].depth);
     r.rewind().expect("rewinds");
     assert_eq!(all(r.as_mut()), got);
-    assert!(RgbdFolderWriter::create(dir.path(), &calibration).is_err(), "never writes over a recording");
+    assert!(
+        RgbdFolderWriter::create(dir.path(), &calibration).is_err(),
+        "never writes over a recording"
+    );
 }
 
 #[test]
@@ -70,7 +93,10 @@ fn names_sort_at_thirty_hertz_and_scales_become_millimetres() {
     write_png_depth(&dir.path().join("depth/1.png"), &frame(9, false).depth).expect("written");
     let mut f = RgbdFolder::open(dir.path()).expect("opens");
     let got = all(&mut f);
-    assert_eq!((got.len(), got[1].time_ns, got[0].depth.data()[3]), (2, 33_333_333, 100));
+    assert_eq!(
+        (got.len(), got[1].time_ns, got[0].depth.data()[3]),
+        (2, 33_333_333, 100)
+    );
     // Units of a centimetre: 65,535 units are beyond what millimetres in 16 bits can say.
     let mut far = DepthImage::new(2, 1, vec![65_535, 100]).expect("sizes");
     depth_to_mm(&mut far, 100.0);
@@ -81,26 +107,44 @@ fn names_sort_at_thirty_hertz_and_scales_become_millimetres() {
 fn bad_folders_are_refused_by_file_and_field() {
     let dir = folder_with(&camera("NaN", ""));
     let e = refusal(&dir);
-    assert!(e.contains("camera.json") && e.contains("`fx`") && e.contains("finite"), "{e}");
+    assert!(
+        e.contains("camera.json") && e.contains("`fx`") && e.contains("finite"),
+        "{e}"
+    );
     for (text, field) in [
         (camera("-5", ""), "`fx`"),
         (camera("\"five\"", ""), "`fx`"),
         (camera("5", r#", "depth_scale": 0"#), "`depth_scale`"),
         (camera("5", r#", "color": {"width": 4}"#), "`color.height`"),
-        (camera("5", r#", "color_from_depth": {"translation": [0, 0]}"#), "`color_from_depth.translation`"),
-        (camera("5", r#", "color_from_depth": {"translation": [0,0,0], "rotation": [0,0,0,2]}"#), "rotation`"),
+        (
+            camera("5", r#", "color_from_depth": {"translation": [0, 0]}"#),
+            "`color_from_depth.translation`",
+        ),
+        (
+            camera(
+                "5",
+                r#", "color_from_depth": {"translation": [0,0,0], "rotation": [0,0,0,2]}"#,
+            ),
+            "rotation`",
+        ),
         ("[1]".into(), "`json`"),
         ("{\"width\": 4".into(), "`json`"),
         (r#"{"width": 4.5, "height": 3}"#.into(), "`width`"),
     ] {
         let dir = folder_with(&text);
         let e = refusal(&dir);
-        assert!(e.contains("camera.json") && e.contains(field), "{text}: {e}");
+        assert!(
+            e.contains("camera.json") && e.contains(field),
+            "{text}: {e}"
+        );
     }
     // A picture of another size, a truncated one, none at all.
     let dir = folder_with(&camera("5", "").replace("\"width\": 4", "\"width\": 8"));
     let e = refusal(&dir);
-    assert!(e.contains("0.png") && e.contains("`depth size`") && e.contains("8×3"), "{e}");
+    assert!(
+        e.contains("0.png") && e.contains("`depth size`") && e.contains("8×3"),
+        "{e}"
+    );
     let dir = folder_with(&camera("5", ""));
     let png = dir.path().join("depth/0.png");
     let bytes = fs::read(&png).expect("read");
@@ -115,7 +159,11 @@ fn bad_folders_are_refused_by_file_and_field() {
     let dir = folder_with(&camera("5", ""));
     fs::write(dir.path().join("depth.txt"), "0.0 ../../etc/passwd\n").expect("written");
     assert!(refusal(&dir).contains("out of the folder"));
-    fs::write(dir.path().join("depth.txt"), "# list\n0.0 depth/0.png\nsoon depth/1.png\n").expect("written");
+    fs::write(
+        dir.path().join("depth.txt"),
+        "# list\n0.0 depth/0.png\nsoon depth/1.png\n",
+    )
+    .expect("written");
     assert!(refusal(&dir).contains("`line 3`"));
 }
 
@@ -133,10 +181,17 @@ fn after_a_bad_frame_the_next_one_comes() {
 #[test]
 fn shared_recordings_open() {
     let root = std::env::var_os("TRYON_SHARED")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from)
+        .map_or_else(
+            || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"),
+            PathBuf::from,
+        )
         .join("data");
     if !root.exists() {
-        assert!(std::env::var_os("TRYON_REQUIRE_ALL").is_none(), "{} is missing", root.display());
+        assert!(
+            std::env::var_os("TRYON_REQUIRE_ALL").is_none(),
+            "{} is missing",
+            root.display()
+        );
         eprintln!("SKIPPED: {} is missing", root.display());
         return;
     }
@@ -150,7 +205,15 @@ fn shared_recordings_open() {
         assert_eq!(r.len(), Some(frames), "{name}");
         let f = r.next_frame().expect(name).expect(name);
         assert_eq!(f.color.is_some(), color, "{name}");
-        let seen = f.depth.data().iter().filter(|d| (300..8000).contains(*d)).count();
-        assert!(seen * 10 > f.depth.data().len(), "{name}: {seen} pixels between 0.3 and 8 m");
+        let seen = f
+            .depth
+            .data()
+            .iter()
+            .filter(|d| (300..8000).contains(*d))
+            .count();
+        assert!(
+            seen * 10 > f.depth.data().len(),
+            "{name}: {seen} pixels between 0.3 and 8 m"
+        );
     }
 }

@@ -36,15 +36,28 @@ impl RgbdFolderWriter {
     pub fn create(folder: &Path, calibration: &Calibration) -> Result<Self, FormatError> {
         let camera = folder.join("camera.json");
         if camera.exists() {
-            return Err(FormatError::field(&camera, "file", "exists already; choose an empty folder"));
+            return Err(FormatError::field(
+                &camera,
+                "file",
+                "exists already; choose an empty folder",
+            ));
         }
         let depth = folder.join("depth");
         std::fs::create_dir_all(&depth).map_err(|e| FormatError::io(&depth, e))?;
-        let file = CameraFile { calibration: calibration.clone(), depth_scale: 1000.0 };
+        let file = CameraFile {
+            calibration: calibration.clone(),
+            depth_scale: 1000.0,
+        };
         std::fs::write(&camera, file.to_json()).map_err(|e| FormatError::io(&camera, e))?;
         let list = folder.join("depth.txt");
         let depth_list = File::create(&list).map_err(|e| FormatError::io(&list, e))?;
-        Ok(Self { folder: folder.to_owned(), depth_list, color_list: None, color_file: ColorFile::Png, frames: 0 })
+        Ok(Self {
+            folder: folder.to_owned(),
+            depth_list,
+            color_list: None,
+            color_file: ColorFile::Png,
+            frames: 0,
+        })
     }
     /// Writes colour as JPEG of this quality (1 to 100) instead of PNG.
     #[must_use]
@@ -63,7 +76,11 @@ impl RgbdFolderWriter {
     pub fn write(&mut self, frame: &RgbdFrame) -> Result<(), FormatError> {
         let name = format!("depth/{:06}.png", self.frames);
         write_png_depth(&self.folder.join(&name), &frame.depth)?;
-        let time = format!("{}.{:09}", frame.time_ns / 1_000_000_000, frame.time_ns % 1_000_000_000);
+        let time = format!(
+            "{}.{:09}",
+            frame.time_ns / 1_000_000_000,
+            frame.time_ns % 1_000_000_000
+        );
         let list = self.folder.join("depth.txt");
         writeln!(self.depth_list, "{time} {name}").map_err(|e| FormatError::io(&list, e))?;
         if let Some(color) = &frame.color {
@@ -82,7 +99,8 @@ impl RgbdFolderWriter {
                 ColorFile::Jpeg(quality) => {
                     let name = format!("rgb/{:06}.jpg", self.frames);
                     let path = self.folder.join(&name);
-                    std::fs::write(&path, encode_jpeg(color, quality)?).map_err(|e| FormatError::io(&path, e))?;
+                    std::fs::write(&path, encode_jpeg(color, quality)?)
+                        .map_err(|e| FormatError::io(&path, e))?;
                     name
                 }
             };

@@ -44,7 +44,11 @@ fn quality(t: &[P2; 3]) -> f64 {
     let e = [sub(t[1], t[0]), sub(t[2], t[1]), sub(t[0], t[2])];
     let l = e.map(length);
     let product = (l[0] * l[1]).max(l[1] * l[2]).max(l[2] * l[0]);
-    if product > 0.0 { cross(e[0], e[1]) / product } else { 0.0 }
+    if product > 0.0 {
+        cross(e[0], e[1]) / product
+    } else {
+        0.0
+    }
 }
 
 /// Where a panel's vertex goes: the panel's vertex that it becomes and its place.
@@ -54,7 +58,12 @@ impl Coarsener {
     /// Edges short enough, the shortest first.
     fn short(&self) -> Vec<(u32, u32)> {
         let mut all = BTreeMap::new();
-        for (f, t) in self.faces.iter().zip(&self.rest).filter_map(|(f, t)| Some((f.as_ref()?.0, t))) {
+        for (f, t) in self
+            .faces
+            .iter()
+            .zip(&self.rest)
+            .filter_map(|(f, t)| Some((f.as_ref()?.0, t)))
+        {
             for k in 0..3 {
                 let (a, b) = (f[k], f[(k + 1) % 3]);
                 let l = length(sub(t[(k + 1) % 3], t[k]));
@@ -62,17 +71,26 @@ impl Coarsener {
                 *e = e.max(l);
             }
         }
-        let mut out: Vec<_> = all.into_iter().filter(|(_, l)| *l < COLLAPSE * self.target).collect();
+        let mut out: Vec<_> = all
+            .into_iter()
+            .filter(|(_, l)| *l < COLLAPSE * self.target)
+            .collect();
         out.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
         out.into_iter().map(|(e, _)| e).collect()
     }
     fn near(&self, v: u32) -> BTreeSet<u32> {
-        let faces = self.around[v as usize].iter().filter_map(|f| self.faces[*f as usize]);
+        let faces = self.around[v as usize]
+            .iter()
+            .filter_map(|f| self.faces[*f as usize]);
         faces.flat_map(|f| f.0).filter(|w| *w != v).collect()
     }
     /// What collapsing `v` into `w` does to the panels, if it may be done.
     fn may(&self, v: u32, w: u32) -> Option<Moves> {
-        let here = || self.around[v as usize].iter().filter_map(|f| Some((*f as usize, self.faces[*f as usize]?)));
+        let here = || {
+            self.around[v as usize]
+                .iter()
+                .filter_map(|f| Some((*f as usize, self.faces[*f as usize]?)))
+        };
         let corner = |f: &Face, v: u32| f.iter().position(|c| *c == v);
         let mut moves = Moves::new();
         let mut opposite = BTreeSet::new();
@@ -83,7 +101,12 @@ impl Coarsener {
             let i = corner(&sim, v)?;
             at.insert(loose[i], self.rest[f][i]);
             for k in [(i + 1) % 3, (i + 2) % 3] {
-                rings.entry(loose[i]).or_default().entry(loose[k]).or_insert((0, self.rest[f][k])).0 += 1;
+                rings
+                    .entry(loose[i])
+                    .or_default()
+                    .entry(loose[k])
+                    .or_insert((0, self.rest[f][k]))
+                    .0 += 1;
             }
             if let Some(j) = corner(&sim, w) {
                 opposite.insert(sim[3 - i - j]);
@@ -93,18 +116,25 @@ impl Coarsener {
                 }
             }
         }
-        if moves.len() != rings.len() || self.near(v).intersection(&self.near(w)).count() != opposite.len() {
+        if moves.len() != rings.len()
+            || self.near(v).intersection(&self.near(w)).count() != opposite.len()
+        {
             return None;
         }
         for (copy, ring) in &rings {
             let (to, place) = moves[copy];
-            let rim: Vec<(u32, P2)> = ring.iter().filter(|(_, n)| n.0 == 1).map(|(l, n)| (*l, n.1)).collect();
+            let rim: Vec<(u32, P2)> = ring
+                .iter()
+                .filter(|(_, n)| n.0 == 1)
+                .map(|(l, n)| (*l, n.1))
+                .collect();
             match rim[..] {
                 [] => {}
                 [a, b] if a.0 == to || b.0 == to => {
                     let end = if a.0 == to { b.1 } else { a.1 };
                     let chord = sub(place, end);
-                    let off = cross(chord, sub(at[copy], end)).abs() / length(chord).max(f64::MIN_POSITIVE);
+                    let off = cross(chord, sub(at[copy], end)).abs()
+                        / length(chord).max(f64::MIN_POSITIVE);
                     if off > OFF_COURSE * self.target {
                         return None;
                     }
@@ -118,7 +148,8 @@ impl Coarsener {
             let old = self.rest[f];
             let mut new = old;
             new[i] = moves.get(&loose[i])?.1;
-            let long = (0..3).any(|k| length(sub(new[k], new[(k + 1) % 3])) > LONGEST * self.target);
+            let long =
+                (0..3).any(|k| length(sub(new[k], new[(k + 1) % 3])) > LONGEST * self.target);
             let (before, after) = (quality(&old), quality(&new));
             if long || before * after <= 0.0 || after.abs() < good.min(before.abs()) {
                 return None;
@@ -128,7 +159,9 @@ impl Coarsener {
     }
     fn collapse(&mut self, v: u32, w: u32, moves: &Moves) {
         for f in std::mem::take(&mut self.around[v as usize]) {
-            let Some((sim, loose)) = &mut self.faces[f as usize] else { continue };
+            let Some((sim, loose)) = &mut self.faces[f as usize] else {
+                continue;
+            };
             if sim.contains(&w) {
                 self.faces[f as usize] = None;
                 continue;
@@ -146,7 +179,11 @@ impl Coarsener {
 
 /// Median length of the edges at rest, metres.
 pub fn median_edge(g: &GarmentMesh) -> f64 {
-    let mut l: Vec<f64> = g.rest.iter().flat_map(|t| (0..3).map(|k| length(sub(t[(k + 1) % 3], t[k])))).collect();
+    let mut l: Vec<f64> = g
+        .rest
+        .iter()
+        .flat_map(|t| (0..3).map(|k| length(sub(t[(k + 1) % 3], t[k]))))
+        .collect();
     l.sort_unstable_by(f64::total_cmp);
     l.get(l.len() / 2).copied().unwrap_or(0.0)
 }
@@ -157,8 +194,18 @@ pub fn coarsen(g: &GarmentMesh, positions: &[P3], target: f64) -> (GarmentMesh, 
     for (i, f) in g.faces.iter().enumerate() {
         f.iter().for_each(|v| around[*v as usize].push(i as u32));
     }
-    let faces = g.faces.iter().zip(&g.render.faces).map(|(a, b)| Some((*a, *b))).collect();
-    let mut c = Coarsener { faces, rest: g.rest.clone(), around, target };
+    let faces = g
+        .faces
+        .iter()
+        .zip(&g.render.faces)
+        .map(|(a, b)| Some((*a, *b)))
+        .collect();
+    let mut c = Coarsener {
+        faces,
+        rest: g.rest.clone(),
+        around,
+        target,
+    };
     for _ in 0..PASSES {
         let mut gone = BTreeSet::new();
         for (a, b) in c.short() {
@@ -166,7 +213,9 @@ pub fn coarsen(g: &GarmentMesh, positions: &[P3], target: f64) -> (GarmentMesh, 
             if gone.contains(&a) || gone.contains(&b) {
                 continue;
             }
-            let way = [(a, b), (b, a)].into_iter().find_map(|(v, w)| Some((v, w, c.may(v, w)?)));
+            let way = [(a, b), (b, a)]
+                .into_iter()
+                .find_map(|(v, w)| Some((v, w, c.may(v, w)?)));
             if let Some((v, w, moves)) = way {
                 c.collapse(v, w, &moves);
                 gone.extend([v, w]);
@@ -186,19 +235,38 @@ fn numbered(used: impl Iterator<Item = u32>) -> BTreeMap<u32, u32> {
 }
 
 fn rebuilt(g: &GarmentMesh, positions: &[P3], c: &Coarsener) -> (GarmentMesh, Vec<P3>) {
-    let kept: Vec<(usize, Face, Face)> =
-        c.faces.iter().enumerate().filter_map(|(i, f)| f.map(|(sim, loose)| (i, sim, loose))).collect();
-    let (sim, loose) = (numbered(kept.iter().flat_map(|k| k.1)), numbered(kept.iter().flat_map(|k| k.2)));
-    let mut out = GarmentMesh { vertices: sim.len(), ..g.clone() };
+    let kept: Vec<(usize, Face, Face)> = c
+        .faces
+        .iter()
+        .enumerate()
+        .filter_map(|(i, f)| f.map(|(sim, loose)| (i, sim, loose)))
+        .collect();
+    let (sim, loose) = (
+        numbered(kept.iter().flat_map(|k| k.1)),
+        numbered(kept.iter().flat_map(|k| k.2)),
+    );
+    let mut out = GarmentMesh {
+        vertices: sim.len(),
+        ..g.clone()
+    };
     out.faces = kept.iter().map(|k| k.1.map(|v| sim[&v])).collect();
     out.rest = kept.iter().map(|k| c.rest[k.0]).collect();
     out.face_panel = kept.iter().map(|k| g.face_panel[k.0]).collect();
     out.corners = sim.keys().map(|v| g.corners[*v as usize].clone()).collect();
     out.uv = sim.keys().map(|v| g.uv[*v as usize]).collect();
     out.regions = sim.keys().map(|v| g.regions[*v as usize]).collect();
-    out.anchors.iter_mut().for_each(|a| a.vertices = a.vertices.iter().filter_map(|v| sim.get(v).copied()).collect());
+    out.anchors.iter_mut().for_each(|a| {
+        a.vertices = a
+            .vertices
+            .iter()
+            .filter_map(|v| sim.get(v).copied())
+            .collect()
+    });
     out.render = RenderMesh {
-        vertex: loose.keys().map(|l| sim[&g.render.vertex[*l as usize]]).collect(),
+        vertex: loose
+            .keys()
+            .map(|l| sim[&g.render.vertex[*l as usize]])
+            .collect(),
         uv: loose.keys().map(|l| g.render.uv[*l as usize]).collect(),
         faces: kept.iter().map(|k| k.2.map(|l| loose[&l])).collect(),
     };
@@ -211,10 +279,17 @@ fn rebuilt(g: &GarmentMesh, positions: &[P3], c: &Coarsener) -> (GarmentMesh, Ve
             in_panels.entry(pair(l)).or_insert((0, pair(f))).0 += 1;
         }
     }
-    let seams: BTreeSet<(u32, u32)> =
-        in_panels.values().filter(|(n, e)| *n == 1 && in_all[e] == 2).map(|(_, e)| *e).collect();
+    let seams: BTreeSet<(u32, u32)> = in_panels
+        .values()
+        .filter(|(n, e)| *n == 1 && in_all[e] == 2)
+        .map(|(_, e)| *e)
+        .collect();
     out.seams = seams.into_iter().map(|(a, b)| [a, b]).collect();
-    out.min_angle = out.rest.iter().map(|t| quality(t).abs().asin().to_degrees()).fold(180.0, f64::min);
+    out.min_angle = out
+        .rest
+        .iter()
+        .map(|t| quality(t).abs().asin().to_degrees())
+        .fold(180.0, f64::min);
     (out, sim.keys().map(|v| positions[*v as usize]).collect())
 }
 
@@ -226,16 +301,34 @@ mod tests {
     #[test]
     fn panels_keep_their_area_seams_and_holes_with_a_tenth_of_the_vertices() {
         let p = library::pattern("tshirt", Size::M).expect("pattern");
-        let fine =
-            GarmentMesh::sew(&p, &Triangulation { edge_length: 0.008, min_angle: 20.0, ..Triangulation::default() })
-                .expect("sewn");
-        let at: Vec<P3> = (0..fine.vertices).map(|i| P3::new(i as f32, 0.0, 0.0)).collect();
+        let fine = GarmentMesh::sew(
+            &p,
+            &Triangulation {
+                edge_length: 0.008,
+                min_angle: 20.0,
+                ..Triangulation::default()
+            },
+        )
+        .expect("sewn");
+        let at: Vec<P3> = (0..fine.vertices)
+            .map(|i| P3::new(i as f32, 0.0, 0.0))
+            .collect();
         let (coarse, kept) = coarsen(&fine, &at, 0.024);
-        assert!(coarse.vertices * 6 < fine.vertices, "{} of {}", coarse.vertices, fine.vertices);
+        assert!(
+            coarse.vertices * 6 < fine.vertices,
+            "{} of {}",
+            coarse.vertices,
+            fine.vertices
+        );
         assert_eq!(kept.len(), coarse.vertices);
         assert!(coarse.min_angle > 15.0, "{}", coarse.min_angle);
         let area = |g: &GarmentMesh| g.rest.iter().map(mesh_area).sum::<f64>();
-        assert!((area(&coarse) / area(&fine) - 1.0).abs() < 0.01, "{} {}", area(&coarse), area(&fine));
+        assert!(
+            (area(&coarse) / area(&fine) - 1.0).abs() < 0.01,
+            "{} {}",
+            area(&coarse),
+            area(&fine)
+        );
         // Holes, pieces and handles are the same: Euler's number.
         let euler = |g: &GarmentMesh| {
             let t = g.topology().expect("proper");
@@ -245,7 +338,10 @@ mod tests {
         // Both sides of a seam have the same lengths.
         let longest = |g: &GarmentMesh| g.seams.len();
         assert!(longest(&coarse) > 40 && longest(&coarse) < longest(&fine));
-        assert!(coarse.render.vertex.len() > coarse.vertices, "panels keep their own vertices along seams");
+        assert!(
+            coarse.render.vertex.len() > coarse.vertices,
+            "panels keep their own vertices along seams"
+        );
         for (f, l) in coarse.faces.iter().zip(&coarse.render.faces) {
             assert_eq!(*f, l.map(|v| coarse.render.vertex[v as usize]));
         }
@@ -254,8 +350,15 @@ mod tests {
     #[test]
     fn what_is_coarse_already_stays() {
         let p = library::pattern("skirt", Size::M).expect("pattern");
-        let g = GarmentMesh::sew(&p, &Triangulation { edge_length: 0.03, min_angle: 20.0, ..Triangulation::default() })
-            .expect("sewn");
+        let g = GarmentMesh::sew(
+            &p,
+            &Triangulation {
+                edge_length: 0.03,
+                min_angle: 20.0,
+                ..Triangulation::default()
+            },
+        )
+        .expect("sewn");
         let at = vec![P3::origin(); g.vertices];
         let (same, _) = coarsen(&g, &at, 0.01);
         assert_eq!((same.vertices, &same.faces), (g.vertices, &g.faces));

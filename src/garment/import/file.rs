@@ -31,24 +31,54 @@ pub struct MeshFile {
 /// What is wrong in the file; an edge with more than two faces, or a surface with one side (a Möbius strip), by its
 /// vertices.
 pub fn read_mesh(path: &Path, base: Option<&[P3]>) -> Result<MeshFile, FormatError> {
-    let stem = path.file_stem().and_then(|s| s.to_str()).unwrap_or("garment").to_owned();
-    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let stem = path
+        .file_stem()
+        .and_then(|s| s.to_str())
+        .unwrap_or("garment")
+        .to_owned();
+    let ending = path
+        .extension()
+        .and_then(|e| e.to_str())
+        .unwrap_or("")
+        .to_ascii_lowercase();
     let (name, mut sewn, bound) = match ending.as_str() {
         "obj" => (stem, read_sewn_obj(path)?, false),
-        "glb" | "gltf" => (stem, SewnObj { obj: welded(read_glb(path)?, path)?, stitches: Vec::new() }, false),
+        "glb" | "gltf" => (
+            stem,
+            SewnObj {
+                obj: welded(read_glb(path)?, path)?,
+                stitches: Vec::new(),
+            },
+            false,
+        ),
         "mhclo" => {
             let m = read_mhclo(path)?;
             let mut obj = read_obj(&path.with_file_name(&m.obj_file))?;
             if m.bindings.len() != obj.mesh.vertices().len() {
-                let why = format!("{} are bound, {} has {}", m.bindings.len(), m.obj_file, obj.mesh.vertices().len());
+                let why = format!(
+                    "{} are bound, {} has {}",
+                    m.bindings.len(),
+                    m.obj_file,
+                    obj.mesh.vertices().len()
+                );
                 return Err(FormatError::field(path, "verts", why));
             }
             let fitted = base.and_then(|b| m.fit(b, path).ok());
             let bound = fitted.is_some();
             if let Some(p) = fitted {
-                obj.mesh = obj.mesh.with_vertices(p).map_err(|e| FormatError::field(path, "verts", e.to_string()))?;
+                obj.mesh = obj
+                    .mesh
+                    .with_vertices(p)
+                    .map_err(|e| FormatError::field(path, "verts", e.to_string()))?;
             }
-            (if m.name.is_empty() { stem } else { m.name }, SewnObj { obj, stitches: Vec::new() }, bound)
+            (
+                if m.name.is_empty() { stem } else { m.name },
+                SewnObj {
+                    obj,
+                    stitches: Vec::new(),
+                },
+                bound,
+            )
         }
         other => {
             let why = format!("`.{other}` is no mesh garment; .obj, .glb, .gltf and .mhclo are");
@@ -56,14 +86,23 @@ pub fn read_mesh(path: &Path, base: Option<&[P3]>) -> Result<MeshFile, FormatErr
         }
     };
     let turned = turn_alike(&mut sewn.obj, path)?;
-    Ok(MeshFile { name, sewn, turned, bound })
+    Ok(MeshFile {
+        name,
+        sewn,
+        turned,
+        bound,
+    })
 }
 
 /// glTF splits vertices along texture seams: those at one place become one again.
 fn welded(model: GltfModel, path: &Path) -> Result<ObjMesh, FormatError> {
     /// Vertices nearer than this share of the model's size are one.
     const SAME: f32 = 1e-5;
-    let size = model.mesh.bounds().map_or(1.0, |(lo, hi)| (hi - lo).amax()).max(f32::MIN_POSITIVE);
+    let size = model
+        .mesh
+        .bounds()
+        .map_or(1.0, |(lo, hi)| (hi - lo).amax())
+        .max(f32::MIN_POSITIVE);
     let key = |p: &P3| [p.x, p.y, p.z].map(|c| (c / (SAME * size)).round() as i64);
     let mut seen = BTreeMap::new();
     let mut vertices = Vec::new();
@@ -89,8 +128,13 @@ fn welded(model: GltfModel, path: &Path) -> Result<ObjMesh, FormatError> {
     if model.uv.is_empty() {
         face_uv.clear();
     }
-    let mesh = TriMesh::new(vertices, faces).map_err(|e| FormatError::field(path, "mesh", e.to_string()))?;
-    Ok(ObjMesh { mesh, uv: model.uv, face_uv })
+    let mesh = TriMesh::new(vertices, faces)
+        .map_err(|e| FormatError::field(path, "mesh", e.to_string()))?;
+    Ok(ObjMesh {
+        mesh,
+        uv: model.uv,
+        face_uv,
+    })
 }
 
 /// Turns faces over until neighbours agree which side is out; says how many were turned.
@@ -100,11 +144,18 @@ fn turn_alike(o: &mut ObjMesh, path: &Path) -> Result<usize, FormatError> {
     for (i, f) in faces.iter().enumerate() {
         for k in 0..3 {
             let (a, b) = (f[k], f[(k + 1) % 3]);
-            around.entry((a.min(b), a.max(b))).or_default().push(i as u32);
+            around
+                .entry((a.min(b), a.max(b)))
+                .or_default()
+                .push(i as u32);
         }
     }
     if let Some(((a, b), f)) = around.iter().find(|(_, f)| f.len() > 2) {
-        let why = format!("{} faces meet there ({:?}); cloth has at most two", f.len(), f);
+        let why = format!(
+            "{} faces meet there ({:?}); cloth has at most two",
+            f.len(),
+            f
+        );
         return Err(FormatError::field(path, format!("edge ({a}, {b})"), why));
     }
     let runs = |f: &Face, a: u32, b: u32| (0..3).any(|k| f[k] == a && f[(k + 1) % 3] == b);
@@ -126,7 +177,8 @@ fn turn_alike(o: &mut ObjMesh, path: &Path) -> Result<usize, FormatError> {
                     // Two faces that agree run along their edge in opposite directions.
                     let alike = n == i || !runs(&faces[n], a, b);
                     if known[n] && !alike {
-                        let why = "its faces cannot be turned alike: the surface has one side only".to_owned();
+                        let why = "its faces cannot be turned alike: the surface has one side only"
+                            .to_owned();
                         return Err(FormatError::field(path, format!("edge ({a}, {b})"), why));
                     }
                     if !std::mem::replace(&mut known[n], true) {
@@ -150,8 +202,8 @@ fn turn_alike(o: &mut ObjMesh, path: &Path) -> Result<usize, FormatError> {
     for (f, _) in o.face_uv.iter_mut().zip(&turned).filter(|(_, t)| **t) {
         f.swap(1, 2);
     }
-    o.mesh =
-        TriMesh::new(o.mesh.vertices().to_vec(), faces).map_err(|e| FormatError::field(path, "mesh", e.to_string()))?;
+    o.mesh = TriMesh::new(o.mesh.vertices().to_vec(), faces)
+        .map_err(|e| FormatError::field(path, "mesh", e.to_string()))?;
     Ok(turned.iter().filter(|t| **t).count())
 }
 
@@ -182,7 +234,10 @@ pub fn split(sewn: &SewnObj) -> Vec<SewnObj> {
     for (i, f) in sewn.obj.mesh.faces().iter().enumerate() {
         pieces.entry(find(&mut root, f[0])).or_default().push(i);
     }
-    let mut out: Vec<SewnObj> = pieces.into_values().filter_map(|faces| some_faces(sewn, &faces)).collect();
+    let mut out: Vec<SewnObj> = pieces
+        .into_values()
+        .filter_map(|faces| some_faces(sewn, &faces))
+        .collect();
     out.sort_by_key(|p| std::cmp::Reverse(p.obj.mesh.faces().len()));
     out
 }
@@ -199,16 +254,37 @@ pub fn some_faces(sewn: &SewnObj, faces: &[usize]) -> Option<SewnObj> {
         }
         *l
     };
-    let own: Vec<Face> = faces.iter().map(|i| sewn.obj.mesh.faces()[*i].map(&mut name)).collect();
+    let own: Vec<Face> = faces
+        .iter()
+        .map(|i| sewn.obj.mesh.faces()[*i].map(&mut name))
+        .collect();
     let at = |v: u32| Some(label[v as usize]).filter(|l| *l != u32::MAX);
     let stitches = sewn
         .stitches
         .iter()
-        .filter_map(|s| Some(Stitch { vertex: at(s.vertex)?, edge: [at(s.edge[0])?, at(s.edge[1])?], at: s.at }))
+        .filter_map(|s| {
+            Some(Stitch {
+                vertex: at(s.vertex)?,
+                edge: [at(s.edge[0])?, at(s.edge[1])?],
+                at: s.at,
+            })
+        })
         .collect();
-    let face_uv = faces.iter().filter_map(|i| sewn.obj.face_uv.get(*i).copied()).collect();
-    let mesh = TriMesh::new(vertices, own).ok().filter(|m| !m.faces().is_empty())?;
-    Some(SewnObj { obj: ObjMesh { mesh, uv: sewn.obj.uv.clone(), face_uv }, stitches })
+    let face_uv = faces
+        .iter()
+        .filter_map(|i| sewn.obj.face_uv.get(*i).copied())
+        .collect();
+    let mesh = TriMesh::new(vertices, own)
+        .ok()
+        .filter(|m| !m.faces().is_empty())?;
+    Some(SewnObj {
+        obj: ObjMesh {
+            mesh,
+            uv: sewn.obj.uv.clone(),
+            face_uv,
+        },
+        stitches,
+    })
 }
 
 #[cfg(test)]
@@ -229,22 +305,46 @@ mod tests {
         let n = turn_alike(&mut o, Path::new("t.obj")).expect("turned");
         assert!(n > 0 && Topology::new(&o.mesh).is_ok());
         let mut o = obj(&format!("{QUAD}v 2 0 0\nf 1 2 3\nf 2 1 4\nf 1 2 5"));
-        let e = turn_alike(&mut o, Path::new("t.obj")).expect_err("three").to_string();
+        let e = turn_alike(&mut o, Path::new("t.obj"))
+            .expect_err("three")
+            .to_string();
         assert!(e.contains("edge (0, 1)") && e.contains("3 faces"), "{e}");
         // A Möbius strip of five triangles.
         let ring = "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nv 4 0 0\nf 1 2 3\nf 2 3 4\nf 3 4 5\nf 4 5 1\nf 5 1 2";
-        let e = turn_alike(&mut obj(ring), Path::new("t.obj")).expect_err("one side").to_string();
+        let e = turn_alike(&mut obj(ring), Path::new("t.obj"))
+            .expect_err("one side")
+            .to_string();
         assert!(e.contains("one side"), "{e}");
     }
 
     #[test]
     fn pieces_are_told_apart_by_faces_and_stitches() {
-        let two = obj(&format!("{QUAD}v 5 0 0\nv 6 0 0\nv 6 1 0\nf 5 6 7\nf 1 2 3 4"));
-        let sewn = SewnObj { obj: two, stitches: Vec::new() };
+        let two = obj(&format!(
+            "{QUAD}v 5 0 0\nv 6 0 0\nv 6 1 0\nf 5 6 7\nf 1 2 3 4"
+        ));
+        let sewn = SewnObj {
+            obj: two,
+            stitches: Vec::new(),
+        };
         let p = split(&sewn);
-        assert_eq!(p.iter().map(|s| s.obj.mesh.vertices().len()).collect::<Vec<_>>(), [4, 3]);
-        let stitch = Stitch { vertex: 4, edge: [1, 2], at: 0.0 };
-        let p = split(&SewnObj { stitches: vec![stitch], ..sewn });
-        assert_eq!((p.len(), p[0].stitches.len(), p[0].obj.mesh.vertices().len()), (1, 1, 7));
+        assert_eq!(
+            p.iter()
+                .map(|s| s.obj.mesh.vertices().len())
+                .collect::<Vec<_>>(),
+            [4, 3]
+        );
+        let stitch = Stitch {
+            vertex: 4,
+            edge: [1, 2],
+            at: 0.0,
+        };
+        let p = split(&SewnObj {
+            stitches: vec![stitch],
+            ..sewn
+        });
+        assert_eq!(
+            (p.len(), p[0].stitches.len(), p[0].obj.mesh.vertices().len()),
+            (1, 1, 7)
+        );
     }
 }

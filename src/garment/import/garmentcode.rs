@@ -2,7 +2,8 @@
 
 use crate::formats::garmentcode::{RawCurve, RawEdge, RawPanel, RawPattern};
 use crate::garment::{
-    Anchor, Curve, GarmentError, GarmentKind, Material, Panel, PanelEdge, Pattern, Placement, Seam, Side, Size,
+    Anchor, Curve, GarmentError, GarmentKind, Material, Panel, PanelEdge, Pattern, Placement, Seam,
+    Side, Size,
 };
 
 /// Edges shorter than this are taken out together with the ones they are sewn to, metres: they come from seam arithmetic
@@ -13,8 +14,17 @@ const CRUMB: f64 = 0.009;
 ///
 /// # Errors
 /// A panel whose place cannot be told from its name, or faults of the finished pattern (panel, edge, seam).
-pub fn from_garmentcode(raw: &RawPattern, name: &str, size: Size, material: Material) -> Result<Pattern, GarmentError> {
-    let places = raw.panels.iter().map(place).collect::<Result<Vec<_>, _>>()?;
+pub fn from_garmentcode(
+    raw: &RawPattern,
+    name: &str,
+    size: Size,
+    material: Material,
+) -> Result<Pattern, GarmentError> {
+    let places = raw
+        .panels
+        .iter()
+        .map(place)
+        .collect::<Result<Vec<_>, _>>()?;
     let dropped = crumbs(raw);
     let heights = Heights::new(raw, &places);
     let mut panels = Vec::new();
@@ -28,20 +38,36 @@ pub fn from_garmentcode(raw: &RawPattern, name: &str, size: Size, material: Mate
     name_landmarks(raw, &places, &mut panels, &mut edge_names);
     let mut seams = Vec::new();
     for [a, b] in &raw.stitches {
-        let of = |s: &(usize, usize)| edge_names[s.0][s.1].clone().map(|e| [panels[s.0].name.clone(), e]);
+        let of = |s: &(usize, usize)| {
+            edge_names[s.0][s.1]
+                .clone()
+                .map(|e| [panels[s.0].name.clone(), e])
+        };
         if let (Some(a), Some(b)) = (of(a), of(b)) {
-            seams.push(Seam { a, b, reversed: true });
+            seams.push(Seam {
+                a,
+                b,
+                reversed: true,
+            });
         }
     }
     let has = |f: &dyn Fn(&Placement) -> bool| places.iter().any(f);
     let trunk = has(&|p| matches!(p, Placement::TrunkFront | Placement::TrunkBack));
     let below = has(&|p| {
-        !matches!(p, Placement::TrunkFront | Placement::TrunkBack | Placement::Sleeve(_) | Placement::Hood(_))
+        !matches!(
+            p,
+            Placement::TrunkFront
+                | Placement::TrunkBack
+                | Placement::Sleeve(_)
+                | Placement::Hood(_)
+        )
     });
     let kind = match (trunk, below) {
         (true, true) => GarmentKind::Dress,
         (true, false) => GarmentKind::Top,
-        _ if has(&|p| matches!(p, Placement::SkirtFront | Placement::SkirtBack)) => GarmentKind::Skirt,
+        _ if has(&|p| matches!(p, Placement::SkirtFront | Placement::SkirtBack)) => {
+            GarmentKind::Skirt
+        }
         _ => GarmentKind::Trousers,
     };
     let anchors = anchors(&panels, &seams, trunk);
@@ -65,26 +91,39 @@ pub fn from_garmentcode(raw: &RawPattern, name: &str, size: Size, material: Mate
 fn place(p: &RawPanel) -> Result<Placement, GarmentError> {
     let n = p.name.to_lowercase();
     let has = |words: &[&str]| words.iter().any(|w| n.contains(w));
-    let side = if n.contains("left") || n.ends_with("_l") || (n.contains("_l_") && !n.contains("right")) {
-        Side::Left
-    } else if n.contains("right") || n.ends_with("_r") || n.contains("_r_") {
-        Side::Right
-    } else if p.translation[0] >= 0.0 {
-        Side::Left
-    } else {
-        Side::Right
-    };
+    let side =
+        if n.contains("left") || n.ends_with("_l") || (n.contains("_l_") && !n.contains("right")) {
+            Side::Left
+        } else if n.contains("right") || n.ends_with("_r") || n.contains("_r_") {
+            Side::Right
+        } else if p.translation[0] >= 0.0 {
+            Side::Left
+        } else {
+            Side::Right
+        };
     let front = p.translation[2] >= 0.0;
     Ok(if has(&["hood"]) {
         Placement::Hood(side)
     } else if has(&["sleeve", "sl_cuff"]) {
         Placement::Sleeve(side)
     } else if has(&["pant", "leg"]) {
-        if front { Placement::LegFront(side) } else { Placement::LegBack(side) }
+        if front {
+            Placement::LegFront(side)
+        } else {
+            Placement::LegBack(side)
+        }
     } else if has(&["skirt"]) {
-        if front { Placement::SkirtFront } else { Placement::SkirtBack }
+        if front {
+            Placement::SkirtFront
+        } else {
+            Placement::SkirtBack
+        }
     } else if has(&["torso", "bodice"]) {
-        if front { Placement::TrunkFront } else { Placement::TrunkBack }
+        if front {
+            Placement::TrunkFront
+        } else {
+            Placement::TrunkBack
+        }
     } else {
         return Err(GarmentError::Panel {
             panel: p.name.clone(),
@@ -115,7 +154,9 @@ impl Heights {
     fn new(raw: &RawPattern, places: &[Placement]) -> Self {
         let top = |wanted: &dyn Fn(&Placement) -> bool| {
             let panels = raw.panels.iter().zip(places).filter(|(_, p)| wanted(p));
-            panels.flat_map(|(p, _)| p.vertices.iter().map(|v| stand(p, *v)[1])).fold(f64::MIN, f64::max)
+            panels
+                .flat_map(|(p, _)| p.vertices.iter().map(|v| stand(p, *v)[1]))
+                .fold(f64::MIN, f64::max)
         };
         Self {
             shoulder: top(&|p| matches!(p, Placement::TrunkFront | Placement::TrunkBack)),
@@ -132,8 +173,12 @@ fn crumbs(raw: &RawPattern) -> Vec<Vec<bool>> {
         let [a, b] = panel.edges[e].ends.map(|v| panel.vertices[v]);
         (a[0] - b[0]).hypot(a[1] - b[1]) < CRUMB
     };
-    let mut out: Vec<Vec<bool>> =
-        raw.panels.iter().enumerate().map(|(p, q)| (0..q.edges.len()).map(|e| short(p, e)).collect()).collect();
+    let mut out: Vec<Vec<bool>> = raw
+        .panels
+        .iter()
+        .enumerate()
+        .map(|(p, q)| (0..q.edges.len()).map(|e| short(p, e)).collect())
+        .collect();
     for [a, b] in &raw.stitches {
         if !(short(a.0, a.1) && short(b.0, b.1)) {
             out[a.0][a.1] = false;
@@ -156,16 +201,34 @@ fn chart(p: &RawPanel, place: Placement, heights: &Heights, q: [f64; 2]) -> [f64
         Placement::Hood(side) => {
             // Hood panels are turned about y: their own x runs forward or back.
             let forward = s[2] - p.translation[2];
-            [if side == Side::Left { -forward } else { forward }, s[1] - heights.shoulder]
+            [
+                if side == Side::Left {
+                    -forward
+                } else {
+                    forward
+                },
+                s[1] - heights.shoulder,
+            ]
         }
         Placement::Sleeve(side) => {
             // In the panel's own frame the arm lies along x and the overarm seam is the upper edge.
             let out = if side == Side::Left { 1.0 } else { -1.0 };
-            let along = p.vertices.iter().map(|v| out * v[0]).fold(f64::MAX, f64::min);
+            let along = p
+                .vertices
+                .iter()
+                .map(|v| out * v[0])
+                .fold(f64::MAX, f64::min);
             let top = p.vertices.iter().map(|v| v[1]).fold(f64::MIN, f64::max);
             let across = top - q[1];
             let back = p.translation[2] < 0.0;
-            [if back == (side == Side::Left) { across } else { -across }, along - out * q[0]]
+            [
+                if back == (side == Side::Left) {
+                    across
+                } else {
+                    -across
+                },
+                along - out * q[0],
+            ]
         }
     }
 }
@@ -173,12 +236,22 @@ fn chart(p: &RawPanel, place: Placement, heights: &Heights, q: [f64; 2]) -> [f64
 /// The control points of an edge in panel coordinates.
 fn bend(e: &RawEdge, a: [f64; 2], b: [f64; 2]) -> Option<[[f64; 2]; 2]> {
     let d = [b[0] - a[0], b[1] - a[1]];
-    let absolute = |r: [f64; 2]| [a[0] + r[0] * d[0] - r[1] * d[1], a[1] + r[0] * d[1] + r[1] * d[0]];
+    let absolute = |r: [f64; 2]| {
+        [
+            a[0] + r[0] * d[0] - r[1] * d[1],
+            a[1] + r[0] * d[1] + r[1] * d[0],
+        ]
+    };
     match e.curve {
         RawCurve::Line => None,
         RawCurve::Quadratic(c) => {
             let c = absolute(c);
-            let third = |p: [f64; 2]| [p[0] + (c[0] - p[0]) * 2.0 / 3.0, p[1] + (c[1] - p[1]) * 2.0 / 3.0];
+            let third = |p: [f64; 2]| {
+                [
+                    p[0] + (c[0] - p[0]) * 2.0 / 3.0,
+                    p[1] + (c[1] - p[1]) * 2.0 / 3.0,
+                ]
+            };
             Some([third(a), third(b)])
         }
         RawCurve::Cubic(c, f) => Some([absolute(c), absolute(f)]),
@@ -186,7 +259,11 @@ fn bend(e: &RawEdge, a: [f64; 2], b: [f64; 2]) -> Option<[[f64; 2]; 2]> {
             // Half the angle of the arc; a chord longer than the diameter is a half circle.
             let chord = d[0].hypot(d[1]);
             let half = (chord / (2.0 * radius)).min(1.0).asin();
-            let half = if large { std::f64::consts::PI - half } else { half };
+            let half = if large {
+                std::f64::consts::PI - half
+            } else {
+                half
+            };
             // A cubic whose ends lean `half` off the chord: control length 4/3·tan(θ/4) of the radius.
             let k = 4.0 / 3.0 * (half / 2.0).tan() * radius / chord;
             let lean = if right { -half } else { half };
@@ -215,16 +292,26 @@ fn convert(
     let mut edges = Vec::new();
     for &e in &kept {
         let [a, b] = p.edges[e].ends.map(|v| p.vertices[v]);
-        let curve = bend(&p.edges[e], a, b).map_or(Curve::Line, |c| Curve::Cubic(to(c[0]), to(c[1])));
+        let curve =
+            bend(&p.edges[e], a, b).map_or(Curve::Line, |c| Curve::Cubic(to(c[0]), to(c[1])));
         names[e] = Some(format!("edge_{e}"));
-        edges.push(PanelEdge { name: format!("edge_{e}"), from: to(a), curve });
+        edges.push(PanelEdge {
+            name: format!("edge_{e}"),
+            from: to(a),
+            curve,
+        });
     }
-    let mut panel = Panel { name: p.name.clone(), placement: place, edges };
+    let mut panel = Panel {
+        name: p.name.clone(),
+        placement: place,
+        edges,
+    };
     // Counter-clockwise seen from outside: some places mirror their panels.
     let corners: Vec<[f64; 2]> = panel.edges.iter().map(|e| e.from).collect();
     let m = corners.len();
-    let area: f64 =
-        (0..m).map(|i| corners[i][0] * corners[(i + 1) % m][1] - corners[i][1] * corners[(i + 1) % m][0]).sum();
+    let area: f64 = (0..m)
+        .map(|i| corners[i][0] * corners[(i + 1) % m][1] - corners[i][1] * corners[(i + 1) % m][0])
+        .sum();
     if area < 0.0 {
         let turned = (0..m)
             .rev()
@@ -243,13 +330,21 @@ fn convert(
 }
 
 /// Gives the edges that placement looks for their names.
-fn name_landmarks(raw: &RawPattern, places: &[Placement], panels: &mut [Panel], names: &mut [Vec<Option<String>>]) {
+fn name_landmarks(
+    raw: &RawPattern,
+    places: &[Placement],
+    panels: &mut [Panel],
+    names: &mut [Vec<Option<String>>],
+) {
     let mut rename = |panel: &mut Panel, k: usize, edge: usize, new: &str| {
         let old = panel.edges[edge].name.clone();
         if panel.edges.iter().any(|e| e.name == new) || old.starts_with("shoulder") {
             return;
         }
-        names[k].iter_mut().filter(|n| n.as_deref() == Some(&old)).for_each(|n| *n = Some(new.to_owned()));
+        names[k]
+            .iter_mut()
+            .filter(|n| n.as_deref() == Some(&old))
+            .for_each(|n| *n = Some(new.to_owned()));
         panel.edges[edge].name = new.to_owned();
     };
     for (k, panel) in panels.iter_mut().enumerate() {
@@ -257,23 +352,38 @@ fn name_landmarks(raw: &RawPattern, places: &[Placement], panels: &mut [Panel], 
         match places[k] {
             Placement::TrunkFront | Placement::TrunkBack => {
                 // The shoulder seam starts or ends in the highest corner and runs outwards.
-                let top =
-                    (0..n).max_by(|a, b| panel.edges[*a].from[1].total_cmp(&panel.edges[*b].from[1])).unwrap_or(0);
+                let top = (0..n)
+                    .max_by(|a, b| panel.edges[*a].from[1].total_cmp(&panel.edges[*b].from[1]))
+                    .unwrap_or(0);
                 let before = (top + n - 1) % n;
                 let far = |q: [f64; 2]| q[0].abs();
-                let shoulder = if far(panel.edges[before].from) > far(panel.end(top)) { before } else { top };
+                let shoulder = if far(panel.edges[before].from) > far(panel.end(top)) {
+                    before
+                } else {
+                    top
+                };
                 rename(panel, k, shoulder, "shoulder");
             }
             Placement::LegFront(side) | Placement::LegBack(side) => {
                 // The crotch is the innermost corner.
                 let front = matches!(places[k], Placement::LegFront(_));
-                let inner = if (side == Side::Left) == front { -1.0 } else { 1.0 };
+                let inner = if (side == Side::Left) == front {
+                    -1.0
+                } else {
+                    1.0
+                };
                 let at = (0..n)
-                    .max_by(|a, b| (inner * panel.edges[*a].from[0]).total_cmp(&(inner * panel.edges[*b].from[0])))
+                    .max_by(|a, b| {
+                        (inner * panel.edges[*a].from[0])
+                            .total_cmp(&(inner * panel.edges[*b].from[0]))
+                    })
                     .unwrap_or(0);
                 let before = (at + n - 1) % n;
-                let (up, down) =
-                    if panel.end(at)[1] > panel.edges[before].from[1] { (at, before) } else { (before, at) };
+                let (up, down) = if panel.end(at)[1] > panel.edges[before].from[1] {
+                    (at, before)
+                } else {
+                    (before, at)
+                };
                 rename(panel, k, up, "crotch");
                 rename(panel, k, down, "inseam");
             }
@@ -312,7 +422,11 @@ fn anchors(panels: &[Panel], seams: &[Seam], trunk: bool) -> Vec<Anchor> {
             .filter(|p| p.placement == Placement::TrunkFront && p.edge("shoulder").is_some())
             .map(|p| [p.name.clone(), "shoulder".to_owned()])
             .collect();
-        return vec![Anchor { name: "shoulders".into(), edges, strength: 0.5 }];
+        return vec![Anchor {
+            name: "shoulders".into(),
+            edges,
+            strength: 0.5,
+        }];
     }
     /// Edges whose corners are this near to the top of their panel are the waist, metres.
     const NEAR_TOP: f64 = 0.04;
@@ -327,32 +441,46 @@ fn anchors(panels: &[Panel], seams: &[Seam], trunk: bool) -> Vec<Anchor> {
             }
         }
     }
-    vec![Anchor { name: "waist".into(), edges, strength: 1.0 }]
+    vec![Anchor {
+        name: "waist".into(),
+        edges,
+        strength: 1.0,
+    }]
 }
 
 /// Girths at chest, waist and hip by adding up the panels' widths; 0 where there is no cloth.
 fn girths(panels: &[Panel], trunk: bool) -> [f64; 3] {
     let width = |p: &Panel, y: f64| {
-        let points: Vec<[f64; 2]> =
-            (0..p.edges.len()).flat_map(|i| p.edges[i].sample(p.end(i), 8).into_iter().take(8)).collect();
+        let points: Vec<[f64; 2]> = (0..p.edges.len())
+            .flat_map(|i| p.edges[i].sample(p.end(i), 8).into_iter().take(8))
+            .collect();
         let mut cuts: Vec<f64> = (0..points.len())
             .filter_map(|i| {
                 let (a, b) = (points[i], points[(i + 1) % points.len()]);
-                ((a[1] <= y) != (b[1] <= y)).then(|| a[0] + (b[0] - a[0]) * (y - a[1]) / (b[1] - a[1]))
+                ((a[1] <= y) != (b[1] <= y))
+                    .then(|| a[0] + (b[0] - a[0]) * (y - a[1]) / (b[1] - a[1]))
             })
             .collect();
         cuts.sort_by(f64::total_cmp);
         cuts.chunks_exact(2).map(|c| c[1] - c[0]).sum::<f64>()
     };
     let around = |wanted: &dyn Fn(Placement) -> bool, y: f64| {
-        panels.iter().filter(|p| wanted(p.placement)).map(|p| width(p, y)).sum::<f64>()
+        panels
+            .iter()
+            .filter(|p| wanted(p.placement))
+            .map(|p| width(p, y))
+            .sum::<f64>()
     };
     let is_trunk = |p: Placement| matches!(p, Placement::TrunkFront | Placement::TrunkBack);
     let is_skirt = |p: Placement| matches!(p, Placement::SkirtFront | Placement::SkirtBack);
     let is_leg = |p: Placement| matches!(p, Placement::LegFront(_) | Placement::LegBack(_));
     /// Below the shoulder point: just under the armpit; below the waist: waistband and hip line. Metres.
     const LEVELS: [f64; 3] = [-0.26, -0.01, -0.19];
-    let chest = if trunk { around(&is_trunk, LEVELS[0]) } else { 0.0 };
+    let chest = if trunk {
+        around(&is_trunk, LEVELS[0])
+    } else {
+        0.0
+    };
     let lower = |y: f64| around(&is_skirt, y).max(around(&is_leg, y));
     [chest, lower(LEVELS[1]), lower(LEVELS[2])]
 }

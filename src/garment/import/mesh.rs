@@ -65,7 +65,10 @@ pub fn from_mesh(
         };
         let area = crate::garment::mesh_area(&t);
         if !(area > SMALLEST) {
-            return Err(GarmentError::Face { face: i, why: format!("its rest shape has an area of {area} m²") });
+            return Err(GarmentError::Face {
+                face: i,
+                why: format!("its rest shape has an area of {area} m²"),
+            });
         }
         faces.push(w);
         rest.push(t);
@@ -74,9 +77,15 @@ pub fn from_mesh(
     }
     // Vertices that only closed triangles had stay unused: refuse them by name.
     let mut used = vec![false; vertices];
-    faces.iter().flatten().for_each(|v| used[*v as usize] = true);
+    faces
+        .iter()
+        .flatten()
+        .for_each(|v| used[*v as usize] = true);
     if let Some(vertex) = used.iter().position(|u| !u) {
-        return Err(GarmentError::Vertex { vertex, why: "no triangle is left around it".into() });
+        return Err(GarmentError::Vertex {
+            vertex,
+            why: "no triangle is left around it".into(),
+        });
     }
     let uv_of = |i: usize, k: usize| rest[i][k].map(|c: f64| c as f32);
     let mut uv = vec![[0.0; 2]; vertices];
@@ -111,11 +120,21 @@ pub fn from_mesh(
         regions: vec![Region::ALL; vertices],
         anchors: vec![],
         seams,
-        render: RenderMesh { vertex: welded, uv: render_uv, faces: loose },
+        render: RenderMesh {
+            vertex: welded,
+            uv: render_uv,
+            faces: loose,
+        },
         min_angle,
     };
     garment.topology()?;
-    Ok(MeshGarment { garment, positions, closed, open, flat: flat.is_some() })
+    Ok(MeshGarment {
+        garment,
+        positions,
+        closed,
+        open,
+        flat: flat.is_some(),
+    })
 }
 
 /// The texture coordinates are panels in metres: the rest shape is theirs.
@@ -129,7 +148,11 @@ fn flat_rest(sewn: &SewnObj) -> Option<Vec<[[f64; 2]; 3]>> {
     if o.face_uv.is_empty() {
         return None;
     }
-    let rest: Vec<[[f64; 2]; 3]> = o.face_uv.iter().map(|f| f.map(|t| o.uv[t as usize].map(f64::from))).collect();
+    let rest: Vec<[[f64; 2]; 3]> = o
+        .face_uv
+        .iter()
+        .map(|f| f.map(|t| o.uv[t as usize].map(f64::from)))
+        .collect();
     let mut ratio: Vec<f64> = o
         .mesh
         .faces()
@@ -137,11 +160,16 @@ fn flat_rest(sewn: &SewnObj) -> Option<Vec<[[f64; 2]; 3]>> {
         .zip(&rest)
         .map(|(f, t)| {
             let p = f.map(|v| o.mesh.vertices()[v as usize].cast::<f64>());
-            (t[1][0] - t[0][0]).hypot(t[1][1] - t[0][1]) / (p[1] - p[0]).norm().max(f64::MIN_POSITIVE)
+            (t[1][0] - t[0][0]).hypot(t[1][1] - t[0][1])
+                / (p[1] - p[0]).norm().max(f64::MIN_POSITIVE)
         })
         .collect();
     ratio.sort_by(f64::total_cmp);
-    let at = |share: usize| ratio.get(ratio.len() * share / 100).map(|r| (r - 1.0).abs());
+    let at = |share: usize| {
+        ratio
+            .get(ratio.len() * share / 100)
+            .map(|r| (r - 1.0).abs())
+    };
     (at(50)? < SAME_SCALE && at(25)? < ISOMETRIC && at(75)? < ISOMETRIC).then_some(rest)
 }
 
@@ -157,7 +185,10 @@ fn smallest_angle(t: &[[f64; 2]; 3]) -> f64 {
         .map(|k| {
             let (a, b, c) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
             let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
-            (u[0] * v[1] - u[1] * v[0]).abs().atan2(u[0] * v[0] + u[1] * v[1]).to_degrees()
+            (u[0] * v[1] - u[1] * v[0])
+                .abs()
+                .atan2(u[0] * v[0] + u[1] * v[1])
+                .to_degrees()
         })
         .fold(180.0, f64::min)
 }
@@ -169,7 +200,8 @@ fn weld_properly(n: usize, faces: &[Face], stitches: &[Stitch]) -> (Vec<u32>, us
     let mut active = stitches.to_vec();
     let mut welded = weld(n, &active);
     for _ in 0..ROUNDS {
-        let mut uses: std::collections::BTreeMap<(u32, u32), [u32; 2]> = std::collections::BTreeMap::new();
+        let mut uses: std::collections::BTreeMap<(u32, u32), [u32; 2]> =
+            std::collections::BTreeMap::new();
         for f in faces {
             let w = f.map(|v| welded[v as usize]);
             if w[0] == w[1] || w[1] == w[2] || w[0] == w[2] {
@@ -181,8 +213,11 @@ fn weld_properly(n: usize, faces: &[Face], stitches: &[Stitch]) -> (Vec<u32>, us
             }
         }
         // A proper edge is used once in each direction.
-        let bad: std::collections::BTreeSet<u32> =
-            uses.iter().filter(|(_, u)| u[0] > 1 || u[1] > 1).flat_map(|((a, b), _)| [*a, *b]).collect();
+        let bad: std::collections::BTreeSet<u32> = uses
+            .iter()
+            .filter(|(_, u)| u[0] > 1 || u[1] > 1)
+            .flat_map(|((a, b), _)| [*a, *b])
+            .collect();
         let before = active.len();
         let mut opened = std::collections::BTreeSet::new();
         // One stitch of each improper vertex a round, the last in the file.
@@ -232,7 +267,10 @@ fn weld(n: usize, stitches: &[Stitch]) -> Vec<u32> {
 /// Neighbouring stitches as lines to draw.
 fn seam_pairs(stitches: &[Stitch], welded: &[u32]) -> Vec<[u32; 2]> {
     let at: Vec<u32> = stitches.iter().map(|s| welded[s.vertex as usize]).collect();
-    at.windows(2).filter(|w| w[0] != w[1]).map(|w| [w[0], w[1]]).collect()
+    at.windows(2)
+        .filter(|w| w[0] != w[1])
+        .map(|w| [w[0], w[1]])
+        .collect()
 }
 
 #[cfg(test)]
@@ -243,7 +281,12 @@ mod tests {
 
     fn garment(text: &str) -> Result<MeshGarment, GarmentError> {
         let o = parse_sewn_obj(text, Path::new("g.obj")).expect("an OBJ");
-        from_mesh(&o, "g", GarmentKind::Skirt, Material::preset("cotton").expect("preset"))
+        from_mesh(
+            &o,
+            "g",
+            GarmentKind::Skirt,
+            Material::preset("cotton").expect("preset"),
+        )
     }
 
     /// Two unit squares beside each other, texture coordinates as in space.
@@ -254,24 +297,43 @@ mod tests {
     #[test]
     fn stitched_panels_become_one_surface_with_flat_rest() {
         let g = garment(SQUARES).expect("garment");
-        assert_eq!((g.garment.vertices, g.garment.faces.len(), g.closed), (6, 4, 0));
+        assert_eq!(
+            (g.garment.vertices, g.garment.faces.len(), g.closed),
+            (6, 4, 0)
+        );
         assert_eq!(g.garment.panels.len(), 2);
         let area: f64 = g.garment.rest.iter().map(crate::garment::mesh_area).sum();
         assert!((area - 2.0).abs() < 1e-9);
-        assert!((g.positions[1].z - 0.05).abs() < 1e-6, "welded vertices meet in the middle");
+        assert!(
+            (g.positions[1].z - 0.05).abs() < 1e-6,
+            "welded vertices meet in the middle"
+        );
     }
 
     #[test]
     fn faults_name_triangle_and_edge() {
         let flat = SQUARES.replace("vt 1 1\nvt 0 1", "vt 1 0\nvt 0 0");
-        assert!(matches!(garment(&flat), Err(GarmentError::Face { face: 0, .. })));
+        assert!(matches!(
+            garment(&flat),
+            Err(GarmentError::Face { face: 0, .. })
+        ));
         // Without texture coordinates the triangles keep the shape they have.
         let bare = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-        assert!((crate::garment::mesh_area(&garment(bare).expect("garment").garment.rest[0]) - 0.5).abs() < 1e-9);
+        assert!(
+            (crate::garment::mesh_area(&garment(bare).expect("garment").garment.rest[0]) - 0.5)
+                .abs()
+                < 1e-9
+        );
         // A third face on an edge.
         let three = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 2 1 4\nf 1 2 5\n";
         let o = parse_sewn_obj(three, Path::new("g.obj")).expect("an OBJ");
-        let e = from_mesh(&o, "g", GarmentKind::Top, Material::preset("cotton").expect("preset")).expect_err("edge");
+        let e = from_mesh(
+            &o,
+            "g",
+            GarmentKind::Top,
+            Material::preset("cotton").expect("preset"),
+        )
+        .expect_err("edge");
         assert!(e.to_string().contains("edge (0, 1)"), "{e}");
     }
 }

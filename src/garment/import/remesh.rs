@@ -31,7 +31,13 @@ pub fn remesh(mesh: &TriMesh, target: f64) -> TriMesh {
         f.iter().for_each(|&v| around[v as usize].push(i as u32));
     }
     let rim = vec![false; points.len()];
-    let mut r = Remesher { target, points, rim, faces: mesh.faces().iter().copied().map(Some).collect(), around };
+    let mut r = Remesher {
+        target,
+        points,
+        rim,
+        faces: mesh.faces().iter().copied().map(Some).collect(),
+        around,
+    };
     for (a, b) in r.edges() {
         if r.edge_faces(a, b).len() == 1 {
             r.rim[a as usize] = true;
@@ -51,7 +57,12 @@ pub fn remesh(mesh: &TriMesh, target: f64) -> TriMesh {
         index[i] = vertices.len() as u32;
         vertices.push(P3::from(r.points[i].coords.cast::<f32>()));
     }
-    let faces = r.faces.iter().flatten().map(|f| f.map(|v| index[v as usize])).collect();
+    let faces = r
+        .faces
+        .iter()
+        .flatten()
+        .map(|f| f.map(|v| index[v as usize]))
+        .collect();
     TriMesh::new(vertices, faces).unwrap_or_else(|_| mesh.clone())
 }
 
@@ -61,9 +72,17 @@ fn normal(p: [P3d; 3]) -> V3d {
 
 /// Sine of the smallest angle.
 fn smallest_angle(c: [P3d; 3]) -> f64 {
-    let l = [(c[1] - c[0]).norm(), (c[2] - c[1]).norm(), (c[0] - c[2]).norm()];
+    let l = [
+        (c[1] - c[0]).norm(),
+        (c[2] - c[1]).norm(),
+        (c[0] - c[2]).norm(),
+    ];
     let product = (l[0] * l[1]).max(l[1] * l[2]).max(l[2] * l[0]);
-    if product > 0.0 { normal(c).norm() / product } else { 0.0 }
+    if product > 0.0 {
+        normal(c).norm() / product
+    } else {
+        0.0
+    }
 }
 
 impl Remesher {
@@ -82,10 +101,16 @@ impl Remesher {
     }
     fn edge_faces(&self, a: u32, b: u32) -> Vec<u32> {
         let has = |f: &u32| self.faces[*f as usize].is_some_and(|f| f.contains(&b));
-        self.around[a as usize].iter().copied().filter(has).collect()
+        self.around[a as usize]
+            .iter()
+            .copied()
+            .filter(has)
+            .collect()
     }
     fn ring(&self, v: u32) -> Vec<u32> {
-        let faces = self.around[v as usize].iter().filter_map(|&f| self.faces[f as usize]);
+        let faces = self.around[v as usize]
+            .iter()
+            .filter_map(|&f| self.faces[f as usize]);
         let mut r: Vec<u32> = faces.flatten().filter(|w| *w != v).collect();
         r.sort_unstable();
         r.dedup();
@@ -96,7 +121,8 @@ impl Remesher {
     }
     fn put(&mut self, face: u32, f: Option<Face>) {
         if let Some(old) = self.faces[face as usize] {
-            old.iter().for_each(|&v| self.around[v as usize].retain(|&g| g != face));
+            old.iter()
+                .for_each(|&v| self.around[v as usize].retain(|&g| g != face));
         }
         self.faces[face as usize] = f;
         if let Some(new) = f {
@@ -105,8 +131,12 @@ impl Remesher {
     }
     /// Edges whose stretch is wanted, sorted by it.
     fn by_length(&self, wanted: impl Fn(f64) -> bool) -> Vec<(u32, u32)> {
-        let mut e: Vec<(f64, (u32, u32))> =
-            self.edges().into_iter().map(|e| (self.stretch(e.0, e.1), e)).filter(|e| wanted(e.0)).collect();
+        let mut e: Vec<(f64, (u32, u32))> = self
+            .edges()
+            .into_iter()
+            .map(|e| (self.stretch(e.0, e.1), e))
+            .filter(|e| wanted(e.0))
+            .collect();
         e.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         e.into_iter().map(|e| e.1).collect()
     }
@@ -115,14 +145,22 @@ impl Remesher {
         for (a, b) in self.by_length(|s| s > SPLIT).into_iter().rev() {
             let faces = self.edge_faces(a, b);
             let m = self.points.len() as u32;
-            self.points.push(nalgebra::center(&self.points[a as usize], &self.points[b as usize]));
+            self.points.push(nalgebra::center(
+                &self.points[a as usize],
+                &self.points[b as usize],
+            ));
             self.rim.push(faces.len() == 1);
             self.around.push(Vec::new());
             for f in faces {
-                let Some(old) = self.faces[f as usize] else { continue };
+                let Some(old) = self.faces[f as usize] else {
+                    continue;
+                };
                 self.put(f, Some(old.map(|v| if v == b { m } else { v })));
                 self.faces.push(None);
-                self.put(self.faces.len() as u32 - 1, Some(old.map(|v| if v == a { m } else { v })));
+                self.put(
+                    self.faces.len() as u32 - 1,
+                    Some(old.map(|v| if v == a { m } else { v })),
+                );
             }
         }
     }
@@ -149,24 +187,41 @@ impl Remesher {
         }
         let both = self.rim[keep as usize] == self.rim[drop as usize];
         let old = self.points[keep as usize];
-        let p = if both { nalgebra::center(&old, &self.points[drop as usize]) } else { old };
+        let p = if both {
+            nalgebra::center(&old, &self.points[drop as usize])
+        } else {
+            old
+        };
         for v in rk.iter().chain(&rd).filter(|v| **v != keep && **v != drop) {
             if (self.points[*v as usize] - p).norm() > SPLIT * self.target {
                 return;
             }
             // Every vertex keeps enough neighbours.
-            let opposite = shared.iter().any(|f| self.faces[*f as usize].is_some_and(|f| f.contains(v)));
+            let opposite = shared
+                .iter()
+                .any(|f| self.faces[*f as usize].is_some_and(|f| f.contains(v)));
             let least = if self.rim[*v as usize] { 1 } else { 3 };
             if opposite && self.around[*v as usize].len() <= least {
                 return;
             }
         }
-        for &f in self.around[keep as usize].iter().chain(&self.around[drop as usize]) {
+        for &f in self.around[keep as usize]
+            .iter()
+            .chain(&self.around[drop as usize])
+        {
             if shared.contains(&f) {
                 continue;
             }
-            let Some(face) = self.faces[f as usize] else { continue };
-            let after = face.map(|v| if v == keep || v == drop { p } else { self.points[v as usize] });
+            let Some(face) = self.faces[f as usize] else {
+                continue;
+            };
+            let after = face.map(|v| {
+                if v == keep || v == drop {
+                    p
+                } else {
+                    self.points[v as usize]
+                }
+            });
             let (n0, n1) = (normal(self.corners(&face)), normal(after));
             if n1.norm() == 0.0 || n0.norm() > 0.0 && n0.dot(&n1) < TURN * n0.norm() * n1.norm() {
                 return;
@@ -188,9 +243,13 @@ impl Remesher {
         for (a, b) in self.edges() {
             let faces = self.edge_faces(a, b);
             let &[f, g] = faces.as_slice() else { continue };
-            let (Some(ff), Some(gg)) = (self.faces[f as usize], self.faces[g as usize]) else { continue };
+            let (Some(ff), Some(gg)) = (self.faces[f as usize], self.faces[g as usize]) else {
+                continue;
+            };
             let other = |t: &Face| t.iter().copied().find(|&v| v != a && v != b);
-            let (Some(c), Some(d)) = (other(&ff), other(&gg)) else { continue };
+            let (Some(c), Some(d)) = (other(&ff), other(&gg)) else {
+                continue;
+            };
             if c == d || !self.edge_faces(c, d).is_empty() {
                 continue;
             }
@@ -199,8 +258,13 @@ impl Remesher {
             let cost = |v: u32, change: i32| (faces_of(v) + change - ideal(v)).pow(2);
             let before = cost(a, 0) + cost(b, 0) + cost(c, 0) + cost(d, 0);
             let after = cost(a, -1) + cost(b, -1) + cost(c, 1) + cost(d, 1);
-            let (new_f, new_g) = (ff.map(|v| if v == b { d } else { v }), gg.map(|v| if v == a { c } else { v }));
-            let worst = |x: &Face, y: &Face| smallest_angle(self.corners(x)).min(smallest_angle(self.corners(y)));
+            let (new_f, new_g) = (
+                ff.map(|v| if v == b { d } else { v }),
+                gg.map(|v| if v == a { c } else { v }),
+            );
+            let worst = |x: &Face, y: &Face| {
+                smallest_angle(self.corners(x)).min(smallest_angle(self.corners(y)))
+            };
             let (q0, q1) = (worst(&ff, &gg), worst(&new_f, &new_g));
             let better = after < before && q1 > 0.6 * q0 || q0 < 0.3 && q1 > 1.3 * q0;
             let poor = |v: u32| faces_of(v) <= if self.rim[v as usize] { 1 } else { 3 };
@@ -233,7 +297,10 @@ impl Remesher {
                     return p;
                 }
                 let (mut sum, mut area, mut n) = (V3d::zeros(), 0.0, V3d::zeros());
-                for f in self.around[i].iter().filter_map(|f| self.faces[*f as usize]) {
+                for f in self.around[i]
+                    .iter()
+                    .filter_map(|f| self.faces[*f as usize])
+                {
                     let c = self.corners(&f);
                     let m = normal(c);
                     n += m;
@@ -267,11 +334,22 @@ mod tests {
         };
         let at = |i: u32, j: u32| j * n + i % n;
         let v = (0..=rows)
-            .flat_map(|j| (0..n).map(move |i| P3::new(0.15 * angle(i).sin(), 0.03 * j as f32, 0.15 * angle(i).cos())))
+            .flat_map(|j| {
+                (0..n).map(move |i| {
+                    P3::new(
+                        0.15 * angle(i).sin(),
+                        0.03 * j as f32,
+                        0.15 * angle(i).cos(),
+                    )
+                })
+            })
             .collect();
         let f = (0..rows).flat_map(|j| {
             (0..n).flat_map(move |i| {
-                [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
+                [
+                    [at(i, j), at(i + 1, j), at(i + 1, j + 1)],
+                    [at(i, j), at(i + 1, j + 1), at(i, j + 1)],
+                ]
             })
         });
         TriMesh::new(v, f.collect()).expect("a tube")
@@ -282,16 +360,28 @@ mod tests {
         let (before, target) = (tube(), 0.02);
         let after = remesh(&before, target);
         let t = Topology::new(&after).expect("proper");
-        let chi = after.vertices().len() as i64 - t.edges().len() as i64 + after.faces().len() as i64;
+        let chi =
+            after.vertices().len() as i64 - t.edges().len() as i64 + after.faces().len() as i64;
         assert_eq!((chi, t.components().1), (0, 1), "still a tube");
-        assert!((after.area() / before.area() - 1.0).abs() < 0.02, "{} {}", after.area(), before.area());
+        assert!(
+            (after.area() / before.area() - 1.0).abs() < 0.02,
+            "{} {}",
+            after.area(),
+            before.area()
+        );
         for p in after.vertices() {
-            assert!((p.x.hypot(p.z) - 0.15).abs() < 4e-3 && (-1e-6..0.36 + 1e-4).contains(&p.y), "{p}");
+            assert!(
+                (p.x.hypot(p.z) - 0.15).abs() < 4e-3 && (-1e-6..0.36 + 1e-4).contains(&p.y),
+                "{p}"
+            );
         }
         let mut lengths: Vec<f32> = t
             .edges()
             .iter()
-            .map(|e| (after.vertices()[e.v[0] as usize] - after.vertices()[e.v[1] as usize]).norm() / target as f32)
+            .map(|e| {
+                (after.vertices()[e.v[0] as usize] - after.vertices()[e.v[1] as usize]).norm()
+                    / target as f32
+            })
             .collect();
         lengths.sort_by(f32::total_cmp);
         let at = |q: usize| lengths[lengths.len() * q / 100];

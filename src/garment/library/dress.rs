@@ -3,7 +3,9 @@
 use super::skirt::{HIP_DEPTH, darts, flare, sector};
 use super::top::{SHOULDER_FALL, shoulders, trunk_seams, yoke};
 use super::{panel, sewn};
-use crate::garment::{Anchor, Curve, GarmentError, GarmentKind, Material, Pattern, Placement, SizeRow};
+use crate::garment::{
+    Anchor, Curve, GarmentError, GarmentKind, Material, Pattern, Placement, SizeRow,
+};
 
 /// Ease at chest, waist and hip, metres.
 const EASE: [f64; 3] = [0.06, 0.04, 0.10];
@@ -26,9 +28,18 @@ pub(super) fn flared(row: &SizeRow) -> Result<Pattern, GarmentError> {
     let length = -(row.trunk - HIP_DEPTH + 0.01);
     let bodice = |name: &str, placement, drop: f64, depth: f64| {
         let flip = |p: [f64; 2]| [-p[0], p[1]];
-        let (hp, st, ua, wa) = ([neck, 0.0], [tip, -SHOULDER_FALL], [half, armpit], [cut_waist, length]);
+        let (hp, st, ua, wa) = (
+            [neck, 0.0],
+            [tip, -SHOULDER_FALL],
+            [half, armpit],
+            [cut_waist, length],
+        );
         let at = cut_waist * 0.52;
-        let (inn, apex, out) = ([at - DART / 2.0, length], [at, length + depth], [at + DART / 2.0, length]);
+        let (inn, apex, out) = (
+            [at - DART / 2.0, length],
+            [at, length + depth],
+            [at + DART / 2.0, length],
+        );
         let (lower, upper) = ([tip - 0.012, armpit + 0.01], [tip - 0.024, armpit * 0.55]);
         panel(
             name,
@@ -55,7 +66,8 @@ pub(super) fn flared(row: &SizeRow) -> Result<Pattern, GarmentError> {
     // The skirt's waist is divided where the bodice's darts close.
     let side = (cut_waist - (cut_waist * 0.52 + DART / 2.0)) / skirt_waist;
     let cuts = [side, 1.0 - side];
-    let skirt = |name: &str, placement| sector(name, placement, skirt_waist, half_angle, SKIRT, &cuts);
+    let skirt =
+        |name: &str, placement| sector(name, placement, skirt_waist, half_angle, SKIRT, &cuts);
     let panels = vec![
         bodice("front", Placement::TrunkFront, DROP[0], DART_DEPTH[0]),
         bodice("back", Placement::TrunkBack, DROP[1], DART_DEPTH[1]),
@@ -63,8 +75,14 @@ pub(super) fn flared(row: &SizeRow) -> Result<Pattern, GarmentError> {
         skirt("skirt_back", Placement::SkirtBack),
     ];
     let mut seams = trunk_seams();
-    seams.push(sewn(["skirt_front", "side_right"], ["skirt_back", "side_left"]));
-    seams.push(sewn(["skirt_front", "side_left"], ["skirt_back", "side_right"]));
+    seams.push(sewn(
+        ["skirt_front", "side_right"],
+        ["skirt_back", "side_left"],
+    ));
+    seams.push(sewn(
+        ["skirt_front", "side_left"],
+        ["skirt_back", "side_right"],
+    ));
     for side in ["front", "back"] {
         let s = format!("skirt_{side}");
         for e in ["waist_0", "waist_1", "waist_2"] {
@@ -79,9 +97,16 @@ pub(super) fn flared(row: &SizeRow) -> Result<Pattern, GarmentError> {
         panels,
         seams,
         darts: darts(&["front", "back"]),
-        anchors: vec![Anchor { strength: 0.5, ..shoulders() }],
+        anchors: vec![Anchor {
+            strength: 0.5,
+            ..shoulders()
+        }],
         material: Material::preset("cotton")?,
         layer: 1,
-        finished: [half * 4.0, waist * 4.0, (radius + HIP_DEPTH) * half_angle * 4.0],
+        finished: [
+            half * 4.0,
+            waist * 4.0,
+            (radius + HIP_DEPTH) * half_angle * 4.0,
+        ],
     })
 }

@@ -9,7 +9,17 @@ use super::{Curve, GarmentError, Panel, PanelEdge, Pattern, Placement, Seam, Siz
 
 /// Names of all garments, in the order to show them.
 pub fn names() -> &'static [&'static str] {
-    &["tshirt", "longsleeve", "tank", "hoodie", "dress", "skirt", "straight_skirt", "trousers", "shorts"]
+    &[
+        "tshirt",
+        "longsleeve",
+        "tank",
+        "hoodie",
+        "dress",
+        "skirt",
+        "straight_skirt",
+        "trousers",
+        "shorts",
+    ]
 }
 
 /// Colour a garment is shown in unless another is chosen, sRGB. Unknown names get the first.
@@ -25,7 +35,10 @@ pub fn dye(name: &str) -> [u8; 3] {
         [0x34, 0x3c, 0x52],
         [0x9a, 0x88, 0x66],
     ];
-    names().iter().position(|n| *n == name).map_or(DYES[0], |i| DYES[i])
+    names()
+        .iter()
+        .position(|n| *n == name)
+        .map_or(DYES[0], |i| DYES[i])
 }
 
 /// Draws the pattern of a garment in a size.
@@ -44,7 +57,12 @@ pub fn pattern(name: &str, size: Size) -> Result<Pattern, GarmentError> {
         "straight_skirt" => skirt::straight(&row)?,
         "trousers" => trousers::long(&row)?,
         "shorts" => trousers::shorts(&row)?,
-        _ => return Err(GarmentError::UnknownGarment { name: name.to_owned(), known: names().join(", ") }),
+        _ => {
+            return Err(GarmentError::UnknownGarment {
+                name: name.to_owned(),
+                known: names().join(", "),
+            });
+        }
     };
     p.check()?;
     Ok(p)
@@ -57,7 +75,11 @@ fn panel(name: &str, placement: Placement, edges: &[(&str, [f64; 2], Curve)]) ->
         placement,
         edges: edges
             .iter()
-            .map(|(n, from, curve)| PanelEdge { name: (*n).to_owned(), from: *from, curve: *curve })
+            .map(|(n, from, curve)| PanelEdge {
+                name: (*n).to_owned(),
+                from: *from,
+                curve: *curve,
+            })
             .collect(),
     }
 }
@@ -77,11 +99,19 @@ fn mirrored(p: &Panel, name: &str, placement: Placement) -> Panel {
             },
         })
         .collect();
-    Panel { name: name.to_owned(), placement, edges }
+    Panel {
+        name: name.to_owned(),
+        placement,
+        edges,
+    }
 }
 
 fn sewn(a: [&str; 2], b: [&str; 2]) -> Seam {
-    Seam { a: a.map(str::to_owned), b: b.map(str::to_owned), reversed: true }
+    Seam {
+        a: a.map(str::to_owned),
+        b: b.map(str::to_owned),
+        reversed: true,
+    }
 }
 
 #[cfg(test)]
@@ -97,9 +127,15 @@ mod tests {
         for name in names() {
             for size in Size::ALL {
                 let p = pattern(name, size).expect("pattern");
-                let m =
-                    GarmentMesh::sew(&p, &Triangulation::default()).unwrap_or_else(|e| panic!("{name} {size}: {e}"));
-                let rims = m.topology().expect("manifold").edges().iter().filter(|e| e.twin.is_none()).count();
+                let m = GarmentMesh::sew(&p, &Triangulation::default())
+                    .unwrap_or_else(|e| panic!("{name} {size}: {e}"));
+                let rims = m
+                    .topology()
+                    .expect("manifold")
+                    .edges()
+                    .iter()
+                    .filter(|e| e.twin.is_none())
+                    .count();
                 eprintln!(
                     "{name} {size}: {} vertices, {} faces, min angle {:.1}, rim edges {rims}",
                     m.vertices,
@@ -110,8 +146,8 @@ mod tests {
                 assert!(m.rest.iter().all(|t| crate::garment::mesh_area(t) > 0.0));
                 // Euler characteristic: tops are spheres with neck, hem and two sleeve openings; skirts tubes;
                 // trousers a sphere with three holes.
-                let chi =
-                    m.vertices as i64 - m.topology().expect("manifold").edges().len() as i64 + m.faces.len() as i64;
+                let chi = m.vertices as i64 - m.topology().expect("manifold").edges().len() as i64
+                    + m.faces.len() as i64;
                 let holes = match *name {
                     "skirt" | "straight_skirt" => 2, // tubes
                     "trousers" | "shorts" => 3,
@@ -129,7 +165,10 @@ mod tests {
         let back = Pattern::from_json(&p.to_json()).expect("round trip");
         let (a, b) = (&p.panels[0].edges[2], &back.panels[0].edges[2]);
         assert!((a.from[1] - b.from[1]).abs() < 1e-12 && a.name == b.name);
-        assert_eq!((back.seams, back.anchors, back.size), (p.seams.clone(), p.anchors.clone(), p.size));
+        assert_eq!(
+            (back.seams, back.anchors, back.size),
+            (p.seams.clone(), p.anchors.clone(), p.size)
+        );
         let mut q = p.clone();
         q.seams[0].b[1] = "nowhere".into();
         assert!(q.check().expect_err("seam").to_string().contains("nowhere"));
@@ -140,6 +179,9 @@ mod tests {
         let mut q = p.clone();
         q.panels[1].edges[0].from[0] = f64::NAN;
         assert!(matches!(q.check(), Err(GarmentError::Edge { .. })));
-        assert!(matches!(pattern("cape", Size::M), Err(GarmentError::UnknownGarment { .. })));
+        assert!(matches!(
+            pattern("cape", Size::M),
+            Err(GarmentError::UnknownGarment { .. })
+        ));
     }
 }

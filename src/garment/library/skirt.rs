@@ -1,7 +1,9 @@
 //! Skirts to the knee: flared (waist and hem on arcs) and straight (shaped by darts).
 
 use super::{panel, sewn};
-use crate::garment::{Anchor, Curve, Dart, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, SizeRow};
+use crate::garment::{
+    Anchor, Curve, Dart, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, SizeRow,
+};
 
 /// Ease at the waist, metres.
 const WAIST_EASE: f64 = 0.015;
@@ -32,22 +34,34 @@ pub(super) fn sector(
     let arc = |r: f64, from: f64, to: f64| {
         let k = 4.0 / 3.0 * ((to - from) / 4.0).tan() * r;
         let (p, q) = (at(r, from), at(r, to));
-        Curve::Cubic([p[0] + k * from.cos(), p[1] + k * from.sin()], [q[0] - k * to.cos(), q[1] - k * to.sin()])
+        Curve::Cubic(
+            [p[0] + k * from.cos(), p[1] + k * from.sin()],
+            [q[0] - k * to.cos(), q[1] - k * to.sin()],
+        )
     };
     let low = radius + length;
     let mut edges = vec![
-        ("hem".to_owned(), at(low, -half_angle), arc(low, -half_angle, half_angle)),
+        (
+            "hem".to_owned(),
+            at(low, -half_angle),
+            arc(low, -half_angle, half_angle),
+        ),
         ("side_right".to_owned(), at(low, half_angle), Curve::Line),
     ];
     let mut from = half_angle;
     for (k, share) in cuts.iter().copied().chain([1.0]).enumerate() {
         let to = half_angle * (1.0 - 2.0 * share);
-        let edge = if cuts.is_empty() { "waist".to_owned() } else { format!("waist_{k}") };
+        let edge = if cuts.is_empty() {
+            "waist".to_owned()
+        } else {
+            format!("waist_{k}")
+        };
         edges.push((edge, at(radius, from), arc(radius, from, to)));
         from = to;
     }
     edges.push(("side_left".to_owned(), at(radius, -half_angle), Curve::Line));
-    let edges: Vec<(&str, [f64; 2], Curve)> = edges.iter().map(|(n, p, c)| (n.as_str(), *p, *c)).collect();
+    let edges: Vec<(&str, [f64; 2], Curve)> =
+        edges.iter().map(|(n, p, c)| (n.as_str(), *p, *c)).collect();
     panel(name, placement, &edges)
 }
 
@@ -62,9 +76,20 @@ pub(super) fn flared(row: &SizeRow) -> Result<Pattern, GarmentError> {
     let half_angle = flare(waist, hip);
     let radius = waist / (2.0 * half_angle);
     let build = |name: &str, placement| sector(name, placement, waist, half_angle, LENGTH, &[]);
-    let panels = vec![build("front", Placement::SkirtFront), build("back", Placement::SkirtBack)];
+    let panels = vec![
+        build("front", Placement::SkirtFront),
+        build("back", Placement::SkirtBack),
+    ];
     let hips = (radius + HIP_DEPTH) * half_angle * 4.0;
-    finish(row, "skirt", "twill", panels, vec![], vec!["waist"], [0.0, waist * 2.0, hips])
+    finish(
+        row,
+        "skirt",
+        "twill",
+        panels,
+        vec![],
+        vec!["waist"],
+        [0.0, waist * 2.0, hips],
+    )
 }
 
 pub(super) fn straight(row: &SizeRow) -> Result<Pattern, GarmentError> {
@@ -79,12 +104,21 @@ pub(super) fn straight(row: &SizeRow) -> Result<Pattern, GarmentError> {
         let flip = |p: [f64; 2]| [-p[0], p[1]];
         let at = top * 0.52;
         let line = |x: f64| rise * x / top;
-        let (out, apex, inn) =
-            ([at + dart / 2.0, line(at + dart / 2.0)], [at, -depth], [at - dart / 2.0, line(at - dart / 2.0)]);
+        let (out, apex, inn) = (
+            [at + dart / 2.0, line(at + dart / 2.0)],
+            [at, -depth],
+            [at - dart / 2.0, line(at - dart / 2.0)],
+        );
         let (corner, hips, low) = ([top, rise], [hip, -HIP_DEPTH], [hem, -LENGTH]);
         // The hip curve leaves the hip line upright.
-        let curve = Curve::Cubic([hip, -HIP_DEPTH * 0.55], [top + (hip - top) * 0.55, -HIP_DEPTH * 0.18]);
-        let back = Curve::Cubic([-top - (hip - top) * 0.55, -HIP_DEPTH * 0.18], [-hip, -HIP_DEPTH * 0.55]);
+        let curve = Curve::Cubic(
+            [hip, -HIP_DEPTH * 0.55],
+            [top + (hip - top) * 0.55, -HIP_DEPTH * 0.18],
+        );
+        let back = Curve::Cubic(
+            [-top - (hip - top) * 0.55, -HIP_DEPTH * 0.18],
+            [-hip, -HIP_DEPTH * 0.55],
+        );
         panel(
             name,
             placement,
@@ -104,8 +138,10 @@ pub(super) fn straight(row: &SizeRow) -> Result<Pattern, GarmentError> {
             ],
         )
     };
-    let panels =
-        vec![build("front", Placement::SkirtFront, DART_DEPTH[0]), build("back", Placement::SkirtBack, DART_DEPTH[1])];
+    let panels = vec![
+        build("front", Placement::SkirtFront, DART_DEPTH[0]),
+        build("back", Placement::SkirtBack, DART_DEPTH[1]),
+    ];
     let darts = darts(&["front", "back"]);
     finish(
         row,
@@ -123,8 +159,10 @@ pub(super) fn darts(panels: &[&str]) -> Vec<Dart> {
     panels
         .iter()
         .flat_map(|p| {
-            ["right", "left"]
-                .map(|s| Dart { panel: (*p).to_owned(), edges: [format!("dart_{s}_a"), format!("dart_{s}_b")] })
+            ["right", "left"].map(|s| Dart {
+                panel: (*p).to_owned(),
+                edges: [format!("dart_{s}_a"), format!("dart_{s}_b")],
+            })
         })
         .collect()
 }
@@ -146,8 +184,14 @@ fn finish(
         seams.push(sewn(["front", "hip_right"], ["back", "hip_left"]));
         seams.push(sewn(["front", "hip_left"], ["back", "hip_right"]));
     }
-    let edges =
-        ["front", "back"].iter().flat_map(|p| waist.iter().map(move |e| [(*p).to_owned(), (*e).to_owned()])).collect();
+    let edges = ["front", "back"]
+        .iter()
+        .flat_map(|p| {
+            waist
+                .iter()
+                .map(move |e| [(*p).to_owned(), (*e).to_owned()])
+        })
+        .collect();
     Ok(Pattern {
         name: name.into(),
         kind: GarmentKind::Skirt,
@@ -155,7 +199,11 @@ fn finish(
         panels,
         seams,
         darts,
-        anchors: vec![Anchor { name: "waist".into(), edges, strength: 1.0 }],
+        anchors: vec![Anchor {
+            name: "waist".into(),
+            edges,
+            strength: 1.0,
+        }],
         material: Material::preset(fabric)?,
         layer: 0,
         finished,

@@ -2,7 +2,8 @@
 
 use super::{mirrored, panel, sewn};
 use crate::garment::{
-    Anchor, Curve, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, Seam, Side, SizeRow,
+    Anchor, Curve, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, Seam, Side,
+    SizeRow,
 };
 
 /// Fall of the shoulder seam from neck to tip, metres.
@@ -48,13 +49,21 @@ const TSHIRT: Cut = Cut {
     strap: 0.0,
     scye: 0.105,
     longer: 0.045,
-    sleeve: Some(Sleeve { ease: 0.085, length: Some(0.215), cuff: 0.93 }),
+    sleeve: Some(Sleeve {
+        ease: 0.085,
+        length: Some(0.215),
+        cuff: 0.93,
+    }),
     hood: false,
 };
 const LONGSLEEVE: Cut = Cut {
     name: "longsleeve",
     fabric: "cotton",
-    sleeve: Some(Sleeve { ease: 0.085, length: None, cuff: 0.50 }),
+    sleeve: Some(Sleeve {
+        ease: 0.085,
+        length: None,
+        cuff: 0.50,
+    }),
     ..TSHIRT
 };
 const TANK: Cut = Cut {
@@ -76,7 +85,11 @@ const HOODIE: Cut = Cut {
     drop: [0.085, 0.020],
     scye: 0.125,
     longer: 0.04,
-    sleeve: Some(Sleeve { ease: 0.12, length: None, cuff: 0.50 }),
+    sleeve: Some(Sleeve {
+        ease: 0.12,
+        length: None,
+        cuff: 0.50,
+    }),
     hood: true,
     ..TSHIRT
 };
@@ -108,10 +121,22 @@ pub(super) fn yoke(
     [
         ("armhole_right", underarm, Curve::Cubic(lower, upper)),
         ("shoulder_right", tip, Curve::Line),
-        ("neck_right", high, Curve::Cubic([neck * 0.93, -drop * 0.62], [neck * 0.5, -drop])),
-        ("neck_left", [0.0, -drop], Curve::Cubic([-neck * 0.5, -drop], [-neck * 0.93, -drop * 0.62])),
+        (
+            "neck_right",
+            high,
+            Curve::Cubic([neck * 0.93, -drop * 0.62], [neck * 0.5, -drop]),
+        ),
+        (
+            "neck_left",
+            [0.0, -drop],
+            Curve::Cubic([-neck * 0.5, -drop], [-neck * 0.93, -drop * 0.62]),
+        ),
         ("shoulder_left", flip(high), Curve::Line),
-        ("armhole_left", flip(tip), Curve::Cubic(flip(upper), flip(lower))),
+        (
+            "armhole_left",
+            flip(tip),
+            Curve::Cubic(flip(upper), flip(lower)),
+        ),
     ]
 }
 
@@ -119,7 +144,11 @@ fn draw(row: &SizeRow, cut: &Cut) -> Result<Pattern, GarmentError> {
     let half = (row.body.chest + cut.ease[0]) / 4.0; // half width of the front panel
     let hem = (row.body.hip.max(row.body.chest) + cut.ease[1]) / 4.0;
     let neck = row.neck / 5.0 + cut.neck;
-    let tip = if cut.strap > 0.0 { neck + cut.strap } else { row.shoulders / 2.0 + 0.005 };
+    let tip = if cut.strap > 0.0 {
+        neck + cut.strap
+    } else {
+        row.shoulders / 2.0 + 0.005
+    };
     let fall = SHOULDER_FALL * ((tip - neck) / (row.shoulders / 2.0 - row.neck / 5.0)).min(1.0);
     let armpit = -(row.body.chest / 8.0 + cut.scye);
     let length = -(row.trunk + cut.longer);
@@ -133,7 +162,10 @@ fn draw(row: &SizeRow, cut: &Cut) -> Result<Pattern, GarmentError> {
             name,
             placement,
             &[
-                &[("hem", flip(he), Curve::Line), ("side_right", he, Curve::Line)],
+                &[
+                    ("hem", flip(he), Curve::Line),
+                    ("side_right", he, Curve::Line),
+                ],
                 &yoke(hp, st, ua, drop, [lower, upper])[..],
                 &[("side_left", flip(ua), Curve::Line)],
             ]
@@ -179,7 +211,10 @@ pub(super) fn trunk_seams() -> Vec<Seam> {
 pub(super) fn shoulders() -> Anchor {
     Anchor {
         name: "shoulders".into(),
-        edges: vec![["front".into(), "shoulder_right".into()], ["front".into(), "shoulder_left".into()]],
+        edges: vec![
+            ["front".into(), "shoulder_right".into()],
+            ["front".into(), "shoulder_left".into()],
+        ],
         strength: 0.5,
     }
 }
@@ -189,7 +224,8 @@ fn length_of(p: &Panel, edge: &str) -> f64 {
 }
 
 fn sleeves(row: &SizeRow, cut: &Sleeve, panels: &mut Vec<Panel>, seams: &mut Vec<Seam>) {
-    let hole = 0.5 * (length_of(&panels[0], "armhole_right") + length_of(&panels[1], "armhole_right"));
+    let hole =
+        0.5 * (length_of(&panels[0], "armhole_right") + length_of(&panels[1], "armhole_right"));
     let bicep = (row.upper_arm + cut.ease) / 2.0; // half width of the sleeve at the underarm
     let length = cut.length.unwrap_or(row.arm);
     let cuff = bicep * cut.cuff;
@@ -204,8 +240,16 @@ fn sleeves(row: &SizeRow, cut: &Sleeve, panels: &mut Vec<Panel>, seams: &mut Vec
             &[
                 ("cuff", [-cuff, -length], Curve::Line),
                 ("under_right", [cuff, -length], Curve::Line),
-                ("cap_right", r, Curve::Cubic([bicep * 0.62, -cap * 0.93], [bicep * 0.50, 0.0])),
-                ("cap_left", top, Curve::Cubic([-bicep * 0.50, 0.0], [-bicep * 0.62, -cap * 0.93])),
+                (
+                    "cap_right",
+                    r,
+                    Curve::Cubic([bicep * 0.62, -cap * 0.93], [bicep * 0.50, 0.0]),
+                ),
+                (
+                    "cap_left",
+                    top,
+                    Curve::Cubic([-bicep * 0.50, 0.0], [-bicep * 0.62, -cap * 0.93]),
+                ),
                 ("under_left", l, Curve::Line),
             ],
         )
@@ -222,8 +266,14 @@ fn sleeves(row: &SizeRow, cut: &Sleeve, panels: &mut Vec<Panel>, seams: &mut Vec
         sewn(["sleeve_left", "cap_left"], ["front", "armhole_right"]),
         sewn(["sleeve_right", "cap_right"], ["back", "armhole_right"]),
         sewn(["sleeve_right", "cap_left"], ["front", "armhole_left"]),
-        sewn(["sleeve_left", "under_right"], ["sleeve_left", "under_left"]),
-        sewn(["sleeve_right", "under_right"], ["sleeve_right", "under_left"]),
+        sewn(
+            ["sleeve_left", "under_right"],
+            ["sleeve_left", "under_left"],
+        ),
+        sewn(
+            ["sleeve_right", "under_right"],
+            ["sleeve_right", "under_left"],
+        ),
     ]);
 }
 
@@ -234,7 +284,10 @@ const HOOD_DEPTH: f64 = 0.245;
 
 /// Two mirrored halves, sewn along the crown and to the neckline.
 fn hood(panels: &mut Vec<Panel>, seams: &mut Vec<Seam>) {
-    let (b, f) = (length_of(&panels[1], "neck_right"), length_of(&panels[0], "neck_right"));
+    let (b, f) = (
+        length_of(&panels[1], "neck_right"),
+        length_of(&panels[0], "neck_right"),
+    );
     // Seen from the wearer's right: x runs to the front, the seam along neck and crown starts at the nape.
     let dip = 0.03; // the front of a neckline lies lower
     let right = panel(
@@ -243,11 +296,18 @@ fn hood(panels: &mut Vec<Panel>, seams: &mut Vec<Seam>) {
         &[
             ("neck_back", [0.0, 0.0], Curve::Line),
             ("neck_front", [b, 0.0], Curve::Line),
-            ("face", [b + (f * f - dip * dip).max(0.0).sqrt(), -dip], Curve::Line),
+            (
+                "face",
+                [b + (f * f - dip * dip).max(0.0).sqrt(), -dip],
+                Curve::Line,
+            ),
             (
                 "crown",
                 [HOOD_DEPTH * 0.98, HOOD_HEIGHT],
-                Curve::Cubic([HOOD_DEPTH * 0.30, HOOD_HEIGHT * 1.08], [-0.14, HOOD_HEIGHT * 0.62]),
+                Curve::Cubic(
+                    [HOOD_DEPTH * 0.30, HOOD_HEIGHT * 1.08],
+                    [-0.14, HOOD_HEIGHT * 0.62],
+                ),
             ),
         ],
     );

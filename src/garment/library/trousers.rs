@@ -1,7 +1,9 @@
 //! Straight trousers and shorts: two fronts, two backs.
 
 use super::{mirrored, panel, sewn};
-use crate::garment::{Anchor, Curve, GarmentError, GarmentKind, Material, Pattern, Placement, Side, SizeRow};
+use crate::garment::{
+    Anchor, Curve, GarmentError, GarmentKind, Material, Pattern, Placement, Side, SizeRow,
+};
 
 /// Ease at the waist, metres.
 const WAIST_EASE: f64 = 0.02;
@@ -23,7 +25,13 @@ pub(super) fn shorts(row: &SizeRow) -> Result<Pattern, GarmentError> {
 }
 
 /// `taper` is the width at the hem over that at the crotch.
-fn draw(row: &SizeRow, name: &str, fabric: &str, inseam: f64, taper: f64) -> Result<Pattern, GarmentError> {
+fn draw(
+    row: &SizeRow,
+    name: &str,
+    fabric: &str,
+    inseam: f64,
+    taper: f64,
+) -> Result<Pattern, GarmentError> {
     let hip = (row.body.hip + HIP_EASE) / 4.0; // width of one of four panels at the hip
     let waist = (row.body.waist + WAIST_EASE) / 4.0;
     let rise = -(row.rise + RISE_EASE);
@@ -41,10 +49,21 @@ fn draw(row: &SizeRow, name: &str, fabric: &str, inseam: f64, taper: f64) -> Res
             &[
                 ("hem", [crease - cuff, hem], Curve::Line),
                 ("outseam", [crease + cuff, hem], Curve::Line),
-                ("outseam_top", co, Curve::Cubic([hip, rise * 0.62], [waist + (hip - waist) * 0.75, hip_line * 0.35])),
+                (
+                    "outseam_top",
+                    co,
+                    Curve::Cubic(
+                        [hip, rise * 0.62],
+                        [waist + (hip - waist) * 0.75, hip_line * 0.35],
+                    ),
+                ),
                 ("waist", wo, Curve::Line),
                 ("centre", [0.0, 0.0], Curve::Line),
-                ("crotch", [0.0, hip_line], Curve::Cubic([0.0, rise * 0.90], [inner * 0.35, rise])),
+                (
+                    "crotch",
+                    [0.0, hip_line],
+                    Curve::Cubic([0.0, rise * 0.90], [inner * 0.35, rise]),
+                ),
                 ("inseam", [inner, rise], Curve::Line),
             ],
         )
@@ -75,7 +94,12 @@ fn draw(row: &SizeRow, name: &str, fabric: &str, inseam: f64, taper: f64) -> Res
         darts: vec![],
         anchors: vec![Anchor {
             name: "waist".into(),
-            edges: vec![edge("front_left"), edge("front_right"), edge("back_left"), edge("back_right")],
+            edges: vec![
+                edge("front_left"),
+                edge("front_right"),
+                edge("back_left"),
+                edge("back_right"),
+            ],
             strength: 1.0,
         }],
         material: Material::preset(fabric)?,

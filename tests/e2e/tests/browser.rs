@@ -1,6 +1,9 @@
 //! The page in a real browser, against the real services in this process: `tests/web/mirror.mjs` is the shopper.
 
-#![allow(clippy::print_stdout, reason = "a skipped test must be loud, and the script says what it saw")]
+#![allow(
+    clippy::print_stdout,
+    reason = "a skipped test must be loud, and the script says what it saw"
+)]
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -30,14 +33,28 @@ fn chromium() -> PathBuf {
 
 /// What this machine lacks for `what`; with `TRYON_REQUIRE_ALL=1` lacking it is a failure.
 fn missing(what: &str, browser: bool) -> bool {
-    let node = Command::new("node").arg("--version").output().is_ok_and(|o| o.status.success());
+    let node = Command::new("node")
+        .arg("--version")
+        .output()
+        .is_ok_and(|o| o.status.success());
     let lacks = [
         (!node, "node is not installed"),
-        (browser && !chromium().exists(), "chromium is not installed (or $CHROMIUM is not a file)"),
-        (browser && !web().join("node_modules/playwright-core").exists(), "`npm ci` has not run in tests/web"),
+        (
+            browser && !chromium().exists(),
+            "chromium is not installed (or $CHROMIUM is not a file)",
+        ),
+        (
+            browser && !web().join("node_modules/playwright-core").exists(),
+            "`npm ci` has not run in tests/web",
+        ),
     ];
-    let Some((_, why)) = lacks.into_iter().find(|(lacking, _)| *lacking) else { return false };
-    assert!(std::env::var_os("TRYON_REQUIRE_ALL").is_none_or(|v| v != "1"), "{what}: {why}");
+    let Some((_, why)) = lacks.into_iter().find(|(lacking, _)| *lacking) else {
+        return false;
+    };
+    assert!(
+        std::env::var_os("TRYON_REQUIRE_ALL").is_none_or(|v| v != "1"),
+        "{what}: {why}"
+    );
     println!("SKIPPED: {what}: {why}");
     true
 }
@@ -47,7 +64,10 @@ fn modules_of_the_page_and_names_in_deploy() -> Result<()> {
     if missing("the page's unit tests", false) {
         return Ok(());
     }
-    let out = Command::new("node").arg("--test").current_dir(web()).output()?;
+    let out = Command::new("node")
+        .arg("--test")
+        .current_dir(web())
+        .output()?;
     let said = String::from_utf8_lossy(&out.stdout);
     ensure!(out.status.success(), "node --test in tests/web:\n{said}");
     Ok(())
@@ -64,7 +84,9 @@ struct Chain {
 
 impl Chain {
     fn start() -> Result<Self> {
-        let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .enable_all()
+            .build()?;
         let pool = Pool::new(0)?;
         let anywhere = ([127, 0, 0, 1], 0).into();
         let mut config = Config::default();
@@ -78,7 +100,13 @@ impl Chain {
         config.tracking.admin = anywhere;
         config.cloth.admin = anywhere;
         config.compositor.admin = anywhere;
-        let mut chain = Self { runtime, bus: LocalBus::new(pool.clone()), pool, config, running: Vec::new() };
+        let mut chain = Self {
+            runtime,
+            bus: LocalBus::new(pool.clone()),
+            pool,
+            config,
+            running: Vec::new(),
+        };
         for name in ["capture", "tracking", "cloth", "compositor"] {
             chain.start_one(name)?;
         }
@@ -121,7 +149,11 @@ impl Chain {
     }
 
     fn end_one(&mut self, name: &str) -> Result<()> {
-        let at = self.running.iter().position(|(n, ..)| *n == name).ok_or_else(|| anyhow!("{name} does not run"))?;
+        let at = self
+            .running
+            .iter()
+            .position(|(n, ..)| *n == name)
+            .ok_or_else(|| anyhow!("{name} does not run"))?;
         let (_, shutdown, running) = self.running.remove(at);
         shutdown.cancel();
         self.runtime.block_on(running.ended())?;
@@ -142,7 +174,14 @@ fn a_shopper_in_chromium() -> Result<()> {
     let mut script = Command::new("node")
         .arg("mirror.mjs")
         .arg(format!("http://{}/", chain.config.compositor.address))
-        .args(["--stdio", "--rounds", &BROKEN.len().to_string(), "--timeout", "90", "--out"])
+        .args([
+            "--stdio",
+            "--rounds",
+            &BROKEN.len().to_string(),
+            "--timeout",
+            "90",
+            "--out",
+        ])
         .arg(&out)
         .arg("--chromium")
         .arg(chromium())
@@ -183,6 +222,10 @@ fn a_shopper_in_chromium() -> Result<()> {
     drop(finished);
     let _ = guard.join();
     let status = script.wait()?;
-    ensure!(status.success() && round == BROKEN.len(), "pictures of the failure: {}\n{said}", out.display());
+    ensure!(
+        status.success() && round == BROKEN.len(),
+        "pictures of the failure: {}\n{said}",
+        out.display()
+    );
     Ok(())
 }

@@ -21,10 +21,18 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
 }
 
 fn tracking(args: &BenchTrackingArgs) -> Result<ExitCode> {
-    let extent = if args.quick { Extent::Quick } else { Extent::Full };
+    let extent = if args.quick {
+        Extent::Quick
+    } else {
+        Extent::Full
+    };
     let plan = ablation::plan(args.data.as_deref(), extent)?;
     let bar = input::progress(Some(plan.runs() as u64), "measuring");
-    let mut table = Table::new("tracking", command(args), "one step on one thread, displacements amortised");
+    let mut table = Table::new(
+        "tracking",
+        command(args),
+        "one step on one thread, displacements amortised",
+    );
     with_threads(1, || {
         plan.run(|row: Row| {
             bar.inc(1);
@@ -36,7 +44,10 @@ fn tracking(args: &BenchTrackingArgs) -> Result<ExitCode> {
 }
 
 fn cloth(args: &BenchClothArgs) -> Result<ExitCode> {
-    let mut bench = ClothBench { full: args.full, ..ClothBench::default() };
+    let mut bench = ClothBench {
+        full: args.full,
+        ..ClothBench::default()
+    };
     if !args.scene.is_empty() {
         bench.scenes.clone_from(&args.scene);
     }
@@ -57,7 +68,13 @@ fn finish(table: &Table, out: &std::path::Path) -> Result<ExitCode> {
 
 /// The command as it can be typed again.
 fn command(args: &BenchTrackingArgs) -> String {
-    let data = args.data.as_ref().map_or(String::new(), |d| format!(" --data {}", d.display()));
+    let data = args
+        .data
+        .as_ref()
+        .map_or(String::new(), |d| format!(" --data {}", d.display()));
     let quick = if args.quick { " --quick" } else { "" };
-    format!("tryon bench tracking --out {}{data}{quick}", args.out.display())
+    format!(
+        "tryon bench tracking --out {}{data}{quick}",
+        args.out.display()
+    )
 }

@@ -30,15 +30,41 @@ pub(crate) fn run(args: &CompositeArgs) -> Result<ExitCode> {
     let mut depth = read_png_depth(&args.depth)?;
     depth_to_mm(&mut depth, depth_scale);
     let color = read_color(&args.color)?;
-    let garments = args.garments.iter().map(|p| load(p)).collect::<Result<Vec<_>>>()?;
-    let frame = RgbdFrame { sequence: 0, time_ns: 0, depth, color: Some(color) };
+    let garments = args
+        .garments
+        .iter()
+        .map(|p| load(p))
+        .collect::<Result<Vec<_>>>()?;
+    let frame = RgbdFrame {
+        sequence: 0,
+        time_ns: 0,
+        depth,
+        color: Some(color),
+    };
     let views: Vec<GarmentView<'_>> = garments
         .iter()
-        .map(|g| GarmentView { vertices: &g.vertices, faces: &g.faces, uv: &g.uv, normals: &[], look: &g.look })
+        .map(|g| GarmentView {
+            vertices: &g.vertices,
+            faces: &g.faces,
+            uv: &g.uv,
+            normals: &[],
+            look: &g.look,
+        })
         .collect();
-    let input = Input { frame: &frame, calibration: &calibration, garments: &views, body: None, output: None };
-    let (picture, report) = render(&Model::default(), &mut State::default(), &input, &mut Workspace::default())
-        .with_context(|| format!("cannot draw {}", args.color.display()))?;
+    let input = Input {
+        frame: &frame,
+        calibration: &calibration,
+        garments: &views,
+        body: None,
+        output: None,
+    };
+    let (picture, report) = render(
+        &Model::default(),
+        &mut State::default(),
+        &input,
+        &mut Workspace::default(),
+    )
+    .with_context(|| format!("cannot draw {}", args.color.display()))?;
     write_png_rgb(&args.out, &picture)?;
     println!(
         "{}: {} garment pixels, {} hidden behind the person, {} tiles untouched",
@@ -51,16 +77,29 @@ pub(crate) fn run(args: &CompositeArgs) -> Result<ExitCode> {
 }
 
 fn load(path: &Path) -> Result<Loaded> {
-    let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = path
+        .file_stem()
+        .map(|s| s.to_string_lossy().into_owned())
+        .unwrap_or_default();
     let look = crate::chain::look(&name);
     match path.extension().and_then(|e| e.to_str()) {
         Some("obj") => {
             let (vertices, uv, faces, _) = read_obj(path)?.unwelded();
-            Ok(Loaded { vertices, uv, faces, look })
+            Ok(Loaded {
+                vertices,
+                uv,
+                faces,
+                look,
+            })
         }
         Some("glb" | "gltf") => {
             let mesh = read_glb(path)?;
-            Ok(Loaded { vertices: mesh.mesh.vertices().to_vec(), uv: mesh.uv, faces: mesh.mesh.faces().to_vec(), look })
+            Ok(Loaded {
+                vertices: mesh.mesh.vertices().to_vec(),
+                uv: mesh.uv,
+                faces: mesh.mesh.faces().to_vec(),
+                look,
+            })
         }
         _ => bail!("{}: a garment is an .obj or a .glb file", path.display()),
     }

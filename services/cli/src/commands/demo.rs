@@ -63,7 +63,10 @@ pub(crate) fn run(args: &DemoArgs) -> Result<ExitCode> {
     }
     // The recorder must be there before the first counter is.
     let _ = telemetry::metrics();
-    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().context("the runtime")?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()
+        .context("the runtime")?;
     let outcome = runtime.block_on(demo(args));
     runtime.shutdown_timeout(Duration::from_millis(200));
     outcome
@@ -71,7 +74,13 @@ pub(crate) fn run(args: &DemoArgs) -> Result<ExitCode> {
 
 fn configuration(args: &DemoArgs) -> Result<Config> {
     let any_port = std::net::SocketAddr::from(([127, 0, 0, 1], 0));
-    let mut c = Config { log: LogConfig { level: "warn".into(), ..LogConfig::default() }, ..Config::default() };
+    let mut c = Config {
+        log: LogConfig {
+            level: "warn".into(),
+            ..LogConfig::default()
+        },
+        ..Config::default()
+    };
     (c.capture.address, c.capture.admin) = (any_port, any_port);
     (c.tracking.address, c.tracking.admin) = (any_port, any_port);
     (c.cloth.address, c.cloth.admin) = (any_port, any_port);
@@ -80,7 +89,10 @@ fn configuration(args: &DemoArgs) -> Result<Config> {
     for camera in &mut c.capture.cameras {
         camera.rate = args.fps;
         if let Some(recording) = &args.input {
-            camera.source = recording.to_str().context("--input: the path is not UTF-8")?.to_owned();
+            camera.source = recording
+                .to_str()
+                .context("--input: the path is not UTF-8")?
+                .to_owned();
         }
     }
     c.validate()?;
@@ -89,12 +101,24 @@ fn configuration(args: &DemoArgs) -> Result<Config> {
 
 async fn demo(args: &DemoArgs) -> Result<ExitCode> {
     let services = OneBox::start(configuration(args)?, None).await?;
-    let address = services.address("compositor").context("the compositor has no address")?;
+    let address = services
+        .address("compositor")
+        .context("the compositor has no address")?;
     if args.headless {
         let seconds = args.seconds.unwrap_or(HEADLESS_SECONDS);
         input::create_dir(&args.out)?;
-        println!("headless: {seconds} s of {} into {}", args.garments.join(" and "), args.out.display());
-        let received = mirror::watch(address, &args.garments, Duration::from_secs_f64(seconds), &args.out).await;
+        println!(
+            "headless: {seconds} s of {} into {}",
+            args.garments.join(" and "),
+            args.out.display()
+        );
+        let received = mirror::watch(
+            address,
+            &args.garments,
+            Duration::from_secs_f64(seconds),
+            &args.out,
+        )
+        .await;
         services.stop().await;
         return summarise(args, &received?);
     }
@@ -119,7 +143,12 @@ fn skipped(counters: &BTreeMap<String, f64>) -> BTreeMap<String, f64> {
         Some(after.split_once('"')?.0.to_owned())
     };
     (counters.iter().filter(|(k, _)| k.starts_with(SKIPPED)))
-        .filter_map(|(k, v)| Some((format!("{}: {}", label(k, "service")?, label(k, "what")?), *v)))
+        .filter_map(|(k, v)| {
+            Some((
+                format!("{}: {}", label(k, "service")?, label(k, "what")?),
+                *v,
+            ))
+        })
         .collect()
 }
 
@@ -128,12 +157,19 @@ fn summarise(args: &DemoArgs, received: &Received) -> Result<ExitCode> {
     let all_ms: Vec<f64> = received.pictures.iter().map(|p| p.latency_ms).collect();
     let live_ms: Vec<f64> = live.iter().map(|p| p.latency_ms).collect();
     let mut stages = report::Samples::default();
-    live.iter().for_each(|p| stages.extend(p.stages.iter().map(|(n, ms)| (n.as_str(), *ms))));
+    live.iter()
+        .for_each(|p| stages.extend(p.stages.iter().map(|(n, ms)| (n.as_str(), *ms))));
     let span = |v: &[&mirror::Seen]| match (v.first(), v.last()) {
         (Some(a), Some(b)) => b.at - a.at,
         _ => 0.0,
     };
-    let rate = |v: &[&mirror::Seen]| if span(v) > 0.0 { (v.len() - 1) as f64 / span(v) } else { 0.0 };
+    let rate = |v: &[&mirror::Seen]| {
+        if span(v) > 0.0 {
+            (v.len() - 1) as f64 / span(v)
+        } else {
+            0.0
+        }
+    };
     let everything: Vec<_> = received.pictures.iter().collect();
     let frames_in = match (everything.first(), everything.last()) {
         (Some(a), Some(b)) => b.sequence.saturating_sub(a.sequence) + 1,
@@ -174,7 +210,11 @@ fn summarise(args: &DemoArgs, received: &Received) -> Result<ExitCode> {
         r.live_latency_ms.p99,
         r.peak_memory_bytes.unwrap_or(0) as f64 / (1024.0 * 1024.0)
     );
-    println!("{} pictures and report.json in {}", received.kept, args.out.display());
+    println!(
+        "{} pictures and report.json in {}",
+        received.kept,
+        args.out.display()
+    );
     if r.frames_live == 0 {
         eprintln!("tryon: no live picture came; report.json says which states were seen");
         return Ok(ExitCode::FAILURE);

@@ -31,7 +31,14 @@ struct Finding {
 /// # Errors
 /// Only when the report cannot be printed.
 pub(crate) fn run(args: &DoctorArgs) -> Result<ExitCode> {
-    let findings = [cores(), memory(), body(), adapter(), port(8080), shared_data()];
+    let findings = [
+        cores(),
+        memory(),
+        body(),
+        adapter(),
+        port(8080),
+        shared_data(),
+    ];
     if args.json {
         println!("{}", serde_json::to_string_pretty(&findings)?);
     } else {
@@ -45,25 +52,42 @@ pub(crate) fn run(args: &DoctorArgs) -> Result<ExitCode> {
         }
     }
     let bad = findings.iter().any(|f| f.verdict == Verdict::Bad);
-    Ok(if bad { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    Ok(if bad {
+        ExitCode::FAILURE
+    } else {
+        ExitCode::SUCCESS
+    })
 }
 
 fn cores() -> Finding {
     let n = std::thread::available_parallelism().map_or(1, usize::from);
     let verdict = if n >= 2 { Verdict::Good } else { Verdict::Note };
-    Finding { what: "cores", verdict, detail: format!("{n}; the chain is built for two") }
+    Finding {
+        what: "cores",
+        verdict,
+        detail: format!("{n}; the chain is built for two"),
+    }
 }
 
 fn memory() -> Finding {
     const WANTED_MIB: u64 = 1024;
     let available = std::fs::read_to_string("/proc/meminfo").ok().and_then(|t| {
-        let line = t.lines().find(|l| l.starts_with("MemAvailable:"))?.to_owned();
-        line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib / 1024)
+        let line = t
+            .lines()
+            .find(|l| l.starts_with("MemAvailable:"))?
+            .to_owned();
+        line.split_whitespace()
+            .nth(1)?
+            .parse::<u64>()
+            .ok()
+            .map(|kib| kib / 1024)
     });
     match available {
-        Some(mib) if mib >= WANTED_MIB => {
-            Finding { what: "memory", verdict: Verdict::Good, detail: format!("{mib} MiB available") }
-        }
+        Some(mib) if mib >= WANTED_MIB => Finding {
+            what: "memory",
+            verdict: Verdict::Good,
+            detail: format!("{mib} MiB available"),
+        },
         Some(mib) => Finding {
             what: "memory",
             verdict: Verdict::Note,
@@ -71,14 +95,26 @@ fn memory() -> Finding {
                 "{mib} MiB available; the chain of one box is measured against 500 MiB, leave it {WANTED_MIB}"
             ),
         },
-        None => Finding { what: "memory", verdict: Verdict::Note, detail: "this system does not tell".into() },
+        None => Finding {
+            what: "memory",
+            verdict: Verdict::Note,
+            detail: "this system does not tell".into(),
+        },
     }
 }
 
 fn body() -> Finding {
     let t = tryon::body::embedded::template();
-    let detail = format!("embedded body: {} vertices, {} joints", t.mesh().vertices().len(), t.skeleton().len());
-    Finding { what: "body", verdict: Verdict::Good, detail }
+    let detail = format!(
+        "embedded body: {} vertices, {} joints",
+        t.mesh().vertices().len(),
+        t.skeleton().len()
+    );
+    Finding {
+        what: "body",
+        verdict: Verdict::Good,
+        detail,
+    }
 }
 
 fn adapter() -> Finding {
@@ -86,27 +122,40 @@ fn adapter() -> Finding {
         list if list.is_empty() => Finding {
             what: "graphics",
             verdict: Verdict::Note,
-            detail: "no wgpu adapter: pictures are drawn on the CPU, which needs nothing else".into(),
+            detail: "no wgpu adapter: pictures are drawn on the CPU, which needs nothing else"
+                .into(),
         },
         list => {
             let names = list.iter().map(|a| {
-                let kind = if a.software { "software: pictures are drawn on the CPU" } else { "hardware" };
+                let kind = if a.software {
+                    "software: pictures are drawn on the CPU"
+                } else {
+                    "hardware"
+                };
                 format!("{} ({}, {kind})", a.name, a.backend)
             });
-            Finding { what: "graphics", verdict: Verdict::Good, detail: names.collect::<Vec<_>>().join("; ") }
+            Finding {
+                what: "graphics",
+                verdict: Verdict::Good,
+                detail: names.collect::<Vec<_>>().join("; "),
+            }
         }
     }
 }
 
 fn port(number: u16) -> Finding {
     match TcpListener::bind(("127.0.0.1", number)) {
-        Ok(_) => {
-            Finding { what: "port", verdict: Verdict::Good, detail: format!("{number} is free for the mirror page") }
-        }
+        Ok(_) => Finding {
+            what: "port",
+            verdict: Verdict::Good,
+            detail: format!("{number} is free for the mirror page"),
+        },
         Err(e) => Finding {
             what: "port",
             verdict: Verdict::Note,
-            detail: format!("{number}: {e}; start the demo with --listen 127.0.0.1:0 or another port"),
+            detail: format!(
+                "{number}: {e}; start the demo with --listen 127.0.0.1:0 or another port"
+            ),
         },
     }
 }
@@ -119,5 +168,9 @@ fn shared_data() -> Finding {
     } else {
         format!("{root}/data is missing: tests on real recordings are skipped (set TRYON_SHARED)")
     };
-    Finding { what: "shared data", verdict: if found { Verdict::Good } else { Verdict::Note }, detail }
+    Finding {
+        what: "shared data",
+        verdict: if found { Verdict::Good } else { Verdict::Note },
+        detail,
+    }
 }

@@ -25,22 +25,44 @@ pub(crate) fn run(args: &ExportArgs) -> Result<ExitCode> {
         library::names().iter().for_each(|name| println!("{name}"));
         return Ok(ExitCode::SUCCESS);
     }
-    let (Some(what), Some(out)) = (&args.what, &args.out) else { bail!("say what to export and where to (--out)") };
+    let (Some(what), Some(out)) = (&args.what, &args.out) else {
+        bail!("say what to export and where to (--out)")
+    };
     if what == "body" {
         let t = embedded::template();
-        mesh(out, "body", t.mesh().vertices(), t.mesh().faces(), &[], [205, 170, 150])?;
+        mesh(
+            out,
+            "body",
+            t.mesh().vertices(),
+            t.mesh().faces(),
+            &[],
+            [205, 170, 150],
+        )?;
     } else {
         let size: Size = args.size.parse()?;
         let pattern = library::pattern(what, size)?;
         if out.extension().is_some_and(|e| e == "json") {
-            std::fs::write(out, pattern.to_json()).with_context(|| format!("cannot write {}", out.display()))?;
+            std::fs::write(out, pattern.to_json())
+                .with_context(|| format!("cannot write {}", out.display()))?;
         } else if args.worn {
             worn(out, &pattern, args.seconds)?;
         } else {
             // Flat, as cut: the rest shape is the panels laid out side by side.
             let g = GarmentMesh::sew(&pattern, &Triangulation::default())?;
-            let flat: Vec<P3> = g.render.uv.iter().map(|p| P3::new(p[0], p[1], 0.0)).collect();
-            mesh(out, what, &flat, &g.render.faces, &g.render.uv, crate::chain::look(what).base)?;
+            let flat: Vec<P3> = g
+                .render
+                .uv
+                .iter()
+                .map(|p| P3::new(p[0], p[1], 0.0))
+                .collect();
+            mesh(
+                out,
+                what,
+                &flat,
+                &g.render.faces,
+                &g.render.uv,
+                crate::chain::look(what).base,
+            )?;
         }
     }
     println!("{what} in {}", out.display());
@@ -58,22 +80,34 @@ fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
     let rest = sequence.rest();
     let pose = |i: u64| -> Pose<World> {
         let p = sequence.truth(i).pose;
-        Pose { root: sequence.setting().world_from_camera * p.root, angles: p.angles }
+        Pose {
+            root: sequence.setting().world_from_camera * p.root,
+            angles: p.angles,
+        }
     };
     let dressed = dress(
         &template,
         rest,
         &pose(0),
         std::slice::from_ref(pattern),
-        &DressOptions { any_size: true, ..DressOptions::default() },
+        &DressOptions {
+            any_size: true,
+            ..DressOptions::default()
+        },
     )?;
-    let (model, mut state, mut work) = (dressed.model, dressed.state, realtime::Workspace::default());
+    let (model, mut state, mut work) =
+        (dressed.model, dressed.state, realtime::Workspace::default());
     let garment = &model.outfit.garments[0];
-    let stands = pose(0).root.point(&template.skeleton().joints()[0].rest).coords.cast::<f32>();
+    let stands = pose(0)
+        .root
+        .point(&template.skeleton().joints()[0].rest)
+        .coords
+        .cast::<f32>();
     let drawn = |state: &realtime::State| {
         let mut p = Vec::new();
         garment.render_positions(&state.garments[0].positions, &mut p);
-        p.iter_mut().for_each(|p| *p -= V3::new(stands.x, 0.0, stands.z));
+        p.iter_mut()
+            .for_each(|p| *p -= V3::new(stands.x, 0.0, stands.z));
         p
     };
     let start = drawn(&state);
@@ -94,15 +128,35 @@ fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
     for i in 0..count {
         let mut bones = BoneTransforms::default();
         pose(i).bones(template.skeleton(), rest, &mut bones);
-        skin(Par::Rayon, &rest.vertices, template.weights(), &bones, &mut body);
-        realtime::step(&model, &mut state, &realtime::Input { body: &body, dt: 1.0 / FRAMES }, &mut work)?;
+        skin(
+            Par::Rayon,
+            &rest.vertices,
+            template.weights(),
+            &bones,
+            &mut body,
+        );
+        realtime::step(
+            &model,
+            &mut state,
+            &realtime::Input {
+                body: &body,
+                dt: 1.0 / FRAMES,
+            },
+            &mut work,
+        )?;
         frames.push(drawn(&state));
         bar.inc(1);
     }
     bar.finish_and_clear();
     let name = garment.name.as_str();
     let color = crate::chain::look(name).base;
-    let m = GlbMesh { name, vertices: &start, faces: &garment.render.faces, uv: &garment.render.uv, color };
+    let m = GlbMesh {
+        name,
+        vertices: &start,
+        faces: &garment.render.faces,
+        uv: &garment.render.uv,
+        color,
+    };
     write_glb_motion(out, &[m], &[frames], (1.0 / FRAMES) as f32)?;
     Ok(())
 }
@@ -121,8 +175,20 @@ pub(crate) fn mesh(
 ) -> Result<()> {
     match out.extension().and_then(|e| e.to_str()) {
         Some("obj") => write_obj(out, vertices, faces, (!uv.is_empty()).then_some(uv))?,
-        Some("glb") => write_glb(out, &[GlbMesh { name, vertices, faces, uv, color: rgb }])?,
-        _ => bail!("{}: the ending must be .obj or .glb (or .json for a garment's pattern)", out.display()),
+        Some("glb") => write_glb(
+            out,
+            &[GlbMesh {
+                name,
+                vertices,
+                faces,
+                uv,
+                color: rgb,
+            }],
+        )?,
+        _ => bail!(
+            "{}: the ending must be .obj or .glb (or .json for a garment's pattern)",
+            out.display()
+        ),
     }
     Ok(())
 }

@@ -37,8 +37,15 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
                 s.len(),
                 s.dofs()
             );
-            println!("shape directions: {}", t.shape_space().map_or(0, |s| s.vertices.len()));
-            println!("closed: {}, volume {:.4} m³", t.topology().is_closed(), m.volume());
+            println!(
+                "shape directions: {}",
+                t.shape_space().map_or(0, |s| s.vertices.len())
+            );
+            println!(
+                "closed: {}, volume {:.4} m³",
+                t.topology().is_closed(),
+                m.volume()
+            );
             if let Some(out) = &args.out {
                 mesh(out, t.name(), m.vertices(), m.faces(), &[], GREY)?;
             }
@@ -47,18 +54,30 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
             let (vertices, faces, uv, surface) = if ending == "obj" {
                 let sewn = read_sewn_obj(path)?;
                 if !sewn.stitches.is_empty() {
-                    let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or("garment");
-                    let g = from_mesh(&sewn, name, GarmentKind::Dress, Material::preset("cotton")?)?;
+                    let name = path
+                        .file_stem()
+                        .and_then(|s| s.to_str())
+                        .unwrap_or("garment");
+                    let g =
+                        from_mesh(&sewn, name, GarmentKind::Dress, Material::preset("cotton")?)?;
                     let (n, panels) = (g.garment.vertices, g.garment.panels.len());
                     let s = sewn.stitches.len();
-                    println!("sewn garment: {panels} panels, {s} stitches ({} left open), {n} vertices", g.open);
+                    println!(
+                        "sewn garment: {panels} panels, {s} stitches ({} left open), {n} vertices",
+                        g.open
+                    );
                 }
                 let o = sewn.obj;
                 let (v, t, f, _) = o.unwelded();
                 (v, f, t, o.mesh)
             } else {
                 let g = read_glb(path)?;
-                (g.mesh.vertices().to_vec(), g.mesh.faces().to_vec(), g.uv, g.mesh)
+                (
+                    g.mesh.vertices().to_vec(),
+                    g.mesh.faces().to_vec(),
+                    g.uv,
+                    g.mesh,
+                )
             };
             let topology = Topology::new(&surface)?;
             let (_, pieces) = topology.components();
@@ -79,9 +98,18 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
             let o = read_obj(&path.with_file_name(&m.obj_file))?;
             let (bound, has) = (m.bindings.len(), o.mesh.vertices().len());
             if bound != has {
-                bail!("{}: {bound} vertices are bound, but {} has {has}", path.display(), m.obj_file);
+                bail!(
+                    "{}: {bound} vertices are bound, but {} has {has}",
+                    path.display(),
+                    m.obj_file
+                );
             }
-            println!("clothes `{}` for {}: {bound} vertices, hides {} of the body", m.name, m.base, m.deleted.len());
+            println!(
+                "clothes `{}` for {}: {bound} vertices, hides {} of the body",
+                m.name,
+                m.base,
+                m.deleted.len()
+            );
             if let Some(out) = &args.out {
                 let (v, t, f, _) = o.unwelded();
                 mesh(out, &m.name, &v, &f, &t, GREY)?;
@@ -99,8 +127,12 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
 /// A sewing pattern, GarmentCode's or ours, or a measured fabric.
 fn json(args: &ImportArgs) -> Result<()> {
     let path = &args.input;
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or("garment");
+    let text =
+        std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let name = path
+        .file_stem()
+        .and_then(|s| s.to_str())
+        .unwrap_or("garment");
     if text.contains("\"stretching\"") {
         let m = Material::from_measured(name, &parse_fabric(&text, path)?)?;
         println!(
@@ -114,7 +146,8 @@ fn json(args: &ImportArgs) -> Result<()> {
         return Ok(());
     }
     let pattern = input::pattern(path)?;
-    let g = GarmentMesh::sew(&pattern, &Triangulation::default()).with_context(|| path.display().to_string())?;
+    let g = GarmentMesh::sew(&pattern, &Triangulation::default())
+        .with_context(|| path.display().to_string())?;
     println!(
         "garment: {} panels, {} seams, {} darts, {} vertices, smallest angle {:.0}°",
         pattern.panels.len(),
@@ -124,9 +157,16 @@ fn json(args: &ImportArgs) -> Result<()> {
         g.min_angle
     );
     match &args.out {
-        Some(out) if out.extension().is_some_and(|e| e == "json") => std::fs::write(out, pattern.to_json())?,
+        Some(out) if out.extension().is_some_and(|e| e == "json") => {
+            std::fs::write(out, pattern.to_json())?
+        }
         Some(out) => {
-            let flat: Vec<P3> = g.render.uv.iter().map(|p| P3::new(p[0], p[1], 0.0)).collect();
+            let flat: Vec<P3> = g
+                .render
+                .uv
+                .iter()
+                .map(|p| P3::new(p[0], p[1], 0.0))
+                .collect();
             mesh(out, name, &flat, &g.render.faces, &g.render.uv, GREY)?;
         }
         None => {}
@@ -136,7 +176,11 @@ fn json(args: &ImportArgs) -> Result<()> {
 
 fn recording(args: &ImportArgs) -> Result<()> {
     let mut source = open_recording(&args.input)?;
-    let mut sink = args.out.as_ref().map(|out| Sink::create(out, source.calibration())).transpose()?;
+    let mut sink = args
+        .out
+        .as_ref()
+        .map(|out| Sink::create(out, source.calibration()))
+        .transpose()?;
     let bar = input::progress(source.len().map(|n| n as u64), "checking");
     let mut bad = 0u64;
     loop {
@@ -159,6 +203,11 @@ fn recording(args: &ImportArgs) -> Result<()> {
     }
     bar.finish_and_clear();
     let k = source.calibration().depth;
-    println!("recording: {} frames, {bad} of them bad, {}×{}", bar.position(), k.width, k.height);
+    println!(
+        "recording: {} frames, {bad} of them bad, {}×{}",
+        bar.position(),
+        k.width,
+        k.height
+    );
     Ok(())
 }

@@ -34,7 +34,10 @@ impl Sink {
         if path.extension().is_some_and(|e| e == "mcap") {
             return Ok(Self::Mcap(Box::new(McapWriter::create(path, calibration)?)));
         }
-        Ok(Self::Folder(Box::new(RgbdFolderWriter::create(path, calibration)?)))
+        Ok(Self::Folder(Box::new(RgbdFolderWriter::create(
+            path,
+            calibration,
+        )?)))
     }
     /// Adds a frame.
     ///
@@ -93,14 +96,23 @@ fn from_source(args: &RecordArgs) -> Result<u64> {
 /// A camera that runs now. People are in the picture: that needs their word.
 fn from_bus(args: &RecordArgs, camera: &str) -> Result<u64> {
     if !args.consent {
-        bail!("a live camera shows people: record it only when they agreed, and say so with --consent");
+        bail!(
+            "a live camera shows people: record it only when they agreed, and say so with --consent"
+        );
     }
-    let key = camera.split_once('/').and_then(|(store, camera)| CameraKey::new(store, camera));
-    let key = key.with_context(|| format!("--source bus:{camera}: STORE/CAMERA of [a-z0-9_-] is needed"))?;
+    let key = camera
+        .split_once('/')
+        .and_then(|(store, camera)| CameraKey::new(store, camera));
+    let key = key
+        .with_context(|| format!("--source bus:{camera}: STORE/CAMERA of [a-z0-9_-] is needed"))?;
     let config = Config::load(args.config.as_deref(), &[])?;
-    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().context("the runtime")?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()
+        .context("the runtime")?;
     runtime.block_on(async {
-        let bus = ZenohBus::open(&[], &config.bus.connect, Pool::new(1).context("threads")?).await?;
+        let bus =
+            ZenohBus::open(&[], &config.bus.connect, Pool::new(1).context("threads")?).await?;
         let bus: Arc<dyn FrameBus> = bus;
         let mut frames = bus.subscribe(&key).await?;
         let bar = input::progress(None, "recording");
@@ -108,7 +120,9 @@ fn from_bus(args: &RecordArgs, camera: &str) -> Result<u64> {
         let mut sink: Option<Sink> = None;
         while tokio::time::Instant::now() < end {
             let next = tokio::time::timeout(SILENCE, frames.next()).await;
-            let Some(exposure) = next.with_context(|| format!("camera {camera} is silent"))? else { break };
+            let Some(exposure) = next.with_context(|| format!("camera {camera} is silent"))? else {
+                break;
+            };
             // Disk work off the async workers; frames are small next to a disk's second.
             tokio::task::block_in_place(|| {
                 if sink.is_none() {

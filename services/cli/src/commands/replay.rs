@@ -20,8 +20,16 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<ExitCode> {
     // Faults of the recording are said here, not by a camera that is listed as failed.
     drop(open_recording(&args.input)?);
     let mut config = Config::load(args.config.as_deref(), &[])?;
-    let source = args.input.to_str().context("--input: the path is not UTF-8")?.to_owned();
-    let name = config.capture.cameras.first().map_or_else(|| "front".to_owned(), |c| c.name.clone());
+    let source = args
+        .input
+        .to_str()
+        .context("--input: the path is not UTF-8")?
+        .to_owned();
+    let name = config
+        .capture
+        .cameras
+        .first()
+        .map_or_else(|| "front".to_owned(), |c| c.name.clone());
     config.capture.cameras = vec![CameraConfig {
         name: name.clone(),
         source,
@@ -30,13 +38,21 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<ExitCode> {
         looped: args.repeat,
         autostart: true,
     }];
-    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().context("the runtime")?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()
+        .context("the runtime")?;
     runtime.block_on(async {
         let pool = Pool::new(config.process.compute_threads).context("threads")?;
         let bus = ZenohBus::open(&config.bus.listen, &[], pool.clone()).await?;
         let shutdown = CancellationToken::new();
         let grace = Duration::from_millis(config.process.grace_ms);
-        let ctx = ServiceContext { bus: bus.clone(), pool, shutdown: shutdown.clone(), grace };
+        let ctx = ServiceContext {
+            bus: bus.clone(),
+            pool,
+            shutdown: shutdown.clone(),
+            grace,
+        };
         let key = format!("tryon/{}/{name}/rgbd", config.capture.store);
         let service = tryon_capture::start(&config, ctx).await?;
         println!(

@@ -39,7 +39,11 @@ struct Report {
 /// # Errors
 /// Bad input, named; or pictures that cannot be written.
 pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
-    let choices = Choice::parse(&args.garments, args.size.as_deref(), args.garment_body.as_deref())?;
+    let choices = Choice::parse(
+        &args.garments,
+        args.size.as_deref(),
+        args.garment_body.as_deref(),
+    )?;
     let source = open_recording(&args.input)?;
     let template = input::template(args.body.as_deref())?;
     input::create_dir(&args.out)?;
@@ -56,7 +60,10 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
         args.out.display()
     );
     if report.dressed_frames == 0 {
-        eprintln!("tryon: nobody was dressed: no person was tracked in {}", args.input.display());
+        eprintln!(
+            "tryon: nobody was dressed: no person was tracked in {}",
+            args.input.display()
+        );
         return Ok(ExitCode::FAILURE);
     }
     Ok(ExitCode::SUCCESS)
@@ -64,9 +71,14 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
 
 fn dress_all(args: &RunArgs, mut source: Box<dyn RgbdSource>, mut chain: Chain) -> Result<Report> {
     let calibration = source.calibration().clone();
-    let total = source.len().map(|n| n.min(args.frames.unwrap_or(usize::MAX)));
+    let total = source
+        .len()
+        .map(|n| n.min(args.frames.unwrap_or(usize::MAX)));
     let still = total == Some(1);
-    let bar = input::progress(total.map(|n| if still { args.still_frames } else { n } as u64), "dressing");
+    let bar = input::progress(
+        total.map(|n| if still { args.still_frames } else { n } as u64),
+        "dressing",
+    );
     let (mut stages, mut skipped) = (Samples::default(), Samples::default());
     let (mut residual, mut penetration) = (Vec::new(), Vec::new());
     let mut report = Report::default();
@@ -91,7 +103,9 @@ fn dress_all(args: &RunArgs, mut source: Box<dyn RgbdSource>, mut chain: Chain) 
                 sequence: frame.sequence + k,
                 ..frame.clone()
             };
-            let outcome = chain.frame(&frame).with_context(|| format!("frame {index}"))?;
+            let outcome = chain
+                .frame(&frame)
+                .with_context(|| format!("frame {index}"))?;
             stages.extend(outcome.stages.iter().copied());
             skipped.extend(outcome.skipped.iter().copied());
             residual.push(outcome.residual_mm);
@@ -104,7 +118,12 @@ fn dress_all(args: &RunArgs, mut source: Box<dyn RgbdSource>, mut chain: Chain) 
             write_png_rgb(&args.out.join(format!("frame_{index:06}.png")), &picture)?;
             report.pictures += 1;
             if args.overlay {
-                overlay(&args.out.join(format!("frame_{index:06}_body.png")), &chain, &frame, &calibration)?;
+                overlay(
+                    &args.out.join(format!("frame_{index:06}_body.png")),
+                    &chain,
+                    &frame,
+                    &calibration,
+                )?;
             }
         }
         report.frames += 1;
@@ -121,21 +140,44 @@ fn dress_all(args: &RunArgs, mut source: Box<dyn RgbdSource>, mut chain: Chain) 
 }
 
 /// The tracked body, shaded by its normals, half transparent over the picture.
-fn overlay(path: &Path, chain: &Chain, frame: &RgbdFrame, calibration: &tryon::camera::Calibration) -> Result<()> {
+fn overlay(
+    path: &Path,
+    chain: &Chain,
+    frame: &RgbdFrame,
+    calibration: &tryon::camera::Calibration,
+) -> Result<()> {
     let (vertices, template) = chain.body();
     let mesh = template.mesh();
     let topology = Topology::new(mesh)?;
     let mut normals = Vec::new();
-    vertex_normals(Par::Rayon, &vertices, mesh.faces(), topology.vertex_faces(), &mut normals);
+    vertex_normals(
+        Par::Rayon,
+        &vertices,
+        mesh.faces(),
+        topology.vertex_faces(),
+        &mut normals,
+    );
     let camera = calibration.depth;
     let mut seen = VisibilityBuffer::default();
-    rasterise(&View::Perspective { camera, near: 0.05 }, &vertices, mesh.faces(), &mut seen);
+    rasterise(
+        &View::Perspective { camera, near: 0.05 },
+        &vertices,
+        mesh.faces(),
+        &mut seen,
+    );
     let mut picture = match &frame.color {
         Some(c) if (c.width(), c.height()) == (camera.width, camera.height) => c.clone(),
         _ => depth_picture(frame),
     };
-    for (i, &face) in seen.face.iter().enumerate().filter(|(_, f)| **f != VisibilityBuffer::NONE) {
-        let n = mesh.faces()[face as usize].iter().fold(tryon::math::V3::zeros(), |s, &v| s + normals[v as usize]);
+    for (i, &face) in seen
+        .face
+        .iter()
+        .enumerate()
+        .filter(|(_, f)| **f != VisibilityBuffer::NONE)
+    {
+        let n = mesh.faces()[face as usize]
+            .iter()
+            .fold(tryon::math::V3::zeros(), |s, &v| s + normals[v as usize]);
         let light = (-n.z / n.norm().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
         for (c, tint) in [80.0, 200.0, 255.0].iter().enumerate() {
             let p = &mut picture.data_mut()[3 * i + c];

@@ -30,7 +30,10 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<ExitCode> {
     scene::write_positions(&args.out.join("positions.npy"), &frames)?;
     write(&args.out.join("report.json"), &report)?;
     if report.unconverged > 0 {
-        eprintln!("warning: {} steps did not converge; see report.json", report.unconverged);
+        eprintln!(
+            "warning: {} steps did not converge; see report.json",
+            report.unconverged
+        );
     }
     println!("{} frames in {}", scene.frames(), args.out.display());
     Ok(ExitCode::SUCCESS)

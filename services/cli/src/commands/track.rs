@@ -21,19 +21,31 @@ use tryon::tracking::{StepReport, TrackerConfig, TrackerModel, TrackerState, Wor
 pub(crate) fn run(args: &TrackArgs) -> Result<ExitCode> {
     let mut source = open_recording(&args.input)?;
     let template = input::template(args.body.as_deref())?;
-    let model = TrackerModel::new(template, source.calibration().clone(), TrackerConfig::default());
+    let model = TrackerModel::new(
+        template,
+        source.calibration().clone(),
+        TrackerConfig::default(),
+    );
     let mut state = TrackerState::new(&model);
     if let Some(path) = &args.init {
         let start = input::rough_start(path)?;
-        state.start_at(&model, start.root_position.into(), start.facing_yaw_deg.to_radians());
+        state.start_at(
+            &model,
+            start.root_position.into(),
+            start.facing_yaw_deg.to_radians(),
+        );
     }
     if let Some(dir) = &args.meshes {
         input::create_dir(dir)?;
     }
-    let file = std::fs::File::create(&args.out).with_context(|| format!("cannot write {}", args.out.display()))?;
+    let file = std::fs::File::create(&args.out)
+        .with_context(|| format!("cannot write {}", args.out.display()))?;
     let mut out = BufWriter::new(file);
-    with_threads(args.threads, || track_all(args, source.as_mut(), &model, state, &mut out))??;
-    out.flush().with_context(|| format!("cannot write {}", args.out.display()))?;
+    with_threads(args.threads, || {
+        track_all(args, source.as_mut(), &model, state, &mut out)
+    })??;
+    out.flush()
+        .with_context(|| format!("cannot write {}", args.out.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -67,7 +79,8 @@ fn track_all(
             }
         };
         let started = std::time::Instant::now();
-        let report = step(model, &mut state, &frame, &mut workspace).with_context(|| format!("frame {index}"))?;
+        let report = step(model, &mut state, &frame, &mut workspace)
+            .with_context(|| format!("frame {index}"))?;
         let ms = started.elapsed().as_secs_f64() * 1e3;
         live += u64::from(state.status.is_live());
         serde_json::to_writer(&mut *out, &line(index, &frame, model, &state, &report, ms))?;
@@ -79,8 +92,16 @@ fn track_all(
         index += 1;
     }
     bar.finish_and_clear();
-    ensure!(index > bad, "{}: no frame can be read", args.input.display());
-    println!("{}: {live} of {index} frames with a live pose, in {}", args.input.display(), args.out.display());
+    ensure!(
+        index > bad,
+        "{}: no frame can be read",
+        args.input.display()
+    );
+    println!(
+        "{}: {live} of {index} frames with a live pose, in {}",
+        args.input.display(),
+        args.out.display()
+    );
     Ok(())
 }
 
@@ -97,10 +118,18 @@ fn line(
     let rest = model.template().personalise(&state.shape);
     let mut bones = BoneTransforms::default();
     state.pose.bones(skeleton, &rest, &mut bones);
-    let joints: BTreeMap<&str, [f64; 3]> =
-        skeleton.joints().iter().zip(&bones.joints).map(|(j, p)| (j.name.as_str(), [p.x, p.y, p.z])).collect();
-    let scales: BTreeMap<&str, f64> =
-        skeleton.joints().iter().zip(&state.shape.bone_scales).map(|(j, s)| (j.name.as_str(), *s)).collect();
+    let joints: BTreeMap<&str, [f64; 3]> = skeleton
+        .joints()
+        .iter()
+        .zip(&bones.joints)
+        .map(|(j, p)| (j.name.as_str(), [p.x, p.y, p.z]))
+        .collect();
+    let scales: BTreeMap<&str, f64> = skeleton
+        .joints()
+        .iter()
+        .zip(&state.shape.bone_scales)
+        .map(|(j, s)| (j.name.as_str(), *s))
+        .collect();
     json!({
         "frame": index,
         "time_ns": frame.time_ns,
@@ -126,7 +155,13 @@ fn write_surface(path: &std::path::Path, model: &TrackerModel, state: &TrackerSt
     let mut bones = BoneTransforms::default();
     state.pose.bones(template.skeleton(), &rest, &mut bones);
     let mut vertices: Vec<P3> = Vec::new();
-    skin(Par::Rayon, &rest.vertices, template.weights(), &bones, &mut vertices);
+    skin(
+        Par::Rayon,
+        &rest.vertices,
+        template.weights(),
+        &bones,
+        &mut vertices,
+    );
     tryon::formats::obj::write_obj(path, &vertices, template.mesh().faces(), None)?;
     Ok(())
 }

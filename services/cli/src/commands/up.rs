@@ -28,7 +28,10 @@ pub(crate) fn run(args: &UpArgs) -> Result<ExitCode> {
         println!("{}", toml_of(&config)?);
         return Ok(ExitCode::SUCCESS);
     }
-    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().context("the runtime")?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()
+        .context("the runtime")?;
     runtime.block_on(async {
         // The bus listens, so that a camera node or `tryon replay` elsewhere can join.
         let pool = Pool::new(1).context("the bus's threads")?;

@@ -32,7 +32,10 @@ pub struct LogConfig {
 
 impl Default for LogConfig {
     fn default() -> Self {
-        Self { format: LogFormat::Pretty, level: "info,zenoh=error".into() }
+        Self {
+            format: LogFormat::Pretty,
+            level: "info,zenoh=error".into(),
+        }
     }
 }
 
@@ -48,7 +51,10 @@ pub struct ProcessConfig {
 
 impl Default for ProcessConfig {
     fn default() -> Self {
-        Self { compute_threads: 0, grace_ms: 3000 }
+        Self {
+            compute_threads: 0,
+            grace_ms: 3000,
+        }
     }
 }
 
@@ -65,7 +71,10 @@ pub struct BusConfig {
 impl Default for BusConfig {
     fn default() -> Self {
         let endpoint = vec!["tcp/127.0.0.1:7447".to_owned()];
-        Self { listen: endpoint.clone(), connect: endpoint }
+        Self {
+            listen: endpoint.clone(),
+            connect: endpoint,
+        }
     }
 }
 
@@ -118,7 +127,14 @@ pub struct CameraConfig {
 
 impl Default for CameraConfig {
     fn default() -> Self {
-        Self { name: "front".into(), source: "synth".into(), rate: 0.0, fast: false, looped: true, autostart: true }
+        Self {
+            name: "front".into(),
+            source: "synth".into(),
+            rate: 0.0,
+            fast: false,
+            looped: true,
+            autostart: true,
+        }
     }
 }
 
@@ -140,7 +156,13 @@ pub struct TrackingConfig {
 
 impl Default for TrackingConfig {
     fn default() -> Self {
-        Self { address: local(50052), admin: local(9102), body: PathBuf::new(), max_sessions: 4, idle_s: 30 }
+        Self {
+            address: local(50052),
+            admin: local(9102),
+            body: PathBuf::new(),
+            max_sessions: 4,
+            idle_s: 30,
+        }
     }
 }
 

@@ -32,7 +32,12 @@ impl<T> Sender<T> {
     /// Never waits: replaces a value that nobody took, and counts it.
     /// `false` when the receiver is gone.
     pub fn send(&self, value: T) -> bool {
-        let old = self.0.place.lock().unwrap_or_else(PoisonError::into_inner).replace(value);
+        let old = self
+            .0
+            .place
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .replace(value);
         if old.is_some() {
             self.0.dropped.fetch_add(1, Ordering::Relaxed);
         }
@@ -77,7 +82,11 @@ impl<T> Receiver<T> {
     }
     /// The newest value, if one waits.
     pub fn try_recv(&mut self) -> Option<T> {
-        self.0.place.lock().unwrap_or_else(PoisonError::into_inner).take()
+        self.0
+            .place
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take()
     }
     /// Values replaced before they were taken.
     pub fn dropped(&self) -> u64 {

@@ -28,8 +28,17 @@ pub struct Receiver<T>(Arc<Shared<T>>);
 
 /// A queue for one keyframe and `capacity` updates.
 pub fn channel<T>(capacity: usize) -> (Sender<T>, Receiver<T>) {
-    let inner = Inner { key: None, updates: VecDeque::new(), dropped: 0, closed: false };
-    let shared = Arc::new(Shared { inner: Mutex::new(inner), capacity: capacity.max(1), arrived: Notify::new() });
+    let inner = Inner {
+        key: None,
+        updates: VecDeque::new(),
+        dropped: 0,
+        closed: false,
+    };
+    let shared = Arc::new(Shared {
+        inner: Mutex::new(inner),
+        capacity: capacity.max(1),
+        arrived: Notify::new(),
+    });
     (Sender(shared.clone()), Receiver(shared))
 }
 
@@ -87,7 +96,9 @@ impl<T> Receiver<T> {
     /// The next value in order; `None` when the sender is gone and nothing waits. Cancel safe.
     pub async fn recv(&mut self) -> Option<T> {
         loop {
-            let (next, closed) = self.0.with(|q| (q.key.take().or_else(|| q.updates.pop_front()), q.closed));
+            let (next, closed) = self
+                .0
+                .with(|q| (q.key.take().or_else(|| q.updates.pop_front()), q.closed));
             if next.is_some() || closed {
                 return next;
             }
@@ -117,6 +128,9 @@ mod tests {
         tx.update("d");
         assert_eq!(rx.dropped(), 2);
         drop(tx);
-        assert_eq!((rx.recv().await, rx.recv().await, rx.recv().await), (Some("K2"), Some("d"), None));
+        assert_eq!(
+            (rx.recv().await, rx.recv().await, rx.recv().await),
+            (Some("K2"), Some("d"), None)
+        );
     }
 }

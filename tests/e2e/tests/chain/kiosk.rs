@@ -56,7 +56,10 @@ impl Kiosk {
             rate,
             ..CameraConfig::default()
         };
-        config.capture.cameras = vec![camera("front", source, rate), camera("side", "pattern", 10.0)];
+        config.capture.cameras = vec![
+            camera("front", source, rate),
+            camera("side", "pattern", 10.0),
+        ];
         for a in [
             &mut config.capture.address,
             &mut config.capture.admin,
@@ -70,7 +73,10 @@ impl Kiosk {
             *a = any;
         }
         change(&mut config);
-        let mut kiosk = Self { config, processes: vec![None, None, None, None] };
+        let mut kiosk = Self {
+            config,
+            processes: vec![None, None, None, None],
+        };
         PARTS.into_iter().for_each(|p| kiosk.restart(p));
         kiosk
     }
@@ -87,7 +93,10 @@ impl Kiosk {
                     Ok(started) => return started,
                     // The port of a part that was killed a moment ago.
                     Err(StartError::Bind { .. }) if begun.elapsed() < Duration::from_secs(2) => {
-                        #[allow(clippy::disallowed_methods, reason = "a plain thread of a test waits for a port")]
+                        #[allow(
+                            clippy::disallowed_methods,
+                            reason = "a plain thread of a test waits for a port"
+                        )]
                         std::thread::sleep(Duration::from_millis(20));
                     }
                     Err(e) => panic!("{part:?}: {e}"),
@@ -108,20 +117,38 @@ impl Kiosk {
             }
             Part::Compositor => self.config.compositor.address = running.address,
         }
-        self.processes[part as usize] = Some(Process { runtime, running, shutdown });
+        self.processes[part as usize] = Some(Process {
+            runtime,
+            running,
+            shutdown,
+        });
     }
 
-    fn run(part: Part, config: Config, token: CancellationToken) -> Result<(Runtime, Running), StartError> {
-        let runtime =
-            tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().expect("a runtime");
+    fn run(
+        part: Part,
+        config: Config,
+        token: CancellationToken,
+    ) -> Result<(Runtime, Running), StartError> {
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(2)
+            .enable_all()
+            .build()
+            .expect("a runtime");
         let running = runtime.block_on(async move {
             let pool = Pool::new(config.process.compute_threads).expect("threads");
             let (listen, connect) = match part {
                 Part::Capture => (&config.bus.listen[..], &[][..]),
                 _ => (&[][..], &config.bus.connect[..]),
             };
-            let bus = ZenohBus::open(listen, connect, pool.clone()).await.expect("a bus");
-            let ctx = Context { bus, pool, shutdown: token, grace: Duration::from_millis(config.process.grace_ms) };
+            let bus = ZenohBus::open(listen, connect, pool.clone())
+                .await
+                .expect("a bus");
+            let ctx = Context {
+                bus,
+                pool,
+                shutdown: token,
+                grace: Duration::from_millis(config.process.grace_ms),
+            };
             match part {
                 Part::Capture => tryon_capture::start(&config, ctx).await,
                 Part::Tracking => tryon_tracking::start(&config, ctx).await,
@@ -160,7 +187,11 @@ impl Kiosk {
     }
 
     pub fn admin(&self, part: Part) -> SocketAddr {
-        self.processes[part as usize].as_ref().expect("runs").running.admin
+        self.processes[part as usize]
+            .as_ref()
+            .expect("runs")
+            .running
+            .admin
     }
 
     pub fn channel(&self, part: Part) -> Channel {
@@ -185,7 +216,14 @@ impl Drop for Kiosk {
 }
 
 pub fn wear(garments: &[&str]) -> Vec<GarmentChoice> {
-    garments.iter().map(|g| GarmentChoice { garment: (*g).into(), size: "M".into(), color_rgb: None }).collect()
+    garments
+        .iter()
+        .map(|g| GarmentChoice {
+            garment: (*g).into(),
+            size: "M".into(),
+            color_rgb: None,
+        })
+        .collect()
 }
 
 /// A viewer of one try-on.
@@ -213,7 +251,12 @@ impl Watcher {
         }
     }
 
-    async fn try_open(kiosk: &Kiosk, id: &str, camera: &str, garments: &[&str]) -> Result<Self, tonic::Status> {
+    async fn try_open(
+        kiosk: &Kiosk,
+        id: &str,
+        camera: &str,
+        garments: &[&str],
+    ) -> Result<Self, tonic::Status> {
         let mut c = kiosk.compositor();
         let r = OpenTryOnRequest {
             try_on_id: id.into(),
@@ -222,13 +265,22 @@ impl Watcher {
             garments: wear(garments),
         };
         c.open_try_on(r).await?;
-        let r = StreamFramesRequest { try_on_id: id.into(), width: 320, height: 240, ..Default::default() };
-        Ok(Self { events: c.stream_frames(r).await?.into_inner() })
+        let r = StreamFramesRequest {
+            try_on_id: id.into(),
+            width: 320,
+            height: 240,
+            ..Default::default()
+        };
+        Ok(Self {
+            events: c.stream_frames(r).await?.into_inner(),
+        })
     }
 
     /// The next event; `Err` carries the status with which the stream ended, OK for a regular end.
     pub async fn next(&mut self) -> Result<Event, tonic::Status> {
-        let next = tokio::time::timeout(PATIENCE, self.events.message()).await.expect("the stream went silent");
+        let next = tokio::time::timeout(PATIENCE, self.events.message())
+            .await
+            .expect("the stream went silent");
         let message = next?.ok_or_else(|| tonic::Status::ok("the end"))?;
         Ok(message.event.expect("an event"))
     }
@@ -238,7 +290,10 @@ impl Watcher {
         let begun = Instant::now();
         let mut last = String::new();
         loop {
-            let e = self.next().await.unwrap_or_else(|s| panic!("the stream ended before {what}: {s}; last {last}"));
+            let e = self
+                .next()
+                .await
+                .unwrap_or_else(|s| panic!("the stream ended before {what}: {s}; last {last}"));
             if wanted(&e) {
                 return e;
             }
@@ -246,19 +301,31 @@ impl Watcher {
                 Event::Picture(p) => format!("picture {:?} {:?}", p.state(), p.reason()),
                 Event::Status(s) => format!("status {:?} {:?} {}", s.state(), s.reason(), s.detail),
             };
-            assert!(begun.elapsed() < PATIENCE, "waited too long for {what}; last {last}");
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "waited too long for {what}; last {last}"
+            );
         }
     }
 
     pub async fn picture(&mut self, state: TryOnState) -> Picture {
-        let e = self.until(state.as_str_name(), |e| matches!(e, Event::Picture(p) if p.state() == state)).await;
-        let Event::Picture(p) = e else { unreachable!("just matched") };
+        let e = self
+            .until(
+                state.as_str_name(),
+                |e| matches!(e, Event::Picture(p) if p.state() == state),
+            )
+            .await;
+        let Event::Picture(p) = e else {
+            unreachable!("just matched")
+        };
         p
     }
 
     pub async fn degraded(&mut self, reason: DegradedReason) -> TryOnStatus {
         let is = |e: &Event| matches!(e, Event::Status(s) if s.state() == TryOnState::Degraded && s.reason() == reason);
-        let Event::Status(s) = self.until(reason.as_str_name(), is).await else { unreachable!("just matched") };
+        let Event::Status(s) = self.until(reason.as_str_name(), is).await else {
+            unreachable!("just matched")
+        };
         s
     }
 }

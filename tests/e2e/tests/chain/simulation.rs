@@ -20,17 +20,29 @@ fn falling(change: impl Fn(&mut serde_json::Value)) -> StartSimulationRequest {
         "gravity": [0.0, -9.81, 0.0], "duration_s": 0.5, "output_fps": RATE
     });
     change(&mut scene);
-    StartSimulationRequest { scene_json: scene.to_string(), solver: ClothSolver::Unspecified.into() }
+    StartSimulationRequest {
+        scene_json: scene.to_string(),
+        solver: ClothSolver::Unspecified.into(),
+    }
 }
 
 /// Mean height of each frame from `first` on.
 async fn heights(c: &mut ClothServiceClient<Channel>, id: &str, first: u32) -> Vec<f64> {
-    let r = FollowSimulationRequest { simulation_id: id.into(), first_frame: first };
+    let r = FollowSimulationRequest {
+        simulation_id: id.into(),
+        first_frame: first,
+    };
     let mut frames = c.follow_simulation(r).await.expect("followed").into_inner();
     let mut out = Vec::new();
     while let Some(f) = frames.message().await.expect("a frame") {
-        assert_eq!((f.frame, f.frame_count, f.positions.len()), (first + out.len() as u32, FRAMES, 4 * 12));
-        let y = f.positions.chunks_exact(12).map(|p| f32::from_le_bytes([p[4], p[5], p[6], p[7]]));
+        assert_eq!(
+            (f.frame, f.frame_count, f.positions.len()),
+            (first + out.len() as u32, FRAMES, 4 * 12)
+        );
+        let y = f
+            .positions
+            .chunks_exact(12)
+            .map(|p| f32::from_le_bytes([p[4], p[5], p[6], p[7]]));
         out.push(y.map(f64::from).sum::<f64>() / 4.0);
     }
     out
@@ -43,7 +55,10 @@ fn a_simulation_on_request_falls_as_bodies_fall() {
         let mut c = ClothServiceClient::new(kiosk.channel(Part::Cloth));
         for solver in [ClothSolver::Realtime, ClothSolver::Offline] {
             let started = c
-                .start_simulation(StartSimulationRequest { solver: solver.into(), ..falling(|_| ()) })
+                .start_simulation(StartSimulationRequest {
+                    solver: solver.into(),
+                    ..falling(|_| ())
+                })
                 .await
                 .expect("started")
                 .into_inner();
@@ -61,14 +76,29 @@ fn a_simulation_on_request_falls_as_bodies_fall() {
             }
             // A second reader, later and from the middle, sees the same frames.
             assert_eq!(heights(&mut c, &started.simulation_id, 10).await, all[10..]);
-            let beyond = FollowSimulationRequest { simulation_id: started.simulation_id, first_frame: FRAMES };
-            assert_eq!(c.follow_simulation(beyond).await.expect_err("beyond").code(), Code::InvalidArgument);
+            let beyond = FollowSimulationRequest {
+                simulation_id: started.simulation_id,
+                first_frame: FRAMES,
+            };
+            assert_eq!(
+                c.follow_simulation(beyond)
+                    .await
+                    .expect_err("beyond")
+                    .code(),
+                Code::InvalidArgument
+            );
         }
 
         let faults = [
-            (falling(|s| s["mesh_obj"] = "v 0 0 0\nf 1 2 3\n".into()), "face 0"),
+            (
+                falling(|s| s["mesh_obj"] = "v 0 0 0\nf 1 2 3\n".into()),
+                "face 0",
+            ),
             (falling(|s| s["duration_s"] = (-1.0).into()), "duration_s"),
-            (falling(|s| s["pinned_vertices"] = vec![9].into()), "pinned_vertices"),
+            (
+                falling(|s| s["pinned_vertices"] = vec![9].into()),
+                "pinned_vertices",
+            ),
             (
                 falling(|s| {
                     s.as_object_mut().expect("an object").remove("mesh_obj");
@@ -79,9 +109,18 @@ fn a_simulation_on_request_falls_as_bodies_fall() {
         ];
         for (request, part) in faults {
             let e = c.start_simulation(request).await.expect_err("refused");
-            assert!(e.code() == Code::InvalidArgument && e.message().contains(part), "{part}: {e}");
+            assert!(
+                e.code() == Code::InvalidArgument && e.message().contains(part),
+                "{part}: {e}"
+            );
         }
-        let gone = FollowSimulationRequest { simulation_id: "other".into(), first_frame: 0 };
-        assert_eq!(c.follow_simulation(gone).await.expect_err("unknown").code(), Code::NotFound);
+        let gone = FollowSimulationRequest {
+            simulation_id: "other".into(),
+            first_frame: 0,
+        };
+        assert_eq!(
+            c.follow_simulation(gone).await.expect_err("unknown").code(),
+            Code::NotFound
+        );
     });
 }
