@@ -1,9 +1,15 @@
-//! The house rules that a compiler does not know: layers, doors, charters and file budgets.
+//! The house rules that a compiler does not know: layers, doors, charters, import circles, budgets, wording.
 //!
 //! The table below is the architecture as data. To change the architecture, change it here, in one reviewable place.
 
+#[path = "tidy/imports.rs"]
+mod imports;
+#[path = "tidy/source.rs"]
+mod source;
+
+use source::{SourceFile, code, code_without_tests, root};
+use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
 
 /// Layer, module, charter: the first `//!` line of `src/<module>/mod.rs`, word for word.
 const MODULES: &[(u8, &str, &str)] = &[
@@ -142,162 +148,100 @@ const DOORS: &[(&str, &[&str])] = &[
 
 /// Longest source file, lines. Around 200 is the aim; at 600 a file holds more than one idea.
 const MAX_LINES: usize = 600;
+/// Longest function, lines from `fn` to its closing brace. Around 30 is the aim.
+const MAX_FUNCTION_LINES: usize = 80;
+/// Longest document, bytes: what a person reads in one sitting.
+const MAX_DOCUMENT_BYTES: usize = 20_000;
+/// Words that no comment opens with: a comment says what a thing is, by the field's term.
+const OPENINGS: &[&str] = &["What", "Which", "Whether", "Where", "How far", "So many"];
+/// Type names that each module may use for its own step; every other name has one meaning.
+const SHARED_NAMES: &[&str] = &[
+    "Model",
+    "State",
+    "Input",
+    "Workspace",
+    "Config",
+    "StepReport",
+    "StepError",
+];
 
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-}
-
-fn rust_files(dir: &Path, out: &mut Vec<PathBuf>) {
-    let Ok(entries) = fs::read_dir(dir) else {
-        return;
-    };
-    for entry in entries.flatten() {
-        let path = entry.path();
-        let name = entry.file_name();
-        if path.is_dir() {
-            if name != "target" && name != ".git" {
-                rust_files(&path, out);
-            }
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            out.push(path);
-        }
-    }
-}
-
-fn all_files() -> Vec<(String, String)> {
-    let mut files = Vec::new();
-    for dir in ["src", "proto", "services", "tests", "benches", "examples"] {
-        rust_files(&root().join(dir), &mut files);
-    }
-    files.sort();
-    files
-        .into_iter()
-        .map(|p| {
-            let rel = p
-                .strip_prefix(root())
-                .expect("inside the root")
-                .to_string_lossy()
-                .replace('\\', "/");
-            (rel, fs::read_to_string(&p).expect("readable"))
-        })
-        .collect()
-}
-
-/// Source without comments (doc comments may name whatever they like). String literals stay; none names a crate path.
-fn code(source: &str) -> String {
-    source
-        .lines()
-        .map(|l| l.split("//").next().unwrap_or(""))
-        .collect::<Vec<_>>()
-        .join("\n")
-}
-
-/// First path segments after each `crate::`, also inside `use crate::{a::b, c}`.
-fn modules_named(code: &str) -> Vec<String> {
-    let ident = |s: &str| {
-        s.chars()
-            .take_while(|c| c.is_alphanumeric() || *c == '_')
-            .collect::<String>()
-    };
-    let mut named = Vec::new();
-    for (at, _) in code.match_indices("crate::") {
-        if code[..at].ends_with('$')
-            || code[..at]
-                .chars()
-                .last()
-                .is_some_and(|c| c.is_alphanumeric() || c == '_')
-        {
-            continue;
-        }
-        let rest = &code[at + "crate::".len()..];
-        if let Some(group) = rest.strip_prefix('{') {
-            let (mut depth, mut start) = (1, true);
-            for (i, c) in group.char_indices() {
-                match c {
-                    '{' => depth += 1,
-                    '}' => depth -= 1,
-                    ',' if depth == 1 => start = true,
-                    _ if start && depth == 1 && !c.is_whitespace() => {
-                        named.push(ident(&group[i..]));
-                        start = false;
-                    }
-                    _ => {}
-                }
-                if depth == 0 {
-                    break;
-                }
-            }
-        } else {
-            named.push(ident(rest));
-        }
-    }
-    named
+/// Fails with one line a fault.
+fn assert_none(faults: &[String]) {
+    assert!(
+        faults.is_empty(),
+        "{} faults\n{}",
+        faults.len(),
+        faults.join("\n")
+    );
 }
 
 fn layer_of(module: &str) -> Option<u8> {
     MODULES.iter().find(|m| m.1 == module).map(|m| m.0)
 }
 
+/// Top module of a file of the library.
+fn module_of(file: &SourceFile) -> Option<&str> {
+    let inner = file.path.strip_prefix("src/")?;
+    inner.split_once('/').map(|p| p.0)
+}
+
 #[test]
 fn a_module_uses_only_lower_layers() {
     let mut faults = Vec::new();
-    for (path, source) in all_files() {
-        let Some(module) = path
-            .strip_prefix("src/")
-            .and_then(|p| p.split_once('/'))
-            .map(|p| p.0)
-        else {
+    for file in source::rust() {
+        let Some(module) = module_of(&file) else {
             continue;
         };
         let Some(own) = layer_of(module) else {
-            faults.push(format!("{path}: module `{module}` is not in the table"));
+            faults.push(format!(
+                "{}: module `{module}` is not in the table",
+                file.path
+            ));
             continue;
         };
-        for other in modules_named(&code(&source)) {
-            if other == module {
-                continue;
-            }
-            if let Some(layer) = layer_of(&other).filter(|layer| *layer >= own) {
+        for other in imports::modules_named(&code(&file.text)) {
+            if let Some(layer) = layer_of(&other).filter(|l| other != module && *l >= own) {
                 faults.push(format!(
-                    "{path}: `{module}` (layer {own}) uses `{other}` (layer {layer})"
+                    "{}: `{module}` (layer {own}) uses `{other}` (layer {layer})",
+                    file.path
                 ));
             }
         }
     }
-    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+    assert_none(&faults);
+}
+
+#[test]
+fn files_of_a_module_import_without_circles() {
+    let sources = source::rust();
+    let graph = imports::Library::new(&sources).imports();
+    let faults: Vec<String> = imports::circles(&graph)
+        .iter()
+        .map(|circle| circle.join(" ⇄ "))
+        .collect();
+    assert_none(&faults);
 }
 
 #[test]
 fn external_crates_stay_behind_their_doors() {
     let mut faults = Vec::new();
-    for (path, source) in all_files() {
-        if path == "tests/tidy.rs" {
+    for file in source::rust() {
+        if file.path.starts_with("tests/tidy") {
             continue;
         }
-        let text = code(&source);
+        let text = code(&file.text);
         for (name, doors) in DOORS {
-            if doors.iter().any(|d| path.starts_with(d)) {
-                continue;
-            }
-            let pattern = format!("{name}::");
-            let named = text.match_indices(&pattern).any(|(at, _)| {
-                // `formats::mcap::…` is ours, `mcap::…` at the start of a path is the crate.
-                let before = &text[..at];
-                !before.ends_with("::")
-                    && !before
-                        .chars()
-                        .last()
-                        .is_some_and(|c| c.is_alphanumeric() || c == '_')
-            });
-            if named {
+            let behind = doors.iter().any(|d| file.path.starts_with(d));
+            if !behind && imports::names_crate(&text, name) {
                 faults.push(format!(
-                    "{path}: names `{name}`, whose door is {}",
+                    "{}: names `{name}`, whose door is {}",
+                    file.path,
                     doors.join(", ")
                 ));
             }
         }
     }
-    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+    assert_none(&faults);
 }
 
 #[test]
@@ -317,14 +261,102 @@ fn every_module_opens_with_its_charter() {
 
 #[test]
 fn files_stay_small() {
-    let faults: Vec<String> = all_files()
-        .into_iter()
-        .filter(|(path, _)| !path.starts_with("proto/src/gen/"))
-        .map(|(path, source)| (path, source.lines().count()))
+    let faults: Vec<String> = source::rust()
+        .iter()
+        .map(|file| (&file.path, file.text.lines().count()))
         .filter(|(_, lines)| *lines > MAX_LINES)
         .map(|(path, lines)| format!("{path}: {lines} lines (at most {MAX_LINES})"))
         .collect();
-    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+    assert_none(&faults);
+}
+
+#[test]
+fn functions_fit_a_head() {
+    let mut faults = Vec::new();
+    for file in source::rust() {
+        for f in source::functions(&file.text) {
+            if f.length > MAX_FUNCTION_LINES {
+                faults.push(format!(
+                    "{}:{}: `{}` has {} lines (at most {MAX_FUNCTION_LINES})",
+                    file.path, f.line, f.name, f.length
+                ));
+            }
+        }
+    }
+    assert_none(&faults);
+}
+
+#[test]
+fn comments_say_what_a_thing_is() {
+    let mut faults = Vec::new();
+    for file in source::rust() {
+        for (n, line) in file.text.lines().enumerate() {
+            let Some(comment) = line.trim_start().strip_prefix("//") else {
+                continue;
+            };
+            let words = comment.trim_start_matches(['/', '!']).trim_start();
+            let opens = |o: &&&str| {
+                words
+                    .strip_prefix(**o)
+                    .is_some_and(|rest| !rest.starts_with(char::is_alphanumeric))
+            };
+            if let Some(opening) = OPENINGS.iter().find(opens) {
+                faults.push(format!(
+                    "{}:{}: a comment opens with `{opening}`",
+                    file.path,
+                    n + 1
+                ));
+            }
+        }
+    }
+    assert_none(&faults);
+}
+
+#[test]
+fn a_type_name_has_one_meaning() {
+    let mut places = BTreeMap::<String, Vec<String>>::new();
+    for file in source::rust() {
+        if module_of(&file).is_some() && !file.path.ends_with("tests.rs") {
+            for name in source::types(&code_without_tests(&file.text)) {
+                places.entry(name).or_default().push(file.path.clone());
+            }
+        }
+    }
+    let faults: Vec<String> = places
+        .iter()
+        .filter(|(name, files)| files.len() > 1 && !SHARED_NAMES.contains(&name.as_str()))
+        .map(|(name, files)| format!("`{name}`: {}", files.join(", ")))
+        .collect();
+    assert_none(&faults);
+}
+
+#[test]
+fn documents_fit_one_sitting() {
+    let mut documents = source::files(&["docs", "deploy", "proto", "tests"], "md");
+    for name in [
+        "README.md",
+        "ARCHITECTURE.md",
+        "CHANGELOG.md",
+        "CONTRIBUTING.md",
+    ] {
+        let text = fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+        documents.push(SourceFile {
+            path: name.to_owned(),
+            text,
+        });
+    }
+    let faults: Vec<String> = documents
+        .iter()
+        .filter(|d| d.text.len() > MAX_DOCUMENT_BYTES)
+        .map(|d| {
+            format!(
+                "{}: {} bytes (at most {MAX_DOCUMENT_BYTES})",
+                d.path,
+                d.text.len()
+            )
+        })
+        .collect();
+    assert_none(&faults);
 }
 
 #[test]
@@ -351,9 +383,48 @@ fn services_do_not_depend_on_each_other() {
 }
 
 #[test]
-fn the_scanner_sees_grouped_and_plain_paths() {
-    let found = modules_named(
+fn the_scanner_reads_grouped_and_plain_paths() {
+    let found = imports::modules_named(
         "use crate::{math::{P3, V3}, mesh};\nlet x = crate::raster::View; $crate::par::x",
     );
-    assert_eq!(found, ["math", "mesh", "raster"]);
+    assert_eq!(found, ["math", "math", "mesh", "raster"]);
+}
+
+#[test]
+fn the_scanner_finds_circles_through_reexports_and_none_through_tests() {
+    let file = |path: &str, text: &str| SourceFile {
+        path: path.to_owned(),
+        text: text.to_owned(),
+    };
+    let module = file(
+        "src/m/mod.rs",
+        "mod a;\nmod b;\nmod c;\npub use a::A;\npub use b::{B, f};\n",
+    );
+    let a = file("src/m/a.rs", "use super::B;\npub struct A(B);\n");
+    let b = file(
+        "src/m/b.rs",
+        "pub struct B;\npub fn f(a: &super::a::A) {}\n",
+    );
+    let c = file(
+        "src/m/c.rs",
+        "use crate::m::{A, b::f};\n#[cfg(test)]\nmod tests {\n}\n",
+    );
+    let all = [module, a, b, c];
+    let found = imports::circles(&imports::Library::new(&all).imports());
+    assert_eq!(found, [["m::a", "m::b"]]);
+    let tested = "pub struct B;\n#[cfg(test)]\nmod tests {\n    use super::super::a::A;\n}\n";
+    let [module, a, _, c] = all;
+    let all = [module, a, file("src/m/b.rs", tested), c];
+    assert!(imports::circles(&imports::Library::new(&all).imports()).is_empty());
+}
+
+#[test]
+fn the_scanner_measures_functions() {
+    let text = "impl A {\n    pub(crate) const fn f(\n        x: u8,\n    ) -> u8 {\n        x\n    }\n    fn g();\n}\n";
+    let found = source::functions(text);
+    assert_eq!(found.len(), 1);
+    assert_eq!(
+        (found[0].name.as_str(), found[0].line, found[0].length),
+        ("f", 2, 5)
+    );
 }
