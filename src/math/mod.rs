@@ -1,5 +1,7 @@
 //! Small fixed-size algebra that nalgebra lacks: so(3)/se(3) maps, twists, polar, PSD projection, stable roots.
 
+#[cfg(test)]
+pub(crate) mod derivative_check;
 mod frames;
 mod lie;
 mod polar;
