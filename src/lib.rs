@@ -35,4 +35,6 @@ pub mod gpu;
 pub mod session;
 pub mod synth;
 // Layer 6
+pub mod mirror;
+// Layer 7
 pub mod evaluate;

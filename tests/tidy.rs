@@ -120,6 +120,11 @@ const MODULES: &[(u8, &str, &str)] = &[
     ),
     (
         6,
+        "mirror",
+        "Frame to picture for one person: track, choose size, dress, simulate, composite; the one chain that command line and services share.",
+    ),
+    (
+        7,
         "evaluate",
         "Run time against error: standard scenes, methods side by side, tables and plots behind `tryon bench`.",
     ),

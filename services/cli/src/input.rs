@@ -1,4 +1,4 @@
-//! What several commands read: bodies, rough starts, recordings with a progress bar.
+//! Inputs that several commands share: bodies, garments, rough starts, and the progress bar over frames.
 
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -11,6 +11,7 @@ use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
 use tryon::formats::npz::read_smpl;
 use tryon::garment::import::from_garmentcode;
 use tryon::garment::{Material, Pattern, Size, Triangulation};
+use tryon::mirror::Choice;
 
 /// The body to track: an SMPL-layout npz, or the embedded one.
 ///
@@ -53,19 +54,42 @@ pub(crate) fn pattern(path: &Path) -> Result<Pattern> {
     .with_context(|| path.display().to_string())
 }
 
-/// The name is that of a mesh garment's file.
-pub(crate) fn is_mesh(name: &str) -> bool {
-    Path::new(name)
-        .extension()
-        .and_then(|e| e.to_str())
-        .is_some_and(|e| ["obj", "glb", "gltf", "mhclo"].contains(&e.to_ascii_lowercase().as_str()))
-}
-
-/// A mesh garment from a file, made on `body` (a guess without one), of cotton.
+/// Garments by library name, pattern file or mesh file; `size` for those of the library, `body` under the meshes.
 ///
 /// # Errors
-/// Names the file and the edge, face or vertex at fault.
-pub(crate) fn mesh_garment(path: &Path, body: Option<MadeOn>) -> Result<MeshWear> {
+/// Names the unknown garment or size, or the fault in a file.
+pub(crate) fn choices(
+    names: &[String],
+    size: Option<&str>,
+    body: Option<&Path>,
+) -> Result<Vec<Choice>> {
+    let size = size.map(str::parse::<Size>).transpose()?;
+    let body = body
+        .map(MadeOn::read)
+        .transpose()
+        .context("--garment-body")?;
+    let choice = |name: &String| {
+        let path = Path::new(name);
+        Ok(if name.ends_with(".json") {
+            Choice::Pattern(Box::new(pattern(path)?))
+        } else if is_mesh(path) {
+            Choice::Mesh(Arc::new(mesh_garment(path, body.clone())?))
+        } else {
+            Choice::library(name, size)?
+        })
+    };
+    names.iter().map(choice).collect()
+}
+
+fn is_mesh(path: &Path) -> bool {
+    const ENDINGS: [&str; 4] = ["obj", "glb", "gltf", "mhclo"];
+    path.extension()
+        .and_then(|e| e.to_str())
+        .is_some_and(|e| ENDINGS.contains(&e.to_ascii_lowercase().as_str()))
+}
+
+/// Mesh garment of cotton, made on `body`, which is guessed when absent.
+fn mesh_garment(path: &Path, body: Option<MadeOn>) -> Result<MeshWear> {
     let edge = Triangulation::default().edge_length;
     MeshWear::on(path, body, &Material::preset("cotton")?, edge)
         .with_context(|| path.display().to_string())

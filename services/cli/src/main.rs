@@ -5,12 +5,11 @@
 )]
 
 mod args;
-mod chain;
 mod commands;
 mod input;
-mod mirror;
 mod onebox;
 mod report;
+mod viewer;
 
 use args::{Cli, Command};
 use clap::Parser;

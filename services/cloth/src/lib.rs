@@ -1,7 +1,7 @@
-//! The cloth service: garments on the bodies that tracking reports.
+//! Cloth service: garments on the bodies that tracking reports.
 //!
-//! One task owns one session (`session`): it follows the session's body states, dresses the body when it is
-//! calibrated, steps the garments on the compute pool and hands each reader a keyframe and then positions.
+//! One task owns one session (`session`): it follows the body states, dresses the body when it is calibrated, steps the
+//! garments on the compute pool and sends each reader a keyframe and then positions.
 
 mod engine;
 mod library;
@@ -13,7 +13,7 @@ use tryon_kit::config::Config;
 use tryon_kit::server::{self, Context, Running, Service, StartError};
 use tryon_proto::v1::cloth_service_server::{ClothServiceServer, SERVICE_NAME};
 
-/// A scene of a simulation, with room for its message.
+/// Largest request, bytes: a scene of a simulation and its message.
 const MAX_REQUEST_BYTES: usize = 1024 * 1024 + 4096;
 
 /// Starts the service. The tracking service need not run yet.

@@ -1,19 +1,21 @@
-//! What can be worn: the library's garments and those of the configured folder, in the words of the wire.
+//! Garments on offer: those of the library and of the configured folder, as the wire lists them.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use tryon::dressing::{MadeOn, MeshWear};
 use tryon::garment::{GarmentKind, Material, Size, Triangulation, library};
+use tryon::mirror::Choice;
 use tryon_kit::config::ClothConfig;
 use tryon_kit::server::StartError;
 use tryon_proto::convert::WireError;
 use tryon_proto::keys::is_name;
 use tryon_proto::v1::{GarmentChoice, GarmentInfo};
 
-/// Files that are garments.
+/// Endings of mesh garment files.
 const MESHES: [&str; 4] = ["mhclo", "obj", "glb", "gltf"];
 
-/// For people.
+/// Title of a garment for people.
 fn title(name: &str) -> String {
     match name {
         "tshirt" => "T-shirt".into(),
@@ -24,14 +26,14 @@ fn title(name: &str) -> String {
     }
 }
 
-/// The colour a garment has unless another is chosen.
+/// Colour of a garment unless another is chosen, 0x00RRGGBB.
 pub(crate) fn own_color(garment: &str) -> u32 {
     let [r, g, b] = library::dye(garment);
     u32::from_be_bytes([0, r, g, b])
 }
 
 /// The size of that name, in any case.
-pub(crate) fn size(name: &str) -> Option<Size> {
+fn size(name: &str) -> Option<Size> {
     Size::ALL
         .into_iter()
         .find(|s| s.to_string().eq_ignore_ascii_case(name))
@@ -40,7 +42,7 @@ pub(crate) fn size(name: &str) -> Option<Size> {
 /// Everything that can be worn.
 #[derive(Debug, Default)]
 pub(crate) struct Library {
-    meshes: BTreeMap<String, MeshWear>,
+    meshes: BTreeMap<String, Arc<MeshWear>>,
 }
 
 impl Library {
@@ -115,13 +117,19 @@ impl Library {
             .map_err(|e| e.to_string())?
             .named(name);
         let notes = wear.notes.join("; ");
-        self.meshes.insert(name.to_owned(), wear);
+        self.meshes.insert(name.to_owned(), Arc::new(wear));
         Ok(notes)
     }
 
-    /// The mesh garment of that name.
-    pub(crate) fn mesh(&self, name: &str) -> Option<&MeshWear> {
-        self.meshes.get(name)
+    /// A checked wire choice in the terms of the chain. Without a size, and for meshes, the body decides.
+    pub(crate) fn choice(&self, c: &GarmentChoice) -> Choice {
+        match self.meshes.get(&c.garment) {
+            Some(mesh) => Choice::Mesh(Arc::clone(mesh)),
+            None => Choice::Library {
+                name: c.garment.clone(),
+                size: size(&c.size),
+            },
+        }
     }
 
     /// Every garment, sorted by name.
@@ -148,7 +156,10 @@ impl Library {
         all
     }
 
-    /// Refuses what there is not.
+    /// Refuses unknown garments and sizes.
+    ///
+    /// # Errors
+    /// Names the field of the request.
     pub(crate) fn check(&self, choices: &[GarmentChoice]) -> Result<(), WireError> {
         for (i, c) in choices.iter().enumerate() {
             let fault = |f: &str, why: String| {
@@ -187,7 +198,8 @@ impl Library {
     }
 }
 
-/// The garments of a folder and of the folders in it, in the order of their paths. What an `.mhclo` binds is part of it.
+/// Garment files of a folder and of the folders in it, in the order of their paths. The mesh that an `.mhclo` binds is no
+/// garment of its own.
 fn files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let list = |folder: &Path| -> std::io::Result<Vec<PathBuf>> {
         std::fs::read_dir(folder)?
@@ -219,7 +231,7 @@ fn files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     Ok(all)
 }
 
-/// What a file's garment is called.
+/// Name of the garment in a file: lower case, with `_` for every other character.
 fn name_of(file: &Path) -> String {
     let stem = file
         .file_stem()

@@ -1,8 +1,8 @@
-//! The rpcs: check, find the session, answer.
+//! Remote procedures of the cloth service: check the request, find the session, answer.
 
-use crate::engine::Said;
+use crate::engine::Update;
 use crate::library::Library;
-use crate::session::{self, Command, Handle, Setup, Told, reader};
+use crate::session::{self, Command, Handle, Message, Setup, reader};
 use crate::simulation::{Frames, Simulations};
 use futures::Stream;
 use std::pin::Pin;
@@ -19,7 +19,7 @@ use tryon_proto::convert::request;
 use tryon_proto::v1::cloth_service_server::ClothService;
 use tryon_proto::v1::*;
 
-/// The directory of sessions and what new ones need.
+/// Directory of sessions and the dependencies of new ones.
 pub(crate) struct Cloth {
     sessions: Sessions<Handle>,
     simulations: Simulations,
@@ -127,13 +127,13 @@ impl ClothService for Cloth {
             .send(Command::Read(tx))
             .await
             .map_err(|_| not_found("session", id))?;
-        // Coded here, behind the queue: positions build only on what this reader was really sent.
+        // Encoded behind the queue: position deltas refer to the last message that this reader received.
         let start = Some((rx, GarmentWriter::default()));
         let frames = futures::stream::unfold(start, |at| async move {
             let (mut rx, mut writer) = at?;
-            let Told {
-                said:
-                    Said {
+            let Message {
+                update:
+                    Update {
                         mut frame,
                         positions,
                     },

@@ -1,6 +1,6 @@
 //! One session: its task, its outfit, its readers.
 
-use crate::engine::{Body, Said, Worn, dress};
+use crate::engine::{Body, Update, Worn, dress};
 use crate::library::Library;
 use std::sync::Arc;
 use std::time::Duration;
@@ -17,34 +17,35 @@ use tryon_proto::v1::{
     self, ClothStatus, DegradedReason, GarmentChoice, GarmentFrame, TrackingStatus,
 };
 
-/// A reader hears something at least this often.
+/// Longest interval between messages to a reader; a silent stream repeats its last status.
 const HEARTBEAT: Duration = Duration::from_millis(450);
-/// Position updates that may wait for a slow reader.
+/// Position updates that wait for a slow reader; a further one replaces the oldest.
 const WAITING: usize = 2;
-/// The end that was asked for.
+/// Reason of an end on request.
 const ASKED: &str = "asked to";
 
-/// What is wanted: grows with each change.
+/// Outfit that the client asked for; the revision grows with each change.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Outfit {
+pub(crate) struct WantedOutfit {
     pub(crate) revision: u64,
     pub(crate) choices: Vec<GarmentChoice>,
 }
 
-/// How others reach a session.
+/// Access to a session from the rpcs.
 pub(crate) struct Handle {
-    pub(crate) outfit: watch::Sender<Outfit>,
+    pub(crate) outfit: watch::Sender<WantedOutfit>,
     pub(crate) commands: mpsc::Sender<Command>,
 }
 
-/// What a session can be told.
+/// Command to a session.
 pub(crate) enum Command {
-    /// Somebody wants to read.
-    Read(ordered::Sender<Told>),
+    /// Adds a reader.
+    Read(ordered::Sender<Message>),
+    /// Ends the session.
     Close,
 }
 
-/// What a session's task needs.
+/// Dependencies of a session's task.
 pub(crate) struct Setup {
     pub(crate) id: String,
     pub(crate) ctx: Context,
@@ -54,14 +55,14 @@ pub(crate) struct Setup {
     pub(crate) directory: Sessions<Handle>,
 }
 
-/// A queue for one reader.
-pub(crate) fn reader() -> (ordered::Sender<Told>, ordered::Receiver<Told>) {
+/// Queue for one reader.
+pub(crate) fn reader() -> (ordered::Sender<Message>, ordered::Receiver<Message>) {
     ordered::channel(WAITING)
 }
 
 /// Starts the task of a session that wears nothing yet.
 pub(crate) fn spawn(setup: Setup) -> Handle {
-    let (outfit, wanted) = watch::channel(Outfit::default());
+    let (outfit, wanted) = watch::channel(WantedOutfit::default());
     let (commands, inbox) = mpsc::channel(8);
     tokio::spawn(async move {
         let (id, directory) = (setup.id.clone(), setup.directory.clone());
@@ -97,39 +98,39 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
     Handle { outfit, commands }
 }
 
-/// An outfit that is ready, or why not.
+/// Result of dressing one revision.
 struct Dressed {
     revision: u64,
     outcome: Result<Worn, String>,
 }
 
-/// A message to one reader.
+/// Message to one reader.
 #[derive(Clone)]
-pub(crate) struct Told {
-    pub(crate) said: Said,
-    /// The outfit, when this reader does not know it yet.
+pub(crate) struct Message {
+    pub(crate) update: Update,
+    /// Outfit, for a reader that does not have it yet.
     pub(crate) keyframe: Option<Garments>,
 }
 
-/// An outfit as it was put on once.
+/// Immutable part of a worn outfit.
 type Garments = Arc<[Arc<WornGarment>]>;
 
 struct Reader {
-    queue: ordered::Sender<Told>,
-    /// The outfit that it knows.
+    queue: ordered::Sender<Message>,
+    /// Outfit of its last keyframe.
     has: Option<Garments>,
 }
 
 struct Task {
     setup: Setup,
-    wanted: watch::Receiver<Outfit>,
-    /// What is on, away while the pool steps it.
+    wanted: watch::Receiver<WantedOutfit>,
+    /// Worn outfit; `None` while the pool steps it.
     worn: Option<Worn>,
-    /// Revision of what is on; 0 for nothing.
+    /// Revision of the worn outfit; 0 for nothing.
     on: u64,
-    /// Revision that could not be put on.
+    /// Revision that failed to be put on.
     failed: u64,
-    /// Revision that is being put on beside the old one, and for which round of measuring.
+    /// Revision that is being put on while the old one stays on; `None` once the body it is for is gone.
     dressing: Option<u64>,
     dressed: mpsc::Sender<Dressed>,
     readers: Vec<Reader>,
@@ -146,8 +147,8 @@ impl Task {
         let shutdown = self.setup.ctx.shutdown.clone();
         let mut tick = tokio::time::interval(HEARTBEAT / 3);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-        let (mut said, mut read) = (Instant::now(), Instant::now());
-        let mut status = Said::from(waiting(DegradedReason::NoPerson, String::new()));
+        let (mut published, mut read) = (Instant::now(), Instant::now());
+        let mut status = Update::from(waiting(DegradedReason::NoPerson, String::new()));
         loop {
             tokio::select! {
                 biased;
@@ -155,29 +156,29 @@ impl Task {
                 c = inbox.recv() => match c {
                     Some(Command::Read(queue)) => {
                         self.readers.push(Reader { queue, has: None });
-                        self.tell(status.clone());
+                        self.publish(status.clone());
                     }
                     Some(Command::Close) | None => return ASKED,
                 },
-                Some(d) = ready.recv() => self.take_on(d),
+                Some(d) = ready.recv() => self.on_dressed(d),
                 n = news.recv() => {
                     status = match n {
-                        Some(n) => self.hear(n).await,
+                        Some(n) => self.on_tracking(n).await,
                         None => return "tracking cannot be followed",
                     };
                     self.skipped = news.dropped();
-                    self.tell(status.clone());
-                    said = Instant::now();
-                    // What is repeated later must not pass old positions off as new ones.
+                    self.publish(status.clone());
+                    published = Instant::now();
+                    // A repetition of the status must not present old positions as new.
                     status.positions = Positions::default();
                 }
                 _ = tick.tick() => {
-                    if said.elapsed() >= HEARTBEAT {
+                    if published.elapsed() >= HEARTBEAT {
                         if status.frame.status() == ClothStatus::Live {
                             status = waiting(DegradedReason::CameraSilent, "no body state".into()).into();
                         }
-                        self.tell(status.clone());
-                        said = Instant::now();
+                        self.publish(status.clone());
+                        published = Instant::now();
                     }
                     self.readers.retain(|r| !r.queue.is_closed());
                     if !self.readers.is_empty() {
@@ -190,9 +191,9 @@ impl Task {
         }
     }
 
-    /// Hands a message to every reader, each with the outfit that it does not know yet.
-    fn tell(&mut self, mut said: Said) {
-        let frame = &mut said.frame;
+    /// Queues a message for every reader, as a keyframe for those that lack the outfit.
+    fn publish(&mut self, mut update: Update) {
+        let frame = &mut update.frame;
         frame.session_id = self.setup.id.clone();
         frame.steps_skipped = self.skipped;
         if frame.outfit_revision == 0 {
@@ -200,8 +201,8 @@ impl Task {
         }
         let garments = self.worn.as_ref().map(Worn::garments);
         let live = frame.status() == ClothStatus::Live;
-        if live && said.positions.len() != garments.map_or(0, |g| g.len()) {
-            // A repeated message without its positions: nothing that a reader could use.
+        if live && update.positions.len() != garments.map_or(0, |g| g.len()) {
+            // A repeated status has no positions, and without them a reader cannot use it.
             return;
         }
         let shown = garments.filter(|_| live && frame.frame.is_some());
@@ -210,14 +211,14 @@ impl Task {
             match shown.filter(|g| !known(g)) {
                 Some(g) => {
                     r.has = Some(g.clone());
-                    r.queue.keyframe(Told {
-                        said: said.clone(),
+                    r.queue.keyframe(Message {
+                        update: update.clone(),
                         keyframe: Some(g.clone()),
                     });
                 }
                 None => {
-                    r.queue.update(Told {
-                        said: said.clone(),
+                    r.queue.update(Message {
+                        update: update.clone(),
                         keyframe: None,
                     });
                 }
@@ -225,7 +226,7 @@ impl Task {
         }
     }
 
-    async fn hear(&mut self, news: News) -> Said {
+    async fn on_tracking(&mut self, news: News) -> Update {
         let (state, shape, template) = match news {
             News::Gone(why) => return waiting(DegradedReason::TrackingUnavailable, why).into(),
             News::Body {
@@ -235,9 +236,9 @@ impl Task {
             } => (*state, shape, template),
         };
         let frame = state.frame;
-        let said = |mut f: GarmentFrame| {
+        let for_frame = |mut f: GarmentFrame| {
             (f.frame, f.world_from_camera) = (frame, state.world_from_camera);
-            Said::from(f)
+            Update::from(f)
         };
         match (state.status(), shape) {
             (TrackingStatus::Tracking, Some(shape)) => {
@@ -248,9 +249,9 @@ impl Task {
                 self.follow_body(body).await
             }
             (TrackingStatus::Calibrating, _) => {
-                // Another size, perhaps another person: what is on belongs to who was there before.
+                // A new measurement, perhaps of another subject: the worn outfit is for the old one.
                 self.undress();
-                said(waiting(
+                for_frame(waiting(
                     DegradedReason::Unspecified,
                     "the body is being measured".into(),
                 ))
@@ -258,22 +259,22 @@ impl Task {
             (TrackingStatus::Lost, _) => {
                 let mut f = waiting(state.reason(), state.detail.clone());
                 f.set_status(ClothStatus::Holding);
-                said(f)
+                for_frame(f)
             }
             _ => {
                 self.undress();
-                said(waiting(state.reason(), state.detail.clone()))
+                for_frame(waiting(state.reason(), state.detail.clone()))
             }
         }
     }
 
     fn undress(&mut self) {
         (self.worn, self.on) = (None, 0);
-        // What is being put on now is for a body that is gone.
+        // The outfit in preparation is for a body that is gone.
         self.dressing = None;
     }
 
-    fn take_on(&mut self, d: Dressed) {
+    fn on_dressed(&mut self, d: Dressed) {
         if self.dressing != Some(d.revision) {
             return;
         }
@@ -283,12 +284,12 @@ impl Task {
             Err(why) => {
                 tracing::warn!(session = self.setup.id, %why, "cannot be dressed");
                 self.failed = d.revision;
-                self.tell(failed(d.revision, why).into());
+                self.publish(failed(d.revision, why).into());
             }
         }
     }
 
-    async fn follow_body(&mut self, body: Body) -> Said {
+    async fn follow_body(&mut self, body: Body) -> Update {
         let wanted = self.wanted.borrow_and_update().clone();
         if wanted.choices.is_empty() {
             self.undress();
@@ -307,7 +308,7 @@ impl Task {
             && self.failed != wanted.revision
             && self.dressing != Some(wanted.revision)
         {
-            self.put_on(body.clone(), wanted.clone());
+            self.start_dressing(body.clone(), wanted.clone());
         }
         let Some(mut worn) = self.worn.take() else {
             return match self.dressing {
@@ -339,8 +340,8 @@ impl Task {
         }
     }
 
-    /// Dresses beside the stream: what is on stays on and moves meanwhile.
-    fn put_on(&mut self, body: Arc<Body>, wanted: Outfit) {
+    /// Dresses on the pool; the worn outfit is stepped meanwhile.
+    fn start_dressing(&mut self, body: Arc<Body>, wanted: WantedOutfit) {
         self.dressing = Some(wanted.revision);
         let (pool, done) = (self.setup.ctx.pool.clone(), self.dressed.clone());
         let library = self.setup.library.clone();
@@ -370,10 +371,10 @@ fn dressing(body: &Body) -> GarmentFrame {
     f
 }
 
-fn live(mut said: Said, revision: u64) -> Said {
-    said.frame.set_status(ClothStatus::Live);
-    said.frame.outfit_revision = revision;
-    said
+fn live(mut update: Update, revision: u64) -> Update {
+    update.frame.set_status(ClothStatus::Live);
+    update.frame.outfit_revision = revision;
+    update
 }
 
 fn waiting(reason: DegradedReason, detail: String) -> GarmentFrame {

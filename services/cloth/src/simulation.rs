@@ -1,7 +1,7 @@
-//! Simulations that need no camera: started, followed, forgotten.
+//! Simulations of scenes without a camera.
 //!
-//! Each runs on a thread of its own, so that live sessions keep the compute pool, and keeps its finished frames in
-//! memory for any number of readers.
+//! Each runs on a thread of its own, apart from the compute pool of live sessions. Its finished frames stay in memory
+//! for any number of readers.
 
 use bytes::Bytes;
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ use tryon_proto::v1::{
     ClothSolver, FollowSimulationResponse, StartSimulationRequest, StartSimulationResponse,
 };
 
-/// Frames of a simulation for one reader.
+/// Frame stream of one reader.
 pub(crate) type Frames =
     Pin<Box<dyn futures::Stream<Item = Result<FollowSimulationResponse, Status>> + Send>>;
 
@@ -28,17 +28,17 @@ pub(crate) type Frames =
 const MAX_SCENE_BYTES: usize = 1024 * 1024;
 /// Most memory for the frames of one simulation, bytes: 10 s of 20,000 vertices at 60 frames/s take 144 MB.
 const MAX_RESULT_BYTES: usize = 256 << 20;
-/// How long the frames are kept after the end; as the contract says.
+/// Time that frames are kept after the end; as the contract says.
 const KEPT: Duration = Duration::from_secs(600);
 
-/// What of a simulation is known so far. `frames` only grows.
+/// Progress of a simulation. `frames` only grows.
 #[derive(Default)]
 struct Progress {
     frames: Vec<(Bytes, f32)>,
     end: Option<(Instant, Result<(), String>)>,
 }
 
-/// The simulations of the process; forgotten ones break off.
+/// Simulations of the process; one without an entry breaks off.
 pub(crate) struct Simulations {
     limit: usize,
     started: AtomicU64,
@@ -48,7 +48,7 @@ pub(crate) struct Simulations {
 /// Number of frames and progress of each simulation by its id.
 type Directory = BTreeMap<String, (u32, watch::Receiver<Progress>)>;
 
-/// Drops what ended long ago.
+/// Removes simulations that ended more than [`KEPT`] ago.
 fn forget(all: &mut Directory) {
     all.retain(|_, (_, p)| {
         p.borrow()
@@ -155,11 +155,11 @@ async fn wait(
     progress: &mut watch::Receiver<Progress>,
     next: u32,
 ) -> Result<Option<(Bytes, f32)>, Status> {
-    let seen = progress
+    let known = progress
         .wait_for(|p| p.frames.len() > next as usize || p.end.is_some())
         .await
         .map_err(|_| Status::aborted("the simulation broke off"))?;
-    match (seen.frames.get(next as usize), &seen.end) {
+    match (known.frames.get(next as usize), &known.end) {
         (Some(frame), _) => Ok(Some(frame.clone())),
         (None, Some((_, Err(why)))) => Err(Status::aborted(why.clone())),
         (None, _) => Ok(None),
@@ -189,7 +189,7 @@ fn check(r: &StartSimulationRequest) -> Result<Scene, Status> {
     Ok(scene)
 }
 
-/// Runs a scene to its end, or until nobody can ask for it any more.
+/// Runs a scene to its end, or until no reader can follow it.
 fn compute(scene: &Scene, config: &RunConfig, progress: &watch::Sender<Progress>) {
     let mut last = Instant::now();
     let result = scene::run(scene, config, |_, positions| {

@@ -12,6 +12,7 @@ use tryon::formats::obj::read_obj;
 use tryon::formats::{depth_to_mm, read_camera};
 use tryon::math::P3;
 use tryon::mesh::Face;
+use tryon::mirror::library_appearance;
 
 /// A garment mesh for drawing.
 struct Loaded {
@@ -81,7 +82,7 @@ fn load(path: &Path) -> Result<Loaded> {
         .file_stem()
         .map(|s| s.to_string_lossy().into_owned())
         .unwrap_or_default();
-    let look = crate::chain::look(&name);
+    let look = library_appearance(&name);
     match path.extension().and_then(|e| e.to_str()) {
         Some("obj") => {
             let (vertices, uv, faces, _) = read_obj(path)?.unwelded();

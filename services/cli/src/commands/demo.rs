@@ -1,9 +1,9 @@
 //! `tryon demo`: the whole chain in one process on a synthetic shopper.
 
 use crate::args::DemoArgs;
-use crate::mirror::{self, Received};
 use crate::onebox::OneBox;
 use crate::report::{Summary, peak_memory, write};
+use crate::viewer::{self, Received, ReceivedPicture};
 use crate::{input, report};
 use anyhow::{Context, Result};
 use serde::Serialize;
@@ -112,7 +112,7 @@ async fn demo(args: &DemoArgs) -> Result<ExitCode> {
             args.garments.join(" and "),
             args.out.display()
         );
-        let received = mirror::watch(
+        let received = viewer::watch(
             address,
             &args.garments,
             Duration::from_secs_f64(seconds),
@@ -159,11 +159,11 @@ fn summarise(args: &DemoArgs, received: &Received) -> Result<ExitCode> {
     let mut stages = report::Samples::default();
     live.iter()
         .for_each(|p| stages.extend(p.stages.iter().map(|(n, ms)| (n.as_str(), *ms))));
-    let span = |v: &[&mirror::Seen]| match (v.first(), v.last()) {
+    let span = |v: &[&ReceivedPicture]| match (v.first(), v.last()) {
         (Some(a), Some(b)) => b.at - a.at,
         _ => 0.0,
     };
-    let rate = |v: &[&mirror::Seen]| {
+    let rate = |v: &[&ReceivedPicture]| {
         if span(v) > 0.0 {
             (v.len() - 1) as f64 / span(v)
         } else {

@@ -61,7 +61,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<ExitCode> {
                 &flat,
                 &g.render.faces,
                 &g.render.uv,
-                crate::chain::look(what).base,
+                library::dye(what),
             )?;
         }
     }
@@ -119,7 +119,7 @@ fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
             &start,
             &garment.render.faces,
             &garment.render.uv,
-            crate::chain::look(&garment.name).base,
+            library::dye(&garment.name),
         );
     }
     let bar = crate::input::progress(Some(count), "simulating");
@@ -149,7 +149,7 @@ fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
     }
     bar.finish_and_clear();
     let name = garment.name.as_str();
-    let color = crate::chain::look(name).base;
+    let color = library::dye(name);
     let m = GlbMesh {
         name,
         vertices: &start,

@@ -1,22 +1,22 @@
 //! `tryon run`: a recording to composited pictures.
 
 use crate::args::RunArgs;
-use crate::chain::{Chain, Choice};
 use crate::input;
 use crate::report::{Samples, Summary, peak_memory, write};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::process::ExitCode;
-use tryon::camera::{ColorImage, RgbdFrame};
+use tryon::camera::{Calibration, ColorImage, RgbdFrame};
 use tryon::formats::image::write_png_rgb;
 use tryon::formats::{RgbdSource, open_recording};
-use tryon::mesh::{Topology, vertex_normals};
+use tryon::math::{P3, V3};
+use tryon::mesh::{Topology, TriMesh, vertex_normals};
+use tryon::mirror::{Mirror, MirrorFrame};
 use tryon::par::{Par, with_threads};
 use tryon::raster::{View, VisibilityBuffer, rasterise};
 
-/// Time between the repetitions of a still picture, nanoseconds: 30 a second.
+/// Time between the repetitions of a still picture [ns]: 30 a second.
 const STILL_INTERVAL_NS: u64 = 33_333_333;
 
 /// report.json of this command.
@@ -34,12 +34,69 @@ struct Report {
     peak_memory_bytes: Option<u64>,
 }
 
+/// Measurements of all frames.
+#[derive(Debug, Default)]
+struct Measured {
+    stages_ms: Samples,
+    skipped: Samples,
+    residual_mm: Vec<f64>,
+    penetration_mm: Vec<f64>,
+    dressed: usize,
+}
+
+impl Measured {
+    fn add(&mut self, seen: &MirrorFrame) {
+        self.stages_ms.extend(seen.stages_ms.iter().copied());
+        self.skipped.extend(skipped(seen));
+        self.residual_mm.push(seen.tracking.residual_mm);
+        let depth = seen.cloth.as_ref().map_or(0.0, |c| c.penetration_left);
+        self.penetration_mm.push(depth * 1e3);
+        self.dressed += usize::from(seen.is_dressed);
+    }
+
+    fn into_report(self, report: Report) -> Report {
+        Report {
+            dressed_frames: self.dressed,
+            stages_ms: self.stages_ms.summaries(),
+            skipped: self.skipped.summaries(),
+            residual_mm: Summary::of(&self.residual_mm),
+            penetration_mm: Summary::of(&self.penetration_mm),
+            peak_memory_bytes: peak_memory(),
+            ..report
+        }
+    }
+}
+
+/// Work that a frame did not need, by the names of report.json.
+fn skipped(seen: &MirrorFrame) -> impl Iterator<Item = (&'static str, f64)> {
+    let (tracking, render) = (&seen.tracking.skipped, &seen.render);
+    let counts = [
+        ("hidden template points", Some(tracking.hidden_points)),
+        ("pictures that show nothing new", Some(tracking.frames)),
+        (
+            "sleeping cloth vertices",
+            seen.cloth.as_ref().map(|c| c.sleeping),
+        ),
+        ("picture tiles without garment", Some(render.tiles_skipped)),
+        ("garment faces hidden by others", Some(render.faces_hidden)),
+        ("garments hidden by others", Some(render.garments_hidden)),
+        (
+            "normals of unseen garment vertices",
+            Some(render.normals_skipped),
+        ),
+        ("hands away from garments", Some(render.hands.skipped)),
+    ];
+    counts
+        .into_iter()
+        .filter_map(|(name, n)| Some((name, n? as f64)))
+}
+
 /// Runs the command.
 ///
 /// # Errors
 /// Bad input, named; or pictures that cannot be written.
 pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
-    let choices = Choice::parse(
+    let choices = input::choices(
         &args.garments,
         args.size.as_deref(),
         args.garment_body.as_deref(),
@@ -47,8 +104,8 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
     let source = open_recording(&args.input)?;
     let template = input::template(args.body.as_deref())?;
     input::create_dir(&args.out)?;
-    let chain = Chain::new(template, source.calibration(), choices);
-    let report = with_threads(args.threads, || dress_all(args, source, chain))??;
+    let mirror = Mirror::new(template, source.calibration(), choices);
+    let report = with_threads(args.threads, || dress_all(args, source, mirror))??;
     write(&args.out.join("report.json"), &report)?;
     for note in &report.sizes {
         println!("{note}");
@@ -69,18 +126,19 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn dress_all(args: &RunArgs, mut source: Box<dyn RgbdSource>, mut chain: Chain) -> Result<Report> {
+fn dress_all(
+    args: &RunArgs,
+    mut source: Box<dyn RgbdSource>,
+    mut mirror: Mirror,
+) -> Result<Report> {
     let calibration = source.calibration().clone();
     let total = source
         .len()
         .map(|n| n.min(args.frames.unwrap_or(usize::MAX)));
-    let still = total == Some(1);
-    let bar = input::progress(
-        total.map(|n| if still { args.still_frames } else { n } as u64),
-        "dressing",
-    );
-    let (mut stages, mut skipped) = (Samples::default(), Samples::default());
-    let (mut residual, mut penetration) = (Vec::new(), Vec::new());
+    let is_still = total == Some(1);
+    let shown = total.map(|n| if is_still { args.still_frames } else { n } as u64);
+    let bar = input::progress(shown, "dressing");
+    let mut measured = Measured::default();
     let mut report = Report::default();
     let mut index = 0;
     while args.frames.is_none_or(|n| index < n) {
@@ -95,64 +153,68 @@ fn dress_all(args: &RunArgs, mut source: Box<dyn RgbdSource>, mut chain: Chain) 
                 continue;
             }
         };
-        let repeats = if still { args.still_frames.max(1) } else { 1 };
-        let mut last = None;
+
+        let repeats = if is_still {
+            args.still_frames.max(1)
+        } else {
+            1
+        };
+        let mut picture = None;
         for k in 0..repeats as u64 {
-            let frame = RgbdFrame {
-                time_ns: frame.time_ns + k * STILL_INTERVAL_NS,
-                sequence: frame.sequence + k,
-                ..frame.clone()
-            };
-            let outcome = chain
-                .frame(&frame)
+            let seen = mirror
+                .step(&repetition(&frame, k))
                 .with_context(|| format!("frame {index}"))?;
-            stages.extend(outcome.stages.iter().copied());
-            skipped.extend(outcome.skipped.iter().copied());
-            residual.push(outcome.residual_mm);
-            penetration.push(outcome.penetration * 1e3);
-            report.dressed_frames += usize::from(outcome.dressed);
+            measured.add(&seen);
             bar.inc(1);
-            last = Some(outcome.picture);
+            picture = Some(seen.picture);
         }
-        if let Some(picture) = last {
+
+        if let Some(picture) = picture {
             write_png_rgb(&args.out.join(format!("frame_{index:06}.png")), &picture)?;
             report.pictures += 1;
-            if args.overlay {
-                overlay(
-                    &args.out.join(format!("frame_{index:06}_body.png")),
-                    &chain,
-                    &frame,
-                    &calibration,
-                )?;
-            }
+        }
+        if args.overlay {
+            let path = args.out.join(format!("frame_{index:06}_body.png"));
+            let mesh = mirror.template().mesh().clone();
+            let picture = overlay(mirror.posed_body(), &mesh, &frame, &calibration)?;
+            write_png_rgb(&path, &picture)?;
         }
         report.frames += 1;
         index += 1;
     }
     bar.finish_and_clear();
-    report.sizes = std::mem::take(&mut chain.notes);
-    report.stages_ms = stages.summaries();
-    report.skipped = skipped.summaries();
-    report.residual_mm = Summary::of(&residual);
-    report.penetration_mm = Summary::of(&penetration);
-    report.peak_memory_bytes = peak_memory();
-    Ok(report)
+    report.sizes = mirror.notes().to_vec();
+    Ok(measured.into_report(report))
 }
+
+/// The `k`-th repetition of a still picture.
+fn repetition(frame: &RgbdFrame, k: u64) -> RgbdFrame {
+    RgbdFrame {
+        time_ns: frame.time_ns + k * STILL_INTERVAL_NS,
+        sequence: frame.sequence + k,
+        ..frame.clone()
+    }
+}
+
+/// Nearest surface of the overlay [m]: no body of a recording is nearer.
+const NEAR: f32 = 0.05;
+/// Colour of the overlay, sRGB.
+const TINT: [f32; 3] = [80.0, 200.0, 255.0];
+/// Share of light on a surface seen edge-on.
+const AMBIENT: f32 = 0.3;
 
 /// The tracked body, shaded by its normals, half transparent over the picture.
 fn overlay(
-    path: &Path,
-    chain: &Chain,
+    vertices: &[P3],
+    mesh: &TriMesh,
     frame: &RgbdFrame,
-    calibration: &tryon::camera::Calibration,
-) -> Result<()> {
-    let (vertices, template) = chain.body();
-    let mesh = template.mesh();
+    calibration: &Calibration,
+) -> Result<ColorImage> {
     let topology = Topology::new(mesh)?;
     let mut normals = Vec::new();
     vertex_normals(
         Par::Rayon,
-        &vertices,
+        vertices,
         mesh.faces(),
         topology.vertex_faces(),
         &mut normals,
@@ -160,8 +222,8 @@ fn overlay(
     let camera = calibration.depth;
     let mut seen = VisibilityBuffer::default();
     rasterise(
-        &View::Perspective { camera, near: 0.05 },
-        &vertices,
+        &View::Perspective { camera, near: NEAR },
+        vertices,
         mesh.faces(),
         &mut seen,
     );
@@ -177,23 +239,25 @@ fn overlay(
     {
         let n = mesh.faces()[face as usize]
             .iter()
-            .fold(tryon::math::V3::zeros(), |s, &v| s + normals[v as usize]);
+            .fold(V3::zeros(), |s, &v| s + normals[v as usize]);
         let light = (-n.z / n.norm().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
-        for (c, tint) in [80.0, 200.0, 255.0].iter().enumerate() {
+        for (c, tint) in TINT.iter().enumerate() {
             let p = &mut picture.data_mut()[3 * i + c];
-            *p = (0.5 * f32::from(*p) + 0.5 * tint * (0.3 + 0.7 * light)) as u8;
+            *p = (0.5 * f32::from(*p) + 0.5 * tint * (AMBIENT + (1.0 - AMBIENT) * light)) as u8;
         }
     }
-    Ok(write_png_rgb(path, &picture)?)
+    Ok(picture)
 }
 
-/// Depth as grey, near is bright; readings missing are black.
+/// Depth as grey: near is bright, missing readings are black.
 fn depth_picture(frame: &RgbdFrame) -> ColorImage {
+    /// Distance of the darkest grey [mm], and that grey.
     const FARTHEST_MM: f32 = 5000.0;
+    const DARKEST: f32 = 0.05;
     let mut out = ColorImage::filled(frame.depth.width(), frame.depth.height(), [0; 3]);
     for (p, &mm) in out.data_mut().chunks_exact_mut(3).zip(frame.depth.data()) {
         if mm > 0 {
-            p.fill((255.0 * (1.0 - f32::from(mm) / FARTHEST_MM).clamp(0.05, 1.0)) as u8);
+            p.fill((255.0 * (1.0 - f32::from(mm) / FARTHEST_MM).clamp(DARKEST, 1.0)) as u8);
         }
     }
     out

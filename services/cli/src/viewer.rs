@@ -1,4 +1,4 @@
-//! A client of the compositor: what a kiosk does, without a screen.
+//! A viewer without a screen: a client of the compositor that counts pictures and keeps some of them.
 
 use anyhow::{Context, Result};
 use std::collections::BTreeMap;
@@ -10,22 +10,23 @@ use tryon_kit::client::{channel, request};
 use tryon_kit::telemetry;
 use tryon_proto::v1;
 use tryon_proto::v1::compositor_service_client::CompositorServiceClient;
+use tryon_proto::v1::stream_frames_response::Event;
 
-/// Seconds between the pictures that are kept.
+/// Time between the pictures that are kept [s].
 const KEEP_EVERY: f64 = 0.5;
-/// Silence after which the compositor counts as gone; it promises two messages a second.
+/// Silence after which the compositor counts as gone; it sends at least two messages a second.
 const SILENCE: Duration = Duration::from_secs(5);
-/// A picture at 1080p with quality 80 takes 400 kB.
+/// Largest picture, bytes: one of 1080p with quality 80 takes 400 kB.
 const MAX_PICTURE_BYTES: usize = 16 << 20;
 
 /// One picture that arrived.
 #[derive(Debug)]
-pub(crate) struct Seen {
-    /// Seconds since the try-on was opened.
+pub(crate) struct ReceivedPicture {
+    /// Time since the try-on was opened [s].
     pub(crate) at: f64,
     /// Number of the exposure.
     pub(crate) sequence: u64,
-    /// The garments are on the person of this very exposure.
+    /// The garments were computed for this exposure.
     pub(crate) live: bool,
     /// Milliseconds from capture to encoded picture.
     pub(crate) latency_ms: f64,
@@ -33,12 +34,12 @@ pub(crate) struct Seen {
     pub(crate) stages: Vec<(String, f64)>,
 }
 
-/// What came in while watching.
+/// Messages of one try-on.
 #[derive(Debug, Default)]
 pub(crate) struct Received {
     /// Pictures in order.
-    pub(crate) pictures: Vec<Seen>,
-    /// Messages by state.
+    pub(crate) pictures: Vec<ReceivedPicture>,
+    /// Number of messages by state.
     pub(crate) states: BTreeMap<String, usize>,
     /// Counters of all services in this process.
     pub(crate) counters: BTreeMap<String, f64>,
@@ -59,23 +60,8 @@ pub(crate) async fn watch(
     let channel = channel(&format!("http://{address}")).map_err(anyhow::Error::msg)?;
     let mut client =
         CompositorServiceClient::new(channel).max_decoding_message_size(MAX_PICTURE_BYTES);
-    let choices = garments
-        .iter()
-        .map(|g| v1::GarmentChoice {
-            garment: g.clone(),
-            ..Default::default()
-        })
-        .collect();
-    let open = v1::OpenTryOnRequest {
-        garments: choices,
-        ..Default::default()
-    };
-    let id = client
-        .open_try_on(request(open))
-        .await
-        .context("opening a try-on")?
-        .into_inner()
-        .try_on_id;
+    let opened = client.open_try_on(request(open_request(garments))).await;
+    let id = opened.context("opening a try-on")?.into_inner().try_on_id;
     let stream = v1::StreamFramesRequest {
         try_on_id: id.clone(),
         ..Default::default()
@@ -85,6 +71,7 @@ pub(crate) async fn watch(
         .await
         .context("streaming pictures")?
         .into_inner();
+
     let started = Instant::now();
     let mut received = Received::default();
     let mut next_kept = 0.0;
@@ -97,41 +84,18 @@ pub(crate) async fn watch(
         };
         let at = started.elapsed().as_secs_f64();
         match event {
-            v1::stream_frames_response::Event::Status(s) => {
-                *received
-                    .states
-                    .entry(s.state().as_str_name().to_owned())
-                    .or_default() += 1;
-            }
-            v1::stream_frames_response::Event::Picture(p) => {
-                *received
-                    .states
-                    .entry(p.state().as_str_name().to_owned())
-                    .or_default() += 1;
-                let live = p.state() == v1::TryOnState::Live && p.outfit_revision > 0;
+            Event::Status(s) => received.count(s.state()),
+            Event::Picture(p) => {
+                received.count(p.state());
                 if at >= next_kept {
                     next_kept = at + KEEP_EVERY;
-                    let picture = decode_jpeg(&p.image)?;
-                    write_png_rgb(
-                        &out.join(format!("frame_{:04}.png", received.kept)),
-                        &picture,
-                    )?;
-                    received.kept += 1;
+                    received.keep(&p, out)?;
                 }
-                received.pictures.push(Seen {
-                    at,
-                    sequence: p.frame.as_ref().map_or(0, |f| f.sequence),
-                    live,
-                    latency_ms: f64::from(p.latency_ms),
-                    stages: p
-                        .stages
-                        .iter()
-                        .map(|s| (s.stage.clone(), f64::from(s.ms)))
-                        .collect(),
-                });
+                received.pictures.push(picture(&p, at));
             }
         }
     }
+
     drop(stream);
     client
         .close_try_on(request(v1::CloseTryOnRequest { try_on_id: id }))
@@ -141,7 +105,44 @@ pub(crate) async fn watch(
     Ok(received)
 }
 
-/// Counters and gauges of this process: the lines of the metrics page that are no histogram.
+fn open_request(garments: &[String]) -> v1::OpenTryOnRequest {
+    let choice = |g: &String| v1::GarmentChoice {
+        garment: g.clone(),
+        ..Default::default()
+    };
+    v1::OpenTryOnRequest {
+        garments: garments.iter().map(choice).collect(),
+        ..Default::default()
+    }
+}
+
+fn picture(p: &v1::Picture, at: f64) -> ReceivedPicture {
+    let stage = |s: &v1::StageTime| (s.stage.clone(), f64::from(s.ms));
+    ReceivedPicture {
+        at,
+        sequence: p.frame.as_ref().map_or(0, |f| f.sequence),
+        live: p.state() == v1::TryOnState::Live && p.outfit_revision > 0,
+        latency_ms: f64::from(p.latency_ms),
+        stages: p.stages.iter().map(stage).collect(),
+    }
+}
+
+impl Received {
+    fn count(&mut self, state: v1::TryOnState) {
+        let name = state.as_str_name().to_owned();
+        *self.states.entry(name).or_default() += 1;
+    }
+
+    fn keep(&mut self, p: &v1::Picture, out: &Path) -> Result<()> {
+        let picture = decode_jpeg(&p.image)?;
+        let path = out.join(format!("frame_{:04}.png", self.kept));
+        write_png_rgb(&path, &picture)?;
+        self.kept += 1;
+        Ok(())
+    }
+}
+
+/// Counters and gauges of this process: the lines of the metrics page that belong to no histogram.
 fn counters() -> BTreeMap<String, f64> {
     let Some(handle) = telemetry::metrics() else {
         return BTreeMap::new();

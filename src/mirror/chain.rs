@@ -1,0 +1,189 @@
+//! The chain of one person in front of one camera.
+
+use super::choice::Choice;
+use super::clock::{FrameClock, LongGap};
+use super::error::MirrorError;
+use super::outfit::{DressedOutfit, Subject};
+use super::picture::{CameraGarments, DrawnBody, DrawnSurface, library_appearance};
+use super::report::{MirrorFrame, StageTimer};
+use crate::body::measure::measure;
+use crate::body::{Pose, Template};
+use crate::camera::{Calibration, ColorImage, RgbdFrame};
+use crate::cloth::realtime;
+use crate::composite::{self, Look, RenderReport};
+use crate::math::P3;
+use crate::tracking::{self, Status, TrackerConfig, TrackerModel, TrackerState};
+use std::sync::Arc;
+
+/// One person, one camera, one outfit: frames in, pictures out.
+pub struct Mirror {
+    choices: Vec<Choice>,
+    tracker: TrackerModel,
+    tracked: TrackerState,
+    tracking_work: tracking::Workspace,
+    clock: FrameClock,
+    worn: Option<Worn>,
+    body: DrawnBody,
+    garments: CameraGarments,
+    compositor: composite::Model,
+    composite_state: composite::State,
+    composite_work: composite::Workspace,
+    notes: Vec<String>,
+}
+
+/// Garments on the subject and the appearance of each.
+#[derive(Debug)]
+struct Worn {
+    outfit: DressedOutfit,
+    looks: Vec<Look>,
+}
+
+impl Mirror {
+    /// A chain in front of this camera. Nobody is tracked or dressed yet.
+    pub fn new(template: Arc<Template>, calibration: &Calibration, choices: Vec<Choice>) -> Self {
+        let body = DrawnBody::new(Arc::clone(&template));
+        let tracker = TrackerModel::new(template, calibration.clone(), TrackerConfig::default());
+        Self {
+            choices,
+            tracked: TrackerState::new(&tracker),
+            tracker,
+            tracking_work: tracking::Workspace::default(),
+            clock: FrameClock::default(),
+            worn: None,
+            body,
+            garments: CameraGarments::default(),
+            compositor: composite::Model::default(),
+            composite_state: composite::State::default(),
+            composite_work: composite::Workspace::default(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// Takes one frame through tracking, dressing, cloth and compositing. The subject is dressed in the first frame in
+    /// which the tracker is live.
+    ///
+    /// # Errors
+    /// A frame that does not fit the camera, or a garment that cannot be put on.
+    pub fn step(&mut self, frame: &RgbdFrame) -> Result<MirrorFrame, MirrorError> {
+        let mut timer = StageTimer::start();
+        let work = &mut self.tracking_work;
+        let tracking = tracking::step(&self.tracker, &mut self.tracked, frame, work)?;
+        timer.lap("tracking");
+
+        let dt = LongGap::Nominal.time_step(self.clock.gap(frame.time_ns));
+        let body = self.live_body();
+        if body.is_some() && self.worn.is_none() && !self.choices.is_empty() {
+            self.worn = Some(self.dress()?);
+            timer.lap("dressing");
+        }
+
+        let cloth = match &body {
+            Some(body) => self.simulate(body, dt)?,
+            None => None,
+        };
+        if cloth.is_some() {
+            timer.lap("cloth");
+        }
+
+        let (picture, render) = self.draw(frame, body.as_deref())?;
+        timer.lap("composite");
+        Ok(MirrorFrame {
+            picture,
+            is_dressed: cloth.is_some(),
+            stages_ms: timer.stages_ms,
+            tracking,
+            cloth,
+            render,
+        })
+    }
+
+    /// Surface of the tracked body, live or not: camera frame, metres.
+    pub fn posed_body(&mut self) -> &[P3] {
+        self.tracking_work.posed(&self.tracker, &self.tracked).0
+    }
+
+    /// Body model.
+    pub fn template(&self) -> &Template {
+        self.tracker.template()
+    }
+
+    /// Remarks about sizes and meshes; empty before the subject is dressed.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    fn live_body(&mut self) -> Option<Vec<P3>> {
+        (self.tracked.status == Status::Tracking).then(|| self.posed_body().to_vec())
+    }
+
+    fn dress(&mut self) -> Result<Worn, MirrorError> {
+        let template = self.tracker.template();
+        let rest = template.personalise(&self.tracked.shape);
+        let measures = measure(template, &rest)?;
+        let sized = self.choices.iter().map(|c| c.sized(&measures));
+        let sized = sized.collect::<Result<Vec<_>, _>>()?;
+        (self.notes).extend(sized.iter().flat_map(|g| g.notes.iter().cloned()));
+
+        let world_from_camera = self.tracked.world_from_camera;
+        let pose = Pose {
+            root: world_from_camera * self.tracked.pose.root,
+            angles: self.tracked.pose.angles.clone(),
+        };
+        let subject = Subject {
+            template,
+            rest: &rest,
+            pose: &pose,
+            world_from_camera,
+        };
+        let outfit = DressedOutfit::put_on(&subject, sized, false).map_err(MirrorError::Dress)?;
+        let garments = &outfit.model.outfit.garments;
+        let looks = garments
+            .iter()
+            .map(|g| library_appearance(&g.name))
+            .collect();
+        Ok(Worn { outfit, looks })
+    }
+
+    fn simulate(
+        &mut self,
+        body_camera: &[P3],
+        dt: f64,
+    ) -> Result<Option<realtime::StepReport>, MirrorError> {
+        let Some(worn) = &mut self.worn else {
+            return Ok(None);
+        };
+        let mut body = Vec::new();
+        let world_from_camera = &self.tracked.world_from_camera;
+        world_from_camera.points_f32(body_camera, &mut body);
+        Ok(Some(worn.outfit.step(&body, dt)?))
+    }
+
+    fn draw(
+        &mut self,
+        frame: &RgbdFrame,
+        body: Option<&[P3]>,
+    ) -> Result<(ColorImage, RenderReport), MirrorError> {
+        let worn = self.worn.as_ref().filter(|_| body.is_some());
+        let drawn = worn.map_or_else(Vec::new, |w| w.outfit.drawn_positions());
+        let camera_from_world = self.tracked.world_from_camera.inverse();
+        (self.garments).place(&camera_from_world, drawn.iter().map(Vec::as_slice));
+        let surfaces = worn.iter().flat_map(|worn| {
+            let meshes = worn.outfit.model.outfit.garments.iter();
+            meshes.zip(&worn.looks).map(|(mesh, look)| DrawnSurface {
+                faces: &mesh.render.faces,
+                uv: &mesh.render.uv,
+                look,
+            })
+        });
+
+        let input = composite::Input {
+            frame,
+            calibration: self.tracker.calibration(),
+            garments: &self.garments.views(surfaces),
+            body: body.map(|posed| self.body.view(posed, worn.is_some())),
+            output: None,
+        };
+        let (state, work) = (&mut self.composite_state, &mut self.composite_work);
+        Ok(composite::render(&self.compositor, state, &input, work)?)
+    }
+}

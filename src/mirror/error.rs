@@ -1,0 +1,31 @@
+//! Failures of the chain, by the stage at fault.
+
+use crate::body::measure::MeasureError;
+use crate::cloth::ClothError;
+use crate::composite::RenderError;
+use crate::dressing::DressError;
+use crate::garment::GarmentError;
+use crate::tracking;
+
+/// Frame or garment that stops the chain.
+#[derive(Debug, thiserror::Error)]
+pub enum MirrorError {
+    /// The frame does not fit the camera.
+    #[error(transparent)]
+    Track(#[from] tracking::StepError),
+    /// The tracked body cannot be measured.
+    #[error(transparent)]
+    Measure(#[from] MeasureError),
+    /// A garment is unknown or at fault.
+    #[error(transparent)]
+    Garment(#[from] GarmentError),
+    /// The garments cannot be put on the tracked body.
+    #[error("the garments cannot be put on")]
+    Dress(#[source] DressError),
+    /// The cloth cannot be stepped.
+    #[error(transparent)]
+    Cloth(#[from] ClothError),
+    /// The picture cannot be drawn.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}

@@ -1,0 +1,42 @@
+//! Frame to picture for one person: track, choose size, dress, simulate, composite; the one chain that command line and services share.
+//!
+//! [`Mirror`] is the whole chain in one thread. The services run its parts in separate processes:
+//! [`choice`](Choice) and [`DressedOutfit`] in cloth, [`PosedBody`] and [`CameraGarments`] in the compositor.
+//!
+//! ```
+//! use tryon::body::embedded;
+//! use tryon::mirror::{Choice, Mirror};
+//! use tryon::formats::RgbdSource;
+//! use tryon::synth::{Sequence, Setting, Shopper, SynthSource};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scene = Sequence::new(Shopper::default(), Setting::default());
+//! let mut recording = SynthSource::new(scene, Some(2));
+//! let choices = vec![Choice::library("tshirt", None)?];
+//! let mut mirror = Mirror::new(embedded::template(), recording.calibration(), choices);
+//! while let Some(frame) = recording.next_frame()? {
+//!     let seen = mirror.step(&frame)?;
+//!     assert!(!seen.is_dressed, "the body is still being measured");
+//!     assert_eq!(seen.picture.width(), frame.depth.width());
+//! }
+//! # Ok(())
+//! # }
+//! ```
+
+mod body;
+mod chain;
+mod choice;
+mod clock;
+mod error;
+mod outfit;
+mod picture;
+mod report;
+
+pub use body::PosedBody;
+pub use chain::Mirror;
+pub use choice::{Choice, SizedGarment};
+pub use clock::{FrameClock, LongGap};
+pub use error::MirrorError;
+pub use outfit::{DressedOutfit, Subject};
+pub use picture::{CameraGarments, DrawnBody, DrawnSurface, library_appearance};
+pub use report::MirrorFrame;

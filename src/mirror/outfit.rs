@@ -1,0 +1,97 @@
+//! An outfit on a body: put on once, then stepped with every posed body.
+
+use super::choice::SizedGarment;
+use crate::body::{Pose, RestBody, Template};
+use crate::cloth::ClothError;
+use crate::cloth::realtime::{Config, Input, Model, State, StepReport, Workspace, step};
+use crate::dressing::{DressError, DressOptions, Wear, dress_all};
+use crate::math::{Camera, P3, Rigid, World};
+
+/// Tracked body that is dressed.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject<'a> {
+    /// Body model.
+    pub template: &'a Template,
+    /// Template with the shape of the subject.
+    pub rest: &'a RestBody,
+    /// Pose in the world.
+    pub pose: &'a Pose<World>,
+    /// Camera that tracks the subject.
+    pub world_from_camera: Rigid<World, Camera>,
+}
+
+/// Garments on a body.
+#[derive(Debug)]
+pub struct DressedOutfit {
+    /// Immutable part of the simulation.
+    pub model: Model,
+    /// State after the last step.
+    pub state: State,
+    work: Workspace,
+    worn: Vec<SizedGarment>,
+}
+
+impl DressedOutfit {
+    /// Puts garments on; takes about a second. With `any_size` also those that do not fit.
+    ///
+    /// # Errors
+    /// Faults of the garments or the pose; without `any_size` a garment that does not fit.
+    pub fn put_on(
+        subject: &Subject<'_>,
+        worn: Vec<SizedGarment>,
+        any_size: bool,
+    ) -> Result<Self, DressError> {
+        let wear: Vec<Wear<'_>> = worn.iter().map(SizedGarment::wear).collect();
+        let options = DressOptions {
+            config: Config::tracked().seen_from(&subject.world_from_camera),
+            any_size,
+            ..DressOptions::default()
+        };
+        let dressed = dress_all(
+            subject.template,
+            subject.rest,
+            subject.pose,
+            &wear,
+            &options,
+        )?;
+        Ok(Self {
+            model: dressed.model,
+            state: dressed.state,
+            work: Workspace::default(),
+            worn,
+        })
+    }
+
+    /// Advances the cloth by `dt` [s] to a posed body (world, metres).
+    ///
+    /// # Errors
+    /// A body of another size or with a vertex that is not finite; a time step that is not positive.
+    pub fn step(&mut self, body: &[P3], dt: f64) -> Result<StepReport, ClothError> {
+        let input = Input { body, dt };
+        step(&self.model, &mut self.state, &input, &mut self.work)
+    }
+
+    /// Index of the chosen garment that garment `k` of the outfit is made from. The outfit is ordered by layer, and a
+    /// mesh may have become several garments.
+    pub fn source(&self, k: usize) -> Option<usize> {
+        let name = &self.model.outfit.garments[k].name;
+        self.worn.iter().position(|w| w.name() == name)
+    }
+
+    /// Chosen garments, in the order in which they were chosen.
+    pub fn worn(&self) -> &[SizedGarment] {
+        &self.worn
+    }
+
+    /// Vertices of the drawn mesh of each garment, world, metres.
+    pub fn drawn_positions(&self) -> Vec<Vec<P3>> {
+        (self.model.outfit.garments.iter())
+            .zip(&self.state.garments)
+            .map(|(mesh, state)| {
+                let mut drawn = Vec::new();
+                mesh.render_positions(&state.positions, &mut drawn);
+                drawn
+            })
+            .collect()
+    }
+}
