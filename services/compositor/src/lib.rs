@@ -1,8 +1,9 @@
-//! The compositor: the one address a kiosk or page talks to.
+//! Compositor: pictures for kiosks and pages, which connect to this service only.
 //!
-//! One task owns one try-on (`try_on`): it opens the sessions behind it, joins frames, bodies and garments by epoch
-//! and sequence (`scene`), renders on the compute pool (`engine`, on a `card` where there is one) and gives every viewer its own queue
-//! (`viewer`). The life of a try-on is `tryon::session`'s table. gRPC, gRPC-web and the page share one port.
+//! One task owns one try-on (`try_on`): it opens the sessions behind it and joins frames, bodies and garments by epoch
+//! and sequence (`scene`). It renders on the compute pool (`engine`, on a `card` where there is one) and queues pictures
+//! for every viewer (`viewer`). The states of a try-on are the table of `tryon::session`. gRPC, gRPC-web and the page
+//! share one port.
 
 mod card;
 mod engine;

@@ -1,4 +1,4 @@
-//! The life of a try-on in the words of the wire.
+//! State of a try-on in the terms of the wire.
 
 use tryon::session::{Reason, State};
 use tryon_proto::v1::{DegradedReason, TryOnState};
@@ -41,7 +41,7 @@ pub(crate) fn from_wire(r: DegradedReason) -> Option<Reason> {
     })
 }
 
-/// Which service is at fault.
+/// Service at fault; empty when none is.
 pub(crate) fn service(s: State) -> &'static str {
     match s.reason() {
         Some(Reason::CameraSilent) => "capture",

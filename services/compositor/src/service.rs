@@ -1,4 +1,4 @@
-//! The rpcs: check, find the try-on, answer.
+//! Remote procedures of the compositor: check the request, find the try-on, answer.
 
 use crate::card::Card;
 use crate::engine::Encoding;
@@ -21,10 +21,15 @@ use tryon_proto::convert::{WireError, request};
 use tryon_proto::v1::compositor_service_server::CompositorService;
 use tryon_proto::v1::*;
 
-/// Pictures of a viewer.
+/// JPEG quality of snapshots.
+const SNAPSHOT_QUALITY: u8 = 95;
+/// Longest wait for a snapshot.
+const SNAPSHOT_DEADLINE: Duration = Duration::from_secs(2);
+
+/// Picture stream of a viewer.
 type Pictures = Pin<Box<dyn Stream<Item = Result<StreamFramesResponse, Status>> + Send>>;
 
-/// The directory of try-ons and what new ones need.
+/// Directory of try-ons and the dependencies of new ones.
 pub(crate) struct Compositor {
     try_ons: Sessions<Handle>,
     config: CompositorConfig,
@@ -61,7 +66,7 @@ impl Compositor {
             .ok_or_else(|| not_found("try-on", id))
     }
 
-    /// Whether cloth accepts the outfit. That it does not answer is no fault of the outfit.
+    /// Dresses the session in cloth. A silent cloth service is UNAVAILABLE, no fault of the outfit.
     async fn dress(
         &self,
         id: &str,
@@ -176,7 +181,7 @@ impl CompositorService for Compositor {
         {
             return Err(s.clone());
         }
-        // Kept even when cloth does not answer: it is applied when cloth is back.
+        // The choice is kept when cloth does not answer, and applied when it is back.
         handle.wanted.send_if_modified(|w| {
             let changed = w.choices != choices;
             if changed {
@@ -244,13 +249,13 @@ impl CompositorService for Compositor {
         let r = r.get_ref();
         let encoding = match PictureCodec::try_from(r.codec) {
             Ok(PictureCodec::Unspecified | PictureCodec::Png) => Encoding::Png,
-            Ok(PictureCodec::Jpeg) => Encoding::Jpeg(95),
+            Ok(PictureCodec::Jpeg) => Encoding::Jpeg(SNAPSHOT_QUALITY),
             Err(_) => {
                 return Err(WireError::new("take_snapshot_request.codec", "JPEG or PNG").into());
             }
         };
         let handle = self.find(&r.try_on_id)?;
-        let (answer, heard) = oneshot::channel();
+        let (answer, drawn) = oneshot::channel();
         let gone = || not_found("try-on", &r.try_on_id);
         handle
             .commands
@@ -258,7 +263,7 @@ impl CompositorService for Compositor {
             .await
             .map_err(|_| gone())?;
         let late = |_| unavailable("compositor", "the picture took too long");
-        let picture = tokio::time::timeout(Duration::from_secs(2), heard)
+        let picture = tokio::time::timeout(SNAPSHOT_DEADLINE, drawn)
             .await
             .map_err(late)?
             .map_err(|_| gone())??;

@@ -1,4 +1,4 @@
-//! The cloth service behind a try-on, followed through losses and restarts.
+//! Subscription to the garments of a session of the cloth service, through losses and restarts.
 
 use crate::engine::Placed;
 use std::sync::Arc;
@@ -18,23 +18,23 @@ use tryon_proto::v1::{
     ClothStatus, DressRequest, GarmentChoice, GarmentFrame, StreamGarmentsRequest,
 };
 
-/// Eight garments of 260,000 vertices would be 40 MB; ours take a few hundred kB.
+/// Largest garment message, bytes. Outfits of the library take a few hundred kB.
 const MAX_GARMENT_BYTES: usize = 16 * 1024 * 1024;
 
-/// What the shopper wants to wear; `revision` as this service counts.
+/// Outfit that the user chose; `revision` as this service counts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Wanted {
     pub(crate) revision: u64,
     pub(crate) choices: Vec<GarmentChoice>,
 }
 
-/// What cloth says.
+/// Message of the subscription.
 pub(crate) enum News {
     /// Garments for an exposure; `frame` without its bulk.
     Placed(Box<GarmentFrame>, Arc<Placed>),
-    /// Nothing to show, and why.
+    /// No garments, with the reason.
     Status(Box<GarmentFrame>),
-    /// It does not answer.
+    /// Cloth does not answer.
     Gone(String),
 }
 
@@ -42,7 +42,7 @@ pub(crate) fn client(channel: Channel) -> ClothServiceClient<Channel> {
     ClothServiceClient::new(channel).max_decoding_message_size(MAX_GARMENT_BYTES)
 }
 
-/// Asks cloth for an outfit; its own revision of it.
+/// Requests an outfit from cloth; cloth's own revision of it.
 pub(crate) async fn dress(
     client: &mut ClothServiceClient<Channel>,
     session: &str,
@@ -59,7 +59,7 @@ pub(crate) async fn dress(
         .outfit_revision)
 }
 
-/// A fault of our own request to cloth, told with the field path of the request that caused it.
+/// Fault of a request to cloth, with the field path of the request that caused it.
 pub(crate) fn renamed(s: &Status, message: &str) -> Status {
     let details = s.get_error_details();
     let Some(bad) = details.bad_request() else {
@@ -78,7 +78,7 @@ pub(crate) fn renamed(s: &Status, message: &str) -> Status {
     )
 }
 
-/// Follows the garments of `session` until the receiver of `news` is gone, dressing it in whatever is wanted.
+/// Follows the garments of `session` until the receiver of `news` is gone, and dresses it as wanted.
 pub(crate) async fn follow(
     channel: Channel,
     session: String,
@@ -110,12 +110,12 @@ async fn one_stream(
     news: &latest::Sender<News>,
     any: &mut bool,
 ) -> Result<(), String> {
-    let said = |s: Status| s.message().to_owned();
-    // Cloth counts anew after each restart: its revision to ours.
+    let text = |s: Status| s.message().to_owned();
+    // Pairs of cloth's revision, which restarts with cloth, and ours.
     let mut ours: Vec<(u64, u64)> = Vec::new();
     let w = wanted.borrow_and_update().clone();
     ours.push((
-        dress(client, session, &w.choices).await.map_err(said)?,
+        dress(client, session, &w.choices).await.map_err(text)?,
         w.revision,
     ));
     let call = client
@@ -123,7 +123,7 @@ async fn one_stream(
             session_id: session.into(),
         })
         .await;
-    let mut frames = call.map_err(said)?.into_inner();
+    let mut frames = call.map_err(text)?.into_inner();
     let mut reader = GarmentReader::default();
     loop {
         let message = tokio::select! {
@@ -133,7 +133,7 @@ async fn one_stream(
                     return Ok(());
                 }
                 let w = wanted.borrow_and_update().clone();
-                let theirs = dress(client, session, &w.choices).await.map_err(said)?;
+                let theirs = dress(client, session, &w.choices).await.map_err(text)?;
                 ours.retain(|(t, _)| *t != theirs);
                 ours.push((theirs, w.revision));
                 continue;
@@ -143,7 +143,7 @@ async fn one_stream(
             return Ok(());
         };
         let frame = required(
-            message.map_err(said)?.frame,
+            message.map_err(text)?.frame,
             "stream_garments_response.frame",
         );
         let frame = frame.map_err(|e| e.to_string())?;

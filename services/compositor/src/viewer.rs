@@ -1,4 +1,4 @@
-//! One reader of pictures: its format, its rate, its queue.
+//! One viewer: its format, its rate, its queue.
 
 use futures::Stream;
 use tokio::sync::mpsc;
@@ -9,7 +9,7 @@ use tryon_proto::convert::request::PictureFormat;
 use tryon_proto::v1::stream_frames_response::Event;
 use tryon_proto::v1::{Picture, StreamFramesResponse, TryOnStatus};
 
-/// Statuses that may wait for a slow reader. They are never dropped: a reader so slow that they fill this is cut off.
+/// Statuses that wait for a slow reader. They are never dropped: a reader that fills the queue is cut off.
 const STATUSES: usize = 64;
 
 /// The writing end.
@@ -45,21 +45,21 @@ pub(crate) fn viewer(format: PictureFormat) -> (Viewer, Reader) {
 }
 
 impl Viewer {
-    /// Whether its rate allows a picture now.
+    /// Its rate allows a picture now.
     pub(crate) fn wants(&self) -> bool {
         self.next <= Instant::now()
     }
-    /// A picture, replacing one that still waits.
+    /// Queues a picture in place of one that still waits.
     pub(crate) fn picture(&mut self, p: Picture) {
         if let Some(rate) = self.format.max_rate {
-            // Measured from when it was due, so that the rate is met on average, but without catching up.
+            // Counted from the time it was due: the rate is met on average, without bursts after a gap.
             let step = Duration::from_secs_f32(1.0 / rate);
             let now = Instant::now();
             self.next = (self.next + step).max(now.checked_sub(step).unwrap_or(now));
         }
         self.pictures.send(p);
     }
-    /// A status; `false` when the reader is gone or hopeless.
+    /// Queues a status; `false` when the reader is gone or its queue is full.
     pub(crate) fn status(&self, s: TryOnStatus) -> bool {
         self.statuses.try_send(s).is_ok()
     }
@@ -89,7 +89,7 @@ mod tests {
     use tokio_stream::StreamExt;
 
     #[tokio::test]
-    async fn a_slow_reader_gets_every_status_and_the_newest_picture() {
+    async fn slow_reader_receives_every_status_and_the_newest_picture() {
         let (mut v, r) = viewer(PictureFormat {
             size: None,
             quality: 80,

@@ -1,0 +1,48 @@
+//! Access to a try-on's task and the dependencies of that task.
+
+use crate::card::Card;
+use crate::engine::Encoding;
+use crate::upstream::Wanted;
+use crate::viewer::Viewer;
+use tokio::sync::{mpsc, oneshot, watch};
+use tonic::Status;
+use tryon_kit::config::CompositorConfig;
+use tryon_kit::frames::CameraKey;
+use tryon_kit::server::Context;
+use tryon_kit::sessions::Sessions;
+use tryon_proto::v1::{GarmentChoice, Picture};
+
+/// Access to a try-on from the rpcs.
+pub(crate) struct Handle {
+    pub(crate) key: CameraKey,
+    pub(crate) commands: mpsc::Sender<Command>,
+    pub(crate) wanted: watch::Sender<Wanted>,
+}
+
+/// Receiver of a snapshot.
+pub(crate) type Answer = oneshot::Sender<Result<Picture, Status>>;
+
+/// Command to a try-on.
+pub(crate) enum Command {
+    /// Adds a viewer.
+    View(Viewer),
+    /// Draws the newest picture once.
+    Snapshot(Encoding, Answer),
+    /// Keeps the try-on open.
+    Touch,
+    /// Draws garments in the colours of their fit, or in their own.
+    ShowFit(bool),
+    /// Ends the try-on.
+    Close,
+}
+
+/// Dependencies of a try-on's task.
+pub(crate) struct Setup {
+    pub(crate) id: String,
+    pub(crate) key: CameraKey,
+    pub(crate) choices: Vec<GarmentChoice>,
+    pub(crate) ctx: Context,
+    pub(crate) config: CompositorConfig,
+    pub(crate) card: Card,
+    pub(crate) directory: Sessions<Handle>,
+}

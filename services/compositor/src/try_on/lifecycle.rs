@@ -1,0 +1,229 @@
+//! State of one try-on: the transition table of `tryon::session`, fed with events, faults and silences.
+
+use crate::life;
+use tokio::time::Instant;
+use tryon::session::{Ages, Effect, Event, Limits, Reason, State, transition};
+use tryon_proto::v1::TryOnStatus;
+
+/// Answers of a service behind the try-on.
+#[derive(Default)]
+struct Upstream {
+    is_up: bool,
+    /// Fault as a level: repeated to the table as long as it lasts.
+    fault: Option<(Reason, String)>,
+}
+
+/// State, faults and ages of one try-on.
+pub(super) struct Lifecycle {
+    id: String,
+    limits: Limits,
+    state: State,
+    detail: String,
+    /// Start of the current state.
+    since: Instant,
+    born: Instant,
+    last_live: Option<Instant>,
+    ages: Ages,
+    tracking: Upstream,
+    cloth: Upstream,
+    announced: Vec<TryOnStatus>,
+}
+
+impl Lifecycle {
+    /// A try-on that opens now.
+    pub(super) fn new(id: String, limits: Limits) -> Self {
+        let now = Instant::now();
+        Self {
+            id,
+            limits,
+            state: State::Opening,
+            detail: String::new(),
+            since: now,
+            born: now,
+            last_live: None,
+            ages: Ages::default(),
+            tracking: Upstream::default(),
+            cloth: Upstream::default(),
+            announced: Vec::new(),
+        }
+    }
+
+    /// Current state.
+    pub(super) fn state(&self) -> State {
+        self.state
+    }
+
+    /// Time since the last live picture could be shown [s]; 0 before the first.
+    pub(super) fn degraded_age(&self) -> f32 {
+        self.last_live.map_or(0.0, |t| t.elapsed().as_secs_f32())
+    }
+
+    /// Tracking answered last time.
+    pub(super) fn is_tracking_up(&self) -> bool {
+        self.tracking.is_up
+    }
+
+    /// Garments of a frame that arrived at `arrived` are too old to be shown.
+    pub(super) fn is_late(&self, arrived: Instant) -> bool {
+        arrived.elapsed().as_nanos() > u128::from(self.limits.garments_age_ns)
+    }
+
+    /// Current state in the terms of the wire.
+    pub(super) fn status(&self) -> TryOnStatus {
+        TryOnStatus {
+            state: life::state(self.state).into(),
+            reason: life::reason(self.state).into(),
+            age: self.since.elapsed().as_secs_f32(),
+            service: life::service(self.state).into(),
+            detail: match self.state.reason() {
+                Some(r) if self.detail.is_empty() => r.words().into(),
+                Some(_) => self.detail.clone(),
+                None => String::new(),
+            },
+            retry_after: 0.0,
+        }
+    }
+
+    /// Statuses to announce since the last call, in order.
+    pub(super) fn take_announced(&mut self) -> Vec<TryOnStatus> {
+        std::mem::take(&mut self.announced)
+    }
+
+    /// Applies one event to the table.
+    pub(super) fn apply(&mut self, event: Event) {
+        let (next, effects) = transition(self.state, event);
+        if next != self.state {
+            tracing::info!(try_on = self.id, from = ?self.state, to = ?next, detail = self.detail, "state");
+            if self.state == State::Live {
+                self.last_live = Some(Instant::now());
+            }
+            (self.state, self.since) = (next, Instant::now());
+        }
+        for effect in effects {
+            match effect {
+                Effect::Announce(_) => self.announced.push(self.status()),
+                Effect::ForgetGarments => self.ages.garments_ns = None,
+                // Followers reopen and dress by themselves; viewers' streams end with the task.
+                Effect::Reopen(_) | Effect::Dress | Effect::CloseUpstream | Effect::EndStreams => {}
+            }
+        }
+    }
+
+    /// Applies a fault of this moment.
+    pub(super) fn fail(&mut self, reason: Reason, detail: &str) {
+        if self.detail != detail {
+            self.detail = detail.into();
+        }
+        self.apply(Event::Failed(reason));
+    }
+
+    /// A frame arrived.
+    pub(super) fn on_frame(&mut self) {
+        self.ages.frame_ns = Some(self.since_birth_ns(Instant::now()));
+        if self.state == State::Degraded(Reason::CameraSilent) {
+            self.apply(Event::CameraBack);
+        }
+    }
+
+    /// Tracking answered.
+    pub(super) fn on_tracking(&mut self) {
+        self.tracking.is_up = true;
+        self.ages.body_ns = Some(self.since_birth_ns(Instant::now()));
+        self.open_if_both_answer();
+        self.tracking.fault = None;
+    }
+
+    /// Tracking answered that it follows nobody.
+    pub(super) fn on_nobody(&mut self, reason: Reason, detail: &str) {
+        self.fail(reason, detail);
+        self.tracking.fault = Some((reason, detail.to_owned()));
+    }
+
+    /// Tracking does not answer.
+    pub(super) fn on_tracking_gone(&mut self, why: String) {
+        self.tracking.is_up = false;
+        self.ages.body_ns = None;
+        self.fail(Reason::TrackingUnavailable, &why);
+        self.tracking.fault = Some((Reason::TrackingUnavailable, why));
+    }
+
+    /// Cloth answered; without garments their age is forgotten.
+    pub(super) fn on_cloth(&mut self, has_garments: bool) {
+        self.cloth.is_up = true;
+        self.open_if_both_answer();
+        self.cloth.fault = None;
+        if !has_garments {
+            self.ages.garments_ns = None;
+        }
+    }
+
+    /// Garments belong to a frame that arrived at `arrived`.
+    pub(super) fn on_garments(&mut self, arrived: Instant) {
+        self.ages.garments_ns = Some(self.since_birth_ns(arrived));
+    }
+
+    /// Cloth does not answer.
+    pub(super) fn on_cloth_gone(&mut self, why: String) {
+        self.cloth.is_up = false;
+        self.fail(Reason::ClothUnavailable, &why);
+        self.cloth.fault = Some((Reason::ClothUnavailable, why));
+    }
+
+    /// Repeats lasting faults and looks for silence.
+    pub(super) fn check(&mut self) {
+        for fault in [self.cloth.fault.clone(), self.tracking.fault.clone()] {
+            if let Some((reason, why)) = fault {
+                self.fail(reason, &why);
+            }
+        }
+        let now = self.since_birth_ns(Instant::now());
+        if let Some(reason) = self.ages.overdue(now, &self.limits) {
+            self.fail(reason, "");
+        } else if self.ages.frame_ns.is_none() && now > self.limits.camera_silence_ns {
+            self.fail(Reason::CameraSilent, "no frame has come yet");
+        }
+    }
+
+    fn open_if_both_answer(&mut self) {
+        let is_closed = matches!(
+            self.state,
+            State::Opening
+                | State::Degraded(Reason::TrackingUnavailable | Reason::ClothUnavailable)
+        );
+        if is_closed && self.tracking.is_up && self.cloth.is_up {
+            self.apply(Event::Opened);
+        }
+    }
+
+    fn since_birth_ns(&self, at: Instant) -> u64 {
+        let age = at.saturating_duration_since(self.born);
+        u64::try_from(age.as_nanos()).unwrap_or(u64::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_hidden_fault_comes_up_once_the_one_before_it_is_gone() {
+        let mut life = Lifecycle::new("t".into(), Limits::default());
+        life.on_frame();
+        life.on_tracking();
+        life.on_cloth(true);
+        assert_eq!(life.state(), State::Calibrating);
+
+        life.on_cloth_gone("no cloth".into());
+        life.on_tracking_gone("no tracking".into());
+        life.check();
+        assert_eq!(life.state(), State::Degraded(Reason::TrackingUnavailable));
+
+        life.on_tracking();
+        life.apply(Event::Opened);
+        life.check();
+        assert_eq!(life.state(), State::Degraded(Reason::ClothUnavailable));
+        assert_eq!(life.status().detail, "no cloth");
+        assert_eq!(life.take_announced().len(), 5);
+        assert!(life.take_announced().is_empty());
+    }
+}

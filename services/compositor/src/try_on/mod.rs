@@ -1,0 +1,10 @@
+//! One try-on: its life, its pictures, its task.
+
+mod drawing;
+mod handle;
+mod lifecycle;
+mod open;
+mod task;
+
+pub(crate) use handle::{Command, Handle, Setup};
+pub(crate) use open::spawn;

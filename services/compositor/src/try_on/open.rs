@@ -1,0 +1,116 @@
+//! Start and end of a try-on's task, with the streams from the services behind it.
+
+use super::handle::{Handle, Setup};
+use super::lifecycle::Lifecycle;
+use super::task::{ASKED, Inputs, Task};
+use crate::upstream::{self, Wanted};
+use std::time::Duration;
+use tokio::sync::{mpsc, watch};
+use tonic::transport::Channel;
+use tryon::session::Limits;
+use tryon_kit::bodies;
+use tryon_kit::client::{CALL_DEADLINE, channel, request};
+use tryon_kit::config::CompositorConfig;
+use tryon_kit::queue::latest;
+use tryon_proto::v1::tracking_service_client::TrackingServiceClient;
+use tryon_proto::v1::{CloseSessionRequest, UndressRequest};
+
+/// Silence of tracking that counts as a fault while it has a session. Its stream repeats itself twice a second.
+const TRACKING_SILENCE: Duration = Duration::from_millis(800);
+
+/// Starts the task of a try-on.
+pub(crate) fn spawn(mut setup: Setup) -> Handle {
+    let (commands, inbox) = mpsc::channel(8);
+    let choices = std::mem::take(&mut setup.choices);
+    let (wanted, outfit) = watch::channel(Wanted {
+        revision: 1,
+        choices,
+    });
+    let key = setup.key.clone();
+    tokio::spawn(async move {
+        let (id, directory) = (setup.id.clone(), setup.directory.clone());
+        let why = run(setup, inbox, outfit).await;
+        if why != ASKED {
+            directory.remove(&id);
+        }
+        metrics::gauge!("tryon_try_ons").set(directory.len() as f64);
+        tracing::info!(try_on = id, why, "closed");
+    });
+    Handle {
+        key,
+        commands,
+        wanted,
+    }
+}
+
+/// Follows camera, tracking and cloth until the task ends; the reason of the end.
+async fn run(
+    setup: Setup,
+    inbox: mpsc::Receiver<super::Command>,
+    outfit: watch::Receiver<Wanted>,
+) -> &'static str {
+    let frames = match setup.ctx.bus.subscribe(&setup.key).await {
+        Ok(f) => f,
+        Err(e) => {
+            tracing::error!(try_on = setup.id, error = %e, "cannot subscribe");
+            return "the bus refused";
+        }
+    };
+    // One connection for each stream; both URLs were checked at the start.
+    let (Ok(tracking), Ok(cloth)) = (
+        channel(&setup.config.tracking),
+        channel(&setup.config.cloth),
+    ) else {
+        return "a URL is none";
+    };
+    let id = setup.id.clone();
+
+    let (tx, bodies) = latest::channel();
+    let follow_bodies = tokio::spawn(bodies::follow(
+        tracking.clone(),
+        id.clone(),
+        Some(setup.key.clone()),
+        setup.ctx.pool.clone(),
+        tx,
+    ));
+    let (tx, garments) = latest::channel();
+    let follow_garments = tokio::spawn(upstream::follow(cloth.clone(), id.clone(), outfit, tx));
+
+    let life = Lifecycle::new(id.clone(), limits(&setup.config));
+    let (done, drawn) = mpsc::channel(1);
+    let inputs = Inputs {
+        inbox,
+        frames,
+        bodies,
+        garments,
+        drawn,
+    };
+    let why = Task::new(setup, life, done).run(inputs).await;
+
+    follow_bodies.abort();
+    follow_garments.abort();
+    close_sessions(id, tracking, cloth).await;
+    why
+}
+
+fn limits(config: &CompositorConfig) -> Limits {
+    Limits {
+        camera_silence_ns: config.camera_silence_ms * 1_000_000,
+        tracking_silence_ns: TRACKING_SILENCE.as_nanos() as u64,
+        garments_age_ns: config.garments_late_ms * 1_000_000,
+    }
+}
+
+/// Closes the sessions behind a try-on, within a deadline: idle ones end by themselves.
+async fn close_sessions(id: String, tracking: Channel, cloth: Channel) {
+    let close = async {
+        let session_id = id.clone();
+        let _ = TrackingServiceClient::new(tracking)
+            .close_session(request(CloseSessionRequest { session_id }))
+            .await;
+        let _ = upstream::client(cloth)
+            .undress(request(UndressRequest { session_id: id }))
+            .await;
+    };
+    let _ = tokio::time::timeout(CALL_DEADLINE, close).await;
+}

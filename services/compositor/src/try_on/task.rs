@@ -1,0 +1,417 @@
+//! Task of one try-on: joins frames, bodies and garments, and hands pictures to viewers.
+
+use super::drawing::{Done, Drawing};
+use super::handle::{Answer, Command, Setup};
+use super::lifecycle::Lifecycle;
+use crate::engine::{Drawn, Encoded, Encoding, Job, Placed};
+use crate::life;
+use crate::scene::{Body, Scene, not_after};
+use crate::upstream;
+use crate::viewer::Viewer;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::mpsc;
+use tokio::time::Instant;
+use tryon::session::{Event, Reason};
+use tryon_kit::bodies;
+use tryon_kit::frames::{Exposure, FrameSubscription};
+use tryon_kit::queue::latest;
+use tryon_kit::sessions::unix_ns;
+use tryon_kit::status::unavailable;
+use tryon_kit::telemetry::record_stages;
+use tryon_proto::v1::{
+    BodyState, FrameId, GarmentFit, GarmentFrame, Picture, PictureCodec, TrackingStatus,
+    TryOnState, TryOnStatus,
+};
+
+/// Interval of the checks for silence.
+const TICK: Duration = Duration::from_millis(100);
+/// Longest interval between messages to a viewer.
+const HEARTBEAT: Duration = Duration::from_millis(450);
+/// Age above which a picture is no snapshot.
+const SNAPSHOT_AGE: Duration = Duration::from_secs(1);
+/// Reason of an end on request.
+pub(super) const ASKED: &str = "asked to";
+
+/// Streams into a try-on.
+pub(super) struct Inputs {
+    pub(super) inbox: mpsc::Receiver<Command>,
+    pub(super) frames: FrameSubscription,
+    pub(super) bodies: latest::Receiver<bodies::News>,
+    pub(super) garments: latest::Receiver<upstream::News>,
+    pub(super) drawn: mpsc::Receiver<Done>,
+}
+
+/// Fit of the worn outfit as cloth last reported it.
+#[derive(Default)]
+struct OutfitFit {
+    /// Revision of the outfit.
+    revision: u64,
+    /// Fit of each garment, without the bulk.
+    garments: Vec<GarmentFit>,
+    /// Tightness of each vertex of each garment, which pictures do not carry.
+    tightness: Arc<[bytes::Bytes]>,
+    /// Garments are drawn in the colours of their fit.
+    is_shown: bool,
+}
+
+/// State of one try-on.
+pub(super) struct Task {
+    setup: Setup,
+    life: Lifecycle,
+    drawing: Drawing,
+    scene: Scene,
+    fit: OutfitFit,
+    viewers: Vec<Viewer>,
+    /// Last message to the viewers.
+    said: Instant,
+    /// Last sign of interest in this try-on.
+    wanted: Instant,
+    /// Newest exposure in which nobody was followed; garments up to it are not shown.
+    lost_at: Option<FrameId>,
+    /// Newest exposure shown.
+    shown: Option<FrameId>,
+    /// Last job, for snapshots.
+    last: Option<(Instant, Job)>,
+}
+
+impl Task {
+    /// A try-on without viewers that sends finished jobs to `done`.
+    pub(super) fn new(setup: Setup, life: Lifecycle, done: mpsc::Sender<Done>) -> Self {
+        let now = Instant::now();
+        Self {
+            drawing: Drawing::new(setup.card.clone(), setup.ctx.pool.clone(), done),
+            setup,
+            life,
+            scene: Scene::default(),
+            fit: OutfitFit::default(),
+            viewers: Vec::new(),
+            said: now,
+            wanted: now,
+            lost_at: None,
+            shown: None,
+            last: None,
+        }
+    }
+
+    /// Runs to the end of the try-on; the reason of the end.
+    pub(super) async fn run(mut self, mut inputs: Inputs) -> &'static str {
+        let mut tick = tokio::time::interval(TICK);
+        tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        loop {
+            let end = self.next(&mut inputs, &mut tick).await;
+            for status in self.life.take_announced() {
+                self.say(&status);
+            }
+            if let Some(why) = end {
+                return why;
+            }
+        }
+    }
+
+    /// Handles one event; the reason if it ends the try-on.
+    async fn next(
+        &mut self,
+        i: &mut Inputs,
+        tick: &mut tokio::time::Interval,
+    ) -> Option<&'static str> {
+        tokio::select! {
+            biased;
+            () = self.setup.ctx.shutdown.cancelled() => {
+                self.life.apply(Event::Drain);
+                return Some("shutting down");
+            }
+            c = i.inbox.recv() => return self.on_command(c),
+            Some(d) = i.drawn.recv() => self.on_drawn(d),
+            g = i.garments.recv() => match g {
+                Some(g) => self.on_garments(g),
+                None => return Some("cloth cannot be followed"),
+            },
+            b = i.bodies.recv() => match b {
+                Some(b) => self.on_body(b),
+                None => return Some("tracking cannot be followed"),
+            },
+            f = i.frames.next() => match f {
+                Some(f) => self.on_frame(f),
+                None => return Some("the bus is gone"),
+            },
+            _ = tick.tick() => {
+                self.on_tick();
+                if self.wanted.elapsed() > Duration::from_secs(self.setup.config.idle_s) {
+                    self.life.apply(Event::Close);
+                    return Some("nobody watches");
+                }
+            }
+        }
+        None
+    }
+
+    fn on_command(&mut self, command: Option<Command>) -> Option<&'static str> {
+        match command {
+            Some(Command::View(v)) => {
+                v.status(self.life.status());
+                self.viewers.push(v);
+            }
+            Some(Command::Snapshot(encoding, answer)) => self.snapshot(encoding, answer),
+            Some(Command::Touch) => self.wanted = Instant::now(),
+            Some(Command::ShowFit(show)) => self.fit.is_shown = show,
+            Some(Command::Close) | None => {
+                self.life.apply(Event::Close);
+                return Some(ASKED);
+            }
+        }
+        None
+    }
+
+    fn say(&mut self, status: &TryOnStatus) {
+        self.viewers.retain(|v| v.status(status.clone()));
+        self.said = Instant::now();
+    }
+
+    fn on_tick(&mut self) {
+        self.life.check();
+        self.viewers.retain(|v| !v.is_gone());
+        if !self.viewers.is_empty() {
+            self.wanted = Instant::now();
+        }
+        if self.said.elapsed() >= HEARTBEAT {
+            let status = self.life.status();
+            self.say(&status);
+        }
+    }
+
+    fn on_frame(&mut self, e: Arc<Exposure>) {
+        self.life.on_frame();
+        self.scene.frame(e.clone());
+        // While live, pictures wait for their garments; otherwise the plain picture is shown at once.
+        if !self.life.state().shows_garments() {
+            self.draw(Job {
+                exposure: e,
+                placed: None,
+                body: None,
+                formats: Vec::new(),
+                fit: None,
+            });
+        }
+    }
+
+    fn on_body(&mut self, news: bodies::News) {
+        let (state, shape, template) = match news {
+            bodies::News::Gone(why) => return self.life.on_tracking_gone(why),
+            bodies::News::Body {
+                state,
+                shape,
+                template,
+            } => (*state, shape, template),
+        };
+        self.life.on_tracking();
+        match state.status() {
+            TrackingStatus::Calibrating | TrackingStatus::Tracking => {
+                self.life.apply(Event::PersonFound);
+                if let Some(shape) = shape {
+                    self.scene.body(Body {
+                        state: Arc::new(state),
+                        shape,
+                        template,
+                    });
+                }
+            }
+            _ => self.on_nobody(&state),
+        }
+    }
+
+    fn on_nobody(&mut self, state: &BodyState) {
+        let reason = life::from_wire(state.reason()).unwrap_or(Reason::TrackingLost);
+        // The silence of the camera is detected here, from the frames themselves.
+        if reason != Reason::CameraSilent {
+            self.lost_at = state.frame;
+            self.life.on_nobody(reason, &state.detail);
+        }
+    }
+
+    fn on_garments(&mut self, news: upstream::News) {
+        match news {
+            upstream::News::Gone(why) => self.life.on_cloth_gone(why),
+            upstream::News::Status(frame) => {
+                self.life.on_cloth(false);
+                // Reasons other than its own step reach this service from tracking.
+                if life::from_wire(frame.reason()) == Some(Reason::StepFailed) {
+                    self.life.fail(Reason::StepFailed, &frame.detail);
+                }
+            }
+            upstream::News::Placed(frame, placed) => {
+                self.life.on_cloth(true);
+                let id = frame.frame;
+                self.fit.update(*frame, placed.revision);
+                if let Some(id) = id {
+                    self.on_placed(&id, placed);
+                }
+            }
+        }
+    }
+
+    fn on_placed(&mut self, id: &FrameId, placed: Arc<Placed>) {
+        let Some((arrived, exposure)) = self.scene.find(id) else {
+            metrics::counter!("tryon_compositor_unmatched").increment(1);
+            return;
+        };
+        self.life.on_garments(arrived);
+        let is_lost = self.lost_at.as_ref().is_some_and(|l| not_after(id, l));
+        if self.life.is_late(arrived) || is_lost || !self.life.is_tracking_up() {
+            return;
+        }
+        self.life.apply(Event::GarmentsOn);
+        if self.life.state().shows_garments() {
+            let fit = self.fit.is_shown.then(|| self.fit.tightness.clone());
+            self.draw(Job {
+                exposure,
+                placed: Some(placed),
+                body: self.scene.find_body(id),
+                formats: Vec::new(),
+                fit,
+            });
+        }
+    }
+
+    /// Draws for every viewer whose rate allows a picture now; the newest job wins.
+    fn draw(&mut self, mut job: Job) {
+        if self.is_shown(&job.exposure.id) {
+            return;
+        }
+        for v in self.viewers.iter().filter(|v| v.wants()) {
+            let f = Job::wants(&v.format);
+            if !job.formats.contains(&f) {
+                job.formats.push(f);
+            }
+        }
+        self.last = Some((Instant::now(), job.clone()));
+        if job.formats.is_empty() {
+            // Without a viewer nothing is drawn; a snapshot can still be drawn from `last`.
+            metrics::counter!("tryon_compositor_skipped").increment(1);
+            return;
+        }
+        self.drawing.queue(job);
+    }
+
+    fn is_shown(&self, id: &FrameId) -> bool {
+        self.shown.as_ref().is_some_and(|s| not_after(id, s))
+    }
+
+    fn on_drawn(&mut self, d: Done) {
+        match d.outcome {
+            Ok(drawn) => {
+                record_stages("compositor", &drawn.stages);
+                if let Some(answer) = d.answer {
+                    let picture = drawn
+                        .pictures
+                        .first()
+                        .map(|p| self.picture(&d.job, &drawn, p));
+                    let _ =
+                        answer.send(picture.ok_or_else(|| unavailable("compositor", "no picture")));
+                } else if d.job.placed.is_some() == self.life.state().shows_garments() {
+                    self.deliver(&d.job, &drawn);
+                }
+            }
+            Err(why) => {
+                tracing::warn!(try_on = self.setup.id, %why, "a picture could not be drawn");
+                if let Some(answer) = d.answer {
+                    let _ = answer.send(Err(unavailable("compositor", &why)));
+                }
+                self.life.fail(Reason::StepFailed, &why);
+            }
+        }
+        self.drawing.resume(d.engine);
+    }
+
+    fn deliver(&mut self, job: &Job, drawn: &Drawn) {
+        let id = job.exposure.id;
+        if self.is_shown(&id) {
+            return;
+        }
+        self.shown = Some(id);
+        let mut viewers = std::mem::take(&mut self.viewers);
+        for v in viewers.iter_mut().filter(|v| v.wants()) {
+            let wanted = Job::wants(&v.format);
+            let made = |p: &&Encoded| (p.size, p.encoding) == wanted;
+            if let Some(p) = drawn.pictures.iter().find(made) {
+                v.picture(self.picture(job, drawn, p));
+            }
+        }
+        self.viewers = viewers;
+        self.said = Instant::now();
+        let state = life::state(self.life.state()).as_str_name();
+        metrics::counter!("tryon_pictures", "state" => state).increment(1);
+        let latency = unix_ns().saturating_sub(id.received_unix_ns) as f64 * 1e-6;
+        metrics::histogram!("tryon_stage_ms", "stage" => "latency").record(latency);
+    }
+
+    fn picture(&self, job: &Job, drawn: &Drawn, p: &Encoded) -> Picture {
+        let id = job.exposure.id;
+        // The state of the picture's content, which may differ from the state by now.
+        let state = if job.placed.is_some() {
+            TryOnState::Live
+        } else {
+            life::state(self.life.state())
+        };
+        let is_degraded = state == TryOnState::Degraded;
+        let mut picture = Picture {
+            frame: Some(id),
+            state: state.into(),
+            codec: match p.encoding {
+                Encoding::Jpeg(_) => PictureCodec::Jpeg.into(),
+                Encoding::Png => PictureCodec::Png.into(),
+            },
+            width: p.width,
+            height: p.height,
+            image: p.bytes.clone(),
+            latency_ms: unix_ns().saturating_sub(id.received_unix_ns) as f32 * 1e-6,
+            stages: drawn.stages.clone(),
+            ..Picture::default()
+        };
+        if is_degraded {
+            picture.reason = life::reason(self.life.state()).into();
+            picture.degraded_age = self.life.degraded_age();
+        }
+        if let Some(placed) = &job.placed {
+            picture.outfit_revision = placed.revision;
+            if placed.revision == self.fit.revision {
+                picture.fit.clone_from(&self.fit.garments);
+            }
+        }
+        picture
+    }
+
+    fn snapshot(&mut self, encoding: Encoding, answer: Answer) {
+        let young = self
+            .last
+            .as_ref()
+            .filter(|(at, _)| at.elapsed() < SNAPSHOT_AGE);
+        let Some((_, job)) = young else {
+            let _ = answer.send(Err(unavailable(
+                "compositor",
+                "there is no picture younger than a second",
+            )));
+            return;
+        };
+        let job = Job {
+            formats: vec![(None, encoding)],
+            ..job.clone()
+        };
+        self.drawing.queue_snapshot(job, answer);
+    }
+}
+
+impl OutfitFit {
+    /// Takes the fit of a message; most messages have none, and then it is kept for the same outfit.
+    fn update(&mut self, frame: GarmentFrame, revision: u64) {
+        if frame.fit.is_empty() && self.revision == revision {
+            return;
+        }
+        let mut garments = frame.fit;
+        self.tightness = garments
+            .iter_mut()
+            .map(|f| std::mem::take(&mut f.tightness))
+            .collect();
+        (self.revision, self.garments) = (revision, garments);
+    }
+}
