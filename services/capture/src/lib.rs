@@ -1,10 +1,12 @@
-//! The capture service: cameras and recordings onto the bus.
+//! Capture service: cameras and recordings onto the bus.
 //!
-//! One task owns one camera (`camera`); frames are made on the compute pool and handed to the bus, which keeps
-//! only the newest. The service itself only starts, stops and reports.
+//! One task owns one camera (`camera`). Its frames are read on the compute pool (`reader`) and published on the bus,
+//! which keeps only the newest. The rpcs (`service`) start, stop and report.
 
 mod camera;
+mod pace;
 mod pattern;
+mod reader;
 mod recorder;
 mod service;
 mod source;

@@ -1,4 +1,4 @@
-//! Recording: a thread that writes, beside a camera that does not wait for it.
+//! Recording to a file on a thread of its own, which the camera does not wait for.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -9,7 +9,7 @@ use tryon::camera::Calibration;
 use tryon::formats::McapWriter;
 use tryon_kit::frames::Exposure;
 
-/// Frames that may wait for the disk: half a second at 30 a second, 20 MB of shared images.
+/// Frames that wait for the disk: half a second at 30 a second, 20 MB of shared images.
 const WAITING: usize = 16;
 
 /// A finished recording.
@@ -26,7 +26,7 @@ struct Active {
     writer: std::thread::JoinHandle<Result<u64, String>>,
 }
 
-/// The recording of one camera, if one is under way. Clones share it.
+/// Recording of one camera, if one is under way. Clones share it.
 #[derive(Clone, Default)]
 pub(crate) struct Recorder(Arc<Mutex<Option<Active>>>);
 
@@ -63,7 +63,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Hands over a frame, or counts it as dropped: the camera never waits.
+    /// Queues a frame, or counts it as dropped: the camera never waits.
     pub(crate) fn offer(&self, exposure: &Arc<Exposure>) {
         self.with(|a| {
             if let Some(a) = a

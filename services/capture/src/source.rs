@@ -1,4 +1,4 @@
-//! What feeds a camera: `synth`, `pattern`, or a recording.
+//! Sources of a camera: `synth`, `pattern`, or a recording.
 
 use crate::pattern::Pattern;
 use std::path::Path;
@@ -14,7 +14,7 @@ pub type OpenSource = Box<dyn RgbdSource>;
 pub struct SourceError {
     /// As configured.
     pub source_name: String,
-    /// What is wrong.
+    /// Fault.
     pub why: String,
 }
 

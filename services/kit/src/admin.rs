@@ -1,4 +1,4 @@
-//! The admin port: `/metrics` for Prometheus, `/healthz` (the process lives), `/readyz` (it takes work).
+//! Admin port: `/metrics` for Prometheus, `/healthz` (the process lives), `/readyz` (it accepts work).
 
 use axum::Router;
 use axum::extract::State;
@@ -30,7 +30,7 @@ async fn metrics_page() -> (StatusCode, String) {
     }
 }
 
-/// Serves the admin port until `shutdown`; answers the bound address.
+/// Serves the admin port until `shutdown` and returns the bound address.
 ///
 /// # Errors
 /// When the address cannot be bound.

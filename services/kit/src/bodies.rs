@@ -1,4 +1,4 @@
-//! Following a tracking session through losses and restarts: what cloth and compositor both do.
+//! Subscription to the body states of a tracking session, through losses and restarts; for cloth and compositor.
 
 use crate::client::{pauses, request};
 use crate::compute::Pool;
@@ -14,26 +14,27 @@ use tryon_proto::v1::{
     BodyState, GetBodyTemplateRequest, OpenSessionRequest, StreamBodyStatesRequest,
 };
 
-/// A template of 13,000 vertices with ten shape directions takes 2 MB.
+/// Largest template message, bytes: one of 13,000 vertices with ten shape directions takes 2 MB.
 const MAX_TEMPLATE_BYTES: usize = 16 * 1024 * 1024;
 
-/// What is known about a body.
+/// Message of the subscription.
 pub enum News {
-    /// A state with the shape that belongs to it, if there is one.
+    /// A state and its shape, if there is one.
     Body {
-        /// As it came, without its shape.
+        /// State without its shape.
         state: Box<BodyState>,
-        /// The shape of `state.shape_version`.
+        /// Shape of `state.shape_version`.
         shape: Option<Arc<BodyShape>>,
-        /// What both speak about.
+        /// Template that state and shape refer to.
         template: Arc<Template>,
     },
     /// Tracking does not answer, or does not know the session.
     Gone(String),
 }
 
-/// Follows `session` until the receiver of `news` is gone; `open` opens it first, each time. The newest state wins;
-/// shapes are never lost, because they are put together before anything is dropped.
+/// Follows `session` until the receiver of `news` is gone. With `open`, each stream opens the session first.
+///
+/// The newest state wins. Shapes are never lost: they are joined to states before the queue drops any.
 pub async fn follow(
     channel: Channel,
     session: String,

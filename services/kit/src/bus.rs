@@ -1,9 +1,9 @@
-//! zenoh: the only file that names it. An embedded peer with explicit endpoints, no scouting, no router.
+//! Frame bus between processes over zenoh, the only file that names it: an embedded peer with explicit endpoints, no
+//! scouting, no router.
 //!
-//! Publishing uses `Block`, because transport-level dropping loses large messages silently (zenoh #2258); newest-wins
-//! is the subscriber's ring of one, which keeps `put` at 1.3 ms beside a subscriber that takes 100 ms a frame (the
-//! default FIFO: 101 ms). `low_latency` and shared memory stay off: the first delivers nothing of this size, the
-//! second lost frames of stalled subscribers (zenoh #2628).
+//! Publishing uses `Block`: transport-level dropping loses large messages silently (zenoh #2258). Newest-wins is the
+//! subscriber's ring of one: `put` takes 1.3 ms beside a subscriber of 100 ms a frame (default FIFO: 101 ms).
+//! `low_latency` delivers no message of this size, shared memory loses frames of stalled subscribers (zenoh #2628).
 
 use crate::compute::Pool;
 use crate::frames::exposure_to_wire;
@@ -21,19 +21,19 @@ use zenoh::handlers::RingChannel;
 use zenoh::qos::CongestionControl;
 use zenoh::sample::SampleKind;
 
-/// How a stalled peer (stopped, not dead) is treated: it may hold the others up for this long, microseconds, then its
-/// connection is closed and it comes back by itself. zenoh's default of 5 s would freeze every screen.
+/// Time that a stalled peer may block the others [µs]; then its connection is closed and reopened. zenoh's default of
+/// 5 s freezes every screen.
 const WAIT_BEFORE_CLOSE_US: u32 = 300_000;
-/// A connection that says nothing for this long is dead, milliseconds.
+/// Silence after which a connection counts as dead [ms].
 const LEASE_MS: u32 = 2_000;
-/// First and longest pause between attempts to connect, milliseconds: a restarted peer is found within a second.
+/// First and longest pause between attempts to connect [ms]: a restarted peer is found within a second.
 const RETRY_MS: (u32, u32) = (100, 500);
 
 fn fault(e: impl std::fmt::Display) -> BusError {
     BusError(e.to_string())
 }
 
-/// A peer on the bus between processes.
+/// Peer on the bus.
 pub struct ZenohBus {
     session: zenoh::Session,
     pool: Arc<Pool>,
@@ -41,7 +41,7 @@ pub struct ZenohBus {
 
 impl ZenohBus {
     /// Opens the peer. Endpoints are `tcp/ADDRESS:PORT` or `unixsock-stream/PATH`; those to connect to may come up
-    /// later. Needs a multi-threaded runtime.
+    /// later. Requires a multi-threaded runtime.
     ///
     /// # Errors
     /// Names the endpoint that is malformed or cannot be listened on.
@@ -85,7 +85,7 @@ impl ZenohBus {
     }
 }
 
-/// An endpoint `tcp/127.0.0.1:PORT` on a port that is free now; zenoh cannot tell which port it got for port 0.
+/// Endpoint `tcp/127.0.0.1:PORT` on a port that is free now; zenoh does not report the port it got for port 0.
 ///
 /// # Errors
 /// When the system has no free port.
@@ -109,7 +109,7 @@ impl FramePublisher for ZenohPublisher {
             let pack = move || exposure_to_wire(&exposure).map(|m| m.encode_to_vec());
             let bytes = self.pool.run(pack).await.map_err(fault)?.map_err(fault)?;
             let frames = self.frames.clone();
-            // `put` may wait for a stalled peer: not on an async worker.
+            // `put` may block on a stalled peer: not on an async worker.
             tokio::task::spawn_blocking(move || frames.put(bytes).wait())
                 .await
                 .map_err(fault)?
@@ -179,16 +179,16 @@ impl FrameBus for ZenohBus {
                     }
                 }
             });
-            let (tell, alive) = watch::channel(false);
-            let hear = move |s: zenoh::sample::Sample| {
-                tell.send_replace(s.kind() == SampleKind::Put);
+            let (set_alive, alive) = watch::channel(false);
+            let on_liveliness = move |s: zenoh::sample::Sample| {
+                set_alive.send_replace(s.kind() == SampleKind::Put);
             };
             let life = self
                 .session
                 .liveliness()
                 .declare_subscriber(key.alive())
                 .history(true)
-                .callback(hear);
+                .callback(on_liveliness);
             let life = life.await.map_err(fault)?;
             let guard = Box::new((AbortOnDrop(pump), life));
             Ok(FrameSubscription::new(
@@ -221,7 +221,7 @@ mod tests {
             .await
             .expect("opens before its peer");
         let camera = ZenohBus::open(&endpoint, &[], pool).await.expect("listens");
-        crate::frames::tests::carries(camera.as_ref(), late.as_ref()).await;
+        crate::frames::tests::fulfils_the_contract(camera.as_ref(), late.as_ref()).await;
         late.close().await;
         camera.close().await;
     }

@@ -1,25 +1,25 @@
-//! Clients that come back: lazy connections that notice a dead peer, and pauses between attempts.
+//! Reconnecting clients: lazy connections that detect a dead peer, and pauses between attempts.
 
 use backon::{BackoffBuilder, ExponentialBuilder};
 use std::time::Duration;
 use tonic::transport::{Channel, Endpoint};
 
-/// A ping on an open stream goes out this often; no answer within [`PING_TIMEOUT`] means that the peer is gone. A killed
-/// process closes its connection at once, and streams repeat themselves twice a second, so a stopped one is noticed
-/// by its silence within a second: pings only clear away connections to machines that vanished. Shorter ones cut off
-/// living neighbours on a busy two-core box.
+/// Interval of pings on an open stream. They detect machines that vanished; a stopped process is detected within a
+/// second by the silence of its streams. Shorter intervals cut off living neighbours on a busy two-core box.
 const PING_EVERY: Duration = Duration::from_secs(1);
+/// Time without an answer to a ping after which the peer counts as gone.
 const PING_TIMEOUT: Duration = Duration::from_secs(2);
+/// Time of one attempt to connect.
 const CONNECT_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// Deadline of a unary call to a neighbour on the same box.
 pub const CALL_DEADLINE: Duration = Duration::from_secs(2);
 
-/// A connection that is made when first used and made again after each loss. Open one for each frame stream: a slow
-/// reader stalls the other streams of its connection (hyper #2899).
+/// Connection made on first use and again after each loss. Open one for each frame stream: a slow reader stalls the
+/// other streams of its connection (hyper #2899).
 ///
 /// # Errors
-/// When `url` is none.
+/// A malformed URL.
 pub fn channel(url: &str) -> Result<Channel, String> {
     let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|e| format!("{url}: {e}"))?;
     Ok(endpoint
@@ -31,14 +31,14 @@ pub fn channel(url: &str) -> Result<Channel, String> {
         .connect_lazy())
 }
 
-/// A request with the deadline of a unary call.
+/// Request with the deadline of a unary call.
 pub fn request<T>(message: T) -> tonic::Request<T> {
     let mut r = tonic::Request::new(message);
     r.set_timeout(CALL_DEADLINE);
     r
 }
 
-/// Pauses between attempts: 50 ms, doubling to half a second, forever, jittered so that neighbours do not march.
+/// Endless pauses between attempts: 50 ms, doubling to half a second, with jitter.
 pub fn pauses() -> impl Iterator<Item = Duration> + Send {
     ExponentialBuilder::new()
         .with_min_delay(Duration::from_millis(50))

@@ -1,4 +1,4 @@
-//! The compute pool: threads for work that thinks, so that async workers only ever wait.
+//! Compute pool: threads for computation, so that async workers only ever wait.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
@@ -6,17 +6,17 @@ use tokio::sync::oneshot;
 
 type Job = Box<dyn FnOnce() + Send>;
 
-/// A fixed number of threads that run jobs in the order of their arrival.
+/// Fixed number of threads that run jobs in order of arrival.
 ///
-/// The queue needs no bound of its own: every session has at most one job under way, and sessions are bounded.
+/// The queue is unbounded: every session has at most one job under way, and sessions are bounded.
 pub struct Pool {
     jobs: Mutex<mpsc::Sender<Job>>,
 }
 
-/// A job that gave no answer.
+/// Job without a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ComputeError {
-    /// The job panicked; its state is gone, the pool goes on.
+    /// The job panicked; its state is lost, the pool goes on.
     #[error("the computation panicked")]
     Panicked,
     /// The pool is shutting down.
@@ -43,7 +43,7 @@ impl Pool {
                 .name(format!("compute-{i}"))
                 .spawn(move || {
                     loop {
-                        // The lock is held while waiting, which is fine: waiting threads have nothing else to do.
+                        // The lock is held while waiting: the other idle threads wait for it.
                         let job = rx.lock().unwrap_or_else(PoisonError::into_inner).recv();
                         match job {
                             Ok(job) => job(),
@@ -57,7 +57,7 @@ impl Pool {
         }))
     }
 
-    /// Runs `f` on the pool and waits for its answer. Dropping the future lets the job finish unheard.
+    /// Runs `f` on the pool and waits for its result. Dropping the future lets the job finish and discards the result.
     ///
     /// # Errors
     /// [`ComputeError`] when the job panicked or the pool is gone.
@@ -67,7 +67,7 @@ impl Pool {
     ) -> Result<T, ComputeError> {
         let (tx, rx) = oneshot::channel();
         let job: Job = Box::new(move || {
-            // A panic costs the job's own state, which moved in with it; nothing shared can be half changed.
+            // A panic loses the state that moved into the job; nothing shared is left half changed.
             let answer = catch_unwind(AssertUnwindSafe(f));
             let _ = tx.send(answer);
         });

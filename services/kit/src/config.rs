@@ -1,4 +1,4 @@
-//! One configuration for the whole box: flag > `TRYON_*` > TOML file > default; unknown keys are refused.
+//! Configuration of the whole box: flag > `TRYON_*` > TOML file > default; unknown keys are refused.
 
 mod sections;
 
@@ -10,13 +10,13 @@ use figment::value::Value;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Everything that can be configured. `deploy/tryon.toml` shows each key with its default.
+/// All configuration. `deploy/tryon.toml` shows each key with its default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
     /// Logs.
     pub log: LogConfig,
-    /// Threads and the end.
+    /// Threads and shutdown.
     pub process: ProcessConfig,
     /// Frames between processes.
     pub bus: BusConfig,
@@ -30,13 +30,13 @@ pub struct Config {
     pub compositor: CompositorConfig,
 }
 
-/// A configuration that cannot be used: which key, and why.
+/// Unusable configuration: the key and the fault.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct ConfigError(pub String);
 
-/// Variables of the environment that start like ours but are no keys: test switches, the file's own name, and the
-/// log filter of the command line (services have `TRYON_LOG__LEVEL`).
+/// Environment variables with the prefix that are no keys: test switches, the path of the file, and the log filter of
+/// the command line (services have `TRYON_LOG__LEVEL`).
 const NOT_KEYS: [&str; 4] = ["SHARED", "REQUIRE_ALL", "CONFIG", "LOG"];
 
 impl Config {
@@ -67,7 +67,7 @@ impl Config {
         Ok(config)
     }
 
-    /// Checks what types cannot say.
+    /// Checks ranges, names and URLs.
     ///
     /// # Errors
     /// Names the first key at fault.

@@ -1,12 +1,12 @@
-//! Ending: everyone is told, has `grace` to finish, and then it is over in any case.
+//! Shutdown with a deadline: work has `grace` to finish, then it is cut.
 //!
-//! hyper's graceful shutdown can wait for an hour on one connection (hyper #4170), so nothing here trusts it.
+//! hyper's graceful shutdown alone can wait for an hour on one connection (hyper #4170).
 
 use std::future::Future;
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 
-/// How a server ended.
+/// End of a server.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Drained {
     /// Everything finished by itself.
@@ -34,7 +34,7 @@ pub async fn until_deadline<E>(
     }
 }
 
-/// Waits for SIGTERM or SIGINT and tells its name.
+/// Waits for SIGTERM or SIGINT and returns its name.
 ///
 /// # Errors
 /// When the system refuses a handler.

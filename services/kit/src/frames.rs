@@ -1,4 +1,4 @@
-//! Frames between processes, whatever carries them: the trait, and the carrier inside one process.
+//! Frame bus: the trait, and its implementation inside one process.
 
 use crate::compute::{ComputeError, Pool};
 use crate::queue::latest;
@@ -14,7 +14,7 @@ use tryon_proto::Message;
 pub use tryon_proto::convert::frame::{Exposure, exposure_from_wire, exposure_to_wire, stage};
 pub use tryon_proto::keys::CameraKey;
 
-/// A boxed future: what object-safe async traits answer.
+/// Future of an object-safe async method.
 pub type BoxFuture<'a, T> = Pin<Box<dyn Future<Output = T> + Send + 'a>>;
 
 /// The bus refused or lost something.
@@ -22,7 +22,7 @@ pub type BoxFuture<'a, T> = Pin<Box<dyn Future<Output = T> + Send + 'a>>;
 #[error("bus: {0}")]
 pub struct BusError(pub String);
 
-/// Carries exposures from cameras to whoever subscribes; newest wins everywhere.
+/// Transport of exposures from cameras to subscribers; the newest wins everywhere.
 pub trait FrameBus: Send + Sync {
     /// Announces a camera as alive and readies its keys. Dropping the publisher takes it off the bus.
     fn publish(
@@ -34,28 +34,28 @@ pub trait FrameBus: Send + Sync {
     fn subscribe(&self, key: &CameraKey) -> BoxFuture<'_, Result<FrameSubscription, BusError>>;
 }
 
-/// The publishing end of one camera.
+/// Publishing end of one camera.
 pub trait FramePublisher: Send {
-    /// Hands over one exposure.
+    /// Publishes one exposure.
     fn send(&mut self, exposure: Arc<Exposure>) -> BoxFuture<'_, Result<(), BusError>>;
 }
 
-/// What waits for a subscriber: unpacked inside one process, packed between processes.
+/// Exposure in a subscriber's queue: unpacked inside one process, packed between processes.
 pub(crate) enum Packet {
     Ready(Arc<Exposure>),
     Packed(Bytes),
 }
 
-/// The receiving end of one camera: the newest exposure, with everything it missed counted.
+/// Receiving end of one camera: the newest exposure, with missed ones counted.
 pub struct FrameSubscription {
     pub(crate) packets: latest::Receiver<Packet>,
     pub(crate) alive: watch::Receiver<bool>,
     pub(crate) pool: Arc<Pool>,
-    /// A frame on its way through the pool: kept here, so that a dropped [`Self::next`] loses nothing.
+    /// Frame that the pool unpacks; kept here, so that dropping the future of [`Self::next`] loses nothing.
     unpacking: Option<BoxFuture<'static, Result<Result<Exposure, String>, ComputeError>>>,
     last: Option<(u64, u64)>,
     skipped: u64,
-    /// Keeps the carrier's own subscription open.
+    /// Keeps the transport's own subscription open.
     _guard: Box<dyn Any + Send>,
 }
 
@@ -78,6 +78,7 @@ impl FrameSubscription {
     }
 
     /// The newest exposure, waiting for one; `None` when the bus is gone. Broken ones are logged and left out.
+    ///
     /// Cancel safe.
     pub async fn next(&mut self) -> Option<Arc<Exposure>> {
         loop {
@@ -117,11 +118,11 @@ impl FrameSubscription {
             return Some(exposure);
         }
     }
-    /// Exposures of the current epoch that passed unseen.
+    /// Number of missed exposures of the current epoch.
     pub fn skipped(&self) -> u64 {
         self.skipped
     }
-    /// Whether the camera is on the bus.
+    /// The camera is on the bus.
     pub fn alive(&self) -> bool {
         *self.alive.borrow()
     }
@@ -137,7 +138,7 @@ struct Topic {
     alive: watch::Sender<bool>,
 }
 
-/// The bus inside one process: exposures are shared, not packed.
+/// Bus inside one process: exposures are shared, not packed.
 #[derive(Clone)]
 pub struct LocalBus {
     topics: Arc<Mutex<BTreeMap<CameraKey, Arc<Topic>>>>,
@@ -243,8 +244,11 @@ pub(crate) mod tests {
         })
     }
 
-    /// What every bus must do: the newest wins, losses are counted, life and death are seen.
-    pub(crate) async fn carries(publishing: &dyn FrameBus, subscribing: &dyn FrameBus) {
+    /// Contract of every bus: the newest wins, order holds, a camera's presence is reported.
+    pub(crate) async fn fulfils_the_contract(
+        publishing: &dyn FrameBus,
+        subscribing: &dyn FrameBus,
+    ) {
         let key = CameraKey::new("store", "front").expect("names");
         let mut s = subscribing.subscribe(&key).await.expect("subscribed");
         assert!(!s.alive());
@@ -252,7 +256,7 @@ pub(crate) mod tests {
             .publish(&key, &exposure(0).calibration)
             .await
             .expect("published");
-        // A peer that connects later misses what came before: send until something arrives.
+        // A peer that connects later misses earlier frames: send until one arrives.
         let mut sequence = 0;
         let first = loop {
             sequence += 1;
@@ -284,8 +288,8 @@ pub(crate) mod tests {
     }
 
     #[tokio::test]
-    async fn the_local_bus_carries() {
+    async fn local_bus_fulfils_the_contract() {
         let bus = LocalBus::new(Pool::new(1).expect("a thread"));
-        carries(bus.as_ref(), bus.as_ref()).await;
+        fulfils_the_contract(bus.as_ref(), bus.as_ref()).await;
     }
 }

@@ -1,5 +1,5 @@
-//! What every process of the product shares: configuration, logs and metrics, the bus, queues with a policy,
-//! the compute pool, servers, clients that come back, and a shutdown with a deadline.
+//! Parts that every process shares: configuration, logs and metrics, the bus, queues with a policy, the compute pool,
+//! servers, reconnecting clients, and a shutdown with a deadline.
 
 pub mod admin;
 pub mod bodies;

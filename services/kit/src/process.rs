@@ -1,4 +1,4 @@
-//! A service as a process: parse, validate (exit 64), build, announce, serve, drain, say how it ended.
+//! A service as a process: parse, validate (exit 64), build, announce addresses, serve, drain, report the end.
 
 use crate::bus::ZenohBus;
 use crate::compute::Pool;
@@ -18,7 +18,7 @@ pub const EXIT_USAGE: u8 = 64;
 /// Exit status of a service that could not start or broke (EX_SOFTWARE).
 pub const EXIT_BROKEN: u8 = 70;
 
-/// The command line of every service.
+/// Command line of every service.
 #[derive(Debug, Parser)]
 #[command(version, about)]
 pub struct Args {
@@ -33,7 +33,7 @@ pub struct Args {
     pub check: bool,
 }
 
-/// Which end of the bus a process is.
+/// End of the bus that a process is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BusRole {
     /// Listens: capture.
@@ -42,7 +42,7 @@ pub enum BusRole {
     Connect,
 }
 
-/// Says something on standard output, where supervisors and tests read it.
+/// Writes a line to standard output for supervisors and tests.
 fn say(line: &str) {
     let _ = writeln!(std::io::stdout().lock(), "{line}");
 }
@@ -81,7 +81,7 @@ where
         }
     };
     let end = runtime.block_on(serve(name, role, config, start, grace));
-    // Whatever still runs now is cut: the deadline was theirs.
+    // Tasks that outlive the deadline are cut.
     runtime.shutdown_timeout(Duration::from_millis(100));
     match end {
         Ok(Drained::Clean) => {
@@ -146,7 +146,7 @@ where
     });
     let end = running.ended().await;
     watch.abort();
-    // Leaving politely must not take longer than being cut off.
+    // The bus closes within a deadline of its own.
     let _ = tokio::time::timeout(Duration::from_millis(500), bus.close()).await;
     end
 }

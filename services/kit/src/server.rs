@@ -1,4 +1,4 @@
-//! Servers: health and reflection beside the service, limits and keepalive, an end with a deadline.
+//! gRPC servers: health and reflection beside the service, limits and keepalive, an end with a deadline.
 
 use crate::compute::Pool;
 use crate::drain::{Drained, until_deadline};
@@ -16,30 +16,31 @@ use tonic::transport::Server;
 use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
 
-/// Time that a call may take until its headers or answer; streams run on.
+/// Longest time of a call until its headers or answer; streams run on.
 const CALL_TIMEOUT: Duration = Duration::from_secs(10);
-/// Clients that vanish without a word are noticed after these two.
+/// Interval of pings, which detect clients that vanished.
 const PING_EVERY: Duration = Duration::from_secs(5);
+/// Time without an answer to a ping after which the client counts as gone.
 const PING_TIMEOUT: Duration = Duration::from_secs(5);
-/// Streams on one connection. A kiosk needs three, a page six.
+/// Most streams on one connection: a kiosk opens three, a page six.
 const MAX_STREAMS: u32 = 64;
-/// Headers of our clients take 1 kB.
+/// Largest headers, bytes: those of our clients take 1 kB.
 const MAX_HEADER_BYTES: u32 = 16 * 1024;
-/// Requests are names and numbers; what needs more says so at its service.
+/// Largest request, bytes: requests are names and numbers. A service with larger ones sets its own limit.
 pub const MAX_REQUEST_BYTES: usize = 64 * 1024;
-/// Beyond `grace`, what a handler needs to see the signal and end its streams by itself.
+/// Time beyond `grace` for handlers to see the signal and end their streams.
 const CUT: Duration = Duration::from_millis(250);
 
-/// What a service needs from the process that runs it.
+/// Dependencies of a service on its process.
 #[derive(Clone)]
 pub struct Context {
-    /// Where frames travel.
+    /// Frame bus.
     pub bus: Arc<dyn FrameBus>,
-    /// Where computing happens.
+    /// Compute pool.
     pub pool: Arc<Pool>,
     /// Cancelled when the process should end.
     pub shutdown: CancellationToken,
-    /// What open streams have to finish.
+    /// Time that open streams have to finish.
     pub grace: Duration,
 }
 
@@ -53,7 +54,7 @@ pub enum StartError {
         key: String,
         /// Its value.
         address: SocketAddr,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// A configured value turned out unusable.
@@ -61,7 +62,7 @@ pub enum StartError {
     Config {
         /// Configuration key.
         key: String,
-        /// What is wrong.
+        /// Fault.
         why: String,
     },
     /// The bus could not be joined.
@@ -70,14 +71,14 @@ pub enum StartError {
     /// The server broke while running.
     #[error("{service}: {why}")]
     Broken {
-        /// Which service.
+        /// Service at fault.
         service: &'static str,
-        /// How.
+        /// Fault.
         why: String,
     },
 }
 
-/// How a service ended.
+/// End of a service.
 pub type Outcome = Drained;
 
 /// A running service.
@@ -85,9 +86,9 @@ pub type Outcome = Drained;
 pub struct Running {
     /// Its name.
     pub name: &'static str,
-    /// Where its gRPC is.
+    /// gRPC address.
     pub address: SocketAddr,
-    /// Where its metrics and probes are.
+    /// Address of metrics and probes.
     pub admin: SocketAddr,
     task: JoinHandle<Result<Outcome, StartError>>,
 }
@@ -127,15 +128,15 @@ pub fn routes() -> Result<(RoutesBuilder, HealthReporter), StartError> {
     Ok((builder, reporter))
 }
 
-/// What [`start`] needs to know about a service.
+/// Arguments of [`start`].
 pub struct Service {
     /// Its name, as in the configuration: `tracking`.
     pub name: &'static str,
     /// Its gRPC name: `tryon.v1.TrackingService`.
     pub grpc_name: &'static str,
-    /// Where to listen.
+    /// gRPC address to bind.
     pub address: SocketAddr,
-    /// Where the admin port listens.
+    /// Admin address to bind.
     pub admin: SocketAddr,
     /// Its routes.
     pub routes: Routes,
@@ -171,7 +172,7 @@ pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartErro
         .map_err(bind("address", address))?;
     let bound = listener.local_addr().map_err(bind("address", address))?;
     let (ready, is_ready) = watch::channel(true);
-    // The admin port lives as long as the service itself, so that probes can watch it drain.
+    // The admin port outlives the drain, so that probes can observe it.
     let ended = CancellationToken::new();
     let admin = crate::admin::serve(admin, is_ready, ended.clone())
         .await

@@ -1,10 +1,9 @@
-//! The open sessions of a service: names to handles. What a session knows belongs to its own task; this is only the
-//! directory in which callers find it.
+//! Directory of the open sessions of a service, by id. The state of a session belongs to its own task.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A directory with a limit. Clones share it.
+/// Directory with a limit. Clones share it.
 pub struct Sessions<H> {
     open: Arc<Mutex<BTreeMap<String, Arc<H>>>>,
     limit: usize,
@@ -19,7 +18,7 @@ impl<H> Clone for Sessions<H> {
     }
 }
 
-/// What [`Sessions::open`] found.
+/// Result of [`Sessions::open`].
 pub enum Opened<H> {
     /// It was there.
     Found(Arc<H>),
@@ -66,7 +65,7 @@ impl<H> Sessions<H> {
     pub fn limit(&self) -> usize {
         self.limit
     }
-    /// How many are open.
+    /// Number of open sessions.
     pub fn len(&self) -> usize {
         self.with(|m| m.len())
     }

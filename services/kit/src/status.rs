@@ -4,9 +4,9 @@ use std::time::Duration;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt};
 
-/// When a caller should come back after an upstream failed: the time within which a restarted service is up.
+/// Retry delay after an upstream failed: the time within which a restarted service is up.
 pub const RETRY_UPSTREAM: Duration = Duration::from_millis(500);
-/// When a caller should come back after a limit was reached.
+/// Retry delay after a limit was reached.
 pub const RETRY_LIMIT: Duration = Duration::from_secs(5);
 
 /// UNAVAILABLE with RetryInfo: `service` does not answer.
@@ -25,13 +25,13 @@ pub fn exhausted(what: &str, limit: usize) -> Status {
     )
 }
 
-/// NOT_FOUND naming what is not there.
+/// NOT_FOUND with kind and id.
 pub fn not_found(what: &str, id: &str) -> Status {
     Status::not_found(format!("no {what} `{id}`"))
 }
 
-/// A failure of `service` as its caller's caller should see it: the arguments' own faults pass through, everything
-/// else is UNAVAILABLE.
+/// Failure of an upstream `service` for the downstream caller: faults of the arguments pass through, all others become
+/// UNAVAILABLE.
 pub fn from_upstream(service: &str, s: &Status) -> Status {
     match s.code() {
         Code::InvalidArgument

@@ -14,7 +14,7 @@ pub fn init_logs(config: &LogConfig) -> Result<(), String> {
     let builder = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr);
-    // A second subscriber is refused; the first one stays, which is what tests and `demo` want.
+    // A second subscriber is refused and the first one stays: tests and `demo` rely on it.
     let _ = match config.format {
         LogFormat::Json => builder.json().try_init(),
         LogFormat::Pretty => builder.try_init(),
@@ -22,7 +22,7 @@ pub fn init_logs(config: &LogConfig) -> Result<(), String> {
     Ok(())
 }
 
-/// Upper bounds of the histograms of times, milliseconds: fine below a frame at 30/s, coarse above.
+/// Upper bounds of the time histograms [ms]: fine below a frame interval at 30/s, coarse above.
 const MS_BUCKETS: [f64; 14] = [
     0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 33.0, 66.0, 100.0, 150.0, 250.0, 500.0, 1000.0,
 ];
@@ -40,7 +40,7 @@ pub fn metrics() -> Option<&'static PrometheusHandle> {
     HANDLE.get_or_init(install).as_ref()
 }
 
-/// Counts work that a scene did not need as `tryon_skipped{service="…", what="…"}`.
+/// Counts skipped work as `tryon_skipped{service="…", what="…"}`.
 pub fn record_skipped<const N: usize>(service: &'static str, skipped: [(&'static str, usize); N]) {
     for (what, n) in skipped {
         metrics::counter!("tryon_skipped", "service" => service, "what" => what)

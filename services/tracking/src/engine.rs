@@ -1,4 +1,4 @@
-//! The tracker and the words for what it says: everything of a session that computes.
+//! Tracker of a session and the wire form of its states.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::{body, geometry};
 use tryon_proto::v1::{self, DegradedReason, TrackingStatus};
 
-/// The configured template: an SMPL-layout npz, or the embedded body when the path is empty.
+/// Configured template: an SMPL-layout npz, or the embedded body for an empty path.
 pub(crate) fn load_template(path: &Path) -> Result<Arc<Template>, String> {
     if path.as_os_str().is_empty() {
         return Ok(embedded::template());
@@ -41,7 +41,7 @@ pub(crate) struct Engine {
 }
 
 impl Engine {
-    /// A tracker that has seen nobody. `shape_version` goes on from an earlier engine of the session.
+    /// A tracker that searches. `shape_version` continues that of an earlier engine of the session.
     pub(crate) fn new(
         template: Arc<Template>,
         calibration: Arc<Calibration>,
@@ -68,8 +68,8 @@ impl Engine {
         }
     }
 
-    /// Whether it can go on with this exposure: same run of the same camera.
-    pub(crate) fn fits(&self, e: &Exposure) -> bool {
+    /// The exposure is of the same run of the same camera.
+    pub(crate) fn is_for(&self, e: &Exposure) -> bool {
         self.epoch == e.id.epoch
             && (Arc::ptr_eq(&self.calibration, &e.calibration) || self.calibration == e.calibration)
     }
@@ -83,7 +83,7 @@ impl Engine {
         self.state.reset(&self.model);
     }
 
-    /// One step; what it found, as the wire says it.
+    /// Tracks one exposure; the wire form of the state.
     pub(crate) fn step(&mut self, e: &Exposure) -> v1::BodyState {
         let start = Instant::now();
         let report = step(&self.model, &mut self.state, &e.rgbd, &mut self.work);
@@ -109,7 +109,7 @@ impl Engine {
                     (r.residual_mm as f32, r.visible_points as u32);
                 record_skipped("tracking", r.skipped.counts());
                 state.iterations = r.iterations as u32;
-                let (status, reason) = words(self.state.status);
+                let (status, reason) = status_to_wire(self.state.status);
                 state.set_status(status);
                 state.set_reason(reason);
             }
@@ -136,7 +136,7 @@ impl Engine {
     }
 }
 
-fn words(status: Status) -> (TrackingStatus, DegradedReason) {
+fn status_to_wire(status: Status) -> (TrackingStatus, DegradedReason) {
     match status {
         Status::Searching => (TrackingStatus::Searching, DegradedReason::NoPerson),
         Status::Calibrating => (TrackingStatus::Calibrating, DegradedReason::Unspecified),

@@ -1,7 +1,7 @@
-//! The tracking service: body states from the frames of a camera.
+//! Tracking service: body states from the frames of a camera.
 //!
-//! One task owns one session (`session`): it takes the newest frame, steps the tracker on the compute pool and
-//! leaves the state in a watch that any number of streams read.
+//! One task owns one session (`session`): it receives the newest frame, steps the tracker on the compute pool and
+//! publishes the state in a watch that any number of streams read.
 
 mod engine;
 mod service;

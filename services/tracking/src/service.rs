@@ -1,4 +1,4 @@
-//! The rpcs: check, find the session, answer.
+//! Remote procedures of the tracking service: check the request, find the session, answer.
 
 use crate::session::{self, Command, Handle, Setup};
 use futures::Stream;
@@ -17,7 +17,7 @@ use tryon_proto::convert::{body, request};
 use tryon_proto::v1::tracking_service_server::TrackingService;
 use tryon_proto::v1::*;
 
-/// The directory of sessions and what new ones need.
+/// Directory of sessions and the dependencies of new ones.
 pub(crate) struct Tracking {
     sessions: Sessions<Handle>,
     ctx: Context,

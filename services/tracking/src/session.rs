@@ -1,4 +1,4 @@
-//! One session: its task, its tracker, its clock.
+//! Task of one session: its tracker, its clock.
 
 use crate::engine::Engine;
 use std::sync::Arc;
@@ -12,28 +12,30 @@ use tryon_kit::sessions::Sessions;
 use tryon_kit::telemetry::record_stages;
 use tryon_proto::v1::{self, DegradedReason, TrackingStatus};
 
-/// A camera that says nothing for this long is silent; half of what a client may wait for the news.
+/// Time without a frame after which the camera counts as silent: half of the time in which clients must know.
 const SILENCE: Duration = Duration::from_millis(500);
 
-/// The end that was asked for.
+/// Reason of an end on request.
 const ASKED: &str = "asked to";
 
-/// How others reach a session.
+/// Access to a session from the rpcs.
 pub(crate) struct Handle {
     pub(crate) key: CameraKey,
     pub(crate) commands: mpsc::Sender<Command>,
     pub(crate) states: watch::Receiver<Arc<v1::BodyState>>,
 }
 
-/// What a session can be told.
+/// Command to a session.
 pub(crate) enum Command {
+    /// Forgets body and pose.
     Reset,
+    /// Ends the session.
     Close,
-    /// Somebody opened it again: it is wanted.
+    /// Keeps the session open.
     Touch,
 }
 
-/// What a session's task needs.
+/// Dependencies of a session's task.
 pub(crate) struct Setup {
     pub(crate) id: String,
     pub(crate) key: CameraKey,
@@ -51,20 +53,20 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
         reason: DegradedReason::NoPerson.into(),
         ..Default::default()
     };
-    let (tell, states) = watch::channel(Arc::new(first));
+    let (sender, states) = watch::channel(Arc::new(first));
     let (commands, inbox) = mpsc::channel(8);
     let key = setup.key.clone();
     tokio::spawn(async move {
         let (id, directory) = (setup.id.clone(), setup.directory.clone());
         let why = Task {
             setup,
-            tell,
+            states: sender,
             engine: None,
             shape_version: 0,
         }
         .run(inbox)
         .await;
-        // Who asked for the end has taken it out already, and may have opened another of that id.
+        // After an end on request the id is removed, and may name another session.
         if why != ASKED {
             directory.remove(&id);
         }
@@ -80,8 +82,8 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
 
 struct Task {
     setup: Setup,
-    tell: watch::Sender<Arc<v1::BodyState>>,
-    /// Away while the pool steps it.
+    states: watch::Sender<Arc<v1::BodyState>>,
+    /// `None` while the pool steps it.
     engine: Option<Engine>,
     shape_version: u64,
 }
@@ -98,7 +100,8 @@ impl Task {
         let shutdown = self.setup.ctx.shutdown.clone();
         let mut tick = tokio::time::interval(SILENCE / 2);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-        let (mut heard, mut said, mut wanted) = (Instant::now(), Instant::now(), Instant::now());
+        let (mut received, mut published, mut wanted) =
+            (Instant::now(), Instant::now(), Instant::now());
         loop {
             tokio::select! {
                 biased;
@@ -111,17 +114,17 @@ impl Task {
                 frame = frames.next() => match frame {
                     Some(f) => {
                         self.step(f, frames.skipped()).await;
-                        (heard, said) = (Instant::now(), Instant::now());
+                        (received, published) = (Instant::now(), Instant::now());
                     }
                     None => return "the bus is gone",
                 },
                 _ = tick.tick() => {
-                    if heard.elapsed() >= SILENCE && said.elapsed() >= SILENCE {
+                    if received.elapsed() >= SILENCE && published.elapsed() >= SILENCE {
                         self.silent(&frames);
-                        said = Instant::now();
+                        published = Instant::now();
                     }
-                    // One receiver is the handle in the directory.
-                    if self.tell.receiver_count() > 1 {
+                    // One receiver is the handle of the directory.
+                    if self.states.receiver_count() > 1 {
                         wanted = Instant::now();
                     } else if wanted.elapsed() > self.setup.idle {
                         return "nobody reads it";
@@ -132,7 +135,7 @@ impl Task {
     }
 
     async fn step(&mut self, exposure: Arc<Exposure>, skipped: u64) {
-        let engine = self.engine.take().filter(|e| e.fits(&exposure));
+        let engine = self.engine.take().filter(|e| e.is_for(&exposure));
         let (template, version) = (self.setup.template.clone(), self.shape_version);
         let work = move || {
             let fresh = || {
@@ -155,10 +158,10 @@ impl Task {
                 state.frames_dropped = skipped;
                 record_stages("tracking", &state.stages);
                 metrics::counter!("tryon_tracking_steps").increment(1);
-                self.tell.send_replace(Arc::new(state));
+                self.states.send_replace(Arc::new(state));
             }
             Err(why) => {
-                // The tracker went down with its panic: start over, and say so.
+                // The tracker is lost to its panic: the next frame starts a new one.
                 tracing::error!(session = self.setup.id, %why, "a step was lost");
                 self.fault(DegradedReason::StepFailed, why.to_string());
             }
@@ -176,13 +179,13 @@ impl Task {
 
     /// Repeats the last state as lost, or as searching when there never was one.
     fn fault(&mut self, reason: DegradedReason, detail: String) {
-        let mut state = v1::BodyState::clone(&self.tell.borrow());
+        let mut state = v1::BodyState::clone(&self.states.borrow());
         if state.pose.is_some() {
             state.set_status(TrackingStatus::Lost);
         }
         state.set_reason(reason);
         state.detail = detail;
         state.age_frames = state.age_frames.saturating_add(1);
-        self.tell.send_replace(Arc::new(state));
+        self.states.send_replace(Arc::new(state));
     }
 }

@@ -1,4 +1,4 @@
-//! The sections of the configuration with their defaults.
+//! Sections of the configuration with their defaults.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -9,7 +9,7 @@ const fn local(port: u16) -> SocketAddr {
     SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), port)
 }
 
-/// How logs look.
+/// Format of logs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LogFormat {
@@ -39,13 +39,13 @@ impl Default for LogConfig {
     }
 }
 
-/// Threads and the end.
+/// Threads and shutdown.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ProcessConfig {
     /// Threads for computing; 0 means one for each core.
     pub compute_threads: usize,
-    /// Milliseconds that open streams have to finish after a signal; then they are cut.
+    /// Time that open streams have to finish after a signal [ms]; then they are cut.
     pub grace_ms: u64,
 }
 
@@ -182,12 +182,12 @@ pub struct ClothConfig {
     pub idle_s: u64,
     /// Most simulations at a time.
     pub max_simulations: usize,
-    /// Folder of mesh garments (`.obj`, `.glb`, `.gltf`, `.mhclo`; one level of folders in it is looked into) that are
-    /// offered under their files' names beside the library; empty for none. A faulty file is left out and logged.
+    /// Folder of mesh garments (`.obj`, `.glb`, `.gltf`, `.mhclo`), with one level of folders in it; empty for none. They
+    /// are offered under their files' names beside the library. A faulty file is left out and logged.
     pub garments: PathBuf,
     /// Body that the garments of the folder were made on (`.obj` or SMPL-layout `.npz`); empty: a guess for each.
     pub garments_body: PathBuf,
-    /// What the garments of the folder are made of: `cotton` or another preset.
+    /// Material of the garments of the folder: `cotton` or another preset.
     pub garments_material: String,
     /// Other materials for garments of the folder, by the name they are offered under.
     pub garment_materials: BTreeMap<String, String>,
@@ -238,16 +238,16 @@ pub struct CompositorConfig {
     pub renderer: RendererChoice,
 }
 
-/// Where pictures are drawn.
+/// Renderer of the pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RendererChoice {
-    /// On a real graphics card if there is one, else on the processor.
+    /// A real graphics card if there is one, else the processor.
     #[default]
     Auto,
-    /// On the processor.
+    /// The processor.
     Cpu,
-    /// On any adapter, software included; none is an error at the start.
+    /// Any adapter, software included; without one the start fails.
     Gpu,
 }
 

@@ -1,26 +1,26 @@
-//! One place, newest wins, losses counted.
+//! Queue of one slot: the newest value wins, losses are counted.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use tokio::sync::Notify;
 
 struct Shared<T> {
-    place: Mutex<Option<T>>,
+    slot: Mutex<Option<T>>,
     dropped: AtomicU64,
     closed: AtomicBool,
     arrived: Notify,
 }
 
-/// Puts values into the place.
+/// Writing end.
 pub struct Sender<T>(Arc<Shared<T>>);
 
-/// Takes them out.
+/// Reading end.
 pub struct Receiver<T>(Arc<Shared<T>>);
 
-/// An empty place with its two ends.
+/// An empty queue and its two ends.
 pub fn channel<T>() -> (Sender<T>, Receiver<T>) {
     let shared = Arc::new(Shared {
-        place: Mutex::new(None),
+        slot: Mutex::new(None),
         dropped: AtomicU64::new(0),
         closed: AtomicBool::new(false),
         arrived: Notify::new(),
@@ -29,12 +29,11 @@ pub fn channel<T>() -> (Sender<T>, Receiver<T>) {
 }
 
 impl<T> Sender<T> {
-    /// Never waits: replaces a value that nobody took, and counts it.
-    /// `false` when the receiver is gone.
+    /// Stores a value without waiting; a replaced one is counted. `false` when the receiver is gone.
     pub fn send(&self, value: T) -> bool {
         let old = self
             .0
-            .place
+            .slot
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .replace(value);
@@ -83,7 +82,7 @@ impl<T> Receiver<T> {
     /// The newest value, if one waits.
     pub fn try_recv(&mut self) -> Option<T> {
         self.0
-            .place
+            .slot
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .take()
@@ -99,7 +98,7 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn the_newest_wins_and_losses_are_counted() {
+    async fn newest_value_wins_and_losses_are_counted() {
         let (tx, mut rx) = channel();
         for i in 0..5 {
             assert!(tx.send(i));
@@ -116,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sender_learns_that_nobody_listens() {
+    fn send_reports_a_dropped_receiver() {
         let (tx, rx) = channel();
         drop(rx);
         assert!(!tx.send(1));

@@ -1,7 +1,7 @@
-//! Keyframes and updates in order: keyframes are never lost, of updates the oldest goes first.
+//! Queue of keyframes and updates in order: keyframes are never lost, the oldest update is dropped first.
 //!
-//! An update must need nothing but its keyframe, so dropping one costs a moment, not the stream. A new keyframe
-//! makes everything before it pointless, so at most one keyframe and `capacity` updates wait.
+//! An update depends on its keyframe only, so a dropped one loses a moment, not the stream. A new keyframe supersedes
+//! everything before it, so at most one keyframe and `capacity` updates wait.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -20,13 +20,13 @@ struct Shared<T> {
     arrived: Notify,
 }
 
-/// Puts keyframes and updates in.
+/// Writing end.
 pub struct Sender<T>(Arc<Shared<T>>);
 
-/// Takes them out in order.
+/// Reading end.
 pub struct Receiver<T>(Arc<Shared<T>>);
 
-/// A queue for one keyframe and `capacity` updates.
+/// Queue of one keyframe and `capacity` updates.
 pub fn channel<T>(capacity: usize) -> (Sender<T>, Receiver<T>) {
     let inner = Inner {
         key: None,
@@ -49,7 +49,7 @@ impl<T> Shared<T> {
 }
 
 impl<T> Sender<T> {
-    /// Queues a keyframe; whatever waits before it is pointless now and dropped. `false` when nobody listens.
+    /// Queues a keyframe and drops everything before it. `false` when the receiver is gone.
     pub fn keyframe(&self, value: T) -> bool {
         let open = self.0.with(|q| {
             q.dropped += q.updates.len() as u64 + u64::from(q.key.is_some());
@@ -60,7 +60,7 @@ impl<T> Sender<T> {
         self.0.arrived.notify_one();
         open
     }
-    /// Queues an update; when the queue is full the oldest update goes. `false` when nobody listens.
+    /// Queues an update; a full queue drops its oldest one. `false` when the receiver is gone.
     pub fn update(&self, value: T) -> bool {
         let open = self.0.with(|q| {
             if q.updates.len() == self.0.capacity {
@@ -116,7 +116,7 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn keyframes_survive_a_slow_reader_and_order_is_kept() {
+    async fn keyframes_are_kept_and_order_holds_for_a_slow_reader() {
         let (tx, mut rx) = channel(2);
         tx.keyframe("K1");
         for u in ["a", "b", "c"] {

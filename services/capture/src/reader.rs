@@ -1,0 +1,117 @@
+//! Reader of a source: frames at their pace, onto the bus and into a recording.
+
+use crate::pace::Pace;
+use crate::recorder::Recorder;
+use crate::source::OpenSource;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tokio::sync::watch;
+use tryon::camera::{Calibration, RgbdFrame};
+use tryon_kit::config::CameraConfig;
+use tryon_kit::frames::{Exposure, FramePublisher, stage};
+use tryon_kit::server::Context;
+use tryon_kit::sessions::unix_ns;
+use tryon_proto::v1::{self, CameraState};
+
+/// Pause after an unreadable frame, so that a broken recording does not spin.
+const AFTER_FAULT: Duration = Duration::from_millis(100);
+/// Unreadable frames in a row after which a source counts as failed.
+const MAX_FAULTS: u32 = 30;
+
+/// Reader of one run of a source.
+pub(crate) struct Reader {
+    /// `None` while the pool reads it.
+    pub(crate) source: Option<OpenSource>,
+    pub(crate) calibration: Arc<Calibration>,
+    pub(crate) epoch: u64,
+    pub(crate) config: CameraConfig,
+    pub(crate) ctx: Context,
+    pub(crate) info: Arc<watch::Sender<v1::CameraInfo>>,
+    pub(crate) recorder: Recorder,
+}
+
+impl Reader {
+    fn end(&self, state: CameraState, why: String) {
+        tracing::info!(camera = self.config.name, ?state, %why, "the source has ended");
+        self.info.send_modify(|i| {
+            i.set_state(state);
+            i.detail = why;
+        });
+    }
+
+    /// The next frame; a looped source rewinds at its end.
+    async fn read(&mut self) -> Result<Option<RgbdFrame>, String> {
+        let Some(mut source) = self.source.take() else {
+            return Err("the source was lost to a panic".into());
+        };
+        let looped = self.config.looped;
+        let read = move || {
+            let frame = match source.next_frame() {
+                Ok(None) if looped && !source.is_empty() => {
+                    source.rewind().and_then(|()| source.next_frame())
+                }
+                other => other,
+            };
+            (source, frame)
+        };
+        let (source, frame) = self.ctx.pool.run(read).await.map_err(|e| e.to_string())?;
+        self.source = Some(source);
+        frame.map_err(|e| e.to_string())
+    }
+
+    /// Publishes frames until the source ends or fails.
+    pub(crate) async fn run(mut self, mut publisher: Box<dyn FramePublisher>) {
+        let (mut pace, mut faults, mut sequence) = (Pace::new(), 0, 0);
+        loop {
+            let start = Instant::now();
+            let frame = match self.read().await {
+                Ok(Some(f)) => f,
+                Ok(None) => return self.end(CameraState::Ended, String::new()),
+                Err(why) => {
+                    faults += 1;
+                    tracing::warn!(camera = self.config.name, %why, "left out a frame");
+                    metrics::counter!("tryon_capture_faults").increment(1);
+                    if faults == MAX_FAULTS || self.source.is_none() {
+                        return self.end(CameraState::Failed, why);
+                    }
+                    tokio::time::sleep(AFTER_FAULT).await;
+                    continue;
+                }
+            };
+            faults = 0;
+            let read = stage("capture.read", start);
+            let (time_ns, due) = pace.next(frame.time_ns, &self.config);
+            if let Some(due) = due {
+                tokio::time::sleep_until(due).await;
+            }
+            let id = v1::FrameId {
+                epoch: self.epoch,
+                sequence,
+                capture_time_ns: time_ns,
+                received_unix_ns: unix_ns(),
+            };
+            sequence += 1;
+            let rgbd = RgbdFrame {
+                sequence: id.sequence,
+                time_ns,
+                ..frame
+            };
+            let exposure = Arc::new(Exposure {
+                id,
+                calibration: self.calibration.clone(),
+                rgbd,
+                stages: vec![read],
+            });
+            self.recorder.offer(&exposure);
+            if let Err(e) = publisher.send(exposure).await {
+                tracing::warn!(camera = self.config.name, error = %e, "a frame did not get out");
+            }
+            metrics::counter!("tryon_capture_frames").increment(1);
+            self.info.send_if_modified(|i| {
+                i.frames += 1;
+                // The count alone wakes no receiver.
+                false
+            });
+        }
+    }
+}
