@@ -19,7 +19,7 @@ pub fn is_session_id(s: &str) -> bool {
             .all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-')
 }
 
-/// Which camera: the two variable parts of its bus keys. Holds checked names only.
+/// Identity of a camera: the two variable parts of its bus keys, checked.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct CameraKey {
     store: String,
@@ -27,7 +27,7 @@ pub struct CameraKey {
 }
 
 impl CameraKey {
-    /// `None` when either name has characters that a key must not have.
+    /// `None` when either is no valid name.
     pub fn new(store: &str, camera: &str) -> Option<Self> {
         (is_name(store) && is_name(camera)).then(|| Self {
             store: store.into(),
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_that_would_change_a_key_are_refused() {
+    fn invalid_names_are_refused() {
         assert_eq!(
             CameraKey::new("store", "front").expect("fine").rgbd(),
             "tryon/store/front/rgbd"

@@ -6,7 +6,7 @@
 pub mod convert;
 pub mod keys;
 
-/// Encoding and decoding of messages; whoever carries bytes needs it, and prost stays behind this door.
+/// Encoding and decoding of messages, so that transports need not name prost.
 pub use prost::Message;
 
 /// Messages, clients and servers of package `tryon.v1`.

@@ -14,10 +14,10 @@ const MAX_FACES: u32 = 131_072;
 const MAX_JOINTS: usize = 255;
 const MAX_DIRECTIONS: usize = 64;
 
-/// Metres per step of a displacement on the wire: a tenth of a sensor's noise, reach 3.2 m.
+/// Step of a displacement on the wire [m]: a tenth of a sensor's noise, with a range of 3.2 m.
 const DISPLACEMENT_UNIT: f32 = 1e-4;
 
-/// A template for the wire.
+/// Wire message of a template.
 pub fn template_to_wire(t: &Template) -> v1::BodyTemplate {
     let (mesh, weights) = (t.mesh(), t.weights());
     v1::BodyTemplate {
@@ -97,7 +97,7 @@ fn joint(j: &v1::Joint, field: &str) -> Result<Joint, WireError> {
     })
 }
 
-/// A template whose parts fit each other.
+/// Template with consistent sizes.
 ///
 /// # Errors
 /// Names the field that is of the wrong size, not finite or not a body.
@@ -150,7 +150,7 @@ pub fn template_from_wire(t: &v1::BodyTemplate) -> Result<Template, WireError> {
         .map_err(|e| WireError::new("body_template", e.to_string()))
 }
 
-/// A pose for the wire.
+/// Wire message of a pose.
 pub fn pose_to_wire(p: &Pose<Camera>) -> v1::BodyPose {
     v1::BodyPose {
         camera_from_body: Some(geometry::rigid_to_wire(&p.root)),
@@ -158,7 +158,7 @@ pub fn pose_to_wire(p: &Pose<Camera>) -> v1::BodyPose {
     }
 }
 
-/// A pose of a skeleton with `dofs` angles.
+/// Pose of a skeleton with `dofs` angles.
 ///
 /// # Errors
 /// Names the field that is absent, of the wrong size or not finite.
@@ -171,7 +171,7 @@ pub fn pose_from_wire(p: &v1::BodyPose, dofs: usize) -> Result<Pose<Camera>, Wir
     })
 }
 
-/// A shape for the wire; displacements are rounded to a tenth of a millimetre.
+/// Wire message of a shape; displacements are rounded to a tenth of a millimetre.
 pub fn shape_to_wire(s: &BodyShape) -> v1::BodyShape {
     let quantised: Vec<i16> = s
         .displacements
@@ -186,7 +186,7 @@ pub fn shape_to_wire(s: &BodyShape) -> v1::BodyShape {
     }
 }
 
-/// A shape of `template`.
+/// Shape of `template`.
 ///
 /// # Errors
 /// Names the field whose size does not fit the template or whose numbers are not finite.
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_named() {
+    fn faults_name_their_field() {
         let t = small_template();
         let fault = |change: &dyn Fn(&mut v1::BodyTemplate)| {
             let mut w = template_to_wire(&t);

@@ -1,9 +1,9 @@
-//! Arrays as bytes: little endian, tightly packed; the length is checked before anything is allocated.
+//! Arrays as bytes: little endian, tightly packed; lengths are checked before allocation.
 
 use super::WireError;
 use bytes::{BufMut, Bytes, BytesMut};
 
-/// A number that travels in arrays.
+/// Number type of an array.
 pub(super) trait Element: Copy {
     const SIZE: usize;
     fn read(b: &[u8]) -> Self;
@@ -62,7 +62,7 @@ pub(super) fn read<T: Element, const N: usize>(
     Ok(out)
 }
 
-/// Reads a flat array of at most `limit` elements, however many there are.
+/// Reads a flat array of any length up to `limit` elements.
 pub(super) fn read_flat<T: Element>(
     field: &str,
     limit: usize,
@@ -101,7 +101,7 @@ pub(super) fn write_flat<T: Element>(values: &[T]) -> Bytes {
     write(values.iter().map(|&v| [v]))
 }
 
-/// Refuses a count beyond `limit`, before it sizes anything.
+/// Checks a count against `limit`, before any allocation.
 pub(super) fn count(field: &str, n: u32, limit: u32) -> Result<usize, WireError> {
     if n > limit {
         return Err(WireError::new(
@@ -134,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn arrays_round_trip_and_wrong_sizes_and_numbers_are_named() {
+    fn arrays_round_trip_and_faults_name_their_field() {
         let rows = [[1.5f32, -2.0, 3.25], [0.0, f32::MIN_POSITIVE, 1e30]];
         let b = write(rows.iter().copied());
         assert_eq!(read::<f32, 3>("x", 2, &b).expect("same size"), rows);

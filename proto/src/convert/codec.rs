@@ -1,11 +1,11 @@
-//! Images of a frame, compressed and back.
+//! Compression of the images of a frame.
 
 use super::WireError;
 use bytes::Bytes;
 use tryon::camera::{ColorImage, DepthImage, Intrinsics};
 use tryon::formats::image;
 
-/// JPEG quality of frames on the bus: 35 kB at 640×480 and no blocks that an eye finds; 90 would be 60 kB.
+/// JPEG quality of frames on the bus: 35 kB at 640×480 without visible blocks; 60 kB at 90.
 const BUS_JPEG_QUALITY: u8 = 80;
 
 pub(super) fn depth(b: &Bytes, k: &Intrinsics) -> Result<DepthImage, WireError> {

@@ -1,14 +1,14 @@
-//! What is wrong with a message, by field path.
+//! Faults of a message, by field path.
 
 use tonic_types::{ErrorDetails, FieldViolation, StatusExt};
 
-/// A message that cannot be what it claims to be.
+/// Invalid field of a message.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{field}: {why}")]
 pub struct WireError {
     /// Path of the field, `message.field`, with indices where a field repeats.
     pub field: String,
-    /// What is wrong with it.
+    /// Fault of the field.
     pub why: String,
 }
 
@@ -20,7 +20,7 @@ impl WireError {
             why: why.into(),
         }
     }
-    /// The same fault seen from the message that contains this one.
+    /// The same fault with the path from a containing message.
     pub fn within(self, parent: &str) -> Self {
         Self {
             field: format!("{parent}.{}", self.field),
@@ -39,7 +39,7 @@ impl From<WireError> for tonic::Status {
     }
 }
 
-/// The value of a message field that must be there.
+/// Value of a required message field.
 ///
 /// # Errors
 /// When it is absent.
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_fault_becomes_invalid_argument_with_its_path() {
+    fn fault_becomes_invalid_argument_with_its_path() {
         let status = tonic::Status::from(
             WireError::new("depth.fx", "must be positive").within("calibration"),
         );

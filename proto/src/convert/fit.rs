@@ -1,9 +1,9 @@
-//! Fit maps, by region.
+//! Fit maps on the wire.
 
 use crate::v1::{FitClass, GarmentFit, RegionFit};
 use tryon::dressing::{Fit, FitMap, Suggestion};
 
-/// The byte of cloth as tight as the map tells.
+/// Byte of a tightness.
 const TIGHTEST: f32 = 127.0;
 
 /// Tightness of a vertex, −1 (loose) to 1 (tight), from its byte.
@@ -11,8 +11,8 @@ pub fn tightness(byte: u8) -> f32 {
     f32::from(byte as i8) / TIGHTEST
 }
 
-/// A fit map: its regions, and a byte for each vertex. `cut` is how the garment's pattern is cut for the body, which
-/// tells the room in metres; `None` for a garment without pattern.
+/// Wire message of a fit map: its regions and a byte for each vertex. `cut` has the ease in metres; `None` for a garment
+/// without a pattern.
 pub fn fit_to_wire(
     garment: &str,
     size: &str,
@@ -58,7 +58,7 @@ mod tests {
     use tryon::garment::{Size, library};
 
     #[test]
-    fn room_in_metres_comes_with_the_region_it_belongs_to() {
+    fn ease_is_reported_with_its_region() {
         let region = |name: &str| Region {
             name: name.to_owned(),
             area: 0.1,
@@ -73,7 +73,7 @@ mod tests {
             regions: ["chest", "waist", "left thigh"].map(region).to_vec(),
         };
         let pattern = library::pattern("tshirt", Size::S).expect("pattern");
-        // 2 cm more than the shirt is made for.
+        // A chest 2 cm too large for the shirt.
         let chest = pattern.finished[0] - 0.04 + 0.02;
         let body = Measurements {
             chest,

@@ -1,4 +1,4 @@
-//! Exposures.
+//! Exposures on the bus.
 
 use super::{WireError, codec, geometry, required};
 use crate::v1;
@@ -7,16 +7,16 @@ use std::sync::Arc;
 use std::time::Instant;
 use tryon::camera::{Calibration, RgbdFrame};
 
-/// One exposure with everything that travels beside it.
+/// One exposure with its calibration and stage times.
 #[derive(Clone, Debug)]
 pub struct Exposure {
-    /// Epoch, sequence, capture time and when it was received.
+    /// Epoch, sequence, times of capture and reception.
     pub id: v1::FrameId,
-    /// The camera it came from.
+    /// Calibration of its camera.
     pub calibration: Arc<Calibration>,
-    /// The images; its sequence and time are those of `id`.
+    /// Images; sequence and time are those of `id`.
     pub rgbd: RgbdFrame,
-    /// What was spent on it so far.
+    /// Times of the stages so far.
     pub stages: Vec<v1::StageTime>,
 }
 
@@ -51,10 +51,10 @@ pub fn exposure_to_wire(e: &Exposure) -> Result<v1::RgbdFrame, WireError> {
     })
 }
 
-/// Most stages a message may carry: a chain has about twenty.
+/// Most stages of a message; a chain has about twenty.
 const MAX_STAGES: usize = 64;
 
-/// Stage times that are finite and few.
+/// Stage times, finite and at most 64.
 ///
 /// # Errors
 /// Names the list.
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_named() {
+    fn faults_name_their_field() {
         let fault = |change: &dyn Fn(&mut v1::RgbdFrame)| {
             let mut w = exposure_to_wire(&exposure()).expect("packs");
             change(&mut w);
@@ -189,7 +189,7 @@ mod tests {
             fault(&|w| k(w, &|k| k.width = u32::MAX)),
             "rgbd_frame.calibration.depth.width"
         );
-        // A size that is fine for a camera but not the size of the images.
+        // A valid size of a camera that is not the size of the images.
         assert_eq!(fault(&|w| k(w, &|k| k.width = 65)), "rgbd_frame.depth");
         assert_eq!(
             fault(&|w| w.stages = vec![v1::StageTime::default(); 100]),
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_arrives_is_an_error_and_never_a_panic() {
+    fn broken_messages_are_errors_never_panics() {
         let good = exposure_to_wire(&exposure())
             .expect("packs")
             .encode_to_vec();
@@ -208,14 +208,14 @@ mod tests {
             exposure_from_wire(&m)
         };
         read(&good).expect("untouched, it is fine");
-        // Between two of the last fields a cut message is a whole one with less in it; anywhere else it is broken.
+        // Cut between two of the last fields, a message is valid with fewer fields; cut elsewhere it is broken.
         let whole = (0..good.len())
             .filter(|n| read(&good[..*n]).is_ok())
             .count();
         assert!(whole <= 2, "{whole} cuts went unnoticed");
         // A depth field that announces 4 GiB.
         assert!(read(&[0x1a, 0xff, 0xff, 0xff, 0xff, 0x0f, 1, 2, 3]).is_err());
-        // Every byte turned over, by a fixed sequence of flips: refused or read, never a panic.
+        // Every byte flipped in a fixed sequence: refused or read, never a panic.
         let mut x = 0x9e37_79b9_u32;
         for i in 0..good.len() {
             let mut bad = good.clone();

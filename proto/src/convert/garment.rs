@@ -1,4 +1,4 @@
-//! Garment meshes.
+//! Garment meshes on the wire.
 
 use super::{WireError, bulk, required};
 use crate::v1;
@@ -13,7 +13,7 @@ const MAX_DRAWN: u32 = 524_288;
 /// Most garments worn at once.
 pub const MAX_GARMENTS: usize = 8;
 
-/// What of a garment does not change while it is worn.
+/// Immutable part of a worn garment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WornGarment {
     /// Name in the library.
@@ -33,7 +33,7 @@ pub struct WornGarment {
 }
 
 impl WornGarment {
-    /// One end of the stream of its positions.
+    /// Position coder, the same for both ends of a stream.
     fn coder(&self) -> PositionCoder {
         let faces: Vec<Face> = self
             .faces
@@ -44,7 +44,7 @@ impl WornGarment {
     }
 }
 
-/// Topology for the wire.
+/// Wire message of a topology.
 pub fn topology_to_wire(g: &WornGarment) -> v1::GarmentTopology {
     v1::GarmentTopology {
         garment: g.garment.clone(),
@@ -59,7 +59,7 @@ pub fn topology_to_wire(g: &WornGarment) -> v1::GarmentTopology {
     }
 }
 
-/// Topology whose parts fit each other.
+/// Topology with consistent sizes.
 ///
 /// # Errors
 /// Names the field of the wrong size or with an index out of range.
@@ -100,18 +100,18 @@ pub fn topology_from_wire(t: &v1::GarmentTopology) -> Result<WornGarment, WireEr
 /// Simulated positions of each garment, metres, world frame.
 pub type Positions = Arc<Vec<Vec<P3>>>;
 
-/// Writes one stream of garment frames, for one reader: topology when the reader lacks it, then positions coded
-/// against what this reader got before.
+/// Encoder of the garment frames of one reader: keyframes with topology, then positions coded against the messages that
+/// this reader received before.
 #[derive(Clone, Debug, Default)]
 pub struct GarmentWriter {
     coders: Vec<PositionCoder>,
 }
 
 impl GarmentWriter {
-    /// Puts positions into `f`, with `keyframe` a new outfit's topology too.
+    /// Writes positions into `f`, and with `keyframe` the topology of a new outfit.
     ///
     /// # Errors
-    /// Names the garment and vertex that cannot be coded, or says that positions do not fit the outfit.
+    /// Names the garment and vertex that cannot be coded, or positions that do not fit the outfit.
     pub fn write(
         &mut self,
         f: &mut v1::GarmentFrame,
@@ -149,7 +149,7 @@ fn at(garment: usize, e: &FormatError) -> WireError {
     )
 }
 
-/// Reads one stream of garment frames: remembers topology between keyframes, and positions that others build on.
+/// Decoder of one stream of garment frames; keeps topology and the positions that later messages refer to.
 #[derive(Clone, Debug, Default)]
 pub struct GarmentReader {
     revision: u64,
@@ -160,7 +160,7 @@ pub struct GarmentReader {
 pub type PlacedGarments = Vec<(Arc<WornGarment>, Vec<P3>)>;
 
 impl GarmentReader {
-    /// Garments of one message. After an error the stream must be opened again.
+    /// Decodes the garments of one message. After an error the stream must be opened again.
     ///
     /// # Errors
     /// Names the field at fault; positions without an earlier keyframe are one.

@@ -1,4 +1,4 @@
-//! Transforms and cameras.
+//! Transforms and cameras on the wire.
 
 use super::{WireError, required};
 use crate::v1;
@@ -6,7 +6,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use tryon::camera::{Calibration, Intrinsics};
 use tryon::math::Rigid;
 
-/// How far the norm of a quaternion may be off one: f32 senders are off by 1e-7, a wrong scale by far more.
+/// Largest error of a quaternion's norm: f32 senders are off by 1e-7, wrong scales by far more.
 const QUATERNION_NORM_TOLERANCE: f64 = 1e-3;
 
 fn vector(v: &v1::Vector3, field: &str) -> Result<Vector3<f64>, WireError> {
@@ -18,7 +18,7 @@ fn vector(v: &v1::Vector3, field: &str) -> Result<Vector3<f64>, WireError> {
     Ok(Vector3::new(v.x, v.y, v.z))
 }
 
-/// A finite vector.
+/// Finite vector.
 ///
 /// # Errors
 /// Names the component at fault.
@@ -26,7 +26,7 @@ pub fn vector_from_wire(v: Option<&v1::Vector3>, field: &str) -> Result<Vector3<
     vector(required(v, field)?, field)
 }
 
-/// A vector for the wire.
+/// Wire message of a vector.
 pub fn vector_to_wire(v: &Vector3<f64>) -> v1::Vector3 {
     v1::Vector3 {
         x: v.x,
@@ -35,7 +35,7 @@ pub fn vector_to_wire(v: &Vector3<f64>) -> v1::Vector3 {
     }
 }
 
-/// A rigid transform; the caller names its frames.
+/// Rigid transform; the caller names its frames.
 ///
 /// # Errors
 /// Names the part that is absent, not finite or no rotation.
@@ -47,7 +47,7 @@ pub fn rigid_from_wire<A, B>(
     let q = required(t.rotation, &format!("{field}.rotation"))?;
     let q = Quaternion::new(q.w, q.x, q.y, q.z);
     let norm = q.norm();
-    // Written so that NaN fails too.
+    // The negated form also refuses NaN.
     if !((norm - 1.0).abs() <= QUATERNION_NORM_TOLERANCE) {
         return Err(WireError::new(
             format!("{field}.rotation"),
@@ -60,7 +60,7 @@ pub fn rigid_from_wire<A, B>(
     ))
 }
 
-/// A rigid transform for the wire.
+/// Wire message of a rigid transform.
 pub fn rigid_to_wire<A, B>(t: &Rigid<A, B>) -> v1::RigidTransform {
     let q = t.iso().rotation.coords;
     v1::RigidTransform {
@@ -103,10 +103,10 @@ fn intrinsics_to_wire(k: &Intrinsics) -> v1::Intrinsics {
     }
 }
 
-/// A usable calibration.
+/// Calibration with valid intrinsics.
 ///
 /// # Errors
-/// Names the field that no camera can have.
+/// Names the field out of range.
 pub fn calibration_from_wire(c: &v1::Calibration) -> Result<Calibration, WireError> {
     Ok(Calibration {
         depth: intrinsics(
@@ -125,7 +125,7 @@ pub fn calibration_from_wire(c: &v1::Calibration) -> Result<Calibration, WireErr
     })
 }
 
-/// A calibration for the wire.
+/// Wire message of a calibration.
 pub fn calibration_to_wire(c: &Calibration) -> v1::Calibration {
     v1::Calibration {
         depth: Some(intrinsics_to_wire(&c.depth)),

@@ -1,7 +1,7 @@
-//! The only place where wire becomes domain, and back.
+//! Conversion between wire and domain, the only one.
 //!
-//! Everything that arrives is checked here: sizes before allocation, numbers for being finite, names, ranges.
-//! An error names the field by its path, `message.field`, as in the protos.
+//! Incoming messages are checked here: sizes before allocation, finite numbers, names, ranges. An error names the field
+//! by its path, `message.field`, as in the protos.
 
 pub mod body;
 mod bulk;

@@ -1,14 +1,14 @@
-//! Small fields of requests: names, ids, sizes, garment choices.
+//! Fields of requests: names, ids, sizes, garment choices.
 
 use super::WireError;
 use super::garment::MAX_GARMENTS;
 use crate::keys::{CameraKey, is_name, is_session_id};
 use crate::v1;
 
-/// A session id, or a fault.
+/// Session id.
 ///
 /// # Errors
-/// When it is empty, too long or has other characters than `[A-Za-z0-9_-]`.
+/// An id that is empty, too long or has other characters than `[A-Za-z0-9_-]`.
 pub fn session_id(field: &str, id: &str) -> Result<String, WireError> {
     if is_session_id(id) {
         return Ok(id.into());
@@ -19,7 +19,7 @@ pub fn session_id(field: &str, id: &str) -> Result<String, WireError> {
     ))
 }
 
-/// The bus keys of a camera.
+/// Bus keys of a camera.
 ///
 /// # Errors
 /// Names the part at fault, `<message>.store` or `<message>.camera`.
@@ -31,7 +31,7 @@ pub fn camera_key(message: &str, store: &str, camera: &str) -> Result<CameraKey,
     })
 }
 
-/// Garment choices that are few, named and coloured; whether the library has them is the cloth service's to say.
+/// Garment choices: their number, names and colours. The cloth service checks them against its library.
 ///
 /// # Errors
 /// Names the choice at fault.
@@ -59,14 +59,14 @@ pub fn choices(
     Ok(garments.to_vec())
 }
 
-/// What a reader of pictures asked for, checked.
+/// Picture format of a viewer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureFormat {
     /// Pixels; `None` means the camera's size.
     pub size: Option<(u32, u32)>,
     /// JPEG quality, 1 to 100.
     pub quality: u8,
-    /// Most pictures a second; `None` means as many as there are.
+    /// Most pictures a second; `None` means no limit.
     pub max_rate: Option<f32>,
 }
 

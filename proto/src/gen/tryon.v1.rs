@@ -49,7 +49,7 @@ pub struct Intrinsics {
     #[prost(double, tag = "6")]
     pub cy: f64,
 }
-/// What stays the same while a camera runs.
+/// Calibration of a camera, constant while it runs.
 #[derive(Clone, Copy, PartialEq, ::prost::Message)]
 pub struct Calibration {
     /// Depth camera; required.
@@ -62,7 +62,7 @@ pub struct Calibration {
     #[prost(message, optional, tag = "3")]
     pub color_from_depth: ::core::option::Option<RigidTransform>,
 }
-/// Names one exposure. The same value travels with everything computed from that exposure.
+/// Identity of one exposure. The same value accompanies everything computed from that exposure.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct FrameId {
     /// Random number drawn at each start of a camera; sequence numbers compare only within one epoch.
@@ -74,12 +74,12 @@ pub struct FrameId {
     /// Exposure time, nanoseconds of the sensor's (or recording's) own clock.
     #[prost(uint64, tag = "3")]
     pub capture_time_ns: u64,
-    /// Wall clock of the capture process when it got the exposure, Unix nanoseconds: latencies count from here.
+    /// Wall clock of the capture process on reception of the exposure, Unix nanoseconds: the start of all latencies.
     #[prost(uint64, tag = "4")]
     pub received_unix_ns: u64,
 }
-/// What one stage spent on the frame. Stages appear in the order in which they ran; a stage's list repeats those
-/// of the stages before it, so the last receiver sees the whole chain.
+/// Time of one stage of a frame. Stages are in the order in which they ran. Each message repeats the stages before its
+/// own, so the last receiver has the whole chain.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct StageTime {
     /// Dotted, service first: "capture.encode", "tracking.solve", "cloth.step", "compositor.render".
@@ -89,7 +89,7 @@ pub struct StageTime {
     #[prost(float, tag = "2")]
     pub ms: f32,
 }
-/// A garment and how it should be worn.
+/// A garment in a size and colour.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct GarmentChoice {
     /// Name from ListGarments, e.g. "tshirt"; 1 to 64 characters of \[a-z0-9_-\].
@@ -108,7 +108,7 @@ pub struct GarmentInfo {
     /// For GarmentChoice.garment.
     #[prost(string, tag = "1")]
     pub name: ::prost::alloc::string::String,
-    /// For people.
+    /// Title for people.
     #[prost(string, tag = "2")]
     pub title: ::prost::alloc::string::String,
     /// "top" or "bottom".
@@ -121,18 +121,18 @@ pub struct GarmentInfo {
     #[prost(uint32, tag = "5")]
     pub color_rgb: u32,
 }
-/// How a garment fits on one region of the body.
+/// Fit of a garment on one region of the body.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct RegionFit {
-    /// As a tailor calls it: `chest`, `waist`, `left upper arm` and so on.
+    /// Tailor's name of the region: `chest`, `waist`, `left upper arm` and so on.
     #[prost(string, tag = "1")]
     pub region: ::prost::alloc::string::String,
     #[prost(enumeration = "FitClass", tag = "2")]
     pub fit: i32,
-    /// Stretch of the cloth that 95 % of it stay below, length over rest length minus one.
+    /// 95th percentile of the stretch: length over rest length minus one.
     #[prost(float, tag = "3")]
     pub stretch: f32,
-    /// Mean pressure on the skin where the cloth touches, Pa.
+    /// Mean pressure on the skin under touching cloth, Pa.
     #[prost(float, tag = "4")]
     pub pressure: f32,
     /// Share of the cloth that touches, 0 to 1.
@@ -144,40 +144,40 @@ pub struct RegionFit {
     /// Girth of the finished garment minus the body's, metres. At `chest`, `waist` and `hip`, where the garment has a girth.
     #[prost(float, optional, tag = "7")]
     pub ease: ::core::option::Option<f32>,
-    /// The least ease it is made to have there, metres: what `ease` lacks of it, the garment is too tight by.
+    /// Least ease that the garment is designed for, metres; with less, it is too tight by the difference.
     #[prost(float, optional, tag = "8")]
     pub ease_needed: ::core::option::Option<f32>,
 }
-/// How a garment fits the body that wears it now.
+/// Fit of a garment on the body that wears it.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct GarmentFit {
     #[prost(string, tag = "1")]
     pub garment: ::prost::alloc::string::String,
     #[prost(string, tag = "2")]
     pub size: ::prost::alloc::string::String,
-    /// From top to bottom; regions with less cloth than a hand's breadth square are left out.
+    /// From top to bottom, without regions that hold less cloth than a hand's breadth square.
     #[prost(message, repeated, tag = "3")]
     pub regions: ::prost::alloc::vec::Vec<RegionFit>,
     /// One signed byte for each simulation vertex: from -127 (loose) over 0 (fitted) to 127 (tight). Empty in pictures.
     #[prost(bytes = "bytes", tag = "4")]
     pub tightness: ::prost::bytes::Bytes,
-    /// Lowest hem above a mark of the body, metres; negative below it. Absent for garments that are no patterns.
+    /// Lowest hem above a mark of the body, metres, negative below it. Absent for mesh garments.
     #[prost(float, optional, tag = "5")]
     pub hem_above: ::core::option::Option<f32>,
     /// The mark: `the crotch`, `the knee` or `the floor`.
     #[prost(string, tag = "6")]
     pub hem_mark: ::prost::alloc::string::String,
 }
-/// Why a picture or a state is less than it should be.
+/// Reason of a degraded picture or state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
 pub enum DegradedReason {
     Unspecified = 0,
-    /// Nobody has been found in front of the camera.
+    /// No person has been found in front of the camera.
     NoPerson = 1,
-    /// Somebody was tracked and left the view.
+    /// The tracked person left the view.
     PersonLeft = 2,
-    /// Somebody is there, but the tracker no longer explains what the camera sees.
+    /// A person is in view, but the tracked body does not explain the depth image.
     TrackingLost = 3,
     /// No frame has arrived from the camera for longer than the configured silence.
     CameraSilent = 4,
@@ -187,7 +187,7 @@ pub enum DegradedReason {
     ClothUnavailable = 6,
     /// The garments are older than the configured age.
     GarmentsLate = 7,
-    /// A step failed on this frame (numbers, not network); the last good state is kept.
+    /// A computation failed on this frame; the last good state is kept.
     StepFailed = 8,
 }
 impl DegradedReason {
@@ -256,12 +256,12 @@ impl FitClass {
         }
     }
 }
-/// One exposure: colour and depth, about 130 kB at 640x480. A frame is complete in itself.
+/// One exposure: colour and depth, about 130 kB at 640x480. A frame depends on no other message.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct RgbdFrame {
     #[prost(message, optional, tag = "1")]
     pub id: ::core::option::Option<FrameId>,
-    /// The camera's calibration, repeated in each frame (about 150 bytes), so that no frame waits for another message.
+    /// Calibration of the camera, repeated in each frame (about 150 bytes).
     #[prost(message, optional, tag = "2")]
     pub calibration: ::core::option::Option<Calibration>,
     /// Depth, millimetres, u16, 0 = no reading: magic "TRD1"-style header with width and height, row delta in byte
@@ -284,12 +284,12 @@ pub struct CameraInfo {
     /// Name, unique within the process, and camera part of its bus keys.
     #[prost(string, tag = "2")]
     pub camera: ::prost::alloc::string::String,
-    /// What feeds it: "synth", or the recording's file name.
+    /// Source of the frames: "synth", or the file name of a recording.
     #[prost(string, tag = "3")]
     pub source: ::prost::alloc::string::String,
     #[prost(enumeration = "CameraState", tag = "4")]
     pub state: i32,
-    /// Why it failed, for people; empty otherwise.
+    /// Reason of a failure, for people; empty otherwise.
     #[prost(string, tag = "5")]
     pub detail: ::prost::alloc::string::String,
     /// Epoch of the current or last run; 0 before the first.
@@ -366,7 +366,7 @@ pub struct StopRecordingResponse {
     /// Frames in the file.
     #[prost(uint64, tag = "2")]
     pub frames: u64,
-    /// Frames that the disk was too slow for.
+    /// Frames dropped because the disk was too slow.
     #[prost(uint64, tag = "3")]
     pub dropped: u64,
 }
@@ -376,9 +376,9 @@ pub enum CameraState {
     Unspecified = 0,
     Stopped = 1,
     Running = 2,
-    /// A recording played once has come to its end.
+    /// A recording that plays once is at its end.
     Ended = 3,
-    /// The source failed; `detail` says how.
+    /// The source failed; `detail` has the reason.
     Failed = 4,
 }
 impl CameraState {
@@ -418,7 +418,7 @@ pub mod capture_service_client {
     )]
     use tonic::codegen::*;
     use tonic::codegen::http::Uri;
-    /// Cameras and recordings, and whether they publish to the bus. Frames themselves travel on the bus (frame.proto).
+    /// Control of cameras and recordings. Their frames are published on the bus (frame.proto).
     #[derive(Debug, Clone)]
     pub struct CaptureServiceClient<T> {
         inner: tonic::client::Grpc<T>,
@@ -499,7 +499,7 @@ pub mod capture_service_client {
             self.inner = self.inner.max_encoding_message_size(limit);
             self
         }
-        /// Every camera that this process knows, running or not, by name.
+        /// Lists every configured camera, running or not, sorted by name.
         pub async fn list_cameras(
             &mut self,
             request: impl tonic::IntoRequest<super::ListCamerasRequest>,
@@ -524,7 +524,7 @@ pub mod capture_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CaptureService", "ListCameras"));
             self.inner.unary(req, path, codec).await
         }
-        /// NOT_FOUND when no camera has that name.
+        /// Returns the calibration of a camera. NOT_FOUND for an unknown name.
         pub async fn get_calibration(
             &mut self,
             request: impl tonic::IntoRequest<super::GetCalibrationRequest>,
@@ -602,7 +602,7 @@ pub mod capture_service_client {
         }
         /// Starts writing every published frame of a camera to an MCAP file in the configured folder.
         /// FAILED_PRECONDITION without consent, when no folder is configured or a recording is already under way.
-        /// Recording never slows publishing: frames that the disk is too slow for are dropped from the file and counted.
+        /// Recording never slows publishing: when the disk is too slow, frames are dropped from the file and counted.
         pub async fn start_recording(
             &mut self,
             request: impl tonic::IntoRequest<super::StartRecordingRequest>,
@@ -667,7 +667,7 @@ pub mod capture_service_server {
     /// Generated trait containing gRPC methods that should be implemented for use with CaptureServiceServer.
     #[async_trait]
     pub trait CaptureService: std::marker::Send + std::marker::Sync + 'static {
-        /// Every camera that this process knows, running or not, by name.
+        /// Lists every configured camera, running or not, sorted by name.
         async fn list_cameras(
             &self,
             request: tonic::Request<super::ListCamerasRequest>,
@@ -675,7 +675,7 @@ pub mod capture_service_server {
             tonic::Response<super::ListCamerasResponse>,
             tonic::Status,
         >;
-        /// NOT_FOUND when no camera has that name.
+        /// Returns the calibration of a camera. NOT_FOUND for an unknown name.
         async fn get_calibration(
             &self,
             request: tonic::Request<super::GetCalibrationRequest>,
@@ -702,7 +702,7 @@ pub mod capture_service_server {
         >;
         /// Starts writing every published frame of a camera to an MCAP file in the configured folder.
         /// FAILED_PRECONDITION without consent, when no folder is configured or a recording is already under way.
-        /// Recording never slows publishing: frames that the disk is too slow for are dropped from the file and counted.
+        /// Recording never slows publishing: when the disk is too slow, frames are dropped from the file and counted.
         async fn start_recording(
             &self,
             request: tonic::Request<super::StartRecordingRequest>,
@@ -719,7 +719,7 @@ pub mod capture_service_server {
             tonic::Status,
         >;
     }
-    /// Cameras and recordings, and whether they publish to the bus. Frames themselves travel on the bus (frame.proto).
+    /// Control of cameras and recordings. Their frames are published on the bus (frame.proto).
     #[derive(Debug)]
     pub struct CaptureServiceServer<T> {
         inner: Arc<T>,
@@ -1236,7 +1236,7 @@ pub struct BodyState {
     /// Set for SEARCHING and LOST.
     #[prost(enumeration = "DegradedReason", tag = "4")]
     pub reason: i32,
-    /// The reason in words, for logs; never shown to shoppers.
+    /// The reason in words, for logs; never shown to users.
     #[prost(string, tag = "5")]
     pub detail: ::prost::alloc::string::String,
     /// Absent while searching.
@@ -1251,13 +1251,13 @@ pub struct BodyState {
     /// Absent when the reader already has `shape_version`.
     #[prost(message, optional, tag = "9")]
     pub shape: ::core::option::Option<BodyShape>,
-    /// Exposures since pose and shape last explained the picture; 0 while tracking.
+    /// Exposures since pose and shape were last measured; 0 while tracking.
     #[prost(uint32, tag = "10")]
     pub age_frames: u32,
-    /// Frames that this session could not take, since it was opened.
+    /// Frames that this session dropped since it was opened.
     #[prost(uint64, tag = "11")]
     pub frames_dropped: u64,
-    /// How well the body explains the picture: root mean square distance of matched points, millimetres.
+    /// Root mean square distance of matched points to the body, millimetres.
     #[prost(float, tag = "12")]
     pub residual_mm: f32,
     /// Template vertices that had a match, and solver iterations of this step.
@@ -1292,7 +1292,7 @@ pub struct BodyShape {
     #[prost(float, tag = "4")]
     pub displacement_unit: f32,
 }
-/// How a joint may move relative to its parent.
+/// Degrees of freedom of a joint relative to its parent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
 pub enum JointKind {
@@ -1332,13 +1332,13 @@ impl JointKind {
 #[repr(i32)]
 pub enum TrackingStatus {
     Unspecified = 0,
-    /// Looking for a person; pose and shape mean nothing.
+    /// No person has been found; pose and shape are meaningless.
     Searching = 1,
-    /// A person is there and the body is being fitted; the pose is provisional.
+    /// A person is in view and the body is being fitted; the pose is provisional.
     Calibrating = 2,
     /// Pose and shape belong to `frame`.
     Tracking = 3,
-    /// Pose and shape are the last good ones, `age_frames` old; `reason` says why.
+    /// Pose and shape are the last good ones, `age_frames` old; `reason` is set.
     Lost = 4,
 }
 impl TrackingStatus {
@@ -1537,7 +1537,7 @@ pub mod tracking_service_client {
                 .insert(GrpcMethod::new("tryon.v1.TrackingService", "ResetSession"));
             self.inner.unary(req, path, codec).await
         }
-        /// The template whose shape and pose the states speak about. Up to 16 MiB.
+        /// Returns the template that shapes and poses refer to, up to 16 MiB.
         pub async fn get_body_template(
             &mut self,
             request: impl tonic::IntoRequest<super::GetBodyTemplateRequest>,
@@ -1562,10 +1562,10 @@ pub mod tracking_service_client {
                 .insert(GrpcMethod::new("tryon.v1.TrackingService", "GetBodyTemplate"));
             self.inner.unary(req, path, codec).await
         }
-        /// The newest state of a session, again each time it changes. A watch: at most one state waits for a slow reader,
-        /// newer ones replace it, `sequence` shows the gaps; order is kept. The first message carries the shape, later ones
-        /// only when it changed since the last one sent on this stream. While nothing arrives from the camera a state
-        /// with CAMERA_SILENT repeats twice a second, so silence on this stream means that the service is gone.
+        /// Streams the newest state of a session on each change, in order. At most one state waits for a slow reader; newer
+        /// ones replace it and `sequence` shows the gaps. The first message has the shape, later ones only after a change
+        /// since the last one sent on this stream. While no frame arrives, a state with CAMERA_SILENT repeats twice a second:
+        /// a silent stream means that the service is gone.
         /// NOT_FOUND for an unknown id. Ends with OK when the session is closed.
         pub async fn stream_body_states(
             &mut self,
@@ -1633,7 +1633,7 @@ pub mod tracking_service_server {
             tonic::Response<super::ResetSessionResponse>,
             tonic::Status,
         >;
-        /// The template whose shape and pose the states speak about. Up to 16 MiB.
+        /// Returns the template that shapes and poses refer to, up to 16 MiB.
         async fn get_body_template(
             &self,
             request: tonic::Request<super::GetBodyTemplateRequest>,
@@ -1650,10 +1650,10 @@ pub mod tracking_service_server {
             >
             + std::marker::Send
             + 'static;
-        /// The newest state of a session, again each time it changes. A watch: at most one state waits for a slow reader,
-        /// newer ones replace it, `sequence` shows the gaps; order is kept. The first message carries the shape, later ones
-        /// only when it changed since the last one sent on this stream. While nothing arrives from the camera a state
-        /// with CAMERA_SILENT repeats twice a second, so silence on this stream means that the service is gone.
+        /// Streams the newest state of a session on each change, in order. At most one state waits for a slow reader; newer
+        /// ones replace it and `sequence` shows the gaps. The first message has the shape, later ones only after a change
+        /// since the last one sent on this stream. While no frame arrives, a state with CAMERA_SILENT repeats twice a second:
+        /// a silent stream means that the service is gone.
         /// NOT_FOUND for an unknown id. Ends with OK when the session is closed.
         async fn stream_body_states(
             &self,
@@ -2062,7 +2062,7 @@ pub struct GarmentFrame {
     pub reason: i32,
     #[prost(string, tag = "5")]
     pub detail: ::prost::alloc::string::String,
-    /// Revision of the outfit shown here; grows with each Dress that changed it.
+    /// Revision of the outfit of this message; grows with each Dress that changes it.
     #[prost(uint64, tag = "6")]
     pub outfit_revision: u64,
     /// Camera to world of this exposure: garments are in the world frame, the picture is the camera's.
@@ -2071,7 +2071,7 @@ pub struct GarmentFrame {
     /// Inner layer first.
     #[prost(message, repeated, tag = "8")]
     pub garments: ::prost::alloc::vec::Vec<GarmentMesh>,
-    /// Steps that were skipped because newer body states were there, since the outfit was put on.
+    /// Body states skipped in favour of newer ones since the session was opened.
     #[prost(uint64, tag = "9")]
     pub steps_skipped: u64,
     #[prost(message, repeated, tag = "10")]
@@ -2082,8 +2082,7 @@ pub struct GarmentFrame {
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct GarmentMesh {
-    /// Present in the first message of a stream and whenever garments were put on anew (another outfit revision, another
-    /// body): a keyframe.
+    /// Present in a keyframe: the first message of a stream, and the first one of a newly worn outfit.
     #[prost(message, optional, tag = "1")]
     pub topology: ::core::option::Option<GarmentTopology>,
     /// Positions of topology.vertex_count vertices, world frame, in whole steps of 0.2 mm. Layout: one byte o, the order
@@ -2091,13 +2090,13 @@ pub struct GarmentMesh {
     /// steps in this message and q\[t-1\], q\[t-2\] those in the messages before it that carried this garment since the
     /// keyframe, the prediction p is 0 for o = 0, q\[t-1\] for o = 1, 2 q\[t-1\] - q\[t-2\] for o = 2. The number of vertex i is
     /// e\[i\] - e\[j\] where e = q\[t\] - p and j is the smallest neighbour of i (vertex of a common face) if j < i, else e\[i\].
-    /// Arithmetic wraps at 32 bits. A keyframe has o = 0. Nothing builds on messages that were dropped for this reader.
+    /// Arithmetic wraps at 32 bits. A keyframe has o = 0. No message depends on one that was dropped for this reader.
     #[prost(bytes = "bytes", tag = "2")]
     pub positions: ::prost::bytes::Bytes,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct GarmentTopology {
-    /// As chosen, with the size that is worn.
+    /// Name as chosen, and the size worn.
     #[prost(string, tag = "1")]
     pub garment: ::prost::alloc::string::String,
     #[prost(string, tag = "2")]
@@ -2122,7 +2121,7 @@ pub struct GarmentTopology {
     #[prost(bytes = "bytes", tag = "9")]
     pub drawn: ::prost::bytes::Bytes,
 }
-/// How a garment is drawn.
+/// Appearance of a garment.
 #[derive(Clone, Copy, PartialEq, ::prost::Message)]
 pub struct GarmentLook {
     /// sRGB 0xRRGGBB.
@@ -2149,7 +2148,7 @@ pub struct StartSimulationRequest {
 pub struct StartSimulationResponse {
     #[prost(string, tag = "1")]
     pub simulation_id: ::prost::alloc::string::String,
-    /// Frames that it will have.
+    /// Number of frames of the simulation.
     #[prost(uint32, tag = "2")]
     pub frame_count: u32,
     /// Vertices of all garments together.
@@ -2181,15 +2180,15 @@ pub struct FollowSimulationResponse {
 #[repr(i32)]
 pub enum ClothStatus {
     Unspecified = 0,
-    /// No body yet, or the body is not calibrated; `reason` says why.
+    /// No calibrated body; `reason` is set.
     Waiting = 1,
     /// Garments are being sewn and draped.
     Dressing = 2,
     /// Positions belong to `frame`.
     Live = 3,
-    /// The body is lost or silent; `reason` says why. Messages carry no garments until it is back.
+    /// The body is lost or silent; `reason` is set. Messages have no garments until it is back.
     Holding = 4,
-    /// Dressing failed; `detail` says how. Choosing garments again may help.
+    /// Dressing failed; `detail` has the reason. Another choice of garments may succeed.
     Failed = 5,
 }
 impl ClothStatus {
@@ -2262,7 +2261,7 @@ pub mod cloth_service_client {
     )]
     use tonic::codegen::*;
     use tonic::codegen::http::Uri;
-    /// Garments on a tracked body, and simulations that may take their time.
+    /// Garments on a tracked body, and simulations of scenes that are not bound to real time.
     #[derive(Debug, Clone)]
     pub struct ClothServiceClient<T> {
         inner: tonic::client::Grpc<T>,
@@ -2343,7 +2342,7 @@ pub mod cloth_service_client {
             self.inner = self.inner.max_encoding_message_size(limit);
             self
         }
-        /// Every garment of the library with its sizes, sorted by name.
+        /// Lists every garment with its sizes, sorted by name.
         pub async fn list_garments(
             &mut self,
             request: impl tonic::IntoRequest<super::ListGarmentsRequest>,
@@ -2368,10 +2367,10 @@ pub mod cloth_service_client {
                 .insert(GrpcMethod::new("tryon.v1.ClothService", "ListGarments"));
             self.inner.unary(req, path, codec).await
         }
-        /// Puts garments on the body of a tracking session, inner layer first, replacing what it wore; no garments undress
-        /// it. Answers at once: dressing happens when the body is calibrated and shows in the stream as a new
-        /// `outfit_revision`. Calling again with the same garments changes nothing, so it is safe after a lost connection or
-        /// a restart. INVALID_ARGUMENT names an unknown garment or size. RESOURCE_EXHAUSTED at the configured number of
+        /// Puts garments on the body of a tracking session, inner layer first, in place of the worn ones; an empty list
+        /// undresses it. Answers at once: the body is dressed when it is calibrated, and the stream then shows a new
+        /// `outfit_revision`. A repeated call with the same garments changes nothing, so it is safe after a lost connection
+        /// or a restart. INVALID_ARGUMENT names an unknown garment or size. RESOURCE_EXHAUSTED at the configured number of
         /// sessions. A session that nobody streams is closed after the configured idle time.
         pub async fn dress(
             &mut self,
@@ -2419,10 +2418,10 @@ pub mod cloth_service_client {
                 .insert(GrpcMethod::new("tryon.v1.ClothService", "Undress"));
             self.inner.unary(req, path, codec).await
         }
-        /// The garments of a session, one message per simulated body state, in order. Topology is sent when garments were put
-        /// on, as a keyframe that is never dropped; of position updates at most two wait for a slow reader, then the older one
-        /// is dropped (`sequence` shows the gap) and what follows does without it. While there is nothing to simulate a message
-        /// without garments repeats twice a second with the reason. NOT_FOUND for an unknown id.
+        /// Streams the garments of a session, one message per simulated body state, in order. A newly worn outfit is sent as
+        /// a keyframe with topology, which is never dropped. At most two position updates wait for a slow reader; then the
+        /// older one is dropped (`sequence` shows the gap) and later ones do not depend on it. Without a body to simulate, a
+        /// message without garments repeats twice a second with the reason. NOT_FOUND for an unknown id.
         pub async fn stream_garments(
             &mut self,
             request: impl tonic::IntoRequest<super::StreamGarmentsRequest>,
@@ -2474,8 +2473,8 @@ pub mod cloth_service_client {
                 .insert(GrpcMethod::new("tryon.v1.ClothService", "StartSimulation"));
             self.inner.unary(req, path, codec).await
         }
-        /// Every frame of a simulation from `first_frame` on, in order, nothing dropped: finished frames are kept until the
-        /// simulation is forgotten (ten minutes after its end), and the simulation does not wait for readers.
+        /// Streams every frame of a simulation from `first_frame` on, in order; none is dropped. Finished frames are kept
+        /// until ten minutes after the end of the simulation, which does not wait for readers.
         /// Ends with OK after the last frame, or with the simulation's error.
         pub async fn follow_simulation(
             &mut self,
@@ -2516,7 +2515,7 @@ pub mod cloth_service_server {
     /// Generated trait containing gRPC methods that should be implemented for use with ClothServiceServer.
     #[async_trait]
     pub trait ClothService: std::marker::Send + std::marker::Sync + 'static {
-        /// Every garment of the library with its sizes, sorted by name.
+        /// Lists every garment with its sizes, sorted by name.
         async fn list_garments(
             &self,
             request: tonic::Request<super::ListGarmentsRequest>,
@@ -2524,10 +2523,10 @@ pub mod cloth_service_server {
             tonic::Response<super::ListGarmentsResponse>,
             tonic::Status,
         >;
-        /// Puts garments on the body of a tracking session, inner layer first, replacing what it wore; no garments undress
-        /// it. Answers at once: dressing happens when the body is calibrated and shows in the stream as a new
-        /// `outfit_revision`. Calling again with the same garments changes nothing, so it is safe after a lost connection or
-        /// a restart. INVALID_ARGUMENT names an unknown garment or size. RESOURCE_EXHAUSTED at the configured number of
+        /// Puts garments on the body of a tracking session, inner layer first, in place of the worn ones; an empty list
+        /// undresses it. Answers at once: the body is dressed when it is calibrated, and the stream then shows a new
+        /// `outfit_revision`. A repeated call with the same garments changes nothing, so it is safe after a lost connection
+        /// or a restart. INVALID_ARGUMENT names an unknown garment or size. RESOURCE_EXHAUSTED at the configured number of
         /// sessions. A session that nobody streams is closed after the configured idle time.
         async fn dress(
             &self,
@@ -2544,10 +2543,10 @@ pub mod cloth_service_server {
             >
             + std::marker::Send
             + 'static;
-        /// The garments of a session, one message per simulated body state, in order. Topology is sent when garments were put
-        /// on, as a keyframe that is never dropped; of position updates at most two wait for a slow reader, then the older one
-        /// is dropped (`sequence` shows the gap) and what follows does without it. While there is nothing to simulate a message
-        /// without garments repeats twice a second with the reason. NOT_FOUND for an unknown id.
+        /// Streams the garments of a session, one message per simulated body state, in order. A newly worn outfit is sent as
+        /// a keyframe with topology, which is never dropped. At most two position updates wait for a slow reader; then the
+        /// older one is dropped (`sequence` shows the gap) and later ones do not depend on it. Without a body to simulate, a
+        /// message without garments repeats twice a second with the reason. NOT_FOUND for an unknown id.
         async fn stream_garments(
             &self,
             request: tonic::Request<super::StreamGarmentsRequest>,
@@ -2574,8 +2573,8 @@ pub mod cloth_service_server {
             >
             + std::marker::Send
             + 'static;
-        /// Every frame of a simulation from `first_frame` on, in order, nothing dropped: finished frames are kept until the
-        /// simulation is forgotten (ten minutes after its end), and the simulation does not wait for readers.
+        /// Streams every frame of a simulation from `first_frame` on, in order; none is dropped. Finished frames are kept
+        /// until ten minutes after the end of the simulation, which does not wait for readers.
         /// Ends with OK after the last frame, or with the simulation's error.
         async fn follow_simulation(
             &self,
@@ -2585,7 +2584,7 @@ pub mod cloth_service_server {
             tonic::Status,
         >;
     }
-    /// Garments on a tracked body, and simulations that may take their time.
+    /// Garments on a tracked body, and simulations of scenes that are not bound to real time.
     #[derive(Debug)]
     pub struct ClothServiceServer<T> {
         inner: Arc<T>,
@@ -3051,7 +3050,7 @@ pub struct StreamFramesRequest {
     /// JPEG quality 1 to 100; 0 means 80.
     #[prost(uint32, tag = "5")]
     pub quality: u32,
-    /// Most pictures a second; 0 means as many as there are.
+    /// Most pictures a second; 0 means no limit.
     #[prost(float, tag = "6")]
     pub max_rate: f32,
 }
@@ -3095,7 +3094,8 @@ pub struct Picture {
     /// Outfit that is drawn; 0 means none.
     #[prost(uint64, tag = "9")]
     pub outfit_revision: u64,
-    /// From the capture process receiving the exposure to this picture being encoded, milliseconds (clocks of one box).
+    /// Time from the reception of the exposure by the capture process to the encoded picture, milliseconds (clocks of one
+    /// box).
     #[prost(float, tag = "10")]
     pub latency_ms: f32,
     #[prost(message, repeated, tag = "11")]
@@ -3117,13 +3117,13 @@ pub struct TryOnStatus {
     /// Seconds in this state.
     #[prost(float, tag = "3")]
     pub age: f32,
-    /// Which service is at fault: "capture", "tracking", "cloth"; empty when none is.
+    /// Service at fault: "capture", "tracking", "cloth"; empty when none is.
     #[prost(string, tag = "4")]
     pub service: ::prost::alloc::string::String,
     /// The reason in words, for logs.
     #[prost(string, tag = "5")]
     pub detail: ::prost::alloc::string::String,
-    /// When worth trying again, seconds; 0 means that the compositor does so itself.
+    /// Delay before a retry, seconds; 0 means that the compositor retries by itself.
     #[prost(float, tag = "6")]
     pub retry_after: f32,
 }
@@ -3171,18 +3171,18 @@ impl PictureCodec {
         }
     }
 }
-/// The life of a try-on: Opening, Calibrating, Live and Degraded in turn, Draining, Closed.
+/// State of a try-on: Opening, Calibrating, Live and Degraded in turn, Draining, Closed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
 pub enum TryOnState {
     Unspecified = 0,
     /// Sessions behind it are being opened.
     Opening = 1,
-    /// A person is there and the body is being fitted, or garments are being put on.
+    /// The body is being found and fitted, or garments are being put on.
     Calibrating = 2,
     /// Pictures show the garments on the frame that they were computed for.
     Live = 3,
-    /// Pictures, if any, are the plain camera picture; `reason` says why.
+    /// Pictures, if any, are the plain camera picture; `reason` is set.
     Degraded = 4,
     /// The service is shutting down; open again elsewhere or later.
     Draining = 5,
@@ -3229,9 +3229,9 @@ pub mod compositor_service_client {
     )]
     use tonic::codegen::*;
     use tonic::codegen::http::Uri;
-    /// The one address that a kiosk or page talks to. It opens the sessions behind a try-on, joins frames and garments by
-    /// session, epoch and sequence, and streams finished pictures. Unary and server streaming only, so that browsers reach
-    /// all of it through gRPC-web.
+    /// Pictures for kiosks and pages, which connect to this service only. It opens the sessions behind a try-on, joins
+    /// frames and garments by session, epoch and sequence, and streams finished pictures. All calls are unary or server
+    /// streaming, so that browsers reach them through gRPC-web.
     #[derive(Debug, Clone)]
     pub struct CompositorServiceClient<T> {
         inner: tonic::client::Grpc<T>,
@@ -3313,7 +3313,7 @@ pub mod compositor_service_client {
             self
         }
         /// Opens a try-on, or answers with the open one of that id: safe to call again after a lost connection or a restart.
-        /// Does not wait for camera or person; the stream says how far things are. RESOURCE_EXHAUSTED with RetryInfo at the
+        /// Does not wait for camera or person; the stream reports the progress. RESOURCE_EXHAUSTED with RetryInfo at the
         /// configured number of try-ons, FAILED_PRECONDITION when the id is open with another camera. A try-on that nobody
         /// streams is closed after the configured idle time.
         pub async fn open_try_on(
@@ -3365,8 +3365,8 @@ pub mod compositor_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CompositorService", "CloseTryOn"));
             self.inner.unary(req, path, codec).await
         }
-        /// Replaces the garments. Answers at once; pictures show the new `outfit_revision` when they are on. Until then the
-        /// old garments are shown. INVALID_ARGUMENT names the unknown garment or size; UNAVAILABLE with RetryInfo when the
+        /// Replaces the garments. Answers at once; pictures show the old garments until the new ones are worn, then the new
+        /// `outfit_revision`. INVALID_ARGUMENT names the unknown garment or size; UNAVAILABLE with RetryInfo when the
         /// cloth service does not answer (the choice is kept and applied when it is back).
         pub async fn choose_garments(
             &mut self,
@@ -3392,8 +3392,8 @@ pub mod compositor_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CompositorService", "ChooseGarments"));
             self.inner.unary(req, path, codec).await
         }
-        /// Draws garments in the colours of their fit (red tight, green fitted, blue loose) instead of their own, or no longer.
-        /// Takes effect with the next picture once the fit has been measured; a garment whose fit is unknown keeps its own.
+        /// Draws garments in the colours of their fit (red tight, green fitted, blue loose), or in their own. Takes effect
+        /// with the next picture; a garment whose fit has not been measured keeps its own colour.
         pub async fn show_fit(
             &mut self,
             request: impl tonic::IntoRequest<super::ShowFitRequest>,
@@ -3418,7 +3418,7 @@ pub mod compositor_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CompositorService", "ShowFit"));
             self.inner.unary(req, path, codec).await
         }
-        /// What can be chosen, passed on from the cloth service.
+        /// Lists the garments of the cloth service.
         pub async fn list_garment_choices(
             &mut self,
             request: impl tonic::IntoRequest<super::ListGarmentChoicesRequest>,
@@ -3445,11 +3445,11 @@ pub mod compositor_service_client {
                 );
             self.inner.unary(req, path, codec).await
         }
-        /// Pictures and statuses, in order. The first message is a status. At most one picture waits for a slow reader and
-        /// newer ones replace it (`dropped` counts them); statuses are never dropped. A status is sent when state or reason
-        /// changes and at least twice a second while there are no pictures, so silence of a second means that the
-        /// compositor is gone. Each reader has its own queue: a slow one delays nobody else. Use one HTTP/2 connection per
-        /// stream: a slow reader stalls the other streams of its own connection.
+        /// Streams pictures and statuses, in order. The first message is a status. At most one picture waits for a slow
+        /// reader; newer ones replace it (`dropped` counts them). Statuses are never dropped. A status is sent when state or
+        /// reason changes and at least twice a second while there are no pictures, so silence of a second means that the
+        /// compositor is gone. Each reader has its own queue: a slow one does not delay the others. Use one HTTP/2 connection
+        /// per stream: a slow reader stalls the other streams of its own connection.
         /// The last message before a regular end is a status with CLOSED or DRAINING.
         pub async fn stream_frames(
             &mut self,
@@ -3475,8 +3475,8 @@ pub mod compositor_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CompositorService", "StreamFrames"));
             self.inner.server_streaming(req, path, codec).await
         }
-        /// The newest picture, PNG or JPEG, at the camera's size. UNAVAILABLE with RetryInfo when there is none younger than
-        /// a second.
+        /// Returns the newest picture, PNG or JPEG, at the camera's size. UNAVAILABLE with RetryInfo when the newest is older
+        /// than a second.
         pub async fn take_snapshot(
             &mut self,
             request: impl tonic::IntoRequest<super::TakeSnapshotRequest>,
@@ -3517,7 +3517,7 @@ pub mod compositor_service_server {
     #[async_trait]
     pub trait CompositorService: std::marker::Send + std::marker::Sync + 'static {
         /// Opens a try-on, or answers with the open one of that id: safe to call again after a lost connection or a restart.
-        /// Does not wait for camera or person; the stream says how far things are. RESOURCE_EXHAUSTED with RetryInfo at the
+        /// Does not wait for camera or person; the stream reports the progress. RESOURCE_EXHAUSTED with RetryInfo at the
         /// configured number of try-ons, FAILED_PRECONDITION when the id is open with another camera. A try-on that nobody
         /// streams is closed after the configured idle time.
         async fn open_try_on(
@@ -3535,8 +3535,8 @@ pub mod compositor_service_server {
             tonic::Response<super::CloseTryOnResponse>,
             tonic::Status,
         >;
-        /// Replaces the garments. Answers at once; pictures show the new `outfit_revision` when they are on. Until then the
-        /// old garments are shown. INVALID_ARGUMENT names the unknown garment or size; UNAVAILABLE with RetryInfo when the
+        /// Replaces the garments. Answers at once; pictures show the old garments until the new ones are worn, then the new
+        /// `outfit_revision`. INVALID_ARGUMENT names the unknown garment or size; UNAVAILABLE with RetryInfo when the
         /// cloth service does not answer (the choice is kept and applied when it is back).
         async fn choose_garments(
             &self,
@@ -3545,13 +3545,13 @@ pub mod compositor_service_server {
             tonic::Response<super::ChooseGarmentsResponse>,
             tonic::Status,
         >;
-        /// Draws garments in the colours of their fit (red tight, green fitted, blue loose) instead of their own, or no longer.
-        /// Takes effect with the next picture once the fit has been measured; a garment whose fit is unknown keeps its own.
+        /// Draws garments in the colours of their fit (red tight, green fitted, blue loose), or in their own. Takes effect
+        /// with the next picture; a garment whose fit has not been measured keeps its own colour.
         async fn show_fit(
             &self,
             request: tonic::Request<super::ShowFitRequest>,
         ) -> std::result::Result<tonic::Response<super::ShowFitResponse>, tonic::Status>;
-        /// What can be chosen, passed on from the cloth service.
+        /// Lists the garments of the cloth service.
         async fn list_garment_choices(
             &self,
             request: tonic::Request<super::ListGarmentChoicesRequest>,
@@ -3565,11 +3565,11 @@ pub mod compositor_service_server {
             >
             + std::marker::Send
             + 'static;
-        /// Pictures and statuses, in order. The first message is a status. At most one picture waits for a slow reader and
-        /// newer ones replace it (`dropped` counts them); statuses are never dropped. A status is sent when state or reason
-        /// changes and at least twice a second while there are no pictures, so silence of a second means that the
-        /// compositor is gone. Each reader has its own queue: a slow one delays nobody else. Use one HTTP/2 connection per
-        /// stream: a slow reader stalls the other streams of its own connection.
+        /// Streams pictures and statuses, in order. The first message is a status. At most one picture waits for a slow
+        /// reader; newer ones replace it (`dropped` counts them). Statuses are never dropped. A status is sent when state or
+        /// reason changes and at least twice a second while there are no pictures, so silence of a second means that the
+        /// compositor is gone. Each reader has its own queue: a slow one does not delay the others. Use one HTTP/2 connection
+        /// per stream: a slow reader stalls the other streams of its own connection.
         /// The last message before a regular end is a status with CLOSED or DRAINING.
         async fn stream_frames(
             &self,
@@ -3578,8 +3578,8 @@ pub mod compositor_service_server {
             tonic::Response<Self::StreamFramesStream>,
             tonic::Status,
         >;
-        /// The newest picture, PNG or JPEG, at the camera's size. UNAVAILABLE with RetryInfo when there is none younger than
-        /// a second.
+        /// Returns the newest picture, PNG or JPEG, at the camera's size. UNAVAILABLE with RetryInfo when the newest is older
+        /// than a second.
         async fn take_snapshot(
             &self,
             request: tonic::Request<super::TakeSnapshotRequest>,
@@ -3588,9 +3588,9 @@ pub mod compositor_service_server {
             tonic::Status,
         >;
     }
-    /// The one address that a kiosk or page talks to. It opens the sessions behind a try-on, joins frames and garments by
-    /// session, epoch and sequence, and streams finished pictures. Unary and server streaming only, so that browsers reach
-    /// all of it through gRPC-web.
+    /// Pictures for kiosks and pages, which connect to this service only. It opens the sessions behind a try-on, joins
+    /// frames and garments by session, epoch and sequence, and streams finished pictures. All calls are unary or server
+    /// streaming, so that browsers reach them through gRPC-web.
     #[derive(Debug)]
     pub struct CompositorServiceServer<T> {
         inner: Arc<T>,
