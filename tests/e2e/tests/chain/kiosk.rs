@@ -1,4 +1,4 @@
-//! A whole box in one process: each service on a runtime and a bus peer of its own, so that one can be killed.
+//! The services of one box in one process, each on a runtime and a bus peer of its own, so that one can be killed.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
@@ -14,7 +14,7 @@ use tryon_proto::v1::compositor_service_client::CompositorServiceClient;
 use tryon_proto::v1::stream_frames_response::Event;
 use tryon_proto::v1::*;
 
-/// The four services, upstream first.
+/// A service of the box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Part {
     Capture,
@@ -23,21 +23,24 @@ pub enum Part {
     Compositor,
 }
 
+/// All services, upstream first.
 pub const PARTS: [Part; 4] = [Part::Capture, Part::Tracking, Part::Cloth, Part::Compositor];
 
+/// One service on a runtime of its own.
 struct Process {
     runtime: Runtime,
     running: Running,
     shutdown: CancellationToken,
 }
 
+/// Configuration and processes of one box.
 pub struct Kiosk {
     pub config: Config,
     processes: Vec<Option<Process>>,
 }
 
 impl Kiosk {
-    /// Starts all four, with a camera `front` on `source`, and `side` on the test picture.
+    /// Starts all four, with a camera `front` on `source`, and `side` on the test pattern.
     pub fn start(source: &str, rate: f64) -> Self {
         Self::with(source, rate, |_| {})
     }
@@ -81,17 +84,17 @@ impl Kiosk {
         kiosk
     }
 
-    /// Starts a part where it was before, or for the first time.
+    /// Starts a part, on its earlier address if it had one.
     pub fn restart(&mut self, part: Part) {
         let config = self.config.clone();
         let shutdown = CancellationToken::new();
-        // A thread of its own, because the caller may be inside a runtime already.
+        // On a thread of its own: the caller may be inside a runtime.
         let begin = || {
             let begun = Instant::now();
             loop {
                 match Self::run(part, config.clone(), shutdown.clone()) {
                     Ok(started) => return started,
-                    // The port of a part that was killed a moment ago.
+                    // The port of a part that was killed may be in use for a moment.
                     Err(StartError::Bind { .. }) if begun.elapsed() < Duration::from_secs(2) => {
                         #[allow(
                             clippy::disallowed_methods,
@@ -165,14 +168,14 @@ impl Kiosk {
         }
     }
 
-    /// As by SIGKILL: every task and connection of the part is gone at once.
+    /// Ends every task and connection of the part at once, as SIGKILL does.
     pub fn kill(&mut self, part: Part) {
         if let Some(p) = self.processes[part as usize].take() {
             p.runtime.shutdown_background();
         }
     }
 
-    /// As by SIGTERM; how it ended and how long that took.
+    /// Drains the part, as SIGTERM does; its end and the time that took.
     pub fn stop(&mut self, part: Part) -> (Outcome, Duration) {
         let p = self.processes[part as usize].take().expect("runs");
         let end = move || {
@@ -186,6 +189,7 @@ impl Kiosk {
         std::thread::scope(|s| s.spawn(end).join()).expect("ends")
     }
 
+    /// Admin address of a running part.
     pub fn admin(&self, part: Part) -> SocketAddr {
         self.processes[part as usize]
             .as_ref()
@@ -194,6 +198,7 @@ impl Kiosk {
             .admin
     }
 
+    /// Connection to a part.
     pub fn channel(&self, part: Part) -> Channel {
         let address = match part {
             Part::Capture => self.config.capture.address,
@@ -204,6 +209,7 @@ impl Kiosk {
         tryon_kit::client::channel(&format!("http://{address}")).expect("a URL")
     }
 
+    /// Client of the compositor.
     pub fn compositor(&self) -> CompositorServiceClient<Channel> {
         CompositorServiceClient::new(self.channel(Part::Compositor))
     }
@@ -215,6 +221,7 @@ impl Drop for Kiosk {
     }
 }
 
+/// Choices of garments in size M.
 pub fn wear(garments: &[&str]) -> Vec<GarmentChoice> {
     garments
         .iter()
@@ -231,12 +238,12 @@ pub struct Watcher {
     pub events: Streaming<StreamFramesResponse>,
 }
 
-/// How long anything may take here. Far beyond what is promised, because tests share their machine; what is promised
-/// is asserted where it is the point.
+/// Longest wait for any event, far beyond the promised times because tests share their machine. The tests of those times
+/// assert them.
 pub const PATIENCE: Duration = Duration::from_secs(150);
 
 impl Watcher {
-    /// Opens the try-on and watches it, trying again while the compositor is away.
+    /// Opens the try-on and watches it, with retries while the compositor is away.
     pub async fn open(kiosk: &Kiosk, id: &str, camera: &str, garments: &[&str]) -> Self {
         let begun = Instant::now();
         loop {
@@ -276,7 +283,7 @@ impl Watcher {
         })
     }
 
-    /// The next event; `Err` carries the status with which the stream ended, OK for a regular end.
+    /// The next event; `Err` is the status with which the stream ended, OK for a regular end.
     pub async fn next(&mut self) -> Result<Event, tonic::Status> {
         let next = tokio::time::timeout(PATIENCE, self.events.message())
             .await
@@ -285,7 +292,7 @@ impl Watcher {
         Ok(message.event.expect("an event"))
     }
 
-    /// Reads until `wanted` says yes, and answers what it said yes to.
+    /// Reads until an event that is `wanted`.
     pub async fn until(&mut self, what: &str, wanted: impl Fn(&Event) -> bool) -> Event {
         let begun = Instant::now();
         let mut last = String::new();
@@ -308,19 +315,26 @@ impl Watcher {
         }
     }
 
-    pub async fn picture(&mut self, state: TryOnState) -> Picture {
-        let e = self
-            .until(
-                state.as_str_name(),
-                |e| matches!(e, Event::Picture(p) if p.state() == state),
-            )
-            .await;
-        let Event::Picture(p) = e else {
+    /// Reads until a picture that is `wanted`.
+    pub async fn picture_where(
+        &mut self,
+        what: &str,
+        wanted: impl Fn(&Picture) -> bool,
+    ) -> Picture {
+        let is = |e: &Event| matches!(e, Event::Picture(p) if wanted(p));
+        let Event::Picture(p) = self.until(what, is).await else {
             unreachable!("just matched")
         };
         p
     }
 
+    /// Reads until a picture in `state`.
+    pub async fn picture(&mut self, state: TryOnState) -> Picture {
+        self.picture_where(state.as_str_name(), |p| p.state() == state)
+            .await
+    }
+
+    /// Reads until a status that is degraded for `reason`.
     pub async fn degraded(&mut self, reason: DegradedReason) -> TryOnStatus {
         let is = |e: &Event| matches!(e, Event::Status(s) if s.state() == TryOnState::Degraded && s.reason() == reason);
         let Event::Status(s) = self.until(reason.as_str_name(), is).await else {

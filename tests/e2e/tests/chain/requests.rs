@@ -1,0 +1,101 @@
+//! Bad requests: each names its field, and none disturbs another try-on.
+
+use crate::client;
+use crate::kiosk::{Kiosk, Part, Watcher, wear};
+use tonic::{Code, Status};
+use tonic_types::StatusExt;
+use tryon_proto::v1::capture_service_client::CaptureServiceClient;
+use tryon_proto::v1::*;
+
+/// Path of the field at fault.
+fn field(s: Status) -> String {
+    assert_eq!(s.code(), Code::InvalidArgument, "{s}");
+    let details = s.get_error_details();
+    let bad = details.bad_request().expect("BadRequest");
+    bad.field_violations[0].field.clone()
+}
+
+#[test]
+fn bad_requests_name_their_fields_and_disturb_nobody() {
+    let kiosk = Kiosk::start("pattern", 10.0);
+    client(async {
+        let mut w = Watcher::open(&kiosk, "good", "front", &[]).await;
+        w.picture(TryOnState::Degraded).await;
+        bad_compositor_requests(&kiosk).await;
+        bad_capture_requests(&kiosk).await;
+        huge_length_prefix(kiosk.config.compositor.address).await;
+        w.picture(TryOnState::Degraded).await;
+    });
+}
+
+async fn bad_compositor_requests(kiosk: &Kiosk) {
+    let mut c = kiosk.compositor();
+    let open = |camera: &str, garments| OpenTryOnRequest {
+        try_on_id: "bad".into(),
+        store: String::new(),
+        camera: camera.into(),
+        garments,
+    };
+    let wildcard = c.open_try_on(open("*", vec![])).await;
+    let named = field(wildcard.expect_err("a wildcard"));
+    assert_eq!(named, "open_try_on_request.camera");
+    let cape = c.open_try_on(open("front", wear(&["cape"]))).await;
+    let named = field(cape.expect_err("no cape"));
+    assert_eq!(named, "open_try_on_request.garments[0].garment");
+
+    let mut garments = wear(&["tshirt"]);
+    garments[0].size = "XXXXXL".into();
+    let huge = ChooseGarmentsRequest {
+        try_on_id: "good".into(),
+        garments,
+    };
+    let named = field(c.choose_garments(huge).await.expect_err("no such size"));
+    assert_eq!(named, "choose_garments_request.garments[0].size");
+
+    let small = StreamFramesRequest {
+        width: 5,
+        height: 5,
+        ..Default::default()
+    };
+    let named = field(c.stream_frames(small).await.expect_err("too small"));
+    assert_eq!(named, "stream_frames_request.width");
+    let unknown = StreamFramesRequest {
+        try_on_id: "nobody".into(),
+        ..Default::default()
+    };
+    let unknown = c.stream_frames(unknown).await.expect_err("unknown");
+    assert_eq!(unknown.code(), Code::NotFound);
+}
+
+async fn bad_capture_requests(kiosk: &Kiosk) {
+    let mut capture = CaptureServiceClient::new(kiosk.channel(Part::Capture));
+    let camera = "front".to_owned();
+    let without_consent = StartRecordingRequest {
+        camera: camera.clone(),
+        consent: false,
+    };
+    let e = capture.start_recording(without_consent).await;
+    assert_eq!(e.expect_err("no consent").code(), Code::FailedPrecondition);
+    let e = capture.start_camera(StartCameraRequest { camera }).await;
+    assert_eq!(e.expect_err("it runs").code(), Code::FailedPrecondition);
+}
+
+/// A gRPC message that announces 4 GiB: an error, no allocation, and the server lives.
+async fn huge_length_prefix(address: std::net::SocketAddr) {
+    use std::io::{Read, Write};
+    let mut s = std::net::TcpStream::connect(address).expect("connects");
+    let body = [0u8, 0xff, 0xff, 0xff, 0xff, 1, 2, 3];
+    let head = "POST /tryon.v1.CompositorService/OpenTryOn HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\
+                Content-Type: application/grpc-web+proto\r\nContent-Length: 8\r\n\r\n";
+    s.write_all(head.as_bytes())
+        .and_then(|()| s.write_all(&body))
+        .expect("sends");
+    let mut out = Vec::new();
+    s.read_to_end(&mut out).expect("answers");
+    let text = String::from_utf8_lossy(&out).to_lowercase();
+    let status = text
+        .split("grpc-status:")
+        .nth(1)
+        .and_then(|t| t.trim().chars().next());
+    assert!(status.is_some_and(|c| c != '0'), "{text}");
+}
