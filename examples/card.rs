@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release --features gpu --example card -- [--software] [--rounds N] [--out DIR]`
 //!
-//! A synthetic shopper in T-shirt and skirt, drawn at three sizes. Prints a Markdown row a size: medians and 99th
-//! percentiles in milliseconds, and how far the pictures differ.
+//! A synthetic user in T-shirt and skirt at three sizes. Prints a Markdown row a size: medians and 99th percentiles in
+//! milliseconds, and the number of pixels that differ.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
 
 use std::path::PathBuf;
@@ -11,117 +11,135 @@ use std::time::Instant;
 use tryon::body::Pose;
 use tryon::camera::ColorImage;
 use tryon::composite::{
-    BodyView, GarmentView, Input, Limbs, Look, Model, RenderError, RenderReport, State, Workspace,
-    render,
+    BodyView, Input, Limbs, Model, RenderError, RenderReport, State, Workspace, render,
 };
-use tryon::dressing::{DressOptions, dress};
+use tryon::dressing::{DressOptions, Dressed, dress};
 use tryon::formats::image::write_png_rgb;
 use tryon::garment::{Size, library};
 use tryon::gpu::Renderer;
 use tryon::math::{P3, World};
+use tryon::mirror::{CameraGarments, DrawnSurface, library_appearance};
 use tryon::synth::{Sequence, Setting, Shopper};
 
 const SIZES: [[u32; 2]; 3] = [[640, 480], [1280, 720], [1920, 1080]];
 /// Grey levels beyond which a pixel counts as different.
-const DIFFERENT: i32 = 3;
+const DIFFERENT: u8 = 3;
+/// Frame of the synthetic sequence.
+const FRAME: u64 = 60;
+/// Rounds before the timed ones.
+const WARM_UP: usize = 3;
 
-fn main() {
-    let (mut software, mut rounds, mut out) = (false, 60, None::<PathBuf>);
-    let mut args = std::env::args().skip(1);
-    while let Some(word) = args.next() {
+struct Args {
+    software: bool,
+    rounds: usize,
+    out: Option<PathBuf>,
+}
+
+fn args() -> Args {
+    let mut a = Args {
+        software: false,
+        rounds: 60,
+        out: None,
+    };
+    let mut words = std::env::args().skip(1);
+    while let Some(word) = words.next() {
         match word.as_str() {
-            "--software" => software = true,
-            "--rounds" => rounds = args.next().unwrap().parse().unwrap(),
-            "--out" => out = Some(args.next().unwrap().into()),
+            "--software" => a.software = true,
+            "--rounds" => a.rounds = words.next().unwrap().parse().unwrap(),
+            "--out" => a.out = Some(words.next().unwrap().into()),
             other => panic!("{other} is not understood"),
         }
     }
+    a
+}
+
+fn main() {
+    let args = args();
     let begun = Instant::now();
-    let mut card = Renderer::new(software).expect("an adapter");
+    let mut card = Renderer::new(args.software).expect("an adapter");
     println!("{:?}, ready after {:.0} ms", card.adapter(), ms(begun));
 
     let sequence = Sequence::new(Shopper::default(), Setting::default());
-    let (frame, truth) = sequence.frame(60);
-    let patterns = ["tshirt", "skirt"].map(|name| library::pattern(name, Size::default()).unwrap());
-    let template = &sequence.shopper().template;
+    let (frame, truth) = sequence.frame(FRAME);
     let world_from_camera = sequence.setting().world_from_camera;
-    let pose: Pose<World> = Pose {
+    let pose = Pose {
         root: world_from_camera * truth.pose.root,
         angles: truth.pose.angles.clone(),
     };
-    let dressed = dress(
-        template,
-        sequence.rest(),
-        &pose,
-        &patterns,
-        &DressOptions::default(),
-    )
-    .unwrap();
-    let camera_from_world = world_from_camera.inverse();
+    let dressed = dressed(&sequence, &pose);
     let meshes = &dressed.model.outfit.garments;
-    let drawn: Vec<Vec<P3>> = (meshes.iter().zip(&dressed.state.garments))
+    let world: Vec<Vec<P3>> = (meshes.iter().zip(&dressed.state.garments))
         .map(|(mesh, state)| {
-            let (mut world, mut camera) = (Vec::new(), Vec::new());
+            let mut world = Vec::new();
             mesh.render_positions(&state.positions, &mut world);
-            camera_from_world.points_f32(&world, &mut camera);
-            camera
+            world
         })
         .collect();
-    let looks = [
-        Look::default(),
-        Look {
-            base: [120, 40, 60],
-            ..Look::default()
-        },
-    ];
-    let garments: Vec<GarmentView<'_>> = (drawn.iter().zip(meshes).zip(&looks))
-        .map(|((vertices, m), look)| GarmentView {
-            vertices,
-            faces: &m.render.faces,
-            uv: &m.render.uv,
-            normals: &[],
-            look,
-        })
-        .collect();
-    let model = Model::default();
-    let limbs = Limbs::of(template);
-
+    let mut camera = CameraGarments::default();
+    camera.place(&world_from_camera.inverse(), world.iter().map(Vec::as_slice));
+    let appearances = ["tshirt", "skirt"].map(library_appearance);
+    let surfaces = (meshes.iter().zip(&appearances)).map(|(mesh, appearance)| DrawnSurface {
+        faces: &mesh.render.faces,
+        uv: &mesh.render.uv,
+        appearance,
+    });
+    let garments = camera.views(surfaces);
+    let template = &sequence.shopper().template;
+    let input = Input {
+        frame: &frame,
+        calibration: sequence.calibration(),
+        garments: &garments,
+        body: Some(BodyView {
+            vertices: &truth.vertices,
+            faces: template.mesh().faces(),
+            limbs: &Limbs::of(template),
+        }),
+        output: None,
+    };
     println!(
         "\n| picture | processor, one thread: p50 / p99 ms | card: p50 / p99 ms | pixels that differ by more than {DIFFERENT} |"
     );
     println!("|---|---|---|---|");
     for size in SIZES {
         let input = Input {
-            frame: &frame,
-            calibration: sequence.calibration(),
-            garments: &garments,
-            body: Some(BodyView {
-                vertices: &truth.vertices,
-                faces: template.mesh().faces(),
-                limbs: &limbs,
-            }),
             output: Some(size),
+            ..input
         };
-        let (mut state, mut work) = (State::default(), Workspace::default());
-        let (on_processor, a) = timed(rounds, || render(&model, &mut state, &input, &mut work));
-        let (mut state, mut work) = (State::default(), Workspace::default());
-        let (on_card, b) = timed(rounds, || {
-            card.render(&model, &mut state, &input, &mut work)
-        });
-        println!(
-            "| {}×{} | {a} | {b} | {} |",
-            size[0],
-            size[1],
-            different(&on_processor, &on_card)
-        );
-        if let Some(dir) = &out {
-            std::fs::create_dir_all(dir).unwrap();
-            write_png_rgb(
-                &dir.join(format!("{}_processor.png", size[0])),
-                &on_processor,
-            )
-            .unwrap();
-            write_png_rgb(&dir.join(format!("{}_card.png", size[0])), &on_card).unwrap();
+        compare(&args, &mut card, &input);
+    }
+}
+
+fn dressed(sequence: &Sequence, pose: &Pose<World>) -> Dressed {
+    let patterns = ["tshirt", "skirt"].map(|name| library::pattern(name, Size::default()).unwrap());
+    dress(
+        &sequence.shopper().template,
+        sequence.rest(),
+        pose,
+        &patterns,
+        &DressOptions::default(),
+    )
+    .unwrap()
+}
+
+/// Prints the row of one size and writes its two pictures.
+fn compare(args: &Args, card: &mut Renderer, input: &Input<'_>) {
+    let model = Model::default();
+    let (mut state, mut work) = (State::default(), Workspace::default());
+    let (on_processor, a) = timed(args.rounds, || render(&model, &mut state, input, &mut work));
+    let (mut state, mut work) = (State::default(), Workspace::default());
+    let (on_card, b) = timed(args.rounds, || {
+        card.render(&model, &mut state, input, &mut work)
+    });
+    let (width, height) = (on_card.width(), on_card.height());
+    let count = different(&on_processor, &on_card);
+    println!(
+        "| {width}×{height} | {a} | {b} | {count} of {} |",
+        width * height
+    );
+    if let Some(dir) = &args.out {
+        std::fs::create_dir_all(dir).unwrap();
+        for (name, image) in [("processor", &on_processor), ("card", &on_card)] {
+            write_png_rgb(&dir.join(format!("{width}_{name}.png")), image).unwrap();
         }
     }
 }
@@ -130,20 +148,20 @@ fn ms(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 
-/// The last picture, and times without the first three rounds.
+/// The last picture, and median and 99th percentile of the times.
 fn timed(
     rounds: usize,
     mut draw: impl FnMut() -> Result<(ColorImage, RenderReport), RenderError>,
 ) -> (ColorImage, String) {
     let mut times = Vec::new();
     let mut last = None;
-    for i in 0..rounds + 3 {
+    for i in 0..rounds + WARM_UP {
         let begun = Instant::now();
-        let (image, report) = draw().expect("drawn");
-        if i >= 3 {
+        let drawn = draw().expect("drawn");
+        if i >= WARM_UP {
             times.push(ms(begun));
         }
-        last = Some((image, report));
+        last = Some(drawn);
     }
     times.sort_by(f64::total_cmp);
     let (image, report) = last.expect("at least one");
@@ -163,17 +181,10 @@ fn timed(
     )
 }
 
-fn different(a: &ColorImage, b: &ColorImage) -> String {
-    let far = |a: &[u8], b: &[u8]| {
-        a.iter()
-            .zip(b)
-            .any(|(a, b)| (i32::from(*a) - i32::from(*b)).abs() > DIFFERENT)
-    };
-    let n = a
-        .data()
-        .chunks(3)
-        .zip(b.data().chunks(3))
-        .filter(|(a, b)| far(a, b))
-        .count();
-    format!("{n} of {}", a.width() * a.height())
+/// Number of pixels that differ in some channel.
+fn different(a: &ColorImage, b: &ColorImage) -> usize {
+    let pixels = a.data().chunks(3).zip(b.data().chunks(3));
+    pixels
+        .filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) > DIFFERENT))
+        .count()
 }

@@ -1,4 +1,4 @@
-//! What a picture costs with and without the work that nobody sees: hidden faces and the normals of unseen ones.
+//! Cost of a picture with and without hidden faces and the normals of unseen ones.
 //!
 //! `cargo run --release --example unseen -- [--input ../shared/data/rgbd/depthkit_still] [--rounds 60] [--threads 1]
 //!   [--out DIR]`
@@ -14,7 +14,7 @@ use tryon::body::{Pose, embedded};
 use tryon::camera::RgbdFrame;
 use tryon::cloth::realtime::{self, Config as ClothConfig};
 use tryon::composite::{
-    BodyView, Config, GarmentView, Input, Limbs, Look, Model, State, Workspace, render,
+    Appearance, BodyView, Config, GarmentView, Input, Limbs, Model, State, Workspace, render,
 };
 use tryon::dressing::{DressOptions, dress, suggest};
 use tryon::formats::image::write_png_rgb;
@@ -48,7 +48,7 @@ struct Drawn {
     vertices: Vec<P3>,
     faces: Vec<Face>,
     uv: Vec<[f32; 2]>,
-    look: Look,
+    appearance: Appearance,
 }
 
 impl Drawn {
@@ -77,7 +77,7 @@ impl Drawn {
             vertices,
             faces,
             uv,
-            look: self.look.clone(),
+            appearance: self.appearance.clone(),
         }
     }
 }
@@ -174,15 +174,15 @@ fn main() {
             let (mut world, mut vertices) = (Vec::new(), Vec::new());
             mesh.render_positions(&state.positions, &mut world);
             camera_from_world.points_f32(&world, &mut vertices);
-            let look = Look {
+            let appearance = Appearance {
                 base: library::dye(&mesh.name),
-                ..Look::default()
+                ..Appearance::default()
             };
             Drawn {
                 vertices,
                 faces: mesh.render.faces.clone(),
                 uv: mesh.render.uv.clone(),
-                look,
+                appearance,
             }
         })
         .collect();
@@ -195,7 +195,7 @@ fn main() {
                     faces: &d.faces,
                     uv: &d.uv,
                     normals: &[],
-                    look: &d.look,
+                    appearance: &d.appearance,
                 })
                 .collect();
             let input = Input {

@@ -1,109 +1,10 @@
-//! The colour of this shopper's skin against what else they wear, learnt from the pictures themselves.
+//! Classifier of skin against clothes by colour.
 //!
-//! Two classes: forearms, as one normal distribution of brightness and chroma, and trunk and thighs, as a mixture of
-//! [`KINDS`] of them (shirt, trousers, their shadows). Whether the forearms are skin at all is asked of the face and
-//! the hands; whether colour tells skin from shirt, of the shirt.
+//! Skin is one normal distribution of brightness and chroma, clothes a mixture of [`KINDS`] (shirt, trousers, their
+//! shadows).
 
-use serde::{Deserialize, Serialize};
-
-/// What is remembered between pictures: one colour a place of the body, so that a model is made of the last few
-/// pictures, and a word once given is not taken back for a small change.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct State {
-    /// Colours by [`Source`] and slot; `None` = never seen.
-    colors: [Vec<Option<[f32; 3]>>; 4],
-    /// Pictures so far in which colours were taken.
-    pictures: u32,
-    /// Colour decided in the last picture.
-    usable: bool,
-}
-
-/// Whose colour it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Source {
-    Forearm,
-    Hand,
-    Face,
-    Trunk,
-}
-
-/// Places of which colours are remembered.
-pub(super) const SLOTS: [usize; 4] = [160, 64, 64, 320];
-/// After the first picture, one place in so many is looked at in a picture.
-const TURNS: usize = 4;
-
-impl State {
-    /// Forgets when nobody is tracked: the next one may be somebody else.
-    pub(crate) fn keep_if(&mut self, tracked: bool) {
-        if !tracked && self.pictures > 0 {
-            *self = Self::default();
-        }
-    }
-
-    /// Which of `vertices` to look at in this picture: slot and vertex.
-    pub(super) fn due<'a>(
-        &'a self,
-        source: Source,
-        vertices: &'a [u32],
-    ) -> impl Iterator<Item = (usize, u32)> + use<'a> {
-        let slots = SLOTS[source as usize].min(vertices.len());
-        let (first, turn) = (self.pictures == 0, self.pictures as usize % TURNS);
-        (0..slots)
-            .filter(move |s| first || s % TURNS == turn)
-            .map(move |s| (s, vertices[s * vertices.len() / slots]))
-    }
-
-    /// Remembers the sRGB colour of a place.
-    pub(super) fn put(&mut self, source: Source, slot: usize, rgb: [u8; 3]) {
-        let colors = &mut self.colors[source as usize];
-        if colors.len() <= slot {
-            colors.resize(slot + 1, None);
-        }
-        colors[slot] = Some(tone(rgb));
-    }
-
-    /// The model of what was seen, if it can tell skin from clothes. One call a picture, after its colours are in.
-    pub(super) fn learn(&mut self) -> Option<Skin> {
-        self.pictures = self.pictures.saturating_add(1);
-        let seen = |s: Source| {
-            self.colors[s as usize]
-                .iter()
-                .flatten()
-                .copied()
-                .collect::<Vec<_>>()
-        };
-        let (arms, trunk) = (seen(Source::Forearm), seen(Source::Trunk));
-        let skin = Skin::fit(&arms, &trunk);
-        let usable = skin.as_ref().is_some_and(|skin| {
-            let share = |s: Source| {
-                let colors = seen(s);
-                let like = colors.iter().filter(|c| skin.likes(c)).count();
-                if colors.len() < FEW {
-                    0.0
-                } else {
-                    like as f32 / colors.len() as f32
-                }
-            };
-            let (agree, mixed) = if self.usable {
-                (AGREE[1], MIXED[1])
-            } else {
-                (AGREE[0], MIXED[0])
-            };
-            share(Source::Forearm) >= agree
-                && share(Source::Face).max(share(Source::Hand)) >= agree
-                && share(Source::Trunk) <= mixed
-        });
-        self.usable = usable;
-        skin.filter(|_| usable)
-    }
-}
-
-/// Fewer colours than this say nothing.
-const FEW: usize = 12;
-/// Share of the face or the hands that must look like the forearms: to begin, to go on.
-const AGREE: [f32; 2] = [0.5, 0.4];
-/// Share of the trunk that may look like them (a neckline, a hand where it was not expected): to begin, to go on.
-const MIXED: [f32; 2] = [0.08, 0.14];
+/// Least number of tones of a class.
+pub(super) const MIN_TONES: usize = 12;
 
 /// Brightness and the two chroma differences of an sRGB colour (ITU-R BT.601), each 0 to 255 wide.
 #[inline]
@@ -113,9 +14,9 @@ pub(super) fn tone(rgb: [u8; 3]) -> [f32; 3] {
     [y, 0.564 * (b - y), 0.713 * (r - y)]
 }
 
-/// Normal distribution of a colour, up to a constant.
+/// Normal distribution of tones, up to a constant factor.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Normal {
+struct Gaussian {
     mean: [f32; 3],
     /// Inverse of the lower triangular factor of the covariance: 00, 10, 11, 20, 21, 22.
     factor: [f32; 6],
@@ -123,26 +24,27 @@ struct Normal {
     log: f32,
 }
 
-/// Least standard deviations of a kind, grey levels: a sensor's noise and a fold's shading.
-const FLOOR: [f32; 3] = [8.0, 2.5, 2.5];
-/// Clothes of a colour nobody has seen yet are this likely everywhere, logarithm.
-const UNSEEN: f32 = -18.0;
-/// Kinds of clothes. Two miss the shadows of a bright shirt.
+/// Least standard deviation of brightness and chroma, grey levels: sensor noise and shading of folds.
+const MIN_SIGMA: [f32; 3] = [8.0, 2.5, 2.5];
+/// Logarithm of the density of clothes of an unknown colour, everywhere; larger rejects more skin.
+const UNKNOWN_CLOTHES: f32 = -18.0;
+/// Mixture components of clothes; two miss the shadows of a bright shirt.
 const KINDS: usize = 4;
-/// Brightness counts this much when kinds are told apart: one cloth in light and shade is one or two kinds.
+/// Weight of brightness against chroma in clustering: one cloth in light and shade is one or two components.
 const BRIGHTNESS: f32 = 0.3;
-/// Rounds of telling kinds apart.
-const ROUNDS: usize = 6;
+/// Iterations of Lloyd's algorithm.
+const ITERATIONS: usize = 6;
 
-impl Normal {
-    fn of(colors: &[[f32; 3]], weight: f32) -> Self {
-        let n = colors.len().max(1) as f32;
-        let mean = colors
+impl Gaussian {
+    /// Maximum likelihood with [`MIN_SIGMA`] added to the covariance; `weight` is the component's share.
+    fn of(tones: &[[f32; 3]], weight: f32) -> Self {
+        let n = tones.len().max(1) as f32;
+        let mean = tones
             .iter()
             .fold([0.0; 3], |s, c| [s[0] + c[0], s[1] + c[1], s[2] + c[2]])
             .map(|s| s / n);
         let mut s = [0.0f32; 6];
-        for c in colors {
+        for c in tones {
             let d = [c[0] - mean[0], c[1] - mean[1], c[2] - mean[2]];
             let mut k = 0;
             for i in 0..3 {
@@ -153,11 +55,11 @@ impl Normal {
             }
         }
         (s[0], s[2], s[5]) = (
-            s[0] + FLOOR[0].powi(2),
-            s[2] + FLOOR[1].powi(2),
-            s[5] + FLOOR[2].powi(2),
+            s[0] + MIN_SIGMA[0].powi(2),
+            s[2] + MIN_SIGMA[1].powi(2),
+            s[5] + MIN_SIGMA[2].powi(2),
         );
-        // Cholesky; the floors keep the pivots positive.
+        // Cholesky; the least deviations keep the pivots positive.
         let l00 = s[0].sqrt();
         let (l10, l20) = (s[1] / l00, s[3] / l00);
         let l11 = (s[2] - l10 * l10).max(1.0).sqrt();
@@ -182,7 +84,7 @@ impl Normal {
 
     /// Logarithm of the density.
     #[inline]
-    fn log(&self, c: &[f32; 3]) -> f32 {
+    fn log_density(&self, c: &[f32; 3]) -> f32 {
         let d = [
             c[0] - self.mean[0],
             c[1] - self.mean[1],
@@ -196,20 +98,23 @@ impl Normal {
     }
 }
 
-/// Tells skin from clothes.
+/// Share of skin tones nearest to the median chroma that are fitted, as a fraction.
+const KEPT: [usize; 2] = [9, 10];
+
+/// Classifier of skin against clothes.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Skin {
-    skin: Normal,
-    clothes: Vec<Normal>,
+pub(super) struct SkinClassifier {
+    skin: Gaussian,
+    clothes: Vec<Gaussian>,
 }
 
-impl Skin {
-    /// From tones of skin and of everything else; `None` when there are too few.
-    fn fit(skin: &[[f32; 3]], clothes: &[[f32; 3]]) -> Option<Self> {
-        if skin.len() < FEW || clothes.len() < FEW {
+impl SkinClassifier {
+    /// Fits tones of skin and of everything else; `None` when there are too few.
+    pub(super) fn fit(skin: &[[f32; 3]], clothes: &[[f32; 3]]) -> Option<Self> {
+        if skin.len() < MIN_TONES || clothes.len() < MIN_TONES {
             return None;
         }
-        // What lay beside a limb that is tracked a little off: farther from the median than most.
+        // Trims tones beside a limb that is tracked a little off: farther from the median than most.
         let median = |k: usize| {
             let mut x: Vec<f32> = skin.iter().map(|c| c[k]).collect();
             let middle = x.len() / 2;
@@ -219,61 +124,111 @@ impl Skin {
         let off = |c: &[f32; 3]| (c[1] - middle[0]).abs() + (c[2] - middle[1]).abs();
         let mut kept = skin.to_vec();
         kept.sort_by(|a, b| off(a).total_cmp(&off(b)));
-        kept.truncate(skin.len() * 9 / 10);
+        kept.truncate(skin.len() * KEPT[0] / KEPT[1]);
         Some(Self {
-            skin: Normal::of(&kept, 1.0),
-            clothes: kinds(clothes),
+            skin: Gaussian::of(&kept, 1.0),
+            clothes: cluster(clothes),
         })
     }
 
-    /// This tone is rather skin than anything else.
+    /// Skin is the most likely class of this tone.
     #[inline]
-    pub(super) fn likes(&self, c: &[f32; 3]) -> bool {
-        let skin = self.skin.log(c);
-        skin > UNSEEN && self.clothes.iter().all(|k| k.log(c) < skin)
+    pub(super) fn is_skin(&self, c: &[f32; 3]) -> bool {
+        let skin = self.skin.log_density(c);
+        skin > UNKNOWN_CLOTHES && self.clothes.iter().all(|k| k.log_density(c) < skin)
     }
 }
 
-/// The kinds of clothes among these tones: farthest first, then nearest middle.
-fn kinds(colors: &[[f32; 3]]) -> Vec<Normal> {
-    let far = |a: &[f32; 3], b: &[f32; 3]| {
-        (BRIGHTNESS * (a[0] - b[0])).powi(2) + (a[1] - b[1]).powi(2) + (a[2] - b[2]).powi(2)
-    };
-    let mut middles = vec![colors[0]];
-    let mut nearest: Vec<f32> = colors.iter().map(|c| far(c, &middles[0])).collect();
-    while middles.len() < KINDS {
-        let Some(k) = (0..colors.len()).max_by(|&a, &b| nearest[a].total_cmp(&nearest[b])) else {
-            break;
-        };
-        middles.push(colors[k]);
-        nearest
-            .iter_mut()
-            .zip(colors)
-            .for_each(|(n, c)| *n = n.min(far(c, &colors[k])));
-    }
-    let mut members = vec![Vec::new(); middles.len()];
-    for _ in 0..ROUNDS {
+/// Tones of a component below which it is a speck, or a finger in an unexpected place.
+const SPECK: usize = 8;
+
+/// Squared distance of two tones in clustering.
+fn squared_distance(a: &[f32; 3], b: &[f32; 3]) -> f32 {
+    (BRIGHTNESS * (a[0] - b[0])).powi(2) + (a[1] - b[1]).powi(2) + (a[2] - b[2]).powi(2)
+}
+
+/// Mixture components of the tones of clothes: farthest-point seeds, then k-means.
+fn cluster(tones: &[[f32; 3]]) -> Vec<Gaussian> {
+    let mut centres = farthest_points(tones);
+    let mut members = vec![Vec::new(); centres.len()];
+    for _ in 0..ITERATIONS {
         members.iter_mut().for_each(Vec::clear);
-        for c in colors {
-            let best = (0..middles.len())
-                .min_by(|&a, &b| far(c, &middles[a]).total_cmp(&far(c, &middles[b])));
+        for c in tones {
+            let distance = |k: &usize| squared_distance(c, &centres[*k]);
+            let best = (0..centres.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
             members[best.unwrap_or(0)].push(*c);
         }
-        for (m, of) in middles
-            .iter_mut()
-            .zip(&members)
-            .filter(|(_, of)| !of.is_empty())
-        {
-            *m = Normal::of(of, 1.0).mean;
+        for (centre, of) in centres.iter_mut().zip(&members) {
+            if !of.is_empty() {
+                *centre = Gaussian::of(of, 1.0).mean;
+            }
         }
     }
-    let share = |of: &Vec<[f32; 3]>| of.len() as f32 / colors.len() as f32;
+    let share = |of: &Vec<[f32; 3]>| of.len() as f32 / tones.len() as f32;
     members
         .iter()
         .filter(|of| of.len() >= SPECK)
-        .map(|of| Normal::of(of, share(of)))
+        .map(|of| Gaussian::of(of, share(of)))
         .collect()
 }
 
-/// A kind with fewer tones is a speck or a finger that lay where it was not expected.
-const SPECK: usize = 8;
+/// Up to [`KINDS`] tones, each the farthest from those before it.
+fn farthest_points(tones: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    let mut centres = vec![tones[0]];
+    let mut nearest = vec![f32::INFINITY; tones.len()];
+    while centres.len() < KINDS {
+        let last = centres[centres.len() - 1];
+        for (n, c) in nearest.iter_mut().zip(tones) {
+            *n = n.min(squared_distance(c, &last));
+        }
+        let farthest = (0..tones.len()).max_by(|&a, &b| nearest[a].total_cmp(&nearest[b]));
+        let Some(k) = farthest else { break };
+        centres.push(tones[k]);
+    }
+    centres
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `n` tones spread a few grey levels about one.
+    fn spread(rgb: [u8; 3], n: usize) -> Vec<[f32; 3]> {
+        let [y, b, r] = tone(rgb);
+        (0..n)
+            .map(|i| {
+                let t = |k: usize| (i * k % 7) as f32 - 3.0;
+                [y + 3.0 * t(1), b + t(2), r + t(3)]
+            })
+            .collect()
+    }
+
+    const SKIN: [u8; 3] = [205, 160, 135];
+    const SHIRT: [u8; 3] = [40, 60, 120];
+    const TROUSERS: [u8; 3] = [30, 30, 34];
+
+    #[test]
+    fn skin_is_separated_from_two_clothes() {
+        let mut clothes = spread(SHIRT, 40);
+        clothes.extend(spread(TROUSERS, 40));
+        let c = SkinClassifier::fit(&spread(SKIN, 40), &clothes).expect("enough tones");
+        assert!(c.is_skin(&tone(SKIN)));
+        assert!(!c.is_skin(&tone(SHIRT)) && !c.is_skin(&tone(TROUSERS)));
+        assert!(
+            !c.is_skin(&tone([0, 255, 0])),
+            "an unknown colour is clothes"
+        );
+    }
+
+    #[test]
+    fn few_or_equal_tones_are_degenerate_but_finite() {
+        assert_eq!(
+            SkinClassifier::fit(&spread(SKIN, 11), &spread(SHIRT, 40)),
+            None
+        );
+        assert_eq!(SkinClassifier::fit(&spread(SKIN, 40), &[]), None);
+        let one = Gaussian::of(&[tone(SKIN); 20], 1.0);
+        assert!(one.log_density(&tone(SKIN)).is_finite());
+        assert_eq!(cluster(&[tone(SHIRT); 20]).len(), 1);
+    }
+}

@@ -1,12 +1,12 @@
-//! What is uploaded for each picture. Layouts are those of `garments.wgsl`; padding has a name.
+//! Data uploaded for each picture. Layouts are those of `garments.wgsl`; padding has a name.
 
-use crate::composite::framing::Stage;
-use crate::composite::look::{Fabric, Print};
-use crate::composite::render::FOLD_GAP;
-use crate::composite::shade::Shader;
-use crate::composite::shadow::{NO_SHADOW, SHADOW_DEPTH, Shadows};
-use crate::composite::surface::{Area, NEAR, Surface, part_of};
-use crate::raster::View;
+use crate::composite::appearance::{Fabric, Print};
+use crate::composite::area::{Area, NEAR};
+use crate::composite::contact_shadow::{ContactShadows, NO_SHADOW, SHADOW_DEPTH};
+use crate::composite::coverage::FOLD_GAP;
+use crate::composite::shading::Shader;
+use crate::composite::surface::Surface;
+use crate::composite::viewport::Viewport;
 use bytemuck::{Pod, Zeroable};
 
 /// `Scene` of the shader.
@@ -25,17 +25,15 @@ pub(super) struct SceneData {
 
 impl SceneData {
     pub(super) fn new(
-        stage: &Stage,
+        viewport: &Viewport,
         area: &Area,
         samples: u32,
         behind: f32,
         shader: &Shader<'_>,
     ) -> Self {
-        let mut lens = [0.0; 4];
-        if let View::Perspective { camera: k, .. } = part_of(stage, area, samples) {
-            lens = [k.fx, k.fy, k.cx + 0.5, k.cy + 0.5].map(|v| v as f32);
-        }
-        let (k, l) = (&stage.camera, &shader.lights);
+        let k = viewport.sample_camera(area, samples);
+        let lens = [k.fx, k.fy, k.cx + 0.5, k.cy + 0.5].map(|v| v as f32);
+        let (k, l) = (&viewport.camera, &shader.lights);
         let around = [area.width.div_ceil(2), area.height.div_ceil(2)];
         Self {
             lens,
@@ -86,6 +84,9 @@ impl From<&Fabric> for FabricData {
     }
 }
 
+/// Flag of an owner seen from inside, above the garment's number.
+const INNER: u32 = 256;
+
 /// Bytes of the five storage buffers, in the order of their bindings.
 pub(super) fn geometry(surface: &Surface) -> [Vec<u8>; 5] {
     let points: Vec<[f32; 4]> = surface
@@ -97,7 +98,7 @@ pub(super) fn geometry(surface: &Surface) -> [Vec<u8>; 5] {
         .garment
         .iter()
         .zip(&surface.inner)
-        .map(|(g, i)| u32::from(*g) + if *i { 256 } else { 0 })
+        .map(|(g, i)| u32::from(*g) + u32::from(*i) * INNER)
         .collect();
     let fabrics: Vec<FabricData> = surface.fabrics.iter().map(FabricData::from).collect();
     [
@@ -110,6 +111,6 @@ pub(super) fn geometry(surface: &Surface) -> [Vec<u8>; 5] {
 }
 
 /// Bytes of the shadow image.
-pub(super) fn shadows(shadows: &Shadows) -> &[u8] {
+pub(super) fn shadow_texels(shadows: &ContactShadows) -> &[u8] {
     bytemuck::cast_slice(&shadows.around)
 }

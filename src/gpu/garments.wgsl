@@ -1,5 +1,5 @@
-// The garments on the graphics card: which face each sample sees, what a pixel's samples agree on, and the light.
-// The maths is that of composite::{render, shade, look, shadow}; a test holds both pictures against each other.
+// The garments on the graphics card: visibility of faces, coverage of pixels, and light.
+// The maths is that of composite::{coverage, shading, appearance, contact_shadow, blend}; a test compares the pictures.
 
 struct Scene {
     // Focal lengths and principal point in samples of the drawn area, the latter + 0.5 (framebuffer positions).
@@ -16,7 +16,7 @@ struct Scene {
     key: vec4f,
     // Ground, inside, contact, brightness.
     light: vec4f,
-    // Fold gap (metres), shadow depth (metres), least shadow, how much farther insides are drawn (metres).
+    // Fold gap (metres), shadow depth (metres), least shadow, displacement of inner sides (metres).
     limits: vec4f,
 }
 

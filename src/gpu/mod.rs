@@ -1,13 +1,17 @@
 //! wgpu twins of `raster` and `composite`, same inputs and outputs; the only module naming wgpu.
 //!
-//! The card draws and shades; patches of occluders are decided by the same code as in [`crate::composite`], from a
-//! depth image read back in between. On software adapters this is slower than [`crate::composite::render`]:
-//! [`choose`] says which to use.
+//! The card rasterises and shades; visibility is resolved by the code of [`crate::composite`] from a depth image read
+//! back in between. Software adapters are slower than [`crate::composite::render`]: [`choose`] selects the renderer.
 
+mod adapter;
 mod buffers;
-mod probe;
+mod choice;
+mod passes;
+mod pipelines;
+mod readback;
 mod renderer;
 mod targets;
 
-pub use probe::{AdapterReport, GpuError, Prefer, adapters, choose};
+pub use adapter::{AdapterReport, GpuError, adapters};
+pub use choice::{Prefer, choose};
 pub use renderer::Renderer;

@@ -1,4 +1,4 @@
-//! Textures and read-back buffers, grown when a garment needs more room and then kept.
+//! Textures and read-back buffers, grown when a larger area needs them and then kept.
 
 use wgpu::TextureFormat as Format;
 
@@ -23,6 +23,7 @@ pub(super) struct Targets {
 }
 
 impl Targets {
+    /// Targets for an area of `width × height` pixels, sizes rounded up.
     pub(super) fn new(device: &wgpu::Device, width: u32, height: u32, samples: u32) -> Self {
         use wgpu::TextureUsages as U;
         let size = [width, height].map(|s| s.div_ceil(ROUND) * ROUND);
@@ -71,6 +72,8 @@ impl Targets {
             picture_out: buffer("picture out", 4),
         }
     }
+
+    /// Large enough for an area, with the same samples a pixel.
     pub(super) fn fits(&self, width: u32, height: u32, samples: u32) -> bool {
         width <= self.size[0] && height <= self.size[1] && samples == self.samples
     }
@@ -81,12 +84,11 @@ pub(super) fn padded_row(width: u32, bytes: u32) -> u32 {
     (width * bytes).div_ceil(ROW_ALIGN) * ROW_ALIGN
 }
 
-/// Writes the upper left `width × height` texels.
+/// Writes the upper left `width × height` texels of `bytes` each.
 pub(super) fn write(
     queue: &wgpu::Queue,
     texture: &wgpu::Texture,
-    width: u32,
-    height: u32,
+    [width, height]: [u32; 2],
     bytes: u32,
     data: &[u8],
 ) {
@@ -106,13 +108,12 @@ pub(super) fn write(
     );
 }
 
-/// Copies the upper left `width × height` texels into a read-back buffer.
+/// Copies the upper left `width × height` texels of `bytes` each into a read-back buffer.
 pub(super) fn read(
     encoder: &mut wgpu::CommandEncoder,
     texture: &wgpu::Texture,
     buffer: &wgpu::Buffer,
-    width: u32,
-    height: u32,
+    [width, height]: [u32; 2],
     bytes: u32,
 ) {
     encoder.copy_texture_to_buffer(

@@ -10,7 +10,7 @@ use crate::body::measure::measure;
 use crate::body::{Pose, Template};
 use crate::camera::{Calibration, ColorImage, RgbdFrame};
 use crate::cloth::realtime;
-use crate::composite::{self, Look, RenderReport};
+use crate::composite::{self, Appearance, RenderReport};
 use crate::math::P3;
 use crate::tracking::{self, Status, TrackerConfig, TrackerModel, TrackerState};
 use std::sync::Arc;
@@ -35,7 +35,7 @@ pub struct Mirror {
 #[derive(Debug)]
 struct Worn {
     outfit: DressedOutfit,
-    looks: Vec<Look>,
+    appearances: Vec<Appearance>,
 }
 
 impl Mirror {
@@ -137,11 +137,14 @@ impl Mirror {
         };
         let outfit = DressedOutfit::put_on(&subject, sized, false).map_err(MirrorError::Dress)?;
         let garments = &outfit.model.outfit.garments;
-        let looks = garments
+        let appearances = garments
             .iter()
             .map(|g| library_appearance(&g.name))
             .collect();
-        Ok(Worn { outfit, looks })
+        Ok(Worn {
+            outfit,
+            appearances,
+        })
     }
 
     fn simulate(
@@ -169,10 +172,10 @@ impl Mirror {
         (self.garments).place(&camera_from_world, drawn.iter().map(Vec::as_slice));
         let surfaces = worn.iter().flat_map(|worn| {
             let meshes = worn.outfit.model.outfit.garments.iter();
-            meshes.zip(&worn.looks).map(|(mesh, look)| DrawnSurface {
+            meshes.zip(&worn.appearances).map(|(mesh, appearance)| DrawnSurface {
                 faces: &mesh.render.faces,
                 uv: &mesh.render.uv,
-                look,
+                appearance,
             })
         });
 

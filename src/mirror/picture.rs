@@ -2,7 +2,7 @@
 
 use crate::body::Template;
 use crate::cloth::realtime::{Config, RoomyBody};
-use crate::composite::{BodyView, GarmentView, Limbs, Look};
+use crate::composite::{Appearance, BodyView, GarmentView, Limbs};
 use crate::garment::library;
 use crate::math::{Camera, P3, Rigid, World};
 use crate::mesh::Face;
@@ -10,10 +10,10 @@ use crate::par::Par;
 use std::sync::Arc;
 
 /// Appearance of a garment of the library; of other names that of its first garment.
-pub fn library_appearance(garment: &str) -> Look {
-    Look {
+pub fn library_appearance(garment: &str) -> Appearance {
+    Appearance {
         base: library::dye(garment),
-        ..Look::default()
+        ..Appearance::default()
     }
 }
 
@@ -24,8 +24,8 @@ pub struct DrawnSurface<'a> {
     pub faces: &'a [Face],
     /// Texture coordinates, shape `[n]`.
     pub uv: &'a [[f32; 2]],
-    /// Fabric.
-    pub look: &'a Look,
+    /// Colour and surface of the fabric.
+    pub appearance: &'a Appearance,
 }
 
 /// Garment vertices in the camera frame, in buffers that are kept from frame to frame.
@@ -58,7 +58,7 @@ impl CameraGarments {
                 faces: surface.faces,
                 uv: surface.uv,
                 normals: &[],
-                look: surface.look,
+                appearance: surface.appearance,
             })
             .collect()
     }

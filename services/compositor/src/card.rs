@@ -1,4 +1,4 @@
-//! The graphics card, if a real one is there: shared by all try-ons, the processor takes over when it fails.
+//! The graphics card shared by all try-ons; the processor takes over without one or when it fails.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -7,7 +7,7 @@ use tryon::composite::{Input, Model, RenderError, RenderReport, State, Workspace
 use tryon::gpu::{GpuError, Prefer, Renderer, choose};
 use tryon_kit::config::RendererChoice;
 
-/// Where pictures are drawn. Clones share the card; the last one to go waits for the search to end.
+/// Renderer of all pictures. Clones share the card; the last one dropped waits for the end of the search.
 #[derive(Clone, Default)]
 pub(crate) struct Card {
     slot: Slot,
@@ -16,8 +16,8 @@ pub(crate) struct Card {
 
 type Slot = Arc<Mutex<Option<Renderer>>>;
 
-/// The search for a card. A process that exits while a driver is being loaded runs the driver's destructors beside its
-/// constructors, and aborts (LLVM: "Option registered more than once").
+/// Thread that searches for a card, joined on drop. A process that exits while a driver loads runs the driver's
+/// destructors beside its constructors, and aborts (LLVM: "Option registered more than once").
 struct Search(Option<JoinHandle<()>>);
 
 impl Drop for Search {
@@ -57,7 +57,7 @@ impl Card {
         Ok(card)
     }
 
-    /// One picture. A card that fails is given up, and the processor draws this and all later pictures.
+    /// Renders one picture. After a failure of the card the processor renders this and all later pictures.
     pub(crate) fn draw(
         &self,
         model: &Model,
@@ -79,7 +79,7 @@ impl Card {
                 done => return done,
             }
         }
-        // Processors draw side by side; only the card is one at a time.
+        // Only the card is exclusive: processors render side by side.
         drop(slot);
         render(model, state, input, work)
     }
@@ -107,7 +107,7 @@ mod tests {
     use std::sync::atomic::{AtomicBool, Ordering};
 
     #[test]
-    fn a_process_does_not_end_before_its_search_for_a_card() {
+    fn the_last_clone_waits_for_the_search() {
         let ended = Arc::new(AtomicBool::new(false));
         let seen = ended.clone();
         let (never, wait) = std::sync::mpsc::channel::<()>();

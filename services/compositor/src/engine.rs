@@ -1,20 +1,18 @@
-//! Rendering and encoding: everything of a try-on that computes.
+//! Rendering and encoding of one try-on's pictures.
 
 use crate::card::Card;
-use crate::scene::Body;
+use crate::join_buffer::ReportedBody;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
-use tryon::body::{BodyShape, BoneTransforms, RestBody, Template, skin};
 use tryon::camera::ColorImage;
-use tryon::cloth::realtime::{self, RoomyBody};
 use tryon::composite::{
-    BodyView, Config, Framing, GarmentView, Input, Limbs, Look, Model, Print, State, Workspace,
+    Appearance, Config, Framing, Input, Model, Print, RenderReport, State, Workspace,
 };
 use tryon::dressing::FIT_COLORS;
 use tryon::formats::image::{encode_jpeg, encode_png_rgb};
-use tryon::math::{Camera, P3, Rigid, World};
-use tryon::par::Par;
+use tryon::math::{Camera, Rigid, World};
+use tryon::mirror::{CameraGarments, DrawnBody, DrawnSurface, PosedBody};
 use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::body::pose_from_wire;
@@ -32,22 +30,22 @@ pub(crate) struct Placed {
     pub(crate) revision: u64,
 }
 
-/// How a picture leaves.
+/// Encoding of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Encoding {
     Jpeg(u8),
     Png,
 }
 
-/// What to draw, and for whom.
+/// Pictures to render of one exposure.
 #[derive(Clone)]
 pub(crate) struct Job {
     pub(crate) exposure: Arc<Exposure>,
     /// Absent for the plain camera picture.
     pub(crate) placed: Option<Arc<Placed>>,
-    pub(crate) body: Option<Body>,
+    pub(crate) body: Option<ReportedBody>,
     pub(crate) formats: Vec<(Option<(u32, u32)>, Encoding)>,
-    /// Draw garments in the colours of their fit, as far as it is known: a byte for each simulated vertex.
+    /// Tightness byte of each simulated vertex by garment: draws garments in the colours of their fit.
     pub(crate) fit: Option<Arc<[bytes::Bytes]>>,
 }
 
@@ -60,7 +58,7 @@ pub(crate) struct Encoded {
     pub(crate) bytes: bytes::Bytes,
 }
 
-/// What came of a job.
+/// Result of a job.
 pub(crate) struct Drawn {
     pub(crate) pictures: Vec<Encoded>,
     pub(crate) stages: Vec<StageTime>,
@@ -80,15 +78,13 @@ pub(crate) struct Engine {
     model: Model,
     state: State,
     work: Workspace,
-    limbs: Limbs,
-    rest: RestBody,
-    rest_of: Option<Arc<BodyShape>>,
-    bones: BoneTransforms,
-    posed: Vec<P3>,
-    /// Where cloth lies between parts of the body, and for which template; `None` inside where it has faults.
-    roomy: Option<(Arc<Template>, Option<RoomyBody>)>,
-    garments: Vec<Vec<P3>>,
+    posed: PosedBody,
+    body: Option<DrawnBody>,
+    garments: CameraGarments,
 }
+
+/// Pictures by their size.
+type Sizes = Vec<(Option<(u32, u32)>, ColorImage)>;
 
 impl Engine {
     pub(crate) fn new(card: Card) -> Self {
@@ -104,65 +100,36 @@ impl Engine {
         }
     }
 
-    /// Draws each size once and encodes each format once.
+    /// Renders each size once and encodes each format once.
     pub(crate) fn draw(&mut self, job: &Job) -> Result<Drawn, String> {
         let start = Instant::now();
-        let has_body = job.placed.is_some() && job.body.as_ref().is_some_and(|b| self.pose(b));
-        let mut stages = job
-            .placed
-            .as_ref()
-            .map_or_else(|| job.exposure.stages.clone(), |p| p.stages.clone());
-        let placed: &[(Arc<WornGarment>, Vec<P3>)] =
-            job.placed.as_ref().map_or(&[], |p| &p.garments);
-        let scales: Vec<Option<Vec<[f32; 2]>>> = placed
-            .iter()
-            .enumerate()
-            .map(|(k, (w, _))| fit_scale(w, job.fit.as_ref()?.get(k)?))
-            .collect();
-        let of = |(scale, (w, _)): (&Option<_>, &(Arc<WornGarment>, _))| {
-            scale.as_ref().map_or(look(&w.look), |_| fit_look())
+        let mut stages = match &job.placed {
+            Some(placed) => placed.stages.clone(),
+            None => job.exposure.stages.clone(),
         };
-        let looks: Vec<Look> = scales.iter().zip(placed).map(of).collect();
-        self.garments.resize_with(placed.len(), Vec::new);
+        let images = self.render(job)?;
+        stages.push(stage("compositor.render", start));
+        let begun = Instant::now();
+        let pictures = encode(job, &images)?;
+        stages.push(stage("compositor.encode", begun));
+        Ok(Drawn { pictures, stages })
+    }
+
+    fn render(&mut self, job: &Job) -> Result<Sizes, String> {
+        let reported = job.body.as_ref().filter(|_| job.placed.is_some());
+        let has_body = reported.is_some_and(|b| self.pose(b));
+        let worn = worn_garments(job);
         if let Some(p) = &job.placed {
-            let camera_from_world = p.world_from_camera.inverse();
-            for ((_, world), out) in placed.iter().zip(&mut self.garments) {
-                camera_from_world.points_f32(world, out);
-            }
+            let world = p.garments.iter().map(|(_, world)| world.as_slice());
+            self.garments.place(&p.world_from_camera.inverse(), world);
         }
-        let views: Vec<GarmentView<'_>> =
-            (placed.iter().zip(&scales).zip(&self.garments).zip(&looks))
-                .map(|((((w, _), scale), vertices), look)| {
-                    let uv = scale.as_ref().unwrap_or(&w.uvs);
-                    GarmentView {
-                        vertices,
-                        faces: &w.faces,
-                        uv,
-                        normals: &[],
-                        look,
-                    }
-                })
-                .collect();
-        let faces = job
-            .body
-            .as_ref()
-            .map_or(&[][..], |b| b.template.mesh().faces());
-        // Who wears nothing here needs no room for it.
-        let roomy = self
-            .roomy
-            .as_mut()
-            .and_then(|r| r.1.as_mut())
-            .filter(|_| has_body && !views.is_empty());
-        let vertices = roomy.map_or(&self.posed[..], |r| r.make_room(Par::Rayon, &self.posed));
-        let body = has_body.then_some(BodyView {
-            vertices,
-            faces,
-            limbs: &self.limbs,
-        });
-        let (mut pictures, mut drawn) =
-            (Vec::new(), Vec::<(Option<(u32, u32)>, ColorImage)>::new());
+        let views = self.garments.views(worn.iter().map(Worn::surface));
+        let is_dressed = !views.is_empty();
+        let body = self.body.as_mut().filter(|_| has_body);
+        let body = body.map(|b| b.view(self.posed.vertices(), is_dressed));
+        let mut images = Sizes::new();
         for &(size, _) in &job.formats {
-            if drawn.iter().any(|(s, _)| *s == size) {
+            if images.iter().any(|(s, _)| *s == size) {
                 continue;
             }
             let input = Input {
@@ -176,78 +143,102 @@ impl Engine {
                 .card
                 .draw(&self.model, &mut self.state, &input, &mut self.work)
                 .map_err(|e| e.to_string())?;
-            record_skipped(
-                "compositor",
-                [
-                    ("tiles", report.tiles_skipped),
-                    ("hidden faces", report.faces_hidden),
-                    ("hidden garments", report.garments_hidden),
-                    ("normals", report.normals_skipped),
-                    ("hands away from garments", report.hands.skipped),
-                ],
-            );
-            drawn.push((size, image));
+            record(&report);
+            images.push((size, image));
         }
-        stages.push(stage("compositor.render", start));
-        let begun = Instant::now();
-        for &(size, encoding) in &job.formats {
-            let Some((_, image)) = drawn.iter().find(|(s, _)| *s == size) else {
-                continue;
-            };
-            let bytes = match encoding {
-                Encoding::Jpeg(quality) => encode_jpeg(image, quality),
-                Encoding::Png => encode_png_rgb(image, Path::new("snapshot.png")),
-            };
-            let bytes = bytes.map_err(|e| e.to_string())?.into();
-            pictures.push(Encoded {
-                size,
-                encoding,
-                width: image.width(),
-                height: image.height(),
-                bytes,
-            });
-        }
-        stages.push(stage("compositor.encode", begun));
-        Ok(Drawn { pictures, stages })
+        Ok(images)
     }
 
     /// Poses the body; `false` when its numbers do not fit, which costs only the finer occlusion.
-    fn pose(&mut self, b: &Body) -> bool {
-        let Some(Ok(pose)) = b
-            .state
-            .pose
-            .as_ref()
-            .map(|p| pose_from_wire(p, b.template.skeleton().dofs()))
-        else {
+    fn pose(&mut self, b: &ReportedBody) -> bool {
+        let Some(wire) = &b.state.pose else {
             return false;
         };
-        if !self
-            .rest_of
-            .as_ref()
-            .is_some_and(|s| Arc::ptr_eq(s, &b.shape))
-        {
-            self.rest = b.template.personalise(&b.shape);
-            self.rest_of = Some(b.shape.clone());
-            self.limbs = Limbs::of(&b.template);
+        let Ok(pose) = pose_from_wire(wire, b.template.skeleton().dofs()) else {
+            return false;
+        };
+        let is_known = |d: &DrawnBody| Arc::ptr_eq(d.template(), &b.template);
+        if !self.body.as_ref().is_some_and(is_known) {
+            self.body = Some(DrawnBody::new(b.template.clone()));
+            self.posed = PosedBody::default();
         }
-        if !self
-            .roomy
-            .as_ref()
-            .is_some_and(|(t, _)| Arc::ptr_eq(t, &b.template))
-        {
-            let made = RoomyBody::new(&b.template, &realtime::Config::tracked()).ok();
-            self.roomy = Some((b.template.clone(), made));
-        }
-        pose.bones(b.template.skeleton(), &self.rest, &mut self.bones);
-        skin(
-            Par::Rayon,
-            &self.rest.vertices,
-            b.template.weights(),
-            &self.bones,
-            &mut self.posed,
-        );
+        self.posed.pose(&b.template, &b.shape, &pose);
         true
     }
+}
+
+/// Appearance of one garment of a job.
+struct Worn<'a> {
+    garment: &'a WornGarment,
+    /// Texture coordinates of the fit map, if it is drawn.
+    fit: Option<Vec<[f32; 2]>>,
+    appearance: Appearance,
+}
+
+impl Worn<'_> {
+    fn surface(&self) -> DrawnSurface<'_> {
+        DrawnSurface {
+            faces: &self.garment.faces,
+            uv: self.fit.as_ref().unwrap_or(&self.garment.uvs),
+            appearance: &self.appearance,
+        }
+    }
+}
+
+/// Garments of `job`, innermost first.
+fn worn_garments(job: &Job) -> Vec<Worn<'_>> {
+    let placed = job.placed.iter().flat_map(|p| &p.garments);
+    let fits = |k: usize| job.fit.as_ref()?.get(k);
+    placed
+        .enumerate()
+        .map(|(k, (garment, _))| {
+            let fit = fits(k).and_then(|bytes| fit_scale(garment, bytes));
+            let appearance = match fit {
+                Some(_) => fit_appearance(),
+                None => appearance(&garment.look),
+            };
+            Worn {
+                garment,
+                fit,
+                appearance,
+            }
+        })
+        .collect()
+}
+
+fn record(report: &RenderReport) {
+    record_skipped(
+        "compositor",
+        [
+            ("tiles", report.tiles_skipped),
+            ("hidden faces", report.faces_hidden),
+            ("hidden garments", report.garments_hidden),
+            ("normals", report.normals_skipped),
+            ("hands away from garments", report.hands.skipped),
+        ],
+    );
+}
+
+/// Encodes every format of `job` from the image of its size.
+fn encode(job: &Job, images: &Sizes) -> Result<Vec<Encoded>, String> {
+    let mut pictures = Vec::new();
+    for &(size, encoding) in &job.formats {
+        let Some((_, image)) = images.iter().find(|(s, _)| *s == size) else {
+            continue;
+        };
+        let bytes = match encoding {
+            Encoding::Jpeg(quality) => encode_jpeg(image, quality),
+            Encoding::Png => encode_png_rgb(image, Path::new("snapshot.png")),
+        };
+        pictures.push(Encoded {
+            size,
+            encoding,
+            width: image.width(),
+            height: image.height(),
+            bytes: bytes.map_err(|e| e.to_string())?.into(),
+        });
+    }
+    Ok(pictures)
 }
 
 /// Tightness of each drawn vertex as a texture coordinate; `None` when the bytes are those of another garment.
@@ -260,12 +251,12 @@ fn fit_scale(w: &WornGarment, bytes: &[u8]) -> Option<Vec<[f32; 2]>> {
     })
 }
 
-fn fit_look() -> Look {
+fn fit_appearance() -> Appearance {
     let [low, base, high] = FIT_COLORS;
-    Look {
+    Appearance {
         base,
         pattern: Print::Scale { low, high },
-        ..Look::default()
+        ..Appearance::default()
     }
 }
 
@@ -274,7 +265,7 @@ fn rgb(c: u32) -> [u8; 3] {
     [r, g, b]
 }
 
-fn look(l: &GarmentLook) -> Look {
+fn appearance(l: &GarmentLook) -> Appearance {
     let stripes = l.stripe_width > 0.0 && l.accent_rgb != l.color_rgb;
     let pattern = if stripes {
         Print::Stripes {
@@ -284,9 +275,9 @@ fn look(l: &GarmentLook) -> Look {
     } else {
         Print::Solid
     };
-    Look {
+    Appearance {
         base: rgb(l.color_rgb),
         pattern,
-        ..Look::default()
+        ..Appearance::default()
     }
 }

@@ -1,15 +1,15 @@
 //! Compositor: pictures for kiosks and pages, which connect to this service only.
 //!
 //! One task owns one try-on (`try_on`): it opens the sessions behind it and joins frames, bodies and garments by epoch
-//! and sequence (`scene`). It renders on the compute pool (`engine`, on a `card` where there is one) and queues pictures
+//! and sequence (`join_buffer`). It renders on the compute pool (`engine`, on a `card` where there is one) and queues pictures
 //! for every viewer (`viewer`). The states of a try-on are the table of `tryon::session`. gRPC, gRPC-web and the page
 //! share one port.
 
 mod card;
 mod engine;
+mod join_buffer;
 mod life;
 pub mod page;
-mod scene;
 mod service;
 mod try_on;
 mod upstream;

@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use std::path::Path;
 use std::process::ExitCode;
 use tryon::camera::RgbdFrame;
-use tryon::composite::{GarmentView, Input, Look, Model, State, Workspace, render};
+use tryon::composite::{Appearance, GarmentView, Input, Model, State, Workspace, render};
 use tryon::formats::gltf::read_glb;
 use tryon::formats::image::{read_color, read_png_depth, write_png_rgb};
 use tryon::formats::obj::read_obj;
@@ -19,7 +19,7 @@ struct Loaded {
     vertices: Vec<P3>,
     uv: Vec<[f32; 2]>,
     faces: Vec<Face>,
-    look: Look,
+    appearance: Appearance,
 }
 
 /// Runs the command.
@@ -49,7 +49,7 @@ pub(crate) fn run(args: &CompositeArgs) -> Result<ExitCode> {
             faces: &g.faces,
             uv: &g.uv,
             normals: &[],
-            look: &g.look,
+            appearance: &g.appearance,
         })
         .collect();
     let input = Input {
@@ -82,7 +82,7 @@ fn load(path: &Path) -> Result<Loaded> {
         .file_stem()
         .map(|s| s.to_string_lossy().into_owned())
         .unwrap_or_default();
-    let look = library_appearance(&name);
+    let appearance = library_appearance(&name);
     match path.extension().and_then(|e| e.to_str()) {
         Some("obj") => {
             let (vertices, uv, faces, _) = read_obj(path)?.unwelded();
@@ -90,7 +90,7 @@ fn load(path: &Path) -> Result<Loaded> {
                 vertices,
                 uv,
                 faces,
-                look,
+                appearance,
             })
         }
         Some("glb" | "gltf") => {
@@ -99,7 +99,7 @@ fn load(path: &Path) -> Result<Loaded> {
                 vertices: mesh.mesh.vertices().to_vec(),
                 uv: mesh.uv,
                 faces: mesh.mesh.faces().to_vec(),
-                look,
+                appearance,
             })
         }
         _ => bail!("{}: a garment is an .obj or a .glb file", path.display()),

@@ -4,8 +4,8 @@ use super::drawing::{Done, Drawing};
 use super::handle::{Answer, Command, Setup};
 use super::lifecycle::Lifecycle;
 use crate::engine::{Drawn, Encoded, Encoding, Job, Placed};
+use crate::join_buffer::{JoinBuffer, ReportedBody, not_after};
 use crate::life;
-use crate::scene::{Body, Scene, not_after};
 use crate::upstream;
 use crate::viewer::Viewer;
 use std::sync::Arc;
@@ -60,7 +60,7 @@ pub(super) struct Task {
     setup: Setup,
     life: Lifecycle,
     drawing: Drawing,
-    scene: Scene,
+    join: JoinBuffer,
     fit: OutfitFit,
     viewers: Vec<Viewer>,
     /// Last message to the viewers.
@@ -83,7 +83,7 @@ impl Task {
             drawing: Drawing::new(setup.card.clone(), setup.ctx.pool.clone(), done),
             setup,
             life,
-            scene: Scene::default(),
+            join: JoinBuffer::default(),
             fit: OutfitFit::default(),
             viewers: Vec::new(),
             said: now,
@@ -182,7 +182,7 @@ impl Task {
 
     fn on_frame(&mut self, e: Arc<Exposure>) {
         self.life.on_frame();
-        self.scene.frame(e.clone());
+        self.join.push_frame(e.clone());
         // While live, pictures wait for their garments; otherwise the plain picture is shown at once.
         if !self.life.state().shows_garments() {
             self.draw(Job {
@@ -209,7 +209,7 @@ impl Task {
             TrackingStatus::Calibrating | TrackingStatus::Tracking => {
                 self.life.apply(Event::PersonFound);
                 if let Some(shape) = shape {
-                    self.scene.body(Body {
+                    self.join.push_body(ReportedBody {
                         state: Arc::new(state),
                         shape,
                         template,
@@ -251,7 +251,7 @@ impl Task {
     }
 
     fn on_placed(&mut self, id: &FrameId, placed: Arc<Placed>) {
-        let Some((arrived, exposure)) = self.scene.find(id) else {
+        let Some((arrived, exposure)) = self.join.find(id) else {
             metrics::counter!("tryon_compositor_unmatched").increment(1);
             return;
         };
@@ -266,7 +266,7 @@ impl Task {
             self.draw(Job {
                 exposure,
                 placed: Some(placed),
-                body: self.scene.find_body(id),
+                body: self.join.find_body(id),
                 formats: Vec::new(),
                 fit,
             });

@@ -1,15 +1,21 @@
-//! Soft shadows between garments and what they touch: blurred coverage at half resolution.
+//! Contact shadows between garments and what they touch: blurred coverage at half resolution.
 
-use super::surface::Area;
+use super::area::Area;
 
-/// What lies this far behind a garment's edge still gets its shadow, metres.
+/// Reach of a contact shadow behind a garment's edge, metres.
 pub(crate) const SHADOW_DEPTH: f32 = 0.10;
-/// Less garment around than this casts no visible shadow (one grey level at full contact).
+/// Share of [`SHADOW_DEPTH`] by which noise may put a shadowed pixel in front of the garment.
+const SHADOW_FRONT: f32 = 0.2;
+/// Share of one pixel in a cell of the half-resolution image.
+const QUARTER: f32 = 0.25;
+/// Largest radius of the blur, cells.
+const MAX_RADIUS: f32 = 16.0;
+/// Garment share below which no shadow is visible (one grey level at full contact).
 pub(crate) const NO_SHADOW: f32 = 4e-3;
 
-/// Blurred neighbourhood of every second pixel both ways.
+/// Blurred coverage of every second pixel both ways.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Shadows {
+pub(crate) struct ContactShadows {
     pub(crate) width: usize,
     pub(crate) height: usize,
     /// Garment coverage, depth times that, occluder coverage, unused; shape `[height, width]`.
@@ -17,9 +23,9 @@ pub(crate) struct Shadows {
     scratch: Vec<[f32; 4]>,
 }
 
-/// What is around a pixel.
+/// Blurred coverage around one pixel.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Around {
+pub(crate) struct ShadowSample {
     /// Share that is garment.
     pub(crate) garment: f32,
     /// Depth of the garment times that share.
@@ -28,7 +34,7 @@ pub(crate) struct Around {
     pub(crate) front: f32,
 }
 
-impl Around {
+impl ShadowSample {
     /// Light left on a captured pixel at depth `z` (metres, 0 = unknown) that is in front of a garment by `alpha`.
     #[inline]
     pub(crate) fn on_captured(&self, contact: f32, z: f32, alpha: f32) -> f32 {
@@ -36,7 +42,7 @@ impl Around {
             return 1.0;
         }
         let gap = z - self.depth / self.garment;
-        if !(-0.2 * SHADOW_DEPTH..=SHADOW_DEPTH).contains(&gap) {
+        if !(-SHADOW_FRONT * SHADOW_DEPTH..=SHADOW_DEPTH).contains(&gap) {
             return 1.0;
         }
         let fade = 1.0 - (gap / SHADOW_DEPTH).max(0.0);
@@ -44,7 +50,7 @@ impl Around {
     }
 }
 
-impl Shadows {
+impl ContactShadows {
     /// From coverage and depth of each pixel of `area`; `reach` in pixels.
     pub(crate) fn cast(
         &mut self,
@@ -60,50 +66,45 @@ impl Shadows {
         for (i, ([cover, depth], a)) in pixels.zip(alpha).enumerate() {
             if cover > 0.0 {
                 let slot = &mut self.around[i / width / 2 * self.width + i % width / 2];
-                let seen = 0.25 * cover * (1.0 - a);
-                slot[0] += seen;
-                slot[1] += seen * depth;
-                slot[2] += 0.25 * a;
+                let visible = QUARTER * cover * (1.0 - a);
+                slot[0] += visible;
+                slot[1] += visible * depth;
+                slot[2] += QUARTER * a;
             }
         }
-        let radius = (0.25 * reach).round().clamp(1.0, 16.0) as usize;
+        let radius = (0.25 * reach).round().clamp(1.0, MAX_RADIUS) as usize;
         for _ in 0..2 {
             blur(&mut self.around, &mut self.scratch, self.width, radius);
         }
     }
-    /// No garment near a pixel of the area.
+
+    /// No garment casts a shadow on a pixel of the area.
     #[inline]
     pub(crate) fn is_far(&self, x: usize, y: usize) -> bool {
         self.around[y / 2 * self.width + x / 2][0] < NO_SHADOW
     }
+
+    /// Two cells and their weights along one axis. Odd pixels lie a quarter past their cell's centre, even ones before it.
+    #[inline]
+    fn taps(at: usize, cells: usize) -> [(usize, f32); 2] {
+        let first = (at / 2 + at % 2).saturating_sub(1);
+        let second = if at % 2 == 1 { 0.25 } else { 0.75 };
+        [(first, 1.0 - second), ((first + 1).min(cells - 1), second)]
+    }
+
     /// Bilinear at a pixel of the area.
     #[inline]
-    pub(crate) fn at(&self, x: usize, y: usize) -> Around {
-        // Odd pixels lie a quarter past their cell's centre, even ones a quarter before it.
-        let (x0, y0) = (
-            (x / 2 + x % 2).saturating_sub(1),
-            (y / 2 + y % 2).saturating_sub(1),
-        );
-        let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(self.height - 1));
-        let (wx, wy) = (
-            if x % 2 == 1 { 0.25 } else { 0.75 },
-            if y % 2 == 1 { 0.25 } else { 0.75 },
-        );
-        let (row0, row1) = (y0 * self.width, y1 * self.width);
-        let corners = [
-            (&self.around[row0 + x0], (1.0 - wx) * (1.0 - wy)),
-            (&self.around[row0 + x1], wx * (1.0 - wy)),
-            (&self.around[row1 + x0], (1.0 - wx) * wy),
-            (&self.around[row1 + x1], wx * wy),
-        ];
+    pub(crate) fn at(&self, x: usize, y: usize) -> ShadowSample {
+        let (x, y) = (Self::taps(x, self.width), Self::taps(y, self.height));
         let mut sum = [0.0f32; 4];
-        for (v, w) in corners {
-            for k in 0..4 {
-                sum[k] += v[k] * w;
+        for (row, wy) in y {
+            for (column, wx) in x {
+                let v = &self.around[row * self.width + column];
+                (0..4).for_each(|k| sum[k] += v[k] * (wx * wy));
             }
         }
         let [garment, depth, front, _] = sum;
-        Around {
+        ShadowSample {
             garment,
             depth,
             front,
@@ -111,10 +112,17 @@ impl Shadows {
     }
 }
 
+/// Adds `sign · v` to a running sum.
+#[inline]
+fn add(sum: &mut [f32; 4], v: &[f32; 4], sign: f32) {
+    (0..4).for_each(|k| sum[k] += sign * v[k]);
+}
+
 /// Box blur of side 2·radius + 1, both ways; zero outside.
 fn blur(image: &mut [[f32; 4]], scratch: &mut Vec<[f32; 4]>, width: usize, radius: usize) {
     let scale = 1.0 / (2 * radius + 1) as f32;
-    let add = |s: &mut [f32; 4], v: &[f32; 4], sign: f32| (0..4).for_each(|k| s[k] += sign * v[k]);
+    // Running sums leave a negative rounding residue in empty places.
+    let mean = |sum: &[f32; 4]| sum.map(|s| (s * scale).max(0.0));
     scratch.clear();
     scratch.resize(image.len(), [0.0; 4]);
     for (row, out) in image.chunks(width).zip(scratch.chunks_mut(width)) {
@@ -124,8 +132,7 @@ fn blur(image: &mut [[f32; 4]], scratch: &mut Vec<[f32; 4]>, width: usize, radiu
             if let Some(v) = row.get(x + radius) {
                 add(&mut sum, v, 1.0);
             }
-            // Running sums leave a rounding residue where nothing is.
-            out[x] = sum.map(|s| (s * scale).max(0.0));
+            out[x] = mean(&sum);
             if x >= radius {
                 add(&mut sum, &row[x - radius], -1.0);
             }
@@ -133,25 +140,18 @@ fn blur(image: &mut [[f32; 4]], scratch: &mut Vec<[f32; 4]>, width: usize, radiu
     }
     let height = image.len() / width;
     let mut sums = vec![[0.0; 4]; width];
-    let row = |y: usize| &scratch[y * width..(y + 1) * width];
-    for y in 0..radius.min(height) {
-        sums.iter_mut()
-            .zip(row(y))
-            .for_each(|(s, v)| add(s, v, 1.0));
-    }
-    for y in 0..height {
+    let add_row = |sums: &mut [[f32; 4]], y: usize, sign: f32| {
+        let row = &scratch[y * width..(y + 1) * width];
+        sums.iter_mut().zip(row).for_each(|(s, v)| add(s, v, sign));
+    };
+    (0..radius.min(height)).for_each(|y| add_row(&mut sums, y, 1.0));
+    for (y, out) in image.chunks_mut(width).enumerate() {
         if y + radius < height {
-            sums.iter_mut()
-                .zip(row(y + radius))
-                .for_each(|(s, v)| add(s, v, 1.0));
+            add_row(&mut sums, y + radius, 1.0);
         }
-        for (o, s) in image[y * width..(y + 1) * width].iter_mut().zip(&sums) {
-            *o = s.map(|s| (s * scale).max(0.0));
-        }
+        out.iter_mut().zip(&sums).for_each(|(o, s)| *o = mean(s));
         if y >= radius {
-            sums.iter_mut()
-                .zip(row(y - radius))
-                .for_each(|(s, v)| add(s, v, -1.0));
+            add_row(&mut sums, y - radius, -1.0);
         }
     }
 }
@@ -161,7 +161,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_running_blur_is_the_obvious_one() {
+    fn running_blur_equals_direct_sums() {
         let (w, h, r) = (13usize, 9usize, 3usize);
         let image: Vec<[f32; 4]> = (0..w * h)
             .map(|i| [(i * 7 % 11) as f32, 1.0, (i % 3) as f32, 0.0])

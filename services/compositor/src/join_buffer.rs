@@ -1,4 +1,4 @@
-//! The newest frames and bodies, so that garments and the frame they were computed for meet.
+//! Buffer of the newest frames and bodies, joined with garments by frame id.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -7,13 +7,12 @@ use tryon::body::{BodyShape, Template};
 use tryon_kit::frames::Exposure;
 use tryon_proto::v1::{BodyState, FrameId};
 
-/// Frames kept: half a second at 30 a second, 25 MB at 640×480. Garments are later than that only when they count as
-/// late anyway.
+/// Frames kept: half a second at 30 Hz, 25 MB at 640×480. Garments that arrive later count as late anyway.
 const FRAMES: usize = 16;
 
 /// A body as it was reported.
 #[derive(Clone)]
-pub(crate) struct Body {
+pub(crate) struct ReportedBody {
     pub(crate) state: Arc<BodyState>,
     pub(crate) shape: Arc<BodyShape>,
     pub(crate) template: Arc<Template>,
@@ -29,26 +28,30 @@ pub(crate) fn not_after(a: &FrameId, b: &FrameId) -> bool {
     a.epoch == b.epoch && a.sequence <= b.sequence
 }
 
-/// What is waiting to be joined.
+/// Frames and bodies waiting for their garments.
 #[derive(Default)]
-pub(crate) struct Scene {
+pub(crate) struct JoinBuffer {
     frames: VecDeque<(Instant, Arc<Exposure>)>,
-    bodies: VecDeque<Body>,
+    bodies: VecDeque<ReportedBody>,
 }
 
-impl Scene {
-    pub(crate) fn frame(&mut self, e: Arc<Exposure>) {
+impl JoinBuffer {
+    /// Adds a frame, dropping the oldest.
+    pub(crate) fn push_frame(&mut self, e: Arc<Exposure>) {
         if self.frames.len() == FRAMES {
             self.frames.pop_front();
         }
         self.frames.push_back((Instant::now(), e));
     }
-    pub(crate) fn body(&mut self, b: Body) {
+
+    /// Adds a body, dropping the oldest.
+    pub(crate) fn push_body(&mut self, b: ReportedBody) {
         if self.bodies.len() == FRAMES {
             self.bodies.pop_front();
         }
         self.bodies.push_back(b);
     }
+
     /// The exposure of that id and when it arrived.
     pub(crate) fn find(&self, id: &FrameId) -> Option<(Instant, Arc<Exposure>)> {
         self.frames
@@ -57,8 +60,9 @@ impl Scene {
             .find(|(_, e)| same(&e.id, id))
             .cloned()
     }
+
     /// The body measured from that exposure.
-    pub(crate) fn find_body(&self, id: &FrameId) -> Option<Body> {
+    pub(crate) fn find_body(&self, id: &FrameId) -> Option<ReportedBody> {
         self.bodies
             .iter()
             .rev()

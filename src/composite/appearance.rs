@@ -1,13 +1,13 @@
-//! What a fabric looks like.
+//! Colour and pattern of fabrics, in sRGB and linear light.
 
 use serde::{Deserialize, Serialize};
 
 /// Colour and surface of a garment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Look {
+pub struct Appearance {
     /// Base colour, 8-bit sRGB.
     pub base: [u8; 3],
-    /// What is printed, woven or knitted into it.
+    /// Printed, woven or knitted pattern.
     pub pattern: Print,
     /// 0 = satin, 1 = felt.
     pub roughness: f32,
@@ -34,7 +34,7 @@ pub enum Print {
         /// Side of a repeat, metres.
         period: f32,
     },
-    /// Columns of V-shaped stitches; visible only as near as stitches can be seen.
+    /// Columns of V-shaped stitches; drawn only where a stitch spans two pixels.
     Knit {
         /// Width of a stitch, metres.
         period: f32,
@@ -48,7 +48,7 @@ pub enum Print {
     },
 }
 
-impl Default for Look {
+impl Default for Appearance {
     fn default() -> Self {
         Self {
             base: [52, 92, 150],
@@ -69,7 +69,10 @@ pub(crate) fn linear(c: u8) -> f32 {
     }
 }
 
-/// Linear light to sRGB, 0 to 255, by table: 4096 steps leave less than half a byte of error above black.
+/// Steps of the sRGB table: leave less than half a byte of error above black.
+const SRGB_STEPS: usize = 4096;
+
+/// Linear light to sRGB, 0 to 255, by table.
 #[derive(Clone, Debug)]
 pub(crate) struct ToSrgb(Vec<f32>);
 
@@ -85,8 +88,8 @@ impl Default for ToSrgb {
         };
         // Indexed by the square root of the light, so that dark tones get as many steps as bright ones.
         Self(
-            (0..=4096)
-                .map(|i| encode((i as f32 / 4096.0).powi(2)))
+            (0..=SRGB_STEPS)
+                .map(|i| encode((i as f32 / SRGB_STEPS as f32).powi(2)))
                 .collect(),
         )
     }
@@ -94,11 +97,11 @@ impl Default for ToSrgb {
 
 impl ToSrgb {
     pub(crate) fn get(&self, light: f32) -> f32 {
-        self.0[(light.clamp(0.0, 1.0).sqrt() * 4096.0 + 0.5) as usize]
+        self.0[(light.clamp(0.0, 1.0).sqrt() * SRGB_STEPS as f32 + 0.5) as usize]
     }
 }
 
-/// A look ready for the inner loop.
+/// An appearance in linear light, for the inner loop.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fabric {
     pub(crate) base: [f32; 3],
@@ -110,7 +113,7 @@ pub(crate) struct Fabric {
     pub(crate) metres_per_uv: f32,
 }
 
-/// Share of a square wave (half on) seen by a pixel of `width` periods centred at `x` periods.
+/// Mean of a square wave (half on) over a pixel of `width` periods centred at `x` periods.
 fn square_wave(x: f32, width: f32) -> f32 {
     // Integral of the wave from 0: on during the first half of each period.
     let integral = |x: f32| x.floor() * 0.5 + (x - x.floor()).min(0.5);
@@ -118,24 +121,38 @@ fn square_wave(x: f32, width: f32) -> f32 {
     (integral(x + 0.5 * w) - integral(x - 0.5 * w)) / w
 }
 
+/// Height of a stitch over its width.
+const STITCH_HEIGHT: f32 = 0.7;
+/// Light lost between the ridges of stitches, and along the wale between their columns.
+const GROOVE: [f32; 2] = [0.35, 0.2];
+
+/// Brightness of knitwear at (`x`, `y`) stitches; fades to 1 as a stitch gets smaller than two pixels.
+fn knit_groove(x: f32, y: f32, stitches_per_pixel: f32) -> f32 {
+    let visible = (1.0 - 2.0 * stitches_per_pixel).clamp(0.0, 1.0);
+    let slant = ((x - x.floor()) - 0.5).abs();
+    let s = y + slant;
+    let ridge = 1.0 - 2.0 * ((s - s.floor()) - 0.5).abs();
+    1.0 - GROOVE[0] * visible * (1.0 - ridge) - GROOVE[1] * visible * (2.0 * slant).powi(4)
+}
+
 impl Fabric {
-    pub(crate) fn new(look: &Look) -> Self {
-        let (other, low) = match look.pattern {
-            Print::Stripes { color, .. } | Print::Check { color, .. } => (color, look.base),
+    pub(crate) fn new(appearance: &Appearance) -> Self {
+        let (other, low) = match appearance.pattern {
+            Print::Stripes { color, .. } | Print::Check { color, .. } => (color, appearance.base),
             Print::Scale { low, high } => (high, low),
-            Print::Solid | Print::Knit { .. } => (look.base, look.base),
+            Print::Solid | Print::Knit { .. } => (appearance.base, appearance.base),
         };
         Self {
-            base: look.base.map(linear),
+            base: appearance.base.map(linear),
             other: other.map(linear),
             low: low.map(linear),
-            print: look.pattern,
-            gloss: (1.0 - look.roughness).clamp(0.0, 1.0),
-            metres_per_uv: look.metres_per_uv,
+            print: appearance.pattern,
+            gloss: (1.0 - appearance.roughness).clamp(0.0, 1.0),
+            metres_per_uv: appearance.metres_per_uv,
         }
     }
-    /// Linear reflectance at a texture coordinate seen by a pixel that spans `footprint` metres: patterns are
-    /// averaged over the pixel, so they fade instead of shimmering.
+    /// Linear reflectance at a texture coordinate, averaged over a pixel that spans `footprint` metres.
+    /// The average makes fine patterns fade instead of shimmering.
     #[inline]
     pub(crate) fn albedo(&self, uv: [f32; 2], footprint: f32) -> [f32; 3] {
         let mix = |t: f32| -> [f32; 3] {
@@ -150,17 +167,11 @@ impl Fabric {
                 mix(0.5 * (square_wave(at(0, period), w) + square_wave(at(1, period), w)))
             }
             Print::Knit { period } => {
-                // A stitch must span two pixels to be drawn at all.
-                let visible = (1.0 - 2.0 * footprint / period).clamp(0.0, 1.0);
-                if visible == 0.0 {
-                    return self.base;
-                }
-                let (x, y) = (at(0, period), at(1, period * 0.7));
-                let slant = ((x - x.floor()) - 0.5).abs();
-                let s = y + slant;
-                let ridge = 1.0 - 2.0 * ((s - s.floor()) - 0.5).abs();
-                let groove =
-                    1.0 - 0.35 * visible * (1.0 - ridge) - 0.2 * visible * (2.0 * slant).powi(4);
+                let groove = knit_groove(
+                    at(0, period),
+                    at(1, STITCH_HEIGHT * period),
+                    footprint / period,
+                );
                 self.base.map(|c| c * groove)
             }
             Print::Scale { .. } => {
@@ -180,7 +191,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn light_round_trips_through_srgb() {
+    fn srgb_table_inverts_linear() {
         let table = ToSrgb::default();
         for c in 0..=255u8 {
             assert!((table.get(linear(c)) - f32::from(c)).abs() < 0.5, "{c}");
@@ -188,14 +199,14 @@ mod tests {
     }
 
     #[test]
-    fn a_scale_goes_from_low_over_the_base_to_high() {
+    fn scale_interpolates_low_base_high_and_clamps() {
         let (low, high) = ([0, 0, 255], [255, 0, 0]);
-        let look = Look {
+        let appearance = Appearance {
             pattern: Print::Scale { low, high },
             base: [0, 255, 0],
-            ..Look::default()
+            ..Appearance::default()
         };
-        let fabric = Fabric::new(&look);
+        let fabric = Fabric::new(&appearance);
         let at = |u: f32| fabric.albedo([u, 0.3], 0.01);
         assert_eq!(
             (at(-1.0), at(0.0), at(1.0)),
@@ -205,25 +216,25 @@ mod tests {
     }
 
     #[test]
-    fn a_pattern_averages_instead_of_shimmering() {
-        let look = Look {
+    fn fine_stripes_average_to_their_mean() {
+        let appearance = Appearance {
             pattern: Print::Stripes {
                 color: [255, 255, 255],
                 period: 0.02,
             },
-            ..Look::default()
+            ..Appearance::default()
         };
-        let fabric = Fabric::new(&look);
+        let fabric = Fabric::new(&appearance);
         let near = |v: f32| fabric.albedo([0.0, v], 1e-5);
         for k in 0..3 {
             assert!((near(0.005)[k] - 1.0).abs() < 1e-3);
-            assert!((near(0.015)[k] - linear(look.base[k])).abs() < 1e-3);
+            assert!((near(0.015)[k] - linear(appearance.base[k])).abs() < 1e-3);
         }
-        // A pixel of many stripes sees the mean wherever it is.
+        // A pixel of many stripes shows their mean at any position.
         for v in [0.0, 0.0031, 0.0177] {
             let far = fabric.albedo([0.0, v], 0.4);
             for k in 0..3 {
-                let mean = 0.5 * (1.0 + linear(look.base[k]));
+                let mean = 0.5 * (1.0 + linear(appearance.base[k]));
                 assert!((far[k] - mean).abs() < 0.03, "{far:?}");
             }
         }

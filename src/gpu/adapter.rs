@@ -1,18 +1,4 @@
-//! Which graphics card, if any.
-
-use super::Renderer;
-
-/// What the caller wants.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Prefer {
-    /// A real card if there is one, else the processor.
-    #[default]
-    Auto,
-    /// The processor.
-    Cpu,
-    /// Any adapter, software included.
-    Gpu,
-}
+//! Graphics adapters and their faults.
 
 /// An adapter found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,9 +20,9 @@ pub enum GpuError {
     /// The driver refused.
     #[error("{adapter}: {why}")]
     Device {
-        /// Which adapter.
+        /// Name of the adapter.
         adapter: String,
-        /// What it said.
+        /// Message of the driver.
         why: String,
     },
 }
@@ -64,6 +50,7 @@ pub(super) fn found() -> Vec<wgpu::Adapter> {
     all
 }
 
+/// Name, backend and kind of an adapter.
 pub(super) fn report(adapter: &wgpu::Adapter) -> AdapterReport {
     let info = adapter.get_info();
     AdapterReport {
@@ -73,20 +60,7 @@ pub(super) fn report(adapter: &wgpu::Adapter) -> AdapterReport {
     }
 }
 
-/// What there is, best first.
+/// Reports of all adapters, the best first.
 pub fn adapters() -> Vec<AdapterReport> {
     found().iter().map(report).collect()
-}
-
-/// The renderer to use, warmed up; `None` = the processor (asked for, or nothing better than software was found:
-/// lavapipe takes 3 to 4 times as long as [`crate::composite::render`]).
-///
-/// # Errors
-/// With [`Prefer::Gpu`], when there is no adapter or it fails. With [`Prefer::Auto`] a failing card means `None`.
-pub fn choose(prefer: Prefer) -> Result<Option<Renderer>, GpuError> {
-    match prefer {
-        Prefer::Cpu => Ok(None),
-        Prefer::Gpu => Renderer::new(true).map(Some),
-        Prefer::Auto => Ok(Renderer::new(false).ok()),
-    }
 }

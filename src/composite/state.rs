@@ -1,0 +1,93 @@
+//! Memory of the colours of one user's skin and clothes between pictures.
+
+use super::skin::{MIN_TONES, SkinClassifier, tone};
+use serde::{Deserialize, Serialize};
+
+/// Least share of the face or the hands that is like the forearms, which makes them skin: to begin, to go on.
+const AGREE: [f32; 2] = [0.5, 0.4];
+/// Largest share of the trunk that is like skin (a neckline, an unexpected hand): to begin, to go on.
+const MIXED: [f32; 2] = [0.08, 0.14];
+
+/// Colours remembered between pictures, one a place of the body: the classifier is fitted to the last few pictures.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// Tones by [`ColorRegion`] and slot; `None` = never seen.
+    colors: [Vec<Option<[f32; 3]>>; 4],
+    /// Number of pictures in which colours were taken.
+    pictures: u32,
+    /// Colour decided in the last picture; keeps the decision under small changes.
+    usable: bool,
+}
+
+/// Region of the body a colour was taken from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ColorRegion {
+    Forearm,
+    Hand,
+    Face,
+    Trunk,
+}
+
+/// Places with a remembered colour, by [`ColorRegion`].
+const SLOTS: [usize; 4] = [160, 64, 64, 320];
+/// Pictures in which all places are sampled once, after the first picture.
+const TURNS: usize = 4;
+
+impl State {
+    /// Forgets when no body is tracked: the next one may be another person.
+    pub(crate) fn keep_if(&mut self, tracked: bool) {
+        if !tracked && self.pictures > 0 {
+            *self = Self::default();
+        }
+    }
+
+    /// Slot and vertex of the `vertices` to sample in this picture.
+    pub(super) fn due<'a>(
+        &'a self,
+        source: ColorRegion,
+        vertices: &'a [u32],
+    ) -> impl Iterator<Item = (usize, u32)> + use<'a> {
+        let slots = SLOTS[source as usize].min(vertices.len());
+        let (first, turn) = (self.pictures == 0, self.pictures as usize % TURNS);
+        (0..slots)
+            .filter(move |s| first || s % TURNS == turn)
+            .map(move |s| (s, vertices[s * vertices.len() / slots]))
+    }
+
+    /// Remembers the sRGB colour of a place.
+    pub(super) fn put(&mut self, source: ColorRegion, slot: usize, rgb: [u8; 3]) {
+        let colors = &mut self.colors[source as usize];
+        if colors.len() <= slot {
+            colors.resize(slot + 1, None);
+        }
+        colors[slot] = Some(tone(rgb));
+    }
+
+    /// Fits the classifier; `None` if colour does not separate skin from clothes. Once a picture, after its colours.
+    pub(super) fn fit_skin(&mut self) -> Option<SkinClassifier> {
+        self.pictures = self.pictures.saturating_add(1);
+        let tones = |s: ColorRegion| -> Vec<[f32; 3]> {
+            self.colors[s as usize].iter().flatten().copied().collect()
+        };
+        let (arms, trunk) = (tones(ColorRegion::Forearm), tones(ColorRegion::Trunk));
+        let skin = SkinClassifier::fit(&arms, &trunk);
+        let usable = skin.as_ref().is_some_and(|skin| {
+            let share = |s: ColorRegion| {
+                let colors = tones(s);
+                let like = colors.iter().filter(|c| skin.is_skin(c)).count();
+                if colors.len() < MIN_TONES {
+                    0.0
+                } else {
+                    like as f32 / colors.len() as f32
+                }
+            };
+            let hysteresis = usize::from(self.usable);
+            let (agree, mixed) = (AGREE[hysteresis], MIXED[hysteresis]);
+            share(ColorRegion::Forearm) >= agree
+                && share(ColorRegion::Face).max(share(ColorRegion::Hand)) >= agree
+                && share(ColorRegion::Trunk) <= mixed
+        });
+        self.usable = usable;
+        skin.filter(|_| usable)
+    }
+}

@@ -1,0 +1,5 @@
+//! Pictures of synthetic users with known truth.
+
+pub(crate) mod fixture;
+mod hands;
+mod pictures;
