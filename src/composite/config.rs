@@ -50,13 +50,13 @@ impl Default for Lights {
 /// Depth margins by which a captured pixel hides a garment, metres, on top of twice the sensor's noise at that depth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Margins {
-    /// Where nothing is known about the body.
+    /// Margin if nothing is known about the body.
     pub plain: f32,
-    /// Where the tracked body itself is in front (an arm).
+    /// Margin if the tracked body itself is in front (an arm).
     pub limb: f32,
-    /// Where the tracked body lies under the garment: own clothes and hair bulge by this much.
+    /// Margin if the tracked body lies under the garment: own clothes and hair bulge by this much.
     pub covered: f32,
-    /// On the inner side of a garment, which is behind the body wherever there is a body.
+    /// Margin on the inner side of a garment, which is behind the body wherever there is a body.
     pub inner: f32,
     /// Further excess that some pixel of a patch must reach, else the patch counts as bulging clothes.
     pub clear: f32,
