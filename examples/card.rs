@@ -76,7 +76,10 @@ fn main() {
         })
         .collect();
     let mut camera = CameraGarments::default();
-    camera.place(&world_from_camera.inverse(), world.iter().map(Vec::as_slice));
+    camera.place(
+        &world_from_camera.inverse(),
+        world.iter().map(Vec::as_slice),
+    );
     let appearances = ["tshirt", "skirt"].map(library_appearance);
     let surfaces = (meshes.iter().zip(&appearances)).map(|(mesh, appearance)| DrawnSurface {
         faces: &mesh.render.faces,

@@ -172,11 +172,13 @@ impl Mirror {
         (self.garments).place(&camera_from_world, drawn.iter().map(Vec::as_slice));
         let surfaces = worn.iter().flat_map(|worn| {
             let meshes = worn.outfit.model.outfit.garments.iter();
-            meshes.zip(&worn.appearances).map(|(mesh, appearance)| DrawnSurface {
-                faces: &mesh.render.faces,
-                uv: &mesh.render.uv,
-                appearance,
-            })
+            meshes
+                .zip(&worn.appearances)
+                .map(|(mesh, appearance)| DrawnSurface {
+                    faces: &mesh.render.faces,
+                    uv: &mesh.render.uv,
+                    appearance,
+                })
         });
 
         let input = composite::Input {
