@@ -3,7 +3,7 @@
 //! A vertex is kept on its side of the nearest triangle of another fold. Each of the two is held off the other and both
 //! move on as they do on average; nothing needs a common solution.
 
-use crate::cloth::small_steps::{Plane, V4};
+use crate::cloth::solver::explicit::{ContactPlane, V4};
 use crate::contact::{Closest, PointGrid, SurfaceFrame, SurfaceModel};
 use crate::math::{P3, V3};
 use crate::mesh::Csr;
@@ -230,7 +230,7 @@ impl FoldModel {
         x: &P3,
         corner: u32,
         search: &Search,
-    ) -> Option<(Plane, f32)> {
+    ) -> Option<(ContactPlane, f32)> {
         let g = &self.surface;
         let hit = self.other_fold(frame, v, x, corner)?;
         let far = hit.signed.abs();
@@ -249,9 +249,9 @@ impl FoldModel {
         let mut plane = touching(g, frame, i, &hit, side, gap);
         let own = frame.speed(g, v);
         let own = V4::new(own.x, own.y, own.z);
-        plane.speed = (plane.speed + own).scale(0.5);
+        plane.velocity = (plane.velocity + own).scale(0.5);
         // Folds that part need no plane: one that follows them would carry what has long met something else.
-        if search.halfway && plane.normal.dot(own - plane.speed) > 0.0 {
+        if search.halfway && plane.normal.dot(own - plane.velocity) > 0.0 {
             return None;
         }
         Some((plane, far))
@@ -266,17 +266,17 @@ pub(crate) fn touching(
     hit: &Closest,
     side: f32,
     gap: f32,
-) -> Plane {
+) -> ContactPlane {
     let corners = g.faces()[hit.face as usize];
     let speed = (0..3).fold(V3::zeros(), |a, k| {
         a + frame.speed(g, corners[k]) * hit.weights[k]
     });
     let n = hit.normal * side;
-    Plane {
+    ContactPlane {
         vertex: i as u32,
         normal: V4::new(n.x, n.y, n.z),
-        level: n.dot(&hit.point.coords) + gap,
-        speed: V4::new(speed.x, speed.y, speed.z),
+        offset: n.dot(&hit.point.coords) + gap,
+        velocity: V4::new(speed.x, speed.y, speed.z),
         friction: FRICTION,
     }
 }

@@ -3,16 +3,13 @@
 mod crossings;
 mod error;
 pub(crate) mod folds;
-pub mod membrane;
-mod pieces;
-pub mod quasi_newton;
+pub mod model;
 pub mod realtime;
 pub mod scene;
-mod sheet;
 pub(crate) mod sleeves;
-pub mod small_steps;
+pub mod solver;
 pub(crate) mod untangle;
 
 pub use crossings::{Crossing, crossings};
 pub use error::ClothError;
-pub use sheet::{Element, Hinge, Sheet};
+pub use model::{Element, Hinge, Sheet};

@@ -117,7 +117,7 @@ fn take_over<'a>(
                 }
             }
             // How far it came: between planes that contradict each other a vertex has a speed and stays.
-            ways.push(motion.moved[i].dot(motion.moved[i]));
+            ways.push(motion.displacement[i].dot(motion.displacement[i]));
         }
     }
     let length = |v: &[u32; 2]| (g.positions[v[0] as usize] - g.positions[v[1] as usize]).norm();

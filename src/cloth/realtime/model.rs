@@ -3,9 +3,9 @@
 use super::regions::{REGION, Regions, clusters};
 use crate::body::{SkinWeights, Template};
 use crate::cloth::folds::FoldModel;
-use crate::cloth::pieces::Pieces;
+use crate::cloth::model::partition::Partition;
 use crate::cloth::sleeves::{Arms, Sleeve};
-use crate::cloth::small_steps::{Fabric, Fit, Plan};
+use crate::cloth::solver::explicit::{PatchModel, StableSheet, StepSpec};
 use crate::cloth::{ClothError, Sheet};
 use crate::contact::{Crease, MapDetail, MapView, SurfaceModel};
 use crate::garment::{GarmentMesh, Region};
@@ -150,7 +150,7 @@ impl Config {
 #[derive(Debug)]
 pub(super) struct GarmentModel {
     pub(super) sheet: Sheet,
-    pub(super) patches: Vec<Fabric>,
+    pub(super) patches: Vec<PatchModel>,
     /// Small step, s.
     pub(super) h: f64,
     /// Steps from one evaluation of bending to the next.
@@ -189,7 +189,7 @@ pub struct Model {
     /// The same where both are thick: part of the body that presses on each of its vertices.
     pub(super) pressing: Vec<u8>,
     /// Its vertices, some at a time.
-    pub(super) clusters: Pieces,
+    pub(super) clusters: Partition,
     pub(super) arms: Arms,
     pub(super) weights: SkinWeights,
     pub(super) joints: usize,
@@ -369,7 +369,7 @@ impl Model {
             // Of the second degree, layers and folds tore the dancer's clothes of 12 mm edges apart: finer garments are
             // softened to the step instead.
             let (smooth, h) = {
-                let step = Plan::comfortable_steps(&sheet, config.ahead);
+                let step = StableSheet::stable_steps(&sheet, config.ahead);
                 let plain = step(0);
                 let smoothed = (plain < LONG_ENOUGH)
                     .then(|| step(1))
@@ -377,17 +377,18 @@ impl Model {
                 smoothed.map_or((0, plain), |h| (1, h))
             };
             let h = h.clamp(1.0 / (60.0 * config.most_steps as f64), 1e-3);
-            let bend_every = Plan::bend_every(&sheet, h);
-            let fit = Fit {
+            let bend_every = StableSheet::bending_interval(&sheet, h);
+            let fit = StepSpec {
                 h,
                 ahead: config.ahead,
                 springs_only: false,
                 bend_every,
                 smooth,
             };
-            let plan = Plan::new(&sheet, &fit);
+            let plan = StableSheet::new(&sheet, &fit);
             // A step moves news by one ring and by one more for each degree, an evaluation of bending by one more.
-            let patches = plan.patches(g.vertices.div_ceil(config.patch), 1 + smooth + 1, REGION);
+            let patches =
+                plan.compile_patches(g.vertices.div_ceil(config.patch), 1 + smooth + 1, REGION);
             let own: Vec<u8> = g.regions.iter().map(|r| r.decisive().0).collect();
             let other = own.iter().map(|o| Region::ALL.0 & !o).collect();
             // Evenly between the skin and where the outermost lies.

@@ -3,7 +3,7 @@
 
 use super::model::{GarmentModel, Model};
 use super::state::{GarmentState, State, StepReport};
-use crate::cloth::small_steps::{Fabric, Plane, V4};
+use crate::cloth::solver::explicit::{ContactPlane, PatchModel, V4};
 use std::ops::Range;
 
 /// Vertices of a piece: few enough that threads end together, many enough that what is
@@ -34,20 +34,20 @@ pub(super) struct Piece {
     /// For each vertex of the garment the last one that it was a neighbour of.
     pub(super) neighbour_of: Vec<u32>,
     /// Planes of the body and of cloth.
-    pub(super) body: Vec<Plane>,
-    pub(super) cloth: Vec<Plane>,
+    pub(super) body: Vec<ContactPlane>,
+    pub(super) cloth: Vec<ContactPlane>,
     /// Vertices that were lifted out of the skin, and how far they have moved since the call began, metres.
     pub(super) lifted: Vec<(u32, V4)>,
     pub(super) report: StepReport,
 }
 
 impl Piece {
-    pub(super) fn model<'a>(&self, model: &'a Model) -> (&'a GarmentModel, &'a Fabric) {
+    pub(super) fn model<'a>(&self, model: &'a Model) -> (&'a GarmentModel, &'a PatchModel) {
         let g = &model.garments[self.garment];
         (g, &g.patches[self.patch])
     }
     /// Its vertices that the patch owns, which are the first ones of a patch: their numbers here and in the patch.
-    pub(super) fn owned(&self, f: &Fabric) -> impl Iterator<Item = (usize, usize)> + use<> {
+    pub(super) fn owned(&self, f: &PatchModel) -> impl Iterator<Item = (usize, usize)> + use<> {
         (self.range.start..self.range.end.min(f.owned)).enumerate()
     }
     fn begin(&mut self, vertices: &[u32], from: &GarmentState) {

@@ -8,8 +8,8 @@ use super::finish::percentile;
 use super::model::Model;
 use super::state::{GarmentState, PatchScratch, State};
 use super::still::stillness;
-use crate::cloth::pieces::{Pieces, cut};
-use crate::cloth::small_steps::Fabric;
+use crate::cloth::model::partition::{Partition, cut};
+use crate::cloth::solver::explicit::PatchModel;
 use crate::contact::SurfaceModel;
 use crate::math::{P3, V3};
 use serde::{Deserialize, Serialize};
@@ -56,7 +56,7 @@ pub(super) struct Regions {
 
 impl Regions {
     pub(super) fn new(
-        patches: &[Fabric],
+        patches: &[PatchModel],
         vertices: usize,
         edges: &[([u32; 2], f64)],
         edge: f32,
@@ -65,7 +65,7 @@ impl Regions {
         for f in patches {
             first.push(members.len());
             members.extend(
-                f.regions
+                f.islands
                     .windows(2)
                     .map(|r| f.vertices[r[0]..r[1]].to_vec()),
             );
@@ -102,7 +102,7 @@ impl Regions {
 }
 
 /// The body's vertices in clusters.
-pub(super) fn clusters(surface: &SurfaceModel) -> Pieces {
+pub(super) fn clusters(surface: &SurfaceModel) -> Partition {
     let n = surface.vertices();
     cut(
         n,
@@ -406,7 +406,7 @@ pub(super) fn wake(model: &Model, state: &mut State, body: &[P3], dt: f64, jumpe
 /// Brings sleeping vertices of a patch to where their speeds lead in a call of `dt` seconds.
 pub(super) fn carry_on(p: &mut PatchScratch, dt: f64) {
     for i in (0..p.asleep.len()).filter(|i| p.asleep[*i]) {
-        p.motion.moved[i] = p.motion.velocity[i].scale(dt as f32);
+        p.motion.displacement[i] = p.motion.velocity[i].scale(dt as f32);
     }
 }
 
@@ -428,8 +428,8 @@ pub(super) fn fall_asleep(
     for (m, regions) in model.garments.iter().zip(&mut rest.regions) {
         for (f, first) in m.patches.iter().zip(&m.regions.first) {
             let Some(p) = patches.next() else { return };
-            for (region, r) in regions[*first..].iter_mut().zip(f.regions.windows(2)) {
-                let mut ways: Vec<f32> = p.motion.moved[r[0]..r[1]]
+            for (region, r) in regions[*first..].iter_mut().zip(f.islands.windows(2)) {
+                let mut ways: Vec<f32> = p.motion.displacement[r[0]..r[1]]
                     .iter()
                     .map(|w| w.dot(*w))
                     .collect();

@@ -7,7 +7,7 @@ use super::regions::Rest;
 use super::untangle::Untangle;
 use crate::cloth::ClothError;
 use crate::cloth::folds::FoldFrame;
-use crate::cloth::small_steps::{Motion, Plane, Strut, Tie};
+use crate::cloth::solver::explicit::{ContactPlane, FoldLimit, PatchState, Pin};
 use crate::contact::{Apart, Buried, DepthMaps, NearSkin, SurfaceFrame};
 use crate::math::{P3, V3};
 use serde::{Deserialize, Serialize};
@@ -263,19 +263,19 @@ pub struct Workspace {
 /// One patch of one garment during a call.
 #[derive(Debug, Default)]
 pub(super) struct PatchScratch {
-    pub(super) motion: Motion,
+    pub(super) motion: PatchState,
     /// Vertices that sleep.
     pub(super) asleep: Vec<bool>,
     /// Planes within reach for some steps, and how many of them are the body's, the first ones.
-    pub(super) near: Vec<Plane>,
+    pub(super) near: Vec<ContactPlane>,
     pub(super) body_near: usize,
     /// Vertices of cloth that is drawn long: it has no room for wide folds.
     pub(super) drawn: Vec<bool>,
     /// Vertices that are about to tear.
     pub(super) torn: Vec<bool>,
-    pub(super) ties: Vec<Tie>,
+    pub(super) ties: Vec<Pin>,
     /// What keeps folds from becoming too sharp during a round.
-    pub(super) struts: Vec<Strut>,
+    pub(super) struts: Vec<FoldLimit>,
     /// Vertices whose place is given: nothing else may push them.
     pub(super) tied: Vec<bool>,
     /// Vertices in contact with the body.

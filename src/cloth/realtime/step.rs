@@ -11,7 +11,7 @@ use super::steady::follow;
 use super::still::{coming_to_rest, is_quiet, sleeps_on};
 use super::touch::{Settled, Touch, anchors, settle};
 use crate::cloth::ClothError;
-use crate::cloth::small_steps::{Borders, Excepted, Step, V4};
+use crate::cloth::solver::explicit::{Exemptions, FoldLimit, HaloExchange, Substep, V4};
 use crate::math::{P3, V3};
 use crate::par::{self, Par};
 use std::time::Instant;
@@ -304,14 +304,15 @@ fn step_on(
         for_patches(model, &mut work.patches, |g, k, p| {
             anchors(model, g, k, &touch, p);
             let fabric = &model.garments[g].patches[k];
-            p.motion.overstretched(fabric, TORN, &mut p.torn);
-            p.motion.overstretched(fabric, DRAWN, &mut p.drawn);
-            let excepted = Excepted {
-                held: &p.tied,
-                free: &p.drawn,
+            p.motion.find_overstretched(fabric, TORN, &mut p.torn);
+            p.motion.find_overstretched(fabric, DRAWN, &mut p.drawn);
+            let excepted = Exemptions {
+                fixed: &p.tied,
+                unlimited: &p.drawn,
             };
-            p.motion.short(
+            FoldLimit::find_active(
                 fabric,
+                &p.motion,
                 config.sharpest as f32,
                 span as f32,
                 &excepted,
@@ -343,7 +344,7 @@ fn step_on(
     for q in &work.pieces {
         q.lifted
             .iter()
-            .for_each(|(i, moved)| work.patches[q.at].motion.moved[*i as usize] = *moved);
+            .for_each(|(i, moved)| work.patches[q.at].motion.displacement[*i as usize] = *moved);
     }
     report.stages_ms.contact += ms(timer);
     let timer = Instant::now();
@@ -428,7 +429,7 @@ fn begin(model: &Model, state: &State, all: &mut Vec<PatchScratch>) {
         let (from, fabric) = (&state.garments[g], &model.garments[g].patches[k]);
         let local = || fabric.vertices.iter().map(|v| *v as usize);
         let v4 = |x: f32, y: f32, z: f32| V4::new(x, y, z);
-        p.motion.begin(
+        p.motion.reset(
             local().map(|v| {
                 v4(
                     from.positions[v].x,
@@ -451,7 +452,7 @@ fn begin(model: &Model, state: &State, all: &mut Vec<PatchScratch>) {
                 .iter()
                 .map(|v| state.rest.sleeps(model, g, *v)),
         );
-        p.motion.leave(fabric, &p.asleep);
+        p.motion.set_sleeping(fabric, &p.asleep);
     });
 }
 
@@ -481,54 +482,54 @@ fn advance(
         let (g, m, patches) = &mut g[0];
         let n = steps(m.h, span);
         let h = (span / n as f64) as f32;
-        let borders = Borders::new(patches.len());
+        let borders = HaloExchange::new(patches.len());
         par::rounds(model.config.par, patches, n, |s, k, p| {
             let f = &m.patches[k];
             if s > 0 {
-                borders.hear(s - 1, f, &mut p.motion);
+                borders.receive(s - 1, f, &mut p.motion);
             }
             let t = s as f32 * h;
             if s % (RECALLED * m.bend_every) == 0 {
                 let alone = (RECALLED * m.bend_every).min(n - s) as f32 * h;
                 let found = || pieces.iter().filter(|q| (q.garment, q.patch) == (*g, k));
                 p.near.clear();
-                found().for_each(|q| p.motion.within_reach(&q.body, t, alone, &mut p.near));
+                found().for_each(|q| p.motion.find_reachable(&q.body, t, alone, &mut p.near));
                 p.body_near = p.near.len();
-                found().for_each(|q| p.motion.within_reach(&q.cloth, t, alone, &mut p.near));
+                found().for_each(|q| p.motion.find_reachable(&q.cloth, t, alone, &mut p.near));
             }
             if s % m.bend_every == 0 {
                 p.motion
-                    .bend(f, h * m.bend_every.min(n - s) as f32 * 0.5, m.smooth);
+                    .update_bending(f, h * m.bend_every.min(n - s) as f32 * 0.5, m.smooth);
             }
-            let step = Step {
+            let step = Substep {
                 h,
                 t,
                 ahead,
                 gravity,
                 rings: 0,
             };
-            p.motion.accelerate(f, &step, &p.near, &p.ties);
-            p.motion.tie(&p.ties, t, h);
-            p.motion.brace(&p.struts, h);
+            p.motion.integrate_velocities(f, &step, &p.near, &p.ties);
+            p.motion.apply_pins(&p.ties, t, h);
+            FoldLimit::apply(&p.struts, &mut p.motion, h);
             // In this order: the body has the last word.
             let (body, cloth) = p.near.split_at(p.body_near);
-            p.motion.restrain(cloth, t, h, CLOTH_RECOVERY);
-            p.contacts = p.motion.restrain(body, t, h, RECOVERY);
+            p.motion.resolve_contacts(cloth, t, h, CLOTH_RECOVERY);
+            p.contacts = p.motion.resolve_contacts(body, t, h, RECOVERY);
             if let Some(limit) = limit {
-                p.motion.slow_down(
+                p.motion.limit_speed(
                     limit,
-                    &Excepted {
-                        held: &p.tied,
-                        free: &p.drawn,
+                    &Exemptions {
+                        fixed: &p.tied,
+                        unlimited: &p.drawn,
                     },
                 );
             }
-            p.motion.advance(f, &step, FASTEST);
-            borders.tell(s, k, f, &p.motion);
+            p.motion.integrate_positions(f, &step, FASTEST);
+            borders.publish(s, k, f, &p.motion);
         });
         m.patches
             .iter()
             .zip(patches.iter_mut())
-            .for_each(|(f, p)| borders.hear(n - 1, f, &mut p.motion));
+            .for_each(|(f, p)| borders.receive(n - 1, f, &mut p.motion));
     });
 }

@@ -4,7 +4,7 @@ use super::model::Model;
 use super::piece::Piece;
 use super::piled::Piled;
 use super::state::{GarmentState, PatchScratch};
-use crate::cloth::small_steps::{Plane, Tie, V4};
+use crate::cloth::solver::explicit::{ContactPlane, Pin, V4};
 use crate::contact::{Buried, Closest, DepthMaps, NearSkin, SurfaceFrame};
 use crate::garment::Region;
 use crate::math::{P3, V3};
@@ -148,11 +148,11 @@ impl Touch<'_> {
                     let v = corners[k] as usize;
                     s + (self.after[v] - self.before[v]) * (c.weights[k] / self.dt)
                 });
-                q.body.push(Plane {
+                q.body.push(ContactPlane {
                     vertex: i as u32,
                     normal: v4(&c.normal),
-                    level: c.normal.dot(&c.point.coords) + offset,
-                    speed: v4(&speed),
+                    offset: c.normal.dot(&c.point.coords) + offset,
+                    velocity: v4(&speed),
                     friction: g.sheet.friction as f32,
                 });
             }
@@ -213,17 +213,17 @@ pub(super) fn anchors(
             touch.now.vertices[v] + (touch.after[v] - touch.before[v]) * (touch.span / touch.dt)
         });
         let end = above(a, moving);
-        let firmness = if a.strength >= 1.0 {
+        let stiffness = if a.strength >= 1.0 {
             1.0
         } else {
             1.0 - (-g.h * ANCHOR_RATE * a.strength / (1.0 - a.strength)).exp()
         };
         p.tied[local as usize] = a.strength >= 1.0;
-        p.ties.push(Tie {
+        p.ties.push(Pin {
             vertex: local,
-            place: v4(&start.coords),
-            speed: v4(&((end - start) / touch.span)),
-            firmness: firmness as f32,
+            target: v4(&start.coords),
+            velocity: v4(&((end - start) / touch.span)),
+            stiffness: stiffness as f32,
         });
     }
 }

@@ -4,7 +4,9 @@ use super::run::{Method, RunConfig, RunReport, deepest};
 use super::small::{RECOVERY, look, v3d, v4};
 use super::{Scene, SceneError};
 use crate::cloth::ClothError;
-use crate::cloth::small_steps::{Fabric, Fit, Motion, Plan, Step, Tie, V4, triangles};
+use crate::cloth::solver::explicit::{
+    PatchModel, PatchState, Pin, StableSheet, StepSpec, Substep, V4, triangles,
+};
 use crate::linear::conjugate_gradient;
 use crate::math::{P3, V3d};
 use nalgebra::{Matrix3, Point3, Vector3};
@@ -38,15 +40,15 @@ pub(super) fn run(
         config.every[0]
     };
     // A plan for a step so short that nothing is softened: both are stable at any step.
-    let fit = Fit {
+    let fit = StepSpec {
         h: 1e-9,
         ahead: 0.0,
         springs_only: springs,
         bend_every,
         smooth: 0,
     };
-    let plan = Plan::new(&scene.sheet, &fit);
-    let fabrics = plan.patches(1, 0, 0);
+    let plan = StableSheet::new(&scene.sheet, &fit);
+    let fabrics = plan.compile_patches(1, 0, 0);
     let Some(f) = fabrics.first() else {
         return Err(ClothError::Count {
             what: "vertices",
@@ -83,14 +85,14 @@ pub(super) fn run(
         .map(|v| (1.0 / scene.sheet.mass[*v as usize]) as f32)
         .collect();
     pins.iter().for_each(|(i, _)| weight[*i as usize] = 0.0);
-    let mut m = Motion::default();
+    let mut m = PatchState::default();
     let mut x: Vec<V4> = f
         .vertices
         .iter()
         .map(|v| v4(&scene.start[*v as usize].coords.cast()))
         .collect();
     let mut velocity = vec![V4::default(); n];
-    let (mut planes, mut ties, mut aim) = (Vec::new(), Vec::<Tie>::new(), Vec::new());
+    let (mut planes, mut ties, mut aim) = (Vec::new(), Vec::<Pin>::new(), Vec::new());
     let mut clear = Vec::new();
     let gravity = v4(&scene.gravity);
     let hf = h as f32;
@@ -101,7 +103,7 @@ pub(super) fn run(
             break;
         }
         let started = Instant::now();
-        m.begin(x.iter().copied(), velocity.iter().copied());
+        m.reset(x.iter().copied(), velocity.iter().copied());
         for s in 0..steps {
             let t = (index - 1) as f64 * dt + s as f64 * h;
             look(scene, config.offset, &m, t, h, &mut planes, &mut clear);
@@ -112,20 +114,20 @@ pub(super) fn run(
                         (scene.colliders[c].placement(t) * Point3::from(local[p as usize])).coords
                     })
                 };
-                ties.push(Tie {
+                ties.push(Pin {
                     vertex: i,
-                    place: v4(&at(t)),
-                    speed: v4(&((at(t + h) - at(t)) / h)),
-                    firmness: 1.0,
+                    target: v4(&at(t)),
+                    velocity: v4(&((at(t + h) - at(t)) / h)),
+                    stiffness: 1.0,
                 });
             }
             match &mut solver {
                 Solver::Xpbd(blocks) => {
                     if s % bend_every == 0 {
-                        m.bend(f, hf * bend_every as f32 * 0.5, 0);
+                        m.update_bending(f, hf * bend_every as f32 * 0.5, 0);
                     }
-                    m.fall(f, hf, gravity);
-                    m.tie(&ties, 0.0, hf);
+                    m.integrate_external(f, hf, gravity);
+                    m.apply_pins(&ties, 0.0, hf);
                     aim.clear();
                     aim.extend((0..n).map(|i| m.position(i) + m.velocity[i].scale(hf)));
                     for b in blocks.iter() {
@@ -137,13 +139,13 @@ pub(super) fn run(
                 }
                 Solver::Springs(springs) => springs.step(&mut m, &ties, h, &scene.gravity),
             }
-            m.restrain(&planes, 0.0, hf, RECOVERY);
-            m.tie(&ties, 0.0, hf);
-            m.advance(
+            m.resolve_contacts(&planes, 0.0, hf, RECOVERY);
+            m.apply_pins(&ties, 0.0, hf);
+            m.integrate_positions(
                 f,
-                &Step {
+                &Substep {
                     h: hf,
-                    ..Step::default()
+                    ..Substep::default()
                 },
                 f32::INFINITY,
             );
@@ -177,7 +179,7 @@ pub(super) fn run(
     })
 }
 
-fn in_order(f: &Fabric, x: &[V4]) -> Vec<V3d> {
+fn in_order(f: &PatchModel, x: &[V4]) -> Vec<V3d> {
     let mut out = vec![V3d::zeros(); x.len()];
     f.vertices
         .iter()
@@ -198,7 +200,7 @@ struct Block {
     compliance: Matrix3<f32>,
 }
 
-fn blocks(scene: &Scene, f: &Fabric, h: f64) -> Vec<Block> {
+fn blocks(scene: &Scene, f: &PatchModel, h: f64) -> Vec<Block> {
     let mut local = vec![0u32; scene.start.len()];
     f.vertices
         .iter()
@@ -257,7 +259,7 @@ struct Springs {
 }
 
 impl Springs {
-    fn new(scene: &Scene, f: &Fabric) -> Self {
+    fn new(scene: &Scene, f: &PatchModel) -> Self {
         let sheet = &scene.sheet;
         let mut local = vec![0usize; scene.start.len()];
         f.vertices
@@ -295,7 +297,7 @@ impl Springs {
     }
 
     /// (M − h²K)Δv = h(f + hKv) (Baraff and Witkin 1998, eq. 6) by conjugate gradients.
-    fn step(&self, m: &mut Motion, ties: &[Tie], h: f64, gravity: &V3d) {
+    fn step(&self, m: &mut PatchState, ties: &[Pin], h: f64, gravity: &V3d) {
         let n = self.mass.len();
         let x: Vec<V3d> = (0..n).map(|i| v3d(m.position(i))).collect();
         let v: Vec<V3d> = m.velocity.iter().map(|v| v3d(*v)).collect();

@@ -2,7 +2,7 @@
 
 use super::{Scene, SceneError};
 use crate::cloth::ClothError;
-use crate::cloth::quasi_newton::{Hold, QuasiNewton, hold_unit};
+use crate::cloth::solver::implicit::quasi_newton::{Hold, QuasiNewton, hold_unit};
 use crate::formats::FormatError;
 use crate::formats::npy::write_npy;
 use crate::linear::SymbolicFactor;
@@ -49,7 +49,7 @@ pub struct RunConfig {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Small explicit steps ([`crate::cloth::small_steps`]).
+    /// Small explicit steps ([`crate::cloth::solver::explicit`]).
     SmallSteps,
     /// Prefactorised quasi-Newton, implicit Euler.
     QuasiNewton,

@@ -4,7 +4,9 @@ use super::run::{RunConfig, RunReport, deepest};
 use super::{Scene, SceneError};
 use crate::cloth::ClothError;
 use crate::cloth::folds::{FoldFrame, FoldModel, Search};
-use crate::cloth::small_steps::{Borders, Fabric, Fit, Motion, Plan, Plane, Step, Tie, V4};
+use crate::cloth::solver::explicit::{
+    ContactPlane, HaloExchange, PatchModel, PatchState, Pin, StableSheet, StepSpec, Substep, V4,
+};
 use crate::contact::SurfaceModel;
 use crate::math::{P3, V3, V3d};
 use crate::mesh::{Topology, TriMesh};
@@ -41,10 +43,13 @@ pub(super) fn run(
     let n = scene.start.len();
     let dt = 1.0 / scene.rate;
     let (smooth, step) = match config.smooth {
-        Some(degree) => (degree, Plan::comfortable_step(sheet, config.ahead, degree)),
+        Some(degree) => (
+            degree,
+            StableSheet::stable_step(sheet, config.ahead, degree),
+        ),
         // Smoothed accelerations move what other folds have stopped: drapes that press on themselves exploded.
-        None if config.self_collision => (0, Plan::comfortable_step(sheet, config.ahead, 0)),
-        None => Plan::comfortable(sheet, config.ahead, LONG_ENOUGH),
+        None if config.self_collision => (0, StableSheet::stable_step(sheet, config.ahead, 0)),
+        None => StableSheet::choose_filter(sheet, config.ahead, LONG_ENOUGH),
     };
     let substeps = match config.substeps {
         0 => (dt / step).ceil() as usize,
@@ -52,15 +57,15 @@ pub(super) fn run(
     };
     let h = dt / substeps as f64;
     let bend_every = if config.every[0] == 0 {
-        Plan::bend_every(sheet, h)
+        StableSheet::bending_interval(sheet, h)
     } else {
         config.every[0]
     };
     // Contacts are looked for again after so many evaluations of bending, where patches meet.
     let looks = config.every[1].max(1).div_ceil(bend_every);
-    let plan = Plan::new(
+    let plan = StableSheet::new(
         sheet,
-        &Fit {
+        &StepSpec {
             h,
             ahead: config.ahead,
             springs_only: false,
@@ -70,8 +75,8 @@ pub(super) fn run(
     );
     // A step moves news by one ring and by one more for each degree, an evaluation of bending before it by one more.
     // Patches meet after every step: what ghosts cost is more than the meeting.
-    let fabrics = plan.patches(config.patches, 1 + smooth + 1, 0);
-    let borders = Borders::new(fabrics.len());
+    let fabrics = plan.compile_patches(config.patches, 1 + smooth + 1, 0);
+    let borders = HaloExchange::new(fabrics.len());
     let start: Vec<V3d> = scene.start.iter().map(|p| p.coords.cast()).collect();
     let local: Vec<V3d> = match scene.pinned_to {
         Some(c) => {
@@ -119,12 +124,12 @@ pub(super) fn run(
                 if r == 0 {
                     let all = || f.vertices.iter().map(|v| *v as usize);
                     w.motion
-                        .begin(all().map(|v| x[v]), all().map(|v| velocity[v]));
+                        .reset(all().map(|v| x[v]), all().map(|v| velocity[v]));
                     if let Some(folds) = &folds {
                         folds.find(f, &pinned[k], w);
                     }
                 } else {
-                    borders.hear(r - 1, f, &mut w.motion);
+                    borders.receive(r - 1, f, &mut w.motion);
                 }
                 let since = r % (bend_every * looks);
                 if since == 0 {
@@ -142,11 +147,11 @@ pub(super) fn run(
                     w.solid = w.planes.len();
                     let t = r as f32 * hf;
                     w.motion
-                        .within_reach(&w.folds, t, span as f32, &mut w.planes);
+                        .find_reachable(&w.folds, t, span as f32, &mut w.planes);
                     // Times count from the last look, for folds too.
                     w.planes[w.solid..]
                         .iter_mut()
-                        .for_each(|p| p.level += p.normal.dot(p.speed) * t);
+                        .for_each(|p| p.offset += p.normal.dot(p.velocity) * t);
                     w.ties.clear();
                     for &(i, p) in &pinned[k] {
                         let at = |t: f64| {
@@ -156,34 +161,34 @@ pub(super) fn run(
                             })
                         };
                         let speed = (at(t0 + span) - at(t0)) / span;
-                        w.ties.push(Tie {
+                        w.ties.push(Pin {
                             vertex: i,
-                            place: v4(&at(t0)),
-                            speed: v4(&speed),
-                            firmness: 1.0,
+                            target: v4(&at(t0)),
+                            velocity: v4(&speed),
+                            stiffness: 1.0,
                         });
                     }
                 }
                 if r % bend_every == 0 {
                     w.motion
-                        .bend(f, hf * bend_every.min(steps - r) as f32 * 0.5, smooth);
+                        .update_bending(f, hf * bend_every.min(steps - r) as f32 * 0.5, smooth);
                 }
                 let t = since as f32 * hf;
-                let step = Step {
+                let step = Substep {
                     h: hf,
                     t,
                     ahead,
                     gravity,
                     rings: 0,
                 };
-                w.motion.accelerate(f, &step, &w.planes, &w.ties);
+                w.motion.integrate_velocities(f, &step, &w.planes, &w.ties);
                 // In this order: a solid has the last word.
                 let (solid, cloth) = w.planes.split_at(w.solid);
-                w.motion.restrain(cloth, t, hf, CLOTH_RECOVERY);
-                w.motion.restrain(solid, t, hf, RECOVERY);
-                w.motion.tie(&w.ties, t, hf);
-                w.motion.advance(f, &step, f32::INFINITY);
-                borders.tell(r, k, f, &w.motion);
+                w.motion.resolve_contacts(cloth, t, hf, CLOTH_RECOVERY);
+                w.motion.resolve_contacts(solid, t, hf, RECOVERY);
+                w.motion.apply_pins(&w.ties, t, hf);
+                w.motion.integrate_positions(f, &step, f32::INFINITY);
+                borders.publish(r, k, f, &w.motion);
             });
             for (w, f) in scratch.iter().zip(&fabrics) {
                 for (i, v) in f.vertices[..f.owned].iter().enumerate() {
@@ -231,14 +236,14 @@ pub(super) fn run(
 
 #[derive(Default)]
 struct Scratch {
-    motion: Motion,
-    planes: Vec<Plane>,
+    motion: PatchState,
+    planes: Vec<ContactPlane>,
     clear: Vec<f32>,
-    ties: Vec<Tie>,
+    ties: Vec<Pin>,
     /// How many of the planes, the first ones, are the solids'.
     solid: usize,
     /// Planes of other folds since they were looked for.
-    folds: Vec<Plane>,
+    folds: Vec<ContactPlane>,
     /// How much nearer other folds may come to each vertex before they are looked for, metres.
     room: Vec<f32>,
     /// Searches left out for that.
@@ -351,7 +356,7 @@ impl Folds {
         looks * self.looks
     }
     /// Planes between the vertices of a patch and other folds.
-    fn find(&self, f: &Fabric, pinned: &[(u32, u32)], w: &mut Scratch) {
+    fn find(&self, f: &PatchModel, pinned: &[(u32, u32)], w: &mut Scratch) {
         w.folds.clear();
         w.held_off = 0;
         w.room.resize(f.vertices.len(), 0.0);
@@ -387,7 +392,7 @@ impl Folds {
 }
 
 /// Local and sheet numbers of a patch's pinned vertices.
-fn pins_of(scene: &Scene, f: &Fabric) -> Vec<(u32, u32)> {
+fn pins_of(scene: &Scene, f: &PatchModel) -> Vec<(u32, u32)> {
     let local = f.vertices.iter().enumerate();
     local
         .filter(|(_, v)| scene.pins.contains(v))
@@ -400,10 +405,10 @@ fn pins_of(scene: &Scene, f: &Fabric) -> Vec<(u32, u32)> {
 pub(super) fn look(
     scene: &Scene,
     offset: f64,
-    motion: &Motion,
+    motion: &PatchState,
     t: f64,
     span: f64,
-    planes: &mut Vec<Plane>,
+    planes: &mut Vec<ContactPlane>,
     clear: &mut Vec<f32>,
 ) {
     planes.clear();
@@ -430,11 +435,11 @@ pub(super) fn look(
             let normal = was.rotation * normal;
             let on = x - normal * d;
             let speed = (change * on - on) / span;
-            planes.push(Plane {
+            planes.push(ContactPlane {
                 vertex: i as u32,
                 normal: v4(&normal),
-                level: (normal.dot(&on.coords) + offset) as f32,
-                speed: v4(&speed),
+                offset: (normal.dot(&on.coords) + offset) as f32,
+                velocity: v4(&speed),
                 friction: c.friction as f32,
             });
         }

@@ -1,7 +1,7 @@
 //! Triangles and hinges, eight to a block: what one pass of the kernels takes.
 
-use super::lanes::{At, LANES, Place};
-use super::plan::{Bent, Triangle};
+use super::simd::{At, LANES, Place};
+use super::stable_sheet::{Bent, Triangle};
 use std::collections::BTreeSet;
 
 /// Eight pairs of triangles a b c and b a d; those without a partner have no stiffness in the second. The last eight are

@@ -5,10 +5,10 @@
 //! not depend on the number of threads.
 
 use super::blocks::{Hinges, Quads, hinges, quads};
-use super::lanes::{LANES, Place};
-use super::plan::{Bent, Plan, Triangle};
-use super::struts::Diagonal;
-use crate::cloth::pieces;
+use super::fold_limit::Diagonal;
+use super::simd::{LANES, Place};
+use super::stable_sheet::{Bent, StableSheet, Triangle};
+use crate::cloth::model::partition;
 
 /// The most vertices a patch may have.
 pub(super) const MOST: usize = 1 << 15;
@@ -34,13 +34,13 @@ pub(super) struct Far {
 
 /// Immutable.
 #[derive(Clone, Debug)]
-pub struct Fabric {
-    /// Sheet vertex of each local one; the first [`Fabric::owned`] belong to this patch.
+pub struct PatchModel {
+    /// Sheet vertex of each local one; the first [`PatchModel::owned`] belong to this patch.
     pub vertices: Vec<u32>,
     /// Number of owned vertices.
     pub owned: usize,
     /// Where its regions begin among the owned vertices, and how many those are: compact pieces that may sleep.
-    pub regions: Vec<usize>,
+    pub islands: Vec<usize>,
     /// Vertices within so many rings of the owned ones.
     pub(super) within: Vec<usize>,
     /// Owned vertices that others have as ghosts.
@@ -65,7 +65,7 @@ pub struct Fabric {
     pub(super) damping: f32,
 }
 
-impl Fabric {
+impl PatchModel {
     /// Vertices that are computed where what lies `rings` rings around the owned ones must be right.
     pub(super) fn reach(&self, rings: usize) -> usize {
         self.within
@@ -75,10 +75,10 @@ impl Fabric {
     }
 }
 
-impl Plan {
+impl StableSheet {
     /// Cuts the sheet into patches: as many as asked for, more where they would be too large; and these into regions of at
     /// most `region` vertices, if that is not 0.
-    pub fn patches(&self, wanted: usize, rings: usize, region: usize) -> Vec<Fabric> {
+    pub fn compile_patches(&self, wanted: usize, rings: usize, region: usize) -> Vec<PatchModel> {
         let n = self.vertices();
         let mut around = vec![Vec::new(); n];
         for e in &self.ends {
@@ -116,12 +116,12 @@ impl Plan {
             .map(bands)
             .min_by_key(cut)
             .unwrap_or_default();
-        let whole = |set: Vec<u32>| pieces::Pieces {
+        let whole = |set: Vec<u32>| partition::Partition {
             starts: vec![0, set.len()],
             order: set,
         };
-        let in_regions = |set| pieces::cut(n, |v| &around[v as usize], set, region, LANES);
-        let sets: Vec<pieces::Pieces> = sets
+        let in_regions = |set| partition::cut(n, |v| &around[v as usize], set, region, LANES);
+        let sets: Vec<partition::Partition> = sets
             .into_iter()
             .map(|set| {
                 if region > 0 {
@@ -137,7 +137,7 @@ impl Plan {
                 owner[*v as usize] = [p as u32, i as u32];
             }
         }
-        let mut all: Vec<Fabric> = sets
+        let mut all: Vec<PatchModel> = sets
             .into_iter()
             .map(|set| self.patch(set, if k > 1 { rings } else { 0 }, &around, &owner))
             .collect();
@@ -225,14 +225,14 @@ impl Plan {
 
     fn patch(
         &self,
-        own: pieces::Pieces,
+        own: partition::Partition,
         rings: usize,
         around: &[Vec<u32>],
         owner: &[[u32; 2]],
-    ) -> Fabric {
-        let pieces::Pieces {
+    ) -> PatchModel {
+        let partition::Partition {
             order: mut set,
-            starts: regions,
+            starts: islands,
         } = own;
         let owned = set.len();
         let mut local = vec![u32::MAX; self.vertices()];
@@ -301,7 +301,7 @@ impl Plan {
                 ends: s.ends.map(at),
                 ..*s
             });
-        Fabric {
+        PatchModel {
             diagonals: diagonals.collect(),
             quads: quads(&triangles.collect::<Vec<_>>()),
             rows,
@@ -320,7 +320,7 @@ impl Plan {
             ghosts: set[owned..].iter().map(|v| owner[*v as usize]).collect(),
             border: Vec::new(),
             owned,
-            regions,
+            islands,
             vertices: set,
             damping: self.damping,
         }

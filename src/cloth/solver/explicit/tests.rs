@@ -49,9 +49,9 @@ pub(super) fn grid(
 pub(super) struct Lab {
     pub(super) bend_every: usize,
     pub(super) sheet: Sheet,
-    pub(super) plan: Plan,
-    fabrics: Vec<Fabric>,
-    motions: Vec<Motion>,
+    pub(super) plan: StableSheet,
+    fabrics: Vec<PatchModel>,
+    motions: Vec<PatchState>,
     h: f64,
     ahead: f32,
     pub(super) gravity: V4,
@@ -62,10 +62,10 @@ impl Lab {
         Self::smooth(sheet, x, h, patches, 2)
     }
     pub(super) fn smooth(sheet: Sheet, x: &[V3d], h: f64, patches: usize, smooth: usize) -> Self {
-        let bend_every = Plan::bend_every(&sheet, h);
-        let plan = Plan::new(
+        let bend_every = StableSheet::bending_interval(&sheet, h);
+        let plan = StableSheet::new(
             &sheet,
-            &Fit {
+            &StepSpec {
                 h,
                 ahead: 0.25,
                 springs_only: false,
@@ -73,7 +73,7 @@ impl Lab {
                 smooth,
             },
         );
-        let fabrics = plan.patches(patches, 8 * (1 + smooth) + 8, 0);
+        let fabrics = plan.compile_patches(patches, 8 * (1 + smooth) + 8, 0);
         let gravity = V4::new(0.0, -9.81, 0.0);
         let mut lab = Self {
             bend_every,
@@ -91,13 +91,13 @@ impl Lab {
     pub(super) fn place(&mut self, x: &[V3d], v: &[V3d]) {
         let v4 = |p: &V3d| V4::new(p.x as f32, p.y as f32, p.z as f32);
         self.motions
-            .resize_with(self.fabrics.len(), Motion::default);
+            .resize_with(self.fabrics.len(), PatchState::default);
         for (m, f) in self.motions.iter_mut().zip(&self.fabrics) {
             let all = || f.vertices.iter().map(|i| *i as usize);
-            m.begin(all().map(|i| v4(&x[i])), all().map(|i| v4(&v[i])));
+            m.reset(all().map(|i| v4(&x[i])), all().map(|i| v4(&v[i])));
         }
     }
-    fn gather(&self, of: impl Fn(&Motion, usize) -> V4) -> Vec<V3d> {
+    fn gather(&self, of: impl Fn(&PatchState, usize) -> V4) -> Vec<V3d> {
         let mut out = vec![V3d::zeros(); self.sheet.mass.len()];
         for (f, m) in self.fabrics.iter().zip(&self.motions) {
             for i in 0..f.owned {
@@ -108,7 +108,7 @@ impl Lab {
         out
     }
     pub(super) fn positions(&self) -> Vec<V3d> {
-        self.gather(Motion::position)
+        self.gather(PatchState::position)
     }
     pub(super) fn velocities(&self) -> Vec<V3d> {
         self.gather(|m, i| m.velocity[i])
@@ -118,9 +118,9 @@ impl Lab {
         self.run_on(n, held, &[]);
     }
     /// The same on planes, whose vertices are those of the one patch.
-    fn run_on(&mut self, n: usize, held: &[u32], planes: &[Plane]) {
+    fn run_on(&mut self, n: usize, held: &[u32], planes: &[ContactPlane]) {
         let h = self.h as f32;
-        let ties: Vec<Vec<Tie>> = self
+        let ties: Vec<Vec<Pin>> = self
             .fabrics
             .iter()
             .zip(&self.motions)
@@ -132,33 +132,33 @@ impl Lab {
             for ((f, m), ties) in self.fabrics.iter().zip(&mut self.motions).zip(&ties) {
                 for s in 0..block {
                     if s % self.bend_every == 0 {
-                        m.bend(
+                        m.update_bending(
                             f,
                             h * self.bend_every.min(block - s) as f32 * 0.5,
                             usize::MAX,
                         );
                     }
-                    let step = Step {
+                    let step = Substep {
                         h,
                         t: 0.0,
                         ahead: self.ahead,
                         gravity: self.gravity,
                         rings: usize::MAX,
                     };
-                    m.accelerate(f, &step, planes, ties);
-                    m.restrain(planes, 0.0, h, 1.0);
-                    m.tie(ties, 0.0, h);
-                    m.advance(f, &step, f32::INFINITY);
+                    m.integrate_velocities(f, &step, planes, ties);
+                    m.resolve_contacts(planes, 0.0, h, 1.0);
+                    m.apply_pins(ties, 0.0, h);
+                    m.integrate_positions(f, &step, f32::INFINITY);
                 }
             }
-            let borders = Borders::new(self.fabrics.len());
+            let borders = HaloExchange::new(self.fabrics.len());
             for (p, (f, m)) in self.fabrics.iter().zip(&self.motions).enumerate() {
-                borders.tell(0, p, f, m);
+                borders.publish(0, p, f, m);
             }
             self.fabrics
                 .iter()
                 .zip(&mut self.motions)
-                .for_each(|(f, m)| borders.hear(0, f, m));
+                .for_each(|(f, m)| borders.receive(0, f, m));
             done += block;
         }
     }
@@ -171,17 +171,17 @@ impl Lab {
     }
 }
 
-fn tied(f: &Fabric, m: &Motion, held: &[u32]) -> Vec<Tie> {
+fn tied(f: &PatchModel, m: &PatchState, held: &[u32]) -> Vec<Pin> {
     let all = f
         .vertices
         .iter()
         .enumerate()
         .filter(|(_, v)| held.contains(v));
-    all.map(|(i, _)| Tie {
+    all.map(|(i, _)| Pin {
         vertex: i as u32,
-        place: m.position(i),
-        speed: V4::default(),
-        firmness: 1.0,
+        target: m.position(i),
+        velocity: V4::default(),
+        stiffness: 1.0,
     })
     .collect()
 }
@@ -354,12 +354,12 @@ fn a_block_slides_as_coulomb_says() {
             .map(|p| down * p.x + V3d::new(0.0, 0.0, p.z))
             .collect();
         lab.place(&on, &vec![V3d::zeros(); x.len()]);
-        let planes: Vec<Plane> = (0..x.len() as u32)
-            .map(|vertex| Plane {
+        let planes: Vec<ContactPlane> = (0..x.len() as u32)
+            .map(|vertex| ContactPlane {
                 vertex,
                 normal,
-                level: 0.0,
-                speed: V4::default(),
+                offset: 0.0,
+                velocity: V4::default(),
                 friction: mu,
             })
             .collect();
@@ -494,7 +494,7 @@ fn smoothing_is_the_filter_and_takes_nothing_from_momentum() {
         .iter()
         .map(|(v, _)| [v[0].min(v[1]), v[0].max(v[1])])
         .collect();
-    let filter = super::plan::filter(&s, ends, 2);
+    let filter = super::stable_sheet::filter(&s, ends, 2);
     let most = plain.iter().map(|a| a.norm()).fold(0.0, f64::max);
     for pair in [[0, 1], [1, 2]] {
         let mut expected: Vec<_> = plain
@@ -517,7 +517,7 @@ fn smoothing_is_the_filter_and_takes_nothing_from_momentum() {
 #[test]
 fn a_million_steps_at_rest_neither_drift_nor_gain() {
     let (x, faces, rest) = grid(3, 2, 0.02, 0.02);
-    let h = Plan::comfortable_step(&sheet(&faces, &rest, x.len(), &cotton(1e-5)), 0.25, 2);
+    let h = StableSheet::stable_step(&sheet(&faces, &rest, x.len(), &cotton(1e-5)), 0.25, 2);
     // Air, or a thousand seconds carry the last digit of a speed far.
     let mut airy = cotton(1e-5);
     airy.damping = 1.0;
@@ -542,7 +542,7 @@ fn a_swinging_sheet_gains_no_energy_at_the_step_that_is_called_comfortable() {
     for degree in 0..3 {
         let (x, faces, rest) = grid(6, 6, 0.02, 0.02);
         let s = sheet(&faces, &rest, x.len(), &cotton(1e-5));
-        let h = Plan::comfortable_step(&s, 0.25, degree);
+        let h = StableSheet::stable_step(&s, 0.25, degree);
         let mut lab = Lab::smooth(s, &x, h, 1, degree);
         assert!(lab.plan.softened > 0.999, "{}", lab.plan.softened);
         for _ in 0..10 {
@@ -554,7 +554,7 @@ fn a_swinging_sheet_gains_no_energy_at_the_step_that_is_called_comfortable() {
 
 #[test]
 fn wide_registers_change_no_bit_and_the_root_is_near() {
-    use super::lanes::{LANES, Plain, inverse_root};
+    use super::simd::{LANES, Plain, inverse_root};
     let (x, faces, rest) = grid(9, 7, 0.02, 0.013);
     let wild: Vec<V3d> = x
         .iter()
@@ -565,7 +565,7 @@ fn wide_registers_change_no_bit_and_the_root_is_near() {
         lab.place(&wild, &vec![V3d::new(0.1, 0.0, 0.3); x.len()]);
         lab
     };
-    let step = Step {
+    let step = Substep {
         h: 1e-4,
         t: 0.0,
         ahead: 0.25,
@@ -573,13 +573,13 @@ fn wide_registers_change_no_bit_and_the_root_is_near() {
         rings: 0,
     };
     let (mut plain, mut wide) = (make(), make());
-    plain.motions[0].pull_kernel(Plain, &plain.fabrics[0], &step);
-    wide.motions[0].accelerate(&wide.fabrics[0], &step, &[], &[]);
+    plain.motions[0].elastic_kernel(Plain, &plain.fabrics[0], &step);
+    wide.motions[0].integrate_velocities(&wide.fabrics[0], &step, &[], &[]);
     let n = x.len();
-    let moved = plain.motions[0].work.push[..n]
+    let moved = plain.motions[0].scratch.push[..n]
         .iter()
         .any(|a| a.dot(*a) > 1.0);
-    assert!(moved && plain.motions[0].work.push[..n] == wide.motions[0].work.push[..n]);
+    assert!(moved && plain.motions[0].scratch.push[..n] == wide.motions[0].scratch.push[..n]);
     let numbers: [f32; LANES] = [1e-12, 1e-7, 2.5e-4, 0.9, 1.0, 1.7, 4.1, 3e5];
     for (a, y) in numbers.iter().zip(inverse_root(Plain, numbers)) {
         assert!(
@@ -594,10 +594,10 @@ fn cloth_beside_sleeping_cloth_moves_as_beside_held_cloth() {
     let (x, faces, rest) = grid(24, 16, 0.02, 0.02);
     for smooth in 0..3 {
         let s = sheet(&faces, &rest, x.len(), &cotton(1e-5));
-        let h = Plan::comfortable_step(&s, 0.25, smooth);
-        let plan = Plan::new(
+        let h = StableSheet::stable_step(&s, 0.25, smooth);
+        let plan = StableSheet::new(
             &s,
-            &Fit {
+            &StepSpec {
                 h,
                 ahead: 0.25,
                 springs_only: false,
@@ -605,16 +605,16 @@ fn cloth_beside_sleeping_cloth_moves_as_beside_held_cloth() {
                 smooth,
             },
         );
-        let f = &plan.patches(1, 0, 64)[0];
+        let f = &plan.compile_patches(1, 0, 64)[0];
         let n = x.len();
         // The regions of one half.
-        let half = f.regions[f.regions.len() / 2];
+        let half = f.islands[f.islands.len() / 2];
         let asleep: Vec<bool> = (0..n).map(|i| i < half).collect();
         let held: Vec<u32> = f.vertices[..half].to_vec();
         let v4 = |p: &V3d| V4::new(p.x as f32, p.y as f32, p.z as f32);
         let run = |sleeps: bool| {
-            let mut m = Motion::default();
-            m.begin(
+            let mut m = PatchState::default();
+            m.reset(
                 f.vertices.iter().map(|v| v4(&x[*v as usize])),
                 (0..n).map(|_| V4::default()),
             );
@@ -624,32 +624,34 @@ fn cloth_beside_sleeping_cloth_moves_as_beside_held_cloth() {
                 tied(f, &m, &held)
             };
             if sleeps {
-                m.leave(f, &asleep);
+                m.set_sleeping(f, &asleep);
             }
             for i in 0..300 {
                 if i % 3 == 0 {
-                    m.bend(f, 1.5 * h as f32, usize::MAX);
+                    m.update_bending(f, 1.5 * h as f32, usize::MAX);
                 }
                 let gravity = V4::new(0.0, -9.81, 0.0);
-                let step = Step {
+                let step = Substep {
                     h: h as f32,
                     t: 0.0,
                     ahead: 0.25,
                     gravity,
                     rings: usize::MAX,
                 };
-                m.accelerate(f, &step, &[], &ties);
-                m.tie(&ties, 0.0, h as f32);
-                m.advance(f, &step, f32::INFINITY);
+                m.integrate_velocities(f, &step, &[], &ties);
+                m.apply_pins(&ties, 0.0, h as f32);
+                m.integrate_positions(f, &step, f32::INFINITY);
             }
             m
         };
         let (sleeping, tied) = (run(true), run(false));
-        let fallen = (0..n).map(|i| -tied.moved[i].0[1]).fold(0.0, f32::max);
+        let fallen = (0..n)
+            .map(|i| -tied.displacement[i].0[1])
+            .fold(0.0, f32::max);
         assert!(fallen > 1e-3, "{fallen}");
-        assert!((0..half).all(|i| sleeping.moved[i] == V4::default()));
+        assert!((0..half).all(|i| sleeping.displacement[i] == V4::default()));
         let apart = (half..n).map(|i| {
-            (sleeping.moved[i] - tied.moved[i])
+            (sleeping.displacement[i] - tied.displacement[i])
                 .0
                 .iter()
                 .fold(0.0, |a: f32, c| a.max(c.abs()))
@@ -660,7 +662,7 @@ fn cloth_beside_sleeping_cloth_moves_as_beside_held_cloth() {
             "degree {smooth}: {apart} m apart, fallen by {fallen}"
         );
         let computed: usize = sleeping
-            .work
+            .scratch
             .awake
             .iter()
             .flat_map(|a| &a.quads)
@@ -683,7 +685,7 @@ fn a_hanging_sheet_stays_where_it_hangs_for_a_million_steps() {
     fabric.damping = 4.0;
     for degree in [0, 1] {
         let s = sheet(&faces, &rest, x.len(), &fabric);
-        let h = Plan::comfortable_step(&s, 0.25, degree);
+        let h = StableSheet::stable_step(&s, 0.25, degree);
         let mut lab = Lab::smooth(s, &x, h, 1, degree);
         let held = [0, 8, 16];
         lab.run((8.0 / h) as usize, &held);

@@ -4,7 +4,7 @@
 //! sheet plus what holds add to the diagonal, factored once for many iterations: an iteration costs one pass over
 //! triangles and one back-substitution.
 
-use super::{ClothError, Sheet};
+use crate::cloth::{ClothError, Sheet};
 use crate::linear::{Factor, SymbolicFactor};
 use crate::math::V3d;
 

@@ -1,14 +1,14 @@
 //! The inner loop: forces of a sheet, and velocities after a step.
 
-use super::awake::{before, part};
-use super::contact::{Plane, Tie};
-use super::fabric::{Fabric, MOST, Rows};
-use super::lanes::{self, Lanes, add3, dot, inverse_root, mul_add3, scale3, sub3};
-use super::motion::{Motion, V4, Work};
+use super::active_set::{before, part};
+use super::contact::{ContactPlane, Pin};
+use super::patch_model::{MOST, PatchModel, Rows};
+use super::patch_state::{PatchState, Scratch, V4};
+use super::simd::{self, Lanes, add3, dot, inverse_root, mul_add3, scale3, sub3};
 
 /// One small step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Step {
+pub struct Substep {
     /// Length, s.
     pub h: f32,
     /// When it begins, since the planes and ties were found, s.
@@ -34,18 +34,18 @@ macro_rules! wide {
         #[cfg(target_arch = "x86_64")]
         {
             #[target_feature(enable = "avx2,fma")]
-            fn avx2(m: &mut Motion, l: lanes::Avx2, $($arg: $kind),*) {
+            fn avx2(m: &mut PatchState, l: simd::Avx2, $($arg: $kind),*) {
                 m.$kernel(l, $($arg),*);
             }
-            match lanes::detect() {
+            match simd::detect() {
                 // Sound: the processor has just been asked.
                 #[allow(unsafe_code)]
                 Some(l) => unsafe { avx2($self, l, $($arg),*) },
-                None => $self.$kernel(lanes::Plain, $($arg),*),
+                None => $self.$kernel(simd::Plain, $($arg),*),
             }
         }
         #[cfg(not(target_arch = "x86_64"))]
-        $self.$kernel(lanes::Plain, $($arg),*);
+        $self.$kernel(simd::Plain, $($arg),*);
     }};
 }
 
@@ -54,7 +54,7 @@ macro_rules! wide {
 fn spring<L: Lanes>(
     l: L,
     edge: [L::F; 3],
-    rest: &[f32; lanes::LANES],
+    rest: &[f32; simd::LANES],
     shortest: L::F,
 ) -> (L::F, L::F) {
     let square = l.max(dot(l, edge, edge), shortest);
@@ -86,34 +86,40 @@ fn even(n: usize) -> usize {
     n.next_multiple_of(2)
 }
 
-impl Motion {
+impl PatchState {
     /// Bending forces, kept until called again, on what lies `rings` rings around the vertices that the patch owns. They
     /// change slowly (docs/benchmarks.md); `late` is how far ahead of the positions they are taken, s, half of the time
     /// they will be kept.
-    pub fn bend(&mut self, f: &Fabric, late: f32, rings: usize) {
-        wide!(self.bend_kernel(f: &Fabric, late: f32, rings: usize));
+    pub fn update_bending(&mut self, f: &PatchModel, late: f32, rings: usize) {
+        wide!(self.bend_kernel(f: &PatchModel, late: f32, rings: usize));
     }
     /// Velocities after a step under inner forces, gravity and air. Planes and ties are only answered where
     /// accelerations are smoothed: they must still be enforced. The same bits with and without AVX2, which is used where
     /// there is one.
-    pub fn accelerate(&mut self, f: &Fabric, step: &Step, planes: &[Plane], ties: &[Tie]) {
-        wide!(self.pull_kernel(f: &Fabric, step: &Step));
+    pub fn integrate_velocities(
+        &mut self,
+        f: &PatchModel,
+        step: &Substep,
+        planes: &[ContactPlane],
+        ties: &[Pin],
+    ) {
+        wide!(self.elastic_kernel(f: &PatchModel, step: &Substep));
         if f.smoothing.len() > 1 {
-            self.answer(f, planes, ties, step);
-            wide!(self.smooth_kernel(f: &Fabric, step: &Step));
+            self.predict_contacts(f, planes, ties, step);
+            wide!(self.smooth_kernel(f: &PatchModel, step: &Substep));
         } else {
-            wide!(self.hasten_kernel(f: &Fabric, step: &Step));
+            wide!(self.integrate_velocity(f: &PatchModel, step: &Substep));
         }
-        self.work.looked = false;
+        self.scratch.looked = false;
     }
     #[inline(always)]
     fn look_ahead(&mut self, time: f32) {
         let all = self
-            .work
+            .scratch
             .ahead
             .iter_mut()
             .zip(&self.start)
-            .zip(&self.moved)
+            .zip(&self.displacement)
             .zip(&self.velocity);
         for (((a, s), m), v) in all {
             *a = *s + *m + v.scale(time);
@@ -121,28 +127,28 @@ impl Motion {
     }
     /// Positions after a step, none faster than `fastest` m/s: where planes contradict each other, speeds would grow
     /// until they are no numbers. The next step must be as long and look as far ahead.
-    pub fn advance(&mut self, f: &Fabric, step: &Step, fastest: f32) {
-        wide!(self.advance_kernel(f: &Fabric, step: &Step, fastest: f32));
-        self.work.looked = true;
+    pub fn integrate_positions(&mut self, f: &PatchModel, step: &Substep, fastest: f32) {
+        wide!(self.advance_kernel(f: &PatchModel, step: &Substep, fastest: f32));
+        self.scratch.looked = true;
     }
     #[inline(always)]
-    fn advance_kernel(&mut self, _: impl Lanes, f: &Fabric, step: &Step, fastest: f32) {
+    fn advance_kernel(&mut self, _: impl Lanes, f: &PatchModel, step: &Substep, fastest: f32) {
         let (h, ahead, most) = (step.h, step.h * step.ahead, fastest * fastest);
         let n = f.reach(step.rings);
-        let Work {
+        let Scratch {
             ahead: look,
             awake,
             pressed,
             sunken,
             ..
-        } = &mut self.work;
+        } = &mut self.scratch;
         sunken
             .drain(..)
             .for_each(|i| pressed[i as usize] = V4::default());
         let whole = 0..n;
         for r in part(awake, &whole, |a| &a.vertices) {
             let r = before(r, n);
-            let all = self.moved[r.clone()]
+            let all = self.displacement[r.clone()]
                 .iter_mut()
                 .zip(&mut self.velocity[r.clone()])
                 .zip(&self.start[r.clone()]);
@@ -156,24 +162,24 @@ impl Motion {
             }
         }
         for i in awake.iter().flat_map(|a| &a.rim).map(|i| *i as usize) {
-            self.moved[i] = self.moved[i] + self.velocity[i].scale(h);
-            look[i & MASK] = self.start[i] + self.moved[i] + self.velocity[i].scale(ahead);
+            self.displacement[i] = self.displacement[i] + self.velocity[i].scale(h);
+            look[i & MASK] = self.start[i] + self.displacement[i] + self.velocity[i].scale(ahead);
         }
     }
 
     /// Elastic accelerations and gravity into `push`.
     #[inline(always)]
-    pub(super) fn pull_kernel<L: Lanes>(&mut self, l: L, f: &Fabric, step: &Step) {
-        if !self.work.looked {
+    pub(super) fn elastic_kernel<L: Lanes>(&mut self, l: L, f: &PatchModel, step: &Substep) {
+        if !self.scratch.looked {
             self.look_ahead(step.h * step.ahead);
         }
-        let Work {
+        let Scratch {
             ahead,
             push,
             bending,
             awake,
             ..
-        } = &mut self.work;
+        } = &mut self.scratch;
         let (x, push): (&[V4; MOST], &mut [V4; MOST]) = (ahead, push);
         let rings = step.rings.saturating_add(f.smoothing.len() - 1);
         let n = f.reach(rings);
@@ -250,10 +256,10 @@ impl Motion {
 
     /// Velocities under accelerations that are not smoothed.
     #[inline(always)]
-    fn hasten_kernel(&mut self, _: impl Lanes, f: &Fabric, step: &Step) {
+    fn integrate_velocity(&mut self, _: impl Lanes, f: &PatchModel, step: &Substep) {
         let keep = 1.0 / (1.0 + step.h * f.damping);
         let n = f.reach(step.rings);
-        let Work { push, awake, .. } = &self.work;
+        let Scratch { push, awake, .. } = &self.scratch;
         let whole = 0..n;
         for r in part(awake, &whole, |a| &a.vertices) {
             let r = before(r, n);
@@ -265,15 +271,15 @@ impl Motion {
 
     /// W times `push` by Horner's scheme, and velocities under that.
     #[inline(always)]
-    fn smooth_kernel<L: Lanes>(&mut self, l: L, f: &Fabric, step: &Step) {
-        let Work {
+    fn smooth_kernel<L: Lanes>(&mut self, l: L, f: &PatchModel, step: &Substep) {
+        let Scratch {
             push,
             smooth,
             smoother,
             held,
             awake,
             ..
-        } = &mut self.work;
+        } = &mut self.scratch;
         let Some((highest, lower)) = f.smoothing.split_last() else {
             return;
         };
@@ -360,15 +366,15 @@ impl Motion {
     }
 
     #[inline(always)]
-    fn bend_kernel<L: Lanes>(&mut self, l: L, f: &Fabric, late: f32, rings: usize) {
+    fn bend_kernel<L: Lanes>(&mut self, l: L, f: &PatchModel, late: f32, rings: usize) {
         let end = f.reach(rings);
-        let Work {
+        let Scratch {
             smoother,
             push,
             bending,
             awake,
             ..
-        } = &mut self.work;
+        } = &mut self.scratch;
         let n = bending.len();
         let whole = 0..n;
         let seen = part(awake, &whole, |a| &a.seen);
@@ -377,7 +383,7 @@ impl Motion {
             let r = before(r, n);
             let all = self.start[r.clone()]
                 .iter()
-                .zip(&self.moved[r.clone()])
+                .zip(&self.displacement[r.clone()])
                 .zip(&self.velocity[r.clone()]);
             for (a, ((s, m), v)) in smoother[r.clone()].iter_mut().zip(all) {
                 *a = *s + *m + v.scale(late);

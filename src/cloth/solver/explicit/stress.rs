@@ -1,9 +1,9 @@
 //! Numbers at their limits: single precision against double, stiffness and shape at extreme ratios, meshes at fault.
 
-use super::plan::filter;
 use super::stability::element_limits;
+use super::stable_sheet::filter;
 use super::tests::{Lab, cotton, grid, sheet};
-use super::{Plan, triangles};
+use super::{StableSheet, triangles};
 use crate::cloth::{ClothError, Sheet};
 use crate::math::V3d;
 use crate::mesh::Face;
@@ -93,7 +93,7 @@ fn single_precision_moves_as_double_does() {
         .collect();
     for smooth in [0, 2] {
         let s = sheet(&faces, &rest, x.len(), &m);
-        let h = 0.5 * Plan::comfortable_step(&s, 0.25, smooth);
+        let h = 0.5 * StableSheet::stable_step(&s, 0.25, smooth);
         let mut lab = Lab::smooth(s, &x, h, 1, smooth);
         lab.place(&wild, &spin);
         assert_eq!(lab.plan.soft_elements, 0);

@@ -1,7 +1,7 @@
 //! Which step is stable: a bound from every element, and the largest eigenvalue of what accelerates the flat sheet.
 
-use super::filter::{Filter, noise};
-use super::plan::edge_stiffness;
+use super::mass_filter::{Filter, noise};
+use super::stable_sheet::edge_stiffness;
 use crate::cloth::Sheet;
 use nalgebra::{Matrix3, Matrix6, Rotation2, Vector2, Vector3, Vector6};
 

@@ -1,9 +1,9 @@
 //! Which part of a patch is computed while the rest of it sleeps: sleeping vertices are seen by their neighbours and go
 //! evenly, or not at all.
 
-use super::fabric::Fabric;
-use super::lanes::At;
-use super::motion::Motion;
+use super::patch_model::PatchModel;
+use super::patch_state::PatchState;
+use super::simd::At;
 use std::ops::Range;
 
 /// Vertices that are woken, and seen, together.
@@ -11,7 +11,7 @@ const GROUP: usize = 8;
 
 /// What a step goes through. Stretches are in order.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Awake {
+pub(super) struct ActiveSet {
     /// Vertices that move by themselves.
     pub(super) vertices: Vec<Range<usize>>,
     /// They and all that pulls at them.
@@ -40,8 +40,8 @@ fn stretches(all: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
     out
 }
 
-impl Awake {
-    fn new(f: &Fabric, asleep: &[bool]) -> Self {
+impl ActiveSet {
+    fn new(f: &PatchModel, asleep: &[bool]) -> Self {
         let n = f.vertices.len();
         let asleep: Vec<bool> = (0..n)
             .map(|i| asleep.get(i).copied().unwrap_or(false))
@@ -107,9 +107,9 @@ impl Awake {
 /// A kind of stretches, or everything if nothing sleeps.
 #[inline(always)]
 pub(super) fn part<'a>(
-    awake: &'a Option<Awake>,
+    awake: &'a Option<ActiveSet>,
     whole: &'a Range<usize>,
-    of: impl Fn(&'a Awake) -> &'a Vec<Range<usize>>,
+    of: impl Fn(&'a ActiveSet) -> &'a Vec<Range<usize>>,
 ) -> &'a [Range<usize>] {
     awake
         .as_ref()
@@ -122,9 +122,9 @@ pub(super) fn before(r: &Range<usize>, end: usize) -> Range<usize> {
     r.start.min(end)..r.end.min(end)
 }
 
-impl Motion {
+impl PatchState {
     /// Leaves the vertices that sleep to themselves until the next outer call: nothing moves them but their own speed.
-    pub fn leave(&mut self, f: &Fabric, asleep: &[bool]) {
-        self.work.awake = asleep.contains(&true).then(|| Awake::new(f, asleep));
+    pub fn set_sleeping(&mut self, f: &PatchModel, asleep: &[bool]) {
+        self.scratch.awake = asleep.contains(&true).then(|| ActiveSet::new(f, asleep));
     }
 }

@@ -2,7 +2,7 @@
 
 /// Vertices piece by piece, and where each piece begins; shape `[pieces + 1]`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Pieces {
+pub(crate) struct Partition {
     /// Vertices in their new order.
     pub(crate) order: Vec<u32>,
     /// Beginnings in that order, and its length.
@@ -18,9 +18,9 @@ pub(crate) fn cut<'a>(
     set: Vec<u32>,
     most: usize,
     multiple: usize,
-) -> Pieces {
+) -> Partition {
     let (most, multiple) = (most.max(1), multiple.max(1));
-    let mut pieces = Pieces {
+    let mut pieces = Partition {
         order: Vec::with_capacity(set.len()),
         starts: vec![0],
     };
@@ -71,7 +71,7 @@ pub(crate) fn cut<'a>(
     pieces
 }
 
-impl Pieces {
+impl Partition {
     /// How many there are.
     pub(crate) fn len(&self) -> usize {
         self.starts.len() - 1

@@ -1,8 +1,7 @@
 //! The state of one sheet between two outer calls, and one small step of it.
 
-use super::awake::Awake;
-use super::fabric::{Fabric, MOST};
-use super::struts::Excepted;
+use super::active_set::ActiveSet;
+use super::patch_model::{MOST, PatchModel};
 use crate::math::P3;
 
 /// Four floats that load at once: x, y, z and a spare lane.
@@ -59,7 +58,7 @@ impl std::ops::Sub for V4 {
     }
 }
 
-/// One vector for every [`super::lanes::Place`]: such an index needs no check.
+/// One vector for every [`super::simd::Place`]: such an index needs no check.
 #[derive(Clone, Debug)]
 pub(super) struct Table {
     all: Vec<V4>,
@@ -100,22 +99,31 @@ impl std::ops::DerefMut for Table {
     }
 }
 
+/// Vertices that fold limits and speed limits leave as they are; shape `[vertices]` each.
+#[derive(Clone, Copy, Debug)]
+pub struct Exemptions<'a> {
+    /// Vertices with a prescribed position.
+    pub fixed: &'a [bool],
+    /// Vertices that no limit applies to.
+    pub unlimited: &'a [bool],
+}
+
 /// Positions are kept as a start plus how far they have moved since: a small step moves less than a position's last
 /// digit, and would be lost.
 #[derive(Clone, Debug, Default)]
-pub struct Motion {
+pub struct PatchState {
     /// Where the outer call began, metres.
     pub start: Vec<V4>,
     /// Moved since, metres.
-    pub moved: Vec<V4>,
+    pub displacement: Vec<V4>,
     /// m/s.
     pub velocity: Vec<V4>,
-    pub(super) work: Work,
+    pub(super) scratch: Scratch,
 }
 
 /// Scratch of the inner loop.
 #[derive(Clone, Debug)]
-pub(super) struct Work {
+pub(super) struct Scratch {
     /// Where forces are evaluated: a little ahead.
     pub(super) ahead: Table,
     /// Acceleration of each vertex, and what becomes of it by smoothing.
@@ -131,10 +139,10 @@ pub(super) struct Work {
     pub(super) pressed: Vec<V4>,
     pub(super) sunken: Vec<u32>,
     /// What is computed; everything, if nothing sleeps.
-    pub(super) awake: Option<Awake>,
+    pub(super) awake: Option<ActiveSet>,
 }
 
-impl Default for Work {
+impl Default for Scratch {
     fn default() -> Self {
         Self {
             ahead: Table::new(0),
@@ -151,9 +159,9 @@ impl Default for Work {
     }
 }
 
-impl Motion {
+impl PatchState {
     /// Begins an outer call.
-    pub fn begin(
+    pub fn reset(
         &mut self,
         positions: impl Iterator<Item = V4>,
         velocities: impl Iterator<Item = V4>,
@@ -162,23 +170,23 @@ impl Motion {
         self.start.extend(positions);
         self.velocity.clear();
         self.velocity.extend(velocities);
-        self.moved.clear();
-        self.moved.resize(self.start.len(), V4::default());
-        self.work.looked = false;
-        self.work.awake = None;
-        self.work.pressed.clear();
-        self.work.pressed.resize(self.start.len(), V4::default());
-        self.work.sunken.clear();
-        self.work.bending.clear();
-        self.work.bending.resize(self.start.len(), V4::default());
+        self.displacement.clear();
+        self.displacement.resize(self.start.len(), V4::default());
+        self.scratch.looked = false;
+        self.scratch.awake = None;
+        self.scratch.pressed.clear();
+        self.scratch.pressed.resize(self.start.len(), V4::default());
+        self.scratch.sunken.clear();
+        self.scratch.bending.clear();
+        self.scratch.bending.resize(self.start.len(), V4::default());
     }
     /// Position of a vertex.
     #[inline(always)]
     pub fn position(&self, i: usize) -> V4 {
-        self.start[i] + self.moved[i]
+        self.start[i] + self.displacement[i]
     }
     /// Marks the vertices of edges that are longer than `most` times their rest length.
-    pub fn overstretched(&self, f: &Fabric, most: f32, out: &mut Vec<bool>) {
+    pub fn find_overstretched(&self, f: &PatchModel, most: f32, out: &mut Vec<bool>) {
         out.clear();
         out.resize(self.start.len(), false);
         for (e, rest) in f.ends.iter().zip(&f.rest) {
@@ -190,8 +198,13 @@ impl Motion {
         }
     }
     /// No vertex stays faster than `most` m/s.
-    pub fn slow_down(&mut self, most: f32, except: &Excepted<'_>) {
-        for ((v, held), free) in self.velocity.iter_mut().zip(except.held).zip(except.free) {
+    pub fn limit_speed(&mut self, most: f32, except: &Exemptions<'_>) {
+        for ((v, held), free) in self
+            .velocity
+            .iter_mut()
+            .zip(except.fixed)
+            .zip(except.unlimited)
+        {
             let square = v.dot(*v);
             if !held && !free && square > most * most {
                 *v = v.scale(most / square.sqrt());
@@ -199,13 +212,13 @@ impl Motion {
         }
     }
     /// Velocities after a step of `h` under bending, gravity and air alone.
-    pub fn fall(&mut self, f: &Fabric, h: f32, gravity: V4) {
+    pub fn integrate_external(&mut self, f: &PatchModel, h: f32, gravity: V4) {
         let keep = 1.0 / (1.0 + h * f.damping);
         let fall = gravity.scale(h);
         for ((v, a), m) in self
             .velocity
             .iter_mut()
-            .zip(&self.work.bending)
+            .zip(&self.scratch.bending)
             .zip(&f.inverse_mass)
         {
             *v = (*v + a.scale(m * h) + fall).scale(keep);
@@ -220,7 +233,7 @@ mod tests {
     #[test]
     fn only_what_is_fast_and_free_to_go_slower_is_slowed_down() {
         let v = |x: f32, y: f32| V4::new(x, y, 0.0);
-        let mut motion = Motion {
+        let mut motion = PatchState {
             velocity: vec![
                 v(3.0, 4.0),
                 v(0.3, 0.4),
@@ -228,17 +241,17 @@ mod tests {
                 v(3.0, 4.0),
                 v(0.0, 0.0),
             ],
-            ..Motion::default()
+            ..PatchState::default()
         };
         let (held, free) = (
             [false, false, true, false, false],
             [false, false, false, true, false],
         );
-        motion.slow_down(
+        motion.limit_speed(
             0.5,
-            &Excepted {
-                held: &held,
-                free: &free,
+            &Exemptions {
+                fixed: &held,
+                unlimited: &free,
             },
         );
         let speeds: Vec<f32> = motion.velocity.iter().map(|v| v.dot(*v).sqrt()).collect();

@@ -5,8 +5,8 @@
 //! the sheet for contact between folds to part them. A strut across each edge, which pushes and does not pull, holds the two
 //! corners opposite it apart: a fold takes several edges, and its sides are seen as two folds.
 
-use super::fabric::Fabric;
-use super::motion::{Motion, V4};
+use super::patch_model::PatchModel;
+use super::patch_state::{Exemptions, PatchState, V4};
 use crate::cloth::Sheet;
 use std::collections::HashMap;
 
@@ -19,21 +19,12 @@ pub(super) struct Diagonal {
 
 /// Two vertices that may come too near each other soon.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Strut {
+pub struct FoldLimit {
     ends: [u32; 2],
     /// They come no nearer, metres.
     least: f32,
     /// Share of the way apart that each of them goes.
     share: [f32; 2],
-}
-
-/// Vertices, by their numbers, that struts and limits of speed leave as they are.
-#[derive(Clone, Copy, Debug)]
-pub struct Excepted<'a> {
-    /// They go nowhere.
-    pub held: &'a [bool],
-    /// They go as far and as fast as they must.
-    pub free: &'a [bool],
 }
 
 /// Speed that two vertices may gain towards each other until struts are looked for again, m/s.
@@ -68,30 +59,31 @@ pub(super) fn diagonals(sheet: &Sheet) -> impl Iterator<Item = ([u32; 2], f64)> 
     })
 }
 
-impl Motion {
-    /// Struts that may become shorter than `limit` times their flat length within `span` seconds, none if that is 0.
-    pub fn short(
-        &self,
-        f: &Fabric,
+impl FoldLimit {
+    /// Limits that may become active within `span` seconds: pairs that may come nearer than `limit` times their flat
+    /// distance, none where that is 0.
+    pub fn find_active(
+        f: &PatchModel,
+        state: &PatchState,
         limit: f32,
         span: f32,
-        except: &Excepted<'_>,
-        out: &mut Vec<Strut>,
+        except: &Exemptions<'_>,
+        out: &mut Vec<Self>,
     ) {
         out.clear();
         let all = if limit > 0.0 { &f.diagonals[..] } else { &[] };
         for s in all {
             let [a, b] = s.ends.map(|v| v as usize);
-            let d = self.position(b) - self.position(a);
+            let d = state.position(b) - state.position(a);
             let square = d.dot(d);
             // At rest, or as near as makes it worth a root.
-            if square >= s.flat * s.flat || except.free[a] || except.free[b] {
+            if square >= s.flat * s.flat || except.unlimited[a] || except.unlimited[b] {
                 continue;
             }
             let (length, least) = (square.sqrt().max(SHORTEST), (limit * s.flat).min(WIDEST));
-            let opening = d.dot(self.velocity[b] - self.velocity[a]) / length;
+            let opening = d.dot(state.velocity[b] - state.velocity[a]) / length;
             let weight = [a, b].map(|v| {
-                if except.held[v] {
+                if except.fixed[v] {
                     0.0
                 } else {
                     f.inverse_mass[v]
@@ -99,7 +91,7 @@ impl Motion {
             });
             let both = weight[0] + weight[1];
             if both > 0.0 && length - least < span * (GAINED - opening) {
-                out.push(Strut {
+                out.push(Self {
                     ends: s.ends,
                     least,
                     share: weight.map(|w| w / both),
@@ -107,27 +99,27 @@ impl Motion {
             }
         }
     }
-    /// Takes from velocities what would make struts too short by the end of a step of `h`, and lets those that are grow. Each
-    /// push is equal and opposite: momentum and its moment stay.
-    pub fn brace(&mut self, struts: &[Strut], h: f32) {
-        for s in struts {
+    /// Takes from velocities what would violate the limits by the end of a step of `h`, and lets violated ones recover.
+    /// Each impulse is equal and opposite: linear and angular momentum stay.
+    pub fn apply(limits: &[Self], state: &mut PatchState, h: f32) {
+        for s in limits {
             let [a, b] = s.ends.map(|v| v as usize);
-            let d = self.position(b) - self.position(a);
+            let d = state.position(b) - state.position(a);
             let length = d.dot(d).sqrt();
             if !(length > SHORTEST) {
                 continue;
             }
             let normal: V4 = d.scale(1.0 / length);
             let gap = length - s.least;
-            let push = -gap.max(0.0) / h - normal.dot(self.velocity[b] - self.velocity[a]);
+            let push = -gap.max(0.0) / h - normal.dot(state.velocity[b] - state.velocity[a]);
             if push > 0.0 {
-                self.velocity[a] = self.velocity[a] - normal.scale(push * s.share[0]);
-                self.velocity[b] = self.velocity[b] + normal.scale(push * s.share[1]);
+                state.velocity[a] = state.velocity[a] - normal.scale(push * s.share[0]);
+                state.velocity[b] = state.velocity[b] + normal.scale(push * s.share[1]);
             }
             if gap < 0.0 {
                 let way = (-gap * RECOVERED).min(RECOVERY * h);
-                self.moved[a] = self.moved[a] - normal.scale(way * s.share[0]);
-                self.moved[b] = self.moved[b] + normal.scale(way * s.share[1]);
+                state.displacement[a] = state.displacement[a] - normal.scale(way * s.share[0]);
+                state.displacement[b] = state.displacement[b] + normal.scale(way * s.share[1]);
             }
         }
     }
@@ -136,7 +128,7 @@ impl Motion {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{cotton, grid, sheet};
-    use super::super::{Fit, Plan, Step};
+    use super::super::{StableSheet, StepSpec, Substep};
     use super::*;
     use crate::math::V3d;
 
@@ -160,14 +152,14 @@ mod tests {
     fn clapped(limit: f32, held: Option<u32>) -> (f64, f64, f64) {
         let (x, faces, rest) = grid(20, 2, 0.012, 0.012);
         let s = sheet(&faces, &rest, x.len(), &cotton(1e-6));
-        let fit = Fit {
+        let fit = StepSpec {
             h: H,
             ahead: 0.25,
             springs_only: false,
             bend_every: 3,
             smooth: 0,
         };
-        let f = &Plan::new(&s, &fit).patches(1, 0, 0)[0];
+        let f = &StableSheet::new(&s, &fit).compile_patches(1, 0, 0)[0];
         let middle = 0.12;
         // A shallow roof whose eaves come down and together at 1.2 m/s.
         let at = |v: &u32| {
@@ -178,11 +170,11 @@ mod tests {
             let d = x[*v as usize].x - middle;
             V4::new((-10.0 * d) as f32, (-10.0 * d.abs()) as f32, 0.0)
         };
-        let mut m = Motion::default();
-        m.begin(f.vertices.iter().map(at), f.vertices.iter().map(speed));
+        let mut m = PatchState::default();
+        m.reset(f.vertices.iter().map(at), f.vertices.iter().map(speed));
         let held: Vec<bool> = f.vertices.iter().map(|v| Some(*v) == held).collect();
         let v3 = |v: V4| V3d::new(f64::from(v.0[0]), f64::from(v.0[1]), f64::from(v.0[2]));
-        let moments = |m: &Motion| {
+        let moments = |m: &PatchState| {
             let of = |i: usize| {
                 let p = v3(m.velocity[i]) / f64::from(f.inverse_mass[i]);
                 (p, v3(m.position(i)).cross(&p))
@@ -192,38 +184,42 @@ mod tests {
                 .fold((V3d::zeros(), V3d::zeros()), |s, o| (s.0 + o.0, s.1 + o.1))
         };
         let before = moments(&m);
-        let (mut struts, mut sharpest) = (Vec::new(), f64::INFINITY);
+        let (mut limits, mut sharpest) = (Vec::new(), f64::INFINITY);
         for k in 0..(0.1 / H) as usize {
             if k % 40 == 0 {
-                let except = Excepted {
-                    held: &held,
-                    free: &vec![false; x.len()],
+                let except = Exemptions {
+                    fixed: &held,
+                    unlimited: &vec![false; x.len()],
                 };
-                m.short(f, limit, 40.0 * H as f32, &except, &mut struts);
+                FoldLimit::find_active(f, &m, limit, 40.0 * H as f32, &except, &mut limits);
             }
             if k % 3 == 0 {
-                m.bend(f, 1.5 * H as f32, usize::MAX);
+                m.update_bending(f, 1.5 * H as f32, usize::MAX);
             }
-            let step = Step {
+            let step = Substep {
                 h: H as f32,
                 t: 0.0,
                 ahead: 0.25,
                 gravity: V4::default(),
                 rings: usize::MAX,
             };
-            m.accelerate(f, &step, &[], &[]);
-            m.brace(&struts, step.h);
+            m.integrate_velocities(f, &step, &[], &[]);
+            FoldLimit::apply(&limits, &mut m, step.h);
             if let Some(i) = held.iter().position(|h| *h) {
                 m.velocity[i] = V4::default();
             }
-            m.advance(f, &step, f32::INFINITY);
+            m.integrate_positions(f, &step, f32::INFINITY);
             for a in &f.diagonals {
                 let d = v3(m.position(a.ends[0] as usize)) - v3(m.position(a.ends[1] as usize));
                 sharpest = sharpest.min(d.norm() / f64::from(a.flat));
             }
         }
         if let Some(i) = held.iter().position(|h| *h) {
-            assert_eq!(m.moved[i], V4::default(), "nothing moves what is held");
+            assert_eq!(
+                m.displacement[i],
+                V4::default(),
+                "nothing moves what is held"
+            );
         }
         let after = moments(&m);
         let went_in: f64 = (0..x.len())
@@ -250,23 +246,21 @@ mod tests {
 
     #[test]
     fn corners_in_one_place_have_no_direction_and_stay_there() {
-        let mut m = Motion::default();
-        m.begin(
+        let mut m = PatchState::default();
+        m.reset(
             [V4::default(); 2].into_iter(),
             [V4::default(); 2].into_iter(),
         );
-        m.brace(
-            &[Strut {
-                ends: [0, 1],
-                least: 0.01,
-                share: [0.5; 2],
-            }],
-            1e-3,
-        );
+        let limit = FoldLimit {
+            ends: [0, 1],
+            least: 0.01,
+            share: [0.5; 2],
+        };
+        FoldLimit::apply(&[limit], &mut m, 1e-3);
         assert!(
             m.velocity
                 .iter()
-                .chain(&m.moved)
+                .chain(&m.displacement)
                 .all(|v| *v == V4::default())
         );
     }

@@ -1,7 +1,7 @@
 //! What patches tell each other after a step: the vertices that others have as ghosts.
 
-use super::fabric::{Fabric, MOST};
-use super::motion::{Motion, V4};
+use super::patch_model::{MOST, PatchModel};
+use super::patch_state::{PatchState, V4};
 use std::sync::RwLock;
 
 /// Moved, velocity, where forces are evaluated.
@@ -9,15 +9,15 @@ type Told = [V4; 3];
 
 /// Letter boxes of all patches, two each: what is told in one round is read in the next, while the other box is filled.
 #[derive(Debug, Default)]
-pub struct Borders(Vec<[RwLock<Vec<Told>>; 2]>);
+pub struct HaloExchange(Vec<[RwLock<Vec<Told>>; 2]>);
 
-impl Borders {
+impl HaloExchange {
     /// For so many patches.
     pub fn new(patches: usize) -> Self {
         Self((0..patches).map(|_| Default::default()).collect())
     }
     /// Tells what patch `p` computed in a round.
-    pub fn tell(&self, round: usize, p: usize, f: &Fabric, motion: &Motion) {
+    pub fn publish(&self, round: usize, p: usize, f: &PatchModel, motion: &PatchState) {
         if f.border.is_empty() {
             return;
         }
@@ -28,14 +28,14 @@ impl Borders {
         to.extend(f.border.iter().map(|i| {
             let i = *i as usize;
             [
-                motion.moved[i],
+                motion.displacement[i],
                 motion.velocity[i],
-                motion.work.ahead[i % MOST],
+                motion.scratch.ahead[i % MOST],
             ]
         }));
     }
     /// Takes over for the ghosts of a patch what their owners told in a round.
-    pub fn hear(&self, round: usize, f: &Fabric, motion: &mut Motion) {
+    pub fn receive(&self, round: usize, f: &PatchModel, motion: &mut PatchState) {
         let (mut from, mut open) = (u32::MAX, None);
         for (k, [q, at]) in f.ghosts.iter().enumerate() {
             if from != *q {
@@ -46,9 +46,9 @@ impl Borders {
                 continue;
             };
             [
-                motion.moved[i],
+                motion.displacement[i],
                 motion.velocity[i],
-                motion.work.ahead[i % MOST],
+                motion.scratch.ahead[i % MOST],
             ] = *told;
         }
     }

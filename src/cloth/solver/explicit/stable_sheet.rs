@@ -1,16 +1,16 @@
 //! A sheet as stiffness between the edges of its triangles, fitted to a step.
 
-use super::filter::Filter;
+use super::fold_limit::{Diagonal, diagonals};
+use super::mass_filter::Filter;
 use super::stability::{
     bending_eigenvalue, element_limits, laid_flat, membrane_eigenvalue, soften,
 };
-use super::struts::{Diagonal, diagonals};
 use crate::cloth::{Element, Sheet};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 
 /// How a sheet is fitted to a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fit {
+pub struct StepSpec {
     /// The step it shall be stable at, s.
     pub h: f64,
     /// How far ahead of positions forces are evaluated, in steps: damps what changes within few steps, by its square.
@@ -46,7 +46,7 @@ pub(super) struct Bent {
 
 /// Immutable. Arrays over vertices and over edges, the latter sorted by their ends.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct StableSheet {
     /// Share of the membrane stiffness that is kept, mean over the area; less than 1 where the step is too long.
     pub softened: f64,
     /// Elements that keep less than 99 %.
@@ -121,9 +121,9 @@ pub fn triangles(sheet: &Sheet) -> Vec<([u32; 3], Matrix3<f64>, [f64; 3])> {
     sheet.elements.iter().filter_map(of).collect()
 }
 
-impl Plan {
+impl StableSheet {
     /// Compiles a sheet for a step size.
-    pub fn new(sheet: &Sheet, fit: &Fit) -> Self {
+    pub fn new(sheet: &Sheet, fit: &StepSpec) -> Self {
         let mut edges: Vec<([u32; 2], f64)> = sheet
             .edges
             .iter()
@@ -219,8 +219,8 @@ impl Plan {
         self.inverse_mass.len()
     }
     /// The lowest degree of smoothing with a step of at least `enough` seconds, or the highest, and that step, s.
-    pub fn comfortable(sheet: &Sheet, ahead: f64, enough: f64) -> (usize, f64) {
-        let step = Self::comfortable_steps(sheet, ahead);
+    pub fn choose_filter(sheet: &Sheet, ahead: f64, enough: f64) -> (usize, f64) {
+        let step = Self::stable_steps(sheet, ahead);
         let mut found = (0, step(0));
         while found.1 < enough && found.0 < HIGHEST {
             found = (found.0 + 1, step(found.0 + 1));
@@ -229,7 +229,7 @@ impl Plan {
     }
     /// Small steps of `h` seconds that bending forces may be kept for: as many as all but a few small hinges allow with all
     /// their stiffness, within `KEPT`.
-    pub fn bend_every(sheet: &Sheet, h: f64) -> usize {
+    pub fn bending_interval(sheet: &Sheet, h: f64) -> usize {
         let limits = hinge_limits(sheet);
         let usual = usual(&limits);
         let keep: Vec<f64> = limits.iter().map(|l| (usual / l).min(1.0)).collect();
@@ -240,11 +240,11 @@ impl Plan {
         ((1.0 / (fastest * h)) as usize).clamp(KEPT[0], KEPT[1])
     }
     /// Longest step at which all but a few small elements keep all their stiffness, s.
-    pub fn comfortable_step(sheet: &Sheet, ahead: f64, smooth: usize) -> f64 {
-        Self::comfortable_steps(sheet, ahead)(smooth)
+    pub fn stable_step(sheet: &Sheet, ahead: f64, smooth: usize) -> f64 {
+        Self::stable_steps(sheet, ahead)(smooth)
     }
-    /// [`Self::comfortable_step`] of any degree of smoothing.
-    pub fn comfortable_steps(sheet: &Sheet, ahead: f64) -> impl Fn(usize) -> f64 {
+    /// [`Self::stable_step`] of any degree of smoothing.
+    pub fn stable_steps(sheet: &Sheet, ahead: f64) -> impl Fn(usize) -> f64 {
         let limits = element_limits(sheet, false);
         let usual = usual(&limits);
         let keep: Vec<f64> = limits

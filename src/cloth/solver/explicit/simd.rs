@@ -2,8 +2,8 @@
 //! up. A product and a sum are fused (rounded once) where [`Lanes::mul_add`] says so and nowhere else, so both give the
 //! same bits.
 
-use super::fabric::MOST;
-use super::motion::V4;
+use super::patch_model::MOST;
+use super::patch_state::V4;
 
 /// Numbers that are taken together.
 pub(super) const LANES: usize = 8;

@@ -1,7 +1,7 @@
 //! A sheet of cloth as a mechanical system: masses, flat triangles, hinges, and the constant matrix of its stiffness.
 
-use super::ClothError;
 use super::membrane::Membrane;
+use crate::cloth::ClothError;
 use crate::garment::Material;
 use crate::linear::SymmetricPattern;
 use crate::math::{P3, V3d};

@@ -1,0 +1,3 @@
+//! Implicit solvers in double precision.
+
+pub mod quasi_newton;

@@ -1,0 +1,4 @@
+//! Solvers: explicit substeps for real time, implicit ones to compare with.
+
+pub mod explicit;
+pub mod implicit;
