@@ -1,4 +1,4 @@
-// The page in a real browser, as a shopper uses it.
+// The page in a real browser, as a user uses it.
 //
 //   node mirror.mjs URL [--out DIR] [--break URL --mend URL | --stdio] [--rounds N] [--timeout SECONDS]
 //   node mirror.mjs --mock [--out DIR]

@@ -1,4 +1,4 @@
-// A compositor made of nothing: the page's files and CompositorService over gRPC-web, with a drawn shopper, for work on
+// A compositor made of nothing: the page's files and CompositorService over gRPC-web, with a drawn user, for work on
 // the page without the chain. `node mock.mjs [PORT]`; POST /mock/{live,calibrate,degrade?reason=N,freeze,break,mend}.
 
 import { readFileSync } from 'node:fs';
@@ -22,7 +22,7 @@ const LIBRARY = [
   { name: 'tshirt', title: 'T-shirt', category: 'top', sizes: ['XS', 'S', 'M', 'L', 'XL'], color_rgb: 0xd9d2c3 },
 ];
 
-// ── a shopper of capsules, shaded by distance ────────────────────────────────────────────────────────────────────
+// ── a user of capsules, shaded by distance ────────────────────────────────────────────────────────────────────
 
 const WIDTH = 480, HEIGHT = 360, LOOP = 40;
 

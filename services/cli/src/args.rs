@@ -1,9 +1,9 @@
-//! Every word the command line understands.
+//! Commands and flags of the command line.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
-/// Live virtual try-on: a depth camera sees a shopper, the mirror shows her in garments she is not wearing.
+/// Live virtual try-on: a depth camera records a person, the mirror shows the person in other garments.
 #[derive(Debug, Parser)]
 #[command(
     name = "tryon",
@@ -12,7 +12,7 @@ use std::path::PathBuf;
     max_term_width = 110
 )]
 pub(crate) struct Cli {
-    /// What to do.
+    /// Command to run.
     #[command(subcommand)]
     pub(crate) command: Command,
     /// Log filter, for example `info` or `tryon_tracking=debug`. Logs go to standard error.
@@ -22,12 +22,12 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Run the whole chain in this process on a synthetic shopper: nothing to install, no camera, no GPU.
+    /// Run the whole chain in this process on a synthetic person: nothing to install, no camera, no GPU.
     ///
     /// Opens the mirror on http://127.0.0.1:8080. With --headless it needs no browser and leaves pictures and
     /// report.json in --out.
     Demo(DemoArgs),
-    /// Run the services of one box from a configuration file, restarting any that dies.
+    /// Run the services of one box from a configuration file, and restart any that ends.
     Up(UpArgs),
     /// Dress the person in a recording: composited PNGs and report.json.
     Run(RunArgs),
@@ -41,13 +41,13 @@ pub(crate) enum Command {
     Import(ImportArgs),
     /// Write the embedded body or a garment to OBJ, glTF or JSON.
     Export(ExportArgs),
-    /// Record a source (the synthetic shopper, a folder, or a running camera node) to MCAP or a folder.
+    /// Record a source (the synthetic person, a folder, or a running camera node) to MCAP or a folder.
     Record(RecordArgs),
     /// Publish a recording as if it were a live camera.
     Replay(ReplayArgs),
     /// Run time against error, methods side by side: tables as CSV and JSON, plots as SVG.
     Bench(BenchArgs),
-    /// Look at this machine: cores, memory, graphics adapter, ports, shared data; say what would go wrong.
+    /// Check this machine: cores, memory, graphics adapter, ports, shared data; report expected faults.
     Doctor(DoctorArgs),
 }
 
@@ -71,7 +71,7 @@ pub(crate) struct DemoArgs {
     /// Frames a second the synthetic camera delivers.
     #[arg(long, default_value_t = 30.0, value_name = "HZ")]
     pub(crate) fps: f64,
-    /// A recording instead of the synthetic shopper (looped).
+    /// A recording instead of the synthetic person (looped).
     #[arg(long, value_name = "REC")]
     pub(crate) input: Option<PathBuf>,
 }
@@ -81,7 +81,7 @@ pub(crate) struct UpArgs {
     /// TOML file; deploy/tryon.toml is the commented default. TRYON_* variables override it.
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
-    /// Read and check the configuration, print what it amounts to, and stop.
+    /// Check the configuration, print the result of all its layers, and stop.
     #[arg(long)]
     pub(crate) check: bool,
 }
@@ -158,7 +158,7 @@ pub(crate) struct SimulateArgs {
     /// Scene file: mesh, pinned vertices, colliders, material, duration.
     #[arg(long, value_name = "SCENE.json")]
     pub(crate) scene: PathBuf,
-    /// Which solver.
+    /// Solver.
     #[arg(long, value_enum, default_value = "realtime")]
     pub(crate) solver: SolverArg,
     /// Folder for positions.npy (frames × vertices × 3, f32) and report.json.
@@ -191,7 +191,7 @@ pub(crate) struct ImportArgs {
     /// of ours or GarmentCode's .json), a measured fabric (.json), or a recording (.mcap or folder).
     #[arg(value_name = "FILE")]
     pub(crate) input: PathBuf,
-    /// Where to write the checked copy (.obj or .glb for bodies and garments, .json for patterns, .mcap or a folder for
+    /// Checked copy to write (.obj or .glb for bodies and garments, .json for patterns, .mcap or a folder for
     /// recordings).
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
@@ -221,14 +221,14 @@ pub(crate) struct ExportArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct RecordArgs {
-    /// Where frames come from: `synth` (or `synth:leave`, `synth:still`, `synth:empty`), a recording to convert, or
+    /// Source of the frames: `synth` (or `synth:leave`, `synth:still`, `synth:empty`), a recording to convert, or
     /// `bus:STORE/CAMERA`, a camera that runs now.
     #[arg(long, default_value = "synth", value_name = "SOURCE")]
     pub(crate) source: String,
     /// An .mcap file, or a folder.
     #[arg(long, value_name = "FILE|DIR")]
     pub(crate) out: PathBuf,
-    /// How long, seconds.
+    /// Length of the recording, seconds.
     #[arg(long, default_value_t = 10.0, value_name = "S")]
     pub(crate) seconds: f64,
     /// Confirms that the person in the picture agreed to being recorded. Body images are biometric data.
@@ -257,7 +257,7 @@ pub(crate) struct ReplayArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct BenchArgs {
-    /// What to measure.
+    /// Component to measure.
     #[command(subcommand)]
     pub(crate) what: BenchWhat,
 }

@@ -13,7 +13,7 @@ use tryon::garment::import::from_garmentcode;
 use tryon::garment::{Material, Pattern, Size, Triangulation};
 use tryon::mirror::Choice;
 
-/// The body to track: an SMPL-layout npz, or the embedded one.
+/// Body to track: an SMPL-layout npz, or the embedded one.
 ///
 /// # Errors
 /// Names the array, joint or vertex of the file that is at fault.
@@ -30,7 +30,7 @@ pub(crate) fn template(path: Option<&Path>) -> Result<Arc<Template>> {
     Ok(Arc::new(template))
 }
 
-/// A sewing pattern from a file: our own JSON or GarmentCode's, the latter cut from cotton.
+/// Sewing pattern from a file: our own JSON, or GarmentCode's, cut from cotton.
 ///
 /// # Errors
 /// Names the file and the panel, edge or seam at fault.
@@ -95,7 +95,7 @@ fn mesh_garment(path: &Path, body: Option<MadeOn>) -> Result<MeshWear> {
         .with_context(|| path.display().to_string())
 }
 
-/// A rough start in the camera's frame, as recordings with truth carry it.
+/// Rough start in the camera frame, part of recordings with ground truth.
 #[derive(Debug, Deserialize)]
 pub(crate) struct RoughStart {
     /// Position of the root joint, metres.
@@ -126,7 +126,7 @@ pub(crate) fn rough_start(path: &Path) -> Result<RoughStart> {
     Ok(start)
 }
 
-/// A progress bar over frames; silent when standard error is no terminal.
+/// Progress bar over frames; silent when standard error is no terminal.
 pub(crate) fn progress(frames: Option<u64>, what: &'static str) -> ProgressBar {
     let (bar, template) = match frames {
         Some(n) => (
@@ -143,7 +143,7 @@ pub(crate) fn progress(frames: Option<u64>, what: &'static str) -> ProgressBar {
     bar.with_style(style).with_prefix(what)
 }
 
-/// Makes a folder for results.
+/// Creates a folder for results.
 ///
 /// # Errors
 /// When the system refuses.

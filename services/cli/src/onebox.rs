@@ -1,4 +1,4 @@
-//! The four services of one box in one process, each started again when it breaks.
+//! The four services of one box in one process, each restarted when it breaks.
 
 use anyhow::{Context as _, Result};
 use std::future::Future;
@@ -33,7 +33,7 @@ const SERVICES: [(&str, Start); 4] = [
     }),
 ];
 
-/// A running box.
+/// Running services of one box.
 pub(crate) struct OneBox {
     /// Addresses by service name.
     pub(crate) addresses: Vec<(&'static str, SocketAddr, SocketAddr)>,
@@ -42,8 +42,8 @@ pub(crate) struct OneBox {
 }
 
 impl OneBox {
-    /// Starts all services. Frames stay in this process unless `bus` says otherwise. Ports may be 0 for services that
-    /// find each other by the configuration made here.
+    /// Starts all services. Without `bus`, frames stay in this process. Ports may be 0: the bound ones are written into
+    /// the configuration of the services that follow.
     ///
     /// # Errors
     /// Names the service and the address or key at fault.
@@ -92,7 +92,7 @@ impl OneBox {
     }
 }
 
-/// Ports that were 0 become what they were bound to, so that the next services and any restart find them.
+/// Replaces port 0 by the bound port, for the services that follow and for restarts.
 fn pin_addresses(config: &mut Config, name: &str, running: &Running) {
     let url = format!("http://{}", running.address);
     match name {
@@ -114,7 +114,7 @@ fn pin_addresses(config: &mut Config, name: &str, running: &Running) {
     }
 }
 
-/// Waits for the end of a service; one that broke is started again after a pause that grows with each failure.
+/// Restarts a service whenever it breaks, after a pause that grows with each failure.
 async fn supervise(
     name: &'static str,
     start: Start,

@@ -1,4 +1,4 @@
-//! What the headless commands leave beside their pictures: report.json.
+//! report.json, written by the headless commands beside their pictures.
 
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -27,7 +27,7 @@ impl Summary {
         let Some(&max) = v.last() else {
             return Self::default();
         };
-        // Nearest rank: the smallest value with at least the stated share of samples at or below it.
+        // Nearest rank: the smallest value with at least the share `q` of samples at or below it.
         let rank = |q: f64| v[((q * v.len() as f64).ceil() as usize).clamp(1, v.len()) - 1];
         Self {
             count: v.len(),
@@ -39,7 +39,7 @@ impl Summary {
     }
 }
 
-/// Samples by name, kept until the end of a run.
+/// Samples of a run by name.
 #[derive(Debug, Default)]
 pub(crate) struct Samples(BTreeMap<String, Vec<f64>>);
 
@@ -63,7 +63,7 @@ impl Samples {
     }
 }
 
-/// Peak resident memory of this process, bytes; `None` where the system does not tell.
+/// Peak resident memory of this process, bytes; `None` where the system does not report it.
 pub(crate) fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn percentiles_by_nearest_rank() {
+    fn percentiles_are_nearest_ranks() {
         let v: Vec<f64> = (1..=100).rev().map(f64::from).collect();
         let s = Summary::of(&v);
         assert_eq!((s.count, s.p50, s.p99, s.max), (100, 50.0, 99.0, 100.0));

@@ -1,4 +1,4 @@
-//! The program as people and scripts run it: what it prints, leaves and returns.
+//! The program from outside: its output, its files and its exit codes.
 #![allow(clippy::unwrap_used, missing_docs, clippy::print_stdout)]
 
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use tryon::formats::image::{write_png_depth, write_png_rgb};
 
 fn tryon(args: &[&str]) -> Output {
     let mut c = Command::new(env!("CARGO_BIN_EXE_tryon"));
-    // Software Vulkan complains where there is no desktop session.
+    // Software Vulkan writes a warning without a desktop session.
     c.args(args)
         .env("XDG_RUNTIME_DIR", std::env::temp_dir())
         .output()
@@ -252,7 +252,7 @@ fn cloth_in_a_scene_file_hangs_from_its_pins() {
 fn the_demo_leaves_pictures_and_its_report() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().display().to_string();
-    // Unoptimised and beside other tests: a slow camera, so that the chain keeps up.
+    // A slow camera, so that the unoptimised chain keeps up beside other tests.
     let run = tryon(&[
         "demo",
         "--headless",
@@ -437,7 +437,7 @@ fn a_pattern_of_another_make_is_worn_in_a_real_picture() {
         serde_json::from_slice(&std::fs::read(dir.path().join("report.json")).unwrap()).unwrap();
     assert!(report["dressed_frames"].as_u64().unwrap() > 3, "{report}");
     let read = |p: &Path| tryon::formats::image::read_color(p).unwrap();
-    // Her red shirt lies under the cream one.
+    // The subject's red shirt lies under the cream garment.
     let red = |i: &ColorImage| {
         i.data()
             .chunks_exact(3)

@@ -1,4 +1,4 @@
-//! The page in a real browser, against the real services in this process: `tests/web/mirror.mjs` is the shopper.
+//! The page in a real browser, against the real services in this process: `tests/web/mirror.mjs` is the user.
 
 #![allow(
     clippy::print_stdout,
@@ -19,8 +19,8 @@ use tryon_kit::config::Config;
 use tryon_kit::frames::LocalBus;
 use tryon_kit::server::{Context, Running};
 
-/// The whole walk, two restarts included, takes about a minute on two idle cores; a hung browser must not take the
-/// run with it.
+/// Longest run of the browser: all steps with two restarts take a minute on two idle cores; a hung browser is ended
+/// here.
 const DEADLINE: Duration = Duration::from_secs(400);
 
 fn web() -> PathBuf {
@@ -31,7 +31,7 @@ fn chromium() -> PathBuf {
     std::env::var_os("CHROMIUM").map_or_else(|| PathBuf::from("/usr/bin/chromium"), PathBuf::from)
 }
 
-/// What this machine lacks for `what`; with `TRYON_REQUIRE_ALL=1` lacking it is a failure.
+/// Reports a program or package that this machine lacks; a failure with `TRYON_REQUIRE_ALL=1`.
 fn missing(what: &str, browser: bool) -> bool {
     let node = Command::new("node")
         .arg("--version")
@@ -73,7 +73,7 @@ fn modules_of_the_page_and_names_in_deploy() -> Result<()> {
     Ok(())
 }
 
-/// All services in one process, each of which can be ended and started again at its old address.
+/// All services in one process, each of which can be ended and restarted at its address.
 struct Chain {
     runtime: Runtime,
     bus: Arc<LocalBus>,
@@ -90,7 +90,7 @@ impl Chain {
         let pool = Pool::new(0)?;
         let anywhere = ([127, 0, 0, 1], 0).into();
         let mut config = Config::default();
-        // A debug build on busy cores is slow; what is late is judged elsewhere.
+        // A debug build on busy cores is slow; other tests judge lateness.
         config.compositor.garments_late_ms = 3000;
         config.capture.address = anywhere;
         config.tracking.address = anywhere;
@@ -161,7 +161,7 @@ impl Chain {
     }
 }
 
-/// Ended in this order: first one behind the compositor, which then has to say why; then the page's own counterpart.
+/// Services in the order in which they are ended: one behind the compositor, then the compositor itself.
 const BROKEN: [&str; 2] = ["cloth", "compositor"];
 
 #[test]

@@ -57,7 +57,7 @@ fn cloth(args: &BenchClothArgs) -> Result<ExitCode> {
     finish(&table, &args.out)
 }
 
-/// Writes the table and says where it is.
+/// Writes the table and prints the paths of its files.
 fn finish(table: &Table, out: &std::path::Path) -> Result<ExitCode> {
     for file in table.write(out)? {
         println!("{}", file.display());
@@ -66,7 +66,7 @@ fn finish(table: &Table, out: &std::path::Path) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The command as it can be typed again.
+/// Command line that repeats the measurement.
 fn command(args: &BenchTrackingArgs) -> String {
     let data = args
         .data

@@ -1,4 +1,4 @@
-//! `tryon demo`: the whole chain in one process on a synthetic shopper.
+//! `tryon demo`: the whole chain in one process on a synthetic person.
 
 use crate::args::DemoArgs;
 use crate::onebox::OneBox;
@@ -15,7 +15,7 @@ use tryon_kit::config::{Config, LogConfig};
 use tryon_kit::drain;
 use tryon_kit::telemetry;
 
-/// Without --seconds a headless run ends after this long.
+/// Length of a headless run without --seconds [s].
 const HEADLESS_SECONDS: f64 = 10.0;
 
 /// report.json of a headless demo.
@@ -37,17 +37,17 @@ struct Report {
     live_rate: f64,
     /// Seconds from opening the try-on to the first live picture: finding, calibrating, dressing.
     first_live_seconds: Option<f64>,
-    /// From the exposure's arrival in the capture service to the picture's arrival at the client, milliseconds.
+    /// From the reception of the exposure by the capture service to the arrival of the picture, milliseconds.
     latency_ms: Summary,
-    /// The same while live.
+    /// Latency of live pictures, milliseconds.
     live_latency_ms: Summary,
     /// Milliseconds by stage, live pictures only.
     stages_ms: BTreeMap<String, Summary>,
-    /// Work that the scene did not need, by service and kind, over the whole run.
+    /// Skipped work by service and kind, over the whole run.
     skipped: BTreeMap<String, f64>,
     /// Counters of all services.
     counters: BTreeMap<String, f64>,
-    /// How often each state was seen.
+    /// Number of messages in each state.
     states: BTreeMap<String, usize>,
     garments: Vec<String>,
     peak_memory_bytes: Option<u64>,
@@ -61,7 +61,7 @@ pub(crate) fn run(args: &DemoArgs) -> Result<ExitCode> {
     for name in &args.garments {
         library::pattern(name, Size::default())?;
     }
-    // The recorder must be there before the first counter is.
+    // The recorder must be installed before the first counter.
     let _ = telemetry::metrics();
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
@@ -133,7 +133,7 @@ async fn demo(args: &DemoArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// How counters of skipped work begin on the metrics page.
+/// Start of the counters of skipped work on the metrics page.
 const SKIPPED: &str = "tryon_skipped{";
 
 /// Counters of skipped work as `service: kind`.

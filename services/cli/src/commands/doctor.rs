@@ -1,4 +1,4 @@
-//! `tryon doctor`: what this machine can do, and what would go wrong.
+//! `tryon doctor`: capabilities of this machine and expected faults.
 
 use crate::args::DoctorArgs;
 use anyhow::Result;
@@ -7,15 +7,15 @@ use std::net::TcpListener;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// How one look went.
+/// Result of one check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum Verdict {
     /// As it should be.
     Good,
-    /// Works, but less than it could; the text says what to do.
+    /// Works with limits; the text has the remedy.
     Note,
-    /// Something will fail; the text says what to do.
+    /// Something will fail; the text has the remedy.
     Bad,
 }
 

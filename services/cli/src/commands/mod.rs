@@ -1,4 +1,4 @@
-//! One file a command.
+//! Commands of the command line, one file each.
 
 pub(crate) mod bench;
 pub(crate) mod composite;

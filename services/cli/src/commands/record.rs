@@ -14,10 +14,10 @@ use tryon_kit::compute::Pool;
 use tryon_kit::config::Config;
 use tryon_kit::frames::{CameraKey, FrameBus};
 
-/// How long a camera on the bus may stay silent before recording gives up.
+/// Silence of a camera on the bus after which the recording fails.
 const SILENCE: Duration = Duration::from_secs(5);
 
-/// Where frames go.
+/// Destination of the frames.
 pub(crate) enum Sink {
     /// An MCAP file.
     Mcap(Box<McapWriter>),
@@ -93,7 +93,7 @@ fn from_source(args: &RecordArgs) -> Result<u64> {
     Ok(bar.position())
 }
 
-/// A camera that runs now. People are in the picture: that needs their word.
+/// Records a live camera, with the consent of the people in view.
 fn from_bus(args: &RecordArgs, camera: &str) -> Result<u64> {
     if !args.consent {
         bail!(
@@ -123,7 +123,7 @@ fn from_bus(args: &RecordArgs, camera: &str) -> Result<u64> {
             let Some(exposure) = next.with_context(|| format!("camera {camera} is silent"))? else {
                 break;
             };
-            // Disk work off the async workers; frames are small next to a disk's second.
+            // Disk work stays off the async workers.
             tokio::task::block_in_place(|| {
                 if sink.is_none() {
                     sink = Some(Sink::create(&args.out, &exposure.calibration)?);

@@ -17,7 +17,7 @@ use tryon_kit::server::Context as ServiceContext;
 /// # Errors
 /// A recording or configuration that cannot be used.
 pub(crate) fn run(args: &ReplayArgs) -> Result<ExitCode> {
-    // Faults of the recording are said here, not by a camera that is listed as failed.
+    // Opened once here, so that a faulty recording is an error and not a camera listed as failed.
     drop(open_recording(&args.input)?);
     let mut config = Config::load(args.config.as_deref(), &[])?;
     let source = args

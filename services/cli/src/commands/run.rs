@@ -146,7 +146,7 @@ fn dress_all(
             Ok(Some(frame)) => frame,
             Ok(None) => break,
             Err(e) => {
-                // The recording goes on behind a bad frame; it is named, not hidden.
+                // A bad frame is reported and the recording continues behind it.
                 eprintln!("tryon: frame {index} is left out: {e}");
                 report.bad_frames.push(e.to_string());
                 index += 1;

@@ -7,11 +7,11 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
 use std::process::ExitCode;
-use tryon::body::{BoneTransforms, skin};
+use tryon::body::BoneTransforms;
 use tryon::camera::RgbdFrame;
+use tryon::formats::obj::write_obj;
 use tryon::formats::{RgbdSource, open_recording};
-use tryon::math::P3;
-use tryon::par::{Par, with_threads};
+use tryon::par::with_threads;
 use tryon::tracking::{StepReport, TrackerConfig, TrackerModel, TrackerState, Workspace, step};
 
 /// Runs the command.
@@ -66,7 +66,7 @@ fn track_all(
             Ok(Some(frame)) => frame,
             Ok(None) => break,
             Err(e) => {
-                // The recording goes on behind a bad frame; it is named, not hidden.
+                // A bad frame is reported and the recording continues behind it.
                 eprintln!("tryon: frame {index} is left out: {e}");
                 serde_json::to_writer(
                     &mut *out,
@@ -86,7 +86,9 @@ fn track_all(
         serde_json::to_writer(&mut *out, &line(index, &frame, model, &state, &report, ms))?;
         out.write_all(b"\n")?;
         if let Some(dir) = &args.meshes {
-            write_surface(&dir.join(format!("{index:06}.obj")), model, &state)?;
+            let (vertices, _) = workspace.posed(model, &state);
+            let faces = model.template().mesh().faces();
+            write_obj(&dir.join(format!("{index:06}.obj")), vertices, faces, None)?;
         }
         bar.inc(1);
         index += 1;
@@ -105,7 +107,7 @@ fn track_all(
     Ok(())
 }
 
-/// One line of the output, in the form of `tryon track --help`'s documentation.
+/// Output line of one frame.
 fn line(
     index: usize,
     frame: &RgbdFrame,
@@ -147,21 +149,4 @@ fn line(
         "ms": ms,
         "stages_ms": report.stages_ms,
     })
-}
-
-fn write_surface(path: &std::path::Path, model: &TrackerModel, state: &TrackerState) -> Result<()> {
-    let template = model.template();
-    let rest = template.personalise(&state.shape);
-    let mut bones = BoneTransforms::default();
-    state.pose.bones(template.skeleton(), &rest, &mut bones);
-    let mut vertices: Vec<P3> = Vec::new();
-    skin(
-        Par::Rayon,
-        &rest.vertices,
-        template.weights(),
-        &bones,
-        &mut vertices,
-    );
-    tryon::formats::obj::write_obj(path, &vertices, template.mesh().faces(), None)?;
-    Ok(())
 }

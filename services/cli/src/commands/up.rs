@@ -33,7 +33,7 @@ pub(crate) fn run(args: &UpArgs) -> Result<ExitCode> {
         .build()
         .context("the runtime")?;
     runtime.block_on(async {
-        // The bus listens, so that a camera node or `tryon replay` elsewhere can join.
+        // The bus listens for camera nodes and `tryon replay` in other processes.
         let pool = Pool::new(1).context("the bus's threads")?;
         let bus: Arc<dyn FrameBus> = ZenohBus::open(&config.bus.listen, &[], pool).await?;
         let services = OneBox::start(config, Some(bus)).await?;

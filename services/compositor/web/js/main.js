@@ -19,7 +19,7 @@ const query = new URLSearchParams(location.search);
 /** Seconds without anybody in view before the mirror asks, and that it then waits for an answer. */
 const IDLE_S = Number(query.get('idle') ?? 30);
 const ANSWER_S = 15;
-/** Seconds that a shopper waits for a mirror that is not live, whatever the reason, before the mirror asks. */
+/** Seconds that a user waits for a mirror that is not live, whatever the reason, before the mirror asks. */
 const ABANDONED_S = 180;
 /** Picture figures and ages are rewritten this often, ms. */
 const TICK_MS = 200;
@@ -71,7 +71,7 @@ function start() {
   refresh();
 }
 
-/** Ends the try-on and wipes everything that shows the shopper. */
+/** Ends the try-on and wipes everything that shows the user. */
 function finish() {
   if (!session) return;
   const { tryOn } = session;
@@ -145,7 +145,7 @@ async function sendChoice(mine) {
   }
 }
 
-/** Asks until the wardrobe is known; it is the same for every shopper. */
+/** Asks until the wardrobe is known; it is the same for every user. */
 async function loadWardrobe() {
   listing = new AbortController();
   const backoff = new Backoff();

@@ -58,7 +58,7 @@ export class Mirror {
     this.on.shown(picture, now, now - at);
   }
 
-  /** Wipes the glass and forgets what waits: the next shopper must not see the last one. */
+  /** Wipes the glass and forgets what waits: the next user must not see the last one. */
   clear() {
     this.#generation += 1;
     this.#waiting = null;

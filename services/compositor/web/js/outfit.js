@@ -1,4 +1,4 @@
-// What the shopper wants to wear: at most one garment of each category, inner layers first. Pure.
+// What the user wants to wear: at most one garment of each category, inner layers first. Pure.
 
 /** Order of layers: what is not listed goes on top. */
 const LAYERS = ['bottom', 'top'];

@@ -1,11 +1,11 @@
-// What to tell the shopper, as a pure function of what is known. A picture that isn't fresh is never called live.
+// Messages to the user, as a pure function of state. A picture that isn't fresh is never called live.
 
 import { Reason, State } from './messages.js';
 
 /** A picture older than this is shown dimmed with its age, ms. Half the slowest rate worth calling live (2 Hz). */
 export const STALE_MS = 1000;
 
-/** A picture older than this is taken off the glass: nobody may find the last shopper there, ms. */
+/** A picture older than this is taken off the glass: nobody may find the last user there, ms. */
 export const BLANK_MS = 12_000;
 
 const REASONS = {

@@ -18,7 +18,7 @@ function drawingOf(info) {
 export class Wardrobe {
   #cards = new Map();
 
-  /** @param {import('./outfit.js').Outfit} outfit @param {() => void} changed called after the shopper changed it */
+  /** @param {import('./outfit.js').Outfit} outfit @param {() => void} changed called after the user changed it */
   constructor(outfit, changed) {
     this.outfit = outfit;
     this.changed = changed;
