@@ -144,7 +144,7 @@ const DOORS: &[(&str, &[&str])] = &[
     ("npyz", &["src/formats/"]),
     ("plotters", &["src/evaluate/"]),
     ("zstd", &["src/formats/"]),
-    // docs/hindsight.md: MCAP channels carry foxglove protobuf messages, so formats encodes those few itself.
+    // docs/decisions/050-recordings.md: MCAP channels carry foxglove protobuf messages, so formats encodes those few itself.
     ("prost", &["proto/", "src/formats/foxglove.rs"]),
     ("tonic", &["proto/", "services/", "tests/"]),
     ("zenoh", &["services/kit/src/bus.rs"]),

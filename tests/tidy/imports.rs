@@ -84,7 +84,7 @@ fn absolute(from: &[String], path: &[String]) -> Vec<String> {
 }
 
 /// Files of the library and the re-exports of each `mod.rs`.
-pub struct Library<'a> {
+pub(crate) struct Library<'a> {
     files: BTreeMap<Vec<String>, &'a SourceFile>,
     /// Module path and item name → absolute path of the item that is re-exported.
     reexports: BTreeMap<(Vec<String>, String), Vec<String>>,
@@ -92,7 +92,7 @@ pub struct Library<'a> {
 
 impl<'a> Library<'a> {
     /// Reads the module tree; files that only tests compile (`#[cfg(test)] mod x;`) are left out.
-    pub fn new(sources: &'a [SourceFile]) -> Self {
+    pub(crate) fn new(sources: &'a [SourceFile]) -> Self {
         let mut files: BTreeMap<_, _> = sources
             .iter()
             .filter(|f| f.path.starts_with("src/"))
@@ -134,7 +134,7 @@ impl<'a> Library<'a> {
     }
 
     /// Files that each file imports from, within the same top module; a re-export is no import.
-    pub fn imports(&self) -> BTreeMap<Vec<String>, BTreeSet<Vec<String>>> {
+    pub(crate) fn imports(&self) -> BTreeMap<Vec<String>, BTreeSet<Vec<String>>> {
         let mut graph = BTreeMap::new();
         for (module, file) in &self.files {
             let source = code_without_tests(&file.text);
@@ -185,7 +185,7 @@ fn test_modules(text: &str) -> Vec<String> {
 }
 
 /// Sets of two or more files each of which imports, by some way, every other.
-pub fn circles(graph: &BTreeMap<Vec<String>, BTreeSet<Vec<String>>>) -> Vec<Vec<String>> {
+pub(crate) fn circles(graph: &BTreeMap<Vec<String>, BTreeSet<Vec<String>>>) -> Vec<Vec<String>> {
     let reach: BTreeMap<_, BTreeSet<Vec<String>>> = graph
         .keys()
         .map(|from| {
@@ -215,7 +215,7 @@ pub fn circles(graph: &BTreeMap<Vec<String>, BTreeSet<Vec<String>>>) -> Vec<Vec<
 }
 
 /// Top modules named after `crate::`.
-pub fn modules_named(code: &str) -> Vec<String> {
+pub(crate) fn modules_named(code: &str) -> Vec<String> {
     paths(code)
         .into_iter()
         .filter(|path| path[0] == "crate" && path.len() > 1)
@@ -224,7 +224,7 @@ pub fn modules_named(code: &str) -> Vec<String> {
 }
 
 /// True where code names an external crate at the start of a path: `formats::mcap::x` is ours, `mcap::x` is not.
-pub fn names_crate(code: &str, name: &str) -> bool {
+pub(crate) fn names_crate(code: &str, name: &str) -> bool {
     code.match_indices(&format!("{name}::")).any(|(at, _)| {
         let before = &code[..at];
         let last = before.chars().last();

@@ -4,18 +4,18 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// One file: path from the root with forward slashes, and its text.
-pub struct SourceFile {
-    pub path: String,
-    pub text: String,
+pub(crate) struct SourceFile {
+    pub(crate) path: String,
+    pub(crate) text: String,
 }
 
 /// Absolute path of the repository.
-pub fn root() -> PathBuf {
+pub(crate) fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
 /// Files below `dirs` with this extension, sorted; build outputs, dependencies and generated code left out.
-pub fn files(dirs: &[&str], extension: &str) -> Vec<SourceFile> {
+pub(crate) fn files(dirs: &[&str], extension: &str) -> Vec<SourceFile> {
     let mut paths = Vec::new();
     for dir in dirs {
         collect(&root().join(dir), extension, &mut paths);
@@ -32,7 +32,7 @@ pub fn files(dirs: &[&str], extension: &str) -> Vec<SourceFile> {
 }
 
 /// Rust written by hand.
-pub fn rust() -> Vec<SourceFile> {
+pub(crate) fn rust() -> Vec<SourceFile> {
     files(
         &["src", "proto", "services", "tests", "benches", "examples"],
         "rs",
@@ -57,7 +57,7 @@ fn collect(dir: &Path, extension: &str, out: &mut Vec<PathBuf>) {
 }
 
 /// Source without comments. String literals stay; none names a crate path.
-pub fn code(source: &str) -> String {
+pub(crate) fn code(source: &str) -> String {
     source
         .lines()
         .map(|l| l.split("//").next().unwrap_or(""))
@@ -66,7 +66,7 @@ pub fn code(source: &str) -> String {
 }
 
 /// Code up to the file's own unit tests, which rustfmt leaves at its end.
-pub fn code_without_tests(source: &str) -> String {
+pub(crate) fn code_without_tests(source: &str) -> String {
     let code = code(source);
     match code.find("#[cfg(test)]\nmod tests {") {
         Some(at) => code[..at].to_owned(),
@@ -75,16 +75,16 @@ pub fn code_without_tests(source: &str) -> String {
 }
 
 /// A function as rustfmt lays it out.
-pub struct Function {
-    pub name: String,
+pub(crate) struct Function {
+    pub(crate) name: String,
     /// Line of `fn`, from 1.
-    pub line: usize,
+    pub(crate) line: usize,
     /// Lines from `fn` to its closing brace.
-    pub length: usize,
+    pub(crate) length: usize,
 }
 
 /// Functions with a body of more than one line, nested ones too.
-pub fn functions(source: &str) -> Vec<Function> {
+pub(crate) fn functions(source: &str) -> Vec<Function> {
     let lines: Vec<&str> = source.lines().collect();
     let mut found = Vec::new();
     for (n, line) in lines.iter().enumerate() {
@@ -126,7 +126,7 @@ fn function_name(line: &str) -> Option<String> {
 }
 
 /// Names of the structs, enums, traits and type aliases that code declares outside its tests.
-pub fn types(code: &str) -> Vec<String> {
+pub(crate) fn types(code: &str) -> Vec<String> {
     let mut names = Vec::new();
     for line in code.lines() {
         let mut words = line.split_whitespace().peekable();
