@@ -1,4 +1,4 @@
-//! Dresses a dancing body, measures, and draws a film strip for looking at.
+//! Dresses a dancing body, measures, and draws a film strip.
 //!
 //! `cargo run --release --example dance -- [--data ../shared/data/garments/cipc_apache2] [--garment tshirt+skirt]
 //!   [--edge 0.0118] [--seconds 4.8] [--threads 2] [--most-steps 72] [--patch 6000] [--sharpest 0.6] [--no-layers] [--no-folds]
@@ -7,28 +7,25 @@
 
 mod drawing;
 
-use drawing::{Part, draw};
+use drawing::{DrawnMesh, Sheet, Turn, draw};
 use std::path::PathBuf;
 use tryon::body::Template;
-use tryon::camera::ColorImage;
 use tryon::cloth::realtime::Config;
 use tryon::contact::MapDetail;
 use tryon::dressing::Dressed;
 use tryon::evaluate::Solid;
 use tryon::evaluate::dance::{Outfit, load};
-use tryon::formats::image::write_png_rgb;
-use tryon::garment::library;
 use tryon::math::P3;
 use tryon::par::with_threads;
 
 /// One cell of the strip, pixels.
 const CELL: (u32, u32) = (270, 460);
-/// As often as the report measures penetration, calls.
-const LOOK_EVERY: usize = 4;
+/// Steps between two lists of sunken vertices, as in the report.
+const LIST_EVERY: usize = 4;
 /// Vertices less deep in the body than this are not listed, metres.
 const SUNKEN: f32 = 1e-3;
 
-/// Which vertices lie how deep in the body, where and when.
+/// Lists vertices in the body: depth, place and time.
 fn find_sunken(
     template: &Template,
     time: f64,
@@ -115,50 +112,33 @@ fn main() {
         dance.seconds(),
         dance.fit * 1e3
     );
-    let mut cells: Vec<Vec<u8>> = Vec::new();
+    let mut cells: Vec<[Vec<u8>; 2]> = Vec::new();
     let mut next = from;
     let (mut call, mut sunken) = (0, Vec::new());
     let report = with_threads(threads, || {
         dance.run(&outfit, |time, body, dressed| {
             call += 1;
-            if deepest > 0 && call % LOOK_EVERY == 0 {
+            if deepest > 0 && call % LIST_EVERY == 0 {
                 find_sunken(&dance.template, time, body, dressed, &mut sunken);
             }
             if out.is_none() || time + 1e-6 < next {
                 return;
             }
             next += every;
-            let skin = [0.86, 0.70, 0.60];
-            let faces = dance.template.mesh().faces().to_vec();
-            let mut parts = vec![Part {
-                vertices: body.to_vec(),
-                faces,
-                color: skin,
-                uv: vec![],
-                painted: vec![],
-            }];
-            for (g, s) in dressed
-                .model
-                .outfit
-                .garments
-                .iter()
-                .zip(&dressed.state.garments)
-            {
-                let mut vertices = Vec::new();
-                g.render_positions(&s.positions, &mut vertices);
-                let color = library::dye(&g.name).map(|c| f32::from(c) / 255.0);
-                let (faces, uv) = (g.render.faces.clone(), g.render.uv.clone());
-                parts.push(Part {
-                    vertices,
-                    faces,
-                    color,
-                    uv,
-                    painted: vec![],
-                });
-            }
-            for yaw in [0.4f32, 2.8] {
-                cells.push(draw(&parts, yaw, CELL, [0.25, 1.4], [0.0, 0.0]));
-            }
+            let mut meshes = vec![DrawnMesh::body(&dance.template, body)];
+            let garments = dressed.model.outfit.garments.iter();
+            meshes.extend(
+                garments
+                    .zip(&dressed.state.garments)
+                    .map(|(g, s)| DrawnMesh::garment(g, &s.positions, &g.name)),
+            );
+            let turn = Turn {
+                yaw: 0.0,
+                cell: CELL,
+                y: [0.25, 1.4],
+                centre: [0.0; 2],
+            };
+            cells.push([0.4f32, 2.8].map(|yaw| draw(&meshes, &Turn { yaw, ..turn })));
         })
     })
     .expect("threads")
@@ -190,16 +170,11 @@ fn main() {
         .take(deepest)
         .for_each(|(depth, what)| println!("{:6.2} mm {what}", depth * 1e3));
     let Some(out) = out else { return };
-    let columns = cells.len() / 2;
-    let (w, h) = (CELL.0 as usize, CELL.1 as usize);
-    let mut sheet = vec![255u8; columns * w * 2 * h * 3];
-    for (k, cell) in cells.iter().enumerate() {
-        for line in 0..h {
-            let to = (((k % 2) * h + line) * columns * w + k / 2 * w) * 3;
-            sheet[to..to + w * 3].copy_from_slice(&cell[line * w * 3..(line + 1) * w * 3]);
-        }
+    let mut sheet = Sheet::new(CELL, cells.len() as u32, 2);
+    for (column, pair) in (0..).zip(&cells) {
+        (0..)
+            .zip(pair)
+            .for_each(|(row, cell)| sheet.put(column, row, cell));
     }
-    let picture = ColorImage::new((columns * w) as u32, (2 * h) as u32, sheet).expect("a picture");
-    write_png_rgb(&out, &picture).expect("written");
-    println!("{}", out.display());
+    sheet.write(&out);
 }

@@ -3,7 +3,7 @@
 use super::area::Area;
 use super::config::Margins;
 use super::evidence::Evidence;
-use super::occluder::{PatchCriteria, PatchScratch, drop_specks};
+use super::occluder::{FloodScratch, PatchCriteria, drop_specks};
 use super::viewport::Viewport;
 use crate::camera::ColorImage;
 use crate::par::{self, Par};
@@ -32,7 +32,7 @@ pub(crate) struct Matte {
     pub(crate) evidence: Vec<Evidence>,
     /// Share of each pixel that is in front of the garment, 0 to 1.
     pub(crate) alpha: Vec<f32>,
-    patches: PatchScratch,
+    patches: FloodScratch,
 }
 
 /// Captured picture and depth of the drawn area.

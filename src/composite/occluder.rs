@@ -26,7 +26,7 @@ pub(super) struct PatchCriteria<'a> {
 
 /// Scratch of [`drop_specks`].
 #[derive(Clone, Debug, Default)]
-pub(super) struct PatchScratch {
+pub(super) struct FloodScratch {
     visited: Vec<bool>,
     stack: Vec<u32>,
     patch: Vec<u32>,
@@ -48,7 +48,7 @@ struct PatchStatistics {
 pub(super) fn drop_specks(
     evidence: &mut [Evidence],
     criteria: &PatchCriteria<'_>,
-    scratch: &mut PatchScratch,
+    scratch: &mut FloodScratch,
 ) -> usize {
     scratch.visited.clear();
     scratch.visited.resize(evidence.len(), false);
@@ -76,9 +76,9 @@ fn grow(
     seed: usize,
     evidence: &[Evidence],
     criteria: &PatchCriteria<'_>,
-    scratch: &mut PatchScratch,
+    scratch: &mut FloodScratch,
 ) -> PatchStatistics {
-    let PatchScratch {
+    let FloodScratch {
         visited,
         stack,
         patch,
@@ -162,7 +162,7 @@ mod tests {
             step: 0.012,
             depth: &depth,
         };
-        let dropped = drop_specks(&mut evidence, &criteria, &mut PatchScratch::default());
+        let dropped = drop_specks(&mut evidence, &criteria, &mut FloodScratch::default());
         (evidence, dropped)
     }
 
@@ -197,7 +197,7 @@ mod tests {
                     step: 0.0,
                     depth: &[],
                 },
-                &mut PatchScratch::default()
+                &mut FloodScratch::default()
             ),
             0
         );
