@@ -14,7 +14,7 @@ use tryon::cloth::realtime::Config;
 use tryon::contact::MapDetail;
 use tryon::dressing::Dressed;
 use tryon::evaluate::Solid;
-use tryon::evaluate::dance::{Outfit, load};
+use tryon::evaluate::dance::{DanceReport, Outfit, load};
 use tryon::math::P3;
 use tryon::par::with_threads;
 
@@ -66,46 +66,68 @@ fn find_sunken(
     }
 }
 
-fn main() {
-    let mut data = PathBuf::from("../shared/data/garments/cipc_apache2");
-    let mut outfit = Outfit {
-        garments: vec!["tshirt".into(), "skirt".into()],
-        edge: 0.0118,
-        config: Config::default(),
-        seconds: 4.8,
+struct Args {
+    data: PathBuf,
+    outfit: Outfit,
+    threads: usize,
+    /// Number of sunken vertices to list.
+    deepest: usize,
+    out: Option<PathBuf>,
+    /// First time on the strip and interval, seconds.
+    from: f64,
+    every: f64,
+}
+
+fn args() -> Args {
+    let mut a = Args {
+        data: PathBuf::from("../shared/data/garments/cipc_apache2"),
+        outfit: Outfit {
+            garments: vec!["tshirt".into(), "skirt".into()],
+            edge: 0.0118,
+            config: Config::default(),
+            seconds: 4.8,
+        },
+        threads: 2,
+        deepest: 0,
+        out: None,
+        from: 0.0,
+        every: 0.4,
     };
-    let (mut threads, mut out, mut every, mut from) = (2, None::<PathBuf>, 0.4, 0.0);
-    let mut deepest = 0usize;
     let mut it = std::env::args().skip(1);
     while let Some(flag) = it.next() {
         let mut value = || it.next().expect("a value");
         match flag.as_str() {
-            "--data" => data = value().into(),
-            "--garment" => outfit.garments = value().split('+').map(str::to_owned).collect(),
-            "--edge" => outfit.edge = value().parse().expect("metres"),
-            "--seconds" => outfit.seconds = value().parse().expect("seconds"),
-            "--threads" => threads = value().parse().expect("a number"),
-            "--sharpest" => outfit.config.sharpest = value().parse().expect("a share"),
-            "--most-steps" => outfit.config.most_steps = value().parse().expect("a number"),
-            "--patch" => outfit.config.patch = value().parse().expect("a number"),
+            "--data" => a.data = value().into(),
+            "--garment" => a.outfit.garments = value().split('+').map(str::to_owned).collect(),
+            "--edge" => a.outfit.edge = value().parse().expect("metres"),
+            "--seconds" => a.outfit.seconds = value().parse().expect("seconds"),
+            "--threads" => a.threads = value().parse().expect("a number"),
+            "--sharpest" => a.outfit.config.sharpest = value().parse().expect("a share"),
+            "--most-steps" => a.outfit.config.most_steps = value().parse().expect("a number"),
+            "--patch" => a.outfit.config.patch = value().parse().expect("a number"),
             "--maps" => {
-                outfit.config.map_detail = match value().as_str() {
+                a.outfit.config.map_detail = match value().as_str() {
                     "view" => MapDetail::InView,
                     "fine" => MapDetail::Everywhere,
                     "coarse" => MapDetail::Nowhere,
                     other => panic!("--maps {other}: view, fine or coarse"),
                 }
             }
-            "--no-layers" => outfit.config.layers = false,
-            "--no-folds" => outfit.config.self_collision = false,
-            "--deepest" => deepest = value().parse().expect("a number"),
-            "--out" => out = Some(value().into()),
-            "--from" => from = value().parse().expect("seconds"),
-            "--every" => every = value().parse().expect("seconds"),
+            "--no-layers" => a.outfit.config.layers = false,
+            "--no-folds" => a.outfit.config.self_collision = false,
+            "--deepest" => a.deepest = value().parse().expect("a number"),
+            "--out" => a.out = Some(value().into()),
+            "--from" => a.from = value().parse().expect("seconds"),
+            "--every" => a.every = value().parse().expect("seconds"),
             other => panic!("{other} is not known"),
         }
     }
-    let dance = load(&data).expect("the dance");
+    a
+}
+
+fn main() {
+    let a = args();
+    let dance = load(&a.data).expect("the dance");
     println!(
         "{} vertices, {:.1} s, fitted template {:.1} mm off",
         dance.rest.vertices.len(),
@@ -113,36 +135,54 @@ fn main() {
         dance.fit * 1e3
     );
     let mut cells: Vec<[Vec<u8>; 2]> = Vec::new();
-    let mut next = from;
-    let (mut call, mut sunken) = (0, Vec::new());
-    let report = with_threads(threads, || {
-        dance.run(&outfit, |time, body, dressed| {
-            call += 1;
-            if deepest > 0 && call % LIST_EVERY == 0 {
+    let mut next = a.from;
+    let (mut steps, mut sunken) = (0, Vec::new());
+    let report = with_threads(a.threads, || {
+        dance.run(&a.outfit, |time, body, dressed| {
+            steps += 1;
+            if a.deepest > 0 && steps % LIST_EVERY == 0 {
                 find_sunken(&dance.template, time, body, dressed, &mut sunken);
             }
-            if out.is_none() || time + 1e-6 < next {
-                return;
+            if a.out.is_some() && time + 1e-6 >= next {
+                next += a.every;
+                cells.push(draw_cells(&dance.template, body, dressed));
             }
-            next += every;
-            let mut meshes = vec![DrawnMesh::body(&dance.template, body)];
-            let garments = dressed.model.outfit.garments.iter();
-            meshes.extend(
-                garments
-                    .zip(&dressed.state.garments)
-                    .map(|(g, s)| DrawnMesh::garment(g, &s.positions, &g.name)),
-            );
-            let turn = Turn {
-                yaw: 0.0,
-                cell: CELL,
-                y: [0.25, 1.4],
-                centre: [0.0; 2],
-            };
-            cells.push([0.4f32, 2.8].map(|yaw| draw(&meshes, &Turn { yaw, ..turn })));
         })
-    })
-    .expect("threads")
-    .expect("a dance");
+    });
+    print_report(&report.expect("threads").expect("a dance"));
+    sunken.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (depth, place) in sunken.iter().take(a.deepest) {
+        println!("{:6.2} mm {place}", depth * 1e3);
+    }
+    let Some(out) = a.out else { return };
+    let mut sheet = Sheet::new(CELL, cells.len() as u32, 2);
+    for (column, pair) in (0..).zip(&cells) {
+        (0..)
+            .zip(pair)
+            .for_each(|(row, cell)| sheet.put(column, row, cell));
+    }
+    sheet.write(&out);
+}
+
+/// The dressed body from two sides.
+fn draw_cells(template: &Template, body: &[P3], dressed: &Dressed) -> [Vec<u8>; 2] {
+    let mut meshes = vec![DrawnMesh::body(template, body)];
+    let garments = dressed.model.outfit.garments.iter();
+    meshes.extend(
+        garments
+            .zip(&dressed.state.garments)
+            .map(|(g, s)| DrawnMesh::garment(g, &s.positions, &g.name)),
+    );
+    let turn = Turn {
+        yaw: 0.0,
+        cell: CELL,
+        y: [0.25, 1.4],
+        centre: [0.0; 2],
+    };
+    [0.4, 2.8].map(|yaw| draw(&meshes, &Turn { yaw, ..turn }))
+}
+
+fn print_report(report: &DanceReport) {
     let mut ms = report.ms.clone();
     ms.sort_unstable_by(f64::total_cmp);
     println!(
@@ -164,17 +204,4 @@ fn main() {
         report.penetration_single[0] * 1e3,
         report.penetration_single[1] * 1e3,
     );
-    sunken.sort_by(|a, b| b.0.total_cmp(&a.0));
-    sunken
-        .iter()
-        .take(deepest)
-        .for_each(|(depth, what)| println!("{:6.2} mm {what}", depth * 1e3));
-    let Some(out) = out else { return };
-    let mut sheet = Sheet::new(CELL, cells.len() as u32, 2);
-    for (column, pair) in (0..).zip(&cells) {
-        (0..)
-            .zip(pair)
-            .for_each(|(row, cell)| sheet.put(column, row, cell));
-    }
-    sheet.write(&out);
 }
