@@ -1,35 +1,34 @@
-//! Which part of a patch is computed while the rest of it sleeps: sleeping vertices are seen by their neighbours and go
-//! evenly, or not at all.
+//! Part of a patch that is computed while the rest sleeps. Sleeping vertices act on their neighbours and keep their
+//! velocity.
 
 use super::patch_model::PatchModel;
-use super::patch_state::PatchState;
-use super::simd::At;
+use super::simd::Slots;
 use std::ops::Range;
 
-/// Vertices that are woken, and seen, together.
+/// Vertices that are marked as involved together. Larger computes more than needed; smaller makes more ranges.
 const GROUP: usize = 8;
 
-/// What a step goes through. Stretches are in order.
+/// Ranges that a substep computes, in order.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ActiveSet {
-    /// Vertices that move by themselves.
+    /// Awake vertices.
     pub(super) vertices: Vec<Range<usize>>,
-    /// They and all that pulls at them.
-    pub(super) seen: Vec<Range<usize>>,
-    /// Blocks of triangles with a corner that moves.
+    /// Awake vertices and all that act on them.
+    pub(super) involved: Vec<Range<usize>>,
+    /// Blocks of triangles with an awake corner.
     pub(super) quads: Vec<Range<usize>>,
-    /// Rows of bending, and where their pairs begin.
+    /// Rows of bending, and the index of their first pair.
     pub(super) bend: Vec<(Range<usize>, usize)>,
-    /// Blocks of bent hinges.
+    /// Blocks of curved hinges with an awake corner.
     pub(super) bent: Vec<Range<usize>>,
-    /// Sleeping vertices that are seen.
+    /// Sleeping vertices that are involved.
     pub(super) rim: Vec<u32>,
-    /// Of all vertices.
+    /// Flag of every vertex.
     pub(super) asleep: Vec<bool>,
 }
 
-/// Stretches of what is true.
-fn stretches(all: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
+/// Ranges of true flags.
+fn ranges(all: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
     let mut out: Vec<Range<usize>> = Vec::new();
     for (i, _) in all.enumerate().filter(|a| a.1) {
         match out.last_mut() {
@@ -41,15 +40,15 @@ fn stretches(all: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
 }
 
 impl ActiveSet {
-    fn new(f: &PatchModel, asleep: &[bool]) -> Self {
+    pub(super) fn new(f: &PatchModel, asleep: &[bool]) -> Self {
         let n = f.vertices.len();
         let asleep: Vec<bool> = (0..n)
             .map(|i| asleep.get(i).copied().unwrap_or(false))
             .collect();
-        let moves = |v: &[At; 4]| v.iter().flatten().any(|p| !asleep[p.index()]);
-        let mut seen = vec![false; n.div_ceil(GROUP)];
-        let mut see = |i: usize| seen[i / GROUP] = true;
-        (0..n).filter(|i| !asleep[*i]).for_each(&mut see);
+        let moves = |v: &[Slots; 4]| v.iter().flatten().any(|p| !asleep[p.index()]);
+        let mut involved = vec![false; n.div_ceil(GROUP)];
+        let mut involve = |i: usize| involved[i / GROUP] = true;
+        (0..n).filter(|i| !asleep[*i]).for_each(&mut involve);
         let quads: Vec<bool> = f.quads.iter().map(|q| moves(&q.v)).collect();
         let bent: Vec<bool> = f.bent.iter().map(|b| moves(&b.v)).collect();
         let corners = f
@@ -61,7 +60,7 @@ impl ActiveSet {
         corners
             .filter(|c| *c.1)
             .flat_map(|c| c.0.iter().flatten())
-            .for_each(|p| see(p.index()));
+            .for_each(|p| involve(p.index()));
         let mut rows = Vec::with_capacity(n);
         let mut offsets = Vec::with_capacity(n);
         let mut from = 0;
@@ -72,31 +71,31 @@ impl ActiveSet {
             let needed =
                 !row.is_empty() && (!asleep[i] || row.iter().any(|(p, _)| !asleep[p.index()]));
             if needed {
-                see(i);
-                row.iter().for_each(|(p, _)| see(p.index()));
+                involve(i);
+                row.iter().for_each(|(p, _)| involve(p.index()));
             }
             rows.push(needed);
         }
-        // Smoothing reaches along edges.
+        // The mass filter acts along edges.
         for e in &f.ends {
             let [i, j] = e.map(usize::from);
             if asleep[i] != asleep[j] {
-                see(i);
-                see(j);
+                involve(i);
+                involve(j);
             }
         }
-        let bend = stretches(rows.into_iter())
+        let bend = ranges(rows.into_iter())
             .into_iter()
             .map(|r| (r.clone(), offsets[r.start]))
             .collect();
         Self {
-            vertices: stretches(asleep.iter().map(|a| !a)),
-            seen: stretches((0..n).map(|i| seen[i / GROUP])),
-            quads: stretches(quads.into_iter()),
+            vertices: ranges(asleep.iter().map(|a| !a)),
+            involved: ranges((0..n).map(|i| involved[i / GROUP])),
+            quads: ranges(quads.into_iter()),
             bend,
-            bent: stretches(bent.into_iter()),
+            bent: ranges(bent.into_iter()),
             rim: (0..n)
-                .filter(|i| asleep[*i] && seen[i / GROUP])
+                .filter(|i| asleep[*i] && involved[i / GROUP])
                 .map(|i| i as u32)
                 .collect(),
             asleep,
@@ -104,27 +103,20 @@ impl ActiveSet {
     }
 }
 
-/// A kind of stretches, or everything if nothing sleeps.
+/// Ranges of one kind, or the whole if nothing sleeps.
 #[inline(always)]
-pub(super) fn part<'a>(
-    awake: &'a Option<ActiveSet>,
+pub(super) fn active_ranges<'a>(
+    active: &'a Option<ActiveSet>,
     whole: &'a Range<usize>,
     of: impl Fn(&'a ActiveSet) -> &'a Vec<Range<usize>>,
 ) -> &'a [Range<usize>] {
-    awake
+    active
         .as_ref()
         .map_or(std::slice::from_ref(whole), |a| of(a))
 }
 
-/// What lies before `end`.
+/// Part of a range below `end`.
 #[inline(always)]
-pub(super) fn before(r: &Range<usize>, end: usize) -> Range<usize> {
+pub(super) fn clip(r: &Range<usize>, end: usize) -> Range<usize> {
     r.start.min(end)..r.end.min(end)
-}
-
-impl PatchState {
-    /// Leaves the vertices that sleep to themselves until the next outer call: nothing moves them but their own speed.
-    pub fn set_sleeping(&mut self, f: &PatchModel, asleep: &[bool]) {
-        self.scratch.awake = asleep.contains(&true).then(|| ActiveSet::new(f, asleep));
-    }
 }

@@ -1,59 +1,40 @@
-//! Triangles and hinges, eight to a block: what one pass of the kernels takes.
+//! Triangles and hinges in blocks of eight: the unit of one pass of the kernels.
 
-use super::simd::{At, LANES, Place};
-use super::stable_sheet::{Bent, Triangle};
+use super::elements::{CurvedHinge, EdgeTriangle};
+use super::simd::{LANES, Slot, Slots};
 use std::collections::BTreeSet;
 
-/// Eight pairs of triangles a b c and b a d; those without a partner have no stiffness in the second. The last eight are
-/// filled up with ones that pull nothing.
+/// Eight pairs of triangles a b c and b a d. A triangle without partner has no stiffness in the second; the last block is
+/// padded with pairs without stiffness.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(32))]
-pub(super) struct Quads {
-    /// Lengths at rest of ab, ac, bc, ad, bd.
+pub(super) struct QuadBlock {
+    /// Lengths at rest of ab, ac, bc, ad, bd [m].
     pub(super) rest: [[f32; LANES]; 5],
-    /// Stiffness between their lengthenings, N/m: of each by itself, ab with the others, ac with bc, ad with bd.
+    /// Stiffness between their lengthenings [N/m]: of each by itself, ab with the others, ac with bc, ad with bd.
     pub(super) k: [[f32; LANES]; 11],
     /// a, b, c, d.
-    pub(super) v: [At; 4],
+    pub(super) v: [Slots; 4],
 }
 
-/// Eight hinges bent at rest; the last eight are filled up.
+/// Eight hinges bent at rest; the last block is padded.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(32))]
-pub(super) struct Hinges {
-    /// Coefficients of all but the first vertex; they sum to zero with its.
+pub(super) struct HingeBlock {
+    /// Coefficients of all but the first vertex; all four sum to zero.
     pub(super) c: [[f32; LANES]; 3],
     pub(super) w: [f32; LANES],
     pub(super) rest: [f32; LANES],
-    pub(super) v: [At; 4],
+    pub(super) v: [Slots; 4],
 }
 
-impl Quads {
-    /// Its lowest vertex is the lowest of all blocks after it.
-    pub(super) fn lowest(&self) -> usize {
-        lowest(&self.v)
-    }
-}
-
-impl Hinges {
-    /// Its lowest vertex is the lowest of all blocks after it.
-    pub(super) fn lowest(&self) -> usize {
-        lowest(&self.v)
-    }
-}
-
-fn lowest(v: &[At; 4]) -> usize {
+/// Lowest vertex of a block. Blocks are sorted by it.
+pub(super) fn lowest(v: &[Slots; 4]) -> usize {
     v.iter().map(|v| v[0].index()).min().unwrap_or(0)
 }
 
-/// Stiffness between edges `i` and `j` of a triangle.
-fn between(t: &Triangle, i: usize, j: usize) -> f32 {
-    if i == j { t.k[i] } else { t.k[6 - i - j] }
-}
-
-/// For each triangle its partner across an edge. Those with the fewest left to choose from choose first, which leaves few
-/// alone.
-fn partners(all: &[Triangle]) -> Vec<Option<usize>> {
+/// Matching of triangles across edges. Those with the fewest free neighbours choose first, which leaves few unmatched.
+fn partners(all: &[EdgeTriangle]) -> Vec<Option<usize>> {
     let mut edges: Vec<([u32; 2], usize)> = Vec::with_capacity(3 * all.len());
     for (n, t) in all.iter().enumerate() {
         edges.extend(
@@ -94,7 +75,7 @@ fn partners(all: &[Triangle]) -> Vec<Option<usize>> {
     partner
 }
 
-/// One lane of [`Quads`].
+/// One lane of a [`QuadBlock`].
 struct Quad {
     v: [u32; 4],
     rest: [f32; 5],
@@ -102,13 +83,13 @@ struct Quad {
 }
 
 impl Quad {
-    fn new(t: &Triangle, other: Option<&Triangle>) -> Self {
-        // The corner that the other triangle has not.
+    fn new(t: &EdgeTriangle, other: Option<&EdgeTriangle>) -> Self {
+        // Corner that the other triangle lacks.
         let i = other.map_or(0, |o| (0..3).find(|i| !o.v.contains(&t.v[*i])).unwrap_or(0));
         let (j, l) = ((i + 1) % 3, (i + 2) % 3);
         let (a, b, c) = (t.v[j], t.v[l], t.v[i]);
         // Edge k lies opposite corner k.
-        let k = |x, y| between(t, x, y);
+        let k = |x, y| t.stiffness(x, y);
         let mut quad = Self {
             v: [a, b, c, c],
             rest: [t.rest[i], t.rest[l], t.rest[j], t.rest[l], t.rest[j]],
@@ -129,7 +110,7 @@ impl Quad {
         let corner = |v: u32| other.and_then(|o| o.v.iter().position(|w| *w == v));
         if let (Some(o), Some(p), Some(q)) = (other, corner(a), corner(b)) {
             let d = 3 - p - q;
-            let k = |x, y| between(o, x, y);
+            let k = |x, y| o.stiffness(x, y);
             quad.v[3] = o.v[d];
             (quad.rest[3], quad.rest[4]) = (o.rest[q], o.rest[p]);
             quad.k[0] += k(d, d);
@@ -140,8 +121,8 @@ impl Quad {
     }
 }
 
-/// Pairs of triangles by their lowest corner.
-pub(super) fn quads(all: &[Triangle]) -> Vec<Quads> {
+/// Pairs of triangles in blocks, sorted by their lowest corner.
+pub(super) fn quad_blocks(all: &[EdgeTriangle]) -> Vec<QuadBlock> {
     let partner = partners(all);
     let firsts = (0..all.len()).filter(|t| partner[*t].is_none_or(|p| *t < p));
     let mut quads: Vec<Quad> = firsts
@@ -149,9 +130,9 @@ pub(super) fn quads(all: &[Triangle]) -> Vec<Quads> {
         .collect();
     quads.sort_by_key(|q| q.v.iter().min().copied());
     let block = |of: &[Quad]| {
-        let mut out = Quads::default();
+        let mut out = QuadBlock::default();
         for (lane, q) in of.iter().enumerate() {
-            (0..4).for_each(|i| out.v[i][lane] = Place::of(q.v[i] as usize));
+            (0..4).for_each(|i| out.v[i][lane] = Slot::new(q.v[i] as usize));
             (0..5).for_each(|i| out.rest[i][lane] = q.rest[i]);
             (0..11).for_each(|i| out.k[i][lane] = q.k[i]);
         }
@@ -160,13 +141,13 @@ pub(super) fn quads(all: &[Triangle]) -> Vec<Quads> {
     quads.chunks(LANES).map(block).collect()
 }
 
-/// Hinges by their lowest vertex.
-pub(super) fn hinges(mut all: Vec<Bent>) -> Vec<Hinges> {
+/// Hinges in blocks, sorted by their lowest vertex.
+pub(super) fn hinge_blocks(mut all: Vec<CurvedHinge>) -> Vec<HingeBlock> {
     all.sort_by_key(|b| b.v.iter().min().copied());
-    let block = |of: &[Bent]| {
-        let mut out = Hinges::default();
+    let block = |of: &[CurvedHinge]| {
+        let mut out = HingeBlock::default();
         for (lane, b) in of.iter().enumerate() {
-            (0..4).for_each(|i| out.v[i][lane] = Place::of(b.v[i] as usize));
+            (0..4).for_each(|i| out.v[i][lane] = Slot::new(b.v[i] as usize));
             (0..3).for_each(|i| out.c[i][lane] = b.c[i + 1]);
             (out.w[lane], out.rest[lane]) = (b.w, b.rest);
         }
@@ -180,16 +161,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_triangle_is_in_one_pair_and_few_are_alone() {
-        // A strip of squares cut in triangles, 20 by 9: an odd number of triangles cannot be, so all find a partner.
+    fn matching_is_symmetric_and_leaves_few_triangles_unmatched() {
+        // A strip of 20 by 9 squares cut into triangles.
         let at = |i: u32, j: u32| j * 21 + i;
         let mut all = Vec::new();
         for j in 0..9 {
             for i in 0..20 {
                 let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-                all.extend([[a, b, c], [a, c, d]].map(|v| Triangle {
+                all.extend([[a, b, c], [a, c, d]].map(|v| EdgeTriangle {
                     v,
-                    ..Triangle::default()
+                    ..EdgeTriangle::default()
                 }));
             }
         }

@@ -1,55 +1,57 @@
-//! What patches tell each other after a step: the vertices that others have as ghosts.
+//! Ghost exchange between patches after a substep.
 
-use super::patch_model::{MOST, PatchModel};
-use super::patch_state::{PatchState, V4};
+use super::patch_model::PatchModel;
+use super::patch_state::PatchState;
+use super::vec4::{SLOT_MASK, V4};
 use std::sync::RwLock;
 
-/// Moved, velocity, where forces are evaluated.
-type Told = [V4; 3];
+/// Displacement, velocity and predicted position of one border vertex.
+type BorderVertex = [V4; 3];
 
-/// Letter boxes of all patches, two each: what is told in one round is read in the next, while the other box is filled.
+/// Border vertices of all patches, double buffered: one buffer is read while the next substep fills the other.
 #[derive(Debug, Default)]
-pub struct HaloExchange(Vec<[RwLock<Vec<Told>>; 2]>);
+pub struct HaloExchange(Vec<[RwLock<Vec<BorderVertex>>; 2]>);
 
 impl HaloExchange {
-    /// For so many patches.
+    /// Empty buffers of as many patches.
     pub fn new(patches: usize) -> Self {
         Self((0..patches).map(|_| Default::default()).collect())
     }
-    /// Tells what patch `p` computed in a round.
-    pub fn publish(&self, round: usize, p: usize, f: &PatchModel, motion: &PatchState) {
+    /// Publishes the border of patch `p` after a substep.
+    pub fn publish(&self, substep: usize, p: usize, f: &PatchModel, state: &PatchState) {
         if f.border.is_empty() {
             return;
         }
-        let Ok(mut to) = self.0[p][round % 2].write() else {
+        let Ok(mut to) = self.0[p][substep % 2].write() else {
             return;
         };
         to.clear();
         to.extend(f.border.iter().map(|i| {
             let i = *i as usize;
             [
-                motion.displacement[i],
-                motion.velocity[i],
-                motion.scratch.ahead[i % MOST],
+                state.displacement[i],
+                state.velocity[i],
+                state.scratch.predicted[i & SLOT_MASK],
             ]
         }));
     }
-    /// Takes over for the ghosts of a patch what their owners told in a round.
-    pub fn receive(&self, round: usize, f: &PatchModel, motion: &mut PatchState) {
+    /// Copies the ghosts of a patch from their owners' borders after a substep.
+    pub fn receive(&self, substep: usize, f: &PatchModel, state: &mut PatchState) {
         let (mut from, mut open) = (u32::MAX, None);
         for (k, [q, at]) in f.ghosts.iter().enumerate() {
             if from != *q {
-                (from, open) = (*q, self.0[*q as usize][round % 2].read().ok());
+                let buffer = &self.0[*q as usize][substep % 2];
+                (from, open) = (*q, buffer.read().ok());
             }
-            let (i, Some(told)) = (f.owned + k, open.as_ref().and_then(|o| o.get(*at as usize)))
-            else {
+            let vertex = open.as_ref().and_then(|o| o.get(*at as usize));
+            let (i, Some(vertex)) = (f.owned + k, vertex) else {
                 continue;
             };
             [
-                motion.displacement[i],
-                motion.velocity[i],
-                motion.scratch.ahead[i % MOST],
-            ] = *told;
+                state.displacement[i],
+                state.velocity[i],
+                state.scratch.predicted[i & SLOT_MASK],
+            ] = *vertex;
         }
     }
 }

@@ -1,38 +1,39 @@
-//! Smoothing of accelerations: fine waves get more inertia, everything else keeps what it has.
+//! Selective mass scaling (Olovsson, Simonsson and Unosson 2005) by its inverse (Tkachuk and Bischoff 2015).
 //!
-//! Explicit steps are bound by the finest waves a mesh can hold, which nobody watches. Selective mass scaling (Olovsson,
-//! Simonsson and Unosson 2005) gives them inertia; here its inverse is given, as Tkachuk and Bischoff 2015 do: a = W M⁻¹ f
-//! with W = w(M⁻¹L), L the Laplacian of the sheet's edges and w a polynomial with w(0) = 1. W M⁻¹ is symmetric and
-//! positive, so energy (with that inertia) and momentum are kept; W 1 = 1, so a sheet falls as it should; f = 0 rests
-//! where it did, so stiffness is what it was. Costs one weighted sum over neighbours for each degree.
+//! The finest waves of a mesh bound explicit steps; more inertia allows longer ones. Here a = W M⁻¹ f with W = w(M⁻¹L),
+//! L the Laplacian of the sheet's edges and w a polynomial with w(0) = 1. W M⁻¹ is symmetric and positive, so momentum
+//! and energy (with that inertia) are conserved. W 1 = 1, so free fall is exact; f = 0 implies a = 0, so equilibria stay.
+//! The cost is one weighted sum over neighbours for each degree.
 
+use super::edge_stiffness::TriangleSprings;
+use crate::cloth::Sheet;
 use nalgebra::Vector2;
 
-/// W as weights of edges.
+/// MassFilter W, as weights of edges.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Filter {
+pub(super) struct MassFilter {
     /// Ends of each edge.
     pub(super) ends: Vec<[u32; 2]>,
     /// Weight of each edge, kg, such that no eigenvalue of M⁻¹L is above 1.
     pub(super) weight: Vec<f64>,
     pub(super) inverse_mass: Vec<f64>,
-    /// Coefficients of w, the lowest first; only 1 where nothing is smoothed.
-    pub(super) w: Vec<f64>,
+    /// Coefficients of w, the lowest (1) first; of degree 0 where nothing is filtered.
+    pub(super) coefficients: Vec<f64>,
 }
 
-/// How far the argument of the Chebyshev polynomial starts beyond 1, times its degree squared: no wave keeps less than
-/// a twentieth of its acceleration. Less, and such waves would be as good as free of forces; more shortens the step.
+/// Start of the Chebyshev argument beyond 1, times the degree squared: every wave keeps a twentieth of its acceleration.
+/// Smaller leaves some waves nearly without forces; larger shortens the step.
 const DAMPING: f64 = 1.0;
-/// Room for the estimate of the largest eigenvalue, which is one from below (ratio).
-const ROOM: f64 = 1.03;
-/// Share of the vertices that count as most.
-const MOST: f64 = 0.9;
-/// Products of the power iteration for it.
-const PRODUCTS: usize = 60;
+/// Safety factor of the largest eigenvalue, whose estimate is a lower bound. Larger filters less.
+const EIGENVALUE_MARGIN: f64 = 1.03;
+/// Quantile of the vertices' stiffness over mass that normalises the weights. Larger lets slivers weaken the filter.
+const USUAL_QUANTILE: f64 = 0.9;
+/// Iterations of the power method. Fewer underestimate the eigenvalue by more than its margin.
+const POWER_ITERATIONS: usize = 60;
 
 /// Coefficients of w(s) = (1 − Tₙ(u) / Tₙ(u₀)) / (c s) with n = degree + 1, u falling from u₀ at s = 0 to −1 at s = 1:
-/// of all polynomials with w(0) = 1 the one with (nearly) the smallest s·w(s) on 0 to 1, about 1/n² (van der Houwen's
-/// damped stability polynomials).
+/// the polynomial with w(0) = 1 and (nearly) the smallest s·w(s) on 0 to 1, about 1/n² (van der Houwen's damped stability
+/// polynomials).
 pub(super) fn coefficients(degree: usize) -> Vec<f64> {
     if degree == 0 {
         return vec![1.0];
@@ -55,10 +56,27 @@ pub(super) fn coefficients(degree: usize) -> Vec<f64> {
     (1..=n).map(|k| now[k] / now[1]).collect()
 }
 
-impl Filter {
-    /// `stiffness` of each edge says which neighbours it is coupled to, N/m. Places stiffer for their mass than most are
-    /// normalised by themselves, so that one narrow triangle does not leave all others without a filter.
-    pub(super) fn new(
+impl MassFilter {
+    /// Filter of a sheet, with the edges' own stiffness as weights. `ends` of its edges, the lower vertex first.
+    pub(super) fn of_sheet(sheet: &Sheet, ends: Vec<[u32; 2]>, degree: usize) -> Self {
+        let mut order: Vec<([u32; 2], usize)> =
+            ends.iter().enumerate().map(|(i, e)| (*e, i)).collect();
+        order.sort_unstable();
+        let mut own = vec![0.0; ends.len()];
+        for t in sheet.elements.iter().filter_map(|e| TriangleSprings::new(sheet, e)) {
+            for i in 0..3 {
+                let (a, b) = (t.v[(i + 1) % 3], t.v[(i + 2) % 3]);
+                if let Ok(at) = order.binary_search_by_key(&[a.min(b), a.max(b)], |o| o.0) {
+                    own[order[at].1] += t.stiffness[(i, i)];
+                }
+            }
+        }
+        let inverse_mass = sheet.mass.iter().map(|m| 1.0 / m).collect();
+        Self::new(ends, &own, inverse_mass, degree)
+    }
+    /// Filter with weights in proportion to the `stiffness` of each edge [N/m]. Regions stiffer for their mass than most
+    /// are normalised by themselves, so that one sliver does not weaken the filter elsewhere.
+    fn new(
         ends: Vec<[u32; 2]>,
         stiffness: &[f64],
         inverse_mass: Vec<f64>,
@@ -72,7 +90,7 @@ impl Filter {
         let mut all: Vec<f64> = (0..around.len() as u32).map(rate).collect();
         all.sort_unstable_by(f64::total_cmp);
         let usual = all
-            .get((all.len() as f64 * MOST) as usize)
+            .get((all.len() as f64 * USUAL_QUANTILE) as usize)
             .copied()
             .unwrap_or(0.0)
             .max(f64::MIN_POSITIVE);
@@ -82,26 +100,26 @@ impl Filter {
             ends,
             weight,
             inverse_mass,
-            w: coefficients(degree),
+            coefficients: coefficients(degree),
         };
         if degree > 0 {
-            let scale = 1.0 / (ROOM * filter.largest()).max(f64::MIN_POSITIVE);
+            let scale = 1.0 / (EIGENVALUE_MARGIN * filter.largest_eigenvalue()).max(f64::MIN_POSITIVE);
             filter.weight.iter_mut().for_each(|w| *w *= scale);
         }
         filter
     }
-    /// The identity on the same sheet.
-    pub(super) fn without(&self) -> Self {
+    /// Identity on the same sheet.
+    pub(super) fn identity(&self) -> Self {
         Self {
-            w: vec![1.0],
+            coefficients: vec![1.0],
             ..self.clone()
         }
     }
     /// Largest eigenvalue of M⁻¹L.
-    fn largest(&self) -> f64 {
+    fn largest_eigenvalue(&self) -> f64 {
         let mut x = noise(self.inverse_mass.len());
         let mut value = 0.0;
-        for _ in 0..PRODUCTS {
+        for _ in 0..POWER_ITERATIONS {
             let y = self.laplacian(&x);
             let (mut along, mut whole, mut norm) = (0.0, 0.0, 0.0);
             for ((x, y), m) in x.iter().zip(&y).zip(&self.inverse_mass) {
@@ -127,7 +145,7 @@ impl Filter {
     }
     /// W x.
     pub(super) fn apply(&self, x: &mut [Vector2<f64>]) {
-        let Some((last, lower)) = self.w.split_last() else {
+        let Some((last, lower)) = self.coefficients.split_last() else {
             return;
         };
         if lower.is_empty() {
@@ -142,7 +160,7 @@ impl Filter {
     }
 }
 
-/// A start for power iterations that has something of every wave.
+/// Initial vector of power iterations, with a component along every mode.
 pub(super) fn noise(n: usize) -> Vec<Vector2<f64>> {
     let of = |i: usize| {
         let r = (i as u32).wrapping_mul(2_654_435_761);
@@ -159,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_polynomial_starts_at_one_stays_positive_and_bounds_s_times_w() {
+    fn polynomial_starts_at_one_stays_positive_and_bounds_s_times_w() {
         for degree in 0..4 {
             let w = coefficients(degree);
             assert_eq!(w.len(), degree + 1);
