@@ -1,7 +1,11 @@
-//! A garment as a mechanical system: sheet, membrane, bending, and its partition.
+//! A garment as a mechanical system: sheet, membrane, bending, and its partition into bands and islands.
 
-pub mod membrane;
+pub(super) mod bands;
+mod bending;
+mod membrane;
 pub(crate) mod partition;
 mod sheet;
 
-pub use sheet::{Element, Hinge, Sheet};
+pub use bending::Hinge;
+pub use membrane::Membrane;
+pub use sheet::{Element, Sheet};

@@ -1,17 +1,16 @@
-//! A sheet cut into compact pieces, fixed when it is made: what sleeps as one, and what is asked for folds as one.
+//! Partition of a sheet into compact parts, fixed when the garment is made.
 
-/// Vertices piece by piece, and where each piece begins; shape `[pieces + 1]`.
+/// Vertices in the order of the parts, and the start of each part.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Partition {
     /// Vertices in their new order.
     pub(crate) order: Vec<u32>,
-    /// Beginnings in that order, and its length.
+    /// First index of each part in that order, then its length; shape `[parts + 1]`.
     pub(crate) starts: Vec<usize>,
 }
 
-/// Cuts `set` into pieces of at most `most` vertices that begin at multiples of `multiple`, halving along its length
-/// until they are small enough. Within a piece neighbours come close together, as pieces do among each other.
-/// `vertices` is more than any number in the set.
+/// Cuts `set` into parts of at most `most` vertices that begin at multiples of `multiple`, by halves along its length.
+/// Neighbours are close together in the order. `vertices` is above any number in the set.
 pub(crate) fn cut<'a>(
     vertices: usize,
     near: impl Fn(u32) -> &'a [u32],
@@ -20,12 +19,12 @@ pub(crate) fn cut<'a>(
     multiple: usize,
 ) -> Partition {
     let (most, multiple) = (most.max(1), multiple.max(1));
-    let mut pieces = Partition {
+    let mut partition = Partition {
         order: Vec::with_capacity(set.len()),
         starts: vec![0],
     };
-    // In which part each vertex is, and how often it was met.
-    let (mut part, mut met) = (vec![0u32; vertices], vec![0u32; vertices]);
+    // Part of each vertex, and the last walk that visited it.
+    let (mut part, mut visited) = (vec![0u32; vertices], vec![0u32; vertices]);
     let (mut parts, mut walks) = (0, 0);
     let mut left = vec![set];
     while let Some(set) = left.pop() {
@@ -35,9 +34,9 @@ pub(crate) fn cut<'a>(
             walks += 1;
             let mut order: Vec<u32> = Vec::with_capacity(set.len());
             let mut next = 0;
-            // Where the part falls apart, what is not reached begins anew.
+            // Components that the first start does not reach follow.
             for start in from.iter().chain(&set) {
-                if std::mem::replace(&mut met[*start as usize], walks) != walks {
+                if std::mem::replace(&mut visited[*start as usize], walks) != walks {
                     order.push(*start);
                 }
                 while next < order.len() {
@@ -45,7 +44,7 @@ pub(crate) fn cut<'a>(
                     next += 1;
                     for w in near(v) {
                         if part[*w as usize] == parts
-                            && std::mem::replace(&mut met[*w as usize], walks) != walks
+                            && std::mem::replace(&mut visited[*w as usize], walks) != walks
                         {
                             order.push(*w);
                         }
@@ -54,35 +53,42 @@ pub(crate) fn cut<'a>(
             }
             order
         };
-        // From an end of it, so that a cut through the middle is short.
+        // A walk from one end makes the cut through the middle short.
         let end = walk(&[]).last().copied();
         let mut order = walk(end.as_slice());
         let half = order.len().div_ceil(2).next_multiple_of(multiple);
         if order.len() <= most || half >= order.len() {
-            pieces.order.append(&mut order);
-            pieces.starts.push(pieces.order.len());
+            partition.order.append(&mut order);
+            partition.starts.push(partition.order.len());
         } else {
             let rest = order.split_off(half);
             left.push(rest);
             left.push(order);
         }
     }
-    pieces.starts.dedup();
-    pieces
+    partition.starts.dedup();
+    partition
 }
 
 impl Partition {
-    /// How many there are.
+    /// One part.
+    pub(crate) fn whole(set: Vec<u32>) -> Self {
+        Self {
+            starts: vec![0, set.len()],
+            order: set,
+        }
+    }
+    /// Number of parts.
     pub(crate) fn len(&self) -> usize {
         self.starts.len() - 1
     }
-    /// Vertices of one.
-    pub(crate) fn members(&self, piece: usize) -> &[u32] {
-        &self.order[self.starts[piece]..self.starts[piece + 1]]
+    /// Vertices of one part.
+    pub(crate) fn members(&self, part: usize) -> &[u32] {
+        &self.order[self.starts[part]..self.starts[part + 1]]
     }
-    /// The piece of each of so many vertices.
+    /// Part of each vertex.
     #[cfg(test)]
-    pub(crate) fn of(&self, vertices: usize) -> Vec<u32> {
+    fn of(&self, vertices: usize) -> Vec<u32> {
         let mut of = vec![0; vertices];
         for p in 0..self.len() {
             self.members(p)
@@ -98,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_square_falls_into_compact_pieces_and_nothing_is_lost() {
+    fn parts_of_a_square_are_compact_and_cover_it() {
         let n = 40u32;
         let near: Vec<Vec<u32>> = (0..n * n)
             .map(|v| {
@@ -133,7 +139,7 @@ mod tests {
                 "{}",
                 members.len()
             );
-            // Few of its neighbours are elsewhere: a band one vertex wide would have all of them there.
+            // A band one vertex wide would have all neighbours outside.
             let outside = members
                 .iter()
                 .flat_map(|v| &near[*v as usize])
@@ -141,14 +147,14 @@ mod tests {
             let outside = outside.count();
             assert!(
                 outside < members.len(),
-                "piece {k}: {outside} edges leave {} vertices",
+                "part {k}: {outside} edges leave {} vertices",
                 members.len()
             );
         }
         assert_eq!(
             cut(3, |_| &[], vec![2, 0, 1], 2, 1).order.len(),
             3,
-            "what hangs together by nothing"
+            "without edges"
         );
         assert_eq!(cut(0, |_| &[], vec![], 2, 1).len(), 0);
     }

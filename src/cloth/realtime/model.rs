@@ -380,10 +380,10 @@ impl Model {
             let bend_every = StableSheet::bending_interval(&sheet, h);
             let fit = StepSpec {
                 h,
-                ahead: config.ahead,
+                lookahead: config.ahead,
                 springs_only: false,
-                bend_every,
-                smooth,
+                bending_interval: bend_every,
+                filter_degree: smooth,
             };
             let plan = StableSheet::new(&sheet, &fit);
             // A step moves news by one ring and by one more for each degree, an evaluation of bending by one more.
@@ -403,7 +403,7 @@ impl Model {
                 h,
                 bend_every,
                 smooth,
-                softened: plan.softened,
+                softened: plan.kept_stiffness,
                 own,
                 other,
                 offset,

@@ -504,7 +504,7 @@ fn advance(
             let step = Substep {
                 h,
                 t,
-                ahead,
+                lookahead: ahead,
                 gravity,
                 rings: 0,
             };

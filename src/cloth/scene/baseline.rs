@@ -4,8 +4,9 @@ use super::run::{Method, RunConfig, RunReport, deepest};
 use super::small::{RECOVERY, look, v3d, v4};
 use super::{Scene, SceneError};
 use crate::cloth::ClothError;
+use crate::cloth::solver::explicit::edge_stiffness::triangle_springs;
 use crate::cloth::solver::explicit::{
-    PatchModel, PatchState, Pin, StableSheet, StepSpec, Substep, V4, triangles,
+    PatchModel, PatchState, Pin, StableSheet, StepSpec, Substep, V4,
 };
 use crate::linear::conjugate_gradient;
 use crate::math::{P3, V3d};
@@ -42,10 +43,10 @@ pub(super) fn run(
     // A plan for a step so short that nothing is softened: both are stable at any step.
     let fit = StepSpec {
         h: 1e-9,
-        ahead: 0.0,
+        lookahead: 0.0,
         springs_only: springs,
-        bend_every,
-        smooth: 0,
+        bending_interval: bend_every,
+        filter_degree: 0,
     };
     let plan = StableSheet::new(&scene.sheet, &fit);
     let fabrics = plan.compile_patches(1, 0, 0);
@@ -206,10 +207,11 @@ fn blocks(scene: &Scene, f: &PatchModel, h: f64) -> Vec<Block> {
         .iter()
         .enumerate()
         .for_each(|(i, v)| local[*v as usize] = i as u32);
-    triangles(&scene.sheet)
+    triangle_springs(&scene.sheet)
         .into_iter()
-        .filter_map(|(v, k, rest)| {
-            let compliance = (k.try_inverse()? / (h * h)).cast();
+        .filter_map(|s| {
+            let (v, rest) = (s.v, s.rest);
+            let compliance = (s.stiffness.try_inverse()? / (h * h)).cast();
             Some(Block {
                 v: v.map(|v| local[v as usize]),
                 rest: rest.map(|l| l as f32),
@@ -267,7 +269,8 @@ impl Springs {
             .enumerate()
             .for_each(|(i, v)| local[*v as usize] = i);
         let mut stiff = std::collections::BTreeMap::<[u32; 2], f64>::new();
-        for (v, k, _) in triangles(sheet) {
+        for s in triangle_springs(sheet) {
+            let (v, k) = (s.v, s.stiffness);
             for i in 0..3 {
                 let (a, b) = (v[(i + 1) % 3], v[(i + 2) % 3]);
                 *stiff.entry([a.min(b), a.max(b)]).or_default() += k[(i, i)];

@@ -67,10 +67,10 @@ pub(super) fn run(
         sheet,
         &StepSpec {
             h,
-            ahead: config.ahead,
+            lookahead: config.ahead,
             springs_only: false,
-            bend_every,
-            smooth,
+            bending_interval: bend_every,
+            filter_degree: smooth,
         },
     );
     // A step moves news by one ring and by one more for each degree, an evaluation of bending before it by one more.
@@ -177,7 +177,7 @@ pub(super) fn run(
                 let step = Substep {
                     h: hf,
                     t,
-                    ahead,
+                    lookahead: ahead,
                     gravity,
                     rings: 0,
                 };
@@ -226,7 +226,7 @@ pub(super) fn run(
         substeps,
         iterations: 1,
         penetration,
-        softened: plan.softened,
+        softened: plan.kept_stiffness,
         soft_elements: plan.soft_elements,
         fold_contacts,
         fold_searches_skipped: scratch.iter().map(|w| w.spared).sum(),

@@ -5,13 +5,13 @@ use nalgebra::{Matrix2, Matrix3, Vector2};
 
 /// Springs of a triangle. Edge k lies opposite corner k.
 #[derive(Clone, Copy, Debug)]
-pub(in super::super) struct TriangleSprings {
+pub(crate) struct TriangleSprings {
     /// Corners.
-    pub(in super::super) v: [u32; 3],
+    pub(crate) v: [u32; 3],
     /// Stiffness between the lengthenings of the edges [N/m].
-    pub(in super::super) stiffness: Matrix3<f64>,
+    pub(crate) stiffness: Matrix3<f64>,
     /// Lengths at rest [m].
-    pub(in super::super) rest: [f64; 3],
+    pub(crate) rest: [f64; 3],
     /// Unit directions at rest, from corner k + 1 to corner k + 2.
     pub(super) directions: [Vector2<f64>; 3],
 }
@@ -33,7 +33,7 @@ impl TriangleSprings {
         let directions = std::array::from_fn(|i| edges[i] / rest[i]);
         Some(Self {
             v: e.v,
-            stiffness: inverse.transpose() * sheet.membrane.plane_stress() * inverse * e.area,
+            stiffness: inverse.transpose() * sheet.membrane.hooke() * inverse * e.area,
             rest,
             directions,
         })
@@ -41,7 +41,7 @@ impl TriangleSprings {
 }
 
 /// Springs of every triangle with an area.
-pub(in super::super) fn triangle_springs(sheet: &Sheet) -> Vec<TriangleSprings> {
+pub(crate) fn triangle_springs(sheet: &Sheet) -> Vec<TriangleSprings> {
     let of = |e| TriangleSprings::new(sheet, e);
     sheet.elements.iter().filter_map(of).collect()
 }

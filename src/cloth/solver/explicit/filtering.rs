@@ -83,9 +83,15 @@ fn integrate_filtered<L: Simd8>(
         active,
         ..
     } = &state.scratch;
-    let Iteration { scale, reach: n, .. } = iteration;
+    let Iteration {
+        scale, reach: n, ..
+    } = iteration;
     let keep = 1.0 / (1.0 + step.h * f.damping);
-    let y: &[V4; MAX_VERTICES] = if iteration.first { acceleration } else { filtered };
+    let y: &[V4; MAX_VERTICES] = if iteration.first {
+        acceleration
+    } else {
+        filtered
+    };
     let (wide, by) = (l.splat(scale), l.splat(iteration.coefficient));
     let (h, kept) = (l.splat(step.h), l.splat(keep));
     let whole = 0..n;
@@ -97,8 +103,8 @@ fn integrate_filtered<L: Simd8>(
             .iter()
             .zip(own.zip(acceleration[r.start..].as_chunks::<2>().0));
         // The velocity of an odd last vertex has no partner.
-        let (both, last) = state.velocity[r.start..even(r.end).min(f.vertices.len())]
-            .as_chunks_mut::<2>();
+        let (both, last) =
+            state.velocity[r.start..even(r.end).min(f.vertices.len())].as_chunks_mut::<2>();
         let mut odd = [last.first().copied().unwrap_or_default(); 2];
         for (v, (r, (own, first))) in both.iter_mut().chain([&mut odd]).zip(pairs) {
             let own = l.load_pair(own);
@@ -132,7 +138,9 @@ fn filter_once<L: Simd8>(scratch: &mut PatchScratch, l: L, f: &PatchModel, itera
     } else {
         (&**filtered, &mut **refiltered)
     };
-    let Iteration { scale, reach: n, .. } = iteration;
+    let Iteration {
+        scale, reach: n, ..
+    } = iteration;
     let (wide, by) = (l.splat(scale), l.splat(iteration.coefficient));
     let whole = 0..n;
     for r in active_ranges(active, &whole, |a| &a.vertices) {

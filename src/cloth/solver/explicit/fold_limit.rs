@@ -65,7 +65,13 @@ impl FoldLimit {
         }
         let (length, least) = (square.sqrt().max(SHORTEST), (ratio * flat).min(WIDEST));
         let opening = d.dot(state.velocity[b] - state.velocity[a]) / length;
-        let weight = [a, b].map(|v| if except.fixed[v] { 0.0 } else { f.inverse_mass[v] });
+        let weight = [a, b].map(|v| {
+            if except.fixed[v] {
+                0.0
+            } else {
+                f.inverse_mass[v]
+            }
+        });
         let both = weight[0] + weight[1];
         let active = both > 0.0 && length - least < span * (SPEED_GAIN - opening);
         active.then(|| Self {
@@ -132,7 +138,9 @@ mod tests {
                 bending_interval: 3,
                 filter_degree: 0,
             };
-            let model = StableSheet::new(&s, &spec).compile_patches(1, 0, 0).remove(0);
+            let model = StableSheet::new(&s, &spec)
+                .compile_patches(1, 0, 0)
+                .remove(0);
             let flat: Vec<V3d> = model.vertices.iter().map(|v| x[*v as usize]).collect();
             let mut this = Self {
                 model,
@@ -140,12 +148,16 @@ mod tests {
                 flat,
             };
             // A shallow roof whose eaves come down and together.
-            let position = |p: &V3d| V4::new(p.x as f32, -0.3 * (p.x - MIDDLE).abs() as f32, p.z as f32);
+            let position =
+                |p: &V3d| V4::new(p.x as f32, -0.3 * (p.x - MIDDLE).abs() as f32, p.z as f32);
             let velocity = |p: &V3d| {
                 let d = p.x - MIDDLE;
                 V4::new((-10.0 * d) as f32, (-10.0 * d.abs()) as f32, 0.0)
             };
-            let (x, v) = (this.flat.iter().map(position), this.flat.iter().map(velocity));
+            let (x, v) = (
+                this.flat.iter().map(position),
+                this.flat.iter().map(velocity),
+            );
             this.state.reset(x, v);
             this
         }
@@ -163,7 +175,11 @@ mod tests {
                 let [a, b] = d.ends.map(|v| self.state.position(v as usize).to_f64());
                 (a - b).norm() / f64::from(d.flat)
             };
-            self.model.diagonals.iter().map(ratio).fold(f64::INFINITY, f64::min)
+            self.model
+                .diagonals
+                .iter()
+                .map(ratio)
+                .fold(f64::INFINITY, f64::min)
         }
         fn step(&mut self, limits: &[FoldLimit], held: Option<usize>, bend: bool) {
             let step = Substep {
@@ -175,12 +191,14 @@ mod tests {
             if bend {
                 self.state.update_bending(&self.model, 1.5 * H, usize::MAX);
             }
-            self.state.integrate_velocities(&self.model, &step, &[], &[]);
+            self.state
+                .integrate_velocities(&self.model, &step, &[], &[]);
             FoldLimit::apply(limits, &mut self.state, H);
             if let Some(i) = held {
                 self.state.velocity[i] = V4::default();
             }
-            self.state.integrate_positions(&self.model, &step, f32::INFINITY);
+            self.state
+                .integrate_positions(&self.model, &step, f32::INFINITY);
         }
         /// Sharpest fold within 0.1 s.
         fn run(&mut self, ratio: f32, held: Option<usize>) -> f64 {
@@ -194,7 +212,14 @@ mod tests {
             for k in 0..STEPS {
                 if k % SEARCH_EVERY == 0 {
                     let span = SEARCH_EVERY as f32 * H;
-                    FoldLimit::find_active(&self.model, &self.state, ratio, span, &except, &mut limits);
+                    FoldLimit::find_active(
+                        &self.model,
+                        &self.state,
+                        ratio,
+                        span,
+                        &except,
+                        &mut limits,
+                    );
                 }
                 self.step(&limits, held, k % 3 == 0);
                 sharpest = sharpest.min(self.sharpest());
@@ -217,7 +242,12 @@ mod tests {
         let angular = (after.1 - before.1).norm() / (0.1 * before.2);
         assert!(linear < 1e-4 && angular < 1e-4, "{linear:e} {angular:e}");
         let mut held = Clapping::new();
-        let vertex = held.model.vertices.iter().position(|v| *v == 31).expect("in the strip");
+        let vertex = held
+            .model
+            .vertices
+            .iter()
+            .position(|v| *v == 31)
+            .expect("in the strip");
         let sharpest = held.run(RATIO, Some(vertex));
         assert!(sharpest > f64::from(RATIO) - 0.15, "{sharpest}");
         assert_eq!(held.state.displacement[vertex], V4::default(), "held");
@@ -226,7 +256,10 @@ mod tests {
     #[test]
     fn coincident_corners_stay_finite() {
         let mut state = PatchState::default();
-        state.reset([V4::default(); 2].into_iter(), [V4::default(); 2].into_iter());
+        state.reset(
+            [V4::default(); 2].into_iter(),
+            [V4::default(); 2].into_iter(),
+        );
         let limit = FoldLimit {
             ends: [0, 1],
             least: 0.01,

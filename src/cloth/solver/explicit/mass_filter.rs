@@ -63,7 +63,11 @@ impl MassFilter {
             ends.iter().enumerate().map(|(i, e)| (*e, i)).collect();
         order.sort_unstable();
         let mut own = vec![0.0; ends.len()];
-        for t in sheet.elements.iter().filter_map(|e| TriangleSprings::new(sheet, e)) {
+        for t in sheet
+            .elements
+            .iter()
+            .filter_map(|e| TriangleSprings::new(sheet, e))
+        {
             for i in 0..3 {
                 let (a, b) = (t.v[(i + 1) % 3], t.v[(i + 2) % 3]);
                 if let Ok(at) = order.binary_search_by_key(&[a.min(b), a.max(b)], |o| o.0) {
@@ -76,12 +80,7 @@ impl MassFilter {
     }
     /// Filter with weights in proportion to the `stiffness` of each edge [N/m]. Regions stiffer for their mass than most
     /// are normalised by themselves, so that one sliver does not weaken the filter elsewhere.
-    fn new(
-        ends: Vec<[u32; 2]>,
-        stiffness: &[f64],
-        inverse_mass: Vec<f64>,
-        degree: usize,
-    ) -> Self {
+    fn new(ends: Vec<[u32; 2]>, stiffness: &[f64], inverse_mass: Vec<f64>, degree: usize) -> Self {
         let mut around = vec![0.0; inverse_mass.len()];
         for (e, k) in ends.iter().zip(stiffness) {
             e.iter().for_each(|v| around[*v as usize] += k);
@@ -103,7 +102,8 @@ impl MassFilter {
             coefficients: coefficients(degree),
         };
         if degree > 0 {
-            let scale = 1.0 / (EIGENVALUE_MARGIN * filter.largest_eigenvalue()).max(f64::MIN_POSITIVE);
+            let scale =
+                1.0 / (EIGENVALUE_MARGIN * filter.largest_eigenvalue()).max(f64::MIN_POSITIVE);
             filter.weight.iter_mut().for_each(|w| *w *= scale);
         }
         filter

@@ -11,7 +11,7 @@ mod blocks;
 mod constraint;
 mod contact;
 mod dispatch;
-pub(super) mod edge_stiffness;
+pub(crate) mod edge_stiffness;
 mod elastic;
 mod elements;
 mod filtering;

@@ -6,8 +6,8 @@ use super::patch_model::{FilterOverflow, FilterRow, PatchModel, ROW};
 use super::simd::{LANES, Slot};
 use super::stable_sheet::StableSheet;
 use super::vec4::MAX_VERTICES;
-use crate::cloth::model::partition::{Partition, cut};
 use crate::cloth::model::bands::bands;
+use crate::cloth::model::partition::{Partition, cut};
 
 impl StableSheet {
     /// Cuts the sheet into `wanted` patches with `rings` rings of ghosts, more where they would be too large. Islands have
@@ -20,7 +20,11 @@ impl StableSheet {
             around[e[1] as usize].push(e[0]);
         }
         // A large patch leaves half of its capacity to ghosts.
-        let needed = if n < MAX_VERTICES { 1 } else { n.div_ceil(MAX_VERTICES / 2) };
+        let needed = if n < MAX_VERTICES {
+            1
+        } else {
+            n.div_ceil(MAX_VERTICES / 2)
+        };
         let count = wanted.max(1).max(needed).min(n.max(1));
         let islands = |set: Vec<u32>| {
             if island > 0 {
@@ -59,7 +63,11 @@ impl StableSheet {
         let mut bend: Vec<([u32; 2], f32)> = pairs.map(|(v, w)| (sorted(v), *w)).collect();
         bend.sort_unstable_by_key(|e| e.0);
         let Numbering {
-            set, owned, islands, within, ..
+            set,
+            owned,
+            islands,
+            within,
+            ..
         } = &numbering;
         let mut bend_count = vec![0u16; set.len()];
         bend.iter().for_each(|e| bend_count[e.0[0] as usize] += 1);
@@ -68,11 +76,20 @@ impl StableSheet {
         let ends: Vec<[u16; 2]> = edges.iter().map(|e| e.0.map(|v| v as u16)).collect();
         let (filter_rows, filter_overflow) = filter_rows(&ends, &weight, &inverse_mass);
         let triangles = self.triangles.iter().filter(|t| inside(&t.v));
-        let triangle = |t: &EdgeTriangle| EdgeTriangle { v: t.v.map(at), ..*t };
+        let triangle = |t: &EdgeTriangle| EdgeTriangle {
+            v: t.v.map(at),
+            ..*t
+        };
         let bent = self.bent.iter().filter(|b| inside(&b.v));
-        let hinge = |b: &CurvedHinge| CurvedHinge { v: b.v.map(at), ..*b };
+        let hinge = |b: &CurvedHinge| CurvedHinge {
+            v: b.v.map(at),
+            ..*b
+        };
         let diagonals = self.diagonals.iter().filter(|d| inside(&d.ends));
-        let diagonal = |d: &Diagonal| Diagonal { ends: d.ends.map(at), ..*d };
+        let diagonal = |d: &Diagonal| Diagonal {
+            ends: d.ends.map(at),
+            ..*d
+        };
         PatchModel {
             quads: quad_blocks(&triangles.map(triangle).collect::<Vec<_>>()),
             bent: hinge_blocks(bent.map(hinge).collect()),
@@ -83,7 +100,10 @@ impl StableSheet {
             ends,
             rest: edges.iter().map(|e| self.rest[e.1]).collect(),
             bend_count,
-            bend: bend.iter().map(|e| (Slot::new(e.0[1] as usize), e.1)).collect(),
+            bend: bend
+                .iter()
+                .map(|e| (Slot::new(e.0[1] as usize), e.1))
+                .collect(),
             inverse_mass,
             ghosts: set[*owned..].iter().map(|v| owner[*v as usize]).collect(),
             border: Vec::new(),

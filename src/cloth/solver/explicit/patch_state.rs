@@ -164,6 +164,9 @@ mod tests {
         state.limit_speed(0.5, &except);
         let speeds: Vec<f32> = state.velocity.iter().map(|v| v.dot(*v).sqrt()).collect();
         assert_eq!(speeds, [0.5, 0.5, 5.0, 5.0, 0.0]);
-        assert!((state.velocity[0].0[0] - 0.3).abs() < 1e-6, "same direction");
+        assert!(
+            (state.velocity[0].0[0] - 0.3).abs() < 1e-6,
+            "same direction"
+        );
     }
 }

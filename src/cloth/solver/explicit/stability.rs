@@ -30,7 +30,8 @@ pub(super) fn element_limits(sheet: &Sheet, springs_only: bool) -> Vec<f64> {
     let limit = |e: &Element| {
         let springs = TriangleSprings::new(sheet, e)?;
         // Each corner lends the element its mass in proportion to the element's area around it.
-        let mass = e.v.map(|v| sheet.mass[v as usize] * e.area / area[v as usize]);
+        let mass =
+            e.v.map(|v| sheet.mass[v as usize] * e.area / area[v as usize]);
         Some(element_limit(&springs, mass, springs_only))
     };
     let all = sheet.elements.iter();

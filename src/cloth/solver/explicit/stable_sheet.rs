@@ -1,7 +1,7 @@
 //! A sheet as coupled edge springs, softened where a step would be unstable.
 
-use super::elements::{CurvedHinge, Diagonal, EdgeTriangle, diagonals};
 use super::edge_stiffness::TriangleSprings;
+use super::elements::{CurvedHinge, Diagonal, EdgeTriangle, diagonals};
 use super::mass_filter::MassFilter;
 use super::stability::{
     FlatSheet, bending_eigenvalue, element_limits, hinge_limits, soften, without_outliers,
@@ -67,9 +67,16 @@ impl StableSheet {
         let filter = MassFilter::of_sheet(sheet, edges.ends(), spec.filter_degree);
         let limits = element_limits(sheet, spec.springs_only);
         let flat = FlatSheet::new(sheet);
-        let keep = soften(limit, &limits, |k| flat.eigenvalue(k, spec.springs_only, &filter));
+        let keep = soften(limit, &limits, |k| {
+            flat.eigenvalue(k, spec.springs_only, &filter)
+        });
         let area: f64 = sheet.elements.iter().map(|e| e.area).sum();
-        let kept: f64 = sheet.elements.iter().zip(&keep).map(|(e, k)| e.area * k).sum();
+        let kept: f64 = sheet
+            .elements
+            .iter()
+            .zip(&keep)
+            .map(|(e, k)| e.area * k)
+            .sum();
         let (bend, bent) = bending(sheet, spec, &edges, &filter.identity());
         let diagonal = |(ends, flat)| Diagonal {
             ends,

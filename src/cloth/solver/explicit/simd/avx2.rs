@@ -30,9 +30,7 @@ impl Avx2 {
 /// Two vectors side by side.
 #[inline(always)]
 unsafe fn pair(x: &[V4; MAX_VERTICES], low: Slot, high: Slot) -> __m256 {
-    unsafe {
-        _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(vector(x, low)), vector(x, high))
-    }
+    unsafe { _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(vector(x, low)), vector(x, high)) }
 }
 
 #[inline(always)]

@@ -57,12 +57,7 @@ pub(in super::super) fn sub3<L: Simd8>(l: L, a: [L::F; 3], b: [L::F; 3]) -> [L::
 
 /// Vectors times numbers plus vectors, each rounded once.
 #[inline(always)]
-pub(in super::super) fn mul_add3<L: Simd8>(
-    l: L,
-    a: [L::F; 3],
-    s: L::F,
-    b: [L::F; 3],
-) -> [L::F; 3] {
+pub(in super::super) fn mul_add3<L: Simd8>(l: L, a: [L::F; 3], s: L::F, b: [L::F; 3]) -> [L::F; 3] {
     [
         l.mul_add(a[0], s, b[0]),
         l.mul_add(a[1], s, b[1]),

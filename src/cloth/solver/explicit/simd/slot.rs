@@ -39,6 +39,11 @@ impl Slot {
     #[allow(unsafe_code)]
     #[inline(always)]
     pub(in super::super) fn set(self, x: &mut [V4; MAX_VERTICES], to: V4) {
-        unsafe { *x.as_mut_ptr().cast::<u8>().add(self.byte_offset()).cast::<V4>() = to }
+        unsafe {
+            *x.as_mut_ptr()
+                .cast::<u8>()
+                .add(self.byte_offset())
+                .cast::<V4>() = to
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! Numbers at their limits: single precision against double, extreme stiffness and shape ratios, degenerate meshes.
 
+use crate::cloth::solver::explicit::StableSheet;
 use crate::cloth::solver::explicit::edge_stiffness::triangle_springs;
 use crate::cloth::solver::explicit::mass_filter::MassFilter;
 use crate::cloth::solver::explicit::stability::element_limits;
@@ -102,8 +103,8 @@ fn single_precision_follows_double_precision() {
             v: spin.clone(),
             bending: Vec::new(),
             h,
-            lookahead: 0.25,
-            filter_degree: smooth,
+            ahead: 0.25,
+            smooth,
         };
         let blocks = (0.05 / (h * every as f64)) as usize;
         for _ in 0..blocks {
@@ -111,7 +112,10 @@ fn single_precision_follows_double_precision() {
             oracle.bend(h * every as f64 * 0.5);
             (0..every).for_each(|_| oracle.step());
         }
-        let (went, apart) = (distance(&oracle.x, &wild), distance(&oracle.x, &lab.positions()));
+        let (went, apart) = (
+            distance(&oracle.x, &wild),
+            distance(&oracle.x, &lab.positions()),
+        );
         assert!(
             went > 0.05 && apart < 5e-6,
             "degree {smooth}: {apart} m apart after {went} m"
@@ -162,8 +166,9 @@ fn slivers_soften_only_themselves() {
 #[test]
 fn sheets_without_area_or_mass_are_refused_by_name() {
     let (x, faces, mut rest) = grid(3, 3, 0.02, 0.02);
-    let whole =
-        |faces: &[crate::mesh::Face], rest: &[_], n| Sheet::new(n, faces, rest, &cotton(1e-5), None).map(|_| ());
+    let whole = |faces: &[crate::mesh::Face], rest: &[_], n| {
+        Sheet::new(n, faces, rest, &cotton(1e-5), None).map(|_| ())
+    };
     assert_eq!(whole(&faces, &rest, x.len()), Ok(()));
     // A vertex of no triangle has no mass.
     let fault = whole(&faces, &rest, x.len() + 1).expect_err("a vertex without a triangle");
@@ -232,4 +237,3 @@ fn slivers_and_anisotropic_sheets_stay_stable() {
         );
     }
 }
-

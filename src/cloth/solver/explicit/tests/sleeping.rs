@@ -53,10 +53,19 @@ fn cloth_beside_sleeping_cloth_moves_as_beside_held_cloth() {
         let half = f.islands[f.islands.len() / 2];
         let [sleeping, held] = [true, false].map(|sleeps| fall(f, &x, h as f32, half, sleeps));
         let n = x.len();
-        let fallen = held.displacement.iter().map(|d| -d.0[1]).fold(0.0, f32::max);
+        let fallen = held
+            .displacement
+            .iter()
+            .map(|d| -d.0[1])
+            .fold(0.0, f32::max);
         assert!(fallen > 1e-3, "{fallen}");
-        assert!(sleeping.displacement[..half].iter().all(|d| *d == V4::default()));
-        let components = (half..n).flat_map(|i| (sleeping.displacement[i] - held.displacement[i]).0);
+        assert!(
+            sleeping.displacement[..half]
+                .iter()
+                .all(|d| *d == V4::default())
+        );
+        let components =
+            (half..n).flat_map(|i| (sleeping.displacement[i] - held.displacement[i]).0);
         let apart = components.fold(0.0, |a: f32, c| a.max(c.abs()));
         assert!(
             apart < 1e-4 * fallen,
