@@ -3,6 +3,7 @@
 pub mod embedded;
 pub mod import;
 pub mod measure;
+pub mod parts;
 mod pose;
 mod rig;
 mod shape;

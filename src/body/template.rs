@@ -1,5 +1,6 @@
 //! The template: mesh, skeleton, weights and shape space that belong together.
 
+use super::parts::BodyParts;
 use super::{ShapeSpace, Skeleton, SkinWeights};
 use crate::mesh::{MeshError, Topology, TriMesh};
 
@@ -41,6 +42,7 @@ pub struct Template {
     name: String,
     mesh: TriMesh,
     topology: Topology,
+    parts: BodyParts,
     skeleton: Skeleton,
     weights: SkinWeights,
     shape_space: Option<ShapeSpace>,
@@ -107,6 +109,7 @@ impl Template {
             name: name.into(),
             mesh,
             topology,
+            parts: BodyParts::new(&skeleton),
             skeleton,
             weights,
             shape_space,
@@ -127,6 +130,10 @@ impl Template {
     /// Kinematic tree.
     pub fn skeleton(&self) -> &Skeleton {
         &self.skeleton
+    }
+    /// Segments and parts of the joints.
+    pub fn parts(&self) -> &BodyParts {
+        &self.parts
     }
     /// Skinning weights.
     pub fn weights(&self) -> &SkinWeights {

@@ -6,7 +6,7 @@
 use super::figure::Figure;
 use super::made_on::MadeOn;
 use crate::body::Template;
-use crate::cloth::realtime::body_parts;
+use crate::body::parts::vertex_masks;
 use crate::garment::Region;
 use crate::math::{P3, P3d, V3, V3d};
 use crate::mesh::vertex_normals;
@@ -49,7 +49,7 @@ impl Carrier {
             bones,
             rest: vec![V3d::zeros(); n],
         };
-        let parts = body_parts(source);
+        let parts = vertex_masks(source);
         let mut normals = Vec::new();
         let faces = template.mesh().faces();
         vertex_normals(

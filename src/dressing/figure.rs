@@ -1,8 +1,8 @@
 //! Cross-sections of a body in the canonical pose, for placing panels around it.
 
 use crate::body::measure::Measurements;
+use crate::body::parts::vertex_masks;
 use crate::body::{BoneTransforms, RestBody, Template, skin};
-use crate::cloth::realtime::body_parts;
 use crate::garment::Region;
 use crate::math::P3;
 use crate::mesh::Face;
@@ -174,7 +174,7 @@ impl Figure {
             &bones,
             &mut vertices,
         );
-        let parts = body_parts(template);
+        let parts = vertex_masks(template);
         let faces = template.mesh().faces();
         let lower_mask = Region::TRUNK.with(Region::LEFT_LEG).with(Region::RIGHT_LEG);
         let trunk = Slices::cut(&vertices, faces, &parts, Region::TRUNK);

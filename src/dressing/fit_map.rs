@@ -6,6 +6,7 @@
 
 use super::Fit;
 use crate::body::Template;
+use crate::body::parts::{BodySegment, BodySide};
 use crate::cloth::realtime::{Model, State};
 use crate::cloth::{ClothError, Sheet};
 use crate::contact::{SurfaceFrame, SurfaceModel};
@@ -99,36 +100,31 @@ pub struct FitProbe {
     frame: SurfaceFrame,
 }
 
-/// Regions from top to bottom, and the joints whose skin they are.
-const REGIONS: [(&str, &[&str]); 15] = [
-    ("head", &["head", "head_end", "jaw"]),
-    ("neck", &["neck"]),
-    ("left shoulder", &["left_collar"]),
-    ("right shoulder", &["right_collar"]),
-    ("chest", &["spine3", "spine2"]),
-    ("left upper arm", &["left_shoulder"]),
-    ("right upper arm", &["right_shoulder"]),
-    (
-        "left forearm",
-        &["left_elbow", "left_wrist", "left_hand", "left_hand_end"],
-    ),
-    (
-        "right forearm",
-        &["right_elbow", "right_wrist", "right_hand", "right_hand_end"],
-    ),
-    ("waist", &["spine1"]),
-    ("hip", &["pelvis"]),
-    ("left thigh", &["left_hip"]),
-    ("right thigh", &["right_hip"]),
-    (
-        "left lower leg",
-        &["left_knee", "left_ankle", "left_foot", "left_foot_end"],
-    ),
-    (
-        "right lower leg",
-        &["right_knee", "right_ankle", "right_foot", "right_foot_end"],
-    ),
-];
+/// Regions from top to bottom, and the segments whose skin they are.
+const REGIONS: [(&str, Option<BodySide>, &[BodySegment]); 15] = {
+    use BodySegment::*;
+    const LEFT: Option<BodySide> = Some(BodySide::Left);
+    const RIGHT: Option<BodySide> = Some(BodySide::Right);
+    [
+        ("head", None, &[Head]),
+        ("neck", None, &[Neck]),
+        ("left shoulder", LEFT, &[Collar]),
+        ("right shoulder", RIGHT, &[Collar]),
+        ("chest", None, &[Chest]),
+        ("left upper arm", LEFT, &[UpperArm]),
+        ("right upper arm", RIGHT, &[UpperArm]),
+        ("left forearm", LEFT, &[Forearm, Hand, Fingers]),
+        ("right forearm", RIGHT, &[Forearm, Hand, Fingers]),
+        ("waist", None, &[Abdomen]),
+        ("hip", None, &[Pelvis]),
+        ("left thigh", LEFT, &[Thigh]),
+        ("right thigh", RIGHT, &[Thigh]),
+        ("left lower leg", LEFT, &[Shin, Foot, Toes]),
+        ("right lower leg", RIGHT, &[Shin, Foot, Toes]),
+    ]
+};
+/// Region of the pelvis, for joints in no other.
+const HIP: usize = 10;
 
 impl FitProbe {
     /// Prepares an outfit.
@@ -136,19 +132,13 @@ impl FitProbe {
     /// # Errors
     /// Faults of the garments.
     pub fn new(template: &Template, model: &Model) -> Result<Self, ClothError> {
-        let of = |joint: &str| REGIONS.iter().position(|(_, names)| names.contains(&joint));
-        let skeleton = template.skeleton();
-        let by_joint: Vec<u8> = (0..skeleton.len())
+        let parts = template.parts();
+        let by_joint: Vec<u8> = (0..template.skeleton().len())
             .map(|j| {
-                // Joints between the named ones belong to the nearest named ancestor.
-                let mut at = Some(j);
-                while let Some(k) = at {
-                    if let Some(r) = of(&skeleton.joints()[k].name) {
-                        return r as u8;
-                    }
-                    at = skeleton.joints()[k].parent;
-                }
-                10 // the hip, where every tree starts
+                let is = |(_, side, segments): &(_, _, &[_])| {
+                    *side == parts.side(j) && segments.contains(&parts.segment(j))
+                };
+                REGIONS.iter().position(is).unwrap_or(HIP) as u8
             })
             .collect();
         let n = template.mesh().vertices().len();
@@ -300,7 +290,7 @@ fn summarise(
         .flat_map(|a| a.vertices.iter().copied())
         .collect();
     let mut out = Vec::new();
-    for (r, (name, _)) in REGIONS.iter().enumerate() {
+    for (r, (name, ..)) in REGIONS.iter().enumerate() {
         let own: Vec<usize> = (0..vertices.len())
             .filter(|i| usize::from(region[near[*i] as usize]) == r)
             .collect();

@@ -3,7 +3,7 @@
 use super::carry::{Bound, Carrier, bind};
 use super::made_on::{MadeOn, WearError};
 use crate::body::Template;
-use crate::cloth::realtime::body_parts;
+use crate::body::parts::vertex_masks;
 use crate::formats::obj::ObjMesh;
 use crate::formats::sewn_obj::SewnObj;
 use crate::garment::import::{
@@ -316,23 +316,17 @@ struct Judge<'a> {
 impl<'a> Judge<'a> {
     fn new(template: &'a Template) -> Self {
         let sk = template.skeleton();
-        let ends: Vec<bool> = sk
-            .joints()
-            .iter()
-            .map(|j| {
-                ["head", "wrist", "hand", "ankle", "foot", "toe", "jaw"]
-                    .iter()
-                    .any(|w| j.name.contains(w))
-            })
-            .collect();
         let body = template.mesh().vertices();
         let at = |n: &str| sk.index(n).map(|j| sk.joints()[j].rest.y as f32);
         let shoulder = at("left_shoulder").or_else(|| at("neck")).unwrap_or(1.4);
         Self {
-            parts: body_parts(template),
+            parts: vertex_masks(template),
             tree: PointTree::new(body),
             end: (0..body.len())
-                .map(|i| ends[template.weights().dominant(i)])
+                .map(|i| {
+                    let joint = template.weights().dominant(i);
+                    template.parts().segment(joint).is_extremity()
+                })
                 .collect(),
             shoulder,
             knee: at("left_knee").unwrap_or(f32::MIN),
@@ -593,14 +587,8 @@ fn one_tube(template: &Template, x: &[P3], bound: &mut Bound) {
     let (Some(left), Some(right)) = (side("left"), side("right")) else {
         return;
     };
-    let arms: Vec<bool> = sk
-        .joints()
-        .iter()
-        .map(|j| {
-            ["shoulder", "elbow", "wrist", "hand"]
-                .iter()
-                .any(|w| j.name.contains(w))
-        })
+    let arms: Vec<bool> = (0..sk.len())
+        .map(|j| template.parts().segment(j).is_arm())
         .collect();
     /// From the hip joints down to where legs alone decide, metres.
     const FADE: f32 = 0.12;

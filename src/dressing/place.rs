@@ -2,6 +2,7 @@
 
 use super::figure::{Figure, Slice};
 use crate::body::Template;
+use crate::body::parts::BodySegment;
 use crate::garment::{GarmentMesh, Pattern, Placement, Region, Side};
 use crate::math::P3;
 
@@ -586,19 +587,14 @@ fn sewn_waist(template: &Template, figure: &Figure, pattern: &Pattern) -> Option
 fn shoulder_line(template: &Template, figure: &Figure, seam: [[f64; 2]; 2]) -> (f32, f32) {
     /// Clearance of the shoulder seam, metres.
     const CLEAR: f32 = 0.008;
-    let head: Vec<bool> = template
-        .skeleton()
-        .joints()
-        .iter()
-        .map(|j| j.name.contains("head") || j.name.contains("jaw"))
-        .collect();
+    let is_head = |v| template.parts().segment(template.weights().dominant(v)) == BodySegment::Head;
     let (x0, x1) = (seam[0][0] as f32, seam[1][0] as f32);
     let mut top = f32::MIN;
     let bins = 12;
     let mut highest = vec![(f32::MIN, 0.0f32); bins];
     for (i, p) in figure.vertices.iter().enumerate() {
         let t = (p.x.abs() - x0) / (x1 - x0);
-        if !(0.0..1.0).contains(&t) || head[template.weights().dominant(i)] {
+        if !(0.0..1.0).contains(&t) || is_head(i) {
             continue;
         }
         let b = &mut highest[(t * bins as f32) as usize];

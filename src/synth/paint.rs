@@ -1,5 +1,6 @@
 //! What a synthetic shopper wears and looks like: colours by place on the rest body.
 
+use crate::body::parts::{BodyParts, BodySegment};
 use crate::body::{RestBody, Skeleton, SkinWeights};
 use crate::math::{P3, V3};
 
@@ -84,18 +85,16 @@ impl Paint {
                 .index(name)
                 .map_or(V3::zeros(), |j| rest.joints[j].coords.cast::<f32>())
         };
+        let parts = BodyParts::new(skeleton);
         let region = |i: usize| {
-            let name = skeleton.joints()[weights.dominant(i)].name.as_str();
-            match name
-                .trim_start_matches("left_")
-                .trim_start_matches("right_")
-            {
-                "neck" | "head" | "head_end" | "jaw" => Region::Head,
-                "shoulder" => Region::UpperArm,
-                "elbow" | "wrist" | "hand" | "hand_end" => Region::LowerArm,
-                "hip" | "knee" => Region::Leg,
-                "ankle" | "foot" | "foot_end" => Region::Foot,
-                _ => Region::Trunk,
+            use BodySegment::*;
+            match parts.segment(weights.dominant(i)) {
+                Neck | Head => Region::Head,
+                UpperArm => Region::UpperArm,
+                Forearm | Hand | Fingers => Region::LowerArm,
+                Thigh | Shin => Region::Leg,
+                Foot | Toes => Region::Foot,
+                Pelvis | Abdomen | Chest | Collar => Region::Trunk,
             }
         };
         let regions: Vec<Region> = (0..rest.vertices.len()).map(region).collect();

@@ -3,26 +3,13 @@
 
 use super::align::limit;
 use super::model::TrackerModel;
-use crate::body::{BoneTransforms, JointMotion, Pose, RestBody, Template};
+use crate::body::parts::BodyPart;
+use crate::body::{BoneTransforms, JointMotion, Pose, RestBody};
 use crate::math::{Rigid, exp_so3, log_so3};
 use nalgebra::Vector3;
 
 /// Parts of the body that move by themselves: trunk with head, arms, legs.
-pub(super) const PARTS: usize = 5;
-
-/// The part of each joint; a limb begins at its ball, so that the shoulder's own angles are the arm's.
-pub(super) fn parts(template: &Template) -> Vec<usize> {
-    let skeleton = template.skeleton();
-    let limbs =
-        ["left_shoulder", "right_shoulder", "left_hip", "right_hip"].map(|n| skeleton.index(n));
-    let part = |j: usize| {
-        let of = limbs
-            .iter()
-            .position(|l| l.is_some_and(|l| l == j || skeleton.is_ancestor(l, j)));
-        of.map_or(0, |k| k + 1)
-    };
-    (0..skeleton.len()).map(part).collect()
-}
+pub(super) const PARTS: usize = BodyPart::ALL.len();
 
 /// Share of the newest way in its running mean, four frames' worth: noise averages out of it, motion does not.
 const MEMORY: f64 = 0.25;

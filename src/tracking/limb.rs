@@ -1,6 +1,7 @@
 //! Arms and legs as chains of a ball, a hinge and an end, put where a hand or a foot was seen (law of cosines).
 
 use super::model::TrackerModel;
+use crate::body::parts::{BodyPart, LimbJoints};
 use crate::body::{BoneTransforms, JointMotion, Pose, RestBody, Template};
 use crate::math::{P3d, exp_so3, log_so3};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -31,45 +32,25 @@ const FOOT: f64 = 0.5;
 
 /// The arms of a template, left and right; `None` for one without.
 pub(super) fn arms(template: &Template) -> [Option<Limb>; 2] {
-    ["left", "right"].map(|side| {
-        limb(
-            template,
-            side,
-            ["shoulder", "elbow", "wrist"],
-            ["hand_end", "hand"],
-            HAND,
-        )
-    })
+    [BodyPart::LeftArm, BodyPart::RightArm].map(|arm| limb(template, arm, HAND))
 }
 
 /// The legs of a template, left and right; `None` for one without.
 pub(super) fn legs(template: &Template) -> [Option<Limb>; 2] {
-    ["left", "right"].map(|side| {
-        limb(
-            template,
-            side,
-            ["hip", "knee", "ankle"],
-            ["foot", "foot_end"],
-            FOOT,
-        )
-    })
+    [BodyPart::LeftLeg, BodyPart::RightLeg].map(|leg| limb(template, leg, FOOT))
 }
 
-fn limb(
-    template: &Template,
-    side: &str,
-    joints: [&str; 3],
-    tips: [&str; 2],
-    middle: f64,
-) -> Option<Limb> {
+fn limb(template: &Template, part: BodyPart, middle: f64) -> Option<Limb> {
     let skeleton = template.skeleton();
-    let at = |part: &str| skeleton.index(&format!("{side}_{part}"));
-    let [root, hinge, end] = joints.map(at);
-    let (root, hinge, end) = (root?, hinge?, end?);
+    let LimbJoints {
+        root,
+        hinge,
+        end,
+        tip,
+    } = template.parts().limb(part)?;
     let hinged = matches!(skeleton.joints()[hinge].motion, JointMotion::Hinge { .. });
     let ball = matches!(skeleton.joints()[root].motion, JointMotion::Ball { .. });
     let (s, bend) = (skeleton.dof_offset(root), skeleton.dof_offset(hinge));
-    let tip = tips.into_iter().find_map(at).unwrap_or(end);
     (hinged && ball).then(|| Limb {
         root,
         hinge,

@@ -1,9 +1,9 @@
 //! What never changes while tracking: the template, the camera and points chosen on the template.
 
 use super::TrackerConfig;
-use super::calm;
 use super::limb::{self, Limb};
 use super::stand::{self, Leg};
+use crate::body::parts::{BodySegment, BodySide};
 use crate::body::{JointMotion, SkinWeights, Template};
 use crate::camera::Calibration;
 use crate::math::{P3, V3};
@@ -50,7 +50,7 @@ pub struct TrackerModel {
     pub(super) arms: [Option<Limb>; 2],
     /// Legs, left and right, for feet found at the start.
     pub(super) legs: [Option<Limb>; 2],
-    /// Part of the body that each joint belongs to, see [`calm::parts`].
+    /// [`BodyPart`](crate::body::parts::BodyPart) of each joint, as a number.
     pub(super) parts: Vec<usize>,
     /// Angles of knees, ankles and feet.
     pub(super) below_knee: Vec<bool>,
@@ -97,20 +97,15 @@ impl TrackerModel {
         let first = directions.len();
         directions.extend(bone_directions(&template, &samples, &weights));
         let tied = tied_bones(&template, &directions, first);
-        let stiffness = stiffness(&template);
+        let stiffness = per_angle(&template, stiffness);
         let standing = stand::legs(&template);
         let arms = limb::arms(&template);
         let legs = limb::legs(&template);
-        let parts = calm::parts(&template);
-        let below_knee = |name: &str| ["knee", "ankle", "foot"].iter().any(|s| name.contains(s));
-        let below_knee = skeleton
-            .joints()
-            .iter()
-            .flat_map(|j| std::iter::repeat_n(below_knee(&j.name), j.motion.dofs()))
+        let parts = (0..skeleton.len())
+            .map(|j| template.parts().part(j) as usize)
             .collect();
-        let share =
-            |j: &crate::body::Joint| std::iter::repeat_n(seen_share(&j.name), j.motion.dofs());
-        let seen_shares = skeleton.joints().iter().flat_map(share).collect();
+        let below_knee = per_angle(&template, |s| s.is_leg() && s != BodySegment::Thigh);
+        let seen_shares = per_angle(&template, seen_share);
         Self {
             template,
             calibration,
@@ -232,16 +227,13 @@ fn tied_bones(
     directions: &[Direction],
     first: usize,
 ) -> Vec<(usize, usize, f64)> {
-    let joints = template.skeleton().joints();
+    let (joints, parts) = (template.skeleton().joints(), template.parts());
     let of = |j: usize| directions.iter().position(|d| d.bone == Some(j));
     let mut out = Vec::new();
     for (i, d) in directions.iter().enumerate().skip(first) {
         let Some(j) = d.bone else { continue };
-        if let Some(part) = joints[j].name.strip_prefix("left_") {
-            let twin = template
-                .skeleton()
-                .index(&format!("right_{part}"))
-                .and_then(of);
+        if parts.side(j) == Some(BodySide::Left) {
+            let twin = parts.twin(j).and_then(of);
             out.extend(twin.map(|k| (i, k, 1.0)));
         }
         out.extend(joints[j].parent.and_then(of).map(|k| (i, k, 0.5)));
@@ -249,38 +241,38 @@ fn tied_bones(
     out
 }
 
-/// Share of the pull to the rest pose that is left for a joint in full view: it shortens every motion. Hips and legs keep
-/// it all, because of a body cut off below them a little is seen, and that little drags them; neck and head keep it
-/// because of hair.
-fn seen_share(name: &str) -> f64 {
-    let any = |parts: &[&str]| parts.iter().any(|p| name.contains(p));
-    if any(&["spine", "collar"]) {
-        0.5
-    } else if any(&["shoulder", "elbow", "wrist"]) {
-        0.25
-    } else {
-        1.0
+/// A value of each angle, given by the segment that its joint moves.
+fn per_angle<T: Copy>(template: &Template, value: impl Fn(BodySegment) -> T) -> Vec<T> {
+    let joints = template.skeleton().joints().iter().enumerate();
+    joints
+        .flat_map(|(j, joint)| {
+            std::iter::repeat_n(value(template.parts().segment(j)), joint.motion.dofs())
+        })
+        .collect()
+}
+
+/// Share of the rest-pose prior that is left for a joint in full view: the prior shortens every motion.
+///
+/// Hips and legs keep all of it: the little that is seen of a cut-off leg drags them. Neck and head keep it because of
+/// hair.
+fn seen_share(segment: BodySegment) -> f64 {
+    use BodySegment::*;
+    match segment {
+        Abdomen | Chest | Collar => 0.5,
+        UpperArm | Forearm | Hand => 0.25,
+        _ => 1.0,
     }
 }
 
-/// Weights of the rest-pose prior, per point and squared radian. A limb of fifty points with a lever of 15 cm has
-/// 7·10⁻⁴, so this yields where there is data; joints that share a motion (the spine) share it evenly.
-fn stiffness(template: &Template) -> Vec<f64> {
-    let mut out = Vec::new();
-    for joint in template.skeleton().joints() {
-        let name = joint.name.as_str();
-        let stiff = ["spine", "neck", "collar", "wrist", "foot", "hand"]
-            .iter()
-            .any(|s| name.contains(s));
-        let ankle = name.contains("ankle");
-        let weight = if stiff || name.contains("head") {
-            2e-5
-        } else if ankle {
-            1e-5
-        } else {
-            2e-6
-        };
-        out.extend(std::iter::repeat_n(weight, joint.motion.dofs()));
+/// Weight of the rest-pose prior, per point and squared radian.
+///
+/// A limb of fifty points with a lever of 15 cm has 7·10⁻⁴, so this yields where there is data. Joints that share a
+/// motion (the spine) share it evenly.
+fn stiffness(segment: BodySegment) -> f64 {
+    use BodySegment::*;
+    match segment {
+        Abdomen | Chest | Neck | Head | Collar | Hand | Toes => 2e-5,
+        Foot => 1e-5,
+        _ => 2e-6,
     }
-    out
 }

@@ -1,7 +1,8 @@
 //! A T-shirt and a skirt on a body that dances fast and touches itself.
 
 use crate::common::shared;
-use tryon::cloth::realtime::{Config, body_parts};
+use tryon::body::parts::vertex_masks;
+use tryon::cloth::realtime::Config;
 use tryon::evaluate::dance::{Outfit, load};
 
 #[test]
@@ -13,7 +14,7 @@ fn an_outfit_survives_a_dance_outside_the_body_and_unstretched() {
     // The skeleton that was found for the bare mesh lies in it.
     assert!(dance.fit < 0.012, "{}", dance.fit);
     // Pegs in its wrists and ankles, four pieces of five vertices, are no skin: cloth in front of their tips is inside a limb.
-    let parts = body_parts(&dance.template);
+    let parts = vertex_masks(&dance.template);
     assert_eq!(parts.iter().filter(|p| **p == 0).count(), 20);
     let garments = ["tshirt", "skirt"].map(str::to_owned).to_vec();
     let outfit = Outfit {

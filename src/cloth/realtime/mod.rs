@@ -15,7 +15,7 @@ mod still;
 mod touch;
 mod untangle;
 
-pub use model::{AnchorBinding, Config, Model, Outfit, body_parts};
+pub use model::{AnchorBinding, Config, Model, Outfit};
 pub use roomy::RoomyBody;
 pub use state::{GarmentState, Input, State, StepReport, Workspace};
 pub use step::step;

@@ -1,6 +1,7 @@
 //! What stays the same while an outfit is worn.
 
 use super::regions::{REGION, Regions, clusters};
+use crate::body::parts::{BodyPart, hinge_vertices, opposing_masks, pressing_masks, vertex_masks};
 use crate::body::{SkinWeights, Template};
 use crate::cloth::folds::FoldModel;
 use crate::cloth::model::partition::Partition;
@@ -9,7 +10,7 @@ use crate::cloth::solver::explicit::{PatchModel, StableSheet, StepSpec};
 use crate::cloth::{ClothError, Sheet};
 use crate::contact::{Crease, MapDetail, MapView, SurfaceModel};
 use crate::garment::{GarmentMesh, Region};
-use crate::math::{Camera, P3, Rigid, V3, World};
+use crate::math::{Camera, Rigid, World};
 use crate::mesh::Topology;
 use serde::{Deserialize, Serialize};
 
@@ -202,120 +203,28 @@ pub(super) const RECALLED: usize = 2;
 /// cloth trembled on and never slept.
 const LONG_ENOUGH: f64 = 1.0 / 3600.0;
 
-/// A connected component of a body's surface with at most this share of all vertices is no skin: a mannequin's pegs have
-/// 0.04 % each, its hands 3.8 %.
-const SMALLEST_COMPONENT: f64 = 1e-3;
-
-/// Which [`Region`] each body vertex belongs to, by the name of its dominant joint; 0 where it belongs to a
-/// connected component too small to be skin. A mannequin's pegs in its wrists and ankles end just under the skin: cloth in
-/// front of such a point is inside the limb, and was taken to be outside.
-pub fn body_parts(template: &Template) -> Vec<u8> {
-    let of = |name: &str| {
-        let left = name.starts_with("left");
-        let has = |words: &[&str]| words.iter().any(|w| name.contains(w));
-        if has(&[
-            "shoulder", "elbow", "wrist", "hand", "finger", "thumb", "arm",
-        ]) {
-            if left {
-                Region::LEFT_ARM
-            } else {
-                Region::RIGHT_ARM
-            }
-        } else if has(&["hip", "knee", "ankle", "foot", "toe", "leg"]) {
-            if left {
-                Region::LEFT_LEG
-            } else {
-                Region::RIGHT_LEG
-            }
-        } else {
-            Region::TRUNK
-        }
-    };
-    let by_joint: Vec<u8> = template
-        .skeleton()
-        .joints()
-        .iter()
-        .map(|j| of(&j.name).0)
-        .collect();
-    let (component, count) = template.topology().components();
-    let mut sizes = vec![0usize; count];
-    component.iter().for_each(|c| sizes[*c as usize] += 1);
-    let small = |i: usize| {
-        sizes[component[i] as usize] as f64 <= SMALLEST_COMPONENT * component.len() as f64
-    };
-    let part = |i| {
-        if small(i) {
-            0
-        } else {
-            by_joint[template.weights().dominant(i)]
-        }
-    };
-    (0..template.mesh().vertices().len()).map(part).collect()
-}
-
-/// The part that each body vertex may come to lie in: an arm in the trunk, the trunk in its nearer arm, a leg in the
-/// other leg.
-pub(super) fn opposites(template: &Template, parts: &[u8]) -> Vec<u8> {
-    let vertices = template.mesh().vertices();
-    let mean = |part: Region| {
-        let of: Vec<_> = vertices
-            .iter()
-            .zip(parts)
-            .filter(|(_, p)| **p == part.0)
-            .map(|(v, _)| v.coords)
-            .collect();
-        of.iter().sum::<V3>() / of.len().max(1) as f32
-    };
-    let (left, right) = (mean(Region::LEFT_ARM), mean(Region::RIGHT_ARM));
-    let of = |(v, part): (&P3, &u8)| match Region(*part) {
-        Region(0) => 0,
-        Region::LEFT_ARM | Region::RIGHT_ARM => Region::TRUNK.0,
-        Region::LEFT_LEG => Region::RIGHT_LEG.0,
-        Region::RIGHT_LEG => Region::LEFT_LEG.0,
-        _ if (v.coords - left).norm() < (v.coords - right).norm() => Region::LEFT_ARM.0,
-        _ => Region::RIGHT_ARM.0,
-    };
-    vertices.iter().zip(parts).map(of).collect()
-}
-
-/// Elbows and knees, where both limbs are one part.
-pub(super) fn creases(template: &Template, surface: &SurfaceModel) -> Vec<Crease> {
-    let joints = template.skeleton().joints();
-    let moved_by = |j: usize| {
-        (0..surface.vertices())
-            .filter(|v| template.weights().dominant(*v) == j)
-            .map(|v| v as u32)
-            .collect()
-    };
-    let of = |(j, joint): (usize, &crate::body::Joint)| {
-        let bends = ["elbow", "knee"].iter().any(|n| joint.name.contains(n));
-        bends
-            .then(|| Crease::new(surface, moved_by(joint.parent?), moved_by(j)))
-            .flatten()
-    };
-    joints.iter().enumerate().filter_map(of).collect()
-}
-
-/// Of these [`opposites`] those of thick parts: hands and forearms have cloth on one side only, and a hand in a hip does
-/// not know any more which one that is.
-pub(super) fn pressing(template: &Template, opposite: Vec<u8>) -> Vec<u8> {
-    const THIN: [&str; 9] = [
-        "elbow", "wrist", "hand", "finger", "thumb", "knee", "ankle", "foot", "toe",
+/// A garment's regions are masks of body parts.
+const _: () = {
+    let masks = [
+        Region::TRUNK,
+        Region::LEFT_ARM,
+        Region::RIGHT_ARM,
+        Region::LEFT_LEG,
+        Region::RIGHT_LEG,
     ];
-    let thin: Vec<bool> = template
-        .skeleton()
-        .joints()
-        .iter()
-        .map(|j| THIN.iter().any(|t| j.name.contains(t)))
-        .collect();
-    let of = |(v, part): (usize, u8)| {
-        if thin[template.weights().dominant(v)] {
-            0
-        } else {
-            part
-        }
-    };
-    opposite.into_iter().enumerate().map(of).collect()
+    let mut k = 0;
+    while k < masks.len() {
+        assert!(masks[k].0 == BodyPart::ALL[k].mask());
+        k += 1;
+    }
+};
+
+/// Folds of the body's elbows and knees.
+pub(super) fn creases(template: &Template, surface: &SurfaceModel) -> Vec<Crease> {
+    hinge_vertices(template)
+        .into_iter()
+        .filter_map(|[upper, lower]| Crease::new(surface, upper, lower))
+        .collect()
 }
 
 impl Model {
@@ -412,15 +321,15 @@ impl Model {
                 anchors: Vec::new(),
             });
         }
-        let parts = body_parts(template);
-        let opposite = opposites(template, &parts);
+        let parts = vertex_masks(template);
+        let opposite = opposing_masks(template, &parts);
         let surface = SurfaceModel::new(
             template.mesh().faces().to_vec(),
             Topology::new(template.mesh())?,
             parts.clone(),
         );
         let mut model = Self {
-            pressing: pressing(template, opposite.clone()),
+            pressing: pressing_masks(template, opposite.clone()),
             opposite,
             creases: creases(template, &surface),
             clusters: clusters(&surface),

@@ -1,8 +1,9 @@
 //! The body as cloth meets it, for who draws a dressed body.
 
 use super::Config;
-use super::model::{body_parts, creases, opposites, pressing};
+use super::model::creases;
 use crate::body::Template;
+use crate::body::parts::{opposing_masks, pressing_masks, vertex_masks};
 use crate::cloth::ClothError;
 use crate::contact::{Apart, Crease, Part, SurfaceFrame, SurfaceModel};
 use crate::math::P3;
@@ -34,8 +35,8 @@ impl RoomyBody {
     /// # Errors
     /// Faults of the template's mesh.
     pub fn new(template: &Template, config: &Config) -> Result<Self, ClothError> {
-        let parts = body_parts(template);
-        let pressing = pressing(template, opposites(template, &parts));
+        let parts = vertex_masks(template);
+        let pressing = pressing_masks(template, opposing_masks(template, &parts));
         let surface = SurfaceModel::new(
             template.mesh().faces().to_vec(),
             Topology::new(template.mesh())?,
