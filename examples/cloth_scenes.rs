@@ -1,9 +1,9 @@
 //! Standard cloth scenes by every solver: time a frame, error against the reference, strain, penetration.
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 use std::path::Path;
-use tryon::cloth::crossings;
 use tryon::cloth::scene::{Method, RunConfig, load, run};
 use tryon::formats::npy::read_npy;
+use tryon::spatial::intersections;
 
 fn main() {
     let args: Vec<String> = std::env::args().collect();
@@ -129,7 +129,7 @@ fn main() {
             .iter()
             .skip(5)
             .step_by(5)
-            .map(|p| crossings(&s.faces, p).len())
+            .map(|p| intersections(&s.faces, p).len())
             .max()
             .unwrap_or(0)
     );

@@ -41,7 +41,7 @@ const MODULES: &[(u8, &str, &str)] = &[
     (
         2,
         "spatial",
-        "Neighbours fast: BVH, grids, kd-tree (the only file naming kiddo), each beside its brute-force oracle.",
+        "Neighbours fast: refit BVH (closest, overlap, ray parity), hash grid, kd-tree (the only file naming kiddo), organised image, each beside its brute-force oracle.",
     ),
     (
         2,

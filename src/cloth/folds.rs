@@ -4,10 +4,11 @@
 //! move on as they do on average; nothing needs a common solution.
 
 use crate::cloth::solver::explicit::{ContactPlane, V4};
-use crate::contact::{Closest, PointGrid, SurfaceFrame, SurfaceModel};
+use crate::contact::{Closest, SurfaceFrame, SurfaceModel};
 use crate::math::{P3, V3};
 use crate::mesh::Csr;
 use crate::par::Par;
+use crate::spatial::HashGrid;
 use wide::f32x4;
 
 /// Folds close at up to this speed, m/s.
@@ -52,7 +53,7 @@ pub(crate) struct FoldFrame {
     calm: Vec<f32x4>,
     /// Scratch.
     calmer: Vec<f32x4>,
-    grid: PointGrid,
+    grid: HashGrid,
 }
 
 impl FoldFrame {

@@ -1,6 +1,5 @@
 //! One step of garment motion against a moving body: the real-time and the offline solvers.
 
-mod crossings;
 mod error;
 pub(crate) mod folds;
 pub mod model;
@@ -10,6 +9,5 @@ pub(crate) mod sleeves;
 pub mod solver;
 pub(crate) mod untangle;
 
-pub use crossings::{Crossing, crossings};
 pub use error::ClothError;
 pub use model::{Element, Hinge, Sheet};

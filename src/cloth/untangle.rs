@@ -5,10 +5,10 @@
 //! minimisation (Volino & Magnenat-Thalmann 2006, "Resolving surface collisions through intersection contour
 //! minimization").
 
-use super::crossings::{Finder, NONE};
 use crate::math::V3d;
 use crate::mesh::Face;
 use crate::par::Par;
+use crate::spatial::SelfIntersections;
 
 /// An edge flatter in a triangle than this (sine of the angle between them) is taken to be as steep: where it comes out
 /// says too much.
@@ -41,7 +41,7 @@ pub(crate) struct Round {
 /// first, and everywhere where nothing is found there.
 #[derive(Clone, Debug)]
 pub(crate) struct Untangler {
-    pub(crate) finder: Finder,
+    pub(crate) finder: SelfIntersections,
     /// How far the last round moved each vertex, metres, and the weight of what it is the mean of: 0 where nothing crossed.
     pub(crate) pushes: Vec<(V3d, f64)>,
     /// Which part each vertex is in, by way of others of it.
@@ -58,15 +58,15 @@ pub(crate) struct Untangler {
 /// A piece of the sheet, and the numbers that its edges and triangles have there.
 #[derive(Clone, Debug)]
 struct Hot {
-    finder: Finder,
+    finder: SelfIntersections,
     edges: Vec<u32>,
     faces: Vec<u32>,
 }
 
 impl Hot {
     /// The triangles of `whole` with a corner that is `near`, at `x`.
-    fn new(whole: &Finder, near: &[bool], x: &[V3d]) -> Self {
-        let (finder, [edges, faces]) = whole.piece(|f| f.iter().any(|v| near[*v as usize]), x);
+    fn new(whole: &SelfIntersections, near: &[bool], x: &[V3d]) -> Self {
+        let (finder, [edges, faces]) = whole.subset(|f| f.iter().any(|v| near[*v as usize]), x);
         Self {
             finder,
             edges,
@@ -96,7 +96,7 @@ impl Untangler {
     /// For a sheet that is at `x`.
     pub(crate) fn new(faces: &[Face], x: &[V3d]) -> Self {
         let mut new = Self {
-            finder: Finder::new(faces, x),
+            finder: SelfIntersections::new(faces, x),
             pushes: Vec::new(),
             part: Vec::new(),
             size: Vec::new(),
@@ -126,8 +126,8 @@ impl Untangler {
         }
         let astray = self.part(x.len(), &found);
         for (e, f) in &found {
-            let ends = self.finder.edges[*e as usize].map(|v| self.wrong[v as usize]);
-            let corners = self.finder.faces[*f as usize].map(|v| self.wrong[v as usize]);
+            let ends = self.finder.edges()[*e as usize].map(|v| self.wrong[v as usize]);
+            let corners = self.finder.faces()[*f as usize].map(|v| self.wrong[v as usize]);
             let Some(mut m) = self.meeting(x, *e as usize, *f as usize) else {
                 continue;
             };
@@ -179,7 +179,7 @@ impl Untangler {
         for _ in 0..rings {
             let ring: Vec<[u32; 2]> = self
                 .finder
-                .edges
+                .edges()
                 .iter()
                 .filter(|e| e.iter().any(|v| near[*v as usize]))
                 .copied()
@@ -188,7 +188,7 @@ impl Untangler {
         }
         for _ in 0..IRONED {
             let mut sum = vec![(V3d::zeros(), 0.0); n];
-            for e in &self.finder.edges {
+            for e in self.finder.edges() {
                 for [a, b] in [[e[0], e[1]], [e[1], e[0]]].map(|e| e.map(|v| v as usize)) {
                     if near[a] {
                         sum[a].0 += x[b];
@@ -213,16 +213,21 @@ impl Untangler {
         if !found.is_empty() {
             let mut near = vec![false; x.len()];
             for (e, f) in &found {
-                let corners = self.finder.faces[*f as usize];
-                self.finder.edges[*e as usize]
+                let corners = self.finder.faces()[*f as usize];
+                self.finder.edges()[*e as usize]
                     .iter()
                     .chain(&corners)
                     .for_each(|v| near[*v as usize] = true);
             }
             for _ in 0..AROUND {
                 let touches = |e: &&[u32; 2]| e.iter().any(|v| near[*v as usize]);
-                let ring: Vec<[u32; 2]> =
-                    self.finder.edges.iter().filter(touches).copied().collect();
+                let ring: Vec<[u32; 2]> = self
+                    .finder
+                    .edges()
+                    .iter()
+                    .filter(touches)
+                    .copied()
+                    .collect();
                 ring.iter().flatten().for_each(|v| near[*v as usize] = true);
             }
             self.hot = Some(Hot::new(&self.finder, &near, x));
@@ -232,7 +237,7 @@ impl Untangler {
     /// Vertices on the wrong side that no crossing edge tells where to go follow those beside them.
     fn follow(&mut self) {
         let mut told: Vec<(u32, V3d)> = Vec::new();
-        for e in &self.finder.edges {
+        for e in self.finder.edges() {
             for [a, b] in [[e[0], e[1]], [e[1], e[0]]] {
                 if self.wrong[a as usize]
                     && self.pushes[a as usize].1 == 0.0
@@ -261,11 +266,11 @@ impl Untangler {
         self.part.extend(0..n as u32);
         self.size.clear();
         self.size.resize(n, 1);
-        for k in 0..self.finder.edges.len() {
+        for k in 0..self.finder.edges().len() {
             if cut && self.odd[k] {
                 continue;
             }
-            let [a, b] = self.finder.edges[k].map(|v| self.root(v));
+            let [a, b] = self.finder.edges()[k].map(|v| self.root(v));
             if a != b {
                 let (small, large) = if self.size[a as usize] < self.size[b as usize] {
                     (a, b)
@@ -286,7 +291,7 @@ impl Untangler {
     /// Which vertices are on the wrong side: cut off by edges that pass through the sheet an odd number of times.
     fn part(&mut self, n: usize, found: &[(u32, u32)]) -> usize {
         self.odd.clear();
-        self.odd.resize(self.finder.edges.len(), false);
+        self.odd.resize(self.finder.edges().len(), false);
         found
             .iter()
             .for_each(|(e, _)| self.odd[*e as usize] ^= true);
@@ -313,8 +318,8 @@ impl Untangler {
     }
     /// `None` where a triangle has no area. The way makes the line shorter and is not of any length yet.
     fn meeting(&self, x: &[V3d], e: usize, f: usize) -> Option<Meeting> {
-        let ends = self.finder.edges[e].map(|v| v as usize);
-        let corners = self.finder.faces[f].map(|v| v as usize);
+        let ends = self.finder.edges()[e].map(|v| v as usize);
+        let corners = self.finder.faces()[f].map(|v| v as usize);
         let [p, q] = ends.map(|v| x[v]);
         let [a, b, c] = corners.map(|v| x[v]);
         let full = (b - a).cross(&(c - a));
@@ -327,8 +332,8 @@ impl Untangler {
         let steep = along.dot(&normal);
         let steep = steep.signum() * steep.abs().max(FLATTEST);
         let mut way = V3d::zeros();
-        for n in self.finder.beside[e].into_iter().filter(|n| *n != NONE) {
-            let face = self.finder.faces[n as usize].map(|v| v as usize);
+        for n in self.finder.faces_beside(e) {
+            let face = self.finder.faces()[n as usize].map(|v| v as usize);
             let Some(tip) = face.into_iter().find(|v| !ends.contains(v)) else {
                 continue;
             };
@@ -417,14 +422,14 @@ mod tests {
         let mut seen = Vec::new();
         let rest: Vec<f64> = u
             .finder
-            .edges
+            .edges()
             .iter()
             .map(|e| (x[e[0] as usize] - x[e[1] as usize]).norm())
             .collect();
         for _ in 0..most {
             let r = u.round(Par::Seq, &mut x, |_| 1.0, step, 0.001);
             for _ in 0..4 {
-                for (e, l) in u.finder.edges.iter().zip(&rest) {
+                for (e, l) in u.finder.edges().iter().zip(&rest) {
                     let [a, b] = e.map(|v| v as usize);
                     let d = x[a] - x[b];
                     let push = d * (0.5 * (d.norm() - l) / d.norm());
@@ -499,37 +504,6 @@ mod tests {
         let (seen, _) = rounds(strip, 0.002, 60);
         assert!(seen[0] > 4, "{seen:?}");
         assert_eq!(seen.last(), Some(&0), "{seen:?}");
-    }
-
-    #[test]
-    fn a_piece_of_a_sheet_finds_what_a_look_at_all_of_it_finds_there() {
-        // A crumpled sheet.
-        let mut seed = 5u32;
-        let mut random = || {
-            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f64::from(seed >> 8) / f64::from(1u32 << 24)
-        };
-        let (mut x, faces) = grid(20, 20, 0, |u, v| [(u % 7.0) * CELL, 0.0, (v % 5.0) * CELL]);
-        x.iter_mut()
-            .for_each(|p| *p += V3d::new(random(), random(), random()) * CELL);
-        let mut whole = Finder::new(&faces, &x);
-        let all = whole.find(Par::Seq, &x);
-        assert!(all.len() > 100, "{}", all.len());
-        for share in [0.0, 0.3, 1.0] {
-            let near: Vec<bool> = (0..x.len()).map(|_| random() < share).collect();
-            let hot = |corners: &[u32]| corners.iter().any(|v| near[*v as usize]);
-            let beside = |e: u32| whole.beside[e as usize].into_iter().filter(|f| *f != NONE);
-            let inside = |(e, f): &&(u32, u32)| {
-                hot(&faces[*f as usize]) && beside(*e).any(|f| hot(&faces[f as usize]))
-            };
-            let wanted: Vec<(u32, u32)> = all.iter().filter(inside).copied().collect();
-            assert_eq!(
-                Hot::new(&whole, &near, &x).find(Par::Seq, &x),
-                wanted,
-                "{share}"
-            );
-            assert_eq!(wanted.len() == all.len(), share == 1.0);
-        }
     }
 
     #[test]

@@ -32,6 +32,7 @@ const RING: f64 = 0.08;
 const FACE: [f32; 2] = [0.2, 0.6];
 /// Front part of the head that is the face, as a share of its depth.
 const FACE_FRONT: f32 = 0.75;
+
 impl Limbs {
     /// The limbs of a template whose joints have SMPL's names; empty for others, which disables the detection of hands.
     pub fn of(template: &Template) -> Self {
@@ -118,118 +119,6 @@ fn moved_by(template: &Template, is_wanted: impl Fn(BodySegment) -> bool) -> Vec
     let segment = |v: u32| template.parts().segment(template.weights().dominant(v as usize));
     (0..template.mesh().vertices().len() as u32)
         .filter(|v| is_wanted(segment(*v)))
-        .collect()
-}
-
-/// Front of the face, without brow and chin.
-    pub(super) face: Vec<u32>,
-    /// Trunk, hips and thighs.
-    pub(super) trunk: Vec<u32>,
-    /// Upper arm, forearm or hand, shape `[vertices]`.
-    pub(super) is_arm: Vec<bool>,
-}
-
-/// Vertices of one arm.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Arm {
-    pub(super) forearm: Vec<u32>,
-    pub(super) hand: Vec<u32>,
-    /// Rings centred at the elbow, the wrist and the finger tips.
-    pub(super) rings: [Vec<u32>; 3],
-}
-
-/// Half the length of the rings at elbow, wrist and tips, as a share of the forearm.
-const RING: f64 = 0.08;
-/// Height range of the face, as shares of the head's extent upwards from the chin.
-const FACE: [f32; 2] = [0.2, 0.6];
-/// Front part of the head that is the face, as a share of its depth.
-const FACE_FRONT: f32 = 0.75;
-impl Limbs {
-    /// The limbs of a template whose joints have SMPL's names; empty for others, which disables the detection of hands.
-    pub fn of(template: &Template) -> Self {
-        let (parts, weights) = (template.parts(), template.weights());
-        let vertices = template.mesh().vertices().len();
-        let mut out = Self {
-            is_arm: vec![false; vertices],
-            ..Self::default()
-        };
-        let sides = [BodyPart::LeftArm, BodyPart::RightArm];
-        for (side, arm) in sides.into_iter().zip(&mut out.arms) {
-            let Some(joints) = parts.limb(side) else {
-                return Self::default();
-            };
-            for (v, is_arm) in out.is_arm.iter_mut().enumerate() {
-                *is_arm |= parts.part(weights.dominant(v)) == side;
-            }
-            *arm = Arm::of(template, side, &joints);
-        }
-        use BodySegment::{Abdomen, Chest, Head, Pelvis, Thigh};
-        out.face = front_of_face(template, &moved_by(template, |s| s == Head));
-        out.trunk = moved_by(template, |s| [Pelvis, Abdomen, Chest, Thigh].contains(&s));
-        out
-    }
-
-    /// Belongs to an arm.
-    pub(super) fn is_arm(&self, vertex: u32) -> bool {
-        self.is_arm.get(vertex as usize) == Some(&true)
-    }
-
-    /// Made for a body of so many vertices.
-    pub(super) fn fits(&self, vertices: usize) -> bool {
-        vertices > 0 && self.is_arm.len() == vertices
-    }
-}
-
-impl Arm {
-    /// Vertices of one side's arm below the elbow, by their dominant joint.
-    fn of(template: &Template, side: BodyPart, arm: &LimbJoints) -> Self {
-        let (joints, parts) = (template.skeleton().joints(), template.parts());
-        let rest = template.mesh().vertices();
-        let owner = |v: u32| template.weights().dominant(v as usize);
-        let [e, w] = [arm.hinge, arm.end].map(|j| joints[j].rest);
-        let axis = w - e;
-        let share = |v: u32| (rest[v as usize].cast::<f64>() - e).dot(&axis) / axis.norm_squared();
-        let is_below = |v: &u32| {
-            let joint = owner(*v);
-            parts.part(joint) == side && parts.segment(joint) != BodySegment::UpperArm
-        };
-        let vertices: Vec<u32> = (0..rest.len() as u32).filter(is_below).collect();
-        let reach = vertices.iter().map(|&v| share(v)).fold(0.0, f64::max);
-        let ring = |at: f64| {
-            let near = |v: &u32| (share(*v) - at).abs() < RING;
-            vertices.iter().copied().filter(near).collect()
-        };
-        let rings = [0.0, 1.0, reach].map(ring);
-        let is_hand = |v: &u32| parts.segment(owner(*v)) != BodySegment::Forearm;
-        let (hand, forearm) = vertices.into_iter().partition(is_hand);
-        Self {
-            forearm,
-            hand,
-            rings,
-        }
-    }
-
-    /// Axis on a posed body; `None` when the arm has no vertices or they are not finite.
-    pub(super) fn axis(&self, body: &[P3]) -> Option<ArmAxis> {
-        let centre = |ring: &[u32]| {
-            let sum: V3 = ring.iter().map(|&v| body[v as usize].coords).sum();
-            let p = P3::from(sum / ring.len() as f32);
-            p.iter().all(|c| c.is_finite()).then_some(p)
-        };
-        let [elbow, wrist, tip] = self.rings.each_ref().map(|r| centre(r));
-        Some(ArmAxis {
-            elbow: elbow?,
-            wrist: wrist?,
-            tip: tip?,
-        })
-    }
-}
-
-/// Vertices whose dominant joint is `joint` or below it.
-fn descendants(template: &Template, joint: usize) -> Vec<u32> {
-    let owner = |v: u32| template.weights().dominant(v as usize);
-    (0..template.mesh().vertices().len() as u32)
-        .filter(|&v| template.skeleton().is_ancestor(joint, owner(v)))
         .collect()
 }
 

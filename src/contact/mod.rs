@@ -7,7 +7,6 @@ mod buried;
 mod creases;
 mod depth_maps;
 mod near_skin;
-mod point_grid;
 mod surface;
 mod winding;
 
@@ -16,5 +15,4 @@ pub use buried::Buried;
 pub use creases::Crease;
 pub use depth_maps::{DepthMaps, MapDetail, MapView};
 pub use near_skin::{Near, NearSkin};
-pub use point_grid::PointGrid;
 pub use surface::{Closest, Part, SurfaceFrame, SurfaceModel};

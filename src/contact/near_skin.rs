@@ -3,8 +3,9 @@
 //! In the crook of an elbow a walk ends on the upper arm though the forearm is nearer, and between toes or fingers on any of
 //! them: it finds skin that is near by, but not the skin that cloth is under.
 
-use super::{Closest, Part, PointGrid, SurfaceFrame, SurfaceModel};
+use super::{Closest, Part, SurfaceFrame, SurfaceModel};
 use crate::math::P3;
+use crate::spatial::HashGrid;
 
 /// The nearest vertex is looked for within this, metres: the vertices of a body are about as far from each other. Within
 /// 25 mm a hood on a slim neck was crumpled.
@@ -16,7 +17,7 @@ const UNDER: f32 = 0.025;
 /// The vertices of a surface, looked for around a place.
 #[derive(Clone, Debug, Default)]
 pub struct NearSkin {
-    grid: PointGrid,
+    grid: HashGrid,
 }
 
 impl NearSkin {

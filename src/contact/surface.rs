@@ -418,6 +418,7 @@ impl Fan {
 pub(super) mod tests {
     use super::*;
     use crate::mesh::TriMesh;
+    use crate::spatial::closest_on_triangle;
 
     /// A sphere from a subdivided octahedron.
     pub(in crate::contact) fn sphere(levels: usize) -> TriMesh {
@@ -597,7 +598,7 @@ pub(super) mod tests {
             for l in 0..LANES {
                 let of = |a: &[[f32; LANES]; 3]| P3::new(a[0][l], a[1][l], a[2][l]);
                 let (b, c, p) = (of(&fan.ab), of(&fan.ac), of(&fan.ap));
-                let w = closest_on_triangle(&p, &P3::origin(), &b, &c);
+                let w = closest_on_triangle(&p, [P3::origin(), b, c]);
                 let alone = (p - (b.coords * w[1] + c.coords * w[2]))
                     .coords
                     .norm_squared();
@@ -613,45 +614,5 @@ pub(super) mod tests {
                 );
             }
         }
-    }
-
-    /// Barycentric weights of the point of a triangle nearest to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
-    fn closest_on_triangle(p: &P3, a: &P3, b: &P3, c: &P3) -> [f32; 3] {
-        let (ab, ac, ap) = (b - a, c - a, p - a);
-        let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
-        if d1 <= 0.0 && d2 <= 0.0 {
-            return [1.0, 0.0, 0.0];
-        }
-        let bp = p - b;
-        let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
-        if d3 >= 0.0 && d4 <= d3 {
-            return [0.0, 1.0, 0.0];
-        }
-        let vc = d1 * d4 - d3 * d2;
-        if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-            let v = if d1 == d3 { 0.0 } else { d1 / (d1 - d3) };
-            return [1.0 - v, v, 0.0];
-        }
-        let cp = p - c;
-        let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
-        if d6 >= 0.0 && d5 <= d6 {
-            return [0.0, 0.0, 1.0];
-        }
-        let vb = d5 * d2 - d1 * d6;
-        if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-            let w = if d2 == d6 { 0.0 } else { d2 / (d2 - d6) };
-            return [1.0 - w, 0.0, w];
-        }
-        let va = d3 * d6 - d5 * d4;
-        if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-            let s = (d4 - d3) + (d5 - d6);
-            let w = if s == 0.0 { 0.0 } else { (d4 - d3) / s };
-            return [0.0, 1.0 - w, w];
-        }
-        let sum = va + vb + vc;
-        if sum == 0.0 {
-            return [1.0, 0.0, 0.0];
-        }
-        [va / sum, vb / sum, vc / sum]
     }
 }

@@ -12,11 +12,12 @@ use super::waistband::spread;
 use crate::body::measure::measure;
 use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
 use crate::cloth::realtime::{AnchorBinding, Config, Model, Outfit, State};
-use crate::cloth::{ClothError, Sheet, crossings};
+use crate::cloth::{ClothError, Sheet};
 use crate::contact::{SurfaceFrame, SurfaceModel};
 use crate::garment::{GarmentError, GarmentMesh, Pattern, Region, Triangulation};
 use crate::math::{P3, World};
 use crate::par::Par;
+use crate::spatial::intersections;
 use std::time::Instant;
 
 /// Why a garment could not be put on.
@@ -368,7 +369,7 @@ pub fn dress_all(
         let (deepest, p99, _) = d.judge(&skin);
         report.penetration = report.penetration.max(deepest);
         report.p99_strain = report.p99_strain.max(p99);
-        report.crossings += crossings(&mesh.faces, &d.positions()).len();
+        report.crossings += intersections(&mesh.faces, &d.positions()).len();
         anchors.push(bind(
             skin.model,
             skin.frame(),

@@ -6,11 +6,10 @@ use crate::camera::Intrinsics;
 use crate::math::{P3, P3d};
 use crate::mesh::Face;
 use crate::raster::{View, VisibilityBuffer, rasterise};
-use crate::spatial::PointTree;
+use crate::spatial::{PointTree, closest_on_triangle};
 use crate::tracking::{
     StagesMs, StepReport, TrackerConfig, TrackerModel, TrackerState, Workspace, step,
 };
-use nalgebra::Vector3;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -262,69 +261,15 @@ fn surface_errors(
     (visible / seen as f64, whole / truth.vertices.len() as f64)
 }
 
-/// Distance of a point from a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
-fn distance_to_triangle(p: &P3, [a, b, c]: [P3; 3]) -> f32 {
-    let (ab, ac, ap) = (b - a, c - a, p - a);
-    let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
-    let at = |q: Vector3<f32>| (ap - q).norm();
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return at(Vector3::zeros());
-    }
-    let bp = p - b;
-    let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
-    if d3 >= 0.0 && d4 <= d3 {
-        return at(ab);
-    }
-    let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return at(ab * (d1 / (d1 - d3)));
-    }
-    let cp = p - c;
-    let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
-    if d6 >= 0.0 && d5 <= d6 {
-        return at(ac);
-    }
-    let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return at(ac * (d2 / (d2 - d6)));
-    }
-    let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        return at(ab + (ac - ab) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))));
-    }
-    let n = 1.0 / (va + vb + vc);
-    at(ab * (vb * n) + ac * (vc * n))
+fn distance_to_triangle(p: &P3, corners: [P3; 3]) -> f32 {
+    let w = closest_on_triangle(p, corners);
+    let sum = |k: usize| corners[k].coords * w[k];
+    (p.coords - sum(0) - sum(1) - sum(2)).norm()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn triangles_are_near_at_face_edge_and_corner() {
-        let t = [
-            P3::new(0.0, 0.0, 0.0),
-            P3::new(1.0, 0.0, 0.0),
-            P3::new(0.0, 1.0, 0.0),
-        ];
-        let cases = [
-            ([0.2, 0.2, 0.5], 0.5),
-            ([0.5, -0.3, 0.4], 0.5),
-            ([-0.3, -0.4, 0.0], 0.5),
-            ([2.0, 0.0, 0.0], 1.0),
-        ];
-        for (p, d) in cases {
-            assert!(
-                (distance_to_triangle(&P3::from(p), t) - d).abs() < 1e-6,
-                "{p:?}"
-            );
-        }
-        let flat = [t[0], t[0], t[0]];
-        assert!(
-            distance_to_triangle(&P3::new(0.0, 3.0, 4.0), flat) == 5.0,
-            "a degenerate triangle is a point"
-        );
-    }
 
     #[test]
     fn medians_and_means_of_nothing_are_nan() {

@@ -2,12 +2,12 @@
 
 use super::common::{arms_down, posed};
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
-use tryon::cloth::crossings;
 use tryon::cloth::realtime::{Config, Input, StepReport, Workspace, step};
 use tryon::dressing::{DressOptions, dress};
 use tryon::evaluate::Solid;
 use tryon::garment::{Size, Triangulation, library};
 use tryon::math::{P3, World};
+use tryon::spatial::intersections;
 
 const DT: f64 = 1.0 / 30.0;
 /// Bending and straightening again takes so many calls, two seconds, and the person stands for so many more.
@@ -71,7 +71,7 @@ fn bend(
             .expect("a step"),
         );
         crossed.push(
-            crossings(
+            intersections(
                 &d.model.outfit.garments[0].faces,
                 &state.garments[0].positions,
             )

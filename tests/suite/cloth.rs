@@ -5,12 +5,12 @@ use nalgebra::UnitQuaternion;
 use rand::{Rng, SeedableRng};
 use std::sync::OnceLock;
 use tryon::body::{BodyShape, Pose, RestBody};
-use tryon::cloth::crossings;
 use tryon::cloth::realtime::{Config, Input, Model, State, StepReport, Workspace, step};
 use tryon::dressing::{DressOptions, dress};
 use tryon::garment::{Size, Triangulation, library};
 use tryon::math::{Body, P3, Rigid, V3, V3d, World, log_so3};
 use tryon::par::with_threads;
+use tryon::spatial::intersections;
 
 const DT: f64 = 1.0 / 30.0;
 
@@ -502,7 +502,7 @@ fn a_hem_that_is_woven_through_itself_comes_loose() {
             let out = 1.0 + 0.06 * (8.0 * p.z.atan2(p.x)).sin();
             *p = P3::new(p.x * out, 2.0 * fold - p.y, p.z * out);
         }
-        let pulled = crossings(faces, hem).len();
+        let pulled = intersections(faces, hem).len();
         assert!(pulled > 20, "{pulled}");
         for _ in 0..60 {
             step(
@@ -516,7 +516,7 @@ fn a_hem_that_is_woven_through_itself_comes_loose() {
             )
             .expect("a step");
         }
-        let left = crossings(faces, &state.garments[0].positions).len();
+        let left = intersections(faces, &state.garments[0].positions).len();
         println!(
             "{untangle} s between looks, {height} m: {pulled} crossings, {left} two seconds later"
         );

@@ -414,8 +414,8 @@ fn outside(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloth::crossings;
     use crate::cloth::scene::parse;
+    use crate::spatial::intersections;
 
     /// A square sheet of 0.3 m, held at two corners, that falls and swings.
     fn swing() -> Scene {
@@ -537,7 +537,7 @@ mod tests {
             let mut most = 0;
             let report = run(&scene, config, |k, x| {
                 if k % 5 == 0 {
-                    most = crossings(&scene.faces, x).len().max(most);
+                    most = intersections(&scene.faces, x).len().max(most);
                 }
                 ControlFlow::Continue(())
             });

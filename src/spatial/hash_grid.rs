@@ -1,34 +1,35 @@
-//! Points in cells, to find those near a place. Made anew each time: two passes over the points.
+//! A hash grid of points for radius queries, rebuilt in two passes over the points.
 
 use crate::math::P3;
 use wide::f32x8;
 
-/// Points sorted by the hash of their cell.
+/// Points sorted by the hash of their cell (counting sort).
 #[derive(Clone, Debug, Default)]
-pub struct PointGrid {
+pub struct HashGrid {
     cell: f32,
+    /// First slot of each bucket, shape `[buckets + 1]`.
     first: Vec<u32>,
-    /// Number and coordinates of each point, bucket by bucket, then as many points at infinity as are looked at together.
+    /// Index and coordinates of each point, bucket by bucket; padded by one register of points at infinity.
     numbers: Vec<u32>,
     places: [Vec<f32>; 3],
     keys: Vec<u32>,
 }
 
-/// Points that are looked at together.
+/// Points tested together: the lanes of a wide register.
 const LANES: usize = 8;
 
-/// Buckets of the hash: a power of two, twice the points of a usual garment.
+/// Buckets: a power of two, twice the vertices of a usual garment. Fewer collide, more cost the counting sort.
 const BUCKETS: usize = 1 << 13;
-/// Cells are so many times as narrow along x, where they lie in a row of buckets. Narrower ones gain nothing.
+/// Cells of one row of buckets per cell size along x: a query reads a contiguous run. More gain nothing.
 const NARROW: f32 = 2.0;
 
-/// The whole number below `t`: `f32::floor` is a call into the C library on the machines that this is built for.
+/// `t` rounded down. `f32::floor` is a library call on the baseline x86-64 target.
 fn below(t: f32) -> i32 {
     let i = t as i32;
     i.saturating_sub(i32::from(i as f32 > t))
 }
 
-/// Where a row of cells along x has its first bucket.
+/// First bucket of the row of cells along x.
 fn row(y: i32, z: i32) -> u32 {
     let h = (y as u32).wrapping_mul(0x85EB_CA77) ^ (z as u32).wrapping_mul(0xC2B2_AE3D);
     h ^ (h >> 15)
@@ -38,7 +39,7 @@ fn bucket(x: i32, row: u32) -> usize {
     row.wrapping_add(x as u32) as usize & (BUCKETS - 1)
 }
 
-impl PointGrid {
+impl HashGrid {
     /// Sorts points into cells of this size, metres; along x they are half as wide.
     pub fn fill(&mut self, points: &[P3], cell: f32) {
         self.cell = cell.max(f32::MIN_POSITIVE);
@@ -74,14 +75,14 @@ impl PointGrid {
             (0..3).for_each(|d| self.places[d][slot] = points[i][d]);
         }
     }
-    /// Calls `f` with number and squared distance (m²) of every point within `reach` of `p`, half a cell at most; maybe
-    /// more than once.
+    /// Calls `f` with index and squared distance (m²) of every point within `reach` of `p`, possibly more than once.
+    /// `reach` is half a cell at most, metres.
     pub fn within(&self, p: &P3, reach: f32, mut f: impl FnMut(u32, f32)) {
         if self.numbers.is_empty() {
             return;
         }
         let [narrow, wide] = [NARROW / self.cell, 1.0 / self.cell];
-        // Saturating: cloth that has flown away keeps its place in the last cell.
+        // Saturating: points far away fall into the last cell.
         let [low, high] = [p.x - reach, p.x + reach].map(|x| below(x * narrow));
         let beside = |v: f32| {
             let t = v * wide;
@@ -105,7 +106,7 @@ impl PointGrid {
             }
         }
     }
-    /// Calls `f` with those of some points that are near `at`.
+    /// Calls `f` with the points of some slots whose squared distance from `at` is at most `most`.
     #[inline(always)]
     fn scan(&self, from: u32, to: u32, at: [f32x8; 3], most: f32x8, f: &mut impl FnMut(u32, f32)) {
         let (mut from, to) = (from as usize, to as usize);
@@ -142,40 +143,37 @@ impl PointGrid {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spatial::brute;
+    use rand::{Rng, SeedableRng};
 
     #[test]
-    fn finds_what_a_scan_finds() {
-        let mut seed = 3u32;
-        let mut random = || {
-            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (seed >> 8) as f32 / (1u32 << 24) as f32 - 0.5
-        };
+    fn within_agrees_with_brute_force() {
+        const REACH: f32 = 0.039;
+        let mut rng = rand_pcg::Pcg32::seed_from_u64(3);
         let points: Vec<P3> = (0..3000)
-            .map(|_| P3::new(random(), random(), random()))
+            .map(|_| P3::from(std::array::from_fn(|_| rng.random_range(-0.5f32..0.5))))
             .collect();
-        let mut grid = PointGrid::default();
+        let mut grid = HashGrid::default();
         grid.fill(&points, 0.08);
         for q in points.iter().step_by(97) {
             let mut got = Vec::new();
-            grid.within(q, 0.039, |i, d| got.push((i, d)));
-            for (i, p) in points.iter().enumerate() {
-                let d = (p - q).norm_squared();
-                assert_eq!(d <= 0.039 * 0.039, got.contains(&(i as u32, d)), "{i}");
-            }
+            grid.within(q, REACH, |i, d| got.push((i, d)));
+            got.sort_unstable_by_key(|g| g.0);
+            got.dedup();
+            assert_eq!(got, brute::within(&points, q, REACH));
         }
-        // Far away, and not a number: found or not, but nothing breaks.
-        grid.fill(
-            &[P3::new(1e30, 0.0, -1e30), P3::new(1e30, f32::NAN, -1e30)],
-            0.08,
-        );
+    }
+
+    #[test]
+    fn distant_and_nan_points_and_empty_grids_do_not_panic() {
+        let far = P3::new(1e30, 0.0, -1e30);
+        let nan = P3::new(1e30, f32::NAN, -1e30);
+        let mut grid = HashGrid::default();
+        grid.within(&P3::origin(), 1.0, |_, _| unreachable!("no points"));
+        grid.fill(&[far, nan], 0.08);
         let mut got = Vec::new();
-        grid.within(&P3::new(1e30, 0.0, -1e30), 0.04, |i, _| got.push(i));
+        grid.within(&far, 0.04, |i, _| got.push(i));
         assert!(got.contains(&0) && !got.contains(&1), "{got:?}");
-        grid.within(&P3::new(1e30, f32::NAN, -1e30), 0.04, |_, _| {
-            unreachable!("it is nowhere")
-        });
-        PointGrid::default().within(&P3::origin(), 1.0, |_, _| {
-            unreachable!("an empty grid has no points")
-        });
+        grid.within(&nan, 0.04, |_, _| unreachable!("near nothing"));
     }
 }
