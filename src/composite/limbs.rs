@@ -116,7 +116,11 @@ impl Arm {
 
 /// Vertices whose dominant joint moves one of these segments.
 fn moved_by(template: &Template, is_wanted: impl Fn(BodySegment) -> bool) -> Vec<u32> {
-    let segment = |v: u32| template.parts().segment(template.weights().dominant(v as usize));
+    let segment = |v: u32| {
+        template
+            .parts()
+            .segment(template.weights().dominant(v as usize))
+    };
     (0..template.mesh().vertices().len() as u32)
         .filter(|v| is_wanted(segment(*v)))
         .collect()
