@@ -7,7 +7,7 @@ use crate::wardrobe::Garment;
 use std::time::Instant;
 use tryon::body::Pose;
 use tryon::body::measure::measure;
-use tryon::cloth::crossings;
+use tryon::spatial::intersections;
 use tryon::cloth::realtime::{Config, Input, RoomyBody, State, StepReport, Workspace, step};
 use tryon::dressing::{DressError, DressOptions, Dressed, FitMap, FitProbe, Wear, dress_all};
 use tryon::garment::{GarmentMesh, library};
@@ -119,7 +119,7 @@ impl Fitting {
     /// Edges through triangles of the same garment, by garment.
     fn crossed(&self) -> Vec<usize> {
         self.meshes()
-            .map(|(g, x)| crossings(&g.faces, x).len())
+            .map(|(g, x)| intersections(&g.faces, x).len())
             .collect()
     }
 
@@ -233,7 +233,7 @@ impl Fitting {
 /// Colours of a garment's vertices by crossings.
 fn crossing_colors(g: &GarmentMesh, positions: &[P3]) -> Vec<[u8; 3]> {
     let mut colors = vec![CROSSING_COLORS[0]; g.vertices];
-    for c in crossings(&g.faces, positions) {
+    for c in intersections(&g.faces, positions) {
         let touched = c.edge.iter().chain(&g.faces[c.face as usize]);
         touched.for_each(|v| colors[*v as usize] = CROSSING_COLORS[1]);
     }
