@@ -7,12 +7,12 @@ use crate::wardrobe::Garment;
 use std::time::Instant;
 use tryon::body::Pose;
 use tryon::body::measure::measure;
-use tryon::spatial::intersections;
 use tryon::cloth::realtime::{Config, Input, RoomyBody, State, StepReport, Workspace, step};
 use tryon::dressing::{DressError, DressOptions, Dressed, FitMap, FitProbe, Wear, dress_all};
 use tryon::garment::{GarmentMesh, library};
 use tryon::math::{P3, World};
 use tryon::par::Par;
+use tryon::spatial::intersections;
 
 /// Steps a second.
 const RATE: f64 = 30.0;
