@@ -171,10 +171,9 @@ impl Lifecycle {
 
     /// Repeats lasting faults and looks for silence.
     pub(super) fn check(&mut self) {
-        for fault in [self.cloth.fault.clone(), self.tracking.fault.clone()] {
-            if let Some((reason, why)) = fault {
-                self.fail(reason, &why);
-            }
+        let faults = [self.cloth.fault.clone(), self.tracking.fault.clone()];
+        for (reason, why) in faults.into_iter().flatten() {
+            self.fail(reason, &why);
         }
         let now = self.since_birth_ns(Instant::now());
         if let Some(reason) = self.ages.overdue(now, &self.limits) {
