@@ -17,7 +17,7 @@ use tryon::registration::{
 };
 use tryon::segment::{Contour, SegmentScratch, contour, find_person, find_planes};
 use tryon::spatial::{OrganisedCloud, PointTree};
-use tryon::synth::{Routine, Sequence, Setting, Shopper};
+use tryon::synth::{Actor, Routine, Sequence, Setting};
 use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
 
 fn shopper(routine: Routine) -> Sequence {
@@ -27,7 +27,7 @@ fn shopper(routine: Routine) -> Sequence {
         color: false,
         ..Setting::default()
     };
-    Sequence::new(Shopper::default(), setting)
+    Sequence::new(Actor::default(), setting)
 }
 
 fn segmentation(c: &mut Criterion) {
@@ -62,7 +62,7 @@ fn segmentation(c: &mut Criterion) {
 
 /// A thousand points of the shopper's surface where it is, with their normals and dominant bones.
 fn samples(sequence: &Sequence) -> (Vec<P3>, Vec<V3>, Vec<u8>) {
-    let template = &sequence.shopper().template;
+    let template = &sequence.actor().template;
     let truth = sequence.truth(0);
     let every = template.mesh().vertices().len() / 1000;
     let pick = |i: &usize| i.is_multiple_of(every);
@@ -113,7 +113,7 @@ fn correspondences(c: &mut Criterion) {
     let tree = PointTree::new(&points);
     let (positions, normals, bones) = samples(&sequence);
     let parents: Vec<Option<usize>> = sequence
-        .shopper()
+        .actor()
         .template
         .skeleton()
         .joints()
@@ -273,7 +273,7 @@ fn equations(c: &mut Criterion) {
 fn whole_step(c: &mut Criterion) {
     for (name, routine) in [("still person", Routine::Still), ("nobody", Routine::Empty)] {
         let sequence = shopper(routine);
-        let template = sequence.shopper().template.clone();
+        let template = sequence.actor().template.clone();
         let model = TrackerModel::new(
             template,
             sequence.calibration().clone(),

@@ -19,7 +19,7 @@ use tryon::garment::{Size, library};
 use tryon::gpu::Renderer;
 use tryon::math::{P3, World};
 use tryon::mirror::{CameraGarments, DrawnSurface, library_appearance};
-use tryon::synth::{Sequence, Setting, Shopper};
+use tryon::synth::{Actor, Sequence, Setting};
 
 const SIZES: [[u32; 2]; 3] = [[640, 480], [1280, 720], [1920, 1080]];
 /// Grey levels beyond which a pixel counts as different.
@@ -59,7 +59,7 @@ fn main() {
     let mut card = Renderer::new(args.software).expect("an adapter");
     println!("{:?}, ready after {:.0} ms", card.adapter(), ms(begun));
 
-    let sequence = Sequence::new(Shopper::default(), Setting::default());
+    let sequence = Sequence::new(Actor::default(), Setting::default());
     let (frame, truth) = sequence.frame(FRAME);
     let world_from_camera = sequence.setting().world_from_camera;
     let pose = Pose {
@@ -87,7 +87,7 @@ fn main() {
         appearance,
     });
     let garments = camera.views(surfaces);
-    let template = &sequence.shopper().template;
+    let template = &sequence.actor().template;
     let input = Input {
         frame: &frame,
         calibration: sequence.calibration(),
@@ -115,7 +115,7 @@ fn main() {
 fn dressed(sequence: &Sequence, pose: &Pose<World>) -> Dressed {
     let patterns = ["tshirt", "skirt"].map(|name| library::pattern(name, Size::default()).unwrap());
     dress(
-        &sequence.shopper().template,
+        &sequence.actor().template,
         sequence.rest(),
         pose,
         &patterns,

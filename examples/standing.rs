@@ -1,4 +1,4 @@
-//! A person who stands, waves or walks off: what of her clothes sleeps, how long a call takes, how far off that is.
+//! Sleeping cloth on a body that stands, waves or walks off: share asleep, time of a step, distance from the truth.
 //!
 //! `cargo run --release --example standing -- [--garment skirt+tshirt] [--edge 0.0118] [--threads 2] [--calls 120]
 //!   [--rounds 2] [--arms 75]`
@@ -32,17 +32,17 @@ fn main() {
         }
     }
     with_threads(threads, || {
-        let mut her = Standing::new(&wearing).expect("dressed");
+        let mut body = Standing::new(&wearing).expect("dressed");
         for (what, base, noise) in [("exact", Config::default(), 0.0), ("tracked", Config::tracked(), 1.5e-3f32)] {
             for doing in [Doing::Standing, Doing::Waving, Doing::Lifting, Doing::WalkingOff] {
                 let whole = Config { sleep_regions: false, ..base.clone() };
                 let never = Config { sleep: false, ..base.clone() };
-                // In turn, so that the machine's pace is the same for all.
+                // In turn, so that the machine is equally fast for all.
                 for _ in 0..rounds {
-                    let truth = her.run(&never, doing, calls, noise).expect("a run");
+                    let truth = body.run(&never, doing, calls, noise).expect("a run");
                     println!("{what} {doing:?}, never asleep: {:.2} ms (median; mean {:.2})", truth.median_ms(), truth.mean_ms());
                     for (name, config) in [("whole outfit", &whole), ("by region", &base)] {
-                        let r = her.run(config, doing, calls, noise).expect("a run");
+                        let r = body.run(config, doing, calls, noise).expect("a run");
                         let [rms, p99, most] = r.apart(&truth);
                         println!(
                             "{what} {doing:?}, {name}: {:.2} ms (median; mean {:.2}), asleep {:.0} %, {:.2} mm rms, {:.2} p99, {:.1} most; deepest {:.2} mm",

@@ -20,7 +20,7 @@ use tryon::mesh::face_normal;
 use tryon::raster::{View, VisibilityBuffer, rasterise};
 use tryon::segment::{SegmentScratch, find_person, find_planes};
 use tryon::spatial::{Label, OrganisedCloud};
-use tryon::synth::{Routine, Sequence, Setting, Shopper};
+use tryon::synth::{Actor, Routine, Sequence, Setting};
 use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace};
 
 #[derive(Default)]
@@ -281,9 +281,9 @@ const UPPER: [Upper; 5] = [
 ];
 
 fn upper(data: &Path, &(name, body, clip, noise, [height, away], frames): &Upper) -> Scene {
-    let shopper = Shopper {
+    let subject = Actor {
         template: scenes::subject(data, body).expect("a body"),
-        ..Shopper::default()
+        ..Actor::default()
     };
     let setting = Setting {
         world_from_camera: Setting::tilted(height, 0.0, 0.0),
@@ -295,7 +295,7 @@ fn upper(data: &Path, &(name, body, clip, noise, [height, away], frames): &Upper
         ..Setting::default()
     };
     let motion = read_motion(&data.join("motion").join(clip)).expect("a clip");
-    let sequence = Sequence::new(shopper, setting)
+    let sequence = Sequence::new(subject, setting)
         .with_clip(motion.at_cmu_rate())
         .expect("a clip of a person");
     Scene::synthetic(name, &sequence, frames)
@@ -436,8 +436,8 @@ fn run(a: &Args, template: &Arc<Template>, config: &TrackerConfig, scene: &Scene
 /// Frames of the routine back and forth (`--frames`, 30) with the body that is tracked: how far each joint is at each
 /// picture of a round from where it was in the second round, at rounds that grow by a half.
 fn drift(a: &Args, settings: &str, frames: u64) {
-    let shopper = Shopper::default();
-    let template = shopper.template.clone();
+    let subject = Actor::default();
+    let template = subject.template.clone();
     let noise = if a.hard {
         NoiseModel::KinectV1
     } else {
@@ -450,7 +450,7 @@ fn drift(a: &Args, settings: &str, frames: u64) {
         ..Setting::default()
     };
     let length = a.frames.unwrap_or(30) as u64;
-    let scene = Scene::synthetic("drift", &Sequence::new(shopper, setting), length);
+    let scene = Scene::synthetic("drift", &Sequence::new(subject, setting), length);
     let config = TrackerConfig {
         adapt_size: false,
         displacements: false,
@@ -524,9 +524,9 @@ fn tremble(a: &Args, settings: &str) {
             ..Setting::default()
         };
         let frames = a.frames.unwrap_or(180) as u64;
-        let sequence = Sequence::new(Shopper::default(), setting);
+        let sequence = Sequence::new(Actor::default(), setting);
         let scene = Scene::synthetic(name, &sequence, frames);
-        let template = Shopper::default().template;
+        let template = Actor::default().template;
         let model = TrackerModel::new(template, scene.calibration.clone(), configuration(settings));
         let (mut state, mut workspace) = (TrackerState::new(&model), Workspace::default());
         let (mut skins, mut off): (Vec<Vec<tryon::math::P3>>, Vec<f64>) = (vec![], vec![]);

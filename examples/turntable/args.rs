@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 use tryon::cloth::realtime::Config;
-use tryon::dressing::MadeOn;
+use tryon::dressing::SourceBody;
 use tryon::garment::library;
 
 /// Options of the command line.
 pub(crate) struct Args {
     pub(crate) garments: Vec<String>,
-    pub(crate) garment_body: Option<MadeOn>,
+    pub(crate) garment_body: Option<SourceBody>,
     pub(crate) bodies: Vec<String>,
     pub(crate) sizes: Vec<String>,
     pub(crate) pose: String,
@@ -58,8 +58,8 @@ pub(crate) fn args() -> Args {
         match flag.as_str() {
             "--garment" => a.garments.push(value()),
             "--garment-body" => {
-                let body = MadeOn::read(std::path::Path::new(&value())).expect("a body");
-                println!("{}", body.said);
+                let body = SourceBody::read(std::path::Path::new(&value())).expect("a body");
+                println!("{}", body.description);
                 a.garment_body = Some(body);
             }
             "--body" => a.bodies = list(value()),

@@ -8,7 +8,9 @@ use std::time::Instant;
 use tryon::body::Pose;
 use tryon::body::measure::measure;
 use tryon::cloth::realtime::{Config, Input, RoomyBody, State, StepReport, Workspace, step};
-use tryon::dressing::{DressError, DressOptions, Dressed, FitMap, FitProbe, Wear, dress_all};
+use tryon::dressing::{
+    DressError, DressOptions, Dressed, FitMap, FitProbe, GarmentSource, dress_all,
+};
 use tryon::garment::{GarmentMesh, library};
 use tryon::math::{P3, World};
 use tryon::par::Par;
@@ -79,7 +81,7 @@ impl Fitting {
         let worn: Vec<Garment> = (outfit.split('+'))
             .map(|g| Garment::load(a, g, body, size, &measures))
             .collect();
-        let wear: Vec<Wear<'_>> = worn.iter().map(Garment::wear).collect();
+        let wear: Vec<GarmentSource<'_>> = worn.iter().map(Garment::wear).collect();
         let options = options(a, person.film.is_some());
         let dressed = match dress_all(&person.template, &person.rest, start, &wear, &options) {
             Ok(dressed) => dressed,

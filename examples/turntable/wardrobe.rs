@@ -3,13 +3,13 @@
 use crate::args::Args;
 use std::path::Path;
 use tryon::body::measure::Measurements;
-use tryon::dressing::{MeshWear, Wear, suggest};
+use tryon::dressing::{GarmentSource, MeshGarment, suggest};
 use tryon::garment::{Pattern, Triangulation, library};
 
 /// A garment to put on.
 pub(crate) enum Garment {
     Pattern(Box<Pattern>),
-    Mesh(Box<MeshWear>),
+    Mesh(Box<MeshGarment>),
 }
 
 impl Garment {
@@ -28,7 +28,7 @@ impl Garment {
         if [".obj", ".glb", ".gltf", ".mhclo"].iter().any(is_mesh) {
             let fabric = tryon::garment::Material::preset("cotton").expect("preset");
             let edge = a.edge.unwrap_or(Triangulation::default().edge_length);
-            let mesh = MeshWear::on(Path::new(name), a.garment_body.clone(), &fabric, edge);
+            let mesh = MeshGarment::read_on(Path::new(name), a.garment_body.clone(), &fabric, edge);
             let mesh = mesh.expect("a garment");
             mesh.notes.iter().for_each(|n| println!("  {n}"));
             return Self::Mesh(Box::new(mesh));
@@ -44,10 +44,10 @@ impl Garment {
         Self::Pattern(Box::new(library::pattern(name, chosen).expect("a pattern")))
     }
 
-    pub(crate) fn wear(&self) -> Wear<'_> {
+    pub(crate) fn wear(&self) -> GarmentSource<'_> {
         match self {
-            Self::Pattern(p) => Wear::Pattern(p),
-            Self::Mesh(m) => Wear::Mesh(m),
+            Self::Pattern(p) => GarmentSource::Pattern(p),
+            Self::Mesh(m) => GarmentSource::Mesh(m),
         }
     }
 }

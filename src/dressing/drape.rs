@@ -5,7 +5,7 @@
 //! one in a few steps more. The simulator that follows starts from cloth at rest.
 
 use super::hood::Hood;
-use super::plane::Plane;
+use super::plane::DrapePlane;
 use super::skin::Skin;
 use crate::cloth::Sheet;
 use crate::cloth::realtime::AnchorBinding;
@@ -33,11 +33,11 @@ pub(super) struct Drape {
     held_down: Vec<bool>,
     /// Nearest body vertex among the own parts, then among the others.
     pub(super) nearest: Vec<[u32; 2]>,
-    planes: Vec<[Plane; 2]>,
+    planes: Vec<[DrapePlane; 2]>,
     /// Nearest vertex of every garment further out, shape `[garments][vertices]`.
     nearest_cover: Vec<Vec<u32>>,
     /// Vertices that an outer garment covers, and the plane each stays under.
-    covers: Vec<(u32, Plane)>,
+    covers: Vec<(u32, DrapePlane)>,
     pinned: Vec<Option<V3d>>,
     before: Vec<V3d>,
     /// What skin gives way by, where cloth has no room between skins, metres.
@@ -248,7 +248,7 @@ impl Drape {
             own,
             sleeves: Sleeve::of(mesh, &sheet.edges),
             nearest: vec![[u32::MAX; 2]; n],
-            planes: vec![[Plane::default(); 2]; n],
+            planes: vec![[DrapePlane::default(); 2]; n],
             nearest_cover: Vec::new(),
             covers: Vec::new(),
             pinned: vec![None; n],
@@ -590,7 +590,7 @@ impl Drape {
         }
     }
     /// Lifts a vertex above a plane, and says how far.
-    fn out_of(&mut self, i: usize, p: &Plane, sunk: f64) -> f64 {
+    fn out_of(&mut self, i: usize, p: &DrapePlane, sunk: f64) -> f64 {
         let d = self.x[i] - p.point;
         let slack = self.slack[i];
         let height = p.height
@@ -629,7 +629,7 @@ impl Drape {
                 .map(f64::from);
             let room = facing.unwrap_or(f64::INFINITY);
             for (plane, c) in self.planes[i].iter_mut().zip(&found) {
-                *plane = Plane {
+                *plane = DrapePlane {
                     point: c.point.coords.cast(),
                     normal: c.normal.cast(),
                     height: on.offset,
@@ -680,7 +680,7 @@ impl Drape {
                     let (point, normal) = (c.point.coords.cast(), -c.normal.cast::<f64>());
                     self.covers.push((
                         i as u32,
-                        Plane {
+                        DrapePlane {
                             point,
                             normal,
                             height: UNDER,

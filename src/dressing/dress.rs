@@ -1,69 +1,47 @@
-//! Putting garments on: place, drape, tie to the body, follow into the tracked pose.
+//! Dressing: sew and place, drape, follow the body into the tracked pose, refine, tie to the body.
 
+use super::body_sections::BodySections;
 use super::canonical::{between, canonical_pose, upright_root};
 use super::drape::{Drape, Layers};
-use super::figure::Figure;
-use super::mesh_wear::{CARRIED, MeshWear};
-use super::place::place;
+use super::error::DressError;
+use super::options::{DressOptions, DressReport};
 use super::refine::prolong;
+use super::sew::{GarmentSource, PlacedSheet, Sewing};
 use super::skin::Skin;
-use super::suggest::{Misfit, wearable};
-use super::waistband::spread;
+use super::waistband::GarmentOnSkin;
 use crate::body::measure::measure;
 use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
-use crate::cloth::realtime::{AnchorBinding, Config, Model, Outfit, State};
-use crate::cloth::{ClothError, Sheet};
-use crate::contact::{SurfaceFrame, SurfaceModel};
-use crate::garment::{GarmentError, GarmentMesh, Pattern, Region, Triangulation};
+use crate::cloth::Sheet;
+use crate::cloth::realtime::{AnchorBinding, Model, Outfit, State};
+use crate::garment::{GarmentMesh, Pattern};
 use crate::math::{P3, World};
 use crate::par::Par;
 use crate::spatial::intersections;
 use std::time::Instant;
 
-/// Why a garment could not be put on.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum DressError {
-    /// Nothing to put on.
-    #[error("garments: the list is empty")]
-    NoGarments,
-    /// The pattern is at fault.
-    #[error(transparent)]
-    Garment(#[from] GarmentError),
-    /// The body or the simulation is at fault.
-    #[error(transparent)]
-    Cloth(#[from] ClothError),
-    /// A size that cannot be worn by this body.
-    #[error(transparent)]
-    Misfit(#[from] Misfit),
-    /// The pose has a value that is not finite or the wrong number of angles.
-    #[error("pose: {0}")]
-    Pose(String),
-}
-
-/// How to dress.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DressOptions {
-    /// How finely to triangulate the garments.
-    pub triangulation: Triangulation,
-    /// How to simulate afterwards.
-    pub config: Config,
-    /// Put on what does not fit too: panels are stretched or slide, which shows as crumpled cloth.
-    pub any_size: bool,
-    /// Take garments out of themselves, so that no edge passes through a triangle of the same garment. Without, shirts are
-    /// put on in about two thirds of the time, and sleeves and trunks pass through each other in the armpits.
-    pub untangle: bool,
-}
-
-impl Default for DressOptions {
-    fn default() -> Self {
-        Self {
-            triangulation: Triangulation::default(),
-            config: Config::default(),
-            any_size: false,
-            untangle: true,
-        }
-    }
-}
+/// Substep on the coarse mesh, s.
+const COARSE_STEP: f64 = 2e-3;
+/// Substeps that close seams and gaps, and the share of gravity during them.
+const CLOSING: usize = 60;
+const CLOSING_GRAVITY: f64 = 0.1;
+/// Substeps of the first drape, 0.5 s: cloth that started 2 cm off the body hangs.
+const DRAPING: usize = 260;
+/// Bodies from the canonical to the tracked pose and substeps on each; 16 are at most 8° apart for a half-turn of the arm.
+const FOLLOWING: [usize; 2] = [16, 12];
+/// The same with untangling: from farther bodies cloth is moved into other cloth.
+const UNTANGLED_FOLLOWING: [usize; 2] = [24, 8];
+/// Rounds of untangling on each of these bodies.
+const CLEARING: usize = 6;
+/// Most rounds of untangling in the tracked pose; most garments need none.
+const CLEARED: usize = 120;
+/// Substeps in the tracked pose.
+const SETTLING: usize = 80;
+/// Substep on the fine mesh, s.
+const FINE_STEP: f64 = 1e-3;
+/// Substeps on the fine mesh: they add the wrinkles that the coarse one lacks.
+const FINISHING: usize = 90;
+/// Attempts to settle until the fine garment is free of itself off the arms: hoods may fold in a way that nothing untangles.
+const ATTEMPTS: usize = 4;
 
 /// A dressed body, ready for [`crate::cloth::realtime::step`].
 #[derive(Debug)]
@@ -72,107 +50,8 @@ pub struct Dressed {
     pub model: Model,
     /// Garments draped on the body in the given pose.
     pub state: State,
-    /// How it went.
+    /// Outcome of dressing.
     pub report: DressReport,
-}
-
-/// How dressing went.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct DressReport {
-    /// Substeps of the first drape and on the way to the tracked pose, all garments.
-    pub steps: usize,
-    /// Deepest garment vertex under the skin at the end, metres.
-    pub penetration: f64,
-    /// Edges that pass through triangles of the same garment at the end.
-    pub crossings: usize,
-    /// 99th percentile of the stretch at the end, worst garment.
-    pub p99_strain: f64,
-    /// Milliseconds by stage.
-    pub stages_ms: DressMs,
-    /// Milliseconds in all.
-    pub ms: f64,
-}
-
-/// Milliseconds of dressing.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct DressMs {
-    /// Triangulating and sewing.
-    pub sew: f64,
-    /// Measuring the body and wrapping the panels around it.
-    pub place: f64,
-    /// Draping on the coarse mesh, canonical pose, then on the way to the tracked one.
-    pub coarse: f64,
-    /// Draping on the fine mesh.
-    pub fine: f64,
-    /// Preparing the simulator.
-    pub model: f64,
-}
-
-/// Edge length of the mesh that is draped first, over that of the garment. Four times fewer vertices.
-const COARSER: f64 = 2.0;
-/// The same for hoods. From edges of 28 instead of 31 mm they had a fifth more crossings when worn (docs/benchmarks.md).
-const HOOD_COARSER: f64 = 2.2;
-/// Longest edge of that mesh, metres: longer ones lose sleeves.
-const COARSEST: f64 = 0.045;
-/// Substep on the coarse mesh, s.
-const COARSE_STEP: f64 = 2e-3;
-/// Substeps that close seams and gaps before gravity acts fully.
-const CLOSING: usize = 60;
-/// Substeps of the first drape: 0.5 s, until cloth that started 2 cm off the body hangs.
-const DRAPING: usize = 260;
-/// Bodies on the way from the canonical to the tracked pose: at most 8° apart for a half-turn of the arm.
-const FOLLOW_BODIES: usize = 16;
-/// The same, and substeps on each, where garments are taken out of themselves: what an arm carries passes into other cloth by the
-/// way from one body to the next.
-const UNTANGLED_BODIES: [usize; 2] = [24, 8];
-/// Substeps on each of them.
-const FOLLOWING: usize = 12;
-/// Rounds of untangling on each of them.
-const CLEARING: usize = 6;
-/// Rounds of untangling on the coarse mesh at the end, on the fine one at first, and at its end: most garments need none.
-const CLEARED: usize = 120;
-/// Substeps in the tracked pose.
-const SETTLING: usize = 80;
-/// Substep on the fine mesh, s.
-const FINE_STEP: f64 = 1e-3;
-/// Substeps on the fine mesh: wrinkles that the coarse one lacks. Half of them again where rounds of untangling leave
-/// something.
-const FINISHING: usize = 90;
-/// So often a coarse garment settles, until the fine one that is made from it is free of itself on the trunk: a hood on a
-/// thick neck may come to lie in folds that nothing takes apart. The crook of a bent elbow always does.
-const TRIES: usize = 4;
-
-/// Something to put on.
-#[derive(Clone, Copy, Debug)]
-pub enum Wear<'a> {
-    /// Cut from a pattern.
-    Pattern(&'a Pattern),
-    /// A mesh made on another body.
-    Mesh(&'a MeshWear),
-}
-
-impl Wear<'_> {
-    fn layer(&self) -> u8 {
-        match self {
-            Self::Pattern(p) => p.layer,
-            Self::Mesh(m) => m.layer(),
-        }
-    }
-}
-
-/// One sheet of cloth on its way onto the body.
-struct Sheeted {
-    fine: GarmentMesh,
-    /// What is draped first; `None` where that is the garment's own mesh.
-    coarse: Option<GarmentMesh>,
-    /// Start positions of what is draped first, frame of the canonical body, metres.
-    placed: Vec<P3>,
-}
-
-impl Sheeted {
-    fn first(&self) -> &GarmentMesh {
-        self.coarse.as_ref().unwrap_or(&self.fine)
-    }
 }
 
 /// Puts garments on a body in a pose (world frame, y up). Patterns are worn in the order of their `layer`; the outfit
@@ -187,8 +66,8 @@ pub fn dress(
     patterns: &[Pattern],
     options: &DressOptions,
 ) -> Result<Dressed, DressError> {
-    let wear: Vec<Wear<'_>> = patterns.iter().map(Wear::Pattern).collect();
-    dress_all(template, rest, pose, &wear, options)
+    let garments: Vec<GarmentSource<'_>> = patterns.iter().map(GarmentSource::Pattern).collect();
+    dress_all(template, rest, pose, &garments, options)
 }
 
 /// As [`dress`], for patterns and meshes together. A mesh becomes as many garments of the outfit as it has pieces of
@@ -200,83 +79,33 @@ pub fn dress_all(
     template: &Template,
     rest: &RestBody,
     pose: &Pose<World>,
-    wear: &[Wear<'_>],
+    garments: &[GarmentSource<'_>],
     options: &DressOptions,
 ) -> Result<Dressed, DressError> {
     let started = Instant::now();
-    if wear.is_empty() {
+    if garments.is_empty() {
         return Err(DressError::NoGarments);
     }
-    if !pose.is_finite() || pose.angles.len() != template.skeleton().dofs() {
-        return Err(DressError::Pose(format!(
-            "{} angles for {} degrees of freedom, all must be finite",
-            pose.angles.len(),
-            template.skeleton().dofs()
-        )));
-    }
+    check_pose(template, pose)?;
     let mut report = DressReport::default();
-    let mut order: Vec<&Wear<'_>> = wear.iter().collect();
-    order.sort_by_key(|w| w.layer());
+
     let timer = Instant::now();
     let measures = measure(template, rest).ok();
-    let figure = Figure::new(template, rest, measures.as_ref());
+    let sections = BodySections::new(template, rest, measures.as_ref());
     report.stages_ms.place = ms(timer);
+
     let timer = Instant::now();
-    let fine = options.triangulation;
-    // The coarse mesh may have slimmer triangles: nothing is simulated on it later.
-    let length = (fine.edge_length * COARSER)
-        .min(COARSEST)
-        .max(fine.edge_length);
-    let coarse = Triangulation {
-        edge_length: length,
-        hood_length: fine.hood_length * HOOD_COARSER,
-        min_angle: 0.0,
+    let sewing = Sewing {
+        template,
+        sections: &sections,
+        measures: measures.as_ref(),
+        options,
     };
-    let mut sheets: Vec<Sheeted> = Vec::new();
-    for w in order {
-        match w {
-            Wear::Pattern(p) => {
-                if let Some(m) = measures.as_ref().filter(|_| !options.any_size) {
-                    wearable(p, m)?;
-                }
-                let rough = GarmentMesh::sew(p, &coarse)?;
-                let placed = place(template, &figure, p, &rough);
-                sheets.push(Sheeted {
-                    fine: GarmentMesh::sew(p, &fine)?,
-                    coarse: Some(rough),
-                    placed,
-                });
-            }
-            Wear::Mesh(m) => sheets.extend(m.put_on(template, &figure).into_iter().map(
-                |(fine, placed)| Sheeted {
-                    fine,
-                    coarse: None,
-                    placed,
-                },
-            )),
-        }
-    }
-    // Hats and shoes press nothing: cloth goes over them.
-    let is_carried = |s: &Sheeted| s.fine.anchors.iter().any(|a| a.name == CARRIED);
-    sheets.sort_by_key(|s| !is_carried(s));
+    let mut sheets = sewing.sew(garments)?;
     report.stages_ms.sew = ms(timer);
 
-    let root = upright_root(rest, &pose.root);
-    let start = Pose {
-        root,
-        angles: canonical_pose(template, rest).angles,
-    };
-    let coarse: Vec<GarmentMesh> = sheets.iter().map(|s| s.first().clone()).collect();
-    let own: Vec<bool> = sheets.iter().map(|s| s.coarse.is_none()).collect();
-    let (mut meshes, mut placed) = (Vec::new(), Vec::new());
-    for s in sheets {
-        let mut world = Vec::new();
-        root.points_f32(&s.placed, &mut world);
-        placed.push(world);
-        meshes.push(s.fine);
-    }
-
     let timer = Instant::now();
+    let meshes: Vec<GarmentMesh> = sheets.iter().map(|s| s.garment.clone()).collect();
     let outfit = Outfit {
         anchors: vec![Vec::new(); meshes.len()],
         garments: meshes,
@@ -285,105 +114,32 @@ pub fn dress_all(
     report.stages_ms.model = ms(timer);
 
     let timer = Instant::now();
-    let [follow, following] = if options.untangle {
-        UNTANGLED_BODIES
-    } else {
-        [FOLLOW_BODIES, FOLLOWING]
+    let start = Pose {
+        root: upright_root(rest, &pose.root),
+        angles: canonical_pose(template, rest).angles,
     };
-    let bodies: Vec<Vec<P3>> = (0..=follow)
-        .map(|i| {
-            let t = i as f64 / follow as f64;
-            let mut body = Vec::new();
-            pose_body(
-                template,
-                rest,
-                &between(template, rest, &start, pose, t * t * (3.0 - 2.0 * t)),
-                &mut body,
-            );
-            body
-        })
-        .collect();
-    let mut skin = Skin::of(&model);
-    skin.show(&bodies[0]);
-    let offsets: Vec<f64> = (0..coarse.len()).map(|k| model.offset(k)).collect();
-    let mut ties = Vec::new();
-    let mut drapes = Vec::new();
-    for ((mesh, placed), offset) in coarse.iter().zip(placed).zip(&offsets) {
-        let sheet = Sheet::of_garment(mesh)?;
-        let mut d = Drape::new(mesh, &sheet, placed);
-        d.find_all(&skin);
-        ties.push(fasten(&skin, mesh, &d, *offset)?);
-        drapes.push(if options.untangle {
-            d.untangled(mesh, &sheet)?
-        } else {
-            d
-        });
+    for s in &mut sheets {
+        let local = std::mem::take(&mut s.positions);
+        start.root.points_f32(&local, &mut s.positions);
     }
-    let mut rough = Layers::new(&coarse, drapes)?;
-    rough.each(&skin, &offsets, |k, d, on| {
-        d.pin(&ties[k], skin.frame());
-        d.run(on, CLOSING, COARSE_STEP, 0.1);
-        d.stop();
-        d.run(on, DRAPING, COARSE_STEP, 1.0);
-    });
-    for w in bodies.windows(2) {
-        skin.show(&w[1]);
-        rough.each(&skin, &offsets, |k, d, on| {
-            d.carry(&w[0], &w[1]);
-            d.put_back(&skin);
-            d.pin(&ties[k], skin.frame());
-            d.run(on, following, COARSE_STEP, 1.0);
-            d.clear(on, CLEARING);
-        });
-    }
+    let [count, substeps] = if options.untangle {
+        UNTANGLED_FOLLOWING
+    } else {
+        FOLLOWING
+    };
+    let bodies = bodies_between(template, rest, &start, pose, count);
+    let mut draping = Draping::new(&model, sheets, &bodies[0], options.untangle)?;
+    draping.hang();
+    draping.follow(&bodies, substeps);
     report.stages_ms.coarse = ms(timer);
-    let mut fine = Layers::default();
-    for _ in 0..TRIES {
-        let timer = Instant::now();
-        rough.each(&skin, &offsets, |_, d, on| {
-            d.put_back(&skin);
-            d.run(on, SETTLING, COARSE_STEP, 1.0);
-            d.clear(on, CLEARED);
-        });
-        report.stages_ms.coarse += ms(timer);
-        let timer = Instant::now();
-        fine = refine(
-            &model,
-            &coarse,
-            &rough,
-            &own,
-            &skin,
-            &offsets,
-            options.untangle,
-        )?;
-        report.stages_ms.fine += ms(timer);
-        report.steps += fine.drapes.iter().map(|d| d.steps).sum::<usize>();
-        if !fine.drapes.iter().any(Drape::crosses_off_arms) {
-            break;
-        }
-    }
+    let fine = draping.finish(&mut report)?;
+
     let timer = Instant::now();
-    report.steps += rough.drapes.iter().map(|d| d.steps).sum::<usize>();
-    let (mut positions, mut anchors) = (Vec::new(), Vec::new());
-    for (k, (mesh, d)) in model.outfit.garments.iter().zip(&fine.drapes).enumerate() {
-        let (deepest, p99, _) = d.judge(&skin);
-        report.penetration = report.penetration.max(deepest);
-        report.p99_strain = report.p99_strain.max(p99);
-        report.crossings += intersections(&mesh.faces, &d.positions()).len();
-        anchors.push(bind(
-            skin.model,
-            skin.frame(),
-            mesh,
-            &d.positions(),
-            offsets[k],
-            false,
-        ));
-        positions.push(d.positions());
-    }
+    let (positions, anchors) = draping.tie(&fine, &mut report);
+    let (body, buried, apart) = draping.skin.known();
     report.stages_ms.fine += ms(timer);
 
     let timer = Instant::now();
-    let (body, buried, apart) = skin.known();
     model.set_anchors(anchors);
     let state = State::new(&model, positions, &body)?.on_skin(buried, apart);
     report.stages_ms.model += ms(timer);
@@ -395,139 +151,255 @@ pub fn dress_all(
     })
 }
 
-/// Drapes the garments of `model` from coarse ones; those that are their `own` coarse ones start from where those are.
-fn refine(
-    model: &Model,
-    coarse: &[GarmentMesh],
-    rough: &Layers,
-    own: &[bool],
-    skin: &Skin<'_>,
-    offsets: &[f64],
-    untangle: bool,
-) -> Result<Layers, DressError> {
-    let mut drapes = Vec::new();
-    for (k, mesh) in model.outfit.garments.iter().enumerate() {
-        let x = if own[k] {
-            rough.drapes[k].x.clone()
-        } else {
-            prolong(&coarse[k], mesh, &rough.drapes[k].x)
-        };
-        let sheet = Sheet::of_garment(mesh)?;
-        let mut d = Drape::new(
-            mesh,
-            &sheet,
-            x.iter().map(|p| P3::from(p.cast::<f32>())).collect(),
-        );
-        d.find_from(skin, &rough.drapes[k]);
-        d.pin(&fasten(skin, mesh, &d, offsets[k])?, skin.frame());
-        drapes.push(if untangle {
-            d.untangled(mesh, &sheet)?
-        } else {
-            d
-        });
+fn check_pose(template: &Template, pose: &Pose<World>) -> Result<(), DressError> {
+    let dofs = template.skeleton().dofs();
+    if pose.is_finite() && pose.angles.len() == dofs {
+        return Ok(());
     }
-    let mut fine = Layers::new(&model.outfit.garments, drapes)?;
-    fine.each(skin, offsets, |_, d, on| {
-        d.put_back(skin);
-        d.clear(on, CLEARED);
-        d.run(on, FINISHING, FINE_STEP, 1.0);
-        if d.clear(on, CLEARED) > 0 {
-            // Ironed cloth is pressed together, and finds room.
-            d.run(on, FINISHING / 2, FINE_STEP, 1.0);
-            d.clear(on, CLEARED);
-        }
-        d.lift_deep(skin);
-    });
-    Ok(fine)
+    Err(DressError::Pose(format!(
+        "{} angles for {dofs} degrees of freedom, all must be finite",
+        pose.angles.len()
+    )))
 }
 
 fn ms(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 
-fn pose_body(template: &Template, rest: &RestBody, pose: &Pose<World>, out: &mut Vec<P3>) {
-    let mut bones = BoneTransforms::default();
-    pose.bones(template.skeleton(), rest, &mut bones);
-    skin(Par::Rayon, &rest.vertices, template.weights(), &bones, out);
+/// Posed vertices of `count + 1` bodies from one pose to another, slow at both ends.
+fn bodies_between(
+    template: &Template,
+    rest: &RestBody,
+    from: &Pose<World>,
+    to: &Pose<World>,
+    count: usize,
+) -> Vec<Vec<P3>> {
+    let body = |i: usize| {
+        let t = i as f64 / count as f64;
+        let pose = between(template, rest, from, to, t * t * (3.0 - 2.0 * t));
+        let mut bones = BoneTransforms::default();
+        pose.bones(template.skeleton(), rest, &mut bones);
+        let mut out = Vec::new();
+        skin(
+            Par::Rayon,
+            &rest.vertices,
+            template.weights(),
+            &bones,
+            &mut out,
+        );
+        out
+    };
+    (0..=count).map(body).collect()
 }
 
-/// Ties the anchors of a garment to the skin, `offset` metres off, waistbands evenly stretched.
-fn fasten(
-    skin: &Skin<'_>,
-    mesh: &GarmentMesh,
-    drape: &Drape,
-    offset: f64,
-) -> Result<Vec<AnchorBinding>, DressError> {
-    let mut positions = drape.positions();
-    spread(
-        mesh,
-        &Sheet::of_garment(mesh)?.edges,
-        skin.model,
-        skin.frame(),
-        offset,
-        &mut positions,
-    );
-    Ok(bind(
-        skin.model,
-        skin.frame(),
-        mesh,
-        &positions,
-        offset,
-        true,
-    ))
+/// Garments being draped on the body of a model.
+struct Draping<'a> {
+    model: &'a Model,
+    skin: Skin<'a>,
+    /// Distance of each garment from the skin, metres.
+    offsets: Vec<f64>,
+    /// Mesh of each garment that is draped first; `None` where it is the garment's own.
+    coarse: Vec<Option<GarmentMesh>>,
+    anchors: Vec<Vec<AnchorBinding>>,
+    layers: Layers,
+    untangle: bool,
 }
 
-/// Ties the anchors of a garment to the body below them; `hug` puts them at `offset` metres from the skin instead of
-/// where they are.
-fn bind(
-    surface: &SurfaceModel,
-    frame: &SurfaceFrame,
-    mesh: &GarmentMesh,
-    positions: &[P3],
-    offset: f64,
-    hug: bool,
-) -> Vec<AnchorBinding> {
-    let mut out = Vec::new();
-    for set in &mesh.anchors {
-        for &vertex in &set.vertices {
-            let p = positions[vertex as usize];
-            let near = surface.nearest_vertex(frame, &p, Region::ALL.0);
-            let c = surface.closest_around(frame, &p, near, Region::ALL.0);
-            if set.name == CARRIED {
-                out.push(exactly(vertex, &p, surface.faces()[c.face as usize], frame));
-                continue;
-            }
-            out.push(AnchorBinding {
-                vertex,
-                body: surface.faces()[c.face as usize],
-                weights: c.weights,
-                height: if hug {
-                    offset as f32
-                } else {
-                    c.signed.max(offset as f32)
-                },
-                strength: set.strength,
+impl<'a> Draping<'a> {
+    /// Sheets around the first body, their anchors tied to it.
+    fn new(
+        model: &'a Model,
+        sheets: Vec<PlacedSheet>,
+        body: &[P3],
+        untangle: bool,
+    ) -> Result<Self, DressError> {
+        let mut skin = Skin::of(model);
+        skin.show(body);
+        let offsets: Vec<f64> = (0..sheets.len()).map(|k| model.offset(k)).collect();
+        let (mut coarse, mut firsts) = (Vec::new(), Vec::new());
+        let (mut anchors, mut drapes) = (Vec::new(), Vec::new());
+        for (s, offset) in sheets.into_iter().zip(&offsets) {
+            let first = s.coarse.clone().unwrap_or(s.garment);
+            let sheet = Sheet::of_garment(&first)?;
+            let mut d = Drape::new(&first, &sheet, s.positions);
+            d.find_all(&skin);
+            let on = on_skin(&skin, &first, *offset);
+            anchors.push(on.fasten(&d.positions())?);
+            drapes.push(if untangle {
+                d.untangled(&first, &sheet)?
+            } else {
+                d
+            });
+            coarse.push(s.coarse);
+            firsts.push(first);
+        }
+        Ok(Self {
+            layers: Layers::new(&firsts, drapes)?,
+            model,
+            skin,
+            offsets,
+            coarse,
+            anchors,
+            untangle,
+        })
+    }
+    fn garment(&self, k: usize) -> GarmentOnSkin<'_> {
+        let mesh = &self.model.outfit.garments[k];
+        on_skin(&self.skin, mesh, self.offsets[k])
+    }
+    /// Drapes in the canonical pose.
+    fn hang(&mut self) {
+        let (skin, anchors) = (&self.skin, &self.anchors);
+        self.layers.each(skin, &self.offsets, |k, d, on| {
+            d.pin(&anchors[k], skin.frame());
+            d.run(on, CLOSING, COARSE_STEP, CLOSING_GRAVITY);
+            d.stop();
+            d.run(on, DRAPING, COARSE_STEP, 1.0);
+        });
+    }
+    /// Follows the body through its poses.
+    fn follow(&mut self, bodies: &[Vec<P3>], substeps: usize) {
+        for w in bodies.windows(2) {
+            self.skin.show(&w[1]);
+            let (skin, anchors) = (&self.skin, &self.anchors);
+            self.layers.each(skin, &self.offsets, |k, d, on| {
+                d.carry(&w[0], &w[1]);
+                d.put_back(skin);
+                d.pin(&anchors[k], skin.frame());
+                d.run(on, substeps, COARSE_STEP, 1.0);
+                d.clear(on, CLEARING);
             });
         }
     }
-    out
+    /// Settles in the tracked pose and refines, again while the fine garments intersect themselves off the arms.
+    fn finish(&mut self, report: &mut DressReport) -> Result<Layers, DressError> {
+        let mut fine = Layers::default();
+        for _ in 0..ATTEMPTS {
+            let timer = Instant::now();
+            let skin = &self.skin;
+            self.layers.each(skin, &self.offsets, |_, d, on| {
+                d.put_back(skin);
+                d.run(on, SETTLING, COARSE_STEP, 1.0);
+                d.clear(on, CLEARED);
+            });
+            report.stages_ms.coarse += ms(timer);
+            let timer = Instant::now();
+            fine = self.refine()?;
+            report.stages_ms.fine += ms(timer);
+            report.steps += fine.drapes.iter().map(|d| d.steps).sum::<usize>();
+            if !fine.drapes.iter().any(Drape::crosses_off_arms) {
+                break;
+            }
+        }
+        report.steps += self.layers.drapes.iter().map(|d| d.steps).sum::<usize>();
+        Ok(fine)
+    }
+    /// Positions of the draped garments and the bindings of their anchors; adds the quality of the drape to the report.
+    fn tie(
+        &self,
+        fine: &Layers,
+        report: &mut DressReport,
+    ) -> (Vec<Vec<P3>>, Vec<Vec<AnchorBinding>>) {
+        let tie = |(k, d): (usize, &Drape)| {
+            let (x, on) = (d.positions(), self.garment(k));
+            let (deepest, p99, _) = d.judge(&self.skin);
+            report.penetration = report.penetration.max(deepest);
+            report.p99_strain = report.p99_strain.max(p99);
+            report.crossings += intersections(&on.mesh.faces, &x).len();
+            let anchors = on.bind_in_place(&x);
+            (x, anchors)
+        };
+        fine.drapes.iter().enumerate().map(tie).unzip()
+    }
+    /// Drapes the garments' own meshes from the coarse ones.
+    fn refine(&self) -> Result<Layers, DressError> {
+        let mut drapes = Vec::new();
+        for (k, rough) in self.layers.drapes.iter().enumerate() {
+            let on = self.garment(k);
+            let x = self.coarse[k].as_ref().map_or_else(
+                || rough.x.clone(),
+                |coarse| prolong(coarse, on.mesh, &rough.x),
+            );
+            let sheet = Sheet::of_garment(on.mesh)?;
+            let x = x.iter().map(|p| P3::from(p.cast::<f32>())).collect();
+            let mut d = Drape::new(on.mesh, &sheet, x);
+            d.find_from(&self.skin, rough);
+            d.pin(&on.fasten(&d.positions())?, self.skin.frame());
+            drapes.push(if self.untangle {
+                d.untangled(on.mesh, &sheet)?
+            } else {
+                d
+            });
+        }
+        let mut fine = Layers::new(&self.model.outfit.garments, drapes)?;
+        fine.each(&self.skin, &self.offsets, |_, d, on| {
+            d.put_back(&self.skin);
+            d.clear(on, CLEARED);
+            d.run(on, FINISHING, FINE_STEP, 1.0);
+            if d.clear(on, CLEARED) > 0 {
+                // Smoothed cloth is compressed, and spreads.
+                d.run(on, FINISHING / 2, FINE_STEP, 1.0);
+                d.clear(on, CLEARED);
+            }
+            d.lift_deep(&self.skin);
+        });
+        Ok(fine)
+    }
 }
 
-/// Ties a vertex to a triangle exactly where it is: weights of where it stands over the triangle's plane, and its height.
-fn exactly(vertex: u32, at: &P3, body: [u32; 3], frame: &SurfaceFrame) -> AnchorBinding {
-    let [p, q, r] = body.map(|v| frame.vertices[v as usize]);
-    let (u, v, d) = (q - p, r - p, at - p);
-    let normal = u.cross(&v);
-    let square = normal.norm_squared().max(f32::MIN_POSITIVE);
-    let (b, c) = (
-        d.cross(&v).dot(&normal) / square,
-        u.cross(&d).dot(&normal) / square,
-    );
-    AnchorBinding {
-        vertex,
-        body,
-        weights: [1.0 - b - c, b, c],
-        height: d.dot(&normal) / square.sqrt(),
-        strength: 1.0,
+fn on_skin<'a>(skin: &'a Skin<'_>, mesh: &'a GarmentMesh, offset: f64) -> GarmentOnSkin<'a> {
+    GarmentOnSkin {
+        mesh,
+        surface: skin.model,
+        frame: skin.frame(),
+        offset,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::{BodyShape, embedded};
+    use crate::garment::{Size, library};
+    use crate::math::Rigid;
+
+    #[test]
+    fn bodies_between_two_poses_start_and_end_at_them() {
+        let t = embedded::template();
+        let rest = t.personalise(&BodyShape::default());
+        let pose = |angles| Pose {
+            root: Rigid::identity(),
+            angles,
+        };
+        let a = pose(canonical_pose(&t, &rest).angles);
+        let b = pose(vec![0.0; a.angles.len()]);
+        let bodies = bodies_between(&t, &rest, &a, &b, 3);
+        assert_eq!(bodies.len(), 4);
+        let far = |x: &[P3], y: &[P3]| {
+            let pairs = x.iter().zip(y);
+            pairs.map(|(p, q)| (p - q).norm()).fold(0.0, f32::max)
+        };
+        for (body, at) in [(&bodies[0], &a), (&bodies[3], &b)] {
+            let alone = bodies_between(&t, &rest, at, at, 1);
+            assert!(far(body, &alone[0]) < 1e-5);
+        }
+        assert!(far(&bodies[1], &bodies[2]) < far(&bodies[0], &bodies[3]));
+    }
+
+    #[test]
+    fn empty_lists_and_faulty_poses_are_refused() {
+        let t = embedded::template();
+        let rest = t.personalise(&BodyShape::default());
+        let options = DressOptions::default();
+        let mut pose = Pose::rest(t.skeleton(), Rigid::identity());
+        let none = dress(&t, &rest, &pose, &[], &options);
+        assert_eq!(none.err(), Some(DressError::NoGarments));
+        let tank = [library::pattern("tank", Size::M).expect("pattern")];
+        pose.angles[0] = f64::NAN;
+        let e = dress(&t, &rest, &pose, &tank, &options);
+        assert!(matches!(e, Err(DressError::Pose(_))));
+        pose.angles = vec![0.0; 3];
+        let e = dress(&t, &rest, &pose, &tank, &options);
+        assert!(matches!(e, Err(DressError::Pose(_))));
     }
 }

@@ -1,10 +1,9 @@
-//! Where a garment is tight, fitted or loose on the body it is worn on: stretch, pressure and room, as numbers and
-//! colours.
+//! Fit map: stretch, pressure and gap of a garment on the body that wears it, per vertex and per body region.
 //!
-//! Pressure follows from balance: what the stretched cloth and its weight press into the skin, the skin presses back.
-//! Nothing but positions is needed, so any solver's state will do; in fast motion inertia is read as pressure.
+//! Pressure follows from balance: the skin carries the force of the stretched cloth and its weight. Positions suffice, so any
+//! solver's state will do; in fast motion inertia reads as pressure.
 
-use super::Fit;
+use super::suggest::FitClass;
 use crate::body::Template;
 use crate::body::parts::{BodySegment, BodySide};
 use crate::cloth::realtime::{Model, State};
@@ -14,8 +13,9 @@ use crate::garment::{GarmentMesh, Region};
 use crate::math::{P3, V3d};
 use crate::par::Par;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
-/// What one vertex of a garment feels.
+/// Fit at one vertex of a garment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct VertexFit {
     /// Larger principal stretch minus one, mean of the triangles around.
@@ -26,12 +26,12 @@ pub struct VertexFit {
     pub gap: f32,
 }
 
-/// A part of the body under a garment.
+/// Fit over one region of the body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RegionFit {
-    /// What a tailor calls it: `chest`, `waist`, `hip`, `left upper arm` …
+    /// Tailor's name: `chest`, `waist`, `hip`, `left upper arm` …
     pub name: String,
-    /// Cloth there, m².
+    /// Area of cloth there, m².
     pub area: f64,
     /// Mean and 95th percentile of the stretch.
     pub stretch: [f64; 2],
@@ -41,8 +41,8 @@ pub struct RegionFit {
     pub touching: f64,
     /// Mean distance from the skin, metres.
     pub gap: f64,
-    /// In a word.
-    pub fit: Fit,
+    /// Class of the fit.
+    pub fit: FitClass,
 }
 
 /// Fit of one garment.
@@ -54,16 +54,22 @@ pub struct FitMap {
     pub regions: Vec<RegionFit>,
 }
 
-/// Cloth this much further off the skin than its layer's own distance still touches, metres.
+/// Cloth this much farther off the skin than its layer's own distance still touches, metres.
 const TOUCH: f32 = 3e-3;
-/// From this stretch (95th percentile) on a region is tight: a woven fabric's comfortable limit of about 5 % (Kirk &
-/// Ibrahim 1966 give skin strains of 12 % and more at joints, which cloth must not have to follow at rest).
+/// Stretch (95th percentile) from which a region is tight: a woven fabric's comfortable limit, a third of the 12 % and more
+/// that skin strains at joints (Kirk & Ibrahim 1966).
 const TIGHT_STRETCH: f64 = 0.05;
-/// From this mean pressure on a region is tight, Pa. Denton 1972 puts discomfort at 6 to 10 kPa; a waistband that is
-/// felt but tolerated is at 1 to 2 kPa.
+/// Mean pressure from which a region is tight, Pa: a waistband is felt but tolerated at 1 to 2 kPa, and 6 to 10 kPa are
+/// uncomfortable (Denton 1972).
 const TIGHT_PRESSURE: f64 = 1_000.0;
-/// From this mean distance on a region is loose, metres: 19 cm of girth.
+/// Mean distance from which a region is loose, metres: 19 cm of girth.
 const LOOSE_GAP: f64 = 0.03;
+/// Least cloth from which a region is reported, m²: a hand's breadth square.
+const LEAST_AREA: f64 = 0.006;
+/// Percentile of stretch and pressure that is reported; the maximum is noise of single vertices.
+const PERCENTILE: usize = 95;
+/// Gravity, m/s².
+const GRAVITY: V3d = V3d::new(0.0, -9.81, 0.0);
 
 /// Colours of loose, fitted and tight cloth, sRGB.
 pub const FIT_COLORS: [[u8; 3]; 3] = [[58, 104, 190], [96, 168, 96], [206, 58, 48]];
@@ -90,7 +96,7 @@ impl VertexFit {
     }
 }
 
-/// What stays the same for an outfit; keeps the nearest skin of each vertex between calls.
+/// Probe that measures the fit of an outfit; keeps the nearest skin of each vertex between queries.
 #[derive(Debug)]
 pub struct FitProbe {
     sheets: Vec<Sheet>,
@@ -142,17 +148,16 @@ impl FitProbe {
             })
             .collect();
         let n = template.mesh().vertices().len();
+        let garments = &model.outfit.garments;
         Ok(Self {
-            sheets: model
-                .outfit
-                .garments
+            sheets: garments
                 .iter()
                 .map(Sheet::of_garment)
                 .collect::<Result<_, _>>()?,
             region: (0..n)
                 .map(|v| by_joint[template.weights().dominant(v)])
                 .collect(),
-            nearest: vec![Vec::new(); model.outfit.garments.len()],
+            nearest: vec![Vec::new(); garments.len()],
             frame: SurfaceFrame::default(),
         })
     }
@@ -189,160 +194,140 @@ impl FitProbe {
             if g.positions.len() != mesh.vertices {
                 return Err(count("garment vertices", g.positions.len(), mesh.vertices));
             }
-            let offset = model.offset(k) as f32;
-            let near = &mut self.nearest[k];
-            let vertices = feel(
-                &self.sheets[k],
+            let worn = WornGarment {
+                sheet: &self.sheets[k],
                 mesh,
-                &g.positions,
+                positions: &g.positions,
                 surface,
-                &self.frame,
-                offset,
-                near,
-            );
-            let regions = summarise(&self.sheets[k], mesh, &vertices, near, &self.region);
+                frame: &self.frame,
+                offset: model.offset(k) as f32,
+            };
+            let near = &mut self.nearest[k];
+            let vertices = worn.vertex_fits(near);
+            let regions = worn.region_fits(&vertices, near, &self.region);
             out.push(FitMap { vertices, regions });
         }
         Ok(out)
     }
 }
 
-/// Fit of each vertex. `near` holds the nearest body vertices of the last call, or nothing.
-fn feel(
-    sheet: &Sheet,
-    mesh: &GarmentMesh,
-    positions: &[P3],
-    surface: &SurfaceModel,
-    frame: &SurfaceFrame,
+/// One garment on the posed body.
+struct WornGarment<'a> {
+    sheet: &'a Sheet,
+    mesh: &'a GarmentMesh,
+    positions: &'a [P3],
+    surface: &'a SurfaceModel,
+    frame: &'a SurfaceFrame,
+    /// Distance of its layer from the skin, metres.
     offset: f32,
-    near: &mut Vec<u32>,
-) -> Vec<VertexFit> {
-    const GRAVITY: V3d = V3d::new(0.0, -9.81, 0.0);
-    let n = positions.len();
-    let x: Vec<V3d> = positions.iter().map(|p| p.coords.cast()).collect();
-    let mut pull = vec![V3d::zeros(); n];
-    sheet.add_gradient(&x, &mut pull);
-    let (mut area, mut stretch) = (vec![0.0f64; n], vec![0.0f64; n]);
-    for e in &sheet.elements {
-        let f = e.gradient(&x);
-        let c = f.transpose() * f;
-        // Larger eigenvalue of the 2×2 Cauchy–Green tensor.
-        let (half, det) = (0.5 * c.trace(), c.determinant());
-        let largest = (half + (half * half - det).max(0.0).sqrt()).sqrt() - 1.0;
-        for v in e.v {
-            area[v as usize] += e.area / 3.0;
-            stretch[v as usize] += largest * e.area / 3.0;
+}
+
+impl WornGarment<'_> {
+    /// Fit of each vertex; `near`: nearest body vertices of the last query, or empty.
+    fn vertex_fits(&self, near: &mut Vec<u32>) -> Vec<VertexFit> {
+        let n = self.positions.len();
+        let x: Vec<V3d> = self.positions.iter().map(|p| p.coords.cast()).collect();
+        let mut gradient = vec![V3d::zeros(); n];
+        self.sheet.add_gradient(&x, &mut gradient);
+        let (mut area, mut stretch) = (vec![0.0f64; n], vec![0.0f64; n]);
+        for e in &self.sheet.elements {
+            let f = e.gradient(&x);
+            let c = f.transpose() * f;
+            // Larger eigenvalue of the 2×2 Cauchy–Green tensor.
+            let (half, det) = (0.5 * c.trace(), c.determinant());
+            let largest = (half + (half * half - det).max(0.0).sqrt()).sqrt() - 1.0;
+            for v in e.v {
+                area[v as usize] += e.area / 3.0;
+                stretch[v as usize] += largest * e.area / 3.0;
+            }
         }
-    }
-    if near.len() != n {
-        *near = (0..n)
+        let mask = |i: usize| self.mesh.regions.get(i).map_or(Region::ALL.0, |r| r.0);
+        let (surface, frame) = (self.surface, self.frame);
+        if near.len() != n {
+            *near = (0..n)
+                .map(|i| surface.nearest_vertex(frame, &self.positions[i], mask(i)))
+                .collect();
+        }
+        (0..n)
             .map(|i| {
-                surface.nearest_vertex(
-                    frame,
-                    &positions[i],
-                    mesh.regions.get(i).map_or(Region::ALL.0, |r| r.0),
-                )
+                let c = surface.closest_beyond(frame, &self.positions[i], near[i], mask(i));
+                near[i] = c.vertex;
+                let a = area[i].max(f64::MIN_POSITIVE);
+                let gap = c.signed.max(0.0);
+                let pressure = if gap < self.offset + TOUCH {
+                    // −gradient + weight + skin = 0 along the normal.
+                    let force = gradient[i] - GRAVITY * self.sheet.mass[i];
+                    c.normal.cast::<f64>().dot(&force).max(0.0) / a
+                } else {
+                    0.0
+                };
+                VertexFit {
+                    stretch: (stretch[i] / a) as f32,
+                    pressure: pressure as f32,
+                    gap,
+                }
             })
-            .collect();
+            .collect()
     }
-    (0..n)
-        .map(|i| {
-            let mask = mesh.regions.get(i).map_or(Region::ALL.0, |r| r.0);
-            let c = surface.closest_beyond(frame, &positions[i], near[i], mask);
-            near[i] = c.vertex;
-            let a = area[i].max(f64::MIN_POSITIVE);
-            let gap = c.signed.max(0.0);
-            let pressure = if gap < offset + TOUCH {
-                // −gradient + weight + skin = 0 along the normal.
-                c.normal
-                    .cast::<f64>()
-                    .dot(&(pull[i] - GRAVITY * sheet.mass[i]))
-                    .max(0.0)
-                    / a
+    /// Fit of each region that has enough cloth; `region` per body vertex.
+    fn region_fits(&self, fits: &[VertexFit], near: &[u32], region: &[u8]) -> Vec<RegionFit> {
+        let mut area = vec![0.0f64; fits.len()];
+        for e in &self.sheet.elements {
+            e.v.iter().for_each(|v| area[*v as usize] += e.area / 3.0);
+        }
+        // Firm anchors stretch the cloth where they hold it.
+        let firm = self.mesh.anchors.iter().filter(|a| a.strength >= 1.0);
+        let held: BTreeSet<u32> = firm.flat_map(|a| a.vertices.iter().copied()).collect();
+        let mut out = Vec::new();
+        for (r, (name, ..)) in REGIONS.iter().enumerate() {
+            let own: Vec<usize> = (0..fits.len())
+                .filter(|i| usize::from(region[near[*i] as usize]) == r)
+                .collect();
+            let total: f64 = own.iter().map(|i| area[*i]).sum();
+            if total < LEAST_AREA {
+                continue;
+            }
+            let percentile = |value: &dyn Fn(&VertexFit) -> f32| {
+                let free = own.iter().filter(|i| !held.contains(&(**i as u32)));
+                let mut all: Vec<f32> = free.map(|i| value(&fits[*i])).collect();
+                all.sort_unstable_by(f32::total_cmp);
+                all.get((all.len() * PERCENTILE / 100).min(all.len().saturating_sub(1)))
+                    .map_or(0.0, |v| f64::from(*v))
+            };
+            let mean = |value: &dyn Fn(&VertexFit) -> f32| {
+                own.iter()
+                    .map(|i| f64::from(value(&fits[*i])) * area[*i])
+                    .sum::<f64>()
+                    / total
+            };
+            let touching = mean(&|v| f32::from(u8::from(v.pressure > 0.0)));
+            let stretch = [mean(&|v| v.stretch), percentile(&|v| v.stretch)];
+            let on_skin = if touching > 0.0 {
+                mean(&|v| v.pressure) / touching
             } else {
                 0.0
             };
-            VertexFit {
-                stretch: (stretch[i] / a) as f32,
-                pressure: pressure as f32,
+            let pressure = [on_skin, percentile(&|v| v.pressure)];
+            let gap = mean(&|v| v.gap);
+            let fit = if stretch[1] > TIGHT_STRETCH || pressure[0] > TIGHT_PRESSURE {
+                FitClass::Tight
+            } else if gap > LOOSE_GAP {
+                FitClass::Loose
+            } else {
+                FitClass::Fitted
+            };
+            out.push(RegionFit {
+                name: (*name).to_owned(),
+                area: total,
+                stretch,
+                pressure,
+                touching,
                 gap,
-            }
-        })
-        .collect()
-}
-
-fn summarise(
-    sheet: &Sheet,
-    mesh: &GarmentMesh,
-    vertices: &[VertexFit],
-    near: &[u32],
-    region: &[u8],
-) -> Vec<RegionFit> {
-    let mut area = vec![0.0f64; vertices.len()];
-    for e in &sheet.elements {
-        e.v.iter().for_each(|v| area[*v as usize] += e.area / 3.0);
-    }
-    // Edges that are tied to the body stretch where they are held; they are told by their pressure.
-    let held: std::collections::BTreeSet<u32> = mesh
-        .anchors
-        .iter()
-        .filter(|a| a.strength >= 1.0)
-        .flat_map(|a| a.vertices.iter().copied())
-        .collect();
-    let mut out = Vec::new();
-    for (r, (name, ..)) in REGIONS.iter().enumerate() {
-        let own: Vec<usize> = (0..vertices.len())
-            .filter(|i| usize::from(region[near[*i] as usize]) == r)
-            .collect();
-        let total: f64 = own.iter().map(|i| area[*i]).sum();
-        /// Less cloth than this says nothing about a region, m²: a hand's breadth square.
-        const LEAST: f64 = 0.006;
-        if total < LEAST {
-            continue;
+                fit,
+            });
         }
-        let percentile = |value: &dyn Fn(&VertexFit) -> f32| {
-            let mut all: Vec<f32> = own
-                .iter()
-                .filter(|i| !held.contains(&(**i as u32)))
-                .map(|i| value(&vertices[*i]))
-                .collect();
-            all.sort_unstable_by(f32::total_cmp);
-            all.get((all.len() * 95 / 100).min(all.len().saturating_sub(1)))
-                .map_or(0.0, |v| f64::from(*v))
-        };
-        let mean = |value: &dyn Fn(&VertexFit) -> f32| {
-            own.iter()
-                .map(|i| f64::from(value(&vertices[*i])) * area[*i])
-                .sum::<f64>()
-                / total
-        };
-        let touching = mean(&|v| f32::from(u8::from(v.pressure > 0.0)));
-        let stretch = [mean(&|v| v.stretch), percentile(&|v| v.stretch)];
-        let on_skin = if touching > 0.0 {
-            mean(&|v| v.pressure) / touching
-        } else {
-            0.0
-        };
-        let pressure = [on_skin, percentile(&|v| v.pressure)];
-        let gap = mean(&|v| v.gap);
-        let fit = if stretch[1] > TIGHT_STRETCH || pressure[0] > TIGHT_PRESSURE {
-            Fit::Tight
-        } else if gap > LOOSE_GAP {
-            Fit::Loose
-        } else {
-            Fit::Fitted
-        };
-        out.push(RegionFit {
-            name: (*name).to_owned(),
-            area: total,
-            stretch,
-            pressure,
-            touching,
-            gap,
-            fit,
-        });
+        out
     }
-    out
 }
 
 #[cfg(test)]
@@ -434,15 +419,15 @@ mod tests {
             render: RenderMesh::default(),
             min_angle: 45.0,
         };
-        feel(
-            &sheet,
-            &garment,
-            &x,
-            &surface,
-            &frame,
-            0.005,
-            &mut Vec::new(),
-        )
+        WornGarment {
+            sheet: &sheet,
+            mesh: &garment,
+            positions: &x,
+            surface: &surface,
+            frame: &frame,
+            offset: 0.005,
+        }
+        .vertex_fits(&mut Vec::new())
     }
 
     #[test]
@@ -474,7 +459,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tube_off_the_body_presses_nowhere_and_its_gap_is_the_distance() {
+    fn a_tube_off_the_body_has_no_pressure_and_its_gap_is_the_distance() {
         let fit = worn(TAU * 0.15, 0.15);
         for v in fit.iter().skip(64 * 5).take(64 * 10) {
             assert!(

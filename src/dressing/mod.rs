@@ -1,24 +1,63 @@
 //! A garment onto a body: panel placement, sewing, size choice, first drape, fit map.
+//!
+//! Panels are mapped around the body in a canonical pose, sewn and draped on a coarse mesh, moved with the body into the
+//! tracked pose, and refined. The result is a model and a state for [`crate::cloth::realtime::step`].
+//!
+//! ```
+//! use tryon::body::measure::measure;
+//! use tryon::body::{BodyShape, Pose, embedded};
+//! use tryon::dressing::{DressOptions, dress, suggest};
+//! use tryon::garment::library;
+//! use tryon::math::Rigid;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let template = embedded::template();
+//! let rest = template.personalise(&BodyShape::default());
+//! let choice = suggest("tank", &measure(&template, &rest)?)?;
+//! let pattern = library::pattern("tank", choice.size)?;
+//! let pose = Pose::rest(template.skeleton(), Rigid::identity());
+//! let dressed = dress(&template, &rest, &pose, &[pattern], &DressOptions::default())?;
+//! assert_eq!(dressed.state.garments.len(), 1);
+//! assert_eq!(dressed.report.crossings, 0);
+//! # Ok(())
+//! # }
+//! ```
 
+mod anchoring;
+mod body_guess;
+mod body_sections;
+mod bone_map;
 mod canonical;
-mod carry;
 mod drape;
 mod dress;
-mod figure;
+mod error;
+mod file_frame;
 mod fit_map;
 mod hood;
-mod made_on;
-mod mesh_wear;
+mod mesh_garment;
+mod options;
 mod place;
 mod plane;
 mod refine;
+mod retarget;
+mod rig_standing;
+mod sew;
 mod skin;
+mod skin_binding;
+mod source_body;
 mod suggest;
 mod waistband;
 
 pub use crate::cloth::realtime::{AnchorBinding, Outfit};
-pub use dress::{DressError, DressOptions, DressReport, Dressed, Wear, dress, dress_all};
+pub use dress::{Dressed, dress, dress_all};
+pub use error::{DressError, MeshGarmentError};
 pub use fit_map::{FIT_COLORS, FitMap, FitProbe, RegionFit, VertexFit};
-pub use made_on::{MadeOn, WearError, rig_standing};
-pub use mesh_wear::MeshWear;
-pub use suggest::{Fit, Misfit, Room, Suggestion, hem_height, judge, rooms, suggest, wearable};
+pub use mesh_garment::MeshGarment;
+pub use options::{DressMs, DressOptions, DressReport};
+pub use rig_standing::rig_standing;
+pub use sew::GarmentSource;
+pub use source_body::SourceBody;
+pub use suggest::{
+    FitClass, GirthEase, Misfit, Suggestion, assess, check_wearable, girth_eases, hem_height,
+    suggest,
+};

@@ -1,26 +1,29 @@
-//! What a vertex of a garment that is put on stays above.
+//! Contact plane of one vertex of a garment being draped.
 
 use crate::math::V3d;
 
-/// Skins face each other where the difference of their normals is longer than this: at a right angle √2.
+/// Length of the difference of two skins' normals from which they face each other: √2 at a right angle.
 const FACING: f64 = 1.41;
-/// Cloth further from its own skin than this may hang on the other half, metres: a shirt hangs beside a forearm.
+/// Distance from its own skin beyond which cloth may lie on the other half, metres: a shirt hangs beside a forearm.
 const HALVED: f64 = 0.06;
-/// Distance of either layer from the middle, metres: half of that between two layers on the skin.
+/// Distance of either layer from the middle plane, metres: half of that between two layers on the skin.
 const HALF_GAP: f64 = 0.00125;
 
-/// A plane a vertex stays above.
+/// Half-space constraint n · (x − point) ≥ height, metres.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Plane {
+pub(super) struct DrapePlane {
     pub(super) point: V3d,
     pub(super) normal: V3d,
     pub(super) height: f64,
+    /// Near enough to constrain the vertex.
     pub(super) near: bool,
 }
 
-impl Plane {
-    /// Between skins that face each other with `room` between them, `far` metres from `x`, cloth stays on its own half:
-    /// sleeves and the trunk of a shirt press on each other as the arms go down. Says whether that is so.
+impl DrapePlane {
+    /// Keeps cloth between two facing skins on its own half: sleeve and trunk are pressed together as the arms go down.
+    ///
+    /// `room`: clearance between the skins; `far`: distance of `x` from each, metres. Returns `false`, and changes
+    /// nothing, where the skins do not face each other.
     pub(super) fn keep_half(
         &mut self,
         other: &mut Self,
@@ -33,7 +36,7 @@ impl Plane {
         let facing = steep > FACING && far[0] < HALVED && far[1] < 2.0 * HALVED;
         if facing {
             let gap = HALF_GAP.min(0.25 * room);
-            // Where it would be as far from either.
+            // The point as far from either skin.
             other.point = x - away * ((far[1] - far[0]) / (steep * steep));
             other.normal = away / steep;
             other.height = gap;

@@ -1,10 +1,11 @@
-//! Positions of a fine mesh from those of a coarse one of the same pattern, through the flat panels.
+//! Prolongation: positions of a fine mesh from those of a coarse one of the same pattern, through the flat panels.
 
 use crate::garment::GarmentMesh;
 use crate::math::V3d;
 
-/// Interpolates linearly in the coarse triangle that holds each fine vertex on its panel; where the outlines differ
-/// (curves have more chords on the fine mesh) the nearest triangle is continued.
+/// Interpolates linearly in the coarse triangle that contains each fine vertex on its panel.
+///
+/// The outlines differ, as curves have more chords on the fine mesh: there the nearest triangle extrapolates.
 pub(super) fn prolong(coarse: &GarmentMesh, fine: &GarmentMesh, x: &[V3d]) -> Vec<V3d> {
     let mut by_panel: Vec<Vec<usize>> = vec![Vec::new(); coarse.panels.len()];
     for (f, p) in coarse.face_panel.iter().enumerate() {
@@ -16,15 +17,15 @@ pub(super) fn prolong(coarse: &GarmentMesh, fine: &GarmentMesh, x: &[V3d]) -> Ve
             let sum = corners.iter().fold(V3d::zeros(), |s, (panel, q)| {
                 s + by_panel
                     .get(usize::from(*panel))
-                    .map_or_else(V3d::zeros, |faces| at(coarse, faces, x, *q))
+                    .map_or_else(V3d::zeros, |faces| interpolate(coarse, faces, x, *q))
             });
             sum / corners.len().max(1) as f64
         })
         .collect()
 }
 
-fn at(mesh: &GarmentMesh, faces: &[usize], x: &[V3d], q: [f64; 2]) -> V3d {
-    // The triangle whose smallest weight is largest: the one that holds the point, or the one it is least outside of.
+fn interpolate(mesh: &GarmentMesh, faces: &[usize], x: &[V3d], q: [f64; 2]) -> V3d {
+    // The triangle whose smallest weight is largest contains the point, or is the one nearest to containing it.
     let mut best = (f64::NEG_INFINITY, 0usize, [0.0; 3]);
     for &f in faces {
         let w = weights(&mesh.rest[f], q);
@@ -59,7 +60,7 @@ mod tests {
     use crate::garment::{Size, Triangulation, library};
 
     #[test]
-    fn a_linear_map_of_the_panels_is_reproduced() {
+    fn prolongation_reproduces_a_linear_map_of_the_panels() {
         let p = library::pattern("skirt", Size::M).expect("pattern");
         let how = |edge_length| Triangulation {
             edge_length,
@@ -68,11 +69,10 @@ mod tests {
         };
         let sew = |edge_length| GarmentMesh::sew(&p, &how(edge_length)).expect("sewn");
         let (coarse, fine) = (sew(0.05), sew(0.02));
-        // Inner vertices only: seams average two panels that a linear map pulls apart.
         let map = |q: [f64; 2]| V3d::new(2.0 * q[0] - q[1], 0.5 * q[0], 3.0 * q[1] + 1.0);
         let x: Vec<V3d> = coarse.corners.iter().map(|c| map(c[0].1)).collect();
         let y = prolong(&coarse, &fine, &x);
-        // A panel without its seams: vertices far from any seam vertex.
+        // Away from seams, which average two panels that a linear map pulls apart.
         let seam_free = |q: [f64; 2]| q[0].abs() < 0.1;
         let mut seen = 0;
         for (c, y) in fine

@@ -1,4 +1,4 @@
-//! The body as garments meet it while they are put on.
+//! The collision body of the drape.
 
 use crate::cloth::realtime::Model;
 use crate::cloth::sleeves::{Arms, Line};
@@ -6,7 +6,7 @@ use crate::contact::{Apart, Buried, Closest, Crease, NearSkin, Part, SurfaceFram
 use crate::math::P3;
 use crate::par::Par;
 
-/// What cloth is draped on.
+/// Posed skin with its parts separated, for one drape.
 #[derive(Debug)]
 pub(super) struct Skin<'a> {
     pub(super) model: &'a SurfaceModel,
@@ -18,12 +18,12 @@ pub(super) struct Skin<'a> {
     opposite: &'a [Part],
     creases: &'a [Crease],
     pressing: &'a [Part],
-    /// What cloth needs between parts that press on each other, metres.
+    /// Clearance of cloth between parts that press on each other, metres.
     room: f32,
 }
 
 impl<'a> Skin<'a> {
-    /// Of the body that an outfit is simulated on.
+    /// For the body of a model, not posed yet.
     pub(super) fn of(model: &'a Model) -> Self {
         Self {
             model: model.surface(),
@@ -38,7 +38,7 @@ impl<'a> Skin<'a> {
             room: model.room(),
         }
     }
-    /// The body stands like this now.
+    /// Moves the body to posed vertices (world, metres).
     pub(super) fn show(&mut self, body: &[P3]) {
         self.frame.vertices.clear();
         self.frame.vertices.extend_from_slice(body);
@@ -60,23 +60,23 @@ impl<'a> Skin<'a> {
     pub(super) fn frame(&self) -> &SurfaceFrame {
         &self.frame
     }
-    /// Where its arms are.
+    /// Centre lines of the arms.
     pub(super) fn arm_lines(&self) -> [Line; 2] {
         self.arms.lines(&self.frame.vertices)
     }
-    /// Skin that lies in other skin, which it faces.
+    /// Skin inside other skin that it faces: cloth cannot lie there.
     pub(super) fn holds_nothing(&self, c: &Closest) -> bool {
         self.buried
             .holds_nothing(self.model.faces()[c.face as usize])
     }
-    /// The nearest point of some parts to `p`: where a walk from `start` leads, or a nearer one that no walk led to.
+    /// Nearest point of some parts to `p`: by a walk from vertex `start`, or from the grid where that is nearer.
     pub(super) fn closest(&self, p: &P3, start: u32, mask: Part) -> Closest {
         let walked = self.model.closest(&self.frame, p, start, mask);
         let [near, _] = self.near.around(self.model, &self.frame, p, [mask, 0]);
         near.or_nearer(self.model, &self.frame, p, Some(walked), mask)
             .unwrap_or(walked)
     }
-    /// Of two kinds of parts the nearest points to `p` where walks led, or nearer ones that no walk led to.
+    /// The nearer of walked and grid points, for each of two sets of parts.
     pub(super) fn nearer(&self, p: &P3, walked: [Closest; 2], masks: [Part; 2]) -> [Closest; 2] {
         let near = self.near.around(self.model, &self.frame, p, masks);
         std::array::from_fn(|k| {
@@ -84,7 +84,7 @@ impl<'a> Skin<'a> {
             found.unwrap_or(walked[k])
         })
     }
-    /// The body as cloth meets it, and what is known about its skin.
+    /// Separated vertices and the caches of the collision body.
     pub(super) fn known(self) -> (Vec<P3>, Buried, Apart) {
         (self.frame.vertices, self.buried, self.apart)
     }

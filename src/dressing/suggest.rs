@@ -1,63 +1,62 @@
-//! Which size fits, and why.
+//! Size choice: ease of each size on a measured body, with its reason in words.
 
 use crate::body::measure::Measurements;
 use crate::garment::{GarmentError, GarmentKind, Pattern, Placement, Size, library};
 
-/// How a place feels.
+/// Class of the fit at one place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Fit {
-    /// Less room than the garment needs.
+pub enum FitClass {
+    /// Less ease than the garment needs.
     Tight,
-    /// As drawn.
+    /// As designed.
     Fitted,
-    /// Much more room than drawn.
+    /// Much more ease than designed.
     Loose,
 }
 
-/// Room at one place.
+/// Ease of one girth: the garment's against the body's.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Room {
+pub struct GirthEase {
     /// `chest`, `waist` or `hip`.
     pub place: &'static str,
     /// Girth of the body, metres.
     pub body: f64,
     /// Girth of the finished garment, metres.
     pub garment: f64,
-    /// Least ease it is made to have, metres.
-    pub needed: f64,
-    /// How that feels.
-    pub fit: Fit,
+    /// Least ease by design, metres.
+    pub least_ease: f64,
+    /// Class of the fit there.
+    pub fit: FitClass,
 }
 
-impl Room {
+impl GirthEase {
     /// Finished girth minus body girth, metres.
     pub fn ease(&self) -> f64 {
         self.garment - self.body
     }
 }
 
-/// A size and its reason.
+/// A size on a body, with the reason for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Suggestion {
     /// The size.
     pub size: Size,
-    /// Room at chest, waist and hip (finished girth minus body girth), metres; NaN where the garment has no girth.
+    /// Ease at chest, waist and hip (finished girth minus body girth), metres; NaN where the garment has no girth.
     pub ease: [f64; 3],
-    /// The same, place by place, where the garment has a girth.
-    pub rooms: Vec<Room>,
-    /// Where the hem will be, metres above the floor.
+    /// Ease of the girths that the garment has.
+    pub girths: Vec<GirthEase>,
+    /// Height of the hem above the floor, metres.
     pub hem: f64,
-    /// The same above a mark of the body that tells more, metres (negative below it), and the mark.
+    /// Height of the hem above a landmark of the body, metres (negative below it), and the landmark.
     pub length: (f64, &'static str),
-    /// One sentence for the shopper.
+    /// One sentence for the user.
     pub reason: String,
 }
 
-/// Least room a garment must leave at chest, waist and hip, metres: a T-shirt 4 cm at the chest, a waistband none (it
-/// sits lower on a fuller body) and 2 cm at the hip.
+/// Least ease at chest, waist and hip, metres: a waistband needs none, it sits lower on a fuller body.
 const LEAST: [f64; 3] = [0.04, -0.03, 0.02];
-/// Room beyond [`LEAST`] from which a place counts as loose, metres: two sizes of the table.
+/// Ease beyond [`LEAST`] from which a place counts as loose, metres: two sizes of the table.
 const LOOSE: f64 = 0.14;
 /// Height of the high point of the shoulder over stature: cervicale height 1.521 m at 1.756 m (ANSUR II, men; women's
 /// 0.864), a finger below.
@@ -66,34 +65,38 @@ const SHOULDER_POINT: f64 = 0.862;
 const WAIST_HEIGHT: f64 = 0.62;
 /// Height of the middle of the knee over stature (ANSUR II: 0.49 m at 1.756 m).
 const KNEE_HEIGHT: f64 = 0.279;
-/// Cloth's crotch below the body's, metres.
-const CROTCH_ROOM: f64 = 0.012;
+/// Crotch of trousers below the body's, metres.
+pub(super) const CROTCH_CLEARANCE: f64 = 0.012;
+/// Height of the crotch point of trousers without an inseam, panel coordinates, metres.
+pub(super) const DEFAULT_RISE: f64 = -0.29;
+/// Hem height from which trousers are shorts, metres.
+const SHORTS: f64 = 0.25;
 
-/// Room at chest, waist and hip that a pattern leaves on a body.
-pub fn rooms(pattern: &Pattern, body: &Measurements) -> Vec<Room> {
+/// Ease at chest, waist and hip of a pattern on a body, where the pattern has a girth.
+pub fn girth_eases(pattern: &Pattern, body: &Measurements) -> Vec<GirthEase> {
     let girths = [body.chest, body.natural_waist, body.hip];
     (0..3)
         .filter(|&k| pattern.finished[k] > 0.0)
         .map(|k| {
-            let more = pattern.finished[k] - girths[k] - LEAST[k];
-            Room {
+            let spare = pattern.finished[k] - girths[k] - LEAST[k];
+            GirthEase {
                 place: ["chest", "waist", "hip"][k],
                 body: girths[k],
                 garment: pattern.finished[k],
-                needed: LEAST[k],
-                fit: if more < 0.0 {
-                    Fit::Tight
-                } else if more > LOOSE {
-                    Fit::Loose
+                least_ease: LEAST[k],
+                fit: if spare < 0.0 {
+                    FitClass::Tight
+                } else if spare > LOOSE {
+                    FitClass::Loose
                 } else {
-                    Fit::Fitted
+                    FitClass::Fitted
                 },
             }
         })
         .collect()
 }
 
-/// Where the lowest hem of a pattern will be on a body, metres above the floor.
+/// Height of the lowest hem of a pattern on a body, metres above the floor.
 pub fn hem_height(pattern: &Pattern, body: &Measurements) -> f64 {
     let lowest = |wanted: &dyn Fn(Placement) -> bool| {
         let panels = pattern.panels.iter().filter(|p| wanted(p.placement));
@@ -119,14 +122,19 @@ pub fn hem_height(pattern: &Pattern, body: &Measurements) -> f64 {
                         .map(|i| p.edges[i].from[1].max(p.end(i)[1]))
                 })
                 .fold(f64::MIN, f64::max);
-            body.inseam - CROTCH_ROOM + l - if crotch > f64::MIN { crotch } else { -0.29 }
+            body.inseam - CROTCH_CLEARANCE + l
+                - if crotch > f64::MIN {
+                    crotch
+                } else {
+                    DEFAULT_RISE
+                }
         }
         (None, None, None) => 0.0,
     }
     .max(0.0)
 }
 
-/// The smallest size with enough room everywhere; the largest when none has.
+/// The smallest size with enough ease everywhere; the largest when none has.
 ///
 /// # Errors
 /// Unknown garment.
@@ -134,8 +142,8 @@ pub fn suggest(garment: &str, body: &Measurements) -> Result<Suggestion, Garment
     let mut last = None;
     for size in Size::ALL {
         let p = library::pattern(garment, size)?;
-        let s = judge(&p, body);
-        let fits = s.rooms.iter().all(|r| r.fit != Fit::Tight);
+        let s = assess(&p, body);
+        let fits = s.girths.iter().all(|r| r.fit != FitClass::Tight);
         if fits {
             return Ok(s);
         }
@@ -146,10 +154,10 @@ pub fn suggest(garment: &str, body: &Measurements) -> Result<Suggestion, Garment
     Ok(s)
 }
 
-/// Why a size cannot be worn, and which one can.
+/// A size that cannot be worn, with the nearest one that can.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Misfit {
-    /// Even stretched it does not go around the body.
+    /// Too small even when stretched.
     #[error("{garment} {size} cannot be closed: at the {place} it lacks {:.0} cm (body {:.0} cm, garment {:.0} cm, {fabric} gives {:.0} cm){}",
         (lacks * 100.0).ceil(), body * 100.0, girth * 100.0, gives * 100.0, advice(*better))]
     TooSmall {
@@ -163,16 +171,16 @@ pub enum Misfit {
         body: f64,
         /// Girth of the finished garment, metres.
         girth: f64,
-        /// How far the fabric stretches there, metres.
+        /// Stretch of the fabric there, metres.
         gives: f64,
-        /// What is missing beyond that, metres.
+        /// Girth that is missing beyond that, metres.
         lacks: f64,
         /// The fabric.
         fabric: String,
         /// A size that can be worn.
         better: Option<Size>,
     },
-    /// Nothing holds it up.
+    /// Too wide to be held up.
     #[error("{garment} {size} would slide off: its waist is {:.0} cm wider than the hips (hips {:.0} cm, waist {:.0} cm){}",
         ((girth - body) * 100.0).ceil(), body * 100.0, girth * 100.0, advice(*better))]
     TooLarge {
@@ -196,20 +204,20 @@ fn advice(better: Option<Size>) -> String {
     )
 }
 
-/// A waistband that lacks this much still closes: it sits lower, or the button moves, metres.
+/// Girth that a waistband may lack, metres: it sits lower, or its button moves.
 const SITS_LOWER: f64 = 0.03;
 
-/// Whether a pattern can be worn by a body at all: closed with what its fabric gives, and held up.
+/// Checks that a body can wear a pattern: it closes with the stretch of its fabric, and is held up.
 ///
 /// # Errors
-/// What is missing where, and which size of the library can be worn.
-pub fn wearable(pattern: &Pattern, body: &Measurements) -> Result<(), Misfit> {
+/// The missing girth, and the nearest size of the library that can be worn.
+pub fn check_wearable(pattern: &Pattern, body: &Measurements) -> Result<(), Misfit> {
     let fault = misfit(pattern, body);
     fault.map_or(Ok(()), |mut m| {
         let wears = |s: &Size| {
             library::pattern(&pattern.name, *s).is_ok_and(|p| misfit(&p, body).is_none())
         };
-        // The nearest in the direction that is needed.
+        // The nearest in the direction that is least_ease.
         let found = match m {
             Misfit::TooSmall { .. } => Size::ALL
                 .into_iter()
@@ -230,7 +238,7 @@ pub fn wearable(pattern: &Pattern, body: &Measurements) -> Result<(), Misfit> {
 fn misfit(pattern: &Pattern, body: &Measurements) -> Option<Misfit> {
     let (garment, size) = (pattern.name.clone(), pattern.size);
     let held = matches!(pattern.kind, GarmentKind::Skirt | GarmentKind::Trousers);
-    let tightest = rooms(pattern, body)
+    let tightest = girth_eases(pattern, body)
         .into_iter()
         .map(|r| {
             let gives = r.garment * pattern.material.give();
@@ -268,20 +276,20 @@ fn misfit(pattern: &Pattern, body: &Measurements) -> Option<Misfit> {
     })
 }
 
-/// How one pattern fits a body, in numbers and in a sentence.
-pub fn judge(pattern: &Pattern, body: &Measurements) -> Suggestion {
-    let rooms = rooms(pattern, body);
-    let girths = [body.chest, body.natural_waist, body.hip];
+/// Fit of one pattern on a body, in numbers and in a sentence.
+pub fn assess(pattern: &Pattern, body: &Measurements) -> Suggestion {
+    let girths = girth_eases(pattern, body);
+    let body_girths = [body.chest, body.natural_waist, body.hip];
     let ease: [f64; 3] = std::array::from_fn(|k| {
         if pattern.finished[k] > 0.0 {
-            pattern.finished[k] - girths[k]
+            pattern.finished[k] - body_girths[k]
         } else {
             f64::NAN
         }
     });
-    let tightest = rooms
+    let tightest = girths
         .iter()
-        .min_by(|a, b| (a.ease() - a.needed).total_cmp(&(b.ease() - b.needed)));
+        .min_by(|a, b| (a.ease() - a.least_ease).total_cmp(&(b.ease() - b.least_ease)));
     let (what, leaves) = match pattern.kind {
         GarmentKind::Top => ("top", "leaves"),
         GarmentKind::Skirt => ("skirt", "leaves"),
@@ -292,10 +300,10 @@ pub fn judge(pattern: &Pattern, body: &Measurements) -> Suggestion {
     let length = match pattern.kind {
         GarmentKind::Top => (hem - body.inseam, "the crotch"),
         GarmentKind::Skirt | GarmentKind::Dress => (hem - KNEE_HEIGHT * body.stature, "the knee"),
-        GarmentKind::Trousers if hem > 0.25 => (hem - KNEE_HEIGHT * body.stature, "the knee"),
+        GarmentKind::Trousers if hem > SHORTS => (hem - KNEE_HEIGHT * body.stature, "the knee"),
         GarmentKind::Trousers => (hem, "the floor"),
     };
-    let room = tightest.map_or_else(String::new, |r| {
+    let ease_text = tightest.map_or_else(String::new, |r| {
         format!(
             "the {what} {leaves} {:+.0} cm at the {} of {:.0} cm; ",
             r.ease() * 100.0,
@@ -306,11 +314,11 @@ pub fn judge(pattern: &Pattern, body: &Measurements) -> Suggestion {
     Suggestion {
         size: pattern.size,
         ease,
-        rooms,
+        girths,
         hem,
         length,
         reason: format!(
-            "{}: {room}the hem ends {}",
+            "{}: {ease_text}the hem ends {}",
             pattern.size,
             relative(length.0, length.1)
         ),
@@ -358,7 +366,7 @@ mod tests {
             assert_eq!(sizes[3], Size::Xxl);
         }
         let s = suggest("tshirt", &body(1.0)).expect("size");
-        let tightest = s.rooms.iter().map(|r| r.place).collect::<Vec<_>>();
+        let tightest = s.girths.iter().map(|r| r.place).collect::<Vec<_>>();
         assert_eq!(tightest, ["chest", "hip"]);
         assert!(
             s.reason.contains("cm at the") && s.reason.contains("the crotch"),
@@ -376,25 +384,25 @@ mod tests {
     #[test]
     fn ease_is_the_difference_of_girths_and_classes_follow_it() {
         let p = library::pattern("tshirt", Size::M).expect("pattern");
-        let s = judge(&p, &body(1.0));
+        let s = assess(&p, &body(1.0));
         assert!((s.ease[0] - (p.finished[0] - 0.88)).abs() < 1e-12 && s.ease[1].is_nan());
-        let fit = |g: f64| judge(&p, &body(g)).rooms[0].fit;
+        let fit = |g: f64| assess(&p, &body(g)).girths[0].fit;
         assert_eq!(
             [fit(1.3), fit(1.1), fit(0.8)],
-            [Fit::Tight, Fit::Fitted, Fit::Loose]
+            [FitClass::Tight, FitClass::Fitted, FitClass::Loose]
         );
     }
 
     #[test]
-    fn what_cannot_be_closed_or_held_up_is_refused_with_what_is_missing() {
+    fn sizes_that_cannot_be_closed_or_held_up_are_refused_with_the_missing_girth() {
         let p = library::pattern("tshirt", Size::S).expect("pattern");
         let give = p.material.give();
         let mut b = body(1.0);
         b.hip = 0.5;
         b.chest = p.finished[0] * (1.0 + give) - 0.001;
-        assert_eq!(wearable(&p, &b), Ok(()), "worn tight");
+        assert_eq!(check_wearable(&p, &b), Ok(()), "worn tight");
         b.chest += 0.0505;
-        let e = wearable(&p, &b).expect_err("too small");
+        let e = check_wearable(&p, &b).expect_err("too small");
         let text = e.to_string();
         assert!(
             text.contains("tshirt S cannot be closed: at the chest it lacks 5 cm")
@@ -404,9 +412,11 @@ mod tests {
         // A waistband closes with less than its hips, and slides off if it is wider than these.
         let skirt = library::pattern("skirt", Size::Xl).expect("pattern");
         let slim = body(0.9);
-        let e = wearable(&skirt, &slim).expect_err("too large").to_string();
+        let e = check_wearable(&skirt, &slim)
+            .expect_err("too large")
+            .to_string();
         assert!(e.contains("slide off") && e.contains("can be worn"), "{e}");
-        let none = wearable(
+        let none = check_wearable(
             &library::pattern("skirt", Size::Xxl).expect("pattern"),
             &body(2.0),
         )
@@ -424,6 +434,6 @@ mod tests {
         let low = hem_height(&trousers, &b);
         b.inseam += 0.05;
         assert!((hem_height(&trousers, &b) - low - 0.05).abs() < 1e-12);
-        assert!(judge(&trousers, &b).reason.contains("the floor"));
+        assert!(assess(&trousers, &b).reason.contains("the floor"));
     }
 }

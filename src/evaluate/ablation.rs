@@ -5,7 +5,7 @@ use super::{EvaluateError, Row, Scene, scenes};
 use crate::body::{Template, embedded};
 use crate::camera::NoiseModel;
 use crate::registration::Association;
-use crate::synth::{Room, Sequence, Setting, Shopper};
+use crate::synth::{Actor, Room, Sequence, Setting};
 use crate::tracking::{Normals, TrackerConfig};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -182,7 +182,7 @@ impl Source {
                     room: Some(Room::default()),
                     ..Setting::default()
                 };
-                let sequence = Sequence::new(Shopper::default(), setting);
+                let sequence = Sequence::new(Actor::default(), setting);
                 let name = if *noise == NoiseModel::KinectV1 {
                     "synthetic_kinect1"
                 } else {

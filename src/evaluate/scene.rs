@@ -124,7 +124,7 @@ impl Scene {
 
     /// The first `frames` frames of a synthetic sequence. End points are not compared, as in the recorded truth.
     pub fn synthetic(name: impl Into<String>, sequence: &Sequence, frames: u64) -> Self {
-        let template = &sequence.shopper().template;
+        let template = &sequence.actor().template;
         let joints = template.skeleton().joints();
         let compared: Vec<usize> = (0..joints.len())
             .filter(|&j| !joints[j].name.ends_with("_end"))

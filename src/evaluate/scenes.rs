@@ -7,7 +7,7 @@ use crate::camera::NoiseModel;
 use crate::formats::npz::read_smpl;
 use crate::formats::read_motion;
 use crate::math::P3d;
-use crate::synth::{Room, Routine, Sequence, Setting, Shopper};
+use crate::synth::{Actor, Room, Routine, Sequence, Setting};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -17,9 +17,9 @@ use std::sync::Arc;
 /// # Errors
 /// When the body cannot be read.
 pub fn hard(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
-    let shopper = Shopper {
+    let subject = Actor {
         template: subject(data, "subject_f_avg")?,
-        ..Shopper::default()
+        ..Actor::default()
     };
     let setting = |height: f64, away: f64, routine| Setting {
         world_from_camera: Setting::tilted(height, 0.0, 0.0),
@@ -32,9 +32,9 @@ pub fn hard(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
         ..Setting::default()
     };
     let frames = 200;
-    let upper = Sequence::new(shopper.clone(), setting(1.35, 1.25, Routine::Turn));
+    let upper = Sequence::new(subject.clone(), setting(1.35, 1.25, Routine::Turn));
     let turn = Scene::synthetic("turn_upper", &upper, frames);
-    let whole = Sequence::new(shopper.clone(), setting(1.0, 2.4, Routine::TryOn));
+    let whole = Sequence::new(subject.clone(), setting(1.0, 2.4, Routine::TryOn));
     let arm = Scene::synthetic("arm_without_return", &whole, frames);
     let arm = arm
         .without_return("left_shoulder", "left_elbow", 0.10)
@@ -46,7 +46,7 @@ pub fn hard(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
     };
     let hole = Scene::synthetic(
         "arm_without_return_room",
-        &Sequence::new(shopper, walled),
+        &Sequence::new(subject, walled),
         frames,
     );
     let hole = hole
@@ -60,9 +60,9 @@ pub fn hard(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
 /// # Errors
 /// When the body cannot be read.
 pub fn idle(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
-    let shopper = Shopper {
+    let subject = Actor {
         template: subject(data, "subject_m_heavy")?,
-        ..Shopper::default()
+        ..Actor::default()
     };
     let scene = |name: &str, routine| {
         let setting = Setting {
@@ -71,7 +71,7 @@ pub fn idle(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
             seed: 5,
             ..Setting::default()
         };
-        Scene::synthetic(name, &Sequence::new(shopper.clone(), setting), 150)
+        Scene::synthetic(name, &Sequence::new(subject.clone(), setting), 150)
     };
     Ok(vec![
         scene("still", Routine::Still),
@@ -185,9 +185,9 @@ pub fn unseen(data: &Path, name: &str) -> Result<Scene, EvaluateError> {
     else {
         return Err(fault("no such scene".into()));
     };
-    let shopper = Shopper {
+    let subject = Actor {
         template: subject(data, body)?,
-        ..Shopper::default()
+        ..Actor::default()
     };
     let setting = Setting {
         world_from_camera: Setting::tilted(height, down, 0.0),
@@ -199,7 +199,7 @@ pub fn unseen(data: &Path, name: &str) -> Result<Scene, EvaluateError> {
         seed: 7,
         ..Setting::default()
     };
-    let mut sequence = Sequence::new(shopper, setting);
+    let mut sequence = Sequence::new(subject, setting);
     if let Some(clip) = clip {
         let motion =
             read_motion(&data.join("motion").join(clip)).map_err(|e| fault(e.to_string()))?;

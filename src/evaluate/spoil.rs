@@ -173,7 +173,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synth::{Routine, Sequence, Setting, Shopper};
+    use crate::synth::{Actor, Routine, Sequence, Setting};
 
     #[test]
     fn shares_are_kept_and_truth_goes_along() {
@@ -182,7 +182,7 @@ mod tests {
             color: false,
             ..Setting::default()
         };
-        let scene = Scene::synthetic("still", &Sequence::new(Shopper::default(), setting), 5);
+        let scene = Scene::synthetic("still", &Sequence::new(Actor::default(), setting), 5);
         let readings =
             |s: &Scene| s.frames[1].depth.data().iter().filter(|d| **d > 0).count() as f64;
         let all = readings(&scene);

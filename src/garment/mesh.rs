@@ -86,11 +86,33 @@ impl Region {
     }
 }
 
-/// Vertices that hang on the body.
+/// How a set of anchors is tied to the body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum AnchorKind {
+    /// A band around the body: its vertices are spread evenly before they are tied.
+    Band,
+    /// Cloth that lies on the shoulders: each vertex is tied to the nearest skin.
+    Shoulders,
+    /// A rigid accessory: each vertex keeps its exact place over the skin.
+    Rigid,
+}
+
+impl AnchorKind {
+    /// Kind of a pattern's anchor: patterns call theirs `shoulders` or by the edge that holds them.
+    fn of_pattern(name: &str) -> Self {
+        if name == "shoulders" {
+            Self::Shoulders
+        } else {
+            Self::Band
+        }
+    }
+}
+
+/// Vertices that are tied to the body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AnchorSet {
-    /// Name as in the pattern.
-    pub name: String,
+    /// How they are tied.
+    pub kind: AnchorKind,
     /// Simulation vertices.
     pub vertices: Vec<u32>,
     /// How firmly, 0 to 1.
@@ -262,7 +284,7 @@ impl GarmentMesh {
             vertices.sort_unstable();
             vertices.dedup();
             out.anchors.push(AnchorSet {
-                name: a.name.clone(),
+                kind: AnchorKind::of_pattern(&a.name),
                 vertices,
                 strength: a.strength,
             });

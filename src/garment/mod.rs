@@ -13,7 +13,7 @@ mod triangulate;
 pub use error::GarmentError;
 pub use material::Material;
 pub use mesh::mesh_area;
-pub use mesh::{AnchorSet, GarmentMesh, Region, RenderMesh, Triangulation};
+pub use mesh::{AnchorKind, AnchorSet, GarmentMesh, Region, RenderMesh, Triangulation};
 pub use outline::{Curve, PanelEdge};
 pub use pattern::{Anchor, Dart, GarmentKind, Panel, Pattern, Placement, Seam, Side};
 pub use size::{BodyMeasures, Size, SizeRow, size_table};

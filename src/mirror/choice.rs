@@ -1,7 +1,7 @@
 //! Garments chosen for a person and the size in which each is worn.
 
 use crate::body::measure::Measurements;
-use crate::dressing::{MeshWear, Wear, suggest};
+use crate::dressing::{GarmentSource, MeshGarment, suggest};
 use crate::garment::{GarmentError, Pattern, Size, library};
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ pub enum Choice {
     /// Pattern in the size it was drawn in.
     Pattern(Box<Pattern>),
     /// Mesh made on another body.
-    Mesh(Arc<MeshWear>),
+    Mesh(Arc<MeshGarment>),
 }
 
 impl Choice {
@@ -75,7 +75,7 @@ pub struct SizedGarment {
 #[derive(Clone, Debug)]
 enum Item {
     Pattern(Box<Pattern>),
-    Mesh(Arc<MeshWear>),
+    Mesh(Arc<MeshGarment>),
 }
 
 impl SizedGarment {
@@ -95,10 +95,10 @@ impl SizedGarment {
         }
     }
 
-    pub(super) fn wear(&self) -> Wear<'_> {
+    pub(super) fn wear(&self) -> GarmentSource<'_> {
         match &self.item {
-            Item::Pattern(p) => Wear::Pattern(p),
-            Item::Mesh(m) => Wear::Mesh(m),
+            Item::Pattern(p) => GarmentSource::Pattern(p),
+            Item::Mesh(m) => GarmentSource::Mesh(m),
         }
     }
 }

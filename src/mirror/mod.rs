@@ -7,10 +7,10 @@
 //! use tryon::body::embedded;
 //! use tryon::mirror::{Choice, Mirror};
 //! use tryon::formats::RgbdSource;
-//! use tryon::synth::{Sequence, Setting, Shopper, SynthSource};
+//! use tryon::synth::{Sequence, Setting, Actor, SynthSource};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let scene = Sequence::new(Shopper::default(), Setting::default());
+//! let scene = Sequence::new(Actor::default(), Setting::default());
 //! let mut recording = SynthSource::new(scene, Some(2));
 //! let choices = vec![Choice::library("tshirt", None)?];
 //! let mut mirror = Mirror::new(embedded::template(), recording.calibration(), choices);

@@ -4,7 +4,7 @@ use super::choice::SizedGarment;
 use crate::body::{Pose, RestBody, Template};
 use crate::cloth::ClothError;
 use crate::cloth::realtime::{Config, Input, Model, State, StepReport, Workspace, step};
-use crate::dressing::{DressError, DressOptions, Wear, dress_all};
+use crate::dressing::{DressError, DressOptions, GarmentSource, dress_all};
 use crate::math::{Camera, P3, Rigid, World};
 
 /// Tracked body that is dressed.
@@ -41,7 +41,7 @@ impl DressedOutfit {
         worn: Vec<SizedGarment>,
         any_size: bool,
     ) -> Result<Self, DressError> {
-        let wear: Vec<Wear<'_>> = worn.iter().map(SizedGarment::wear).collect();
+        let wear: Vec<GarmentSource<'_>> = worn.iter().map(SizedGarment::wear).collect();
         let options = DressOptions {
             config: Config::tracked().seen_from(&subject.world_from_camera),
             any_size,

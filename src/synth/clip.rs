@@ -21,7 +21,7 @@ struct Landmarks {
     head: Option<[usize; 2]>,
 }
 
-/// A clip whose joints have been found.
+/// A clip with its landmarks.
 #[derive(Clone, Debug)]
 pub(super) struct Performance {
     clip: MotionClip,
@@ -44,7 +44,7 @@ pub struct ClipError(
     pub String,
 );
 
-/// Names a landmark goes by: CMU's ASF, two MakeHuman BVH rigs, Mixamo. `?` stands for the side.
+/// Joint names of a landmark: CMU's ASF, two MakeHuman BVH rigs, Mixamo. `?` and `*` stand for the side.
 const NAMES: [(&str, &[&str]); 8] = [
     ("hip", &["?femur", "?Thigh", "?hip", "*UpLeg"]),
     ("knee", &["?tibia", "?Shin", "?knee", "*Leg"]),
@@ -138,11 +138,6 @@ impl Performance {
         })
     }
 
-    /// Length with the calibration pose before it, seconds.
-    pub(super) fn seconds(&self) -> f64 {
-        HOLD + BLEND + self.clip.seconds()
-    }
-
     /// Stance at `t`: calibration pose, blend, then the clip.
     pub(super) fn stance(&self, rig: &Rig, home: P3d, t: f64) -> Stance {
         let still = || Routine::Still.stance(rig, home, t);
@@ -221,7 +216,7 @@ impl Performance {
 #[cfg(test)]
 mod tests {
     use crate::formats::{MotionClip, read_motion};
-    use crate::synth::{Sequence, Setting, Shopper};
+    use crate::synth::{Actor, Sequence, Setting};
     use std::path::PathBuf;
 
     fn shared(name: &str) -> Option<MotionClip> {
@@ -250,7 +245,7 @@ mod tests {
             frames: vec![],
             period: 0.01,
         };
-        let e = Sequence::new(Shopper::default(), Setting::default())
+        let e = Sequence::new(Actor::default(), Setting::default())
             .with_clip(clip)
             .expect_err("no joints");
         assert!(e.to_string().contains("neck"), "{e}");
@@ -269,10 +264,10 @@ mod tests {
             ),
         ] {
             let Some(clip) = shared(file) else { return };
-            let s = Sequence::new(Shopper::default(), Setting::default())
+            let s = Sequence::new(Actor::default(), Setting::default())
                 .with_clip(clip.clone())
                 .expect("plays");
-            let skeleton = s.shopper().template.skeleton().clone();
+            let skeleton = s.actor().template.skeleton().clone();
             let ours = ["left_shoulder", "left_elbow", "right_hip", "right_knee"]
                 .map(|n| skeleton.index(n).expect(n));
             let theirs = names.map(|n| clip.joint(&[n]).expect(n));
@@ -281,45 +276,12 @@ mod tests {
                 let truth = s.truth(i);
                 let t = i as f64 / 30.0 - 2.0;
                 let f = &clip.frames[((t / clip.period) as usize).min(clip.frames.len() - 1)];
-                // Angle between thigh and upper arm does not depend on where the clip or the camera looks.
+                // The angle between thigh and upper arm does not depend on the headings of clip and camera.
                 let w = |k: usize| truth.joints[ours[k + 1]] - truth.joints[ours[k]];
                 let c = |k: usize| f[theirs[k + 1]] - f[theirs[k]];
                 worst = worst.max((w(0).angle(&w(2)) - c(0).angle(&c(2))).abs());
             }
             assert!(worst < 0.2, "{file}: {worst} rad");
-        }
-    }
-
-    /// Writes pictures for eyes into the folder named by `TRYON_LOOK`.
-    #[test]
-    fn look() {
-        let Some(dir) = std::env::var_os("TRYON_LOOK").map(PathBuf::from) else {
-            return;
-        };
-        for (n, file) in [
-            "cmu_asf_amc/02_07.amc",
-            "cmu_bvh/02_02_makehuman.bvh",
-            "cmu_bvh/02_03.bvh",
-            "cmu_asf_amc/13_29.amc",
-        ]
-        .into_iter()
-        .enumerate()
-        {
-            let Some(clip) = shared(file) else { return };
-            let s = Sequence::new(Shopper::default(), Setting::default())
-                .with_clip(clip.at_cmu_rate())
-                .expect("plays");
-            let mut sheet = crate::camera::ColorImage::filled(4 * 640, 480, [0; 3]);
-            for (k, i) in [50u64, 66, 80, 95].into_iter().enumerate() {
-                let color = s.frame(i).0.color.expect("colour");
-                for v in 0..480 {
-                    let at = 3 * (v * 4 * 640 + k * 640);
-                    sheet.data_mut()[at..at + 3 * 640]
-                        .copy_from_slice(&color.data()[3 * v * 640..3 * (v + 1) * 640]);
-                }
-            }
-            crate::formats::image::write_png_rgb(&dir.join(format!("clip_{n}.png")), &sheet)
-                .expect("written");
         }
     }
 }

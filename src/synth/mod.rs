@@ -1,6 +1,6 @@
 //! Synthetic people, garments, cameras and sequences with known truth, for the demo, tests and benches.
 //!
-//! A [`Sequence`] is a [`Shopper`] doing a [`Routine`] in a [`Room`] before a camera with a
+//! A [`Sequence`] is an [`Actor`] doing a [`Routine`] in a [`Room`] before a camera with a
 //! [`NoiseModel`]. Frames are functions of their number: any order, same bits.
 
 mod clip;
@@ -15,5 +15,5 @@ pub use crate::camera::NoiseModel;
 pub use clip::ClipError;
 pub use room::Room;
 pub use routine::Routine;
-pub use sequence::{Sequence, Setting, Shopper, Truth};
+pub use sequence::{Actor, Sequence, Setting, Truth};
 pub use source::SynthSource;

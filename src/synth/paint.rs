@@ -1,10 +1,10 @@
-//! What a synthetic shopper wears and looks like: colours by place on the rest body.
+//! Appearance of the synthetic actor: colours by region of the rest body.
 
 use crate::body::parts::{BodyParts, BodySegment};
 use crate::body::{RestBody, Skeleton, SkinWeights};
 use crate::math::{P3, V3};
 
-/// Colours of a shopper, sRGB.
+/// Colours of an actor, sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Colors {
     pub(super) skin: [u8; 3],
@@ -14,7 +14,7 @@ pub(super) struct Colors {
     pub(super) shoes: [u8; 3],
 }
 
-/// Skins, hair, shirts and leggings to choose from.
+/// Palettes of skin, hair, shirts and leggings, sRGB.
 const SKIN: [[u8; 3]; 4] = [
     [226, 180, 152],
     [198, 146, 112],
@@ -26,7 +26,7 @@ const SHIRT: [[u8; 3]; 3] = [[150, 154, 160], [126, 140, 150], [168, 160, 150]];
 const LEGS: [[u8; 3]; 3] = [[46, 48, 56], [54, 58, 78], [62, 54, 50]];
 
 impl Colors {
-    /// One of the looks, the same for the same number.
+    /// Colours of a seed.
     pub(super) fn pick(seed: u64) -> Self {
         let at =
             |n: u64, len: usize| (seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> n) as usize % len;
@@ -40,9 +40,9 @@ impl Colors {
     }
 }
 
-/// Regions that are painted alike.
+/// Regions of one colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Region {
+enum PaintedRegion {
     Head,
     Trunk,
     UpperArm,
@@ -55,7 +55,7 @@ enum Region {
 #[derive(Clone, Debug)]
 pub(super) struct Paint {
     colors: Colors,
-    regions: Vec<Region>,
+    regions: Vec<PaintedRegion>,
     neck: V3,
     head: V3,
     /// Head size against the embedded body's.
@@ -68,7 +68,7 @@ pub(super) struct Paint {
     elbow: V3,
 }
 
-/// Half width of the skull at the ears, metres: what is farther out is ear.
+/// Half width of the skull at the ears, metres: skin farther out is ear.
 const EAR: f32 = 0.074;
 /// Length of the embedded body's head from the base of the skull to the crown, metres: unit of the face below.
 const HEAD_LENGTH: f32 = 0.162;
@@ -89,21 +89,21 @@ impl Paint {
         let region = |i: usize| {
             use BodySegment::*;
             match parts.segment(weights.dominant(i)) {
-                Neck | Head => Region::Head,
-                UpperArm => Region::UpperArm,
-                Forearm | Hand | Fingers => Region::LowerArm,
-                Thigh | Shin => Region::Leg,
-                Foot | Toes => Region::Foot,
-                Pelvis | Abdomen | Chest | Collar => Region::Trunk,
+                Neck | Head => PaintedRegion::Head,
+                UpperArm => PaintedRegion::UpperArm,
+                Forearm | Hand | Fingers => PaintedRegion::LowerArm,
+                Thigh | Shin => PaintedRegion::Leg,
+                Foot | Toes => PaintedRegion::Foot,
+                Pelvis | Abdomen | Chest | Collar => PaintedRegion::Trunk,
             }
         };
-        let regions: Vec<Region> = (0..rest.vertices.len()).map(region).collect();
+        let regions: Vec<PaintedRegion> = (0..rest.vertices.len()).map(region).collect();
         let head = joint("head");
         let of_head = || {
             rest.vertices
                 .iter()
                 .zip(&regions)
-                .filter(|(_, r)| **r == Region::Head)
+                .filter(|(_, r)| **r == PaintedRegion::Head)
                 .map(|(v, _)| v.coords)
         };
         let top = of_head().map(|v| v.y).fold(head.y, f32::max);
@@ -126,18 +126,18 @@ impl Paint {
     pub(super) fn color(&self, vertex: u32, p: &P3) -> [u8; 3] {
         let c = &self.colors;
         match self.regions[vertex as usize] {
-            Region::Head => self.head_color(p),
-            Region::LowerArm => c.skin,
-            Region::Foot => c.shoes,
-            Region::Leg if p.y < self.ankle_y + 0.05 => c.shoes,
-            Region::Leg => c.legs,
-            Region::UpperArm => {
+            PaintedRegion::Head => self.head_color(p),
+            PaintedRegion::LowerArm => c.skin,
+            PaintedRegion::Foot => c.shoes,
+            PaintedRegion::Leg if p.y < self.ankle_y + 0.05 => c.shoes,
+            PaintedRegion::Leg => c.legs,
+            PaintedRegion::UpperArm => {
                 let d = self.elbow - self.shoulder;
                 let q = V3::new(p.x.abs(), p.y, p.z) - self.shoulder;
                 let along = q.dot(&d) / d.norm_squared();
                 if along < 0.55 { c.shirt } else { c.skin }
             }
-            Region::Trunk => {
+            PaintedRegion::Trunk => {
                 // A round neckline, deeper in front.
                 let (x, z) = (p.x - self.neck.x, p.z - self.neck.z);
                 let depth = if z > 0.0 { 0.055 } else { 0.01 };

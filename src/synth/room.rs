@@ -1,4 +1,4 @@
-//! A room with a wooden floor and two walls, seen once and kept.
+//! A room with a wooden floor and two walls, rendered once.
 
 use crate::camera::Intrinsics;
 use crate::math::{Camera, P3d, Rigid, V3d, World};
@@ -6,9 +6,9 @@ use crate::math::{Camera, P3d, Rigid, V3d, World};
 /// Planes and colours of a room. World frame: floor at y = 0, the camera looks towards −z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Room {
-    /// Where the back wall stands, metres (negative: in front of the camera).
+    /// z of the back wall, metres (negative: in front of the camera).
     pub back_z: f64,
-    /// Where the left wall stands, metres; −∞ for none.
+    /// x of the left wall, metres; −∞ for none.
     pub left_x: f64,
     /// Colour of the walls, sRGB.
     pub wall: [u8; 3],
@@ -44,7 +44,7 @@ const SKIRTING: f64 = 0.09;
 /// A framed picture on the back wall: x from, to, y from, to, metres.
 const PICTURE: [f64; 4] = [0.75, 1.30, 1.15, 1.85];
 
-/// A number in [0, 1) that looks random, for boards and plaster.
+/// Hash of a cell to [0, 1), for the texture of boards and plaster.
 fn speckle(a: i64, b: i64) -> f64 {
     let mut x = (a as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
         ^ (b as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
@@ -97,7 +97,7 @@ impl Room {
                 continue;
             }
             let p = eye + d * t;
-            // Width of a pixel there: what is finer fades to its mean.
+            // Width of a pixel there: finer texture fades to its mean.
             let pixel = t / camera.fx;
             let (base, shade) = if t == floor {
                 out.floor.push((i as u32, [p.x as f32, p.z as f32]));
@@ -149,7 +149,7 @@ impl Room {
             0.04 * ((p.x * 310.0 + 3.0 * (p.z * 4.0).sin()).sin()) * (1.0 - pixel / 0.01).max(0.0);
         let from_edge = (p.x / BOARD - row).min(row + 1.0 - p.x / BOARD) * BOARD;
         let gap = 0.35 * (1.0 - from_edge / 0.004).max(0.0) * (1.0 - pixel / 0.012).max(0.0);
-        // Darker in the corners of the room, where less light comes from.
+        // Ambient occlusion of the corners.
         let corner =
             0.25 * (-(p.z - self.back_z) / 0.35).exp() + 0.2 * (-(p.x - self.left_x) / 0.35).exp();
         (tint + grain - gap) * (1.0 - corner) * 0.95
@@ -178,7 +178,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn planes_are_where_they_are_said_to_be() {
+    fn depth_of_floor_and_wall_equals_the_ray_plane_intersection() {
         let k = Intrinsics::KINECT_V1;
         let world_from_camera = Rigid::<World, Camera>::level(1.0);
         let room = Room {

@@ -1,13 +1,13 @@
-//! What the synthetic shopper does: keyframes of torso and arms, a path for the pelvis, feet that step under it.
+//! Routines of the synthetic actor: keyframes of torso and arms, a path for the pelvis, feet that step under it.
 
 use super::stance::{Limb, Rig, Stance};
 use crate::math::{P3d, V3d, exp_so3};
 use nalgebra::UnitQuaternion;
 
-/// What happens in front of the camera.
+/// Motion in front of the camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Routine {
-    /// Calibration pose, a look to both sides, arms up, hand on hip, side steps, a look down at the shirt, one arm
+    /// Calibration pose, turns to both sides, arms up, hand on hip, side steps, head down to the shirt, one arm
     /// across the body; repeats every [`Routine::period`] seconds.
     #[default]
     TryOn,
@@ -17,7 +17,7 @@ pub enum Routine {
     Turn,
     /// Stands still in the calibration pose.
     Still,
-    /// Nobody comes.
+    /// An empty room.
     Empty,
 }
 
@@ -85,215 +85,97 @@ const HEM: Limb = [
     v(-0.40, -0.84, 0.36),
 ];
 
-const REST: Key = Key {
-    t: 0.0,
-    place: [0.0, 0.0],
-    yaw: 0.0,
-    chest: [0.0; 3],
-    head: [0.0; 2],
-    arms: [A, A],
-};
+/// Turn of the body and posture of chest and head.
+#[derive(Clone, Copy)]
+struct Torso {
+    yaw: f64,
+    chest: [f64; 3],
+    head: [f64; 2],
+}
+
+const fn torso(yaw: f64, chest: [f64; 3], head: [f64; 2]) -> Torso {
+    Torso { yaw, chest, head }
+}
+
+const fn turned(yaw: f64) -> Torso {
+    torso(yaw, [0.0; 3], [0.0; 2])
+}
+
+const fn key(t: f64, torso: Torso, arms: [Limb; 2]) -> Key {
+    key_at(t, [0.0; 2], torso, arms)
+}
+
+const fn key_at(t: f64, place: [f64; 2], torso: Torso, arms: [Limb; 2]) -> Key {
+    let Torso { yaw, chest, head } = torso;
+    Key {
+        t,
+        place,
+        yaw,
+        chest,
+        head,
+        arms,
+    }
+}
+
+const FRONT: Torso = turned(0.0);
+const LEFT: Torso = torso(22.0, [0.0, 16.0, 0.0], [4.0, 8.0]);
+const RIGHT: Torso = torso(-22.0, [0.0, -16.0, 0.0], [4.0, -8.0]);
+const BACK_BENT: Torso = torso(0.0, [-3.0, 0.0, 0.0], [-6.0, 0.0]);
+const HIP_RIGHT: Torso = torso(0.0, [0.0, -4.0, 4.0], [0.0, 6.0]);
+const HIP_LEFT: Torso = torso(12.0, [0.0, 4.0, 4.0], [0.0, -6.0]);
+const HEAD_DOWN: Torso = torso(0.0, [10.0, 0.0, 0.0], [32.0, 0.0]);
+const HEAD_DOWN_LEFT: Torso = torso(0.0, [10.0, 4.0, 0.0], [30.0, 5.0]);
+const TWIST_LEFT: Torso = torso(0.0, [0.0, 5.0, 0.0], [0.0; 2]);
+const TWIST_RIGHT: Torso = torso(-8.0, [0.0, -8.0, 0.0], [0.0; 2]);
 
 /// The try-on routine of the demo.
 const TRY_ON: [Key; 22] = [
-    REST,
-    Key { t: 1.6, ..REST },
-    Key {
-        t: 2.6,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 3.6,
-        yaw: 22.0,
-        chest: [0.0, 16.0, 0.0],
-        head: [4.0, 8.0],
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 4.1,
-        yaw: 22.0,
-        chest: [0.0, 16.0, 0.0],
-        head: [4.0, 8.0],
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 5.9,
-        yaw: -22.0,
-        chest: [0.0, -16.0, 0.0],
-        head: [4.0, -8.0],
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 6.9,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 7.9,
-        arms: [SIDE, SIDE],
-        ..REST
-    },
-    Key {
-        t: 8.8,
-        chest: [-3.0, 0.0, 0.0],
-        head: [-6.0, 0.0],
-        arms: [UP, UP],
-        ..REST
-    },
-    Key {
-        t: 10.2,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 11.2,
-        chest: [0.0, -4.0, 4.0],
-        head: [0.0, 6.0],
-        arms: [DOWN, HIP],
-        ..REST
-    },
-    Key {
-        t: 12.4,
-        yaw: 12.0,
-        chest: [0.0, 4.0, 4.0],
-        head: [0.0, -6.0],
-        arms: [DOWN, HIP],
-        ..REST
-    },
-    Key {
-        t: 13.4,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 14.8,
-        place: [0.35, 0.05],
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 16.4,
-        place: [-0.25, 0.0],
-        yaw: -6.0,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 17.4,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 18.2,
-        chest: [10.0, 0.0, 0.0],
-        head: [32.0, 0.0],
-        arms: [HEM, HEM],
-        ..REST
-    },
-    Key {
-        t: 19.2,
-        chest: [10.0, 4.0, 0.0],
-        head: [30.0, 5.0],
-        arms: [HEM, HEM],
-        ..REST
-    },
-    Key {
-        t: 20.2,
-        chest: [0.0, 5.0, 0.0],
-        arms: [ACROSS, DOWN],
-        ..REST
-    },
-    Key {
-        t: 21.2,
-        chest: [0.0, -8.0, 0.0],
-        yaw: -8.0,
-        arms: [ACROSS, DOWN],
-        ..REST
-    },
-    Key {
-        t: 22.4,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key { t: 24.0, ..REST },
+    key(0.0, FRONT, [A; 2]),
+    key(1.6, FRONT, [A; 2]),
+    key(2.6, FRONT, [DOWN; 2]),
+    key(3.6, LEFT, [DOWN; 2]),
+    key(4.1, LEFT, [DOWN; 2]),
+    key(5.9, RIGHT, [DOWN; 2]),
+    key(6.9, FRONT, [DOWN; 2]),
+    key(7.9, FRONT, [SIDE; 2]),
+    key(8.8, BACK_BENT, [UP; 2]),
+    key(10.2, FRONT, [DOWN; 2]),
+    key(11.2, HIP_RIGHT, [DOWN, HIP]),
+    key(12.4, HIP_LEFT, [DOWN, HIP]),
+    key(13.4, FRONT, [DOWN; 2]),
+    key_at(14.8, [0.35, 0.05], FRONT, [DOWN; 2]),
+    key_at(16.4, [-0.25, 0.0], turned(-6.0), [DOWN; 2]),
+    key(17.4, FRONT, [DOWN; 2]),
+    key(18.2, HEAD_DOWN, [HEM; 2]),
+    key(19.2, HEAD_DOWN_LEFT, [HEM; 2]),
+    key(20.2, TWIST_LEFT, [ACROSS, DOWN]),
+    key(21.2, TWIST_RIGHT, [ACROSS, DOWN]),
+    key(22.4, FRONT, [DOWN; 2]),
+    key(24.0, FRONT, [A; 2]),
 ];
 
 /// To the left, to the right and back.
 const TURN: [Key; 8] = [
-    REST,
-    Key { t: 1.0, ..REST },
-    Key {
-        t: 2.0,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 3.0,
-        yaw: 40.0,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 3.6,
-        yaw: 40.0,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 5.2,
-        yaw: -40.0,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 5.8,
-        yaw: -40.0,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key { t: 7.2, ..REST },
+    key(0.0, FRONT, [A; 2]),
+    key(1.0, FRONT, [A; 2]),
+    key(2.0, FRONT, [DOWN; 2]),
+    key(3.0, turned(40.0), [DOWN; 2]),
+    key(3.6, turned(40.0), [DOWN; 2]),
+    key(5.2, turned(-40.0), [DOWN; 2]),
+    key(5.8, turned(-40.0), [DOWN; 2]),
+    key(7.2, FRONT, [A; 2]),
 ];
 
 /// Out to the side and back.
 const LEAVE: [Key; 8] = [
-    REST,
-    Key { t: 2.0, ..REST },
-    Key {
-        t: 2.6,
-        yaw: 80.0,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 5.0,
-        place: [3.6, 0.2],
-        yaw: 80.0,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 7.0,
-        place: [3.6, 0.2],
-        yaw: -80.0,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 9.4,
-        yaw: -80.0,
-        arms: [DOWN, DOWN],
-        ..REST
-    },
-    Key {
-        t: 10.2,
-        arms: [A, A],
-        ..REST
-    },
-    Key { t: 12.0, ..REST },
+    key(0.0, FRONT, [A; 2]),
+    key(2.0, FRONT, [A; 2]),
+    key(2.6, turned(80.0), [DOWN; 2]),
+    key_at(5.0, [3.6, 0.2], turned(80.0), [DOWN; 2]),
+    key_at(7.0, [3.6, 0.2], turned(-80.0), [DOWN; 2]),
+    key(9.4, turned(-80.0), [DOWN; 2]),
+    key(10.2, FRONT, [A; 2]),
+    key(12.0, FRONT, [A; 2]),
 ];
 
 /// One step with each foot takes this long, seconds: an unhurried 100 steps a minute.
@@ -326,7 +208,7 @@ impl Routine {
     pub fn period(self) -> f64 {
         self.keys().last().map_or(1.0, |k| k.t.max(1.0))
     }
-    /// Whether somebody is there at all.
+    /// An actor is present at some time.
     pub fn has_person(self) -> bool {
         self != Self::Empty
     }
@@ -360,7 +242,7 @@ impl Routine {
         }
     }
 
-    /// Where the sole of a foot is at `t`: planted under the pelvis of the middle of its stance, swinging between.
+    /// Point under the ankle and yaw of a foot at `t`: planted under the pelvis of mid-stance, swinging between.
     fn sole(self, side: usize, t: f64) -> (P3d, f64) {
         let phase = t / CYCLE - 0.5 * side as f64;
         let (round, part) = (phase.floor(), phase.rem_euclid(1.0));
@@ -391,7 +273,7 @@ impl Routine {
     /// The stance at `t` seconds; `home` is where the routine starts, on the floor.
     pub(super) fn stance(self, rig: &Rig, home: P3d, t: f64) -> Stance {
         let k = self.key(t);
-        // Nobody stands like a statue: breath and sway, a few millimetres and tenths of a degree.
+        // Breath and sway: a few millimetres and tenths of a degree.
         let sway = [(0.9 * t).sin(), (1.3 * t + 1.0).sin(), (1.57 * t).sin()];
         let heading =
             UnitQuaternion::from_axis_angle(&V3d::y_axis(), (k.yaw + 0.6 * sway[0]).to_radians());

@@ -1,4 +1,4 @@
-//! Frames of a synthetic shopper, with the truth beside them.
+//! Frames of a synthetic actor, with ground truth.
 
 use super::clip::{ClipError, Performance};
 use super::paint::{Colors, Paint};
@@ -15,53 +15,53 @@ use crate::raster::{Cull, Options, View, VisibilityBuffer, barycentrics, rasteri
 use nalgebra::UnitQuaternion;
 use std::sync::Arc;
 
-/// Who is in front of the camera.
+/// Person in front of the camera.
 #[derive(Clone, Debug)]
-pub struct Shopper {
+pub struct Actor {
     /// Body and joints.
     pub template: Arc<Template>,
-    /// What makes the template this person.
+    /// Shape of this person.
     pub shape: BodyShape,
     /// Chooses skin, hair and clothes.
-    pub look: u64,
+    pub appearance: u64,
 }
 
-impl Default for Shopper {
+impl Default for Actor {
     /// The embedded body as it is.
     fn default() -> Self {
         Self {
             template: crate::body::embedded::template(),
             shape: BodyShape::default(),
-            look: 0,
+            appearance: 0,
         }
     }
 }
 
-/// Camera, room and what happens.
+/// Camera, room and routine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// Depth and (registered) colour camera.
     pub camera: Intrinsics,
-    /// Where the camera is; the world's floor is y = 0.
+    /// Pose of the camera; the world's floor is y = 0.
     pub world_from_camera: Rigid<World, Camera>,
-    /// Where the shopper starts, on the floor, world.
+    /// Start of the actor on the floor, world.
     pub home: P3d,
     /// Walls and floor; `None` for a person alone in the dark.
     pub room: Option<Room>,
-    /// How depth is spoilt.
+    /// Noise of the depth image.
     pub noise: NoiseModel,
-    /// What the shopper does.
+    /// Motion of the actor.
     pub routine: Routine,
     /// Frames a second.
     pub rate: f64,
-    /// Whether colour is rendered.
+    /// Renders colour too.
     pub color: bool,
-    /// Chooses the noise.
+    /// Seed of the noise.
     pub seed: u64,
 }
 
 impl Default for Setting {
-    /// A Kinect v1 on a shelf, one metre high and tilted 3° down, 2.4 m from the shopper.
+    /// A Kinect v1 on a shelf, one metre high and tilted 3° down, 2.4 m from the actor.
     fn default() -> Self {
         Self {
             camera: Intrinsics::KINECT_V1,
@@ -102,7 +102,7 @@ impl Setting {
     }
 }
 
-/// What is true in a frame.
+/// Ground truth of a frame.
 #[derive(Clone, Debug)]
 pub struct Truth {
     /// Somebody is in the room (perhaps outside the picture).
@@ -115,10 +115,10 @@ pub struct Truth {
     pub vertices: Vec<P3>,
 }
 
-/// A shopper in a setting: any frame, any order, always the same.
+/// An actor in a setting: frames are functions of their number.
 #[derive(Clone, Debug)]
 pub struct Sequence {
-    shopper: Shopper,
+    actor: Actor,
     setting: Setting,
     rest: RestBody,
     rig: Rig,
@@ -133,17 +133,26 @@ const NEAR: f32 = 0.2;
 /// Light from above, in front and a little from the left; and a weak one from the right. World frame.
 const KEY_LIGHT: [f64; 3] = [-0.45, 0.75, 0.55];
 const FILL_LIGHT: [f64; 3] = [0.8, 0.2, 0.5];
+/// Shares of ambient light, light from above, key light and fill light.
+const SHADE: [f32; 4] = [0.42, 0.10, 0.52, 0.14];
 /// Radius of the shadow under a foot and under the body, metres.
 const SHADOW: [f32; 2] = [0.16, 0.55];
+/// Darkness of these shadows in their middle.
+const SHADOW_DEPTH: [f32; 2] = [0.45, 0.30];
 
 impl Sequence {
     /// Prepares everything that does not change from frame to frame.
-    pub fn new(shopper: Shopper, setting: Setting) -> Self {
-        let t = &shopper.template;
-        let rest = t.personalise(&shopper.shape);
+    pub fn new(actor: Actor, setting: Setting) -> Self {
+        let t = &actor.template;
+        let rest = t.personalise(&actor.shape);
         Self {
             rig: Rig::new(t.skeleton(), &rest),
-            paint: Paint::new(t.skeleton(), t.weights(), &rest, Colors::pick(shopper.look)),
+            paint: Paint::new(
+                t.skeleton(),
+                t.weights(),
+                &rest,
+                Colors::pick(actor.appearance),
+            ),
             background: Room::draw(
                 setting.room.as_ref(),
                 &setting.camera,
@@ -152,7 +161,7 @@ impl Sequence {
             calibration: Calibration::registered(setting.camera),
             rest,
             performance: None,
-            shopper,
+            actor,
             setting,
         }
     }
@@ -169,9 +178,9 @@ impl Sequence {
     pub fn setting(&self) -> &Setting {
         &self.setting
     }
-    /// Who it is.
-    pub fn shopper(&self) -> &Shopper {
-        &self.shopper
+    /// Person in front of the camera.
+    pub fn actor(&self) -> &Actor {
+        &self.actor
     }
     /// The personalised rest body.
     pub fn rest(&self) -> &RestBody {
@@ -181,18 +190,10 @@ impl Sequence {
     pub fn calibration(&self) -> &Calibration {
         &self.calibration
     }
-    /// Frames in one round of the routine, or in the clip.
-    pub fn round(&self) -> u64 {
-        let seconds = self
-            .performance
-            .as_ref()
-            .map_or(self.setting.routine.period(), |p| p.seconds());
-        (seconds * self.setting.rate).round() as u64
-    }
 
     /// Truth of frame `i`.
     pub fn truth(&self, i: u64) -> Truth {
-        let t = &self.shopper.template;
+        let t = &self.actor.template;
         let camera_from_world = self.setting.world_from_camera.inverse();
         let (time, home) = (i as f64 / self.setting.rate, self.setting.home);
         let stance = match &self.performance {
@@ -256,7 +257,7 @@ impl Sequence {
     }
 
     fn draw(&self, truth: &Truth, depth: &mut [f32], color: Option<&mut [u8]>) {
-        let t = &self.shopper.template;
+        let t = &self.actor.template;
         let faces = t.mesh().faces();
         let view = View::Perspective {
             camera: self.setting.camera,
@@ -317,10 +318,11 @@ impl Sequence {
             };
             let base = self.paint.color(f[nearest], &P3::from(rest));
             let n = n / n.norm().max(f32::EPSILON);
-            let shade = 0.42
-                + 0.10 * n.dot(&up)
-                + 0.52 * n.dot(&key).max(0.0)
-                + 0.14 * n.dot(&fill).max(0.0);
+            let [ambient, sky, key_share, fill_share] = SHADE;
+            let shade = ambient
+                + sky * n.dot(&up)
+                + key_share * n.dot(&key).max(0.0)
+                + fill_share * n.dot(&fill).max(0.0);
             for (c, b) in color[3 * i..3 * i + 3].iter_mut().zip(base) {
                 *c = (f32::from(b) * shade).min(255.0) as u8;
             }
@@ -329,7 +331,7 @@ impl Sequence {
 
     /// Darkens the floor under feet and body.
     fn cast_shadow(&self, truth: &Truth, color: &mut [u8]) {
-        let skeleton = self.shopper.template.skeleton();
+        let skeleton = self.actor.template.skeleton();
         let over = |name: &str| {
             let p = self
                 .setting
@@ -338,9 +340,9 @@ impl Sequence {
             [p.x as f32, p.z as f32]
         };
         let spots = [
-            (over("left_foot"), SHADOW[0], 0.45),
-            (over("right_foot"), SHADOW[0], 0.45),
-            (over("pelvis"), SHADOW[1], 0.30),
+            (over("left_foot"), SHADOW[0], SHADOW_DEPTH[0]),
+            (over("right_foot"), SHADOW[0], SHADOW_DEPTH[0]),
+            (over("pelvis"), SHADOW[1], SHADOW_DEPTH[1]),
         ];
         for &(i, at) in &self.background.floor {
             let mut light = 1.0f32;

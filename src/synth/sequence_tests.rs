@@ -1,9 +1,8 @@
 use super::*;
-use crate::formats::image::write_png_rgb;
 
 fn sequence(routine: Routine, noise: NoiseModel) -> Sequence {
     Sequence::new(
-        Shopper::default(),
+        Actor::default(),
         Setting {
             routine,
             noise,
@@ -23,7 +22,7 @@ fn frames_are_functions_of_their_number() {
 }
 
 #[test]
-fn depth_shows_the_true_surface() {
+fn depth_equals_the_true_surface() {
     let s = sequence(Routine::TryOn, NoiseModel::None);
     let k = s.setting().camera;
     for i in [0, 110, 260, 340, 550, 620] {
@@ -63,11 +62,11 @@ fn depth_shows_the_true_surface() {
 }
 
 #[test]
-fn motion_is_human_and_smooth() {
+fn motion_keeps_joint_limits_and_speeds() {
     let s = sequence(Routine::TryOn, NoiseModel::None);
-    let limits = s.shopper().template.skeleton().limits();
+    let limits = s.actor().template.skeleton().limits();
     let mut last: Option<Truth> = None;
-    for i in 0..s.round() + 2 {
+    for i in 0..(Routine::TryOn.period() * s.setting().rate) as u64 + 2 {
         let t = s.truth(i);
         for (d, (a, l)) in t.pose.angles.iter().zip(&limits).enumerate() {
             assert!(
@@ -90,7 +89,7 @@ fn motion_is_human_and_smooth() {
 }
 
 #[test]
-fn leaving_and_returning_and_an_empty_room() {
+fn actor_leaves_and_returns_and_an_empty_room_has_none() {
     let s = sequence(Routine::LeaveAndReturn, NoiseModel::KinectV1);
     let seen = |i: u64| {
         let (_, t) = s.frame(i);
@@ -106,7 +105,7 @@ fn leaving_and_returning_and_an_empty_room() {
 }
 
 #[test]
-fn a_rolled_camera_sees_the_same_world() {
+fn a_rolled_camera_renders_the_same_world() {
     let upright = sequence(Routine::Still, NoiseModel::None);
     let world_from_camera = Setting::tilted(1.0, 3.0, 90.0);
     let setting = Setting {
@@ -114,7 +113,7 @@ fn a_rolled_camera_sees_the_same_world() {
         ..upright.setting().clone()
     }
     .portrait();
-    let rolled = Sequence::new(Shopper::default(), setting);
+    let rolled = Sequence::new(Actor::default(), setting);
     let (a, b) = (upright.truth(0), rolled.truth(0));
     for (p, q) in a.joints.iter().zip(&b.joints) {
         let (p, q) = (
@@ -132,61 +131,4 @@ fn a_rolled_camera_sees_the_same_world() {
             x.abs_diff(y) <= 2
         });
     assert!(same.count() > 300_000);
-}
-
-/// Writes pictures for eyes into the folder named by `TRYON_LOOK`.
-#[test]
-fn look() {
-    let Some(dir) = std::env::var_os("TRYON_LOOK").map(std::path::PathBuf::from) else {
-        return;
-    };
-    let s = sequence(Routine::TryOn, NoiseModel::KinectV1);
-    let frames = [0u64, 110, 170, 240, 265, 340, 440, 560, 620];
-    let (w, h) = (640usize, 480usize);
-    let mut sheet = ColorImage::filled(3 * 640, 3 * 480, [0; 3]);
-    let mut depths = ColorImage::filled(3 * 640, 3 * 480, [0; 3]);
-    for (n, i) in frames.into_iter().enumerate() {
-        let (frame, _) = s.frame(i);
-        let color = frame.color.expect("colour");
-        for v in 0..h {
-            for u in 0..w {
-                let at = 3 * (((n / 3) * h + v) * 3 * w + (n % 3) * w + u);
-                sheet.data_mut()[at..at + 3].copy_from_slice(&color.at(u as u32, v as u32));
-                let d = frame.depth.at(u as i32, v as i32);
-                let t = (f32::from(d) - 1500.0) / 2700.0;
-                let ramp = |c: f32| (255.0 * (1.5 - (4.0 * t - c).abs()).clamp(0.0, 1.0)) as u8;
-                let false_color = if d == 0 {
-                    [0; 3]
-                } else {
-                    [ramp(3.0), ramp(2.0), ramp(1.0)]
-                };
-                depths.data_mut()[at..at + 3].copy_from_slice(&false_color);
-            }
-        }
-    }
-    write_png_rgb(&dir.join("synth_color.png"), &sheet).expect("written");
-    write_png_rgb(&dir.join("synth_depth.png"), &depths).expect("written");
-    let started = std::time::Instant::now();
-    for i in 0..60 {
-        std::hint::black_box(s.frame(i * 11));
-    }
-    eprintln!(
-        "{:.2} ms a frame",
-        started.elapsed().as_secs_f64() * 1e3 / 60.0
-    );
-    let clean: Vec<f32> = s.background.depth.clone();
-    for m in [
-        NoiseModel::None,
-        NoiseModel::KinectV1,
-        NoiseModel::TimeOfFlight,
-    ] {
-        let t = std::time::Instant::now();
-        for i in 0..30 {
-            std::hint::black_box(m.apply(&s.setting().camera, &clean, 1, i));
-        }
-        eprintln!("{m:?}: {:.2} ms", t.elapsed().as_secs_f64() * 1e3 / 30.0);
-    }
-    let t = std::time::Instant::now();
-    (0..30).for_each(|i| drop(std::hint::black_box(s.truth(i))));
-    eprintln!("truth: {:.2} ms", t.elapsed().as_secs_f64() * 1e3 / 30.0);
 }

@@ -1,10 +1,10 @@
-//! A synthetic sequence as a recording.
+//! A synthetic sequence as a source of frames.
 
 use super::Sequence;
 use crate::camera::{Calibration, RgbdFrame};
 use crate::formats::{FormatError, RgbdSource};
 
-/// Frames of a [`Sequence`] one after the other.
+/// Frames of a [`Sequence`] in order.
 #[derive(Clone, Debug)]
 pub struct SynthSource {
     sequence: Sequence,
@@ -13,7 +13,7 @@ pub struct SynthSource {
 }
 
 impl SynthSource {
-    /// The first `frames` frames, or without end.
+    /// The first `frames` frames; `None` is endless.
     pub fn new(sequence: Sequence, frames: Option<u64>) -> Self {
         Self {
             sequence,
@@ -21,7 +21,7 @@ impl SynthSource {
             next: 0,
         }
     }
-    /// The sequence, for its truth.
+    /// The sequence, with its ground truth.
     pub fn sequence(&self) -> &Sequence {
         &self.sequence
     }
@@ -51,16 +51,16 @@ impl RgbdSource for SynthSource {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synth::{Routine, Setting, Shopper};
+    use crate::synth::{Actor, Routine, Setting};
 
     #[test]
-    fn it_ends_and_starts_again() {
+    fn source_ends_after_its_frames_and_rewinds_to_the_same_bits() {
         let setting = Setting {
             routine: Routine::Empty,
             color: false,
             ..Setting::default()
         };
-        let mut s = SynthSource::new(Sequence::new(Shopper::default(), setting), Some(2));
+        let mut s = SynthSource::new(Sequence::new(Actor::default(), setting), Some(2));
         assert_eq!(s.len(), Some(2));
         let first = s.next_frame().expect("frame").expect("frame");
         assert_eq!(s.next_frame().expect("frame").map(|f| f.sequence), Some(1));

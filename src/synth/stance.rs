@@ -1,7 +1,6 @@
-//! A stance: how a person stands in words of directions, whatever the template's rest pose is.
+//! A stance: a configuration of a person in directions of bones, independent of a template's rest pose.
 //!
-//! Keyframes and motion clips speak in directions of bones; [`Rig::pose`] finds the joint angles of a given template
-//! that put its bones there.
+//! Keyframes and motion clips give directions; [`Rig::pose`] finds the joint angles of a template for them.
 
 use crate::body::{JointMotion, Pose, RestBody, Skeleton};
 use crate::math::{P3d, Rigid, V3d, World, exp_so3, log_so3};
@@ -73,7 +72,7 @@ struct LimbRig {
     length: [f64; 2],
 }
 
-/// What a template needs for taking a stance.
+/// Joints and rest geometry of a template that turn a stance into a pose.
 #[derive(Clone, Debug)]
 pub(super) struct Rig {
     skeleton: Skeleton,
@@ -88,7 +87,7 @@ pub(super) struct Rig {
     ankle_height: f64,
 }
 
-/// Share of a straight leg that standing legs keep in hand, so that knees bend at all.
+/// Longest leg over a straight one: knees of a straight leg have no direction to bend in.
 const SLACK: f64 = 0.997;
 
 /// Weight of the rest axis against the plane of the limb: a limb bent by less than about 3° has no plane.
@@ -164,7 +163,7 @@ impl Rig {
     /// point under each ankle, and yaw).
     pub(super) fn stand(&self, stance: &mut Stance, soles: [(P3d, f64); 2]) {
         let hips = self.hips.map(|h| stance.heading * h);
-        // As high as the straighter leg allows.
+        // The straighter leg limits the height.
         let mut height = f64::INFINITY;
         for s in 0..2 {
             let Some(leg) = &self.legs[s] else { continue };
@@ -192,7 +191,7 @@ impl Rig {
                 .norm()
                 .clamp((a - b).abs() + f64::EPSILON, (a + b) * SLACK);
             let down = to.try_normalize(0.0).unwrap_or(-V3d::y());
-            // The knee points where halfway between pelvis and foot points.
+            // The knee points halfway between the directions of pelvis and foot.
             let pole = stance.heading * V3d::z() + yaw * V3d::z();
             let front = (pole - down * pole.dot(&down))
                 .try_normalize(0.0)

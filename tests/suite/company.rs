@@ -1,4 +1,4 @@
-//! What shares the picture with the shopper, how the camera is mounted, and what the tracker leaves out.
+//! Tracking with other people and objects in the picture, with mounted cameras, and with skipped work.
 
 use crate::common::shared;
 use std::sync::Arc;
@@ -8,10 +8,10 @@ use tryon::evaluate::Scene;
 use tryon::evaluate::scenes;
 use tryon::evaluate::tracking::{Outcome, follow, mean};
 use tryon::math::P3d;
-use tryon::synth::{Routine, Sequence, Setting, Shopper};
+use tryon::synth::{Actor, Routine, Sequence, Setting};
 use tryon::tracking::{Reason, TrackerConfig};
 
-/// The shopper that the embedded body can become, without colour and in the dark.
+/// An actor alone in the dark, without colour.
 fn alone() -> Setting {
     Setting {
         room: None,
@@ -23,10 +23,10 @@ fn alone() -> Setting {
 }
 
 fn scene(setting: Setting, frames: u64) -> (Arc<Template>, Scene) {
-    let shopper = Shopper::default();
+    let actor = Actor::default();
     (
-        shopper.template.clone(),
-        Scene::synthetic("shopper", &Sequence::new(shopper, setting), frames),
+        actor.template.clone(),
+        Scene::synthetic("actor", &Sequence::new(actor, setting), frames),
     )
 }
 
@@ -61,7 +61,7 @@ const UPPER: [&str; 8] = [
     "pelvis",
 ];
 
-/// Someone walks past, out to the side and back, at `z` metres from the camera.
+/// A passer-by, out to the side and back, at `z` metres from the camera.
 fn passer_by(z: f64, frames: u64) -> Scene {
     let setting = Setting {
         routine: Routine::LeaveAndReturn,
@@ -73,7 +73,7 @@ fn passer_by(z: f64, frames: u64) -> Scene {
 }
 
 #[test]
-fn a_passer_by_does_not_take_the_tracker_along() {
+fn tracking_stays_on_its_subject_when_someone_passes() {
     for (z, most) in [(3.6, 12.0), (1.7, 25.0)] {
         let (template, mut own) = scene(alone(), 170);
         let clean = mean(&track(&template, &own).joints_mm);
@@ -118,7 +118,7 @@ fn a_passer_by_does_not_take_the_tracker_along() {
 }
 
 #[test]
-fn a_held_thing_costs_little() {
+fn a_held_object_costs_little_accuracy() {
     let (template, own) = scene(alone(), 120);
     let clean = mean(&track(&template, &own).joints_mm);
     let holding = own.holding("left_wrist", 0.09);
@@ -132,7 +132,7 @@ fn a_held_thing_costs_little() {
 }
 
 #[test]
-fn black_trousers_leave_the_upper_body_alone() {
+fn legs_without_depth_leave_the_upper_body_accurate_and_are_flagged() {
     let setting = Setting {
         room: Some(Default::default()),
         ..alone()
@@ -167,7 +167,7 @@ fn black_trousers_leave_the_upper_body_alone() {
 }
 
 #[test]
-fn cameras_may_lean_and_stand_upright() {
+fn tilted_rolled_and_portrait_cameras_track_alike() {
     let tilted = |down: f64, roll: f64| Setting {
         world_from_camera: Setting::tilted(1.1, down, roll),
         ..alone()
@@ -200,8 +200,8 @@ fn cameras_may_lean_and_stand_upright() {
 }
 
 #[test]
-fn half_a_person_at_the_side_of_the_picture_is_enough() {
-    // An arm out of the picture from the first frame on; and all right of the breastbone gone after the start.
+fn half_a_person_in_the_picture_is_tracked() {
+    // An arm out of the picture from the first frame on; all right of the breastbone missing after the start.
     let beside = scene(
         Setting {
             home: P3d::new(1.15, 0.0, -2.4),
@@ -253,8 +253,7 @@ fn half_a_person_at_the_side_of_the_picture_is_enough() {
     }
 }
 
-/// The side of the picture cuts her through the middle from the first frame on: what is in the picture is a person, not a
-/// wall, in a room and in the dark.
+/// The side of the picture cuts the body through the middle from the first frame on, in a room and in the dark.
 #[test]
 fn a_person_cut_by_the_side_from_the_start_is_found() {
     for (name, room) in [("dark", None), ("room", Some(Default::default()))] {
@@ -300,8 +299,8 @@ fn a_person_cut_by_the_side_from_the_start_is_found() {
     }
 }
 
-/// What the tracker leaves out must not change the answer by more than this, joints and displaced surface, millimetres on
-/// average: an unhurried routine has coarse iterations to leave out, a fast dance converges late.
+/// Skipped work changes joints and displaced surface by less than a bound, millimetres on average. An unhurried routine
+/// skips coarse iterations, a fast dance converges late.
 #[test]
 fn each_skip_keeps_its_bound() {
     let all = TrackerConfig::default();
@@ -424,7 +423,7 @@ fn compare_skips(template: &Arc<Template>, own: &Scene, cases: &[(&str, TrackerC
 }
 
 #[test]
-fn an_arm_lost_at_low_rate_is_found_again() {
+fn limb_recovery_finds_an_arm_lost_at_low_rate() {
     let (Some(folder), Some(data)) = (shared("sequences/jacks_f_avg_kinect1_room"), shared("."))
     else {
         return;

@@ -1,11 +1,11 @@
-//! Garments that others made as meshes, worn by bodies they were not made on; and sizes that cannot be worn.
+//! Mesh garments on bodies that they were not made on, and sizes that cannot be worn.
 
 use crate::common::{posed, shared};
 use std::path::{Path, PathBuf};
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
 use tryon::cloth::realtime::{Config, Input, Workspace, step};
 use tryon::dressing::{
-    DressError, DressOptions, Dressed, MadeOn, MeshWear, Wear, dress, dress_all,
+    DressError, DressOptions, Dressed, GarmentSource, MeshGarment, SourceBody, dress, dress_all,
 };
 use tryon::formats::gltf::{GlbMesh, write_glb};
 use tryon::garment::{GarmentKind, Material, Size, library};
@@ -23,7 +23,7 @@ fn person(shape: &[f64]) -> (std::sync::Arc<Template>, RestBody) {
     (t, rest)
 }
 
-/// Arms this far below the horizontal, radians.
+/// A standing pose; `down`: arms below the horizontal, radians.
 fn standing(template: &Template, rest: &RestBody, down: f64) -> Pose<World> {
     let sk = template.skeleton();
     let mut p = Pose::rest(sk, Rigid::<World, Body>::identity());
@@ -43,8 +43,8 @@ fn clothes(file: &str) -> Option<PathBuf> {
     shared(&format!("garments/makehuman_clothes_cc0/{file}.mhclo"))
 }
 
-fn read(file: &Path, body: Option<MadeOn>) -> MeshWear {
-    let w = MeshWear::on(
+fn read(file: &Path, body: Option<SourceBody>) -> MeshGarment {
+    let w = MeshGarment::read_on(
         file,
         body,
         &Material::preset("cotton").expect("preset"),
@@ -55,21 +55,21 @@ fn read(file: &Path, body: Option<MadeOn>) -> MeshWear {
     w
 }
 
-fn worn(shape: &[f64], wear: &MeshWear) -> Dressed {
+fn worn(shape: &[f64], wear: &MeshGarment) -> Dressed {
     let (t, rest) = person(shape);
     let pose = standing(&t, &rest, 1.3);
     dress_all(
         &t,
         &rest,
         &pose,
-        &[Wear::Mesh(wear)],
+        &[GarmentSource::Mesh(wear)],
         &DressOptions::default(),
     )
     .expect("dressed")
 }
 
-/// Height of the lowest and highest vertex, area in space over area at rest.
-fn look(d: &Dressed, k: usize) -> ([f32; 2], f64) {
+/// Heights of the lowest and highest vertex [m], and area in space over area at rest.
+fn extent_and_area(d: &Dressed, k: usize) -> ([f32; 2], f64) {
     let (g, x) = (&d.model.outfit.garments[k], &d.state.garments[k].positions);
     let (mut now, mut flat) = (0.0, 0.0);
     for (f, r) in g.faces.iter().zip(&g.rest) {
@@ -84,7 +84,7 @@ fn look(d: &Dressed, k: usize) -> ([f32; 2], f64) {
     )
 }
 
-fn shirt_and_trousers(body: Option<MadeOn>) {
+fn shirt_and_trousers(body: Option<SourceBody>) {
     let Some(file) = clothes("male_casualsuit02/male_casualsuit02") else {
         return;
     };
@@ -104,7 +104,7 @@ fn shirt_and_trousers(body: Option<MadeOn>) {
             d.report
         );
         for (k, kind) in kinds.iter().enumerate() {
-            let ([low, high], area) = look(&d, k);
+            let ([low, high], area) = extent_and_area(&d, k);
             println!("  {kind:?}: from {low:.2} to {high:.2} m, area {area:.3}");
             assert!((0.93..1.08).contains(&area), "{name} {kind:?}: area {area}");
             match kind {
@@ -122,37 +122,37 @@ fn shirt_and_trousers(body: Option<MadeOn>) {
 }
 
 #[test]
-fn makehuman_clothes_are_worn_by_bodies_of_ours() {
+fn makehuman_clothes_are_retargeted_to_bodies_of_ours() {
     let Some(base) = shared("body/makehuman_hm08_cc0/makehuman_app/3dobjs/base.obj") else {
         return;
     };
-    shirt_and_trousers(Some(MadeOn::read(&base).expect("a body")));
+    shirt_and_trousers(Some(SourceBody::read(&base).expect("a body")));
 }
 
 #[test]
-fn without_the_body_it_was_made_on_a_guess_will_do() {
+fn a_guessed_source_body_suffices() {
     shirt_and_trousers(None);
 }
 
 #[test]
-fn hats_are_carried_by_the_head() {
+fn hats_follow_the_head_rigidly() {
     let (Some(base), Some(hat)) = (
         shared("body/makehuman_hm08_cc0/makehuman_app/3dobjs/base.obj"),
         clothes("fedora01/fedora"),
     ) else {
         return;
     };
-    let wear = read(&hat, Some(MadeOn::read(&base).expect("a body")));
+    let wear = read(&hat, Some(SourceBody::read(&base).expect("a body")));
     let mut d = worn(AVERAGE, &wear);
     let (t, rest) = person(AVERAGE);
     let top = rest.vertices.iter().map(|p| p.y).fold(0.0, f32::max);
     let before = d.state.garments[0].positions.clone();
-    let ([low, high], _) = look(&d, 0);
+    let ([low, high], _) = extent_and_area(&d, 0);
     assert!(
         low > top - 0.2 && high > top,
         "{low} to {high} on a head that ends at {top}"
     );
-    // The person walks half a metre in half a second: the hat goes with the head and keeps its shape.
+    // The body walks half a metre in half a second: the hat follows the head and keeps its shape.
     let mut work = Workspace::default();
     for i in 1..=15 {
         let body: Vec<_> = posed(&t, &rest, &standing(&t, &rest, 1.3))
@@ -180,7 +180,7 @@ fn hats_are_carried_by_the_head() {
 }
 
 #[test]
-fn a_size_that_cannot_be_closed_is_refused_with_what_is_missing() {
+fn a_size_that_cannot_be_closed_is_refused_with_the_missing_girth() {
     let (t, rest) = person(HEAVY);
     let pose = standing(&t, &rest, 1.3);
     let put_on = |size, any_size| {
@@ -208,17 +208,17 @@ fn a_size_that_cannot_be_closed_is_refused_with_what_is_missing() {
     );
     assert!(
         put_on(Size::Xs, true).is_ok(),
-        "asked for, it is put on all the same"
+        "any_size dresses it all the same"
     );
     // Worn tight: the hem stays where a hem is.
     let d = put_on(Size::M, false).expect("tight");
-    let ([low, high], _) = look(&d, 0);
+    let ([low, high], _) = extent_and_area(&d, 0);
     println!("M from {low:.2} to {high:.2} m");
     assert!(low < 1.0 && high > 1.35, "rolled up: {low} to {high}");
 }
 
 #[test]
-fn our_own_gltf_is_worn_wherever_its_person_stood() {
+fn our_own_gltf_is_retargeted_from_any_place_in_a_room() {
     let (t, rest) = person(AVERAGE);
     let pattern = library::pattern("tshirt", Size::M).expect("pattern");
     let pose = standing(&t, &rest, 0.9);
@@ -248,17 +248,17 @@ fn our_own_gltf_is_worn_wherever_its_person_stood() {
             color,
         };
         write_glb(&file, &[mesh]).expect("written");
-        MeshWear::on(
+        MeshGarment::read_on(
             &file,
             None,
             &Material::preset("cotton").expect("preset"),
             0.021,
         )
     };
-    let before = look(&first, 0).0;
+    let before = extent_and_area(&first, 0).0;
     for aside in [[0.0; 3], [0.3, 0.0, -2.4]] {
         let d = worn(AVERAGE, &worn_from(aside).expect("wearable"));
-        let (after, area) = look(&d, 0);
+        let (after, area) = extent_and_area(&d, 0);
         println!("{aside:?}: {before:?} before, {after:?} after, area {area:.3}");
         assert!((0.93..1.08).contains(&area), "{area}");
         for (a, b) in before.iter().zip(after) {

@@ -1,4 +1,4 @@
-//! Garments on a moving shopper, coded and read back.
+//! Garments on a moving subject, coded and read back.
 
 use tryon::body::Pose;
 use tryon::cloth::realtime::{self, Input};
@@ -6,16 +6,16 @@ use tryon::dressing::{DressOptions, dress};
 use tryon::formats::{POSITION_STEP, PositionCoder};
 use tryon::garment::{Size, library};
 use tryon::math::{P3, World};
-use tryon::synth::{Sequence, Setting, Shopper};
+use tryon::synth::{Actor, Sequence, Setting};
 
 /// Bytes a vertex and frame that a stream may take (the goal is 2).
 const MOST: f64 = 4.0;
 
 #[test]
 fn moving_garments_take_few_bytes_and_lose_nothing() {
-    let sequence = Sequence::new(Shopper::default(), Setting::default());
+    let sequence = Sequence::new(Actor::default(), Setting::default());
     let world_from_camera = sequence.setting().world_from_camera;
-    let template = &sequence.shopper().template;
+    let template = &sequence.actor().template;
     let body = |i: u64| {
         let truth = sequence.truth(i);
         let mut world: Vec<P3> = Vec::new();

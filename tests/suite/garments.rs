@@ -1,11 +1,11 @@
-//! Garments of the library on bodies: what an eye would see at once, as numbers.
+//! Garments of the library on bodies: faults that an eye sees at once, as numbers.
 
 use super::common::{arms_down, posed};
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use tryon::body::measure::measure;
 use tryon::body::{BodyShape, BoneTransforms, RestBody, Template, embedded};
 use tryon::cloth::realtime::{Input, Workspace, step};
-use tryon::dressing::{DressOptions, Dressed, Fit, FitProbe, dress, suggest};
+use tryon::dressing::{DressOptions, Dressed, FitClass, FitProbe, dress, suggest};
 use tryon::formats::fabric_json::read_fabric;
 use tryon::formats::garmentcode::{parse_garmentcode, read_garmentcode};
 use tryon::formats::mhclo::read_mhclo;
@@ -25,12 +25,16 @@ const BODIES: [(&str, &[f64]); 3] = [
     ("heavy man", &[0.3, 2.0, 1.2, -0.2, 0.2, 0.3, 0.0, 0.6, 0.0]),
 ];
 
-fn wear(coefficients: &[f64], patterns: &dyn Fn(&Template, &RestBody) -> Vec<Pattern>) -> Dressed {
-    let t = embedded::template();
-    let rest = t.personalise(&BodyShape {
+fn person(template: &Template, coefficients: &[f64]) -> RestBody {
+    template.personalise(&BodyShape {
         coefficients: coefficients.to_vec(),
         ..BodyShape::default()
-    });
+    })
+}
+
+fn wear(coefficients: &[f64], patterns: &dyn Fn(&Template, &RestBody) -> Vec<Pattern>) -> Dressed {
+    let t = embedded::template();
+    let rest = person(&t, coefficients);
     let list = patterns(&t, &rest);
     dress(
         &t,
@@ -52,7 +56,7 @@ fn suggested(name: &'static str) -> impl Fn(&Template, &RestBody) -> Vec<Pattern
 }
 
 #[test]
-fn every_garment_hangs_on_three_bodies() {
+fn every_garment_is_neither_torn_nor_crumpled_on_three_bodies() {
     for name in library::names() {
         for (body, shape) in BODIES {
             let d = wear(shape, &suggested(name));
@@ -107,13 +111,10 @@ fn every_garment_hangs_on_three_bodies() {
                 GarmentKind::Trousers => 0.02..0.12,
             };
             assert!(hem.contains(&low), "{name} on {body}: the hem is at {low}");
-            // The suggestion's sentence says where the hem will be.
+            // The hem that the suggestion predicts.
             if !matches!(g.kind, GarmentKind::Skirt) {
                 let t = embedded::template();
-                let rest = t.personalise(&BodyShape {
-                    coefficients: shape.to_vec(),
-                    ..BodyShape::default()
-                });
+                let rest = person(&t, shape);
                 let said = suggest(name, &measure(&t, &rest).expect("measurable"))
                     .expect("size")
                     .hem;
@@ -133,13 +134,10 @@ fn every_garment_hangs_on_three_bodies() {
 }
 
 #[test]
-fn a_shirt_that_is_taken_out_of_itself_crosses_itself_nowhere_and_is_not_torn() {
+fn untangling_leaves_no_crossing_and_tears_nothing() {
     let t = embedded::template();
     for (body, shape) in BODIES {
-        let rest = t.personalise(&BodyShape {
-            coefficients: shape.to_vec(),
-            ..BodyShape::default()
-        });
+        let rest = person(&t, shape);
         let shirt = suggested("tshirt")(&t, &rest);
         let worn = |untangle| {
             let options = DressOptions {
@@ -166,12 +164,9 @@ fn a_shirt_that_is_taken_out_of_itself_crosses_itself_nowhere_and_is_not_torn() 
 }
 
 #[test]
-fn a_hood_of_fine_cloth_in_folds_on_a_thick_neck_passes_through_itself_nowhere() {
+fn a_fine_hood_on_a_thick_neck_has_no_crossing() {
     let t = embedded::template();
-    let rest = t.personalise(&BodyShape {
-        coefficients: BODIES[2].1.to_vec(),
-        ..BodyShape::default()
-    });
+    let rest = person(&t, BODIES[2].1);
     let options = DressOptions {
         triangulation: Triangulation {
             edge_length: 0.0155,
@@ -197,13 +192,10 @@ fn a_hood_of_fine_cloth_in_folds_on_a_thick_neck_passes_through_itself_nowhere()
 }
 
 #[test]
-fn wide_hoods_are_free_of_themselves_at_the_first_try() {
+fn wide_hoods_need_one_attempt() {
     let t = embedded::template();
     for (body, shape) in BODIES {
-        let rest = t.personalise(&BodyShape {
-            coefficients: shape.to_vec(),
-            ..BodyShape::default()
-        });
+        let rest = person(&t, shape);
         for size in [Size::L, Size::Xl] {
             let hoodie = [library::pattern("hoodie", size).expect("pattern")];
             let options = DressOptions {
@@ -214,14 +206,14 @@ fn wide_hoods_are_free_of_themselves_at_the_first_try() {
                 .expect("dressed")
                 .report;
             assert_eq!(r.crossings, 0, "{size} on {body}");
-            // A second try would take 170 more.
+            // A second attempt takes 170 more.
             assert!(r.steps < 800, "{size} on {body}: {} substeps", r.steps);
         }
     }
 }
 
-/// Widest angle about the middle of a forearm in which no cloth lies, degrees: what is 3 cm or less along the bone from there
-/// and 20 cm or less beside it counts.
+/// Widest angle about the middle of a forearm without cloth, degrees; cloth counts within 3 cm along the bone and 20 cm
+/// beside it.
 fn bare(d: &Dressed, joints: [Point3<f64>; 2]) -> f64 {
     let along = (joints[1] - joints[0]).normalize();
     let middle = joints[0] + (joints[1] - joints[0]) * 0.5;
@@ -250,10 +242,7 @@ fn bent_arms_are_in_their_sleeves() {
     let sk = t.skeleton();
     let mut lost = Vec::new();
     for (body, shape) in &BODIES[1..] {
-        let rest = t.personalise(&BodyShape {
-            coefficients: shape.to_vec(),
-            ..BodyShape::default()
-        });
+        let rest = person(&t, shape);
         let pattern = suggested("longsleeve")(&t, &rest);
         for k in 0..9 {
             let mut pose = arms_down(&t, &rest);
@@ -265,7 +254,7 @@ fn bent_arms_are_in_their_sleeves() {
                 let arm = rest.joints[joint("elbow")] - rest.joints[joint("shoulder")];
                 let wanted = Vector3::new(s * out.sin(), -out.cos(), 0.3);
                 let turn = UnitQuaternion::rotation_between(&arm, &wanted).expect("turn");
-                // The crook of the elbow to the front or outwards: inwards a forearm is in the belly.
+                // The elbow bends to the front or outwards: inwards the forearm is in the belly.
                 let twist = UnitQuaternion::from_axis_angle(
                     &Unit::new_normalize(arm),
                     s * [0.0, -0.3, -0.6][(k + k / 3) % 3],
@@ -354,7 +343,7 @@ fn every_garmentcode_pattern_is_imported_and_worn() {
             from_garmentcode(&raw, name, Size::M, fabric).unwrap_or_else(|e| panic!("{name}: {e}"));
         let round = Pattern::from_json(&p.to_json()).expect("our own JSON");
         assert_eq!(round.panels.len(), raw.panels.len());
-        // Stitches between edges of a few millimetres are closed by leaving the edges out.
+        // Edges of a few millimetres are left out, with their stitches.
         assert!(
             p.seams.len() + 10 >= raw.stitches.len(),
             "{name}: {} of {}",
@@ -391,7 +380,7 @@ fn damaged_garmentcode_files_are_refused_or_read_but_never_panic() {
     let Some(files) = garmentcode() else { return };
     let text = std::fs::read_to_string(&files[0]).expect("text");
     let at = std::path::Path::new("p.json");
-    // Cut at many places, and digits swapped for others: indices and coordinates that no longer fit.
+    // Cut at many places, and digits replaced: indices and coordinates that do not fit.
     for cut in (0..text.len())
         .step_by(97)
         .filter(|c| text.is_char_boundary(*c))
@@ -455,7 +444,7 @@ fn the_stitched_dress_becomes_one_surface() {
 }
 
 #[test]
-fn a_fit_map_tells_a_tight_size_from_a_loose_one() {
+fn a_fit_map_separates_a_tight_size_from_a_loose_one() {
     let worn = |size| {
         let mut d = wear(&[], &|_, _| {
             vec![library::pattern("tank", size).expect("pattern")]
@@ -463,7 +452,7 @@ fn a_fit_map_tells_a_tight_size_from_a_loose_one() {
         let t = embedded::template();
         let rest = t.personalise(&BodyShape::default());
         let body = posed(&t, &rest, &arms_down(&t, &rest));
-        // Forces at rest are read as pressure, and cloth that has just been put on is not.
+        // Pressure is of cloth at rest: half a second and more to settle.
         let mut work = Workspace::default();
         for _ in 0..30 {
             step(
@@ -499,8 +488,8 @@ fn a_fit_map_tells_a_tight_size_from_a_loose_one() {
     let (s, l) = (chest(&small), chest(&large));
     eprintln!("S {s:?}\nXXL {l:?}");
     assert!(s.stretch[0] > l.stretch[0] + 0.01 && s.gap < l.gap && s.pressure[0] > l.pressure[0]);
-    assert_eq!(s.fit, Fit::Tight);
-    assert_ne!(l.fit, Fit::Tight);
+    assert_eq!(s.fit, FitClass::Tight);
+    assert_ne!(l.fit, FitClass::Tight);
 }
 
 #[test]
@@ -572,7 +561,7 @@ fn makehuman_clothes_fit_their_base_mesh() {
 }
 
 #[test]
-fn dressing_is_the_same_twice() {
+fn dressing_repeats_its_bits() {
     let a = wear(&[], &suggested("tank"));
     let b = wear(&[], &suggested("tank"));
     assert_eq!(a.state, b.state);

@@ -11,7 +11,7 @@ use tryon::evaluate::tracking::{Outcome, follow, mean};
 use tryon::evaluate::{Scene, scenes};
 use tryon::math::{P3d, Rigid};
 use tryon::raster::{View, VisibilityBuffer, rasterise};
-use tryon::synth::{Routine, Sequence, Setting, Shopper};
+use tryon::synth::{Actor, Routine, Sequence, Setting};
 use tryon::tracking::{
     LostReason, Reason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace, step,
 };
@@ -57,8 +57,8 @@ fn joints(model: &TrackerModel, state: &TrackerState) -> Vec<P3d> {
 
 /// The routine with the body that is tracked: what is left is the tracker's own error.
 fn own_body(routine: Routine, noise: NoiseModel, frames: u64) -> (Arc<Template>, Scene) {
-    let shopper = Shopper::default();
-    let template = shopper.template.clone();
+    let subject = Actor::default();
+    let template = subject.template.clone();
     let setting = Setting {
         routine,
         noise,
@@ -67,7 +67,7 @@ fn own_body(routine: Routine, noise: NoiseModel, frames: u64) -> (Arc<Template>,
     };
     (
         template,
-        Scene::synthetic("own", &Sequence::new(shopper, setting), frames),
+        Scene::synthetic("own", &Sequence::new(subject, setting), frames),
     )
 }
 

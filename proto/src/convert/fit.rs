@@ -1,7 +1,7 @@
 //! Fit maps on the wire.
 
 use crate::v1::{FitClass, GarmentFit, RegionFit};
-use tryon::dressing::{Fit, FitMap, Suggestion};
+use tryon::dressing::{self, FitMap, Suggestion};
 
 /// Byte of a tightness.
 const TIGHTEST: f32 = 127.0;
@@ -19,21 +19,21 @@ pub fn fit_to_wire(
     map: &FitMap,
     cut: Option<&Suggestion>,
 ) -> GarmentFit {
-    let room = |place: &str| cut.and_then(|c| c.rooms.iter().find(|r| r.place == place));
+    let ease = |place: &str| cut.and_then(|c| c.girths.iter().find(|r| r.place == place));
     let regions = map.regions.iter().map(|r| RegionFit {
         region: r.name.clone(),
         fit: match r.fit {
-            Fit::Tight => FitClass::Tight,
-            Fit::Fitted => FitClass::Fitted,
-            Fit::Loose => FitClass::Loose,
+            dressing::FitClass::Tight => FitClass::Tight,
+            dressing::FitClass::Fitted => FitClass::Fitted,
+            dressing::FitClass::Loose => FitClass::Loose,
         }
         .into(),
         stretch: r.stretch[1] as f32,
         pressure: r.pressure[0] as f32,
         touching: r.touching as f32,
         gap: r.gap as f32,
-        ease: room(&r.name).map(|r| r.ease() as f32),
-        ease_needed: room(&r.name).map(|r| r.needed as f32),
+        ease: ease(&r.name).map(|r| r.ease() as f32),
+        ease_needed: ease(&r.name).map(|r| r.least_ease as f32),
     });
     let tightness = map
         .vertices
@@ -54,7 +54,7 @@ pub fn fit_to_wire(
 mod tests {
     use super::*;
     use tryon::body::measure::Measurements;
-    use tryon::dressing::{RegionFit as Region, judge};
+    use tryon::dressing::{RegionFit as Region, assess};
     use tryon::garment::{Size, library};
 
     #[test]
@@ -66,7 +66,7 @@ mod tests {
             pressure: [0.0; 2],
             touching: 0.0,
             gap: 0.01,
-            fit: Fit::Fitted,
+            fit: dressing::FitClass::Fitted,
         };
         let map = FitMap {
             vertices: Vec::new(),
@@ -83,7 +83,7 @@ mod tests {
             inseam: 0.8,
             ..Measurements::default()
         };
-        let cut = judge(&pattern, &body);
+        let cut = assess(&pattern, &body);
         let wire = fit_to_wire("tshirt", "S", &map, Some(&cut));
         let [chest, waist, thigh] = &wire.regions[..] else {
             panic!("{wire:?}")

@@ -3,7 +3,7 @@
 use crate::pattern::Pattern;
 use std::path::Path;
 use tryon::formats::{RgbdSource, open_recording};
-use tryon::synth::{Routine, Sequence, Setting, Shopper, SynthSource};
+use tryon::synth::{Actor, Routine, Sequence, Setting, SynthSource};
 
 /// A source ready to be read.
 pub type OpenSource = Box<dyn RgbdSource>;
@@ -48,7 +48,7 @@ fn synth(clip: &str) -> Result<OpenSource, String> {
         }
     };
     let sequence = Sequence::new(
-        Shopper::default(),
+        Actor::default(),
         Setting {
             routine,
             ..Setting::default()

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use std::path::Path;
 use std::sync::Arc;
 use tryon::body::{Template, embedded, import::template_from_smpl};
-use tryon::dressing::{MadeOn, MeshWear};
+use tryon::dressing::{MeshGarment, SourceBody};
 use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
 use tryon::formats::npz::read_smpl;
 use tryon::garment::import::from_garmentcode;
@@ -65,7 +65,7 @@ pub(crate) fn choices(
 ) -> Result<Vec<Choice>> {
     let size = size.map(str::parse::<Size>).transpose()?;
     let body = body
-        .map(MadeOn::read)
+        .map(SourceBody::read)
         .transpose()
         .context("--garment-body")?;
     let choice = |name: &String| {
@@ -89,9 +89,9 @@ fn is_mesh(path: &Path) -> bool {
 }
 
 /// Mesh garment of cotton, made on `body`, which is guessed when absent.
-fn mesh_garment(path: &Path, body: Option<MadeOn>) -> Result<MeshWear> {
+fn mesh_garment(path: &Path, body: Option<SourceBody>) -> Result<MeshGarment> {
     let edge = Triangulation::default().edge_length;
-    MeshWear::on(path, body, &Material::preset("cotton")?, edge)
+    MeshGarment::read_on(path, body, &Material::preset("cotton")?, edge)
         .with_context(|| path.display().to_string())
 }
 

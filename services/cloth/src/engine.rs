@@ -102,7 +102,7 @@ fn ease(outfit: &DressedOutfit, measures: &Measurements) -> Vec<Option<Suggestio
     (0..outfit.model.outfit.garments.len())
         .map(|k| {
             let pattern = outfit.worn()[outfit.source(k)?].pattern()?;
-            Some(dressing::judge(pattern, measures))
+            Some(dressing::assess(pattern, measures))
         })
         .collect()
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tryon::dressing::{MadeOn, MeshWear};
+use tryon::dressing::{MeshGarment, SourceBody};
 use tryon::garment::{GarmentKind, Material, Size, Triangulation, library};
 use tryon::mirror::Choice;
 use tryon_kit::config::ClothConfig;
@@ -42,7 +42,7 @@ fn size(name: &str) -> Option<Size> {
 /// Everything that can be worn.
 #[derive(Debug, Default)]
 pub(crate) struct Library {
-    meshes: BTreeMap<String, Arc<MeshWear>>,
+    meshes: BTreeMap<String, Arc<MeshGarment>>,
 }
 
 impl Library {
@@ -72,7 +72,7 @@ impl Library {
         let files = files(&config.garments).map_err(unreadable)?;
         let body = &config.garments_body;
         let body = (!body.as_os_str().is_empty())
-            .then(|| MadeOn::read(body))
+            .then(|| SourceBody::read(body))
             .transpose();
         let body = body.map_err(|e| {
             fault(
@@ -103,7 +103,7 @@ impl Library {
         &mut self,
         name: &str,
         file: &Path,
-        body: Option<MadeOn>,
+        body: Option<SourceBody>,
         material: &Material,
     ) -> Result<String, String> {
         if !is_name(name) {
@@ -113,7 +113,7 @@ impl Library {
             return Err(format!("there is another garment named {name}"));
         }
         let edge = Triangulation::default().edge_length;
-        let wear = MeshWear::on(file, body, material, edge)
+        let wear = MeshGarment::read_on(file, body, material, edge)
             .map_err(|e| e.to_string())?
             .named(name);
         let notes = wear.notes.join("; ");

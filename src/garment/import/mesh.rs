@@ -7,7 +7,7 @@ use crate::mesh::{Face, Topology};
 
 /// A mesh garment and where its vertices are in the file.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MeshGarment {
+pub struct ImportedMesh {
     /// The garment, seams welded. It has no panels to place: it is worn where `positions` are.
     pub garment: GarmentMesh,
     /// Positions of the simulation vertices, metres: the middle of what is welded there.
@@ -37,7 +37,7 @@ pub fn from_mesh(
     name: &str,
     kind: GarmentKind,
     material: Material,
-) -> Result<MeshGarment, GarmentError> {
+) -> Result<ImportedMesh, GarmentError> {
     let mesh = &sewn.obj.mesh;
     let topology = Topology::new(mesh)?;
     let (piece, pieces) = topology.components();
@@ -128,7 +128,7 @@ pub fn from_mesh(
         min_angle,
     };
     garment.topology()?;
-    Ok(MeshGarment {
+    Ok(ImportedMesh {
         garment,
         positions,
         closed,
@@ -279,7 +279,7 @@ mod tests {
     use crate::formats::sewn_obj::parse_sewn_obj;
     use std::path::Path;
 
-    fn garment(text: &str) -> Result<MeshGarment, GarmentError> {
+    fn garment(text: &str) -> Result<ImportedMesh, GarmentError> {
         let o = parse_sewn_obj(text, Path::new("g.obj")).expect("an OBJ");
         from_mesh(
             &o,

@@ -10,5 +10,5 @@ pub use coarsen::{coarsen, median_edge};
 pub use file::{MeshFile, read_mesh, some_faces, split};
 pub use garmentcode::from_garmentcode;
 pub(crate) use mesh::unfold;
-pub use mesh::{MeshGarment, from_mesh, panels_in_metres};
+pub use mesh::{ImportedMesh, from_mesh, panels_in_metres};
 pub use remesh::remesh;

@@ -11,9 +11,8 @@ use tryon::formats::gltf::{GlbMesh, write_glb, write_glb_motion};
 use tryon::formats::obj::write_obj;
 use tryon::garment::{GarmentMesh, Pattern, Size, Triangulation, library};
 use tryon::math::{P3, V3, World};
-use tryon::mesh::Face;
 use tryon::par::Par;
-use tryon::synth::{Sequence, Setting, Shopper};
+use tryon::synth::{Actor, Sequence, Setting};
 
 /// Runs the command.
 ///
@@ -30,14 +29,14 @@ pub(crate) fn run(args: &ExportArgs) -> Result<ExitCode> {
     };
     if what == "body" {
         let t = embedded::template();
-        mesh(
-            out,
-            "body",
-            t.mesh().vertices(),
-            t.mesh().faces(),
-            &[],
-            [205, 170, 150],
-        )?;
+        let body = GlbMesh {
+            name: "body",
+            vertices: t.mesh().vertices(),
+            faces: t.mesh().faces(),
+            uv: &[],
+            color: SKIN,
+        };
+        write_mesh(out, body)?;
     } else {
         let size: Size = args.size.parse()?;
         let pattern = library::pattern(what, size)?;
@@ -47,87 +46,102 @@ pub(crate) fn run(args: &ExportArgs) -> Result<ExitCode> {
         } else if args.worn {
             worn(out, &pattern, args.seconds)?;
         } else {
-            // Flat, as cut: the rest shape is the panels laid out side by side.
             let g = GarmentMesh::sew(&pattern, &Triangulation::default())?;
-            let flat: Vec<P3> = g
-                .render
-                .uv
-                .iter()
-                .map(|p| P3::new(p[0], p[1], 0.0))
-                .collect();
-            mesh(
-                out,
-                what,
-                &flat,
-                &g.render.faces,
-                &g.render.uv,
-                library::dye(what),
-            )?;
+            let cut = GlbMesh {
+                name: what,
+                vertices: &flat(&g),
+                faces: &g.render.faces,
+                uv: &g.render.uv,
+                color: library::dye(what),
+            };
+            write_mesh(out, cut)?;
         }
     }
     println!("{what} in {}", out.display());
     Ok(ExitCode::SUCCESS)
 }
 
+/// Colour of the exported body, sRGB.
+const SKIN: [u8; 3] = [205, 170, 150];
 /// Frames a second of an exported animation.
 const FRAMES: f64 = 30.0;
+/// Longest animation, s.
+const LONGEST: f64 = 60.0;
+
+/// Vertices of a garment as cut: its panels side by side, metres.
+pub(crate) fn flat(garment: &GarmentMesh) -> Vec<P3> {
+    let uv = garment.render.uv.iter();
+    uv.map(|p| P3::new(p[0], p[1], 0.0)).collect()
+}
+
+/// Pose of the try-on routine in frame `i`.
+fn pose(sequence: &Sequence, i: u64) -> Pose<World> {
+    let p = sequence.truth(i).pose;
+    Pose {
+        root: sequence.setting().world_from_camera * p.root,
+        angles: p.angles,
+    }
+}
 
 /// The garment on the embedded body, which starts upright over the origin and faces +z: still, or moving with the try-on
 /// routine for some seconds.
 fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
-    let sequence = Sequence::new(Shopper::default(), Setting::default());
+    let sequence = Sequence::new(Actor::default(), Setting::default());
     let template = embedded::template();
-    let rest = sequence.rest();
-    let pose = |i: u64| -> Pose<World> {
-        let p = sequence.truth(i).pose;
-        Pose {
-            root: sequence.setting().world_from_camera * p.root,
-            angles: p.angles,
-        }
+    let start = pose(&sequence, 0);
+    let options = DressOptions {
+        any_size: true,
+        ..DressOptions::default()
     };
-    let dressed = dress(
-        &template,
-        rest,
-        &pose(0),
-        std::slice::from_ref(pattern),
-        &DressOptions {
-            any_size: true,
-            ..DressOptions::default()
-        },
-    )?;
-    let (model, mut state, mut work) =
-        (dressed.model, dressed.state, realtime::Workspace::default());
-    let garment = &model.outfit.garments[0];
-    let stands = pose(0)
-        .root
-        .point(&template.skeleton().joints()[0].rest)
-        .coords
-        .cast::<f32>();
+    let patterns = std::slice::from_ref(pattern);
+    let dressed = dress(&template, sequence.rest(), &start, patterns, &options)?;
+    let garment = &dressed.model.outfit.garments[0];
+    let pelvis = start.root.point(&template.skeleton().joints()[0].rest);
+    let home = V3::new(pelvis.x as f32, 0.0, pelvis.z as f32);
     let drawn = |state: &realtime::State| {
         let mut p = Vec::new();
         garment.render_positions(&state.garments[0].positions, &mut p);
-        p.iter_mut()
-            .for_each(|p| *p -= V3::new(stands.x, 0.0, stands.z));
+        p.iter_mut().for_each(|p| *p -= home);
         p
     };
-    let start = drawn(&state);
-    let count = (seconds.clamp(0.0, 60.0) * FRAMES) as u64;
+    let still = drawn(&dressed.state);
+    let m = GlbMesh {
+        name: &garment.name,
+        vertices: &still,
+        faces: &garment.render.faces,
+        uv: &garment.render.uv,
+        color: library::dye(&garment.name),
+    };
+    let count = (seconds.clamp(0.0, LONGEST) * FRAMES) as u64;
     if count == 0 || out.extension().is_none_or(|e| e != "glb") {
-        return mesh(
-            out,
-            &garment.name,
-            &start,
-            &garment.render.faces,
-            &garment.render.uv,
-            library::dye(&garment.name),
-        );
+        return write_mesh(out, m);
     }
+    let frames = simulate(
+        &sequence,
+        &dressed.model,
+        dressed.state.clone(),
+        count,
+        drawn,
+    )?;
+    write_glb_motion(out, &[m], &[frames], (1.0 / FRAMES) as f32)?;
+    Ok(())
+}
+
+/// Drawn vertices of the first `count` frames of the routine.
+fn simulate(
+    sequence: &Sequence,
+    model: &realtime::Model,
+    mut state: realtime::State,
+    count: u64,
+    drawn: impl Fn(&realtime::State) -> Vec<P3>,
+) -> Result<Vec<Vec<P3>>> {
+    let (template, rest) = (&sequence.actor().template, sequence.rest());
     let bar = crate::input::progress(Some(count), "simulating");
+    let (mut work, mut body) = (realtime::Workspace::default(), Vec::new());
     let mut frames = Vec::new();
-    let mut body = Vec::new();
     for i in 0..count {
         let mut bones = BoneTransforms::default();
-        pose(i).bones(template.skeleton(), rest, &mut bones);
+        pose(sequence, i).bones(template.skeleton(), rest, &mut bones);
         skin(
             Par::Rayon,
             &rest.vertices,
@@ -135,56 +149,29 @@ fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
             &bones,
             &mut body,
         );
-        realtime::step(
-            &model,
-            &mut state,
-            &realtime::Input {
-                body: &body,
-                dt: 1.0 / FRAMES,
-            },
-            &mut work,
-        )?;
+        let input = realtime::Input {
+            body: &body,
+            dt: 1.0 / FRAMES,
+        };
+        realtime::step(model, &mut state, &input, &mut work)?;
         frames.push(drawn(&state));
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let name = garment.name.as_str();
-    let color = library::dye(name);
-    let m = GlbMesh {
-        name,
-        vertices: &start,
-        faces: &garment.render.faces,
-        uv: &garment.render.uv,
-        color,
-    };
-    write_glb_motion(out, &[m], &[frames], (1.0 / FRAMES) as f32)?;
-    Ok(())
+    Ok(frames)
 }
 
 /// Writes a mesh in the format that the ending names.
 ///
 /// # Errors
 /// An unknown ending, or a file that cannot be written.
-pub(crate) fn mesh(
-    out: &Path,
-    name: &str,
-    vertices: &[P3],
-    faces: &[Face],
-    uv: &[[f32; 2]],
-    rgb: [u8; 3],
-) -> Result<()> {
+pub(crate) fn write_mesh(out: &Path, m: GlbMesh<'_>) -> Result<()> {
     match out.extension().and_then(|e| e.to_str()) {
-        Some("obj") => write_obj(out, vertices, faces, (!uv.is_empty()).then_some(uv))?,
-        Some("glb") => write_glb(
-            out,
-            &[GlbMesh {
-                name,
-                vertices,
-                faces,
-                uv,
-                color: rgb,
-            }],
-        )?,
+        Some("obj") => {
+            let uv = (!m.uv.is_empty()).then_some(m.uv);
+            write_obj(out, m.vertices, m.faces, uv)?;
+        }
+        Some("glb") => write_glb(out, &[m])?,
         _ => bail!(
             "{}: the ending must be .obj or .glb (or .json for a garment's pattern)",
             out.display()

@@ -1,12 +1,16 @@
-//! `tryon import`: what was made elsewhere, checked and converted.
+//! `tryon import`: bodies, garments and recordings of others, checked and converted.
 
-use super::{export::mesh, record::Sink};
+use super::{
+    export::{flat, write_mesh},
+    record::Sink,
+};
 use crate::args::ImportArgs;
 use crate::input;
 use anyhow::{Context, Result, bail};
+use std::path::Path;
 use std::process::ExitCode;
 use tryon::formats::fabric_json::parse_fabric;
-use tryon::formats::gltf::read_glb;
+use tryon::formats::gltf::{GlbMesh, read_glb};
 use tryon::formats::mhclo::read_mhclo;
 use tryon::formats::obj::read_obj;
 use tryon::formats::open_recording;
@@ -14,7 +18,7 @@ use tryon::formats::sewn_obj::read_sewn_obj;
 use tryon::garment::import::from_mesh;
 use tryon::garment::{GarmentKind, GarmentMesh, Material, Triangulation};
 use tryon::math::P3;
-use tryon::mesh::Topology;
+use tryon::mesh::{Face, Topology, TriMesh};
 
 /// Colour of imported meshes without their own.
 const GREY: [u8; 3] = [180, 180, 180];
@@ -25,96 +29,16 @@ const GREY: [u8; 3] = [180, 180, 180];
 /// The fault of the file, named by field, joint, vertex, face, panel or frame.
 pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
     let path = &args.input;
-    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-    match ending {
-        "npz" => {
-            let t = input::template(Some(path))?;
-            let (m, s) = (t.mesh(), t.skeleton());
-            println!(
-                "body: {} vertices, {} faces, {} joints, {} angles",
-                m.vertices().len(),
-                m.faces().len(),
-                s.len(),
-                s.dofs()
-            );
-            println!(
-                "shape directions: {}",
-                t.shape_space().map_or(0, |s| s.vertices.len())
-            );
-            println!(
-                "closed: {}, volume {:.4} m³",
-                t.topology().is_closed(),
-                m.volume()
-            );
-            if let Some(out) = &args.out {
-                mesh(out, t.name(), m.vertices(), m.faces(), &[], GREY)?;
-            }
-        }
-        "obj" | "glb" | "gltf" => {
-            let (vertices, faces, uv, surface) = if ending == "obj" {
-                let sewn = read_sewn_obj(path)?;
-                if !sewn.stitches.is_empty() {
-                    let name = path
-                        .file_stem()
-                        .and_then(|s| s.to_str())
-                        .unwrap_or("garment");
-                    let g =
-                        from_mesh(&sewn, name, GarmentKind::Dress, Material::preset("cotton")?)?;
-                    let (n, panels) = (g.garment.vertices, g.garment.panels.len());
-                    let s = sewn.stitches.len();
-                    println!(
-                        "sewn garment: {panels} panels, {s} stitches ({} left open), {n} vertices",
-                        g.open
-                    );
-                }
-                let o = sewn.obj;
-                let (v, t, f, _) = o.unwelded();
-                (v, f, t, o.mesh)
-            } else {
-                let g = read_glb(path)?;
-                (
-                    g.mesh.vertices().to_vec(),
-                    g.mesh.faces().to_vec(),
-                    g.uv,
-                    g.mesh,
-                )
-            };
-            let topology = Topology::new(&surface)?;
-            let (_, pieces) = topology.components();
-            println!(
-                "mesh: {} vertices, {} faces, {pieces} pieces, closed: {}, area {:.3} m²",
-                surface.vertices().len(),
-                surface.faces().len(),
-                topology.is_closed(),
-                surface.area()
-            );
-            if let Some(out) = &args.out {
-                mesh(out, "garment", &vertices, &faces, &uv, GREY)?;
-            }
+    match path.extension().and_then(|e| e.to_str()).unwrap_or("") {
+        "npz" => body(args)?,
+        "obj" => obj(args)?,
+        "glb" | "gltf" => {
+            let g = read_glb(path)?;
+            describe(&g.mesh)?;
+            write(args, "garment", g.mesh.vertices(), g.mesh.faces(), &g.uv)?;
         }
         "json" => json(args)?,
-        "mhclo" => {
-            let m = read_mhclo(path)?;
-            let o = read_obj(&path.with_file_name(&m.obj_file))?;
-            let (bound, has) = (m.bindings.len(), o.mesh.vertices().len());
-            if bound != has {
-                bail!(
-                    "{}: {bound} vertices are bound, but {} has {has}",
-                    path.display(),
-                    m.obj_file
-                );
-            }
-            println!(
-                "clothes `{}` for {}: {bound} vertices, hides {} of the body",
-                m.name,
-                m.base,
-                m.deleted.len()
-            );
-            if let Some(out) = &args.out {
-                let (v, t, f, _) = o.unwelded();
-                mesh(out, &m.name, &v, &f, &t, GREY)?;
-            }
-        }
+        "mhclo" => clothes(args)?,
         "mcap" | "" => recording(args)?,
         other => bail!(
             "{}: .{other} is not known; bodies are .npz, garments .obj, .glb or .json, recordings .mcap or a folder",
@@ -124,15 +48,114 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Writes a mesh to `--out` where that is given.
+fn write(
+    args: &ImportArgs,
+    name: &str,
+    vertices: &[P3],
+    faces: &[Face],
+    uv: &[[f32; 2]],
+) -> Result<()> {
+    let m = GlbMesh {
+        name,
+        vertices,
+        faces,
+        uv,
+        color: GREY,
+    };
+    args.out.as_ref().map_or(Ok(()), |out| write_mesh(out, m))
+}
+
+/// Name of a garment: that of its file.
+fn stem(path: &Path) -> &str {
+    path.file_stem()
+        .and_then(|s| s.to_str())
+        .unwrap_or("garment")
+}
+
+fn body(args: &ImportArgs) -> Result<()> {
+    let t = input::template(Some(&args.input))?;
+    let (m, s) = (t.mesh(), t.skeleton());
+    println!(
+        "body: {} vertices, {} faces, {} joints, {} angles",
+        m.vertices().len(),
+        m.faces().len(),
+        s.len(),
+        s.dofs()
+    );
+    println!(
+        "shape directions: {}",
+        t.shape_space().map_or(0, |s| s.vertices.len())
+    );
+    println!(
+        "closed: {}, volume {:.4} m³",
+        t.topology().is_closed(),
+        m.volume()
+    );
+    write(args, t.name(), m.vertices(), m.faces(), &[])
+}
+
+/// A mesh, with stitches or without.
+fn obj(args: &ImportArgs) -> Result<()> {
+    let sewn = read_sewn_obj(&args.input)?;
+    if !sewn.stitches.is_empty() {
+        let cotton = Material::preset("cotton")?;
+        let g = from_mesh(&sewn, stem(&args.input), GarmentKind::Dress, cotton)?;
+        println!(
+            "sewn garment: {} panels, {} stitches ({} left open), {} vertices",
+            g.garment.panels.len(),
+            sewn.stitches.len(),
+            g.open,
+            g.garment.vertices
+        );
+    }
+    describe(&sewn.obj.mesh)?;
+    let (vertices, uv, faces, _) = sewn.obj.unwelded();
+    write(args, "garment", &vertices, &faces, &uv)
+}
+
+fn describe(surface: &TriMesh) -> Result<()> {
+    let topology = Topology::new(surface)?;
+    let (_, pieces) = topology.components();
+    println!(
+        "mesh: {} vertices, {} faces, {pieces} pieces, closed: {}, area {:.3} m²",
+        surface.vertices().len(),
+        surface.faces().len(),
+        topology.is_closed(),
+        surface.area()
+    );
+    Ok(())
+}
+
+/// MakeHuman clothes, with the OBJ beside them.
+fn clothes(args: &ImportArgs) -> Result<()> {
+    let path = &args.input;
+    let m = read_mhclo(path)?;
+    let o = read_obj(&path.with_file_name(&m.obj_file))?;
+    let (bound, has) = (m.bindings.len(), o.mesh.vertices().len());
+    if bound != has {
+        bail!(
+            "{}: {bound} vertices are bound, but {} has {has}",
+            path.display(),
+            m.obj_file
+        );
+    }
+    println!(
+        "clothes `{}` for {}: {bound} vertices, hides {} of the body",
+        m.name,
+        m.base,
+        m.deleted.len()
+    );
+    let (vertices, uv, faces, _) = o.unwelded();
+    write(args, &m.name, &vertices, &faces, &uv)
+}
+
 /// A sewing pattern, GarmentCode's or ours, or a measured fabric.
 fn json(args: &ImportArgs) -> Result<()> {
     let path = &args.input;
     let text =
         std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let name = path
-        .file_stem()
-        .and_then(|s| s.to_str())
-        .unwrap_or("garment");
+    let name = stem(path);
     if text.contains("\"stretching\"") {
         let m = Material::from_measured(name, &parse_fabric(&text, path)?)?;
         println!(
@@ -160,16 +183,7 @@ fn json(args: &ImportArgs) -> Result<()> {
         Some(out) if out.extension().is_some_and(|e| e == "json") => {
             std::fs::write(out, pattern.to_json())?
         }
-        Some(out) => {
-            let flat: Vec<P3> = g
-                .render
-                .uv
-                .iter()
-                .map(|p| P3::new(p[0], p[1], 0.0))
-                .collect();
-            mesh(out, name, &flat, &g.render.faces, &g.render.uv, GREY)?;
-        }
-        None => {}
+        _ => write(args, name, &flat(&g), &g.render.faces, &g.render.uv)?,
     }
     Ok(())
 }

@@ -1,0 +1,255 @@
+//! The body under a garment when its file does not say: scale, arms and place at which the cloth lies just above the skin.
+
+use super::error::MeshGarmentError;
+use super::file_frame::{FileFrame, bounds};
+use super::skin_binding::skin_normals;
+use crate::body::{
+    BodyError, BodyShape, BoneTransforms, Joint, Pose, RestBody, Skeleton, Template, skin,
+};
+use crate::math::{Body, P3, Rigid, V3, World, log_so3};
+use crate::par::Par;
+use crate::spatial::PointTree;
+use nalgebra::{UnitQuaternion, Vector3};
+use std::sync::Arc;
+
+/// Limits of a garment's largest extent, metres; they decide the file's unit.
+const EXTENT: [f32; 2] = [0.22, 2.2];
+/// Horizontal distance of a garment from the file's zero from which it is moved there first, metres.
+const ASIDE: f32 = 0.4;
+/// Garment vertices in the cost; more change the guess by less than its error.
+const SAMPLES: usize = 500;
+/// Distance from the skin at which the cost saturates, metres.
+const FAR: f32 = 0.08;
+/// Mean cost over [`FAR`] from which no body wears the garment; one in mid-air has 1.
+const NOT_WORN: f32 = 0.9;
+/// Weight of vertices inside the body against those outside.
+const INSIDE: f32 = 4.0;
+/// Usual height of cloth over skin, metres.
+const ABOVE: f32 = 0.008;
+/// Standard deviation of stature over its mean.
+const STATURE_SPREAD: f64 = 0.05;
+/// Standard deviation of the floor's height in files, metres.
+const FLOOR_SPREAD: f64 = 0.03;
+/// Mean distance that one variance of stature or floor is worth, metres; larger prefers the usual body to the better fit.
+const PRIOR: f32 = 0.002;
+/// A garment that reaches below this height, metres, has the file's zero at half the stature.
+const UNDERGROUND: f32 = -0.05;
+/// Scale and arms [rad below the horizontal] at the start.
+const START: [f64; 2] = [1.0, 0.75];
+/// Limits of scale and of arms [rad].
+const LIMITS: [std::ops::Range<f64>; 2] = [0.8..1.15, -0.3..1.4];
+/// First steps of the search (see [`Guess`]), and how often they are halved.
+const STEPS: Guess = [0.04, 0.2, 0.04, 0.02];
+const HALVINGS: usize = 5;
+/// Distance within which skin is searched, metres.
+const ANYWHERE: f32 = 10.0;
+
+/// Scale, arms below the horizontal [rad], shift of the garment up and to the front [m].
+type Guess = [f64; 4];
+
+/// Frame in which the garment's vertices lie over the skin of `template`.
+pub(super) fn locate(template: &Template, garment: &[P3]) -> FileFrame {
+    let fit = GuessFit::new(template, garment, false);
+    fit.frame(&fit.minimise().1)
+}
+
+/// `template` scaled, with its arms turned, and the frame in which the garment's vertices lie over its skin.
+///
+/// # Errors
+/// When no body lies near the garment.
+pub(super) fn guess(
+    template: &Template,
+    garment: &[P3],
+) -> Result<(Arc<Template>, FileFrame), MeshGarmentError> {
+    let fit = GuessFit::new(template, garment, true);
+    let (cost, q) = fit.minimise();
+    if cost > NOT_WORN * FAR {
+        let why = "no body fits into it: is it worn, upright, y up, and facing +z?";
+        return Err(MeshGarmentError::NotFound(why.into()));
+    }
+    let (vertices, bones) = fit.stand(&q);
+    let joints = template.skeleton().joints().iter().zip(&bones.joints);
+    let joints = joints
+        .map(|(joint, rest)| Joint {
+            rest: *rest,
+            ..joint.clone()
+        })
+        .collect();
+    let mesh = template.mesh().with_vertices(vertices);
+    let made = Template::new(
+        "guessed",
+        mesh.map_err(BodyError::Mesh)?,
+        Skeleton::new(joints)?,
+        template.weights().clone(),
+        None,
+    )?;
+    Ok((Arc::new(made), fit.frame(&q)))
+}
+
+/// A garment and the body that is fitted under it.
+struct GuessFit<'a> {
+    template: &'a Template,
+    rest: RestBody,
+    stature: f32,
+    /// Scale and arms are unknowns too.
+    free: bool,
+    /// First frame of the garment, and samples of it there.
+    start: FileFrame,
+    points: Vec<P3>,
+    /// The garment's lowest height in `start`, metres.
+    lowest: f32,
+}
+
+impl<'a> GuessFit<'a> {
+    fn new(template: &'a Template, garment: &[P3], free: bool) -> Self {
+        let (lo, hi) = bounds(garment.iter());
+        let scale = FileFrame::unit_of((hi - lo).amax(), EXTENT).unwrap_or(1.0);
+        // The person in a file may stand anywhere in a room.
+        let middle = nalgebra::center(&lo, &hi).coords * scale;
+        let aside = V3::new(middle.x, 0.0, middle.z);
+        let start = FileFrame {
+            scale,
+            shift: if aside.norm() > ASIDE {
+                -aside
+            } else {
+                V3::zeros()
+            },
+            ..FileFrame::METRES
+        };
+        let rest = template.personalise(&BodyShape::default());
+        Self {
+            template,
+            stature: rest.vertices.iter().map(|p| p.y).fold(0.0, f32::max),
+            rest,
+            free,
+            start,
+            points: garment
+                .iter()
+                .step_by(garment.len().div_ceil(SAMPLES).max(1))
+                .map(|p| start.to_metres(p))
+                .collect(),
+            lowest: lo.y * scale,
+        }
+    }
+    fn frame(&self, q: &Guess) -> FileFrame {
+        FileFrame {
+            shift: self.start.shift + V3::new(0.0, q[2] as f32, q[3] as f32),
+            ..self.start
+        }
+    }
+    /// The template scaled, its arms turned if they are free: vertices and bones.
+    fn stand(&self, q: &Guess) -> (Vec<P3>, BoneTransforms) {
+        let (sk, rest, [scale, down, ..]) = (self.template.skeleton(), &self.rest, *q);
+        let mut pose = Pose::rest(sk, Rigid::<World, Body>::identity());
+        let arms = [("left", 1.0), ("right", -1.0)];
+        for (side, sign) in arms.into_iter().filter(|_| self.free) {
+            let at = |n: &str| sk.index(&format!("{side}_{n}"));
+            let (Some(j), Some(c)) = (at("shoulder"), at("elbow")) else {
+                continue;
+            };
+            let arm = rest.joints[c] - rest.joints[j];
+            let wanted = Vector3::new(sign * down.cos(), -down.sin(), 0.0);
+            if let Some(q) = UnitQuaternion::rotation_between(&arm, &wanted) {
+                pose.set(sk, &format!("{side}_shoulder"), log_so3(&q).as_slice());
+            }
+        }
+        let mut bones = BoneTransforms::default();
+        pose.bones(sk, rest, &mut bones);
+        let mut out = Vec::new();
+        skin(
+            Par::Rayon,
+            &rest.vertices,
+            self.template.weights(),
+            &bones,
+            &mut out,
+        );
+        out.iter_mut().for_each(|p| *p *= scale as f32);
+        bones.joints.iter_mut().for_each(|p| *p *= scale);
+        (out, bones)
+    }
+    /// Mean distance of the cloth from its height over the skin, plus the prior, metres.
+    fn cost(&self, q: &Guess) -> f32 {
+        let (vertices, _) = self.stand(q);
+        let normals = skin_normals(self.template, &vertices);
+        let tree = PointTree::new(&vertices);
+        let shift = V3::new(0.0, q[2] as f32, q[3] as f32);
+        let distance = |p: &P3| {
+            let p = p + shift;
+            let Some((near, d2)) = tree.nearest(&p, ANYWHERE) else {
+                return FAR * INSIDE;
+            };
+            if (p - vertices[near]).dot(&normals[near]) < 0.0 {
+                (INSIDE * d2.sqrt()).min(FAR * INSIDE)
+            } else {
+                (d2.sqrt() - ABOVE).abs().min(FAR)
+            }
+        };
+        let sum: f32 = self.points.iter().map(distance).sum();
+        // A short body in a loose garment costs as little as a tall one in a tight one: the prior decides.
+        // Files have the floor at zero, or zero at half the stature.
+        let floor = q[2]
+            .abs()
+            .min((q[2] - q[0] * f64::from(self.stature) / 2.0).abs());
+        let prior = ((q[0] - 1.0) / STATURE_SPREAD).powi(2) + (floor / FLOOR_SPREAD).powi(2);
+        sum / self.points.len().max(1) as f32 + PRIOR * prior as f32
+    }
+    /// Coordinate descent with halved steps: least cost and its guess.
+    fn minimise(&self) -> (f32, Guess) {
+        let at = |up: f64| -> Guess { [START[0], START[1], up, 0.0] };
+        let starts = [at(f64::from(self.stature) / 2.0), at(0.0)];
+        let count = if self.lowest < UNDERGROUND { 1 } else { 2 };
+        let mut best = starts[..count]
+            .iter()
+            .map(|s| (self.cost(s), *s))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .unwrap_or_default();
+        let mut step = STEPS;
+        for _ in 0..HALVINGS {
+            for k in if self.free { 0..4 } else { 2..4 } {
+                for sign in [-1.0, 1.0] {
+                    loop {
+                        let mut q = best.1;
+                        q[k] += sign * step[k];
+                        let inside = LIMITS[0].contains(&q[0]) && LIMITS[1].contains(&q[1]);
+                        let c = if inside { self.cost(&q) } else { f32::MAX };
+                        if c >= best.0 {
+                            break;
+                        }
+                        best = (c, q);
+                    }
+                }
+            }
+            step.iter_mut().for_each(|s| *s *= 0.5);
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::embedded;
+
+    #[test]
+    fn locate_finds_unit_and_shift_of_a_garment_that_is_an_offset_skin() {
+        let t = embedded::template();
+        let x = t.mesh().vertices();
+        let normals = skin_normals(&t, x);
+        let garment: Vec<P3> = (0..x.len())
+            .filter(|i| (0.9..1.3).contains(&x[*i].y) && x[*i].x.abs() < 0.2)
+            .map(|i| (x[i] + normals[i] * ABOVE + V3::new(0.0, 0.0, 0.04)) * 1e3)
+            .collect();
+        let frame = locate(&t, &garment);
+        assert_eq!(frame.scale, 0.001);
+        let miss = frame.shift - V3::new(0.0, 0.0, -0.04);
+        assert!(miss.norm() < 0.01, "{miss}");
+    }
+
+    #[test]
+    fn a_garment_in_mid_air_has_no_body() {
+        let corners = [[0.0, 4.0], [0.5, 4.0], [0.5, 4.4], [0.0, 4.4]];
+        let garment = corners.map(|[x, y]| P3::new(x, y, 0.0));
+        let e = guess(&embedded::template(), &garment).expect_err("nobody is that tall");
+        assert!(e.to_string().contains("no body fits"), "{e}");
+    }
+}

@@ -1,0 +1,52 @@
+//! Faults of dressing.
+
+use super::suggest::Misfit;
+use crate::body::BodyError;
+use crate::cloth::ClothError;
+use crate::formats::FormatError;
+use crate::garment::GarmentError;
+
+/// Why a garment could not be put on.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DressError {
+    /// Nothing to put on.
+    #[error("garments: the list is empty")]
+    NoGarments,
+    /// The pattern is at fault.
+    #[error(transparent)]
+    Garment(#[from] GarmentError),
+    /// The body or the simulation is at fault.
+    #[error(transparent)]
+    Cloth(#[from] ClothError),
+    /// A size that cannot be worn by this body.
+    #[error(transparent)]
+    Misfit(#[from] Misfit),
+    /// The pose has a value that is not finite or the wrong number of angles.
+    #[error("pose: {0}")]
+    Pose(String),
+}
+
+/// Why a mesh garment cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum MeshGarmentError {
+    /// A file is at fault.
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    /// The cloth is at fault.
+    #[error("piece {piece}: {why}")]
+    Piece {
+        /// Number of the piece, the largest is 0.
+        piece: usize,
+        /// The fault; vertices and faces are counted within the piece.
+        why: GarmentError,
+    },
+    /// The body that it was made on is at fault.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    /// The body that it was made on has no skeleton, and none was found for it.
+    #[error("the body that the garment was made on: {0}")]
+    NotFound(String),
+    /// The file has no piece to wear.
+    #[error("{0}")]
+    Nothing(String),
+}

@@ -1,0 +1,169 @@
+//! Classification of a piece of a mesh garment by the skin it lies over.
+
+use crate::body::Template;
+use crate::body::parts::vertex_masks;
+use crate::dressing::file_frame::bounds;
+use crate::dressing::skin_binding::SkinBinding;
+use crate::formats::sewn_obj::SewnObj;
+use crate::garment::{GarmentKind, Region};
+use crate::math::P3;
+use crate::mesh::Topology;
+use crate::spatial::PointTree;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A piece smaller than this in every direction is a button or a buckle, metres.
+const SMALLEST: f32 = 0.08;
+/// Share of vertices over head, hands or feet from which a piece is an accessory.
+const ACCESSORY: f64 = 0.85;
+/// An opening smaller than this across is a slit, metres.
+const OPENING: f32 = 0.06;
+/// Tenths of an opening that lie over one leg where the opening is a trouser hem.
+const HEM_TENTHS: usize = 9;
+/// Cloth that reaches this close to the shoulders' height, metres, is held by them.
+const NEAR_SHOULDER: f32 = 0.02;
+/// Share of vertices over legs from which a garment is a dress (from the shoulders) or a skirt (from an opening).
+const OVER_LEGS: [f64; 2] = [0.25, 0.15];
+/// Height of the shoulders of a skeleton without joints there, metres.
+const DEFAULT_SHOULDER: f32 = 1.4;
+/// Distance within which skin is searched, metres.
+const ANYWHERE: f32 = 10.0;
+
+/// Both legs.
+pub(super) const LEGS: Region = Region::LEFT_LEG.with(Region::RIGHT_LEG);
+
+/// The part of a piece that the body holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Support {
+    /// Cloth over the shoulders.
+    Shoulders,
+    /// The uppermost opening.
+    Opening,
+}
+
+/// Findings about a piece of cloth.
+pub(super) struct PieceShape {
+    pub(super) kind: GarmentKind,
+    pub(super) support: Support,
+    /// Body part below each vertex.
+    pub(super) parts: Vec<u8>,
+    /// Boundary loops wider than a slit.
+    pub(super) openings: Vec<Vec<u32>>,
+    /// It ends in a leg on either side.
+    pub(super) has_legs: bool,
+}
+
+/// The body that pieces are classified on.
+pub(super) struct PieceClassifier<'a> {
+    pub(super) template: &'a Template,
+    parts: Vec<u8>,
+    tree: PointTree,
+    /// Per body vertex: it belongs to the head, a hand or a foot.
+    is_end: Vec<bool>,
+    /// Heights, metres.
+    shoulder: f32,
+    knee: f32,
+}
+
+impl<'a> PieceClassifier<'a> {
+    pub(super) fn new(template: &'a Template) -> Self {
+        let sk = template.skeleton();
+        let segment = |i: usize| template.parts().segment(template.weights().dominant(i));
+        let body = template.mesh().vertices();
+        let height = |n: &str| sk.index(n).map(|j| sk.joints()[j].rest.y as f32);
+        Self {
+            parts: vertex_masks(template),
+            tree: PointTree::new(body),
+            is_end: (0..body.len()).map(|i| segment(i).is_extremity()).collect(),
+            shoulder: height("left_shoulder")
+                .or_else(|| height("neck"))
+                .unwrap_or(DEFAULT_SHOULDER),
+            knee: height("left_knee").unwrap_or(f32::MIN),
+            template,
+        }
+    }
+    /// Cloth, in contrast to an accessory that keeps its shape: hats, shoes, buttons. Socks count as shoes.
+    pub(super) fn is_cloth(&self, piece: &SewnObj) -> bool {
+        let Some((lo, hi)) = piece.obj.mesh.bounds() else {
+            return false;
+        };
+        let v = piece.obj.mesh.vertices();
+        let nearest = |p| self.tree.nearest(p, ANYWHERE);
+        let over_ends = v
+            .iter()
+            .filter(|p| nearest(p).is_some_and(|(i, _)| self.is_end[i]))
+            .count();
+        (hi - lo).amax() > SMALLEST
+            && hi.y > self.knee
+            && (over_ends as f64) < ACCESSORY * v.len() as f64
+    }
+    /// Classifies a piece of cloth with vertices `x` [m] bound to the body.
+    pub(super) fn classify(
+        &self,
+        topology: &Topology,
+        x: &[P3],
+        binding: &SkinBinding,
+    ) -> PieceShape {
+        let below = |i: usize| binding.vertices[i].first().map_or(0, |v| v.0 as usize);
+        let parts: Vec<u8> = (0..x.len()).map(|i| self.parts[below(i)]).collect();
+        let diameter = |l: &[u32]| {
+            let (lo, hi) = bounds(l.iter().map(|v| &x[*v as usize]));
+            (hi - lo).norm()
+        };
+        let openings: Vec<Vec<u32>> = boundary_loops(topology)
+            .into_iter()
+            .filter(|l| diameter(l) > OPENING)
+            .collect();
+        let over = |leg: Region, l: &[u32]| {
+            let over = l.iter().filter(|v| parts[**v as usize] & leg.0 != 0);
+            over.count() * 10 > l.len() * HEM_TENTHS
+        };
+        let has_hem = |leg: Region| openings.iter().any(|l| over(leg, l));
+        let has_legs = has_hem(Region::LEFT_LEG) && has_hem(Region::RIGHT_LEG);
+        let top = x.iter().map(|p| p.y).fold(f32::MIN, f32::max);
+        let support = if top > self.shoulder - NEAR_SHOULDER {
+            Support::Shoulders
+        } else {
+            Support::Opening
+        };
+        let over_legs =
+            parts.iter().filter(|p| **p & LEGS.0 != 0).count() as f64 / parts.len().max(1) as f64;
+        let kind = match support {
+            Support::Shoulders if over_legs > OVER_LEGS[0] => GarmentKind::Dress,
+            Support::Opening if has_legs => GarmentKind::Trousers,
+            Support::Opening if over_legs > OVER_LEGS[1] => GarmentKind::Skirt,
+            _ => GarmentKind::Top,
+        };
+        PieceShape {
+            kind,
+            support,
+            parts,
+            openings,
+            has_legs,
+        }
+    }
+}
+
+/// Vertices of each connected set of boundary edges.
+fn boundary_loops(t: &Topology) -> Vec<Vec<u32>> {
+    let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for e in t.edges().iter().filter(|e| e.twin.is_none()) {
+        next.entry(e.v[0]).or_default().push(e.v[1]);
+        next.entry(e.v[1]).or_default().push(e.v[0]);
+    }
+    let mut seen = BTreeSet::new();
+    let mut out = Vec::new();
+    for &start in next.keys() {
+        if seen.contains(&start) {
+            continue;
+        }
+        let (mut chain, mut stack) = (Vec::new(), vec![start]);
+        while let Some(v) = stack.pop() {
+            if seen.insert(v) {
+                chain.push(v);
+                stack.extend(&next[&v]);
+            }
+        }
+        out.push(chain);
+    }
+    out
+}

@@ -1,0 +1,326 @@
+//! One piece of a mesh garment: a sheet of cloth, or an accessory that keeps its shape.
+
+use super::anchors::anchors;
+use super::classifier::{LEGS, PieceClassifier, PieceShape, Support};
+use super::surface::{follow_both_legs, orient_outwards, unroll};
+use crate::dressing::retarget::Retargeting;
+use crate::dressing::skin_binding::SkinBinding;
+use crate::formats::obj::ObjMesh;
+use crate::formats::sewn_obj::SewnObj;
+use crate::garment::import::{
+    coarsen, from_mesh, median_edge, panels_in_metres, remesh, some_faces, unfold,
+};
+use crate::garment::{
+    AnchorKind, AnchorSet, GarmentError, GarmentKind, GarmentMesh, Material, Region, mesh_area,
+};
+use crate::math::P3;
+use crate::mesh::{Face, Topology, TriMesh, face_normal};
+
+/// Share of the wanted edge length below which panels are coarsened: finer ones cannot be simulated in time.
+const FINER: f64 = 0.7;
+/// Smallest triangle of an accessory, m².
+const LEAST_AREA: f64 = 2e-8;
+/// Cloth this near to the sagittal plane may touch both legs, metres.
+const MIDDLE: f32 = 0.02;
+/// Share of its area below which a retargeted triangle has collapsed and keeps its rest shape.
+const COLLAPSED: f64 = 0.2;
+
+/// A piece on the body that it was made on.
+#[derive(Clone, Debug)]
+pub(super) struct GarmentPiece {
+    pub(super) garment: GarmentMesh,
+    /// Metres, frame of the source body.
+    positions: Vec<P3>,
+    pub(super) binding: SkinBinding,
+    /// Flat panels keep their shape and are graded to the body's size; other meshes take the shape of the body, as the
+    /// programs of their makers do.
+    graded: bool,
+}
+
+/// Settings that all pieces of a garment share.
+pub(super) struct PieceBuilder<'a> {
+    pub(super) classifier: &'a PieceClassifier<'a>,
+    pub(super) name: &'a str,
+    pub(super) material: &'a Material,
+    /// Wanted edge length, metres.
+    pub(super) edge: f64,
+}
+
+impl PieceBuilder<'_> {
+    /// A sheet of cloth, and a note about it.
+    pub(super) fn cloth(&self, sewn: SewnObj) -> Result<(GarmentPiece, String), GarmentError> {
+        let sewn = self.remeshed(sewn);
+        let made = from_mesh(&sewn, self.name, GarmentKind::Top, self.material.clone())?;
+        let (mut garment, mut x) = (made.garment, made.positions);
+        let mut more = String::new();
+        if made.open + made.closed > 0 {
+            more = format!(
+                ", {} stitches open, {} triangles closed",
+                made.open, made.closed
+            );
+        }
+        if made.flat && median_edge(&garment) < FINER * self.edge {
+            more += &format!(", {} in the file", garment.vertices);
+            (garment, x) = coarsen(&garment, &x, self.edge);
+        }
+        let topology = garment.topology()?;
+        let template = self.classifier.template;
+        let neighbours = |i: usize| topology.vertex_neighbours().row(i).to_vec();
+        let mut binding = SkinBinding::new(template, &x, neighbours);
+        orient_outwards(&mut garment, &x, &binding);
+        if !made.flat {
+            unroll(&mut garment, &x);
+        }
+        let shape = self.classifier.classify(&topology, &x, &binding);
+        if !shape.has_legs {
+            follow_both_legs(template, &x, &mut binding);
+        }
+        garment.kind = shape.kind;
+        garment.regions = regions(&shape, &topology, &x);
+        garment.anchors = anchors(template, &shape, &x);
+        let note = format!(
+            "{}, {} vertices, {}{more}",
+            kind_name(shape.kind),
+            garment.vertices,
+            if made.flat {
+                "panels graded to the body"
+            } else {
+                "fitted to the body"
+            }
+        );
+        let piece = GarmentPiece {
+            garment,
+            positions: x,
+            binding,
+            graded: made.flat,
+        };
+        Ok((piece, note))
+    }
+    /// The accessories as one rigid piece; `None` where no triangle of them has an area.
+    pub(super) fn rigid(&self, pieces: &[SewnObj]) -> Result<Option<GarmentPiece>, GarmentError> {
+        let has_area = |m: &TriMesh, f: &Face| {
+            0.5 * f64::from(face_normal(m.vertices(), f).norm()) > LEAST_AREA
+        };
+        let kept = merge(pieces).and_then(|merged| {
+            let mesh = &merged.obj.mesh;
+            let faces = 0..mesh.faces().len();
+            let kept: Vec<usize> = faces
+                .filter(|f| has_area(mesh, &mesh.faces()[*f]))
+                .collect();
+            some_faces(&merged, &kept)
+        });
+        let Some(sewn) = kept else {
+            return Ok(None);
+        };
+        let made = from_mesh(&sewn, self.name, GarmentKind::Top, self.material.clone())?;
+        let (mut garment, positions) = (made.garment, made.positions);
+        garment.anchors = vec![AnchorSet {
+            kind: AnchorKind::Rigid,
+            vertices: (0..positions.len() as u32).collect(),
+            strength: 1.0,
+        }];
+        Ok(Some(GarmentPiece {
+            garment,
+            binding: SkinBinding::new(self.classifier.template, &positions, |_| Vec::new()),
+            positions,
+            graded: false,
+        }))
+    }
+    /// A mesh without flat panels gets even triangles.
+    fn remeshed(&self, sewn: SewnObj) -> SewnObj {
+        let is_plain = sewn.stitches.is_empty() && sewn.obj.face_uv.is_empty();
+        if !is_plain && panels_in_metres(&sewn) {
+            return sewn;
+        }
+        SewnObj {
+            obj: ObjMesh {
+                mesh: remesh(&sewn.obj.mesh, self.edge),
+                uv: Vec::new(),
+                face_uv: Vec::new(),
+            },
+            stitches: Vec::new(),
+        }
+    }
+}
+
+fn kind_name(kind: GarmentKind) -> &'static str {
+    match kind {
+        GarmentKind::Top => "top",
+        GarmentKind::Skirt => "skirt",
+        GarmentKind::Trousers => "trousers",
+        GarmentKind::Dress => "dress or suit",
+    }
+}
+
+/// Body parts that each vertex may touch: its own, and at the border of sleeve and trunk both.
+fn regions(shape: &PieceShape, topology: &Topology, x: &[P3]) -> Vec<Region> {
+    let own = |i: usize| -> Region {
+        let p = Region(shape.parts[i]);
+        if p.meets(Region::ARMS) {
+            return p;
+        }
+        let over_trunk = p.meets(Region::TRUNK) && shape.support == Support::Shoulders;
+        Region::TRUNK.with(if !shape.has_legs || over_trunk || x[i].x.abs() < MIDDLE {
+            LEGS
+        } else if x[i].x > 0.0 {
+            Region::LEFT_LEG
+        } else {
+            Region::RIGHT_LEG
+        })
+    };
+    let own: Vec<Region> = (0..x.len()).map(own).collect();
+    (0..x.len())
+        .map(|i| {
+            let around = topology.vertex_neighbours().row(i).iter();
+            around.fold(own[i], |r, n| r.with(own[*n as usize]))
+        })
+        .collect()
+}
+
+/// Several pieces as one.
+fn merge(pieces: &[SewnObj]) -> Option<SewnObj> {
+    let mut out = pieces.first()?.clone();
+    let (mut vertices, mut faces) = (
+        out.obj.mesh.vertices().to_vec(),
+        out.obj.mesh.faces().to_vec(),
+    );
+    for p in &pieces[1..] {
+        let first = vertices.len() as u32;
+        vertices.extend(p.obj.mesh.vertices());
+        faces.extend(p.obj.mesh.faces().iter().map(|f| f.map(|v| v + first)));
+        out.obj.face_uv.extend(&p.obj.face_uv);
+    }
+    out.stitches.clear();
+    out.obj.mesh = TriMesh::new(vertices, faces).ok()?;
+    Some(out)
+}
+
+impl GarmentPiece {
+    fn is_rigid(&self) -> bool {
+        let mut anchors = self.garment.anchors.iter();
+        anchors.any(|a| a.kind == AnchorKind::Rigid)
+    }
+    /// The piece on another body: its mesh, and positions in the canonical pose [m]. `lift` puts points above the skin:
+    /// a rest shape taken below it would be too tight for good.
+    pub(super) fn retargeted(
+        &self,
+        map: &Retargeting,
+        lift: impl Fn(P3) -> P3,
+    ) -> (GarmentMesh, Vec<P3>) {
+        let (binding, rigid) = (&self.binding, self.is_rigid());
+        let x: Vec<P3> = (0..self.positions.len())
+            .map(|i| {
+                let p = map.point(&self.positions[i], &binding.joints[i], &binding.vertices[i]);
+                if rigid { p } else { lift(p) }
+            })
+            .collect();
+        let mut garment = self.garment.clone();
+        if self.graded {
+            let area = |x: &[P3]| {
+                let faces = garment.faces.iter();
+                faces
+                    .map(|f| f64::from(face_normal(x, f).norm()))
+                    .sum::<f64>()
+            };
+            let grade = (area(&x) / area(&self.positions).max(f64::MIN_POSITIVE)).sqrt();
+            for c in garment.rest.iter_mut().flatten().flatten() {
+                *c *= grade;
+            }
+        } else {
+            for (rest, f) in garment.rest.iter_mut().zip(&garment.faces) {
+                let t = unfold(f.map(|v| x[v as usize].coords.cast()));
+                if mesh_area(&t) > COLLAPSED * mesh_area(rest) {
+                    *rest = t;
+                }
+            }
+        }
+        (garment, x)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::layers::by_layer;
+    use super::*;
+    use crate::body::embedded;
+    use std::f32::consts::TAU;
+
+    /// An upright open tube around (0, 0) in the file's own coordinates.
+    fn tube(radius: f32, y: std::ops::Range<f32>) -> SewnObj {
+        let (n, rows) = (48u32, 16u32);
+        let vertices = (0..n * rows).map(|k| {
+            let (a, t) = (TAU * (k % n) as f32 / n as f32, (k / n) as f32);
+            let y = y.start + (y.end - y.start) * t / (rows - 1) as f32;
+            P3::new(radius * a.sin(), y, radius * a.cos())
+        });
+        let faces = (0..n * (rows - 1)).flat_map(|k| {
+            let (i, j) = (k % n, k / n);
+            let at = |i: u32, j: u32| j * n + i % n;
+            [
+                [at(i, j), at(i + 1, j), at(i + 1, j + 1)],
+                [at(i, j), at(i + 1, j + 1), at(i, j + 1)],
+            ]
+        });
+        let mesh = TriMesh::new(vertices.collect(), faces.collect()).expect("a tube");
+        SewnObj {
+            obj: ObjMesh {
+                mesh,
+                uv: Vec::new(),
+                face_uv: Vec::new(),
+            },
+            stitches: Vec::new(),
+        }
+    }
+
+    fn with_builder(test: impl Fn(&PieceBuilder<'_>)) {
+        let template = embedded::template();
+        test(&PieceBuilder {
+            classifier: &PieceClassifier::new(&template),
+            name: "piece",
+            material: &Material::preset("cotton").expect("preset"),
+            edge: 0.03,
+        });
+    }
+
+    #[test]
+    fn a_tube_around_both_legs_is_a_skirt_held_at_its_upper_opening() {
+        with_builder(|b| {
+            let (piece, note) = b.cloth(tube(0.26, 0.45..1.0)).expect("cloth");
+            let g = &piece.garment;
+            assert_eq!(g.kind, GarmentKind::Skirt, "{note}");
+            assert_eq!(g.anchors.len(), 1);
+            assert_eq!(g.anchors[0].kind, AnchorKind::Band);
+            let lowest = g.anchors[0].vertices.iter();
+            let lowest = lowest
+                .map(|v| piece.positions[*v as usize].y)
+                .fold(9.0, f32::min);
+            assert!(lowest > 0.95, "{lowest}");
+            // Every vertex may touch both legs, and no arm.
+            let all = Region::TRUNK.with(LEGS);
+            assert!(g.regions.iter().filter(|r| **r == all).count() * 10 > 8 * g.vertices);
+        });
+    }
+
+    #[test]
+    fn buttons_and_hats_are_no_cloth_and_become_one_rigid_piece() {
+        with_builder(|b| {
+            let (button, hat) = (tube(0.02, 1.2..1.22), tube(0.12, 1.62..1.8));
+            assert!(!b.classifier.is_cloth(&button) && !b.classifier.is_cloth(&hat));
+            assert!(b.classifier.is_cloth(&tube(0.26, 0.45..1.0)));
+            let rigid = b.rigid(&[button, hat]).expect("a mesh").expect("an area");
+            assert!(rigid.is_rigid() && rigid.garment.vertices == 2 * 48 * 16);
+            assert!(b.rigid(&[]).expect("nothing").is_none());
+        });
+    }
+
+    #[test]
+    fn layers_are_ordered_from_the_skin_outwards() {
+        with_builder(|b| {
+            let piece = |r| b.cloth(tube(r, 0.5..1.0)).expect("cloth").0;
+            let radius = |p: &GarmentPiece| p.positions[0].x.hypot(p.positions[0].z);
+            let sorted = by_layer(vec![piece(0.34), piece(0.24), piece(0.29)]);
+            let radii: Vec<f32> = sorted.iter().map(radius).collect();
+            assert!(radii.windows(2).all(|w| w[0] < w[1]), "{radii:?}");
+        });
+    }
+}

@@ -1,0 +1,61 @@
+//! Settings and report of dressing.
+
+use crate::cloth::realtime::Config;
+use crate::garment::Triangulation;
+
+/// Settings of dressing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DressOptions {
+    /// Fineness of the garments' meshes.
+    pub triangulation: Triangulation,
+    /// Settings of the simulation afterwards.
+    pub config: Config,
+    /// Dress in sizes that do not fit too: panels are stretched or slide, which shows as crumpled cloth.
+    pub any_size: bool,
+    /// Remove self-intersections. Without, shirts take about two thirds of the time, and sleeves and trunk intersect in the
+    /// armpits.
+    pub untangle: bool,
+}
+
+impl Default for DressOptions {
+    fn default() -> Self {
+        Self {
+            triangulation: Triangulation::default(),
+            config: Config::default(),
+            any_size: false,
+            untangle: true,
+        }
+    }
+}
+
+/// Outcome of dressing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DressReport {
+    /// Substeps of all garments: first drape, motion to the tracked pose, fine drape.
+    pub steps: usize,
+    /// Deepest garment vertex under the skin at the end, metres.
+    pub penetration: f64,
+    /// Edges that pass through triangles of the same garment at the end.
+    pub crossings: usize,
+    /// 99th percentile of the stretch at the end, worst garment.
+    pub p99_strain: f64,
+    /// Milliseconds by stage.
+    pub stages_ms: DressMs,
+    /// Milliseconds in all.
+    pub ms: f64,
+}
+
+/// Milliseconds of each stage of dressing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DressMs {
+    /// Measuring the body and cutting it into sections.
+    pub place: f64,
+    /// Triangulating and sewing, and wrapping the panels around the body.
+    pub sew: f64,
+    /// Draping on the coarse mesh, canonical pose to tracked pose.
+    pub coarse: f64,
+    /// Draping on the fine mesh.
+    pub fine: f64,
+    /// Preparing the simulator.
+    pub model: f64,
+}

@@ -1,0 +1,85 @@
+//! Trouser panels: half tubes around a leg that blend into quarter tubes around the hips.
+
+use super::outline::PanelOutline;
+use super::placed_body::{PlacedBody, ends, sign};
+use super::tube::{Ellipse, HALF_PANELS};
+use crate::dressing::body_sections::BodySections;
+use crate::dressing::suggest::{CROTCH_CLEARANCE, DEFAULT_RISE};
+use crate::garment::{Panel, Side};
+use crate::math::P3;
+use std::f32::consts::{FRAC_PI_2, PI};
+
+/// Least distance of a trouser leg from the sagittal plane, metres: closer, the legs start in each other.
+const INSEAM_GAP: f32 = 0.001;
+/// Height of the crotch line of a panel without one, panel coordinates, metres.
+const DEFAULT_HIP_LINE: f64 = -0.2;
+/// Highest section of one leg alone, metres below the crotch.
+const LEG_TOP: f32 = 0.04;
+/// Least width of a row, metres.
+const LEAST_WIDTH: f32 = 1e-4;
+
+/// Chart of the front or back panel of one leg.
+pub(super) struct LegChart<'a> {
+    sections: &'a BodySections,
+    outline: PanelOutline,
+    side: Side,
+    front: bool,
+    /// Height of the panel's y = 0.
+    waist: f32,
+    /// Heights on the panel of the crotch point and of the hip line.
+    rise: f32,
+    hip_line: f32,
+    /// Half width of the panel.
+    half: f32,
+}
+
+impl<'a> LegChart<'a> {
+    pub(super) fn new(body: &PlacedBody<'a>, panel: &Panel, side: Side, front: bool) -> Self {
+        let higher = |name: &str, default: f64| {
+            ends(panel, name).map_or(default, |[a, b]| a[1].max(b[1])) as f32
+        };
+        let rise = higher("inseam", DEFAULT_RISE);
+        let heights = &body.sections.heights;
+        let outline = PanelOutline::of(panel);
+        Self {
+            sections: body.sections,
+            side,
+            front,
+            waist: (heights.fork - CROTCH_CLEARANCE as f32 - rise).min(heights.waist),
+            rise,
+            hip_line: higher("crotch", DEFAULT_HIP_LINE),
+            half: outline.half_width(),
+            outline,
+        }
+    }
+    pub(super) fn point(&self, p: [f32; 2]) -> P3 {
+        let (left, front) = (sign(self.side), if self.front { 1.0 } else { -1.0 });
+        // Share of the row from the inner to the outer side.
+        let [lo, hi] = self.outline.span(p[1]);
+        let outer_is_high = (self.side == Side::Left) == self.front;
+        let t = ((p[0] - lo) / (hi - lo).max(LEAST_WIDTH)).clamp(0.0, 1.0);
+        let t = if outer_is_high { t } else { 1.0 - t };
+        let y = self.waist + p[1];
+
+        let leg = &self.sections.legs[usize::from(self.side == Side::Right)];
+        let section = leg.at(y.min(self.sections.heights.crotch - LEG_TOP));
+        let Ellipse { center: c, half } =
+            Ellipse::around(&section, 2.0 * (hi - lo).min(2.0 * self.half));
+        let on_leg = [
+            c[0] - left * half[0] * (PI * t).cos(),
+            c[1] + front * half[1] * (PI * t).sin(),
+        ];
+        let Ellipse { center: c, half } =
+            Ellipse::around(&self.sections.lower.at(y), HALF_PANELS * (hi - lo));
+        let on_hip = [
+            c[0] + left * half[0] * (FRAC_PI_2 * t).sin(),
+            c[1] + front * half[1] * (FRAC_PI_2 * t).cos(),
+        ];
+
+        let share = ((p[1] - self.rise) / (self.hip_line - self.rise)).clamp(0.0, 1.0);
+        let share = share * share * (3.0 - 2.0 * share);
+        let mix = |k: usize| on_leg[k] + (on_hip[k] - on_leg[k]) * share;
+        // Each trouser leg stays on its own side where the thighs touch.
+        P3::new(left * (left * mix(0)).max(INSEAM_GAP), y, mix(1))
+    }
+}

@@ -1,0 +1,112 @@
+//! Panels to space: one chart a panel, averaged along seams.
+
+use super::hood::HoodChart;
+use super::leg::LegChart;
+use super::placed_body::PlacedBody;
+use super::skirt::SkirtChart;
+use super::sleeve::SleeveChart;
+use super::trunk::TrunkChart;
+use crate::body::Template;
+use crate::dressing::body_sections::BodySections;
+use crate::garment::{GarmentMesh, Panel, Pattern, Placement};
+use crate::math::{P3, V3};
+
+/// Start positions of the simulation vertices, frame of the canonical body (root identity), metres.
+pub(in crate::dressing) fn place(
+    template: &Template,
+    sections: &BodySections,
+    pattern: &Pattern,
+    mesh: &GarmentMesh,
+) -> Vec<P3> {
+    let body = PlacedBody {
+        template,
+        sections,
+        pattern,
+    };
+    let charts: Vec<PanelChart<'_>> = pattern
+        .panels
+        .iter()
+        .map(|p| PanelChart::new(&body, p))
+        .collect();
+    mesh.corners
+        .iter()
+        .map(|c| {
+            let sum = c.iter().fold(V3::zeros(), |s, (panel, q)| {
+                let q = [q[0] as f32, q[1] as f32];
+                s + charts[usize::from(*panel)].point(q).coords
+            });
+            P3::from(sum / c.len() as f32)
+        })
+        .collect()
+}
+
+/// Map from one flat panel to space.
+enum PanelChart<'a> {
+    Trunk(TrunkChart<'a>),
+    Skirt(SkirtChart<'a>),
+    Hood(HoodChart),
+    Leg(LegChart<'a>),
+    Sleeve(SleeveChart),
+}
+
+impl<'a> PanelChart<'a> {
+    fn new(body: &PlacedBody<'a>, panel: &Panel) -> Self {
+        match panel.placement {
+            Placement::TrunkFront => Self::Trunk(TrunkChart::new(body, panel, true)),
+            Placement::TrunkBack => Self::Trunk(TrunkChart::new(body, panel, false)),
+            Placement::SkirtFront => Self::Skirt(SkirtChart::new(body, panel, true)),
+            Placement::SkirtBack => Self::Skirt(SkirtChart::new(body, panel, false)),
+            Placement::Hood(side) => Self::Hood(HoodChart::new(body, panel, side)),
+            Placement::LegFront(side) => Self::Leg(LegChart::new(body, panel, side, true)),
+            Placement::LegBack(side) => Self::Leg(LegChart::new(body, panel, side, false)),
+            Placement::Sleeve(side) => Self::Sleeve(SleeveChart::new(body, panel, side)),
+        }
+    }
+    /// Panel coordinates (x, y) [m] to the frame of the canonical body [m].
+    fn point(&self, p: [f32; 2]) -> P3 {
+        match self {
+            Self::Trunk(c) => c.point(p),
+            Self::Skirt(c) => c.point(p),
+            Self::Hood(c) => c.point(p),
+            Self::Leg(c) => c.point(p),
+            Self::Sleeve(c) => c.point(p),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::{BodyShape, embedded};
+    use crate::garment::{Size, Triangulation, library};
+
+    #[test]
+    fn charts_of_panels_meet_at_their_seams() {
+        let template = embedded::template();
+        let rest = template.personalise(&BodyShape::default());
+        let sections = BodySections::new(&template, &rest, None);
+        for (name, most) in [
+            ("skirt", 0.005),
+            ("straight_skirt", 0.02),
+            ("trousers", 0.05),
+        ] {
+            let pattern = library::pattern(name, Size::M).expect("pattern");
+            let mesh = GarmentMesh::sew(&pattern, &Triangulation::default()).expect("sewn");
+            let body = PlacedBody {
+                template: &template,
+                sections: &sections,
+                pattern: &pattern,
+            };
+            let panels = pattern.panels.iter();
+            let charts: Vec<_> = panels.map(|p| PanelChart::new(&body, p)).collect();
+            let gap = |c: &Vec<(u16, [f64; 2])>| {
+                let at = |k: usize| charts[usize::from(c[k].0)].point(c[k].1.map(|q| q as f32));
+                (1..c.len())
+                    .map(|k| (at(k) - at(0)).norm())
+                    .fold(0.0, f32::max)
+            };
+            let widest = mesh.corners.iter().map(gap).fold(0.0, f32::max);
+            assert!(widest < most, "{name}: {widest} m");
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! Skirt panels and waistbands: rows around the lower body, arcs where the waist is curved.
+
+use super::outline::{PanelOutline, sample_edges};
+use super::placed_body::PlacedBody;
+use super::tube::{Ellipse, HALF_PANELS};
+use crate::dressing::body_sections::BodySections;
+use crate::garment::{Curve, Panel};
+use crate::math::P3;
+use std::f32::consts::FRAC_PI_2;
+
+/// Chords of one waist edge.
+const CHORDS: usize = 8;
+/// Right end of a waist without edges, panel coordinates, metres.
+const DEFAULT_END: [f64; 2] = [0.0, 0.02];
+/// Least sag of the waist line, metres: a straight one would have its apex at infinity.
+const LEAST_SAG: f64 = 1e-4;
+/// Share of its length over which a skirt starts: it settles downwards.
+const SHORTENED: f32 = 0.97;
+/// Least height of a waistband above the hip, metres: lower it slides off.
+const ABOVE_HIP: f32 = 0.05;
+/// Step and tolerance in which the height of a waistband is searched, metres of height and of girth.
+const WAIST_STEP: f32 = 0.01;
+/// Least half width of a row, metres.
+const LEAST_HALF: f32 = 0.02;
+
+/// Chart of a front or back panel.
+pub(super) struct SkirtChart<'a> {
+    sections: &'a BodySections,
+    outline: PanelOutline,
+    /// 1 in front, −1 behind.
+    side: f32,
+    /// Height of the waist.
+    waist: f32,
+    rows: SkirtRows,
+}
+
+/// Shape of the rows.
+enum SkirtRows {
+    /// Arcs about (0, apex): a ring sector of this half angle, radians.
+    Arcs { apex: f32, half_angle: f32 },
+    /// Level lines.
+    Level,
+}
+
+impl<'a> SkirtChart<'a> {
+    pub(super) fn new(body: &PlacedBody<'a>, panel: &Panel, front: bool) -> Self {
+        let points = sample_edges(panel, "waist", CHORDS);
+        let end = points
+            .iter()
+            .fold(DEFAULT_END, |e, p| if p[0] > e[0] { *p } else { e });
+        let curved = panel
+            .edge("hem")
+            .is_some_and(|i| panel.edges[i].curve != Curve::Line);
+        let rows = if curved {
+            let middle = points.iter().map(|p| p[1]).fold(end[1], f64::min);
+            let sag = (end[1] - middle).max(LEAST_SAG);
+            let apex = ((end[0] * end[0] + sag * sag) / (2.0 * sag)) as f32;
+            let half_angle = (end[0] as f32).atan2(apex - sag as f32);
+            SkirtRows::Arcs { apex, half_angle }
+        } else {
+            SkirtRows::Level
+        };
+        let girth = if body.pattern.finished[1] > 0.0 {
+            body.pattern.finished[1] as f32
+        } else {
+            HALF_PANELS * end[0] as f32
+        };
+        Self {
+            sections: body.sections,
+            outline: PanelOutline::of(panel),
+            side: if front { 1.0 } else { -1.0 },
+            waist: body
+                .sewn_waist()
+                .unwrap_or_else(|| waist_height(body.sections, girth)),
+            rows,
+        }
+    }
+    pub(super) fn point(&self, p: [f32; 2]) -> P3 {
+        let (y, turn, girth) = match self.rows {
+            SkirtRows::Arcs { apex, half_angle } => {
+                let (r, angle) = (p[0].hypot(apex - p[1]), p[0].atan2(apex - p[1]));
+                (
+                    self.waist - (r - apex) * SHORTENED,
+                    (angle / half_angle).clamp(-1.0, 1.0) * FRAC_PI_2,
+                    HALF_PANELS * half_angle * r,
+                )
+            }
+            SkirtRows::Level => {
+                let half = self.outline.half_width_at(p[1], LEAST_HALF);
+                (
+                    self.waist + p[1],
+                    (p[0] / half).clamp(-1.0, 1.0) * FRAC_PI_2,
+                    HALF_PANELS * half,
+                )
+            }
+        };
+        Ellipse::rounded(&self.sections.lower.at(y), girth).point(y, turn, self.side)
+    }
+}
+
+/// Height of a waistband of this girth: the waist, or lower where the hip becomes as wide as the band, metres.
+fn waist_height(sections: &BodySections, girth: f32) -> f32 {
+    let mut waist = sections.heights.waist;
+    while waist > sections.heights.hip + ABOVE_HIP
+        && sections.lower.at(waist).girth < girth - WAIST_STEP
+    {
+        waist -= WAIST_STEP;
+    }
+    waist
+}

@@ -1,0 +1,97 @@
+//! Panels of the trunk: half tubes that turn over the shoulders and flatten towards the seam.
+
+use super::outline::PanelOutline;
+use super::placed_body::{PlacedBody, ends};
+use super::tube::{Ellipse, HALF_PANELS, quarter_circle};
+use crate::dressing::body_sections::BodySections;
+use crate::garment::Panel;
+use crate::math::P3;
+use std::f32::consts::FRAC_PI_2;
+
+/// Depth over which a shirt turns over the shoulder, metres: less makes a sharp crease there.
+const SHOULDER_DEPTH: f32 = 0.10;
+/// Least half width of a row, metres.
+const LEAST_HALF: f32 = 0.05;
+/// Rows this far below the armpit go around the legs too, metres: a long top over the hips.
+const LOWER_BODY: f32 = 0.05;
+/// An underarm point lies at least this far outside and below the shoulder tip, metres.
+const UNDERARM: [f64; 2] = [0.01, 0.05];
+/// Underarm point of a panel that has none, panel coordinates, metres (library T-shirt, M).
+const DEFAULT_UNDERARM: [f64; 2] = [0.26, -0.22];
+
+/// Chart of a front or back panel.
+pub(super) struct TrunkChart<'a> {
+    sections: &'a BodySections,
+    outline: PanelOutline,
+    front: bool,
+    /// Height of the panel's y = 0 and z of the shoulder seam.
+    top: f32,
+    shoulder_z: f32,
+    /// Underarm point: half width of the trunk and y.
+    half: f32,
+    armpit: f32,
+    /// |x| of the tip and the neck end of the shoulder seam, and how far the tip is below the neck end.
+    tip: f32,
+    neck: f32,
+    fall: f32,
+}
+
+impl<'a> TrunkChart<'a> {
+    pub(super) fn new(body: &PlacedBody<'a>, panel: &Panel, front: bool) -> Self {
+        let [neck, tip] = body.shoulder_seam();
+        // Without an armhole: the highest corner outside the shoulder tip.
+        let underarm = ends(panel, "armhole_right").map_or_else(
+            || {
+                let corners = panel.edges.iter().map(|e| [e.from[0].abs(), e.from[1]]);
+                corners
+                    .filter(|p| p[0] > tip[0] + UNDERARM[0] && p[1] < tip[1] - UNDERARM[1])
+                    .max_by(|a, b| a[1].total_cmp(&b[1]))
+                    .unwrap_or(DEFAULT_UNDERARM)
+            },
+            |[from, _]| from,
+        );
+        let (top, shoulder_z) = body.shoulder_line();
+        Self {
+            sections: body.sections,
+            outline: PanelOutline::of(panel),
+            front,
+            top,
+            shoulder_z,
+            half: underarm[0] as f32,
+            armpit: underarm[1] as f32,
+            tip: tip[0] as f32,
+            neck: neck[0] as f32,
+            fall: -tip[1] as f32,
+        }
+    }
+    pub(super) fn point(&self, p: [f32; 2]) -> P3 {
+        let &Self {
+            armpit, fall, neck, ..
+        } = self;
+        let x = if self.front { p[0] } else { -p[0] };
+        let y = self.top + p[1];
+        let width = if p[1] < armpit {
+            self.outline.half_width_at(p[1], LEAST_HALF)
+        } else {
+            self.half
+        };
+        let section = if p[1] < armpit - LOWER_BODY {
+            self.sections.lower.at(y)
+        } else {
+            self.sections.trunk.at(y)
+        };
+        let Ellipse {
+            center: c,
+            half: [a, b],
+        } = Ellipse::around(&section, HALF_PANELS * width);
+        let angle = FRAC_PI_2 * (x / width).clamp(-1.0, 1.0);
+        // From the armpit up rows straighten towards the shoulder seam.
+        let up = ((p[1] - armpit) / (-fall - armpit)).clamp(0.0, 1.0);
+        let wx = (1.0 - up) * (c[0] + a * angle.sin()) + up * x;
+        let ellipse_z = c[1] + if self.front { b } else { -b } * angle.cos();
+        let seam_y = -fall * ((x.abs() - neck) / (self.tip - neck)).clamp(0.0, 1.0);
+        let below = ((seam_y - p[1]) / SHOULDER_DEPTH).clamp(0.0, 1.0);
+        let z = self.shoulder_z + (ellipse_z - self.shoulder_z) * quarter_circle(below);
+        P3::new(wx, y, z)
+    }
+}

@@ -1,0 +1,112 @@
+//! Garments to sheets of cloth around the canonical body.
+
+use super::body_sections::BodySections;
+use super::error::DressError;
+use super::mesh_garment::MeshGarment;
+use super::options::DressOptions;
+use super::place::place;
+use super::suggest::check_wearable;
+use crate::body::Template;
+use crate::body::measure::Measurements;
+use crate::garment::{AnchorKind, GarmentMesh, Pattern, Triangulation};
+use crate::math::P3;
+
+/// Edge length of the mesh that is draped first over that of the garment: four times fewer vertices.
+const COARSER: f64 = 2.0;
+/// The same for hoods; from shorter edges worn hoods intersect themselves more (docs/benchmarks.md).
+const HOOD_COARSER: f64 = 2.2;
+/// Longest edge of the mesh that is draped first, metres: longer ones lose sleeves.
+const COARSEST: f64 = 0.045;
+
+/// A garment to put on.
+#[derive(Clone, Copy, Debug)]
+pub enum GarmentSource<'a> {
+    /// Cut from a pattern.
+    Pattern(&'a Pattern),
+    /// A mesh made on another body.
+    Mesh(&'a MeshGarment),
+}
+
+impl GarmentSource<'_> {
+    fn layer(&self) -> u8 {
+        match self {
+            Self::Pattern(p) => p.layer,
+            Self::Mesh(m) => m.layer(),
+        }
+    }
+}
+
+/// A sheet of cloth and its start.
+pub(super) struct PlacedSheet {
+    pub(super) garment: GarmentMesh,
+    /// The mesh that is draped first; `None` where that is the garment's own.
+    pub(super) coarse: Option<GarmentMesh>,
+    /// Start positions of the mesh that is draped first, frame of the canonical body, metres.
+    pub(super) positions: Vec<P3>,
+}
+
+impl PlacedSheet {
+    fn is_rigid(&self) -> bool {
+        let mut anchors = self.garment.anchors.iter();
+        anchors.any(|a| a.kind == AnchorKind::Rigid)
+    }
+}
+
+/// The body that garments are sewn around.
+pub(super) struct Sewing<'a> {
+    pub(super) template: &'a Template,
+    pub(super) sections: &'a BodySections,
+    /// Without them any size is worn.
+    pub(super) measures: Option<&'a Measurements>,
+    pub(super) options: &'a DressOptions,
+}
+
+impl Sewing<'_> {
+    /// Sheets of all garments, innermost first; rigid accessories are innermost, as cloth goes over them.
+    pub(super) fn sew(
+        &self,
+        garments: &[GarmentSource<'_>],
+    ) -> Result<Vec<PlacedSheet>, DressError> {
+        let mut order: Vec<&GarmentSource<'_>> = garments.iter().collect();
+        order.sort_by_key(|g| g.layer());
+        let mut sheets: Vec<PlacedSheet> = Vec::new();
+        for garment in order {
+            match garment {
+                GarmentSource::Pattern(p) => sheets.push(self.sew_pattern(p)?),
+                GarmentSource::Mesh(m) => {
+                    sheets.extend(m.retargeted(self.template, self.sections).into_iter().map(
+                        |(garment, positions)| PlacedSheet {
+                            garment,
+                            coarse: None,
+                            positions,
+                        },
+                    ))
+                }
+            }
+        }
+        sheets.sort_by_key(|s| !s.is_rigid());
+        Ok(sheets)
+    }
+    fn sew_pattern(&self, pattern: &Pattern) -> Result<PlacedSheet, DressError> {
+        if let Some(m) = self.measures.filter(|_| !self.options.any_size) {
+            check_wearable(pattern, m)?;
+        }
+        let fine = &self.options.triangulation;
+        // Slim triangles are allowed: nothing is simulated on this mesh later.
+        let coarse = GarmentMesh::sew(
+            pattern,
+            &Triangulation {
+                edge_length: (fine.edge_length * COARSER)
+                    .min(COARSEST)
+                    .max(fine.edge_length),
+                hood_length: fine.hood_length * HOOD_COARSER,
+                min_angle: 0.0,
+            },
+        )?;
+        Ok(PlacedSheet {
+            positions: place(self.template, self.sections, pattern, &coarse),
+            garment: GarmentMesh::sew(pattern, fine)?,
+            coarse: Some(coarse),
+        })
+    }
+}

@@ -1,0 +1,117 @@
+//! Points bound to the skin of a body: the vertices below them and the joints they follow.
+
+use crate::body::Template;
+use crate::math::{P3, V3};
+use crate::mesh::vertex_normals;
+use crate::par::Par;
+use crate::spatial::PointTree;
+use std::collections::BTreeMap;
+
+/// Rounds of averaging over the garment: the nearest vertex jumps between neighbours, cloth does not.
+const ROUNDS: usize = 6;
+/// Cloth farther than this from the skin (a skirt between the legs) is averaged over more of it, metres.
+const LOOSE: f32 = 0.04;
+/// Further rounds for loose cloth.
+const LOOSE_ROUNDS: usize = 30;
+/// Most skin vertices below one point; more cost time without effect.
+const MOST_VERTICES: usize = 16;
+/// Distance within which skin is searched, metres: all of a body.
+const ANYWHERE: f32 = 100.0;
+
+/// Vertices with weights that sum to one.
+pub(super) type VertexWeights = Vec<(u32, f32)>;
+
+/// Points bound to a skin. All fields have shape `[points]`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct SkinBinding {
+    /// Skin vertices below each point, heaviest first.
+    pub(super) vertices: Vec<VertexWeights>,
+    /// Weights of all joints.
+    pub(super) joints: Vec<Vec<f32>>,
+    /// Distance from the nearest skin vertex, metres.
+    pub(super) distance: Vec<f32>,
+    /// Outward normal of the nearest skin vertex.
+    pub(super) normal: Vec<V3>,
+}
+
+/// Vertex normals of a template's skin at other positions.
+pub(super) fn skin_normals(template: &Template, vertices: &[P3]) -> Vec<V3> {
+    let mut out = Vec::new();
+    vertex_normals(
+        Par::Rayon,
+        vertices,
+        template.mesh().faces(),
+        template.topology().vertex_faces(),
+        &mut out,
+    );
+    out
+}
+
+impl SkinBinding {
+    /// Binds points (frame of the body, metres) to a body; `neighbours` along the edges of their mesh.
+    pub(super) fn new(
+        template: &Template,
+        points: &[P3],
+        neighbours: impl Fn(usize) -> Vec<u32>,
+    ) -> Self {
+        let mut out = Self::nearest(template, points);
+        let around: Vec<Vec<u32>> = (0..points.len()).map(neighbours).collect();
+        for round in 0..ROUNDS + LOOSE_ROUNDS {
+            let active = |i: usize| round < ROUNDS || out.distance[i] > LOOSE;
+            let next: Vec<_> = (0..points.len())
+                .map(|i| (active(i) && !around[i].is_empty()).then(|| out.averaged(i, &around[i])))
+                .collect();
+            for (i, n) in next.into_iter().enumerate() {
+                if let Some(n) = n {
+                    (out.joints[i], out.vertices[i]) = n;
+                }
+            }
+        }
+        out
+    }
+    /// Binds each point to its nearest skin vertex.
+    fn nearest(template: &Template, points: &[P3]) -> Self {
+        let body = template.mesh().vertices();
+        let normals = skin_normals(template, body);
+        let tree = PointTree::new(body);
+        let weights = template.weights();
+        let mut out = Self::default();
+        for p in points {
+            let (near, d2) = tree.nearest(p, ANYWHERE).unwrap_or((0, 0.0));
+            let mut row = vec![0.0f32; template.skeleton().len()];
+            for k in 0..4 {
+                row[usize::from(weights.joints[near][k])] += weights.weights[near][k];
+            }
+            out.vertices.push(vec![(near as u32, 1.0)]);
+            out.joints.push(row);
+            out.distance.push(d2.sqrt());
+            out.normal.push(normals[near]);
+        }
+        out
+    }
+    /// Half of a point's own weights and half of its neighbours' mean: of joints, and of the heaviest vertices.
+    fn averaged(&self, i: usize, around: &[u32]) -> (Vec<f32>, VertexWeights) {
+        let share = 0.5 / around.len() as f32;
+        let mut joints: Vec<f32> = self.joints[i].iter().map(|w| 0.5 * w).collect();
+        let mut vertices: BTreeMap<u32, f32> = BTreeMap::new();
+        for (v, w) in &self.vertices[i] {
+            *vertices.entry(*v).or_default() += 0.5 * w;
+        }
+        for n in around.iter().map(|n| *n as usize) {
+            for (a, b) in joints.iter_mut().zip(&self.joints[n]) {
+                *a += share * b;
+            }
+            for (v, w) in &self.vertices[n] {
+                *vertices.entry(*v).or_default() += share * w;
+            }
+        }
+        let mut vertices: VertexWeights = vertices.into_iter().collect();
+        vertices.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        vertices.truncate(MOST_VERTICES);
+        let sum: f32 = vertices.iter().map(|o| o.1).sum();
+        for o in &mut vertices {
+            o.1 /= sum.max(f32::MIN_POSITIVE);
+        }
+        (joints, vertices)
+    }
+}

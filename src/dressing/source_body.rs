@@ -1,0 +1,126 @@
+//! The body that a mesh garment was made on: read from a file, or the embedded one fitted under the garment.
+
+use super::body_guess::{guess, locate};
+use super::error::MeshGarmentError;
+use super::file_frame::FileFrame;
+use super::rig_standing::rig_standing;
+use crate::body::import::template_from_smpl;
+use crate::body::{BodyError, Template, embedded};
+use crate::formats::npz::read_smpl;
+use crate::formats::obj::read_obj;
+use crate::math::{P3, V3};
+use crate::mesh::{Face, MeshError, Topology, TriMesh};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Limits of a grown body's stature, metres; they decide the file's unit.
+const STATURE: [f32; 2] = [1.1, 2.4];
+
+/// A body in the pose and place in which garments were made on it.
+#[derive(Clone, Debug)]
+pub struct SourceBody {
+    /// Metres, y up, facing +z.
+    pub(super) template: Arc<Template>,
+    /// All vertices of its file, in the file's unit: MakeHuman's clothes are bound to helpers beyond the skin too.
+    pub(super) file: Vec<P3>,
+    frame: FileFrame,
+    /// Its origin in words, for people.
+    pub description: String,
+}
+
+impl SourceBody {
+    /// Reads a body: `.npz` in SMPL layout (its rest pose), or `.obj`: a body that stands upright with its arms away from
+    /// its sides, y or z up, in m, dm, cm or mm. An OBJ's skeleton is found by [`rig_standing`]; only its largest
+    /// component is skin.
+    ///
+    /// # Errors
+    /// A fault of the file, or a mesh in which no person is found.
+    pub fn read(path: &Path) -> Result<Self, MeshGarmentError> {
+        let name = path
+            .file_name()
+            .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        if path.extension().is_some_and(|e| e == "npz") {
+            let template = template_from_smpl(&name, &read_smpl(path)?)?;
+            let file = template.mesh().vertices().to_vec();
+            return Ok(Self {
+                template: Arc::new(template),
+                file,
+                frame: FileFrame::METRES,
+                description: name,
+            });
+        }
+        let mesh = read_obj(path)?.mesh;
+        let unknown = |why: &str| MeshGarmentError::NotFound(format!("{}: {why}", path.display()));
+        let (lo, hi) = mesh.bounds().ok_or_else(|| unknown("it has no vertices"))?;
+        let size = hi - lo;
+        let z_up = size.z > size.y;
+        let tall = if z_up { size.z } else { size.y };
+        let scale = FileFrame::unit_of(tall, STATURE)
+            .ok_or_else(|| unknown(&format!("{tall} high is no person in m, dm, cm or mm")))?;
+        let frame = FileFrame {
+            scale,
+            z_up,
+            shift: V3::zeros(),
+        };
+        let skin = largest_component(&mesh, frame).map_err(BodyError::Mesh)?;
+        let (template, fit) = rig_standing(skin).map_err(MeshGarmentError::NotFound)?;
+        Ok(Self {
+            template: Arc::new(template),
+            file: mesh.vertices().to_vec(),
+            frame,
+            description: format!("{name}, skeleton found within {:.0} mm", fit * 1e3),
+        })
+    }
+    /// The embedded body, scaled, moved and with its arms turned so that garment vertices lie just above its skin: a
+    /// garment constrains the body inside it only loosely.
+    ///
+    /// # Errors
+    /// When no body fits into them.
+    pub fn guess(garment: &[P3]) -> Result<Self, MeshGarmentError> {
+        let (template, frame) = guess(&embedded::template(), garment)?;
+        let stature = template.mesh().bounds().map_or(0.0, |(lo, hi)| hi.y - lo.y);
+        let description = format!(
+            "a guess: our body, {:.0} cm tall, its floor {:.0} cm below the file's zero",
+            stature * 100.0,
+            frame.shift.y * 100.0
+        );
+        Ok(Self {
+            template,
+            file: Vec::new(),
+            frame,
+            description,
+        })
+    }
+    /// The same body under a garment whose file has a unit and place of its own.
+    pub(super) fn under(self, garment: &[P3]) -> Self {
+        let frame = locate(&self.template, garment);
+        Self { frame, ..self }
+    }
+    /// Metres in a unit of the file.
+    pub(super) fn unit(&self) -> f32 {
+        self.frame.scale
+    }
+    /// Points of the garment's or the body's file in the frame of the template, metres.
+    pub(super) fn to_metres(&self, p: &[P3]) -> Vec<P3> {
+        p.iter().map(|p| self.frame.to_metres(p)).collect()
+    }
+}
+
+fn largest_component(mesh: &TriMesh, frame: FileFrame) -> Result<TriMesh, MeshError> {
+    let (label, count) = Topology::new(mesh)?.components();
+    let mut sizes = vec![0usize; count];
+    label.iter().for_each(|l| sizes[*l as usize] += 1);
+    let largest = (0..count)
+        .max_by_key(|c| (sizes[*c], std::cmp::Reverse(*c)))
+        .unwrap_or(0) as u32;
+    let mut index = vec![u32::MAX; label.len()];
+    let mut vertices = Vec::new();
+    for (i, _) in label.iter().enumerate().filter(|(_, l)| **l == largest) {
+        index[i] = vertices.len() as u32;
+        vertices.push(frame.to_metres(&mesh.vertices()[i]));
+    }
+    let own = |f: &&Face| label[f[0] as usize] == largest;
+    let faces = mesh.faces().iter().filter(own);
+    let faces = faces.map(|f| f.map(|v| index[v as usize])).collect();
+    TriMesh::new(vertices, faces)
+}
