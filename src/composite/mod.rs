@@ -2,7 +2,44 @@
 //!
 //! Two passes (Ye et al. 2014, section 5): the captured pixels at their depth, then the garments with a depth test.
 //! The test is decided by area, not by pixel (`occluder`): sensor noise is as large as the gap between chest and shirt.
-//! [`render`] runs the stages: captured picture, rasterisation, vertex shading, visibility, blending.
+//! [`render()`] runs the stages: captured picture, rasterisation, vertex shading, visibility, blending.
+//!
+//! ```
+//! use tryon::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
+//! use tryon::composite::{Appearance, GarmentView, Input, Model, State, Workspace, render};
+//! use tryon::math::P3;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let camera = Intrinsics::KINECT_V1.resized(64, 48);
+//! let frame = RgbdFrame {
+//!     sequence: 0,
+//!     time_ns: 0,
+//!     depth: DepthImage::new(64, 48, vec![2500; 64 * 48])?, // a wall at 2.5 m
+//!     color: Some(ColorImage::filled(64, 48, [90; 3])),
+//! };
+//! let cloth = [[-0.3, 0.3, 2.0], [0.3, 0.3, 2.0], [0.0, -0.3, 2.0]].map(P3::from);
+//! let garment = GarmentView {
+//!     vertices: &cloth,
+//!     faces: &[[0, 1, 2]],
+//!     uv: &[],
+//!     normals: &[],
+//!     appearance: &Appearance::default(),
+//! };
+//! let input = Input {
+//!     frame: &frame,
+//!     calibration: &Calibration::registered(camera),
+//!     garments: &[garment],
+//!     body: None,
+//!     output: None,
+//! };
+//! let (mut state, mut work) = (State::default(), Workspace::default());
+//! let (picture, report) = render(&Model::default(), &mut state, &input, &mut work)?;
+//! assert_ne!(picture.at(32, 24), [90; 3]);
+//! assert_eq!(picture.at(2, 2), [90; 3]);
+//! assert!(report.pixels_drawn > 50 && report.pixels_occluded == 0);
+//! # Ok(())
+//! # }
+//! ```
 
 pub(crate) mod appearance;
 pub(crate) mod area;
