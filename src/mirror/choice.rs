@@ -40,13 +40,13 @@ impl Choice {
     /// Unknown name.
     pub fn sized(&self, body: &Measurements) -> Result<SizedGarment, GarmentError> {
         let cut = |pattern, notes| SizedGarment {
-            item: Item::Pattern(pattern),
+            item: WornItem::Pattern(pattern),
             notes,
         };
         Ok(match self {
             Self::Pattern(pattern) => cut(pattern.clone(), Vec::new()),
             Self::Mesh(mesh) => SizedGarment {
-                item: Item::Mesh(Arc::clone(mesh)),
+                item: WornItem::Mesh(Arc::clone(mesh)),
                 notes: (mesh.notes.iter())
                     .map(|n| format!("{}: {n}", mesh.name))
                     .collect(),
@@ -67,13 +67,13 @@ impl Choice {
 /// Garment whose size is settled.
 #[derive(Clone, Debug)]
 pub struct SizedGarment {
-    item: Item,
+    item: WornItem,
     /// Remarks for people: the suggested size with its reason, or the decisions taken for a mesh.
     pub notes: Vec<String>,
 }
 
 #[derive(Clone, Debug)]
-enum Item {
+enum WornItem {
     Pattern(Box<Pattern>),
     Mesh(Arc<MeshGarment>),
 }
@@ -82,23 +82,23 @@ impl SizedGarment {
     /// Name of the garment.
     pub fn name(&self) -> &str {
         match &self.item {
-            Item::Pattern(p) => &p.name,
-            Item::Mesh(m) => &m.name,
+            WornItem::Pattern(p) => &p.name,
+            WornItem::Mesh(m) => &m.name,
         }
     }
 
     /// Pattern it is cut from; `None` for a mesh.
     pub fn pattern(&self) -> Option<&Pattern> {
         match &self.item {
-            Item::Pattern(p) => Some(p),
-            Item::Mesh(_) => None,
+            WornItem::Pattern(p) => Some(p),
+            WornItem::Mesh(_) => None,
         }
     }
 
     pub(super) fn wear(&self) -> GarmentSource<'_> {
         match &self.item {
-            Item::Pattern(p) => GarmentSource::Pattern(p),
-            Item::Mesh(m) => GarmentSource::Mesh(m),
+            WornItem::Pattern(p) => GarmentSource::Pattern(p),
+            WornItem::Mesh(m) => GarmentSource::Mesh(m),
         }
     }
 }
