@@ -143,8 +143,11 @@ fn by_distance(around: &[Vec<u32>]) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    /// Adjacency, edges and faces of a strip of `n` squares.
-    fn strip(n: u32) -> (Vec<Vec<u32>>, Vec<[u32; 2]>, Vec<[u32; 3]>) {
+    /// Adjacency, edges and faces.
+    type Strip = (Vec<Vec<u32>>, Vec<[u32; 2]>, Vec<[u32; 3]>);
+
+    /// A strip of `n` squares.
+    fn strip(n: u32) -> Strip {
         let faces: Vec<[u32; 3]> = (0..n)
             .flat_map(|i| [[2 * i, 2 * i + 1, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 2]])
             .collect();
