@@ -1,7 +1,7 @@
 //! Cloth against cloth: an outer layer outside the inner ones, and the folds of one garment off each other.
 //!
 //! A vertex is kept on its side of the nearest triangle. Outer layers press inner ones inwards and are not pushed back,
-//! as the body bears them both: the other way round a bell of a skirt carried the shirt up (docs/hindsight.md). Between
+//! as the body bears them both: the other way round a bell of a skirt carried the shirt up (docs/decisions/011-layers.md). Between
 //! two folds of one garment each is held off the other. Nothing needs a common solution.
 
 use super::model::Model;

@@ -2,7 +2,7 @@
 //!
 //! Outer layers press inner ones inwards and are not pushed back (`cloth_touch.rs`). Where an inner one lies in folds
 //! there is no room for it between skin and shirt; pressed from both sides it was squeezed out upwards
-//! (docs/hindsight.md). So the outer ones keep off the skin by what lies on it.
+//! (docs/decisions/011-layers.md). So the outer ones keep off the skin by what lies on it.
 
 use super::model::Model;
 use super::state::State;
