@@ -87,7 +87,7 @@ mod tests {
         let sections = BodySections::new(&template, &rest, None);
         for (name, most) in [
             ("skirt", 0.005),
-            ("straight_skirt", 0.02),
+            ("straight_skirt", 0.035),
             ("trousers", 0.05),
         ] {
             let pattern = library::pattern(name, Size::M).expect("pattern");
