@@ -44,7 +44,7 @@ const HALVINGS: usize = 5;
 /// Distance within which skin is searched, metres.
 const ANYWHERE: f32 = 10.0;
 
-/// Scale, arms below the horizontal [rad], shift of the garment up and to the front [m].
+/// Scale, arms below the horizontal [rad], shift of the garment up and to the front (m).
 type Guess = [f64; 4];
 
 /// Frame in which the garment's vertices lie over the skin of `template`.

@@ -21,7 +21,7 @@ const CROTCH_STRIP: f32 = 0.012;
 const LOWEST_CROTCH: f32 = 0.3;
 /// Crotch below the hip joints where no skin is found in the strip, metres.
 const CROTCH_DROP: f32 = 0.08;
-/// Heights above the crotch between which the hip is widest: from [m], to [share of the trunk].
+/// Heights above the crotch between which the hip is widest: from (m), to [share of the trunk].
 const HIP_RANGE: (f32, f32) = (0.02, 0.32);
 /// Heights above the crotch between which the waist is narrowest, shares of the trunk.
 const WAIST_RANGE: Range<f32> = 0.30..0.62;
@@ -102,7 +102,7 @@ impl SectionStack {
             sections,
         }
     }
-    /// Cross-section nearest to height `y` [m]; beyond the ends the last one.
+    /// Cross-section nearest to height `y` (m); beyond the ends the last one.
     pub(super) fn at(&self, y: f32) -> CrossSection {
         let last = self.sections.len().saturating_sub(1);
         let i = (((y - self.bottom) / SPACING).round().max(0.0) as usize).min(last);
@@ -111,7 +111,7 @@ impl SectionStack {
             .or_else(|| self.sections.iter().flatten().copied().next())
             .unwrap_or_default()
     }
-    /// Height in `range` [m] at which `key` of the cross-section is smallest.
+    /// Height in `range` (m) at which `key` of the cross-section is smallest.
     fn argmin(&self, range: Range<f32>, key: impl Fn(&CrossSection) -> f32) -> f32 {
         let n = ((range.end - range.start) / SPACING).max(0.0) as usize;
         (0..=n)

@@ -26,7 +26,7 @@ impl FileFrame {
         };
         q * self.scale + self.shift
     }
-    /// Metres in a unit (m, dm, cm or mm) in which `extent` units lie strictly between `limits` [m].
+    /// Metres in a unit (m, dm, cm or mm) in which `extent` units lie strictly between `limits` (m).
     pub(super) fn unit_of(extent: f32, limits: [f32; 2]) -> Option<f32> {
         let mut units = [1.0f32, 0.1, 0.01, 0.001].into_iter();
         units.find(|s| extent * s > limits[0] && extent * s < limits[1])

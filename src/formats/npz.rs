@@ -23,17 +23,17 @@ pub struct SmplArrays {
     pub vertices: Vec<[f32; 3]>,
     /// `f`: corners of each triangle, shape `[F]`.
     pub faces: Vec<[u32; 3]>,
-    /// `weights`: skinning weights, row-major, shape `[V][J]`.
+    /// `weights`: skinning weights, row-major, shape `[V](J)`.
     pub weights: Vec<f32>,
-    /// `kintree_table` row 0: parent of each joint, `None` for the root, shape `[J]`. Parents come first.
+    /// `kintree_table` row 0: parent of each joint, `None` for the root, shape `(J)`. Parents come first.
     pub parents: Vec<Option<usize>>,
-    /// `J`, or `J_regressor · v_template`: rest joints, metres, shape `[J]`.
+    /// `J`, or `J_regressor · v_template`: rest joints, metres, shape `(J)`.
     pub joints: Vec<[f64; 3]>,
-    /// `J_regressor`: row-major, shape `[J][V]`; empty when the file has none.
+    /// `J_regressor`: row-major, shape `(J)[V]`; empty when the file has none.
     pub joint_regressor: Vec<f32>,
     /// `shapedirs`: offsets per unit of each coefficient, metres, shape `[B][V]`; empty when the file has none.
     pub shape_directions: Vec<Vec<[f32; 3]>>,
-    /// `joint_names`, shape `[J]`, or SMPL's own names when the file has none and has SMPL's number of joints.
+    /// `joint_names`, shape `(J)`, or SMPL's own names when the file has none and has SMPL's number of joints.
     pub joint_names: Vec<String>,
 }
 
@@ -369,7 +369,7 @@ pub fn read_smpl(path: impl AsRef<Path>) -> Result<SmplArrays, FormatError> {
     })
 }
 
-/// `regressor · points`, shape `[J]` for a row-major regressor of shape `[J][points]`.
+/// `regressor · points`, shape `(J)` for a row-major regressor of shape `(J)[points]`.
 pub fn regress(regressor: &[f32], points: &[[f32; 3]]) -> Vec<[f64; 3]> {
     let row = |r: &[f32]| {
         let mut sum = [0.0; 3];

@@ -97,7 +97,7 @@ impl TriMesh {
     pub fn vertices(&self) -> &[P3] {
         &self.vertices
     }
-    /// Triangles, shape `[m]`.
+    /// Triangles, shape `(m)`.
     pub fn faces(&self) -> &[Face] {
         &self.faces
     }

@@ -1,10 +1,10 @@
 //! Time step of the cloth from the capture times of frames.
 
-/// Time step when frames give none [s]: a 30 Hz camera.
+/// Time step when frames give none (s): a 30 Hz camera.
 const NOMINAL: f64 = 1.0 / 30.0;
-/// Longest gap of a recording that counts as a time step [s]; a longer one is a pause of the camera.
+/// Longest gap of a recording that counts as a time step (s); a longer one is a pause of the camera.
 const LONGEST_RECORDED: f64 = 0.2;
-/// Time steps of a live stream [s]: a gap in the stream does not become one huge step.
+/// Time steps of a live stream (s): a gap in the stream does not become one huge step.
 const LIVE: [f64; 2] = [1.0 / 120.0, 1.0 / 10.0];
 
 /// Time step for a gap that no camera interval explains.
@@ -17,7 +17,7 @@ pub enum LongGap {
 }
 
 impl LongGap {
-    /// Time step of the cloth for a gap between frames [s].
+    /// Time step of the cloth for a gap between frames (s).
     pub fn time_step(self, gap: f64) -> f64 {
         match self {
             Self::Nominal if gap > 0.0 && gap <= LONGEST_RECORDED => gap,
@@ -41,7 +41,7 @@ impl FrameClock {
         }
     }
 
-    /// Time since the previous frame [s]; 0 for the first frame and for one that is not later.
+    /// Time since the previous frame (s); 0 for the first frame and for one that is not later.
     pub fn gap(&mut self, time_ns: u64) -> f64 {
         let last = self.last_ns.replace(time_ns).unwrap_or(time_ns);
         time_ns.saturating_sub(last) as f64 * 1e-9

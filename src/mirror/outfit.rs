@@ -62,7 +62,7 @@ impl DressedOutfit {
         })
     }
 
-    /// Advances the cloth by `dt` [s] to a posed body (world, metres).
+    /// Advances the cloth by `dt` (s) to a posed body (world, metres).
     ///
     /// # Errors
     /// A body of another size or with a vertex that is not finite; a time step that is not positive.

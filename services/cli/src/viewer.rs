@@ -12,7 +12,7 @@ use tryon_proto::v1;
 use tryon_proto::v1::compositor_service_client::CompositorServiceClient;
 use tryon_proto::v1::stream_frames_response::Event;
 
-/// Time between the pictures that are kept [s].
+/// Time between the pictures that are kept (s).
 const KEEP_EVERY: f64 = 0.5;
 /// Silence after which the compositor counts as gone; it sends at least two messages a second.
 const SILENCE: Duration = Duration::from_secs(5);
@@ -22,7 +22,7 @@ const MAX_PICTURE_BYTES: usize = 16 << 20;
 /// One picture that arrived.
 #[derive(Debug)]
 pub(crate) struct ReceivedPicture {
-    /// Time since the try-on was opened [s].
+    /// Time since the try-on was opened (s).
     pub(crate) at: f64,
     /// Number of the exposure.
     pub(crate) sequence: u64,

@@ -75,7 +75,7 @@ pub(crate) struct Worn {
     fit: FitProbe,
     /// Room of each garment on the body; `None` for meshes.
     ease: Vec<Option<Suggestion>>,
-    /// Time of the stream since the fit was measured [s].
+    /// Time of the stream since the fit was measured (s).
     fit_age: f64,
 }
 

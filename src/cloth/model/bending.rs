@@ -11,7 +11,7 @@ pub struct Hinge {
     pub c: [f64; 4],
     /// Stiffness [N/m].
     pub w: f64,
-    /// Length of Σ cₖ xₖ at rest [m]; zero for a flat hinge.
+    /// Length of Σ cₖ xₖ at rest (m); zero for a flat hinge.
     pub rest: f64,
 }
 
@@ -25,7 +25,7 @@ fn cotangent(side: f64, edge: f64, across: f64) -> f64 {
     cos / (1.0 - cos * cos).max(SLIVER).sqrt()
 }
 
-/// Flat triangle on an edge a b, by the lengths of its sides [m].
+/// Flat triangle on an edge a b, by the lengths of its sides (m).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wing {
     pub(super) edge: f64,
@@ -47,17 +47,17 @@ impl Hinge {
         let ([c1, c2], [c3, c4]) = (wings[0].cotangents(), wings[1].cotangents());
         [c2 + c4, c1 + c3, -c1 - c2, -c3 - c4]
     }
-    /// Σ cₖ xₖ [m].
+    /// Σ cₖ xₖ (m).
     #[inline]
     pub(crate) fn bow(&self, x: impl Fn(u32) -> V3d) -> V3d {
         (0..4).fold(V3d::zeros(), |s, k| s + x(self.v[k]) * self.c[k])
     }
-    /// Energy [J].
+    /// Energy (J).
     pub fn energy(&self, x: &[V3d]) -> f64 {
         let q = self.bow(|v| x[v as usize]);
         0.5 * self.w * (q.norm() - self.rest).powi(2)
     }
-    /// Adds the derivative of the energy by the positions to `out` [N].
+    /// Adds the derivative of the energy by the positions to `out` (N).
     pub fn add_gradient(&self, x: &[V3d], out: &mut [V3d]) {
         let mut q = self.bow(|v| x[v as usize]);
         if self.rest > 0.0 {

@@ -17,12 +17,12 @@ pub struct Element {
     pub v: [u32; 3],
     /// Shape gradients [1/m].
     pub b: [[f64; 2]; 3],
-    /// Rest area [m²].
+    /// Rest area (m²).
     pub area: f64,
 }
 
 impl Element {
-    /// Element of a triangle with these flat corners [m]; a signed area.
+    /// Element of a triangle with these flat corners (m); a signed area.
     fn new(v: Face, t: &[[f64; 2]; 3]) -> Self {
         let (e1, e2) = (
             [t[1][0] - t[0][0], t[1][1] - t[0][1]],
@@ -46,7 +46,7 @@ impl Element {
     }
 }
 
-/// Smallest rest area of a triangle, a hundredth of a square millimetre [m²]. Smaller ones have no usable gradient.
+/// Smallest rest area of a triangle, a hundredth of a square millimetre (m²). Smaller ones have no usable gradient.
 const SMALLEST_AREA: f64 = 1e-8;
 /// Quantile of the reported stretch.
 const STRETCH_QUANTILE: f64 = 0.99;
@@ -54,7 +54,7 @@ const STRETCH_QUANTILE: f64 = 0.99;
 /// Immutable description of a sheet.
 #[derive(Clone, Debug)]
 pub struct Sheet {
-    /// Mass of each vertex [kg].
+    /// Mass of each vertex (kg).
     pub mass: Vec<f64>,
     /// Triangles.
     pub elements: Vec<Element>,
@@ -62,7 +62,7 @@ pub struct Sheet {
     pub hinges: Vec<Hinge>,
     /// Membrane stiffness.
     pub membrane: Membrane,
-    /// Edges with their rest lengths [m].
+    /// Edges with their rest lengths (m).
     pub edges: Vec<([u32; 2], f64)>,
     /// Pattern of the system matrix.
     pub pattern: Arc<SymmetricPattern>,
@@ -134,14 +134,14 @@ impl Sheet {
     pub fn of_garment(g: &crate::garment::GarmentMesh) -> Result<Self, ClothError> {
         Self::new(g.vertices, &g.faces, &g.rest, &g.material, None)
     }
-    /// Elastic energy [J].
+    /// Elastic energy (J).
     pub fn energy(&self, x: &[V3d]) -> f64 {
         let membrane = |e: &Element| e.area * self.membrane.value(&e.gradient(x));
         let membrane: f64 = self.elements.iter().map(membrane).sum();
         let bending: f64 = self.hinges.iter().map(|h| h.energy(x)).sum();
         membrane + bending
     }
-    /// Adds the derivative of the energy by the positions to `out` [N].
+    /// Adds the derivative of the energy by the positions to `out` (N).
     pub fn add_gradient(&self, x: &[V3d], out: &mut [V3d]) {
         for e in &self.elements {
             let g = self.membrane.gradient(&e.gradient(x)) * e.area;
@@ -192,14 +192,14 @@ fn masses(vertices: usize, elements: &[Element], density: f64) -> Result<Vec<f64
     }
 }
 
-/// Faces with their flat corners [m].
+/// Faces with their flat corners (m).
 struct FlatTriangles<'a> {
     faces: &'a [Face],
     rest: &'a [[[f64; 2]; 3]],
 }
 
 impl FlatTriangles<'_> {
-    /// Distance of two corners of a face [m].
+    /// Distance of two corners of a face (m).
     fn length(&self, face: u32, a: u32, b: u32) -> f64 {
         let (f, t) = (&self.faces[face as usize], &self.rest[face as usize]);
         let at = |v: u32| f.iter().position(|q| *q == v).map_or([0.0; 2], |k| t[k]);

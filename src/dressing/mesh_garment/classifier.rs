@@ -96,7 +96,7 @@ impl<'a> PieceClassifier<'a> {
             && hi.y > self.knee
             && (over_ends as f64) < ACCESSORY * v.len() as f64
     }
-    /// Classifies a piece of cloth with vertices `x` [m] bound to the body.
+    /// Classifies a piece of cloth with vertices `x` (m) bound to the body.
     pub(super) fn classify(
         &self,
         topology: &Topology,

@@ -200,7 +200,7 @@ impl GarmentPiece {
         let mut anchors = self.garment.anchors.iter();
         anchors.any(|a| a.kind == AnchorKind::Rigid)
     }
-    /// The piece on another body: its mesh, and positions in the canonical pose [m]. `lift` puts points above the skin:
+    /// The piece on another body: its mesh, and positions in the canonical pose (m). `lift` puts points above the skin:
     /// a rest shape taken below it would be too tight for good.
     pub(super) fn retargeted(
         &self,

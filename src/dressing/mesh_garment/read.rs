@@ -119,7 +119,7 @@ impl MeshGarment {
     pub fn vertices(&self) -> usize {
         self.pieces.iter().map(|p| p.garment.vertices).sum()
     }
-    /// The pieces on another body, innermost first: meshes, and positions in the canonical pose [m].
+    /// The pieces on another body, innermost first: meshes, and positions in the canonical pose (m).
     pub(in crate::dressing) fn retargeted(
         &self,
         template: &Template,

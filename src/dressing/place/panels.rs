@@ -62,7 +62,7 @@ impl<'a> PanelChart<'a> {
             Placement::Sleeve(side) => Self::Sleeve(SleeveChart::new(body, panel, side)),
         }
     }
-    /// Panel coordinates (x, y) [m] to the frame of the canonical body [m].
+    /// Panel coordinates (x, y) (m) to the frame of the canonical body (m).
     fn point(&self, p: [f32; 2]) -> P3 {
         match self {
             Self::Trunk(c) => c.point(p),

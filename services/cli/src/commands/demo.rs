@@ -15,7 +15,7 @@ use tryon_kit::config::{Config, LogConfig};
 use tryon_kit::drain;
 use tryon_kit::telemetry;
 
-/// Length of a headless run without --seconds [s].
+/// Length of a headless run without --seconds (s).
 const HEADLESS_SECONDS: f64 = 10.0;
 
 /// report.json of a headless demo.

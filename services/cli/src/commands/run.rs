@@ -196,7 +196,7 @@ fn repetition(frame: &RgbdFrame, k: u64) -> RgbdFrame {
     }
 }
 
-/// Nearest surface of the overlay [m]: no body of a recording is nearer.
+/// Nearest surface of the overlay (m): no body of a recording is nearer.
 const NEAR: f32 = 0.05;
 /// Colour of the overlay, sRGB.
 const TINT: [f32; 3] = [80.0, 200.0, 255.0];

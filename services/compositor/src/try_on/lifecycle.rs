@@ -53,7 +53,7 @@ impl Lifecycle {
         self.state
     }
 
-    /// Time since the last live picture could be shown [s]; 0 before the first.
+    /// Time since the last live picture could be shown (s); 0 before the first.
     pub(super) fn degraded_age(&self) -> f32 {
         self.last_live.map_or(0.0, |t| t.elapsed().as_secs_f32())
     }

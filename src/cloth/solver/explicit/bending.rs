@@ -8,12 +8,12 @@ use super::patch_state::{PatchScratch, PatchState};
 use super::simd::{Simd8, Slot, add3, dot, mul_add3, rsqrt, scale3, sub3};
 use super::vec4::{MAX_VERTICES, SLOT_MASK, V4};
 
-/// Square of the shortest Σ cₖ xₖ of a hinge that has a direction [m²].
+/// Square of the shortest Σ cₖ xₖ of a hinge that has a direction (m²).
 const SMALLEST: f32 = 1e-24;
 
 impl PatchState {
     /// Evaluates bending forces within `rings` rings of the owned vertices; they are kept until the next evaluation.
-    /// Positions are extrapolated by `lookahead` [s], half of the time that forces will be kept.
+    /// Positions are extrapolated by `lookahead` (s), half of the time that forces will be kept.
     pub fn update_bending(&mut self, f: &PatchModel, lookahead: f32, rings: usize) {
         wide!(bending_kernel(self, f: &PatchModel, lookahead: f32, rings: usize));
     }

@@ -9,7 +9,7 @@ pub struct ContactPlane {
     pub vertex: u32,
     /// Unit normal, outward.
     pub normal: V4,
-    /// Lower bound of `normal · x` at the time of the query [m].
+    /// Lower bound of `normal · x` at the time of the query (m).
     pub offset: f32,
     /// Velocity of the surface [m/s].
     pub velocity: V4,
@@ -23,7 +23,7 @@ impl ContactPlane {
     pub(super) fn rate(&self) -> f32 {
         self.normal.dot(self.velocity)
     }
-    /// Signed distance of `x` at time `t` since the query [m].
+    /// Signed distance of `x` at time `t` since the query (m).
     #[inline(always)]
     pub(super) fn gap(&self, x: V4, t: f32) -> f32 {
         self.normal.dot(x) - self.offset - self.rate() * t
@@ -35,7 +35,7 @@ impl ContactPlane {
 pub struct Pin {
     /// Constrained vertex of the patch.
     pub vertex: u32,
-    /// Position at the time of the query [m].
+    /// Position at the time of the query (m).
     pub target: V4,
     /// Velocity of the target [m/s].
     pub velocity: V4,

@@ -17,7 +17,7 @@ struct Approach {
     normal: f32,
     /// Least normal velocity that violates nothing by the end of the substep [m/s].
     least: f32,
-    /// Distance from the plane [m].
+    /// Distance from the plane (m).
     gap: f32,
 }
 
@@ -158,7 +158,7 @@ impl PatchState {
 mod tests {
     use super::*;
 
-    /// Displacement in one substep of a vertex at the origin, 1 cm under planes with these normals [m].
+    /// Displacement in one substep of a vertex at the origin, 1 cm under planes with these normals (m).
     fn recovery(normals: &[[f32; 2]]) -> V4 {
         let mut state = PatchState::default();
         state.reset([V4::default()].into_iter(), [V4::default()].into_iter());

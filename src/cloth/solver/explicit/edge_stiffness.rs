@@ -10,7 +10,7 @@ pub(crate) struct TriangleSprings {
     pub(crate) v: [u32; 3],
     /// Stiffness between the lengthenings of the edges [N/m].
     pub(crate) stiffness: Matrix3<f64>,
-    /// Lengths at rest [m].
+    /// Lengths at rest (m).
     pub(crate) rest: [f64; 3],
     /// Unit directions at rest, from corner k + 1 to corner k + 2.
     pub(super) directions: [Vector2<f64>; 3],

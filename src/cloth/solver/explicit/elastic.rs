@@ -7,7 +7,7 @@ use super::patch_state::{PatchScratch, PatchState, Substep};
 use super::simd::{LANES, Simd8, add3, dot, mul_add3, rsqrt, scale3, sub3};
 use super::vec4::{MAX_VERTICES, SLOT_MASK, V4};
 
-/// Shortest length of an edge that has a direction [m].
+/// Shortest length of an edge that has a direction (m).
 const SHORTEST: f32 = 1e-6;
 
 /// Elastic accelerations and gravity into `acceleration`.
@@ -67,7 +67,7 @@ fn predict(state: &mut PatchState, time: f32) {
     }
 }
 
-/// 1 / length of edges, and their lengthening [m].
+/// 1 / length of edges, and their lengthening (m).
 #[inline(always)]
 fn spring<L: Simd8>(l: L, edge: [L::F; 3], rest: &[f32; LANES]) -> (L::F, L::F) {
     let square = l.max(dot(l, edge, edge), l.splat(SHORTEST * SHORTEST));

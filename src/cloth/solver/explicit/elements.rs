@@ -7,7 +7,7 @@ use std::collections::HashMap;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct EdgeTriangle {
     pub(super) v: [u32; 3],
-    /// Lengths at rest [m].
+    /// Lengths at rest (m).
     pub(super) rest: [f32; 3],
     /// Stiffness between lengthenings 00, 11, 22, 12, 20, 01 [N/m].
     pub(super) k: [f32; 6],
@@ -27,18 +27,18 @@ pub(super) struct CurvedHinge {
     pub(super) c: [f32; 4],
     /// Stiffness [N/m].
     pub(super) w: f32,
-    /// Length of Σ cₖ xₖ at rest [m].
+    /// Length of Σ cₖ xₖ at rest (m).
     pub(super) rest: f32,
 }
 
-/// Two corners opposite each other across an edge, with their distance in the flat sheet [m].
+/// Two corners opposite each other across an edge, with their distance in the flat sheet (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Diagonal {
     pub(super) ends: [u32; 2],
     pub(super) flat: f32,
 }
 
-/// Corners across every hinge of a sheet, with their distance in the flat sheet [m].
+/// Corners across every hinge of a sheet, with their distance in the flat sheet (m).
 pub(super) fn diagonals(sheet: &Sheet) -> impl Iterator<Item = ([u32; 2], f64)> {
     let edges: HashMap<[u32; 2], f64> = sheet
         .edges

@@ -12,7 +12,7 @@ use super::vec4::V4;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoldLimit {
     ends: [u32; 2],
-    /// Minimal distance [m].
+    /// Minimal distance (m).
     least: f32,
     /// Share of the relative motion that each vertex takes, by inverse mass.
     share: [f32; 2],
@@ -24,9 +24,9 @@ const SPEED_GAIN: f32 = 0.3;
 const RECOVERED: f32 = 0.2;
 /// Largest opening speed of a violated limit [m/s].
 const RECOVERY_SPEED: f32 = 1.0;
-/// Shortest distance that has a direction [m].
+/// Shortest distance that has a direction (m).
 const SHORTEST: f32 = 1e-6;
-/// Largest minimal distance [m]: folds of 3 cm triangles would not fit under an arm with more.
+/// Largest minimal distance (m): folds of 3 cm triangles would not fit under an arm with more.
 const WIDEST: f32 = 0.02;
 
 impl FoldLimit {
@@ -123,7 +123,7 @@ mod tests {
     struct Clapping {
         model: PatchModel,
         state: PatchState,
-        /// Position of the patch's vertices in the flat strip [m].
+        /// Position of the patch's vertices in the flat strip (m).
         flat: Vec<V3d>,
     }
 

@@ -16,11 +16,11 @@ pub struct Exemptions<'a> {
 /// Input of one substep.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Substep {
-    /// Length [s].
+    /// Length (s).
     pub h: f32,
-    /// Time of its begin since the contact query [s].
+    /// Time of its begin since the contact query (s).
     pub t: f32,
-    /// Extrapolation of the positions that forces are evaluated at [substeps].
+    /// Extrapolation of the positions that forces are evaluated at (substeps).
     pub lookahead: f32,
     /// m/s².
     pub gravity: V4,
@@ -32,9 +32,9 @@ pub struct Substep {
 /// of its position.
 #[derive(Clone, Debug, Default)]
 pub struct PatchState {
-    /// Positions at [`PatchState::reset`] [m].
+    /// Positions at [`PatchState::reset`] (m).
     pub start: Vec<V4>,
-    /// Displacement since then [m].
+    /// Displacement since then (m).
     pub displacement: Vec<V4>,
     /// m/s.
     pub velocity: Vec<V4>,
@@ -55,7 +55,7 @@ pub(super) struct PatchScratch {
     pub(super) is_predicted: bool,
     /// Vertices with a rigid pin.
     pub(super) pinned: Vec<u32>,
-    /// Displacement of penetrating vertices by contacts of this substep [m], and these vertices.
+    /// Displacement of penetrating vertices by contacts of this substep (m), and these vertices.
     pub(super) recovered: Vec<V4>,
     pub(super) penetrating: Vec<u32>,
     /// `None` if nothing sleeps.
@@ -80,7 +80,7 @@ impl Default for PatchScratch {
 }
 
 impl PatchState {
-    /// Replaces positions [m] and velocities [m/s]; nothing sleeps.
+    /// Replaces positions (m) and velocities [m/s]; nothing sleeps.
     pub fn reset(
         &mut self,
         positions: impl Iterator<Item = V4>,
@@ -107,7 +107,7 @@ impl PatchState {
     pub fn set_sleeping(&mut self, f: &PatchModel, asleep: &[bool]) {
         self.scratch.active = asleep.contains(&true).then(|| ActiveSet::new(f, asleep));
     }
-    /// Position of a vertex [m].
+    /// Position of a vertex (m).
     #[inline(always)]
     pub fn position(&self, i: usize) -> V4 {
         self.start[i] + self.displacement[i]

@@ -12,9 +12,9 @@ use std::collections::BTreeMap;
 /// Step that a sheet is made stable for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepSpec {
-    /// Length of a substep [s].
+    /// Length of a substep (s).
     pub h: f64,
-    /// Extrapolation of the positions that forces are evaluated at [substeps]. Damps the fastest modes.
+    /// Extrapolation of the positions that forces are evaluated at (substeps). Damps the fastest modes.
     pub lookahead: f64,
     /// Uncoupled edges: the paper's mass-spring model.
     pub springs_only: bool,
@@ -39,7 +39,7 @@ pub struct StableSheet {
     pub(super) bend: Vec<([u32; 2], f32)>,
     pub(super) bent: Vec<CurvedHinge>,
     pub(super) diagonals: Vec<Diagonal>,
-    /// Weight of each edge in the mass filter [kg].
+    /// Weight of each edge in the mass filter (kg).
     pub(super) filter_weight: Vec<f32>,
     /// Coefficients of the mass filter, the lowest (1) first.
     pub(super) filter: Vec<f32>,
@@ -101,7 +101,7 @@ impl StableSheet {
     pub fn vertices(&self) -> usize {
         self.inverse_mass.len()
     }
-    /// The lowest filter degree with a stable step of at least `enough` seconds, or the highest, and that step [s].
+    /// The lowest filter degree with a stable step of at least `enough` seconds, or the highest, and that step (s).
     pub fn choose_filter(sheet: &Sheet, lookahead: f64, enough: f64) -> (usize, f64) {
         let step = Self::stable_steps(sheet, lookahead);
         let mut found = (0, step(0));
@@ -110,7 +110,7 @@ impl StableSheet {
         }
         found
     }
-    /// Substeps of `h` seconds that bending forces may be kept for, within [`BENDING_INTERVAL`]: all but a few small
+    /// Substeps of `h` seconds that bending forces may be kept for, within `BENDING_INTERVAL`: all but a few small
     /// hinges keep all their stiffness.
     pub fn bending_interval(sheet: &Sheet, h: f64) -> usize {
         let keep = without_outliers(&hinge_limits(sheet));
@@ -120,7 +120,7 @@ impl StableSheet {
             .sqrt();
         ((1.0 / (fastest * h)) as usize).clamp(BENDING_INTERVAL[0], BENDING_INTERVAL[1])
     }
-    /// Longest step at which all but a few small elements keep all their stiffness [s].
+    /// Longest step at which all but a few small elements keep all their stiffness (s).
     pub fn stable_step(sheet: &Sheet, lookahead: f64, filter_degree: usize) -> f64 {
         Self::stable_steps(sheet, lookahead)(filter_degree)
     }
@@ -142,7 +142,7 @@ pub(super) fn ends(sheet: &Sheet) -> Vec<[u32; 2]> {
     sheet.edges.iter().map(sorted).collect()
 }
 
-/// Ends of edges, the lower vertex first, and lengths at rest [m]; sorted by ends.
+/// Ends of edges, the lower vertex first, and lengths at rest (m); sorted by ends.
 struct SortedEdges(Vec<([u32; 2], f64)>);
 
 impl SortedEdges {

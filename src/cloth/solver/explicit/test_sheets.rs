@@ -56,7 +56,7 @@ pub(super) fn crumpled(x: &[V3d]) -> Vec<V3d> {
     x.iter().map(|p| p + V3d::new(0.0, wave(p), 0.0)).collect()
 }
 
-/// Largest distance between two arrays of vertices [m].
+/// Largest distance between two arrays of vertices (m).
 pub(super) fn distance(a: &[V3d], b: &[V3d]) -> f64 {
     let all = a.iter().zip(b).map(|(a, b)| (a - b).norm());
     all.fold(0.0, f64::max)
@@ -173,7 +173,7 @@ impl Lab {
             m.integrate_positions(f, &step, f32::INFINITY);
         }
     }
-    /// Elastic, kinetic and potential energy [J].
+    /// Elastic, kinetic and potential energy (J).
     pub(super) fn energy(&self) -> f64 {
         let (y, v) = (self.positions(), self.velocities());
         let g = -f64::from(self.gravity.0[1]);
