@@ -4,9 +4,9 @@ use std::time::Duration;
 use tokio::time::Instant;
 use tryon_kit::config::CameraConfig;
 
-/// Time between frames before the source has shown its own [ns]: 30 a second.
+/// Time between frames before the source has shown its own (ns): 30 a second.
 const NOMINAL_STEP_NS: u64 = 33_333_333;
-/// Shortest and longest time between two rounds of a source [ns].
+/// Shortest and longest time between two rounds of a source (ns).
 const STEP_NS: [u64; 2] = [1_000_000, 1_000_000_000];
 
 /// Clock of a source that may be played in rounds.

@@ -24,9 +24,9 @@ use zenoh::sample::SampleKind;
 /// Time that a stalled peer may block the others [µs]; then its connection is closed and reopened. zenoh's default of
 /// 5 s freezes every screen.
 const WAIT_BEFORE_CLOSE_US: u32 = 300_000;
-/// Silence after which a connection counts as dead [ms].
+/// Silence after which a connection counts as dead (ms).
 const LEASE_MS: u32 = 2_000;
-/// First and longest pause between attempts to connect [ms]: a restarted peer is found within a second.
+/// First and longest pause between attempts to connect (ms): a restarted peer is found within a second.
 const RETRY_MS: (u32, u32) = (100, 500);
 
 fn fault(e: impl std::fmt::Display) -> BusError {

@@ -22,7 +22,7 @@ pub fn init_logs(config: &LogConfig) -> Result<(), String> {
     Ok(())
 }
 
-/// Upper bounds of the time histograms [ms]: fine below a frame interval at 30/s, coarse above.
+/// Upper bounds of the time histograms (ms): fine below a frame interval at 30/s, coarse above.
 const MS_BUCKETS: [f64; 14] = [
     0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 33.0, 66.0, 100.0, 150.0, 250.0, 500.0, 1000.0,
 ];

@@ -16,7 +16,7 @@ use tryon::mirror::{Mirror, MirrorFrame};
 use tryon::par::{Par, with_threads};
 use tryon::raster::{View, VisibilityBuffer, rasterise};
 
-/// Time between the repetitions of a still picture [ns]: 30 a second.
+/// Time between the repetitions of a still picture (ns): 30 a second.
 const STILL_INTERVAL_NS: u64 = 33_333_333;
 
 /// report.json of this command.
@@ -251,7 +251,7 @@ fn overlay(
 
 /// Depth as grey: near is bright, missing readings are black.
 fn depth_picture(frame: &RgbdFrame) -> ColorImage {
-    /// Distance of the darkest grey [mm], and that grey.
+    /// Distance of the darkest grey (mm), and that grey.
     const FARTHEST_MM: f32 = 5000.0;
     const DARKEST: f32 = 0.05;
     let mut out = ColorImage::filled(frame.depth.width(), frame.depth.height(), [0; 3]);

@@ -45,7 +45,7 @@ impl Default for LogConfig {
 pub struct ProcessConfig {
     /// Threads for computing; 0 means one for each core.
     pub compute_threads: usize,
-    /// Time that open streams have to finish after a signal [ms]; then they are cut.
+    /// Time that open streams have to finish after a signal (ms); then they are cut.
     pub grace_ms: u64,
 }
 
