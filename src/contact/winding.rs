@@ -1,7 +1,8 @@
-//! Whether points lie inside a closed surface that may pass through itself: crossings of a ray, counted.
+//! Inside test of a closed surface that may intersect itself: winding number by ray crossings, faces sorted by height.
 
 use crate::math::P3;
 use crate::mesh::Face;
+use crate::spatial::ray_crossing;
 
 /// Height of the bands that faces are sorted into, metres: about two edges of a body.
 const BAND: f32 = 0.02;
@@ -14,7 +15,7 @@ pub(super) struct Winding<'a> {
     vertices: &'a [P3],
     faces: &'a [Face],
     low: f32,
-    /// Where each band begins in `of`, shape `[bands + 1]`.
+    /// Start of each band in `of`, shape `[bands + 1]`.
     first: Vec<u32>,
     of: Vec<u32>,
 }
@@ -58,36 +59,14 @@ impl<'a> Winding<'a> {
         let [from, to] = [0, 1].map(|k| self.first[band as usize + k] as usize);
         self.of[from..to]
             .iter()
-            .map(|f| self.crossing(*f, p))
+            .map(|f| {
+                ray_crossing(
+                    p,
+                    self.faces[*f as usize].map(|v| self.vertices[v as usize]),
+                )
+            })
             .sum::<i32>()
             > 0
-    }
-    /// +1 where the ray from `p` along +z leaves through the face, −1 where it enters. Edges are half-open, so that
-    /// between two faces a ray crosses one of them.
-    fn crossing(&self, face: u32, p: &P3) -> i32 {
-        let corners = self.faces[face as usize].map(|v| &self.vertices[v as usize]);
-        // Height and depth where the line x = p.x meets the edge that goes right, and the one that goes left.
-        let mut cut = [None; 2];
-        for k in 0..3 {
-            let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            let (left, beyond) = (a.x < p.x, b.x < p.x);
-            if left != beyond {
-                let (a, b) = if left { (a, b) } else { (b, a) };
-                let (a, d) = (a.cast::<f64>(), (b - a).cast::<f64>());
-                let t = (f64::from(p.x) - a.x) / d.x;
-                cut[usize::from(!left)] = Some((a.y + t * d.y, a.z + t * d.z));
-            }
-        }
-        let [Some((y0, z0)), Some((y1, z1))] = cut else {
-            return 0;
-        };
-        let y = f64::from(p.y);
-        let sign = i32::from(y0 <= y && y < y1) - i32::from(y1 <= y && y < y0);
-        if sign != 0 && z0 + (z1 - z0) * (y - y0) / (y1 - y0) > f64::from(p.z) {
-            sign
-        } else {
-            0
-        }
     }
 }
 

@@ -45,7 +45,7 @@ pub fn closest_on_triangle(p: &P3, [a, b, c]: [P3; 3]) -> [f32; 3] {
 /// +1 where the ray from `p` along +z leaves through a counter-clockwise triangle, −1 where it enters, else 0.
 ///
 /// Edges are half-open: a ray through an edge crosses exactly one of its two faces.
-pub(super) fn ray_crossing(p: &P3, corners: [P3; 3]) -> i32 {
+pub(crate) fn ray_crossing(p: &P3, corners: [P3; 3]) -> i32 {
     // Height and depth where the line x = p.x meets the edge going right and the edge going left.
     let mut cut = [None; 2];
     for k in 0..3 {

@@ -114,7 +114,6 @@ pub(crate) const OPENINGS: &[&str] = &[
     "src/contact/depth_maps.rs",
     "src/contact/near_skin.rs",
     "src/contact/surface.rs",
-    "src/contact/winding.rs",
     "src/dressing/drape.rs",
     "src/dressing/hood.rs",
     "src/evaluate/ablation.rs",
