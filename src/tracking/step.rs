@@ -20,7 +20,7 @@ use super::{
 use crate::body::{BodyShape, BoneTransforms, Pose};
 use crate::camera::RgbdFrame;
 use crate::math::{Camera, P3, Rigid};
-use crate::segment::{PersonSearch, Prior, contour, find_person, find_planes};
+use crate::segment::{PersonPrior, PersonSearch, contour, find_person, find_planes};
 use crate::spatial::{OrganisedCloud, PointTree};
 use nalgebra::{Translation3, Vector3};
 
@@ -235,7 +235,7 @@ fn segment(
             state.set_scene(scene);
         }
     }
-    let prior = state.status.is_live().then_some(Prior {
+    let prior = state.status.is_live().then_some(PersonPrior {
         centre: state.centre,
         reach: REACH,
     });
