@@ -6,7 +6,8 @@
 //! minimization").
 
 use crate::math::V3d;
-use crate::mesh::Face;
+use crate::mesh::smoothing::smoothed;
+use crate::mesh::{Csr, Face};
 use crate::par::Par;
 use crate::spatial::SelfIntersections;
 
@@ -186,18 +187,18 @@ impl Untangler {
                 .collect();
             ring.iter().flatten().for_each(|v| near[*v as usize] = true);
         }
+        let pairs: Vec<(u32, u32)> = self
+            .finder
+            .edges()
+            .iter()
+            .flat_map(|&[a, b]| [(a, b), (b, a)])
+            .filter(|(a, _)| near[*a as usize])
+            .collect();
+        let neighbours = Csr::from_pairs(n, &pairs);
         for _ in 0..IRONED {
-            let mut sum = vec![(V3d::zeros(), 0.0); n];
-            for e in self.finder.edges() {
-                for [a, b] in [[e[0], e[1]], [e[1], e[0]]].map(|e| e.map(|v| v as usize)) {
-                    if near[a] {
-                        sum[a].0 += x[b];
-                        sum[a].1 += 1.0;
-                    }
-                }
-            }
-            for v in (0..n).filter(|v| near[*v] && movable(*v) && sum[*v].1 > 0.0) {
-                x[v] = (x[v] + sum[v].0 / sum[v].1) * 0.5;
+            let next = smoothed(Par::Seq, &neighbours, x);
+            for v in (0..n).filter(|v| near[*v] && movable(*v)) {
+                x[v] = next[v];
             }
         }
     }
