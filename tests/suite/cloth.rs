@@ -340,8 +340,7 @@ fn cloth_on_a_body_that_trembles_sleeps_and_wakes() {
     assert_eq!(r.sleeping, 0, "a centimetre wakes it");
 }
 
-/// A standing person sways by a centimetre or so: cloth sleeps on, moves with her, and is where it would be if it had been
-/// computed.
+/// A standing subject sways by a centimetre: cloth stays asleep, follows the skin, and ends where computed cloth would.
 #[test]
 fn cloth_on_a_body_that_sways_rides_asleep() {
     let mut d = dressed(&Config::tracked());
@@ -400,7 +399,7 @@ fn cloth_on_a_body_that_sways_rides_asleep() {
     );
 }
 
-/// Where a ray meets a triangle, in lengths of its direction (Möller and Trumbore).
+/// Parameter of the intersection of a ray and a triangle, in lengths of its direction (Möller and Trumbore).
 fn crossing(from: &P3, way: &V3, [a, b, c]: &[P3; 3]) -> Option<f32> {
     let (e1, e2) = (b - a, c - a);
     let h = way.cross(&e2);
@@ -424,7 +423,7 @@ fn under_the_skin(cloth: &[P3], body: &[P3], faces: &[[u32; 3]]) -> usize {
     cloth.iter().filter(deep).filter(inside).count()
 }
 
-/// How far outside the shirt the skirt stands, metres, at each of its vertices that the shirt goes around: along a
+/// Distance of the skirt outside the shirt [m], at each of its vertices that the shirt surrounds: along a
 /// horizontal ray from the middle of the shirt at that height.
 fn outside(skirt: &[P3], shirt: &[P3], faces: &[[u32; 3]]) -> Vec<f32> {
     let hem = shirt.iter().map(|p| p.y).fold(f32::MAX, f32::min);
@@ -496,7 +495,7 @@ fn a_hem_that_is_woven_through_itself_comes_loose() {
         let faces = &d.model.outfit.garments[0].faces;
         let hem = &mut state.garments[0].positions;
         let low = hem.iter().fold(f32::MAX, |l, p| l.min(p.y));
-        // What is lower turned up, and woven in and out of what it is turned up on.
+        // The part below is turned up and woven through the part above.
         let fold = low + height;
         for p in hem.iter_mut().filter(|p| p.y < fold) {
             let out = 1.0 + 0.06 * (8.0 * p.z.atan2(p.x)).sin();
