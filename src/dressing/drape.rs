@@ -7,10 +7,10 @@
 use super::hood::Hood;
 use super::plane::Plane;
 use super::skin::Skin;
+use crate::cloth::AnchorBinding;
 use crate::cloth::Sheet;
-use crate::cloth::realtime::AnchorBinding;
-use crate::cloth::sleeves::Sleeve;
-use crate::cloth::untangle::Untangler;
+use crate::cloth::repair::sleeve_rings::Sleeve;
+use crate::cloth::repair::untangler::Untangler;
 use crate::contact::{Part, SurfaceFrame, SurfaceModel};
 use crate::garment::{GarmentError, GarmentMesh, Region};
 use crate::math::{P3, V3, V3d};
@@ -246,7 +246,7 @@ impl Drape {
                 .map(|h| (h.v, h.c, 1.0 / h.w))
                 .collect(),
             own,
-            sleeves: Sleeve::of(mesh, &sheet.edges),
+            sleeves: Sleeve::find(mesh, &sheet.edges),
             nearest: vec![[u32::MAX; 2]; n],
             planes: vec![[Plane::default(); 2]; n],
             nearest_cover: Vec::new(),
@@ -354,8 +354,8 @@ impl Drape {
         let ways: Vec<(u32, P3)> = self
             .sleeves
             .iter()
-            .flat_map(|s| s.lost(&lines, at))
-            .flat_map(|f| f.ring.iter().map(move |v| (*v, f.way * at(*v))))
+            .flat_map(|s| s.lost_rings(&lines, at))
+            .flat_map(|f| f.vertices.iter().map(move |v| (*v, f.recovery * at(*v))))
             .collect();
         for (v, to) in ways {
             let i = v as usize;
@@ -415,7 +415,7 @@ impl Drape {
     fn hold_hood(&mut self, anew: bool, h: f64) {
         let Some(hood) = &mut self.hood else { return };
         if anew {
-            let pushes = self.sheet.as_ref().map_or(&[][..], |s| &s.pushes);
+            let pushes = self.sheet.as_ref().map_or(&[][..], |s| &s.displacements);
             hood.look(&self.x, |v| {
                 pushes.get(v as usize).is_some_and(|p| p.1 > 0.0)
             });
@@ -435,13 +435,13 @@ impl Drape {
     fn untangle(&mut self, anew: bool) {
         let Some(sheet) = &mut self.sheet else { return };
         if anew {
-            sheet.look_anew();
+            sheet.invalidate();
         }
         let (pinned, inverse) = (&self.pinned, &self.inverse_mass);
         let weight = |i: usize| if pinned[i].is_some() { 0.0 } else { inverse[i] };
-        let r = sheet.round(Par::Rayon, &mut self.x, weight, APART_STEP, APART_GAP);
-        self.crossings = r.crossings;
-        for (i, (push, n)) in sheet.pushes.iter().enumerate() {
+        let r = sheet.iterate(Par::Rayon, &mut self.x, weight, APART_STEP, APART_GAP);
+        self.crossings = r.intersections;
+        for (i, (push, n)) in sheet.displacements.iter().enumerate() {
             self.before[i] += push;
             self.slack[i] = if *n > 0.0 {
                 (self.slack[i] + SLACK_STEP).min(SLACK)
@@ -480,7 +480,12 @@ impl Drape {
                     // Ironed, a sleeve comes through the arm.
                     let (pinned, own) = (&self.pinned, &self.own);
                     let movable = |v: usize| pinned[v].is_none() && !on_arms(own[v]);
-                    sheet.iron(&mut self.x, sheet.crossed().collect(), movable, ironed);
+                    sheet.smooth_locally(
+                        &mut self.x,
+                        sheet.intersecting().collect(),
+                        movable,
+                        ironed,
+                    );
                 }
             }
             if k % LOOK_EVERY == 0 {
@@ -504,9 +509,9 @@ impl Drape {
         for i in 0..self.x.len() {
             let p = P3::from(self.x[i].cast::<f32>());
             let c = skin.closest(&p, self.nearest[i][0], self.own[i]);
-            if f64::from(c.signed) < -DEEP
-                && !c.rim
-                && !skin.holds_nothing(&c)
+            if f64::from(c.signed_distance) < -DEEP
+                && !c.on_part_boundary
+                && !skin.is_interior(&c)
                 && self.pinned[i].is_none()
             {
                 self.x[i] = c.point.coords.cast();
@@ -516,7 +521,7 @@ impl Drape {
     /// Where it passed through itself in the last round there is cloth that is on no arm.
     pub(super) fn crosses_off_arms(&self) -> bool {
         let crosses = |s: &Untangler| {
-            s.pushes
+            s.displacements
                 .iter()
                 .zip(&self.own)
                 .any(|((_, n), own)| *n > 0.0 && !on_arms(*own))
@@ -615,7 +620,7 @@ impl Drape {
             let masks = [self.own[i], Region::ALL.0 & !self.own[i]];
             let mut found = [
                 skin.model
-                    .closest_beyond(skin.frame(), &p, near[0], masks[0]),
+                    .closest_across_parts(skin.frame(), &p, near[0], masks[0]),
                 skin.model.closest(skin.frame(), &p, near[1], masks[1]),
             ];
             if self.fine {
@@ -624,8 +629,8 @@ impl Drape {
             *near = found.map(|c| c.vertex);
             // Where the body closes on itself its own part decides, and skin inside the body holds nothing.
             let facing = found[0]
-                .room(&found[1])
-                .filter(|_| !found[1].rim)
+                .clearance_to(&found[1])
+                .filter(|_| !found[1].on_part_boundary)
                 .map(f64::from);
             let room = facing.unwrap_or(f64::INFINITY);
             for (plane, c) in self.planes[i].iter_mut().zip(&found) {
@@ -634,19 +639,25 @@ impl Drape {
                     normal: c.normal.cast(),
                     height: on.offset,
                     near: room >= 0.0
-                        && !c.rim
-                        && !skin.holds_nothing(c)
-                        && f64::from(c.signed) < REACH,
+                        && !c.on_part_boundary
+                        && !skin.is_interior(c)
+                        && f64::from(c.signed_distance) < REACH,
                 };
             }
             let [own, other] = &mut self.planes[i];
-            if self.fine && self.sheet.is_some() && (-CLOSED..0.0).contains(&room) && !found[0].rim
+            if self.fine
+                && self.sheet.is_some()
+                && (-CLOSED..0.0).contains(&room)
+                && !found[0].on_part_boundary
             {
                 // No deeper than half-way into skin that lies in other skin; coarse cloth needs its way out through it.
-                let held = !skin.holds_nothing(&found[0]);
-                (own.near, own.height) = (held && f64::from(found[0].signed) < REACH, 0.5 * room);
+                let held = !skin.is_interior(&found[0]);
+                (own.near, own.height) = (
+                    held && f64::from(found[0].signed_distance) < REACH,
+                    0.5 * room,
+                );
             }
-            let far = found.map(|c| f64::from(c.signed));
+            let far = found.map(|c| f64::from(c.signed_distance));
             let halved = self.sheet.is_some() && facing.is_some() && own.near && other.near;
             let kept = halved && own.keep_half(other, &self.x[i], far, room);
             other.near &= kept || room >= 2.0 * on.offset;
@@ -670,11 +681,11 @@ impl Drape {
                 let p = P3::from(self.x[i].cast::<f32>());
                 let c = cover.model.closest(&cover.frame, &p, *near, self.own[i]);
                 *near = c.vertex;
-                let Some(c) = cover.model.under(&cover.frame, &p, &c, HEM) else {
+                let Some(c) = cover.model.cover(&cover.frame, &p, &c, HEM) else {
                     continue;
                 };
-                if c.signed < COVER_REACH
-                    && -f64::from(c.signed) < REACH
+                if c.signed_distance < COVER_REACH
+                    && -f64::from(c.signed_distance) < REACH
                     && self.pinned[i].is_none()
                 {
                     let (point, normal) = (c.point.coords.cast(), -c.normal.cast::<f64>());
@@ -698,8 +709,8 @@ impl Drape {
         for i in 0..self.x.len() {
             let p = P3::from(self.x[i].cast::<f32>());
             let c = skin.closest(&p, self.nearest[i][0], self.own[i]);
-            if !c.rim && !skin.holds_nothing(&c) {
-                deepest = deepest.max(-f64::from(c.signed));
+            if !c.on_part_boundary && !skin.is_interior(&c) {
+                deepest = deepest.max(-f64::from(c.signed_distance));
             }
         }
         let mut strain: Vec<f64> = self

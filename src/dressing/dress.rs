@@ -11,7 +11,7 @@ use super::suggest::{Misfit, wearable};
 use super::waistband::spread;
 use crate::body::measure::measure;
 use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
-use crate::cloth::realtime::{AnchorBinding, Config, Model, Outfit, State};
+use crate::cloth::{AnchorBinding, Config, Model, Outfit, State};
 use crate::cloth::{ClothError, Sheet};
 use crate::contact::{SurfaceFrame, SurfaceModel};
 use crate::garment::{GarmentError, GarmentMesh, Pattern, Region, Triangulation};
@@ -65,7 +65,7 @@ impl Default for DressOptions {
     }
 }
 
-/// A dressed body, ready for [`crate::cloth::realtime::step`].
+/// A dressed body, ready for [`crate::cloth::step`].
 #[derive(Debug)]
 pub struct Dressed {
     /// Immutable part; wrap it in an `Arc` to share it.
@@ -304,7 +304,7 @@ pub fn dress_all(
         })
         .collect();
     let mut skin = Skin::of(&model);
-    skin.show(&bodies[0]);
+    skin.place(&bodies[0]).map_err(ClothError::from)?;
     let offsets: Vec<f64> = (0..coarse.len()).map(|k| model.offset(k)).collect();
     let mut ties = Vec::new();
     let mut drapes = Vec::new();
@@ -327,7 +327,7 @@ pub fn dress_all(
         d.run(on, DRAPING, COARSE_STEP, 1.0);
     });
     for w in bodies.windows(2) {
-        skin.show(&w[1]);
+        skin.place(&w[1]).map_err(ClothError::from)?;
         rough.each(&skin, &offsets, |k, d, on| {
             d.carry(&w[0], &w[1]);
             d.put_back(&skin);
@@ -383,9 +383,9 @@ pub fn dress_all(
     report.stages_ms.fine += ms(timer);
 
     let timer = Instant::now();
-    let (body, buried, apart) = skin.known();
+    let body = skin.into_body();
     model.set_anchors(anchors);
-    let state = State::new(&model, positions, &body)?.on_skin(buried, apart);
+    let state = State::on_body(&model, positions, body)?;
     report.stages_ms.model += ms(timer);
     report.ms = ms(started);
     Ok(Dressed {
@@ -504,7 +504,7 @@ fn bind(
                 height: if hug {
                     offset as f32
                 } else {
-                    c.signed.max(offset as f32)
+                    c.signed_distance.max(offset as f32)
                 },
                 strength: set.strength,
             });

@@ -7,8 +7,8 @@
 use super::Fit;
 use crate::body::Template;
 use crate::body::parts::{BodySegment, BodySide};
-use crate::cloth::realtime::{Model, State};
 use crate::cloth::{ClothError, Sheet};
+use crate::cloth::{Model, State};
 use crate::contact::{SurfaceFrame, SurfaceModel};
 use crate::garment::{GarmentMesh, Region};
 use crate::math::{P3, V3d};
@@ -171,7 +171,7 @@ impl FitProbe {
             got,
             expected,
         };
-        let surface = model.surface();
+        let surface = model.collision().surface();
         if body.len() != surface.vertices() || body.len() != self.region.len() {
             return Err(count("body vertices", body.len(), self.region.len()));
         }
@@ -248,10 +248,10 @@ fn feel(
     (0..n)
         .map(|i| {
             let mask = mesh.regions.get(i).map_or(Region::ALL.0, |r| r.0);
-            let c = surface.closest_beyond(frame, &positions[i], near[i], mask);
+            let c = surface.closest_across_parts(frame, &positions[i], near[i], mask);
             near[i] = c.vertex;
             let a = area[i].max(f64::MIN_POSITIVE);
-            let gap = c.signed.max(0.0);
+            let gap = c.signed_distance.max(0.0);
             let pressure = if gap < offset + TOUCH {
                 // −gradient + weight + skin = 0 along the normal.
                 c.normal

@@ -16,7 +16,7 @@ mod skin;
 mod suggest;
 mod waistband;
 
-pub use crate::cloth::realtime::{AnchorBinding, Outfit};
+pub use crate::cloth::{AnchorBinding, Outfit};
 pub use dress::{DressError, DressOptions, DressReport, Dressed, Wear, dress, dress_all};
 pub use fit_map::{FIT_COLORS, FitMap, FitProbe, RegionFit, VertexFit};
 pub use made_on::{MadeOn, WearError, rig_standing};

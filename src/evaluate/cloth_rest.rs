@@ -2,7 +2,7 @@
 
 use super::EvaluateError;
 use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
-use crate::cloth::realtime::{Config, Input, State, StepReport, Workspace, step};
+use crate::cloth::{Config, Input, State, StepReport, Workspace, step};
 use crate::dressing::{DressOptions, Dressed, dress};
 use crate::garment::{Size, library};
 use crate::math::{Body, P3, Rigid, V3, V3d, World, log_so3};

@@ -3,7 +3,7 @@
 use super::inside::Solid;
 use super::{EvaluateError, Row};
 use crate::body::{BodyShape, Pose, RestBody, Template, measure};
-use crate::cloth::realtime::{Config, Input, State, Workspace, step};
+use crate::cloth::{Config, Input, State, Workspace, step};
 use crate::dressing::{DressOptions, Dressed, dress, rig_standing, suggest};
 use crate::formats::obj::read_obj;
 use crate::garment::library;

@@ -3,7 +3,7 @@
 use super::run::{RunConfig, RunReport, deepest};
 use super::{Scene, SceneError};
 use crate::cloth::ClothError;
-use crate::cloth::folds::{FoldFrame, FoldModel, Search};
+use crate::cloth::contact::self_contact::{Search, SelfContactFrame, SelfContactModel};
 use crate::cloth::solver::explicit::{
     ContactPlane, HaloExchange, PatchModel, PatchState, Pin, StableSheet, StepSpec, Substep, V4,
 };
@@ -282,8 +282,8 @@ fn rigid_part(x: &[P3], v: &[V3], rest: &mut Vec<f32>) -> f32 {
 
 /// Contact of the sheet with itself.
 struct Folds {
-    model: FoldModel,
-    frame: FoldFrame,
+    model: SelfContactModel,
+    frame: SelfContactFrame,
     search: Search,
     thickness: f32,
     /// Speed of each vertex beside the rigid motion of the whole, and the most of it that a neighbour may have, m/s.
@@ -310,11 +310,11 @@ impl Folds {
             .map_err(|e| fault(e.to_string()))?;
         let topology = Topology::new(&mesh).map_err(|e| fault(e.to_string()))?;
         let surface = SurfaceModel::new(scene.faces.clone(), topology, vec![1; scene.start.len()]);
-        let model = FoldModel::new(surface, scene.sheet.edges.iter().map(|e| e.1 as f32));
+        let model = SelfContactModel::new(surface, scene.sheet.edges.iter().map(|e| e.1 as f32));
         let most = ((config.fold_search / (looks as f64 * h)) as usize).max(1);
         let thickness = config.thickness as f32;
         let search = model.search_all(thickness, 0.0);
-        let (frame, speeds, h) = (FoldFrame::default(), Vec::new(), h as f32);
+        let (frame, speeds, h) = (SelfContactFrame::default(), Vec::new(), h as f32);
         Ok(Self {
             model,
             frame,
@@ -373,10 +373,10 @@ impl Folds {
                 continue;
             }
             let x = self.frame.surface.vertices[v as usize];
-            let corner = self
-                .model
-                .corner(&self.frame, v, &x, &self.search, &mut w.neighbour_of);
-            w.room[i] = FoldModel::room(&self.search, corner);
+            let corner =
+                self.model
+                    .candidate(&self.frame, v, &x, &self.search, &mut w.neighbour_of);
+            w.room[i] = SelfContactModel::clearance(&self.search, corner);
             let Some((corner, _)) = corner.filter(|_| w.room[i] < 0.0) else {
                 continue;
             };

@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use std::path::Path;
 use std::process::ExitCode;
 use tryon::body::{BoneTransforms, Pose, embedded, skin};
-use tryon::cloth::realtime;
+use tryon::cloth;
 use tryon::dressing::{DressOptions, dress};
 use tryon::formats::gltf::{GlbMesh, write_glb, write_glb_motion};
 use tryon::formats::obj::write_obj;
@@ -95,15 +95,14 @@ fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
             ..DressOptions::default()
         },
     )?;
-    let (model, mut state, mut work) =
-        (dressed.model, dressed.state, realtime::Workspace::default());
+    let (model, mut state, mut work) = (dressed.model, dressed.state, cloth::Workspace::default());
     let garment = &model.outfit.garments[0];
     let stands = pose(0)
         .root
         .point(&template.skeleton().joints()[0].rest)
         .coords
         .cast::<f32>();
-    let drawn = |state: &realtime::State| {
+    let drawn = |state: &cloth::State| {
         let mut p = Vec::new();
         garment.render_positions(&state.garments[0].positions, &mut p);
         p.iter_mut()
@@ -135,10 +134,10 @@ fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
             &bones,
             &mut body,
         );
-        realtime::step(
+        cloth::step(
             &model,
             &mut state,
-            &realtime::Input {
+            &cloth::Input {
                 body: &body,
                 dt: 1.0 / FRAMES,
             },
