@@ -107,7 +107,7 @@ impl Surface {
             None => nalgebra::Isometry3::identity(),
         };
         for (number, g) in (0..u8::MAX).zip(input.garments) {
-            self.append(g, number, &iso, config.layer_offset * f32::from(number));
+            self.append(g, number, &iso, config.layer_bias * f32::from(number));
         }
         let mut z: Vec<f32> = self
             .vertices
@@ -206,7 +206,7 @@ impl Surface {
             let layers: Vec<Range<usize>> = self.layers.iter().map(|l| l.faces.clone()).collect();
             return rasterise_layers(
                 config.par,
-                config.inside_offset,
+                config.inner_bias,
                 &view,
                 vertices,
                 faces,
@@ -217,7 +217,7 @@ impl Surface {
         let options = Options {
             par: config.par,
             cull: Cull::None,
-            behind: config.inside_offset,
+            behind: config.inner_bias,
         };
         rasterise_with(options, &view, vertices, faces, &mut self.samples);
         0

@@ -10,9 +10,6 @@ use crate::math::P3;
 use crate::mesh::Topology;
 use crate::par::Par;
 
-/// More room than cloth is given, metres: some of it lies a little deeper.
-const SUNK: f32 = 0.015;
-
 /// A body with room for two layers of cloth between parts that press on each other, as a [`super::Model`] makes it.
 ///
 /// Cloth between an upper arm and the chest lies on skin that was moved back, inside the skin as it is measured. Drawn with
@@ -66,7 +63,7 @@ impl RoomyBody {
                     &self.surface,
                     &self.pressing,
                     &mut self.frame,
-                    self.room + SUNK,
+                    self.room,
                 );
                 self.creases
                     .iter()
