@@ -6,14 +6,15 @@
 #![allow(clippy::expect_used)] // a bench stops at the first fault
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, Vector3};
 use tryon::body::skin;
 use tryon::camera::{DepthImage, NoiseModel, RgbdFrame};
 use tryon::math::{P3, Twist, V3};
 use tryon::par::Par;
+use tryon::registration::residual::PointTerm;
 use tryon::registration::{
-    ArticulatedSums, Association, Dof, Metric, ModelPoints, PairingConfig, PairingScratch,
-    pair_surfaces, solve_damped,
+    Association, Dof, Metric, ModelPoints, NormalEquations, Observation, PairingConfig,
+    PairingScratch, pair_surfaces,
 };
 use tryon::segment::{Contour, SegmentScratch, contour, find_person, find_planes};
 use tryon::spatial::{OrganisedCloud, PointTree};
@@ -92,43 +93,66 @@ fn samples(sequence: &Sequence) -> (Vec<P3>, Vec<V3>, Vec<u8>) {
     )
 }
 
-fn correspondences(c: &mut Criterion) {
+/// Readings of the subject in the first frame of the try-on routine.
+struct Readings {
+    sequence: Sequence,
+    grid: OrganisedCloud,
+    cells: Vec<u32>,
+    edges: Contour,
+    points: Vec<P3>,
+}
+
+fn readings() -> Readings {
     let sequence = shopper(Routine::TryOn);
     let (frame, _) = sequence.frame(0);
     let mut grid = OrganisedCloud::new(&sequence.calibration().depth, None);
     grid.sample(&frame.depth, 8.0);
     let planes = find_planes(&grid);
-    let person = find_person(&mut grid, &planes, None, &mut SegmentScratch::default());
-    grid.refine(&frame.depth, &person.cells);
+    let cells = find_person(&mut grid, &planes, None, &mut SegmentScratch::default()).cells;
+    grid.refine(&frame.depth, &cells);
     let mut edges = Contour::default();
-    contour(&grid, &person.cells, &mut edges);
-    let points: Vec<P3> = person
-        .cells
-        .iter()
-        .map(|&k| grid.points[k as usize])
-        .collect();
+    contour(&grid, &cells, &mut edges);
+    Readings {
+        points: cells.iter().map(|&k| grid.points[k as usize]).collect(),
+        sequence,
+        grid,
+        cells,
+        edges,
+    }
+}
+
+fn correspondences(c: &mut Criterion) {
+    let r = readings();
     c.bench_function("pairs/tree over the readings", |b| {
-        b.iter(|| PointTree::new(&points))
+        b.iter(|| PointTree::new(&r.points))
     });
-    let tree = PointTree::new(&points);
-    let (positions, normals, bones) = samples(&sequence);
-    let parents: Vec<Option<usize>> = sequence
-        .actor()
-        .template
-        .skeleton()
-        .joints()
-        .iter()
-        .map(|j| j.parent)
-        .collect();
-    let model = ModelPoints {
-        positions: &positions,
-        normals: &normals,
-        bones: &bones,
-        parents: &parents,
-        spacing: 0.04,
+    let tree = PointTree::new(&r.points);
+    let observation = Observation {
+        grid: &r.grid,
+        cells: &r.cells,
+        false_edges: &r.edges.false_edges,
+        true_edges: &r.edges.true_edges,
+        tree: Some(&tree),
     };
+    let (positions, normals, bones) = samples(&r.sequence);
+    let joints = r.sequence.actor().template.skeleton().joints();
+    let parents: Vec<Option<usize>> = joints.iter().map(|j| j.parent).collect();
+    // The body is somewhere else: nothing pairs, every reading pulls.
+    let shift = V3::new(3.0, 0.0, 0.0);
+    let away: Vec<P3> = positions.iter().map(|p| p + shift).collect();
     let (mut scratch, mut pairs) = (PairingScratch::default(), vec![]);
-    for association in [Association::Projective, Association::KdTree] {
+    for (name, positions, association) in [
+        ("windows, 1,000 points", &positions, Association::Projective),
+        ("kd-tree, 1,000 points", &positions, Association::KdTree),
+        ("kd-tree, the body is elsewhere", &away, Association::KdTree),
+    ] {
+        let model = ModelPoints {
+            positions,
+            normals: &normals,
+            bones: &bones,
+            parents: &parents,
+            spacing: 0.04,
+        };
         let config = PairingConfig {
             association,
             distance: 0.12,
@@ -137,64 +161,14 @@ fn correspondences(c: &mut Criterion) {
             data_step: 2,
             reuse: 0.0,
         };
-        c.bench_function(
-            &format!("pairs/{association:?}, 1,000 points both ways"),
-            |b| {
-                b.iter(|| {
-                    let e = &edges.false_edges;
-                    pair_surfaces(
-                        &model,
-                        &grid,
-                        &person.cells,
-                        e,
-                        Some(&tree),
-                        &config,
-                        &mut scratch,
-                        &mut pairs,
-                    )
-                });
-            },
-        );
-    }
-    // The body is somewhere else: nothing pairs, every reading pulls.
-    let away: Vec<P3> = positions
-        .iter()
-        .map(|p| p + V3::new(3.0, 0.0, 0.0))
-        .collect();
-    let model = ModelPoints {
-        positions: &away,
-        ..model
-    };
-    let config = PairingConfig {
-        association: Association::KdTree,
-        distance: 0.12,
-        cos_normal: 0.5,
-        pull: 0.35,
-        data_step: 2,
-        reuse: 0.0,
-    };
-    c.bench_function("pairs/KdTree, the body is elsewhere", |b| {
-        b.iter(|| {
-            let e = &edges.false_edges;
-            pair_surfaces(
-                &model,
-                &grid,
-                &person.cells,
-                e,
-                Some(&tree),
-                &config,
-                &mut scratch,
-                &mut pairs,
-            )
+        c.bench_function(&format!("pairs/{name}"), |b| {
+            b.iter(|| pair_surfaces(&model, &observation, &config, &mut scratch, &mut pairs));
         });
-    });
+    }
 }
 
-/// Bone, point, residual and metric.
-type Pull = (usize, Vector3<f64>, Vector3<f64>, Metric);
-
 /// A tree of 24 bones with three rotations each and the root's shift, and 1,600 residuals on them.
-fn chain() -> (Vec<Option<usize>>, Vec<Dof>, Vec<Pull>) {
+fn chain() -> (Vec<Option<usize>>, Vec<Dof>, Vec<PointTerm>) {
     let parents: Vec<Option<usize>> = (0..24usize).map(|b| (b > 0).then(|| (b - 1) / 2)).collect();
     let axis = |k: usize| Vector3::from_fn(|r, _| f64::from(u8::from(r == k)));
     let mut dofs: Vec<Dof> = (0..3)
@@ -216,35 +190,31 @@ fn chain() -> (Vec<Option<usize>>, Vec<Dof>, Vec<Pull>) {
     let residual = |i: usize| {
         let t = i as f64 * 0.37;
         let direction = Vector3::new(t.sin(), t.cos(), 0.3).normalize();
-        let p = Vector3::new((1.3 * t).sin(), (0.7 * t).cos(), 0.1 * t.sin());
-        (
-            i % 24,
-            p,
-            direction * 0.01,
-            Metric {
+        PointTerm {
+            sample: i,
+            bone: i % 24,
+            point: Vector3::new((1.3 * t).sin(), (0.7 * t).cos(), 0.1 * t.sin()),
+            residual: direction * 0.01,
+            metric: Metric {
                 isotropic: 0.1,
                 directional: 1.0,
                 direction,
             },
-        )
+            weight: 1.0,
+            cost: 0.0,
+        }
     };
     (parents, dofs, (0..1600).map(residual).collect())
 }
 
 fn equations(c: &mut Criterion) {
     let (parents, dofs, residuals) = chain();
-    let mut sums = ArticulatedSums::default();
-    let (mut h, mut g) = (DMatrix::zeros(0, 0), DVector::zeros(0));
-    let mut fill = |sums: &mut ArticulatedSums, single: bool, list: &[Pull]| {
+    let mut sums = NormalEquations::default();
+    let fill = |sums: &mut NormalEquations, single: bool, list: &[PointTerm]| {
         sums.reset(parents.len());
-        for (bone, p, r, metric) in list {
-            if single {
-                sums.single[*bone].add(&p.cast(), &r.cast(), &metric.cast(), 1.0);
-            } else {
-                sums.bones[*bone].add(p, r, metric, 1.0);
-            }
-        }
-        sums.assemble(&parents, &dofs, &mut h, &mut g);
+        let centre = Vector3::zeros();
+        list.iter().for_each(|t| sums.add_point(t, &centre, single));
+        sums.assemble(&parents, &dofs);
     };
     c.bench_function("equations/1,600 residuals, 75 unknowns, f64", |b| {
         b.iter(|| fill(&mut sums, false, &residuals))
@@ -258,15 +228,15 @@ fn equations(c: &mut Criterion) {
     fill(&mut sums, false, &residuals);
     let damping = vec![1e-1; dofs.len()];
     c.bench_function("solve/75 unknowns", |b| {
-        b.iter(|| solve_damped(&h, &g, &damping))
+        b.iter(|| sums.solve_damped(&damping))
     });
-    let flat = DMatrix::zeros(dofs.len(), dofs.len());
+    sums.hessian = DMatrix::zeros(dofs.len(), dofs.len());
     c.bench_function("solve/nothing known but the damping", |b| {
-        b.iter(|| solve_damped(&flat, &g, &damping))
+        b.iter(|| sums.solve_damped(&damping))
     });
-    let broken = DMatrix::from_element(dofs.len(), dofs.len(), f64::NAN);
+    sums.hessian.fill(f64::NAN);
     c.bench_function("solve/not a number", |b| {
-        b.iter(|| solve_damped(&broken, &g, &damping))
+        b.iter(|| sums.solve_damped(&damping))
     });
 }
 

@@ -6,7 +6,7 @@ use crate::body::{Template, embedded};
 use crate::camera::NoiseModel;
 use crate::registration::Association;
 use crate::synth::{Actor, Room, Sequence, Setting};
-use crate::tracking::{Normals, TrackerConfig};
+use crate::tracking::{SurfaceNormals, TrackerConfig};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -93,7 +93,7 @@ pub fn variants() -> Vec<Variant> {
     add("metric", "symmetric + 0.05 point", &|_| {});
     add("metric", "symmetric", &|c| c.point_to_point = 0.0);
     add("metric", "plane + 0.05 point", &|c| {
-        c.normals = Normals::Model
+        c.normals = SurfaceNormals::Model
     });
     add("metric", "point", &|c| {
         (c.point_to_point, c.point_to_plane) = (1.0, 0.0)

@@ -1,4 +1,4 @@
-//! How far apart two points are, and how much a far pair counts.
+//! Metric of a point residual and the robust kernel of its weight.
 
 use nalgebra::{Matrix3, RealField, Vector3};
 

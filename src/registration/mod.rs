@@ -1,15 +1,18 @@
 //! Correspondences, robust kernels and Gauss–Newton that pull one surface onto another.
 
-mod articulated;
+mod correspondence;
 mod edge_pairs;
+mod index_image;
 mod metric;
+mod normal_equations;
 mod pairing;
-mod projective;
+pub mod residual;
 
-pub use articulated::{ArticulatedSums, BoneSums, Dof, solve_damped};
-pub use edge_pairs::{EdgePairs, EdgeSide, pair_edges};
-pub use metric::{GemanMcClure, Metric};
-pub use pairing::{
-    Association, ModelPoints, Pair, PairingConfig, PairingScratch, PairingStats, pair_surfaces,
+pub use correspondence::{
+    Association, ModelPoints, Observation, Pair, PairingConfig, PairingStats,
 };
-pub use projective::IndexImage;
+pub use edge_pairs::{EdgePairs, EdgeSide, pair_edges};
+pub use index_image::IndexImage;
+pub use metric::{GemanMcClure, Metric};
+pub use normal_equations::{BoneSums, Dof, NormalEquations, ROOT_UNKNOWNS, is_ancestor};
+pub use pairing::{PairingScratch, pair_surfaces};

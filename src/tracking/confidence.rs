@@ -1,12 +1,11 @@
-//! How sure each joint is, and why not.
+//! Confidence of each joint and its limiting reason, from the last pairing and normal equations.
 
-use super::align::{AlignScratch, Seen};
-use super::model::TrackerModel;
+use super::pose_fit::{FitContext, FitScratch};
 use crate::body::{JointMotion, Pose};
 use crate::spatial::Label;
 use serde::{Deserialize, Serialize};
 
-/// What a joint's angles rest on.
+/// Reason that limits a joint's confidence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
@@ -14,11 +13,11 @@ pub enum Reason {
     Measured,
     /// An angle is at the end of its range.
     AtLimit,
-    /// Its bone is seen, but some way of turning changes nothing in the picture (a twist, a limb along the view).
+    /// Its bone has readings, but some turn does not change them (a twist, a limb along the view).
     Ambiguous,
-    /// Its bone should be in view, but the camera got no readings there (black trousers, shiny things).
+    /// Its bone projects to cells without readings (black trousers, shiny surfaces).
     NoReturn,
-    /// Its bone is behind something or outside the picture.
+    /// Its bone is occluded or outside the image.
     Unseen,
 }
 
@@ -27,82 +26,97 @@ pub enum Reason {
 pub struct JointConfidence {
     /// 0 (a guess) to 1 (well measured).
     pub value: f32,
-    /// What holds it back.
+    /// Limiting reason.
     pub reason: Reason,
 }
 
-/// A bone with so many readings is half sure.
+/// Readings of a bone at which its confidence is half of the most.
 const HALF_SURE: f32 = 4.0;
-/// A degree of freedom with less data than this (per point, m²/rad²) is ambiguous: a twentieth of a shank in view.
+/// Information below which a degree of freedom is ambiguous, per point, m²/rad²: a twentieth of a shank in view.
 const AMBIGUOUS: f64 = 3e-5;
-/// Nearer to a limit than this, radians, is at the limit.
+/// Distance from a limit that counts as at the limit, radians.
 const LIMIT: f64 = 1e-3;
-/// A model point this far behind the drawn model (metres) is hidden by it.
+/// Factors on the confidence of a joint with a limiting reason.
+const NO_RETURN_FACTOR: f32 = 0.5;
+/// See [`NO_RETURN_FACTOR`].
+const AMBIGUOUS_FACTOR: f32 = 0.7;
+/// See [`NO_RETURN_FACTOR`].
+const AT_LIMIT_FACTOR: f32 = 0.8;
+/// Depth behind the drawn model from which a model point is occluded by it, metres.
 const HIDDEN: f32 = 0.05;
 
-/// Confidence of every joint of the skeleton, from the last pairing and normal equations.
+/// Confidence of every joint of the skeleton.
 pub(super) fn confidence(
-    model: &TrackerModel,
+    context: &FitContext<'_>,
     pose: &Pose,
-    seen: &Seen<'_>,
-    scratch: &AlignScratch,
+    scratch: &FitScratch,
 ) -> Vec<JointConfidence> {
+    let model = context.model;
     let skeleton = model.template.skeleton();
-    let n = skeleton.len();
-    let (mut readings, mut missing) = (vec![0u32; n], vec![0u32; n]);
+    let readings = paired_samples(context, scratch);
+    let missing = samples_without_return(context, scratch);
+    let limits = skeleton.limits();
+    let of_joint = |j: usize| {
+        let motion = &skeleton.joints()[j].motion;
+        // An end point or a joint without skin takes the confidence of its parent bone.
+        let is_end = matches!(motion, JointMotion::Fixed) && readings[j] == 0;
+        let bone = if is_end {
+            model.parents[j].unwrap_or(j)
+        } else {
+            j
+        };
+        let at = skeleton.dof_offset(j);
+        let angles = at..at + motion.dofs();
+        let least = angles
+            .clone()
+            .map(|k| scratch.information(k))
+            .fold(f64::INFINITY, f64::min);
+        let at_limit = angles.clone().any(|k| {
+            pose.angles[k] - limits[k][0] < LIMIT || limits[k][1] - pose.angles[k] < LIMIT
+        });
+        let share = readings[bone] as f32 / (readings[bone] as f32 + HALF_SURE);
+        let (reason, value) = if readings[bone] == 0 && missing[bone] == 0 {
+            (Reason::Unseen, 0.0)
+        } else if readings[bone] == 0 {
+            (Reason::NoReturn, 0.0)
+        } else if missing[bone] > readings[bone] {
+            (Reason::NoReturn, NO_RETURN_FACTOR * share)
+        } else if !angles.is_empty() && least < AMBIGUOUS {
+            (Reason::Ambiguous, AMBIGUOUS_FACTOR * share)
+        } else if at_limit {
+            (Reason::AtLimit, AT_LIMIT_FACTOR * share)
+        } else {
+            (Reason::Measured, share)
+        };
+        JointConfidence { value, reason }
+    };
+    (0..skeleton.len()).map(of_joint).collect()
+}
+
+/// Samples of each bone that found a reading.
+fn paired_samples(context: &FitContext<'_>, scratch: &FitScratch) -> Vec<u32> {
+    let mut counts = vec![0u32; context.model.parents.len()];
     for pair in scratch.pairs.iter().filter(|p| !p.from_data) {
-        readings[usize::from(model.bones[pair.model as usize])] += 1;
+        counts[usize::from(context.model.bones[pair.model as usize])] += 1;
     }
+    counts
+}
+
+/// Visible samples of each bone at cells without any reading.
+fn samples_without_return(context: &FitContext<'_>, scratch: &FitScratch) -> Vec<u32> {
+    let grid = context.observation.grid;
     let image = &scratch.pairing.image;
+    let mut counts = vec![0u32; context.model.parents.len()];
     for (i, (p, normal)) in scratch.positions.iter().zip(&scratch.normals).enumerate() {
         if normal.dot(&p.coords) >= 0.0 {
             continue;
         }
-        let Some(cell) = seen.grid.cell_of(p).and_then(|(u, v)| seen.grid.cell(u, v)) else {
+        let Some(cell) = grid.cell_of(p).and_then(|(u, v)| grid.cell(u, v)) else {
             continue;
         };
-        if seen.grid.labels[cell] == Label::Unknown && p.z <= image.depth[cell] + HIDDEN {
-            missing[usize::from(model.bones[i])] += 1;
+        if grid.labels[cell] == Label::Unknown && p.z <= image.depth[cell] + HIDDEN {
+            counts[usize::from(context.model.bones[i])] += 1;
         }
     }
-    let limits = skeleton.limits();
-    (0..n)
-        .map(|j| {
-            let at = skeleton.dof_offset(j);
-            let dofs = skeleton.joints()[j].motion.dofs();
-            // End points and unskinned joints speak for the bone that carries them.
-            let bone =
-                if matches!(skeleton.joints()[j].motion, JointMotion::Fixed) && readings[j] == 0 {
-                    model.parents[j].unwrap_or(j)
-                } else {
-                    j
-                };
-            let seen_share = readings[bone] as f32 / (readings[bone] as f32 + HALF_SURE);
-            let least = (at..at + dofs)
-                .map(|k| scratch.information(6 + k))
-                .fold(f64::INFINITY, f64::min);
-            let at_limit = (at..at + dofs).any(|k| {
-                pose.angles[k] - limits[k][0] < LIMIT || limits[k][1] - pose.angles[k] < LIMIT
-            });
-            let (reason, value) = if readings[bone] == 0 {
-                (
-                    if missing[bone] > 0 {
-                        Reason::NoReturn
-                    } else {
-                        Reason::Unseen
-                    },
-                    0.0,
-                )
-            } else if missing[bone] > readings[bone] {
-                (Reason::NoReturn, 0.5 * seen_share)
-            } else if dofs > 0 && least < AMBIGUOUS {
-                (Reason::Ambiguous, 0.7 * seen_share)
-            } else if at_limit {
-                (Reason::AtLimit, 0.8 * seen_share)
-            } else {
-                (Reason::Measured, seen_share)
-            };
-            JointConfidence { value, reason }
-        })
-        .collect()
+    counts
 }

@@ -1,14 +1,13 @@
-//! Poses of arms and legs to try: a fixed handful of arms, and limbs that end where the body ends in the picture.
+//! Pose hypotheses of arms and legs: a fixed set of arms, and limbs that end at extremities of the readings.
 
-use super::align::{AlignScratch, SampleRest, Seen, aim, evaluate};
 use super::limb::Limb;
-use super::model::TrackerModel;
-use crate::body::{BoneTransforms, Pose, RestBody};
-use crate::math::{P3, P3d, exp_so3};
+use super::pose_fit::{FitContext, FitScratch, evaluate};
+use crate::body::{BoneTransforms, JointMotion, Pose};
+use crate::math::{P3, P3d, exp_so3, log_so3};
 use crate::segment::{Extremity, extremities};
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
-/// Directions of the upper arm that are tried (x outward, y up, z forward).
+/// Directions of the upper arm (x outward, y up, z forward).
 const UPPER_ARMS: [[f64; 3]; 9] = [
     [0.15, -0.99, 0.0],
     [0.4, -0.92, 0.0],
@@ -20,237 +19,260 @@ const UPPER_ARMS: [[f64; 3]; 9] = [
     [0.3, -0.1, 0.95],
     [0.75, -0.2, 0.6],
 ];
-/// Bends of the elbow, radians, tried in a first and a second round; and turns of the upper arm about itself.
+/// Bends of the elbow in the first pass over arms, radians.
 const BENDS: [f64; 2] = [0.1, 1.4];
-/// See [`BENDS`].
+/// Bends of elbow or knee in the second pass, radians.
 const MORE_BENDS: [f64; 3] = [0.7, 1.4, 2.2];
-/// See [`BENDS`].
+/// Turns of the upper arm about its own axis in the second pass, radians.
 const TWISTS: [f64; 5] = [-1.8, -0.9, 0.0, 0.9, 1.8];
-/// Turns of a thigh about itself that are tried with the knee at an end.
+/// Turns of a thigh about its own axis with the knee at an extremity, radians.
 const LEG_TWISTS: [f64; 3] = [-0.9, 0.0, 0.9];
-/// What a bend and a twist must earn, m² per point and squared radian: a straight arm explained by a bent one that is
-/// turned inside out stays so for good. A hand of ten readings is worth 7·10⁻⁵.
+/// Cost of a bend, m² per point and squared radian; a hand of ten readings is worth 7·10⁻⁵. Without it a straight arm,
+/// explained by a bent one turned inside out, stays so.
 const BEND_COST: f64 = 1e-5;
-/// See [`BEND_COST`].
+/// Cost of a twist, m² per point and squared radian; see [`BEND_COST`].
 const TWIST_COST: f64 = 3e-5;
-/// Upper arms that go into the second round.
+/// Upper arms that enter the second pass.
 const ARM_FINALISTS: usize = 3;
 
-/// Ends of the body that are looked at: head, hands, feet, and elbows of hands that lie on the body.
-const ENDS: usize = 7;
-/// An end farther from a limb's root than the limb is long times this is not this limb's.
+/// Extremities to detect: head, hands, feet, and elbows of hands that lie on the body.
+const EXTREMITIES: usize = 7;
+/// Limb lengths from its root beyond which an extremity is not this limb's.
 const STRETCH: f64 = 1.15;
-/// An end lies on the skin, its joint this far behind it, metres.
+/// Depth of a joint below its extremity on the skin, metres.
 const BEHIND: f64 = 0.02;
-/// Reach of the comparison of poses, metres.
+/// Distance of a hinge from its root, in lengths of the upper bone, at which a point may be the hinge.
+const HINGE_RANGE: std::ops::Range<f64> = 0.5..1.4;
+/// Longest pair in comparisons of hypotheses, metres.
 const REACH: f32 = 0.15;
 
-/// The ends of the body that is seen around `torso` (camera frame).
-pub(super) fn ends(seen: &Seen<'_>, torso: &P3) -> Vec<Extremity> {
-    extremities(seen.grid, seen.cells, torso, ENDS)
-}
-
-/// A point of the skin moved to where the bone is.
+/// A point of the skin displaced along its viewing ray to the bone.
 fn inside(p: &P3) -> P3d {
     let p = p.cast::<f64>();
     p + p.coords.try_normalize(0.0).unwrap_or_else(Vector3::z) * BEHIND
 }
 
-/// The arm pose of one side (0 left, 1 right) that explains the picture best.
-pub(super) fn choose_arm(
-    model: &TrackerModel,
-    rest: (&RestBody, &SampleRest),
-    pose: &Pose,
-    seen: &Seen<'_>,
-    side: usize,
-    ends: &[Extremity],
-    scratch: &mut AlignScratch,
-) -> Pose {
-    let Some(arm) = &model.arms[side] else {
-        return pose.clone();
-    };
-    let skeleton = model.template.skeleton();
-    let sign = [1.0, -1.0][side];
-    let (shoulder, elbow) = (
-        &skeleton.joints()[arm.root].name,
-        &skeleton.joints()[arm.hinge].name,
-    );
-    let mut tried: Vec<(f64, Option<Vector3<f64>>, Pose)> = Vec::new();
-    for pose in at_ends(model, rest.0, pose, arm, ends) {
-        let cost = evaluate(model, rest, &pose, seen, REACH, scratch).cost;
-        tried.push((cost + effort(model, &pose, arm), None, pose));
-    }
-    let mut guess = |d: Vector3<f64>, bend: f64, twist: f64| {
-        let mut guess = pose.clone();
-        aim(model, &mut guess, shoulder, elbow, d, twist * sign);
-        guess.set(skeleton, elbow, &[bend]);
-        guess.clamp_to_limits(skeleton);
-        let effort = BEND_COST * bend * bend + TWIST_COST * twist * twist;
-        (
-            evaluate(model, rest, &guess, seen, REACH, scratch).cost + effort,
-            guess,
-        )
-    };
-    let outward = |d: [f64; 3]| Vector3::new(d[0] * sign, d[1], d[2]).normalize();
-    let mut directions: Vec<Vector3<f64>> = UPPER_ARMS.into_iter().map(outward).collect();
-    // An end may be the elbow, and the way to one passes it.
-    let lower = (rest.0.joints[arm.tip] - rest.0.joints[arm.hinge]).norm() as f32;
-    let elbows = ends.iter().flat_map(|e| [e.point, e.along(lower)]);
-    directions.extend(towards(model, rest.0, pose, arm, elbows));
-    for direction in directions {
-        for bend in BENDS {
-            let (cost, pose) = guess(direction, bend, 0.0);
-            tried.push((cost, Some(direction), pose));
+/// Hypotheses of limbs in the readings of one frame.
+pub(super) struct Hypotheses<'a> {
+    context: FitContext<'a>,
+    extremities: Vec<Extremity>,
+}
+
+/// A hypothesis of an arm.
+struct ArmPose {
+    cost: f64,
+    /// Direction of the upper arm, for those of the first pass.
+    direction: Option<Vector3<f64>>,
+    pose: Pose,
+}
+
+impl<'a> Hypotheses<'a> {
+    /// Detects the extremities around `torso`, camera frame, metres.
+    pub(super) fn new(context: &FitContext<'a>, torso: &P3) -> Self {
+        let observation = context.observation;
+        Self {
+            context: *context,
+            extremities: extremities(observation.grid, observation.cells, torso, EXTREMITIES),
         }
     }
-    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut finalists: Vec<Vector3<f64>> = Vec::new();
-    for direction in tried.iter().filter_map(|t| t.1) {
-        if finalists.len() < ARM_FINALISTS && !finalists.contains(&direction) {
-            finalists.push(direction);
+
+    /// The arm pose of one side (0 left, 1 right) of least cost.
+    pub(super) fn choose_arm(&self, pose: &Pose, side: usize, scratch: &mut FitScratch) -> Pose {
+        let Some(arm) = &self.context.model.arms[side] else {
+            return pose.clone();
+        };
+        let mut all = Vec::new();
+        for pose in self.at_extremities(pose, arm) {
+            all.push(ArmPose {
+                cost: self.cost(&pose, scratch) + self.effort(&pose, arm),
+                direction: None,
+                pose,
+            });
         }
+        for direction in self.upper_arms(pose, arm, side) {
+            for bend in BENDS {
+                let hypothesis = self.aimed_arm(pose, side, (direction, bend, 0.0), scratch);
+                all.push(hypothesis);
+            }
+        }
+        all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let mut finalists: Vec<Vector3<f64>> = Vec::new();
+        for direction in all.iter().filter_map(|a| a.direction) {
+            if finalists.len() < ARM_FINALISTS && !finalists.contains(&direction) {
+                finalists.push(direction);
+            }
+        }
+        for direction in finalists {
+            for bend in MORE_BENDS {
+                for twist in TWISTS {
+                    all.push(self.aimed_arm(pose, side, (direction, bend, twist), scratch));
+                }
+            }
+        }
+        all.into_iter()
+            .min_by(|a, b| a.cost.total_cmp(&b.cost))
+            .map_or_else(|| pose.clone(), |a| a.pose)
     }
-    for direction in finalists {
+
+    /// The leg pose of one side (0 left, 1 right) of least cost: as it is, with the knee bent, with the foot or the knee
+    /// at an extremity.
+    pub(super) fn choose_leg(&self, pose: &Pose, side: usize, scratch: &mut FitScratch) -> Pose {
+        let Some(leg) = &self.context.model.legs[side] else {
+            return pose.clone();
+        };
+        let skeleton = self.context.model.template.skeleton();
+        let knee = &skeleton.joints()[leg.hinge].name;
+        let mut hypotheses = self.at_extremities(pose, leg);
+        let directions = self.towards(pose, leg, self.extremities.iter().map(|e| e.point));
         for bend in MORE_BENDS {
-            for twist in TWISTS {
-                let (cost, pose) = guess(direction, bend, twist);
-                tried.push((cost, None, pose));
+            let mut bent = pose.clone();
+            bent.set(skeleton, knee, &[bend]);
+            hypotheses.push(bent);
+            for &direction in &directions {
+                for twist in LEG_TWISTS {
+                    hypotheses.push(self.aimed(pose, leg, direction, (bend, twist)));
+                }
             }
         }
-    }
-    tried
-        .into_iter()
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .map_or_else(|| pose.clone(), |t| t.2)
-}
-
-/// The leg pose of one side (0 left, 1 right) that explains the picture best: as it is, with the knee bent, with the foot
-/// or the knee at an end.
-pub(super) fn choose_leg(
-    model: &TrackerModel,
-    rest: (&RestBody, &SampleRest),
-    pose: &Pose,
-    seen: &Seen<'_>,
-    side: usize,
-    ends: &[Extremity],
-    scratch: &mut AlignScratch,
-) -> Pose {
-    let Some(leg) = &model.legs[side] else {
-        return pose.clone();
-    };
-    let skeleton = model.template.skeleton();
-    let (hip, knee) = (
-        &skeleton.joints()[leg.root].name,
-        &skeleton.joints()[leg.hinge].name,
-    );
-    let mut guesses = at_ends(model, rest.0, pose, leg, ends);
-    let directions = towards(model, rest.0, pose, leg, ends.iter().map(|e| e.point));
-    for bend in MORE_BENDS {
-        let mut bent = pose.clone();
-        bent.set(skeleton, knee, &[bend]);
-        guesses.push(bent);
-        for &direction in &directions {
-            for twist in LEG_TWISTS {
-                let mut guess = pose.clone();
-                aim(model, &mut guess, hip, knee, direction, twist);
-                guess.set(skeleton, knee, &[bend]);
-                guess.clamp_to_limits(skeleton);
-                guesses.push(guess);
+        let mut best = (self.cost(pose, scratch), pose.clone());
+        for pose in hypotheses {
+            let cost = self.cost(&pose, scratch) + self.effort(&pose, leg);
+            if cost < best.0 {
+                best = (cost, pose);
             }
         }
+        best.1
     }
-    let mut best = (
-        evaluate(model, rest, pose, seen, REACH, scratch).cost,
-        pose.clone(),
-    );
-    for pose in guesses {
-        let cost =
-            evaluate(model, rest, &pose, seen, REACH, scratch).cost + effort(model, &pose, leg);
-        if cost < best.0 {
-            best = (cost, pose);
+
+    fn cost(&self, pose: &Pose, scratch: &mut FitScratch) -> f64 {
+        evaluate(&self.context, pose, REACH, scratch).cost
+    }
+
+    /// Directions of the upper arm for the first pass. An extremity may be the elbow, and a path to one passes it.
+    fn upper_arms(&self, pose: &Pose, arm: &Limb, side: usize) -> Vec<Vector3<f64>> {
+        let sign = outward_sign(side);
+        let outward = |d: [f64; 3]| Vector3::new(d[0] * sign, d[1], d[2]).normalize();
+        let mut directions: Vec<Vector3<f64>> = UPPER_ARMS.into_iter().map(outward).collect();
+        let joints = &self.context.body.rest.joints;
+        let lower = (joints[arm.tip] - joints[arm.hinge]).norm() as f32;
+        let elbows = self.extremities.iter();
+        let elbows = elbows.flat_map(|e| [e.point, e.along(lower)]);
+        directions.extend(self.towards(pose, arm, elbows));
+        directions
+    }
+
+    /// The arm of `side` along a direction, with a bend and a twist, radians.
+    fn aimed_arm(
+        &self,
+        pose: &Pose,
+        side: usize,
+        (direction, bend, twist): (Vector3<f64>, f64, f64),
+        scratch: &mut FitScratch,
+    ) -> ArmPose {
+        let pose = match &self.context.model.arms[side] {
+            Some(arm) => self.aimed(pose, arm, direction, (bend, twist * outward_sign(side))),
+            None => pose.clone(),
+        };
+        let effort = BEND_COST * bend * bend + TWIST_COST * twist * twist;
+        ArmPose {
+            cost: self.cost(&pose, scratch) + effort,
+            direction: (twist == 0.0).then_some(direction),
+            pose,
         }
     }
-    best.1
-}
 
-/// What the pose of a limb must earn; see [`BEND_COST`].
-fn effort(model: &TrackerModel, pose: &Pose, limb: &Limb) -> f64 {
-    let joints = model.template.skeleton().joints();
-    let Some(child) = joints.iter().position(|j| j.parent == Some(limb.root)) else {
-        return 0.0;
-    };
-    // The part of the root's turn that is about its own bone (swing and twist).
-    let along = (joints[child].rest - joints[limb.root].rest).normalize();
-    let turn = Vector3::new(
-        pose.angles[limb.angles[0]],
-        pose.angles[limb.angles[1]],
-        pose.angles[limb.angles[2]],
-    );
-    let turn = exp_so3(&turn);
-    let twist = 2.0 * (turn.imag().dot(&along) / turn.w.abs().max(f64::MIN_POSITIVE)).atan();
-    let bend = pose.angles[limb.angles[3]];
-    BEND_COST * bend * bend + TWIST_COST * twist * twist
-}
-
-/// Where the root of a limb and its parent bone are.
-fn root_of(
-    model: &TrackerModel,
-    rest: &RestBody,
-    pose: &Pose,
-    limb: &Limb,
-) -> (P3d, nalgebra::UnitQuaternion<f64>) {
-    let mut bones = BoneTransforms::default();
-    pose.bones(model.template.skeleton(), rest, &mut bones);
-    let parent =
-        model.parents[limb.root].map_or(pose.root.iso().rotation, |p| bones.bones[p].rotation);
-    (bones.joints[limb.root], parent)
-}
-
-/// Poses with the limb's end at each end that it can reach, its hinge where the way along the surface says. (Turned by
-/// right angles from there too, the real stills had 78.1 instead of 79.1 % of their joints within 10 cm.)
-fn at_ends(
-    model: &TrackerModel,
-    rest: &RestBody,
-    pose: &Pose,
-    limb: &Limb,
-    ends: &[Extremity],
-) -> Vec<Pose> {
-    let (root, _) = root_of(model, rest, pose, limb);
-    let lower = (rest.joints[limb.tip] - rest.joints[limb.hinge]).norm();
-    let mut out = Vec::new();
-    for end in ends {
-        let target = inside(&end.point);
-        let line = target - root;
-        if line.norm() > STRETCH * limb.length(rest) || line.norm() < f64::EPSILON {
-            continue;
+    /// A pose with the limb's root aimed along `direction` (rest frame of its parent), twisted about it, and the hinge
+    /// bent, radians.
+    fn aimed(
+        &self,
+        pose: &Pose,
+        limb: &Limb,
+        direction: Vector3<f64>,
+        (bend, twist): (f64, f64),
+    ) -> Pose {
+        let skeleton = self.context.model.template.skeleton();
+        let joints = skeleton.joints();
+        let (root, hinge) = (&joints[limb.root], &joints[limb.hinge]);
+        let mut aimed = pose.clone();
+        let turn = UnitQuaternion::rotation_between(&(hinge.rest - root.rest), &direction);
+        if let (JointMotion::Ball { .. }, Some(turn)) = (&root.motion, turn) {
+            let about = UnitQuaternion::from_scaled_axis(direction * twist);
+            let rotation = log_so3(&(about * turn));
+            aimed.set(skeleton, &root.name, rotation.as_slice());
         }
-        let mut guess = pose.clone();
-        limb.reach(
-            model,
-            rest,
-            &mut guess,
-            &target,
-            Some(&inside(&end.along(lower as f32))),
-        );
-        out.push(guess);
+        aimed.set(skeleton, &hinge.name, &[bend]);
+        aimed.clamp_to_limits(skeleton);
+        aimed
     }
-    out
+
+    /// Cost of the bend and twist of a limb; see [`BEND_COST`].
+    fn effort(&self, pose: &Pose, limb: &Limb) -> f64 {
+        let joints = self.context.model.template.skeleton().joints();
+        let Some(child) = joints.iter().position(|j| j.parent == Some(limb.root)) else {
+            return 0.0;
+        };
+        // Twist of the swing–twist decomposition of the root's rotation about its own bone.
+        let along = (joints[child].rest - joints[limb.root].rest).normalize();
+        let turn = exp_so3(&Vector3::new(
+            pose.angles[limb.angles[0]],
+            pose.angles[limb.angles[1]],
+            pose.angles[limb.angles[2]],
+        ));
+        let twist = 2.0 * (turn.imag().dot(&along) / turn.w.abs().max(f64::MIN_POSITIVE)).atan();
+        let bend = pose.angles[limb.angles[3]];
+        BEND_COST * bend * bend + TWIST_COST * twist * twist
+    }
+
+    /// Position of the limb's root and rotation of its parent bone.
+    fn root_of(&self, pose: &Pose, limb: &Limb) -> (P3d, UnitQuaternion<f64>) {
+        let (model, rest) = (self.context.model, &self.context.body.rest);
+        let mut bones = BoneTransforms::default();
+        pose.bones(model.template.skeleton(), rest, &mut bones);
+        let parent = model.parents[limb.root];
+        let rotation = parent.map_or(pose.root.iso().rotation, |p| bones.bones[p].rotation);
+        (bones.joints[limb.root], rotation)
+    }
+
+    /// Poses with the limb's end at each extremity within its length, and its hinge on the path over the surface there.
+    fn at_extremities(&self, pose: &Pose, limb: &Limb) -> Vec<Pose> {
+        let (model, rest) = (self.context.model, &self.context.body.rest);
+        let skeleton = model.template.skeleton();
+        let (root, _) = self.root_of(pose, limb);
+        let lower = (rest.joints[limb.tip] - rest.joints[limb.hinge]).norm();
+        let mut out = Vec::new();
+        for end in &self.extremities {
+            let target = inside(&end.point);
+            let line = target - root;
+            if line.norm() > STRETCH * limb.length(rest) || line.norm() < f64::EPSILON {
+                continue;
+            }
+            let hinge = inside(&end.along(lower as f32));
+            let mut reached = pose.clone();
+            limb.reach(skeleton, rest, &mut reached, &target, Some(&hinge));
+            out.push(reached);
+        }
+        out
+    }
+
+    /// Directions (rest frame of the parent bone) from the limb's root to those of `points` that may be its hinge.
+    fn towards(
+        &self,
+        pose: &Pose,
+        limb: &Limb,
+        points: impl Iterator<Item = P3>,
+    ) -> Vec<Vector3<f64>> {
+        let joints = &self.context.body.rest.joints;
+        let (root, parent) = self.root_of(pose, limb);
+        let upper = (joints[limb.hinge] - joints[limb.root]).norm();
+        points
+            .map(|p| inside(&p))
+            .filter(|p| HINGE_RANGE.contains(&((p - root).norm() / upper)))
+            .map(|p| (parent.inverse() * (p - root)).normalize())
+            .collect()
+    }
 }
 
-/// Directions (rest frame of the parent bone) from the limb's root to those of `points` that may be its hinge.
-fn towards(
-    model: &TrackerModel,
-    rest: &RestBody,
-    pose: &Pose,
-    limb: &Limb,
-    points: impl Iterator<Item = P3>,
-) -> Vec<Vector3<f64>> {
-    let (root, parent) = root_of(model, rest, pose, limb);
-    let upper = (rest.joints[limb.hinge] - rest.joints[limb.root]).norm();
-    let near = |p: &P3d| (0.5..1.4).contains(&((p - root).norm() / upper));
-    points
-        .map(|p| inside(&p))
-        .filter(near)
-        .map(|p| (parent.inverse() * (p - root)).normalize())
-        .collect()
+/// Sign of the outward x direction of a side (0 left, 1 right).
+fn outward_sign(side: usize) -> f64 {
+    [1.0, -1.0][side]
 }

@@ -1,12 +1,12 @@
-//! The pose as unknowns: unit twists of every degree of freedom in the camera frame, and the update along them.
+//! Kinematics of the pose unknowns: unit twists of every degree of freedom (eq. 31), update, extrapolation.
 
 use crate::body::{BoneTransforms, JointMotion, Pose, Skeleton};
 use crate::math::{Rigid, Twist, exp_se3, exp_so3, log_so3};
 use crate::registration::Dof;
 use nalgebra::{DVector, Vector3};
 
-/// Unit twists (eq. 31) about the point `centre`, which becomes the origin of the twists' frame. An angle of a ball
-/// turns about an axis of its parent bone, so that the update is a rotation on the left.
+/// Fills `out` with the unit twists (eq. 31) about `centre`, the origin of their frame. An angle of a ball turns about an
+/// axis of its parent bone, so that the update is a rotation on the left.
 pub(super) fn linearise(
     skeleton: &Skeleton,
     bones: &BoneTransforms,
@@ -53,7 +53,7 @@ pub(super) fn linearise(
     }
 }
 
-/// Moves `pose` by the solution `x` of the normal equations.
+/// Moves `pose` by the solution `x` of the normal equations, shape `[unknowns]`.
 pub(super) fn apply(skeleton: &Skeleton, pose: &mut Pose, centre: &Vector3<f64>, x: &DVector<f64>) {
     let xi = Twist {
         linear: Vector3::new(x[0], x[1], x[2]),
@@ -69,7 +69,7 @@ pub(super) fn apply(skeleton: &Skeleton, pose: &mut Pose, centre: &Vector3<f64>,
             JointMotion::Fixed => {}
             JointMotion::Hinge { .. } => pose.angles[at] += x[6 + at],
             JointMotion::Ball { .. } => {
-                let old = Vector3::new(pose.angles[at], pose.angles[at + 1], pose.angles[at + 2]);
+                let old = pose.rotation_vector(skeleton, j);
                 let step = Vector3::new(x[6 + at], x[7 + at], x[8 + at]);
                 let new = log_so3(&(exp_so3(&step) * exp_so3(&old)));
                 pose.angles[at..at + 3].copy_from_slice(new.as_slice());
@@ -78,39 +78,43 @@ pub(super) fn apply(skeleton: &Skeleton, pose: &mut Pose, centre: &Vector3<f64>,
     }
 }
 
-/// The pose that comes after `last` when the motion from `before` to `last` goes on for `ratio` of its time.
+/// Extrapolates the motion from `before` to `last` by `ratio` of its duration.
 pub(super) fn extrapolate(skeleton: &Skeleton, before: &Pose, last: &Pose, ratio: f64) -> Pose {
-    let mut next = last.clone();
     let (a, b) = (before.root.iso(), last.root.iso());
     let turn = log_so3(&(b.rotation * a.rotation.inverse())) * ratio;
     let rotation = exp_so3(&turn) * b.rotation;
     let translation = b.translation.vector + (b.translation.vector - a.translation.vector) * ratio;
+    let mut next = last.clone();
     next.root = Rigid::from_parts(translation, rotation);
+    advance_angles(skeleton, &mut next, (before, last), |_| ratio);
+    next
+}
+
+/// Moves the joint angles of `pose` by a share of the way between two poses; `share` is a function of the joint.
+pub(super) fn advance_angles(
+    skeleton: &Skeleton,
+    pose: &mut Pose,
+    (from, to): (&Pose, &Pose),
+    share: impl Fn(usize) -> f64,
+) {
     for (j, joint) in skeleton.joints().iter().enumerate() {
         let at = skeleton.dof_offset(j);
         match &joint.motion {
             JointMotion::Fixed => {}
             JointMotion::Hinge { .. } => {
-                next.angles[at] += (last.angles[at] - before.angles[at]) * ratio
+                pose.angles[at] += (to.angles[at] - from.angles[at]) * share(j);
             }
             JointMotion::Ball { .. } => {
-                let r = |p: &Pose| {
-                    exp_so3(&Vector3::new(
-                        p.angles[at],
-                        p.angles[at + 1],
-                        p.angles[at + 2],
-                    ))
-                };
-                let turn = log_so3(&(r(last) * r(before).inverse())) * ratio;
-                let new = log_so3(&(exp_so3(&turn) * r(last)));
-                next.angles[at..at + 3].copy_from_slice(new.as_slice());
+                let rotation = |p: &Pose| exp_so3(&p.rotation_vector(skeleton, j));
+                let turn = log_so3(&(rotation(to) * rotation(from).inverse())) * share(j);
+                let new = log_so3(&(exp_so3(&turn) * rotation(pose)));
+                pose.angles[at..at + 3].copy_from_slice(new.as_slice());
             }
         }
     }
-    next
 }
 
-/// Distance of skin from the joint that moves it, metres, for comparing turns with shifts.
+/// Lever that makes turns comparable with displacements, metres: distance of skin from its joint.
 pub(super) const LEVER: f64 = 0.25;
 
 /// Largest motion between two poses, metres: of the root, or of a joint's angle with a lever of [`LEVER`].
@@ -205,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn a_steady_motion_is_predicted() {
+    fn extrapolation_continues_a_steady_motion() {
         let (skeleton, _, pose) = arm();
         let x = DVector::from_fn(10, |i, _| 0.01 * (i as f64 - 4.0));
         let c = Vector3::zeros();

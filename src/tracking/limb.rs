@@ -1,8 +1,7 @@
-//! Arms and legs as chains of a ball, a hinge and an end, put where a hand or a foot was seen (law of cosines).
+//! Arms and legs as chains of a ball, a hinge and an end; two-bone inverse kinematics by the law of cosines.
 
-use super::model::TrackerModel;
 use crate::body::parts::{BodyPart, LimbJoints};
-use crate::body::{BoneTransforms, JointMotion, Pose, RestBody, Template};
+use crate::body::{BoneTransforms, JointMotion, Pose, RestBody, Skeleton, Template};
 use crate::math::{P3d, exp_so3, log_so3};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -21,13 +20,13 @@ pub(super) struct Limb {
     pub angles: Vec<usize>,
     /// The hinge's only angle.
     bend: usize,
-    /// What is seen of hand or foot is taken for the point at this share of the way from end to tip.
+    /// Point that stands for hand or foot, as a share of the way from end to tip.
     middle: f64,
 }
 
-/// Of a hand out of its sleeve the middle shows, of one half in it the fingers.
+/// Share of the way from wrist to fingertip: readings of a hand half in its sleeve are the fingers.
 const HAND: f64 = 0.7;
-/// The end of a foot that hangs or stands towards the camera.
+/// Share of the way from ankle to toes, for a foot that hangs or points at the camera.
 const FOOT: f64 = 0.5;
 
 /// The arms of a template, left and right; `None` for one without.
@@ -63,26 +62,25 @@ fn limb(template: &Template, part: BodyPart, middle: f64) -> Option<Limb> {
 }
 
 impl Limb {
-    /// Where what is seen of hand or foot is.
+    /// Point of hand or foot that a reading of it stands for, camera frame, metres.
     pub(super) fn hand(&self, bones: &BoneTransforms) -> P3d {
         bones.joints[self.end] + (bones.joints[self.tip] - bones.joints[self.end]) * self.middle
     }
-    /// From root to tip when stretched, metres.
+    /// Length of the stretched limb from root to tip, metres.
     pub(super) fn length(&self, rest: &RestBody) -> f64 {
         (rest.joints[self.hinge] - rest.joints[self.root]).norm()
             + (rest.joints[self.tip] - rest.joints[self.hinge]).norm()
     }
-    /// Points the limb at `target` with the hinge bent as far as the distance asks, from the rest pose on; where
-    /// `hinge` is given, the hinge then turns towards it about the line from root to target.
+    /// Moves the hand or foot to `target` by bending the hinge and turning the root from the rest pose. With `hinge`, the
+    /// limb then turns about the line from root to target until its hinge points there.
     pub(super) fn reach(
         &self,
-        model: &TrackerModel,
+        skeleton: &Skeleton,
         rest: &RestBody,
         pose: &mut Pose,
         target: &P3d,
         hinge: Option<&P3d>,
     ) {
-        let skeleton = model.template.skeleton();
         let mut bones = BoneTransforms::default();
         pose.angles[self.angles[0]..self.angles[0] + 3].fill(0.0);
         pose.bones(skeleton, rest, &mut bones);
@@ -108,14 +106,10 @@ impl Limb {
             let angle = line.dot(&is.cross(&should)).atan2(is.dot(&should));
             turn = UnitQuaternion::from_scaled_axis(line * angle) * turn;
         }
-        let parent =
-            model.parents[self.root].map_or(pose.root.iso().rotation, |p| bones.bones[p].rotation);
+        let parent = skeleton.joints()[self.root].parent;
+        let parent = parent.map_or(pose.root.iso().rotation, |p| bones.bones[p].rotation);
         let at = self.angles[0];
-        let old = exp_so3(&Vector3::new(
-            pose.angles[at],
-            pose.angles[at + 1],
-            pose.angles[at + 2],
-        ));
+        let old = exp_so3(&pose.rotation_vector(skeleton, self.root));
         let new = log_so3(&(parent.inverse() * turn * parent * old));
         pose.angles[at..at + 3].copy_from_slice(new.as_slice());
         pose.clamp_to_limits(skeleton);
@@ -125,21 +119,14 @@ impl Limb {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{Calibration, Intrinsics};
-    use crate::tracking::{TrackerConfig, TrackerState};
+    use crate::tracking::test_scene::TestScene;
 
     #[test]
-    fn a_limb_reaches_its_target_with_its_hinge_on_the_side_asked_for() {
-        let config = TrackerConfig {
-            samples: 50,
-            ..TrackerConfig::default()
-        };
-        let calibration = Calibration::registered(Intrinsics::KINECT_V1);
-        let model = TrackerModel::new(crate::body::embedded::template(), calibration, config);
-        let rest = model.template.personalise(&Default::default());
-        let pose = TrackerState::new(&model).pose;
-        let mut bones = BoneTransforms::default();
-        pose.bones(model.template.skeleton(), &rest, &mut bones);
+    fn a_limb_reaches_its_target_with_its_hinge_on_the_given_side() {
+        let scene = TestScene::default();
+        let (model, rest, pose) = (&scene.model, &scene.rest, &scene.pose);
+        let skeleton = model.template.skeleton();
+        let bones = scene.bones(pose);
         let limbs = model.arms.iter().chain(&model.legs).flatten();
         for limb in limbs {
             let root = bones.joints[limb.root];
@@ -159,9 +146,8 @@ mod tests {
                     Vector3::new(0.0, 0.0, -0.3)
                 };
             let mut found = pose.clone();
-            limb.reach(&model, &rest, &mut found, &target, Some(&asked));
-            let mut now = BoneTransforms::default();
-            found.bones(model.template.skeleton(), &rest, &mut now);
+            limb.reach(skeleton, rest, &mut found, &target, Some(&asked));
+            let now = scene.bones(&found);
             let off = (limb.hand(&now) - target).norm();
             assert!(off < 0.06, "{}: {off} m", limb.root);
             let line = offset.normalize();
@@ -176,11 +162,10 @@ mod tests {
                 limb.root,
                 is.angle(&should)
             );
-            // Out of reach: stretched towards it, nothing breaks.
             let far = root + offset * 5.0;
-            limb.reach(&model, &rest, &mut found, &far, None);
-            assert!(found.is_finite());
-            limb.reach(&model, &rest, &mut found, &root, Some(&root));
+            limb.reach(skeleton, rest, &mut found, &far, None);
+            assert!(found.is_finite(), "a target out of reach");
+            limb.reach(skeleton, rest, &mut found, &root, Some(&root));
             assert!(found.is_finite(), "a target in the joint itself");
         }
     }

@@ -1,31 +1,67 @@
 //! One step from a frame and the last state to pose, displacements and a confidence report.
+//!
+//! ```
+//! use tryon::body::embedded;
+//! use tryon::synth::{Actor, Routine, Sequence, Setting};
+//! use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+//!
+//! // A synthetic subject before a depth camera; `formats::open_recording` reads recorded ones.
+//! let setting = Setting { routine: Routine::Still, color: false, ..Setting::default() };
+//! let sequence = Sequence::new(Actor::default(), setting);
+//! let model = TrackerModel::new(
+//!     embedded::template(),
+//!     sequence.calibration().clone(),
+//!     TrackerConfig { samples: 300, ..TrackerConfig::default() },
+//! );
+//! let (mut state, mut workspace) = (TrackerState::new(&model), Workspace::default());
+//! for i in 0..2 {
+//!     let (frame, _) = sequence.frame(i);
+//!     let report = step(&model, &mut state, &frame, &mut workspace)?;
+//!     assert!(report.status.is_live() && report.residual_mm < 10.0);
+//! }
+//! // Vertices of the tracked body, camera frame, metres, shape `[vertices]`.
+//! let (vertices, _bones) = workspace.posed(&model, &state);
+//! assert_eq!(vertices.len(), model.template().mesh().vertices().len());
+//! # Ok::<(), tryon::tracking::StepError>(())
+//! ```
 
-mod align;
-mod calm;
+mod calibration;
+mod change_detection;
 mod confidence;
 mod config;
+mod hand_assignment;
 mod hypotheses;
+mod initial_pose;
 mod kinematics;
+mod leg;
 mod limb;
+mod limb_recovery;
 mod model;
-mod place;
+mod personal_body;
+mod pose_filter;
+mod pose_fit;
+mod prediction;
 mod report;
-mod rescue;
+mod segmentation;
 mod size;
-mod sleeve;
-mod stand;
+mod standing;
 mod state;
+mod status;
 mod step;
+mod subject;
 mod surface;
-mod unchanged;
+#[cfg(test)]
+mod test_scene;
 mod workspace;
 
+pub use crate::registration::residual::SurfaceNormals;
 pub use confidence::{JointConfidence, Reason};
-pub use config::{Normals, TrackerConfig};
+pub use config::TrackerConfig;
 pub use model::TrackerModel;
 pub use report::{Skipped, StagesMs, StepError, StepReport};
 pub use size::SizeEstimate;
-pub use state::{LostReason, Status, TrackerState};
+pub use state::TrackerState;
+pub use status::{LostReason, Status};
 pub use step::step;
 pub use surface::SurfaceStatistics;
 pub use workspace::Workspace;

@@ -1,8 +1,8 @@
-//! What never changes while tracking: the template, the camera and points chosen on the template.
+//! Immutable part of a tracker: template, camera, sample points, limbs and priors.
 
 use super::TrackerConfig;
+use super::leg::{Leg, legs};
 use super::limb::{self, Limb};
-use super::stand::{self, Leg};
 use crate::body::parts::{BodySegment, BodySide};
 use crate::body::{JointMotion, SkinWeights, Template};
 use crate::camera::Calibration;
@@ -11,14 +11,14 @@ use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A linear change of the rest body: one shape coefficient or the scale of one bone.
+/// Linear change of the rest body: one shape coefficient or the scale of one bone.
 #[derive(Clone, Debug)]
 pub(super) struct Direction {
     /// Offset of each sample per unit, metres.
     pub samples: Vec<V3>,
     /// Offset of each joint per unit, metres.
     pub joints: Vec<Vector3<f64>>,
-    /// The joint whose bone it scales; `None` for a shape coefficient.
+    /// Joint whose bone it scales; `None` for a shape coefficient.
     pub bone: Option<usize>,
 }
 
@@ -40,7 +40,7 @@ pub struct TrackerModel {
     pub(super) spacing: f32,
     /// Shape coefficients first, then bone scales.
     pub(super) directions: Vec<Direction>,
-    /// Pairs of directions that want equal scales, with weight (eq. 23).
+    /// Pairs of directions with a prior on equal scales, and its weight (eq. 23).
     pub(super) tied: Vec<(usize, usize, f64)>,
     /// Weight of the rest-pose prior of each angle.
     pub(super) stiffness: Vec<f64>,
@@ -50,11 +50,11 @@ pub struct TrackerModel {
     pub(super) arms: [Option<Limb>; 2],
     /// Legs, left and right, for feet found at the start.
     pub(super) legs: [Option<Limb>; 2],
-    /// [`BodyPart`](crate::body::parts::BodyPart) of each joint, as a number.
+    /// [`BodyPart`](crate::body::parts::BodyPart) of each joint, as a number, for the pose filter.
     pub(super) parts: Vec<usize>,
     /// Angles of knees, ankles and feet.
     pub(super) below_knee: Vec<bool>,
-    /// Share of the pull to the rest pose that is left for each angle when its bone is in full view.
+    /// Share of the rest-pose prior left for each angle when its bone is in full view.
     pub(super) seen_shares: Vec<f64>,
 }
 
@@ -98,7 +98,7 @@ impl TrackerModel {
         directions.extend(bone_directions(&template, &samples, &weights));
         let tied = tied_bones(&template, &directions, first);
         let stiffness = per_angle(&template, stiffness);
-        let standing = stand::legs(&template);
+        let standing = legs(&template);
         let arms = limb::arms(&template);
         let legs = limb::legs(&template);
         let parts = (0..skeleton.len())
@@ -126,21 +126,26 @@ impl TrackerModel {
             seen_shares,
         }
     }
-    /// The body that is tracked.
+    /// Template of the tracked body.
     pub fn template(&self) -> &Arc<Template> {
         &self.template
     }
-    /// The camera.
+    /// Calibration of the camera.
     pub fn calibration(&self) -> &Calibration {
         &self.calibration
     }
-    /// The settings.
+    /// Settings.
     pub fn config(&self) -> &TrackerConfig {
         &self.config
     }
 }
 
-/// About `wanted` vertices spread evenly: one per cell of a voxel grid whose size is found by bisection.
+/// Cell sizes that enclose the sought one, metres.
+const CELL_SIZES: [f32; 2] = [0.002, 0.2];
+/// Bisections of the cell size: to a thousandth of its logarithm.
+const BISECTIONS: usize = 12;
+
+/// About `wanted` evenly spread vertices: one per cell of a voxel grid whose size is found by bisection.
 fn choose_samples(vertices: &[P3], wanted: usize) -> Vec<u32> {
     if wanted >= vertices.len() {
         return (0..vertices.len() as u32).collect();
@@ -162,8 +167,8 @@ fn choose_samples(vertices: &[P3], wanted: usize) -> Vec<u32> {
         }
         cells.into_values().map(|(_, i)| i).collect::<Vec<u32>>()
     };
-    let (mut fine, mut coarse) = (0.002f32, 0.2f32);
-    for _ in 0..12 {
+    let [mut fine, mut coarse] = CELL_SIZES;
+    for _ in 0..BISECTIONS {
         let size = (fine * coarse).sqrt();
         if pick(size).len() > wanted {
             fine = size
@@ -181,7 +186,7 @@ fn bone_directions(template: &Template, samples: &[u32], weights: &SkinWeights) 
     let rest: Vec<Point3<f64>> = joints.iter().map(|j| j.rest).collect();
     let mut out = Vec::new();
     for (m, joint) in joints.iter().enumerate() {
-        // End points have no skin of their own; their bones follow by displacement and shape.
+        // End points have no skin; displacements and shape adapt their bones.
         let Some(parent) = joint.parent.filter(|_| joint.motion != JointMotion::Fixed) else {
             continue;
         };
@@ -221,7 +226,10 @@ fn bone_directions(template: &Template, samples: &[u32], weights: &SkinWeights) 
     out
 }
 
-/// The pairs of eq. 23: left and right (1), and bones that follow each other in a limb (0.5).
+/// Weight of eq. 23 between left and right bones, and between successive bones of a limb.
+const TIE_WEIGHTS: [f64; 2] = [1.0, 0.5];
+
+/// Pairs of bone scales tied by eq. 23.
 fn tied_bones(
     template: &Template,
     directions: &[Direction],
@@ -234,9 +242,14 @@ fn tied_bones(
         let Some(j) = d.bone else { continue };
         if parts.side(j) == Some(BodySide::Left) {
             let twin = parts.twin(j).and_then(of);
-            out.extend(twin.map(|k| (i, k, 1.0)));
+            out.extend(twin.map(|k| (i, k, TIE_WEIGHTS[0])));
         }
-        out.extend(joints[j].parent.and_then(of).map(|k| (i, k, 0.5)));
+        out.extend(
+            joints[j]
+                .parent
+                .and_then(of)
+                .map(|k| (i, k, TIE_WEIGHTS[1])),
+        );
     }
     out
 }

@@ -1,15 +1,16 @@
-//! What a step says about itself, and how it can fail.
+//! Report and error of a step.
 
-use super::{JointConfidence, Status};
+use super::confidence::JointConfidence;
+use super::status::Status;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Milliseconds of each stage of one step. Measured, never used.
+/// Wall time of each stage of one step, milliseconds. No result depends on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StagesMs {
     /// Sampling the depth image, floor, background, person, outline.
     pub segment: f64,
-    /// First placement.
+    /// Initial pose and limb recovery.
     pub place: f64,
     /// Prediction and pose.
     pub pose: f64,
@@ -26,7 +27,7 @@ impl StagesMs {
     }
 }
 
-/// Work that the scene did not need.
+/// Counts of skipped work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Skipped {
     /// Template samples that the camera cannot see, at the last iteration.
@@ -39,12 +40,12 @@ pub struct Skipped {
     pub displacements: usize,
     /// Pairs dropped by relaxed bijective consistency (eq. 9), at the last iteration.
     pub inconsistent_pairs: usize,
-    /// Searches for a pair that bones and points which hardly moved since the last did not need, at the last iteration.
+    /// Tree queries saved by earlier answers, at the last iteration.
     #[serde(default)]
     pub searches: usize,
-    /// Cells of the grid that were not the person.
+    /// Cells of the grid outside the subject.
     pub cells: usize,
-    /// 1 for a frame that showed nothing new, so that nothing was searched or fitted and the last pose holds.
+    /// 1 for a frame that reused the last report.
     #[serde(default)]
     pub frames: usize,
 }
@@ -64,39 +65,38 @@ impl Skipped {
     }
 }
 
-/// How one step went.
+/// Report of one step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepReport {
     /// Status after the step.
     pub status: Status,
-    /// Iterations of the pose.
+    /// Iterations of the pose fit.
     pub iterations: usize,
-    /// The pose stopped moving before the iterations ran out.
+    /// True when the pose fit converged within its iterations.
     pub converged: bool,
-    /// Template samples that the camera sees.
+    /// Template samples visible to the camera.
     pub visible_points: usize,
-    /// Cells of the person.
+    /// Cells of the subject.
     pub person_cells: usize,
     /// Mean distance between surface and readings along the normal, millimetres.
     pub residual_mm: f64,
-    /// Share of the person's readings that the body explains, 0 to 1.
+    /// Share of the subject's readings that the body explains, 0 to 1.
     pub explained: f64,
     /// Share of the body's visible points that found a reading, 0 to 1.
     pub matched: f64,
-    /// One figure for the frame, 0 to 1: how much of the person and of the body found each other, less the more the
-    /// residual exceeds a sensor's noise.
+    /// Quality of the frame, 0 to 1: the smaller of `explained` and `matched`, reduced by the residual.
     pub quality: f64,
     /// Confidence of each joint of the skeleton; empty without a live pose.
     pub confidence: Vec<JointConfidence>,
     /// Frames since the pose was measured; 0 for a live pose.
     pub pose_age: u32,
-    /// What was skipped.
+    /// Skipped work.
     pub skipped: Skipped,
     /// Time per stage.
     pub stages_ms: StagesMs,
 }
 
-/// A frame that cannot be used; the state is as before.
+/// Unusable frame; the state is unchanged.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StepError {
     /// The image does not fit the calibration.

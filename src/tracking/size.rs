@@ -1,19 +1,19 @@
 //! Body size and shape: scales of bones (eq. 18 to 23) and coefficients of the shape space in one linear system.
 //!
 //! The paper solves for scales alone at a fixed pose. Here pose and size are linearised together and the pose is
-//! eliminated (Schur complement), so that what a frame says about size counts only as far as no pose explains it; the
-//! information of the first frames adds up and the prior decides the rest.
+//! eliminated (Schur complement): a frame informs size only as far as no pose explains its readings. Information of the
+//! first frames adds up; the prior decides the rest.
 
-use super::align::{AlignScratch, SampleRest, Seen, for_residuals, normal_equations, pair};
 use super::model::TrackerModel;
-use crate::body::{BodyShape, Pose, RestBody};
+use super::pose_fit::{FitContext, FitScratch, assemble, for_each_point, pair};
+use crate::body::{BodyShape, Pose};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
-/// What the frames so far say about size and shape.
+/// Accumulated information on size and shape.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SizeEstimate {
-    /// Frames that were used.
+    /// Frames used so far.
     pub frames: u32,
     /// Sum of the faded weights of the frames.
     weight: f64,
@@ -29,30 +29,34 @@ const TIE: f64 = 5e-3;
 const MOST_DEVIATIONS: f64 = 3.0;
 /// Bounds of a bone's scale.
 const SCALES: [f64; 2] = [0.7, 1.4];
-/// Longest pair used for size and kernel width, metres: while pose and size still look for each other, and later. Feet
-/// of a body of the wrong stature start a hand's width away.
+/// Longest pair and kernel width in the first frames, metres: feet of a wrong stature start 10 cm away.
 const START: (f32, f64) = (0.15, 0.08);
+/// The same after [`SEARCHING`] frames.
 const LATER: (f32, f64) = (0.08, 0.04);
-/// Frames over which size looks farther.
+/// Frames with the longer pairs.
 const SEARCHING: u32 = 20;
-/// Point-to-point weight: sizes must slide along limbs, so it is a fifth of the pose's.
+/// Point-to-point weight: a fifth of the pose's, as sizes must slide along limbs.
 const POINT_TO_POINT: f64 = 0.02;
-/// What earlier frames said fades by this factor a frame: their pairs belonged to a body not yet adapted.
+/// Factor on earlier information per frame: its pairs belonged to a body not yet adapted.
 const FADE: f64 = 0.95;
+/// Change of a coefficient that weighs as much as a change of a scale, for convergence.
+const SCALE_CHANGE: f64 = 10.0;
+/// Regularisation of the eliminated pose, per point: far below any observed angle, keeps unobserved ones from absorbing
+/// all information.
+const POSE_RIDGE: f64 = 1e-7;
 
 impl SizeEstimate {
-    /// Takes in one converged frame and updates `shape`. Returns the largest change of a coefficient or of ten times a
-    /// scale.
+    /// Adds one converged frame and updates `shape`; without `keep` the estimate itself stays. Returns the largest change
+    /// of a coefficient or of ten times a scale.
     pub(super) fn observe(
         &mut self,
-        model: &TrackerModel,
-        rest: (&RestBody, &SampleRest),
+        context: &FitContext<'_>,
         pose: &Pose,
-        seen: &Seen<'_>,
         shape: &mut BodyShape,
-        scratch: &mut AlignScratch,
+        scratch: &mut FitScratch,
         keep: bool,
     ) -> f64 {
+        let model = context.model;
         let n = model.directions.len();
         if n == 0 {
             return 0.0;
@@ -62,9 +66,8 @@ impl SizeEstimate {
         } else {
             START
         };
-        pair(model, rest, pose, seen, reach, 0.0, scratch);
-        let Some((information, gradient)) = frame_information(model, pose, seen, sigma, scratch)
-        else {
+        pair(context, pose, reach, 0.0, scratch);
+        let Some((information, gradient)) = frame_information(context, pose, sigma, scratch) else {
             return 0.0;
         };
         let now = current(model, shape);
@@ -88,12 +91,8 @@ impl SizeEstimate {
         store(model, &next, shape);
         (0..n)
             .map(|d| {
-                (next[d] - now[d]).abs()
-                    * if model.directions[d].bone.is_some() {
-                        10.0
-                    } else {
-                        1.0
-                    }
+                let is_scale = model.directions[d].bone.is_some();
+                (next[d] - now[d]).abs() * if is_scale { SCALE_CHANGE } else { 1.0 }
             })
             .fold(0.0, f64::max)
     }
@@ -150,97 +149,158 @@ fn solve(model: &TrackerModel, mut h: DMatrix<f64>, g: DVector<f64>) -> Option<D
     x.iter().all(|v| v.is_finite()).then_some(x)
 }
 
-/// What one frame says about size once the pose is eliminated: (information, gradient), per point.
-fn frame_information(
-    model: &TrackerModel,
-    pose: &Pose,
-    seen: &Seen<'_>,
-    sigma: f64,
-    scratch: &mut AlignScratch,
-) -> Option<(DMatrix<f64>, DVector<f64>)> {
-    let (hpp, gp) = normal_equations(model, pose, seen, sigma, POINT_TO_POINT, scratch);
-    let n = model.directions.len();
-    let bones = &scratch.bones.bones;
-    let centre = scratch.bones.joints[0].coords;
-    let rotations: Vec<_> = bones
-        .iter()
-        .map(|b| b.rotation.to_rotation_matrix().into_inner())
-        .collect();
-    // How each bone shifts per unit of each direction: dg_b − R_b dp_b.
-    let mut shifts = vec![Vector3::zeros(); n * bones.len()];
-    for (d, direction) in model.directions.iter().enumerate() {
-        let mut joint = vec![Vector3::zeros(); bones.len()];
-        for b in 0..bones.len() {
-            let dp = direction.joints[b];
-            joint[b] = match model.parents[b] {
-                None => pose.root.iso().rotation * dp,
-                Some(p) => joint[p] + rotations[p] * (dp - direction.joints[p]),
-            };
-            shifts[d * bones.len() + b] = joint[b] - rotations[b] * dp;
+/// Motion of the posed body per unit of each direction of size.
+struct SizeMotion<'a> {
+    model: &'a TrackerModel,
+    /// Rotation of each bone.
+    rotations: Vec<Matrix3<f64>>,
+    /// Displacement of each bone per unit of a direction, metres, shape `[directions × bones]`.
+    shifts: Vec<Vector3<f64>>,
+}
+
+impl<'a> SizeMotion<'a> {
+    /// dg_b − R_b dp_b for each bone b and direction, with the joints moved along the chain.
+    fn new(model: &'a TrackerModel, pose: &Pose, scratch: &FitScratch) -> Self {
+        let rotation = |b: &nalgebra::Isometry3<f64>| b.rotation.to_rotation_matrix().into_inner();
+        let rotations: Vec<_> = scratch.bones.bones.iter().map(rotation).collect();
+        let bones = rotations.len();
+        let mut shifts = vec![Vector3::zeros(); model.directions.len() * bones];
+        for (d, direction) in model.directions.iter().enumerate() {
+            let mut joint = vec![Vector3::zeros(); bones];
+            for b in 0..bones {
+                let dp = direction.joints[b];
+                joint[b] = match model.parents[b] {
+                    None => pose.root.iso().rotation * dp,
+                    Some(p) => joint[p] + rotations[p] * (dp - direction.joints[p]),
+                };
+                shifts[d * bones + b] = joint[b] - rotations[b] * dp;
+            }
+        }
+        Self {
+            model,
+            rotations,
+            shifts,
         }
     }
-    let mut hss = DMatrix::<f64>::zeros(n, n);
-    let mut gs = DVector::<f64>::zeros(n);
-    let mut hbs = vec![Vector6::zeros(); n * bones.len()];
-    // A sample has several residuals, but moves in one way only: their metrics add up first.
-    let mut sums: Vec<(Matrix3<f64>, Vector3<f64>)> = vec![Default::default(); model.samples.len()];
-    let mut paired: Vec<(usize, usize, Vector3<f64>)> = Vec::new();
-    let mut known = vec![false; model.samples.len()];
-    for_residuals(model, seen, scratch, sigma, POINT_TO_POINT, |r| {
-        let (metric, pull) = &mut sums[r.sample];
-        *metric += r.metric.matrix() * r.weight;
-        *pull += r.metric.apply(&r.residual) * r.weight;
-        if !std::mem::replace(&mut known[r.sample], true) {
-            paired.push((r.sample, r.bone, r.point - centre));
+
+    /// Displacement of a sample on a bone per unit of direction `d`, metres.
+    fn displacement(&self, d: usize, sample: usize, bone: usize) -> Vector3<f64> {
+        let offset = self.model.directions[d].samples[sample].cast::<f64>();
+        self.shifts[d * self.rotations.len() + bone] + self.rotations[bone] * offset
+    }
+}
+
+/// Sample with all its residuals: a sample has several, but one displacement, so their metrics add up first.
+struct PairedSample {
+    sample: usize,
+    bone: usize,
+    /// Position about the root joint, metres.
+    point: Vector3<f64>,
+    /// Σ w M.
+    metric: Matrix3<f64>,
+    /// Σ w M r.
+    pull: Vector3<f64>,
+}
+
+/// Samples of the current pairs in the order of their first residual.
+fn paired_samples(context: &FitContext<'_>, scratch: &FitScratch, sigma: f64) -> Vec<PairedSample> {
+    let centre = scratch.centre();
+    let mut index = vec![usize::MAX; context.model.samples.len()];
+    let mut out: Vec<PairedSample> = Vec::new();
+    for_each_point(context, scratch, sigma, POINT_TO_POINT, |term| {
+        let at = &mut index[term.sample];
+        if *at == usize::MAX {
+            *at = out.len();
+            out.push(PairedSample {
+                sample: term.sample,
+                bone: term.bone,
+                point: term.point - centre,
+                metric: Matrix3::zeros(),
+                pull: Vector3::zeros(),
+            });
         }
+        let sample = &mut out[*at];
+        sample.metric += term.metric.matrix() * term.weight;
+        sample.pull += term.metric.apply(&term.residual) * term.weight;
     });
-    let mut moves = vec![Vector3::zeros(); n];
-    let mut weighed = vec![Vector3::zeros(); n];
-    for &(sample, bone, p) in &paired {
-        let (metric, pull) = &sums[sample];
-        for d in 0..n {
-            let offset = model.directions[d].samples[sample].cast::<f64>();
-            moves[d] = shifts[d * bones.len() + bone] + rotations[bone] * offset;
-            let m = metric * moves[d];
-            let t = p.cross(&m);
-            hbs[d * bones.len() + bone] += Vector6::new(m.x, m.y, m.z, t.x, t.y, t.z);
-            gs[d] += moves[d].dot(pull);
-            weighed[d] = m;
-        }
-        for d in 0..n {
-            for e in 0..=d {
-                hss[(d, e)] += weighed[d].dot(&moves[e]);
+    out
+}
+
+/// Normal equations of size and their coupling with the pose, summed over points.
+struct SizeEquations {
+    hessian: DMatrix<f64>,
+    gradient: DVector<f64>,
+    /// Coupling with the twist of each bone and all below, shape `[directions × bones]`.
+    coupling: Vec<Vector6<f64>>,
+}
+
+impl SizeEquations {
+    fn new(motion: &SizeMotion<'_>, samples: &[PairedSample]) -> Self {
+        let (n, bones) = (motion.model.directions.len(), motion.rotations.len());
+        let mut hessian = DMatrix::<f64>::zeros(n, n);
+        let mut gradient = DVector::<f64>::zeros(n);
+        let mut coupling = vec![Vector6::zeros(); n * bones];
+        let mut moves = vec![Vector3::zeros(); n];
+        let mut weighted = vec![Vector3::zeros(); n];
+        for s in samples {
+            for d in 0..n {
+                moves[d] = motion.displacement(d, s.sample, s.bone);
+                let m = s.metric * moves[d];
+                let t = s.point.cross(&m);
+                coupling[d * bones + s.bone] += Vector6::new(m.x, m.y, m.z, t.x, t.y, t.z);
+                gradient[d] += moves[d].dot(&s.pull);
+                weighted[d] = m;
+            }
+            for d in 0..n {
+                for e in 0..=d {
+                    hessian[(d, e)] += weighted[d].dot(&moves[e]);
+                }
             }
         }
-    }
-    for d in 0..n {
-        for e in 0..d {
-            hss[(e, d)] = hss[(d, e)];
+        hessian.fill_upper_triangle_with_lower_triangle();
+        for d in 0..n {
+            for b in (1..bones).rev() {
+                if let Some(p) = motion.model.parents[b] {
+                    let below = coupling[d * bones + b];
+                    coupling[d * bones + p] += below;
+                }
+            }
+        }
+        Self {
+            hessian,
+            gradient,
+            coupling,
         }
     }
+}
+
+/// Information and gradient of one frame on size with the pose eliminated, per point.
+fn frame_information(
+    context: &FitContext<'_>,
+    pose: &Pose,
+    sigma: f64,
+    scratch: &mut FitScratch,
+) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    assemble(context, pose, sigma, POINT_TO_POINT, scratch);
+    let motion = SizeMotion::new(context.model, pose, scratch);
+    let samples = paired_samples(context, scratch, sigma);
+    let size = SizeEquations::new(&motion, &samples);
     let scale = 1.0 / scratch.residuals().max(1) as f64;
-    for d in 0..n {
-        for b in (1..bones.len()).rev() {
-            if let Some(p) = model.parents[b] {
-                let below = hbs[d * bones.len() + b];
-                hbs[d * bones.len() + p] += below;
-            }
-        }
-    }
-    let hps = DMatrix::from_fn(scratch.dofs.len(), n, |k, d| {
+    let (n, bones) = (context.model.directions.len(), motion.rotations.len());
+    let mixed = DMatrix::from_fn(scratch.dofs.len(), n, |k, d| {
         let dof = &scratch.dofs[k];
-        let h = &hbs[d * bones.len() + dof.bone];
+        let h = &size.coupling[d * bones + dof.bone];
         let (v, w) = (dof.twist.linear, dof.twist.angular);
         scale * (v.x * h[0] + v.y * h[1] + v.z * h[2] + w.x * h[3] + w.y * h[4] + w.z * h[5])
     });
-    let mut pp = hpp;
-    for k in 0..pp.nrows() {
-        // Keeps unobserved angles from swallowing everything; far below any observed one.
-        pp[(k, k)] += 1e-7;
+    let mut pose_hessian = scratch.equations.hessian.clone();
+    for k in 0..pose_hessian.nrows() {
+        pose_hessian[(k, k)] += POSE_RIDGE;
     }
-    let factor = pp.cholesky()?;
-    let reduced = hss * scale - hps.transpose() * factor.solve(&hps);
-    let gradient = gs * scale - hps.transpose() * factor.solve(&gp);
+    let factor = pose_hessian.cholesky()?;
+    let pose_gradient = &scratch.equations.gradient;
+    let reduced = size.hessian * scale - mixed.transpose() * factor.solve(&mixed);
+    let gradient = size.gradient * scale - mixed.transpose() * factor.solve(pose_gradient);
     gradient
         .iter()
         .chain(reduced.iter())
@@ -248,8 +308,8 @@ fn frame_information(
         .then_some((reduced, gradient))
 }
 
-/// The most likely shape of a person of this stature (metres from sole to crown): along the shape space if there is
-/// one, else all bones alike.
+/// Most likely shape of a stature (metres from sole to crown): along the shape space if there is one, else all bones
+/// alike.
 pub(super) fn from_stature(model: &TrackerModel, stature: f64) -> BodyShape {
     let template = &model.template;
     let Some((lo, hi)) = template.mesh().bounds() else {

@@ -1,8 +1,7 @@
 //! Surface displacements along the rest normals (section 3.3, eq. 13 to 17), by warm-started conjugate gradients.
 
-use super::align::Seen;
-use super::model::TrackerModel;
-use crate::body::{BoneTransforms, RestBody, skin};
+use super::pose_fit::FitContext;
+use crate::body::{BoneTransforms, RestBody, Template, skin};
 use crate::math::{P3, V3};
 use crate::par::Par;
 use crate::registration::IndexImage;
@@ -39,39 +38,77 @@ const LAPLACIAN: f32 = 4.0;
 const TEMPORAL: f32 = 6.0;
 const SPATIAL: f32 = 2.0;
 const TEMPORAL_FROM: u32 = 20;
-/// Pull to zero where nothing was ever seen: displacements explain only what shape does not.
+/// Pull to zero where there was never a reading: displacements explain only the remainder of shape.
 const RIDGE: f32 = 0.05;
 /// Longest displacement towards a reading, metres (paper, section 3.3).
 const DISTANCE: f32 = 0.05;
 /// Deviation at which the temporal term weighs as much as a reading, metres; the paper leaves its unit open.
 const UNIT_DEVIATION: f32 = 0.005;
-/// Smallest deviation of a displacement, metres: averaged depth is no better.
+/// Least deviation of a displacement, metres: the accuracy of averaged depth.
 const LEAST_DEVIATION: f32 = 0.002;
-/// Conjugate gradient iterations, warm-started: the error left is carried to the next frame.
+/// Conjugate gradient iterations per update; the next one starts from their result.
 const ITERATIONS: usize = 5;
-/// Points behind the drawn body by more than this (metres) are hidden.
+/// Depth behind the drawn body from which a vertex is occluded, metres.
 const HIDDEN: f32 = 0.04;
-/// Cosine between the surface normal and the ray below which readings say little about displacement.
+/// Cosine between normal and viewing ray below which a reading is too grazing to measure a displacement.
 const GRAZING: f32 = 0.35;
 
-/// Updates displacements from one frame; `image` is the model drawn into the grid. Returns how many vertices had a
-/// reading, and the root mean square of the change, metres.
+/// Cosine between the normals of vertex and reading below which they belong to different surfaces (Table 1: 60°).
+const COS_NORMAL: f32 = 0.5;
+/// Diagonal of LᵀL of a regular mesh: 1 + 1/degree, for the preconditioner.
+const LAPLACIAN_DIAGONAL: f32 = 1.17;
+
+/// Updates displacements (metres, shape `[vertices]`) from one frame; `image` is the model drawn into the grid. Returns
+/// the number of vertices with a reading and the root mean square of the change, metres.
 pub(super) fn fit(
-    model: &TrackerModel,
-    rest: &RestBody,
+    context: &FitContext<'_>,
     bones: &BoneTransforms,
-    seen: &Seen<'_>,
     image: &IndexImage,
     displacements: &mut Vec<f32>,
     statistics: &mut SurfaceStatistics,
     s: &mut SurfaceScratch,
 ) -> (usize, f32) {
-    let template = &model.template;
-    let n = rest.base.len();
+    let n = context.body.rest.base.len();
     displacements.resize(n, 0.0);
     statistics.mean.resize(n, 0.0);
     statistics.spread.resize(n, 0.0);
-    let weights = template.weights();
+    let readings = measure(context, bones, image, s);
+    s.before.clone_from(displacements);
+    let (template, rest) = (&context.model.template, &context.body.rest);
+    solve(template, rest, displacements, statistics, s);
+    let change: f32 = displacements
+        .iter()
+        .zip(&s.before)
+        .map(|(a, b)| (a - b) * (a - b))
+        .sum();
+    statistics.add(displacements);
+    (readings, (change / n.max(1) as f32).sqrt())
+}
+
+impl SurfaceStatistics {
+    /// Updates mean and spread (Welford).
+    fn add(&mut self, displacements: &[f32]) {
+        self.count += 1;
+        let count = self.count as f32;
+        for (i, d) in displacements.iter().enumerate() {
+            let off = d - self.mean[i];
+            self.mean[i] += off / count;
+            self.spread[i] += off * (d - self.mean[i]);
+        }
+    }
+}
+
+/// Fills target (signed distance along the normal to the plane of its reading, metres) and weight of each vertex; returns
+/// the number of vertices with a reading.
+fn measure(
+    context: &FitContext<'_>,
+    bones: &BoneTransforms,
+    image: &IndexImage,
+    s: &mut SurfaceScratch,
+) -> usize {
+    let (rest, observation) = (&context.body.rest, context.observation);
+    let (weights, grid) = (context.model.template.weights(), observation.grid);
+    let n = rest.base.len();
     skin(Par::Seq, &rest.base, weights, bones, &mut s.posed);
     let rotations: Vec<_> = bones
         .bones
@@ -89,61 +126,43 @@ pub(super) fn fit(
         if normal.dot(&p.coords) > -GRAZING * p.coords.norm() {
             continue;
         }
-        let Some(cell) = seen
-            .grid
-            .cell_of(&p)
-            .and_then(|(u, v)| seen.grid.cell(u, v))
-        else {
+        let Some(cell) = grid.cell_of(&p).and_then(|(u, v)| grid.cell(u, v)) else {
             continue;
         };
-        let usable = seen.grid.labels[cell] == Label::Person && !seen.contour.false_edges[cell];
+        let usable = grid.labels[cell] == Label::Person && !observation.false_edges[cell];
         if !usable || p.z > image.depth[cell] + HIDDEN {
             continue;
         }
-        let facet = seen.grid.normals[cell];
+        let facet = grid.normals[cell];
         let slope = facet.dot(&normal);
-        if slope < 0.5 {
+        if slope < COS_NORMAL {
             continue;
         }
-        // Where the vertex's normal meets the plane of the reading.
-        let d = facet.dot(&(seen.grid.points[cell] - p)) / slope;
+        let d = facet.dot(&(grid.points[cell] - p)) / slope;
         if d.abs() < DISTANCE {
             s.target[i] = d;
             s.weight[i] = 1.0;
             readings += 1;
         }
     }
-    s.before.clone_from(displacements);
-    solve(model, rest, displacements, statistics, s);
-    let change: f32 = displacements
-        .iter()
-        .zip(&s.before)
-        .map(|(a, b)| (a - b) * (a - b))
-        .sum();
-    statistics.count += 1;
-    let count = statistics.count as f32;
-    for i in 0..n {
-        let off = displacements[i] - statistics.mean[i];
-        statistics.mean[i] += off / count;
-        statistics.spread[i] += off * (displacements[i] - statistics.mean[i]);
-    }
-    (readings, (change / n.max(1) as f32).sqrt())
+    readings
 }
 
-/// Sum in f64, in order: the same bits every time.
+/// Dot product, summed in f64 in a fixed order.
 fn dot(a: &[f32], b: &[f32]) -> f64 {
     a.iter().zip(b).map(|(x, y)| f64::from(x * y)).sum()
 }
 
+/// Conjugate gradients with a Jacobi preconditioner from the current displacements `d`.
 fn solve(
-    model: &TrackerModel,
+    template: &Template,
     rest: &RestBody,
     d: &mut [f32],
     statistics: &SurfaceStatistics,
     s: &mut SurfaceScratch,
 ) {
     let n = d.len();
-    let neighbours = model.template.topology().vertex_neighbours();
+    let neighbours = template.topology().vertex_neighbours();
     let temporal = |i: usize| {
         if statistics.count < TEMPORAL_FROM {
             return 0.0;
@@ -170,10 +189,11 @@ fn solve(
         let b = s.weight[i] * s.target[i] + temporal(i) * statistics.mean[i];
         s.residual.push(b - s.image[i]);
     }
-    // Jacobi: the Laplacian's own diagonal is about 1 + 1/deg, the spatial term's is deg.
     let jacobi: Vec<f32> = (0..n)
         .map(|i| {
-            1.0 / (s.diagonal[i] + SPATIAL * neighbours.row(i).len() as f32 + LAPLACIAN * 1.17)
+            1.0 / (s.diagonal[i]
+                + SPATIAL * neighbours.row(i).len() as f32
+                + LAPLACIAN * LAPLACIAN_DIAGONAL)
         })
         .collect();
     s.preconditioned.clear();

@@ -1,4 +1,4 @@
-//! What goes wrong in front of a camera, with the thresholds that tracking is held to.
+//! Failure cases before a camera, with the thresholds that tracking is held to.
 //!
 //! `TRYON_LONG_TESTS=1` runs the long forms: 1,000 starts, 100,000 frames back and forth, 100,000 random pictures.
 

@@ -1,11 +1,11 @@
 //! Normal equations of an articulated body, summed per bone: their cost grows with points plus joints, not with
 //! points times joints.
 //!
-//! A point p on bone b moves by S·ξ for the bone's twist ξ = (v, ω), S = [I | −[p]ₓ]; the bone's twist is the sum of
-//! those of its ancestor joints (eq. 3 and 5 with the dominant bone). So Σ over a bone of Sᵀ M S and Sᵀ M r is all
-//! that the points have to say.
+//! A point p on bone b moves by S·ξ for the bone's twist ξ = (v, ω), S = [I | −[p]ₓ]. The bone's twist is the sum of
+//! those of its ancestor joints (eq. 3 and 5 with the dominant bone). So Σ Sᵀ M S and Σ Sᵀ M r over each bone suffice.
 
 use super::Metric;
+use super::residual::{PointTerm, RowTerm};
 use crate::math::Twist;
 use nalgebra::{DMatrix, DVector, Matrix6, RealField, Vector3, Vector6};
 
@@ -25,7 +25,7 @@ impl Dof {
     }
 }
 
-/// What the points of one bone (and below) say.
+/// Sums over the points of one bone (after assembly: and of all bones below).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoneSums<T: RealField + Copy = f64> {
     /// Σ w Sᵀ M S.
@@ -52,7 +52,7 @@ impl<T: RealField + Copy> Default for BoneSums<T> {
 }
 
 impl<T: RealField + Copy> BoneSums<T> {
-    /// Adds one residual `r` (where the point should go minus where it is) of a point at `p`.
+    /// Adds the residual `r` (target minus position, metres) of a point at `p`.
     pub fn add(&mut self, p: &Vector3<T>, r: &Vector3<T>, metric: &Metric<T>, weight: T) {
         let d = metric.direction;
         let m = p.cross(&d);
@@ -97,16 +97,25 @@ impl<T: RealField + Copy> BoneSums<T> {
     }
 }
 
-/// The normal equations in per-bone form.
+/// Normal equations H x = g: point terms in per-bone sums until [`NormalEquations::assemble`], rows after it.
+///
+/// Unknowns: the root's twist (6), then the joint angles.
 #[derive(Clone, Debug, Default)]
-pub struct ArticulatedSums {
-    /// One entry a bone; after [`ArticulatedSums::assemble`] each holds itself and all bones below.
+pub struct NormalEquations {
+    /// Jᵀ W J, shape `[unknowns × unknowns]`.
+    pub hessian: DMatrix<f64>,
+    /// Jᵀ W r, shape `[unknowns]`.
+    pub gradient: DVector<f64>,
+    /// One entry a bone; after [`NormalEquations::assemble`] each holds itself and all bones below.
     pub bones: Vec<BoneSums>,
-    /// The same in single precision, added to `bones` by [`ArticulatedSums::assemble`].
+    /// The same in single precision, added to `bones` by [`NormalEquations::assemble`].
     pub single: Vec<BoneSums<f32>>,
 }
 
-impl ArticulatedSums {
+/// Unknowns of the root before the first joint angle.
+pub const ROOT_UNKNOWNS: usize = 6;
+
+impl NormalEquations {
     /// Empties the sums for `bones` bones.
     pub fn reset(&mut self, bones: usize) {
         self.bones.clear();
@@ -115,15 +124,32 @@ impl ArticulatedSums {
         self.single.resize(bones, BoneSums::default());
     }
 
-    /// JᵀMJ and JᵀMr of all degrees of freedom. `parents` come before children; bone 0 is the root. Each degree of
+    /// Adds a point term about `centre`, which is the origin of the twists; `single` sums in f32.
+    #[inline]
+    pub fn add_point(&mut self, term: &PointTerm, centre: &Vector3<f64>, single: bool) {
+        let p = term.point - centre;
+        if single {
+            let (metric, weight) = (term.metric.cast(), term.weight as f32);
+            self.single[term.bone].add(&p.cast(), &term.residual.cast(), &metric, weight);
+        } else {
+            self.bones[term.bone].add(&p, &term.residual, &term.metric, term.weight);
+        }
+    }
+
+    /// Adds `weight · (slopes · x − residual)²` over the row's angles.
+    pub fn add_row(&mut self, row: &RowTerm<'_>) {
+        for (&a, &sa) in row.angles.iter().zip(row.slopes) {
+            self.gradient[ROOT_UNKNOWNS + a] += row.weight * sa * row.residual;
+            for (&b, &sb) in row.angles.iter().zip(row.slopes) {
+                self.hessian[(ROOT_UNKNOWNS + a, ROOT_UNKNOWNS + b)] += row.weight * sa * sb;
+            }
+        }
+    }
+
+    /// Turns the sums into `hessian` and `gradient`. `parents` come before children; bone 0 is the root. Each degree of
     /// freedom moves its bone and everything below; entries of unrelated ones are zero.
-    pub fn assemble(
-        &mut self,
-        parents: &[Option<usize>],
-        dofs: &[Dof],
-        hessian: &mut DMatrix<f64>,
-        gradient: &mut DVector<f64>,
-    ) {
+    pub fn assemble(&mut self, parents: &[Option<usize>], dofs: &[Dof]) {
+        let (hessian, gradient) = (&mut self.hessian, &mut self.gradient);
         for (sum, single) in self.bones.iter_mut().zip(&mut self.single) {
             sum.finish();
             single.finish();
@@ -158,9 +184,20 @@ impl ArticulatedSums {
             }
         }
     }
+
+    /// Solves (H + diag(damping)) x = g; `None` when the matrix is not positive definite or not finite.
+    pub fn solve_damped(&self, damping: &[f64]) -> Option<DVector<f64>> {
+        let mut a = self.hessian.clone();
+        for (i, d) in damping.iter().enumerate() {
+            a[(i, i)] += d;
+        }
+        let x = a.cholesky()?.solve(&self.gradient);
+        x.iter().all(|v| v.is_finite()).then_some(x)
+    }
 }
 
-fn is_ancestor(parents: &[Option<usize>], a: usize, mut b: usize) -> bool {
+/// True when bone `a` is `b` or an ancestor of it.
+pub fn is_ancestor(parents: &[Option<usize>], a: usize, mut b: usize) -> bool {
     while b > a {
         match parents[b] {
             Some(p) => b = p,
@@ -168,16 +205,6 @@ fn is_ancestor(parents: &[Option<usize>], a: usize, mut b: usize) -> bool {
         }
     }
     a == b
-}
-
-/// Solves (H + diag(damping)) x = g; `None` when the matrix is not positive definite even so, or not finite.
-pub fn solve_damped(h: &DMatrix<f64>, g: &DVector<f64>, damping: &[f64]) -> Option<DVector<f64>> {
-    let mut a = h.clone();
-    for (i, d) in damping.iter().enumerate() {
-        a[(i, i)] += d;
-    }
-    let x = a.cholesky()?.solve(g);
-    x.iter().all(|v| v.is_finite()).then_some(x)
 }
 
 #[cfg(test)]
@@ -216,7 +243,7 @@ mod tests {
                 twist: Twist::revolute(v3().normalize(), v3()),
             });
         }
-        let mut sums = ArticulatedSums::default();
+        let mut sums = NormalEquations::default();
         sums.reset(6);
         let (mut dense_h, mut dense_g) = (DMatrix::zeros(13, 13), DVector::zeros(13));
         for i in 0..200 {
@@ -238,18 +265,22 @@ mod tests {
             dense_h += j.transpose() * metric.matrix() * &j * w;
             dense_g += j.transpose() * (metric.matrix() * r * w);
         }
-        let (mut h, mut g) = (DMatrix::zeros(0, 0), DVector::zeros(0));
-        sums.assemble(&parents, &dofs, &mut h, &mut g);
-        assert!((&h - &dense_h).norm() < 1e-10 * dense_h.norm());
-        assert!((&g - &dense_g).norm() < 1e-10 * dense_g.norm());
+        sums.assemble(&parents, &dofs);
+        assert!((&sums.hessian - &dense_h).norm() < 1e-10 * dense_h.norm());
+        assert!((&sums.gradient - &dense_g).norm() < 1e-10 * dense_g.norm());
     }
 
     #[test]
-    fn rank_deficient_systems_still_solve_with_damping() {
-        let h = DMatrix::from_element(3, 3, 1.0);
-        let g = DVector::from_element(3, 1.0);
-        assert!(solve_damped(&h, &g, &[1e-4; 3]).is_some());
-        assert!(solve_damped(&DMatrix::zeros(3, 3), &g, &[0.0; 3]).is_none());
-        assert!(solve_damped(&DMatrix::from_element(3, 3, f64::NAN), &g, &[1.0; 3]).is_none());
+    fn rank_deficient_systems_solve_only_with_damping() {
+        let of = |hessian| NormalEquations {
+            hessian,
+            gradient: DVector::from_element(3, 1.0),
+            ..NormalEquations::default()
+        };
+        let ones = of(DMatrix::from_element(3, 3, 1.0));
+        assert!(ones.solve_damped(&[1e-4; 3]).is_some());
+        assert!(of(DMatrix::zeros(3, 3)).solve_damped(&[0.0; 3]).is_none());
+        let broken = of(DMatrix::from_element(3, 3, f64::NAN));
+        assert!(broken.solve_damped(&[1.0; 3]).is_none());
     }
 }

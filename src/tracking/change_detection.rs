@@ -1,4 +1,4 @@
-//! Pictures that show nothing new: what came of the last one that was gone through holds for them too.
+//! Change detection: reuses the last report while the depth image differs from a reference only by sensor noise.
 
 use super::{StagesMs, StepReport};
 use crate::camera::DepthImage;
@@ -9,42 +9,42 @@ use serde::{Deserialize, Serialize};
 const BLOCK: usize = 8;
 /// Samples of a block.
 const AREA: usize = BLOCK * BLOCK;
-/// A sample counts as at most this much nearer or farther than before, millimetres; one that came or went counts in full.
-const MOST: i32 = 30;
-/// Changes of a block's mean depth below this are no change, millimetres: a quarter of the sensor's
-/// noise at 2 m.
-const DEAD: f32 = 0.75;
-/// Blocks change by their own noise: root mean square over all blocks, and the largest, as multiples of what the spread of
-/// a block's samples lets its mean change by. A surface that moves by 1.5 [`DEAD`] trips the first, a hand the second.
+/// Largest change of a sample that counts, millimetres; a reading that came or went counts as this.
+const MAX_CHANGE: i32 = 30;
+/// Dead band of a block's mean depth, millimetres: a quarter of the sensor's noise at 2 m.
+const DEAD_BAND: f32 = 0.75;
+/// Normalised change (mean over its standard error and dead band) that counts: root mean square over all blocks, and of
+/// one block. A surface that moves by 1.5 [`DEAD_BAND`] exceeds the first, a hand the second.
 const CHANGED: [f32; 2] = [1.25, 5.0];
-/// After so many pictures in a row one is gone through whatever it shows, so that motion that hides in the noise is at most
-/// a fifth of a second late. At 0 / 5: a still person's step takes 1.29 / 0.42 ms, joints are 5.5 / 5.5 mm off.
-const MOST_KEPT: u32 = 5;
+/// Most frames in a row that reuse a report, so that motion within the noise is at most a fifth of a second late. At 0 / 5
+/// a step of a subject at rest takes 1.29 / 0.42 ms.
+const MOST_REUSED: u32 = 5;
 
-/// Parts of a depth image as they were, and the report of that frame.
+/// Blocks of a depth image and the report of that frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Reference {
+pub(super) struct DepthReference {
     /// Pixels between samples.
     step: u32,
-    /// Columns of blocks that the image has.
+    /// Columns of blocks in the image.
     columns: u32,
-    /// Row-major blocks that count.
+    /// Row-major blocks that are compared.
     blocks: Vec<u32>,
-    /// Millimetres, [`AREA`] of each block in turn.
+    /// Readings, millimetres, [`AREA`] of each block in turn.
     readings: Vec<u16>,
-    /// Frames since.
-    kept: u32,
+    /// Frames that reused the report.
+    #[serde(rename = "kept")]
+    reused: u32,
     report: StepReport,
 }
 
-impl Reference {
-    /// Blocks of all the image, at every `step`-th pixel.
-    pub(super) fn of_all(image: &DepthImage, step: u32, report: &StepReport) -> Self {
+impl DepthReference {
+    /// Reference of the whole image, at every `step`-th pixel.
+    pub(super) fn of_image(image: &DepthImage, step: u32, report: &StepReport) -> Self {
         let [columns, rows] = size(image, step);
         Self::new(image, step, columns, (0..columns * rows).collect(), report)
     }
 
-    /// The blocks that hold any of a grid's `cells`, and those beside them.
+    /// Reference of the blocks that hold any of a grid's `cells`, and of their neighbours.
     pub(super) fn of_cells(
         image: &DepthImage,
         grid: &OrganisedCloud,
@@ -92,24 +92,24 @@ impl Reference {
             columns,
             blocks,
             readings,
-            kept: 0,
+            reused: 0,
             report,
         }
     }
 
-    /// The report of the frame this was made of, when `image` shows the same but for noise. Counts what it keeps.
-    pub(super) fn keep(&mut self, image: &DepthImage) -> Option<&StepReport> {
-        if self.kept >= MOST_KEPT
+    /// Report of the reference frame when `image` equals it but for noise; counts the reuse.
+    pub(super) fn reuse(&mut self, image: &DepthImage) -> Option<&StepReport> {
+        if self.reused >= MOST_REUSED
             || self.columns != size(image, self.step)[0]
-            || self.changed(image)
+            || self.has_changed(image)
         {
             return None;
         }
-        self.kept += 1;
+        self.reused += 1;
         Some(&self.report)
     }
 
-    fn changed(&self, image: &DepthImage) -> bool {
+    fn has_changed(&self, image: &DepthImage) -> bool {
         let (mut sum, mut counted) = (0.0, 0);
         for (&block, before) in self.blocks.iter().zip(self.readings.chunks_exact(AREA)) {
             let (mut first, mut second, mut any, mut k) = (0i32, 0i32, false, 0);
@@ -117,21 +117,21 @@ impl Reference {
                 let was = before[k];
                 k += 1;
                 any |= (now | was) != 0;
-                let way = match (was, now) {
+                let change = match (was, now) {
                     (0, 0) => 0,
-                    (_, 0) => MOST,
-                    (0, _) => -MOST,
-                    _ => (i32::from(now) - i32::from(was)).clamp(-MOST, MOST),
+                    (_, 0) => MAX_CHANGE,
+                    (0, _) => -MAX_CHANGE,
+                    _ => (i32::from(now) - i32::from(was)).clamp(-MAX_CHANGE, MAX_CHANGE),
                 };
-                first += way;
-                second += way * way;
+                first += change;
+                second += change * change;
             });
             if !any {
                 continue;
             }
             let mean = first as f32 / AREA as f32;
             let variance = (second as f32 / AREA as f32 - mean * mean).max(0.0);
-            let share = mean * mean / (variance / AREA as f32 + DEAD * DEAD);
+            let share = mean * mean / (variance / AREA as f32 + DEAD_BAND * DEAD_BAND);
             if share > CHANGED[1] * CHANGED[1] {
                 return true;
             }
@@ -148,7 +148,7 @@ fn size(image: &DepthImage, step: u32) -> [u32; 2] {
     [image.width() / side, image.height() / side]
 }
 
-/// The readings of one block, millimetres, in the middle of their cells.
+/// Visits the readings of one block, millimetres, at the middle of their cells.
 fn samples(image: &DepthImage, step: u32, columns: u32, block: u32, mut f: impl FnMut(u16)) {
     let (step, width) = (step.max(1) as usize, image.width() as usize);
     let (row, column) = (
@@ -189,9 +189,9 @@ mod tests {
         }
     }
 
-    /// A slanted wall at about 2 m, in front of it a body of `body` pixels from column 40 on; noise of `sigma` millimetres and
-    /// a share of lost pixels.
-    fn picture(frame: u64, sigma: f32, lost: f64, nearer: f32, left: u32) -> DepthImage {
+    /// A slanted wall at 3 m and a body of 60 columns from `left` on at 2 m + `nearer` mm; noise of `sigma` mm and a share of
+    /// lost pixels.
+    fn image_of(frame: u64, sigma: f32, lost: f64, nearer: f32, left: u32) -> DepthImage {
         let mut rng = rand_pcg::Pcg32::seed_from_u64(frame);
         let mut data = Vec::new();
         for v in 0..HEIGHT {
@@ -215,20 +215,20 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_no_change_and_motion_is() {
+    fn noise_is_no_change_and_motion_is_one() {
         for (sigma, lost) in [(0.0, 0.0), (3.0, 0.0), (10.0, 0.02)] {
             let seen = |frame, nearer, left| {
-                let first = picture(0, sigma, lost, 0.0, 40);
-                let reference = Reference::of_all(&first, 2, &report());
-                reference.changed(&picture(frame, sigma, lost, nearer, left))
+                let first = image_of(0, sigma, lost, 0.0, 40);
+                let reference = DepthReference::of_image(&first, 2, &report());
+                reference.has_changed(&image_of(frame, sigma, lost, nearer, left))
             };
             let noisy = (1..40).filter(|f| seen(*f, 0.0, 40)).count();
             assert!(
                 noisy <= 1,
-                "{noisy} of 39 pictures of a still body count as changed at {sigma} mm"
+                "{noisy} of 39 images of a body at rest count as changed at {sigma} mm"
             );
-            // As far as the spread of a block's mean lets a camera see it.
-            let far = DEAD + 2.0 * sigma / BLOCK as f32;
+            let standard_error = 2.0 * sigma / BLOCK as f32;
+            let far = DEAD_BAND + standard_error;
             assert!(
                 seen(50, 3.0 * far, 40),
                 "{} mm nearer at {sigma} mm",
@@ -241,25 +241,25 @@ mod tests {
 
     #[test]
     fn a_hand_alone_is_a_change() {
-        let first = picture(0, 3.0, 0.0, 0.0, 40);
-        let reference = Reference::of_all(&first, 2, &report());
-        let mut moved = picture(7, 3.0, 0.0, 0.0, 40);
+        let first = image_of(0, 3.0, 0.0, 0.0, 40);
+        let reference = DepthReference::of_image(&first, 2, &report());
+        let mut moved = image_of(7, 3.0, 0.0, 0.0, 40);
         for v in 60..76 {
             for u in 60..76 {
                 moved.data_mut()[(v * WIDTH + u) as usize] -= 15;
             }
         }
-        assert!(reference.changed(&moved));
+        assert!(reference.has_changed(&moved));
     }
 
     #[test]
-    fn a_picture_is_gone_through_now_and_then_and_only_what_counts_is_compared() {
-        let first = picture(0, 3.0, 0.0, 0.0, 40);
-        let mut reference = Reference::of_all(&first, 2, &report());
-        let kept = (1..=MOST_KEPT + 3)
-            .filter(|_| reference.keep(&first).is_some())
+    fn reuse_is_bounded_and_only_blocks_of_the_cells_are_compared() {
+        let first = image_of(0, 3.0, 0.0, 0.0, 40);
+        let mut reference = DepthReference::of_image(&first, 2, &report());
+        let kept = (1..=MOST_REUSED + 3)
+            .filter(|_| reference.reuse(&first).is_some())
             .count();
-        assert_eq!(kept as u32, MOST_KEPT);
+        assert_eq!(kept as u32, MOST_REUSED);
         let camera = crate::camera::Intrinsics {
             width: WIDTH,
             height: HEIGHT,
@@ -267,20 +267,25 @@ mod tests {
         };
         let grid = OrganisedCloud::new(&camera, Some(2));
         let cell = 30 * (WIDTH / 2) + 36;
-        let of_person = Reference::of_cells(&first, &grid, &[cell], &report());
-        assert_eq!(of_person.blocks.len(), 9, "a block and those beside it");
+        let of_person = DepthReference::of_cells(&first, &grid, &[cell], &report());
+        assert_eq!(of_person.blocks.len(), 9, "a block and its neighbours");
         let mut elsewhere = first.clone();
         elsewhere.data_mut()[..2000].fill(0);
         assert!(
-            Reference::of_all(&first, 2, &report()).changed(&elsewhere)
-                && !of_person.changed(&elsewhere)
+            DepthReference::of_image(&first, 2, &report()).has_changed(&elsewhere)
+                && !of_person.has_changed(&elsewhere)
         );
-        // Another size of picture, one without a reading, and one smaller than a block.
-        assert!(reference.clone().keep(&DepthImage::empty(80, 60)).is_none());
+        // Another image size, one without a reading, and one smaller than a block.
+        assert!(
+            reference
+                .clone()
+                .reuse(&DepthImage::empty(80, 60))
+                .is_none()
+        );
         let dark = DepthImage::empty(WIDTH, HEIGHT);
-        assert!(!Reference::of_all(&dark, 2, &report()).changed(&dark));
-        assert!(Reference::of_all(&dark, 2, &report()).changed(&first));
+        assert!(!DepthReference::of_image(&dark, 2, &report()).has_changed(&dark));
+        assert!(DepthReference::of_image(&dark, 2, &report()).has_changed(&first));
         let tiny = DepthImage::empty(5, 5);
-        assert!(!Reference::of_all(&tiny, 2, &report()).changed(&tiny));
+        assert!(!DepthReference::of_image(&tiny, 2, &report()).has_changed(&tiny));
     }
 }

@@ -1,0 +1,19 @@
+//! Residuals of the pose, one a file: each visits its weighted least-squares terms, which the normal equations add up.
+
+#[cfg(test)]
+mod check;
+mod edge;
+mod floor;
+mod free_space;
+mod hand;
+mod prior;
+mod surface;
+mod term;
+
+pub use edge::EdgeResidual;
+pub use floor::{FloorPlane, FloorResidual, FloorWeights, FootChain, is_in_view};
+pub use free_space::FreeSpaceResidual;
+pub use hand::HandResidual;
+pub use prior::RestPoseResidual;
+pub use surface::{SurfaceMetric, SurfaceNormals, SurfaceResidual};
+pub use term::{PointTerm, Residual, RowTerm};

@@ -1,0 +1,196 @@
+//! Calibration: size, shape and pose in turns (Algorithm 1), and the status that follows from it.
+
+use super::personal_body::PersonalBody;
+use super::pose_fit::{
+    ANNEAL, FitContext, FitReport, FitScratch, START, Schedule, TRACK, evaluate, fit_pose,
+};
+use super::{SizeEstimate, Status, TrackerModel, TrackerState};
+use crate::body::{BodyShape, Pose};
+use crate::math::{Camera, Rigid};
+use crate::registration::Observation;
+use nalgebra::{Translation3, Vector3};
+
+/// Most rounds of pose and size in the first frame.
+const ROUNDS: usize = 8;
+/// Rounds and fit of a trial at another height: shifted from a fitted pose, eight iterations rank it as twenty do.
+const TRIAL_ROUNDS: usize = 2;
+/// See [`TRIAL_ROUNDS`].
+const TRIAL: Schedule = Schedule {
+    iterations: 8,
+    ..START
+};
+/// Change of a coefficient, or of ten times a scale, below which size has settled.
+const SETTLED: f64 = 0.05;
+/// Residual of a first fit above which other heights are tried, metres. Along an upright body the surface hardly changes,
+/// so that a fit 10 cm too high settles there (6.6 mm against 2.1; sensor noise lies between).
+const WELL_FITTED: f64 = 4e-3;
+/// Displacement of the trials along the upright, metres.
+const SHIFT: f64 = 0.15;
+/// Least frames of calibration before the status is `Tracking`.
+const SHORTEST: u32 = 15;
+/// Motion of the root per frame below which it counts as steady, metres: a first fit that is off slides by 12 mm a frame.
+const STEADY_MOTION: f64 = 6e-3;
+/// Steady frames in a row before the status is `Tracking`.
+const STEADY_FRAMES: u32 = 6;
+/// Most frames of calibration: a subject who walks is dressed walking.
+const LONGEST: u32 = 90;
+
+/// Size, shape and pose of one start.
+#[derive(Clone)]
+struct SizedPose {
+    size: SizeEstimate,
+    shape: BodyShape,
+    pose: Pose<Camera>,
+}
+
+/// A settled start with its fit, and the cost by which starts compare.
+struct SettledStart {
+    sized: SizedPose,
+    fit: FitReport,
+    cost: f64,
+}
+
+/// Body, readings and scratch of one calibration.
+pub(super) struct SizeCalibration<'a> {
+    pub model: &'a TrackerModel,
+    pub observation: &'a Observation<'a>,
+    pub body: &'a mut PersonalBody,
+    pub scratch: &'a mut FitScratch,
+    /// Part of the subject lies below the image.
+    pub cut_below: bool,
+}
+
+impl SizeCalibration<'_> {
+    /// Adapts size and shape in `state` and the pose to one frame; returns the new fit where the pose was fitted again.
+    pub(super) fn adapt(
+        &mut self,
+        state: &mut TrackerState,
+        pose: &mut Pose<Camera>,
+        schedule: &Schedule,
+        up: &Vector3<f64>,
+    ) -> Option<FitReport> {
+        let mut fit = None;
+        if state.size.frames == 0 {
+            let start = SizedPose {
+                size: state.size.clone(),
+                shape: state.shape.clone(),
+                pose: pose.clone(),
+            };
+            let best = self.settle_first(start, schedule, up);
+            (state.size, state.shape, *pose) = (best.sized.size, best.sized.shape, best.sized.pose);
+            fit = Some(best.fit);
+            self.body.update(self.model, &state.shape);
+        }
+        let context = FitContext {
+            model: self.model,
+            body: self.body,
+            observation: self.observation,
+        };
+        let shape = &mut state.shape;
+        state
+            .size
+            .observe(&context, pose, shape, self.scratch, true);
+        self.body.update(self.model, &state.shape);
+        fit
+    }
+
+    /// Settles from `start`, and from higher and lower where that fits badly.
+    fn settle_first(
+        &mut self,
+        start: SizedPose,
+        schedule: &Schedule,
+        up: &Vector3<f64>,
+    ) -> SettledStart {
+        let cut_below = self.cut_below;
+        let best = self.settle(start.clone(), schedule, ROUNDS, cut_below);
+        if best.fit.residual <= WELL_FITTED {
+            return best;
+        }
+        let trials = [-SHIFT, SHIFT].map(|shift| {
+            let mut other = start.clone();
+            let shift = Translation3::from(up * shift);
+            other.pose.root = Rigid::new(shift * other.pose.root.iso());
+            self.settle(other, &TRIAL, TRIAL_ROUNDS, cut_below)
+        });
+        let better = trials
+            .into_iter()
+            .filter(|t| t.cost < best.cost)
+            .min_by(|a, b| a.cost.total_cmp(&b.cost));
+        match better {
+            Some(trial) => self.settle(trial.sized, schedule, ROUNDS, false),
+            None => best,
+        }
+    }
+
+    /// Alternates pose and size until both have settled. Kernel and reach shrink once only, unless the body is `cut`: half
+    /// a body informs size so little that its pose must stay free (5 mm on waist-up scenes).
+    fn settle(
+        &mut self,
+        mut sized: SizedPose,
+        schedule: &Schedule,
+        rounds: usize,
+        cut: bool,
+    ) -> SettledStart {
+        self.body.update(self.model, &sized.shape);
+        let near = Schedule {
+            ahead: if cut { schedule.ahead } else { ANNEAL },
+            ..*schedule
+        };
+        let mut fit = self.fit(&mut sized.pose, schedule);
+        for _ in 0..rounds {
+            let context = FitContext {
+                model: self.model,
+                body: self.body,
+                observation: self.observation,
+            };
+            let SizedPose { size, shape, pose } = &mut sized;
+            let change = size.observe(&context, pose, shape, self.scratch, false);
+            self.body.sketch(self.model, shape);
+            fit = self.fit(&mut sized.pose, &near);
+            if change < SETTLED {
+                break;
+            }
+        }
+        self.body.update(self.model, &sized.shape);
+        let context = FitContext {
+            model: self.model,
+            body: self.body,
+            observation: self.observation,
+        };
+        let cost = evaluate(&context, &sized.pose, TRACK.distance[0], self.scratch).cost;
+        SettledStart { sized, fit, cost }
+    }
+
+    fn fit(&mut self, pose: &mut Pose<Camera>, schedule: &Schedule) -> FitReport {
+        let context = FitContext {
+            model: self.model,
+            body: self.body,
+            observation: self.observation,
+        };
+        fit_pose(&context, pose, schedule, self.scratch)
+    }
+}
+
+/// Updates the counters of calibration with the motion of the root in this frame, metres; `None` for a subject just found.
+pub(super) fn count_steady(state: &mut TrackerState, moved: Option<f64>) {
+    state.steady = match moved {
+        Some(moved) if moved < STEADY_MOTION => state.steady.saturating_add(1),
+        _ => 0,
+    };
+    state.calibration_age = match moved {
+        Some(_) => state.calibration_age.saturating_add(1),
+        None => 0,
+    };
+}
+
+/// `Calibrating` until size has seen some frames and the pose is steady, then `Tracking`.
+pub(super) fn live_status(model: &TrackerModel, state: &TrackerState) -> Status {
+    let settling = state.status != Status::Tracking
+        && state.steady < STEADY_FRAMES
+        && state.calibration_age < LONGEST;
+    if model.config.adapt_size && (state.size.frames < SHORTEST || settling) {
+        Status::Calibrating
+    } else {
+        Status::Tracking
+    }
+}

@@ -1,0 +1,237 @@
+//! Initial pose: trunk by outline and principal axes, then hypotheses of yaw, arms and legs.
+
+use super::hypotheses::Hypotheses;
+use super::pose_fit::{FitContext, FitReport, FitScratch, START, Schedule, evaluate, fit_pose};
+use crate::body::Pose;
+use crate::math::{P3, Rigid, principal_axes};
+use crate::registration::Observation;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+/// Landmarks of the subject's silhouette.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outline {
+    /// Middle of the torso's front, camera frame, metres.
+    pub torso: P3,
+    /// Top of the head, camera frame, metres.
+    pub crown: P3,
+    /// Height from sole to crown, metres; `None` when cut off below without a known floor.
+    pub stature: Option<f64>,
+}
+
+/// Half the depth of a chest, metres: readings lie on the front, joints in the middle.
+const HALF_DEPTH: f64 = 0.11;
+/// Horizontal distance from the torso within which the crown is searched, metres; farther out are raised arms.
+const HEAD_BESIDE: f32 = 0.22;
+/// Height above the floor up to which segmentation takes readings for floor, metres: soles are that much lower.
+const SOLES: f64 = 0.02;
+/// Height of a floor above the lowest reading from which it is another floor than the subject's, metres.
+const AFLOAT: f64 = 0.1;
+/// Share of the largest distance to the silhouette above which a cell is torso.
+const TORSO_SHARE: [u32; 2] = [8, 10];
+/// Turns about the vertical to try, radians; the paper asks for a frontal view.
+const YAWS: [f64; 3] = [0.0, 0.6, -0.6];
+/// Best trunks that get arms and a full fit; each costs a third of the search.
+const TRUNK_FINALISTS: usize = 2;
+/// Iterations of a trunk's fit: enough to rank yaws.
+const TRUNK_ITERATIONS: usize = 3;
+/// Longest pairs by which trunks and final poses compare, metres.
+const REACH: [f32; 2] = [0.15, 0.10];
+/// Ratio of the first two variances above which the body is long enough for its axis to be its lean.
+const ELONGATION: f64 = 4.0;
+/// Cosines between lean and vertical that count, 60° to 15°: arms bend the axis by less, and nobody leans more.
+const LEAN_RANGE: std::ops::Range<f64> = 0.5..0.966;
+
+/// Points of the subject's cells that have a reading.
+fn points<'a>(observation: &'a Observation<'_>) -> impl Iterator<Item = (usize, P3)> + 'a {
+    let grid = observation.grid;
+    let cells = observation.cells.iter().map(|&c| c as usize);
+    cells
+        .filter(|&c| grid.depth[c] > 0.0)
+        .map(|c| (c, grid.points[c]))
+}
+
+/// Chessboard distance of each cell to the nearest cell outside the subject, in cells. Cells beyond the image rim count
+/// as outside, except below: a torso cut by the lower rim continues.
+fn silhouette_distance(observation: &Observation<'_>) -> Vec<u16> {
+    let grid = observation.grid;
+    let (columns, rows) = grid.size();
+    let mut distance = vec![0u16; columns * rows];
+    for &c in observation.cells {
+        distance[c as usize] = u16::MAX;
+    }
+    let mut relax = |cell: usize, neighbours: [(i32, i32); 4]| {
+        if distance[cell] == 0 {
+            return;
+        }
+        let (u, v) = ((cell % columns) as i32, (cell / columns) as i32);
+        let least = neighbours
+            .iter()
+            .map(|(du, dv)| match grid.cell(u + du, v + dv) {
+                Some(k) => distance[k],
+                None if v + dv >= rows as i32 => u16::MAX - 1,
+                None => 0,
+            })
+            .min();
+        distance[cell] = distance[cell].min(least.unwrap_or(0).saturating_add(1));
+    };
+    for c in 0..columns * rows {
+        relax(c, [(-1, 0), (0, -1), (-1, -1), (1, -1)]);
+    }
+    for c in (0..columns * rows).rev() {
+        relax(c, [(1, 0), (0, 1), (1, 1), (-1, 1)]);
+    }
+    distance
+}
+
+/// Middle of the readings farthest inside the silhouette, camera frame, metres.
+fn torso(observation: &Observation<'_>) -> Option<P3> {
+    let distance = silhouette_distance(observation);
+    let widest = points(observation).map(|(c, _)| distance[c]).max()?;
+    let (mut sum, mut n) = (Vector3::zeros(), 0.0f32);
+    for (c, p) in points(observation) {
+        if u32::from(distance[c]) * TORSO_SHARE[1] >= u32::from(widest) * TORSO_SHARE[0] {
+            sum += p.coords;
+            n += 1.0;
+        }
+    }
+    Some(P3::from(sum / n.max(1.0)))
+}
+
+/// Measures torso, crown and stature. `up` is the unit direction against gravity, `floor` the camera's height over a known
+/// floor, metres.
+pub(super) fn outline(
+    observation: &Observation<'_>,
+    up: &Vector3<f32>,
+    cut_below: bool,
+    floor: Option<f64>,
+) -> Option<Outline> {
+    let torso = torso(observation)?;
+    let right = up.cross(&Vector3::z()).try_normalize(0.0)?;
+    let height = |p: &P3| up.dot(&p.coords);
+    let crown = points(observation)
+        .map(|(_, p)| p)
+        .filter(|p| right.dot(&(p - torso)).abs() < HEAD_BESIDE)
+        .max_by(|a, b| height(a).total_cmp(&height(b)))?;
+    let lowest = points(observation)
+        .map(|(_, p)| height(&p))
+        .fold(f32::INFINITY, f32::min);
+    let visible_height = f64::from(height(&crown) - lowest) + SOLES;
+    let over_floor = floor
+        .map(|f| f64::from(height(&crown)) + f)
+        .filter(|h| *h > visible_height - AFLOAT);
+    let stature = over_floor.or((!cut_below).then_some(visible_height));
+    Some(Outline {
+        torso,
+        crown,
+        stature,
+    })
+}
+
+/// Rotation of an upright body that faces the camera, turned by `yaw` about the vertical.
+fn upright(up: &Vector3<f64>, yaw: f64) -> UnitQuaternion<f64> {
+    let back = Vector3::z();
+    // The body's z is the camera's −z, made level.
+    let z = (-(back - up * up.dot(&back)))
+        .try_normalize(f64::EPSILON)
+        .unwrap_or_else(|| -Vector3::z());
+    let x = up.cross(&z);
+    let m = Matrix3::from_columns(&[x, *up, z]);
+    let facing = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(m));
+    facing * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw)
+}
+
+/// Finds the initial pose and its fit.
+pub(super) fn initial_pose(
+    context: &FitContext<'_>,
+    outline: &Outline,
+    up: &Vector3<f64>,
+    scratch: &mut FitScratch,
+) -> Option<(Pose, FitReport)> {
+    let mut best = trunks(context, outline, up, scratch);
+    best.sort_by(|a, b| a.0.total_cmp(&b.0));
+    best.truncate(TRUNK_FINALISTS);
+    let hypotheses = Hypotheses::new(context, &outline.torso);
+    // Outlines tell little between hypotheses and cost the most.
+    let terms = scratch.terms;
+    scratch.terms.edge_weight = 0.0;
+    for (_, pose) in &mut best {
+        for side in 0..2 {
+            *pose = hypotheses.choose_arm(pose, side, scratch);
+        }
+        for side in 0..2 {
+            *pose = hypotheses.choose_leg(pose, side, scratch);
+        }
+    }
+    scratch.terms = terms;
+    let mut winner: Option<(Pose, FitReport)> = None;
+    for (_, mut pose) in best {
+        fit_pose(context, &mut pose, &START, scratch);
+        let fit = evaluate(context, &pose, REACH[1], scratch);
+        if winner.as_ref().is_none_or(|(_, w)| fit.cost < w.cost) {
+            winner = Some((pose, fit));
+        }
+    }
+    winner
+}
+
+/// Rest poses at each lean and yaw after a short fit, with their costs.
+fn trunks(
+    context: &FitContext<'_>,
+    outline: &Outline,
+    up: &Vector3<f64>,
+    scratch: &mut FitScratch,
+) -> Vec<(f64, Pose)> {
+    let skeleton = context.model.template.skeleton();
+    let schedule = Schedule {
+        iterations: TRUNK_ITERATIONS,
+        ..START
+    };
+    let mut out = Vec::new();
+    for lean in leans(context.observation, up, outline) {
+        for yaw in YAWS {
+            let root = trunk_root(context, outline, &lean, upright(&lean, yaw));
+            let mut pose = Pose::rest(skeleton, root);
+            fit_pose(context, &mut pose, &schedule, scratch);
+            let cost = evaluate(context, &pose, REACH[0], scratch).cost;
+            out.push((cost, pose));
+        }
+    }
+    out
+}
+
+/// Root of a rest pose of the given rotation: the crown gives its height, the torso its place across, the torso's front
+/// its depth.
+fn trunk_root(
+    context: &FitContext<'_>,
+    outline: &Outline,
+    lean: &Vector3<f64>,
+    rotation: UnitQuaternion<f64>,
+) -> Rigid<crate::math::Camera, crate::math::Body> {
+    let skeleton = context.model.template.skeleton();
+    let crown = skeleton
+        .index("head_end")
+        .or_else(|| skeleton.index("head"))
+        .unwrap_or(0);
+    let chest = skeleton.index("spine3").unwrap_or(0);
+    let at = |j: usize| context.body.rest.joints[j].coords;
+    let front = outline.torso.coords.cast::<f64>();
+    let away = front.try_normalize(0.0).unwrap_or_else(Vector3::z);
+    let mut t = front + away * HALF_DEPTH - rotation * at(chest);
+    let placed = rotation * at(crown) + t;
+    t += lean * (outline.crown.coords.cast::<f64>() - placed).dot(lean);
+    Rigid::from_parts(t, rotation)
+}
+
+/// Upright directions to try: against gravity, and the long principal axis of a whole body that leans.
+fn leans(observation: &Observation<'_>, up: &Vector3<f64>, outline: &Outline) -> Vec<Vector3<f64>> {
+    let mut out = vec![*up];
+    let points: Vec<P3> = points(observation).map(|(_, p)| p).collect();
+    if let (Some(_), Some((_, axes, variance))) = (outline.stature, principal_axes(&points)) {
+        let axis = axes.column(0).into_owned();
+        let axis = if axis.dot(up) < 0.0 { -axis } else { axis };
+        if variance[0] > ELONGATION * variance[1] && LEAN_RANGE.contains(&axis.dot(up)) {
+            out.push(axis);
+        }
+    }
+    out
+}

@@ -1,0 +1,58 @@
+//! Legs as the floor residual sees them: hip, knee hinge, sole joints with their standing heights.
+
+use crate::body::{JointMotion, Template};
+use crate::registration::residual::FootChain;
+
+/// One leg of the template.
+#[derive(Clone, Debug)]
+pub(super) struct Leg {
+    /// Hip joint.
+    pub hip: usize,
+    /// Knee joint.
+    pub knee: Option<usize>,
+    /// Angle of a hinged knee and its limits, radians.
+    pub knee_angle: Option<(usize, [f64; 2])>,
+    /// Foot, and angles from the hip down.
+    pub foot: FootChain,
+}
+
+impl Leg {
+    /// True for an angle that moves the foot.
+    pub(super) fn moves(&self, angle: usize) -> bool {
+        self.foot.angles.contains(&angle)
+    }
+}
+
+/// The legs of a template; empty for one without.
+pub(super) fn legs(template: &Template) -> Vec<Leg> {
+    let skeleton = template.skeleton();
+    let Some((lowest, _)) = template.mesh().bounds() else {
+        return Vec::new();
+    };
+    let leg = |side: &str| {
+        let at = |part: &str| skeleton.index(&format!("{side}_{part}"));
+        let (hip, ankle) = (at("hip")?, at("ankle")?);
+        let height = |j: usize| (j, skeleton.joints()[j].rest.y - f64::from(lowest.y));
+        let soles: Vec<_> = std::iter::once(ankle)
+            .chain(at("foot"))
+            .map(height)
+            .collect();
+        let moves = |j: usize| soles.iter().any(|(s, _)| skeleton.is_ancestor(j, *s));
+        let below = (hip..skeleton.len()).filter(|&j| skeleton.is_ancestor(hip, j) && moves(j));
+        let angles =
+            below.flat_map(|j| (0..skeleton.joints()[j].motion.dofs()).map(move |k| (j, k)));
+        let angles = angles.map(|(j, k)| skeleton.dof_offset(j) + k).collect();
+        let knee = at("knee");
+        let knee_angle = knee.and_then(|k| match skeleton.joints()[k].motion {
+            JointMotion::Hinge { limits, .. } => Some((skeleton.dof_offset(k), limits)),
+            _ => None,
+        });
+        Some(Leg {
+            hip,
+            knee,
+            knee_angle,
+            foot: FootChain { soles, angles },
+        })
+    };
+    ["left", "right"].into_iter().filter_map(leg).collect()
+}

@@ -1,0 +1,39 @@
+//! Status of a tracker.
+
+use serde::{Deserialize, Serialize};
+
+/// Reason for having no live pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LostReason {
+    /// No readings of a body's size.
+    NoPerson,
+    /// The body explains too little of the readings.
+    Residual,
+    /// The result of a step was not finite and was discarded.
+    NotFinite,
+}
+
+/// Status of a tracker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// Nobody has been found yet.
+    Searching,
+    /// A subject is tracked; size and shape still change.
+    Calibrating,
+    /// A subject is tracked.
+    Tracking,
+    /// The subject was lost; the last good pose is kept.
+    Lost {
+        /// Reason.
+        reason: LostReason,
+    },
+}
+
+impl Status {
+    /// True with a pose of this very frame.
+    pub fn is_live(&self) -> bool {
+        matches!(self, Self::Calibrating | Self::Tracking)
+    }
+}

@@ -1,0 +1,349 @@
+//! One subject in view (Algorithm 1): find or predict → fit → recover → calibrate → filter → commit → displacements.
+
+use super::calibration::{SizeCalibration, count_steady, live_status};
+use super::confidence::confidence;
+use super::hand_assignment::assign_hands;
+use super::initial_pose::{initial_pose, outline};
+use super::personal_body::PersonalBody;
+use super::pose_filter::filter_pose;
+use super::pose_fit::{
+    ANNEAL, FitContext, FitReport, FitTerms, START, START_TERMS, Schedule, TRACK, fit_pose, pair,
+};
+use super::prediction::{Prediction, predict};
+use super::report::Stopwatch;
+use super::size::from_stature;
+use super::standing::{FloorStance, FootMemory, bend_hidden_knees, floor_below, highest_hips};
+use super::{
+    LostReason, Skipped, StagesMs, Status, StepReport, TrackerModel, TrackerState, Workspace,
+    surface,
+};
+use crate::body::{BoneTransforms, Pose};
+use crate::camera::RgbdFrame;
+use crate::math::{Camera, P3};
+use crate::registration::Observation;
+use crate::registration::residual::FloorPlane;
+use crate::segment::PersonSearch;
+use crate::spatial::OrganisedCloud;
+use nalgebra::Vector3;
+
+/// Share of explained readings below which a frame is bad.
+const LEAST_EXPLAINED: f64 = 0.45;
+/// Share of visible points with a reading below which a frame is bad.
+const LEAST_MATCHED: f64 = 0.35;
+/// Bad frames in a row that lose the subject.
+const PATIENCE: u32 = 8;
+/// Frames without the subject after which the next one is measured anew.
+const FORGET: u32 = 150;
+/// Statures that are trusted for a first size, metres.
+const STATURES: std::ops::Range<f64> = 1.3..2.2;
+/// Residual that halves the quality of a frame, metres.
+const POOR_RESIDUAL: f64 = 0.02;
+/// Longest pair when the body is drawn for displacements, metres (paper, section 3.3).
+const DISPLACEMENT_DISTANCE: f32 = 0.05;
+/// Root mean square change below which displacements have settled, metres.
+const SETTLED_DISPLACEMENT: f32 = 0.4e-3;
+/// Longest interval between updates of settled displacements, frames.
+const LONGEST_INTERVAL: u32 = 24;
+
+/// Report in progress, with the stopwatch of its stages.
+pub(super) struct StepLog {
+    pub report: StepReport,
+    watch: Stopwatch,
+}
+
+impl StepLog {
+    /// Report after segmentation.
+    pub(super) fn new(
+        state: &TrackerState,
+        grid: &OrganisedCloud,
+        person: &PersonSearch,
+        mut watch: Stopwatch,
+    ) -> Self {
+        let report = StepReport {
+            status: state.status,
+            iterations: 0,
+            converged: false,
+            visible_points: 0,
+            person_cells: person.cells.len(),
+            residual_mm: 0.0,
+            explained: 0.0,
+            matched: 0.0,
+            quality: 0.0,
+            confidence: Vec::new(),
+            pose_age: 0,
+            skipped: Skipped {
+                cells: grid.depth.len() - person.cells.len(),
+                ..Skipped::default()
+            },
+            stages_ms: StagesMs {
+                segment: watch.lap(),
+                ..StagesMs::default()
+            },
+        };
+        Self { report, watch }
+    }
+
+    fn add_fit(&mut self, model: &TrackerModel, state: &TrackerState, fit: &FitReport) {
+        let report = &mut self.report;
+        report.iterations = fit.iterations;
+        report.converged = fit.converged;
+        report.visible_points = fit.pairs.visible;
+        report.residual_mm = fit.residual * 1e3;
+        report.explained = fit.explained;
+        report.matched = fit.matched;
+        report.quality = fit.explained.min(fit.matched) / (1.0 + fit.residual / POOR_RESIDUAL);
+        report.skipped.hidden_points = fit.pairs.hidden;
+        report.skipped.inconsistent_pairs = fit.pairs.inconsistent;
+        report.skipped.searches = fit.pairs.reused;
+        report.skipped.iterations = model.config.iterations.saturating_sub(fit.iterations);
+        report.skipped.displacements = state.shape.displacements.len();
+    }
+}
+
+/// A subject in view and the frame that shows it.
+pub(super) struct SubjectFrame<'a> {
+    pub model: &'a TrackerModel,
+    pub frame: &'a RgbdFrame,
+    pub person: &'a PersonSearch,
+    pub observation: Observation<'a>,
+    /// Unit vector against gravity, camera frame.
+    pub up: Vector3<f64>,
+}
+
+impl SubjectFrame<'_> {
+    fn context<'c>(&'c self, body: &'c PersonalBody) -> FitContext<'c> {
+        FitContext {
+            model: self.model,
+            body,
+            observation: &self.observation,
+        }
+    }
+
+    /// Finds or follows the pose, then adapts size and displacements.
+    pub(super) fn track(
+        &self,
+        state: &mut TrackerState,
+        workspace: &mut Workspace,
+        log: &mut StepLog,
+    ) -> Result<(), LostReason> {
+        let config = &self.model.config;
+        workspace.fit.pairing.forget();
+        let found = !state.status.is_live();
+        let start = if found {
+            self.find(state, workspace, log)?
+        } else {
+            self.predict(state, workspace)
+        };
+        let expected = (!found && config.calm > 0.0).then(|| state.pose.clone());
+        let mut pose = start.pose;
+        let schedule = Schedule {
+            iterations: config.iterations,
+            ahead: if start.is_fine { ANNEAL } else { 0 },
+            ..TRACK
+        };
+        log.report.skipped.coarse_iterations = schedule.ahead;
+        let first = if found { &START } else { &schedule };
+        let mut fit = self.fit(&mut pose, first, workspace);
+        log.report.stages_ms.pose = log.watch.lap();
+        if config.rescue && !found && state.recovery.is_due(&fit) {
+            let (context, scratch) = (self.context(&workspace.body), &mut workspace.fit);
+            let recovery = &mut state.recovery;
+            let found = recovery.search(&context, &mut pose, &schedule, scratch);
+            fit = found.unwrap_or(fit);
+            log.report.stages_ms.place = log.watch.lap();
+        }
+        let good =
+            fit.explained >= LEAST_EXPLAINED && fit.matched >= LEAST_MATCHED && pose.is_finite();
+        if good && !state.calibrated(config) {
+            let mut calibration = SizeCalibration {
+                model: self.model,
+                observation: &self.observation,
+                body: &mut workspace.body,
+                scratch: &mut workspace.fit,
+                cut_below: self.person.cut_below,
+            };
+            let adapted = calibration.adapt(state, &mut pose, &schedule, &self.up);
+            fit = adapted.unwrap_or(fit);
+            log.report.stages_ms.size = log.watch.lap();
+        }
+        log.add_fit(self.model, state, &fit);
+        if !pose.is_finite() {
+            return Err(LostReason::NotFinite);
+        }
+        if let Some(expected) = expected.filter(|_| good) {
+            let rest = &workspace.body.rest;
+            let uncertainty = config.calm * fit.residual;
+            let drift = &mut state.drift;
+            pose = filter_pose(self.model, rest, (&expected, &pose), uncertainty, drift);
+        }
+        state.bad_frames = if good { 0 } else { state.bad_frames + 1 };
+        if state.bad_frames > PATIENCE {
+            return Err(LostReason::Residual);
+        }
+        let context = self.context(&workspace.body);
+        log.report.confidence = confidence(&context, &pose, &workspace.fit);
+        self.commit(state, workspace, pose, &fit);
+        self.update_displacements(good, state, workspace, log);
+        Ok(())
+    }
+
+    /// Finds the subject anew: first size from the stature, then an initial pose.
+    fn find(
+        &self,
+        state: &mut TrackerState,
+        workspace: &mut Workspace,
+        log: &mut StepLog,
+    ) -> Result<Prediction, LostReason> {
+        workspace.fit.terms = START_TERMS;
+        if state.pose_age > FORGET {
+            state.reset(self.model);
+        }
+        let camera_height = state.world_from_camera.iso().translation.vector.y;
+        let floor = state.floor_known.then_some(camera_height);
+        let up = self.up.cast();
+        let outline = outline(&self.observation, &up, self.person.cut_below, floor);
+        let stature = outline
+            .and_then(|o| o.stature)
+            .filter(|s| STATURES.contains(s));
+        if let Some(stature) = stature
+            && state.size.frames == 0
+            && self.model.config.adapt_size
+        {
+            state.shape = from_stature(self.model, stature);
+        }
+        workspace.body.update(self.model, &state.shape);
+        let (context, scratch) = (self.context(&workspace.body), &mut workspace.fit);
+        let found = outline.and_then(|o| initial_pose(&context, &o, &self.up, scratch));
+        log.report.stages_ms.place = log.watch.lap();
+        let (pose, _) = found
+            .filter(|(_, fit)| fit.explained >= LEAST_EXPLAINED)
+            .ok_or(LostReason::Residual)?;
+        (state.before, state.highest_hips, state.feet) = (None, None, None);
+        state.drift.clear();
+        Ok(Prediction {
+            pose,
+            is_fine: false,
+        })
+    }
+
+    /// Sets the residuals of a tracked frame and predicts its pose.
+    fn predict(&self, state: &TrackerState, workspace: &mut Workspace) -> Prediction {
+        let config = &self.model.config;
+        workspace.body.update(self.model, &state.shape);
+        let standing = config.standing.then(|| {
+            let camera_height = state.world_from_camera.iso().translation.vector.y;
+            let height = if state.floor_known {
+                -camera_height
+            } else {
+                floor_below(self.model, &workspace.body.rest, state.highest_hips?)?
+            };
+            Some(FloorStance {
+                floor: FloorPlane {
+                    up: self.up,
+                    height,
+                },
+                feet: state.feet,
+            })
+        });
+        workspace.fit.terms = FitTerms {
+            standing: standing.flatten(),
+            ..FitTerms::tracking(config)
+        };
+        let context = self.context(&workspace.body);
+        predict(&context, state, self.frame.time_ns, &mut workspace.fit)
+    }
+
+    /// Fits the pose, with arms moved to their detected hands before and hidden knees bent after it.
+    fn fit(
+        &self,
+        pose: &mut Pose<Camera>,
+        schedule: &Schedule,
+        workspace: &mut Workspace,
+    ) -> FitReport {
+        let (model, grid) = (self.model, self.observation.grid);
+        let (rest, scratch) = (&workspace.body.rest, &mut workspace.fit);
+        if !self.person.hands.is_empty() {
+            scratch.terms.hands = assign_hands(model, rest, pose, grid, &self.person.hands);
+        }
+        let fit = fit_pose(&self.context(&workspace.body), pose, schedule, scratch);
+        if let Some(standing) = scratch.terms.standing {
+            let last = (scratch.bones.joints.as_slice(), scratch.unseen.as_slice());
+            bend_hidden_knees(model, rest, grid, &standing.floor, last, pose);
+        }
+        fit
+    }
+
+    /// Writes pose, status and memory of a tracked frame into the state.
+    fn commit(
+        &self,
+        state: &mut TrackerState,
+        workspace: &Workspace,
+        pose: Pose<Camera>,
+        fit: &FitReport,
+    ) {
+        let skeleton = self.model.template.skeleton();
+        let found = !state.status.is_live();
+        let root = skeleton.joints()[0].rest;
+        let moved = (pose.root.point(&root) - state.pose.root.point(&root)).norm();
+        count_steady(state, (!found).then_some(moved));
+        let before = std::mem::replace(&mut state.pose, pose);
+        state.before = (!found).then_some(before);
+        state.interval_ns = self.frame.time_ns.saturating_sub(state.time_ns);
+        state.time_ns = self.frame.time_ns;
+        state.pose_age = 0;
+        state.centre = centre(self.observation.grid, &self.person.cells);
+        state.quality = [fit.explained, fit.residual];
+        state.status = live_status(self.model, state);
+        let joints = &workspace.fit.bones.joints;
+        state.highest_hips = highest_hips(self.model, &self.up, state.highest_hips, joints);
+        let mut bones = BoneTransforms::default();
+        state.pose.bones(skeleton, &workspace.body.rest, &mut bones);
+        let feet = FootMemory::of(self.model, &bones.joints);
+        state.feet = Some(state.feet.map_or(feet, |kept| kept.updated(feet)));
+    }
+
+    /// Updates displacements when they are due. The interval doubles while they hardly change.
+    fn update_displacements(
+        &self,
+        good: bool,
+        state: &mut TrackerState,
+        workspace: &mut Workspace,
+        log: &mut StepLog,
+    ) {
+        let config = &self.model.config;
+        let shortest = config.displacement_interval.max(1);
+        let [wait, interval] = &mut state.surface_due;
+        *wait = wait.saturating_sub(1);
+        *interval = (*interval).max(shortest);
+        let tracking = state.status == Status::Tracking;
+        if !(good && config.displacements && tracking && *wait == 0) {
+            return;
+        }
+        let (context, scratch) = (self.context(&workspace.body), &mut workspace.fit);
+        pair(&context, &state.pose, DISPLACEMENT_DISTANCE, 0.0, scratch);
+        let (updated, change) = surface::fit(
+            &context,
+            &scratch.bones,
+            &scratch.pairing.image,
+            &mut state.shape.displacements,
+            &mut state.surface,
+            &mut workspace.surface,
+        );
+        log.report.skipped.displacements = state.shape.displacements.len() - updated;
+        *interval = if config.skip_settled && change < SETTLED_DISPLACEMENT {
+            (*interval * 2).min(LONGEST_INTERVAL)
+        } else {
+            shortest
+        };
+        *wait = *interval;
+        log.report.stages_ms.surface = log.watch.lap();
+    }
+}
+
+/// Mean of the readings of `cells`, camera frame, metres.
+fn centre(grid: &OrganisedCloud, cells: &[u32]) -> P3 {
+    let sum = cells.iter().fold(Vector3::zeros(), |s, &c| {
+        s + grid.points[c as usize].coords.cast::<f64>()
+    });
+    P3::from((sum / cells.len().max(1) as f64).cast::<f32>())
+}
