@@ -1,10 +1,9 @@
-//! `tryon`: everything the try-on product *thinks*.
+//! `tryon`: the library of a virtual try-on: tracking, cloth simulation, dressing and compositing.
 //!
-//! Synchronous code without network, clock or global state. Services are thin
-//! shells around the `step` functions found here. Modules form layers; a module
-//! uses only modules of strictly lower layers, and `tests/tidy.rs` says so.
+//! Synchronous code without network, clock or global state; the services are thin shells around its `step`
+//! functions. A module uses only modules of strictly lower layers; `tests/tidy.rs` checks the layers below.
 //!
-//! Start at [`tracking`], [`cloth`] and [`composite`]: one step of each is the product.
+//! Start at [`mirror`], the chain from a frame to a picture, or at its steps: [`tracking`], [`cloth`] and [`composite`].
 
 // Layer 0
 pub mod math;

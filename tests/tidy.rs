@@ -73,7 +73,7 @@ const MODULES: &[(u8, &str, &str)] = &[
     (
         3,
         "segment",
-        "Which pixels are the person: floor, background, nearest body, edges.",
+        "The pixels of the person: floor, background, nearest body, edges.",
     ),
     (
         3,

@@ -128,7 +128,7 @@ pub(crate) fn draw(meshes: &[DrawnMesh], turn: &Turn) -> Vec<u8> {
     let lamp = V3::from(LAMP).normalize();
     let mut out = vec![BACKGROUND; (w * h * 3) as usize];
     for (i, pixel) in (0..w * h).zip(out.chunks_exact_mut(3)) {
-        let Some((face, b)) = interpolate(&view, &all, &faces, &buffer, i % w, i / w) else {
+        let Some((face, b)) = interpolate(&view, &all, &faces, &buffer, [i % w, i / w]) else {
             continue;
         };
         let f = faces[face as usize];

@@ -10,7 +10,9 @@ use super::input::{GarmentView, Input};
 use super::viewport::Viewport;
 use crate::math::{P3, V3};
 use crate::mesh::Face;
-use crate::raster::{Cull, Options, View, VisibilityBuffer, rasterise_layers, rasterise_with};
+use crate::raster::{
+    Cull, LayeredMesh, Options, View, VisibilityBuffer, rasterise_layers, rasterise_with,
+};
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -202,23 +204,20 @@ impl Surface {
             near: NEAR,
         };
         let (vertices, faces) = (&self.vertices, &self.faces);
-        if config.skip_hidden {
-            let layers: Vec<Range<usize>> = self.layers.iter().map(|l| l.faces.clone()).collect();
-            return rasterise_layers(
-                config.par,
-                config.inside_offset,
-                &view,
-                vertices,
-                faces,
-                &layers,
-                &mut self.samples,
-            );
-        }
         let options = Options {
             par: config.par,
             cull: Cull::None,
-            behind: config.inside_offset,
+            back_offset: config.inside_offset,
         };
+        if config.skip_hidden {
+            let layers: Vec<Range<usize>> = self.layers.iter().map(|l| l.faces.clone()).collect();
+            let mesh = LayeredMesh {
+                vertices,
+                faces,
+                layers: &layers,
+            };
+            return rasterise_layers(options, &view, &mesh, &mut self.samples);
+        }
         rasterise_with(options, &view, vertices, faces, &mut self.samples);
         0
     }

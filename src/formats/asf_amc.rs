@@ -2,23 +2,22 @@
 
 use super::FormatError;
 use super::image::read_limited;
-use super::motion::MotionClip;
+use super::motion_clip::{CMU_PERIOD, MotionClip};
 use crate::math::{P3d, V3d};
 use nalgebra::UnitQuaternion;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::str::SplitWhitespace;
 
-/// An hour at 120 Hz takes 350 MB as text; clips are minutes.
+/// Largest file, bytes. An hour at 120 Hz takes 350 MB as text; clips are minutes.
 const MAX_BYTES: u64 = 256 << 20;
-/// The database does not say its rate; it is 120 Hz throughout.
-const PERIOD: f64 = 1.0 / 120.0;
 /// An inch in metres: lengths are inches divided by the file's `length`.
 const INCH: f64 = 0.0254;
 
 #[derive(Clone, Debug)]
-struct Bone {
+struct AsfBone {
     name: String,
-    /// Index of the bone that this one hangs on.
+    /// Index of the parent bone.
     parent: usize,
     /// From its start to its end, metres, global axes in the rest pose.
     along: V3d,
@@ -28,53 +27,231 @@ struct Bone {
     dof: Vec<usize>,
 }
 
+impl AsfBone {
+    fn new(name: &str) -> Self {
+        Self {
+            name: name.into(),
+            parent: 0,
+            along: V3d::zeros(),
+            axis: UnitQuaternion::identity(),
+            dof: Vec::new(),
+        }
+    }
+}
+
 #[derive(Clone, Debug)]
-struct Skeleton {
-    /// Bone 0 is the root, without length.
-    bones: Vec<Bone>,
+struct AsfSkeleton {
+    /// Bone 0 is the root, without length. Parents come first.
+    bones: Vec<AsfBone>,
     /// Translations (`true`) and rotations of the root, with their axis.
     root: Vec<(bool, usize)>,
     scale: f64,
     degrees: bool,
 }
 
-fn fault(path: &Path, line: usize, why: impl Into<String>) -> FormatError {
-    FormatError::field(path, format!("line {}", line + 1), why)
+impl AsfSkeleton {
+    fn angle(&self, value: f64) -> f64 {
+        if self.degrees {
+            value.to_radians()
+        } else {
+            value
+        }
+    }
 }
 
-fn number(path: &Path, line: usize, what: &str, word: Option<&str>) -> Result<f64, FormatError> {
-    let text = word.ok_or_else(|| fault(path, line, format!("{what}: a number is missing")))?;
-    let value = text.parse::<f64>().ok().filter(|v| v.is_finite());
-    value.ok_or_else(|| fault(path, line, format!("{what}: `{text}` is no finite number")))
+/// Words of one line, with file and line for errors.
+struct AsfLine<'a> {
+    path: &'a Path,
+    /// From zero.
+    number: usize,
+    words: SplitWhitespace<'a>,
 }
 
-/// Angles about x, y, z, applied in that order about fixed axes.
+impl<'a> AsfLine<'a> {
+    fn fault(&self, why: impl Into<String>) -> FormatError {
+        FormatError::field(self.path, format!("line {}", self.number + 1), why)
+    }
+    fn word(&mut self) -> &'a str {
+        self.words.next().unwrap_or_default()
+    }
+    fn float(&mut self, what: &str) -> Result<f64, FormatError> {
+        let text = self.words.next();
+        let text = text.ok_or_else(|| self.fault(format!("{what}: a number is missing")))?;
+        let value = text.parse::<f64>().ok().filter(|v| v.is_finite());
+        value.ok_or_else(|| self.fault(format!("{what}: `{text}` is no finite number")))
+    }
+    fn vector(&mut self, what: &str) -> Result<V3d, FormatError> {
+        Ok(V3d::new(
+            self.float(what)?,
+            self.float(what)?,
+            self.float(what)?,
+        ))
+    }
+}
+
+/// Rotation by angles about the fixed axes x, y, z, applied in that order.
 fn euler(angles: V3d) -> UnitQuaternion<f64> {
     UnitQuaternion::from_euler_angles(angles.x, angles.y, angles.z)
 }
 
-fn axis_of(letter: Option<u8>) -> Option<usize> {
-    letter.and_then(|l| b"xyz".iter().position(|a| *a == l.to_ascii_lowercase()))
+/// Axis of a channel such as `TX` or `rz`.
+fn axis_of(channel: &str) -> Option<usize> {
+    let letter = channel.as_bytes().get(1)?.to_ascii_lowercase();
+    b"xyz".iter().position(|a| *a == letter)
 }
 
-fn parse_asf(text: &str, path: &Path) -> Result<Skeleton, FormatError> {
-    let mut s = Skeleton {
-        bones: Vec::new(),
-        root: Vec::new(),
-        scale: INCH,
-        degrees: true,
+/// Bone between `begin` and `end`.
+struct OpenBone {
+    bone: AsfBone,
+    direction: V3d,
+    /// File units.
+    length: f64,
+}
+
+/// Parser of an ASF file, line by line.
+struct AsfParser {
+    skeleton: AsfSkeleton,
+    open: Option<OpenBone>,
+    /// Child and parent, indices into the bones of the file.
+    links: Vec<(usize, usize)>,
+    has_hierarchy: bool,
+}
+
+impl AsfParser {
+    fn line(&mut self, section: &str, line: &mut AsfLine<'_>) -> Result<(), FormatError> {
+        let key = line.word();
+        match (section, key) {
+            ("units", "length") => {
+                let length = line.float("length")?;
+                if length <= 0.0 {
+                    return Err(line.fault(format!("length {length}, expected a positive number")));
+                }
+                self.skeleton.scale = INCH / length;
+            }
+            ("units", "angle") => self.skeleton.degrees = line.words.next() != Some("rad"),
+            ("root", "order") => {
+                while let Some(word) = line.words.next() {
+                    let axis = axis_of(word)
+                        .ok_or_else(|| line.fault(format!("root: no channel `{word}`")))?;
+                    let is_translation = word.starts_with(['T', 't']);
+                    self.skeleton.root.push((is_translation, axis));
+                }
+            }
+            ("bonedata", "begin") => {
+                self.open = Some(OpenBone {
+                    bone: AsfBone::new(""),
+                    direction: V3d::zeros(),
+                    length: 0.0,
+                });
+            }
+            ("bonedata", "end") => self.end_bone(line)?,
+            ("bonedata", _) => self.bone_field(key, line)?,
+            ("hierarchy", "begin" | "end") => self.has_hierarchy = true,
+            ("hierarchy", parent) => {
+                let parent = self.find(parent, line)?;
+                while let Some(child) = line.words.next() {
+                    self.links.push((self.find(child, line)?, parent));
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn find(&self, name: &str, line: &AsfLine<'_>) -> Result<usize, FormatError> {
+        let at = self.skeleton.bones.iter().position(|b| b.name == name);
+        at.ok_or_else(|| line.fault(format!("no bone `{name}`")))
+    }
+
+    fn bone_field(&mut self, key: &str, line: &mut AsfLine<'_>) -> Result<(), FormatError> {
+        let Some(open) = &mut self.open else {
+            return Ok(());
+        };
+        let name = open.bone.name.clone();
+        match key {
+            "name" => open.bone.name = line.word().into(),
+            "direction" => open.direction = line.vector(&format!("bone `{name}`: direction"))?,
+            "length" => open.length = line.float(&format!("bone `{name}`: length"))?,
+            "axis" => {
+                let angles = line.vector(&format!("bone `{name}`: axis"))?;
+                open.bone.axis = euler(angles.map(|a| self.skeleton.angle(a)));
+            }
+            "dof" => {
+                while let Some(word) = line.words.next() {
+                    let axis = axis_of(word).filter(|_| word.starts_with('r'));
+                    let axis =
+                        axis.ok_or_else(|| line.fault(format!("bone `{name}`: no dof `{word}`")))?;
+                    open.bone.dof.push(axis);
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn end_bone(&mut self, line: &AsfLine<'_>) -> Result<(), FormatError> {
+        let open = self.open.take();
+        let open = open.ok_or_else(|| line.fault("`end` without `begin`"))?;
+        let mut bone = open.bone;
+        bone.along = open.direction * (open.length * self.skeleton.scale);
+        let bones = &mut self.skeleton.bones;
+        if bone.name.is_empty() || bones.iter().any(|o| o.name == bone.name) {
+            let why = format!("bone `{}`: its name is missing or used twice", bone.name);
+            return Err(line.fault(why));
+        }
+        bones.push(bone);
+        Ok(())
+    }
+
+    /// Sorts the bones so that parents come first.
+    fn finish(self, path: &Path) -> Result<AsfSkeleton, FormatError> {
+        let fault = |why: String| FormatError::field(path, "hierarchy", why);
+        let Self {
+            skeleton, links, ..
+        } = self;
+        if !self.has_hierarchy || skeleton.bones.len() < 2 {
+            return Err(fault("no bones: not an ASF file, or cut short".into()));
+        }
+        let mut order = vec![0];
+        let mut at = 0;
+        while at < order.len() {
+            let children = links.iter().filter(|(_, parent)| *parent == order[at]);
+            let children: Vec<usize> = children.map(|(child, _)| *child).collect();
+            if let Some(&c) = children.iter().find(|c| order.contains(c)) {
+                let name = &skeleton.bones[c].name;
+                return Err(fault(format!("bone `{name}` has two parents")));
+            }
+            order.extend(children);
+            at += 1;
+        }
+        let new_index = |old: usize| order.iter().position(|o| *o == old).unwrap_or(0);
+        let sorted = |old: &usize| {
+            let link = links.iter().find(|(child, _)| child == old);
+            AsfBone {
+                parent: link.map_or(0, |(_, parent)| new_index(*parent)),
+                ..skeleton.bones[*old].clone()
+            }
+        };
+        let bones = order.iter().map(sorted).collect();
+        Ok(AsfSkeleton { bones, ..skeleton })
+    }
+}
+
+/// Reads an ASF skeleton.
+fn parse_asf(text: &str, path: &Path) -> Result<AsfSkeleton, FormatError> {
+    let mut parser = AsfParser {
+        skeleton: AsfSkeleton {
+            bones: vec![AsfBone::new("root")],
+            root: Vec::new(),
+            scale: INCH,
+            degrees: true,
+        },
+        open: None,
+        links: Vec::new(),
+        has_hierarchy: false,
     };
-    let blank = |name: &str| Bone {
-        name: name.into(),
-        parent: 0,
-        along: V3d::zeros(),
-        axis: UnitQuaternion::identity(),
-        dof: Vec::new(),
-    };
-    s.bones.push(blank("root"));
-    let (mut section, mut bone) = ("", None::<(Bone, V3d, f64)>);
-    let (mut seen, mut parents) = (false, Vec::new());
-    for (n, line) in text.lines().enumerate() {
+    let mut section = "";
+    for (number, line) in text.lines().enumerate() {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {
             continue;
@@ -83,256 +260,144 @@ fn parse_asf(text: &str, path: &Path) -> Result<Skeleton, FormatError> {
             section = name.split_whitespace().next().unwrap_or_default();
             continue;
         }
-        let mut words = line.split_whitespace();
-        let key = words.next().unwrap_or_default();
-        match (section, key) {
-            ("units", "length") => {
-                let length = number(path, n, "length", words.next())?;
-                if length <= 0.0 {
-                    return Err(fault(
-                        path,
-                        n,
-                        format!("length {length}, expected a positive number"),
-                    ));
-                }
-                s.scale = INCH / length;
-            }
-            ("units", "angle") => s.degrees = words.next() != Some("rad"),
-            ("root", "order") => {
-                for word in words {
-                    let axis = axis_of(word.as_bytes().get(1).copied());
-                    let axis =
-                        axis.ok_or_else(|| fault(path, n, format!("root: no channel `{word}`")))?;
-                    s.root.push((word.starts_with(['T', 't']), axis));
-                }
-            }
-            ("bonedata", "begin") => bone = Some((blank(""), V3d::zeros(), 0.0)),
-            ("bonedata", "end") => {
-                let (mut b, direction, length) = bone
-                    .take()
-                    .ok_or_else(|| fault(path, n, "`end` without `begin`"))?;
-                b.along = direction * (length * s.scale);
-                if b.name.is_empty() || s.bones.iter().any(|o| o.name == b.name) {
-                    return Err(fault(
-                        path,
-                        n,
-                        format!("bone `{}`: its name is missing or used twice", b.name),
-                    ));
-                }
-                s.bones.push(b);
-            }
-            ("bonedata", _) => {
-                let Some((b, direction, length)) = &mut bone else {
-                    continue;
-                };
-                match key {
-                    "name" => b.name = words.next().unwrap_or_default().into(),
-                    "direction" => {
-                        for c in direction.iter_mut() {
-                            *c = number(
-                                path,
-                                n,
-                                &format!("bone `{}`: direction", b.name),
-                                words.next(),
-                            )?;
-                        }
-                    }
-                    "length" => {
-                        *length =
-                            number(path, n, &format!("bone `{}`: length", b.name), words.next())?
-                    }
-                    "axis" => {
-                        let mut a = V3d::zeros();
-                        for c in a.iter_mut() {
-                            *c =
-                                number(path, n, &format!("bone `{}`: axis", b.name), words.next())?;
-                        }
-                        b.axis = euler(if s.degrees { a.map(f64::to_radians) } else { a });
-                    }
-                    "dof" => {
-                        for word in words {
-                            let axis = axis_of(word.as_bytes().get(1).copied())
-                                .filter(|_| word.starts_with('r'));
-                            let axis = axis.ok_or_else(|| {
-                                fault(path, n, format!("bone `{}`: no dof `{word}`", b.name))
-                            })?;
-                            b.dof.push(axis);
-                        }
-                    }
-                    _ => {}
-                }
-            }
-            ("hierarchy", "begin" | "end") => seen = true,
-            ("hierarchy", parent) => {
-                let find = |name: &str| {
-                    let at = s.bones.iter().position(|b| b.name == name);
-                    at.ok_or_else(|| fault(path, n, format!("no bone `{name}`")))
-                };
-                let parent = find(parent)?;
-                for child in words {
-                    parents.push((find(child)?, parent, n));
-                }
-            }
-            _ => {}
-        }
-    }
-    if !seen || s.bones.len() < 2 {
-        return Err(FormatError::field(
+        let words = line.split_whitespace();
+        let mut line = AsfLine {
             path,
-            "hierarchy",
-            "no bones: not an ASF file, or cut short",
-        ));
+            number,
+            words,
+        };
+        parser.line(section, &mut line)?;
     }
-    // Bones in an order in which parents come first.
-    let mut order = vec![0];
-    let mut at = 0;
-    while at < order.len() {
-        let children = parents
-            .iter()
-            .filter(|(_, p, _)| *p == order[at])
-            .map(|(c, ..)| *c)
-            .collect::<Vec<_>>();
-        if let Some(&c) = children.iter().find(|c| order.contains(c)) {
-            return Err(FormatError::field(
-                path,
-                "hierarchy",
-                format!("bone `{}` has two parents", s.bones[c].name),
-            ));
-        }
-        order.extend(children);
-        at += 1;
-    }
-    let place = |old: usize| order.iter().position(|o| *o == old).unwrap_or(0);
-    let bones = order
-        .iter()
-        .map(|&o| {
-            let parent = parents
-                .iter()
-                .find(|(c, ..)| *c == o)
-                .map_or(0, |(_, p, _)| place(*p));
-            Bone {
-                parent,
-                ..s.bones[o].clone()
-            }
-        })
-        .collect();
-    Ok(Skeleton { bones, ..s })
+    parser.finish(path)
 }
 
-/// Reads a skeleton and a motion of it. Positions in metres; a joint is where a bone starts, `NAME_end` where the
-/// last bone of a chain ends.
+/// Reads a skeleton and its motion. Positions in metres; a joint is the start of a bone, `NAME_end` the end of the last
+/// bone of a chain.
 ///
 /// # Errors
 /// Names file, line and bone.
-pub fn read_asf_amc(asf: &Path, amc: &Path) -> Result<MotionClip, FormatError> {
+pub(super) fn read_asf_amc(asf: &Path, amc: &Path) -> Result<MotionClip, FormatError> {
     let text =
         |p: &Path| read_limited(p, MAX_BYTES).map(|b| String::from_utf8_lossy(&b).into_owned());
     parse_asf_amc(&text(asf)?, asf, &text(amc)?, amc)
 }
 
-/// As [`read_asf_amc`] on text; the paths are named in errors.
+/// Parses a skeleton and its motion; the paths are named in errors.
 ///
 /// # Errors
 /// As [`read_asf_amc`].
-pub fn parse_asf_amc(
+fn parse_asf_amc(
     asf: &str,
     asf_path: &Path,
     amc: &str,
     amc_path: &Path,
 ) -> Result<MotionClip, FormatError> {
     let s = parse_asf(asf, asf_path)?;
-    let index: BTreeMap<&str, usize> = s
-        .bones
-        .iter()
-        .enumerate()
-        .map(|(i, b)| (b.name.as_str(), i))
-        .collect();
-    let mut names: Vec<String> = s.bones.iter().map(|b| b.name.clone()).collect();
-    let last: Vec<usize> = (1..s.bones.len())
+    let names = s.bones.iter().enumerate();
+    let index: BTreeMap<&str, usize> = names.map(|(i, b)| (b.name.as_str(), i)).collect();
+    let leaves: Vec<usize> = (1..s.bones.len())
         .filter(|i| s.bones.iter().skip(1).all(|b| b.parent != *i))
         .collect();
-    names.extend(last.iter().map(|&i| format!("{}_end", s.bones[i].name)));
 
-    let mut clip = MotionClip {
-        names,
-        frames: Vec::new(),
-        period: PERIOD,
-    };
-    let mut turns: Vec<V3d> = Vec::new();
+    let mut frames = Vec::new();
+    let mut pose: Option<AmcPose> = None;
     let mut origin = V3d::zeros();
-    let mut open = false;
-    for (n, line) in amc.lines().enumerate() {
+    for (number, line) in amc.lines().enumerate() {
         let line = line.trim();
         if line.is_empty() || line.starts_with(['#', ':']) {
             continue;
         }
-        let mut words = line.split_whitespace();
-        let key = words.next().unwrap_or_default();
+        let mut line = AsfLine {
+            path: amc_path,
+            number,
+            words: line.split_whitespace(),
+        };
+        let key = line.word();
         if key.bytes().all(|b| b.is_ascii_digit()) {
-            if open {
-                clip.frames.push(positions(&s, &last, &turns, origin));
+            if let Some(p) = pose.take() {
+                origin = p.origin;
+                frames.push(p.positions(&s, &leaves));
             }
-            (turns, open) = (vec![V3d::zeros(); s.bones.len()], true);
+            pose = Some(AmcPose {
+                angles: vec![V3d::zeros(); s.bones.len()],
+                origin,
+            });
             continue;
         }
-        if !open {
-            return Err(fault(
-                amc_path,
-                n,
-                format!("`{key}` before the first frame number"),
-            ));
-        }
-        let &bone = index
-            .get(key)
-            .ok_or_else(|| fault(amc_path, n, format!("no bone `{key}` in the skeleton")))?;
-        let what = format!("frame {}, bone `{key}`", clip.frames.len() + 1);
-        let angle = |v: f64| if s.degrees { v.to_radians() } else { v };
+        let Some(pose) = &mut pose else {
+            return Err(line.fault(format!("`{key}` before the first frame number")));
+        };
+        let bone = index.get(key);
+        let bone = bone.ok_or_else(|| line.fault(format!("no bone `{key}` in the skeleton")))?;
+        let what = format!("frame {}, bone `{key}`", frames.len() + 1);
+        pose.read_bone(&s, *bone, &mut line, &what)?;
+    }
+    frames.extend(pose.map(|p| p.positions(&s, &leaves)));
+    if frames.is_empty() {
+        let why = "none: not an AMC file, or cut short";
+        return Err(FormatError::field(amc_path, "frames", why));
+    }
+    let mut names: Vec<String> = s.bones.iter().map(|b| b.name.clone()).collect();
+    names.extend(leaves.iter().map(|&i| format!("{}_end", s.bones[i].name)));
+    Ok(MotionClip {
+        names,
+        frames,
+        period: CMU_PERIOD,
+    })
+}
+
+/// Pose of one AMC frame.
+struct AmcPose {
+    /// Angles of each bone about its own axes, radians.
+    angles: Vec<V3d>,
+    /// Position of the root, metres.
+    origin: V3d,
+}
+
+impl AmcPose {
+    fn read_bone(
+        &mut self,
+        s: &AsfSkeleton,
+        bone: usize,
+        line: &mut AsfLine<'_>,
+        what: &str,
+    ) -> Result<(), FormatError> {
         if bone == 0 {
-            for (is_shift, axis) in &s.root {
-                let v = number(amc_path, n, &what, words.next())?;
-                if *is_shift {
-                    origin[*axis] = v * s.scale;
+            for (is_translation, axis) in &s.root {
+                let v = line.float(what)?;
+                if *is_translation {
+                    self.origin[*axis] = v * s.scale;
                 } else {
-                    turns[0][*axis] = angle(v);
+                    self.angles[0][*axis] = s.angle(v);
                 }
             }
         } else {
             for &axis in &s.bones[bone].dof {
-                turns[bone][axis] = angle(number(amc_path, n, &what, words.next())?);
+                self.angles[bone][axis] = s.angle(line.float(what)?);
             }
         }
+        Ok(())
     }
-    if open {
-        clip.frames.push(positions(&s, &last, &turns, origin));
-    }
-    if clip.frames.is_empty() {
-        return Err(FormatError::field(
-            amc_path,
-            "frames",
-            "none: not an AMC file, or cut short",
-        ));
-    }
-    Ok(clip)
-}
 
-/// Starts of all bones, then the ends of the last ones.
-fn positions(s: &Skeleton, last: &[usize], turns: &[V3d], origin: V3d) -> Vec<P3d> {
-    let mut global: Vec<UnitQuaternion<f64>> = Vec::with_capacity(s.bones.len());
-    let mut ends: Vec<P3d> = Vec::with_capacity(s.bones.len());
-    let mut out = Vec::with_capacity(s.bones.len() + last.len());
-    for (i, b) in s.bones.iter().enumerate() {
-        let local = b.axis * euler(turns[i]) * b.axis.inverse();
-        let (turn, start) = if i == 0 {
-            (local, P3d::from(origin))
-        } else {
-            (global[b.parent] * local, ends[b.parent])
-        };
-        global.push(turn);
-        ends.push(start + turn * b.along);
-        out.push(start);
+    /// Starts of all bones, then the ends of the leaves, metres.
+    fn positions(&self, s: &AsfSkeleton, leaves: &[usize]) -> Vec<P3d> {
+        let mut global: Vec<UnitQuaternion<f64>> = Vec::with_capacity(s.bones.len());
+        let mut ends: Vec<P3d> = Vec::with_capacity(s.bones.len());
+        let mut out = Vec::with_capacity(s.bones.len() + leaves.len());
+        for (i, b) in s.bones.iter().enumerate() {
+            let local = b.axis * euler(self.angles[i]) * b.axis.inverse();
+            let (rotation, start) = if i == 0 {
+                (local, P3d::from(self.origin))
+            } else {
+                (global[b.parent] * local, ends[b.parent])
+            };
+            global.push(rotation);
+            ends.push(start + rotation * b.along);
+            out.push(start);
+        }
+        out.extend(leaves.iter().map(|&i| ends[i]));
+        out
     }
-    out.extend(last.iter().map(|&i| ends[i]));
-    out
 }
 
 #[cfg(test)]
@@ -348,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn bones_turn_about_their_own_axes() {
+    fn bones_rotate_about_their_own_axes() {
         let amc = ":DEGREES\n1\nroot 1 2 3 0 0 0\nthigh 0\nshin 90\n2\nroot 0 0 0 0 90 0\nthigh 90\nshin 0\n";
         let clip = parse(ASF, amc).expect("reads");
         assert_eq!(clip.names, ["root", "thigh", "shin", "shin_end"]);
@@ -356,7 +421,7 @@ mod tests {
             |p: P3d, x: f64, y: f64, z: f64| assert!((p - P3d::new(x, y, z)).norm() < 1e-9, "{p}");
         near(clip.frames[0][2], 1.0, 0.0, 3.0);
         near(clip.frames[0][3], 2.0, 0.0, 3.0);
-        // The thigh's own x axis is the global y axis: it does not swing, only twists.
+        // The thigh's own x axis is the global y axis: it only twists.
         near(clip.frames[1][2], 0.0, -2.0, 0.0);
     }
 
@@ -387,7 +452,7 @@ mod tests {
     }
 
     #[test]
-    fn shared_clips_are_people() {
+    fn shared_clips_keep_bone_lengths_and_human_proportions() {
         let root = std::env::var_os("TRYON_SHARED")
             .map_or_else(
                 || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"),
@@ -420,7 +485,7 @@ mod tests {
             );
             let [hip, knee, ankle] = names.map(|n| clip.joint(&[n]).expect(n));
             for f in clip.frames.iter().step_by(20) {
-                // Bones keep their lengths, and the shank is about as long as the thigh.
+                // Bones keep their lengths; the shank is about as long as the thigh.
                 let (a, b) = ((f[hip] - f[knee]).norm(), (f[knee] - f[ankle]).norm());
                 let first = &clip.frames[0];
                 assert!(

@@ -1,33 +1,48 @@
-//! Biovision hierarchies: a tree of joints and the channels of every frame.
+//! Biovision hierarchies (BVH): a tree of joints and the channels of every frame.
 
 use super::FormatError;
 use super::image::read_limited;
-use super::motion::MotionClip;
+use super::motion_clip::MotionClip;
 use crate::math::{P3d, V3d};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use std::path::Path;
 
-/// An hour at 120 Hz with 60 channels takes 250 MB as text; more is refused.
+/// Largest file, bytes; an hour at 120 Hz with 60 channels takes 250 MB as text.
 const MAX_BYTES: u64 = 256 << 20;
-/// Deeper trees are no skeletons.
+/// Most joints of a skeleton; larger trees are refused.
 const MAX_JOINTS: usize = 1024;
 
-/// What one number of a frame drives.
+/// Target of one number of a frame: position or rotation along an axis.
 #[derive(Clone, Copy, Debug)]
 enum Channel {
     Position(usize),
     Rotation(usize),
 }
 
+impl Channel {
+    /// Channel of a word such as `Xposition` or `zrotation`.
+    fn parse(word: &str) -> Option<Self> {
+        let word = word.to_ascii_lowercase();
+        let axis = b"xyz"
+            .iter()
+            .position(|a| word.bytes().next() == Some(*a))?;
+        match &word[1..] {
+            "position" => Some(Self::Position(axis)),
+            "rotation" => Some(Self::Rotation(axis)),
+            _ => None,
+        }
+    }
+}
+
 #[derive(Debug)]
-struct Joint {
+struct BvhJoint {
     name: String,
     parent: Option<usize>,
     offset: V3d,
     channels: Vec<Channel>,
 }
 
-/// Words with the line they stand on.
+/// Words of the file with their line.
 struct Words<'a> {
     path: &'a Path,
     words: Box<dyn Iterator<Item = (usize, &'a str)> + 'a>,
@@ -71,7 +86,7 @@ impl<'a> Words<'a> {
 ///
 /// # Errors
 /// Names the line and the joint at fault.
-pub fn read_bvh(path: &Path) -> Result<MotionClip, FormatError> {
+pub(super) fn read_bvh(path: &Path) -> Result<MotionClip, FormatError> {
     parse_bvh(
         &String::from_utf8_lossy(&read_limited(path, MAX_BYTES)?),
         path,
@@ -82,7 +97,7 @@ pub fn read_bvh(path: &Path) -> Result<MotionClip, FormatError> {
 ///
 /// # Errors
 /// As [`read_bvh`].
-pub fn parse_bvh(text: &str, origin: &Path) -> Result<MotionClip, FormatError> {
+pub(super) fn parse_bvh(text: &str, origin: &Path) -> Result<MotionClip, FormatError> {
     let words = text
         .lines()
         .enumerate()
@@ -146,8 +161,8 @@ pub fn parse_bvh(text: &str, origin: &Path) -> Result<MotionClip, FormatError> {
     })
 }
 
-fn hierarchy(w: &mut Words<'_>) -> Result<Vec<Joint>, FormatError> {
-    let mut joints: Vec<Joint> = Vec::new();
+fn hierarchy(w: &mut Words<'_>) -> Result<Vec<BvhJoint>, FormatError> {
+    let mut joints: Vec<BvhJoint> = Vec::new();
     let mut open: Vec<usize> = Vec::new();
     let mut name = w.next("the root's name")?.to_owned();
     loop {
@@ -162,7 +177,7 @@ fn hierarchy(w: &mut Words<'_>) -> Result<Vec<Joint>, FormatError> {
         if joints.len() == MAX_JOINTS {
             return Err(w.fault(format!("more than {MAX_JOINTS} joints")));
         }
-        joints.push(Joint {
+        joints.push(BvhJoint {
             name,
             parent: open.last().copied(),
             offset,
@@ -178,28 +193,10 @@ fn hierarchy(w: &mut Words<'_>) -> Result<Vec<Joint>, FormatError> {
                 "CHANNELS" => {
                     for _ in 0..w.count("number of channels")?.min(7) {
                         let word = w.next("a channel")?;
-                        let axis = match word.bytes().next().map(|b| b.to_ascii_lowercase()) {
-                            Some(b'x') => 0,
-                            Some(b'y') => 1,
-                            Some(b'z') => 2,
-                            _ => {
-                                return Err(w.fault(format!(
-                                    "joint `{}`: no channel `{word}`",
-                                    joints[at].name
-                                )));
-                            }
-                        };
-                        let channel = match word.get(1..).map(str::to_ascii_lowercase).as_deref() {
-                            Some("position") => Channel::Position(axis),
-                            Some("rotation") => Channel::Rotation(axis),
-                            _ => {
-                                return Err(w.fault(format!(
-                                    "joint `{}`: no channel `{word}`",
-                                    joints[at].name
-                                )));
-                            }
-                        };
-                        joints[at].channels.push(channel);
+                        let joint = &mut joints[at];
+                        let fault = || format!("joint `{}`: no channel `{word}`", joint.name);
+                        let channel = Channel::parse(word).ok_or_else(|| w.fault(fault()))?;
+                        joint.channels.push(channel);
                     }
                 }
                 "JOINT" => break w.next("a joint's name")?.to_owned(),
@@ -227,14 +224,14 @@ mod tests {
     const ARM: &str = "HIERARCHY\nROOT hip\n{\n OFFSET 0 0 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\n JOINT arm\n {\n  OFFSET 1 0 0\n  CHANNELS 3 Zrotation Xrotation Yrotation\n  End Site\n  {\n   OFFSET 2 0 0\n  }\n }\n}\nMOTION\nFrames: 2\nFrame Time: 0.01\n0 1 0 0 0 0 90 0 0\n0 1 0 90 0 0 0 90 0\n";
 
     #[test]
-    fn turns_are_applied_in_the_order_of_the_channels() {
+    fn rotations_apply_in_the_order_of_the_channels() {
         let clip = parse_bvh(ARM, Path::new("a.bvh")).expect("reads");
         assert_eq!(clip.names, ["hip", "arm", "arm_end"]);
         let near =
             |p: P3d, x: f64, y: f64, z: f64| assert!((p - P3d::new(x, y, z)).norm() < 1e-12, "{p}");
         near(clip.frames[0][1], 1.0, 1.0, 0.0);
         near(clip.frames[0][2], 1.0, 3.0, 0.0);
-        // The root's quarter turn about z carries the arm up; its own turn about x leaves a bone along x alone.
+        // The root's quarter turn about z lifts the arm; its own turn about x does not move a bone along x.
         near(clip.frames[1][1], 0.0, 2.0, 0.0);
         near(clip.frames[1][2], 0.0, 4.0, 0.0);
         assert!((clip.seconds() - 0.02).abs() < 1e-12);
@@ -265,7 +262,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_cut_is_an_error_or_whole(cut in 0usize..400) {
+        fn every_truncation_is_an_error(cut in 0usize..400) {
             if let Some(text) = ARM.get(..cut.min(ARM.len() - 4)) {
                 prop_assert!(parse_bvh(text, Path::new("a.bvh")).is_err());
             }

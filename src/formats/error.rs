@@ -1,8 +1,8 @@
-//! The one error of everything that reads or writes files.
+//! Error of everything that reads or writes files.
 
 use std::path::{Path, PathBuf};
 
-/// A file that could not be read or written, and the field at fault.
+/// Unreadable or unwritable file, and the field at fault.
 #[derive(Debug, thiserror::Error)]
 pub enum FormatError {
     /// The operating system refused.
@@ -10,17 +10,17 @@ pub enum FormatError {
     Io {
         /// The file.
         file: PathBuf,
-        /// What the system said. Not a `source`, since the message says it already.
+        /// Error of the system. Not a `source`, since the message contains it.
         why: std::io::Error,
     },
-    /// A field holds something that cannot be used.
+    /// A field is unusable.
     #[error("{}: `{field}`: {why}", file.display())]
     Field {
         /// The file.
         file: PathBuf,
         /// The field, array or record.
         field: String,
-        /// What is wrong and what would be right.
+        /// The fault and the expectation.
         why: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Measured fabrics as JSON: the format that ARCSim uses for the data of Wang, O'Brien & Ramamoorthi 2011.
+//! Measured fabrics as JSON: ARCSim's format of the data of Wang, O'Brien & Ramamoorthi 2011.
 
 use super::FormatError;
 use super::image::read_limited;
@@ -10,7 +10,7 @@ const MAX_BYTES: u64 = 1 << 20;
 /// Rows and columns of the two tables.
 const SHAPES: [(&str, usize, usize); 2] = [("stretching", 6, 4), ("bending", 3, 5)];
 
-/// A fabric as measured.
+/// Measured fabric.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct MeasuredFabric {
     /// Mass of a square metre, kg/m².
@@ -33,7 +33,7 @@ pub fn read_fabric(path: &Path) -> Result<MeasuredFabric, FormatError> {
     parse_fabric(&text, path)
 }
 
-/// Reads fabric text; `origin` is named in errors.
+/// Parses fabric text; `origin` is named in errors.
 ///
 /// # Errors
 /// Names the field, row or value at fault.
@@ -80,7 +80,7 @@ mod tests {
         "bending":[[1e-6,1e-6,1e-6,1e-6,1e-6],[1e-6,1e-6,1e-6,1e-6,1e-6],[1e-6,1e-6,1e-6,1e-6,1e-6]]}"#;
 
     #[test]
-    fn tables_are_read_and_faults_named() {
+    fn tables_read_and_faults_are_named() {
         let parse = |t: &str| parse_fabric(t, Path::new("f.json")).map_err(|e| e.to_string());
         assert_eq!(parse(FABRIC).expect("valid").stretching[0][2], 2.0);
         let e = parse(&FABRIC.replace("[1,0,2,3]", "[1,0,2]")).expect_err("short row");

@@ -1,4 +1,4 @@
-//! The few Foxglove messages that recordings are made of, field for field, and their descriptors.
+//! Foxglove messages of a recording, field for field, and their descriptors.
 //!
 //! Field numbers as in the foxglove protobuf schemas; Foxglove and rerun read them by these names.
 
@@ -156,6 +156,7 @@ const FRAME_TRANSFORM: &[Field] = &[
 ];
 const TIMESTAMP: &[Field] = &[("seconds", 1, "int64"), ("nanos", 2, "int32")];
 
+/// Descriptor of a file with one message.
 fn file(
     name: &str,
     package: &str,
@@ -163,8 +164,8 @@ fn file(
     fields: &[Field],
     imports: &[&str],
 ) -> FileDescriptorProto {
-    let field = |(name, number, kind): &Field| {
-        let (kind, label) = match *kind {
+    let field = |(name, number, type_name): &Field| {
+        let (kind, label) = match *type_name {
             "doubles" => (Type::Double, Label::Repeated),
             "double" => (Type::Double, Label::Optional),
             "fixed32" => (Type::Fixed32, Label::Optional),
@@ -179,7 +180,7 @@ fn file(
             number: Some(*number),
             label: Some(label.into()),
             r#type: Some(kind.into()),
-            type_name: (kind == Type::Message).then(|| fields_type(fields, name)),
+            type_name: (kind == Type::Message).then(|| (*type_name).to_owned()),
             ..Default::default()
         }
     };
@@ -197,18 +198,11 @@ fn file(
     }
 }
 
-fn fields_type(fields: &[Field], name: &str) -> String {
-    fields
-        .iter()
-        .find(|f| f.0 == name)
-        .map_or(String::new(), |f| f.2.to_owned())
-}
-
-/// The schema of a message as MCAP wants it: a FileDescriptorSet with everything that it needs.
+/// Schema of a message for MCAP: a FileDescriptorSet with all its imports.
 pub(super) fn schema(message: &str) -> Vec<u8> {
     const TIME: &str = "google/protobuf/timestamp.proto";
     const VECTOR: &str = "foxglove/Vector3.proto";
-    const TURN: &str = "foxglove/Quaternion.proto";
+    const ROTATION: &str = "foxglove/Quaternion.proto";
     let mut files = vec![file(TIME, "google.protobuf", "Timestamp", TIMESTAMP, &[])];
     let (fields, imports): (&[Field], &[&str]) = match message {
         "CameraCalibration" => (CALIBRATION, &[TIME]),
@@ -216,8 +210,8 @@ pub(super) fn schema(message: &str) -> Vec<u8> {
         "CompressedImage" => (COMPRESSED_IMAGE, &[TIME]),
         _ => {
             files.push(file(VECTOR, "foxglove", "Vector3", VECTOR3, &[]));
-            files.push(file(TURN, "foxglove", "Quaternion", QUATERNION, &[]));
-            (FRAME_TRANSFORM, &[TIME, VECTOR, TURN])
+            files.push(file(ROTATION, "foxglove", "Quaternion", QUATERNION, &[]));
+            (FRAME_TRANSFORM, &[TIME, VECTOR, ROTATION])
         }
     };
     files.push(file(
@@ -230,16 +224,16 @@ pub(super) fn schema(message: &str) -> Vec<u8> {
     FileDescriptorSet { file: files }.encode_to_vec()
 }
 
-/// Any of these messages to bytes.
+/// Encodes one of these messages.
 pub(super) fn encode(message: &impl Message) -> Vec<u8> {
     message.encode_to_vec()
 }
 
-/// What [`decode`] makes.
+/// Messages that [`decode`] returns.
 pub(super) trait FoxgloveMessage: Message + Default {}
 impl<M: Message + Default> FoxgloveMessage for M {}
 
-/// Bytes to a message; `None` for bytes that are none.
+/// Decodes a message; `None` for invalid bytes.
 pub(super) fn decode<M: FoxgloveMessage>(bytes: &[u8]) -> Option<M> {
     M::decode(bytes).ok()
 }
@@ -266,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn descriptors_hold_what_they_import() {
+    fn descriptors_contain_their_imports() {
         for name in [
             "CameraCalibration",
             "RawImage",

@@ -1,4 +1,4 @@
-//! GarmentCode's sewing patterns (Korosteleva & Sorkine-Hornung 2023): `*_specification.json`, as they are.
+//! GarmentCode's sewing patterns (Korosteleva & Sorkine-Hornung 2023): `*_specification.json`, unprocessed.
 
 use super::FormatError;
 use super::image::read_limited;
@@ -11,8 +11,10 @@ use std::path::Path;
 const MAX_BYTES: u64 = 16 << 20;
 /// Largest coordinate, metres.
 const MAX_COORDINATE: f64 = 10.0;
+/// Largest coordinate of a control point, in lengths of its edge.
+const MAX_CONTROL: f64 = 100.0;
 
-/// How an edge runs between its ends, in the edge's own frame: x along it from 0 to 1, y to its left in the same unit.
+/// Shape of an edge in its own frame: x from its start (0) to its end (1), y to its left in the same unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RawCurve {
     /// Straight.
@@ -21,55 +23,55 @@ pub enum RawCurve {
     Quadratic([f64; 2]),
     /// Cubic Bézier with these control points.
     Cubic([f64; 2], [f64; 2]),
-    /// Circular arc: radius in metres, whether it is the longer one, whether it bulges to the right.
+    /// Circular arc: radius in metres, longer arc, bulge to the right.
     Circle(f64, bool, bool),
 }
 
-/// One edge.
+/// Edge of a panel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawEdge {
-    /// Vertices it runs between.
+    /// Start and end vertex.
     pub ends: [usize; 2],
     /// Shape.
     pub curve: RawCurve,
 }
 
-/// One panel.
+/// Panel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawPanel {
     /// Its name.
     pub name: String,
-    /// Where its origin lies beside the figure, metres (y up, z to the front).
+    /// Position of its origin beside the figure, metres (y up, z to the front).
     pub translation: [f64; 3],
     /// Euler angles about fixed x, y, z axes, degrees.
     pub rotation: [f64; 3],
     /// Corners, metres.
     pub vertices: Vec<[f64; 2]>,
-    /// Edges; each starts where the one before ends, the last ends where the first starts.
+    /// Edges; each starts at the end of the one before, in a closed loop.
     pub edges: Vec<RawEdge>,
 }
 
-/// A pattern.
+/// Sewing pattern.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawPattern {
-    /// Panels in the order of their names.
+    /// Panels sorted by name.
     pub panels: Vec<RawPanel>,
-    /// Pairs of panel and edge numbers that are sewn together.
+    /// Pairs of `(panel, edge)` numbers that are sewn together.
     pub stitches: Vec<[(usize, usize); 2]>,
 }
 
 #[derive(Deserialize)]
-struct File {
-    pattern: Body,
-    properties: Properties,
+struct JsonFile {
+    pattern: JsonPattern,
+    properties: JsonProperties,
 }
 #[derive(Deserialize)]
-struct Body {
+struct JsonPattern {
     panels: BTreeMap<String, JsonPanel>,
     stitches: Vec<Vec<Value>>,
 }
 #[derive(Deserialize)]
-struct Properties {
+struct JsonProperties {
     units_in_meter: f64,
     curvature_coords: String,
 }
@@ -103,7 +105,7 @@ pub fn read_garmentcode(path: &Path) -> Result<RawPattern, FormatError> {
     parse_garmentcode(&text, path)
 }
 
-/// Whether a JSON text looks like a GarmentCode pattern (and not like ours).
+/// True for the JSON text of a GarmentCode pattern (and not of this product).
 pub fn is_garmentcode(text: &str) -> bool {
     serde_json::from_str::<Value>(text).is_ok_and(|v| {
         v.get("pattern")
@@ -111,12 +113,12 @@ pub fn is_garmentcode(text: &str) -> bool {
     })
 }
 
-/// Reads pattern text; `origin` is named in errors.
+/// Parses pattern text; `origin` is named in errors.
 ///
 /// # Errors
 /// Syntax errors name line and column; faults name panel, edge or stitch.
 pub fn parse_garmentcode(text: &str, origin: &Path) -> Result<RawPattern, FormatError> {
-    let file: File = serde_json::from_str(text)
+    let file: JsonFile = serde_json::from_str(text)
         .map_err(|e| FormatError::field(origin, "pattern", e.to_string()))?;
     let units = file.properties.units_in_meter;
     if !(units.is_finite() && units > 0.0) {
@@ -137,41 +139,46 @@ pub fn parse_garmentcode(text: &str, origin: &Path) -> Result<RawPattern, Format
             why,
         ));
     }
-    let mut panels = Vec::new();
-    for (name, p) in file.pattern.panels {
-        panels.push(panel(name, p, units, origin)?);
-    }
-    let mut stitches = Vec::new();
-    for (k, sides) in file.pattern.stitches.into_iter().enumerate() {
-        let field = |what: &str| format!("pattern.stitches[{k}]{what}");
-        // A third entry says which sides of the fabric meet; it does not matter here.
-        let mut pair = [(0, 0); 2];
-        if sides.len() < 2 {
-            return Err(FormatError::field(
-                origin,
-                field(""),
-                format!("{} sides; 2 are sewn", sides.len()),
-            ));
-        }
-        for (i, (slot, side)) in pair.iter_mut().zip(sides).enumerate() {
-            let at = |why: String| FormatError::field(origin, field(&format!("[{i}]")), why);
-            let s: JsonStitch = serde_json::from_value(side).map_err(|e| at(e.to_string()))?;
-            let p = panels
-                .iter()
-                .position(|p: &RawPanel| p.name == s.panel)
-                .ok_or_else(|| at(format!("there is no panel `{}`", s.panel)))?;
-            if s.edge >= panels[p].edges.len() {
-                let n = panels[p].edges.len();
-                return Err(at(format!(
-                    "panel `{}` has no edge {} (it has {n})",
-                    s.panel, s.edge
-                )));
-            }
-            *slot = (p, s.edge);
-        }
-        stitches.push(pair);
-    }
+    let panels = file.pattern.panels.into_iter();
+    let panels = panels
+        .map(|(name, p)| panel(name, p, units, origin))
+        .collect::<Result<Vec<_>, _>>()?;
+    let stitches = file.pattern.stitches.into_iter().enumerate();
+    let stitches = stitches
+        .map(|(k, sides)| stitch(k, sides, &panels, origin))
+        .collect::<Result<_, _>>()?;
     Ok(RawPattern { panels, stitches })
+}
+
+/// Panel and edge of both sides of stitch `k`. A third entry, the sides of the fabric that meet, is ignored.
+fn stitch(
+    k: usize,
+    sides: Vec<Value>,
+    panels: &[RawPanel],
+    origin: &Path,
+) -> Result<[(usize, usize); 2], FormatError> {
+    let fault = |what: &str, why: String| {
+        FormatError::field(origin, format!("pattern.stitches[{k}]{what}"), why)
+    };
+    if sides.len() < 2 {
+        return Err(fault("", format!("{} sides; 2 are sewn", sides.len())));
+    }
+    let mut pair = [(0, 0); 2];
+    for (i, (slot, side)) in pair.iter_mut().zip(sides).enumerate() {
+        let at = |why: String| fault(&format!("[{i}]"), why);
+        let s: JsonStitch = serde_json::from_value(side).map_err(|e| at(e.to_string()))?;
+        let p = panels
+            .iter()
+            .position(|p| p.name == s.panel)
+            .ok_or_else(|| at(format!("there is no panel `{}`", s.panel)))?;
+        let n = panels[p].edges.len();
+        if s.edge >= n {
+            let why = format!("panel `{}` has no edge {} (it has {n})", s.panel, s.edge);
+            return Err(at(why));
+        }
+        *slot = (p, s.edge);
+    }
+    Ok(pair)
 }
 
 fn panel(name: String, p: JsonPanel, units: f64, origin: &Path) -> Result<RawPanel, FormatError> {
@@ -243,14 +250,13 @@ fn curve(value: &Value, units: f64) -> Result<RawCurve, String> {
     let point = |v: &Value| -> Result<[f64; 2], String> {
         let p: [f64; 2] =
             serde_json::from_value(v.clone()).map_err(|e| format!("curvature: {e}"))?;
-        // Control points further away than this are no edge of a garment.
-        if p.iter().all(|c| c.abs() < 100.0) {
+        if p.iter().all(|c| c.abs() < MAX_CONTROL) {
             Ok(p)
         } else {
             Err(format!("control point {p:?} is out of range"))
         }
     };
-    // The old form: a bare control point.
+    // Older form: a bare control point.
     if value.is_array() {
         return point(value).map(RawCurve::Quadratic);
     }
@@ -291,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn centimetres_become_metres_and_curves_are_read() {
+    fn centimetres_become_metres_and_curves_read() {
         let p = parse(SQUARE).expect("valid");
         assert_eq!(p.panels[0].vertices[2], [0.5, 0.5]);
         assert_eq!(

@@ -8,7 +8,7 @@ use std::path::Path;
 /// Largest file, bytes; the largest shared suit has 700 kB.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// How one vertex hangs on the body: Σ weights · corners + offset, the offset in units of the body's scale.
+/// Binding of a garment vertex to the body: Σ weights · corners + offset, the offset in units of the body's scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Binding {
     /// Vertices of the base body.
@@ -19,17 +19,17 @@ pub struct Binding {
     pub offset: [f32; 3],
 }
 
-/// Two body vertices whose distance along an axis, over `length`, scales the offsets along that axis.
+/// Scale of the offsets along an axis: distance of two body vertices along it, over `length`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scale {
+pub struct AxisScale {
     /// Vertices of the base body.
     pub vertices: [u32; 2],
-    /// Their distance on the body the garment was made on, file units.
+    /// Their distance on the source body, file units.
     pub length: f32,
 }
 
 /// A garment file.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mhclo {
     /// Name in the file.
     pub name: String,
@@ -40,8 +40,8 @@ pub struct Mhclo {
     /// Base mesh it belongs to.
     pub base: String,
     /// Scales along x, y, z.
-    pub scales: [Option<Scale>; 3],
-    /// Drawing order: greater lies further out.
+    pub scales: [Option<AxisScale>; 3],
+    /// Drawing order: greater is farther out.
     pub z_depth: i32,
     /// Binding of each vertex of the OBJ.
     pub bindings: Vec<Binding>,
@@ -60,95 +60,89 @@ pub fn read_mhclo(path: &Path) -> Result<Mhclo, FormatError> {
     )
 }
 
-/// Reads `.mhclo` text; `origin` is named in errors.
+/// Parses `.mhclo` text; `origin` is named in errors.
 ///
 /// # Errors
-/// Names the line and what is wrong on it.
+/// Names the line and its fault.
 pub fn parse_mhclo(text: &str, origin: &Path) -> Result<Mhclo, FormatError> {
-    let mut out = Mhclo {
-        name: String::new(),
-        obj_file: String::new(),
-        material: None,
-        base: String::new(),
-        scales: [None; 3],
-        z_depth: 0,
-        bindings: Vec::new(),
-        deleted: Vec::new(),
-    };
-    #[derive(PartialEq)]
-    enum Part {
-        Head,
-        Vertices,
-        Deleted,
-    }
-    let mut part = Part::Head;
+    let mut out = Mhclo::default();
+    let mut section = MhcloSection::Head;
     for (number, line) in text.lines().enumerate() {
-        let at = |what: &str, why: String| {
+        out.parse_line(line, &mut section).map_err(|(what, why)| {
             FormatError::field(origin, format!("line {}: {what}", number + 1), why)
-        };
+        })?;
+    }
+    let missing = |field: &str, why: &str| Err(FormatError::field(origin, field, why));
+    if out.obj_file.is_empty() {
+        return missing("obj_file", "it is missing");
+    }
+    if out.bindings.is_empty() {
+        return missing("verts", "no vertex is bound to the body");
+    }
+    Ok(out)
+}
+
+/// Section of the file that the next line belongs to.
+#[derive(PartialEq)]
+enum MhcloSection {
+    Head,
+    Vertices,
+    Deleted,
+}
+
+impl Mhclo {
+    /// Parses one line; the error is the field and its fault.
+    fn parse_line(
+        &mut self,
+        line: &str,
+        section: &mut MhcloSection,
+    ) -> Result<(), (String, String)> {
         let words: Vec<&str> = line.split_whitespace().collect();
         let Some(first) = words.first().copied().filter(|w| !w.starts_with('#')) else {
-            continue;
+            return Ok(());
         };
         let rest = || {
-            line.split_once(char::is_whitespace)
-                .map_or("", |(_, r)| r)
-                .trim()
-                .to_owned()
+            let rest = line.split_once(char::is_whitespace);
+            rest.map_or("", |(_, r)| r).trim().to_owned()
         };
         match first {
-            "name" => out.name = rest(),
-            "obj_file" => out.obj_file = rest(),
-            "material" => out.material = Some(rest()),
-            "basemesh" => out.base = rest(),
-            "z_depth" => out.z_depth = words.get(1).and_then(|w| w.parse().ok()).unwrap_or(0),
+            "name" => self.name = rest(),
+            "obj_file" => self.obj_file = rest(),
+            "material" => self.material = Some(rest()),
+            "basemesh" => self.base = rest(),
+            "z_depth" => self.z_depth = words.get(1).and_then(|w| w.parse().ok()).unwrap_or(0),
             "x_scale" | "y_scale" | "z_scale" => {
                 let axis = usize::from(first.as_bytes()[0] - b'x');
-                let (a, b) = (vertex(&words, 1), vertex(&words, 2));
-                let length = words
-                    .get(3)
-                    .and_then(|w| w.parse::<f32>().ok())
-                    .filter(|l| l.is_finite() && *l > 0.0);
-                match (a, b, length) {
-                    (Ok(a), Ok(b), Some(length)) => {
-                        out.scales[axis] = Some(Scale {
-                            vertices: [a, b],
-                            length,
-                        })
-                    }
-                    _ => {
-                        return Err(at(
-                            first,
-                            "two body vertices and a positive length are needed".into(),
-                        ));
-                    }
-                }
+                let why = "two body vertices and a positive length are needed";
+                let scale = axis_scale(&words).ok_or_else(|| (first.to_owned(), why.to_owned()))?;
+                self.scales[axis] = Some(scale);
             }
-            "verts" => part = Part::Vertices,
-            "delete_verts" => part = Part::Deleted,
-            _ if part == Part::Vertices && first.starts_with(|c: char| c.is_ascii_digit()) => {
-                out.bindings.push(
-                    binding(&words)
-                        .map_err(|why| at(&format!("vertex {}", out.bindings.len()), why))?,
-                );
+            "verts" => *section = MhcloSection::Vertices,
+            "delete_verts" => *section = MhcloSection::Deleted,
+            _ if *section == MhcloSection::Vertices
+                && first.starts_with(|c: char| c.is_ascii_digit()) =>
+            {
+                let binding = binding(&words);
+                let binding =
+                    binding.map_err(|why| (format!("vertex {}", self.bindings.len()), why))?;
+                self.bindings.push(binding);
             }
-            _ if part == Part::Deleted => {
-                deleted(&words, &mut out.deleted).map_err(|why| at("delete_verts", why))?;
+            _ if *section == MhcloSection::Deleted => {
+                deleted(&words, &mut self.deleted)
+                    .map_err(|why| ("delete_verts".to_owned(), why))?;
             }
             _ => {}
         }
+        Ok(())
     }
-    if out.obj_file.is_empty() {
-        return Err(FormatError::field(origin, "obj_file", "it is missing"));
-    }
-    if out.bindings.is_empty() {
-        return Err(FormatError::field(
-            origin,
-            "verts",
-            "no vertex is bound to the body",
-        ));
-    }
-    Ok(out)
+}
+
+fn axis_scale(words: &[&str]) -> Option<AxisScale> {
+    let length = words.get(3)?.parse::<f32>().ok();
+    Some(AxisScale {
+        vertices: [vertex(words, 1).ok()?, vertex(words, 2).ok()?],
+        length: length.filter(|l| l.is_finite() && *l > 0.0)?,
+    })
 }
 
 fn vertex(words: &[&str], k: usize) -> Result<u32, String> {
@@ -181,9 +175,9 @@ fn binding(words: &[&str]) -> Result<Binding, String> {
     })
 }
 
-/// Single numbers and ranges `a - b`.
+/// Appends vertex numbers and ranges `a - b`.
 fn deleted(words: &[&str], out: &mut Vec<u32>) -> Result<(), String> {
-    /// More vertices than this in a range are no body.
+    /// Longest range; longer ones exceed any body.
     const MOST: u32 = 1_000_000;
     let mut k = 0;
     while k < words.len() {
@@ -256,7 +250,7 @@ mod tests {
         0 1 2 0.5 0.25 0.25 0.1 0.2 0.3\n2\ndelete_verts\n0 - 2\n";
 
     #[test]
-    fn bound_vertices_follow_the_body_and_offsets_scale_with_it() {
+    fn bound_vertices_follow_the_body_with_scaled_offsets() {
         let m = parse_mhclo(TEXT, Path::new("hat.mhclo")).expect("valid");
         assert_eq!(
             (m.deleted.as_slice(), m.z_depth, m.base.as_str()),
@@ -264,7 +258,7 @@ mod tests {
         );
         let body = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]].map(P3::from);
         let p = m.fit(&body, Path::new("hat.mhclo")).expect("fits");
-        // The x distance is twice what it was: the x offset doubles.
+        // The x distance is twice the source length: the x offset doubles.
         assert_eq!(p[0], P3::new(1.0 + 0.2, 1.0 + 0.2, 0.3));
         assert_eq!(p[1], body[2]);
         let e = m

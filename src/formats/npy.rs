@@ -1,4 +1,4 @@
-//! Arrays of numbers as NumPy reads them.
+//! Arrays in NumPy's npy format.
 
 use super::FormatError;
 use npyz::WriterBuilder;
@@ -35,10 +35,10 @@ pub fn write_npy(
     writer.finish().map_err(io)
 }
 
-/// Reads an array of f16, f32 or f64 in C order: its shape and its values as f32.
+/// Reads an array of f16, f32 or f64 in C order: its shape, and its values as f32.
 ///
 /// # Errors
-/// When the file cannot be read, holds another type, or is cut.
+/// When the file cannot be read, holds another type, or is truncated.
 pub fn read_npy(path: &Path) -> Result<(Vec<u64>, Vec<f32>), FormatError> {
     let io = |e| FormatError::io(path, e);
     let bytes = std::fs::read(path).map_err(io)?;
@@ -104,7 +104,7 @@ pub fn read_npy(path: &Path) -> Result<(Vec<u64>, Vec<f32>), FormatError> {
     Ok((shape, values))
 }
 
-/// IEEE 754 binary16.
+/// Value of an IEEE 754 binary16 number.
 fn half(bits: u16) -> f32 {
     let sign = if bits & 0x8000 == 0 { 1.0 } else { -1.0 };
     let (exponent, fraction) = (

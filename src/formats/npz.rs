@@ -1,7 +1,7 @@
 //! Bodies in SMPL's npz layout: named numpy arrays in a zip.
 //!
-//! Every array is measured before it is read: the entry's stated size, the header's shape and the bytes that follow
-//! must agree, so that a broken or hostile file costs an error and no memory.
+//! The entry's stated size, the header's shape and the following bytes must agree before an array is read, so that a
+//! broken or hostile file costs an error and no memory.
 
 use super::FormatError;
 use npyz::{DType, NpyHeader, Order, TypeChar};
@@ -9,31 +9,31 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-/// No array of a body is larger: 55 joints × 50,000 vertices × 8 bytes is 22 MB, 300 shape directions of 10,475
-/// vertices (SMPL-X) are 75 MB.
+/// Largest array of a body, bytes: 55 joints × 50,000 vertices × 8 bytes is 22 MB, 300 shape directions of SMPL-X
+/// (10,475 vertices) are 75 MB.
 const MAX_ARRAY_BYTES: u64 = 512 << 20;
 
 /// The root's parent in SMPL's tables (−1 stored as u32).
 const NO_PARENT: i64 = 4_294_967_295;
 
-/// The arrays of an SMPL-layout body: shapes agree, numbers are finite and indices in range.
+/// Arrays of an SMPL-layout body: shapes agree, numbers are finite and indices in range.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SmplArrays {
-    /// `v_template`: rest vertices, metres, shape `[V]`.
+    /// `v_template`: rest vertices, metres, shape `(V)`.
     pub vertices: Vec<[f32; 3]>,
-    /// `f`: corners of each triangle, shape `[F]`.
+    /// `f`: corners of each triangle, shape `(F)`.
     pub faces: Vec<[u32; 3]>,
-    /// `weights`: skinning weights, row-major, shape `[V](J)`.
+    /// `weights`: skinning weights, row-major, shape `(V, J)`.
     pub weights: Vec<f32>,
     /// `kintree_table` row 0: parent of each joint, `None` for the root, shape `(J)`. Parents come first.
     pub parents: Vec<Option<usize>>,
     /// `J`, or `J_regressor · v_template`: rest joints, metres, shape `(J)`.
     pub joints: Vec<[f64; 3]>,
-    /// `J_regressor`: row-major, shape `(J)[V]`; empty when the file has none.
+    /// `J_regressor`: row-major, shape `(J, V)`; empty if absent.
     pub joint_regressor: Vec<f32>,
-    /// `shapedirs`: offsets per unit of each coefficient, metres, shape `[B][V]`; empty when the file has none.
+    /// `shapedirs`: offsets per unit of each coefficient, metres, shape `(B, V)`; empty if absent.
     pub shape_directions: Vec<Vec<[f32; 3]>>,
-    /// `joint_names`, shape `(J)`, or SMPL's own names when the file has none and has SMPL's number of joints.
+    /// `joint_names`, shape `(J)`; SMPL's own names if absent.
     pub joint_names: Vec<String>,
 }
 
@@ -65,13 +65,20 @@ pub const SMPL_JOINT_NAMES: [&str; 24] = [
     "right_hand",
 ];
 
-/// One array: its shape and its numbers in C order.
-struct Array<T> {
+/// Numbers of one array in C order.
+struct Array {
     shape: Vec<usize>,
-    data: Vec<T>,
+    data: Vec<f64>,
 }
 
-/// The zip and the name to blame.
+impl Array {
+    /// Length along a dimension; 0 if there is no such dimension.
+    fn side(&self, dimension: usize) -> usize {
+        self.shape.get(dimension).copied().unwrap_or(0)
+    }
+}
+
+/// The zip, and its path for errors.
 struct Archive<'a> {
     path: &'a Path,
     npz: npyz::npz::NpzArchive<BufReader<File>>,
@@ -82,7 +89,7 @@ impl Archive<'_> {
         FormatError::field(self.path, field, why)
     }
 
-    /// Header and payload of an entry, or `None` when there is no such array.
+    /// Header and payload of an entry; `None` if there is no such array.
     fn raw(&mut self, name: &str) -> Result<Option<(NpyHeader, Vec<u8>)>, FormatError> {
         let path = self.path;
         let fault = |why: String| FormatError::field(path, name, why);
@@ -100,7 +107,7 @@ impl Archive<'_> {
                 "{size} bytes, but no body array is larger than {MAX_ARRAY_BYTES}"
             )));
         }
-        // `take` and growing as bytes arrive: the stated size alone allocates nothing.
+        // The buffer grows as bytes arrive: the stated size alone allocates nothing.
         let mut bytes = Vec::new();
         let read = entry
             .take(size + 1)
@@ -109,7 +116,7 @@ impl Archive<'_> {
         if read as u64 != size {
             return Err(fault(format!("{read} bytes found, {size} announced")));
         }
-        // npyz allocates the header as long as it says it is; look before it does.
+        // npyz allocates the stated length of the header, so it is checked first.
         let header_end = match bytes.get(6..12) {
             Some([1, _, a, b, ..]) => 10 + u64::from(u16::from_le_bytes([*a, *b])),
             Some([_, _, a, b, c, d]) => 12 + u64::from(u32::from_le_bytes([*a, *b, *c, *d])),
@@ -145,7 +152,7 @@ impl Archive<'_> {
     }
 
     /// Numbers of any plain type as f64.
-    fn numbers(&mut self, name: &str) -> Result<Option<Array<f64>>, FormatError> {
+    fn numbers(&mut self, name: &str) -> Result<Option<Array>, FormatError> {
         let Some((header, bytes)) = self.raw(name)? else {
             return Ok(None);
         };
@@ -184,11 +191,6 @@ impl Archive<'_> {
             data
         };
         Ok(Some(Array { shape, data }))
-    }
-
-    fn required(&mut self, name: &str) -> Result<Array<f64>, FormatError> {
-        self.numbers(name)?
-            .ok_or_else(|| self.fault(name, "missing; an SMPL-layout body needs it"))
     }
 
     /// A numpy array of unicode strings (`<U`).
@@ -256,120 +258,117 @@ pub fn read_smpl(path: impl AsRef<Path>) -> Result<SmplArrays, FormatError> {
     let path = path.as_ref();
     let npz = npyz::npz::NpzArchive::open(path).map_err(|e| FormatError::io(path, e))?;
     let mut a = Archive { path, npz };
-    let expect = |name: &str, shape: &[usize], wanted: &[usize]| {
-        if shape == wanted {
-            return Ok(());
-        }
-        Err(FormatError::field(
-            path,
-            name,
-            format!("shape {shape:?}, expected {wanted:?}"),
-        ))
-    };
-    let triple = |c: &[f64; 3]| c.map(|x| x as f32);
-
-    let v = a.required("v_template")?;
-    let n = v.shape.first().copied().unwrap_or(0);
-    expect("v_template", &v.shape, &[n, 3])?;
-    let vertices: Vec<[f32; 3]> = v.data.as_chunks::<3>().0.iter().map(triple).collect();
-
-    let f = a.required("f")?;
-    expect("f", &f.shape, &[f.shape.first().copied().unwrap_or(0), 3])?;
-    if let Some(i) = f.data.iter().position(|&i| i < 0.0 || i >= n as f64) {
-        return Err(a.fault(
-            "f",
-            format!("face {} names vertex {} of {n}", i / 3, f.data[i]),
-        ));
-    }
-    let faces = f
-        .data
-        .as_chunks::<3>()
-        .0
-        .iter()
-        .map(|c| c.map(|i| i as u32))
-        .collect();
-
-    let tree = a.required("kintree_table")?;
-    let j = tree.shape.get(1).copied().unwrap_or(0);
-    expect("kintree_table", &tree.shape, &[2, j])?;
-    if j == 0 || j > usize::from(u8::MAX) {
-        return Err(a.fault(
-            "kintree_table",
-            format!("{j} joints; 1 to 255 are supported"),
-        ));
-    }
-    let parents = (0..j)
-        .map(|k| match tree.data[k] as i64 {
-            NO_PARENT | -1 if k == 0 => Ok(None),
-            p if k > 0 && (0..k as i64).contains(&p) => Ok(Some(p as usize)),
-            p => Err(a.fault(
-                "kintree_table",
-                format!("joint {k} has parent {p}; parents come before children"),
-            )),
-        })
-        .collect::<Result<Vec<_>, _>>()?;
-
-    let w = a.required("weights")?;
-    expect("weights", &w.shape, &[n, j])?;
-    let weights = w.data.iter().map(|x| *x as f32).collect();
-
-    let joint_regressor: Vec<f32> = match a.numbers("J_regressor")? {
-        None => Vec::new(),
-        Some(r) => {
-            expect("J_regressor", &r.shape, &[j, n])?;
-            r.data.iter().map(|x| *x as f32).collect()
-        }
-    };
-    let joints: Vec<[f64; 3]> = match a.numbers("J")? {
-        Some(q) => {
-            expect("J", &q.shape, &[j, 3])?;
-            q.data.as_chunks::<3>().0.to_vec()
-        }
+    let vertices = a.template()?;
+    let faces = a.faces(vertices.len())?;
+    let parents = a.parents()?;
+    let (n, j) = (vertices.len(), parents.len());
+    let weights = a.shaped("weights", &[n, j])?;
+    let weights = weights.ok_or_else(|| a.missing("weights"))?;
+    let regressor = a.shaped("J_regressor", &[j, n])?.unwrap_or_default();
+    let joint_regressor: Vec<f32> = regressor.iter().map(|x| *x as f32).collect();
+    let joints = match a.shaped("J", &[j, 3])? {
+        Some(joints) => joints.as_chunks::<3>().0.to_vec(),
         None if joint_regressor.is_empty() => {
             return Err(a.fault("J", "neither `J` nor `J_regressor` is there"));
         }
         None => regress(&joint_regressor, &vertices),
     };
-    let shape_directions = match a.numbers("shapedirs")? {
-        None => Vec::new(),
-        Some(s) => {
-            let b = s.shape.get(2).copied().unwrap_or(0);
-            expect("shapedirs", &s.shape, &[n, 3, b])?;
-            let at = |d: usize, i: usize, c: usize| s.data[(i * 3 + c) * b + d] as f32;
-            (0..b)
-                .map(|d| (0..n).map(|i| [0, 1, 2].map(|c| at(d, i, c))).collect())
-                .collect()
-        }
-    };
-    let joint_names = match a.strings("joint_names")? {
-        Some(names) if names.len() == j => names,
-        Some(names) => {
-            return Err(a.fault(
-                "joint_names",
-                format!("{} names for {j} joints", names.len()),
-            ));
-        }
-        None => (0..j)
-            .map(|k| {
-                SMPL_JOINT_NAMES
-                    .get(k)
-                    .map_or_else(|| format!("joint_{k}"), |s| (*s).into())
-            })
-            .collect(),
-    };
     Ok(SmplArrays {
-        vertices,
         faces,
-        weights,
-        parents,
+        weights: weights.iter().map(|x| *x as f32).collect(),
         joints,
         joint_regressor,
-        shape_directions,
-        joint_names,
+        shape_directions: a.shape_directions(n)?,
+        joint_names: a.joint_names(j)?,
+        vertices,
+        parents,
     })
 }
 
-/// `regressor · points`, shape `(J)` for a row-major regressor of shape `(J)[points]`.
+impl Archive<'_> {
+    fn missing(&self, name: &str) -> FormatError {
+        self.fault(name, "missing; an SMPL-layout body needs it")
+    }
+    fn required(&mut self, name: &str) -> Result<Array, FormatError> {
+        self.numbers(name)?.ok_or_else(|| self.missing(name))
+    }
+    fn expect_shape(&self, name: &str, a: &Array, wanted: &[usize]) -> Result<(), FormatError> {
+        if a.shape == wanted {
+            return Ok(());
+        }
+        let shape = &a.shape;
+        Err(self.fault(name, format!("shape {shape:?}, expected {wanted:?}")))
+    }
+    /// Numbers of an array of this shape; `None` if there is no such array.
+    fn shaped(&mut self, name: &str, wanted: &[usize]) -> Result<Option<Vec<f64>>, FormatError> {
+        let Some(array) = self.numbers(name)? else {
+            return Ok(None);
+        };
+        self.expect_shape(name, &array, wanted)?;
+        Ok(Some(array.data))
+    }
+    fn template(&mut self) -> Result<Vec<[f32; 3]>, FormatError> {
+        let v = self.required("v_template")?;
+        self.expect_shape("v_template", &v, &[v.side(0), 3])?;
+        let points = v.data.as_chunks::<3>().0.iter();
+        Ok(points.map(|p| p.map(|x| x as f32)).collect())
+    }
+    fn faces(&mut self, vertices: usize) -> Result<Vec<[u32; 3]>, FormatError> {
+        let f = self.required("f")?;
+        self.expect_shape("f", &f, &[f.side(0), 3])?;
+        let bad = |i: &f64| *i < 0.0 || *i >= vertices as f64;
+        if let Some(i) = f.data.iter().position(bad) {
+            let why = format!("face {} names vertex {} of {vertices}", i / 3, f.data[i]);
+            return Err(self.fault("f", why));
+        }
+        let faces = f.data.as_chunks::<3>().0.iter();
+        Ok(faces.map(|c| c.map(|i| i as u32)).collect())
+    }
+    fn parents(&mut self) -> Result<Vec<Option<usize>>, FormatError> {
+        const NAME: &str = "kintree_table";
+        let tree = self.required(NAME)?;
+        let j = tree.side(1);
+        self.expect_shape(NAME, &tree, &[2, j])?;
+        if j == 0 || j > usize::from(u8::MAX) {
+            return Err(self.fault(NAME, format!("{j} joints; 1 to 255 are supported")));
+        }
+        let parent = |k: usize| match tree.data[k] as i64 {
+            NO_PARENT | -1 if k == 0 => Ok(None),
+            p if k > 0 && (0..k as i64).contains(&p) => Ok(Some(p as usize)),
+            p => {
+                let why = format!("joint {k} has parent {p}; parents come before children");
+                Err(self.fault(NAME, why))
+            }
+        };
+        (0..j).map(parent).collect()
+    }
+    fn shape_directions(&mut self, vertices: usize) -> Result<Vec<Vec<[f32; 3]>>, FormatError> {
+        let Some(s) = self.numbers("shapedirs")? else {
+            return Ok(Vec::new());
+        };
+        let count = s.side(2);
+        self.expect_shape("shapedirs", &s, &[vertices, 3, count])?;
+        let at = |d: usize, i: usize| [0, 1, 2].map(|c| s.data[(i * 3 + c) * count + d] as f32);
+        let direction = |d: usize| (0..vertices).map(|i| at(d, i)).collect();
+        Ok((0..count).map(direction).collect())
+    }
+    fn joint_names(&mut self, joints: usize) -> Result<Vec<String>, FormatError> {
+        if let Some(names) = self.strings("joint_names")? {
+            if names.len() != joints {
+                let why = format!("{} names for {joints} joints", names.len());
+                return Err(self.fault("joint_names", why));
+            }
+            return Ok(names);
+        }
+        let name = |k: usize| {
+            let known = SMPL_JOINT_NAMES.get(k);
+            known.map_or_else(|| format!("joint_{k}"), |s| (*s).into())
+        };
+        Ok((0..joints).map(name).collect())
+    }
+}
+
+/// Product `regressor · points`, shape `(J)`, of a row-major regressor of shape `(J, points)`.
 pub fn regress(regressor: &[f32], points: &[[f32; 3]]) -> Vec<[f64; 3]> {
     let row = |r: &[f32]| {
         let mut sum = [0.0; 3];
@@ -426,7 +425,7 @@ mod tests {
     }
 
     #[test]
-    fn a_small_body_reads_and_faults_are_named() {
+    fn a_minimal_body_reads_and_faults_are_named() {
         let dir = tempfile::tempdir().expect("dir");
         let ok = read_smpl(write(dir.path(), "none", &[], &[])).expect("valid");
         assert_eq!(

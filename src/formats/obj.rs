@@ -1,6 +1,7 @@
-//! Wavefront OBJ: positions, texture coordinates, polygons. Materials and groups are read over.
+//! Wavefront OBJ: positions, texture coordinates, polygons. Materials and groups are ignored.
 
 use super::FormatError;
+use super::image::read_limited;
 use crate::math::P3;
 use crate::mesh::{Face, TriMesh};
 use std::fmt::Write as _;
@@ -9,20 +10,20 @@ use std::path::Path;
 /// Largest OBJ file that is read, bytes; a garment of 100,000 vertices takes about 12 MB.
 const MAX_BYTES: u64 = 512 << 20;
 
-/// A mesh as an OBJ file holds it: corners index positions and texture coordinates separately.
+/// Mesh of an OBJ file: corners index positions and texture coordinates separately.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ObjMesh {
     /// Positions and triangles (polygons are fanned), checked.
     pub mesh: TriMesh,
     /// Texture coordinates, in the order of the file.
     pub uv: Vec<[f32; 2]>,
-    /// Texture coordinate of each corner, shape `[faces]`; empty when any corner has none.
+    /// Texture coordinate of each corner, shape `[faces]`; empty if a corner has none.
     pub face_uv: Vec<Face>,
 }
 
 impl ObjMesh {
-    /// One vertex for each pair of position and texture coordinate, for drawing: vertices, their uv (zero without),
-    /// faces, and the position under each vertex.
+    /// Mesh with one vertex for each pair of position and texture coordinate: vertices, their uv (zero if absent),
+    /// faces, and the position index of each vertex.
     pub fn unwelded(&self) -> (Vec<P3>, Vec<[f32; 2]>, Vec<Face>, Vec<u32>) {
         if self.face_uv.is_empty() {
             let v = self.mesh.vertices().to_vec();
@@ -54,24 +55,16 @@ impl ObjMesh {
 /// Reads an OBJ file.
 ///
 /// # Errors
-/// Names the line and what is wrong on it: a number that is none, an index outside the file's vertices, a polygon
-/// with fewer than three corners or a repeated one.
+/// Names the line and its fault: a malformed number, an index out of range, a polygon with fewer than three corners or
+/// a repeated one.
 pub fn read_obj(path: &Path) -> Result<ObjMesh, FormatError> {
-    let size = std::fs::metadata(path)
-        .map_err(|e| FormatError::io(path, e))?
-        .len();
-    if size > MAX_BYTES {
-        return Err(FormatError::field(
-            path,
-            "size",
-            format!("{size} bytes; at most {MAX_BYTES} are read"),
-        ));
-    }
-    let text = std::fs::read_to_string(path).map_err(|e| FormatError::io(path, e))?;
+    let bytes = read_limited(path, MAX_BYTES)?;
+    let text = String::from_utf8(bytes);
+    let text = text.map_err(|_| FormatError::field(path, "text", "it is not UTF-8"))?;
     parse_obj(&text, path)
 }
 
-/// Reads OBJ text; `origin` is named in errors.
+/// Parses OBJ text; `origin` is named in errors.
 ///
 /// # Errors
 /// As [`read_obj`].
@@ -151,7 +144,7 @@ fn numbers<'a, const N: usize>(words: impl Iterator<Item = &'a str>) -> Result<[
     Ok(out)
 }
 
-/// OBJ counts from 1; negative numbers count back from the last element so far.
+/// Index of an element: OBJ counts from 1, negative numbers count back from the last element so far.
 fn index(word: Option<&str>, count: usize) -> Result<u32, String> {
     let word = word.unwrap_or("");
     let i: i64 = word
@@ -166,7 +159,7 @@ fn index(word: Option<&str>, count: usize) -> Result<u32, String> {
     u32::try_from(at).map_err(|_| format!("index {i} is too large"))
 }
 
-/// Writes positions, faces and, where given, one texture coordinate a vertex.
+/// Writes positions, faces and, if given, one texture coordinate a vertex.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -212,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn seams_in_texture_space_split_vertices() {
+    fn texture_seams_split_vertices() {
         let m = parse(&format!(
             "{QUAD}vt 0 0\nvt 1 0\nvt 1 1\nvt 5 5\nf 1/1 2/2 3/3\nf 1/4 3/3 4/1"
         ))
@@ -254,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn writing_and_reading_gives_the_same_mesh() {
+    fn written_meshes_read_back() {
         let dir = tempfile::tempdir().expect("temporary folder");
         let path = dir.path().join("m.obj");
         let m = parse(&format!("{QUAD}f 1 2 3 4")).expect("valid");
@@ -267,7 +260,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_text_is_read_or_refused(text in "[vft0-9 ./\\-e\n]{0,200}") {
+        fn random_text_never_panics(text in "[vft0-9 ./\\-e\n]{0,200}") {
             let _ = parse(&text);
         }
     }

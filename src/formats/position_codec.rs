@@ -1,8 +1,8 @@
-//! Positions of a moving mesh on the wire: whole steps of 0.2 mm, differences from what both ends expect, then zstd.
+//! Positions of a moving mesh on the wire: quantised to 0.2 mm, predicted at both ends, then zstd.
 //!
-//! What is expected: where a vertex would be had it moved as before (order 2), stood still (order 1), or nothing
-//! (order 0, a keyframe). What a vertex differs from its expectation is much what its neighbour differs, so only the
-//! difference to the neighbour is coded. All arithmetic is on integers: nothing adds up over time.
+//! Prediction: constant velocity (order 2), the last position (order 1), or none (order 0, a keyframe). Residuals of
+//! neighbours are similar, so the code is the difference of a vertex's residual to that of a neighbour. All arithmetic
+//! is on integers: errors do not accumulate.
 //!
 //! Layout: one byte with the order; one zstd frame of LEB128 numbers, zigzag-coded, all x, then all y, then all z.
 
@@ -11,30 +11,31 @@ use crate::math::P3;
 use crate::mesh::Face;
 use std::path::Path;
 
-/// One step of the coded positions, metres; readers see a vertex within half of it along each axis.
+/// Quantisation step of the coded positions, metres; decoded vertices are within half of it along each axis.
 pub const STEP: f64 = 2e-4;
-/// Farthest coordinate, metres: farther away lies a mistake, and steps would no longer be told apart in f32.
+/// Largest coordinate, metres: beyond it f32 does not resolve a step.
 const FARTHEST: f32 = 1e3;
 /// Zstd's fastest regular level.
 const LEVEL: i32 = 1;
 /// Most bytes of one LEB128 number of 32 bits.
 const LONGEST: usize = 5;
-/// What errors are said to come from.
+/// Origin in errors.
 const BYTES: &str = "position bytes";
 
+/// Position in steps.
 type Steps = [i32; 3];
 
-/// One end of a stream of positions of one mesh. Both ends start new with each keyframe.
+/// One end of a stream of positions of one mesh. Both ends start anew with each keyframe.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PositionCoder {
-    /// A neighbour with a smaller index, whose error is expected; itself where there is none.
+    /// Neighbour with a smaller index, whose residual is the prediction; the vertex itself if there is none.
     neighbour: Vec<u32>,
-    /// The newest positions first; as many as are known.
+    /// Up to two last positions, newest first.
     past: Vec<Vec<Steps>>,
 }
 
 impl PositionCoder {
-    /// For a mesh of `vertices` vertices; faces with an index beyond them are ignored.
+    /// Coder of a mesh of `vertices` vertices; faces with an index out of range are ignored.
     pub fn new(vertices: usize, faces: &[Face]) -> Self {
         let mut neighbour: Vec<u32> = (0..vertices as u32).collect();
         for f in faces
@@ -61,7 +62,7 @@ impl PositionCoder {
     /// Codes the next positions, metres, shape `[vertices]`.
     ///
     /// # Errors
-    /// Names the vertex that is not finite or too far away, or says that the count is wrong; the stream can go on.
+    /// Names the vertex that is not finite or too far away, or the wrong count; the stream can continue.
     pub fn encode(&mut self, positions: &[P3]) -> Result<Vec<u8>, FormatError> {
         let fault = |field: String, why: String| FormatError::field(Path::new(BYTES), field, why);
         if positions.len() != self.vertices() {
@@ -97,17 +98,17 @@ impl PositionCoder {
         }
         let mut out = vec![0; 1 + zstd::zstd_safe::compress_bound(numbers.len())];
         out[0] = order as u8;
-        // The buffer has zstd's own bound, so the only failure left is out of memory; decoding then says so.
+        // The buffer has zstd's own bound, so only out of memory can fail; decoding then reports it.
         let written = zstd::bulk::compress_to_buffer(&numbers, &mut out[1..], LEVEL).unwrap_or(0);
         out.truncate(1 + written);
         self.remember(steps);
         Ok(out)
     }
 
-    /// The positions that were coded, within half a [`STEP`] along each axis.
+    /// Decodes positions, within half a [`STEP`] along each axis.
     ///
     /// # Errors
-    /// Damaged or missing data, or data that builds on positions that were never received; the stream cannot go on.
+    /// Damaged or missing data, or data predicted from positions that were never received; the stream cannot continue.
     pub fn decode(&mut self, bytes: &[u8]) -> Result<Vec<P3>, FormatError> {
         let fault = |field: &str, why: String| FormatError::field(Path::new(BYTES), field, why);
         let Some((&order, data)) = bytes.split_first() else {
@@ -126,20 +127,19 @@ impl PositionCoder {
             .map_err(|e| fault("data", format!("damaged, cut short or too long ({e})")))?;
         let mut numbers = numbers.into_iter();
         let mut steps = vec![[0; 3]; n];
-        // Differences from what was expected, of all vertices so far.
-        let mut off = vec![[0i32; 3]; n];
+        let mut residual = vec![[0i32; 3]; n];
         for k in 0..3 {
             for i in 0..n {
                 let z = leb128(&mut numbers)
                     .ok_or_else(|| fault("data", format!("vertex {i}: no number")))?;
                 let d = (z >> 1) as i32 ^ -((z & 1) as i32);
                 let nb = self.neighbour[i] as usize;
-                off[i][k] = if nb == i {
+                residual[i][k] = if nb == i {
                     d
                 } else {
-                    d.wrapping_add(off[nb][k])
+                    d.wrapping_add(residual[nb][k])
                 };
-                steps[i][k] = off[i][k].wrapping_add(self.expected(i, k, order));
+                steps[i][k] = residual[i][k].wrapping_add(self.predicted(i, k, order));
             }
         }
         if numbers.next().is_some() {
@@ -153,7 +153,8 @@ impl PositionCoder {
         Ok(positions)
     }
 
-    fn expected(&self, i: usize, k: usize, order: usize) -> i32 {
+    /// Predicted coordinate `k` of vertex `i`, steps.
+    fn predicted(&self, i: usize, k: usize, order: usize) -> i32 {
         match (order, self.past.first(), self.past.get(1)) {
             (1, Some(last), _) => last[i][k],
             (2, Some(last), Some(before)) => last[i][k].wrapping_mul(2).wrapping_sub(before[i][k]),
@@ -161,16 +162,17 @@ impl PositionCoder {
         }
     }
 
+    /// Residuals less those of the neighbours, all x, then y, then z.
     fn differences(&self, steps: &[Steps], order: usize) -> Vec<i32> {
-        let off = |i: usize, k: usize| steps[i][k].wrapping_sub(self.expected(i, k, order));
+        let residual = |i: usize, k: usize| steps[i][k].wrapping_sub(self.predicted(i, k, order));
         let mut out = Vec::with_capacity(3 * steps.len());
         for k in 0..3 {
             for (i, &nb) in self.neighbour.iter().enumerate() {
                 let nb = nb as usize;
                 out.push(if nb == i {
-                    off(i, k)
+                    residual(i, k)
                 } else {
-                    off(i, k).wrapping_sub(off(nb, k))
+                    residual(i, k).wrapping_sub(residual(nb, k))
                 });
             }
         }
@@ -183,6 +185,7 @@ impl PositionCoder {
     }
 }
 
+/// Next LEB128 number; `None` if it is missing or too long.
 fn leb128(bytes: &mut impl Iterator<Item = u8>) -> Option<u32> {
     let mut value = 0;
     for shift in (0..LONGEST).map(|i| 7 * i) {
@@ -225,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn what_arrives_is_within_half_a_step_and_small() {
+    fn decoded_positions_are_within_half_a_step_and_code_is_small() {
         let (n, faces) = (500, strip(500));
         let (mut tx, mut rx) = (
             PositionCoder::new(1000, &faces),
@@ -247,14 +250,14 @@ mod tests {
             );
             sizes.push(bytes.len());
         }
-        assert_eq!(tx, rx, "both ends know the same");
+        assert_eq!(tx, rx, "both ends have the same state");
         let later = sizes[2..].iter().sum::<usize>() as f64 / (58.0 * 1000.0);
         assert!(
             later < 2.0 && sizes[0] < 4000,
             "{later} bytes a vertex, the first {}",
             sizes[0]
         );
-        // Who stands still costs next to nothing.
+        // A still mesh costs next to nothing.
         let p = waving(n, 2.0);
         tx.encode(&p).expect("coded");
         assert!(tx.encode(&p).expect("coded").len() < 40);
@@ -300,7 +303,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn anything_finite_survives(jumps in prop::collection::vec(prop::collection::vec(-900f32..900.0, 12), 1..6)) {
+        fn finite_positions_survive_the_round_trip(jumps in prop::collection::vec(prop::collection::vec(-900f32..900.0, 12), 1..6)) {
             let faces = [[0, 1, 2], [1, 3, 2]];
             let (mut tx, mut rx) = (PositionCoder::new(4, &faces), PositionCoder::new(4, &faces));
             for j in jumps {

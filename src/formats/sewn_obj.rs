@@ -1,4 +1,4 @@
-//! OBJ files of sewn garments (Codim-IPC's): `stitch V A B T` lines tie vertex V to the point T of the way from A to B.
+//! OBJ files of sewn garments (Codim-IPC): a `stitch V A B T` line ties vertex V to the point A + T·(B − A).
 //! Unlike faces, stitches count vertices from 0.
 
 use super::FormatError;
@@ -16,16 +16,16 @@ pub struct Stitch {
     pub vertex: u32,
     /// Ends of the edge.
     pub edge: [u32; 2],
-    /// Share of the way from the first end to the second, 0 to 1.
+    /// Parameter of the point on the edge, 0 at the first end to 1 at the second.
     pub at: f32,
 }
 
-/// A mesh of flat panels and what sews them.
+/// Mesh of flat panels and its stitches.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SewnObj {
-    /// Positions, faces and texture coordinates; with these the rest shape is flat.
+    /// Positions, faces and texture coordinates; texture coordinates give the flat rest shape.
     pub obj: ObjMesh,
-    /// Stitches, in the order of the file; empty for a mesh that is not sewn.
+    /// Stitches, in the order of the file; empty for a mesh without stitches.
     pub stitches: Vec<Stitch>,
 }
 
@@ -40,7 +40,7 @@ pub fn read_sewn_obj(path: &Path) -> Result<SewnObj, FormatError> {
     )
 }
 
-/// Reads OBJ text with its stitches; `origin` is named in errors.
+/// Parses OBJ text with its stitches; `origin` is named in errors.
 ///
 /// # Errors
 /// As [`parse_obj`]; a stitch at fault is named by its line.
@@ -86,7 +86,7 @@ mod tests {
     const TEXT: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nf 1 2 3\nf 4 5 6\nstitch 3 0 1 0.25\n";
 
     #[test]
-    fn stitches_are_read_and_faults_named() {
+    fn stitches_read_and_faults_are_named() {
         let parse = |t: &str| parse_sewn_obj(t, Path::new("d.obj")).map_err(|e| e.to_string());
         assert_eq!(
             parse(TEXT).expect("valid").stitches,

@@ -1,4 +1,4 @@
-//! What can be wrong with a garment, and where.
+//! Error of a pattern or garment.
 
 /// A fault in a pattern or garment, naming the panel, edge, seam or vertex.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -8,7 +8,7 @@ pub enum GarmentError {
     UnknownGarment {
         /// The name asked for.
         name: String,
-        /// What exists.
+        /// Known names.
         known: String,
     },
     /// A size label that does not exist.
@@ -19,7 +19,7 @@ pub enum GarmentError {
     Panel {
         /// Panel name.
         panel: String,
-        /// What is wrong.
+        /// The fault.
         why: String,
     },
     /// An edge of a panel at fault.
@@ -29,7 +29,7 @@ pub enum GarmentError {
         panel: String,
         /// Edge name.
         edge: String,
-        /// What is wrong.
+        /// The fault.
         why: String,
     },
     /// A seam at fault.
@@ -37,7 +37,7 @@ pub enum GarmentError {
     Seam {
         /// Number of the seam in the pattern.
         seam: usize,
-        /// What is wrong.
+        /// The fault.
         why: String,
     },
     /// A vertex of the triangulated garment at fault.
@@ -45,7 +45,7 @@ pub enum GarmentError {
     Vertex {
         /// Vertex number.
         vertex: usize,
-        /// What is wrong.
+        /// The fault.
         why: String,
     },
     /// A triangle of the garment at fault.
@@ -53,7 +53,7 @@ pub enum GarmentError {
     Face {
         /// Triangle number.
         face: usize,
-        /// What is wrong.
+        /// The fault.
         why: String,
     },
     /// A field of a material, pattern or setting at fault.
@@ -61,7 +61,7 @@ pub enum GarmentError {
     Field {
         /// Field name.
         field: String,
-        /// What is wrong.
+        /// The fault.
         why: String,
     },
     /// The sewn mesh is not a proper surface.

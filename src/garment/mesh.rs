@@ -1,25 +1,29 @@
-//! A pattern sewn: one welded simulation mesh whose triangles keep their flat rest shape.
+//! Sewn garment: one welded simulation mesh whose triangles keep their flat rest shape.
 
 use super::triangulate::{PanelMesh, triangulate};
-use super::{GarmentError, GarmentKind, Material, Panel, Pattern, Placement, Side, Size};
+use super::union_find::UnionFind;
+use super::{Anchor, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, Side, Size};
 use crate::math::P3;
 use crate::mesh::{Face, Topology, TriMesh};
 use serde::{Deserialize, Serialize};
 
-/// How finely to triangulate.
+/// Gap between panels in texture space, metres.
+const TEXTURE_GAP: f64 = 0.02;
+
+/// Settings of the triangulation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Triangulation {
     /// Target edge length, metres.
     pub edge_length: f64,
-    /// Longest edges of a hood, metres: worn down it lies in folds that longer ones cannot show.
+    /// Longest edges of a hood, metres: longer ones do not resolve the folds of a hood worn down.
     pub hood_length: f64,
-    /// Refuse a panel with a smaller angle than this, degrees.
+    /// Smallest angle of a panel, degrees; a panel with a smaller one is refused.
     pub min_angle: f64,
 }
 
 impl Default for Triangulation {
     fn default() -> Self {
-        // 21 mm gives a T-shirt or a skirt about 2,000 vertices; the library's panels stay above 20°.
+        // 21 mm gives a T-shirt or a skirt about 2,000 vertices; the panels of the library stay above 20°.
         Self {
             edge_length: 0.021,
             hood_length: 0.014,
@@ -28,7 +32,28 @@ impl Default for Triangulation {
     }
 }
 
-/// Parts of the body a vertex touches, as bits.
+impl Triangulation {
+    /// Shortest and longest edge length, metres.
+    const LENGTHS: [f64; 2] = [0.001, 0.5];
+
+    fn check(&self) -> Result<(), GarmentError> {
+        let [least, most] = Self::LENGTHS;
+        for (field, length) in [
+            ("edge_length", self.edge_length),
+            ("hood_length", self.hood_length),
+        ] {
+            if !(length > least && length < most) {
+                return Err(GarmentError::Field {
+                    field: field.into(),
+                    why: format!("{length} m is not between {least} and {most}"),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Set of body parts that a vertex touches, as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Region(pub u8);
@@ -44,21 +69,21 @@ impl Region {
     pub const LEFT_LEG: Self = Self(8);
     /// Right leg and foot.
     pub const RIGHT_LEG: Self = Self(16);
-    /// Everything.
+    /// All parts.
     pub const ALL: Self = Self(31);
 
-    /// Both.
+    /// Union.
     pub const fn with(self, o: Self) -> Self {
         Self(self.0 | o.0)
     }
     /// Both arms.
     pub const ARMS: Self = Self::LEFT_ARM.with(Self::RIGHT_ARM);
-    /// Has a part in common.
+    /// True for a part in common.
     pub fn meets(self, o: Self) -> bool {
         self.0 & o.0 != 0
     }
-    /// The parts whose skin decides for cloth that touches these: where a sleeve meets the trunk, the trunk. Its arm
-    /// counts as another part there, so that an armpit that closes is known to be closed.
+    /// Parts whose skin governs contact of cloth that touches these: at the seam of sleeve and trunk, the trunk.
+    /// The arm counts as another part there, so that a closed armpit is detected.
     pub fn decisive(self) -> Self {
         if self.meets(Self::TRUNK) {
             Self(self.0 & !Self::ARMS.0)
@@ -66,7 +91,7 @@ impl Region {
             self
         }
     }
-    /// What a panel wraps.
+    /// Parts that a panel covers.
     pub fn of(p: Placement) -> Self {
         match p {
             Placement::TrunkFront
@@ -86,7 +111,7 @@ impl Region {
     }
 }
 
-/// How a set of anchors is tied to the body.
+/// Attachment of a set of anchors to the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AnchorKind {
     /// A band around the body: its vertices are spread evenly before they are tied.
@@ -108,18 +133,18 @@ impl AnchorKind {
     }
 }
 
-/// Vertices that are tied to the body.
+/// Vertices attached to the body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AnchorSet {
-    /// How they are tied.
+    /// Attachment of the vertices.
     pub kind: AnchorKind,
     /// Simulation vertices.
     pub vertices: Vec<u32>,
-    /// How firmly, 0 to 1.
+    /// Strength, 0 to 1.
     pub strength: f64,
 }
 
-/// The mesh for drawing: panels keep their own vertices along seams, so that textures don't smear across them.
+/// Mesh for rendering: panels keep their own vertices along seams, so that textures do not smear across them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RenderMesh {
     /// Simulation vertex under each render vertex, shape `[render vertices]`.
@@ -130,14 +155,14 @@ pub struct RenderMesh {
     pub faces: Vec<Face>,
 }
 
-/// A sewn garment, ready to be put on.
+/// Sewn garment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GarmentMesh {
     /// Garment name.
     pub name: String,
-    /// What it is.
+    /// Kind of garment.
     pub kind: GarmentKind,
-    /// Its size.
+    /// Letter size.
     pub size: Size,
     /// Fabric.
     pub material: Material,
@@ -153,7 +178,7 @@ pub struct GarmentMesh {
     pub face_panel: Vec<u16>,
     /// Panel names.
     pub panels: Vec<String>,
-    /// Where each panel goes.
+    /// Place of each panel.
     pub placements: Vec<Placement>,
     /// Panels and panel coordinates that meet in each simulation vertex (more than one along seams).
     pub corners: Vec<Vec<(u16, [f64; 2])>>,
@@ -161,14 +186,80 @@ pub struct GarmentMesh {
     pub uv: Vec<[f32; 2]>,
     /// Parts of the body each vertex belongs to.
     pub regions: Vec<Region>,
-    /// What hangs on the body.
+    /// Vertices attached to the body.
     pub anchors: Vec<AnchorSet>,
-    /// Pairs of simulation vertices along the seams, for drawing the stitches.
+    /// Pairs of simulation vertices along the seams, for rendering the stitches.
     pub seams: Vec<[u32; 2]>,
-    /// The mesh for drawing.
+    /// Mesh for rendering.
     pub render: RenderMesh,
     /// Smallest angle of all rest triangles, degrees.
     pub min_angle: f64,
+}
+
+/// Panels sewn: the simulation vertex of every panel vertex.
+struct Sewn {
+    meshes: Vec<PanelMesh>,
+    /// First vertex of each panel, counting all panels' vertices.
+    first: Vec<usize>,
+    /// Simulation vertex of each panel vertex.
+    welded: Vec<u32>,
+    /// Simulation vertices.
+    vertices: usize,
+    /// Panel vertices along one side of each seam, in pairs.
+    seams: Vec<[usize; 2]>,
+}
+
+impl Sewn {
+    fn new(pattern: &Pattern, meshes: Vec<PanelMesh>) -> Self {
+        let mut total = 0;
+        let mut first = Vec::with_capacity(meshes.len());
+        for m in &meshes {
+            first.push(total);
+            total += m.points.len();
+        }
+        let mut sets = UnionFind::new(total);
+        let mut seams = Vec::new();
+        for ((pa, ea), (pb, eb), reversed) in pattern.sewn() {
+            let mut other = meshes[pb].edges[eb].clone();
+            if reversed {
+                other.reverse();
+            }
+            let mut last = None;
+            for (&i, &j) in meshes[pa].edges[ea].iter().zip(&other) {
+                let at = first[pa] + i as usize;
+                sets.join(at as u32, (first[pb] + j as usize) as u32);
+                if let Some(l) = last.replace(at) {
+                    seams.push([l, at]);
+                }
+            }
+        }
+        let (welded, vertices) = sets.number();
+        Self {
+            meshes,
+            first,
+            welded,
+            vertices,
+            seams,
+        }
+    }
+
+    /// Simulation vertices of the edges of an anchor, sorted.
+    fn anchor(&self, pattern: &Pattern, a: &Anchor) -> AnchorSet {
+        let edges = a.edges.iter().filter_map(|r| pattern.find(r));
+        let mut vertices: Vec<u32> = edges
+            .flat_map(|(p, e)| {
+                let points = self.meshes[p].edges[e].iter();
+                points.map(move |&i| self.welded[self.first[p] + i as usize])
+            })
+            .collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        AnchorSet {
+            kind: AnchorKind::of_pattern(&a.name),
+            vertices,
+            strength: a.strength,
+        }
+    }
 }
 
 impl GarmentMesh {
@@ -178,46 +269,11 @@ impl GarmentMesh {
     /// Faults of the pattern or of its triangulation, naming panel, edge or seam.
     pub fn sew(pattern: &Pattern, how: &Triangulation) -> Result<Self, GarmentError> {
         pattern.check()?;
-        for (field, length) in [
-            ("edge_length", how.edge_length),
-            ("hood_length", how.hood_length),
-        ] {
-            if !(length > 1e-3 && length < 0.5) {
-                let why = format!("{length} m is not between 0.001 and 0.5");
-                return Err(GarmentError::Field {
-                    field: field.into(),
-                    why,
-                });
-            }
-        }
-        let meshes = triangulate_all(pattern, how)?;
-        let first: Vec<usize> = meshes
-            .iter()
-            .scan(0, |s, m| {
-                let at = *s;
-                *s += m.points.len();
-                Some(at)
-            })
-            .collect();
-        let loose: usize = meshes.iter().map(|m| m.points.len()).sum();
-        let mut sets = UnionFind::new(loose);
-        let mut stitched: Vec<(usize, usize)> = Vec::new();
-        for ((pa, ea), (pb, eb), reversed) in pattern.sewn() {
-            let mut other = meshes[pb].edges[eb].clone();
-            if reversed {
-                other.reverse();
-            }
-            let mut last = None;
-            for (&i, &j) in meshes[pa].edges[ea].iter().zip(&other) {
-                let at = first[pa] + i as usize;
-                sets.join(at, first[pb] + j as usize);
-                if let Some(l) = last.replace(at) {
-                    stitched.push((l, at));
-                }
-            }
-        }
-        let welded = sets.number();
-        let vertices = welded.iter().max().map_or(0, |m| *m as usize + 1);
+        how.check()?;
+        let sewn = Sewn::new(pattern, triangulate_all(pattern, how)?);
+        let vertices = sewn.vertices;
+        let angles = sewn.meshes.iter().map(|m| m.min_angle);
+        let anchors = pattern.anchors.iter().map(|a| sewn.anchor(pattern, a));
         let mut out = Self {
             name: pattern.name.clone(),
             kind: pattern.kind,
@@ -233,69 +289,57 @@ impl GarmentMesh {
             corners: vec![Vec::new(); vertices],
             uv: vec![[0.0; 2]; vertices],
             regions: vec![Region::default(); vertices],
-            anchors: Vec::new(),
-            seams: stitched
-                .into_iter()
-                .map(|(a, b)| [welded[a], welded[b]])
+            min_angle: angles.fold(180.0, f64::min),
+            anchors: anchors.collect(),
+            seams: sewn
+                .seams
+                .iter()
+                .map(|s| s.map(|v| sewn.welded[v]))
                 .collect(),
             render: RenderMesh {
-                vertex: welded.clone(),
+                vertex: sewn.welded.clone(),
                 ..RenderMesh::default()
             },
-            min_angle: meshes.iter().map(|m| m.min_angle).fold(180.0, f64::min),
         };
         let mut offset = 0.0;
-        for (k, m) in meshes.iter().enumerate() {
-            let lo = m
-                .points
-                .iter()
-                .fold([f64::MAX; 2], |l, p| [l[0].min(p[0]), l[1].min(p[1])]);
-            let hi = m.points.iter().map(|p| p[0]).fold(f64::MIN, f64::max);
-            for (i, p) in m.points.iter().enumerate() {
-                let w = welded[first[k] + i] as usize;
-                let uv = [(p[0] - lo[0] + offset) as f32, (p[1] - lo[1]) as f32];
-                if out.corners[w].is_empty() {
-                    out.uv[w] = uv;
-                }
-                out.corners[w].push((k as u16, *p));
-                out.regions[w] = out.regions[w].with(Region::of(pattern.panels[k].placement));
-                out.render.uv.push(uv);
-            }
-            /// Gap between panels in texture space, metres.
-            const GAP: f64 = 0.02;
-            offset += hi - lo[0] + GAP;
-            for f in &m.faces {
-                out.render
-                    .faces
-                    .push(f.map(|i| (first[k] + i as usize) as u32));
-                out.faces.push(f.map(|i| welded[first[k] + i as usize]));
-                out.rest.push(f.map(|i| m.points[i as usize]));
-                out.face_panel.push(k as u16);
-            }
-        }
-        for a in &pattern.anchors {
-            let mut vertices: Vec<u32> = a
-                .edges
-                .iter()
-                .filter_map(|r| pattern.find(r))
-                .flat_map(|(p, e)| meshes[p].edges[e].iter().map(move |&i| (p, i)))
-                .map(|(p, i)| welded[first[p] + i as usize])
-                .collect();
-            vertices.sort_unstable();
-            vertices.dedup();
-            out.anchors.push(AnchorSet {
-                kind: AnchorKind::of_pattern(&a.name),
-                vertices,
-                strength: a.strength,
-            });
+        for panel in 0..sewn.meshes.len() {
+            offset = out.add_panel(&sewn, panel, offset);
         }
         out.topology()?;
         Ok(out)
     }
+    /// Adds the triangles of a panel, laid out at `offset` in texture space; returns the offset of the next one, metres.
+    fn add_panel(&mut self, sewn: &Sewn, panel: usize, offset: f64) -> f64 {
+        let (m, first) = (&sewn.meshes[panel], sewn.first[panel]);
+        let lo = m
+            .points
+            .iter()
+            .fold([f64::MAX; 2], |l, p| [l[0].min(p[0]), l[1].min(p[1])]);
+        let hi = m.points.iter().map(|p| p[0]).fold(f64::MIN, f64::max);
+        let region = Region::of(self.placements[panel]);
+        for (i, p) in m.points.iter().enumerate() {
+            let w = sewn.welded[first + i] as usize;
+            let uv = [(p[0] - lo[0] + offset) as f32, (p[1] - lo[1]) as f32];
+            if self.corners[w].is_empty() {
+                self.uv[w] = uv;
+            }
+            self.corners[w].push((panel as u16, *p));
+            self.regions[w] = self.regions[w].with(region);
+            self.render.uv.push(uv);
+        }
+        for f in &m.faces {
+            let own = f.map(|i| first + i as usize);
+            self.render.faces.push(own.map(|v| v as u32));
+            self.faces.push(own.map(|v| sewn.welded[v]));
+            self.rest.push(f.map(|i| m.points[i as usize]));
+            self.face_panel.push(panel as u16);
+        }
+        offset + (hi - lo[0] + TEXTURE_GAP)
+    }
     /// Connectivity of the simulation mesh.
     ///
     /// # Errors
-    /// When seams make it non-manifold or turn a panel inside out.
+    /// Seams that make it non-manifold or turn a panel inside out.
     pub fn topology(&self) -> Result<Topology, GarmentError> {
         Ok(Topology::new(&TriMesh::new(
             vec![P3::origin(); self.vertices],
@@ -309,7 +353,7 @@ impl GarmentMesh {
     }
 }
 
-/// Pieces of each edge of each panel: by length, equal on both sides of a seam.
+/// Triangulates all panels. Edges have pieces by their length, equally many on both sides of a seam.
 fn triangulate_all(pattern: &Pattern, how: &Triangulation) -> Result<Vec<PanelMesh>, GarmentError> {
     let length = |p: &Panel| match p.placement {
         Placement::Hood(_) => how.edge_length.min(how.hood_length),
@@ -346,43 +390,4 @@ fn triangulate_all(pattern: &Pattern, how: &Triangulation) -> Result<Vec<PanelMe
             Ok(m)
         })
         .collect()
-}
-
-struct UnionFind(Vec<u32>);
-
-impl UnionFind {
-    fn new(n: usize) -> Self {
-        Self((0..n as u32).collect())
-    }
-    fn root(&mut self, mut i: usize) -> usize {
-        while self.0[i] as usize != i {
-            self.0[i] = self.0[self.0[i] as usize];
-            i = self.0[i] as usize;
-        }
-        i
-    }
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b)] = a.min(b) as u32;
-    }
-    /// Consecutive numbers of the sets, in order of their first member.
-    fn number(&mut self) -> Vec<u32> {
-        let mut label = vec![u32::MAX; self.0.len()];
-        let mut next = 0;
-        (0..self.0.len())
-            .map(|i| {
-                let r = self.root(i);
-                if label[r] == u32::MAX {
-                    label[r] = next;
-                    next += 1;
-                }
-                label[r]
-            })
-            .collect()
-    }
-}
-
-/// Signed area of a flat triangle, m².
-pub fn mesh_area(t: &[[f64; 2]; 3]) -> f64 {
-    0.5 * ((t[1][0] - t[0][0]) * (t[2][1] - t[0][1]) - (t[1][1] - t[0][1]) * (t[2][0] - t[0][0]))
 }

@@ -1,18 +1,21 @@
 //! A garment before it moves: panels, seams, materials, rest shape, sizes, anchors.
 
 mod error;
+mod flat_triangle;
 pub mod import;
 pub mod library;
 mod material;
 mod mesh;
 mod outline;
 mod pattern;
+mod presets;
 mod size;
 mod triangulate;
+mod union_find;
 
 pub use error::GarmentError;
+pub use flat_triangle::rest_area;
 pub use material::Material;
-pub use mesh::mesh_area;
 pub use mesh::{AnchorKind, AnchorSet, GarmentMesh, Region, RenderMesh, Triangulation};
 pub use outline::{Curve, PanelEdge};
 pub use pattern::{Anchor, Dart, GarmentKind, Panel, Pattern, Placement, Seam, Side};

@@ -40,14 +40,14 @@ impl PanelEdge {
             }
         }
     }
-    /// Length, metres, by fine sampling.
+    /// Arc length, metres, by fine sampling.
     pub fn length(&self, to: [f64; 2]) -> f64 {
-        polyline(&self.dense(to)).last().copied().unwrap_or(0.0)
+        arc_lengths(&self.dense(to)).last().copied().unwrap_or(0.0)
     }
     /// `pieces + 1` points at equal arc length, both ends included.
     pub fn sample(&self, to: [f64; 2], pieces: usize) -> Vec<[f64; 2]> {
         let points = self.dense(to);
-        let along = polyline(&points);
+        let along = arc_lengths(&points);
         let total = along.last().copied().unwrap_or(0.0);
         let mut k = 0;
         let mut out: Vec<[f64; 2]> = (0..pieces)
@@ -64,14 +64,15 @@ impl PanelEdge {
         out
     }
     fn dense(&self, to: [f64; 2]) -> Vec<[f64; 2]> {
-        /// Chords a curve is measured with: relative length error about 1e-5 for a quarter circle.
+        /// Chords of a curve: relative length error about 1e-5 for a quarter circle.
         const CHORDS: usize = 96;
         let n = if self.curve == Curve::Line { 1 } else { CHORDS };
         (0..=n).map(|i| self.at(to, i as f64 / n as f64)).collect()
     }
 }
 
-fn polyline(points: &[[f64; 2]]) -> Vec<f64> {
+/// Arc length up to each point, metres.
+fn arc_lengths(points: &[[f64; 2]]) -> Vec<f64> {
     let mut along = vec![0.0];
     for w in points.windows(2) {
         along.push(along[along.len() - 1] + (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1]));
@@ -84,8 +85,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bezier_quarter_circle_has_its_length() {
-        const K: f64 = 0.552_284_749_8; // the usual control length of a quarter circle
+    fn bezier_quarter_circles_have_their_length() {
+        const K: f64 = 0.552_284_749_8; // control length of a quarter circle
         let e = PanelEdge {
             name: "q".into(),
             from: [1.0, 0.0],

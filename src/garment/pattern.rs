@@ -1,46 +1,47 @@
-//! A sewing pattern: flat panels, what is sewn to what, what hangs on the body.
+//! A sewing pattern: flat panels, seams, darts and anchors.
 
-use super::{GarmentError, Material, PanelEdge, Size};
+use super::{Curve, GarmentError, Material, PanelEdge, Size};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
-/// What kind of garment a pattern makes.
+/// Kind of garment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GarmentKind {
-    /// Covers the trunk, hangs from the shoulders.
+    /// Covers the trunk, supported by the shoulders.
     Top,
-    /// Hangs from the waist, one tube.
+    /// Supported by the waist, one tube.
     Skirt,
-    /// Hangs from the waist, two tubes.
+    /// Supported by the waist, two tubes.
     Trousers,
-    /// Covers trunk and hips, hangs from the shoulders.
+    /// Covers trunk and hips, supported by the shoulders.
     Dress,
 }
 
-/// Which side of the wearer.
+/// Side of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Side {
-    /// The wearer's left, +x.
+    /// The body's left, +x.
     Left,
-    /// The wearer's right, −x.
+    /// The body's right, −x.
     Right,
 }
 
-/// Where a panel goes. Panels are drawn as seen from outside the garment, y up along the grain.
+/// Place of a panel on the body. Panels are drawn as seen from outside the garment, y up along the grain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Placement {
-    /// Front of the trunk: panel x is the wearer's left, y = 0 at the high point of the shoulder.
+    /// Front of the trunk: panel x is the body's left, y = 0 at the high point of the shoulder.
     TrunkFront,
-    /// Back of the trunk: panel x is the wearer's right, y = 0 at the high point of the shoulder.
+    /// Back of the trunk: panel x is the body's right, y = 0 at the high point of the shoulder.
     TrunkBack,
     /// Around an arm: x = 0 on top of the arm and positive to the back on the left arm (to the front on the
     /// right), y = 0 at the shoulder, falling towards the hand.
     Sleeve(Side),
-    /// Front of a skirt: panel x is the wearer's left, y = 0 at the waist.
+    /// Front of a skirt: panel x is the body's left, y = 0 at the waist.
     SkirtFront,
-    /// Back of a skirt: panel x is the wearer's right, y = 0 at the waist.
+    /// Back of a skirt: panel x is the body's right, y = 0 at the waist.
     SkirtBack,
     /// Front of a trouser leg: y = 0 at the waist. For the left leg the outer side is +x; for the right, −x.
     LegFront(Side),
@@ -51,20 +52,20 @@ pub enum Placement {
     Hood(Side),
 }
 
-/// One flat piece of cloth.
+/// Flat piece of cloth.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {
     /// Name, unique in the pattern.
     pub name: String,
-    /// Where it goes on the body.
+    /// Place on the body.
     pub placement: Placement,
     /// Closed outline, counter-clockwise seen from outside.
     pub edges: Vec<PanelEdge>,
 }
 
 impl Panel {
-    /// Corner where edge `i` ends.
+    /// End corner of edge `i`.
     pub fn end(&self, i: usize) -> [f64; 2] {
         self.edges[(i + 1) % self.edges.len()].from
     }
@@ -82,7 +83,7 @@ pub struct Seam {
     pub a: [String; 2],
     /// Panel and edge of the other side.
     pub b: [String; 2],
-    /// The start of `a` meets the end of `b`, as it must between two outlines of the same turning sense.
+    /// The start of `a` meets the end of `b`, as between two outlines of the same orientation.
     #[serde(default = "yes")]
     pub reversed: bool,
 }
@@ -101,30 +102,30 @@ fn yes() -> bool {
     true
 }
 
-/// Edges that hang on the body and follow it.
+/// Edges attached to the body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Anchor {
-    /// What it is called: `shoulders`, `waist`.
+    /// Name: `shoulders`, `waist`.
     pub name: String,
     /// Panel and edge names.
     pub edges: Vec<[String; 2]>,
-    /// How firmly, 0 to 1; 1 holds a vertex at its place on the body.
+    /// Strength, 0 to 1; 1 fixes a vertex to its place on the body.
     pub strength: f64,
 }
 
-/// Panel and edge of one side, of the other, and whether they run against each other.
-pub(super) type Stitch = ((usize, usize), (usize, usize), bool);
+/// Panel and edge of one side, of the other, and true if they run against each other.
+pub(super) type EdgePair = ((usize, usize), (usize, usize), bool);
 
-/// A garment on paper.
+/// Sewing pattern of a garment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pattern {
     /// Garment name, as in the library.
     pub name: String,
-    /// What it makes.
+    /// Kind of garment.
     pub kind: GarmentKind,
-    /// Letter size it was drawn for.
+    /// Letter size.
     pub size: Size,
     /// Pieces.
     pub panels: Vec<Panel>,
@@ -139,12 +140,12 @@ pub struct Pattern {
     pub material: Material,
     /// Order on the body, 0 innermost.
     pub layer: u8,
-    /// Girth of the finished garment at chest, waist and hip, metres; 0 where it has none. For size advice.
+    /// Girth of the finished garment at chest, waist and hip, metres; 0 if it has none. For size advice.
     pub finished: [f64; 3],
 }
 
 impl Pattern {
-    /// Reads our own JSON and checks it.
+    /// Parses a pattern as JSON and checks it.
     ///
     /// # Errors
     /// Syntax errors name line and column; faults name panel, edge or seam.
@@ -156,12 +157,12 @@ impl Pattern {
         p.check()?;
         Ok(p)
     }
-    /// Our own JSON.
+    /// The pattern as JSON.
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).unwrap_or_default()
     }
-    /// Everything that is sewn, seams then darts.
-    pub(super) fn sewn(&self) -> Vec<Stitch> {
+    /// Pairs of edges that are sewn: seams, then darts.
+    pub(super) fn sewn(&self) -> Vec<EdgePair> {
         let seams = self
             .seams
             .iter()
@@ -201,81 +202,99 @@ impl Pattern {
             }
             check_outline(p)?;
         }
-        let mut sewn = std::collections::BTreeSet::new();
+        let mut sewn = BTreeSet::new();
         for (seam, s) in self.seams.iter().enumerate() {
-            for r in [&s.a, &s.b] {
-                let at = self.find(r).ok_or_else(|| GarmentError::Seam {
-                    seam,
-                    why: format!("there is no edge `{}` in a panel `{}`", r[1], r[0]),
-                })?;
-                if !sewn.insert(at) {
-                    return Err(GarmentError::Seam {
-                        seam,
-                        why: format!("edge `{}` of panel `{}` is sewn twice", r[1], r[0]),
-                    });
-                }
-            }
+            self.check_seam(seam, s, &mut sewn)?;
         }
         for d in &self.darts {
-            let fault = |edge: &str, why: &str| GarmentError::Edge {
-                panel: d.panel.clone(),
-                edge: edge.to_owned(),
-                why: why.to_owned(),
-            };
-            let mut at = [(0, 0); 2];
-            for (k, e) in d.edges.iter().enumerate() {
-                at[k] = self
-                    .find(&[d.panel.clone(), e.clone()])
-                    .ok_or_else(|| fault(e, "a dart names it, but it does not exist"))?;
-                if !sewn.insert(at[k]) {
-                    return Err(fault(e, "it is sewn twice"));
-                }
-            }
-            let p = &self.panels[at[0].0];
-            if (at[0].1 + 1) % p.edges.len() != at[1].1 {
-                return Err(fault(
-                    &d.edges[1],
-                    &format!(
-                        "a dart's second edge must follow its first, `{}`",
-                        d.edges[0]
-                    ),
-                ));
-            }
-            let [a, b] = [at[0].1, at[1].1].map(|i| p.edges[i].length(p.end(i)));
-            if (a - b).abs() > DART_MISMATCH * a.max(b) {
-                return Err(fault(
-                    &d.edges[1],
-                    &format!("the dart's sides are {a:.3} and {b:.3} m long"),
-                ));
+            self.check_dart(d, &mut sewn)?;
+        }
+        self.anchors.iter().try_for_each(|a| self.check_anchor(a))
+    }
+
+    fn check_seam(
+        &self,
+        seam: usize,
+        s: &Seam,
+        sewn: &mut BTreeSet<(usize, usize)>,
+    ) -> Result<(), GarmentError> {
+        for r in [&s.a, &s.b] {
+            let fault = |why: String| GarmentError::Seam { seam, why };
+            let at = self.find(r).ok_or_else(|| fault(missing(r)))?;
+            if !sewn.insert(at) {
+                let why = format!("edge `{}` of panel `{}` is sewn twice", r[1], r[0]);
+                return Err(fault(why));
             }
         }
-        for a in &self.anchors {
-            for r in &a.edges {
-                if self.find(r).is_none() {
-                    return Err(GarmentError::Field {
-                        field: format!("anchor `{}`", a.name),
-                        why: format!("there is no edge `{}` in a panel `{}`", r[1], r[0]),
-                    });
-                }
+        Ok(())
+    }
+
+    fn check_dart(
+        &self,
+        d: &Dart,
+        sewn: &mut BTreeSet<(usize, usize)>,
+    ) -> Result<(), GarmentError> {
+        let fault = |edge: &str, why: &str| GarmentError::Edge {
+            panel: d.panel.clone(),
+            edge: edge.to_owned(),
+            why: why.to_owned(),
+        };
+        let mut at = [(0, 0); 2];
+        for (k, e) in d.edges.iter().enumerate() {
+            at[k] = self
+                .find(&[d.panel.clone(), e.clone()])
+                .ok_or_else(|| fault(e, "a dart names it, but it does not exist"))?;
+            if !sewn.insert(at[k]) {
+                return Err(fault(e, "it is sewn twice"));
             }
-            if !(0.0..=1.0).contains(&a.strength) {
-                return Err(GarmentError::Field {
-                    field: format!("anchor `{}`.strength", a.name),
-                    why: format!("{} is not between 0 and 1", a.strength),
-                });
-            }
+        }
+        let p = &self.panels[at[0].0];
+        let [first, second] = &d.edges;
+        if (at[0].1 + 1) % p.edges.len() != at[1].1 {
+            let why = format!("a dart's second edge must follow its first, `{first}`");
+            return Err(fault(second, &why));
+        }
+        let [a, b] = [at[0].1, at[1].1].map(|i| p.edges[i].length(p.end(i)));
+        if (a - b).abs() > DART_MISMATCH * a.max(b) {
+            let why = format!("the dart's sides are {a:.3} and {b:.3} m long");
+            return Err(fault(second, &why));
+        }
+        Ok(())
+    }
+
+    fn check_anchor(&self, a: &Anchor) -> Result<(), GarmentError> {
+        let fault = |part: &str, why: String| {
+            let field = format!("anchor `{}`{part}", a.name);
+            Err(GarmentError::Field { field, why })
+        };
+        if let Some(r) = a.edges.iter().find(|r| self.find(r).is_none()) {
+            return fault("", missing(r));
+        }
+        if !(0.0..=1.0).contains(&a.strength) {
+            return fault(
+                ".strength",
+                format!("{} is not between 0 and 1", a.strength),
+            );
         }
         Ok(())
     }
 }
 
-/// Largest difference between the two sides of a dart, as a share: more would pucker.
+fn missing(reference: &[String; 2]) -> String {
+    let [panel, edge] = reference;
+    format!("there is no edge `{edge}` in a panel `{panel}`")
+}
+
+/// Largest relative difference between the two sides of a dart: more puckers.
 const DART_MISMATCH: f64 = 0.05;
-/// Shortest edge accepted, metres: below it two corners are the same stitch.
+/// Shortest edge, metres: below it two corners are the same stitch.
 const SHORTEST_EDGE: f64 = 1e-3;
-/// Longest coordinate accepted, metres: no panel of a garment is larger.
+/// Segments of a curved edge in the crossing test.
+const CURVE_PIECES: usize = 24;
+/// Largest coordinate of a panel, metres.
 const LARGEST_COORDINATE: f64 = 10.0;
 
+/// Checks that an outline is simple and counter-clockwise, with unique names and edges of usable length.
 fn check_outline(p: &Panel) -> Result<(), GarmentError> {
     let panel = |why: &str| GarmentError::Panel {
         panel: p.name.clone(),
@@ -294,7 +313,14 @@ fn check_outline(p: &Panel) -> Result<(), GarmentError> {
         if p.edges[..i].iter().any(|o| o.name == e.name) {
             return Err(edge(i, "the name is used twice".into()));
         }
-        let points = e.sample(p.end(i), if e.curve == super::Curve::Line { 1 } else { 24 });
+        let points = e.sample(
+            p.end(i),
+            if e.curve == Curve::Line {
+                1
+            } else {
+                CURVE_PIECES
+            },
+        );
         if points
             .iter()
             .flatten()
@@ -310,6 +336,24 @@ fn check_outline(p: &Panel) -> Result<(), GarmentError> {
         }
         outline.extend(points[..points.len() - 1].iter().map(|q| (i, *q)));
     }
+    if let Some((i, j)) = crossing(&outline) {
+        return Err(edge(i, format!("it crosses edge `{}`", p.edges[j].name)));
+    }
+    let n = outline.len();
+    let area: f64 = (0..n)
+        .map(|i| {
+            let (p, q) = (outline[i].1, outline[(i + 1) % n].1);
+            0.5 * (p[0] * q[1] - p[1] * q[0])
+        })
+        .sum();
+    if area <= 0.0 {
+        return Err(panel("the outline must run counter-clockwise"));
+    }
+    Ok(())
+}
+
+/// Two edges of a closed outline that cross. Each point has the number of its edge.
+fn crossing(outline: &[(usize, [f64; 2])]) -> Option<(usize, usize)> {
     let n = outline.len();
     let cross = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
         (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
@@ -327,18 +371,9 @@ fn check_outline(p: &Panel) -> Result<(), GarmentError> {
                 && cross(a, b, c) * cross(a, b, d) <= 0.0
                 && cross(c, d, a) * cross(c, d, b) <= 0.0
             {
-                return Err(edge(ei, format!("it crosses edge `{}`", p.edges[ej].name)));
+                return Some((ei, ej));
             }
         }
     }
-    let area: f64 = (0..n)
-        .map(|i| {
-            let (p, q) = (outline[i].1, outline[(i + 1) % n].1);
-            0.5 * (p[0] * q[1] - p[1] * q[0])
-        })
-        .sum();
-    if area <= 0.0 {
-        return Err(panel("the outline must run counter-clockwise"));
-    }
-    Ok(())
+    None
 }

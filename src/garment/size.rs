@@ -1,4 +1,4 @@
-//! Sizes XS to XXL and the bodies they are made for.
+//! Sizes XS to XXL and their bodies.
 
 use super::GarmentError;
 use serde::{Deserialize, Serialize};
@@ -56,7 +56,7 @@ pub struct BodyMeasures {
     pub stature: f64,
 }
 
-/// The body one size is made for, and the lengths that grow with it. Metres.
+/// Body of one size, and the lengths that grow with it. Metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SizeRow {
     /// Letter size.
@@ -83,8 +83,8 @@ pub struct SizeRow {
 /// EN 13402-3:2004 (women's bust XS–XXL 82, 86 … cm with the tabulated waists; men's chest and waist), hips the mean of
 /// the women's hips there and of the seat that Aldrich (*Metric Pattern Cutting for Menswear*) gives for those chests.
 /// Lengths follow ANSUR II (Gordon et al. 2014, NATICK/TR-15/007): crotch height 0.48 and acromion-to-wrist 0.34 of
-/// stature; the grade between sizes is the usual 1 to 1.5 cm. Rounded to half centimetres; entered without the standard
-/// at hand, so compare before quoting.
+/// stature; the grade between sizes is 1 to 1.5 cm. Rounded to half centimetres; entered without the standard at
+/// hand, so compare before quoting.
 pub fn size_table() -> [SizeRow; 6] {
     // chest, waist, hip, stature, shoulders, neck, arm, upper arm, trunk, rise, inseam
     const CM: [[f64; 11]; 6] = [

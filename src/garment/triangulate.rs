@@ -1,5 +1,6 @@
-//! A flat panel to triangles: constrained Delaunay over boundary samples and a hexagonal lattice.
+//! Triangulation of a flat panel: constrained Delaunay over boundary samples and a hexagonal lattice.
 
+use super::flat_triangle::{rest_area, smallest_angle};
 use super::{GarmentError, Panel};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation as _};
 
@@ -7,20 +8,24 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation as _};
 pub(super) struct PanelMesh {
     pub(super) points: Vec<[f64; 2]>,
     pub(super) faces: Vec<[u32; 3]>,
-    /// For each edge: indices of its points from corner to corner, both included.
+    /// Points of each edge from corner to corner, both included.
     pub(super) edges: Vec<Vec<u32>>,
     /// Smallest angle, degrees.
     pub(super) min_angle: f64,
 }
 
-/// Lattice points nearer to the outline than this share of the edge length are left out: at 0.55 the triangles along
-/// the edge stay between a slim and a flat one.
+/// Least distance of lattice points from the outline, in edge lengths: with 0.55 the triangles along the edge stay
+/// between a slim and a flat one.
 const CLEARANCE: f64 = 0.58;
-/// Triangles flatter than this (height over length) are rounding slivers outside a straight edge.
+/// Height over length below which a triangle is a rounding sliver outside a straight edge.
 const FLAT: f64 = 1e-6;
-/// Rounds of moving inner points to the middle of their neighbours.
+/// Iterations of Laplacian smoothing of inner points.
 const SMOOTHING: usize = 4;
 
+/// Triangulates a panel with `pieces` segments on each edge and edges of `length` metres inside.
+///
+/// # Errors
+/// Names the panel: coinciding points, or a point without a triangle.
 pub(super) fn triangulate(
     panel: &Panel,
     pieces: &[usize],
@@ -30,75 +35,22 @@ pub(super) fn triangulate(
         panel: panel.name.clone(),
         why,
     };
-    let mut points: Vec<[f64; 2]> = Vec::new();
-    let mut edges = Vec::new();
-    for (i, e) in panel.edges.iter().enumerate() {
-        let samples = e.sample(panel.end(i), pieces[i]);
-        let first = points.len() as u32;
-        points.extend_from_slice(&samples[..samples.len() - 1]);
-        edges.push((first..first + pieces[i] as u32 + 1).collect::<Vec<u32>>());
+    let (outline, edges) = boundary(panel, pieces);
+    let mut points = outline.clone();
+    points.extend(lattice(&outline, length));
+    for _ in 0..SMOOTHING {
+        let faces = delaunay(&points, &outline).map_err(fault)?;
+        smooth(&mut points, &faces, outline.len());
     }
-    let boundary = points.len();
-    if let Some(last) = edges.last_mut().and_then(|e| e.last_mut()) {
-        *last = 0;
-    }
-    let outline = points.clone();
-    let (lo, hi) = outline
+    let faces = delaunay(&points, &outline).map_err(fault)?;
+    let angles = faces
         .iter()
-        .fold(([f64::MAX; 2], [f64::MIN; 2]), |(lo, hi), p| {
-            (
-                [lo[0].min(p[0]), lo[1].min(p[1])],
-                [hi[0].max(p[0]), hi[1].max(p[1])],
-            )
-        });
-    let step_y = length * 3f64.sqrt() / 2.0;
-    // Centred on x = 0, so that symmetric panels get symmetric triangles.
-    let columns = ((hi[0].abs().max(lo[0].abs())) / length).ceil() as i64 + 1;
-    let rows = ((hi[1] - lo[1]) / step_y).ceil() as i64 + 1;
-    for r in 0..rows {
-        for c in -columns..=columns {
-            let p = [
-                (c as f64 + if r % 2 == 0 { 0.0 } else { 0.5 }) * length,
-                lo[1] + (r as f64 + 0.5) * step_y,
-            ];
-            if inside(&outline, p) && distance(&outline, p) > CLEARANCE * length {
-                points.push(p);
-            }
-        }
-    }
-    let mut faces = Vec::new();
-    for round in 0..=SMOOTHING {
-        faces = delaunay(&points, boundary, &outline).map_err(fault)?;
-        if round == SMOOTHING {
-            break;
-        }
-        let mut sum = vec![([0.0; 2], 0.0); points.len()];
-        for f in &faces {
-            for k in 0..3 {
-                for o in [f[(k + 1) % 3], f[(k + 2) % 3]] {
-                    let s = &mut sum[f[k] as usize];
-                    s.0[0] += points[o as usize][0];
-                    s.0[1] += points[o as usize][1];
-                    s.1 += 1.0;
-                }
-            }
-        }
-        for i in boundary..points.len() {
-            let (s, n) = sum[i];
-            if n > 0.0 {
-                points[i] = [s[0] / n, s[1] / n];
-            }
-        }
-    }
-    let min_angle = faces
-        .iter()
-        .map(|f| smallest_angle(f.map(|i| points[i as usize])))
-        .fold(180.0, f64::min);
+        .map(|f| smallest_angle(&f.map(|i| points[i as usize])));
+    let min_angle = angles.fold(180.0, f64::min);
     let mut used = vec![false; points.len()];
-    faces
-        .iter()
-        .flatten()
-        .for_each(|&i| used[i as usize] = true);
+    for &i in faces.iter().flatten() {
+        used[i as usize] = true;
+    }
     if let Some(vertex) = used.iter().position(|u| !u) {
         return Err(fault(format!(
             "point {vertex} of its triangulation has no triangle; the edge length is too coarse"
@@ -112,11 +64,72 @@ pub(super) fn triangulate(
     })
 }
 
-fn delaunay(
-    points: &[[f64; 2]],
-    boundary: usize,
-    outline: &[[f64; 2]],
-) -> Result<Vec<[u32; 3]>, String> {
+/// Samples of the outline, and the point numbers of each edge.
+fn boundary(panel: &Panel, pieces: &[usize]) -> (Vec<[f64; 2]>, Vec<Vec<u32>>) {
+    let mut points: Vec<[f64; 2]> = Vec::new();
+    let mut edges: Vec<Vec<u32>> = Vec::new();
+    for (i, e) in panel.edges.iter().enumerate() {
+        let samples = e.sample(panel.end(i), pieces[i]);
+        let first = points.len() as u32;
+        points.extend_from_slice(&samples[..samples.len() - 1]);
+        edges.push((first..first + pieces[i] as u32 + 1).collect());
+    }
+    if let Some(last) = edges.last_mut().and_then(|e| e.last_mut()) {
+        *last = 0;
+    }
+    (points, edges)
+}
+
+/// Hexagonal lattice inside the outline, centred on x = 0 so that symmetric panels get symmetric triangles.
+fn lattice(outline: &[[f64; 2]], length: f64) -> Vec<[f64; 2]> {
+    let side = |k: usize| {
+        let coordinates = outline.iter().map(move |p| p[k]);
+        let lo = coordinates.clone().fold(f64::MAX, f64::min);
+        (lo, coordinates.fold(f64::MIN, f64::max))
+    };
+    let ((left, right), (bottom, top)) = (side(0), side(1));
+    let step_y = length * 3f64.sqrt() / 2.0;
+    let columns = (right.abs().max(left.abs()) / length).ceil() as i64 + 1;
+    let rows = ((top - bottom) / step_y).ceil() as i64 + 1;
+    let mut points = Vec::new();
+    for r in 0..rows {
+        for c in -columns..=columns {
+            let p = [
+                (c as f64 + if r % 2 == 0 { 0.0 } else { 0.5 }) * length,
+                bottom + (r as f64 + 0.5) * step_y,
+            ];
+            if inside(outline, p) && distance(outline, p) > CLEARANCE * length {
+                points.push(p);
+            }
+        }
+    }
+    points
+}
+
+/// Moves inner points to the mean of their neighbours.
+fn smooth(points: &mut [[f64; 2]], faces: &[[u32; 3]], boundary: usize) {
+    let mut sum = vec![([0.0; 2], 0.0); points.len()];
+    for f in faces {
+        for k in 0..3 {
+            for o in [f[(k + 1) % 3], f[(k + 2) % 3]] {
+                let s = &mut sum[f[k] as usize];
+                s.0[0] += points[o as usize][0];
+                s.0[1] += points[o as usize][1];
+                s.1 += 1.0;
+            }
+        }
+    }
+    for i in boundary..points.len() {
+        let (s, n) = sum[i];
+        if n > 0.0 {
+            points[i] = [s[0] / n, s[1] / n];
+        }
+    }
+}
+
+/// Constrained Delaunay triangles inside the outline, sorted; the outline is the start of `points`.
+fn delaunay(points: &[[f64; 2]], outline: &[[f64; 2]]) -> Result<Vec<[u32; 3]>, String> {
+    let boundary = outline.len();
     let vertices = points.iter().map(|p| Point2::new(p[0], p[1])).collect();
     let edges = (0..boundary).map(|i| [i, (i + 1) % boundary]).collect();
     let cdt = ConstrainedDelaunayTriangulation::<Point2<f64>>::bulk_load_cdt(vertices, edges)
@@ -124,27 +137,23 @@ fn delaunay(
     if cdt.num_vertices() != points.len() {
         return Err("two points of its outline coincide".into());
     }
+    let is_inside = |f: &[u32; 3]| {
+        let c = f.map(|i| points[i as usize]);
+        let longer = (c[1][0] - c[0][0]).powi(2).max((c[1][1] - c[0][1]).powi(2));
+        let middle = [0, 1].map(|k| (c[0][k] + c[1][k] + c[2][k]) / 3.0);
+        // Samples of a straight edge are collinear but for rounding: slivers between them and the hull lie outside.
+        rest_area(&c) > FLAT * longer && inside(outline, middle)
+    };
     let mut faces: Vec<[u32; 3]> = cdt
         .inner_faces()
         .map(|f| f.vertices().map(|v| v.fix().index() as u32))
-        .filter(|f| {
-            let c = f.map(|i| points[i as usize]);
-            // Samples of a straight edge are collinear but for rounding: the slivers between them and the hull lie outside.
-            super::mesh_area(&c)
-                > FLAT * (c[1][0] - c[0][0]).powi(2).max((c[1][1] - c[0][1]).powi(2))
-                && inside(
-                    outline,
-                    [
-                        (c[0][0] + c[1][0] + c[2][0]) / 3.0,
-                        (c[0][1] + c[1][1] + c[2][1]) / 3.0,
-                    ],
-                )
-        })
+        .filter(is_inside)
         .collect();
     faces.sort_unstable();
     Ok(faces)
 }
 
+/// Even–odd test of a point against a closed outline.
 fn inside(outline: &[[f64; 2]], p: [f64; 2]) -> bool {
     let mut odd = false;
     for i in 0..outline.len() {
@@ -158,6 +167,7 @@ fn inside(outline: &[[f64; 2]], p: [f64; 2]) -> bool {
     odd
 }
 
+/// Distance of a point from a closed outline, metres.
 fn distance(outline: &[[f64; 2]], p: [f64; 2]) -> f64 {
     (0..outline.len())
         .map(|i| {
@@ -169,17 +179,4 @@ fn distance(outline: &[[f64; 2]], p: [f64; 2]) -> f64 {
             (p[0] - a[0] - t * d[0]).hypot(p[1] - a[1] - t * d[1])
         })
         .fold(f64::MAX, f64::min)
-}
-
-fn smallest_angle(p: [[f64; 2]; 3]) -> f64 {
-    (0..3)
-        .map(|k| {
-            let (a, b, c) = (p[k], p[(k + 1) % 3], p[(k + 2) % 3]);
-            let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
-            (u[0] * v[1] - u[1] * v[0])
-                .abs()
-                .atan2(u[0] * v[0] + u[1] * v[1])
-                .to_degrees()
-        })
-        .fold(180.0, f64::min)
 }

@@ -1,19 +1,19 @@
-//! Preconditioned conjugate gradients on three-vectors, matrix-free, block-Jacobi.
+//! Preconditioned conjugate gradients on three-vectors: matrix-free, block Jacobi.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// How an iteration went.
+/// Report of a solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CgReport {
     /// Products with the matrix.
     pub iterations: usize,
-    /// ‖b − A x‖ / ‖b‖ at the end.
+    /// Final ‖b − A x‖ / ‖b‖.
     pub relative_residual: f64,
 }
 
-/// Solves `A x = b` from `x` with the inverse diagonal blocks as preconditioner.
-/// Stops at `tolerance` (relative residual) or after `most` products. `A` must be positive definite on the
-/// directions met; a direction of no positive curvature ends the iteration at the best `x` so far.
+/// Solves `A x = b` from the initial `x` with the inverse diagonal blocks as preconditioner.
+/// Stops at `tolerance` (relative residual) or after `most` products. A search direction without positive curvature
+/// ends the iteration at the current `x`.
 pub fn conjugate_gradient(
     mut apply: impl FnMut(&[Vector3<f64>], &mut [Vector3<f64>]),
     inverse_blocks: &[Matrix3<f64>],

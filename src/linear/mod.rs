@@ -8,7 +8,7 @@ pub use cholesky::{Factor, SymbolicFactor};
 pub use conjugate_gradient::{CgReport, conjugate_gradient};
 pub use pattern::SymmetricPattern;
 
-/// What can go wrong with a system.
+/// Error of a linear system.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LinearError {
     /// A row or column beyond the size.

@@ -1,4 +1,4 @@
-//! Where a symmetric matrix has entries: found once, filled many times.
+//! Sparsity pattern of a symmetric matrix: built once, filled many times.
 
 use super::LinearError;
 
@@ -11,7 +11,7 @@ pub struct SymmetricPattern {
 }
 
 impl SymmetricPattern {
-    /// The union of the diagonal and the given `(row, column)` pairs, either triangle.
+    /// Union of the diagonal and the given `(row, column)` pairs of either triangle.
     ///
     /// # Errors
     /// An index beyond `size`, or more entries than 32 bits count.
@@ -56,7 +56,7 @@ impl SymmetricPattern {
     pub fn entries(&self) -> usize {
         self.rows.len()
     }
-    /// Where entry (row, column) of either triangle is stored; `None` when it is not in the pattern.
+    /// Storage index of entry (row, column) of either triangle; `None` if it is not in the pattern.
     pub fn slot(&self, row: u32, column: u32) -> Option<usize> {
         let (c, r) = (row.min(column) as usize, row.max(column));
         if c >= self.size {
@@ -65,12 +65,12 @@ impl SymmetricPattern {
         let (from, to) = (self.columns[c] as usize, self.columns[c + 1] as usize);
         self.rows[from..to].binary_search(&r).ok().map(|k| from + k)
     }
-    /// Where the diagonal entry of a row is stored.
+    /// Storage index of the diagonal entry of a row.
     pub fn diagonal_slot(&self, row: usize) -> usize {
         // The diagonal is the smallest row of its column in the lower triangle.
         self.columns[row] as usize
     }
-    /// `y = A x` for stored `values`, three right-hand sides at once.
+    /// Product `y = A x` for stored `values`, three right-hand sides at once. Shapes `[size]`.
     pub fn multiply(&self, values: &[f64], x: &[[f64; 3]], y: &mut Vec<[f64; 3]>) {
         y.clear();
         y.resize(self.size, [0.0; 3]);

@@ -1,4 +1,4 @@
-//! The rare triangles with a corner behind the near plane or far outside the picture.
+//! Clipping of triangles with a corner behind the near plane or far outside the picture (Sutherland–Hodgman).
 
 use super::screen::{Corner, GUARD, Projector};
 use crate::math::P3;
@@ -9,8 +9,8 @@ const MAX_CORNERS: usize = 8;
 /// Homogeneous picture point: (x·w, y·w, w, z).
 type Hom = [f64; 4];
 
-/// Cuts a triangle at the near plane and at the guard band and hands the pieces to `draw`, in the triangle's
-/// orientation. Nothing is drawn for corners that are not finite.
+/// Clips a triangle at the near plane and at the guard band; `draw` receives the pieces in its orientation.
+/// A triangle with a corner that is not finite gives no piece.
 pub(super) fn clip(view: &Projector, corners: [P3; 3], mut draw: impl FnMut([Corner; 3])) {
     if !corners.iter().all(|p| p.iter().all(|c| c.is_finite())) {
         return;
@@ -27,7 +27,7 @@ pub(super) fn clip(view: &Projector, corners: [P3; 3], mut draw: impl FnMut([Cor
             |k: usize| f64::from(p[k]) * f64::from(view.scale[k]) + f64::from(view.offset[k]) * w;
         *slot = [axis(0), axis(1), w, f64::from(p.z)];
     }
-    // A hair inside the band, so that rounding to f32 and snapping cannot leave it.
+    // One pixel inside the band, so that rounding to f32 and snapping cannot leave it.
     let g = f64::from(GUARD) - 1.0;
     let near = f64::from(view.near);
     let planes: [&dyn Fn(&Hom) -> f64; 5] = [
@@ -38,7 +38,7 @@ pub(super) fn clip(view: &Projector, corners: [P3; 3], mut draw: impl FnMut([Cor
         &|h| g * h[2] + h[1],
     ];
     for plane in planes {
-        n = cut(&mut polygon, n, plane);
+        n = cut_by(&mut polygon, n, plane);
         if n < 3 {
             return;
         }
@@ -56,8 +56,8 @@ pub(super) fn clip(view: &Projector, corners: [P3; 3], mut draw: impl FnMut([Cor
     }
 }
 
-/// Sutherland–Hodgman against one plane, in place; returns the new number of corners.
-fn cut(polygon: &mut [Hom; MAX_CORNERS + 1], n: usize, inside: impl Fn(&Hom) -> f64) -> usize {
+/// Clips a polygon of `n` corners against one plane, in place; returns the new number of corners.
+fn cut_by(polygon: &mut [Hom; MAX_CORNERS + 1], n: usize, inside: impl Fn(&Hom) -> f64) -> usize {
     let from = *polygon;
     let mut m = 0;
     let mut push = |h: Hom| {
@@ -73,7 +73,7 @@ fn cut(polygon: &mut [Hom; MAX_CORNERS + 1], n: usize, inside: impl Fn(&Hom) -> 
             push(a);
         }
         if (da >= 0.0) != (db >= 0.0) {
-            // Always from the inner end: two faces sharing the edge get the same bits, hence no crack.
+            // From the inner end: two faces that share the edge get the same bits, hence no crack.
             let (p, q, dp, dq) = if da >= 0.0 {
                 (a, b, da, db)
             } else {

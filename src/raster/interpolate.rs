@@ -1,4 +1,4 @@
-//! From "which face" to "where on it".
+//! Barycentric coordinates of a pixel on its visible face.
 
 use super::{View, VisibilityBuffer};
 use crate::math::P3;
@@ -34,14 +34,13 @@ pub fn barycentrics(view: &View, corners: [P3; 3], u: f32, v: f32) -> Option<[f3
     (sum.is_finite() && sum > 0.0).then(|| w.map(|w| w / sum))
 }
 
-/// Face number and corner weights at a pixel of a buffer drawn with `view`; `None` where nothing was drawn.
+/// Face number and corner weights at pixel `[column, row]` of a buffer drawn with `view`; `None` in empty pixels.
 pub fn interpolate(
     view: &View,
     vertices: &[P3],
     faces: &[Face],
     buffer: &VisibilityBuffer,
-    u: u32,
-    v: u32,
+    [u, v]: [u32; 2],
 ) -> Option<(u32, [f32; 3])> {
     if u >= buffer.width || v >= buffer.height {
         return None;
@@ -50,21 +49,4 @@ pub fn interpolate(
     let f = faces.get(id as usize)?;
     let corners = f.map(|i| vertices[i as usize]);
     barycentrics(view, corners, u as f32, v as f32).map(|w| (id, w))
-}
-
-/// Looks `label` up for the face of every pixel: an image of part, panel or garment numbers, `none` where nothing is.
-pub fn id_image<T: Copy>(
-    buffer: &VisibilityBuffer,
-    none: T,
-    label: impl Fn(u32) -> T,
-    out: &mut Vec<T>,
-) {
-    out.clear();
-    out.extend(buffer.face.iter().map(|&f| {
-        if f == VisibilityBuffer::NONE {
-            none
-        } else {
-            label(f)
-        }
-    }));
 }

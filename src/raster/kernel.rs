@@ -3,25 +3,27 @@
 //! Small triangles (nearly all) test every pixel of their box with i32 edge functions; large ones solve for the
 //! span of each row in i64. Both decide the same pixels, since both are exact.
 
-use super::fast::Cull;
-use super::hidden::Coarse;
+use super::buffer::BandScratch;
+use super::options::Cull;
 use super::screen::{Corner, ONE, SUB_BITS};
 
 /// Triangles whose box has no side above this (sub-pixels, 64 px) keep their edge functions inside i32.
 const SMALL: i32 = 64 << SUB_BITS;
 
-/// Rows `top..` of the picture, written by one thread.
+/// Rows `top..top + rows` of the picture, written by one thread.
 pub(super) struct Band<'a> {
     pub(super) width: i32,
     pub(super) top: i32,
     pub(super) rows: i32,
     /// Size of the whole picture in rows; anchors of the depth plane depend on it, never on the band.
     pub(super) height: i32,
-    /// Faces turned away are so much farther, metres.
-    pub(super) behind: f32,
+    /// Depth added to back faces, metres.
+    pub(super) back_offset: f32,
     pub(super) depth: &'a mut [f32],
     pub(super) face: &'a mut [u32],
-    pub(super) coarse: &'a mut Coarse,
+    pub(super) scratch: &'a mut BandScratch,
+    /// Faces left out as occluded; a face of several bands counts in its first.
+    pub(super) occluded: usize,
 }
 
 /// Columns and rows of the pixels whose centres may lie in a triangle.
@@ -29,12 +31,12 @@ pub(super) struct Band<'a> {
 pub(super) struct Span {
     pub(super) columns: [i32; 2],
     pub(super) rows: [i32; 2],
-    /// First row were there no bands.
+    /// First row without the limits of the band.
     top: i32,
 }
 
-/// Whether a sample at depth `z` of face `id` wins against what is there. Of equal depths the first face drawn wins,
-/// or with `TIES` the one of the lowest number, whatever the order.
+/// Depth test of a sample at depth `z` of face `id`. Of equal depths the first face drawn wins, or with `TIES` the lowest
+/// number.
 #[inline(always)]
 fn wins<const TIES: bool>(z: f32, id: u32, depth: f32, face: u32) -> bool {
     if TIES {
@@ -44,8 +46,8 @@ fn wins<const TIES: bool>(z: f32, id: u32, depth: f32, face: u32) -> bool {
     }
 }
 
-/// The plane of the affine quantity q over the picture, anchored at pixel (x0, y0).
-struct Plane {
+/// Plane of the affine quantity q over the picture, anchored at pixel `(x0, y0)` and limited to `lo..=hi`.
+struct DepthPlane {
     x0: i32,
     y0: i32,
     q0: f64,
@@ -55,14 +57,44 @@ struct Plane {
     hi: f32,
 }
 
-impl Plane {
+impl DepthPlane {
+    /// Plane through three corners of twice the area `area` (sub-pixels²), counter-clockwise on the grid.
+    #[inline(always)]
+    fn new([a, b, c]: &[Corner; 3], area: u64, [x0, y0]: [i32; 2]) -> Self {
+        let scale = f64::from(ONE) / area as f64;
+        let (db, dc) = (f64::from(b.q - a.q), f64::from(c.q - a.q));
+        let gx = (f64::from(c.y - a.y) * db - f64::from(b.y - a.y) * dc) * scale;
+        let gy = (f64::from(b.x - a.x) * dc - f64::from(c.x - a.x) * db) * scale;
+        let unit = 1.0 / f64::from(ONE);
+        let q0 = f64::from(a.q)
+            + (gx * f64::from((x0 << SUB_BITS) - a.x) + gy * f64::from((y0 << SUB_BITS) - a.y))
+                * unit;
+        Self {
+            x0,
+            y0,
+            q0,
+            gx,
+            gy,
+            lo: a.q.min(b.q).min(c.q),
+            hi: a.q.max(b.q).max(c.q),
+        }
+    }
     fn row(&self, y: i32) -> f32 {
         (self.q0 + self.gy * f64::from(y - self.y0)) as f32
     }
 }
 
+/// Triangle set up for one band: counter-clockwise on the grid, last column `x1`.
+struct BandTriangle {
+    corners: [Corner; 3],
+    id: u32,
+    plane: DepthPlane,
+    rows: [i32; 2],
+    x1: i32,
+}
+
 impl Band<'_> {
-    /// Pixels of the band that a triangle may touch.
+    /// Pixels of the band whose centres a triangle may cover.
     #[inline(always)]
     pub(super) fn span(&self, [a, b, c]: &[Corner; 3]) -> Option<Span> {
         let min_y = a.y.min(b.y).min(c.y);
@@ -80,6 +112,29 @@ impl Band<'_> {
             rows: [first, last],
             top: y0,
         })
+    }
+
+    /// True if every pixel that the triangle may cover is nearer already, by the tiles of the last
+    /// [`Band::update_tiles`].
+    #[inline(always)]
+    pub(super) fn occludes<const PERSPECTIVE: bool>(&self, corners: &[Corner; 3]) -> bool {
+        let Some(span) = self.span(corners) else {
+            return false;
+        };
+        let q = corners.map(|c| c.q);
+        // The fill loops keep depths of a face between those of its corners, so this is exact.
+        let nearest = if PERSPECTIVE {
+            1.0 / q[0].max(q[1]).max(q[2])
+        } else {
+            q[0].min(q[1]).min(q[2])
+        };
+        let rows = span.rows.map(|y| y - self.top);
+        self.scratch.tiles.occlude(span.columns, rows, nearest)
+    }
+    /// Rebuilds the depth tiles.
+    #[inline(always)]
+    pub(super) fn update_tiles(&mut self) {
+        self.scratch.tiles.update(self.depth, self.width as usize);
     }
 
     /// Draws the part of a triangle that lies in the band.
@@ -120,49 +175,42 @@ impl Band<'_> {
         if area < 0 {
             std::mem::swap(&mut b, &mut c);
         } else {
-            [a, b, c] = [a, b, c].map(|c| c.farther::<PERSPECTIVE>(self.behind));
+            [a, b, c] = [a, b, c].map(|c| c.farther::<PERSPECTIVE>(self.back_offset));
         }
-        let scale = f64::from(ONE) / area.unsigned_abs() as f64;
-        let (db, dc) = (f64::from(b.q - a.q), f64::from(c.q - a.q));
-        let gx = (f64::from(c.y - a.y) * db - f64::from(b.y - a.y) * dc) * scale;
-        let gy = (f64::from(b.x - a.x) * dc - f64::from(c.x - a.x) * db) * scale;
-        let unit = 1.0 / f64::from(ONE);
-        let q0 = f64::from(a.q)
-            + (gx * f64::from((x0 << SUB_BITS) - a.x) + gy * f64::from((y0 << SUB_BITS) - a.y))
-                * unit;
-        let plane = Plane {
-            x0,
-            y0,
-            q0,
-            gx,
-            gy,
-            lo: a.q.min(b.q).min(c.q),
-            hi: a.q.max(b.q).max(c.q),
+        let corners = [a, b, c];
+        let triangle = BandTriangle {
+            plane: DepthPlane::new(&corners, area.unsigned_abs(), [x0, y0]),
+            corners,
+            id,
+            rows: [first, last],
+            x1,
         };
         if small {
-            self.boxed::<PERSPECTIVE, TIES>([a, b, c], id, &plane, [first, last], x1);
+            self.fill_box::<PERSPECTIVE, TIES>(&triangle);
         } else {
-            self.spans::<PERSPECTIVE, TIES>([a, b, c], id, &plane, [first, last], x1);
+            self.fill_spans::<PERSPECTIVE, TIES>(&triangle);
         }
     }
 
+    /// Tests every pixel of the box with i32 edge functions.
     #[inline(always)]
-    fn boxed<const PERSPECTIVE: bool, const TIES: bool>(
-        &mut self,
-        [a, b, c]: [Corner; 3],
-        id: u32,
-        plane: &Plane,
-        [first, last]: [i32; 2],
-        x1: i32,
-    ) {
-        let (x, y) = (plane.x0 << SUB_BITS, first << SUB_BITS);
+    fn fill_box<const PERSPECTIVE: bool, const TIES: bool>(&mut self, triangle: &BandTriangle) {
+        let BandTriangle {
+            corners: [a, b, c],
+            id,
+            plane,
+            rows: [first, last],
+            x1,
+        } = triangle;
+        let (id, x1) = (*id, *x1);
+        let (x, y) = (plane.x0 << SUB_BITS, *first << SUB_BITS);
         let edge = |p: &Corner, q: &Corner| (q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x);
-        let mut e = [edge(&b, &c), edge(&c, &a), edge(&a, &b)];
+        let mut e = [edge(b, c), edge(c, a), edge(a, b)];
         let step = |p: &Corner, q: &Corner| [(p.y - q.y) << SUB_BITS, (q.x - p.x) << SUB_BITS];
-        let s = [step(&b, &c), step(&c, &a), step(&a, &b)];
+        let s = [step(b, c), step(c, a), step(a, b)];
         let n = (x1 - plane.x0 + 1) as usize;
         let gx = plane.gx as f32;
-        for row in first..=last {
+        for row in *first..=*last {
             let start = (row - self.top) as usize * self.width as usize + plane.x0 as usize;
             let depth = &mut self.depth[start..start + n];
             let face = &mut self.face[start..start + n];
@@ -185,21 +233,23 @@ impl Band<'_> {
         }
     }
 
+    /// Solves for the covered span of each row in i64.
     #[inline(never)]
-    fn spans<const PERSPECTIVE: bool, const TIES: bool>(
-        &mut self,
-        [a, b, c]: [Corner; 3],
-        id: u32,
-        plane: &Plane,
-        [first, last]: [i32; 2],
-        x1: i32,
-    ) {
+    fn fill_spans<const PERSPECTIVE: bool, const TIES: bool>(&mut self, triangle: &BandTriangle) {
+        let BandTriangle {
+            corners: [a, b, c],
+            id,
+            plane,
+            rows: [first, last],
+            x1,
+        } = triangle;
+        let (id, x1) = (*id, *x1);
         let gx = plane.gx as f32;
-        for row in first..=last {
+        for row in *first..=*last {
             let y = i64::from(row) << SUB_BITS;
             let (mut lo, mut hi) = (i64::from(plane.x0), i64::from(x1));
-            for (p, q) in [(&b, &c), (&c, &a), (&a, &b)] {
-                // Inside where e + x·d >= 0, x in pixels.
+            for (p, q) in [(b, c), (c, a), (a, b)] {
+                // Inside for e + x·d >= 0, x in pixels.
                 let d = i64::from(p.y - q.y) << SUB_BITS;
                 let e = i64::from(q.x - p.x) * (y - i64::from(p.y))
                     + i64::from(q.y - p.y) * i64::from(p.x);

@@ -3,16 +3,21 @@
 //! Corners are snapped to 1/256 pixel, so coverage is integer arithmetic: exact, watertight along shared
 //! edges, and the same in [`rasterise`], in [`rasterise_reference`] and at any thread count.
 
+mod buffer;
 mod clip;
+mod faces;
 mod fast;
-mod hidden;
+mod hiz;
 mod interpolate;
 mod kernel;
+mod options;
 mod reference;
 mod screen;
 mod view;
 
-pub use fast::{Cull, Options, rasterise, rasterise_layers, rasterise_with};
-pub use interpolate::{barycentrics, id_image, interpolate};
+pub use buffer::VisibilityBuffer;
+pub use fast::{LayeredMesh, rasterise, rasterise_layers, rasterise_with};
+pub use interpolate::{barycentrics, interpolate};
+pub use options::{Cull, Options};
 pub use reference::rasterise_reference;
-pub use view::{View, VisibilityBuffer};
+pub use view::View;

@@ -1,4 +1,4 @@
-//! The slow, obvious rasteriser: the oracle of the fast one.
+//! Brute-force rasteriser: the oracle of the fast one.
 
 use super::screen::{Corner, ONE, Projector};
 use super::{View, VisibilityBuffer, clip};

@@ -3,7 +3,7 @@
 use super::View;
 use crate::math::P3;
 
-/// Sub-pixel bits. 1/256 px moves a silhouette by 8 µm at 2 m for a Kinect; 4 bits would show as crawling edges.
+/// Sub-pixel bits. 1/256 px moves a silhouette by up to 8 µm at 2 m for a Kinect; 4 bits show as crawling edges.
 pub(super) const SUB_BITS: u32 = 8;
 /// One pixel in sub-pixel units.
 pub(super) const ONE: i32 = 1 << SUB_BITS;
@@ -18,19 +18,19 @@ pub(super) struct Corner {
     pub(super) x: i32,
     /// Row · 256.
     pub(super) y: i32,
-    /// What is affine over the picture: 1/z in a perspective view, z in a parallel one.
+    /// Quantity that is affine over the picture: 1/z in a perspective view, z in a parallel one.
     pub(super) q: f32,
 }
 
 impl Corner {
-    /// Behind the near plane, beyond the guard band or not finite.
+    /// Corner behind the near plane, beyond the guard band or not finite.
     pub(super) const OUTSIDE: Self = Self {
         x: i32::MIN,
         y: 0,
         q: 0.0,
     };
 
-    /// Snaps image coordinates.
+    /// Snaps image coordinates (pixels).
     pub(super) fn snap(x: f32, y: f32, q: f32) -> Self {
         // NaN fails both comparisons.
         if x.abs() <= GUARD && y.abs() <= GUARD && q.is_finite() {
@@ -44,7 +44,7 @@ impl Corner {
             Self::OUTSIDE
         }
     }
-    /// The same so many metres behind.
+    /// The same corner `by` metres farther.
     #[inline(always)]
     pub(super) fn farther<const PERSPECTIVE: bool>(self, by: f32) -> Self {
         Self {
@@ -61,7 +61,7 @@ impl Corner {
     }
 }
 
-/// A view unpacked for the inner loop: x·sx/w + ox with w = z or 1.
+/// A view unpacked for the inner loop: column = x·scale/w + offset with w = z or 1.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Projector {
     pub(super) perspective: bool,

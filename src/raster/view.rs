@@ -1,6 +1,5 @@
-//! Where a picture is taken from, and what it holds.
+//! View of a picture: a pinhole camera or a parallel projection.
 
-use super::fast::Scratch;
 use crate::camera::Intrinsics;
 use crate::math::P3;
 
@@ -55,43 +54,5 @@ impl View {
                 p.z,
             ]),
         }
-    }
-}
-
-/// Nearest surface per pixel: depth and which triangle.
-#[derive(Clone, Debug, Default)]
-pub struct VisibilityBuffer {
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Depth along the optical axis, metres; infinity where nothing is.
-    pub depth: Vec<f32>,
-    /// Face number; `u32::MAX` where nothing is.
-    pub face: Vec<u32>,
-    /// The rasteriser's own; says nothing about the picture.
-    pub(super) scratch: Scratch,
-}
-
-impl PartialEq for VisibilityBuffer {
-    fn eq(&self, other: &Self) -> bool {
-        (self.width, self.height) == (other.width, other.height)
-            && self.depth == other.depth
-            && self.face == other.face
-    }
-}
-
-impl VisibilityBuffer {
-    /// No face at this pixel.
-    pub const NONE: u32 = u32::MAX;
-
-    /// Empties the buffer at the size of `view`.
-    pub fn reset(&mut self, view: &View) {
-        (self.width, self.height) = view.size();
-        let n = self.width as usize * self.height as usize;
-        self.depth.clear();
-        self.depth.resize(n, f32::INFINITY);
-        self.face.clear();
-        self.face.resize(n, Self::NONE);
     }
 }

@@ -1,17 +1,17 @@
-//! The outline of the person: cells where the body ends, told from cells where something hides it.
+//! Outline of the person: cells at which the body ends, and cells at which an occluder hides it.
 
 use crate::spatial::{Label, OrganisedCloud};
 
-/// A neighbour nearer than this (metres) hides what is behind it.
+/// Depth difference from which a neighbour occludes, metres; smaller and folds of cloth count as edges.
 const OCCLUDER: f32 = 0.06;
 
-/// The outline, as row-major cells, ascending.
+/// Outline of the person.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contour {
-    /// Where the surface really turns away: beside it lies known free space or a surface farther away.
+    /// Row-major cells, ascending, at which the surface ends: beside it lies known free space or a farther surface.
     pub true_edges: Vec<u32>,
-    /// Per cell: its reading must not be matched, because the surface goes on behind an occluder, beyond the rim of
-    /// the image or into missing readings. Shape `[cells of the grid]`.
+    /// Cells that must not be matched: the surface continues behind an occluder, beyond the image or into missing
+    /// readings. Shape `[cells]`.
     pub false_edges: Vec<bool>,
 }
 
@@ -42,7 +42,7 @@ pub fn contour(cloud: &OrganisedCloud, cells: &[u32], out: &mut Contour) {
                     real |= cloud.depth[k] > z + OCCLUDER;
                     hidden |= cloud.depth[k] < z - OCCLUDER;
                 }
-                // Missing readings at an outline are the usual shadow of the sensor: no evidence for either.
+                // Missing readings at an outline are the shadow of the sensor: no evidence for either.
                 Label::Person | Label::Unknown => {}
             }
         }
@@ -56,13 +56,13 @@ pub fn contour(cloud: &OrganisedCloud, cells: &[u32], out: &mut Contour) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::planes::tests::room;
-    use super::super::{SegmentScratch, find_person, find_planes};
     use super::*;
+    use crate::segment::fixture::room;
+    use crate::segment::{SegmentScratch, find_person, find_planes};
 
     #[test]
-    fn an_arm_before_the_chest_owns_the_edge() {
-        let (mut cloud, _) = room(0.0, true);
+    fn edges_between_arm_and_chest_belong_to_the_arm() {
+        let mut cloud = room(0.0, true);
         let scene = find_planes(&cloud);
         let found = find_person(&mut cloud, &scene, None, &mut SegmentScratch::default());
         let columns = cloud.size().0;
@@ -86,7 +86,7 @@ mod tests {
         assert_eq!(
             on(middle - 1) + on(middle + 4),
             0,
-            "the chest goes on behind the arm"
+            "the chest continues behind the arm"
         );
         assert!(
             found

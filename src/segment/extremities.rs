@@ -6,19 +6,19 @@ use crate::spatial::OrganisedCloud;
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
-/// One end: a hand, a foot, the head, or the elbow of an arm whose hand lies on the body.
+/// One end of the body: a hand, a foot, the head, or the elbow of an arm whose hand lies on the body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Extremity {
     /// Camera frame, metres.
     pub point: P3,
-    /// Way along the surface to what was found before it (the torso, or an earlier end's way), metres.
+    /// Geodesic distance to the torso or to the path of an earlier end, metres.
     pub length: f32,
-    /// Points along that way, from the end on, camera frame, metres.
+    /// Points of that geodesic path, from the end on, camera frame, metres.
     pub path: Vec<P3>,
 }
 
 impl Extremity {
-    /// The point of the way that lies `length` metres from the end along it; the last one if the way is shorter.
+    /// Point of the path at `length` metres from the end; its last point if the path is shorter.
     pub fn along(&self, length: f32) -> P3 {
         let mut left = length;
         for pair in self.path.windows(2) {
@@ -32,16 +32,16 @@ impl Extremity {
     }
 }
 
-/// Cells are neighbours up to this many rows and columns apart: fingers and sleeves leave gaps of one cell.
+/// Rows and columns to the farthest neighbour of a cell: fingers and sleeves leave gaps of one cell.
 const NEIGHBOURS: i32 = 2;
-/// Neighbours farther apart than this (metres), and [`JUMP_SLOPE`] of their distance, lie on different limbs.
+/// Distance from which neighbours lie on different limbs, metres; plus [`JUMP_SLOPE`] × z.
 const JUMP: f32 = 0.06;
-/// See [`JUMP`]; the cells themselves grow with the distance.
+/// Growth of [`JUMP`] with the depth, as cells grow.
 const JUMP_SLOPE: f32 = 0.015;
-/// What is nearer than this (metres) to what was found before is no end of its own.
+/// Least geodesic distance of an end from the torso and from earlier paths, metres; shorter ones are folds and noise.
 const SHORTEST: f32 = 0.2;
 
-/// A cell on the front of the search, nearest first.
+/// Distance and number of a cell on the front of the search, nearest first.
 #[derive(PartialEq)]
 struct Front(f32, u32);
 
@@ -57,91 +57,121 @@ impl PartialOrd for Front {
     }
 }
 
-/// Up to `most` ends of the body whose refined cells are `cells`, the farthest first, seen from the cell nearest to
-/// `torso` (camera frame, metres). What is cut off from the torso has no end.
+/// Geodesic distances over the cells of the body, and the predecessor of each on its shortest path.
+struct Geodesics<'a> {
+    cloud: &'a OrganisedCloud,
+    /// Metres; infinity before it is reached, NaN for cells that are not the body. Shape `[cells]`.
+    distance: Vec<f32>,
+    predecessor: Vec<u32>,
+    front: BinaryHeap<Reverse<Front>>,
+}
+
+impl<'a> Geodesics<'a> {
+    const NONE: u32 = u32::MAX;
+
+    fn new(cloud: &'a OrganisedCloud, cells: impl Iterator<Item = u32>) -> Self {
+        let mut distance = vec![f32::NAN; cloud.depth.len()];
+        for c in cells {
+            distance[c as usize] = f32::INFINITY;
+        }
+        Self {
+            cloud,
+            distance,
+            predecessor: vec![Self::NONE; cloud.depth.len()],
+            front: BinaryHeap::new(),
+        }
+    }
+    /// Makes a cell a source of distance zero.
+    fn add_source(&mut self, cell: u32) {
+        self.predecessor[cell as usize] = Self::NONE;
+        if self.distance[cell as usize] > 0.0 {
+            self.distance[cell as usize] = 0.0;
+            self.front.push(Reverse(Front(0.0, cell)));
+        }
+    }
+    /// Propagates distances from the sources (Dijkstra).
+    fn propagate(&mut self) {
+        let columns = self.cloud.size().0;
+        while let Some(Reverse(Front(d, c))) = self.front.pop() {
+            if d > self.distance[c as usize] {
+                continue;
+            }
+            let (u, v) = ((c as usize % columns) as i32, (c as usize / columns) as i32);
+            let p = self.cloud.points[c as usize];
+            let reach = JUMP + JUMP_SLOPE * p.z;
+            for dv in -NEIGHBOURS..=NEIGHBOURS {
+                for du in -NEIGHBOURS..=NEIGHBOURS {
+                    let Some(k) = self.cloud.cell(u + du, v + dv) else {
+                        continue;
+                    };
+                    let step = (self.cloud.points[k] - p).norm();
+                    // The distance of cells that are not the body is NaN: no comparison with it holds.
+                    if step < reach && d + step < self.distance[k] {
+                        self.distance[k] = d + step;
+                        self.predecessor[k] = c;
+                        self.front.push(Reverse(Front(d + step, k as u32)));
+                    }
+                }
+            }
+        }
+    }
+    /// Farthest cell that was reached.
+    fn farthest(&self, cells: &[u32]) -> Option<u32> {
+        let at = |c: &u32| self.distance[*c as usize];
+        let reached = cells.iter().copied().filter(|c| at(c).is_finite());
+        reached.max_by(|a, b| at(a).total_cmp(&at(b)).then(b.cmp(a)))
+    }
+    /// Path from an end to its source. Its cells become sources: cells beside it are no other end.
+    fn take_path(&mut self, end: u32) -> Vec<P3> {
+        let mut path = Vec::new();
+        let mut at = end;
+        while at != Self::NONE {
+            path.push(self.cloud.points[at as usize]);
+            let next = self.predecessor[at as usize];
+            self.add_source(at);
+            at = next;
+        }
+        path
+    }
+}
+
+/// Up to `most` ends of the body whose refined cells are `cells`, the farthest first, measured from the cell nearest to
+/// `torso` (camera frame, metres). Cells that are not connected to the torso have no end.
 pub fn extremities(
     cloud: &OrganisedCloud,
     cells: &[u32],
     torso: &P3,
     most: usize,
 ) -> Vec<Extremity> {
-    let columns = cloud.size().0;
-    let point = |c: u32| cloud.points[c as usize];
-    let off = |c: u32| (point(c) - torso).norm_squared();
-    let usable = |c: &u32| cloud.depth[*c as usize] > 0.0;
-    let Some(source) = cells
-        .iter()
-        .copied()
-        .filter(usable)
-        .min_by(|a, b| off(*a).total_cmp(&off(*b)))
-    else {
+    let usable = || {
+        cells
+            .iter()
+            .copied()
+            .filter(|c| cloud.depth[*c as usize] > 0.0)
+    };
+    let off = |c: u32| (cloud.points[c as usize] - torso).norm_squared();
+    let Some(source) = usable().min_by(|a, b| off(*a).total_cmp(&off(*b))) else {
         return Vec::new();
     };
-    let mut distance = vec![f32::NAN; cloud.depth.len()];
-    let mut before = vec![u32::MAX; cloud.depth.len()];
-    for &c in cells.iter().filter(|c| usable(c)) {
-        distance[c as usize] = f32::INFINITY;
-    }
-    let mut front = BinaryHeap::new();
-    distance[source as usize] = 0.0;
-    front.push(Reverse(Front(0.0, source)));
+    let mut geodesics = Geodesics::new(cloud, usable());
+    geodesics.add_source(source);
     let mut out: Vec<Extremity> = Vec::new();
-    loop {
-        while let Some(Reverse(Front(d, c))) = front.pop() {
-            if d > distance[c as usize] {
-                continue;
-            }
-            let (u, v, p) = (
-                (c as usize % columns) as i32,
-                (c as usize / columns) as i32,
-                point(c),
-            );
-            let reach = JUMP + JUMP_SLOPE * p.z;
-            for dv in -NEIGHBOURS..=NEIGHBOURS {
-                for du in -NEIGHBOURS..=NEIGHBOURS {
-                    // Cells that are not the person have no distance at all, and no comparison with it holds.
-                    let Some(k) = cloud.cell(u + du, v + dv) else {
-                        continue;
-                    };
-                    let step = (cloud.points[k] - p).norm();
-                    if step < reach && d + step < distance[k] {
-                        distance[k] = d + step;
-                        before[k] = c;
-                        front.push(Reverse(Front(d + step, k as u32)));
-                    }
-                }
-            }
-        }
-        let reached = |c: &u32| distance[*c as usize].is_finite();
-        let farthest = cells.iter().copied().filter(reached).max_by(|a, b| {
-            distance[*a as usize]
-                .total_cmp(&distance[*b as usize])
-                .then(b.cmp(a))
-        });
-        let Some(end) = farthest.filter(|e| distance[*e as usize] >= SHORTEST && out.len() < most)
-        else {
-            return out;
+    while out.len() < most {
+        geodesics.propagate();
+        let Some(end) = geodesics.farthest(cells) else {
+            break;
         };
-        let length = distance[end as usize];
-        // The way to this end counts as found: what is next to it is no other end.
-        let mut path = Vec::new();
-        let mut at = end;
-        while at != u32::MAX {
-            path.push(point(at));
-            let next = before[at as usize];
-            before[at as usize] = u32::MAX;
-            if distance[at as usize] > 0.0 {
-                distance[at as usize] = 0.0;
-                front.push(Reverse(Front(0.0, at)));
-            }
-            at = next;
+        let length = geodesics.distance[end as usize];
+        if length < SHORTEST {
+            break;
         }
         out.push(Extremity {
-            point: point(end),
+            point: cloud.points[end as usize],
             length,
-            path,
+            path: geodesics.take_path(end),
         });
     }
+    out
 }
 
 #[cfg(test)]
@@ -180,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ends_of_a_figure_come_farthest_first() {
+    fn ends_are_sorted_by_geodesic_distance() {
         let (cloud, cells) = figure();
         let ends = extremities(&cloud, &cells, &P3::new(0.0, 0.0, 2.0), 8);
         assert!(ends.len() >= 3, "{}", ends.len());
@@ -202,13 +232,13 @@ mod tests {
         );
         assert!(
             others.iter().any(|p| p[1] <= 6),
-            "what stands up: {others:?}"
+            "the upright stick: {others:?}"
         );
         assert!(
             ends.iter().all(|e| e.point.z > 1.9),
-            "what lies before the trunk is not joined to it"
+            "the stick before the trunk is not connected"
         );
-        // The long arm is straight: half a metre from its end lies half a metre towards the trunk.
+        // The long arm is straight: half a metre along the path is half a metre towards the trunk.
         let along = ends[0].along(0.5);
         assert!(
             (along.x - (ends[0].point.x - 0.5)).abs() < 0.03,
@@ -228,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_has_no_ends() {
+    fn degenerate_bodies_have_no_ends() {
         let (mut cloud, cells) = figure();
         assert!(extremities(&cloud, &[], &P3::origin(), 4).is_empty());
         assert!(extremities(&cloud, &cells, &P3::origin(), 0).is_empty());

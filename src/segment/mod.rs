@@ -1,11 +1,18 @@
-//! Which pixels are the person: floor, background, nearest body, edges.
+//! The pixels of the person: floor, background, nearest body, edges.
 
+mod components;
 mod edges;
 mod extremities;
+#[cfg(test)]
+mod fixture;
+mod hands;
 mod person;
+mod plane_bands;
+mod plane_search;
 mod planes;
 
 pub use edges::{Contour, contour};
 pub use extremities::{Extremity, extremities};
-pub use person::{PersonSearch, Prior, SegmentScratch, find_person};
-pub use planes::{Plane, ScenePlanes, find_planes};
+pub use person::{PersonPrior, PersonSearch, SegmentScratch, find_person};
+pub use plane_search::find_planes;
+pub use planes::{ScenePlane, ScenePlanes};

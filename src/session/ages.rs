@@ -1,24 +1,23 @@
-//! How old the newest word of each part is: what turns silence into a fault.
+//! Ages of the newest message of each stage, and the silence that becomes a fault.
 
-use super::Reason;
+use super::Fault;
 use serde::{Deserialize, Serialize};
 
-/// How long each part may be silent, nanoseconds.
+/// Longest silence of each stage, nanoseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Limits {
-    /// No frame for this long is [`Reason::CameraSilent`].
+pub struct SilenceLimits {
+    /// No frame for this long is [`Fault::CameraSilent`].
     pub camera_silence_ns: u64,
-    /// No body state for this long while frames come is [`Reason::TrackingUnavailable`].
+    /// No body state for this long while frames come is [`Fault::TrackingUnavailable`].
     pub tracking_silence_ns: u64,
-    /// No garment state for this long while bodies come is [`Reason::GarmentsLate`].
+    /// No garment state for this long while bodies come is [`Fault::GarmentsLate`].
     pub garments_age_ns: u64,
 }
 
-impl Default for Limits {
-    /// A client must know within a second (issue: kill −9), so every silence is shorter. Fifteen frames of a 30 Hz
-    /// camera for the camera, which may skip on exposure changes; half of that for garments, for at 250 ms a shirt
-    /// visibly trails its wearer.
+impl Default for SilenceLimits {
+    /// A client learns of a fault within a second, so every limit is shorter. Fifteen frames at 30 Hz for the camera,
+    /// which skips on exposure changes. Half of that for garments: at 250 ms a shirt visibly trails the body.
     fn default() -> Self {
         Self {
             camera_silence_ns: 500_000_000,
@@ -28,7 +27,7 @@ impl Default for Limits {
     }
 }
 
-/// When each part last spoke, nanoseconds of the service's monotonic clock; `None` before the first time.
+/// Time of the newest message of each stage, nanoseconds of the service's monotonic clock; `None` before the first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ages {
     /// Newest frame.
@@ -40,18 +39,18 @@ pub struct Ages {
 }
 
 impl Ages {
-    /// The fault that silence amounts to at `now_ns`, the most upstream one; `None` while all is fresh.
-    /// What has never spoken is not late: opening has its own deadline.
-    pub fn overdue(&self, now_ns: u64, limits: &Limits) -> Option<Reason> {
+    /// Most upstream fault of silence at `now_ns`; `None` while all is fresh.
+    /// A stage without any message is not late: opening has its own deadline.
+    pub fn overdue(&self, now_ns: u64, limits: &SilenceLimits) -> Option<Fault> {
         let late =
             |at: Option<u64>, limit: u64| at.is_some_and(|t| now_ns.saturating_sub(t) > limit);
         if late(self.frame_ns, limits.camera_silence_ns) {
-            return Some(Reason::CameraSilent);
+            return Some(Fault::CameraSilent);
         }
         if late(self.body_ns, limits.tracking_silence_ns) {
-            return Some(Reason::TrackingUnavailable);
+            return Some(Fault::TrackingUnavailable);
         }
-        late(self.garments_ns, limits.garments_age_ns).then_some(Reason::GarmentsLate)
+        late(self.garments_ns, limits.garments_age_ns).then_some(Fault::GarmentsLate)
     }
 }
 
@@ -60,8 +59,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn silence_is_blamed_on_the_first_silent_part() {
-        let limits = Limits {
+    fn silence_is_the_fault_of_the_first_silent_stage() {
+        let limits = SilenceLimits {
             camera_silence_ns: 50,
             tracking_silence_ns: 70,
             garments_age_ns: 25,
@@ -72,15 +71,15 @@ mod tests {
             garments_ns: Some(90),
         };
         assert_eq!(ages.overdue(110, &limits), None);
-        assert_eq!(ages.overdue(120, &limits), Some(Reason::GarmentsLate));
-        assert_eq!(ages.overdue(151, &limits), Some(Reason::CameraSilent));
+        assert_eq!(ages.overdue(120, &limits), Some(Fault::GarmentsLate));
+        assert_eq!(ages.overdue(151, &limits), Some(Fault::CameraSilent));
         let frames = Ages {
             frame_ns: Some(200),
             ..ages
         };
         assert_eq!(
             frames.overdue(200, &limits),
-            Some(Reason::TrackingUnavailable)
+            Some(Fault::TrackingUnavailable)
         );
         assert_eq!(Ages::default().overdue(u64::MAX, &limits), None);
         // A clock that runs backwards is no reason to panic.

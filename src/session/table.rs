@@ -1,85 +1,38 @@
-//! The table itself.
+//! The transition table.
 
-use super::{Effect, Event, Part, Reason, State};
+use super::{Event, Fault, State};
 
-/// The next state and what to do about it. Total: every pair has an answer, and what does not concern a state
-/// leaves it alone without effects.
-pub fn transition(state: State, event: Event) -> (State, Vec<Effect>) {
-    use Effect::{Announce, CloseUpstream, Dress, EndStreams, ForgetGarments};
+/// Next state. Total: every pair has an answer, and an event that does not concern a state leaves it unchanged.
+pub fn transition(state: State, event: Event) -> State {
     use State::{Calibrating, Closed, Degraded, Draining, Live, Opening};
-    let to = |next: State, effects: &[Effect]| {
-        let announce = (next != state).then_some(Announce(next));
-        (
-            next,
-            announce
-                .into_iter()
-                .chain(effects.iter().copied())
-                .collect(),
-        )
-    };
     match (state, event) {
-        (Closed, _) => to(Closed, &[]),
-        (_, Event::Close) => to(Closed, &[CloseUpstream, EndStreams]),
-        (Draining, Event::Drained) => to(Closed, &[CloseUpstream, EndStreams]),
-        (Draining, _) => to(Draining, &[]),
-        (_, Event::Drain) => to(Draining, &[]),
-        (_, Event::Drained) => to(state, &[]),
+        (Closed, _) | (_, Event::Close) | (Draining, Event::Drained) => Closed,
+        (Draining, _) | (_, Event::Drain) => Draining,
 
-        // A reopened session behind this one remembers nothing: dress again.
-        (Opening, Event::Opened) => to(Calibrating, &[Dress]),
-        (Degraded(why), Event::Opened) if is_service(why) => to(Calibrating, &[Dress]),
-        (Degraded(Reason::CameraSilent), Event::CameraBack) => to(Calibrating, &[]),
-        (Degraded(why), Event::PersonFound) if is_person(why) => to(Calibrating, &[]),
-        (Calibrating | Degraded(_), Event::GarmentsOn) => to(Live, &[]),
+        (Opening, Event::Opened) | (Live, Event::OutfitChanged) => Calibrating,
+        (Degraded(fault), Event::Opened) if fault.is_service() => Calibrating,
+        (Degraded(Fault::CameraSilent), Event::CameraBack) => Calibrating,
+        (Degraded(fault), Event::PersonFound) if fault.is_person() => Calibrating,
+        (Calibrating | Degraded(_), Event::GarmentsOn) => Live,
 
-        // Before opening there is nobody to send it to; `Opened` sends whatever is chosen by then.
-        (Opening, Event::OutfitChanged) => to(Opening, &[]),
-        (Live, Event::OutfitChanged) => to(Calibrating, &[Dress]),
-        (_, Event::OutfitChanged) => to(state, &[Dress]),
-
-        (_, Event::Failed(why)) => match after_fault(state, why) {
-            next if next == state => to(state, &[]),
-            next @ Degraded(why) => match why {
-                Reason::TrackingUnavailable => {
-                    to(next, &[ForgetGarments, Effect::Reopen(Part::Tracking)])
-                }
-                Reason::ClothUnavailable => {
-                    to(next, &[ForgetGarments, Effect::Reopen(Part::Cloth)])
-                }
-                // One late or refused frame costs no state: the garments go on from where they are.
-                Reason::GarmentsLate | Reason::StepFailed => to(next, &[]),
-                _ => to(next, &[ForgetGarments]),
-            },
-            next => to(next, &[]),
-        },
-        (_, Event::Opened | Event::CameraBack | Event::PersonFound | Event::GarmentsOn) => {
-            to(state, &[])
-        }
+        (_, Event::Failed(fault)) => after_fault(state, fault),
+        _ => state,
     }
 }
 
-fn is_service(why: Reason) -> bool {
-    matches!(why, Reason::TrackingUnavailable | Reason::ClothUnavailable)
-}
-
-fn is_person(why: Reason) -> bool {
-    matches!(
-        why,
-        Reason::NoPerson | Reason::PersonLeft | Reason::TrackingLost
-    )
-}
-
-/// Where a fault leads: upstream faults hide downstream ones, and a part corrects its own word.
-fn after_fault(state: State, why: Reason) -> State {
+/// Next state on a fault: upstream faults hide downstream ones, and a stage replaces its own fault.
+fn after_fault(state: State, fault: Fault) -> State {
     match state {
-        // Nothing behind it has opened: only a missing camera or service can be true.
-        State::Opening if why == Reason::CameraSilent || is_service(why) => State::Degraded(why),
+        // Nothing upstream has opened: only a missing camera or service can be true.
+        State::Opening if fault == Fault::CameraSilent || fault.is_service() => {
+            State::Degraded(fault)
+        }
         State::Opening | State::Draining | State::Closed => state,
-        // Somebody was there a moment ago.
-        State::Live if why == Reason::NoPerson => State::Degraded(Reason::PersonLeft),
-        State::Calibrating | State::Live => State::Degraded(why),
-        State::Degraded(Reason::PersonLeft) if why == Reason::NoPerson => state,
-        State::Degraded(old) if why.part() <= old.part() => State::Degraded(why),
+        // Live implies that a person was tracked.
+        State::Live if fault == Fault::NoPerson => State::Degraded(Fault::PersonLeft),
+        State::Calibrating | State::Live => State::Degraded(fault),
+        State::Degraded(Fault::PersonLeft) if fault == Fault::NoPerson => state,
+        State::Degraded(old) if fault.stage() <= old.stage() => State::Degraded(fault),
         State::Degraded(_) => state,
     }
 }
@@ -90,14 +43,14 @@ mod tests {
     use Event::{
         CameraBack, Close, Drain, Drained, Failed, GarmentsOn, Opened, OutfitChanged, PersonFound,
     };
-    use Reason::{
+    use Fault::{
         CameraSilent, ClothUnavailable, NoPerson, PersonLeft, StepFailed, TrackingLost,
         TrackingUnavailable,
     };
     use State::{Calibrating, Closed, Degraded, Draining, Live, Opening};
 
     /// The whole table as text, written independently of the code: one row a state, one column an event.
-    /// `.` stays; letters are states; digits are `Degraded` in the order of [`Reason::ALL`].
+    /// `.` stays; letters are states; digits are `Degraded` in the order of [`Fault::ALL`].
     const EXPECTED: &[(&str, &str)] = &[
         // state, columns: Opened CameraBack PersonFound GarmentsOn OutfitChanged Drain Drained Close | 8 faults
         ("O", "C....D.X01...5.."),
@@ -122,23 +75,36 @@ mod tests {
             Live => 'L',
             Draining => 'D',
             Closed => 'X',
-            Degraded(why) => {
-                let i = Reason::ALL.iter().position(|r| *r == why).expect("listed");
+            Degraded(fault) => {
+                let i = Fault::ALL.iter().position(|f| *f == fault).expect("listed");
                 char::from(b'0' + i as u8)
             }
         }
     }
 
     #[test]
-    fn every_state_and_event_is_in_the_table() {
-        let states: Vec<State> = State::all().collect();
-        let events: Vec<Event> = Event::all().collect();
+    fn every_pair_matches_the_written_table() {
+        let states = [Opening, Calibrating, Live, Draining, Closed]
+            .into_iter()
+            .chain(Fault::ALL.map(Degraded));
+        let states: Vec<State> = states.collect();
+        let events = [
+            Opened,
+            CameraBack,
+            PersonFound,
+            GarmentsOn,
+            OutfitChanged,
+            Drain,
+            Drained,
+            Close,
+        ];
+        let events: Vec<Event> = events.into_iter().chain(Fault::ALL.map(Failed)).collect();
         assert_eq!((states.len(), events.len()), (13, 16));
         assert_eq!(EXPECTED.len(), states.len());
         for (state, (name, row)) in states.iter().zip(EXPECTED) {
             assert_eq!(name.chars().next(), Some(letter(*state)));
             for (event, want) in events.iter().zip(row.chars()) {
-                let (next, _) = transition(*state, *event);
+                let next = transition(*state, *event);
                 let got = if next == *state { '.' } else { letter(next) };
                 assert_eq!(got, want, "{state:?} × {event:?}");
             }
@@ -146,46 +112,21 @@ mod tests {
     }
 
     #[test]
-    fn effects_follow_from_the_move() {
-        for state in State::all() {
-            for event in Event::all() {
-                let (next, effects) = transition(state, event);
-                let announced = effects
-                    .iter()
-                    .filter(|e| matches!(e, Effect::Announce(_)))
-                    .count();
-                assert_eq!(
-                    announced,
-                    usize::from(next != state),
-                    "{state:?} × {event:?}: a change is told once"
-                );
-                if next == Closed && state != Closed {
-                    assert!(
-                        effects.contains(&Effect::CloseUpstream)
-                            && effects.contains(&Effect::EndStreams)
-                    );
-                }
-                let reopens = effects.iter().any(|e| matches!(e, Effect::Reopen(_)));
-                assert_eq!(
-                    reopens,
-                    next != state && next.reason().is_some_and(is_service),
-                    "{state:?} × {event:?}"
-                );
-                if effects.contains(&Effect::Dress) {
-                    assert!(state.accepts_work() && matches!(event, Opened | OutfitChanged));
-                }
-            }
-        }
+    fn garments_survive_a_late_or_refused_frame_only() {
+        let kept = |s: State| !s.invalidates_garments();
+        assert!(kept(Live) && kept(Calibrating));
+        let lost = Fault::ALL.into_iter().filter(|f| !kept(Degraded(*f)));
+        assert!(lost.eq(Fault::ALL[..6].iter().copied()));
     }
 
     fn run(events: &[Event]) -> State {
         events
             .iter()
-            .fold(State::default(), |s, e| transition(s, *e).0)
+            .fold(State::default(), |s, e| transition(s, *e))
     }
 
     #[test]
-    fn stories() {
+    fn event_sequences_end_in_the_expected_state() {
         assert_eq!(run(&[Opened, PersonFound, GarmentsOn]), Live);
         let left = [Opened, GarmentsOn, Failed(NoPerson), Failed(NoPerson)];
         assert_eq!(run(&left), Degraded(PersonLeft));

@@ -2,7 +2,7 @@
 
 use super::{TrackerModel, TrackerState, Workspace};
 use crate::camera::RgbdFrame;
-use crate::segment::{PersonSearch, Prior, contour, find_person, find_planes};
+use crate::segment::{PersonPrior, PersonSearch, contour, find_person, find_planes};
 use crate::spatial::OrganisedCloud;
 
 /// Frames without a subject after which the scene planes are searched again.
@@ -31,7 +31,7 @@ pub(super) fn segment(
             state.set_scene(scene);
         }
     }
-    let prior = state.status.is_live().then_some(Prior {
+    let prior = state.status.is_live().then_some(PersonPrior {
         centre: state.centre,
         reach: REACH,
     });

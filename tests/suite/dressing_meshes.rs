@@ -75,7 +75,7 @@ fn extent_and_area(d: &Dressed, k: usize) -> ([f32; 2], f64) {
     for (f, r) in g.faces.iter().zip(&g.rest) {
         let p = f.map(|v| x[v as usize].cast::<f64>());
         now += 0.5 * (p[1] - p[0]).cross(&(p[2] - p[0])).norm();
-        flat += tryon::garment::mesh_area(r);
+        flat += tryon::garment::rest_area(r);
     }
     (
         x.iter()

@@ -67,7 +67,7 @@ fn every_garment_is_neither_torn_nor_crumpled_on_three_bodies() {
             for (f, r) in g.faces.iter().zip(&g.rest) {
                 let p = f.map(|v| x[v as usize].cast::<f64>());
                 let area = 0.5 * (p[1] - p[0]).cross(&(p[2] - p[0])).norm();
-                let rest = tryon::garment::mesh_area(r);
+                let rest = tryon::garment::rest_area(r);
                 flat += rest;
                 now += area;
                 short += usize::from(area < 0.5 * rest);
@@ -356,7 +356,7 @@ fn every_garmentcode_pattern_is_imported_and_worn() {
         for (f, r) in g.faces.iter().zip(&g.rest) {
             let q = f.map(|v| x[v as usize].cast::<f64>());
             now += 0.5 * (q[1] - q[0]).cross(&(q[2] - q[0])).norm();
-            flat += tryon::garment::mesh_area(r);
+            flat += tryon::garment::rest_area(r);
         }
         eprintln!(
             "{name}: {} vertices, smallest angle {:.1}, area {:.3}, p99 stretch {:.3}, {:?} finished {:?}",

@@ -1,6 +1,6 @@
 //! State of a try-on in the terms of the wire.
 
-use tryon::session::{Reason, State};
+use tryon::session::{Fault, State};
 use tryon_proto::v1::{DegradedReason, TryOnState};
 
 pub(crate) fn state(s: State) -> TryOnState {
@@ -15,38 +15,38 @@ pub(crate) fn state(s: State) -> TryOnState {
 }
 
 pub(crate) fn reason(s: State) -> DegradedReason {
-    s.reason().map_or(DegradedReason::Unspecified, |r| match r {
-        Reason::CameraSilent => DegradedReason::CameraSilent,
-        Reason::TrackingUnavailable => DegradedReason::TrackingUnavailable,
-        Reason::NoPerson => DegradedReason::NoPerson,
-        Reason::PersonLeft => DegradedReason::PersonLeft,
-        Reason::TrackingLost => DegradedReason::TrackingLost,
-        Reason::ClothUnavailable => DegradedReason::ClothUnavailable,
-        Reason::GarmentsLate => DegradedReason::GarmentsLate,
-        Reason::StepFailed => DegradedReason::StepFailed,
+    s.fault().map_or(DegradedReason::Unspecified, |f| match f {
+        Fault::CameraSilent => DegradedReason::CameraSilent,
+        Fault::TrackingUnavailable => DegradedReason::TrackingUnavailable,
+        Fault::NoPerson => DegradedReason::NoPerson,
+        Fault::PersonLeft => DegradedReason::PersonLeft,
+        Fault::TrackingLost => DegradedReason::TrackingLost,
+        Fault::ClothUnavailable => DegradedReason::ClothUnavailable,
+        Fault::GarmentsLate => DegradedReason::GarmentsLate,
+        Fault::StepFailed => DegradedReason::StepFailed,
     })
 }
 
-pub(crate) fn from_wire(r: DegradedReason) -> Option<Reason> {
+pub(crate) fn from_wire(r: DegradedReason) -> Option<Fault> {
     Some(match r {
         DegradedReason::Unspecified => return None,
-        DegradedReason::CameraSilent => Reason::CameraSilent,
-        DegradedReason::TrackingUnavailable => Reason::TrackingUnavailable,
-        DegradedReason::NoPerson => Reason::NoPerson,
-        DegradedReason::PersonLeft => Reason::PersonLeft,
-        DegradedReason::TrackingLost => Reason::TrackingLost,
-        DegradedReason::ClothUnavailable => Reason::ClothUnavailable,
-        DegradedReason::GarmentsLate => Reason::GarmentsLate,
-        DegradedReason::StepFailed => Reason::StepFailed,
+        DegradedReason::CameraSilent => Fault::CameraSilent,
+        DegradedReason::TrackingUnavailable => Fault::TrackingUnavailable,
+        DegradedReason::NoPerson => Fault::NoPerson,
+        DegradedReason::PersonLeft => Fault::PersonLeft,
+        DegradedReason::TrackingLost => Fault::TrackingLost,
+        DegradedReason::ClothUnavailable => Fault::ClothUnavailable,
+        DegradedReason::GarmentsLate => Fault::GarmentsLate,
+        DegradedReason::StepFailed => Fault::StepFailed,
     })
 }
 
 /// Service at fault; empty when none is.
 pub(crate) fn service(s: State) -> &'static str {
-    match s.reason() {
-        Some(Reason::CameraSilent) => "capture",
-        Some(Reason::TrackingUnavailable) => "tracking",
-        Some(Reason::ClothUnavailable | Reason::GarmentsLate) => "cloth",
+    match s.fault() {
+        Some(Fault::CameraSilent) => "capture",
+        Some(Fault::TrackingUnavailable) => "tracking",
+        Some(Fault::ClothUnavailable | Fault::GarmentsLate) => "cloth",
         _ => "",
     }
 }
@@ -57,7 +57,7 @@ mod tests {
 
     #[test]
     fn reasons_survive_the_wire() {
-        for r in Reason::ALL {
+        for r in Fault::ALL {
             assert_eq!(from_wire(reason(State::Degraded(r))), Some(r));
         }
         assert_eq!(from_wire(DegradedReason::Unspecified), None);

@@ -11,7 +11,7 @@ use crate::garment::import::{
     coarsen, from_mesh, median_edge, panels_in_metres, remesh, some_faces, unfold,
 };
 use crate::garment::{
-    AnchorKind, AnchorSet, GarmentError, GarmentKind, GarmentMesh, Material, Region, mesh_area,
+    AnchorKind, AnchorSet, GarmentError, GarmentKind, GarmentMesh, Material, Region, rest_area,
 };
 use crate::math::P3;
 use crate::mesh::{Face, Topology, TriMesh, face_normal};
@@ -229,7 +229,7 @@ impl GarmentPiece {
         } else {
             for (rest, f) in garment.rest.iter_mut().zip(&garment.faces) {
                 let t = unfold(f.map(|v| x[v as usize].coords.cast()));
-                if mesh_area(&t) > COLLAPSED * mesh_area(rest) {
+                if rest_area(&t) > COLLAPSED * rest_area(rest) {
                     *rest = t;
                 }
             }

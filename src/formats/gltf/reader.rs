@@ -1,6 +1,5 @@
-//! glTF to meshes. Every accessor is measured against its buffer before it is read.
+//! Meshes from glTF. Every accessor is checked against the size of its buffer before it is read.
 
-use super::{GltfModel, GltfPart};
 use crate::formats::FormatError;
 use crate::formats::image::read_limited;
 use crate::math::P3;
@@ -9,18 +8,44 @@ use ::gltf::accessor::{DataType, Dimensions};
 use ::gltf::mesh::Mode;
 use ::gltf::{Accessor, Gltf, Node, Primitive, Semantic};
 use nalgebra::Matrix4;
+use std::ops::Range;
 use std::path::{Component, Path};
 
 /// Largest file; a garment of 100,000 vertices takes 4 MB without its textures.
 const MAX_BYTES: u64 = 512 << 20;
-/// Deeper scenes are cycles.
+/// Deepest scene; deeper ones are cycles.
 const MAX_DEPTH: usize = 64;
-/// More nodes than this in one scene are no outfit; nodes shared by many parents multiply.
+/// Most nodes of a scene; nodes shared by many parents multiply.
 const MAX_NODES: usize = 10_000;
-/// More vertices than this are no outfit; primitives that share one large accessor multiply.
+/// Most vertices of a scene; primitives that share one large accessor multiply.
 const MAX_VERTICES: usize = 10_000_000;
 
-struct File<'a> {
+/// Triangles of a glTF scene in one mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GltfModel {
+    /// Vertices and triangles of all parts, node transforms applied, checked.
+    pub mesh: TriMesh,
+    /// Texture coordinates, shape `[vertices]`; empty when a part has none.
+    pub uv: Vec<[f32; 2]>,
+    /// The primitives, in the order of the scene.
+    pub parts: Vec<GltfPart>,
+}
+
+/// One primitive of a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GltfPart {
+    /// Name of its mesh.
+    pub name: String,
+    /// Its faces in [`GltfModel::mesh`].
+    pub faces: Range<usize>,
+    /// Base colour, linear RGBA.
+    pub color: [f32; 4],
+    /// Drawn from both sides.
+    pub double_sided: bool,
+}
+
+/// Triangles read so far, and the buffers they come from.
+struct SceneReader<'a> {
     path: &'a Path,
     buffers: Vec<Vec<u8>>,
     vertices: Vec<P3>,
@@ -38,7 +63,7 @@ pub fn read_glb(path: &Path) -> Result<GltfModel, FormatError> {
     parse_gltf(&read_limited(path, MAX_BYTES)?, path)
 }
 
-/// As [`read_glb`] on bytes; buffers in other files are looked for beside `origin`.
+/// Parses the bytes of a file as [`read_glb`] does; external buffers lie beside `origin`.
 ///
 /// # Errors
 /// As [`read_glb`].
@@ -63,7 +88,7 @@ pub fn parse_gltf(bytes: &[u8], origin: &Path) -> Result<GltfModel, FormatError>
         }
         buffers.push(data);
     }
-    let mut file = File {
+    let mut file = SceneReader {
         path: origin,
         buffers,
         vertices: Vec::new(),
@@ -89,7 +114,7 @@ pub fn parse_gltf(bytes: &[u8], origin: &Path) -> Result<GltfModel, FormatError>
     if file.faces.is_empty() {
         return Err(FormatError::field(origin, "meshes", "no triangles"));
     }
-    let File {
+    let SceneReader {
         vertices,
         faces,
         mut uv,
@@ -104,7 +129,7 @@ pub fn parse_gltf(bytes: &[u8], origin: &Path) -> Result<GltfModel, FormatError>
     Ok(GltfModel { mesh, uv, parts })
 }
 
-/// The lengths of header and chunks agree with the bytes at hand.
+/// Checks the lengths of header and chunks against the number of bytes.
 fn check_container(bytes: &[u8], origin: &Path) -> Result<(), FormatError> {
     if !bytes.starts_with(b"glTF") {
         return Ok(());
@@ -136,7 +161,7 @@ fn check_container(bytes: &[u8], origin: &Path) -> Result<(), FormatError> {
     Ok(())
 }
 
-/// The accessor of every POSITION exists: the gltf crate's validation looks it up unchecked.
+/// Checks that the accessor of every POSITION exists: the gltf crate indexes it unchecked.
 fn check_positions(bytes: &[u8], origin: &Path) -> Result<(), FormatError> {
     let text = match bytes.get(12..16) {
         Some(n) if bytes.starts_with(b"glTF") => {
@@ -173,6 +198,7 @@ fn check_positions(bytes: &[u8], origin: &Path) -> Result<(), FormatError> {
     Ok(())
 }
 
+/// Bytes of a data URI, or of a file in the folder of `origin`.
 fn external(uri: &str, origin: &Path, field: &str) -> Result<Vec<u8>, FormatError> {
     if let Some(data) = uri.strip_prefix("data:") {
         let text = data.split_once(";base64,").map(|d| d.1);
@@ -194,7 +220,7 @@ fn external(uri: &str, origin: &Path, field: &str) -> Result<Vec<u8>, FormatErro
     read_limited(&origin.with_file_name("").join(relative), MAX_BYTES)
 }
 
-/// RFC 4648, section 4.
+/// Decodes base64 (RFC 4648, section 4).
 fn base64(text: &str) -> Option<Vec<u8>> {
     let mut out = Vec::with_capacity(text.len() / 4 * 3);
     let (mut bits, mut have) = (0u32, 0);
@@ -218,7 +244,8 @@ fn base64(text: &str) -> Option<Vec<u8>> {
     Some(out)
 }
 
-impl File<'_> {
+impl SceneReader<'_> {
+    /// Adds a node and its children; `above` is the transform of the parent.
     fn node(
         &mut self,
         node: &Node<'_>,
@@ -253,6 +280,7 @@ impl File<'_> {
         Ok(())
     }
 
+    /// Adds primitive `k` of mesh `name` under the transform `place`.
     fn primitive(
         &mut self,
         name: &str,
@@ -300,7 +328,7 @@ impl File<'_> {
             .chunks_exact(3)
             .map(|c| [c[0], c[1], c[2]])
             .collect();
-        // Checked by itself first, so that a fault names the primitive's own face and vertex.
+        // Checked alone first, so that an error names the primitive's own face and vertex.
         let mesh = TriMesh::new(vertices, faces).map_err(|e| fault("mesh", e.to_string()))?;
         let (base, first) = (self.vertices.len() as u32, self.faces.len());
         self.vertices.extend(mesh.vertices());
@@ -317,7 +345,7 @@ impl File<'_> {
         Ok(())
     }
 
-    /// The bytes of each element.
+    /// Bytes of each element of an accessor.
     fn elements<'s>(&'s self, a: &Accessor<'_>, size: usize) -> Result<Vec<&'s [u8]>, String> {
         if a.sparse().is_some() {
             return Err("sparse accessors are not supported; export without them".into());
@@ -400,7 +428,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn base64_of_the_rfc() {
+    fn base64_matches_the_vectors_of_rfc_4648() {
         for (text, want) in [
             ("", ""),
             ("Zg==", "f"),

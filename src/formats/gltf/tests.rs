@@ -1,4 +1,6 @@
 use super::*;
+use crate::math::P3;
+use crate::mesh::Face;
 use std::path::Path;
 
 const CORNERS: [[f32; 3]; 4] = [
@@ -34,7 +36,7 @@ fn encoded(frames: &[Vec<Vec<P3>>]) -> Result<Vec<u8>, crate::formats::FormatErr
 }
 
 #[test]
-fn what_is_written_is_read() {
+fn written_meshes_read_back() {
     let bytes = encoded(&[]).expect("encodes");
     let m = parse_gltf(&bytes, Path::new(AT)).expect("reads");
     assert_eq!(m.mesh.vertices(), [points(), points()].concat());
@@ -54,7 +56,7 @@ fn what_is_written_is_read() {
 }
 
 #[test]
-fn motion_becomes_morph_targets() {
+fn motion_is_written_as_morph_targets() {
     let up = |k: usize| {
         points()
             .iter()

@@ -1,9 +1,8 @@
 //! Binary glTF from meshes: one buffer, one node a mesh, morph targets for motion.
 
-use super::GlbMesh;
 use crate::formats::FormatError;
 use crate::math::{P3, V3};
-use crate::mesh::face_normal;
+use crate::mesh::{Face, face_normal};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -12,17 +11,21 @@ const UNSIGNED: u32 = 5125;
 const VERTEX_BUFFER: u32 = 34_962;
 const INDEX_BUFFER: u32 = 34_963;
 
-/// The binary chunk and what describes it.
+/// The binary chunk and the JSON objects that describe it.
 #[derive(Default)]
 struct Builder {
     bytes: Vec<u8>,
     views: Vec<Value>,
     accessors: Vec<Value>,
+    meshes: Vec<Value>,
+    nodes: Vec<Value>,
+    materials: Vec<Value>,
+    animations: Vec<Value>,
 }
 
 impl Builder {
     fn add(&mut self, data: &[u8], target: Option<u32>, mut accessor: Value) -> usize {
-        // Everything is made of 4-byte values, so offsets stay aligned.
+        // All data are 4-byte values, so offsets stay aligned.
         let mut view =
             json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": data.len()});
         if let Some(t) = target {
@@ -56,9 +59,92 @@ impl Builder {
         });
         self.add(&data, target.then_some(VERTEX_BUFFER), accessor)
     }
+
+    /// Adds a mesh with its node, material and motion.
+    fn mesh(&mut self, m: &GlbMesh<'_>, frames: &[Vec<P3>], frame_seconds: f32) {
+        let index = self.meshes.len();
+        let position = self.vectors("VEC3", m.vertices.iter().map(|p| [p.x, p.y, p.z]), true);
+        let normals = normals(m).into_iter().map(|n| [n.x, n.y, n.z]);
+        let normal = self.vectors("VEC3", normals, true);
+        let mut attributes = json!({"POSITION": position, "NORMAL": normal});
+        if !m.uv.is_empty() {
+            attributes["TEXCOORD_0"] = json!(self.vectors("VEC2", m.uv.iter().copied(), true));
+        }
+        let indices = m.faces.iter().flatten().flat_map(|i| i.to_le_bytes());
+        let indices: Vec<u8> = indices.collect();
+        let count = 3 * m.faces.len();
+        let accessor = json!({"componentType": UNSIGNED, "type": "SCALAR", "count": count});
+        let indices = self.add(&indices, Some(INDEX_BUFFER), accessor);
+        let mut primitive =
+            json!({"attributes": attributes, "indices": indices, "material": index});
+        let mut mesh = json!({"name": m.name});
+        if !frames.is_empty() {
+            primitive["targets"] = self.morph_targets(m, frames);
+            mesh["weights"] = json!(vec![0.0; frames.len()]);
+            self.animation(m.name, frames.len(), frame_seconds);
+        }
+        mesh["primitives"] = json!([primitive]);
+        self.meshes.push(mesh);
+        self.nodes.push(json!({"name": m.name, "mesh": index}));
+        let [r, g, b] = m.color.map(linear);
+        self.materials.push(json!({
+            "name": m.name,
+            "doubleSided": true,
+            "pbrMetallicRoughness": {"baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.9},
+        }));
+    }
+    /// One morph target a frame: displacements from the mesh.
+    fn morph_targets(&mut self, m: &GlbMesh<'_>, frames: &[Vec<P3>]) -> Value {
+        let target = |f: &Vec<P3>| {
+            let rows = f.iter().zip(m.vertices).map(|(p, q)| (p - q).into());
+            json!({"POSITION": self.vectors("VEC3", rows, true)})
+        };
+        frames.iter().map(target).collect()
+    }
+    /// Animation of the next node: each target has weight one at its time; positions are linear in between.
+    fn animation(&mut self, name: &str, frames: usize, frame_seconds: f32) {
+        let times = (0..frames).map(|t| [t as f32 * frame_seconds]);
+        let times = self.vectors("SCALAR", times, false);
+        let weights = (0..frames * frames).map(|w| [f32::from(u8::from(w / frames == w % frames))]);
+        let weights = self.vectors("SCALAR", weights, false);
+        self.animations.push(json!({
+            "name": format!("{name} motion"),
+            "samplers": [{"input": times, "output": weights, "interpolation": "LINEAR"}],
+            "channels": [{"sampler": 0, "target": {"node": self.nodes.len(), "path": "weights"}}],
+        }));
+    }
+    fn finish(self) -> Vec<u8> {
+        let mut root = json!({
+            "asset": {"version": "2.0", "generator": concat!("tryon ", env!("CARGO_PKG_VERSION"))},
+            "scene": 0,
+            "scenes": [{"nodes": (0..self.nodes.len()).collect::<Vec<_>>()}],
+            "nodes": self.nodes, "meshes": self.meshes, "materials": self.materials,
+            "accessors": self.accessors, "bufferViews": self.views,
+            "buffers": [{"byteLength": self.bytes.len()}],
+        });
+        if !self.animations.is_empty() {
+            root["animations"] = json!(self.animations);
+        }
+        container(&root.to_string(), self.bytes)
+    }
 }
 
-/// Area-weighted vertex normals; up where a vertex has no face.
+/// Mesh to write: corners share position and texture coordinate. Metres, y up.
+#[derive(Clone, Copy, Debug)]
+pub struct GlbMesh<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Positions, shape `[vertices]`.
+    pub vertices: &'a [P3],
+    /// Triangles.
+    pub faces: &'a [Face],
+    /// Texture coordinates (v down, as in glTF), shape `[vertices]`; empty for none.
+    pub uv: &'a [[f32; 2]],
+    /// Base colour, sRGB, of both sides.
+    pub color: [u8; 3],
+}
+
+/// Area-weighted vertex normals; +y for a vertex without a face.
 fn normals(m: &GlbMesh<'_>) -> Vec<V3> {
     let mut out = vec![V3::zeros(); m.vertices.len()];
     for f in m.faces {
@@ -80,8 +166,8 @@ fn linear(c: u8) -> f32 {
     }
 }
 
-/// Meshes to the bytes of a `.glb`. `frames` holds positions of each mesh at later moments, shape
-/// `[meshes][frames][vertices]`, `frame_seconds` apart; empty (or too short) for meshes that stand still.
+/// Encodes meshes as a `.glb`. `frames` holds the positions of each mesh over time, shape `[meshes][frames][vertices]`,
+/// `frame_seconds` apart; empty (or too short) for static meshes.
 ///
 /// # Errors
 /// Names the mesh: no faces, an index out of range, a position that is not finite, or texture coordinates or frames
@@ -93,111 +179,44 @@ pub fn encode_glb(
     origin: &Path,
 ) -> Result<Vec<u8>, FormatError> {
     let mut b = Builder::default();
-    let (mut nodes, mut out, mut materials, mut animations) = (vec![], vec![], vec![], vec![]);
     for (i, m) in meshes.iter().enumerate() {
-        let vertices = m.vertices;
         let frames = frames.get(i).map_or(&[][..], Vec::as_slice);
-        let finite = |f: &[P3]| f.iter().all(|p| p.iter().all(|c| c.is_finite()));
-        let fault = |field: &str, why: String| {
-            FormatError::field(origin, format!("mesh `{}`.{field}", m.name), why)
-        };
-        let n = vertices.len();
-        if m.faces.is_empty() {
-            return Err(fault("faces", "none".into()));
-        }
-        if let Some((f, k)) = m
-            .faces
-            .iter()
-            .enumerate()
-            .find_map(|(i, f)| f.iter().find(|k| **k as usize >= n).map(|k| (i, k)))
-        {
-            return Err(fault(
-                "faces",
-                format!("face {f}: vertex index {k} is out of range ({n} vertices)"),
-            ));
-        }
-        if !finite(vertices) {
-            return Err(fault("vertices", "a position is not finite".into()));
-        }
-        if !m.uv.is_empty() && m.uv.len() != n {
-            return Err(fault("uv", format!("{} for {n} vertices", m.uv.len())));
-        }
-        if let Some(k) = frames.iter().position(|f| f.len() != n || !finite(f)) {
-            return Err(fault(
-                "frames",
-                format!("frame {k} needs {n} finite positions"),
-            ));
-        }
-        let position = b.vectors("VEC3", vertices.iter().map(|p| [p.x, p.y, p.z]), true);
-        let normal = b.vectors(
-            "VEC3",
-            normals(m).into_iter().map(|n| [n.x, n.y, n.z]),
-            true,
-        );
-        let mut attributes = json!({"POSITION": position, "NORMAL": normal});
-        if !m.uv.is_empty() {
-            attributes["TEXCOORD_0"] = json!(b.vectors("VEC2", m.uv.iter().copied(), true));
-        }
-        let indices: Vec<u8> = m
-            .faces
-            .iter()
-            .flatten()
-            .flat_map(|i| i.to_le_bytes())
-            .collect();
-        let count = 3 * m.faces.len();
-        let accessor = json!({"componentType": UNSIGNED, "type": "SCALAR", "count": count});
-        let indices = b.add(&indices, Some(INDEX_BUFFER), accessor);
-        let mut primitive = json!({"attributes": attributes, "indices": indices, "material": i});
-        let mut mesh = json!({"name": m.name});
-        if !frames.is_empty() {
-            // One target a frame, each fully on at its time: positions between frames are blended linearly.
-            let off = |f: &Vec<P3>| {
-                let rows: Vec<[f32; 3]> = f
-                    .iter()
-                    .zip(vertices)
-                    .map(|(p, q)| (p - q).into())
-                    .collect();
-                b.vectors("VEC3", rows.into_iter(), true)
-            };
-            let targets: Vec<usize> = frames.iter().map(off).collect();
-            primitive["targets"] = targets.iter().map(|t| json!({"POSITION": t})).collect();
-            let k = frames.len();
-            mesh["weights"] = json!(vec![0.0; k]);
-            let times = b.vectors("SCALAR", (0..k).map(|t| [t as f32 * frame_seconds]), false);
-            let weights = b.vectors(
-                "SCALAR",
-                (0..k * k).map(|w| [f32::from(u8::from(w / k == w % k))]),
-                false,
-            );
-            animations.push(json!({
-                "name": format!("{} motion", m.name),
-                "samplers": [{"input": times, "output": weights, "interpolation": "LINEAR"}],
-                "channels": [{"sampler": 0, "target": {"node": i, "path": "weights"}}],
-            }));
-        }
-        mesh["primitives"] = json!([primitive]);
-        out.push(mesh);
-        nodes.push(json!({"name": m.name, "mesh": i}));
-        materials.push(json!({
-            "name": m.name,
-            "doubleSided": true,
-            "pbrMetallicRoughness": {"baseColorFactor": [linear(m.color[0]), linear(m.color[1]), linear(m.color[2]), 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.9},
-        }));
+        check(m, frames, origin)?;
+        b.mesh(m, frames, frame_seconds);
     }
-    let mut root = json!({
-        "asset": {"version": "2.0", "generator": concat!("tryon ", env!("CARGO_PKG_VERSION"))},
-        "scene": 0,
-        "scenes": [{"nodes": (0..nodes.len()).collect::<Vec<_>>()}],
-        "nodes": nodes, "meshes": out, "materials": materials,
-        "accessors": b.accessors, "bufferViews": b.views, "buffers": [{"byteLength": b.bytes.len()}],
-    });
-    if !animations.is_empty() {
-        root["animations"] = json!(animations);
-    }
-    Ok(container(&root.to_string(), b.bytes))
+    Ok(b.finish())
 }
 
-/// Header, JSON chunk padded with spaces, binary chunk padded with zeros.
+/// Checks indices, positions and lengths of a mesh and its frames.
+fn check(m: &GlbMesh<'_>, frames: &[Vec<P3>], origin: &Path) -> Result<(), FormatError> {
+    let finite = |f: &[P3]| f.iter().all(|p| p.iter().all(|c| c.is_finite()));
+    let fault = |field: &str, why: String| {
+        let field = format!("mesh `{}`.{field}", m.name);
+        Err(FormatError::field(origin, field, why))
+    };
+    let n = m.vertices.len();
+    if m.faces.is_empty() {
+        return fault("faces", "none".into());
+    }
+    let corners = m.faces.iter().enumerate();
+    let mut corners = corners.flat_map(|(f, corners)| corners.iter().map(move |k| (f, *k)));
+    if let Some((f, k)) = corners.find(|(_, k)| *k as usize >= n) {
+        let why = format!("face {f}: vertex index {k} is out of range ({n} vertices)");
+        return fault("faces", why);
+    }
+    if !finite(m.vertices) {
+        return fault("vertices", "a position is not finite".into());
+    }
+    if !m.uv.is_empty() && m.uv.len() != n {
+        return fault("uv", format!("{} for {n} vertices", m.uv.len()));
+    }
+    if let Some(k) = frames.iter().position(|f| f.len() != n || !finite(f)) {
+        return fault("frames", format!("frame {k} needs {n} finite positions"));
+    }
+    Ok(())
+}
+
+/// GLB container: header, JSON chunk padded with spaces, binary chunk padded with zeros.
 fn container(json: &str, mut binary: Vec<u8>) -> Vec<u8> {
     let mut text = json.as_bytes().to_vec();
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -215,7 +234,7 @@ fn container(json: &str, mut binary: Vec<u8>) -> Vec<u8> {
     out
 }
 
-/// Writes a `.glb` of meshes that stand still.
+/// Writes a `.glb` of static meshes.
 ///
 /// # Errors
 /// As [`encode_glb`], or when the file cannot be written.

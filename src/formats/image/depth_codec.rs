@@ -1,24 +1,24 @@
-//! Depth on the wire: differences along rows, low and high bytes apart, then zstd at level 1.
+//! Depth codec of the wire: differences along rows, low and high bytes separated, then zstd at level 1.
 //!
 //! Layout, little-endian: magic `TDZ1`, width u32, height u32, one zstd frame of `2 · width · height` bytes: all low
 //! bytes, then all high bytes of the zigzag-coded difference of each pixel to its left neighbour (0 before a row).
-//! Chosen by measurement, docs/benchmarks.md: smaller and faster than plain zstd and than RVL.
+//! Smaller and faster than plain zstd and than RVL (docs/benchmarks).
 
-use super::check_size;
+use super::limits::check_size;
 use crate::camera::DepthImage;
 use crate::formats::FormatError;
 use std::path::Path;
 
 const MAGIC: &[u8; 4] = b"TDZ1";
 const HEADER: usize = 12;
-/// What errors are said to come from.
+/// Origin in errors.
 const BYTES: &str = "depth bytes";
 /// Zstd's fastest regular level; level 3 saves 0 to 7 % of the bytes for 1.2 to 2.5 times the time.
 const LEVEL: i32 = 1;
-/// A zstd block yields at most 128 KiB from at least 3 bytes (RFC 8878, 3.1.1.2): more is promised only by a lie.
+/// Largest expansion of zstd: a block yields at most 128 KiB from at least 3 bytes (RFC 8878, 3.1.1.2).
 const ZSTD_LIMIT: u64 = (128 << 10) / 3 + 1;
 
-/// Small differences of either sign become small numbers, so that high bytes are mostly zero.
+/// Maps small differences of either sign to small numbers, so that high bytes are mostly zero.
 fn zigzag(d: u16) -> u16 {
     (d << 1) ^ (((d as i16) >> 15) as u16)
 }
@@ -51,14 +51,14 @@ pub fn encode_depth(image: &DepthImage) -> Vec<u8> {
     out[..4].copy_from_slice(MAGIC);
     out[4..8].copy_from_slice(&image.width().to_le_bytes());
     out[8..12].copy_from_slice(&image.height().to_le_bytes());
-    // The buffer has zstd's own bound, so the only failure left is out of memory; then the frame stays empty and
-    // decoding says so.
+    // The buffer has zstd's own bound, so only out of memory can fail; then the frame stays empty and decoding
+    // reports it.
     let written = zstd::bulk::compress_to_buffer(&planes, &mut out[HEADER..], LEVEL).unwrap_or(0);
     out.truncate(HEADER + written);
     out
 }
 
-/// Undoes [`encode_depth`].
+/// Decodes the bytes of [`encode_depth`].
 ///
 /// # Errors
 /// Wrong magic, unusable size, a size the bytes cannot yield, damaged or missing data.

@@ -1,6 +1,6 @@
 //! JPEG for colour on the wire and in recordings.
 
-use super::{MAX_SIDE, check_size};
+use super::limits::{MAX_SIDE, check_size};
 use crate::camera::ColorImage;
 use crate::formats::FormatError;
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
@@ -10,10 +10,12 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-/// What errors of bare bytes are said to come from.
+/// Origin in errors of bare bytes.
 const BYTES: &str = "jpeg bytes";
+/// Largest distance of the end marker from the end of the bytes: some writers pad to a sector.
+const END_WINDOW: usize = 4096;
 
-/// Colour to baseline JPEG with chroma at half resolution, quality 1 (small) to 100 (good).
+/// Encodes colour as baseline JPEG with chroma at half resolution, quality 1 (small) to 100 (good).
 /// Quality 80 takes about 3 ms and 35 kB for a VGA picture.
 ///
 /// # Errors
@@ -37,7 +39,7 @@ pub fn encode_jpeg(image: &ColorImage, quality: u8) -> Result<Vec<u8>, FormatErr
     Ok(out)
 }
 
-/// JPEG bytes to RGB.
+/// Decodes JPEG bytes to RGB.
 ///
 /// # Errors
 /// Not a JPEG, damaged, or of an unusable size.
@@ -45,7 +47,7 @@ pub fn decode_jpeg(bytes: &[u8]) -> Result<ColorImage, FormatError> {
     decode_jpeg_from(bytes, Path::new(BYTES))
 }
 
-/// As [`decode_jpeg`], naming `origin` in errors.
+/// Decodes as [`decode_jpeg`]; `origin` is named in errors.
 pub(super) fn decode_jpeg_from(bytes: &[u8], origin: &Path) -> Result<ColorImage, FormatError> {
     let fault = |why: String| FormatError::field(origin, "jpeg", why);
     let options = DecoderOptions::default()
@@ -62,7 +64,7 @@ pub(super) fn decode_jpeg_from(bytes: &[u8], origin: &Path) -> Result<ColorImage
         .ok_or_else(|| fault("it has no header".into()))?;
     let (width, height) = (u32::from(info.width), u32::from(info.height));
     check_size(origin, width, height)?;
-    // The decoder fills what is missing with grey; a picture without its end marker was cut.
+    // The decoder fills missing data with grey; an image without its end marker is truncated.
     if !bytes
         .windows(2)
         .rev()
@@ -74,9 +76,6 @@ pub(super) fn decode_jpeg_from(bytes: &[u8], origin: &Path) -> Result<ColorImage
     let data = decoder.decode().map_err(|e| fault(format!("{e:?}")))?;
     ColorImage::new(width, height, data).map_err(|e| fault(e.to_string()))
 }
-
-/// How far before the end of the bytes the end marker may stand: some writers pad to a sector.
-const END_WINDOW: usize = 4096;
 
 #[cfg(test)]
 mod tests {
@@ -91,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_smooth_picture_survives() {
+    fn smooth_images_survive_the_round_trip() {
         let image = picture();
         let bytes = encode_jpeg(&image, 90).expect("encodes");
         let back = decode_jpeg(&bytes).expect("decodes");
@@ -107,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn every_cut_is_an_error() {
+    fn every_truncation_is_an_error() {
         let bytes = encode_jpeg(&picture(), 80).expect("encodes");
         for cut in 0..bytes.len() - 1 {
             assert!(decode_jpeg(&bytes[..cut]).is_err(), "cut at {cut}");

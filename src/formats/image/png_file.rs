@@ -1,6 +1,6 @@
 //! PNG: 16-bit grey for depth, 8-bit for colour.
 
-use super::check_size;
+use super::limits::check_size;
 use crate::camera::{ColorImage, DepthImage};
 use crate::formats::FormatError;
 use png::{
@@ -10,11 +10,10 @@ use png::{
 use std::io::Cursor;
 use std::path::Path;
 
-/// What the decoder may allocate besides the image: chunks such as colour profiles, and a few rows.
+/// Memory of the decoder besides the image, bytes: chunks such as colour profiles, and a few rows.
 const DECODER_BYTES: usize = 16 << 20;
 
-/// Deflate never expands more (RFC 1951: 258 bytes from two bits and no header), so a header that promises more
-/// than this many bytes for each byte of the file lies.
+/// Largest expansion of deflate (RFC 1951: 258 bytes from two bits); a header that promises more is refused.
 const DEFLATE_LIMIT: u64 = 1032;
 
 fn fault(origin: &Path, e: &DecodingError) -> FormatError {
@@ -24,7 +23,7 @@ fn fault(origin: &Path, e: &DecodingError) -> FormatError {
     }
 }
 
-/// Header read and sizes checked; nothing of the image allocated yet.
+/// Reads the header and checks the sizes; allocates nothing of the image.
 fn open<'a>(
     bytes: &'a [u8],
     origin: &Path,
@@ -61,7 +60,7 @@ fn pixels(reader: &mut Reader<Cursor<&[u8]>>, origin: &Path) -> Result<Vec<u8>, 
     Ok(data)
 }
 
-/// 16-bit grey PNG bytes to depth in the file's own unit; `origin` is named in errors.
+/// Decodes 16-bit grey PNG bytes to depth in the file's own unit; `origin` is named in errors.
 ///
 /// # Errors
 /// Not a PNG, cut short, not 16-bit grey, or of an unusable size.
@@ -82,7 +81,7 @@ pub fn decode_png_depth(bytes: &[u8], origin: &Path) -> Result<DepthImage, Forma
         .map_err(|e| FormatError::field(origin, "png", e.to_string()))
 }
 
-/// PNG bytes to RGB; `origin` is named in errors.
+/// Decodes PNG bytes to RGB; `origin` is named in errors.
 ///
 /// # Errors
 /// Not a PNG, cut short, or of an unusable size.
@@ -118,7 +117,7 @@ fn encode(
     let mut encoder = Encoder::new(&mut out, size.0, size.1);
     encoder.set_color(color);
     encoder.set_depth(bits);
-    // 2.5 ms a VGA picture; `Balanced` takes 55 ms and can never be live.
+    // 2.5 ms a VGA picture; `Balanced` takes 55 ms.
     encoder.set_compression(Compression::Fast);
     let written = encoder.write_header().and_then(|mut w| {
         w.write_image_data(data)?;
@@ -128,7 +127,7 @@ fn encode(
     Ok(out)
 }
 
-/// Depth as 16-bit grey PNG; `origin` is named in errors.
+/// Encodes depth as 16-bit grey PNG; `origin` is named in errors.
 ///
 /// # Errors
 /// For an image without pixels.
@@ -143,7 +142,7 @@ pub fn encode_png_depth(image: &DepthImage, origin: &Path) -> Result<Vec<u8>, Fo
     )
 }
 
-/// Colour as RGB PNG with fast compression; `origin` is named in errors.
+/// Encodes colour as RGB PNG with fast compression; `origin` is named in errors.
 ///
 /// # Errors
 /// For an image without pixels.
@@ -169,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn every_cut_is_an_error_and_none_a_panic() {
+    fn every_truncation_is_an_error() {
         let bytes = encode_png_depth(&ramp(), Path::new(AT)).expect("encodes");
         // The last chunks (checksum and IEND) carry no pixels; the decoder may do without them.
         for cut in 0..bytes.len() - 16 {

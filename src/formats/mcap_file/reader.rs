@@ -1,11 +1,10 @@
-//! Reads RGBD frames from an MCAP file as a stream: memory for one frame, whatever the file's length.
+//! Reads RGBD frames from an MCAP file as a stream, with memory for one frame.
 
-use crate::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
-use crate::formats::foxglove::{
-    CameraCalibration, CompressedImage, FoxgloveMessage, FrameTransform, RawImage, decode,
-};
-use crate::formats::image::{check_size, decode_color};
-use crate::formats::{FormatError, RgbdSource};
+use super::message::{MessageContext, MessageItem};
+use crate::camera::{Calibration, ColorImage, Intrinsics, RgbdFrame};
+use crate::formats::FormatError;
+use crate::formats::foxglove::{CameraCalibration, FrameTransform};
+use crate::formats::rgbd_source::RgbdSource;
 use crate::math::{Camera, ColorCamera, Rigid};
 use mcap::McapError;
 use mcap::records::Record;
@@ -16,35 +15,20 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// No record is larger: an uncompressed colour image of 4096 × 4096 has 48 MiB. A length above it is refused before
+/// Largest record, bytes: an uncompressed colour image of 4096 × 4096 has 48 MiB. A greater length is refused before
 /// anything is allocated.
 const MAX_RECORD: usize = 64 << 20;
 
-/// Colour older than this against its depth shows another pose, nanoseconds: one frame at 30 Hz.
+/// Largest time between colour and its depth, nanoseconds: one frame at 30 Hz. Older colour shows another pose.
 const MAX_GAP_NS: u64 = 33_400_000;
 
-/// Depth images looked at in search of calibrations before a file is said to have none: writers repeat them at
-/// least once a second.
+/// Depth images searched for calibrations: writers repeat them at least once a second.
 const LOOK_AHEAD: usize = 60;
 
-/// What a message is to us.
-enum Item {
-    Depth {
-        frame_id: String,
-        sequence: u32,
-        time_ns: u64,
-        image: DepthImage,
-    },
-    Color {
-        frame_id: String,
-        time_ns: u64,
-        image: ColorImage,
-    },
-    Calibration(CameraCalibration),
-    Transform(FrameTransform),
-}
+/// Read buffer, bytes.
+const BUFFER: usize = 1 << 16;
 
-/// An MCAP recording, read frame by frame. A file that was cut ends at the cut.
+/// An MCAP recording, read frame by frame. A truncated file ends at the last whole record.
 pub struct McapReader {
     path: PathBuf,
     file: BufReader<File>,
@@ -55,7 +39,6 @@ pub struct McapReader {
     calibration: Calibration,
     color: Option<(u64, ColorImage)>,
     messages: u64,
-    cut: bool,
 }
 
 impl std::fmt::Debug for McapReader {
@@ -76,7 +59,7 @@ fn records() -> LinearReader {
 }
 
 impl McapReader {
-    /// Opens a file and finds its calibration.
+    /// Opens a file and reads its calibration.
     ///
     /// # Errors
     /// Not an MCAP file, no 16-bit depth, no calibration for it, or a damaged start.
@@ -84,22 +67,17 @@ impl McapReader {
         let file = File::open(path).map_err(|e| FormatError::io(path, e))?;
         let mut reader = Self {
             path: path.to_owned(),
-            file: BufReader::with_capacity(1 << 16, file),
+            file: BufReader::with_capacity(BUFFER, file),
             records: records(),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             calibration: Calibration::registered(Intrinsics::KINECT_V1),
             color: None,
             messages: 0,
-            cut: false,
         };
         reader.calibration = reader.find_calibration()?;
         reader.rewind()?;
         Ok(reader)
-    }
-    /// The file ended in the middle of a record; everything before was read.
-    pub fn was_cut(&self) -> bool {
-        self.cut
     }
 
     fn fault(&self, field: impl Into<String>, why: impl Into<String>) -> FormatError {
@@ -113,19 +91,19 @@ impl McapReader {
         while depths < LOOK_AHEAD {
             match self.next_item()? {
                 None => break,
-                Some(Item::Depth { frame_id, .. }) => {
+                Some(MessageItem::Depth { frame_id, .. }) => {
                     depth.get_or_insert(frame_id);
                     depths += 1;
                 }
-                Some(Item::Color { frame_id, .. }) => {
+                Some(MessageItem::Color { frame_id, .. }) => {
                     color.get_or_insert(frame_id);
                 }
-                Some(Item::Calibration(c)) => {
+                Some(MessageItem::Calibration(c)) => {
                     cameras.insert(c.frame_id.clone(), c);
                 }
-                Some(Item::Transform(t)) => transforms.push(t),
+                Some(MessageItem::Transform(t)) => transforms.push(t),
             }
-            // Two depth images: one round of all topics has gone by.
+            // Two depth images: every topic has had a message.
             let known =
                 |frame: &Option<String>| frame.as_ref().is_none_or(|f| cameras.contains_key(f));
             if depths >= 2 && known(&depth) && known(&color) {
@@ -192,10 +170,10 @@ impl McapReader {
         let (Some(p), Some(q)) = (t.translation, t.rotation) else {
             return Ok(Rigid::identity());
         };
-        let turn = Quaternion::new(q.w, q.x, q.y, q.z);
+        let rotation = Quaternion::new(q.w, q.x, q.y, q.z);
         let pose = Rigid::from_parts(
             Vector3::new(p.x, p.y, p.z),
-            UnitQuaternion::from_quaternion(turn),
+            UnitQuaternion::from_quaternion(rotation),
         );
         if pose.is_finite() {
             Ok(pose)
@@ -204,16 +182,16 @@ impl McapReader {
         }
     }
 
-    /// The next message that means something to us; `None` at the end or the cut.
-    fn next_item(&mut self) -> Result<Option<Item>, FormatError> {
+    /// Next message of interest; `None` at the end, also of a truncated file.
+    fn next_item(&mut self) -> Result<Option<MessageItem>, FormatError> {
         loop {
             let Some(event) = self.records.next_event() else {
                 return Ok(None);
             };
             match event {
                 Ok(LinearReadEvent::ReadRequest(n)) => {
-                    // At most a buffer at a time: a lying length then costs what the file holds, not what it claims.
-                    let want = self.records.insert(n.min(1 << 16));
+                    // At most a buffer at a time: a wrong length costs no more memory than the file holds.
+                    let want = self.records.insert(n.min(BUFFER));
                     let got = self
                         .file
                         .read(want)
@@ -243,7 +221,7 @@ impl McapReader {
                                 .channels
                                 .get(&header.channel_id)
                                 .map_or("", String::as_str);
-                            let at = Place {
+                            let at = MessageContext {
                                 path: &self.path,
                                 schema,
                                 message: self.messages,
@@ -256,7 +234,6 @@ impl McapReader {
                     }
                 }
                 Err(McapError::UnexpectedEof | McapError::UnexpectedEoc) if self.messages > 0 => {
-                    self.cut = true;
                     return Ok(None);
                 }
                 Err(e) => {
@@ -265,100 +242,6 @@ impl McapReader {
                 }
             }
         }
-    }
-}
-
-/// A message and where it stands, for errors.
-struct Place<'a> {
-    path: &'a Path,
-    schema: &'a str,
-    message: u64,
-}
-
-impl Place<'_> {
-    fn fault(&self, field: &str, why: impl Into<String>) -> FormatError {
-        FormatError::field(
-            self.path,
-            format!("message {} ({}).{field}", self.message, self.schema),
-            why,
-        )
-    }
-    fn message<M: FoxgloveMessage>(&self, data: &[u8]) -> Result<M, FormatError> {
-        decode(data).ok_or_else(|| self.fault("data", "not a message of this schema"))
-    }
-
-    fn item(&self, sequence: u32, time_ns: u64, data: &[u8]) -> Result<Option<Item>, FormatError> {
-        Ok(match self.schema {
-            "foxglove.RawImage" => {
-                let m: RawImage = self.message(data)?;
-                match m.encoding.as_str() {
-                    "16UC1" | "mono16" => {
-                        let rows = self.rows(&m, 2)?;
-                        let values = rows
-                            .flat_map(|r| {
-                                r.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]]))
-                            })
-                            .collect();
-                        let image = DepthImage::new(m.width, m.height, values)
-                            .map_err(|e| self.fault("data", e.to_string()))?;
-                        Some(Item::Depth {
-                            frame_id: m.frame_id.clone(),
-                            sequence,
-                            time_ns,
-                            image,
-                        })
-                    }
-                    "rgb8" => {
-                        let bytes = self.rows(&m, 3)?.flatten().copied().collect();
-                        let image = ColorImage::new(m.width, m.height, bytes)
-                            .map_err(|e| self.fault("data", e.to_string()))?;
-                        Some(Item::Color {
-                            frame_id: m.frame_id.clone(),
-                            time_ns,
-                            image,
-                        })
-                    }
-                    _ => None,
-                }
-            }
-            "foxglove.CompressedImage" => {
-                let m: CompressedImage = self.message(data)?;
-                if !matches!(m.format.as_str(), "jpeg" | "png") {
-                    return Ok(None);
-                }
-                let image = decode_color(&m.data, self.path)
-                    .map_err(|e| self.fault("data", e.to_string()))?;
-                Some(Item::Color {
-                    frame_id: m.frame_id,
-                    time_ns,
-                    image,
-                })
-            }
-            "foxglove.CameraCalibration" => Some(Item::Calibration(self.message(data)?)),
-            "foxglove.FrameTransform" => Some(Item::Transform(self.message(data)?)),
-            _ => None,
-        })
-    }
-
-    /// The pixels of each row, checked against size and step.
-    fn rows<'m>(
-        &self,
-        m: &'m RawImage,
-        bytes: usize,
-    ) -> Result<impl Iterator<Item = &'m [u8]>, FormatError> {
-        check_size(self.path, m.width, m.height)?;
-        let (row, step) = (m.width as usize * bytes, m.step as usize);
-        if step < row {
-            return Err(self.fault("step", format!("{step}, a row has {row} bytes")));
-        }
-        let need = step * (m.height as usize - 1) + row;
-        if m.data.len() < need {
-            return Err(self.fault("data", format!("{} bytes, expected {need}", m.data.len())));
-        }
-        Ok(m.data
-            .chunks(step)
-            .take(m.height as usize)
-            .map(move |r| &r[..row]))
     }
 }
 
@@ -372,8 +255,8 @@ impl RgbdSource for McapReader {
     fn next_frame(&mut self) -> Result<Option<RgbdFrame>, FormatError> {
         while let Some(item) = self.next_item()? {
             match item {
-                Item::Color { time_ns, image, .. } => self.color = Some((time_ns, image)),
-                Item::Depth {
+                MessageItem::Color { time_ns, image, .. } => self.color = Some((time_ns, image)),
+                MessageItem::Depth {
                     sequence,
                     time_ns,
                     image,
@@ -403,7 +286,7 @@ impl RgbdSource for McapReader {
                         color,
                     }));
                 }
-                Item::Calibration(_) | Item::Transform(_) => {}
+                MessageItem::Calibration(_) | MessageItem::Transform(_) => {}
             }
         }
         Ok(None)
@@ -415,7 +298,7 @@ impl RgbdSource for McapReader {
         self.records = records();
         self.schemas.clear();
         self.channels.clear();
-        (self.color, self.messages, self.cut) = (None, 0, false);
+        (self.color, self.messages) = (None, 0);
         Ok(())
     }
 }

@@ -1,6 +1,5 @@
 //! Streams frames into an MCAP file.
 
-use super::{COLOR_FRAME, DEPTH_FRAME};
 use crate::camera::{Calibration, Intrinsics, RgbdFrame};
 use crate::formats::foxglove::{
     CameraCalibration, CompressedImage, FrameTransform, Quaternion, RawImage, Vector3, encode,
@@ -14,10 +13,15 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-/// Quality of colour: 35 kB a VGA picture.
+/// JPEG quality of colour: 35 kB a VGA image.
 const JPEG_QUALITY: u8 = 85;
 
-/// Numbers of the channels.
+/// Frame of reference of the depth camera, and of colour registered to it.
+const DEPTH_FRAME: &str = "depth_camera";
+/// Frame of reference of a separate colour camera.
+const COLOR_FRAME: &str = "color_camera";
+
+/// Channel numbers.
 #[derive(Clone, Copy, Debug)]
 struct Channels {
     depth: u16,
@@ -26,7 +30,7 @@ struct Channels {
     transform: u16,
 }
 
-/// An MCAP recording being written. Every frame is on its way to disk when [`McapWriter::write`] returns;
+/// An MCAP recording being written. Every frame is flushed when [`McapWriter::write`] returns;
 /// [`McapWriter::finish`] adds the index.
 pub struct McapWriter {
     path: PathBuf,
@@ -46,14 +50,14 @@ impl std::fmt::Debug for McapWriter {
 }
 
 impl McapWriter {
-    /// Makes the file; an existing one is not overwritten.
+    /// Creates the file; an existing one is not overwritten.
     ///
     /// # Errors
-    /// When it exists or cannot be made.
+    /// When it exists or cannot be created.
     pub fn create(path: &Path, calibration: &Calibration) -> Result<Self, FormatError> {
         let fault = |e: mcap::McapError| FormatError::field(path, "mcap", e.to_string());
         let file = File::create_new(path).map_err(|e| FormatError::io(path, e))?;
-        // Raw depth shrinks to a third under lz4 in about a millisecond; JPEG passes through nearly free.
+        // lz4 compresses raw depth to a third in about 1 ms; JPEG costs next to nothing.
         let options = WriteOptions::new()
             .compression(Some(Compression::Lz4))
             .library(concat!("tryon ", env!("CARGO_PKG_VERSION")))
@@ -83,6 +87,7 @@ impl McapWriter {
         self.frames as usize
     }
 
+    /// Writes a message.
     fn put(
         &mut self,
         channel: u16,
@@ -150,7 +155,7 @@ impl McapWriter {
     /// Appends a frame.
     ///
     /// # Errors
-    /// When the file cannot be written, for example for want of space.
+    /// When the file cannot be written.
     pub fn write(&mut self, frame: &RgbdFrame) -> Result<(), FormatError> {
         if self.frames == 0 {
             self.put_calibration(frame.time_ns)?;

@@ -1,4 +1,4 @@
-//! `camera.json`: `{width, height, fx, fy, cx, cy, depth_scale}` and, where colour has its own camera,
+//! `camera.json`: `{width, height, fx, fy, cx, cy, depth_scale}` and, for a separate colour camera,
 //! `color: {width, height, fx, fy, cx, cy}` and `color_from_depth: {translation: [x, y, z], rotation: [x, y, z, w]}`.
 
 use crate::camera::{Calibration, Intrinsics};
@@ -9,19 +9,19 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// A calibration is a few hundred bytes; a megabyte is not one.
+/// Largest file, bytes; a calibration has a few hundred.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Millimetres: what a file without `depth_scale` means.
+/// Units per metre of a file without `depth_scale`: millimetres.
 const DEFAULT_SCALE: f64 = 1000.0;
 
-/// How far a rotation's length may be from one: written with six digits it is within 1e-5.
+/// Largest deviation of a quaternion's length from one; written with six digits it is within 1e-5.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
 /// Calibration and the unit of the depth images.
 #[derive(Clone, Debug)]
 pub(super) struct CameraFile {
-    /// What the product uses.
+    /// Calibration.
     pub(super) calibration: Calibration,
     /// Units per metre.
     pub(super) depth_scale: f64,
@@ -31,7 +31,7 @@ impl CameraFile {
     /// Reads and checks every field.
     pub(super) fn read(path: &Path) -> Result<Self, FormatError> {
         let bytes = read_limited(path, MAX_BYTES)?;
-        // Python and Matlab write NaN and Infinity, which JSON lacks: name the field rather than a column.
+        // Python and Matlab write NaN and Infinity, which JSON lacks: the error names the field, not a column.
         let text = String::from_utf8_lossy(&bytes);
         if let Some(field) = not_a_number(&text) {
             return Err(FormatError::field(path, field, "not a finite number"));
@@ -79,7 +79,7 @@ impl CameraFile {
         })
     }
 
-    /// The file's text.
+    /// Text of the file.
     pub(super) fn to_json(&self) -> String {
         let fields = |k: &Intrinsics| json!({"width": k.width, "height": k.height, "fx": k.fx, "fy": k.fy, "cx": k.cx, "cy": k.cy});
         let mut root = fields(&self.calibration.depth);
@@ -97,7 +97,7 @@ impl CameraFile {
     }
 }
 
-/// The key whose value is a bare NaN or Infinity, if there is one.
+/// Key whose value is a bare NaN or Infinity.
 fn not_a_number(text: &str) -> Option<&str> {
     let mut rest = text;
     while let Some(colon) = rest.find(':') {

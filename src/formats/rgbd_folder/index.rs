@@ -1,17 +1,17 @@
-//! Which files make up which frame.
+//! Files of each frame, by time lists or by name.
 
 use crate::formats::FormatError;
 use crate::formats::image::read_limited;
 use std::path::Path;
 
-/// A time list of a day at 30 Hz has 180 MB; more is no list.
+/// Largest time list, bytes; a day at 30 Hz has 180 MB.
 const MAX_LIST_BYTES: u64 = 256 << 20;
 
-/// Rate assumed where nothing says when images were taken: that of nearly every depth camera.
+/// Frame period of images without a time list, that of most depth cameras.
 const DEFAULT_PERIOD_NS: u64 = 1_000_000_000 / 30;
 
-/// Colour farther in time from its depth than this shows another pose: half a period at 15 Hz, the slowest rate
-/// anyone tracks at.
+/// Largest time between colour and its depth, nanoseconds: half a period at 15 Hz, the slowest tracking rate. Older
+/// colour shows another pose.
 const MAX_GAP_NS: u64 = 33_400_000;
 
 /// The files of one frame, relative to the folder.
@@ -25,7 +25,7 @@ pub(super) struct Entry {
     pub(super) color: Option<String>,
 }
 
-/// All frames, in order of time.
+/// Frames of a folder, sorted by time.
 pub(super) fn entries(folder: &Path) -> Result<Vec<Entry>, FormatError> {
     let depth = images(folder, "depth", &["png"])?;
     if depth.is_empty() {
@@ -46,6 +46,7 @@ pub(super) fn entries(folder: &Path) -> Result<Vec<Entry>, FormatError> {
         .collect())
 }
 
+/// Image nearest in time, within [`MAX_GAP_NS`].
 fn nearest(list: &[(u64, String)], time_ns: u64) -> Option<&str> {
     let after = list.partition_point(|(t, _)| *t < time_ns);
     let candidates = [after.checked_sub(1), Some(after)];
@@ -58,8 +59,12 @@ fn nearest(list: &[(u64, String)], time_ns: u64) -> Option<&str> {
     (gap(&best) <= MAX_GAP_NS).then_some(list[best].1.as_str())
 }
 
-/// `NAME.txt` if there is one, else the sorted files of `NAME/` at 30 Hz. Sorted by time.
-fn images(folder: &Path, name: &str, endings: &[&str]) -> Result<Vec<(u64, String)>, FormatError> {
+/// Images of `NAME.txt` if it exists, else the sorted files of `NAME/` at 30 Hz. Sorted by time.
+fn images(
+    folder: &Path,
+    name: &str,
+    extensions: &[&str],
+) -> Result<Vec<(u64, String)>, FormatError> {
     let list = folder.join(format!("{name}.txt"));
     if list.exists() {
         return time_list(&list);
@@ -71,13 +76,13 @@ fn images(folder: &Path, name: &str, endings: &[&str]) -> Result<Vec<(u64, Strin
     let mut files = Vec::new();
     for item in std::fs::read_dir(&dir).map_err(|e| FormatError::io(&dir, e))? {
         let path = item.map_err(|e| FormatError::io(&dir, e))?.path();
-        let ending = path
+        let extension = path
             .extension()
             .and_then(|e| e.to_str())
             .unwrap_or_default()
             .to_ascii_lowercase();
         if let Some(file) = path.file_name().and_then(|f| f.to_str())
-            && endings.contains(&ending.as_str())
+            && extensions.contains(&extension.as_str())
         {
             files.push(format!("{name}/{file}"));
         }
@@ -118,7 +123,7 @@ fn time_list(path: &Path) -> Result<Vec<(u64, String)>, FormatError> {
     Ok(out)
 }
 
-/// Decimal seconds to nanoseconds without a detour over f64, which has no room for both since 1970.
+/// Parses decimal seconds as nanoseconds, digit by digit: f64 cannot hold nanoseconds since 1970.
 fn nanoseconds(text: &str) -> Option<u64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     let digits = |s: &str| s.bytes().all(|b| b.is_ascii_digit());
@@ -155,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn colour_is_the_nearest_in_time_or_none() {
+    fn colour_is_the_nearest_in_time_within_the_gap() {
         let list: Vec<(u64, String)> = [0u64, 33, 66, 300]
             .iter()
             .map(|t| (t * 1_000_000, format!("{t}")))

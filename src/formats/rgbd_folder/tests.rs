@@ -1,9 +1,11 @@
 use super::*;
-use crate::camera::ColorImage;
+use crate::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
+use crate::formats::RgbdSource;
 use crate::formats::image::write_png_depth;
 use crate::math::Rigid;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::fs;
+use std::path::PathBuf;
 
 const TINY: Intrinsics = Intrinsics {
     width: 4,
@@ -50,7 +52,7 @@ fn refusal(dir: &tempfile::TempDir) -> String {
 }
 
 #[test]
-fn what_is_written_is_read() {
+fn written_frames_read_back() {
     let dir = tempfile::tempdir().expect("temporary folder");
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.01, -0.02, 0.005));
     let calibration = Calibration {
@@ -77,7 +79,7 @@ fn what_is_written_is_read() {
     let got = all(r.as_mut());
     assert_eq!(got[0], frames[0]);
     assert_eq!(got[3], frames[3]);
-    // The neighbour's colour is 33.3 ms away: near enough.
+    // The neighbour's colour is 33.3 ms away: within the gap.
     assert!(got[2].color.is_some() && got[2].depth == frames[2].depth);
     r.rewind().expect("rewinds");
     assert_eq!(all(r.as_mut()), got);
@@ -88,7 +90,7 @@ fn what_is_written_is_read() {
 }
 
 #[test]
-fn names_sort_at_thirty_hertz_and_scales_become_millimetres() {
+fn unlisted_images_sort_at_30_hz_and_scale_to_millimetres() {
     let dir = folder_with(&camera("5", r#", "depth_scale": 10000"#));
     write_png_depth(&dir.path().join("depth/1.png"), &frame(9, false).depth).expect("written");
     let mut f = RgbdFolder::open(dir.path()).expect("opens");
@@ -97,14 +99,14 @@ fn names_sort_at_thirty_hertz_and_scales_become_millimetres() {
         (got.len(), got[1].time_ns, got[0].depth.data()[3]),
         (2, 33_333_333, 100)
     );
-    // Units of a centimetre: 65,535 units are beyond what millimetres in 16 bits can say.
+    // Units of a centimetre: 65,535 units exceed 16 bits of millimetres.
     let mut far = DepthImage::new(2, 1, vec![65_535, 100]).expect("sizes");
     depth_to_mm(&mut far, 100.0);
     assert_eq!(far.data(), [0, 1000]);
 }
 
 #[test]
-fn bad_folders_are_refused_by_file_and_field() {
+fn bad_folders_name_file_and_field() {
     let dir = folder_with(&camera("NaN", ""));
     let e = refusal(&dir);
     assert!(
@@ -168,7 +170,7 @@ fn bad_folders_are_refused_by_file_and_field() {
 }
 
 #[test]
-fn after_a_bad_frame_the_next_one_comes() {
+fn reading_continues_after_a_bad_frame() {
     let dir = folder_with(&camera("5", ""));
     write_png_depth(&dir.path().join("depth/1.png"), &frame(1, false).depth).expect("written");
     fs::write(dir.path().join("depth/0.png"), b"no picture").expect("written");

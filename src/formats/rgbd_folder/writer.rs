@@ -3,20 +3,10 @@
 use super::camera_json::CameraFile;
 use crate::camera::{Calibration, RgbdFrame};
 use crate::formats::FormatError;
-use crate::formats::image::{encode_jpeg, write_png_depth, write_png_rgb};
+use crate::formats::image::{write_png_depth, write_png_rgb};
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-
-/// How colour is stored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum ColorFile {
-    /// Without loss.
-    #[default]
-    Png,
-    /// At this quality, 1 to 100.
-    Jpeg(u8),
-}
 
 /// An RGBD folder being written: each frame is on disk when [`RgbdFolderWriter::write`] returns.
 #[derive(Debug)]
@@ -24,15 +14,14 @@ pub struct RgbdFolderWriter {
     folder: PathBuf,
     depth_list: File,
     color_list: Option<File>,
-    color_file: ColorFile,
     frames: usize,
 }
 
 impl RgbdFolderWriter {
-    /// Makes the folder and its `camera.json` (depth in millimetres). Colour is written as PNG.
+    /// Creates the folder and its `camera.json` (depth in millimetres). Colour is written as PNG.
     ///
     /// # Errors
-    /// When the folder already holds a recording, or cannot be written.
+    /// When the folder already contains a recording, or cannot be written.
     pub fn create(folder: &Path, calibration: &Calibration) -> Result<Self, FormatError> {
         let camera = folder.join("camera.json");
         if camera.exists() {
@@ -55,15 +44,8 @@ impl RgbdFolderWriter {
             folder: folder.to_owned(),
             depth_list,
             color_list: None,
-            color_file: ColorFile::Png,
             frames: 0,
         })
-    }
-    /// Writes colour as JPEG of this quality (1 to 100) instead of PNG.
-    #[must_use]
-    pub fn with_jpeg(mut self, quality: u8) -> Self {
-        self.color_file = ColorFile::Jpeg(quality);
-        self
     }
     /// Frames written so far.
     pub fn frames(&self) -> usize {
@@ -90,20 +72,8 @@ impl RgbdFolderWriter {
                 std::fs::create_dir_all(&dir).map_err(|e| FormatError::io(&dir, e))?;
                 self.color_list = Some(File::create(&list).map_err(|e| FormatError::io(&list, e))?);
             }
-            let name = match self.color_file {
-                ColorFile::Png => {
-                    let name = format!("rgb/{:06}.png", self.frames);
-                    write_png_rgb(&self.folder.join(&name), color)?;
-                    name
-                }
-                ColorFile::Jpeg(quality) => {
-                    let name = format!("rgb/{:06}.jpg", self.frames);
-                    let path = self.folder.join(&name);
-                    std::fs::write(&path, encode_jpeg(color, quality)?)
-                        .map_err(|e| FormatError::io(&path, e))?;
-                    name
-                }
-            };
+            let name = format!("rgb/{:06}.png", self.frames);
+            write_png_rgb(&self.folder.join(&name), color)?;
             if let Some(file) = &mut self.color_list {
                 writeln!(file, "{time} {name}").map_err(|e| FormatError::io(&list, e))?;
             }

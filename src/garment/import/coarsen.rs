@@ -296,7 +296,7 @@ fn rebuilt(g: &GarmentMesh, positions: &[P3], c: &Coarsener) -> (GarmentMesh, Ve
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::garment::{Size, Triangulation, library, mesh_area};
+    use crate::garment::{Size, Triangulation, library, rest_area};
 
     #[test]
     fn panels_keep_their_area_seams_and_holes_with_a_tenth_of_the_vertices() {
@@ -322,7 +322,7 @@ mod tests {
         );
         assert_eq!(kept.len(), coarse.vertices);
         assert!(coarse.min_angle > 15.0, "{}", coarse.min_angle);
-        let area = |g: &GarmentMesh| g.rest.iter().map(mesh_area).sum::<f64>();
+        let area = |g: &GarmentMesh| g.rest.iter().map(rest_area).sum::<f64>();
         assert!(
             (area(&coarse) / area(&fine) - 1.0).abs() < 0.01,
             "{} {}",

@@ -1,47 +1,47 @@
-//! Mesh files as surfaces that can become cloth: OBJ with or without stitches, glTF, MakeHuman clothes.
+//! Mesh files as surfaces of cloth: OBJ with or without stitches, glTF, MakeHuman clothes.
 
 use crate::formats::FormatError;
 use crate::formats::gltf::{GltfModel, read_glb};
 use crate::formats::mhclo::read_mhclo;
 use crate::formats::obj::{ObjMesh, read_obj};
 use crate::formats::sewn_obj::{SewnObj, Stitch, read_sewn_obj};
+use crate::garment::union_find::UnionFind;
 use crate::math::P3;
 use crate::mesh::{Face, TriMesh};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// A surface as its file has it.
+/// Surface of a mesh file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshFile {
-    /// Name of the file, or of the clothes in it.
+    /// Name of the file, or of the garment in it.
     pub name: String,
-    /// Surface in the file's own unit and frame; its faces are turned alike.
+    /// Surface in the unit and frame of the file, with consistent orientation.
     pub sewn: SewnObj,
-    /// Faces that had to be turned over to agree with their neighbours.
+    /// Faces whose orientation was reversed.
     pub turned: usize,
-    /// The positions hang on the body that was given: MakeHuman's binding found all of its vertices there.
+    /// Positions are on the given body: it has all vertices of MakeHuman's binding.
     pub bound: bool,
 }
 
 /// Reads an OBJ, a glTF (`.glb`, `.gltf`) or a MakeHuman binding (`.mhclo`, with the OBJ beside it). `base` are the
-/// vertices of the body that a binding names; without them, or if they lack MakeHuman's helpers, the OBJ's own positions
-/// are taken.
+/// vertices of the body that a binding names; without them, or without MakeHuman's helpers among them, the positions
+/// are those of the OBJ.
 ///
 /// # Errors
-/// What is wrong in the file; an edge with more than two faces, or a surface with one side (a Möbius strip), by its
-/// vertices.
+/// Faults of the file; an edge with more than two faces or of a one-sided surface (Möbius strip), by its vertices.
 pub fn read_mesh(path: &Path, base: Option<&[P3]>) -> Result<MeshFile, FormatError> {
     let stem = path
         .file_stem()
         .and_then(|s| s.to_str())
         .unwrap_or("garment")
         .to_owned();
-    let ending = path
+    let extension = path
         .extension()
         .and_then(|e| e.to_str())
         .unwrap_or("")
         .to_ascii_lowercase();
-    let (name, mut sewn, bound) = match ending.as_str() {
+    let (name, mut sewn, bound) = match extension.as_str() {
         "obj" => (stem, read_sewn_obj(path)?, false),
         "glb" | "gltf" => (
             stem,
@@ -85,7 +85,7 @@ pub fn read_mesh(path: &Path, base: Option<&[P3]>) -> Result<MeshFile, FormatErr
             return Err(FormatError::field(path, "name", why));
         }
     };
-    let turned = turn_alike(&mut sewn.obj, path)?;
+    let turned = orient(&mut sewn.obj, path)?;
     Ok(MeshFile {
         name,
         sewn,
@@ -94,9 +94,9 @@ pub fn read_mesh(path: &Path, base: Option<&[P3]>) -> Result<MeshFile, FormatErr
     })
 }
 
-/// glTF splits vertices along texture seams: those at one place become one again.
+/// Welds the vertices that glTF splits along texture seams.
 fn welded(model: GltfModel, path: &Path) -> Result<ObjMesh, FormatError> {
-    /// Vertices nearer than this share of the model's size are one.
+    /// Largest distance of vertices that are welded, as a share of the model's size.
     const SAME: f32 = 1e-5;
     let size = model
         .mesh
@@ -137,8 +137,8 @@ fn welded(model: GltfModel, path: &Path) -> Result<ObjMesh, FormatError> {
     })
 }
 
-/// Turns faces over until neighbours agree which side is out; says how many were turned.
-fn turn_alike(o: &mut ObjMesh, path: &Path) -> Result<usize, FormatError> {
+/// Reverses faces until neighbours have the same orientation; returns the number of reversed faces.
+fn orient(o: &mut ObjMesh, path: &Path) -> Result<usize, FormatError> {
     let mut faces = o.mesh.faces().to_vec();
     let mut around: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
     for (i, f) in faces.iter().enumerate() {
@@ -174,7 +174,7 @@ fn turn_alike(o: &mut ObjMesh, path: &Path) -> Result<usize, FormatError> {
                 let (a, b) = (f[k], f[(k + 1) % 3]);
                 for &n in &around[&(a.min(b), a.max(b))] {
                     let n = n as usize;
-                    // Two faces that agree run along their edge in opposite directions.
+                    // Faces of the same orientation run along their edge in opposite directions.
                     let alike = n == i || !runs(&faces[n], a, b);
                     if known[n] && !alike {
                         let why = "its faces cannot be turned alike: the surface has one side only"
@@ -191,7 +191,7 @@ fn turn_alike(o: &mut ObjMesh, path: &Path) -> Result<usize, FormatError> {
                 }
             }
         }
-        // What most faces of the piece said about inside and outside stays.
+        // The majority of the piece keeps its orientation.
         if piece.iter().filter(|i| turned[**i]).count() * 2 > piece.len() {
             for i in piece {
                 faces[i].swap(1, 2);
@@ -207,32 +207,20 @@ fn turn_alike(o: &mut ObjMesh, path: &Path) -> Result<usize, FormatError> {
     Ok(turned.iter().filter(|t| **t).count())
 }
 
-/// The pieces of cloth of a file: what hangs together by faces or stitches, largest first.
+/// Pieces of cloth, connected by faces or stitches, largest first.
 pub fn split(sewn: &SewnObj) -> Vec<SewnObj> {
-    let n = sewn.obj.mesh.vertices().len();
-    let mut root: Vec<u32> = (0..n as u32).collect();
-    fn find(root: &mut [u32], mut i: u32) -> u32 {
-        while root[i as usize] != i {
-            root[i as usize] = root[root[i as usize] as usize];
-            i = root[i as usize];
-        }
-        i
-    }
-    let mut join = |a: u32, b: u32| {
-        let (a, b) = (find(&mut root, a), find(&mut root, b));
-        root[a.max(b) as usize] = a.min(b);
-    };
+    let mut sets = UnionFind::new(sewn.obj.mesh.vertices().len());
     for f in sewn.obj.mesh.faces() {
-        join(f[0], f[1]);
-        join(f[0], f[2]);
+        sets.join(f[0], f[1]);
+        sets.join(f[0], f[2]);
     }
     for s in &sewn.stitches {
-        join(s.vertex, s.edge[0]);
-        join(s.vertex, s.edge[1]);
+        sets.join(s.vertex, s.edge[0]);
+        sets.join(s.vertex, s.edge[1]);
     }
     let mut pieces: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (i, f) in sewn.obj.mesh.faces().iter().enumerate() {
-        pieces.entry(find(&mut root, f[0])).or_default().push(i);
+        pieces.entry(sets.root(f[0])).or_default().push(i);
     }
     let mut out: Vec<SewnObj> = pieces
         .into_values()
@@ -242,7 +230,7 @@ pub fn split(sewn: &SewnObj) -> Vec<SewnObj> {
     out
 }
 
-/// Some faces of a surface with their vertices and the stitches between these; `None` without faces.
+/// Part of a surface: these faces, their vertices and the stitches between them; `None` without faces.
 pub fn some_faces(sewn: &SewnObj, faces: &[usize]) -> Option<SewnObj> {
     let mut label = vec![u32::MAX; sewn.obj.mesh.vertices().len()];
     let mut vertices = Vec::new();
@@ -300,25 +288,25 @@ mod tests {
     const QUAD: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
     #[test]
-    fn faces_are_turned_to_agree_and_faults_name_their_edge() {
+    fn faces_get_one_orientation_and_faults_name_their_edge() {
         let mut o = obj(&format!("{QUAD}v 2 0 0\nf 1 2 3\nf 1 4 3\nf 2 3 5"));
-        let n = turn_alike(&mut o, Path::new("t.obj")).expect("turned");
+        let n = orient(&mut o, Path::new("t.obj")).expect("turned");
         assert!(n > 0 && Topology::new(&o.mesh).is_ok());
         let mut o = obj(&format!("{QUAD}v 2 0 0\nf 1 2 3\nf 2 1 4\nf 1 2 5"));
-        let e = turn_alike(&mut o, Path::new("t.obj"))
+        let e = orient(&mut o, Path::new("t.obj"))
             .expect_err("three")
             .to_string();
         assert!(e.contains("edge (0, 1)") && e.contains("3 faces"), "{e}");
         // A Möbius strip of five triangles.
         let ring = "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nv 4 0 0\nf 1 2 3\nf 2 3 4\nf 3 4 5\nf 4 5 1\nf 5 1 2";
-        let e = turn_alike(&mut obj(ring), Path::new("t.obj"))
+        let e = orient(&mut obj(ring), Path::new("t.obj"))
             .expect_err("one side")
             .to_string();
         assert!(e.contains("one side"), "{e}");
     }
 
     #[test]
-    fn pieces_are_told_apart_by_faces_and_stitches() {
+    fn pieces_are_connected_by_faces_and_stitches() {
         let two = obj(&format!(
             "{QUAD}v 5 0 0\nv 6 0 0\nv 6 1 0\nf 5 6 7\nf 1 2 3 4"
         ));

@@ -1,4 +1,4 @@
-//! GarmentCode's patterns as ours: panels in the frames of their places on the body, edges named after what they do.
+//! Patterns from GarmentCode: panels in the frames of their places on the body, landmark edges by name.
 
 use crate::formats::garmentcode::{RawCurve, RawEdge, RawPanel, RawPattern};
 use crate::garment::{
@@ -6,14 +6,14 @@ use crate::garment::{
     Side, Size,
 };
 
-/// Edges shorter than this are taken out together with the ones they are sewn to, metres: they come from seam arithmetic
-/// and would leave triangles a tenth as wide as the mesh.
-const CRUMB: f64 = 0.009;
+/// Length below which an edge is removed together with its partner in a seam, metres: such edges come from seam
+/// arithmetic and give triangles a tenth as wide as the mesh.
+const SHORTEST: f64 = 0.009;
 
-/// Makes a pattern of ours. Size is what the caller knows of the figure it was drawn for.
+/// Converts a pattern. `size` is that of the figure it was drafted for.
 ///
 /// # Errors
-/// A panel whose place cannot be told from its name, or faults of the finished pattern (panel, edge, seam).
+/// A panel whose name gives no place, or faults of the converted pattern (panel, edge, seam).
 pub fn from_garmentcode(
     raw: &RawPattern,
     name: &str,
@@ -25,10 +25,10 @@ pub fn from_garmentcode(
         .iter()
         .map(place)
         .collect::<Result<Vec<_>, _>>()?;
-    let dropped = crumbs(raw);
+    let dropped = short_edges(raw);
     let heights = Heights::new(raw, &places);
     let mut panels = Vec::new();
-    // Where each raw edge went; `None` for crumbs.
+    // Name of each raw edge; `None` if removed.
     let mut edge_names: Vec<Vec<Option<String>>> = Vec::new();
     for (k, p) in raw.panels.iter().enumerate() {
         let (panel, names) = convert(p, places[k], &heights, &dropped[k])?;
@@ -88,6 +88,7 @@ pub fn from_garmentcode(
     Ok(pattern)
 }
 
+/// Place of a panel by its name and position.
 fn place(p: &RawPanel) -> Result<Placement, GarmentError> {
     let n = p.name.to_lowercase();
     let has = |words: &[&str]| words.iter().any(|w| n.contains(w));
@@ -132,8 +133,8 @@ fn place(p: &RawPanel) -> Result<Placement, GarmentError> {
     })
 }
 
-/// Point of a panel in the figure's frame, metres.
-fn stand(p: &RawPanel, q: [f64; 2]) -> [f64; 3] {
+/// Point of a panel in the frame of the figure, metres.
+fn in_space(p: &RawPanel, q: [f64; 2]) -> [f64; 3] {
     let r = nalgebra::Rotation3::from_euler_angles(
         p.rotation[0].to_radians(),
         p.rotation[1].to_radians(),
@@ -143,7 +144,7 @@ fn stand(p: &RawPanel, q: [f64; 2]) -> [f64; 3] {
     std::array::from_fn(|k| v[k] + p.translation[k])
 }
 
-/// Heights that count as zero: shoulder points of the trunk, waists of skirt and trousers. Metres.
+/// Heights of the panel origins, metres: shoulder points of the trunk, waists of skirt and trousers.
 struct Heights {
     shoulder: f64,
     skirt: f64,
@@ -155,7 +156,7 @@ impl Heights {
         let top = |wanted: &dyn Fn(&Placement) -> bool| {
             let panels = raw.panels.iter().zip(places).filter(|(_, p)| wanted(p));
             panels
-                .flat_map(|(p, _)| p.vertices.iter().map(|v| stand(p, *v)[1]))
+                .flat_map(|(p, _)| p.vertices.iter().map(|v| in_space(p, *v)[1]))
                 .fold(f64::MIN, f64::max)
         };
         Self {
@@ -166,12 +167,12 @@ impl Heights {
     }
 }
 
-/// For each panel, which edges are crumbs: short, and sewn to a short one or to nothing.
-fn crumbs(raw: &RawPattern) -> Vec<Vec<bool>> {
+/// True for edges to remove: short, and sewn to a short one or to none. Shape `[panels][edges]`.
+fn short_edges(raw: &RawPattern) -> Vec<Vec<bool>> {
     let short = |p: usize, e: usize| {
         let panel = &raw.panels[p];
         let [a, b] = panel.edges[e].ends.map(|v| panel.vertices[v]);
-        (a[0] - b[0]).hypot(a[1] - b[1]) < CRUMB
+        (a[0] - b[0]).hypot(a[1] - b[1]) < SHORTEST
     };
     let mut out: Vec<Vec<bool>> = raw
         .panels
@@ -190,7 +191,7 @@ fn crumbs(raw: &RawPattern) -> Vec<Vec<bool>> {
 
 /// Chart coordinates of a point of a panel (see [`Placement`]).
 fn chart(p: &RawPanel, place: Placement, heights: &Heights, q: [f64; 2]) -> [f64; 2] {
-    let s = stand(p, q);
+    let s = in_space(p, q);
     match place {
         Placement::TrunkFront => [s[0], s[1] - heights.shoulder],
         Placement::TrunkBack => [-s[0], s[1] - heights.shoulder],
@@ -199,7 +200,7 @@ fn chart(p: &RawPanel, place: Placement, heights: &Heights, q: [f64; 2]) -> [f64
         Placement::LegFront(_) => [s[0], s[1] - heights.leg],
         Placement::LegBack(_) => [-s[0], s[1] - heights.leg],
         Placement::Hood(side) => {
-            // Hood panels are turned about y: their own x runs forward or back.
+            // Hood panels are rotated about y: their x runs forward or back.
             let forward = s[2] - p.translation[2];
             [
                 if side == Side::Left {
@@ -233,8 +234,8 @@ fn chart(p: &RawPanel, place: Placement, heights: &Heights, q: [f64; 2]) -> [f64
     }
 }
 
-/// The control points of an edge in panel coordinates.
-fn bend(e: &RawEdge, a: [f64; 2], b: [f64; 2]) -> Option<[[f64; 2]; 2]> {
+/// Control points of an edge in panel coordinates; `None` for a line.
+fn control_points(e: &RawEdge, a: [f64; 2], b: [f64; 2]) -> Option<[[f64; 2]; 2]> {
     let d = [b[0] - a[0], b[1] - a[1]];
     let absolute = |r: [f64; 2]| {
         [
@@ -264,15 +265,16 @@ fn bend(e: &RawEdge, a: [f64; 2], b: [f64; 2]) -> Option<[[f64; 2]; 2]> {
             } else {
                 half
             };
-            // A cubic whose ends lean `half` off the chord: control length 4/3·tan(θ/4) of the radius.
+            // Cubic with ends at the angle `half` to the chord: control length 4/3·tan(θ/4) of the radius.
             let k = 4.0 / 3.0 * (half / 2.0).tan() * radius / chord;
-            let lean = if right { -half } else { half };
-            let (c, s) = (k * lean.cos(), k * lean.sin());
+            let angle = if right { -half } else { half };
+            let (c, s) = (k * angle.cos(), k * angle.sin());
             Some([absolute([c, s]), absolute([1.0 - c, s])])
         }
     }
 }
 
+/// Converts a panel; also the name of each raw edge.
 fn convert(
     p: &RawPanel,
     place: Placement,
@@ -292,8 +294,8 @@ fn convert(
     let mut edges = Vec::new();
     for &e in &kept {
         let [a, b] = p.edges[e].ends.map(|v| p.vertices[v]);
-        let curve =
-            bend(&p.edges[e], a, b).map_or(Curve::Line, |c| Curve::Cubic(to(c[0]), to(c[1])));
+        let curve = control_points(&p.edges[e], a, b)
+            .map_or(Curve::Line, |c| Curve::Cubic(to(c[0]), to(c[1])));
         names[e] = Some(format!("edge_{e}"));
         edges.push(PanelEdge {
             name: format!("edge_{e}"),
@@ -313,7 +315,7 @@ fn convert(
         .map(|i| corners[i][0] * corners[(i + 1) % m][1] - corners[i][1] * corners[(i + 1) % m][0])
         .sum();
     if area < 0.0 {
-        let turned = (0..m)
+        let reversed = (0..m)
             .rev()
             .map(|i| PanelEdge {
                 name: panel.edges[i].name.clone(),
@@ -324,12 +326,12 @@ fn convert(
                 },
             })
             .collect();
-        panel.edges = turned;
+        panel.edges = reversed;
     }
     Ok((panel, names))
 }
 
-/// Gives the edges that placement looks for their names.
+/// Names the landmark edges of placement: shoulders, crotch, inseam and crown.
 fn name_landmarks(
     raw: &RawPattern,
     places: &[Placement],
@@ -399,7 +401,7 @@ fn name_landmarks(
                     };
                     let own = if a.0 == k { a } else { b };
                     let hood = matches!(places[other.0], Placement::Hood(_));
-                    if let Some(e) = names_at(panel, own.1).filter(|_| hood) {
+                    if let Some(e) = unnamed_edge(panel, own.1).filter(|_| hood) {
                         rename(panel, k, e, &format!("crown_{crown}"));
                         crown += 1;
                     }
@@ -410,11 +412,12 @@ fn name_landmarks(
     }
 }
 
-fn names_at(panel: &Panel, raw_edge: usize) -> Option<usize> {
+/// Edge of a panel that still has its raw name.
+fn unnamed_edge(panel: &Panel, raw_edge: usize) -> Option<usize> {
     panel.edge(&format!("edge_{raw_edge}"))
 }
 
-/// Tops hang on the shoulder seams of the front, everything else on its free upper edges.
+/// Anchors: the front shoulder seams of tops, the free upper edges of other garments.
 fn anchors(panels: &[Panel], seams: &[Seam], trunk: bool) -> Vec<Anchor> {
     if trunk {
         let edges = panels
@@ -428,7 +431,7 @@ fn anchors(panels: &[Panel], seams: &[Seam], trunk: bool) -> Vec<Anchor> {
             strength: 0.5,
         }];
     }
-    /// Edges whose corners are this near to the top of their panel are the waist, metres.
+    /// Largest distance of a waist edge from the top of its panel, metres.
     const NEAR_TOP: f64 = 0.04;
     let mut edges = Vec::new();
     for p in panels {
@@ -448,7 +451,7 @@ fn anchors(panels: &[Panel], seams: &[Seam], trunk: bool) -> Vec<Anchor> {
     }]
 }
 
-/// Girths at chest, waist and hip by adding up the panels' widths; 0 where there is no cloth.
+/// Girths at chest, waist and hip, the sums of panel widths, metres; 0 without cloth.
 fn girths(panels: &[Panel], trunk: bool) -> [f64; 3] {
     let width = |p: &Panel, y: f64| {
         let points: Vec<[f64; 2]> = (0..p.edges.len())
@@ -474,7 +477,7 @@ fn girths(panels: &[Panel], trunk: bool) -> [f64; 3] {
     let is_trunk = |p: Placement| matches!(p, Placement::TrunkFront | Placement::TrunkBack);
     let is_skirt = |p: Placement| matches!(p, Placement::SkirtFront | Placement::SkirtBack);
     let is_leg = |p: Placement| matches!(p, Placement::LegFront(_) | Placement::LegBack(_));
-    /// Below the shoulder point: just under the armpit; below the waist: waistband and hip line. Metres.
+    /// Heights of the girths, metres: under the armpit (from the shoulder point), waistband and hip line (from the waist).
     const LEVELS: [f64; 3] = [-0.26, -0.01, -0.19];
     let chest = if trunk {
         around(&is_trunk, LEVELS[0])

@@ -1,4 +1,4 @@
-//! Garments made by others, as ours.
+//! Garments from other tools.
 
 mod coarsen;
 mod file;
@@ -6,9 +6,9 @@ mod garmentcode;
 mod mesh;
 mod remesh;
 
+pub(crate) use super::flat_triangle::unfold;
 pub use coarsen::{coarsen, median_edge};
 pub use file::{MeshFile, read_mesh, some_faces, split};
 pub use garmentcode::from_garmentcode;
-pub(crate) use mesh::unfold;
 pub use mesh::{ImportedMesh, from_mesh, panels_in_metres};
 pub use remesh::remesh;

@@ -1,6 +1,6 @@
 //! Skirts to the knee: flared (waist and hem on arcs) and straight (shaped by darts).
 
-use super::{panel, sewn};
+use super::draft::{DraftEdge, flip, panel, sewn};
 use crate::garment::{
     Anchor, Curve, Dart, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, SizeRow,
 };
@@ -13,96 +13,108 @@ const HIP_EASE: [f64; 2] = [0.07, 0.045];
 pub(super) const HIP_DEPTH: f64 = 0.20;
 /// Waist to hem, metres.
 const LENGTH: f64 = 0.56;
+/// Least difference of half hip and half waist of the straight skirt, metres.
+const LEAST_SHAPING: f64 = 0.012;
+/// Half hip less half hem of the straight skirt, metres.
+const HEM_TAPER: f64 = 0.012;
+/// Rise of its waist from the centre to the side, metres.
+const WAIST_RISE: f64 = 0.012;
 /// Half angle of each panel's flare, radians: both panels together make a third of a circle.
 const FLARE: f64 = 0.30;
+/// Position of the darts between the centre and the side, as a share of the half waist.
+pub(super) const DART_AT: f64 = 0.52;
 /// Depth of the darts of the straight skirt, front and back, metres.
 const DART_DEPTH: [f64; 2] = [0.095, 0.13];
 
-/// A panel on arcs about (0, radius): `waist` is the length of the upper arc, `cuts` where it is divided (shares of
-/// it); its pieces are `waist`, or `waist_0`, `waist_1` … from paper right to paper left.
-pub(super) fn sector(
-    name: &str,
-    placement: Placement,
-    waist: f64,
-    half_angle: f64,
-    length: f64,
-    cuts: &[f64],
-) -> Panel {
-    let radius = waist / (2.0 * half_angle);
-    // Cubic approximation of an arc: control length 4/3·tan(θ/4).
-    let at = |r: f64, a: f64| [r * a.sin(), radius - r * a.cos()];
-    let arc = |r: f64, from: f64, to: f64| {
-        let k = 4.0 / 3.0 * ((to - from) / 4.0).tan() * r;
-        let (p, q) = (at(r, from), at(r, to));
-        Curve::Cubic(
-            [p[0] + k * from.cos(), p[1] + k * from.sin()],
-            [q[0] - k * to.cos(), q[1] - k * to.sin()],
-        )
-    };
-    let low = radius + length;
-    let mut edges = vec![
-        (
-            "hem".to_owned(),
-            at(low, -half_angle),
-            arc(low, -half_angle, half_angle),
-        ),
-        ("side_right".to_owned(), at(low, half_angle), Curve::Line),
-    ];
-    let mut from = half_angle;
-    for (k, share) in cuts.iter().copied().chain([1.0]).enumerate() {
-        let to = half_angle * (1.0 - 2.0 * share);
-        let edge = if cuts.is_empty() {
-            "waist".to_owned()
-        } else {
-            format!("waist_{k}")
-        };
-        edges.push((edge, at(radius, from), arc(radius, from, to)));
-        from = to;
-    }
-    edges.push(("side_left".to_owned(), at(radius, -half_angle), Curve::Line));
-    let edges: Vec<(&str, [f64; 2], Curve)> =
-        edges.iter().map(|(n, p, c)| (n.as_str(), *p, *c)).collect();
-    panel(name, placement, &edges)
+/// Shape of a skirt panel between two arcs about (0, radius).
+pub(super) struct Sector<'a> {
+    /// Length of the upper arc, metres.
+    pub(super) waist: f64,
+    /// Half of its angle, radians.
+    pub(super) half_angle: f64,
+    /// Waist to hem, metres.
+    pub(super) length: f64,
+    /// Divisions of the upper arc, as shares of it from paper right to paper left.
+    pub(super) cuts: &'a [f64],
 }
 
-/// Half angle of a panel whose girth at the hip line is at least `hip` (both in metres for one panel).
+impl Sector<'_> {
+    fn radius(&self) -> f64 {
+        self.waist / (2.0 * self.half_angle)
+    }
+    /// Girth of two panels `depth` metres below the waist.
+    pub(super) fn girth(&self, depth: f64) -> f64 {
+        (self.radius() + depth) * self.half_angle * 4.0
+    }
+    /// The panel. The pieces of its upper arc are `waist`, or `waist_0`, `waist_1` … from paper right to paper left.
+    pub(super) fn panel(&self, name: &str, placement: Placement) -> Panel {
+        let (radius, half_angle) = (self.radius(), self.half_angle);
+        // Cubic approximation of an arc: control length 4/3·tan(θ/4).
+        let at = |r: f64, a: f64| [r * a.sin(), radius - r * a.cos()];
+        let arc = |r: f64, from: f64, to: f64| {
+            let k = 4.0 / 3.0 * ((to - from) / 4.0).tan() * r;
+            let (p, q) = (at(r, from), at(r, to));
+            Curve::Cubic(
+                [p[0] + k * from.cos(), p[1] + k * from.sin()],
+                [q[0] - k * to.cos(), q[1] - k * to.sin()],
+            )
+        };
+        let low = radius + self.length;
+        let hem = arc(low, -half_angle, half_angle);
+        let mut edges = vec![
+            ("hem".to_owned(), at(low, -half_angle), hem),
+            ("side_right".to_owned(), at(low, half_angle), Curve::Line),
+        ];
+        let mut from = half_angle;
+        for (k, share) in self.cuts.iter().copied().chain([1.0]).enumerate() {
+            let to = half_angle * (1.0 - 2.0 * share);
+            let edge = if self.cuts.is_empty() {
+                "waist".to_owned()
+            } else {
+                format!("waist_{k}")
+            };
+            edges.push((edge, at(radius, from), arc(radius, from, to)));
+            from = to;
+        }
+        edges.push(("side_left".to_owned(), at(radius, -half_angle), Curve::Line));
+        let edges: Vec<DraftEdge<'_>> =
+            edges.iter().map(|(n, p, c)| (n.as_str(), *p, *c)).collect();
+        panel(name, placement, &edges)
+    }
+}
+
+/// Half angle of a panel whose width at the hip line is at least `hip`; widths of one panel, metres.
 pub(super) fn flare(waist: f64, hip: f64) -> f64 {
     FLARE.max((hip - waist) / HIP_DEPTH / 2.0)
 }
 
+/// A flared skirt.
 pub(super) fn flared(row: &SizeRow) -> Result<Pattern, GarmentError> {
     let waist = (row.body.waist + WAIST_EASE) / 2.0;
-    let hip = (row.body.hip + HIP_EASE[0]) / 2.0;
-    let half_angle = flare(waist, hip);
-    let radius = waist / (2.0 * half_angle);
-    let build = |name: &str, placement| sector(name, placement, waist, half_angle, LENGTH, &[]);
+    let sector = Sector {
+        waist,
+        half_angle: flare(waist, (row.body.hip + HIP_EASE[0]) / 2.0),
+        length: LENGTH,
+        cuts: &[],
+    };
     let panels = vec![
-        build("front", Placement::SkirtFront),
-        build("back", Placement::SkirtBack),
+        sector.panel("front", Placement::SkirtFront),
+        sector.panel("back", Placement::SkirtBack),
     ];
-    let hips = (radius + HIP_DEPTH) * half_angle * 4.0;
-    finish(
-        row,
-        "skirt",
-        "twill",
-        panels,
-        vec![],
-        vec!["waist"],
-        [0.0, waist * 2.0, hips],
-    )
+    let finished = [0.0, waist * 2.0, sector.girth(HIP_DEPTH)];
+    finish(row, "skirt", panels, &["waist"], finished)
 }
 
+/// A straight skirt.
 pub(super) fn straight(row: &SizeRow) -> Result<Pattern, GarmentError> {
     let waist = (row.body.waist + WAIST_EASE) / 4.0; // half width of a panel
     let hip = (row.body.hip + HIP_EASE[1]) / 4.0;
-    // What the hip has more than the waist is taken out half at the side seam, half by one dart a side.
-    let more = (hip - waist).max(0.012);
+    // The hip exceeds the waist by a dart on each side, and by as much at the side seam.
+    let more = (hip - waist).max(LEAST_SHAPING);
     let (dart, top) = (0.5 * more, waist + 0.5 * more);
-    let hem = hip - 0.012;
-    let rise = 0.012; // the waist rises towards the side
+    let (hem, rise) = (hip - HEM_TAPER, WAIST_RISE);
     let build = |name: &str, placement, depth: f64| {
-        let flip = |p: [f64; 2]| [-p[0], p[1]];
-        let at = top * 0.52;
+        let at = top * DART_AT;
         let line = |x: f64| rise * x / top;
         let (out, apex, inn) = (
             [at + dart / 2.0, line(at + dart / 2.0)],
@@ -142,19 +154,20 @@ pub(super) fn straight(row: &SizeRow) -> Result<Pattern, GarmentError> {
         build("front", Placement::SkirtFront, DART_DEPTH[0]),
         build("back", Placement::SkirtBack, DART_DEPTH[1]),
     ];
-    let darts = darts(&["front", "back"]);
-    finish(
+    let pattern = finish(
         row,
         "straight_skirt",
-        "twill",
         panels,
-        darts,
-        vec!["waist_0", "waist_1", "waist_2"],
+        &["waist_0", "waist_1", "waist_2"],
         [0.0, waist * 4.0, hip * 4.0],
-    )
+    )?;
+    Ok(Pattern {
+        darts: darts(&["front", "back"]),
+        ..pattern
+    })
 }
 
-/// The two darts of each of these panels.
+/// Two darts of each of these panels.
 pub(super) fn darts(panels: &[&str]) -> Vec<Dart> {
     panels
         .iter()
@@ -167,13 +180,12 @@ pub(super) fn darts(panels: &[&str]) -> Vec<Dart> {
         .collect()
 }
 
+/// Sews a front and a back; `waist` are the edges attached to the body.
 fn finish(
     row: &SizeRow,
     name: &str,
-    fabric: &str,
     panels: Vec<Panel>,
-    darts: Vec<Dart>,
-    waist: Vec<&str>,
+    waist: &[&str],
     finished: [f64; 3],
 ) -> Result<Pattern, GarmentError> {
     let mut seams = vec![
@@ -198,13 +210,13 @@ fn finish(
         size: row.size,
         panels,
         seams,
-        darts,
+        darts: vec![],
         anchors: vec![Anchor {
             name: "waist".into(),
             edges,
             strength: 1.0,
         }],
-        material: Material::preset(fabric)?,
+        material: Material::preset("twill")?,
         layer: 0,
         finished,
     })

@@ -1,6 +1,6 @@
-//! What hangs from the shoulders: T-shirt, long-sleeved shirt, tank top, hooded top.
+//! Tops: T-shirt, long-sleeved shirt, tank top, hooded top.
 
-use super::{mirrored, panel, sewn};
+use super::draft::{DraftEdge, flip, mirrored, panel, sewn};
 use crate::garment::{
     Anchor, Curve, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, Seam, Side,
     SizeRow,
@@ -9,34 +9,38 @@ use crate::garment::{
 /// Fall of the shoulder seam from neck to tip, metres.
 pub(super) const SHOULDER_FALL: f64 = 0.045;
 
-/// What one top has and another has not. Metres.
+/// Length of a sleeve cap over that of the armhole.
+const CAP_EASE: f64 = 1.02;
+/// Iterations for the height of a sleeve cap.
+const CAP_ITERATIONS: usize = 40;
+
+/// Parameters of a top, metres.
 struct Cut {
     name: &'static str,
     fabric: &'static str,
-    /// Ease over the body's chest and hip.
+    /// Ease at chest and hip.
     ease: [f64; 2],
-    /// Half width of the neck opening beyond a fifth of the neck girth (the draughting rule of Aldrich 2015).
+    /// Half width of the neck opening beyond a fifth of the neck girth (drafting rule of Aldrich 2015).
     neck: f64,
     /// Drop of the front and back neckline below the high point of the shoulder.
     drop: [f64; 2],
-    /// Width of the shoulder seam; zero runs to the shoulder tip.
+    /// Width of the shoulder seam; zero for a seam to the shoulder tip.
     strap: f64,
-    /// Below an eighth of the chest: scye depth.
+    /// Scye depth beyond an eighth of the chest.
     scye: f64,
-    /// Below the hip line.
+    /// Length below the hip line.
     longer: f64,
-    sleeve: Option<Sleeve>,
+    sleeve: Option<SleeveCut>,
     hood: bool,
 }
 
-/// Metres.
-struct Sleeve {
-    /// Ease over the upper arm.
+/// Parameters of a sleeve.
+struct SleeveCut {
+    /// Ease over the upper arm, metres.
     ease: f64,
-    /// Length from the shoulder tip; `None` to the wrist.
+    /// Length from the shoulder tip, metres; `None` for a sleeve to the wrist.
     length: Option<f64>,
-    /// Width at the cuff over width at the underarm: of long sleeves half, wider ones slide to the elbow
-    /// (docs/benchmarks.md).
+    /// Width at the cuff over width at the underarm; long sleeves wider than half slide to the elbow.
     cuff: f64,
 }
 
@@ -49,7 +53,7 @@ const TSHIRT: Cut = Cut {
     strap: 0.0,
     scye: 0.105,
     longer: 0.045,
-    sleeve: Some(Sleeve {
+    sleeve: Some(SleeveCut {
         ease: 0.085,
         length: Some(0.215),
         cuff: 0.93,
@@ -59,7 +63,7 @@ const TSHIRT: Cut = Cut {
 const LONGSLEEVE: Cut = Cut {
     name: "longsleeve",
     fabric: "cotton",
-    sleeve: Some(Sleeve {
+    sleeve: Some(SleeveCut {
         ease: 0.085,
         length: None,
         cuff: 0.50,
@@ -85,7 +89,7 @@ const HOODIE: Cut = Cut {
     drop: [0.085, 0.020],
     scye: 0.125,
     longer: 0.04,
-    sleeve: Some(Sleeve {
+    sleeve: Some(SleeveCut {
         ease: 0.12,
         length: None,
         cuff: 0.50,
@@ -107,15 +111,15 @@ pub(super) fn hoodie(row: &SizeRow) -> Result<Pattern, GarmentError> {
     draw(row, &HOODIE)
 }
 
-/// The edges of a panel above the armpits, from the right one to the left: armholes, shoulders and a neckline `drop`
-/// metres deep. Right side of the high point of the shoulder, its tip, the underarm point, and the armhole's control points.
+/// Edges of a panel above the armpits, from paper right to left: armholes, shoulders and a neckline `drop` metres deep.
+/// Points are those of the right side, the last pair the control points of the armhole.
 pub(super) fn yoke(
     high: [f64; 2],
     tip: [f64; 2],
     underarm: [f64; 2],
     drop: f64,
     [lower, upper]: [[f64; 2]; 2],
-) -> [(&'static str, [f64; 2], Curve); 6] {
+) -> [DraftEdge<'static>; 6] {
     let flip = |p: [f64; 2]| [-p[0], p[1]];
     let neck = high[0];
     [
@@ -153,10 +157,9 @@ fn draw(row: &SizeRow, cut: &Cut) -> Result<Pattern, GarmentError> {
     let armpit = -(row.body.chest / 8.0 + cut.scye);
     let length = -(row.trunk + cut.longer);
     let body = |name: &str, placement, drop: f64| {
-        // Armhole: from the underarm point up to the shoulder tip, hollowed out.
+        // Control points of a hollow armhole, from the underarm point to the shoulder tip.
         let lower = [tip - 0.02, armpit + 0.01];
         let upper = [tip - 0.028_f64.min(0.3 * (half - tip).abs()), armpit * 0.55];
-        let flip = |p: [f64; 2]| [-p[0], p[1]];
         let (hp, st, ua, he) = ([neck, 0.0], [tip, -fall], [half, armpit], [hem, length]);
         panel(
             name,
@@ -172,7 +175,7 @@ fn draw(row: &SizeRow, cut: &Cut) -> Result<Pattern, GarmentError> {
             .concat(),
         )
     };
-    // Here `right` and `left` are the sides of the paper. On the front, paper right is the wearer's left.
+    // `right` and `left` are sides of the paper. On the front, paper right is the body's left.
     let front = body("front", Placement::TrunkFront, cut.drop[0]);
     let back = body("back", Placement::TrunkBack, cut.drop[1]);
     let mut seams = trunk_seams();
@@ -207,7 +210,7 @@ pub(super) fn trunk_seams() -> Vec<Seam> {
     ]
 }
 
-/// What a top hangs on.
+/// Anchor of a top.
 pub(super) fn shoulders() -> Anchor {
     Anchor {
         name: "shoulders".into(),
@@ -219,18 +222,19 @@ pub(super) fn shoulders() -> Anchor {
     }
 }
 
+/// Length of an edge, metres.
 fn length_of(p: &Panel, edge: &str) -> f64 {
     p.edge(edge).map_or(0.0, |i| p.edges[i].length(p.end(i)))
 }
 
-fn sleeves(row: &SizeRow, cut: &Sleeve, panels: &mut Vec<Panel>, seams: &mut Vec<Seam>) {
+/// Adds two sleeves whose caps fit the armholes.
+fn sleeves(row: &SizeRow, cut: &SleeveCut, panels: &mut Vec<Panel>, seams: &mut Vec<Seam>) {
     let hole =
         0.5 * (length_of(&panels[0], "armhole_right") + length_of(&panels[1], "armhole_right"));
     let bicep = (row.upper_arm + cut.ease) / 2.0; // half width of the sleeve at the underarm
     let length = cut.length.unwrap_or(row.arm);
     let cuff = bicep * cut.cuff;
-    // Cap height such that the two halves of the cap curve are as long as an armhole with a little ease.
-    let cap_length = hole * 1.02;
+    let cap_length = hole * CAP_EASE;
     let mut cap = 0.10;
     let build = |cap: f64| {
         let (l, r, top) = ([-bicep, -cap], [bicep, -cap], [0.0, 0.0]);
@@ -254,7 +258,8 @@ fn sleeves(row: &SizeRow, cut: &Sleeve, panels: &mut Vec<Panel>, seams: &mut Vec
             ],
         )
     };
-    for _ in 0..40 {
+    // Fixed-point iteration for the cap height at which each half of the cap curve has this length.
+    for _ in 0..CAP_ITERATIONS {
         cap = (cap + (cap_length - length_of(&build(cap), "cap_right"))).clamp(0.02, 0.3);
     }
     let left = build(cap);
@@ -277,18 +282,18 @@ fn sleeves(row: &SizeRow, cut: &Sleeve, panels: &mut Vec<Panel>, seams: &mut Vec
     ]);
 }
 
-/// Height of a hood from the neckline to its top, metres: head height and room.
+/// Height of a hood from the neckline to its top, metres: head height and clearance.
 const HOOD_HEIGHT: f64 = 0.355;
 /// Depth of a hood at its widest, metres.
 const HOOD_DEPTH: f64 = 0.245;
 
-/// Two mirrored halves, sewn along the crown and to the neckline.
+/// Adds the two halves of a hood, sewn along the crown and to the neckline.
 fn hood(panels: &mut Vec<Panel>, seams: &mut Vec<Seam>) {
     let (b, f) = (
         length_of(&panels[1], "neck_right"),
         length_of(&panels[0], "neck_right"),
     );
-    // Seen from the wearer's right: x runs to the front, the seam along neck and crown starts at the nape.
+    // Seen from the body's right: x runs to the front, the seam along neck and crown starts at the nape.
     let dip = 0.03; // the front of a neckline lies lower
     let right = panel(
         "hood_right",
@@ -315,7 +320,7 @@ fn hood(panels: &mut Vec<Panel>, seams: &mut Vec<Seam>) {
     panels.extend([right, left]);
     seams.extend([
         sewn(["hood_right", "crown"], ["hood_left", "crown"]),
-        // On the front, paper left is the wearer's right; on the back, paper right.
+        // On the front, paper left is the body's right; on the back, paper right.
         sewn(["hood_right", "neck_back"], ["back", "neck_right"]),
         sewn(["hood_right", "neck_front"], ["front", "neck_left"]),
         sewn(["hood_left", "neck_back"], ["back", "neck_left"]),

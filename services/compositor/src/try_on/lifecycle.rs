@@ -2,7 +2,7 @@
 
 use crate::life;
 use tokio::time::Instant;
-use tryon::session::{Ages, Effect, Event, Limits, Reason, State, transition};
+use tryon::session::{Ages, Event, Fault, SilenceLimits, State, transition};
 use tryon_proto::v1::TryOnStatus;
 
 /// Answers of a service behind the try-on.
@@ -10,13 +10,13 @@ use tryon_proto::v1::TryOnStatus;
 struct Upstream {
     is_up: bool,
     /// Fault as a level: repeated to the table as long as it lasts.
-    fault: Option<(Reason, String)>,
+    fault: Option<(Fault, String)>,
 }
 
 /// State, faults and ages of one try-on.
 pub(super) struct Lifecycle {
     id: String,
-    limits: Limits,
+    limits: SilenceLimits,
     state: State,
     detail: String,
     /// Start of the current state.
@@ -31,7 +31,7 @@ pub(super) struct Lifecycle {
 
 impl Lifecycle {
     /// A try-on that opens now.
-    pub(super) fn new(id: String, limits: Limits) -> Self {
+    pub(super) fn new(id: String, limits: SilenceLimits) -> Self {
         let now = Instant::now();
         Self {
             id,
@@ -75,7 +75,7 @@ impl Lifecycle {
             reason: life::reason(self.state).into(),
             age: self.since.elapsed().as_secs_f32(),
             service: life::service(self.state).into(),
-            detail: match self.state.reason() {
+            detail: match self.state.fault() {
                 Some(r) if self.detail.is_empty() => r.words().into(),
                 Some(_) => self.detail.clone(),
                 None => String::new(),
@@ -91,26 +91,23 @@ impl Lifecycle {
 
     /// Applies one event to the table.
     pub(super) fn apply(&mut self, event: Event) {
-        let (next, effects) = transition(self.state, event);
-        if next != self.state {
-            tracing::info!(try_on = self.id, from = ?self.state, to = ?next, detail = self.detail, "state");
-            if self.state == State::Live {
-                self.last_live = Some(Instant::now());
-            }
-            (self.state, self.since) = (next, Instant::now());
+        let next = transition(self.state, event);
+        if next == self.state {
+            return;
         }
-        for effect in effects {
-            match effect {
-                Effect::Announce(_) => self.announced.push(self.status()),
-                Effect::ForgetGarments => self.ages.garments_ns = None,
-                // Followers reopen and dress by themselves; viewers' streams end with the task.
-                Effect::Reopen(_) | Effect::Dress | Effect::CloseUpstream | Effect::EndStreams => {}
-            }
+        tracing::info!(try_on = self.id, from = ?self.state, to = ?next, detail = self.detail, "state");
+        if self.state == State::Live {
+            self.last_live = Some(Instant::now());
+        }
+        (self.state, self.since) = (next, Instant::now());
+        self.announced.push(self.status());
+        if next.invalidates_garments() {
+            self.ages.garments_ns = None;
         }
     }
 
     /// Applies a fault of this moment.
-    pub(super) fn fail(&mut self, reason: Reason, detail: &str) {
+    pub(super) fn fail(&mut self, reason: Fault, detail: &str) {
         if self.detail != detail {
             self.detail = detail.into();
         }
@@ -120,7 +117,7 @@ impl Lifecycle {
     /// A frame arrived.
     pub(super) fn on_frame(&mut self) {
         self.ages.frame_ns = Some(self.since_birth_ns(Instant::now()));
-        if self.state == State::Degraded(Reason::CameraSilent) {
+        if self.state == State::Degraded(Fault::CameraSilent) {
             self.apply(Event::CameraBack);
         }
     }
@@ -134,7 +131,7 @@ impl Lifecycle {
     }
 
     /// Tracking answered that it follows nobody.
-    pub(super) fn on_nobody(&mut self, reason: Reason, detail: &str) {
+    pub(super) fn on_nobody(&mut self, reason: Fault, detail: &str) {
         self.fail(reason, detail);
         self.tracking.fault = Some((reason, detail.to_owned()));
     }
@@ -143,8 +140,8 @@ impl Lifecycle {
     pub(super) fn on_tracking_gone(&mut self, why: String) {
         self.tracking.is_up = false;
         self.ages.body_ns = None;
-        self.fail(Reason::TrackingUnavailable, &why);
-        self.tracking.fault = Some((Reason::TrackingUnavailable, why));
+        self.fail(Fault::TrackingUnavailable, &why);
+        self.tracking.fault = Some((Fault::TrackingUnavailable, why));
     }
 
     /// Cloth answered; without garments their age is forgotten.
@@ -165,8 +162,8 @@ impl Lifecycle {
     /// Cloth does not answer.
     pub(super) fn on_cloth_gone(&mut self, why: String) {
         self.cloth.is_up = false;
-        self.fail(Reason::ClothUnavailable, &why);
-        self.cloth.fault = Some((Reason::ClothUnavailable, why));
+        self.fail(Fault::ClothUnavailable, &why);
+        self.cloth.fault = Some((Fault::ClothUnavailable, why));
     }
 
     /// Repeats lasting faults and looks for silence.
@@ -179,15 +176,14 @@ impl Lifecycle {
         if let Some(reason) = self.ages.overdue(now, &self.limits) {
             self.fail(reason, "");
         } else if self.ages.frame_ns.is_none() && now > self.limits.camera_silence_ns {
-            self.fail(Reason::CameraSilent, "no frame has come yet");
+            self.fail(Fault::CameraSilent, "no frame has come yet");
         }
     }
 
     fn open_if_both_answer(&mut self) {
         let is_closed = matches!(
             self.state,
-            State::Opening
-                | State::Degraded(Reason::TrackingUnavailable | Reason::ClothUnavailable)
+            State::Opening | State::Degraded(Fault::TrackingUnavailable | Fault::ClothUnavailable)
         );
         if is_closed && self.tracking.is_up && self.cloth.is_up {
             self.apply(Event::Opened);
@@ -206,7 +202,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_hidden_fault_comes_up_once_the_one_before_it_is_gone() {
-        let mut life = Lifecycle::new("t".into(), Limits::default());
+        let mut life = Lifecycle::new("t".into(), SilenceLimits::default());
         life.on_frame();
         life.on_tracking();
         life.on_cloth(true);
@@ -215,12 +211,12 @@ mod tests {
         life.on_cloth_gone("no cloth".into());
         life.on_tracking_gone("no tracking".into());
         life.check();
-        assert_eq!(life.state(), State::Degraded(Reason::TrackingUnavailable));
+        assert_eq!(life.state(), State::Degraded(Fault::TrackingUnavailable));
 
         life.on_tracking();
         life.apply(Event::Opened);
         life.check();
-        assert_eq!(life.state(), State::Degraded(Reason::ClothUnavailable));
+        assert_eq!(life.state(), State::Degraded(Fault::ClothUnavailable));
         assert_eq!(life.status().detail, "no cloth");
         assert_eq!(life.take_announced().len(), 5);
         assert!(life.take_announced().is_empty());

@@ -7,7 +7,7 @@ use crate::upstream::{self, Wanted};
 use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tonic::transport::Channel;
-use tryon::session::Limits;
+use tryon::session::SilenceLimits;
 use tryon_kit::bodies;
 use tryon_kit::client::{CALL_DEADLINE, channel, request};
 use tryon_kit::config::CompositorConfig;
@@ -93,8 +93,8 @@ async fn run(
     why
 }
 
-fn limits(config: &CompositorConfig) -> Limits {
-    Limits {
+fn limits(config: &CompositorConfig) -> SilenceLimits {
+    SilenceLimits {
         camera_silence_ns: config.camera_silence_ms * 1_000_000,
         tracking_silence_ns: TRACKING_SILENCE.as_nanos() as u64,
         garments_age_ns: config.garments_late_ms * 1_000_000,

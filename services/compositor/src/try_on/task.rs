@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::time::Instant;
-use tryon::session::{Event, Reason};
+use tryon::session::{Event, Fault};
 use tryon_kit::bodies;
 use tryon_kit::frames::{Exposure, FrameSubscription};
 use tryon_kit::queue::latest;
@@ -221,9 +221,9 @@ impl Task {
     }
 
     fn on_nobody(&mut self, state: &BodyState) {
-        let reason = life::from_wire(state.reason()).unwrap_or(Reason::TrackingLost);
+        let reason = life::from_wire(state.reason()).unwrap_or(Fault::TrackingLost);
         // The silence of the camera is detected here, from the frames themselves.
-        if reason != Reason::CameraSilent {
+        if reason != Fault::CameraSilent {
             self.lost_at = state.frame;
             self.life.on_nobody(reason, &state.detail);
         }
@@ -235,8 +235,8 @@ impl Task {
             upstream::News::Status(frame) => {
                 self.life.on_cloth(false);
                 // Reasons other than its own step reach this service from tracking.
-                if life::from_wire(frame.reason()) == Some(Reason::StepFailed) {
-                    self.life.fail(Reason::StepFailed, &frame.detail);
+                if life::from_wire(frame.reason()) == Some(Fault::StepFailed) {
+                    self.life.fail(Fault::StepFailed, &frame.detail);
                 }
             }
             upstream::News::Placed(frame, placed) => {
@@ -317,7 +317,7 @@ impl Task {
                 if let Some(answer) = d.answer {
                     let _ = answer.send(Err(unavailable("compositor", &why)));
                 }
-                self.life.fail(Reason::StepFailed, &why);
+                self.life.fail(Fault::StepFailed, &why);
             }
         }
         self.drawing.resume(d.engine);

@@ -1,0 +1,26 @@
+//! Interface of every recording: a calibration and frames in order.
+
+use super::FormatError;
+use crate::camera::{Calibration, RgbdFrame};
+
+/// Frames of one camera, in capture order.
+pub trait RgbdSource: Send {
+    /// Calibration of all frames.
+    fn calibration(&self) -> &Calibration;
+    /// Number of frames, if known without reading them all.
+    fn len(&self) -> Option<usize>;
+    /// True if it is known to contain no frame.
+    fn is_empty(&self) -> bool {
+        self.len() == Some(0)
+    }
+    /// The next frame; `None` at the end. After an error the next call returns the frame after the bad one.
+    ///
+    /// # Errors
+    /// Names the file and the field of this frame.
+    fn next_frame(&mut self) -> Result<Option<RgbdFrame>, FormatError>;
+    /// Returns to the first frame.
+    ///
+    /// # Errors
+    /// When the file cannot be read again.
+    fn rewind(&mut self) -> Result<(), FormatError>;
+}
