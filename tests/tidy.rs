@@ -28,7 +28,7 @@ const MODULES: &[(u8, &str, &str)] = &[
     (
         1,
         "mesh",
-        "Triangle meshes and their topology, checked once at construction; normals, boundaries, UVs.",
+        "Triangle meshes and their topology, checked once at construction; normals, boundaries, UVs, isotropic remeshing, neighbour smoothing.",
     ),
     (
         1,
@@ -58,7 +58,7 @@ const MODULES: &[(u8, &str, &str)] = &[
     (
         3,
         "body",
-        "The articulated template: skeleton, twists, skinning, shape, bone scales, displacements; the embedded body; importers.",
+        "The articulated template: skeleton, twists, skinning, shape, bone scales, displacements, the one map from vertices to parts and limbs; the embedded body; importers.",
     ),
     (
         3,

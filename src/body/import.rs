@@ -1,4 +1,4 @@
-//! Bodies made by others: SMPL-layout arrays to a template with anatomical joints.
+//! Import of SMPL-layout arrays as a template with anatomical joints.
 
 use super::{BodyError, Joint, JointMotion, ShapeSpace, Skeleton, SkinWeights, Template};
 use crate::formats::npz::{SmplArrays, regress};
@@ -6,22 +6,23 @@ use crate::math::{P3, V3};
 use crate::mesh::TriMesh;
 use nalgebra::{Point3, Vector3};
 
-/// A bend of the rest pose (radians) from which the plane of elbow or knee is read; below, it is the plane that
-/// holds the body's forward direction. At 0.25 the axis is still known to some 5° when joints are off by 5 mm.
+/// Bend of the rest pose from which on it defines the plane of elbow or knee, radians; below, the forward direction
+/// does. At 0.25 the axis is known to some 5° when joints are off by 5 mm.
 const BENT: f64 = 0.25;
-/// An elbow or knee may be overstretched by this much (radians): hypermobility, and rest joints off by a few mm.
+/// Overstretching of elbows and knees, radians: hypermobility, and rest joints off by a few mm.
 const OVERSTRETCH: f64 = 0.1;
 /// Flexion of elbow and knee, radians from straight (about 150° and 145°; clinical ranges of motion, AAOS 1965).
 const ELBOW_FLEXION: f64 = 2.62;
 /// See [`ELBOW_FLEXION`].
 const KNEE_FLEXION: f64 = 2.53;
 
-/// Builds a template from the arrays of an SMPL-layout body. Joints get the motion and limits of the human joint of
-/// their name; end points `head_end`, `left_hand_end`, `right_hand_end`, `left_foot_end`, `right_foot_end` are added at
-/// the surface. Unknown names become balls.
+/// Builds a template from the arrays of an SMPL-layout body.
+///
+/// Joints get the motion and limits of the human joint of their name; unknown names become balls. End points `head_end`,
+/// `left_hand_end`, `right_hand_end`, `left_foot_end` and `right_foot_end` are added at the surface.
 ///
 /// # Errors
-/// Names the array, joint or vertex that does not fit.
+/// Names the array, joint or vertex that does not match.
 pub fn template_from_smpl(name: &str, arrays: &SmplArrays) -> Result<Template, BodyError> {
     let (n, j) = (arrays.vertices.len(), arrays.parents.len());
     let array = |array: &str, why: String| BodyError::Array {
@@ -84,14 +85,14 @@ pub fn template_from_smpl(name: &str, arrays: &SmplArrays) -> Result<Template, B
     Template::new(name, mesh, Skeleton::new(joints)?, weights, shape_space)
 }
 
-/// Where a limb ends: a vertex of the surface.
+/// End point of a limb: a vertex of the surface.
 struct EndPoint {
     name: &'static str,
     parent: usize,
     vertex: usize,
 }
 
-/// The farthest vertex of each hand, foot and the head, seen along the limb.
+/// The farthest vertex along each hand, each foot and the head.
 fn end_points(arrays: &SmplArrays, weights: &SkinWeights, mesh: &TriMesh) -> Vec<EndPoint> {
     let index = |name: &str| arrays.joint_names.iter().position(|n| n == name);
     let wanted = [
@@ -174,8 +175,9 @@ fn shape_space(arrays: &SmplArrays, ends: &[EndPoint]) -> ShapeSpace {
     }
 }
 
-/// Motion of a joint by its SMPL name. Limits are active ranges of motion (AAOS 1965) widened by a fifth, because
-/// the rest pose (T or A) that they count from differs between bodies; they keep limbs human, not exact.
+/// Motion of a joint by its SMPL name. Limits are active ranges of motion (AAOS 1965) widened by a fifth.
+///
+/// The rest pose (T or A) that they count from differs between bodies: they keep limbs human, not exact.
 fn motion(k: usize, arrays: &SmplArrays, rest: &[Point3<f64>]) -> JointMotion {
     let name = arrays.joint_names[k].as_str();
     // Left and right mirror each other in the sagittal plane: rotations about y and z change sign.

@@ -1,4 +1,4 @@
-//! The articulated template: skeleton, twists, skinning, shape, bone scales, displacements; the embedded body; importers.
+//! The articulated template: skeleton, twists, skinning, shape, bone scales, displacements, the one map from vertices to parts and limbs; the embedded body; importers.
 
 pub mod embedded;
 pub mod import;

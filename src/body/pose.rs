@@ -1,4 +1,4 @@
-//! A pose: where the root is and the angle of every joint; forward kinematics.
+//! Pose (root transform and joint angles) and forward kinematics.
 
 use super::{JointMotion, RestBody, Skeleton};
 use crate::math::{Body, Camera, Rigid, exp_so3};
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct Pose<F = Camera> {
-    /// Takes rest coordinates to `F` before any joint moves.
+    /// Rest coordinates to `F`, before any joint moves.
     pub root: Rigid<F, Body>,
     /// Joint angles in the order of [`Skeleton::dof_offset`], radians: one for a hinge, a rotation vector for a ball.
     pub angles: Vec<f64>,
@@ -37,7 +37,7 @@ impl<F> std::fmt::Debug for Pose<F> {
     }
 }
 
-/// For each joint, the transform of its bone: rest coordinates to posed coordinates.
+/// Bone transforms of a posed body, rest coordinates to posed coordinates.
 #[derive(Clone, Debug, Default)]
 pub struct BoneTransforms {
     /// Skinning transforms, shape `[joints]`.
@@ -96,7 +96,7 @@ impl<F> Pose<F> {
             *a = a.clamp(l[0], l[1]);
         }
     }
-    /// Everything is finite.
+    /// Has finite numbers only.
     pub fn is_finite(&self) -> bool {
         self.root.is_finite() && self.angles.iter().all(|a| a.is_finite())
     }

@@ -1,32 +1,33 @@
-//! A skeleton for a bare mesh: joints and skinning weights from a template that has been fitted to it.
+//! Rigging of a bare mesh: joints and skinning weights from a template that has been fitted to it.
 
 use super::{
     BodyError, BoneTransforms, Joint, JointMotion, RestBody, Skeleton, SkinWeights, Template,
 };
 use crate::math::P3;
-use crate::mesh::{Topology, TriMesh, vertex_normals};
+use crate::mesh::smoothing::mean;
+use crate::mesh::{Face, Topology, TriMesh, vertex_normals};
 use crate::par::Par;
 use crate::spatial::PointTree;
 use nalgebra::Vector3;
 use std::f64::consts::PI;
 
-/// Template vertices further than this from a mesh vertex say nothing about it, metres: a template that lies on the
-/// mesh is within 5 cm even where hair or shoes stand off.
+/// Template vertices further than this from a mesh vertex lend it no weights, metres. A template on the mesh is within
+/// 5 cm even where hair or shoes stand off.
 const REACH: f32 = 0.15;
-/// Normals that differ by more than this cosine belong to another side: the inside of the other thigh, the chest
-/// behind an arm.
-const SAME_SIDE: f32 = 0.3;
-/// Rounds of averaging over neighbours: nearest vertices jump, skin bends gradually.
+/// Share of [`REACH`] by which both skins are shifted along their normals before the search: it keeps the other side of
+/// a limb further away.
+const SHIFT: f32 = 0.3;
+/// Passes of smoothing of the weights: nearest vertices jump, skin bends gradually.
 const SMOOTHING: usize = 4;
 
 /// Makes a template of `mesh` (y up, facing +z, metres), whose rest pose is the mesh as it is. `fitted` is `template`
 /// posed on it: the bones that put it there and its vertices, both in the mesh's frame.
 ///
-/// Hinges keep their axes and ranges, counted from the mesh's pose; balls are free, for their limits are boxes in the
+/// Hinges keep their axes and ranges, counted from the mesh's pose. Balls are free: their limits are boxes in the
 /// template's own rest pose and mean nothing in another.
 ///
 /// # Errors
-/// Names the first vertex with no part of the fitted template near it, or what is wrong with the mesh.
+/// Names the first vertex with no part of the fitted template near it, or the fault of the mesh.
 pub fn rig(
     name: &str,
     mesh: TriMesh,
@@ -34,96 +35,74 @@ pub fn rig(
     bones: &BoneTransforms,
     fitted: &RestBody,
 ) -> Result<Template, BodyError> {
-    let array = |array: &str, got: usize, expected: usize| BodyError::Array {
-        array: array.into(),
-        why: format!("{got} entries for {expected}"),
+    let check = |array: &str, got: usize, expected: usize| match got == expected {
+        true => Ok(()),
+        false => Err(BodyError::Array {
+            array: array.into(),
+            why: format!("{got} entries for {expected}"),
+        }),
     };
     let joints = template.skeleton().joints();
-    if bones.joints.len() != joints.len() || bones.bones.len() != joints.len() {
-        return Err(array("bones", bones.joints.len(), joints.len()));
-    }
-    if fitted.vertices.len() != template.mesh().vertices().len() {
-        return Err(array(
-            "fitted",
-            fitted.vertices.len(),
-            template.mesh().vertices().len(),
-        ));
-    }
-    let skeleton = Skeleton::new(
-        joints
-            .iter()
-            .enumerate()
-            .map(|(j, joint)| Joint {
-                rest: bones.joints[j],
-                motion: turned(&joint.motion, &bones.bones[j].rotation),
-                ..joint.clone()
-            })
-            .collect(),
-    )?;
+    check("bones", bones.joints.len(), joints.len())?;
+    check("bones", bones.bones.len(), joints.len())?;
+    let vertices = template.mesh().vertices().len();
+    check("fitted", fitted.vertices.len(), vertices)?;
+    let posed = joints.iter().enumerate().map(|(j, joint)| Joint {
+        rest: bones.joints[j],
+        motion: turned(&joint.motion, &bones.bones[j].rotation),
+        ..joint.clone()
+    });
+    let skeleton = Skeleton::new(posed.collect())?;
     let topology = Topology::new(&mesh)?;
-    let (mut own, mut theirs) = (Vec::new(), Vec::new());
-    vertex_normals(
-        Par::Seq,
-        mesh.vertices(),
-        mesh.faces(),
-        topology.vertex_faces(),
-        &mut own,
-    );
-    let t = template.mesh();
-    vertex_normals(
-        Par::Seq,
-        &fitted.vertices,
-        t.faces(),
-        template.topology().vertex_faces(),
-        &mut theirs,
-    );
-    // Six numbers would need another tree; a step back along the normal keeps the other side of a limb further away.
-    let shifted: Vec<P3> = fitted
-        .vertices
-        .iter()
-        .zip(&theirs)
-        .map(|(p, n)| p + n * (REACH * SAME_SIDE))
-        .collect();
-    let tree = PointTree::new(&shifted);
-    let mut rows = Vec::with_capacity(own.len());
-    for (vertex, (p, n)) in mesh.vertices().iter().zip(&own).enumerate() {
-        let Some((near, _)) = tree.nearest(&(p + n * (REACH * SAME_SIDE)), REACH) else {
+    let mut rows = nearest_weights(&mesh, &topology, template, fitted)?;
+    for _ in 0..SMOOTHING {
+        rows = (0..rows.len())
+            .filter_map(|i| {
+                let around = topology.vertex_neighbours().row(i).iter();
+                mean(std::iter::once(&rows[i]).chain(around.map(|v| &rows[*v as usize])))
+            })
+            .collect();
+    }
+    let rows = rows.into_iter();
+    let weights = SkinWeights::from_rows(rows.map(|row| row.into_iter().enumerate().collect()))?;
+    Template::new(name, mesh, skeleton, weights, None)
+}
+
+/// Weights of the nearest vertex of the fitted template on the same side, shape `[vertices][joints]`.
+fn nearest_weights(
+    mesh: &TriMesh,
+    topology: &Topology,
+    template: &Template,
+    fitted: &RestBody,
+) -> Result<Vec<Vec<f64>>, BodyError> {
+    let shifted = |vertices: &[P3], faces: &[Face], topology: &Topology| -> Vec<P3> {
+        let mut normals = Vec::new();
+        let around = topology.vertex_faces();
+        vertex_normals(Par::Seq, vertices, faces, around, &mut normals);
+        let pairs = vertices.iter().zip(&normals);
+        pairs.map(|(p, n)| p + n * (REACH * SHIFT)).collect()
+    };
+    let faces = template.mesh().faces();
+    let tree = PointTree::new(&shifted(&fitted.vertices, faces, template.topology()));
+    let (w, joints) = (template.weights(), template.skeleton().len());
+    let row = |(vertex, p): (usize, &P3)| {
+        let Some((near, _)) = tree.nearest(p, REACH) else {
             return Err(BodyError::Vertex {
                 vertex,
                 why: "no part of the fitted template is near it".into(),
             });
         };
-        let w = template.weights();
-        let mut row = vec![0.0; joints.len()];
-        for k in 0..4 {
-            row[usize::from(w.joints[near][k])] += f64::from(w.weights[near][k]);
+        let mut row = vec![0.0; joints];
+        for (j, weight) in w.joints[near].iter().zip(w.weights[near]) {
+            row[usize::from(*j)] += f64::from(weight);
         }
-        rows.push(row);
-    }
-    for _ in 0..SMOOTHING {
-        rows = (0..rows.len())
-            .map(|i| {
-                let around = topology.vertex_neighbours().row(i);
-                let share = 1.0 / (1 + around.len()) as f64;
-                let mut row = rows[i].clone();
-                for j in around {
-                    row.iter_mut()
-                        .zip(&rows[*j as usize])
-                        .for_each(|(a, b)| *a += b);
-                }
-                row.iter_mut().for_each(|a| *a *= share);
-                row
-            })
-            .collect();
-    }
-    let weights = SkinWeights::from_rows(
-        rows.into_iter()
-            .map(|row| row.into_iter().enumerate().collect()),
-    )?;
-    Template::new(name, mesh, skeleton, weights, None)
+        Ok(row)
+    };
+    let points = shifted(mesh.vertices(), mesh.faces(), topology);
+    points.iter().enumerate().map(row).collect()
 }
 
-/// A joint's motion where its bone has been turned by `q`.
+/// Motion of a joint after a turn of its bone by `q`.
 fn turned(motion: &JointMotion, q: &nalgebra::UnitQuaternion<f64>) -> JointMotion {
     match motion {
         JointMotion::Fixed => JointMotion::Fixed,

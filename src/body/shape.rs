@@ -1,4 +1,4 @@
-//! What makes a template a person: shape coefficients, bone scales, surface displacements.
+//! Personal shape: coefficients, bone scales and surface displacements, applied to a template.
 
 use super::Template;
 use crate::math::{P3, V3};
@@ -18,7 +18,7 @@ pub struct ShapeSpace {
     pub joints: Vec<Vec<Vector3<f64>>>,
 }
 
-/// A person's shape relative to the template. Default: the template itself.
+/// Shape of a subject relative to the template. Default: the template itself.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BodyShape {
     /// Coefficients of [`ShapeSpace`], standard deviations; missing ones are zero.
@@ -141,7 +141,7 @@ impl Template {
                 let mut foot = joints[j] - old[j];
                 if let Some(c) = skeleton.primary_child(j) {
                     let d = old[c] - old[j];
-                    // Clamped: beyond its ends a bone carries its neighbourhood along rigidly.
+                    // Clamped: beyond its ends a bone's neighbourhood moves rigidly.
                     let t = ((v.cast::<f64>() - old[j]).dot(&d)
                         / d.norm_squared().max(f64::MIN_POSITIVE))
                     .clamp(0.0, 1.0);

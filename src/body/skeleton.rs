@@ -4,10 +4,10 @@ use super::BodyError;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
-/// How a joint may move relative to its parent.
+/// Degrees of freedom of a joint relative to its parent.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum JointMotion {
-    /// Not at all: end points of limbs, or joints a template does not use.
+    /// None: end points of limbs, or joints that a template does not use.
     Fixed,
     /// One twist: rotation about `axis` (unit, rest frame) by an angle within `limits`, radians.
     Hinge {
@@ -16,8 +16,8 @@ pub enum JointMotion {
         /// Smallest and largest angle, radians.
         limits: [f64; 2],
     },
-    /// Three degrees of freedom: the rotation vector (axis × angle) in the rest frame,
-    /// each component within its limits, radians. Free of gimbal lock inside a half turn.
+    /// Three: the rotation vector (axis × angle) in the rest frame, each component within its limits, radians.
+    /// Free of gimbal lock inside a half turn.
     Ball {
         /// Smallest and largest value of each component of the rotation vector, radians.
         limits: [[f64; 2]; 3],
@@ -38,9 +38,9 @@ impl JointMotion {
 /// One node of the kinematic tree.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Joint {
-    /// Name, SMPL style: `pelvis`, `left_hip`, … ; left is the body's own left (+x facing +z).
+    /// Name, SMPL style: `pelvis`, `left_hip`, …; left is the subject's own left (+x facing +z).
     pub name: String,
-    /// Index of the parent; `None` for the root only. Parents come before children.
+    /// Index of the parent, smaller than the joint's own; `None` for the root only.
     pub parent: Option<usize>,
     /// Position in the rest pose, metres, frame `Body`.
     pub rest: Point3<f64>,
@@ -108,7 +108,7 @@ impl Skeleton {
                 at
             })
             .collect();
-        // The primary child carries the bone of a joint: the child most in line with the bone that arrives,
+        // The bone of a joint leads to its primary child: the one most in line with the parent's bone,
         // or at the root the first child named `spine…`, else the first child.
         let primary_child = (0..joints.len())
             .map(|i| {
@@ -147,7 +147,7 @@ impl Skeleton {
     pub fn len(&self) -> usize {
         self.joints.len()
     }
-    /// No joints at all.
+    /// Has no joints.
     pub fn is_empty(&self) -> bool {
         self.joints.is_empty()
     }
@@ -155,7 +155,7 @@ impl Skeleton {
     pub fn dofs(&self) -> usize {
         self.dofs
     }
-    /// Where a joint's angles start in [`super::Pose::angles`].
+    /// Index of a joint's first angle in [`super::Pose::angles`].
     pub fn dof_offset(&self, joint: usize) -> usize {
         self.dof_offsets[joint]
     }

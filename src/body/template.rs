@@ -1,10 +1,10 @@
-//! The template: mesh, skeleton, weights and shape space that belong together.
+//! The body template: mesh, skeleton, weights and shape space of one body.
 
 use super::parts::BodyParts;
 use super::{ShapeSpace, Skeleton, SkinWeights};
 use crate::mesh::{MeshError, Topology, TriMesh};
 
-/// What is wrong with a body.
+/// A fault of a body's data.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BodyError {
     /// A joint at fault.
@@ -12,7 +12,7 @@ pub enum BodyError {
     Joint {
         /// Joint name.
         joint: String,
-        /// What is wrong.
+        /// Reason.
         why: String,
     },
     /// A vertex at fault.
@@ -20,7 +20,7 @@ pub enum BodyError {
     Vertex {
         /// Vertex number.
         vertex: usize,
-        /// What is wrong.
+        /// Reason.
         why: String,
     },
     /// An array of the wrong size or type.
@@ -28,7 +28,7 @@ pub enum BodyError {
     Array {
         /// Array name as in the file.
         array: String,
-        /// What is wrong.
+        /// Reason.
         why: String,
     },
     /// The surface is not a proper mesh.
@@ -49,10 +49,10 @@ pub struct Template {
 }
 
 impl Template {
-    /// Checks that the parts fit each other.
+    /// Checks the sizes of all parts against each other.
     ///
     /// # Errors
-    /// Names the vertex, joint or array that does not fit.
+    /// Names the vertex, joint or array that does not match.
     pub fn new(
         name: impl Into<String>,
         mesh: TriMesh,
@@ -115,7 +115,7 @@ impl Template {
             shape_space,
         })
     }
-    /// What it is called.
+    /// Name.
     pub fn name(&self) -> &str {
         &self.name
     }

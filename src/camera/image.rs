@@ -1,10 +1,10 @@
 //! Depth and colour images.
 
-/// Wrong number of pixels for the stated size.
+/// Number of values that does not match the stated size.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{what}: {got} values, but {width}×{height} needs {expected}")]
 pub struct ImageError {
-    /// Which image.
+    /// Kind of image.
     pub what: &'static str,
     /// Columns.
     pub width: u32,
@@ -46,7 +46,7 @@ pub struct DepthImage {
 }
 
 impl DepthImage {
-    /// Takes row-major millimetres.
+    /// Checks row-major millimetres.
     ///
     /// # Errors
     /// When the number of values is not `width × height`.
@@ -100,7 +100,7 @@ pub struct ColorImage {
 }
 
 impl ColorImage {
-    /// Takes row-major interleaved RGB.
+    /// Checks row-major interleaved RGB.
     ///
     /// # Errors
     /// When the number of bytes is not `3 × width × height`.

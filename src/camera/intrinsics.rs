@@ -21,7 +21,7 @@ pub struct Intrinsics {
     pub cy: f64,
 }
 
-/// A calibration that no camera can have.
+/// A calibration field outside its range.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("camera.{field}: {value} is not usable ({why})")]
 pub struct IntrinsicsError {
@@ -29,11 +29,11 @@ pub struct IntrinsicsError {
     pub field: &'static str,
     /// Its value.
     pub value: f64,
-    /// What it should be.
+    /// Allowed values.
     pub why: &'static str,
 }
 
-/// No sensor or display of this product is larger; a bigger size is a broken file, not a camera.
+/// Largest side of an image, pixels: a larger one is a broken file.
 const MAX_SIDE: u32 = 16_384;
 
 impl Intrinsics {
@@ -85,7 +85,7 @@ impl Intrinsics {
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize
     }
-    /// Image coordinates of a camera-frame point; meaningless for z ≤ 0.
+    /// Image coordinates of a camera-frame point; undefined for z ≤ 0.
     pub fn project(&self, p: &P3) -> Point2<f32> {
         Point2::new(
             p.x / p.z * self.fx as f32 + self.cx as f32,

@@ -13,7 +13,7 @@ pub use noise::{
 use crate::math::{Camera, ColorCamera, Rigid};
 use serde::{Deserialize, Serialize};
 
-/// What stays the same while a camera runs.
+/// Calibration of a camera: constant while it runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     /// Depth camera.
@@ -35,7 +35,7 @@ impl Calibration {
     }
 }
 
-/// One exposure: depth, maybe colour, and when.
+/// One exposure: depth, optional colour and capture time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RgbdFrame {
     /// Number within the epoch, without gaps at the sensor.

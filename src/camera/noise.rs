@@ -1,13 +1,13 @@
 //! Published noise models of depth cameras, applied to perfect depth.
 //!
-//! Random numbers come from a counter (seed, frame, pixel), so that a frame's noise depends on nothing but its number.
+//! Random numbers come from a counter (seed, frame, pixel): a frame's noise depends on its number only.
 
 use super::{DepthImage, Intrinsics};
 
-/// How a depth camera errs.
+/// Noise model of a depth camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum NoiseModel {
-    /// Not at all, but for rounding to millimetres.
+    /// Rounding to millimetres only.
     #[default]
     None,
     /// Structured light, Kinect v1: Nguyen, Izadi and Lovell, "Modeling Kinect sensor noise" (3DIMPVT 2012): axial
@@ -96,8 +96,7 @@ fn lateral_table() -> [i8; 256] {
 }
 
 impl NoiseModel {
-    /// What the camera reports of perfect depth `clean` (metres, row-major, infinity where nothing is).
-    /// Deterministic in `seed` and `frame`.
+    /// Reading of perfect depth `clean` (metres, row-major, infinity for no surface); deterministic in `seed` and `frame`.
     ///
     /// # Panics
     /// When `clean` has fewer values than the camera has pixels.
@@ -179,7 +178,7 @@ impl NoiseModel {
     }
 }
 
-/// Another number in [0, 1) from a pixel's bits.
+/// A uniform number in [0, 1) from a pixel's bits.
 fn uniform(bits: u64) -> f32 {
     (hash(bits) >> 40) as f32 / (1u64 << 24) as f32
 }
@@ -195,7 +194,7 @@ fn small_atan(x: f32) -> f32 {
     }
 }
 
-/// Metres to whole millimetres; what 16 bits cannot hold is no reading.
+/// Metres to whole millimetres; 0 (no reading) beyond 16 bits.
 fn millimetres(z: f32) -> u16 {
     let mm = z * 1000.0 + 0.5;
     if (1.0..65_536.0).contains(&mm) {

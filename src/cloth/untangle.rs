@@ -6,7 +6,8 @@
 //! minimization").
 
 use crate::math::V3d;
-use crate::mesh::Face;
+use crate::mesh::smoothing::mean;
+use crate::mesh::{Csr, Face};
 use crate::par::Par;
 use crate::spatial::SelfIntersections;
 
@@ -186,19 +187,22 @@ impl Untangler {
                 .collect();
             ring.iter().flatten().for_each(|v| near[*v as usize] = true);
         }
+        let pairs: Vec<(u32, u32)> = self
+            .finder
+            .edges()
+            .iter()
+            .flat_map(|&[a, b]| [(a, b), (b, a)])
+            .filter(|(a, _)| near[*a as usize])
+            .collect();
+        let neighbours = Csr::from_pairs(n, &pairs);
         for _ in 0..IRONED {
-            let mut sum = vec![(V3d::zeros(), 0.0); n];
-            for e in self.finder.edges() {
-                for [a, b] in [[e[0], e[1]], [e[1], e[0]]].map(|e| e.map(|v| v as usize)) {
-                    if near[a] {
-                        sum[a].0 += x[b];
-                        sum[a].1 += 1.0;
-                    }
-                }
-            }
-            for v in (0..n).filter(|v| near[*v] && movable(*v) && sum[*v].1 > 0.0) {
-                x[v] = (x[v] + sum[v].0 / sum[v].1) * 0.5;
-            }
+            let halfway = |v: usize| {
+                let middle = mean(neighbours.row(v).iter().map(|a| &x[*a as usize]))?;
+                Some((v, (x[v] + middle) * 0.5))
+            };
+            let movable = (0..n).filter(|v| near[*v] && movable(*v));
+            let moved: Vec<_> = movable.filter_map(halfway).collect();
+            moved.into_iter().for_each(|(v, to)| x[v] = to);
         }
     }
     fn find(&mut self, par: Par, x: &[V3d]) -> Vec<(u32, u32)> {

@@ -7,6 +7,7 @@
 use super::across::Across;
 use super::{Part, SurfaceFrame, SurfaceModel};
 use crate::math::V3;
+use crate::mesh::smoothing::mean;
 use crate::par::Par;
 use serde::{Deserialize, Serialize};
 
@@ -83,10 +84,10 @@ impl Apart {
         for _ in 0..ROUNDS {
             for (to, &v) in next.iter_mut().zip(&all) {
                 let around = model.neighbours(v);
-                let sum = around
-                    .iter()
-                    .fold(ways[v as usize], |s, w| s + ways[*w as usize]);
-                let mean = sum / (1 + around.len()) as f32;
+                let around = around.iter().map(|w| &ways[*w as usize]);
+                let Some(mean) = mean(std::iter::once(&ways[v as usize]).chain(around)) else {
+                    continue;
+                };
                 // What must go goes all its way, and takes what is beside it along a little.
                 let own = self.0.seen[v as usize].found;
                 let (most, far) = (own.norm() + BESIDE, mean.norm());

@@ -9,6 +9,7 @@ use crate::body::Template;
 use crate::body::parts::vertex_masks;
 use crate::garment::Region;
 use crate::math::{P3, P3d, V3, V3d};
+use crate::mesh::smoothing::mean;
 use crate::spatial::PointTree;
 
 /// Target skin farther than this from the mapped source skin is not its counterpart, metres: a belly's depth.
@@ -78,12 +79,8 @@ impl Retargeting {
 /// Mean of the known values at a vertex and its neighbours.
 fn mean_around(source: &Template, values: &[Option<V3d>], i: usize) -> Option<V3d> {
     let around = source.topology().vertex_neighbours().row(i).iter();
-    let (sum, count) = around
-        .map(|v| *v as usize)
-        .chain([i])
-        .filter_map(|v| values[v])
-        .fold((V3d::zeros(), 0.0), |(s, c), d| (s + d, c + 1.0));
-    (count > 0.0).then(|| sum / count)
+    let all = around.map(|v| *v as usize).chain([i]);
+    mean(all.filter_map(|v| values[v].as_ref()))
 }
 
 /// The skin of the target, searchable by body part.

@@ -2,6 +2,7 @@
 
 use crate::body::Template;
 use crate::math::{P3, V3};
+use crate::mesh::smoothing::half_mean;
 use crate::mesh::vertex_normals;
 use crate::par::Par;
 use crate::spatial::PointTree;
@@ -92,15 +93,13 @@ impl SkinBinding {
     /// Half of a point's own weights and half of its neighbours' mean: of joints, and of the heaviest vertices.
     fn averaged(&self, i: usize, around: &[u32]) -> (Vec<f32>, VertexWeights) {
         let share = 0.5 / around.len() as f32;
-        let mut joints: Vec<f32> = self.joints[i].iter().map(|w| 0.5 * w).collect();
+        let neighbours = around.iter().map(|n| &self.joints[*n as usize]);
+        let joints = half_mean(&self.joints[i], neighbours);
         let mut vertices: BTreeMap<u32, f32> = BTreeMap::new();
         for (v, w) in &self.vertices[i] {
             *vertices.entry(*v).or_default() += 0.5 * w;
         }
         for n in around.iter().map(|n| *n as usize) {
-            for (a, b) in joints.iter_mut().zip(&self.joints[n]) {
-                *a += share * b;
-            }
             for (v, w) in &self.vertices[n] {
                 *vertices.entry(*v).or_default() += share * w;
             }

@@ -2,6 +2,8 @@
 
 use super::flat_triangle::{rest_area, smallest_angle};
 use super::{GarmentError, Panel};
+use crate::mesh::Csr;
+use crate::mesh::smoothing::mean;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation as _};
 
 /// Triangles of one panel. Boundary vertices come first, in the order of the outline.
@@ -108,22 +110,15 @@ fn lattice(outline: &[[f64; 2]], length: f64) -> Vec<[f64; 2]> {
 
 /// Moves inner points to the mean of their neighbours.
 fn smooth(points: &mut [[f64; 2]], faces: &[[u32; 3]], boundary: usize) {
-    let mut sum = vec![([0.0; 2], 0.0); points.len()];
-    for f in faces {
-        for k in 0..3 {
-            for o in [f[(k + 1) % 3], f[(k + 2) % 3]] {
-                let s = &mut sum[f[k] as usize];
-                s.0[0] += points[o as usize][0];
-                s.0[1] += points[o as usize][1];
-                s.1 += 1.0;
-            }
-        }
-    }
-    for i in boundary..points.len() {
-        let (s, n) = sum[i];
-        if n > 0.0 {
-            points[i] = [s[0] / n, s[1] / n];
-        }
+    let pairs: Vec<(u32, u32)> = faces
+        .iter()
+        .flat_map(|&[a, b, c]| [(a, b), (a, c), (b, c), (b, a), (c, a), (c, b)])
+        .collect();
+    let neighbours = Csr::from_pairs(points.len(), &pairs);
+    let middle = |i| mean(neighbours.row(i).iter().map(|n| &points[*n as usize]));
+    let moved: Vec<_> = (boundary..points.len()).map(middle).collect();
+    for (p, to) in points[boundary..].iter_mut().zip(moved) {
+        *p = to.unwrap_or(*p);
     }
 }
 

@@ -54,7 +54,7 @@ impl<A, B> Rigid<A, B> {
     pub fn identity() -> Self {
         Self::new(Isometry3::identity())
     }
-    /// Wraps a bare isometry; the caller vouches for the frames.
+    /// Wraps a bare isometry whose frames the caller knows.
     pub fn new(iso: Isometry3<f64>) -> Self {
         Self {
             iso,
@@ -92,7 +92,7 @@ impl<A, B> Rigid<A, B> {
         out.clear();
         out.extend(points.iter().map(|p| Point3::from(r * p.coords + t)));
     }
-    /// All seven numbers are finite.
+    /// Has finite numbers only.
     pub fn is_finite(&self) -> bool {
         self.iso.translation.vector.iter().all(|v| v.is_finite())
             && self.iso.rotation.coords.iter().all(|v| v.is_finite())

@@ -77,26 +77,6 @@ pub fn exp_se3(xi: &Twist) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(translation), exp_so3(&xi.angular))
 }
 
-/// The twist whose exponential is `iso`.
-pub fn log_se3(iso: &Isometry3<f64>) -> Twist {
-    let angular = log_so3(&iso.rotation);
-    let t2 = angular.norm_squared();
-    let t = t2.sqrt();
-    // Inverse left Jacobian: I − ½K + (1/θ² − (1 + cos θ)/(2 θ sin θ)) K²
-    let c = if t < SMALL_ANGLE {
-        1.0 / 12.0 + t2 / 720.0
-    } else {
-        let half = 0.5 * t;
-        (1.0 - half * half.cos() / half.sin()) / t2
-    };
-    let k = skew(&angular);
-    let inverse = Matrix3::identity() - k * 0.5 + k * k * c;
-    Twist {
-        linear: inverse * iso.translation.vector,
-        angular,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -107,14 +87,6 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn se3_log_undoes_exp(v in vector(3.0), w in vector(1.7)) {
-            let xi = Twist { linear: v, angular: w };
-            let back = log_se3(&exp_se3(&xi));
-            prop_assert!((back.linear - v).norm() < 1e-9);
-            prop_assert!((back.angular - w).norm() < 1e-10);
-        }
-
         #[test]
         fn exp_matches_the_matrix_series(v in vector(1.0), w in vector(1.5)) {
             // Oracle: the power series of eq. 1 summed on 4×4 matrices.

@@ -8,9 +8,9 @@ mod polar;
 mod symmetric;
 
 pub use frames::{Body, Camera, ColorCamera, Rigid, World};
-pub use lie::{Twist, exp_se3, exp_so3, left_jacobian_so3, log_se3, log_so3, skew};
-pub use polar::{polar_rotation_2, polar_rotation_3};
-pub use symmetric::{principal_axes, project_psd_2, project_psd_3};
+pub use lie::{Twist, exp_se3, exp_so3, left_jacobian_so3, log_so3, skew};
+pub use polar::polar_rotation_3;
+pub use symmetric::{principal_axes, project_psd_2};
 
 /// A point in f32, metres: the storage type of surfaces.
 pub type P3 = nalgebra::Point3<f32>;

@@ -1,17 +1,6 @@
 //! The rotation nearest to a matrix (polar decomposition), never a reflection.
 
-use nalgebra::{Matrix2, Matrix3};
-
-/// Rotation closest to `f` in the Frobenius norm. Identity for the zero matrix.
-pub fn polar_rotation_2(f: &Matrix2<f64>) -> Matrix2<f64> {
-    // For 2×2 the closest rotation has tan φ = (f10 − f01)/(f00 + f11).
-    let (c, s) = (f[(0, 0)] + f[(1, 1)], f[(1, 0)] - f[(0, 1)]);
-    let n = c.hypot(s);
-    if n == 0.0 {
-        return Matrix2::identity();
-    }
-    Matrix2::new(c / n, -s / n, s / n, c / n)
-}
+use nalgebra::Matrix3;
 
 /// Rotation closest to `f` in the Frobenius norm (Kabsch: the smallest singular direction flips when det < 0).
 pub fn polar_rotation_3(f: &Matrix3<f64>) -> Matrix3<f64> {
@@ -30,16 +19,13 @@ pub fn polar_rotation_3(f: &Matrix3<f64>) -> Matrix3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Rotation2, Rotation3, Vector3};
+    use nalgebra::{Rotation3, Vector3};
 
     #[test]
     fn recovers_the_rotation_of_a_stretched_matrix() {
         let r = Rotation3::new(Vector3::new(0.3, -1.1, 0.4)).into_inner();
         let s = Matrix3::new(2.0, 0.1, 0.0, 0.1, 1.0, 0.2, 0.0, 0.2, 0.5);
         assert!((polar_rotation_3(&(r * s)) - r).norm() < 1e-12);
-        let r2 = Rotation2::new(2.2).into_inner();
-        let s2 = Matrix2::new(1.5, 0.2, 0.2, 0.7);
-        assert!((polar_rotation_2(&(r2 * s2)) - r2).norm() < 1e-12);
     }
 
     #[test]

@@ -9,13 +9,6 @@ pub fn project_psd_2(m: &Matrix2<f64>) -> Matrix2<f64> {
     e.eigenvectors * d * e.eigenvectors.transpose()
 }
 
-/// Nearest positive semi-definite matrix (negative eigenvalues become zero).
-pub fn project_psd_3(m: &Matrix3<f64>) -> Matrix3<f64> {
-    let e = SymmetricEigen::new(*m);
-    let d = Matrix3::from_diagonal(&e.eigenvalues.map(|v| v.max(0.0)));
-    e.eigenvectors * d * e.eigenvectors.transpose()
-}
-
 /// Centroid, orthonormal axes (columns) and variances of a cloud, largest variance first.
 /// `None` without points or with a non-finite one.
 pub fn principal_axes(points: &[Point3<f32>]) -> Option<(Point3<f64>, Matrix3<f64>, Vector3<f64>)> {
@@ -48,11 +41,13 @@ mod tests {
 
     #[test]
     fn projection_clears_negative_directions_only() {
-        let m = Matrix3::new(2.0, 0.5, 0.0, 0.5, -1.0, 0.3, 0.0, 0.3, 0.4);
-        let p = project_psd_3(&m);
+        let m = Matrix2::new(2.0, 1.5, 1.5, -1.0);
+        let p = project_psd_2(&m);
         assert!(p.symmetric_eigenvalues().iter().all(|v| *v > -1e-12));
-        let positive = Matrix3::new(2.0, 0.5, 0.0, 0.5, 1.0, 0.3, 0.0, 0.3, 0.4);
-        assert!((project_psd_3(&positive) - positive).norm() < 1e-12);
+        // The other part of m is negative and orthogonal to p.
+        assert!((p * (m - p)).norm() < 1e-12 && (m - p).trace() < 0.0);
+        let positive = Matrix2::new(2.0, 0.5, 0.5, 1.0);
+        assert!((project_psd_2(&positive) - positive).norm() < 1e-12);
         assert!(project_psd_2(&Matrix2::new(-1.0, 0.0, 0.0, -2.0)).norm() < 1e-12);
     }
 

@@ -1,7 +1,8 @@
-//! Ways along edges.
+//! Shortest paths along edges.
 
-/// Shortest way along edges (ends, length) from each of `n` vertices to the nearest of some others, metres; infinite where
-/// there is none, and far beyond `up_to`.
+/// Length of the shortest path along edges (ends, length) from each of `n` vertices to the nearest source, metres.
+///
+/// Infinite without a path, and unreliable beyond `up_to`.
 pub fn distances(
     n: usize,
     edges: &[([u32; 2], f64)],

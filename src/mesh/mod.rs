@@ -1,11 +1,16 @@
-//! Triangle meshes and their topology, checked once at construction; normals, boundaries, UVs.
+//! Triangle meshes and their topology, checked once at construction; normals, boundaries, UVs, isotropic remeshing, neighbour smoothing.
 
 mod distances;
+mod editable;
 mod normals;
+mod remesh;
+pub mod smoothing;
 mod topology;
 
 pub use distances::distances;
+pub use editable::smallest_angle;
 pub use normals::{face_normal, vertex_normal, vertex_normals};
+pub use remesh::{Border, RemeshSpec, Remesher, remesh};
 pub use topology::{Csr, Edge, Topology};
 
 use crate::math::P3;
@@ -14,15 +19,15 @@ use serde::{Deserialize, Serialize};
 /// Vertex indices of a triangle, counter-clockwise seen from outside.
 pub type Face = [u32; 3];
 
-/// A triangle mesh whose indices are in range, whose faces have three different corners
-/// and whose positions are finite. Construct with [`TriMesh::new`]; it stays so.
+/// A triangle mesh with indices in range, three different corners a face and finite positions, checked by
+/// [`TriMesh::new`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TriMesh {
     vertices: Vec<P3>,
     faces: Vec<Face>,
 }
 
-/// What is wrong with a mesh, and where.
+/// A fault of a mesh and its place.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum MeshError {
     /// A face names a vertex that does not exist.
@@ -32,7 +37,7 @@ pub enum MeshError {
         face: usize,
         /// The bad index.
         index: u32,
-        /// How many vertices there are.
+        /// Number of vertices.
         vertices: usize,
     },
     /// A face uses a vertex twice.
@@ -61,7 +66,7 @@ pub enum MeshError {
 }
 
 impl TriMesh {
-    /// Checks and takes vertices (metres) and faces.
+    /// Checks vertices (metres) and faces.
     ///
     /// # Errors
     /// [`MeshError`] naming the face or vertex at fault.

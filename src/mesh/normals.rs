@@ -21,7 +21,7 @@ pub fn vertex_normals(
     vertex_faces: &super::topology::Csr,
     out: &mut Vec<V3>,
 ) {
-    // Each is wanted by three vertices.
+    // Each face normal serves three vertices.
     let mut normals = Vec::new();
     par::map_into(par, faces.len(), 2048, &mut normals, |f| {
         face_normal(vertices, &faces[f])
@@ -35,7 +35,7 @@ pub fn vertex_normals(
     });
 }
 
-/// As [`vertex_normals`], of the vertex that has these `faces` around it.
+/// As [`vertex_normals`], of one vertex; `around` are the indices of its faces.
 pub fn vertex_normal(vertices: &[P3], faces: &[Face], around: &[u32]) -> V3 {
     let sum = around.iter().fold(V3::zeros(), |s, &f| {
         s + face_normal(vertices, &faces[f as usize])

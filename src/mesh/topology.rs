@@ -1,9 +1,9 @@
-//! Who touches whom: edges, hinges, neighbours, boundaries.
+//! Connectivity of a triangle mesh: edges, hinges, neighbours, boundaries.
 
 use super::{Face, MeshError, TriMesh};
 use std::collections::BTreeMap;
 
-/// Compressed rows: for each vertex, a list of indices.
+/// Compressed sparse rows: a list of indices for each vertex.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Csr {
     offsets: Vec<u32>,
@@ -138,11 +138,11 @@ impl Topology {
     pub fn vertex_neighbours(&self) -> &Csr {
         &self.vertex_neighbours
     }
-    /// No edge has only one face.
+    /// Has no edge with only one face.
     pub fn is_closed(&self) -> bool {
         self.edges.iter().all(|e| e.twin.is_some())
     }
-    /// Which vertices lie on a boundary edge, shape `[vertices]`.
+    /// Membership in a boundary edge of each vertex, shape `[vertices]`.
     pub fn boundary_vertices(&self) -> Vec<bool> {
         let mut on = vec![false; self.vertex_faces.rows()];
         for e in self.edges.iter().filter(|e| e.twin.is_none()) {

@@ -8,8 +8,10 @@ use super::field::Field;
 use super::figure::{Figure, Joints};
 use super::{carve, rig, statistics as stat};
 use crate::body::measure::{Measurements, measure};
+use crate::body::parts::BodySegment;
 use crate::body::{BodyError, BodyShape, ShapeSpace, Skeleton, SkinWeights, Template};
-use crate::math::{P3d, V3, V3d};
+use crate::math::{P3d, V3d};
+use crate::mesh::smoothing::smoothed;
 use crate::par::{self, Par};
 
 /// Names of the directions, in order; `sex` +1 is the mean man, −1 the mean woman.
@@ -25,12 +27,12 @@ pub const DIRECTIONS: [&str; 9] = [
     "hip",
 ];
 
-/// Coefficients of this size span 98.8 % of a normally distributed population; within them the surface stays sound.
+/// Largest sound coefficient, standard deviations: spans 98.8 % of a normally distributed population.
 pub const RANGE: f64 = 2.5;
 
-/// Projection steps onto the changed surface; a third moves no vertex by 0.1 mm.
+/// Projection steps onto the changed surface; from the third on, no vertex moves by 0.1 mm.
 const STEPS: usize = 4;
-/// Rounds of smoothing of the offsets along the surface.
+/// Passes of smoothing of the offsets along the surface.
 const SMOOTHING: usize = 8;
 /// Sections grow with stature by this share of the growth in length: at the same mass-for-height, r(stature, girths)
 /// is about 0.3, and the deviation of girths is some 1.5 times that of stature, relative to the mean.
@@ -38,24 +40,29 @@ const SECTION_GROWTH: f64 = 0.45;
 /// The head grows with stature by this share (head length has r ≈ 0.3 with stature).
 const HEAD_GROWTH: f64 = 0.35;
 
+/// Relative growth of the limbs' and of the trunk's bones in directions that are then scaled to their targets.
+const LIMB_PROBE: f64 = 0.028;
+const TORSO_PROBE: f64 = 0.04;
+
 /// Offsets of vertices and joints for one unit.
 type Direction = (Vec<V3d>, Vec<V3d>);
 
-/// What the directions are made from: the template without shape, its points (left and right) and mirror images.
-pub(super) struct Source<'a> {
+/// Source of the directions: the template without shape, its points (left and right) and mirror images.
+pub(super) struct ShapeSource<'a> {
     pub template: &'a Template,
     pub points: &'a [P3d],
-    /// For each point its image on the other side.
+    /// Image of each point on the other side.
     pub mirror: &'a [u32],
 }
 
-impl Source<'_> {
+impl ShapeSource<'_> {
     fn skeleton(&self) -> &Skeleton {
         self.template.skeleton()
     }
     fn weights(&self) -> &SkinWeights {
         self.template.weights()
     }
+    /// Mean of a function of the joints of a point, by its skinning weights.
     fn blend(&self, i: usize, f: impl Fn(usize) -> V3d) -> V3d {
         let w = self.weights();
         (0..4)
@@ -85,35 +92,27 @@ impl Source<'_> {
         }
         out
     }
+    /// Offsets after [`SMOOTHING`] passes, still symmetric.
     fn smoothed(&self, mut offsets: Vec<V3d>) -> Vec<V3d> {
+        let neighbours = self.template.topology().vertex_neighbours();
         for _ in 0..SMOOTHING {
-            let mut next = Vec::new();
-            par::map_into(Par::Rayon, offsets.len(), 512, &mut next, |i| {
-                let around = self.template.topology().vertex_neighbours().row(i);
-                // Neighbours of a left vertex in order; a right vertex copies its image, for symmetry to the bit.
-                let sum: V3d = around.iter().map(|&n| offsets[n as usize]).sum();
-                offsets[i] * 0.5 + sum * (0.5 / around.len() as f64)
-            });
+            let next = smoothed(Par::Rayon, neighbours, &offsets);
+            // A right vertex copies its image, for symmetry to the bit.
             offsets = self.mirrored(|i| next[i]);
         }
         offsets
     }
 
-    /// The vertices of the figure `fig`: carried by the bones, then projected.
+    /// Offsets to the figure `fig`, and its joints: vertices follow the bones, then are projected.
     fn reshaped(&self, fig: &Figure) -> (Vec<V3d>, Vec<P3d>) {
         let neutral = Figure::default();
         let (j, joints) = (fig.joints(), rest(&fig.joints()));
         let old = rest(&neutral.joints());
         let field: Field = carve(fig, &j);
-        let size = |k: usize| {
-            let name = &self.skeleton().joints()[k].name;
-            if name.ends_with("wrist") {
-                fig.hand() / neutral.hand()
-            } else if name.ends_with("ankle") {
-                fig.foot() / neutral.foot()
-            } else {
-                1.0
-            }
+        let size = |k: usize| match self.template.parts().segment(k) {
+            BodySegment::Hand => fig.hand() / neutral.hand(),
+            BodySegment::Foot => fig.foot() / neutral.foot(),
+            _ => 1.0,
         };
         let offsets = self.mirrored(|i| {
             let p = self.points[i];
@@ -124,6 +123,7 @@ impl Source<'_> {
         (offsets, joints)
     }
 
+    /// Half the difference between the figures of +1 and −1.
     fn by_figure(&self, change: impl Fn(f64) -> Figure) -> Direction {
         let ((v1, j1), (v0, j0)) = (self.reshaped(&change(1.0)), self.reshaped(&change(-1.0)));
         let vertices = v1.iter().zip(&v0).map(|(a, b)| (a - b) * 0.5).collect();
@@ -133,24 +133,28 @@ impl Source<'_> {
         )
     }
 
-    /// Stretches bones: `length(name)` is the growth of the bone that ends at a joint, `section(name)` that of the
-    /// sections around the bone that starts there; both relative. Soles stay on the floor.
-    fn by_lengths(&self, length: impl Fn(&str) -> f64, section: impl Fn(&str) -> f64) -> Direction {
+    /// Stretches bones; soles stay on the floor. Both functions give relative growth.
+    ///
+    /// `length(s)` is that of the bone that ends where segment `s` begins, `section(s)` that of the sections of `s`.
+    fn by_lengths(
+        &self,
+        length: impl Fn(BodySegment) -> f64,
+        section: impl Fn(BodySegment) -> f64,
+    ) -> Direction {
         let joints = self.skeleton().joints();
+        let segment = |k: usize| self.template.parts().segment(k);
         let mut moved = vec![V3d::zeros(); joints.len()];
         for (k, j) in joints.iter().enumerate() {
             if let Some(p) = j.parent {
-                moved[k] = moved[p] + (j.rest - joints[p].rest) * length(&j.name);
+                moved[k] = moved[p] + (j.rest - joints[p].rest) * length(segment(k));
             }
         }
-        let grow: Vec<(f64, f64)> = joints
-            .iter()
-            .enumerate()
-            .map(|(k, j)| {
+        let grow: Vec<(f64, f64)> = (0..joints.len())
+            .map(|k| {
                 let child = self.skeleton().primary_child(k);
                 (
-                    child.map_or(0.0, |c| length(&joints[c].name)),
-                    section(&j.name),
+                    child.map_or(0.0, |c| length(segment(c))),
+                    section(segment(k)),
                 )
             })
             .collect();
@@ -189,78 +193,72 @@ fn scaled((v, j): Direction, s: f64) -> Direction {
     )
 }
 
+/// A measure and the published deviation that one unit of a direction must change it by, metres.
+type Target = (fn(&Measurements) -> f64, f64);
+
+/// Growth of a segment's sections with stature, relative to the growth in length.
+fn section_growth(segment: BodySegment) -> f64 {
+    match segment {
+        BodySegment::Head => HEAD_GROWTH,
+        // Hands and feet keep their proportions.
+        BodySegment::Hand | BodySegment::Foot => 1.0,
+        _ => SECTION_GROWTH,
+    }
+}
+
+/// The directions before they are scaled to their targets, in the order of [`DIRECTIONS`].
+fn raw_directions(source: &ShapeSource) -> [(Direction, Option<Target>); 9] {
+    use BodySegment::{Abdomen, Chest, Collar, Foot, Forearm, Hand, Head, Neck, Shin};
+    let growth = stat::STATURE.deviation() / stat::STATURE.mean();
+    let along = |s: BodySegment| growth * if s == Head { HEAD_GROWTH } else { 1.0 };
+    let stature = source.by_lengths(along, |s| growth * section_growth(s));
+    let only = |segments: &'static [BodySegment], growth: f64| {
+        let length = move |s: BodySegment| if segments.contains(&s) { growth } else { 0.0 };
+        source.by_lengths(length, |_| 0.0)
+    };
+    let limbs = only(&[Shin, Foot, Forearm, Hand], LIMB_PROBE);
+    let torso = only(&[Abdomen, Chest, Neck, Collar], TORSO_PROBE);
+    let figure = |of: fn(&mut Figure) -> &mut f64| {
+        source.by_figure(|c| {
+            let mut figure = Figure::default();
+            *of(&mut figure) = c;
+            figure
+        })
+    };
+    let mass_waist = stat::MASS_WAIST * stat::WAIST.deviation();
+    let inseam = stat::CROTCH.residual(stat::STATURE_CROTCH);
+    let torso_length = stat::SITTING.residual(stat::STATURE_SITTING);
+    let shoulders = stat::SHOULDERS.residual(stat::STATURE_SHOULDERS);
+    let chest = stat::CHEST.residual(stat::MASS_CHEST);
+    let waist = stat::WAIST.residual(stat::MASS_WAIST);
+    let hip = stat::HIP.residual(stat::MASS_HIP);
+    [
+        (stature, Some((|m| m.stature, stat::STATURE.deviation()))),
+        (figure(|f| &mut f.girth), Some((|m| m.waist, mass_waist))),
+        (figure(|f| &mut f.sex), None),
+        (limbs, Some((|m| m.inseam, inseam))),
+        (torso, Some((|m| m.torso_length, torso_length))),
+        (
+            figure(|f| &mut f.shoulder),
+            Some((|m| m.shoulder_width, shoulders)),
+        ),
+        (figure(|f| &mut f.chest), Some((|m| m.chest, chest))),
+        (figure(|f| &mut f.waist), Some((|m| m.waist, waist))),
+        (figure(|f| &mut f.hip), Some((|m| m.hip, hip))),
+    ]
+}
+
 /// All directions of the shape space.
 ///
 /// # Errors
 /// When the body cannot be measured; never in a correct build.
-pub(super) fn shape_space(source: &Source) -> Result<ShapeSpace, BodyError> {
-    let leg = |n: &str| ["knee", "ankle"].iter().any(|s| n.ends_with(s));
-    let arm = |n: &str| ["elbow", "wrist"].iter().any(|s| n.ends_with(s));
-    let spine = |n: &str| n.starts_with("spine") || n == "neck" || n.ends_with("collar");
-    let growth = stat::STATURE.deviation() / stat::STATURE.mean();
-    let head = |n: &str| n.starts_with("head");
-    let stature = source.by_lengths(
-        |n| growth * if head(n) { HEAD_GROWTH } else { 1.0 },
-        |n| {
-            let share = if head(n) {
-                HEAD_GROWTH
-            } else if n.ends_with("ankle") || n.ends_with("wrist") {
-                // Hands and feet keep their proportions.
-                1.0
-            } else {
-                SECTION_GROWTH
-            };
-            growth * share
-        },
-    );
-    let none = Figure::default();
-    let raw: [(Direction, Option<Target>); 9] = [
-        (stature, Some((|m| m.stature, stat::STATURE.deviation()))),
-        (
-            source.by_figure(|c| Figure { girth: c, ..none }),
-            Some((|m| m.waist, stat::MASS_WAIST * stat::WAIST.deviation())),
-        ),
-        (source.by_figure(|c| Figure { sex: c, ..none }), None),
-        (
-            source.by_lengths(|n| if leg(n) || arm(n) { 0.028 } else { 0.0 }, |_| 0.0),
-            Some((|m| m.inseam, stat::CROTCH.residual(stat::STATURE_CROTCH))),
-        ),
-        (
-            source.by_lengths(|n| if spine(n) { 0.04 } else { 0.0 }, |_| 0.0),
-            Some((
-                |m| m.torso_length,
-                stat::SITTING.residual(stat::STATURE_SITTING),
-            )),
-        ),
-        (
-            source.by_figure(|c| Figure {
-                shoulder: c,
-                ..none
-            }),
-            Some((
-                |m| m.shoulder_width,
-                stat::SHOULDERS.residual(stat::STATURE_SHOULDERS),
-            )),
-        ),
-        (
-            source.by_figure(|c| Figure { chest: c, ..none }),
-            Some((|m| m.chest, stat::CHEST.residual(stat::MASS_CHEST))),
-        ),
-        (
-            source.by_figure(|c| Figure { waist: c, ..none }),
-            Some((|m| m.waist, stat::WAIST.residual(stat::MASS_WAIST))),
-        ),
-        (
-            source.by_figure(|c| Figure { hip: c, ..none }),
-            Some((|m| m.hip, stat::HIP.residual(stat::MASS_HIP))),
-        ),
-    ];
+pub(super) fn shape_space(source: &ShapeSource) -> Result<ShapeSpace, BodyError> {
     let mut space = ShapeSpace::default();
     let mut stature_unit = None;
-    for (name, (mut direction, target)) in DIRECTIONS.iter().zip(raw) {
+    for (name, (mut direction, target)) in DIRECTIONS.iter().zip(raw_directions(source)) {
         if let Some((of, deviation)) = target {
-            let change = 0.5
-                * (of(&probe(source, &direction, 1.0)?) - of(&probe(source, &direction, -1.0)?));
+            let [more, less] = [1.0, -1.0].map(|c| probe(source, &direction, c));
+            let change = 0.5 * (of(&more?) - of(&less?));
             direction = scaled(direction, deviation / change);
         }
         if *name == "stature" {
@@ -268,39 +266,26 @@ pub(super) fn shape_space(source: &Source) -> Result<ShapeSpace, BodyError> {
         }
         if let ("sex", Some(unit)) = (*name, &stature_unit) {
             // Men are taller: the figure's sex is at equal stature, the direction's is not.
-            let taller = scaled(
-                unit.clone(),
-                stat::STATURE.sex() / stat::STATURE.deviation(),
-            );
-            direction
-                .0
-                .iter_mut()
-                .zip(&taller.0)
-                .for_each(|(a, b)| *a += b);
-            direction
-                .1
-                .iter_mut()
-                .zip(&taller.1)
-                .for_each(|(a, b)| *a += b);
+            let growth = stat::STATURE.sex() / stat::STATURE.deviation();
+            let taller = scaled(unit.clone(), growth);
+            let add = |to: &mut [V3d], by: &[V3d]| {
+                to.iter_mut().zip(by).for_each(|(a, b)| *a += b);
+            };
+            add(&mut direction.0, &taller.0);
+            add(&mut direction.1, &taller.1);
         }
+        let (vertices, joints) = direction;
         space.names.push((*name).to_owned());
-        space.vertices.push(
-            direction
-                .0
-                .iter()
-                .map(|o| V3::new(o.x as f32, o.y as f32, o.z as f32))
-                .collect(),
-        );
-        space.joints.push(direction.1);
+        space
+            .vertices
+            .push(vertices.iter().map(|o| o.cast()).collect());
+        space.joints.push(joints);
     }
     Ok(space)
 }
 
-/// A measure and the published deviation that one unit of a direction must change it by, metres.
-type Target = (fn(&Measurements) -> f64, f64);
-
 /// Measures the body moved by `c` units of a direction.
-fn probe(source: &Source, direction: &Direction, c: f64) -> Result<Measurements, BodyError> {
+fn probe(source: &ShapeSource, direction: &Direction, c: f64) -> Result<Measurements, BodyError> {
     let mut body = source.template.personalise(&BodyShape::default());
     body.vertices
         .iter_mut()

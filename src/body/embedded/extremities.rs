@@ -1,19 +1,24 @@
 //! Hands and feet.
 
-use super::field::{Field, Frame, Loft, Solid, Station};
+use super::field::{Field, FieldPrimitive, Frame, Loft, Station};
 use super::figure::{Figure, Joints};
 use crate::math::{P3d, V3d};
 
-/// A finger: where it leaves the hand (across towards the thumb, back of the hand, along), metres from the wrist;
-/// lengths of its segments; radius at the root and at the tip; spread towards the thumb; curl per joint (tangent).
+/// A finger of the mean hand, metres.
 struct Finger {
+    /// Its root: towards the thumb, to the back of the hand, along the hand, from the wrist.
     root: [f64; 3],
+    /// Lengths of its segments.
     segments: [f64; 3],
+    /// Radius at the root and at the tip.
     radii: [f64; 2],
+    /// Spread towards the thumb, tangent.
     spread: f64,
+    /// Curl per joint, tangent.
     curl: f64,
 }
 
+/// Index to little finger.
 const FINGERS: [Finger; 4] = [
     Finger {
         root: [0.0285, 0.000, 0.088],
@@ -45,44 +50,76 @@ const FINGERS: [Finger; 4] = [
     },
 ];
 
+/// Sections of the palm along the hand: u to its back, w towards the thumb, metres.
+const PALM: [Station; 5] = [
+    Station {
+        t: -0.005,
+        c: [0.000, 0.000, 0.0195, 0.0195, 0.0275, 0.0275, 0.1],
+    },
+    Station {
+        t: 0.020,
+        c: [0.000, 0.000, 0.0180, 0.0190, 0.0310, 0.0290, 0.3],
+    },
+    Station {
+        t: 0.050,
+        c: [0.000, 0.000, 0.0150, 0.0170, 0.0370, 0.0360, 0.4],
+    },
+    Station {
+        t: 0.075,
+        c: [0.000, 0.000, 0.0125, 0.0140, 0.0390, 0.0385, 0.4],
+    },
+    Station {
+        t: 0.092,
+        c: [0.000, -0.001, 0.0100, 0.0110, 0.0375, 0.0375, 0.4],
+    },
+];
+
+/// Segments of the thumb: length, radii at both ends, blend, metres.
+const THUMB: [[f64; 4]; 3] = [
+    [0.042, 0.0165, 0.0125, 0.014],
+    [0.032, 0.0122, 0.0105, 0.005],
+    [0.024, 0.0106, 0.0082, 0.004],
+];
+
+/// Frame of a hand: a along it, w towards the thumb (forward), u to its back; sizes relative to the mean hand.
+struct Hand {
+    frame: Frame,
+    size: f64,
+}
+
+/// Adds a hand.
 pub(super) fn hand(f: &mut Field, fig: &Figure, j: &Joints) {
-    // a along the hand, w towards the thumb (forward), u to the back of the hand.
-    let frame = Frame::along(j.wrist, j.hand_end, V3d::z());
-    let size = fig.hand();
-    let at = |w: f64, u: f64, t: f64| frame.point(u * size, w * size, t * size);
-    let palm = [
-        Station {
-            t: -0.005,
-            c: [0.000, 0.000, 0.0195, 0.0195, 0.0275, 0.0275, 0.1],
-        },
-        Station {
-            t: 0.020,
-            c: [0.000, 0.000, 0.0180, 0.0190, 0.0310, 0.0290, 0.3],
-        },
-        Station {
-            t: 0.050,
-            c: [0.000, 0.000, 0.0150, 0.0170, 0.0370, 0.0360, 0.4],
-        },
-        Station {
-            t: 0.075,
-            c: [0.000, 0.000, 0.0125, 0.0140, 0.0390, 0.0385, 0.4],
-        },
-        Station {
-            t: 0.092,
-            c: [0.000, -0.001, 0.0100, 0.0110, 0.0375, 0.0375, 0.4],
-        },
-    ]
-    .map(|s| Station {
-        t: s.t * size,
-        c: std::array::from_fn(|k| if k < 6 { s.c[k] * size } else { s.c[k] }),
-    });
-    f.add(
-        Solid::Loft(Loft::new(frame, palm.to_vec(), [0.02, 0.012])),
-        0.012,
-    );
-    for finger in &FINGERS {
-        let mut p = at(finger.root[0] * 0.9, finger.root[1], finger.root[2] - 0.012);
-        let mut dir = (frame.a + frame.w * finger.spread - frame.u * 0.05).normalize();
+    let hand = Hand {
+        frame: Frame::along(j.wrist, j.hand_end, V3d::z()),
+        size: fig.hand(),
+    };
+    hand.palm(f);
+    FINGERS.iter().for_each(|finger| hand.finger(f, finger));
+    hand.thumb(f);
+    hand.relief(f);
+}
+
+impl Hand {
+    /// A point `w` towards the thumb, `u` to the back and `t` along the mean hand, metres.
+    fn at(&self, w: f64, u: f64, t: f64) -> P3d {
+        self.frame
+            .point(u * self.size, w * self.size, t * self.size)
+    }
+    fn palm(&self, f: &mut Field) {
+        let size = self.size;
+        let palm = PALM.map(|s| Station {
+            t: s.t * size,
+            c: std::array::from_fn(|k| if k < 6 { s.c[k] * size } else { s.c[k] }),
+        });
+        let loft = Loft::new(self.frame, palm.to_vec(), [0.02, 0.012]);
+        f.add(FieldPrimitive::Loft(loft), 0.012);
+    }
+    fn finger(&self, f: &mut Field, finger: &Finger) {
+        let Frame { a, u, w, .. } = self.frame;
+        let size = self.size;
+        // The first segment begins inside the palm.
+        let mut p = self.at(finger.root[0] * 0.9, finger.root[1], finger.root[2] - 0.012);
+        let mut dir = (a + w * finger.spread - u * 0.05).normalize();
         let total: f64 = finger.segments.iter().sum();
         let mut done = 0.0;
         let radius =
@@ -92,46 +129,39 @@ pub(super) fn hand(f: &mut Field, fig: &Figure, j: &Joints) {
             let q = p + dir * (l * size);
             let end = (done + l).min(total);
             f.cone(p, q, radius(done), radius(end), 0.004);
-            dir = (dir - frame.u * finger.curl).normalize();
+            dir = (dir - u * finger.curl).normalize();
             done = end;
             p = q;
         }
     }
-    // Thumb: from the root of the hand, forward and towards the palm.
-    let mut p = at(0.020, -0.006, 0.018);
-    let mut dir = (frame.a * 0.72 + frame.w * 0.66 - frame.u * 0.30).normalize();
-    for (l, r0, r1, blend) in [
-        (0.042, 0.0165, 0.0125, 0.014),
-        (0.032, 0.0122, 0.0105, 0.005),
-        (0.024, 0.0106, 0.0082, 0.004),
-    ] {
-        let q = p + dir * (l * size);
-        f.cone(p, q, r0 * size, r1 * size, blend);
-        dir = (dir + frame.a * 0.14).normalize();
-        p = q;
+    /// From the root of the hand, forward and towards the palm.
+    fn thumb(&self, f: &mut Field) {
+        let Frame { a, u, w, .. } = self.frame;
+        let mut p = self.at(0.020, -0.006, 0.018);
+        let mut dir = (a * 0.72 + w * 0.66 - u * 0.30).normalize();
+        for [l, r0, r1, blend] in THUMB {
+            let q = p + dir * (l * self.size);
+            f.cone(p, q, r0 * self.size, r1 * self.size, blend);
+            dir = (dir + a * 0.14).normalize();
+            p = q;
+        }
     }
-    // Heel of the hand on the side of the little finger.
-    f.bump_in(
-        Frame {
-            origin: at(-0.024, -0.016, 0.035),
-            ..frame
-        },
-        [0.02 * size, 0.022 * size, 0.04 * size],
-        0.004,
-    );
-    // Knuckles and the head of the ulna.
-    for finger in &FINGERS {
-        let o = at(finger.root[0] * 0.95, 0.011, finger.root[2] - 0.006);
-        f.bump_in(Frame { origin: o, ..frame }, [0.010, 0.010, 0.014], 0.0025);
+    /// Heel of the hand on the side of the little finger, knuckles, head of the ulna.
+    fn relief(&self, f: &mut Field) {
+        let size = self.size;
+        let frame_at = |origin| Frame {
+            origin,
+            ..self.frame
+        };
+        let heel = frame_at(self.at(-0.024, -0.016, 0.035));
+        f.bump_in(heel, [0.02 * size, 0.022 * size, 0.04 * size], 0.004);
+        for finger in &FINGERS {
+            let knuckle = self.at(finger.root[0] * 0.95, 0.011, finger.root[2] - 0.006);
+            f.bump_in(frame_at(knuckle), [0.010, 0.010, 0.014], 0.0025);
+        }
+        let ulna = frame_at(self.at(-0.022, 0.014, -0.014));
+        f.bump_in(ulna, [0.014, 0.014, 0.016], 0.004);
     }
-    f.bump_in(
-        Frame {
-            origin: at(-0.022, 0.014, -0.014),
-            ..frame
-        },
-        [0.014, 0.014, 0.016],
-        0.004,
-    );
 }
 
 /// Foot sections: z from the ankle, half width, top, x offset, metres; the sole lies on y = 0.
@@ -156,6 +186,7 @@ const TOES: [[f64; 3]; 5] = [
     [0.035, 0.038, 0.0085],
 ];
 
+/// Adds a foot.
 pub(super) fn foot(f: &mut Field, fig: &Figure, j: &Joints) {
     let size = fig.foot();
     let stations = FOOT[..8]
@@ -177,7 +208,7 @@ pub(super) fn foot(f: &mut Field, fig: &Figure, j: &Joints) {
         a: V3d::z(),
     };
     f.add(
-        Solid::Loft(Loft::new(frame, stations, [0.020, 0.012])),
+        FieldPrimitive::Loft(Loft::new(frame, stations, [0.020, 0.012])),
         0.022,
     );
     for t in TOES {

@@ -1,10 +1,10 @@
 //! The implicit surface the figure is carved from: lofted tubes, ellipsoids, round cones, smooth unions and bumps.
 //!
-//! Only + − × ÷ and √ are used, so that the surface has the same bits on every machine.
+//! Only + − × ÷ and √ are used: the surface has the same bits on every machine.
 
 use crate::math::{P3d, V3d};
 
-/// Numbers of a station after its position: centre (u, w), radii (+u, −u, +w, −w), squareness (0 ellipse, 1 superellipse of order 4).
+/// Numbers of a station: centre (u, w), radii (+u, −u, +w, −w), squareness (0 ellipse, 1 superellipse of order 4).
 const CHANNELS: usize = 7;
 
 /// A cross-section of a loft.
@@ -166,7 +166,7 @@ impl Loft {
 
 /// A solid.
 #[derive(Clone, Debug)]
-pub(super) enum Solid {
+pub(super) enum FieldPrimitive {
     Loft(Loft),
     /// Axes of the frame with half lengths (u, w, a).
     Ellipsoid(Frame, V3d),
@@ -174,7 +174,7 @@ pub(super) enum Solid {
     Cone([P3d; 2], [f64; 2]),
 }
 
-impl Solid {
+impl FieldPrimitive {
     fn distance(&self, p: &P3d) -> f64 {
         match self {
             Self::Loft(l) => l.distance(p),
@@ -210,9 +210,10 @@ impl Solid {
     }
 }
 
+/// A solid of the union.
 #[derive(Clone, Debug)]
-struct Part {
-    solid: Solid,
+struct BlendedSolid {
+    solid: FieldPrimitive,
     /// Blend radius, metres.
     blend: f64,
     bounds: (P3d, P3d),
@@ -231,7 +232,7 @@ struct Bump {
 /// The figure's left half (x ≥ 0), mirrored: negative inside.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Field {
-    parts: Vec<Part>,
+    solids: Vec<BlendedSolid>,
     bumps: Vec<Bump>,
 }
 
@@ -243,21 +244,21 @@ fn smooth_min(a: f64, b: f64, k: f64) -> f64 {
 
 impl Field {
     /// Adds a solid, blended over `blend` metres.
-    pub(super) fn add(&mut self, solid: Solid, blend: f64) {
+    pub(super) fn add(&mut self, solid: FieldPrimitive, blend: f64) {
         let bounds = solid.bounds();
-        self.parts.push(Part {
+        self.solids.push(BlendedSolid {
             solid,
             blend,
             bounds,
         });
     }
     pub(super) fn cone(&mut self, a: P3d, b: P3d, ra: f64, rb: f64, blend: f64) {
-        self.add(Solid::Cone([a, b], [ra, rb]), blend);
+        self.add(FieldPrimitive::Cone([a, b], [ra, rb]), blend);
     }
     pub(super) fn ellipsoid(&mut self, c: impl Into<P3d>, r: [f64; 3], blend: f64) {
         // Frame::upright stores (u, w, a) = (x, z, y).
         self.add(
-            Solid::Ellipsoid(Frame::upright(c.into()), V3d::new(r[0], r[2], r[1])),
+            FieldPrimitive::Ellipsoid(Frame::upright(c.into()), V3d::new(r[0], r[2], r[1])),
             blend,
         );
     }
@@ -279,7 +280,7 @@ impl Field {
     pub(super) fn value(&self, at: &P3d) -> f64 {
         let p = P3d::new(at.x.abs(), at.y, at.z);
         let mut d = f64::INFINITY;
-        for part in &self.parts {
+        for part in &self.solids {
             let (lo, hi) = &part.bounds;
             let lower = (lo - p).sup(&(p - hi)).sup(&V3d::zeros()).norm_squared();
             // smooth_min changes nothing beyond d + blend; the factor covers the estimate's error.
@@ -329,7 +330,7 @@ impl Field {
             if n2 < 0.01 {
                 break;
             }
-            // Near creases the estimate overshoots; a step of more than a centimetre is never meant.
+            // Near creases the estimate overshoots.
             let step = g * (v / n2);
             q -= step * (MAX_STEP / step.norm().max(MAX_STEP));
         }
@@ -337,9 +338,9 @@ impl Field {
     }
 }
 
-/// Relative distance from the middle of a section under which a direction outward means nothing.
+/// Relative distance from the middle of a section below which the outward direction is undefined.
 const CENTRE: f64 = 1e-9;
-/// Close enough to the surface, metres.
+/// Distance from the surface at which projection ends, metres.
 const ON_SURFACE: f64 = 2e-5;
 /// Longest projection step, metres.
 const MAX_STEP: f64 = 0.012;

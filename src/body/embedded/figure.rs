@@ -1,4 +1,4 @@
-//! The proportions that shape parameters change, and where the joints are.
+//! Proportions of the figure by shape parameters, and its joints.
 
 use crate::math::P3d;
 

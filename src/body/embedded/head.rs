@@ -1,10 +1,10 @@
 //! Head and face.
 
-use super::field::{Field, Frame, Loft, Solid, Station};
+use super::field::{Field, FieldPrimitive, Frame, Loft, Station};
 use super::figure::Figure;
 use crate::math::{P3d, V3d};
 
-/// Face: height, half width, front, back, squareness; sex adds to the half width.
+/// Sections of the face: height, half width, front, back (metres), squareness, half width per unit of sex (metres).
 const FACE: [[f64; 6]; 10] = [
     [1.474, 0.022, 0.076, 0.020, 0.1, 0.0025],
     [1.486, 0.034, 0.084, 0.004, 0.15, 0.0030],
@@ -18,9 +18,18 @@ const FACE: [[f64; 6]; 10] = [
     [1.655, 0.0480, 0.054, -0.050, 0.0, 0.0010],
 ];
 
+/// Adds head and face.
 pub(super) fn head(f: &mut Field, fig: &Figure) {
+    skull(f, fig);
+    nose(f);
+    eyes(f);
+    cheeks(f, fig);
+    mouth_and_chin(f, fig);
+    ear(f);
+}
+
+fn skull(f: &mut Field, fig: &Figure) {
     let s = fig.sex;
-    // Skull.
     f.ellipsoid(
         [0.0, 1.604, -0.012],
         [0.0755 + 0.001 * s, 0.088, 0.098 + 0.0015 * s],
@@ -38,14 +47,17 @@ pub(super) fn head(f: &mut Field, fig: &Figure) {
         })
         .collect();
     f.add(
-        Solid::Loft(Loft::new(
+        FieldPrimitive::Loft(Loft::new(
             Frame::upright(P3d::origin()),
             stations,
             [0.008, 0.02],
         )),
         0.02,
     );
-    // Nose: bridge, tip, wings.
+}
+
+/// Bridge, tip and wings.
+fn nose(f: &mut Field) {
     let p = P3d::new;
     f.cone(
         p(0.0, 1.594, 0.0800),
@@ -62,19 +74,26 @@ pub(super) fn head(f: &mut Field, fig: &Figure) {
         0.008,
     );
     f.ellipsoid(p(0.0105, 1.5525, 0.0890), [0.0068, 0.0060, 0.0090], 0.012);
-    // Eye sockets and eyes.
+}
+
+/// Sockets and eyeballs.
+fn eyes(f: &mut Field) {
+    let p = P3d::new;
     f.bump(p(0.031, 1.584, 0.080), [0.024, 0.017, 0.034], -0.0070);
     f.bump(p(0.014, 1.586, 0.080), [0.011, 0.014, 0.030], -0.0035);
     f.bump(p(0.0315, 1.5750, 0.080), [0.018, 0.006, 0.025], -0.0010);
     f.ellipsoid(p(0.0315, 1.5815, 0.0628), [0.0140, 0.0100, 0.0150], 0.003);
-    // Brow and temple.
+}
+
+/// Brow and temple, cheekbone, hollow of the cheek, corner of the jaw.
+fn cheeks(f: &mut Field, fig: &Figure) {
+    let (s, p) = (fig.sex, P3d::new);
     f.bump(
         p(0.024, 1.602, 0.086),
         [0.030, 0.013, 0.030],
         0.003 + 0.002 * s,
     );
     f.bump(p(0.066, 1.602, 0.045), [0.020, 0.030, 0.035], -0.003);
-    // Cheekbone, hollow of the cheek, corner of the jaw.
     f.bump(p(0.048, 1.562, 0.060), [0.030, 0.022, 0.035], 0.0045);
     f.bump(
         p(0.046, 1.528, 0.050),
@@ -86,30 +105,36 @@ pub(super) fn head(f: &mut Field, fig: &Figure) {
         [0.020, 0.024, 0.030],
         0.003 + 0.002 * s,
     );
-    // Mouth: the round of the teeth, lips, the line between, the groove below.
+}
+
+/// The round of the teeth, lips, the line between, the groove below, chin.
+fn mouth_and_chin(f: &mut Field, fig: &Figure) {
+    let p = P3d::new;
     f.bump(p(0.0, 1.522, 0.084), [0.046, 0.034, 0.038], 0.0040);
     f.bump(p(0.0, 1.5275, 0.088), [0.030, 0.0080, 0.024], 0.0022);
     f.bump(p(0.0, 1.5150, 0.087), [0.027, 0.0090, 0.024], 0.0028);
     f.bump(p(0.0, 1.5213, 0.090), [0.034, 0.0055, 0.030], -0.0034);
     f.bump(p(0.0, 1.503, 0.086), [0.026, 0.009, 0.02], -0.0025);
-    // Chin.
     f.bump(
         p(0.0, 1.486, 0.085),
         [0.026, 0.018, 0.025],
-        0.005 + 0.0015 * s,
+        0.005 + 0.0015 * fig.sex,
     );
-    // Ear: a tilted shell, hollowed.
+}
+
+/// A tilted shell, hollowed.
+fn ear(f: &mut Field) {
     let a = V3d::new(0.10, 0.96, -0.26).normalize();
     let w = V3d::new(0.45, 0.20, 0.87);
     let w = (w - a * w.dot(&a)).normalize();
     let ear = Frame {
-        origin: p(0.0785, 1.574, -0.012),
+        origin: P3d::new(0.0785, 1.574, -0.012),
         u: a.cross(&w),
         w,
         a,
     };
     f.add(
-        Solid::Ellipsoid(ear, V3d::new(0.0065, 0.0175, 0.0310)),
+        FieldPrimitive::Ellipsoid(ear, V3d::new(0.0065, 0.0175, 0.0310)),
         0.008,
     );
     f.bump_in(

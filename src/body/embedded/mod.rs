@@ -1,4 +1,4 @@
-//! The embedded body: our own parametric human figure, made at run time by deterministic code.
+//! The embedded body: a parametric human figure, generated at run time by deterministic code.
 //!
 //! Anatomy tables describe an implicit surface; its left half is polygonised, remeshed with finer triangles in
 //! face, hands and feet, mirrored, rigged and given directions of shape.
@@ -10,14 +10,13 @@ mod figure;
 mod head;
 mod limbs;
 mod polygonise;
-mod remesh;
 mod rig;
 pub mod statistics;
 mod torso;
 
 use super::{BodyError, Skeleton, Template};
 use crate::math::{P3, P3d};
-use crate::mesh::{Face, Topology, TriMesh};
+use crate::mesh::{Border, Face, RemeshSpec, Remesher, Topology, TriMesh};
 use field::Field;
 use figure::{Figure, Joints, STATURE};
 use std::sync::{Arc, OnceLock};
@@ -28,6 +27,12 @@ pub use directions::{DIRECTIONS, RANGE};
 const NAME: &str = "embedded";
 /// Rounds of remeshing; more change no angle by a degree.
 const ROUNDS: usize = 5;
+/// Rounds of flips and relaxation after them.
+const LAST_ROUNDS: usize = 2;
+/// Share of the way to the neighbours' centroid per relaxation.
+const RELAXATION: f64 = 0.6;
+/// Newton steps that bring a relaxed vertex back to the surface.
+const PROJECTION_STEPS: usize = 3;
 /// Target edge lengths, metres: trunk and limbs, head, face, hand, foot. Together they give 12,000 to 14,000 vertices.
 const EDGES: [f64; 5] = [0.0153, 0.0098, 0.0052, 0.0060, 0.0085];
 
@@ -67,6 +72,38 @@ fn edge_length(j: &Joints, p: &P3d) -> f64 {
     mix(hand, EDGES[4], 1.0 - ramp(p.y, 0.06, 0.14))
 }
 
+/// The left half with edges of the target lengths, its cut at x = 0 in the mirror plane.
+fn remeshed(
+    field: &Field,
+    j: &Joints,
+    points: Vec<P3d>,
+    faces: Vec<Face>,
+) -> (Vec<P3d>, Vec<Face>) {
+    let spec = RemeshSpec {
+        target: &|p| edge_length(j, p),
+        project: &|p| field.project(p, PROJECTION_STEPS),
+        border: Border::MirrorPlane,
+        graded: true,
+        keep_creases: false,
+        relaxation: RELAXATION,
+    };
+    let mut remesher = Remesher::new(points, faces, spec);
+    for round in 0..ROUNDS {
+        // The polygoniser's edges are short everywhere.
+        if round > 0 {
+            remesher.split();
+        }
+        remesher.collapse();
+        remesher.flip();
+        remesher.relax();
+    }
+    for _ in 0..LAST_ROUNDS {
+        remesher.flip();
+        remesher.relax();
+    }
+    remesher.finish()
+}
+
 /// Left half of the surface, mirrored to the whole: vertices, faces and for each vertex its mirror image.
 fn whole(half: &[P3d], faces: &[Face]) -> (Vec<P3d>, Vec<Face>, Vec<u32>) {
     let mut points = half.to_vec();
@@ -93,10 +130,10 @@ fn whole(half: &[P3d], faces: &[Face]) -> (Vec<P3d>, Vec<Face>, Vec<u32>) {
     (points, all, mirror)
 }
 
-/// Builds the template anew. Deterministic: the same bits every time, on any number of threads.
+/// Builds the template. The same bits every time, on any number of threads.
 ///
 /// # Errors
-/// None in a correct build; the parts check each other as for any template.
+/// None in a correct build.
 pub fn generate() -> Result<Template, BodyError> {
     let fig = Figure::default();
     let j = fig.joints();
@@ -106,8 +143,7 @@ pub fn generate() -> Result<Template, BodyError> {
         P3d::new(0.0, -0.03, -0.25),
         P3d::new(0.75, STATURE + 0.05, 0.30),
     );
-    let target = |p: &P3d| edge_length(&j, p);
-    let (half, half_faces) = remesh::Remesher::new(&field, &target, points, faces).run(ROUNDS);
+    let (half, half_faces) = remeshed(&field, &j, points, faces);
     let (points, faces, mirror) = whole(&half, &half_faces);
     let joints = rig::joints(&j);
     let skeleton = Skeleton::new(joints)?;
@@ -118,7 +154,7 @@ pub fn generate() -> Result<Template, BodyError> {
     let mesh = TriMesh::new(vertices, faces)?;
     let weights = rig::skin_weights(&j, &points, &Topology::new(&mesh)?, &skeleton)?;
     let plain = Template::new(NAME, mesh, skeleton, weights, None)?;
-    let space = directions::shape_space(&directions::Source {
+    let space = directions::shape_space(&directions::ShapeSource {
         template: &plain,
         points: &points,
         mirror: &mirror,
@@ -147,7 +183,5 @@ pub fn template() -> Arc<Template> {
         .clone()
 }
 
-#[cfg(test)]
-mod look;
 #[cfg(test)]
 mod tests;

@@ -10,6 +10,10 @@ use std::collections::BTreeMap;
 const CELL: f64 = 0.0065;
 /// Cells along the edge of a block.
 const BLOCK: i32 = 4;
+/// Nodes along the edge of a block.
+const SIDE: usize = (BLOCK + 1) as usize;
+/// Smallest distance value kept at a grid node, metres.
+const NODE_GAP: f64 = 1e-5;
 /// Levels of blocks above the smallest; each level doubles the edge.
 const LEVELS: u32 = 3;
 /// The six tetrahedra around the diagonal of a cube; corners are bits x, y, z.
@@ -77,6 +81,100 @@ fn blocks(field: &Field, lo: Node, hi: Node) -> Vec<Node> {
     }
 }
 
+/// Field values at the nodes of a block, x fastest.
+fn node_values(field: &Field, block: &Node) -> Vec<f64> {
+    let mut values = Vec::with_capacity(SIDE * SIDE * SIDE);
+    for z in 0..=BLOCK {
+        for y in 0..=BLOCK {
+            for x in 0..=BLOCK {
+                let d = field.value(&position(&[block[0] + x, block[1] + y, block[2] + z]));
+                // Never exactly on a node, nor so near that an edge has no length.
+                values.push(if d.abs() < NODE_GAP { NODE_GAP } else { d });
+            }
+        }
+    }
+    values
+}
+
+/// The corners of a cube: nodes and field values, by bits x, y, z.
+struct Cube {
+    nodes: [Node; 8],
+    values: [f64; 8],
+}
+
+impl Cube {
+    /// One cell of a block with these node values.
+    fn new(block: &Node, values: &[f64], cell: i32) -> Self {
+        let o = [cell % BLOCK, cell / BLOCK % BLOCK, cell / (BLOCK * BLOCK)];
+        let corner = |k: usize| {
+            let bits = [k & 1, k >> 1 & 1, k >> 2];
+            std::array::from_fn::<i32, 3, _>(|a| o[a] + bits[a] as i32)
+        };
+        Self {
+            nodes: std::array::from_fn(|k| {
+                let c = corner(k);
+                std::array::from_fn(|a| block[a] + c[a])
+            }),
+            values: std::array::from_fn(|k| {
+                let c = corner(k).map(|x| x as usize);
+                values[(c[2] * SIDE + c[1]) * SIDE + c[0]]
+            }),
+        }
+    }
+    fn is_cut(&self) -> bool {
+        let inside = self.values.iter().filter(|x| **x < 0.0).count();
+        inside != 0 && inside != 8
+    }
+}
+
+/// The surface while cubes are added; vertices on shared edges are shared.
+#[derive(Default)]
+struct Polygons {
+    vertices: Vec<P3d>,
+    faces: Vec<Face>,
+    cuts: BTreeMap<(Node, Node), u32>,
+}
+
+impl Polygons {
+    /// The vertex between an inner and an outer corner of a cube.
+    fn cut(&mut self, cube: &Cube, inner: usize, outer: usize) -> u32 {
+        let (p, q) = (cube.nodes[inner], cube.nodes[outer]);
+        let key = if p < q { (p, q) } else { (q, p) };
+        *self.cuts.entry(key).or_insert_with(|| {
+            let s = cube.values[inner] / (cube.values[inner] - cube.values[outer]);
+            let vertex = position(&p) + (position(&q) - position(&p)) * s;
+            self.vertices.push(vertex);
+            (self.vertices.len() - 1) as u32
+        })
+    }
+    /// A face that points away from an inner node.
+    fn push(&mut self, f: Face, inner: &Node) {
+        let [x, y, z] = f.map(|i| self.vertices[i as usize]);
+        let outward = (y - x).cross(&(z - x)).dot(&(x - position(inner))) > 0.0;
+        self.faces
+            .push(if outward { f } else { [f[0], f[2], f[1]] });
+    }
+    fn add_tetrahedron(&mut self, cube: &Cube, corners: [usize; 4]) {
+        let (ins, out): (Vec<usize>, Vec<usize>) =
+            corners.iter().partition(|&&k| cube.values[k] < 0.0);
+        let pairs: &[(usize, usize)] = match ins.len() {
+            1 => &[(0, 0), (0, 1), (0, 2)],
+            2 => &[(0, 0), (0, 1), (1, 1), (1, 0)],
+            3 => &[(0, 0), (1, 0), (2, 0)],
+            _ => return,
+        };
+        let q: Vec<u32> = pairs
+            .iter()
+            .map(|&(i, o)| self.cut(cube, ins[i], out[o]))
+            .collect();
+        // The plane separates the outer corners from any inner one.
+        let inner = &cube.nodes[ins[0]];
+        for k in 1..q.len() - 1 {
+            self.push([q[0], q[k], q[k + 1]], inner);
+        }
+    }
+}
+
 /// The zero level of `field` for x ≥ 0 between `lo` and `hi` (metres): vertices and outward faces.
 /// The boundary lies exactly on x = 0.
 pub(super) fn polygonise(field: &Field, lo: P3d, hi: P3d) -> (Vec<P3d>, Vec<Face>) {
@@ -88,99 +186,20 @@ pub(super) fn polygonise(field: &Field, lo: P3d, hi: P3d) -> (Vec<P3d>, Vec<Face
         ]
     };
     let blocks = blocks(field, node(&lo), node(&hi));
-    let side = (BLOCK + 1) as usize;
     let mut values: Vec<Vec<f64>> = Vec::new();
     par::map_into(Par::Rayon, blocks.len(), 16, &mut values, |i| {
-        let b = blocks[i];
-        let mut v = Vec::with_capacity(side * side * side);
-        for z in 0..=BLOCK {
-            for y in 0..=BLOCK {
-                for x in 0..=BLOCK {
-                    let d = field.value(&position(&[b[0] + x, b[1] + y, b[2] + z]));
-                    // Never exactly on a node, nor so near that an edge has no length.
-                    v.push(if d.abs() < NODE_GAP { NODE_GAP } else { d });
-                }
-            }
-        }
-        v
+        node_values(field, &blocks[i])
     });
-    let mut vertices = Vec::new();
-    let mut faces: Vec<Face> = Vec::new();
-    let mut cuts: BTreeMap<(Node, Node), u32> = BTreeMap::new();
-    for (b, v) in blocks.iter().zip(&values) {
+    let mut out = Polygons::default();
+    for (block, values) in blocks.iter().zip(&values) {
         for cell in 0..BLOCK * BLOCK * BLOCK {
-            let o = [cell % BLOCK, cell / BLOCK % BLOCK, cell / (BLOCK * BLOCK)];
-            let corner = |k: usize| {
-                [
-                    o[0] + (k & 1) as i32,
-                    o[1] + (k >> 1 & 1) as i32,
-                    o[2] + (k >> 2) as i32,
-                ]
-            };
-            let value = |k: usize| {
-                let c = corner(k).map(|x| x as usize);
-                v[(c[2] * side + c[1]) * side + c[0]]
-            };
-            let d: [f64; 8] = std::array::from_fn(value);
-            let inside = d.iter().filter(|x| **x < 0.0).count();
-            if inside == 0 || inside == 8 {
-                continue;
-            }
-            let at = |k: usize| {
-                let c = corner(k);
-                [b[0] + c[0], b[1] + c[1], b[2] + c[2]]
-            };
-            for t in TETRAHEDRA {
-                let (ins, out): (Vec<usize>, Vec<usize>) = t.iter().partition(|&&k| d[k] < 0.0);
-                let mut cut = |i: usize, o: usize| {
-                    let (p, q) = (at(i), at(o));
-                    let key = if p < q { (p, q) } else { (q, p) };
-                    *cuts.entry(key).or_insert_with(|| {
-                        let s = d[i] / (d[i] - d[o]);
-                        vertices.push(position(&p) + (position(&q) - position(&p)) * s);
-                        (vertices.len() - 1) as u32
-                    })
-                };
-                let mut push = |f: Face, inner: usize, vertices: &[P3d]| {
-                    let [x, y, z] = f.map(|i| vertices[i as usize]);
-                    let outward = (y - x).cross(&(z - x)).dot(&(x - position(&at(inner)))) > 0.0;
-                    faces.push(if outward { f } else { [f[0], f[2], f[1]] });
-                };
-                match ins.len() {
-                    1 => {
-                        let f = [
-                            cut(ins[0], out[0]),
-                            cut(ins[0], out[1]),
-                            cut(ins[0], out[2]),
-                        ];
-                        push(f, ins[0], &vertices);
-                    }
-                    3 => {
-                        let f = [
-                            cut(ins[0], out[0]),
-                            cut(ins[1], out[0]),
-                            cut(ins[2], out[0]),
-                        ];
-                        // The plane separates the outer corner from any inner one.
-                        push(f, ins[0], &vertices);
-                    }
-                    2 => {
-                        let q = [
-                            cut(ins[0], out[0]),
-                            cut(ins[0], out[1]),
-                            cut(ins[1], out[1]),
-                            cut(ins[1], out[0]),
-                        ];
-                        push([q[0], q[1], q[2]], ins[0], &vertices);
-                        push([q[0], q[2], q[3]], ins[0], &vertices);
-                    }
-                    _ => {}
-                }
+            let cube = Cube::new(block, values, cell);
+            if cube.is_cut() {
+                TETRAHEDRA
+                    .iter()
+                    .for_each(|t| out.add_tetrahedron(&cube, *t));
             }
         }
     }
-    (vertices, faces)
+    (out.vertices, out.faces)
 }
-
-/// Smallest distance value kept at a grid node, metres.
-const NODE_GAP: f64 = 1e-5;

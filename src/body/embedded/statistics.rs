@@ -28,7 +28,7 @@ impl Statistic {
     pub const fn sex(&self) -> f64 {
         0.5 * (self.men[0] - self.women[0])
     }
-    /// What is left of the deviation at a given value of a measure correlated by `r`.
+    /// Standard deviation at a given value of another measure with correlation `r`.
     pub fn residual(&self, r: f64) -> f64 {
         self.deviation() * (1.0 - r * r).sqrt()
     }

@@ -1,13 +1,12 @@
-//! What the embedded body promises.
+//! Tests of the embedded body.
 
-use super::look::{posed, poses};
 use super::statistics as stat;
 use super::*;
 use crate::body::measure::{Measurements, measure};
-use crate::body::{BodyShape, BoneTransforms, JointMotion, Pose};
+use crate::body::{BodyShape, BoneTransforms, JointMotion, Pose, skin};
 use crate::math::{Body, Rigid};
-use crate::mesh::face_normal;
-use crate::par::with_threads;
+use crate::mesh::{face_normal, smallest_angle};
+use crate::par::{Par, with_threads};
 
 fn shape(direction: usize, c: f64) -> BodyShape {
     let mut coefficients = vec![0.0; DIRECTIONS.len()];
@@ -28,7 +27,7 @@ fn volume(t: &Template, v: &[P3]) -> f64 {
 }
 
 #[test]
-fn one_closed_surface_of_the_promised_size() {
+fn surface_is_one_closed_manifold_of_bounded_size() {
     let t = template();
     let (n, f, e) = (
         t.mesh().vertices().len(),
@@ -62,7 +61,7 @@ fn one_closed_surface_of_the_promised_size() {
 #[test]
 fn triangles_are_fit_for_simulation() {
     let t = template();
-    let sine = |i: usize| remesh::smallest_angle(t.mesh().corners(i).map(|p| p.cast::<f64>()));
+    let sine = |i: usize| smallest_angle(t.mesh().corners(i).map(|p| p.cast::<f64>()));
     let worst = (0..t.mesh().faces().len()).map(sine).fold(1.0, f64::min);
     let poor = (0..t.mesh().faces().len())
         .filter(|&i| sine(i) < 0.5)
@@ -202,7 +201,7 @@ fn skeleton_has_the_agreed_joints() {
 }
 
 #[test]
-fn test_poses_are_humanly_possible() {
+fn test_poses_are_within_the_limits() {
     let t = template();
     for (name, set) in poses() {
         let mut pose: Pose<Body> = Pose::rest(t.skeleton(), Rigid::identity());
@@ -214,7 +213,7 @@ fn test_poses_are_humanly_possible() {
 }
 
 #[test]
-fn hinges_bend_the_right_way() {
+fn elbows_bend_forward_and_knees_backward() {
     let t = template();
     let rest = t.personalise(&BodyShape::default());
     for (joint, end, sign) in [
@@ -245,7 +244,7 @@ fn same_bits_on_any_number_of_threads() {
     assert_eq!(once.skeleton(), again.skeleton());
 }
 
-/// Linear blend skinning loses volume inside bends; these bounds hold the tuned weights to what was measured.
+/// Linear blend skinning loses volume inside bends; the bounds are those of the tuned weights.
 #[test]
 fn bends_without_collapsing() {
     let t = template();
@@ -400,7 +399,7 @@ fn sides_stay_apart() {
     }
 }
 
-/// The shape space is linear, the figure is not: how far apart they are at one standard deviation.
+/// The shape space is linear and the figure is not: their distance at one standard deviation is bounded.
 #[test]
 fn linear_directions_stay_near_the_figure() {
     let t = template();
@@ -468,4 +467,45 @@ fn joints_lie_inside() {
             );
         }
     }
+}
+
+/// Vertices of the body in a pose, given as angles by joint, radians.
+fn posed(t: &Template, shape: &BodyShape, set: &[(&str, [f64; 3])]) -> Vec<P3> {
+    let rest = t.personalise(shape);
+    let mut pose: Pose<Body> = Pose::rest(t.skeleton(), Rigid::identity());
+    set.iter().for_each(|(j, a)| pose.set(t.skeleton(), j, a));
+    let mut bones = BoneTransforms::default();
+    pose.bones(t.skeleton(), &rest, &mut bones);
+    let mut out = Vec::new();
+    skin(Par::Rayon, &rest.vertices, t.weights(), &bones, &mut out);
+    out
+}
+
+type Turns = Vec<(&'static str, [f64; 3])>;
+
+/// Named poses, radians.
+fn poses() -> Vec<(&'static str, Turns)> {
+    let q = std::f64::consts::FRAC_PI_4;
+    let both = |j: [&'static str; 2], a: [f64; 3]| [(j[0], a), (j[1], [a[0], -a[1], -a[2]])];
+    let (sh, hip) = (
+        ["left_shoulder", "right_shoulder"],
+        ["left_hip", "right_hip"],
+    );
+    let hinge = |j: [&'static str; 2], a: f64| [(j[0], [a, 0.0, 0.0]), (j[1], [a, 0.0, 0.0])];
+    let mut sit: Turns = both(hip, [-1.5, 0.0, 0.0]).to_vec();
+    sit.extend(hinge(["left_knee", "right_knee"], 1.5));
+    let mut bent: Turns = hinge(["left_elbow", "right_elbow"], 2.0).to_vec();
+    bent.push(("left_hip", [-1.2, 0.0, 0.0]));
+    bent.push(("left_knee", [1.6, 0.0, 0.0]));
+    let mut raised: Turns = both(sh, [0.0, 0.0, 1.9]).to_vec();
+    raised.extend(both(["left_collar", "right_collar"], [0.0, 0.0, 0.3]));
+    vec![
+        ("rest", vec![]),
+        ("t_pose", both(sh, [0.0, 0.0, q]).to_vec()),
+        ("arms_down", both(sh, [0.0, 0.0, -0.62]).to_vec()),
+        ("sitting", sit),
+        ("bent", bent),
+        ("raised", raised),
+        ("forward", both(sh, [0.0, -1.4, 0.3]).to_vec()),
+    ]
 }

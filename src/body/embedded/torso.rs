@@ -1,6 +1,6 @@
 //! Trunk and neck.
 
-use super::field::{Field, Frame, Loft, Solid, Station};
+use super::field::{Field, FieldPrimitive, Frame, Loft, Station};
 use super::figure::{Figure, Joints};
 use crate::math::{P3d, V3d};
 
@@ -69,7 +69,17 @@ fn hump(y: f64, c: f64, r: f64) -> f64 {
     if q > 0.0 { q * q } else { 0.0 }
 }
 
+/// Adds trunk, neck, shoulders and buttocks.
 pub(super) fn trunk(f: &mut Field, fig: &Figure, j: &Joints) {
+    outline(f, fig);
+    neck(f, fig);
+    shoulder(f, fig, j);
+    buttock(f, fig);
+    relief(f, fig);
+}
+
+/// The trunk as one loft.
+fn outline(f: &mut Field, fig: &Figure) {
     let (s, g) = (fig.sex, fig.girth);
     let stations = TRUNK
         .iter()
@@ -90,9 +100,15 @@ pub(super) fn trunk(f: &mut Field, fig: &Figure, j: &Joints) {
         })
         .collect();
     let frame = Frame::upright(P3d::origin());
-    f.add(Solid::Loft(Loft::new(frame, stations, [0.035, 0.03])), 0.02);
+    f.add(
+        FieldPrimitive::Loft(Loft::new(frame, stations, [0.035, 0.03])),
+        0.02,
+    );
+}
 
-    // Neck: leans forward, from between the shoulders into the skull.
+/// A loft that leans forward, from between the shoulders into the skull.
+fn neck(f: &mut Field, fig: &Figure) {
+    let (s, g) = (fig.sex, fig.girth);
     let base = P3d::new(0.0, 1.395, -0.042);
     let axis = Frame::along(base, P3d::new(0.0, 1.560, -0.004), V3d::z());
     let r = |r: f64| r + 0.0047 * s + 0.0027 * g;
@@ -103,8 +119,15 @@ pub(super) fn trunk(f: &mut Field, fig: &Figure, j: &Joints) {
         st(0.08, 0.055, 0.058),
         st(0.15, 0.056, 0.061),
     ];
-    f.add(Solid::Loft(Loft::new(axis, stations, [0.02, 0.02])), 0.03);
+    f.add(
+        FieldPrimitive::Loft(Loft::new(axis, stations, [0.02, 0.02])),
+        0.03,
+    );
+}
 
+/// Shoulder girdle, deltoid and the muscles around the armpit.
+fn shoulder(f: &mut Field, fig: &Figure, j: &Joints) {
+    let s = fig.sex;
     // Trapezius and shoulder girdle: from the neck to the acromion.
     let acromion = P3d::new(
         j.shoulder.x + 0.002,
@@ -147,16 +170,17 @@ pub(super) fn trunk(f: &mut Field, fig: &Figure, j: &Joints) {
         0.036,
         0.03,
     );
-    // Buttock.
-    let seat = 0.006 * g - 0.005 * s + 0.006 * fig.hip;
+}
+
+/// Buttock and the fold below it.
+fn buttock(f: &mut Field, fig: &Figure) {
+    let seat = 0.006 * fig.girth - 0.005 * fig.sex + 0.006 * fig.hip;
     f.ellipsoid(
         [0.074, 0.893, -0.058],
         [0.080 + seat, 0.098 + seat, 0.076 + seat],
         0.045,
     );
-    // The fold below it.
     f.bump([0.085, 0.806, -0.105], [0.075, 0.036, 0.055], -0.0045);
-    relief(f, fig);
 }
 
 /// Muscle and fat under the skin.

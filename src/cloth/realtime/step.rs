@@ -483,7 +483,7 @@ fn advance(
         let n = steps(m.h, span);
         let h = (span / n as f64) as f32;
         let borders = HaloExchange::new(patches.len());
-        par::rounds(model.config.par, patches, n, |s, k, p| {
+        par::lockstep(model.config.par, patches, n, |s, k, p| {
             let f = &m.patches[k];
             if s > 0 {
                 borders.receive(s - 1, f, &mut p.motion);

@@ -119,7 +119,7 @@ pub(super) fn run(
                 .as_mut()
                 .map_or(substeps, |f| f.begin(par, &x, &velocity));
             let steps = segment.min(substeps - s0);
-            par::rounds(par, &mut scratch, steps, |r, k, w| {
+            par::lockstep(par, &mut scratch, steps, |r, k, w| {
                 let f = &fabrics[k];
                 if r == 0 {
                     let all = || f.vertices.iter().map(|v| *v as usize);

@@ -8,13 +8,13 @@ use crate::dressing::skin_binding::SkinBinding;
 use crate::formats::obj::ObjMesh;
 use crate::formats::sewn_obj::SewnObj;
 use crate::garment::import::{
-    coarsen, from_mesh, median_edge, panels_in_metres, remesh, some_faces, unfold,
+    coarsen, from_mesh, median_edge, panels_in_metres, some_faces, unfold,
 };
 use crate::garment::{
     AnchorKind, AnchorSet, GarmentError, GarmentKind, GarmentMesh, Material, Region, rest_area,
 };
 use crate::math::P3;
-use crate::mesh::{Face, Topology, TriMesh, face_normal};
+use crate::mesh::{Face, Topology, TriMesh, face_normal, remesh};
 
 /// Share of the wanted edge length below which panels are coarsened: finer ones cannot be simulated in time.
 const FINER: f64 = 0.7;

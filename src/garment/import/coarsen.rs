@@ -1,18 +1,19 @@
-//! Fewer vertices for panels that were triangulated finer than they can be simulated in time: edges are collapsed in the
-//! flat panels, so that rest shapes stay exact, and along both sides of a seam at once.
+//! Coarsening of panels that are triangulated too finely to be simulated in time.
+//!
+//! Edges are collapsed in the flat panels, so that rest shapes stay exact, and along both sides of a seam at once.
 
 use crate::garment::{GarmentMesh, RenderMesh};
 use crate::math::P3;
 use crate::mesh::Face;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Edges shorter than this times the target are collapsed (Botsch & Kobbelt 2004) …
+/// Edges shorter than this times the target are collapsed (Botsch & Kobbelt 2004).
 const COLLAPSE: f64 = 4.0 / 5.0;
-/// … where no edge becomes longer than this times the target.
+/// No collapse makes an edge longer than this times the target.
 const LONGEST: f64 = 1.6;
 /// Smallest angle that a collapse may make, or none smaller than there was, degrees.
 const ANGLE: f64 = 18.0;
-/// How far seams and rims may leave their course, over the target.
+/// Largest distance of seams and rims from their course, over the target edge length.
 const OFF_COURSE: f64 = 0.1;
 /// Passes over all edges: each may halve the number of vertices.
 const PASSES: usize = 16;
@@ -20,7 +21,7 @@ const PASSES: usize = 16;
 type P2 = [f64; 2];
 
 struct Coarsener {
-    /// Over simulation vertices, and over those of the panels; empty once collapsed.
+    /// Faces over simulation vertices and over those of the panels; `None` once collapsed.
     faces: Vec<Option<(Face, Face)>>,
     rest: Vec<[P2; 3]>,
     around: Vec<Vec<u32>>,
@@ -51,11 +52,11 @@ fn quality(t: &[P2; 3]) -> f64 {
     }
 }
 
-/// Where a panel's vertex goes: the panel's vertex that it becomes and its place.
+/// Targets of a collapse: the panel vertex that each one becomes, and its place.
 type Moves = BTreeMap<u32, (u32, P2)>;
 
 impl Coarsener {
-    /// Edges short enough, the shortest first.
+    /// Edges to collapse, the shortest first.
     fn short(&self) -> Vec<(u32, u32)> {
         let mut all = BTreeMap::new();
         for (f, t) in self
@@ -78,14 +79,14 @@ impl Coarsener {
         out.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
         out.into_iter().map(|(e, _)| e).collect()
     }
-    fn near(&self, v: u32) -> BTreeSet<u32> {
+    fn neighbours(&self, v: u32) -> BTreeSet<u32> {
         let faces = self.around[v as usize]
             .iter()
             .filter_map(|f| self.faces[*f as usize]);
         faces.flat_map(|f| f.0).filter(|w| *w != v).collect()
     }
-    /// What collapsing `v` into `w` does to the panels, if it may be done.
-    fn may(&self, v: u32, w: u32) -> Option<Moves> {
+    /// Moves of the panels' vertices when `v` collapses into `w`; `None` when that is not allowed.
+    fn allowed_moves(&self, v: u32, w: u32) -> Option<Moves> {
         let here = || {
             self.around[v as usize]
                 .iter()
@@ -117,7 +118,7 @@ impl Coarsener {
             }
         }
         if moves.len() != rings.len()
-            || self.near(v).intersection(&self.near(w)).count() != opposite.len()
+            || self.neighbours(v).intersection(&self.neighbours(w)).count() != opposite.len()
         {
             return None;
         }
@@ -188,7 +189,7 @@ pub fn median_edge(g: &GarmentMesh) -> f64 {
     l.get(l.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// The same panels and seams with edges of about `target` metres at rest, on some of the vertices, and where these lie.
+/// The same panels and seams on some of the vertices, with edges of about `target` metres at rest; and their positions.
 pub fn coarsen(g: &GarmentMesh, positions: &[P3], target: f64) -> (GarmentMesh, Vec<P3>) {
     let mut around = vec![Vec::new(); g.vertices];
     for (i, f) in g.faces.iter().enumerate() {
@@ -209,14 +210,14 @@ pub fn coarsen(g: &GarmentMesh, positions: &[P3], target: f64) -> (GarmentMesh, 
     for _ in 0..PASSES {
         let mut gone = BTreeSet::new();
         for (a, b) in c.short() {
-            // A vertex that took a neighbour over waits for the next pass, so that all panels thin out evenly.
+            // Each vertex takes part in one collapse a pass, so that all panels thin out evenly.
             if gone.contains(&a) || gone.contains(&b) {
                 continue;
             }
-            let way = [(a, b), (b, a)]
+            let collapse = [(a, b), (b, a)]
                 .into_iter()
-                .find_map(|(v, w)| Some((v, w, c.may(v, w)?)));
-            if let Some((v, w, moves)) = way {
+                .find_map(|(v, w)| Some((v, w, c.allowed_moves(v, w)?)));
+            if let Some((v, w, moves)) = collapse {
                 c.collapse(v, w, &moves);
                 gone.extend([v, w]);
             }
@@ -348,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_coarse_already_stays() {
+    fn a_coarse_mesh_stays_as_it_is() {
         let p = library::pattern("skirt", Size::M).expect("pattern");
         let g = GarmentMesh::sew(
             &p,

@@ -4,11 +4,9 @@ mod coarsen;
 mod file;
 mod garmentcode;
 mod mesh;
-mod remesh;
 
 pub(crate) use super::flat_triangle::unfold;
 pub use coarsen::{coarsen, median_edge};
 pub use file::{MeshFile, read_mesh, some_faces, split};
 pub use garmentcode::from_garmentcode;
 pub use mesh::{ImportedMesh, from_mesh, panels_in_metres};
-pub use remesh::remesh;
