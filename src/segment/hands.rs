@@ -26,7 +26,7 @@ const MOST_PORES: f32 = 0.03;
 const HAND_LENGTH: f32 = 0.15;
 
 /// Components of the body.
-pub(super) struct BodyParts<'a> {
+pub(super) struct BodyComponents<'a> {
     pub(super) map: &'a ComponentMap,
     /// True for components of the body, shape `[components]`.
     pub(super) members: &'a [bool],
@@ -51,7 +51,7 @@ impl Candidate {
 }
 
 /// Middles of the hands beyond dark sleeves, camera frame, metres.
-pub(super) fn find_hands(cloud: &OrganisedCloud, body: &BodyParts<'_>) -> Vec<P3> {
+pub(super) fn find_hands(cloud: &OrganisedCloud, body: &BodyComponents<'_>) -> Vec<P3> {
     let candidates = candidates(body);
     if candidates.is_empty() {
         return Vec::new();
@@ -84,7 +84,7 @@ fn cell_position(cloud: &OrganisedCloud, cell: usize) -> (i32, i32) {
 }
 
 /// Groups of small components at the depth of the body; fingers are components of their own.
-fn candidates(body: &BodyParts<'_>) -> Vec<Candidate> {
+fn candidates(body: &BodyComponents<'_>) -> Vec<Candidate> {
     let small = |c: &&Component| {
         // Without a background the surroundings of the body are a hole: there a hand must be separate.
         c.id != body.main.id
@@ -117,14 +117,14 @@ fn candidates(body: &BodyParts<'_>) -> Vec<Candidate> {
 }
 
 /// True for a cell of the body that is no hand; a hand beside the hip already belongs to the body.
-fn is_trunk(body: &BodyParts<'_>, cell: usize) -> bool {
+fn is_trunk(body: &BodyComponents<'_>, cell: usize) -> bool {
     body.map
         .member(cell, body.members)
         .is_some_and(|c| c.area >= MOST_AREA)
 }
 
 /// True if single missing readings are all over the body (`sampled` of its cells, every n-th).
-fn is_porous(cloud: &OrganisedCloud, body: &BodyParts<'_>, sampled: usize) -> bool {
+fn is_porous(cloud: &OrganisedCloud, body: &BodyComponents<'_>, sampled: usize) -> bool {
     let columns = cloud.size().0;
     let between = |i: usize, step: usize| {
         i >= step
@@ -140,7 +140,7 @@ fn is_porous(cloud: &OrganisedCloud, body: &BodyParts<'_>, sampled: usize) -> bo
 /// True if the straight line of cells from the candidate to the body runs through missing readings.
 fn is_joined_by_hole(
     cloud: &OrganisedCloud,
-    body: &BodyParts<'_>,
+    body: &BodyComponents<'_>,
     candidate: &Candidate,
     [(u, v), (to_u, to_v)]: [(i32, i32); 2],
 ) -> bool {

@@ -2,7 +2,7 @@
 
 use super::ScenePlanes;
 use super::components::{Component, ComponentMap, RIM_CELLS};
-use super::hands::{BodyParts, find_hands};
+use super::hands::{BodyComponents, find_hands};
 use super::plane_bands::PlaneBands;
 use crate::math::P3;
 use crate::spatial::{Label, OrganisedCloud};
@@ -112,7 +112,7 @@ pub fn find_person(
             out.cells.push(i as u32);
         }
     }
-    let body = BodyParts {
+    let body = BodyComponents {
         map,
         members: &members,
         main,
