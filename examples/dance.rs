@@ -13,8 +13,8 @@ use tryon::body::Template;
 use tryon::cloth::realtime::Config;
 use tryon::contact::MapDetail;
 use tryon::dressing::Dressed;
-use tryon::evaluate::Solid;
-use tryon::evaluate::dance::{DanceReport, Outfit, load};
+use tryon::evaluate::dance::{DanceReport, load};
+use tryon::evaluate::{OutfitSpec, Solid};
 use tryon::math::P3;
 use tryon::par::with_threads;
 
@@ -68,7 +68,8 @@ fn find_sunken(
 
 struct Args {
     data: PathBuf,
-    outfit: Outfit,
+    outfit: OutfitSpec,
+    seconds: f64,
     threads: usize,
     /// Number of sunken vertices to list.
     deepest: usize,
@@ -81,12 +82,12 @@ struct Args {
 fn args() -> Args {
     let mut a = Args {
         data: PathBuf::from("../shared/data/garments/cipc_apache2"),
-        outfit: Outfit {
+        outfit: OutfitSpec {
             garments: vec!["tshirt".into(), "skirt".into()],
             edge: 0.0118,
             config: Config::default(),
-            seconds: 4.8,
         },
+        seconds: 4.8,
         threads: 2,
         deepest: 0,
         out: None,
@@ -100,7 +101,7 @@ fn args() -> Args {
             "--data" => a.data = value().into(),
             "--garment" => a.outfit.garments = value().split('+').map(str::to_owned).collect(),
             "--edge" => a.outfit.edge = value().parse().expect("metres"),
-            "--seconds" => a.outfit.seconds = value().parse().expect("seconds"),
+            "--seconds" => a.seconds = value().parse().expect("seconds"),
             "--threads" => a.threads = value().parse().expect("a number"),
             "--sharpest" => a.outfit.config.sharpest = value().parse().expect("a share"),
             "--most-steps" => a.outfit.config.most_steps = value().parse().expect("a number"),
@@ -138,7 +139,7 @@ fn main() {
     let mut next = a.from;
     let (mut steps, mut sunken) = (0, Vec::new());
     let report = with_threads(a.threads, || {
-        dance.run(&a.outfit, |time, body, dressed| {
+        dance.run(&a.outfit, a.seconds, |time, body, dressed| {
             steps += 1;
             if a.deepest > 0 && steps % LIST_EVERY == 0 {
                 find_sunken(&dance.template, time, body, dressed, &mut sunken);

@@ -1,51 +1,52 @@
 //! Sleeping cloth on a body that stands, waves or walks off: share asleep, time of a step, distance from the truth.
 //!
-//! `cargo run --release --example standing -- [--garment skirt+tshirt] [--edge 0.0118] [--threads 2] [--calls 120]
+//! `cargo run --release --example standing -- [--garment skirt+tshirt] [--edge 0.0118] [--threads 2] [--steps 120]
 //!   [--rounds 2] [--arms 75]`
 //!
 //! `--arms`: degrees below the horizontal; 75 hang, without it they are off the trunk.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
 
 use tryon::cloth::realtime::Config;
-use tryon::evaluate::cloth_rest::{Doing, Standing, Wearing};
+use tryon::evaluate::OutfitSpec;
+use tryon::evaluate::rest::{Motion, RestingSubject};
 use tryon::par::with_threads;
 
 fn main() {
-    let mut wearing = Wearing {
+    let mut outfit = OutfitSpec {
         garments: vec!["skirt".into(), "tshirt".into()],
         edge: 0.0118,
         config: Config::default(),
-        arms: None,
     };
-    let (mut threads, mut calls, mut rounds) = (2, 120, 2);
+    let mut arms = None;
+    let (mut threads, mut steps, mut rounds) = (2, 120, 2);
     let mut it = std::env::args().skip(1);
     while let Some(flag) = it.next() {
         let value = it.next().expect("a value");
         match flag.as_str() {
-            "--garment" => wearing.garments = value.split('+').map(str::to_owned).collect(),
-            "--edge" => wearing.edge = value.parse().expect("metres"),
+            "--garment" => outfit.garments = value.split('+').map(str::to_owned).collect(),
+            "--edge" => outfit.edge = value.parse().expect("metres"),
             "--threads" => threads = value.parse().expect("a number"),
-            "--calls" => calls = value.parse().expect("a number"),
-            "--arms" => wearing.arms = Some(value.parse::<f64>().expect("degrees").to_radians()),
+            "--steps" => steps = value.parse().expect("a number"),
+            "--arms" => arms = Some(value.parse::<f64>().expect("degrees").to_radians()),
             "--rounds" => rounds = value.parse().expect("a number"),
             other => panic!("{other} is not known"),
         }
     }
     with_threads(threads, || {
-        let mut body = Standing::new(&wearing).expect("dressed");
+        let mut body = RestingSubject::new(&outfit, arms).expect("dressed");
         for (what, base, noise) in [("exact", Config::default(), 0.0), ("tracked", Config::tracked(), 1.5e-3f32)] {
-            for doing in [Doing::Standing, Doing::Waving, Doing::Lifting, Doing::WalkingOff] {
+            for motion in [Motion::Standing, Motion::Waving, Motion::Lifting, Motion::WalkingOff] {
                 let whole = Config { sleep_regions: false, ..base.clone() };
                 let never = Config { sleep: false, ..base.clone() };
                 // In turn, so that the machine is equally fast for all.
                 for _ in 0..rounds {
-                    let truth = body.run(&never, doing, calls, noise).expect("a run");
-                    println!("{what} {doing:?}, never asleep: {:.2} ms (median; mean {:.2})", truth.median_ms(), truth.mean_ms());
+                    let truth = body.run(&never, motion, steps, noise).expect("a run");
+                    println!("{what} {motion:?}, never asleep: {:.2} ms (median; mean {:.2})", truth.median_ms(), truth.mean_ms());
                     for (name, config) in [("whole outfit", &whole), ("by region", &base)] {
-                        let r = body.run(config, doing, calls, noise).expect("a run");
+                        let r = body.run(config, motion, steps, noise).expect("a run");
                         let [rms, p99, most] = r.apart(&truth);
                         println!(
-                            "{what} {doing:?}, {name}: {:.2} ms (median; mean {:.2}), asleep {:.0} %, {:.2} mm rms, {:.2} p99, {:.1} most; deepest {:.2} mm",
+                            "{what} {motion:?}, {name}: {:.2} ms (median; mean {:.2}), asleep {:.0} %, {:.2} mm rms, {:.2} p99, {:.1} most; deepest {:.2} mm",
                             r.median_ms(), r.mean_ms(), r.mean_asleep() * 100.0, rms * 1e3, p99 * 1e3, most * 1e3, r.penetration * 1e3
                         );
                     }

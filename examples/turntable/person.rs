@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
-use tryon::evaluate::cloth_rest::lower_arms;
+use tryon::evaluate::rest::lower_arms;
 use tryon::math::{Body, P3, Rigid, World};
 use tryon::tracking::{self, TrackerConfig, TrackerModel, TrackerState};
 

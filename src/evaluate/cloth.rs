@@ -7,11 +7,10 @@ use crate::math::P3;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-/// What is run: scene names (files of the scenes folder without extension), and whether the slow methods run on more
-/// than a thousand vertices.
+/// Scenes and extent of the comparison of solvers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClothBench {
-    /// Scenes.
+    /// Scene names: files of the scenes folder without extension.
     pub scenes: Vec<String>,
     /// All methods on the large scenes too (minutes).
     pub full: bool,
@@ -68,7 +67,7 @@ pub fn method_name(m: Method) -> &'static str {
     }
 }
 
-/// Runs every method on every scene of `folder`; `progress` hears of each row.
+/// Runs every method on every scene of `folder`; `progress` receives each row.
 ///
 /// # Errors
 /// A scene that cannot be read. A method that diverges is a row with error `diverged` 1.

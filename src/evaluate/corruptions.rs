@@ -1,10 +1,10 @@
-//! What goes wrong in front of a camera, done to a scene on purpose.
+//! Corruptions of a depth sequence: noise, lost readings, dropped frames, occlusion, clipping.
 
 use super::{Scene, SceneTruth};
 use crate::camera::DepthImage;
 use rand::Rng;
 
-/// Chooses the pixels that are spoilt.
+/// Seed of the corrupted pixels.
 const SEED: u64 = 41;
 
 impl Scene {
@@ -54,7 +54,7 @@ impl Scene {
         self.truth = self.truth.into_iter().step_by(n.max(1)).collect();
         self
     }
-    /// The frames of a range show nothing; nobody is expected to be seen in them.
+    /// The frames of a range show nothing; their truth is empty.
     #[must_use]
     pub fn blind(mut self, range: std::ops::Range<usize>) -> Self {
         for i in range {
@@ -68,7 +68,7 @@ impl Scene {
         self
     }
     /// Readings within `radius` (metres) of the line between two joints give no return, as black sleeves do. Frames without
-    /// truth stay as they are, and so do all when the scene lacks a joint.
+    /// truth keep their readings, as do all frames if the scene lacks a joint.
     #[must_use]
     pub fn without_return(mut self, from: &str, to: &str, radius: f32) -> Self {
         let find = |n: &str| self.joint_names.iter().position(|m| m == n);
@@ -114,7 +114,7 @@ impl Scene {
         }
         self
     }
-    /// Another scene of the same camera is seen in the same room: of each pixel the nearer reading counts. Truth stays.
+    /// Adds another scene of the same camera: the nearer reading of each pixel counts. Truth stays.
     #[must_use]
     pub fn with(mut self, other: &Scene) -> Self {
         for (frame, second) in self.frames.iter_mut().zip(&other.frames) {
@@ -126,8 +126,8 @@ impl Scene {
         }
         self
     }
-    /// A ball of `radius` (metres) is held in front of a joint. Frames without truth stay as they are, and so do all when
-    /// the scene lacks the joint.
+    /// Puts a ball of `radius` (metres) in front of a joint. Frames without truth keep their readings, as do all frames
+    /// if the scene lacks the joint.
     #[must_use]
     pub fn holding(mut self, joint: &str, radius: f64) -> Self {
         let Some(j) = self.joint_names.iter().position(|m| m == joint) else {
@@ -187,8 +187,8 @@ mod tests {
             |s: &Scene| s.frames[1].depth.data().iter().filter(|d| **d > 0).count() as f64;
         let all = readings(&scene);
         assert!((readings(&scene.clone().thinned(0.9)) / all - 0.1).abs() < 0.01);
-        let spoilt = scene.clone().corrupted(0.1);
-        let changed = spoilt.frames[0]
+        let corrupted = scene.clone().corrupted(0.1);
+        let changed = corrupted.frames[0]
             .depth
             .data()
             .iter()

@@ -1,12 +1,11 @@
-//! An outfit on a dancing body that the tracker has never seen: time, stretch and penetration over the whole dance.
+//! Outfit on a dancing body without a known template: time, stretch and penetration over the whole dance.
 
 use super::inside::Solid;
-use super::{EvaluateError, Row};
+use super::{EvaluateError, OutfitSpec, Row};
 use crate::body::{BodyShape, Pose, RestBody, Template, measure};
-use crate::cloth::realtime::{Config, Input, State, Workspace, step};
-use crate::dressing::{DressOptions, Dressed, dress, rig_standing, suggest};
+use crate::cloth::realtime::{Input, State, Workspace, step};
+use crate::dressing::{Dressed, rig_standing, suggest};
 use crate::formats::obj::read_obj;
-use crate::garment::library;
 use crate::math::{Body, P3, Rigid, World};
 use crate::mesh::Face;
 use std::io::Read;
@@ -17,69 +16,56 @@ use std::time::Instant;
 /// The dance of `../shared/data/garments/cipc_apache2` (Apache-2.0): 121 bodies of 12,811 vertices.
 const BODIES: &str = "rumba_dancing_121x12811x3_f32le.bin.gz";
 const FACES: &str = "wm2_15k.obj";
-/// Time between two of its bodies, s.
+/// Time between two bodies (s).
 const INTERVAL: f64 = 0.04;
-/// Time that the simulator is given at once, s.
-const CALL: f64 = 1.0 / 60.0;
-/// Every so many calls penetration is measured.
-const LOOK_EVERY: usize = 4;
+/// Time of a step (s).
+const DT: f64 = 1.0 / 60.0;
+/// Steps between two measurements of penetration.
+const PENETRATION_INTERVAL: usize = 4;
 
-/// A body that moves, with a skeleton found for it.
+/// Moving body with a fitted skeleton.
 pub struct Dance {
     /// The standing body, rigged.
     pub template: Arc<Template>,
-    /// It as it is.
+    /// Its rest shape.
     pub rest: RestBody,
-    /// Vertices of each body, world, metres, shape `[bodies][vertices]`.
+    /// Vertices of each body, world, metres, shape `(bodies, vertices)`.
     pub bodies: Vec<Vec<P3>>,
-    /// How far the fitted template is from the body's vertices, mean, metres.
+    /// Mean distance between the fitted template and the body's vertices (m).
     pub fit: f64,
 }
 
-/// What is worn and how it is simulated.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Outfit {
-    /// Names of the library's garments; sizes are those suggested for the body.
-    pub garments: Vec<String>,
-    /// Length of the triangles' edges, metres.
-    pub edge: f64,
-    /// Solver.
-    pub config: Config,
-    /// How much of the dance, s.
-    pub seconds: f64,
-}
-
-/// How it went.
+/// Cost and quality of one dance.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DanceReport {
     /// Vertices of all garments.
     pub vertices: usize,
-    /// Dressing, ms.
+    /// Time of dressing (ms).
     pub dressing_ms: f64,
-    /// Each call, for 1/60 s, ms.
+    /// Run time of each step of 1/60 s (ms).
     pub ms: Vec<f64>,
-    /// Of it depth maps, contact and stepping, means, ms.
+    /// Mean share of depth maps, contact and solver in it (ms).
     pub stages_ms: [f64; 3],
     /// 99th percentile of the edges' stretch over the whole dance.
     pub p99_strain: f64,
     /// Depths of vertices inside the body over the whole dance, metres: 99th percentile, largest.
     pub penetration: [f64; 2],
-    /// The same over vertices that lie in one limb only: between two that lie in each other there is no outside.
+    /// Depths over vertices inside one limb only; two limbs that overlap have no outside between them.
     pub penetration_single: [f64; 2],
-    /// Most body vertices that were taken to lie inside another limb.
+    /// Largest number of body vertices inside another limb.
     pub buried: usize,
     /// Smallest share of its stiffness that a garment kept.
     pub softened: f64,
-    /// Calls that threw their result away.
+    /// Steps that kept the last good state.
     pub faults: usize,
 }
 
 impl DanceReport {
-    /// Median of the calls, ms.
+    /// Median run time of a step (ms).
     pub fn median_ms(&self) -> f64 {
         percentile(&mut self.ms.clone(), 0.5)
     }
-    /// As a row of a benchmark.
+    /// Row of a benchmark.
     pub fn row(&self, method: &str) -> Row {
         let mm = |m: f64| m * 1e3;
         Row::new("dance", method, self.median_ms())
@@ -98,18 +84,19 @@ fn percentile(values: &mut [f64], share: f64) -> f64 {
         .unwrap_or(0.0)
 }
 
-/// Reads the dance and finds a skeleton for its body: the embedded template is tracked onto a picture of it.
+fn fault(why: impl ToString) -> EvaluateError {
+    EvaluateError::Scene {
+        scene: "dance".into(),
+        why: why.to_string(),
+    }
+}
+
+/// Reads the dance and fits a skeleton to its body: the embedded template is tracked onto a rendering of it.
 ///
 /// # Errors
 /// A file that is missing or does not fit the others.
 pub fn load(folder: &Path) -> Result<Dance, EvaluateError> {
-    let fault = |why: String| EvaluateError::Scene {
-        scene: "dance".into(),
-        why,
-    };
-    let faces = read_obj(&folder.join(FACES))
-        .map_err(|e| fault(e.to_string()))?
-        .mesh;
+    let faces = read_obj(&folder.join(FACES)).map_err(fault)?.mesh;
     let mut bytes = Vec::new();
     std::fs::File::open(folder.join(BODIES))
         .and_then(|f| flate2::read::GzDecoder::new(f).read_to_end(&mut bytes))
@@ -136,9 +123,7 @@ pub fn load(folder: &Path) -> Result<Dance, EvaluateError> {
     let first = bodies
         .first()
         .ok_or_else(|| fault(format!("{BODIES}: empty")))?;
-    let mesh = faces
-        .with_vertices(first.clone())
-        .map_err(|e| fault(e.to_string()))?;
+    let mesh = faces.with_vertices(first.clone()).map_err(fault)?;
     let (template, fit) = rig_standing(mesh).map_err(fault)?;
     let rest = template.personalise(&BodyShape::default());
     Ok(Dance {
@@ -150,7 +135,7 @@ pub fn load(folder: &Path) -> Result<Dance, EvaluateError> {
 }
 
 impl Dance {
-    /// The body at a time, between the two given ones nearest to it.
+    /// Body at a time, interpolated between its two neighbours (m).
     pub fn body(&self, time: f64) -> Vec<P3> {
         let at = (time / INTERVAL).clamp(0.0, (self.bodies.len() - 1) as f64);
         let (i, share) = (at as usize, at.fract() as f32);
@@ -161,53 +146,36 @@ impl Dance {
             .map(|(a, b)| a + (b - a) * share)
             .collect()
     }
-    /// Length of the dance, s.
+    /// Length of the dance (s).
     pub fn seconds(&self) -> f64 {
         (self.bodies.len() - 1) as f64 * INTERVAL
     }
-    /// Dresses the standing body.
+    /// Dresses the standing body in the suggested sizes.
     ///
     /// # Errors
     /// A garment that is not known or cannot be put on.
-    pub fn dress(&self, outfit: &Outfit) -> Result<Dressed, EvaluateError> {
-        let fault = |why: String| EvaluateError::Scene {
-            scene: "dance".into(),
-            why,
+    pub fn dress(&self, outfit: &OutfitSpec) -> Result<Dressed, EvaluateError> {
+        let measures = measure::measure(&self.template, &self.rest).map_err(fault)?;
+        let size = |garment: &str| {
+            let suggested = suggest(garment, &measures).map_err(|e| e.to_string())?;
+            Ok(suggested.size)
         };
-        let measures =
-            measure::measure(&self.template, &self.rest).map_err(|e| fault(e.to_string()))?;
-        let patterns = outfit
-            .garments
-            .iter()
-            .map(|g| {
-                let size = suggest(g, &measures)
-                    .map_err(|e| fault(e.to_string()))?
-                    .size;
-                library::pattern(g, size).map_err(|e| fault(e.to_string()))
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        let mut options = DressOptions {
-            config: outfit.config.clone(),
-            ..DressOptions::default()
-        };
-        options.triangulation.edge_length = outfit.edge;
         let standing = Pose::rest(self.template.skeleton(), Rigid::<World, Body>::identity());
-        dress(&self.template, &self.rest, &standing, &patterns, &options)
-            .map_err(|e| fault(e.to_string()))
+        outfit
+            .dress(&self.template, &self.rest, &standing, size)
+            .map_err(fault)
     }
-    /// Dances in an outfit; `frame` sees time, body and garments after each call.
+    /// Simulates an outfit over the first `seconds` of the dance; `frame` receives time, body and garments after each
+    /// step.
     ///
     /// # Errors
-    /// What keeps the outfit from being put on or simulated.
+    /// A garment that cannot be put on or simulated.
     pub fn run(
         &self,
-        outfit: &Outfit,
+        outfit: &OutfitSpec,
+        seconds: f64,
         mut frame: impl FnMut(f64, &[P3], &Dressed),
     ) -> Result<DanceReport, EvaluateError> {
-        let fault = |why: String| EvaluateError::Scene {
-            scene: "dance".into(),
-            why,
-        };
         let mut dressed = self.dress(outfit)?;
         let mut report = DanceReport {
             vertices: dressed
@@ -222,9 +190,9 @@ impl Dance {
         };
         let (mut work, mut depths, mut single, mut strain) =
             (Workspace::default(), Vec::new(), Vec::new(), Vec::new());
-        let calls = (outfit.seconds.min(self.seconds()) / CALL) as usize;
-        for call in 1..=calls {
-            let time = call as f64 * CALL;
+        let steps = (seconds.min(self.seconds()) / DT) as usize;
+        for index in 1..=steps {
+            let time = index as f64 * DT;
             let body = self.body(time);
             let started = Instant::now();
             let r = step(
@@ -232,25 +200,25 @@ impl Dance {
                 &mut dressed.state,
                 &Input {
                     body: &body,
-                    dt: CALL,
+                    dt: DT,
                 },
                 &mut work,
             )
-            .map_err(|e| fault(e.to_string()))?;
+            .map_err(fault)?;
             report.ms.push(started.elapsed().as_secs_f64() * 1e3);
             for (sum, part) in report.stages_ms.iter_mut().zip([
                 r.stages_ms.maps,
                 r.stages_ms.contact,
                 r.stages_ms.solve,
             ]) {
-                *sum += part / calls as f64;
+                *sum += part / steps as f64;
             }
             strain.push(r.p99_strain);
             report.buried = report.buried.max(r.buried);
             report.softened = report.softened.min(r.softened);
             report.faults += usize::from(r.kept_last_good.is_some());
-            if call % LOOK_EVERY == 0 {
-                look(
+            if index % PENETRATION_INTERVAL == 0 {
+                measure_depths(
                     &dressed.state,
                     &body,
                     self.template.mesh().faces(),
@@ -267,8 +235,14 @@ impl Dance {
     }
 }
 
-/// How deep each garment vertex lies in the body.
-fn look(state: &State, body: &[P3], faces: &[Face], depths: &mut Vec<f64>, single: &mut Vec<f64>) {
+/// Appends the depth of each garment vertex in the body.
+fn measure_depths(
+    state: &State,
+    body: &[P3],
+    faces: &[Face],
+    depths: &mut Vec<f64>,
+    single: &mut Vec<f64>,
+) {
     let solid = Solid::new(body, faces);
     for p in state.garments.iter().flat_map(|g| &g.positions) {
         let depth = f64::from(solid.depth(p));

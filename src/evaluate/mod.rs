@@ -4,18 +4,23 @@
 
 pub mod ablation;
 pub mod cloth;
-pub mod cloth_rest;
+mod corruptions;
 pub mod dance;
+mod error;
 mod inside;
+mod outfit;
 mod plot;
+pub mod rest;
 mod scene;
 pub mod scenes;
-mod spoil;
 pub mod stills;
 mod table;
 pub mod tracking;
+mod write;
 
+pub use error::EvaluateError;
 pub use inside::Solid;
+pub use outfit::OutfitSpec;
 pub use plot::run_time_against_error;
 pub use scene::{Scene, SceneTruth};
-pub use table::{EvaluateError, Row, Table};
+pub use table::{Row, Table};

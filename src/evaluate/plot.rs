@@ -1,6 +1,6 @@
 //! Run time against error as an SVG picture: the lower left corner is where one wants to be.
 
-use super::table::{EvaluateError, Table};
+use super::{EvaluateError, Table};
 use plotters::prelude::*;
 
 /// Size of a plot, pixels.

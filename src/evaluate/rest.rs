@@ -1,10 +1,10 @@
-//! Someone who stands, waves one arm and walks off, to see what of her clothes need not be computed.
+//! Sleeping cloth under test: a subject who stands, waves one arm or walks off.
 
-use super::EvaluateError;
+use super::{EvaluateError, OutfitSpec};
 use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use crate::cloth::realtime::{Config, Input, State, StepReport, Workspace, step};
-use crate::dressing::{DressOptions, Dressed, dress};
-use crate::garment::{Size, library};
+use crate::dressing::Dressed;
+use crate::garment::Size;
 use crate::math::{Body, P3, Rigid, V3, V3d, World, log_so3};
 use crate::par::Par;
 use nalgebra::UnitQuaternion;
@@ -12,91 +12,71 @@ use rand::{Rng, SeedableRng};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Time of a call, s.
+/// Time of a step (s).
 const DT: f64 = 1.0 / 30.0;
-/// Calls before anything moves: long enough to fall asleep.
+/// Steps before anything moves: long enough to fall asleep.
 const QUIET: usize = 60;
 
-/// What is worn.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Wearing {
-    /// Names of the library's garments, size M.
-    pub garments: Vec<String>,
-    /// Length of the triangles' edges, metres.
-    pub edge: f64,
-    /// The solver while dressing.
-    pub config: Config,
-    /// Angle of straight arms below the horizontal, rad; as in the rest pose (off the trunk) if there is none.
-    pub arms: Option<f64>,
-}
-
-/// What the person does after she has stood still for two seconds.
+/// Motion of the subject after two seconds at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Doing {
-    /// Nothing.
+pub enum Motion {
+    /// None.
     Standing,
-    /// Waves the left forearm once in two seconds, 0.6 rad to each side, and the upper arm by a third of that.
+    /// Left forearm waved once in two seconds, 0.6 rad to each side, and the upper arm by a third of that.
     Waving,
-    /// Lifts the left arm by 0.9 rad and lowers it within two seconds, which drags the shirt's hem along.
+    /// Left arm lifted by 0.9 rad and lowered within two seconds; it drags the hem of the shirt.
     Lifting,
-    /// Walks off at 0.6 m/s.
+    /// Walk at 0.6 m/s.
     WalkingOff,
 }
 
-/// How it went while she did that.
+/// Cost and result of one run, without its rest at the beginning.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RestReport {
-    /// Each call, for 1/30 s, ms.
+    /// Run time of each step of 1/30 s (ms).
     pub ms: Vec<f64>,
-    /// Share of the vertices that slept in each call.
+    /// Share of sleeping vertices in each step.
     pub asleep: Vec<f64>,
-    /// Deepest vertex under the skin, metres.
+    /// Depth of the deepest vertex under the skin (m).
     pub penetration: f64,
-    /// The last call's report.
+    /// Report of the last step.
     pub last: StepReport,
-    /// Where cloth is after each call, shape `[calls][garments][vertices]`, metres.
+    /// Vertices after each step, shape `(steps, garments, vertices)`, metres.
     pub positions: Vec<Vec<Vec<P3>>>,
 }
 
-/// A dressed person.
-pub struct Standing {
+fn fault(why: impl ToString) -> EvaluateError {
+    EvaluateError::Scene {
+        scene: "standing".into(),
+        why: why.to_string(),
+    }
+}
+
+/// Dressed subject at rest.
+pub struct RestingSubject {
     template: Arc<Template>,
     rest: RestBody,
     standing: Pose<World>,
-    /// The outfit on her.
+    /// Outfit on the body.
     pub dressed: Dressed,
 }
 
-impl Standing {
-    /// Dresses the embedded body.
+impl RestingSubject {
+    /// Dresses the embedded body in size M. `arms` is the angle of straight arms below the horizontal (rad); `None`
+    /// leaves them as in the rest pose, off the trunk.
     ///
     /// # Errors
     /// A garment that is not known or cannot be put on.
-    pub fn new(wearing: &Wearing) -> Result<Self, EvaluateError> {
-        let fault = |why: String| EvaluateError::Scene {
-            scene: "standing".into(),
-            why,
-        };
+    pub fn new(outfit: &OutfitSpec, arms: Option<f64>) -> Result<Self, EvaluateError> {
         let template = crate::body::embedded::template();
         let rest = template.personalise(&BodyShape::default());
-        let patterns = wearing
-            .garments
-            .iter()
-            .map(|g| library::pattern(g, Size::M));
-        let patterns = patterns
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(|e| fault(e.to_string()))?;
-        let mut options = DressOptions {
-            config: wearing.config.clone(),
-            ..DressOptions::default()
-        };
-        options.triangulation.edge_length = wearing.edge;
         let mut standing = Pose::rest(template.skeleton(), Rigid::<World, Body>::identity());
-        if let Some(angle) = wearing.arms {
+        if let Some(angle) = arms {
             lower_arms(&template, &rest, angle, &mut standing);
         }
-        let dressed = dress(&template, &rest, &standing, &patterns, &options)
-            .map_err(|e| fault(e.to_string()))?;
+        let dressed = outfit
+            .dress(&template, &rest, &standing, |_| Ok(Size::M))
+            .map_err(fault)?;
         Ok(Self {
             template,
             rest,
@@ -104,15 +84,15 @@ impl Standing {
             dressed,
         })
     }
-    /// Her skin at a time since she began doing something, s, in world coordinates, metres.
-    pub fn body(&self, doing: Doing, time: f64) -> Vec<P3> {
+    /// Skin at a time since the motion began (s), world coordinates (m).
+    pub fn body(&self, motion: Motion, time: f64) -> Vec<P3> {
         let skeleton = self.template.skeleton();
         let mut pose = self.standing.clone();
         let phase = std::f64::consts::PI * time.max(0.0);
-        let turns = match doing {
-            Doing::Waving => [0.2 * phase.sin(), 0.3 * (1.0 - (2.0 * phase).cos())],
-            Doing::Lifting => [0.45 * (1.0 - phase.cos()), 0.0],
-            Doing::Standing | Doing::WalkingOff => [0.0; 2],
+        let turns = match motion {
+            Motion::Waving => [0.2 * phase.sin(), 0.3 * (1.0 - (2.0 * phase).cos())],
+            Motion::Lifting => [0.45 * (1.0 - phase.cos()), 0.0],
+            Motion::Standing | Motion::WalkingOff => [0.0; 2],
         };
         for (joint, turn) in ["left_shoulder", "left_elbow"].iter().zip(turns) {
             // The last angle: about z of the shoulder, the only one of the elbow.
@@ -137,35 +117,31 @@ impl Standing {
             &bones,
             &mut body,
         );
-        if doing == Doing::WalkingOff {
+        if motion == Motion::WalkingOff {
             let by = V3::new(0.0, 0.0, (0.6 * time.max(0.0)) as f32);
             body.iter_mut().for_each(|p| *p += by);
         }
         body
     }
-    /// She stands still for two seconds and then does something for `calls` calls, with the settings of `config`; every
-    /// body is off by up to `noise` metres, the whole of it, with a wave along it.
+    /// Two seconds at rest, then `steps` steps of a motion, with the settings of `config`. Each body is displaced as a
+    /// whole by up to `noise` (m) and by a wave of that height along it.
     ///
     /// # Errors
     /// A step that is refused.
     pub fn run(
         &mut self,
         config: &Config,
-        doing: Doing,
-        calls: usize,
+        motion: Motion,
+        steps: usize,
         noise: f32,
     ) -> Result<RestReport, EvaluateError> {
-        let fault = |why: String| EvaluateError::Scene {
-            scene: "standing".into(),
-            why,
-        };
         let before = std::mem::replace(&mut self.dressed.model.config, config.clone());
         let mut state: State = self.dressed.state.clone();
         let (mut work, mut report) = (Workspace::default(), RestReport::default());
         let total: usize = state.garments.iter().map(|g| g.positions.len()).sum();
         let mut rng = rand_pcg::Pcg32::seed_from_u64(17);
-        for call in 0..QUIET + calls {
-            let mut body = self.body(doing, (call as f64 - QUIET as f64) * DT);
+        for index in 0..QUIET + steps {
+            let mut body = self.body(motion, (index as f64 - QUIET as f64) * DT);
             let mut some = || noise * rng.random_range(-1.0f32..1.0);
             let (whole, wave) = (
                 V3::new(some(), some(), some()),
@@ -178,9 +154,8 @@ impl Standing {
                 body: &body,
                 dt: DT,
             };
-            let r = step(&self.dressed.model, &mut state, &input, &mut work)
-                .map_err(|e| fault(e.to_string()))?;
-            if call >= QUIET {
+            let r = step(&self.dressed.model, &mut state, &input, &mut work).map_err(fault)?;
+            if index >= QUIET {
                 report.ms.push(started.elapsed().as_secs_f64() * 1e3);
                 report.asleep.push(r.sleeping as f64 / total.max(1) as f64);
                 report.penetration = report.penetration.max(r.penetration_left);
@@ -215,13 +190,13 @@ pub fn lower_arms(template: &Template, rest: &RestBody, angle: f64, pose: &mut P
 }
 
 impl RestReport {
-    /// Median time of a call, ms.
+    /// Median time of a step (ms).
     pub fn median_ms(&self) -> f64 {
         let mut ms = self.ms.clone();
         ms.sort_unstable_by(f64::total_cmp);
         ms.get(ms.len() / 2).copied().unwrap_or(0.0)
     }
-    /// Mean time of a call, ms.
+    /// Mean time of a step (ms).
     pub fn mean_ms(&self) -> f64 {
         self.ms.iter().sum::<f64>() / self.ms.len().max(1) as f64
     }
@@ -229,7 +204,7 @@ impl RestReport {
     pub fn mean_asleep(&self) -> f64 {
         self.asleep.iter().sum::<f64>() / self.asleep.len().max(1) as f64
     }
-    /// How far the cloth of two runs is apart after the last call: root mean square, 99th percentile and most, metres.
+    /// Distance between the cloth of two runs after the last step: root mean square, 99th percentile, largest (m).
     pub fn apart(&self, other: &Self) -> [f64; 3] {
         let (Some(a), Some(b)) = (self.positions.last(), other.positions.last()) else {
             return [0.0; 3];

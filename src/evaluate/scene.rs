@@ -8,12 +8,12 @@ use crate::math::{P3, P3d};
 use crate::synth::Sequence;
 use std::path::Path;
 
-/// What is true in one frame.
+/// Ground truth of one frame.
 #[derive(Clone, Debug, Default)]
 pub struct SceneTruth {
-    /// Joints in the order of [`Scene::joint_names`], camera frame, metres; empty when nobody is there.
+    /// Joints in the order of [`Scene::joint_names`], camera frame, metres; empty if there is nobody.
     pub joints: Vec<P3d>,
-    /// Vertices of the person, camera frame, metres; empty where they are not known (nine frames of ten).
+    /// Vertices of the person, camera frame, metres; empty where unknown (nine frames of ten).
     pub vertices: Vec<P3>,
 }
 

@@ -55,7 +55,7 @@ pub fn hard(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
     Ok(vec![turn, arm, hole])
 }
 
-/// What should cost next to nothing: a person who stands still, and a room with nobody in it.
+/// Scenes that should cost next to nothing: a subject at rest, and an empty room.
 ///
 /// # Errors
 /// When the body cannot be read.

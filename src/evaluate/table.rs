@@ -1,20 +1,18 @@
-//! What a benchmark found: one row for each method, parameters and scene.
+//! Results of a benchmark: one row for each method, parameters and scene.
 
-use super::plot::run_time_against_error;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
-use std::path::{Path, PathBuf};
 
 /// One measurement.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Row {
-    /// What was measured on: a sequence or a scene.
+    /// Sequence or scene measured on.
     pub scene: String,
-    /// What was measured: rows of one method in one scene are joined in the plot.
+    /// Method measured; rows of one method in one scene are joined in the plot.
     pub method: String,
     /// Settings, in the order in which they are shown.
     pub parameters: Vec<(String, String)>,
-    /// Run time of one unit of work (a frame, a step), milliseconds; what is meant stands in [`Table::run_time`].
+    /// Run time of one unit of work (a frame, a step), milliseconds; the unit is named by [`Table::run_time`].
     pub run_ms: f64,
     /// Errors by name with unit, for example `("joints_mm", 8.5)`.
     pub errors: Vec<(String, f64)>,
@@ -42,7 +40,7 @@ impl Row {
         self.errors.push((name.to_owned(), value));
         self
     }
-    /// The error of that name.
+    /// Error of that name, if measured.
     pub fn get(&self, name: &str) -> Option<f64> {
         self.errors.iter().find(|(n, _)| n == name).map(|(_, v)| *v)
     }
@@ -53,41 +51,12 @@ impl Row {
 pub struct Table {
     /// File name without extension, and title.
     pub name: String,
-    /// How it was made: the command, so that it can be run again.
+    /// Command that reproduces it.
     pub command: String,
-    /// What [`Row::run_ms`] counts.
+    /// Unit of work that [`Row::run_ms`] counts.
     pub run_time: String,
     /// The measurements.
     pub rows: Vec<Row>,
-}
-
-/// Results that could not be written.
-#[derive(Debug, thiserror::Error)]
-pub enum EvaluateError {
-    /// A file.
-    #[error("cannot write {path}: {source}")]
-    File {
-        /// Which file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A plot.
-    #[error("cannot draw the plot of `{error}`: {why}")]
-    Plot {
-        /// Which measure of error.
-        error: String,
-        /// Why.
-        why: String,
-    },
-    /// A scene that could not be read or made.
-    #[error("scene `{scene}`: {why}")]
-    Scene {
-        /// Which scene.
-        scene: String,
-        /// Why.
-        why: String,
-    },
 }
 
 /// Names of the pairs of all rows, each once, in the order of their first use.
@@ -174,7 +143,7 @@ impl Table {
         }
         out
     }
-    /// The same as JSON; numbers that are not finite become null.
+    /// Table as JSON; numbers that are not finite become null.
     pub fn to_json(&self) -> Value {
         let row = |r: &Row| {
             let text = |(n, v): &(String, String)| (n.clone(), Value::from(v.as_str()));
@@ -218,36 +187,6 @@ impl Table {
             out += &format!("| {} |\n", cells.join(" | "));
         }
         out
-    }
-    /// Writes `NAME.csv`, `NAME.json` and, for each error that has two finite values at least, `NAME-ERROR.svg` into
-    /// `dir`, which is made when missing. Returns the files.
-    ///
-    /// # Errors
-    /// Names the file that cannot be written or the plot that cannot be drawn.
-    pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>, EvaluateError> {
-        let file = |path: &Path| {
-            let path = path.to_owned();
-            move |source| EvaluateError::File { path, source }
-        };
-        std::fs::create_dir_all(dir).map_err(file(dir))?;
-        let mut written = Vec::new();
-        let mut save = |name: String, text: String| {
-            let path = dir.join(name);
-            std::fs::write(&path, text).map_err(file(&path))?;
-            written.push(path);
-            Ok::<(), EvaluateError>(())
-        };
-        save(format!("{}.csv", self.name), self.to_csv())?;
-        save(
-            format!("{}.json", self.name),
-            format!("{:#}\n", self.to_json()),
-        )?;
-        for error in self.errors() {
-            if let Some(svg) = run_time_against_error(self, error)? {
-                save(format!("{}-{error}.svg", self.name), svg)?;
-            }
-        }
-        Ok(written)
     }
 }
 
@@ -297,29 +236,6 @@ mod tests {
                 .to_markdown()
                 .lines()
                 .all(|l| l.matches('|').count() == 7)
-        );
-    }
-
-    #[test]
-    fn files_are_written_and_a_bad_folder_is_named() {
-        let dir = tempfile::tempdir().expect("folder");
-        let files = table().write(&dir.path().join("new")).expect("written");
-        assert_eq!(
-            files.len(),
-            3,
-            "{files:?}: `lost` has a single value and no plot"
-        );
-        let blocked = dir.path().join("file");
-        std::fs::write(&blocked, "x").expect("file");
-        let error = table()
-            .write(&blocked)
-            .expect_err("a file is no folder")
-            .to_string();
-        assert!(error.contains("file"), "{error}");
-        assert_eq!(
-            Table::default().to_csv().lines().count(),
-            1,
-            "an empty table has a head only"
         );
     }
 }

@@ -1,15 +1,15 @@
 //! Worn cloth where the body folds: the insides of elbows and knees, and the groin.
 
 use super::common::{arms_down, posed};
+use crate::common::{DT, step_on};
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
-use tryon::cloth::realtime::{Config, Input, StepReport, Workspace, step};
+use tryon::cloth::realtime::{Config, StepReport, Workspace};
 use tryon::dressing::{DressOptions, dress};
 use tryon::evaluate::Solid;
 use tryon::garment::{Size, Triangulation, library};
 use tryon::math::{P3, World};
 use tryon::spatial::intersections;
 
-const DT: f64 = 1.0 / 30.0;
 /// Bending and straightening again takes so many calls, two seconds, and the person stands for so many more.
 const CALLS: usize = 60;
 const STANDING: usize = 30;
@@ -58,18 +58,7 @@ fn bend(
     let (mut reports, mut crossed) = (Vec::new(), Vec::new());
     for call in 1..=CALLS + STANDING {
         let body = posed(&t, &rest, &pose(&t, &rest, joints, call.min(CALLS)));
-        reports.push(
-            step(
-                &d.model,
-                &mut state,
-                &Input {
-                    body: &body,
-                    dt: DT,
-                },
-                &mut work,
-            )
-            .expect("a step"),
-        );
+        reports.push(step_on(&d.model, &mut state, &body, &mut work).expect("a step"));
         crossed.push(
             intersections(
                 &d.model.outfit.garments[0].faces,
@@ -168,16 +157,7 @@ fn legs_that_swing_past_each_other_under_a_skirt_leave_no_cloth_in_them() {
     let (mut state, mut work, mut deepest) = (d.state.clone(), Workspace::default(), 0.0f32);
     for call in 1..=60 {
         let body = posed(&t, &rest, &pose(call));
-        step(
-            &d.model,
-            &mut state,
-            &Input {
-                body: &body,
-                dt: DT,
-            },
-            &mut work,
-        )
-        .expect("a step");
+        step_on(&d.model, &mut state, &body, &mut work).expect("a step");
         let solid = Solid::new(&body, t.mesh().faces());
         let depth = |p: &P3| {
             if solid.winding(p) < 2 {

@@ -1,6 +1,7 @@
 //! The real-time cloth solver on a dressed body: what it must survive, and that threads change nothing.
 
 use super::common::posed;
+use crate::common::{DT, step_on};
 use nalgebra::UnitQuaternion;
 use rand::{Rng, SeedableRng};
 use std::sync::OnceLock;
@@ -11,8 +12,6 @@ use tryon::garment::{Size, Triangulation, library};
 use tryon::math::{Body, P3, Rigid, V3, V3d, World, log_so3};
 use tryon::par::with_threads;
 use tryon::spatial::intersections;
-
-const DT: f64 = 1.0 / 30.0;
 
 struct Dressed {
     model: Model,
@@ -86,16 +85,7 @@ fn threads_and_restoring_change_no_bit() {
                     work = Workspace::default();
                 }
                 let body = moved(&d.body, V3::new(0.02 * i as f32, 0.0, 0.01));
-                step(
-                    &d.model,
-                    &mut state,
-                    &Input {
-                        body: &body,
-                        dt: DT,
-                    },
-                    &mut work,
-                )
-                .expect("a step");
+                step_on(&d.model, &mut state, &body, &mut work).expect("a step");
             }
             state
         })
@@ -113,16 +103,7 @@ fn a_jump_of_thirty_centimetres_leaves_no_vertex_under_the_skin() {
     let body = moved(&d.body, V3::new(0.3, 0.0, 0.0));
     let mut last = StepReport::default();
     for i in 0..20 {
-        last = step(
-            &d.model,
-            &mut state,
-            &Input {
-                body: &body,
-                dt: DT,
-            },
-            &mut work,
-        )
-        .expect("a step");
+        last = step_on(&d.model, &mut state, &body, &mut work).expect("a step");
         assert_eq!(last.teleported, i == 0);
     }
     sane(&state, &body);
@@ -139,16 +120,7 @@ fn a_body_at_three_metres_a_second_keeps_its_clothes() {
         // Back and forth, 0.3 m each way: 3 m/s in the middle.
         let s = 0.3 * (10.0 * f64::from(i) * DT).sin() as f32;
         body = moved(&d.body, V3::new(s, 0.0, 0.0));
-        let r = step(
-            &d.model,
-            &mut state,
-            &Input {
-                body: &body,
-                dt: DT,
-            },
-            &mut work,
-        )
-        .expect("a step");
+        let r = step_on(&d.model, &mut state, &body, &mut work).expect("a step");
         worst = worst.max(r.penetration_left);
         assert!(r.kept_last_good.is_none());
     }
@@ -162,16 +134,7 @@ fn what_is_not_a_number_is_refused_and_nothing_moves() {
     let (mut state, mut work) = (d.state.clone(), Workspace::default());
     let mut body = d.body.clone();
     body[7].y = f32::NAN;
-    let e = step(
-        &d.model,
-        &mut state,
-        &Input {
-            body: &body,
-            dt: DT,
-        },
-        &mut work,
-    )
-    .expect_err("NaN");
+    let e = step_on(&d.model, &mut state, &body, &mut work).expect_err("NaN");
     assert!(e.to_string().contains('7'), "{e}");
     assert!(
         step(
@@ -185,18 +148,7 @@ fn what_is_not_a_number_is_refused_and_nothing_moves() {
         )
         .is_err()
     );
-    assert!(
-        step(
-            &d.model,
-            &mut state,
-            &Input {
-                body: &d.body[1..],
-                dt: DT
-            },
-            &mut work
-        )
-        .is_err()
-    );
+    assert!(step_on(&d.model, &mut state, &d.body[1..], &mut work).is_err());
     assert!(state == d.state);
 }
 
@@ -218,16 +170,7 @@ fn bodies_that_shrink_or_turn_inside_out_are_survived() {
         .collect();
     for body in [scaled(0.9), scaled(0.6), mirrored, d.body.clone()] {
         for _ in 0..5 {
-            step(
-                &d.model,
-                &mut state,
-                &Input {
-                    body: &body,
-                    dt: DT,
-                },
-                &mut work,
-            )
-            .expect("a step");
+            step_on(&d.model, &mut state, &body, &mut work).expect("a step");
         }
     }
     sane(&state, &d.body);
@@ -238,16 +181,7 @@ fn still_cloth_sleeps_and_wakes() {
     let d = dressed(&Config::default());
     let (mut state, mut work) = (d.state.clone(), Workspace::default());
     let asleep = (0..150).find(|_| {
-        let r = step(
-            &d.model,
-            &mut state,
-            &Input {
-                body: &d.body,
-                dt: DT,
-            },
-            &mut work,
-        )
-        .expect("a step");
+        let r = step_on(&d.model, &mut state, &d.body, &mut work).expect("a step");
         r.sleeping > 0
     });
     assert!(
@@ -259,16 +193,7 @@ fn still_cloth_sleeps_and_wakes() {
     let before = state.garments.clone();
     model.config.sleep = false;
     for _ in 0..30 {
-        step(
-            &model,
-            &mut state,
-            &Input {
-                body: &d.body,
-                dt: DT,
-            },
-            &mut work,
-        )
-        .expect("a step");
+        step_on(&model, &mut state, &d.body, &mut work).expect("a step");
     }
     for (a, b) in before.iter().zip(&state.garments) {
         let sum: f64 = a
@@ -282,16 +207,7 @@ fn still_cloth_sleeps_and_wakes() {
     }
     model.config.sleep = true;
     let body = moved(&d.body, V3::new(0.01, 0.0, 0.0));
-    let r = step(
-        &model,
-        &mut state,
-        &Input {
-            body: &body,
-            dt: DT,
-        },
-        &mut work,
-    )
-    .expect("a step");
+    let r = step_on(&model, &mut state, &body, &mut work).expect("a step");
     assert_eq!(r.sleeping, 0, "a centimetre wakes it");
 }
 
@@ -312,31 +228,13 @@ fn cloth_on_a_body_that_trembles_sleeps_and_wakes() {
     };
     let mut slept = 0;
     for _ in 0..150 {
-        let r = step(
-            &d.model,
-            &mut state,
-            &Input {
-                body: &trembling(),
-                dt: DT,
-            },
-            &mut work,
-        )
-        .expect("a step");
+        let r = step_on(&d.model, &mut state, &trembling(), &mut work).expect("a step");
         slept += usize::from(r.sleeping > 0);
     }
     println!("slept {slept} of 150 calls");
     assert!(slept > 75, "{slept} of 150");
     let body = moved(&d.body, V3::new(0.01, 0.0, 0.0));
-    let r = step(
-        &d.model,
-        &mut state,
-        &Input {
-            body: &body,
-            dt: DT,
-        },
-        &mut work,
-    )
-    .expect("a step");
+    let r = step_on(&d.model, &mut state, &body, &mut work).expect("a step");
     assert_eq!(r.sleeping, 0, "a centimetre wakes it");
 }
 
@@ -358,16 +256,7 @@ fn cloth_on_a_body_that_sways_rides_asleep() {
         d.model.config.sleep = sleep;
         let (mut state, mut work, mut slept) = (d.state.clone(), Workspace::default(), 0);
         for i in 0..300 {
-            let r = step(
-                &d.model,
-                &mut state,
-                &Input {
-                    body: &swaying(i),
-                    dt: DT,
-                },
-                &mut work,
-            )
-            .expect("a step");
+            let r = step_on(&d.model, &mut state, &swaying(i), &mut work).expect("a step");
             slept += usize::from(r.sleeping > 0);
         }
         (state, slept)
@@ -400,7 +289,7 @@ fn cloth_on_a_body_that_sways_rides_asleep() {
     );
 }
 
-/// Where a ray meets a triangle, in lengths of its direction (Möller and Trumbore).
+/// Parameter at which a ray meets a triangle, in lengths of its direction (Möller and Trumbore).
 fn crossing(from: &P3, way: &V3, [a, b, c]: &[P3; 3]) -> Option<f32> {
     let (e1, e2) = (b - a, c - a);
     let h = way.cross(&e2);
@@ -424,8 +313,8 @@ fn under_the_skin(cloth: &[P3], body: &[P3], faces: &[[u32; 3]]) -> usize {
     cloth.iter().filter(deep).filter(inside).count()
 }
 
-/// How far outside the shirt the skirt stands, metres, at each of its vertices that the shirt goes around: along a
-/// horizontal ray from the middle of the shirt at that height.
+/// Distance of the skirt outside the shirt (m), at each skirt vertex that the shirt surrounds: along a horizontal ray
+/// from the middle of the shirt at that height.
 fn outside(skirt: &[P3], shirt: &[P3], faces: &[[u32; 3]]) -> Vec<f32> {
     let hem = shirt.iter().map(|p| p.y).fold(f32::MAX, f32::min);
     let above = |v: &&P3| v.y > hem + 0.04;
@@ -450,16 +339,7 @@ fn a_skirt_stays_under_the_shirt() {
     for i in 0..30 {
         let s = 0.1 * (5.0 * f64::from(i) * DT).sin() as f32;
         let body = moved(&d.body, V3::new(s, 0.0, 0.0));
-        step(
-            &d.model,
-            &mut state,
-            &Input {
-                body: &body,
-                dt: DT,
-            },
-            &mut work,
-        )
-        .expect("a step");
+        step_on(&d.model, &mut state, &body, &mut work).expect("a step");
         if i % 5 == 0 {
             let [skirt, shirt] = [&state.garments[0].positions, &state.garments[1].positions];
             let out = outside(skirt, shirt, &d.model.outfit.garments[1].faces);
@@ -496,7 +376,7 @@ fn a_hem_that_is_woven_through_itself_comes_loose() {
         let faces = &d.model.outfit.garments[0].faces;
         let hem = &mut state.garments[0].positions;
         let low = hem.iter().fold(f32::MAX, |l, p| l.min(p.y));
-        // What is lower turned up, and woven in and out of what it is turned up on.
+        // The lower part is turned up, woven in and out of the upper.
         let fold = low + height;
         for p in hem.iter_mut().filter(|p| p.y < fold) {
             let out = 1.0 + 0.06 * (8.0 * p.z.atan2(p.x)).sin();
@@ -505,16 +385,7 @@ fn a_hem_that_is_woven_through_itself_comes_loose() {
         let pulled = intersections(faces, hem).len();
         assert!(pulled > 20, "{pulled}");
         for _ in 0..60 {
-            step(
-                &d.model,
-                &mut state,
-                &Input {
-                    body: &d.body,
-                    dt: DT,
-                },
-                &mut work,
-            )
-            .expect("a step");
+            step_on(&d.model, &mut state, &d.body, &mut work).expect("a step");
         }
         let left = intersections(faces, &state.garments[0].positions).len();
         println!(
@@ -559,16 +430,7 @@ fn a_heavy_body_with_its_arms_down_keeps_its_sleeves() {
         let (mut state, mut work) = (d.state.clone(), Workspace::default());
         let mut last = StepReport::default();
         for _ in 0..30 {
-            last = step(
-                &d.model,
-                &mut state,
-                &Input {
-                    body: &d.body,
-                    dt: DT,
-                },
-                &mut work,
-            )
-            .expect("a step");
+            last = step_on(&d.model, &mut state, &d.body, &mut work).expect("a step");
             assert_eq!(last.kept_last_good, None);
         }
         println!(

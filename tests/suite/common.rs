@@ -1,8 +1,10 @@
-//! What several tests share: finding the data that lies beside the project, and bodies that stand somehow.
+//! Shared data, standing bodies and single cloth steps for the tests of this binary.
 
 use std::path::PathBuf;
 use tryon::body::{BoneTransforms, Pose, RestBody, Template, skin};
-use tryon::evaluate::cloth_rest::lower_arms;
+use tryon::cloth::ClothError;
+use tryon::cloth::realtime::{Input, Model, State, StepReport, Workspace, step};
+use tryon::evaluate::rest::lower_arms;
 use tryon::math::{Body, P3, Rigid, World};
 use tryon::par::Par;
 
@@ -33,7 +35,20 @@ pub(crate) fn arms_down(template: &Template, rest: &RestBody) -> Pose<World> {
     p
 }
 
-/// The surface of a body that stands like this, metres.
+/// Time of a step (s).
+pub(crate) const DT: f64 = 1.0 / 30.0;
+
+/// One step of cloth on a body of these vertices (m), [`DT`] long.
+pub(crate) fn step_on(
+    model: &Model,
+    state: &mut State,
+    body: &[P3],
+    workspace: &mut Workspace,
+) -> Result<StepReport, ClothError> {
+    step(model, state, &Input { body, dt: DT }, workspace)
+}
+
+/// Skin of a body in a pose (m).
 pub(crate) fn posed(template: &Template, rest: &RestBody, pose: &Pose<World>) -> Vec<P3> {
     let (mut bones, mut body) = (BoneTransforms::default(), Vec::new());
     pose.bones(template.skeleton(), rest, &mut bones);

@@ -39,6 +39,21 @@ fn track(template: &Arc<Template>, scene: &Scene) -> Outcome {
     )
 }
 
+/// Outcome, number of joints that `measured` selects, and their mean error (mm).
+fn track_joints(
+    template: &Arc<Template>,
+    scene: &Scene,
+    measured: impl Fn(usize) -> bool,
+) -> (Outcome, usize, f64) {
+    let out = track(template, scene);
+    let errors = out.per_joint_mm.iter().enumerate();
+    let errors: Vec<f64> = errors
+        .filter(|(j, _)| measured(*j))
+        .map(|(_, e)| *e)
+        .collect();
+    (out, errors.len(), mean(&errors))
+}
+
 fn error_of(out: &Outcome, scene: &Scene, parts: &[&str]) -> f64 {
     let of = |part: &&str| {
         out.per_joint_mm[scene
@@ -227,23 +242,15 @@ fn half_a_person_in_the_picture_is_tracked() {
                 .iter()
                 .all(|t| t.joints[j].x / t.joints[j].z * camera.fx + camera.cx < edge - 10.0)
         };
-        let inside: Vec<usize> = (0..own.joint_names.len()).filter(|&j| always(j)).collect();
-        let out = track(&template, &own);
-        let error = mean(
-            &inside
-                .iter()
-                .map(|&j| out.per_joint_mm[j])
-                .collect::<Vec<_>>(),
-        );
+        let (out, inside, error) = track_joints(&template, &own, always);
         eprintln!(
             "{name} out of view: {} of 22 joints inside, {error:.1} mm, lost {}",
-            inside.len(),
-            out.lost
+            inside, out.lost
         );
         assert!(
-            (5..22).contains(&inside.len()),
+            (5..22).contains(&inside),
             "{name}: the scene cuts the person: {}",
-            inside.len()
+            inside
         );
         assert!(
             error < 20.0 && out.lost == 0 && out.found == Some(0),
@@ -266,30 +273,22 @@ fn a_person_cut_by_the_side_from_the_start_is_found() {
             75,
         );
         let camera = own.calibration.depth;
-        let inside: Vec<usize> = (0..own.joint_names.len())
-            .filter(|&j| {
-                let column = |p: &P3d| p.x / p.z * camera.fx + camera.cx;
-                own.truth
-                    .iter()
-                    .all(|t| (10.0..f64::from(camera.width) - 10.0).contains(&column(&t.joints[j])))
-            })
-            .collect();
-        let out = track(&template, &own);
-        let error = mean(
-            &inside
+        let always = |j: usize| {
+            let column = |p: &P3d| p.x / p.z * camera.fx + camera.cx;
+            let columns = 10.0..f64::from(camera.width) - 10.0;
+            own.truth
                 .iter()
-                .map(|&j| out.per_joint_mm[j])
-                .collect::<Vec<_>>(),
-        );
+                .all(|t| columns.contains(&column(&t.joints[j])))
+        };
+        let (out, inside, error) = track_joints(&template, &own, always);
         eprintln!(
             "half cut off, {name}: {} of 22 joints inside, {error:.1} mm, found {:?}",
-            inside.len(),
-            out.found
+            inside, out.found
         );
         assert!(
-            (5..18).contains(&inside.len()),
+            (5..18).contains(&inside),
             "{name}: the scene cuts the person: {}",
-            inside.len()
+            inside
         );
         assert!(
             error < 8.0 && out.found == Some(0) && out.lost == 0,

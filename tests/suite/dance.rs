@@ -3,7 +3,8 @@
 use crate::common::shared;
 use tryon::body::parts::vertex_masks;
 use tryon::cloth::realtime::Config;
-use tryon::evaluate::dance::{Outfit, load};
+use tryon::evaluate::OutfitSpec;
+use tryon::evaluate::dance::load;
 
 #[test]
 fn an_outfit_survives_a_dance_outside_the_body_and_unstretched() {
@@ -17,13 +18,12 @@ fn an_outfit_survives_a_dance_outside_the_body_and_unstretched() {
     let parts = vertex_masks(&dance.template);
     assert_eq!(parts.iter().filter(|p| **p == 0).count(), 20);
     let garments = ["tshirt", "skirt"].map(str::to_owned).to_vec();
-    let outfit = Outfit {
+    let outfit = OutfitSpec {
         garments,
         edge: 0.022,
         config: Config::default(),
-        seconds: 10.0,
     };
-    let report = dance.run(&outfit, |_, _, _| {}).unwrap();
+    let report = dance.run(&outfit, 10.0, |_, _, _| {}).unwrap();
     println!(
         "{} vertices, p99 strain {:.3}, penetration {:?} m",
         report.vertices, report.p99_strain, report.penetration

@@ -4,13 +4,13 @@
 
 mod bending;
 mod cloth;
-mod cloth_rest;
 mod common;
 mod company;
 mod dance;
 mod dressing_meshes;
 mod garment_stream;
 mod garments;
+mod sleep;
 mod starts;
 mod stress;
 mod tracking;

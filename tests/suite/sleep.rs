@@ -2,31 +2,31 @@
 
 use std::sync::{Mutex, MutexGuard, OnceLock};
 use tryon::cloth::realtime::Config;
-use tryon::evaluate::cloth_rest::{Doing, RestReport, Standing, Wearing};
+use tryon::evaluate::OutfitSpec;
+use tryon::evaluate::rest::{Motion, RestReport, RestingSubject};
 use tryon::par::with_threads;
 
 /// A skirt and a shirt over it, edges of 2 cm.
-fn her() -> MutexGuard<'static, Standing> {
-    static HER: OnceLock<Mutex<Standing>> = OnceLock::new();
-    let dressed = || {
-        let garments = ["skirt", "tshirt"].map(str::to_owned).to_vec();
-        Mutex::new(
-            Standing::new(&Wearing {
-                garments,
-                edge: 0.02,
-                config: Config::default(),
-                arms: None,
-            })
-            .unwrap(),
-        )
-    };
-    HER.get_or_init(dressed)
+fn subject() -> MutexGuard<'static, RestingSubject> {
+    static SUBJECT: OnceLock<Mutex<RestingSubject>> = OnceLock::new();
+    let dressed =
+        || Mutex::new(RestingSubject::new(&outfit(&["skirt", "tshirt"], 0.02), None).unwrap());
+    SUBJECT
+        .get_or_init(dressed)
         .lock()
         .unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
-fn run(config: &Config, doing: Doing, calls: usize, noise: f32) -> RestReport {
-    her().run(config, doing, calls, noise).unwrap()
+fn run(config: &Config, motion: Motion, steps: usize, noise: f32) -> RestReport {
+    subject().run(config, motion, steps, noise).unwrap()
+}
+
+fn outfit(garments: &[&str], edge: f64) -> OutfitSpec {
+    OutfitSpec {
+        garments: garments.iter().map(|g| (*g).to_owned()).collect(),
+        edge,
+        config: Config::default(),
+    }
 }
 
 fn never(base: Config) -> Config {
@@ -36,20 +36,13 @@ fn never(base: Config) -> Config {
     }
 }
 
-/// As shoppers stand. Between arm and trunk cloth has two skins to lie on, and would jump from one to the other for ever.
+/// Between arm and trunk cloth has two skins to lie on, and could alternate between them for ever.
 #[test]
-fn clothes_of_someone_who_stands_with_hanging_arms_come_to_rest() {
+fn clothes_of_a_subject_with_hanging_arms_come_to_rest() {
     for garments in [vec!["skirt", "tshirt"], vec!["longsleeve"], vec!["hoodie"]] {
-        let names = garments.iter().map(|g| (*g).to_owned()).collect();
-        let wearing = Wearing {
-            garments: names,
-            edge: 0.02,
-            config: Config::default(),
-            arms: Some(1.3),
-        };
-        let mut her = Standing::new(&wearing).unwrap();
-        let r = her
-            .run(&Config::default(), Doing::Standing, 30, 0.0)
+        let mut subject = RestingSubject::new(&outfit(&garments, 0.02), Some(1.3)).unwrap();
+        let r = subject
+            .run(&Config::default(), Motion::Standing, 30, 0.0)
             .unwrap();
         println!(
             "{garments:?}: {:?} asleep, deepest {:.2} mm",
@@ -72,19 +65,19 @@ fn a_waving_arm_leaves_the_hem_asleep_and_cloth_near_where_it_would_be() {
             sleep_regions: false,
             ..base.clone()
         };
-        let truth = run(&never(base.clone()), Doing::Waving, 90, noise);
-        let outfit = run(&whole, Doing::Waving, 30, noise);
-        let r = run(&base, Doing::Waving, 90, noise);
+        let truth = run(&never(base.clone()), Motion::Waving, 90, noise);
+        let whole_outfit = run(&whole, Motion::Waving, 30, noise);
+        let r = run(&base, Motion::Waving, 90, noise);
         let apart = r.apart(&truth).map(|d| d * 1e3);
         println!(
             "asleep {:.0} % (whole outfit {:.0} %), {apart:.1?} mm apart (rms, p99, most)",
             r.mean_asleep() * 100.0,
-            outfit.mean_asleep() * 100.0
+            whole_outfit.mean_asleep() * 100.0
         );
         assert!(
-            truth.mean_asleep() == 0.0 && outfit.mean_asleep() < 0.2,
+            truth.mean_asleep() == 0.0 && whole_outfit.mean_asleep() < 0.2,
             "{}",
-            outfit.mean_asleep()
+            whole_outfit.mean_asleep()
         );
         assert!(
             r.mean_asleep() > 0.2 && r.asleep[10..].iter().all(|a| *a < 0.99),
@@ -98,27 +91,20 @@ fn a_waving_arm_leaves_the_hem_asleep_and_cloth_near_where_it_would_be() {
 }
 
 #[test]
-fn nothing_stays_behind_when_she_walks_off() {
+fn nothing_stays_behind_when_the_subject_walks_off() {
     let base = Config::default();
     // A skirt swings this way or that: the mean of some edge lengths.
     let edges = [0.018, 0.019, 0.02, 0.021, 0.022];
     let mut mean = [0.0; 3];
     for edge in edges {
-        let garments = ["skirt", "tshirt"].map(str::to_owned).to_vec();
-        let mut her = Standing::new(&Wearing {
-            garments,
-            edge,
-            config: base.clone(),
-            arms: None,
-        })
-        .unwrap();
-        let truth = her
-            .run(&never(base.clone()), Doing::WalkingOff, 30, 0.0)
+        let mut subject = RestingSubject::new(&outfit(&["skirt", "tshirt"], edge), None).unwrap();
+        let truth = subject
+            .run(&never(base.clone()), Motion::WalkingOff, 30, 0.0)
             .unwrap();
-        let r = her.run(&base, Doing::WalkingOff, 30, 0.0).unwrap();
+        let r = subject.run(&base, Motion::WalkingOff, 30, 0.0).unwrap();
         let apart = r.apart(&truth).map(|d| d * 1e3);
         println!(
-            "asleep when she starts {:.2}, then {:?}; {apart:.1?} mm apart",
+            "asleep at the start {:.2}, then {:?}; {apart:.1?} mm apart",
             r.asleep[0],
             &r.asleep[1..4]
         );
@@ -135,7 +121,7 @@ fn nothing_stays_behind_when_she_walks_off() {
 fn what_sleeps_does_not_depend_on_threads() {
     let run = |threads| {
         with_threads(threads, || {
-            run(&Config::tracked(), Doing::Waving, 30, 1.5e-3)
+            run(&Config::tracked(), Motion::Waving, 30, 1.5e-3)
         })
         .unwrap()
     };
@@ -144,7 +130,7 @@ fn what_sleeps_does_not_depend_on_threads() {
     assert!(one.mean_asleep() > 0.0);
 }
 
-/// Vertices that cannot have come near skin or another fold are not asked again; asked, they are where they were.
+/// Vertices that cannot have come near skin or another fold are not queried again; queried, they keep their place.
 #[test]
 fn searches_left_out_change_next_to_nothing() {
     let skip = never(Config::default());
@@ -153,8 +139,8 @@ fn searches_left_out_change_next_to_nothing() {
         ..skip.clone()
     };
     let (r, truth) = (
-        run(&skip, Doing::Lifting, 30, 0.0),
-        run(&ask, Doing::Lifting, 30, 0.0),
+        run(&skip, Motion::Lifting, 30, 0.0),
+        run(&ask, Motion::Lifting, 30, 0.0),
     );
     let apart = r.apart(&truth).map(|d| d * 1e3);
     println!(
