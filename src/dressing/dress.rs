@@ -222,11 +222,11 @@ impl<'a> Draping<'a> {
             let first = s.coarse.clone().unwrap_or(s.garment);
             let sheet = Sheet::of_garment(&first)?;
             let mut d = Drape::new(&first, &sheet, s.positions);
-            d.find_all(&skin);
+            d.find_nearest(&skin);
             let on = on_skin(&skin, &first, *offset);
             anchors.push(on.fasten(&d.positions())?);
             drapes.push(if untangle {
-                d.untangled(&first, &sheet)?
+                d.with_untangling(&first, &sheet)?
             } else {
                 d
             });
@@ -263,11 +263,11 @@ impl<'a> Draping<'a> {
             self.skin.show(&w[1]);
             let (skin, anchors) = (&self.skin, &self.anchors);
             self.layers.each(skin, &self.offsets, |k, d, on| {
-                d.carry(&w[0], &w[1]);
-                d.put_back(skin);
+                d.follow_skin(&w[0], &w[1]);
+                d.recover_sleeves(skin);
                 d.pin(&anchors[k], skin.frame());
                 d.run(on, substeps, COARSE_STEP, 1.0);
-                d.clear(on, CLEARING);
+                d.untangle_at_rest(on, CLEARING);
             });
         }
     }
@@ -278,9 +278,9 @@ impl<'a> Draping<'a> {
             let timer = Instant::now();
             let skin = &self.skin;
             self.layers.each(skin, &self.offsets, |_, d, on| {
-                d.put_back(skin);
+                d.recover_sleeves(skin);
                 d.run(on, SETTLING, COARSE_STEP, 1.0);
-                d.clear(on, CLEARED);
+                d.untangle_at_rest(on, CLEARED);
             });
             report.stages_ms.coarse += ms(timer);
             let timer = Instant::now();
@@ -302,7 +302,7 @@ impl<'a> Draping<'a> {
     ) -> (Vec<Vec<P3>>, Vec<Vec<AnchorBinding>>) {
         let tie = |(k, d): (usize, &Drape)| {
             let (x, on) = (d.positions(), self.garment(k));
-            let (deepest, p99, _) = d.judge(&self.skin);
+            let (deepest, p99) = d.measure(&self.skin);
             report.penetration = report.penetration.max(deepest);
             report.p99_strain = report.p99_strain.max(p99);
             report.crossings += intersections(&on.mesh.faces, &x).len();
@@ -323,23 +323,23 @@ impl<'a> Draping<'a> {
             let sheet = Sheet::of_garment(on.mesh)?;
             let x = x.iter().map(|p| P3::from(p.cast::<f32>())).collect();
             let mut d = Drape::new(on.mesh, &sheet, x);
-            d.find_from(&self.skin, rough);
+            d.find_nearest_from(&self.skin, rough);
             d.pin(&on.fasten(&d.positions())?, self.skin.frame());
             drapes.push(if self.untangle {
-                d.untangled(on.mesh, &sheet)?
+                d.with_untangling(on.mesh, &sheet)?
             } else {
                 d
             });
         }
         let mut fine = Layers::new(&self.model.outfit.garments, drapes)?;
         fine.each(&self.skin, &self.offsets, |_, d, on| {
-            d.put_back(&self.skin);
-            d.clear(on, CLEARED);
+            d.recover_sleeves(&self.skin);
+            d.untangle_at_rest(on, CLEARED);
             d.run(on, FINISHING, FINE_STEP, 1.0);
-            if d.clear(on, CLEARED) > 0 {
+            if d.untangle_at_rest(on, CLEARED) > 0 {
                 // Smoothed cloth is compressed, and spreads.
                 d.run(on, FINISHING / 2, FINE_STEP, 1.0);
-                d.clear(on, CLEARED);
+                d.untangle_at_rest(on, CLEARED);
             }
             d.lift_deep(&self.skin);
         });

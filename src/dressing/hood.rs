@@ -1,7 +1,7 @@
-//! A hood while it is put on: slow, and its folds held off each other.
+//! Self-contact and speed limit of a hood that is put on.
 //!
-//! Placed, a hood passes nowhere through itself, but it is laid back in three layers, and its edges are far from their
-//! lengths. Let go, it springs and falls through itself at once, and what is jammed in three layers nothing takes apart.
+//! A placed hood is free of itself, but lies back in three layers with edges far from their lengths. Released, it would spring
+//! through itself, and three intersecting layers cannot be untangled.
 
 use crate::cloth::Sheet;
 use crate::cloth::folds::{FoldFrame, FoldModel, Search};
@@ -10,56 +10,66 @@ use crate::garment::{GarmentError, GarmentMesh, Placement};
 use crate::math::{P3, V3, V3d};
 use crate::par::Par;
 
-/// Distance of two folds, metres; at most a quarter of the edges.
+/// Distance of two folds [m]; at most a quarter of the edges.
 const THICKNESS: f32 = 0.01;
-/// Folds nearer than this hold each other, metres. As near as in worn garments (18 mm) hoods had a quarter more crossings
+/// Distance below which folds are in contact [m]. With 18 mm, as in worn garments, hoods have a quarter more intersections
 /// after a second and a half.
 const REACH: f32 = 0.026;
-/// What is nearer goes apart by so much between two looks, metres.
-const APART: f64 = 0.001;
-/// It moves no faster, m/s: between two looks two millimetres. Where only what has another fold near it was slow, one in
-/// seven hoods passed through itself.
-const FASTEST: f64 = 0.3;
+/// Separation of nearer folds between two queries [m].
+const SEPARATION: f64 = 0.001;
+/// Largest speed [m/s]: two millimetres between two queries. Limited only near other folds, one in seven hoods intersects
+/// itself.
+const MAX_SPEED: f64 = 0.3;
 
-/// The hood of one garment, and where it is near another fold.
+/// Hood of one garment with its self-contacts.
 #[derive(Debug)]
 pub(super) struct Hood {
     model: FoldModel,
     frame: FoldFrame,
     search: Search,
     /// Its vertices.
-    of: Vec<u32>,
-    touches: Vec<Touch>,
+    vertices: Vec<u32>,
+    contacts: Vec<FoldContact>,
     neighbour_of: Vec<u32>,
 }
 
-/// A vertex, and the corners of a triangle of another fold.
+/// Vertex against a triangle of another fold.
 #[derive(Clone, Copy, Debug)]
-struct Touch {
+struct FoldContact {
+    /// The vertex, then the corners.
     vertices: [u32; 4],
-    /// 1 of the vertex, and what the corners' are less.
+    /// 1 of the vertex, then the negative barycentric weights of the corners.
     weights: [f64; 4],
-    /// Out of the triangle, on the vertex's side.
+    /// Unit normal of the triangle, on the vertex's side.
     normal: V3d,
-    /// They keep this distance, metres.
-    apart: f64,
+    /// Distance to keep [m].
+    distance: f64,
+}
+
+impl FoldContact {
+    /// Signed distance of the vertex from the triangle [m].
+    fn signed_distance(&self, x: &[V3d]) -> f64 {
+        (0..4)
+            .map(|k| self.weights[k] * self.normal.dot(&x[self.vertices[k] as usize]))
+            .sum()
+    }
 }
 
 impl Hood {
-    /// `None` where a garment has no hood.
-    pub(super) fn of(mesh: &GarmentMesh, sheet: &Sheet) -> Result<Option<Self>, GarmentError> {
+    /// Hood of a garment, `None` if it has none.
+    pub(super) fn new(mesh: &GarmentMesh, sheet: &Sheet) -> Result<Option<Self>, GarmentError> {
         let on_hood = |c: &(u16, [f64; 2])| {
             matches!(
                 mesh.placements.get(usize::from(c.0)),
                 Some(Placement::Hood(_))
             )
         };
-        let of: Vec<u32> = (0u32..)
+        let vertices: Vec<u32> = (0u32..)
             .zip(&mesh.corners)
             .filter(|(_, c)| c.iter().any(on_hood))
             .map(|(v, _)| v)
             .collect();
-        if of.is_empty() {
+        if vertices.is_empty() {
             return Ok(None);
         }
         let parts = mesh.regions.iter().map(|r| r.decisive().0).collect();
@@ -68,14 +78,14 @@ impl Hood {
         Ok(Some(Self {
             search: model.search_all(THICKNESS, REACH),
             model,
-            of,
+            vertices,
             frame: FoldFrame::default(),
-            touches: Vec::new(),
+            contacts: Vec::new(),
             neighbour_of: vec![u32::MAX; mesh.vertices],
         }))
     }
-    /// Looks for what is near another fold. What is `passing` through the sheet is on no side of it.
-    pub(super) fn look(&mut self, x: &[V3d], passing: impl Fn(u32) -> bool) {
+    /// Finds contacts with other folds. A vertex that is `crossing` the sheet is on no side of it.
+    pub(super) fn find_contacts(&mut self, x: &[V3d], crossing: impl Fn(u32) -> bool) {
         let frame = &mut self.frame;
         frame.surface.vertices.clear();
         frame
@@ -85,9 +95,9 @@ impl Hood {
         frame.velocities.resize(x.len(), V3::zeros());
         self.model
             .begin(Par::Seq, frame, Some(&self.search), x.len());
-        self.touches.clear();
+        self.contacts.clear();
         self.neighbour_of.fill(u32::MAX);
-        for &v in self.of.iter().filter(|v| !passing(**v)) {
+        for &v in self.vertices.iter().filter(|v| !crossing(**v)) {
             let p = frame.surface.vertices[v as usize];
             let corner = self
                 .model
@@ -97,33 +107,37 @@ impl Hood {
             };
             let [a, b, c] = self.model.surface.faces()[hit.face as usize];
             let far = f64::from(hit.signed.abs());
-            if far < f64::from(REACH) && ![a, b, c].into_iter().any(&passing) {
+            if far < f64::from(REACH) && ![a, b, c].into_iter().any(&crossing) {
                 let [wa, wb, wc] = hit.weights.map(f64::from);
-                self.touches.push(Touch {
+                self.contacts.push(FoldContact {
                     vertices: [v, a, b, c],
                     weights: [1.0, -wa, -wb, -wc],
                     normal: hit.normal.cast() * f64::from(hit.signed).signum(),
-                    apart: f64::from(self.search.thickness).min(far + APART),
+                    distance: f64::from(self.search.thickness).min(far + SEPARATION),
                 });
             }
         }
     }
-    /// Holds folds apart, and the hood back, at the end of a substep of `h` seconds that began at `before`; `weight`: inverse
-    /// masses.
-    pub(super) fn hold(&self, x: &mut [V3d], before: &[V3d], weight: impl Fn(u32) -> f64, h: f64) {
-        for t in &self.touches {
-            let far: f64 = (0..4)
-                .map(|k| t.weights[k] * t.normal.dot(&x[t.vertices[k] as usize]))
-                .sum();
+    /// Separates folds and limits the hood's speed at the end of a substep of `h` seconds that began at `before`. `weight`:
+    /// inverse masses.
+    pub(super) fn resolve(
+        &self,
+        x: &mut [V3d],
+        before: &[V3d],
+        weight: impl Fn(u32) -> f64,
+        h: f64,
+    ) {
+        for t in &self.contacts {
+            let far = t.signed_distance(x);
             let w = t.vertices.map(&weight);
             let mass: f64 = (0..4).map(|k| w[k] * t.weights[k] * t.weights[k]).sum();
-            if far < t.apart && mass > 0.0 {
-                let push = t.normal * ((t.apart - far) / mass);
+            if far < t.distance && mass > 0.0 {
+                let push = t.normal * ((t.distance - far) / mass);
                 (0..4).for_each(|k| x[t.vertices[k] as usize] += push * (w[k] * t.weights[k]));
             }
         }
-        for v in self.of.iter().map(|v| *v as usize) {
-            x[v] = before[v] + (x[v] - before[v]).cap_magnitude(FASTEST * h);
+        for v in self.vertices.iter().map(|v| *v as usize) {
+            x[v] = before[v] + (x[v] - before[v]).cap_magnitude(MAX_SPEED * h);
         }
     }
 }
@@ -142,11 +156,11 @@ mod tests {
         };
         let mesh = GarmentMesh::sew(&pattern, &how).expect("sewn");
         let sheet = Sheet::of_garment(&mesh).expect("sheet");
-        let hood = Hood::of(&mesh, &sheet).expect("manifold");
+        let hood = Hood::new(&mesh, &sheet).expect("manifold");
         (mesh, hood)
     }
 
-    /// Both halves of a hood in their plane, 6 mm apart away from their seam and less towards it.
+    /// Both halves of a hood in their plane, 6 mm apart, less towards their seam.
     fn closed(mesh: &GarmentMesh) -> Vec<V3d> {
         let at = |c: &Vec<(u16, [f64; 2])>| {
             let (panel, [x, y]) = c[0];
@@ -161,40 +175,36 @@ mod tests {
     }
 
     #[test]
-    fn only_hooded_garments_have_one_and_it_is_no_more_than_the_hood() {
+    fn only_hooded_garments_have_a_hood() {
         assert!(sewn("longsleeve").1.is_none());
         let (mesh, hood) = sewn("hoodie");
         let hood = hood.expect("a hood");
         assert!(
-            hood.of.len() > 100 && hood.of.len() < mesh.vertices / 2,
+            hood.vertices.len() > 100 && hood.vertices.len() < mesh.vertices / 2,
             "{} of {}",
-            hood.of.len(),
+            hood.vertices.len(),
             mesh.vertices
         );
     }
 
     #[test]
-    fn halves_that_come_together_are_parted_and_none_is_carried_along() {
+    fn halves_are_separated_and_keep_their_centre_of_mass() {
         let (mesh, hood) = sewn("hoodie");
         let mut hood = hood.expect("a hood");
         let before = closed(&mesh);
-        hood.look(&before, |_| false);
-        assert!(hood.touches.len() > 50, "{}", hood.touches.len());
-        // Pressed to a quarter of the way.
+        hood.find_contacts(&before, |_| false);
+        assert!(hood.contacts.len() > 50, "{}", hood.contacts.len());
+        // Pressed to a quarter of the distance.
         let pressed: Vec<V3d> = before
             .iter()
             .map(|p| V3d::new(p.x, p.y, if p.z < 1.0 { 0.25 * p.z } else { p.z }))
             .collect();
-        let far = |x: &[V3d], t: &Touch| {
-            (0..4)
-                .map(|k| t.weights[k] * t.normal.dot(&x[t.vertices[k] as usize]))
-                .sum::<f64>()
-        };
         let mean = |x: &[V3d]| {
-            hood.touches.iter().map(|t| far(x, t)).sum::<f64>() / hood.touches.len() as f64
+            let all = hood.contacts.iter().map(|t| t.signed_distance(x));
+            all.sum::<f64>() / hood.contacts.len() as f64
         };
         let mut x = pressed.clone();
-        hood.hold(&mut x, &before, |_| 1.0, 1.0);
+        hood.resolve(&mut x, &before, |_| 1.0, 1.0);
         assert!(
             mean(&x) > 3.0 * mean(&pressed),
             "{} to {} m",
@@ -203,31 +213,31 @@ mod tests {
         );
         let sum: V3d = x.iter().zip(&pressed).map(|(a, b)| a - b).sum();
         assert!(sum.norm() < 1e-8, "moved as a whole by {sum}");
-        // What is pinned stays.
+        // Pinned vertices stay.
         let mut x = pressed.clone();
-        hood.hold(&mut x, &before, |_| 0.0, 1.0);
+        hood.resolve(&mut x, &before, |_| 0.0, 1.0);
         assert!(x.iter().zip(&pressed).all(|(a, b)| (a - b).norm() < 1e-15));
     }
 
     #[test]
-    fn it_is_slow_and_what_passes_through_is_let_go() {
+    fn hood_is_slow_and_crossing_vertices_have_no_contact() {
         let (mesh, hood) = sewn("hoodie");
         let mut hood = hood.expect("a hood");
         let before = closed(&mesh);
-        hood.look(&before, |_| true);
-        assert!(hood.touches.is_empty());
+        hood.find_contacts(&before, |_| true);
+        assert!(hood.contacts.is_empty());
         let mut x: Vec<V3d> = before.iter().map(|p| p + V3d::new(0.1, 0.0, 0.0)).collect();
-        hood.hold(&mut x, &before, |_| 1.0, 2e-3);
+        hood.resolve(&mut x, &before, |_| 1.0, 2e-3);
         for (v, (x, before)) in x.iter().zip(&before).enumerate() {
-            let most = if hood.of.contains(&(v as u32)) {
-                FASTEST * 2e-3
+            let most = if hood.vertices.contains(&(v as u32)) {
+                MAX_SPEED * 2e-3
             } else {
                 0.1
             };
             assert!(((x - before).norm() - most).abs() < 1e-12, "vertex {v}");
         }
-        // A place that is none breaks nothing.
-        x[hood.of[0] as usize].x = f64::NAN;
-        hood.look(&x, |_| false);
+        // A position that is not a number causes no panic.
+        x[hood.vertices[0] as usize].x = f64::NAN;
+        hood.find_contacts(&x, |_| false);
     }
 }

@@ -35,12 +35,12 @@ impl Default for ClothBench {
 
 /// A method and its settings: steps a frame (0: as many as the fabric needs), iterations, patches.
 const SETTINGS: [(Method, usize, usize, usize); 17] = [
-    (Method::SmallSteps, 0, 1, 1),
-    (Method::SmallSteps, 0, 1, 2),
-    (Method::SmallSteps, 50, 1, 1),
-    (Method::SmallSteps, 80, 1, 1),
-    (Method::SmallSteps, 128, 1, 2),
-    (Method::SmallSteps, 160, 1, 1),
+    (Method::Explicit, 0, 1, 1),
+    (Method::Explicit, 0, 1, 2),
+    (Method::Explicit, 50, 1, 1),
+    (Method::Explicit, 80, 1, 1),
+    (Method::Explicit, 128, 1, 2),
+    (Method::Explicit, 160, 1, 1),
     (Method::Xpbd, 20, 1, 1),
     (Method::Xpbd, 40, 1, 1),
     (Method::Xpbd, 80, 1, 1),
@@ -59,7 +59,7 @@ const LARGE: usize = 2000;
 /// Name of a method in tables.
 pub fn method_name(m: Method) -> &'static str {
     match m {
-        Method::SmallSteps => "small steps",
+        Method::Explicit => "small steps",
         Method::QuasiNewton => "quasi-Newton, implicit Euler",
         Method::QuasiNewtonBdf2 => "quasi-Newton, BDF2",
         Method::Xpbd => "XPBD",
@@ -90,7 +90,7 @@ pub fn cloth(
         let scene = load(&folder.join(format!("{name}.json"))).map_err(fault)?;
         let reference = reference(folder, name, &scene);
         for (method, substeps, iterations, patches) in SETTINGS {
-            if scene.start.len() > LARGE && method != Method::SmallSteps && !bench.full {
+            if scene.start.len() > LARGE && method != Method::Explicit && !bench.full {
                 continue;
             }
             let config = RunConfig {
@@ -133,7 +133,7 @@ fn measured(
         .with("patches", config.patches)
         .error("strain_p99_percent", r.p99_strain * 100.0)
         .error("penetration_mm", r.penetration * 1e3);
-    if config.method == Method::SmallSteps {
+    if config.method == Method::Explicit {
         row = row.with("stiffness_kept", format!("{:.2}", r.softened));
     }
     if let Some(reference) = reference {

@@ -238,8 +238,7 @@ fn cloth_on_a_body_that_trembles_sleeps_and_wakes() {
     assert_eq!(r.sleeping, 0, "a centimetre wakes it");
 }
 
-/// A standing person sways by a centimetre or so: cloth sleeps on, moves with her, and is where it would be if it had been
-/// computed.
+/// A standing subject sways by a centimetre: cloth stays asleep, follows the skin, and ends where computed cloth would.
 #[test]
 fn cloth_on_a_body_that_sways_rides_asleep() {
     let mut d = dressed(&Config::tracked());

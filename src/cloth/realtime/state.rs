@@ -282,6 +282,12 @@ pub(super) struct PatchScratch {
     pub(super) contacts: usize,
 }
 
+impl AsMut<PatchState> for PatchScratch {
+    fn as_mut(&mut self) -> &mut PatchState {
+        &mut self.motion
+    }
+}
+
 impl PatchScratch {
     /// Where vertex `i` of it is, metres.
     pub(super) fn place(&self, i: usize) -> P3 {

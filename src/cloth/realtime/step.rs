@@ -11,7 +11,7 @@ use super::steady::follow;
 use super::still::{coming_to_rest, is_quiet, sleeps_on};
 use super::touch::{Settled, Touch, anchors, settle};
 use crate::cloth::ClothError;
-use crate::cloth::solver::explicit::{Exemptions, FoldLimit, HaloExchange, Substep, V4};
+use crate::cloth::solver::explicit::{Exemptions, FoldLimit, Substep, V4, run_substeps};
 use crate::math::{P3, V3};
 use crate::par::{self, Par};
 use std::time::Instant;
@@ -482,12 +482,9 @@ fn advance(
         let (g, m, patches) = &mut g[0];
         let n = steps(m.h, span);
         let h = (span / n as f64) as f32;
-        let borders = HaloExchange::new(patches.len());
-        par::lockstep(model.config.par, patches, n, |s, k, p| {
-            let f = &m.patches[k];
-            if s > 0 {
-                borders.receive(s - 1, f, &mut p.motion);
-            }
+        let (models, par) = (&m.patches, model.config.par);
+        run_substeps(par, models, patches, n, |s, k, p| {
+            let f = &models[k];
             let t = s as f32 * h;
             if s % (RECALLED * m.bend_every) == 0 {
                 let alone = (RECALLED * m.bend_every).min(n - s) as f32 * h;
@@ -525,11 +522,6 @@ fn advance(
                 );
             }
             p.motion.integrate_positions(f, &step, FASTEST);
-            borders.publish(s, k, f, &p.motion);
         });
-        m.patches
-            .iter()
-            .zip(patches.iter_mut())
-            .for_each(|(f, p)| borders.receive(n - 1, f, &mut p.motion));
     });
 }

@@ -10,15 +10,15 @@ type BorderVertex = [V4; 3];
 
 /// Border vertices of all patches, double buffered: one buffer is read while the next substep fills the other.
 #[derive(Debug, Default)]
-pub struct HaloExchange(Vec<[RwLock<Vec<BorderVertex>>; 2]>);
+pub(super) struct HaloExchange(Vec<[RwLock<Vec<BorderVertex>>; 2]>);
 
 impl HaloExchange {
     /// Empty buffers of as many patches.
-    pub fn new(patches: usize) -> Self {
+    pub(super) fn new(patches: usize) -> Self {
         Self((0..patches).map(|_| Default::default()).collect())
     }
     /// Publishes the border of patch `p` after a substep.
-    pub fn publish(&self, substep: usize, p: usize, f: &PatchModel, state: &PatchState) {
+    pub(super) fn publish(&self, substep: usize, p: usize, f: &PatchModel, state: &PatchState) {
         if f.border.is_empty() {
             return;
         }
@@ -36,7 +36,7 @@ impl HaloExchange {
         }));
     }
     /// Copies the ghosts of a patch from their owners' borders after a substep.
-    pub fn receive(&self, substep: usize, f: &PatchModel, state: &mut PatchState) {
+    pub(super) fn receive(&self, substep: usize, f: &PatchModel, state: &mut PatchState) {
         let (mut from, mut open) = (u32::MAX, None);
         for (k, [q, at]) in f.ghosts.iter().enumerate() {
             if from != *q {

@@ -22,9 +22,13 @@ mod mass_filter;
 mod patch_compile;
 mod patch_model;
 mod patch_state;
+mod self_collision;
 mod simd;
+mod solid_contacts;
+mod solver;
 mod stability;
 mod stable_sheet;
+mod substeps;
 #[cfg(test)]
 mod test_sheets;
 #[cfg(test)]
@@ -33,8 +37,11 @@ mod vec4;
 
 pub use constraint::{ContactPlane, Pin};
 pub use fold_limit::FoldLimit;
-pub use halo::HaloExchange;
 pub use patch_model::PatchModel;
 pub use patch_state::{Exemptions, PatchState, Substep};
 pub use stable_sheet::{StableSheet, StepSpec};
+pub use substeps::run_substeps;
 pub use vec4::V4;
+
+pub(super) use solid_contacts::{RECOVERY_SPEED, SolidContacts, moving_pins};
+pub(super) use solver::ExplicitSolver;

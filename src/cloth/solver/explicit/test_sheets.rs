@@ -1,8 +1,7 @@
 //! Sheets and a laboratory for tests of the explicit solver.
 
-use super::{
-    ContactPlane, HaloExchange, PatchModel, PatchState, Pin, StableSheet, StepSpec, Substep, V4,
-};
+use super::halo::HaloExchange;
+use super::{ContactPlane, PatchModel, PatchState, Pin, StableSheet, StepSpec, Substep, V4};
 use crate::cloth::Sheet;
 use crate::garment::Material;
 use crate::math::V3d;

@@ -1,0 +1,249 @@
+//! Contact of a draped garment with skin below and garments above: one plane each for every vertex.
+
+use super::context::{DrapeContext, OuterGarment};
+use super::state::Drape;
+use crate::contact::{Closest, Part};
+use crate::dressing::plane::DrapePlane;
+use crate::dressing::skin::Skin;
+use crate::garment::Region;
+use crate::math::{P3, V3d};
+use crate::par::Par;
+
+/// Distance beyond which a plane is ignored [m].
+const REACH: f64 = 0.10;
+/// Radius around its point within which a plane approximates the surface [m].
+const PLANE_SIZE: f64 = 0.10;
+/// Distance outside an outer garment beyond which a vertex is not under it [m]: a bell of a skirt stands out less, the other
+/// side of the body is farther.
+const OUTER_REACH: f32 = 0.15;
+/// Distance below a hem up to which an inner garment may stand out as far [m]: an edge of the coarse mesh, whose triangles
+/// cross the hem.
+const HEM: f32 = 0.05;
+/// Distance kept under an outer garment [m]: a little more than the 2.5 mm between two layers on the skin.
+const UNDER: f64 = 0.003;
+/// Coulomb coefficient against sliding up the trunk. Sliding down and around is free, as the subject pulls cloth there. With
+/// none, tight hems roll up to the neck.
+const HELD_DOWN: f64 = 0.5;
+/// Largest motion of one projection out of the body [m]: deeper vertices come out over several substeps.
+const LIFT: f64 = 0.01;
+/// Depth in other skin beyond which skin supports no cloth [m].
+const CLOSED: f64 = 0.03;
+/// Depth that is left at the end [m]: a millimetre more than tangled cloth may sink.
+const DEEP: f64 = 0.003;
+
+impl Drape {
+    /// Finds the nearest body vertices among all.
+    pub(in crate::dressing) fn find_nearest(&mut self, skin: &Skin<'_>) {
+        let points = self.positions();
+        let other: Vec<Part> = self.own.iter().map(|o| Region::ALL.0 & !o).collect();
+        let of = |masks: &[Part]| {
+            skin.model
+                .nearest_vertices(Par::Rayon, skin.frame(), &points, masks.iter())
+        };
+        let both = of(&self.own).into_iter().zip(of(&other));
+        self.nearest = both.map(|(own, other)| [own, other]).collect();
+    }
+    /// Takes the nearest body vertices from a coarser drape of the same garment.
+    pub(in crate::dressing) fn find_nearest_from(&mut self, skin: &Skin<'_>, coarse: &Self) {
+        self.fine = true;
+        for (i, near) in self.nearest.iter_mut().enumerate() {
+            let d = |k: usize| (coarse.x[k] - self.x[i]).norm_squared();
+            let k = (0..coarse.x.len())
+                .min_by(|a, b| d(*a).total_cmp(&d(*b)))
+                .unwrap_or(0);
+            *near = coarse.nearest[k];
+            let masks = [self.own[i], Region::ALL.0 & !self.own[i]];
+            // A walk stays within its parts: a vertex of others needs a full search.
+            for (slot, mask) in near.iter_mut().zip(masks) {
+                if skin.model.part(*slot) & mask == 0 {
+                    let p = P3::from(self.x[i].cast::<f32>());
+                    *slot = skin.model.nearest_vertex(skin.frame(), &p, mask);
+                }
+            }
+        }
+    }
+    /// Finds the planes of skin and outer garments.
+    pub(super) fn find_planes(&mut self, context: &DrapeContext<'_>) {
+        for i in 0..self.x.len() {
+            let found = self.closest(i, context.skin);
+            self.nearest[i] = found.map(|c| c.vertex);
+            self.planes[i] = self.skin_planes(i, &found, context);
+        }
+        self.outer_planes.clear();
+        for (k, outer) in context.outer.iter().enumerate() {
+            self.find_outer_planes(k, outer);
+        }
+    }
+    /// Closest points of the own parts and of the others.
+    fn closest(&self, i: usize, skin: &Skin<'_>) -> [Closest; 2] {
+        let (p, near) = (self.point(i), self.nearest[i]);
+        let masks = [self.own[i], Region::ALL.0 & !self.own[i]];
+        let found = [
+            skin.model
+                .closest_beyond(skin.frame(), &p, near[0], masks[0]),
+            skin.model.closest(skin.frame(), &p, near[1], masks[1]),
+        ];
+        if self.fine {
+            skin.nearer(&p, found, masks)
+        } else {
+            found
+        }
+    }
+    /// Planes at the closest points. Where the body closes on itself the own part decides, and skin inside the body supports
+    /// nothing.
+    fn skin_planes(
+        &self,
+        i: usize,
+        found: &[Closest; 2],
+        context: &DrapeContext<'_>,
+    ) -> [DrapePlane; 2] {
+        let (skin, offset) = (context.skin, context.offset);
+        let facing = found[0]
+            .room(&found[1])
+            .filter(|_| !found[1].rim)
+            .map(f64::from);
+        let room = facing.unwrap_or(f64::INFINITY);
+        let distance = found.map(|c| f64::from(c.signed));
+        let plane = |c: &Closest| DrapePlane {
+            point: c.point.coords.cast(),
+            normal: c.normal.cast(),
+            height: offset,
+            near: room >= 0.0 && !c.rim && !skin.holds_nothing(c) && f64::from(c.signed) < REACH,
+        };
+        let [mut own, mut other] = [plane(&found[0]), plane(&found[1])];
+        let untangles = self.untangler.is_some();
+        if self.fine && untangles && (-CLOSED..0.0).contains(&room) && !found[0].rim {
+            // At most half-way into skin that lies in other skin; coarse cloth must pass through it on its way out.
+            let held = !skin.holds_nothing(&found[0]);
+            (own.near, own.height) = (held && distance[0] < REACH, 0.5 * room);
+        }
+        let halved = untangles && facing.is_some() && own.near && other.near;
+        let kept = halved && own.keep_half(&mut other, &self.x[i], distance, room);
+        other.near &= kept || room >= 2.0 * offset;
+        [own, other]
+    }
+    /// Appends the planes of an outer garment.
+    fn find_outer_planes(&mut self, k: usize, outer: &OuterGarment) {
+        let (model, frame) = (&outer.model, &outer.frame);
+        if self.nearest_outer.len() <= k {
+            let nearest = |(x, own): (&V3d, &Part)| {
+                model.nearest_vertex(frame, &P3::from(x.cast::<f32>()), *own)
+            };
+            self.nearest_outer
+                .push(self.x.iter().zip(&self.own).map(nearest).collect());
+        }
+        for (i, near) in self.nearest_outer[k].iter_mut().enumerate() {
+            let p = P3::from(self.x[i].cast::<f32>());
+            let c = model.closest(frame, &p, *near, self.own[i]);
+            *near = c.vertex;
+            let Some(c) = model.under(frame, &p, &c, HEM) else {
+                continue;
+            };
+            let reached = c.signed < OUTER_REACH && -f64::from(c.signed) < REACH;
+            if reached && self.pinned[i].is_none() {
+                let plane = DrapePlane {
+                    point: c.point.coords.cast(),
+                    normal: -c.normal.cast::<f64>(),
+                    height: UNDER,
+                    near: true,
+                };
+                self.outer_planes.push((i as u32, plane));
+            }
+        }
+    }
+    /// Projects under outer garments, then out of the body; the planes of a vertex's own parts come last. Tangled cloth may be
+    /// `sunk` under the skin [m].
+    pub(super) fn project_contacts(&mut self, sunk: f64) {
+        for k in 0..self.outer_planes.len() {
+            let (i, p) = self.outer_planes[k];
+            self.project_out(i as usize, &p, sunk);
+        }
+        for i in 0..self.x.len() {
+            let [own, other] = self.planes[i];
+            let pushed = self.project_out(i, &other, sunk) + self.project_out(i, &own, sunk);
+            let up = self.x[i].y - self.before[i].y;
+            if pushed > 0.0 && up > 0.0 && self.held_down[i] && self.pinned[i].is_none() {
+                self.x[i].y -= up.min(HELD_DOWN * pushed);
+            }
+        }
+    }
+    /// Moves a vertex above a plane; returns the distance [m].
+    fn project_out(&mut self, i: usize, p: &DrapePlane, sunk: f64) -> f64 {
+        let d = self.x[i] - p.point;
+        let slack = self.slack[i];
+        let allowed = if slack > 0.0 {
+            (slack + sunk).min((p.height + sunk).max(0.0))
+        } else {
+            0.0
+        };
+        let gap = p.normal.dot(&d) - (p.height - allowed);
+        if p.near && gap < 0.0 && d.norm_squared() < PLANE_SIZE * PLANE_SIZE {
+            let push = (-gap).min(LIFT);
+            self.x[i] += p.normal * push;
+            return push;
+        }
+        0.0
+    }
+    /// Moves cloth deep under the skin to the skin.
+    pub(in crate::dressing) fn lift_deep(&mut self, skin: &Skin<'_>) {
+        for i in 0..self.x.len() {
+            let c = skin.closest(&self.point(i), self.nearest[i][0], self.own[i]);
+            let deep = f64::from(c.signed) < -DEEP && !c.rim && !skin.holds_nothing(&c);
+            if deep && self.pinned[i].is_none() {
+                self.x[i] = c.point.coords.cast();
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One vertex at a height above a horizontal plane through the origin that keeps 2 mm.
+    fn above(height: f64, slack: f64) -> (Drape, DrapePlane) {
+        let plane = DrapePlane {
+            normal: V3d::y(),
+            height: 0.002,
+            near: true,
+            ..DrapePlane::default()
+        };
+        let drape = Drape {
+            x: vec![V3d::new(0.0, height, 0.0)],
+            slack: vec![slack],
+            ..Drape::default()
+        };
+        (drape, plane)
+    }
+
+    #[test]
+    fn projection_moves_a_vertex_to_its_height_by_at_most_one_lift() {
+        let (mut drape, plane) = above(-0.001, 0.0);
+        assert!((drape.project_out(0, &plane, 0.0) - 0.003).abs() < 1e-12);
+        assert!((drape.x[0].y - 0.002).abs() < 1e-12);
+        assert_eq!(drape.project_out(0, &plane, 0.0), 0.0, "already there");
+        let (mut drape, plane) = above(-0.05, 0.0);
+        assert_eq!(drape.project_out(0, &plane, 0.0), LIFT);
+    }
+
+    #[test]
+    fn slack_vertices_may_sink_to_the_skin_and_no_deeper() {
+        let (mut drape, plane) = above(-0.001, 0.005);
+        drape.project_out(0, &plane, 0.0);
+        assert!(drape.x[0].y.abs() < 1e-12, "{}", drape.x[0].y);
+        let (mut drape, plane) = above(-0.001, 0.005);
+        assert_eq!(drape.project_out(0, &plane, 0.002), 0.0, "sunk by 2 mm");
+    }
+
+    #[test]
+    fn planes_out_of_reach_move_nothing() {
+        let (mut drape, plane) = above(-0.001, 0.0);
+        let ignored = DrapePlane {
+            near: false,
+            ..plane
+        };
+        assert_eq!(drape.project_out(0, &ignored, 0.0), 0.0);
+        drape.x[0].x = PLANE_SIZE;
+        assert_eq!(drape.project_out(0, &plane, 0.0), 0.0);
+    }
+}
