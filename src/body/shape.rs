@@ -7,21 +7,10 @@ use crate::par::Par;
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Linear directions of body shape.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ShapeSpace {
-    /// Name of each direction.
-    pub names: Vec<String>,
-    /// Vertex offsets per unit of each coefficient (one standard deviation), metres, shape `[directions][vertices]`.
-    pub vertices: Vec<Vec<V3>>,
-    /// Joint offsets per unit, metres, shape `[directions][joints]`.
-    pub joints: Vec<Vec<Vector3<f64>>>,
-}
-
 /// Shape of a subject relative to the template. Default: the template itself.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BodyShape {
-    /// Coefficients of [`ShapeSpace`], standard deviations; missing ones are zero.
+    /// Coefficients of [`super::ShapeSpace`], standard deviations; missing ones are zero.
     pub coefficients: Vec<f64>,
     /// Scale of the bone from each joint's parent to the joint, shape `[joints]`; empty means all one. Eq. 19.
     pub bone_scales: Vec<f64>,
