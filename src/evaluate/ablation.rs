@@ -1,4 +1,4 @@
-//! What each part of the tracker earns: one setting changed at a time, run time beside error.
+//! Ablation of the tracker: one setting changed at a time, run time against error.
 
 use super::tracking::follow;
 use super::{EvaluateError, Row, Scene, scenes};
@@ -10,7 +10,7 @@ use crate::tracking::{SurfaceNormals, TrackerConfig};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// How much is measured.
+/// Size of a measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Extent {
     /// Every variant on every scene.
@@ -23,7 +23,7 @@ pub enum Extent {
 /// A tracker to measure.
 #[derive(Clone, Debug)]
 pub struct Variant {
-    /// What is varied; joined in plots.
+    /// Name of the varied setting; its values are joined in plots.
     pub method: &'static str,
     /// Its value.
     pub value: String,
@@ -31,7 +31,7 @@ pub struct Variant {
     pub config: TrackerConfig,
 }
 
-/// Where frames come from, made only when they are needed.
+/// Origin of a scene, which is read or rendered only when a run needs it.
 #[derive(Clone, Debug)]
 enum Source {
     Folder(PathBuf),
@@ -39,7 +39,7 @@ enum Source {
     Embedded(NoiseModel),
 }
 
-/// What will be measured.
+/// Scenes, template and variants of one measurement.
 #[derive(Clone, Debug)]
 pub struct Plan {
     template: Arc<Template>,
@@ -195,11 +195,11 @@ impl Source {
 }
 
 impl Plan {
-    /// How many rows [`Plan::run`] gives.
+    /// Number of rows that [`Plan::run`] returns.
     pub fn runs(&self) -> usize {
         self.sources.len() * self.variants.len()
     }
-    /// Measures scene by scene, all variants on each; `done` takes every row as it is ready.
+    /// Measures scene by scene, all variants on each; `done` receives each row as soon as it exists.
     ///
     /// # Errors
     /// Names the scene that cannot be read.

@@ -1,6 +1,6 @@
-//! How well and how fast a tracker follows a scene: the measures that every table of tracking uses.
+//! Accuracy and run time of a tracker on a scene: the measures that every table of tracking uses.
 
-use super::{Row, Scene};
+use super::{Row, Scene, SceneTruth};
 use crate::body::{BoneTransforms, Template};
 use crate::camera::Intrinsics;
 use crate::math::{P3, P3d};
@@ -20,7 +20,7 @@ const FIRST_TIMED: usize = 75;
 /// A vertex of the truth is visible when the drawn truth is no farther in front of it than this, metres.
 const VISIBLE: f32 = 0.01;
 
-/// What one run found.
+/// Errors and times of one run.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
     /// Mean joint error of each frame from [`FIRST_COMPARED`] on, millimetres.
@@ -101,8 +101,7 @@ impl Outcome {
     }
 }
 
-/// Time this thread has spent on a processor, milliseconds: what counts on a busy machine. Wall time where the system
-/// does not tell.
+/// Processor time of this thread, milliseconds: other load does not count. Wall time where the system has no such clock.
 pub fn thread_ms(start: Instant) -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     let on_processor = text
@@ -111,6 +110,73 @@ pub fn thread_ms(start: Instant) -> f64 {
         .and_then(|n| n.parse::<f64>().ok())
         .map(|ns| ns * 1e-6);
     on_processor.unwrap_or_else(|| start.elapsed().as_secs_f64() * 1e3)
+}
+
+/// TruthComparison of tracked frames with the truth of a scene.
+struct TruthComparison<'a> {
+    template: &'a Template,
+    scene: &'a Scene,
+    /// Joint of the template for each joint of the truth.
+    joints: Vec<Option<usize>>,
+    /// Mean surface errors of each compared frame, millimetres: visible vertices, all, vertices of the same number.
+    surfaces: [Vec<f64>; 3],
+    last_joints: Vec<P3d>,
+}
+
+impl<'a> TruthComparison<'a> {
+    fn new(template: &'a Template, scene: &'a Scene) -> Self {
+        let skeleton = template.skeleton();
+        let names = scene.joint_names.iter();
+        Self {
+            template,
+            scene,
+            joints: names.map(|n| skeleton.index(n)).collect(),
+            surfaces: Default::default(),
+            last_joints: Vec::new(),
+        }
+    }
+
+    /// Adds the joint errors of one frame to `out`.
+    fn add_joints(&mut self, truth: &SceneTruth, bones: &BoneTransforms, out: &mut Outcome) {
+        let pairs = self.joints.iter().zip(&truth.joints);
+        let off: Vec<f64> = pairs
+            .map(|(j, t)| j.map_or(f64::NAN, |j| (bones.joints[j] - t).norm() * 1e3))
+            .collect();
+        out.joints_mm.push(mean(&off));
+        for (sum, off) in out.per_joint_mm.iter_mut().zip(&off) {
+            *sum += off;
+        }
+        self.last_joints.clone_from(&bones.joints);
+    }
+
+    /// Adds the surface errors of one frame.
+    fn add_surface(&mut self, truth: &SceneTruth, posed: &[P3]) {
+        let own = self.template.mesh().faces();
+        let faces = if self.scene.faces.is_empty() {
+            own
+        } else {
+            &self.scene.faces
+        };
+        let camera = &self.scene.calibration.depth;
+        let (visible, whole) = surface_errors(camera, truth, faces, posed, self.template);
+        let [all_visible, all_whole, vertices] = &mut self.surfaces;
+        all_visible.push(visible);
+        all_whole.push(whole);
+        if truth.vertices.len() == posed.len() && faces == own {
+            let pairs = truth.vertices.iter().zip(posed);
+            let off: f64 = pairs.map(|(a, b)| f64::from((a - b).norm())).sum();
+            vertices.push(off / posed.len() as f64 * 1e3);
+        }
+    }
+
+    /// Writes the means over all frames.
+    fn finish(&self, out: &mut Outcome) {
+        let frames = out.joints_mm.len().max(1) as f64;
+        out.per_joint_mm.iter_mut().for_each(|s| *s /= frames);
+        [out.visible_mm, out.whole_mm, out.vertices_mm] =
+            [0, 1, 2].map(|k| mean(&self.surfaces[k]));
+        out.bones_percent = bone_error(self.template, self.scene, &self.joints, &self.last_joints);
+    }
 }
 
 /// Tracks a scene from its first frame on the calling thread. `each` sees every frame with the state after it.
@@ -123,19 +189,12 @@ pub fn follow(
     let model = TrackerModel::new(template.clone(), scene.calibration.clone(), config.clone());
     let mut state = TrackerState::new(&model);
     let mut workspace = Workspace::default();
-    let skeleton = template.skeleton();
-    let joints: Vec<Option<usize>> = scene
-        .joint_names
-        .iter()
-        .map(|n| skeleton.index(n))
-        .collect();
+    let mut comparison = TruthComparison::new(template, scene);
     let mut out = Outcome {
-        per_joint_mm: vec![0.0; joints.len()],
+        per_joint_mm: vec![0.0; comparison.joints.len()],
         ..Outcome::default()
     };
     let clock = Instant::now();
-    let (mut visible, mut whole, mut vertices) = (vec![], vec![], vec![]);
-    let mut last_joints: Vec<P3d> = vec![];
     for (i, frame) in scene.frames.iter().enumerate() {
         let start = thread_ms(clock);
         let Ok(report) = step(&model, &mut state, frame, &mut workspace) else {
@@ -147,6 +206,7 @@ pub fn follow(
         out.step_ms.push(stepped - start);
         out.stages.push(report.stages_ms);
         out.iterations.push(report.iterations as f64);
+
         let live = state.status.is_live();
         let truth = scene.truth.get(i).filter(|t| !t.joints.is_empty());
         if live && out.found.is_none() {
@@ -155,46 +215,15 @@ pub fn follow(
         let nobody = !scene.truth.is_empty() && truth.is_none();
         out.lost += usize::from(!live && out.found.is_some() && !nobody);
         if let Some(truth) = truth.filter(|_| i >= FIRST_COMPARED) {
-            let off: Vec<f64> = joints
-                .iter()
-                .zip(&truth.joints)
-                .map(|(j, t)| j.map_or(f64::NAN, |j| (bones.joints[j] - t).norm() * 1e3))
-                .collect();
-            out.joints_mm.push(mean(&off));
-            out.per_joint_mm
-                .iter_mut()
-                .zip(&off)
-                .for_each(|(s, o)| *s += o);
+            comparison.add_joints(truth, &bones, &mut out);
             if !truth.vertices.is_empty() && live {
-                let faces = if scene.faces.is_empty() {
-                    template.mesh().faces()
-                } else {
-                    &scene.faces
-                };
-                let (v, w) =
-                    surface_errors(&scene.calibration.depth, truth, faces, posed, template);
-                visible.push(v);
-                whole.push(w);
-                if truth.vertices.len() == posed.len() && faces == template.mesh().faces() {
-                    let off: f64 = truth
-                        .vertices
-                        .iter()
-                        .zip(posed)
-                        .map(|(a, b)| f64::from((a - b).norm()))
-                        .sum();
-                    vertices.push(off / posed.len() as f64 * 1e3);
-                }
+                comparison.add_surface(truth, posed);
             }
-            last_joints = bones.joints.clone();
         }
         each(i, &model, &state, &report, &mut workspace);
         out.last = Some(report);
     }
-    let frames = out.joints_mm.len().max(1) as f64;
-    out.per_joint_mm.iter_mut().for_each(|s| *s /= frames);
-    (out.visible_mm, out.whole_mm, out.vertices_mm) =
-        (mean(&visible), mean(&whole), mean(&vertices));
-    out.bones_percent = bone_error(template, scene, &joints, &last_joints);
+    comparison.finish(&mut out);
     out
 }
 
@@ -221,7 +250,7 @@ fn bone_error(template: &Template, scene: &Scene, joints: &[Option<usize>], ours
 /// Mean distance of the truth's vertices from the tracked surface, millimetres: (those in view, all).
 fn surface_errors(
     camera: &Intrinsics,
-    truth: &super::SceneTruth,
+    truth: &SceneTruth,
     truth_faces: &[Face],
     posed: &[P3],
     template: &Template,

@@ -1,13 +1,13 @@
 //! A depth image as a grid of points: neighbours in the image are neighbours in space, except across edges.
 //!
 //! The grid is decimated: one cell stands for `stride × stride` pixels, whose readings are averaged where they
-//! belong to the same surface. A cell knows what it saw (person, background, nothing), so that "no reading" never
-//! passes for "empty space".
+//! belong to the same surface. Each cell has a class (person, background, no reading), so that "no reading"
+//! never passes for "empty space".
 
 use crate::camera::{DepthImage, Intrinsics};
 use crate::math::{P3, V3};
 
-/// What a cell shows.
+/// Class of the surface in a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Label {
@@ -79,7 +79,7 @@ pub struct OrganisedCloud {
     pub depth: Vec<f32>,
     /// Most pixels have no reading: a cell must do with what there is.
     thin: bool,
-    /// What each cell shows.
+    /// Class of each cell.
     pub labels: Vec<Label>,
     /// Mean point of each refined cell, camera frame, metres; zero elsewhere.
     pub points: Vec<P3>,
@@ -314,7 +314,7 @@ impl OrganisedCloud {
             }
             let (nf, half) = (n as f32, (s as f32 - 1.0) * 0.5);
             let z = sum as f32 / nf * 1e-3;
-            // Where in the cell the readings were: partly covered cells would otherwise stand out by half a cell.
+            // Centroid of the readings in the cell: partly covered cells would otherwise stand out by half a cell.
             let column = (cell % self.columns as usize) as f32 + (su as f32 / nf - half) / s as f32;
             let row = (cell / self.columns as usize) as f32 + (sv as f32 / nf - half) / s as f32;
             self.depth[cell] = z;
