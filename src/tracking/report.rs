@@ -115,6 +115,12 @@ pub enum StepError {
         /// Angles of the template.
         expected: usize,
     },
+    /// A number is infinite or not a number. A bad pose alone is no error: the subject is lost and found again.
+    #[error("{field} is not finite")]
+    NotFinite {
+        /// Path of the field.
+        field: &'static str,
+    },
 }
 
 /// A stopwatch for stages.

@@ -25,7 +25,8 @@ const EMPTY_STRIDE: u32 = 2;
 /// last good pose and its reason.
 ///
 /// # Errors
-/// When the image does not fit the calibration, or the state the template; the state is unchanged.
+/// When the image does not fit the calibration or the state the template, or calibration, shape or camera pose are not
+/// finite; the state is unchanged.
 pub fn step(
     model: &TrackerModel,
     state: &mut TrackerState,
@@ -101,7 +102,29 @@ fn check(model: &TrackerModel, state: &TrackerState, frame: &RgbdFrame) -> Resul
     if got != expected {
         return Err(StepError::ForeignState { got, expected });
     }
-    Ok(())
+    let shape = &state.shape;
+    let sizes = shape.coefficients.iter().chain(&shape.bone_scales);
+    let fields = [
+        (
+            "calibration.depth",
+            [camera.fx, camera.fy, camera.cx, camera.cy]
+                .iter()
+                .all(|v| v.is_finite()),
+        ),
+        (
+            "state.world_from_camera",
+            state.world_from_camera.is_finite(),
+        ),
+        ("state.shape", sizes.into_iter().all(|v| v.is_finite())),
+        (
+            "state.shape.displacements",
+            shape.displacements.iter().all(|v| v.is_finite()),
+        ),
+    ];
+    match fields.into_iter().find(|(_, is_finite)| !is_finite) {
+        Some((field, _)) => Err(StepError::NotFinite { field }),
+        None => Ok(()),
+    }
 }
 
 /// Report of a frame without change: pose and report of the reference frame hold.
@@ -144,4 +167,120 @@ fn lose(state: &mut TrackerState, reason: LostReason) {
         state.status = Status::Lost { reason };
     }
     state.bad_frames = 0;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::DepthImage;
+    use crate::tracking::test_scene::TestScene;
+
+    struct Session {
+        scene: TestScene,
+        state: TrackerState,
+        workspace: Workspace,
+    }
+
+    impl Session {
+        /// A subject at rest, tracked for a few frames.
+        fn tracked() -> Self {
+            let scene = TestScene::new(300, 480);
+            let mut session = Self {
+                state: TrackerState::new(&scene.model),
+                workspace: Workspace::default(),
+                scene,
+            };
+            let depth = session.scene.depth(&session.scene.pose);
+            for _ in 0..4 {
+                session.step(depth.clone()).expect("a step");
+            }
+            assert!(session.state.status.is_live());
+            session
+        }
+
+        fn step(&mut self, depth: DepthImage) -> Result<StepReport, StepError> {
+            let sequence = self.state.frames;
+            let frame = RgbdFrame {
+                sequence,
+                time_ns: sequence * 33_333_333,
+                depth,
+                color: None,
+            };
+            step(
+                &self.scene.model,
+                &mut self.state,
+                &frame,
+                &mut self.workspace,
+            )
+        }
+
+        fn empty(&self) -> DepthImage {
+            let camera = &self.scene.model.calibration.depth;
+            DepthImage::empty(camera.width, camera.height)
+        }
+    }
+
+    #[test]
+    fn a_subject_at_rest_is_found_where_it_stands() {
+        let s = Session::tracked();
+        let off = s.scene.distance(&s.state.pose, &s.scene.pose);
+        assert!(off < 0.03, "{off} m");
+    }
+
+    #[test]
+    fn an_empty_image_loses_the_subject_and_keeps_its_last_pose() {
+        let mut s = Session::tracked();
+        let (pose, shape) = (s.state.pose.clone(), s.state.shape.clone());
+        for age in 1..4 {
+            let report = s.step(s.empty()).expect("a step");
+            let lost = Status::Lost {
+                reason: LostReason::NoPerson,
+            };
+            assert_eq!((s.state.status, report.status), (lost, lost));
+            assert_eq!((report.pose_age, report.person_cells), (age, 0));
+        }
+        assert_eq!((&s.state.pose, &s.state.shape), (&pose, &shape));
+
+        let mut fresh = Session {
+            state: TrackerState::new(&s.scene.model),
+            ..s
+        };
+        let report = fresh.step(fresh.empty()).expect("a step");
+        assert_eq!(report.status, Status::Searching, "nobody was there before");
+    }
+
+    #[test]
+    fn unusable_inputs_are_refused_by_name_and_change_nothing() {
+        let mut s = Session::tracked();
+        let before = s.state.clone();
+        let small = s.step(DepthImage::empty(8, 8));
+        assert!(matches!(
+            small,
+            Err(StepError::ImageSize { got: (8, 8), .. })
+        ));
+        assert_eq!(s.state, before);
+
+        let faults: [(&str, fn(&mut TrackerState)); 3] = [
+            ("state.shape", |s| s.shape.bone_scales = vec![f64::NAN]),
+            ("state.shape.displacements", |s| {
+                s.shape.displacements = vec![f32::INFINITY];
+            }),
+            ("state.world_from_camera", |s| {
+                let mut pose = *s.world_from_camera.iso();
+                pose.translation.vector.y = f64::NAN;
+                s.world_from_camera = crate::math::Rigid::new(pose);
+            }),
+        ];
+        for (name, spoil) in faults {
+            s.state = before.clone();
+            spoil(&mut s.state);
+            let refused = s.step(s.empty());
+            assert_eq!(refused, Err(StepError::NotFinite { field: name }));
+            assert_eq!(s.state.frames, before.frames, "{name}");
+        }
+        s.state = before.clone();
+        s.state.pose.angles.pop();
+        let foreign = s.step(s.empty());
+        assert!(matches!(foreign, Err(StepError::ForeignState { .. })));
+    }
 }

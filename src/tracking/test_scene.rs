@@ -1,9 +1,14 @@
-//! The embedded body in its rest pose before a camera, for unit tests.
+//! The embedded body in its rest pose before a camera, and readings of it, for unit tests.
 
 use super::{TrackerConfig, TrackerModel, TrackerState};
-use crate::body::{BoneTransforms, Pose, RestBody, embedded};
-use crate::camera::{Calibration, Intrinsics};
-use crate::math::P3d;
+use crate::body::{BoneTransforms, Pose, RestBody, embedded, skin};
+use crate::camera::{Calibration, DepthImage, Intrinsics};
+use crate::math::{P3, P3d};
+use crate::par::Par;
+use crate::raster::{View, VisibilityBuffer, rasterise};
+use crate::registration::Observation;
+use crate::segment::{Contour, contour};
+use crate::spatial::{Label, OrganisedCloud, PointTree};
 
 pub(super) struct TestScene {
     pub model: TrackerModel,
@@ -39,6 +44,79 @@ impl TestScene {
 
     pub(super) fn joints(&self, pose: &Pose) -> Vec<P3d> {
         self.bones(pose).joints
+    }
+
+    /// Largest distance between the joints of two poses, metres.
+    pub(super) fn distance(&self, a: &Pose, b: &Pose) -> f64 {
+        let (a, b) = (self.joints(a), self.joints(b));
+        let pairs = a.iter().zip(&b);
+        pairs.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+    }
+
+    /// Depth image of the posed body without background.
+    pub(super) fn depth(&self, pose: &Pose) -> DepthImage {
+        let (template, camera) = (&self.model.template, self.model.calibration.depth);
+        let (weights, bones) = (template.weights(), self.bones(pose));
+        let mut vertices = Vec::new();
+        skin(
+            Par::Seq,
+            &self.rest.vertices,
+            weights,
+            &bones,
+            &mut vertices,
+        );
+        let view = View::Perspective { camera, near: 0.1 };
+        let mut buffer = VisibilityBuffer::default();
+        rasterise(&view, &vertices, template.mesh().faces(), &mut buffer);
+        let mut image = DepthImage::empty(camera.width, camera.height);
+        for (mm, z) in image.data_mut().iter_mut().zip(&buffer.depth) {
+            *mm = if z.is_finite() {
+                (z * 1e3).round() as u16
+            } else {
+                0
+            };
+        }
+        image
+    }
+}
+
+/// Readings of one depth image, all of them of the subject.
+pub(super) struct DepthScan {
+    grid: OrganisedCloud,
+    cells: Vec<u32>,
+    edges: Contour,
+    tree: PointTree,
+}
+
+impl DepthScan {
+    pub(super) fn new(model: &TrackerModel, image: &DepthImage) -> Self {
+        let mut grid = OrganisedCloud::new(&model.calibration.depth, None);
+        grid.sample(image, model.config.farthest);
+        let all = 0..grid.depth.len() as u32;
+        let cells: Vec<u32> = all.filter(|&c| grid.depth[c as usize] > 0.0).collect();
+        for &c in &cells {
+            grid.labels[c as usize] = Label::Person;
+        }
+        grid.refine(image, &cells);
+        let mut edges = Contour::default();
+        contour(&grid, &cells, &mut edges);
+        let points: Vec<P3> = cells.iter().map(|&c| grid.points[c as usize]).collect();
+        Self {
+            tree: PointTree::new(&points),
+            grid,
+            cells,
+            edges,
+        }
+    }
+
+    pub(super) fn observation(&self) -> Observation<'_> {
+        Observation {
+            grid: &self.grid,
+            cells: &self.cells,
+            false_edges: &self.edges.false_edges,
+            true_edges: &self.edges.true_edges,
+            tree: Some(&self.tree),
+        }
     }
 }
 

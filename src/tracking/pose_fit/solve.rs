@@ -107,3 +107,85 @@ pub(in crate::tracking) fn limit(model: &TrackerModel, pose: &mut Pose) {
         pose.clamp_to_limits(model.template.skeleton());
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::DepthImage;
+    use crate::math::Rigid;
+    use crate::tracking::personal_body::PersonalBody;
+    use crate::tracking::pose_fit::{FitTerms, TRACK};
+    use crate::tracking::test_scene::{DepthScan, TestScene};
+    use nalgebra::{Translation3, Vector3};
+
+    /// Side of a cell of the grid at the subject's distance, metres.
+    const CELL: f64 = 0.015;
+
+    /// A tracked body with bent limbs, so that the rest pose isn't the truth.
+    fn bent_scene() -> TestScene {
+        let mut scene = TestScene::new(1000, 480);
+        let skeleton = scene.model.template.skeleton();
+        for (joint, angles) in [
+            ("left_elbow", vec![0.8]),
+            ("right_shoulder", vec![0.0, 0.0, -0.4]),
+            ("right_knee", vec![0.3]),
+        ] {
+            scene.pose.set(skeleton, joint, &angles);
+        }
+        scene
+    }
+
+    fn fit(scene: &TestScene, image: &DepthImage, pose: &mut Pose) -> FitReport {
+        let scan = DepthScan::new(&scene.model, image);
+        let mut body = PersonalBody::default();
+        body.update(&scene.model, &Default::default());
+        let context = FitContext {
+            model: &scene.model,
+            body: &body,
+            observation: &scan.observation(),
+        };
+        let mut scratch = FitScratch::default();
+        scratch.terms = FitTerms::tracking(&scene.model.config);
+        fit_pose(&context, pose, &TRACK, &mut scratch)
+    }
+
+    #[test]
+    fn a_fit_stays_at_the_truth_and_returns_to_it() {
+        let scene = bent_scene();
+        let (truth, image) = (&scene.pose, scene.depth(&scene.pose));
+        for (shift, allowed) in [(0.0, 0.5 * CELL), (0.04, CELL)] {
+            let start = Translation3::from(Vector3::new(shift, 0.0, -0.5 * shift));
+            let mut pose = Pose {
+                root: Rigid::new(start * truth.root.iso()),
+                ..truth.clone()
+            };
+            let report = fit(&scene, &image, &mut pose);
+            let off = scene.distance(&pose, truth);
+            assert!(
+                off < allowed,
+                "from {shift} m beside it: {off} m, {report:?}"
+            );
+            assert!(
+                report.explained > 0.95 && report.residual < 2e-3,
+                "from {shift} m beside it: {report:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_pose_without_a_pair_keeps_its_bits() {
+        let scene = bent_scene();
+        let camera = scene.model.calibration.depth;
+        let empty = DepthImage::empty(camera.width, camera.height);
+        let mut pose = scene.pose.clone();
+        let report = fit(&scene, &empty, &mut pose);
+        assert_eq!(pose, scene.pose, "no reading");
+        assert!(!report.converged && report.iterations == 1 && report.residual == 0.0);
+
+        let mut away = scene.pose.clone();
+        away.root = Rigid::new(Translation3::new(0.0, 0.0, -9.0) * away.root.iso());
+        let behind = away.clone();
+        fit(&scene, &scene.depth(&scene.pose), &mut away);
+        assert_eq!(away, behind, "a body behind the camera");
+    }
+}
