@@ -21,7 +21,7 @@ use tryon::spatial::{OrganisedCloud, PointTree};
 use tryon::synth::{Actor, Routine, Sequence, Setting};
 use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
 
-fn shopper(routine: Routine) -> Sequence {
+fn subject(routine: Routine) -> Sequence {
     let setting = Setting {
         routine,
         noise: NoiseModel::KinectV1,
@@ -32,7 +32,7 @@ fn shopper(routine: Routine) -> Sequence {
 }
 
 fn segmentation(c: &mut Criterion) {
-    let sequence = shopper(Routine::TryOn);
+    let sequence = subject(Routine::TryOn);
     let (frame, _) = sequence.frame(0);
     let mut grid = OrganisedCloud::new(&sequence.calibration().depth, None);
     c.bench_function("segment/sample 640x480", |b| {
@@ -61,7 +61,7 @@ fn segmentation(c: &mut Criterion) {
     });
 }
 
-/// A thousand points of the shopper's surface where it is, with their normals and dominant bones.
+/// A thousand points of the subject's surface at its true pose, with their normals and dominant bones.
 fn samples(sequence: &Sequence) -> (Vec<P3>, Vec<V3>, Vec<u8>) {
     let template = &sequence.actor().template;
     let truth = sequence.truth(0);
@@ -103,7 +103,7 @@ struct Readings {
 }
 
 fn readings() -> Readings {
-    let sequence = shopper(Routine::TryOn);
+    let sequence = subject(Routine::TryOn);
     let (frame, _) = sequence.frame(0);
     let mut grid = OrganisedCloud::new(&sequence.calibration().depth, None);
     grid.sample(&frame.depth, 8.0);
@@ -242,7 +242,7 @@ fn equations(c: &mut Criterion) {
 
 fn whole_step(c: &mut Criterion) {
     for (name, routine) in [("still person", Routine::Still), ("nobody", Routine::Empty)] {
-        let sequence = shopper(routine);
+        let sequence = subject(routine);
         let template = sequence.actor().template.clone();
         let model = TrackerModel::new(
             template,

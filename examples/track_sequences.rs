@@ -12,7 +12,7 @@ use std::sync::Arc;
 use tryon::body::{Template, import::template_from_smpl};
 use tryon::camera::{NoiseModel, RgbdFrame};
 use tryon::evaluate::stills::stills;
-use tryon::evaluate::tracking::{Outcome, follow, mean, median};
+use tryon::evaluate::tracking::{TrackOutcome, follow, mean, median};
 use tryon::evaluate::{Scene, scenes};
 use tryon::formats::npz::read_smpl;
 use tryon::formats::read_motion;
@@ -166,7 +166,7 @@ const UPPER: [UpperClip; 5] = [
 ];
 
 fn without_feet(data: &Path, spec: &UpperClip) -> Scene {
-    let shopper = Actor {
+    let subject = Actor {
         template: scenes::subject(data, spec.body).expect("a body"),
         ..Actor::default()
     };
@@ -181,7 +181,7 @@ fn without_feet(data: &Path, spec: &UpperClip) -> Scene {
         ..Setting::default()
     };
     let motion = read_motion(&data.join("motion").join(spec.clip)).expect("a clip");
-    let sequence = Sequence::new(shopper, setting)
+    let sequence = Sequence::new(subject, setting)
         .with_clip(motion.at_cmu_rate())
         .expect("a clip of a person");
     Scene::synthetic(spec.name, &sequence, spec.frames)
@@ -233,7 +233,7 @@ fn run(a: &Args, bodies: &[Arc<Template>], mut scene: Scene, subject: Option<&st
     }
 }
 
-fn print_outcome(scene: &Scene, settings: &str, out: &Outcome, stages: bool) {
+fn print_outcome(scene: &Scene, settings: &str, out: &TrackOutcome, stages: bool) {
     let size: f64 = out.stages.iter().map(|s| s.size).fold(0.0, f64::max);
     println!(
         "{} {settings}: joints {:.1} mm (worst frame {:.1}), visible {:.1}, whole {:.1}, vertices {:.1} mm, bones {:.1} %, lost {}, found {:?}, step {:.2} ms, pose+skin {:.2}, size {size:.0}, residual {:.2}",

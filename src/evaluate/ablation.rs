@@ -33,7 +33,7 @@ pub struct Variant {
 
 /// Origin of a scene, which is read or rendered only when a run needs it.
 #[derive(Clone, Debug)]
-enum Source {
+enum SceneOrigin {
     Folder(PathBuf),
     Unseen(PathBuf, &'static str),
     Embedded(NoiseModel),
@@ -43,7 +43,7 @@ enum Source {
 #[derive(Clone, Debug)]
 pub struct Plan {
     template: Arc<Template>,
-    sources: Vec<Source>,
+    sources: Vec<SceneOrigin>,
     variants: Vec<Variant>,
     frames: usize,
 }
@@ -143,15 +143,16 @@ pub fn plan(data: Option<&Path>, extent: Extent) -> Result<Plan, EvaluateError> 
                 "jacks_f_avg_kinect1_room",
                 "sword_m_tall_tof_noroom_upper",
             ];
-            let mut sources: Vec<Source> = folders
+            let mut sources: Vec<SceneOrigin> = folders
                 .iter()
-                .map(|f| Source::Folder(data.join("sequences").join(f)))
+                .map(|f| SceneOrigin::Folder(data.join("sequences").join(f)))
                 .collect();
-            sources.extend(scenes::unseen_names().map(|n| Source::Unseen(data.to_owned(), n)));
+            sources.extend(scenes::unseen_names().map(|n| SceneOrigin::Unseen(data.to_owned(), n)));
             (scenes::subject(data, "template")?, sources)
         }
         None => {
-            let sources = [NoiseModel::KinectV1, NoiseModel::TimeOfFlight].map(Source::Embedded);
+            let sources =
+                [NoiseModel::KinectV1, NoiseModel::TimeOfFlight].map(SceneOrigin::Embedded);
             (embedded::template(), sources.to_vec())
         }
     };
@@ -170,7 +171,7 @@ pub fn plan(data: Option<&Path>, extent: Extent) -> Result<Plan, EvaluateError> 
     })
 }
 
-impl Source {
+impl SceneOrigin {
     fn scene(&self) -> Result<Scene, EvaluateError> {
         match self {
             Self::Folder(path) => Scene::open(path),

@@ -57,7 +57,7 @@ pub struct StillsOutcome {
 }
 
 #[derive(serde::Deserialize)]
-struct TruthFile {
+struct JointsFile {
     joint_names: Vec<String>,
     frames: Vec<TruthFrame>,
 }
@@ -68,7 +68,7 @@ struct TruthFrame {
     joints: Vec<[f64; 3]>,
 }
 
-impl TruthFile {
+impl JointsFile {
     fn read(path: &Path) -> Result<Self, String> {
         let text = std::fs::read_to_string(path).map_err(|e| e.to_string())?;
         serde_json::from_str(&text).map_err(|e| e.to_string())
@@ -145,7 +145,7 @@ pub fn stills(
         scene: scene.name.clone(),
         why,
     };
-    let truth = TruthFile::read(&folder.join("joints.json"))
+    let truth = JointsFile::read(&folder.join("joints.json"))
         .map_err(|e| fault(format!("joints.json: {e}")))?;
     let mut comparison = JointComparison::new(template.skeleton(), &truth.joint_names);
     let model = TrackerModel::new(template.clone(), scene.calibration.clone(), config.clone());

@@ -8,7 +8,7 @@ use crate::mesh::Face;
 use crate::raster::{View, VisibilityBuffer, rasterise};
 use crate::spatial::{PointTree, closest_on_triangle};
 use crate::tracking::{
-    StagesMs, StepReport, TrackerConfig, TrackerModel, TrackerState, Workspace, step,
+    StepReport, TrackerConfig, TrackerModel, TrackerState, TrackingStagesMs, Workspace, step,
 };
 use std::sync::Arc;
 use std::time::Instant;
@@ -22,7 +22,7 @@ const VISIBLE: f32 = 0.01;
 
 /// Errors and times of one run.
 #[derive(Clone, Debug, Default)]
-pub struct Outcome {
+pub struct TrackOutcome {
     /// Mean joint error of each frame from [`FIRST_COMPARED`] on, millimetres.
     pub joints_mm: Vec<f64>,
     /// Mean error of each joint of the truth, millimetres.
@@ -42,7 +42,7 @@ pub struct Outcome {
     /// Processor time of each whole step, milliseconds.
     pub step_ms: Vec<f64>,
     /// Stages of each step.
-    pub stages: Vec<StagesMs>,
+    pub stages: Vec<TrackingStagesMs>,
     /// Processor time of posing all vertices, milliseconds.
     pub skin_ms: Vec<f64>,
     /// Iterations of each step.
@@ -68,7 +68,7 @@ pub fn steady<T>(values: &[T]) -> &[T] {
     &values[FIRST_TIMED.min(values.len() / 2)..]
 }
 
-impl Outcome {
+impl TrackOutcome {
     /// Mean processor time of a whole steady step, displacements amortised, milliseconds.
     pub fn steady_ms(&self) -> f64 {
         // The system's clock of a thread ticks every few milliseconds: single values are rough, their mean is not.
@@ -76,9 +76,10 @@ impl Outcome {
     }
     /// Time of one stage of the steady steps, milliseconds: the part of the processor time that the stage has in the
     /// sum of all stages.
-    pub fn stage_ms(&self, stage: impl Fn(&StagesMs) -> f64) -> f64 {
-        let sum = |f: &dyn Fn(&StagesMs) -> f64| steady(&self.stages).iter().map(f).sum::<f64>();
-        self.steady_ms() * sum(&stage) / sum(&StagesMs::total)
+    pub fn stage_ms(&self, stage: impl Fn(&TrackingStagesMs) -> f64) -> f64 {
+        let sum =
+            |f: &dyn Fn(&TrackingStagesMs) -> f64| steady(&self.stages).iter().map(f).sum::<f64>();
+        self.steady_ms() * sum(&stage) / sum(&TrackingStagesMs::total)
     }
     /// Mean processor time of posing all vertices, milliseconds.
     pub fn posing_ms(&self) -> f64 {
@@ -137,7 +138,7 @@ impl<'a> TruthComparison<'a> {
     }
 
     /// Adds the joint errors of one frame to `out`.
-    fn add_joints(&mut self, truth: &SceneTruth, bones: &BoneTransforms, out: &mut Outcome) {
+    fn add_joints(&mut self, truth: &SceneTruth, bones: &BoneTransforms, out: &mut TrackOutcome) {
         let pairs = self.joints.iter().zip(&truth.joints);
         let off: Vec<f64> = pairs
             .map(|(j, t)| j.map_or(f64::NAN, |j| (bones.joints[j] - t).norm() * 1e3))
@@ -170,7 +171,7 @@ impl<'a> TruthComparison<'a> {
     }
 
     /// Writes the means over all frames.
-    fn finish(&self, out: &mut Outcome) {
+    fn finish(&self, out: &mut TrackOutcome) {
         let frames = out.joints_mm.len().max(1) as f64;
         out.per_joint_mm.iter_mut().for_each(|s| *s /= frames);
         [out.visible_mm, out.whole_mm, out.vertices_mm] =
@@ -185,14 +186,14 @@ pub fn follow(
     config: &TrackerConfig,
     scene: &Scene,
     mut each: impl FnMut(usize, &TrackerModel, &TrackerState, &StepReport, &mut Workspace),
-) -> Outcome {
+) -> TrackOutcome {
     let model = TrackerModel::new(template.clone(), scene.calibration.clone(), config.clone());
     let mut state = TrackerState::new(&model);
     let mut workspace = Workspace::default();
     let mut comparison = TruthComparison::new(template, scene);
-    let mut out = Outcome {
+    let mut out = TrackOutcome {
         per_joint_mm: vec![0.0; comparison.joints.len()],
-        ..Outcome::default()
+        ..TrackOutcome::default()
     };
     let clock = Instant::now();
     for (i, frame) in scene.frames.iter().enumerate() {

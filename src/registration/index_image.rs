@@ -3,7 +3,7 @@
 use crate::math::{P3, V3};
 use crate::spatial::OrganisedCloud;
 
-/// For each cell of the grid, which model point is in front there.
+/// Image of the frontmost model point of each cell.
 #[derive(Clone, Debug, Default)]
 pub struct IndexImage {
     /// Model point, row-major; [`IndexImage::NONE`] where the model is not.

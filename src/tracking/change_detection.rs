@@ -1,6 +1,6 @@
 //! Change detection: reuses the last report while the depth image differs from a reference only by sensor noise.
 
-use super::{StagesMs, StepReport};
+use super::{StepReport, TrackingStagesMs};
 use crate::camera::DepthImage;
 use crate::spatial::OrganisedCloud;
 use serde::{Deserialize, Serialize};
@@ -84,7 +84,7 @@ impl DepthReference {
         }
         // Times are of that frame alone, and no part of a state.
         let report = StepReport {
-            stages_ms: StagesMs::default(),
+            stages_ms: TrackingStagesMs::default(),
             ..report.clone()
         };
         Self {
@@ -185,7 +185,7 @@ mod tests {
             confidence: Vec::new(),
             pose_age: 0,
             skipped: Skipped::default(),
-            stages_ms: StagesMs::default(),
+            stages_ms: TrackingStagesMs::default(),
         }
     }
 

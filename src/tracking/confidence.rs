@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Reason that limits a joint's confidence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Reason {
+pub enum ConfidenceReason {
     /// Readings of its own bone.
     Measured,
     /// An angle is at the end of its range.
@@ -27,7 +27,7 @@ pub struct JointConfidence {
     /// 0 (a guess) to 1 (well measured).
     pub value: f32,
     /// Limiting reason.
-    pub reason: Reason,
+    pub reason: ConfidenceReason,
 }
 
 /// Readings of a bone at which its confidence is half of the most.
@@ -76,17 +76,17 @@ pub(super) fn confidence(
         });
         let share = readings[bone] as f32 / (readings[bone] as f32 + HALF_SURE);
         let (reason, value) = if readings[bone] == 0 && missing[bone] == 0 {
-            (Reason::Unseen, 0.0)
+            (ConfidenceReason::Unseen, 0.0)
         } else if readings[bone] == 0 {
-            (Reason::NoReturn, 0.0)
+            (ConfidenceReason::NoReturn, 0.0)
         } else if missing[bone] > readings[bone] {
-            (Reason::NoReturn, NO_RETURN_FACTOR * share)
+            (ConfidenceReason::NoReturn, NO_RETURN_FACTOR * share)
         } else if !angles.is_empty() && least < AMBIGUOUS {
-            (Reason::Ambiguous, AMBIGUOUS_FACTOR * share)
+            (ConfidenceReason::Ambiguous, AMBIGUOUS_FACTOR * share)
         } else if at_limit {
-            (Reason::AtLimit, AT_LIMIT_FACTOR * share)
+            (ConfidenceReason::AtLimit, AT_LIMIT_FACTOR * share)
         } else {
-            (Reason::Measured, share)
+            (ConfidenceReason::Measured, share)
         };
         JointConfidence { value, reason }
     };

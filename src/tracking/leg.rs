@@ -1,5 +1,6 @@
-//! Legs as the floor residual sees them: hip, knee hinge, sole joints with their standing heights.
+//! Legs of a template for the floor residual: hip, knee hinge, sole joints with their standing heights.
 
+use crate::body::parts::{BodySegment, BodySide};
 use crate::body::{JointMotion, Template};
 use crate::registration::residual::FootChain;
 
@@ -29,12 +30,12 @@ pub(super) fn legs(template: &Template) -> Vec<Leg> {
     let Some((lowest, _)) = template.mesh().bounds() else {
         return Vec::new();
     };
-    let leg = |side: &str| {
-        let at = |part: &str| skeleton.index(&format!("{side}_{part}"));
-        let (hip, ankle) = (at("hip")?, at("ankle")?);
+    let leg = |side: BodySide| {
+        let at = |segment| template.parts().joint(segment, Some(side));
+        let (hip, ankle) = (at(BodySegment::Thigh)?, at(BodySegment::Foot)?);
         let height = |j: usize| (j, skeleton.joints()[j].rest.y - f64::from(lowest.y));
         let soles: Vec<_> = std::iter::once(ankle)
-            .chain(at("foot"))
+            .chain(at(BodySegment::Toes))
             .map(height)
             .collect();
         let moves = |j: usize| soles.iter().any(|(s, _)| skeleton.is_ancestor(j, *s));
@@ -42,7 +43,7 @@ pub(super) fn legs(template: &Template) -> Vec<Leg> {
         let angles =
             below.flat_map(|j| (0..skeleton.joints()[j].motion.dofs()).map(move |k| (j, k)));
         let angles = angles.map(|(j, k)| skeleton.dof_offset(j) + k).collect();
-        let knee = at("knee");
+        let knee = at(BodySegment::Shin);
         let knee_angle = knee.and_then(|k| match skeleton.joints()[k].motion {
             JointMotion::Hinge { limits, .. } => Some((skeleton.dof_offset(k), limits)),
             _ => None,
@@ -54,5 +55,8 @@ pub(super) fn legs(template: &Template) -> Vec<Leg> {
             foot: FootChain { soles, angles },
         })
     };
-    ["left", "right"].into_iter().filter_map(leg).collect()
+    [BodySide::Left, BodySide::Right]
+        .into_iter()
+        .filter_map(leg)
+        .collect()
 }

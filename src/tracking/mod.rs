@@ -55,10 +55,10 @@ mod test_scene;
 mod workspace;
 
 pub use crate::registration::residual::SurfaceNormals;
-pub use confidence::{JointConfidence, Reason};
+pub use confidence::{ConfidenceReason, JointConfidence};
 pub use config::TrackerConfig;
 pub use model::TrackerModel;
-pub use report::{Skipped, StagesMs, StepError, StepReport};
+pub use report::{Skipped, StepError, StepReport, TrackingStagesMs};
 pub use size::SizeEstimate;
 pub use state::TrackerState;
 pub use status::{LostReason, Status};

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 /// Wall time of each stage of one step, milliseconds. No result depends on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct StagesMs {
+pub struct TrackingStagesMs {
     /// Sampling the depth image, floor, background, person, outline.
     pub segment: f64,
     /// Initial pose and limb recovery.
@@ -20,7 +20,7 @@ pub struct StagesMs {
     pub surface: f64,
 }
 
-impl StagesMs {
+impl TrackingStagesMs {
     /// All stages.
     pub fn total(&self) -> f64 {
         self.segment + self.place + self.pose + self.size + self.surface
@@ -93,7 +93,7 @@ pub struct StepReport {
     /// Skipped work.
     pub skipped: Skipped,
     /// Time per stage.
-    pub stages_ms: StagesMs,
+    pub stages_ms: TrackingStagesMs,
 }
 
 /// Unusable frame; the state is unchanged.

@@ -14,8 +14,8 @@ use super::report::Stopwatch;
 use super::size::from_stature;
 use super::standing::{FloorStance, FootMemory, bend_hidden_knees, floor_below, highest_hips};
 use super::{
-    LostReason, Skipped, StagesMs, Status, StepReport, TrackerModel, TrackerState, Workspace,
-    surface,
+    LostReason, Skipped, Status, StepReport, TrackerModel, TrackerState, TrackingStagesMs,
+    Workspace, surface,
 };
 use crate::body::{BoneTransforms, Pose};
 use crate::camera::RgbdFrame;
@@ -75,9 +75,9 @@ impl StepLog {
                 cells: grid.depth.len() - person.cells.len(),
                 ..Skipped::default()
             },
-            stages_ms: StagesMs {
+            stages_ms: TrackingStagesMs {
                 segment: watch.lap(),
-                ..StagesMs::default()
+                ..TrackingStagesMs::default()
             },
         };
         Self { report, watch }

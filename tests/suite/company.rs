@@ -6,10 +6,10 @@ use tryon::body::Template;
 use tryon::camera::NoiseModel;
 use tryon::evaluate::Scene;
 use tryon::evaluate::scenes;
-use tryon::evaluate::tracking::{Outcome, follow, mean};
+use tryon::evaluate::tracking::{TrackOutcome, follow, mean};
 use tryon::math::P3d;
 use tryon::synth::{Actor, Routine, Sequence, Setting};
-use tryon::tracking::{Reason, TrackerConfig};
+use tryon::tracking::{ConfidenceReason, TrackerConfig};
 
 /// An actor alone in the dark, without colour.
 fn alone() -> Setting {
@@ -30,7 +30,7 @@ fn scene(setting: Setting, frames: u64) -> (Arc<Template>, Scene) {
     )
 }
 
-fn track(template: &Arc<Template>, scene: &Scene) -> Outcome {
+fn track(template: &Arc<Template>, scene: &Scene) -> TrackOutcome {
     follow(
         template,
         &TrackerConfig::default(),
@@ -39,12 +39,12 @@ fn track(template: &Arc<Template>, scene: &Scene) -> Outcome {
     )
 }
 
-/// Outcome, number of joints that `measured` selects, and their mean error (mm).
+/// TrackOutcome, number of joints that `measured` selects, and their mean error (mm).
 fn track_joints(
     template: &Arc<Template>,
     scene: &Scene,
     measured: impl Fn(usize) -> bool,
-) -> (Outcome, usize, f64) {
+) -> (TrackOutcome, usize, f64) {
     let out = track(template, scene);
     let errors = out.per_joint_mm.iter().enumerate();
     let errors: Vec<f64> = errors
@@ -54,7 +54,7 @@ fn track_joints(
     (out, errors.len(), mean(&errors))
 }
 
-fn error_of(out: &Outcome, scene: &Scene, parts: &[&str]) -> f64 {
+fn error_of(out: &TrackOutcome, scene: &Scene, parts: &[&str]) -> f64 {
     let of = |part: &&str| {
         out.per_joint_mm[scene
             .joint_names
@@ -166,8 +166,9 @@ fn legs_without_depth_leave_the_upper_body_accurate_and_are_flagged() {
         &bare,
         |i, _, state, report, _| {
             let reason = report.confidence.get(knee).map(|c| c.reason);
-            flagged +=
-                usize::from(i >= 30 && state.status.is_live() && reason != Some(Reason::Measured));
+            flagged += usize::from(
+                i >= 30 && state.status.is_live() && reason != Some(ConfidenceReason::Measured),
+            );
         },
     );
     let (upper, legs) = (

@@ -1,11 +1,10 @@
 //! Starts from nothing in poses that are no calibration pose: a kick, a lifted knee, hands on the hips.
 
+use crate::tracked::{bones, frame, picture};
 use nalgebra::{UnitQuaternion, Vector3};
-use tryon::body::{BoneTransforms, Pose, embedded, skin};
-use tryon::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+use tryon::body::{Pose, embedded};
+use tryon::camera::{Calibration, Intrinsics};
 use tryon::math::{Camera, Rigid};
-use tryon::par::Par;
-use tryon::raster::{View, VisibilityBuffer, rasterise};
 use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
 
 /// Angles of named joints: a rotation vector each, or one number for a hinge, radians.
@@ -28,32 +27,9 @@ fn mean_error_mm(angles: &Angles<'_>, yaw: f64, of: &[&str]) -> f64 {
         pose.set(skeleton, joint, values);
     }
     pose.clamp_to_limits(skeleton);
-    let mut bones = BoneTransforms::default();
-    pose.bones(skeleton, &rest, &mut bones);
-    let mut vertices = Vec::new();
-    skin(
-        Par::Seq,
-        &rest.vertices,
-        template.weights(),
-        &bones,
-        &mut vertices,
-    );
+    let truth = bones(&template, &rest, &pose).joints;
     let camera = Intrinsics::KINECT_V1;
-    let mut seen = VisibilityBuffer::default();
-    rasterise(
-        &View::Perspective { camera, near: 0.1 },
-        &vertices,
-        template.mesh().faces(),
-        &mut seen,
-    );
-    let mut depth = DepthImage::empty(camera.width, camera.height);
-    for (d, z) in depth.data_mut().iter_mut().zip(&seen.depth) {
-        *d = if z.is_finite() {
-            (z * 1e3).round() as u16
-        } else {
-            0
-        };
-    }
+    let depth = picture(&template, camera, &pose);
     let model = TrackerModel::new(
         template.clone(),
         Calibration::registered(camera),
@@ -62,19 +38,14 @@ fn mean_error_mm(angles: &Angles<'_>, yaw: f64, of: &[&str]) -> f64 {
     let mut state = TrackerState::new(&model);
     let mut workspace = Workspace::default();
     for i in 0..3u64 {
-        let frame = RgbdFrame {
-            sequence: i,
-            time_ns: i * 33_333_333,
-            depth: depth.clone(),
-            color: None,
-        };
+        let frame = frame(i, depth.clone());
         step(&model, &mut state, &frame, &mut workspace).expect("a step");
     }
     assert!(state.status.is_live(), "{:?}", state.status);
     let (_, found) = workspace.posed(&model, &state);
     let off = |j: &&str| {
         let j = skeleton.index(j).expect("a joint");
-        (found.joints[j] - bones.joints[j]).norm() * 1e3
+        (found.joints[j] - truth[j]).norm() * 1e3
     };
     of.iter().map(off).sum::<f64>() / of.len() as f64
 }

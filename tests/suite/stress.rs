@@ -1,83 +1,20 @@
 //! Failure cases before a camera, with the thresholds that tracking is held to.
 //!
-//! `TRYON_LONG_TESTS=1` runs the long forms: 1,000 starts, 100,000 frames back and forth, 100,000 random pictures.
+//! `TRYON_LONG_TESTS=1` runs the long forms: 1,000 starts, 100,000 random pictures.
 
-use crate::common::shared;
-use std::path::PathBuf;
-use std::sync::Arc;
-use tryon::body::{BoneTransforms, Pose, Template};
-use tryon::camera::{Calibration, DepthImage, Intrinsics, NoiseModel, RgbdFrame};
-use tryon::evaluate::tracking::{Outcome, follow, mean};
+use crate::tracked::{
+    data, fixed_size, frame, joints, long, own_body, picture, quiet, recorded, template,
+};
+use tryon::body::Pose;
+use tryon::camera::{Calibration, DepthImage, Intrinsics, NoiseModel};
+use tryon::evaluate::tracking::{follow, mean};
 use tryon::evaluate::{Scene, scenes};
 use tryon::math::{P3d, Rigid};
-use tryon::raster::{View, VisibilityBuffer, rasterise};
-use tryon::synth::{Actor, Routine, Sequence, Setting};
+use tryon::synth::Routine;
 use tryon::tracking::{
-    LostReason, Reason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace, step,
+    ConfidenceReason, LostReason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace,
+    step,
 };
-
-const CHARLESTON: &str = "sequences/charleston_m_heavy_tof_room";
-
-fn long() -> bool {
-    std::env::var_os("TRYON_LONG_TESTS").is_some()
-}
-
-fn data() -> Option<PathBuf> {
-    shared(".")
-}
-
-fn template() -> Option<Arc<Template>> {
-    Some(scenes::subject(&data()?, "template").expect("template"))
-}
-
-fn recorded(frames: usize) -> Option<Scene> {
-    let mut scene = Scene::open(&shared(CHARLESTON)?).expect("scene");
-    scene.frames.truncate(frames);
-    scene.truth.truncate(frames);
-    Some(scene)
-}
-
-fn quiet(template: &Arc<Template>, scene: &Scene) -> Outcome {
-    follow(
-        template,
-        &TrackerConfig::default(),
-        scene,
-        |_, _, _, _, _| {},
-    )
-}
-
-fn joints(model: &TrackerModel, state: &TrackerState) -> Vec<P3d> {
-    let rest = model.template().personalise(&state.shape);
-    let mut bones = BoneTransforms::default();
-    state
-        .pose
-        .bones(model.template().skeleton(), &rest, &mut bones);
-    bones.joints
-}
-
-/// The routine with the body that is tracked: what is left is the tracker's own error.
-fn own_body(routine: Routine, noise: NoiseModel, frames: u64) -> (Arc<Template>, Scene) {
-    let subject = Actor::default();
-    let template = subject.template.clone();
-    let setting = Setting {
-        routine,
-        noise,
-        color: false,
-        ..Setting::default()
-    };
-    (
-        template,
-        Scene::synthetic("own", &Sequence::new(subject, setting), frames),
-    )
-}
-
-fn fixed_size() -> TrackerConfig {
-    TrackerConfig {
-        adapt_size: false,
-        displacements: false,
-        ..TrackerConfig::default()
-    }
-}
 
 #[test]
 fn lost_and_corrupt_pixels_cost_little() {
@@ -212,7 +149,7 @@ fn a_torso_turns_seen_from_the_waist_up() {
             let t = &scene.truth[i].joints;
             let off = yaw(j[ours_left] - j[ours_right]) - yaw(t[left] - t[right]);
             worst = worst.max(off.sin().abs().asin());
-            flagged &= report.confidence[ours("left_ankle")].reason != Reason::Measured;
+            flagged &= report.confidence[ours("left_ankle")].reason != ConfidenceReason::Measured;
         },
     );
     let named: Vec<(String, f64)> = scene
@@ -310,36 +247,6 @@ fn the_lower_half_may_be_missing() {
     assert!(error < 10.0 && out.lost == 0, "{error:.1} mm");
 }
 
-/// Depth of a posed template alone in the dark.
-fn picture(template: &Template, camera: Intrinsics, pose: &Pose) -> DepthImage {
-    let rest = template.personalise(&Default::default());
-    let mut bones = BoneTransforms::default();
-    pose.bones(template.skeleton(), &rest, &mut bones);
-    let mut vertices = Vec::new();
-    tryon::body::skin(
-        tryon::par::Par::Seq,
-        &rest.vertices,
-        template.weights(),
-        &bones,
-        &mut vertices,
-    );
-    let mut buffer = VisibilityBuffer::default();
-    rasterise(
-        &View::Perspective { camera, near: 0.2 },
-        &vertices,
-        template.mesh().faces(),
-        &mut buffer,
-    );
-    let mm = buffer.depth.iter().map(|z| {
-        if z.is_finite() {
-            (z * 1e3).round() as u16
-        } else {
-            0
-        }
-    });
-    DepthImage::new(camera.width, camera.height, mm.collect()).expect("size")
-}
-
 #[test]
 fn straight_limbs_and_an_arm_along_the_view_are_steady() {
     let template = tryon::body::embedded::template();
@@ -373,12 +280,7 @@ fn straight_limbs_and_an_arm_along_the_view_are_steady() {
     let mut before = None;
     let (mut jitter, mut turned) = (0.0f64, 0.0f64);
     for i in 0..40u64 {
-        let frame = RgbdFrame {
-            sequence: i,
-            time_ns: i * 33_333_333,
-            depth: depth.clone(),
-            color: None,
-        };
+        let frame = frame(i, depth.clone());
         step(&model, &mut state, &frame, &mut workspace).expect("step");
         assert!(state.status.is_live());
         let now = joints(&model, &state);
@@ -478,155 +380,6 @@ fn a_rough_start_settles() {
     assert!(f64::from(good) >= 0.95 * seeds as f64, "{good} of {seeds}");
 }
 
-/// Rounds whose mean stands for "where a joint is": paths of one and the same round alternate by up to a millimetre
-/// (a foot's tip changes its pairs), and that is no drift.
-const ROUNDS_AVERAGED: u64 = 10;
-
-/// Shows `frames` pictures back and forth and compares, picture by picture of a round, the mean joint of the last ten
-/// rounds with that of the ten after `settle` rounds. Returns metres by which the worst joint went and joints went on
-/// average, and radians of the worst angle. `creep` may spoil the state after each frame.
-fn drift(
-    model: &TrackerModel,
-    pictures: &[RgbdFrame],
-    frames: u64,
-    settle: u64,
-    mut creep: impl FnMut(&mut TrackerState, u64),
-) -> (f64, f64, f64) {
-    let length = 2 * pictures.len() as u64;
-    let rounds = frames / length;
-    assert!(
-        rounds >= settle + 2 * ROUNDS_AVERAGED,
-        "{rounds} rounds are too few"
-    );
-    let mut state = TrackerState::new(model);
-    let mut workspace = Workspace::default();
-    let (n, dofs) = (
-        model.template().skeleton().len(),
-        model.template().skeleton().dofs(),
-    );
-    let zero = (vec![nalgebra::Vector3::zeros(); n], vec![0.0; dofs]);
-    let mut sums = [
-        vec![zero.clone(); length as usize],
-        vec![zero; length as usize],
-    ];
-    for i in 0..rounds * length {
-        let (round, k) = (i / length, (i % length) as usize);
-        let picture = &pictures[k.min(length as usize - 1 - k)];
-        let frame = RgbdFrame {
-            sequence: i,
-            time_ns: i * 33_333_333,
-            ..picture.clone()
-        };
-        step(model, &mut state, &frame, &mut workspace).expect("step");
-        creep(&mut state, i);
-        let early = (settle..settle + ROUNDS_AVERAGED).contains(&round);
-        let late = round >= rounds - ROUNDS_AVERAGED;
-        if early || late {
-            assert!(state.status.is_live(), "frame {i}: {:?}", state.status);
-            let (joint_sums, angle_sums) = &mut sums[usize::from(late)][k];
-            joint_sums
-                .iter_mut()
-                .zip(joints(model, &state))
-                .for_each(|(s, j)| *s += j.coords);
-            angle_sums
-                .iter_mut()
-                .zip(&state.pose.angles)
-                .for_each(|(s, a)| *s += a);
-        }
-    }
-    let r = state.pose.root.iso().rotation.to_rotation_matrix();
-    let skew = (r.matrix().transpose() * r.matrix() - nalgebra::Matrix3::identity()).norm();
-    assert!(skew < 1e-12, "the root's rotation is off by {skew:.1e}");
-    let (mut worst, mut all, mut turned) = (0.0f64, vec![], 0.0f64);
-    for (early, late) in sums[0].iter().zip(&sums[1]) {
-        let joints = early
-            .0
-            .iter()
-            .zip(&late.0)
-            .map(|(a, b)| (a - b).norm() / ROUNDS_AVERAGED as f64);
-        all.extend(joints.clone());
-        worst = joints.fold(worst, f64::max);
-        let turn = early
-            .1
-            .iter()
-            .zip(&late.1)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max);
-        turned = turned.max(turn / ROUNDS_AVERAGED as f64);
-    }
-    (worst, mean(&all), turned)
-}
-
-/// The bar is half a millimetre in 100,000 frames. The short form compares means 2,400 frames apart and may show as much,
-/// which a creep of 2·10⁻⁷ m a frame would exceed.
-const DRIFT: f64 = 0.5e-3;
-
-#[test]
-fn long_sessions_do_not_drift() {
-    let (template, scene) = own_body(Routine::TryOn, NoiseModel::None, 30);
-    let frames: u64 = if long() { 100_000 } else { 3_600 };
-    let model = TrackerModel::new(template, scene.calibration.clone(), fixed_size());
-    let (off, _, turned) = drift(&model, &scene.frames, frames, 10, |_, _| {});
-    eprintln!(
-        "{frames} frames back and forth: drift {:.4} mm, {turned:.1e} rad",
-        off * 1e3
-    );
-    assert!(off < DRIFT, "{:.3} mm", off * 1e3);
-}
-
-/// The measure must be able to fail: bones that grow by two millionths a frame, a millimetre in half a minute on a leg, are
-/// caught, while a bias of 10⁻⁵ rad in every angle after every frame is measured away again and again.
-#[test]
-fn a_planted_creep_is_caught() {
-    let (template, scene) = own_body(Routine::TryOn, NoiseModel::None, 30);
-    let joints = template.skeleton().len();
-    let model = TrackerModel::new(template, scene.calibration.clone(), fixed_size());
-    let grows = |state: &mut TrackerState, i: u64| {
-        state.shape.bone_scales = vec![1.0 + 2e-6 * i as f64; joints]
-    };
-    let (off, ..) = drift(&model, &scene.frames, 2_400, 10, grows);
-    eprintln!(
-        "bones that grow by 2·10⁻⁶ a frame: {:.3} mm in 2,400 frames",
-        off * 1e3
-    );
-    assert!(
-        off > DRIFT,
-        "a creep of bones passes for none: {:.3} mm",
-        off * 1e3
-    );
-    let biased =
-        |state: &mut TrackerState, _: u64| state.pose.angles.iter_mut().for_each(|a| *a += 1e-5);
-    let (off, ..) = drift(&model, &scene.frames, 2_400, 10, biased);
-    eprintln!(
-        "every angle biased by 10⁻⁵ rad a frame: {:.4} mm",
-        off * 1e3
-    );
-    assert!(off < DRIFT, "a bias adds up: {:.3} mm", off * 1e3);
-}
-
-/// The whole tracker (size, displacements with their running mean and variance) on a recorded dance. Displacements are
-/// fitted at intervals that do not divide the round, so no two rounds are the same, and the tips of fast hands wander among
-/// several answers by millimetres: here the mean over joints and pictures is held to the bar.
-#[test]
-fn long_sessions_with_displacements_do_not_drift() {
-    let (Some(template), Some(scene)) = (template(), recorded(60)) else {
-        return;
-    };
-    let frames: u64 = if long() { 100_000 } else { 2_400 };
-    let model = TrackerModel::new(
-        template,
-        scene.calibration.clone(),
-        TrackerConfig::default(),
-    );
-    // Size and shape are done after 60 frames, displacements have their temporal term after 20 updates.
-    let (worst, off, turned) = drift(&model, &scene.frames[40..], frames, 30, |_, _| {});
-    let (worst, off_mm) = (worst * 1e3, off * 1e3);
-    eprintln!(
-        "{frames} recorded frames back and forth: drift {off_mm:.4} mm, worst {worst:.3}, {turned:.1e} rad"
-    );
-    assert!(off < DRIFT, "{off_mm:.3} mm");
-}
-
 #[test]
 fn random_pictures_never_panic() {
     use rand::{Rng, SeedableRng};
@@ -665,12 +418,7 @@ fn random_pictures_never_panic() {
             }
         };
         let depth = DepthImage::new(160, 120, (0..160 * 120).map(pixel).collect()).expect("size");
-        let frame = RgbdFrame {
-            sequence: i,
-            time_ns: i * 33_333_333,
-            depth,
-            color: None,
-        };
+        let frame = frame(i, depth);
         step(&model, &mut state, &frame, &mut workspace).expect("step");
         assert!(state.pose.is_finite() && state.shape.coefficients.iter().all(|c| c.is_finite()));
     }

@@ -1,10 +1,11 @@
-//! Tracking on real motions with known truth, and on what goes wrong in front of a camera.
+//! Tracking of real motions with known truth, and of frames that fail.
 
 use crate::common::shared;
+use crate::tracked::{frame, joints, template};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tryon::body::{BoneTransforms, Template, import::template_from_smpl};
-use tryon::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+use tryon::body::{Template, import::template_from_smpl};
+use tryon::camera::{Calibration, DepthImage, Intrinsics};
 use tryon::formats::image::read_png_depth;
 use tryon::formats::npz::read_smpl;
 use tryon::par::with_threads;
@@ -57,22 +58,6 @@ impl Sequence {
     }
 }
 
-fn frame(i: usize, depth: DepthImage) -> RgbdFrame {
-    RgbdFrame {
-        sequence: i as u64,
-        time_ns: i as u64 * 33_333_333,
-        depth,
-        color: None,
-    }
-}
-
-fn template() -> Option<Arc<Template>> {
-    let path = shared("body/makehuman_smpl_layout/template.npz")?;
-    Some(Arc::new(
-        template_from_smpl("makehuman", &read_smpl(path).expect("body")).expect("body"),
-    ))
-}
-
 fn tracker(template: &Arc<Template>, camera: Intrinsics) -> (TrackerModel, TrackerState) {
     let model = TrackerModel::new(
         template.clone(),
@@ -81,15 +66,6 @@ fn tracker(template: &Arc<Template>, camera: Intrinsics) -> (TrackerModel, Track
     );
     let state = TrackerState::new(&model);
     (model, state)
-}
-
-fn joints(model: &TrackerModel, state: &TrackerState) -> Vec<nalgebra::Point3<f64>> {
-    let rest = model.template().personalise(&state.shape);
-    let mut bones = BoneTransforms::default();
-    state
-        .pose
-        .bones(model.template().skeleton(), &rest, &mut bones);
-    bones.joints
 }
 
 /// Tracks the frames of `which` and returns the mean error from frame 30 on; `change` may spoil a frame or drop it.
@@ -118,7 +94,7 @@ fn follow_with(
     for i in which {
         let mut depth = s.depth(i);
         change(i, &mut depth);
-        step(&model, &mut state, &frame(i, depth), &mut workspace).expect("step");
+        step(&model, &mut state, &frame(i as u64, depth), &mut workspace).expect("step");
         if i >= 30 {
             assert!(state.status.is_live(), "frame {i}: {:?}", state.status);
             sum += s.error(i, template, &joints(&model, &state));
@@ -205,7 +181,13 @@ fn a_person_leaves_and_comes_back() {
     let (model, mut state) = tracker(&template, s.camera);
     let mut workspace = Workspace::default();
     for i in 0..40 {
-        step(&model, &mut state, &frame(i, s.depth(i)), &mut workspace).expect("step");
+        step(
+            &model,
+            &mut state,
+            &frame(i as u64, s.depth(i)),
+            &mut workspace,
+        )
+        .expect("step");
     }
     assert!(state.status.is_live());
     let kept = state.pose.clone();
@@ -213,7 +195,7 @@ fn a_person_leaves_and_comes_back() {
         let report = step(
             &model,
             &mut state,
-            &frame(i, DepthImage::empty(640, 480)),
+            &frame(i as u64, DepthImage::empty(640, 480)),
             &mut workspace,
         )
         .expect("step");
@@ -230,7 +212,13 @@ fn a_person_leaves_and_comes_back() {
         );
     }
     for i in 55..65 {
-        step(&model, &mut state, &frame(i, s.depth(i)), &mut workspace).expect("step");
+        step(
+            &model,
+            &mut state,
+            &frame(i as u64, s.depth(i)),
+            &mut workspace,
+        )
+        .expect("step");
     }
     assert!(state.status.is_live(), "{:?}", state.status);
     let error = s.error(64, &template, &joints(&model, &state));
@@ -259,7 +247,13 @@ fn threads_and_restarts_change_no_bit() {
                     state = state.clone();
                     workspace = Workspace::default();
                 }
-                step(&model, &mut state, &frame(i, s.depth(i)), &mut workspace).expect("step");
+                step(
+                    &model,
+                    &mut state,
+                    &frame(i as u64, s.depth(i)),
+                    &mut workspace,
+                )
+                .expect("step");
             }
         })
         .expect("pool");
@@ -294,7 +288,7 @@ fn degenerate_frames_are_answered_without_panic() {
     .enumerate()
     {
         let depth = DepthImage::new(640, 480, data).expect("size");
-        step(&model, &mut state, &frame(i, depth), &mut workspace).expect("step");
+        step(&model, &mut state, &frame(i as u64, depth), &mut workspace).expect("step");
         assert_eq!(state.status, Status::Searching, "frame {i}");
         assert!(state.pose.is_finite());
     }
@@ -314,11 +308,23 @@ fn degenerate_frames_are_answered_without_panic() {
     };
     let (model, mut state) = tracker(&template, s.camera);
     for i in 0..3 {
-        step(&model, &mut state, &frame(i, s.depth(i)), &mut workspace).expect("step");
+        step(
+            &model,
+            &mut state,
+            &frame(i as u64, s.depth(i)),
+            &mut workspace,
+        )
+        .expect("step");
     }
     state.pose.angles[3] = f64::NAN;
     for i in 3..20 {
-        step(&model, &mut state, &frame(i, s.depth(i)), &mut workspace).expect("step");
+        step(
+            &model,
+            &mut state,
+            &frame(i as u64, s.depth(i)),
+            &mut workspace,
+        )
+        .expect("step");
     }
     assert!(
         state.status.is_live() && state.pose.is_finite(),
@@ -339,8 +345,15 @@ fn a_still_of_a_real_woman_fits() {
     let depth = read_png_depth(Path::new(&s.folder.join("depth/000000.png"))).expect("depth");
     let mut last = None;
     for i in 0..10 {
-        last =
-            Some(step(&model, &mut state, &frame(i, depth.clone()), &mut workspace).expect("step"));
+        last = Some(
+            step(
+                &model,
+                &mut state,
+                &frame(i as u64, depth.clone()),
+                &mut workspace,
+            )
+            .expect("step"),
+        );
     }
     let report = last.expect("ten steps");
     eprintln!(
