@@ -207,12 +207,7 @@ fn trunk_root(
     lean: &Vector3<f64>,
     rotation: UnitQuaternion<f64>,
 ) -> Rigid<crate::math::Camera, crate::math::Body> {
-    let skeleton = context.model.template.skeleton();
-    let crown = skeleton
-        .index("head_end")
-        .or_else(|| skeleton.index("head"))
-        .unwrap_or(0);
-    let chest = skeleton.index("spine3").unwrap_or(0);
+    let (crown, chest) = (context.model.crown, context.model.chest);
     let at = |j: usize| context.body.rest.joints[j].coords;
     let front = outline.torso.coords.cast::<f64>();
     let away = front.try_normalize(0.0).unwrap_or_else(Vector3::z);

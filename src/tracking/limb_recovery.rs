@@ -61,9 +61,7 @@ impl LimbRecovery {
         let side = (self.searches % 2) as usize;
         self.searches = self.searches.wrapping_add(1);
         let now = evaluate(context, pose, REACH, scratch);
-        let skeleton = context.model.template.skeleton();
-        let chest = skeleton.index("spine3").unwrap_or(0);
-        let torso = scratch.bones.joints[chest].cast::<f32>();
+        let torso = scratch.bones.joints[context.model.chest].cast::<f32>();
         let terms = scratch.terms;
         scratch.terms = FitTerms {
             edge_weight: 0.0,

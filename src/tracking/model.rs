@@ -52,6 +52,10 @@ pub struct TrackerModel {
     pub(super) legs: [Option<Limb>; 2],
     /// [`BodyPart`](crate::body::parts::BodyPart) of each joint, as a number, for the pose filter.
     pub(super) parts: Vec<usize>,
+    /// Joint at the height of the torso's middle; the root for a skeleton without.
+    pub(super) chest: usize,
+    /// End point or joint of the head; the root for a skeleton without.
+    pub(super) crown: usize,
     /// Angles of knees, ankles and feet.
     pub(super) below_knee: Vec<bool>,
     /// Share of the rest-pose prior left for each angle when its bone is in full view.
@@ -104,6 +108,11 @@ impl TrackerModel {
         let parts = (0..skeleton.len())
             .map(|j| template.parts().part(j) as usize)
             .collect();
+        let chest = skeleton.index("spine3").unwrap_or(0);
+        let crown = ["head_end", "head"]
+            .into_iter()
+            .find_map(|n| skeleton.index(n))
+            .unwrap_or(0);
         let below_knee = per_angle(&template, |s| s.is_leg() && s != BodySegment::Thigh);
         let seen_shares = per_angle(&template, seen_share);
         Self {
@@ -122,6 +131,8 @@ impl TrackerModel {
             arms,
             legs,
             parts,
+            chest,
+            crown,
             below_knee,
             seen_shares,
         }

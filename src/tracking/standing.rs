@@ -89,40 +89,47 @@ const BEND_STEP: f64 = 0.05;
 /// Share of a knee (0 to 1) without readings from which its bend is free to choose.
 const FREE: f64 = 0.5;
 
-/// Bends hidden knees whose feet are below the floor by the least angle that lifts them onto it. `joints` and `unseen`
-/// (share of each angle without readings) belong to the last normal equations.
-pub(super) fn bend_hidden_knees(
-    model: &TrackerModel,
-    rest: &RestBody,
-    grid: &OrganisedCloud,
-    floor: &FloorPlane,
-    (joints, unseen): (&[P3d], &[f64]),
-    pose: &mut Pose,
-) {
-    let skeleton = model.template.skeleton();
-    let mut bones = BoneTransforms::default();
-    for leg in &model.standing {
-        let (Some((knee, limits)), Some(&(ankle, height))) =
-            (leg.knee_angle, leg.foot.soles.first())
-        else {
-            continue;
-        };
-        if unseen.get(knee).is_none_or(|share| *share < FREE) || is_in_view(grid, &joints[ankle]) {
-            continue;
-        }
-        let mut below = |pose: &Pose| {
-            pose.bones(skeleton, rest, &mut bones);
-            floor.height + height - floor.up.dot(&bones.joints[ankle].coords)
-        };
-        if below(pose) < BELOW {
-            continue;
-        }
-        let mut bent = pose.clone();
-        while bent.angles[knee] + BEND_STEP < limits[1] {
-            bent.angles[knee] += BEND_STEP;
-            if below(&bent) < 0.0 {
-                *pose = bent;
-                break;
+/// Knees without readings over a floor, at the pose of the last normal equations.
+#[derive(Clone, Copy)]
+pub(super) struct HiddenKnees<'a> {
+    pub model: &'a TrackerModel,
+    pub rest: &'a RestBody,
+    pub grid: &'a OrganisedCloud,
+    pub floor: &'a FloorPlane,
+    pub joints: &'a [P3d],
+    /// Share of each angle without readings, 0 to 1.
+    pub unseen: &'a [f64],
+}
+
+impl HiddenKnees<'_> {
+    /// Bends the knees whose feet are below the floor by the least angle that lifts them onto it.
+    pub(super) fn bend(&self, pose: &mut Pose) {
+        let (skeleton, floor) = (self.model.template.skeleton(), self.floor);
+        let mut bones = BoneTransforms::default();
+        for leg in &self.model.standing {
+            let (Some((knee, limits)), Some(&(ankle, height))) =
+                (leg.knee_angle, leg.foot.soles.first())
+            else {
+                continue;
+            };
+            let is_free = self.unseen.get(knee).is_some_and(|share| *share >= FREE);
+            if !is_free || is_in_view(self.grid, &self.joints[ankle]) {
+                continue;
+            }
+            let mut below = |pose: &Pose| {
+                pose.bones(skeleton, self.rest, &mut bones);
+                floor.height + height - floor.up.dot(&bones.joints[ankle].coords)
+            };
+            if below(pose) < BELOW {
+                continue;
+            }
+            let mut bent = pose.clone();
+            while bent.angles[knee] + BEND_STEP < limits[1] {
+                bent.angles[knee] += BEND_STEP;
+                if below(&bent) < 0.0 {
+                    *pose = bent;
+                    break;
+                }
             }
         }
     }
@@ -158,7 +165,7 @@ mod tests {
     use crate::math::Rigid;
     use crate::registration::NormalEquations;
     use crate::tracking::kinematics::{apply, linearise};
-    use crate::tracking::pose_fit::add_floor;
+    use crate::tracking::pose_fit::FloorLegs;
     use crate::tracking::test_scene::TestScene;
     use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 
@@ -227,16 +234,16 @@ mod tests {
         let grid = OrganisedCloud::new(&model.calibration.depth, None);
         let feet = planted(model, &grid, Some(standing), &bones.joints);
         let unseen = vec![1.0; pose.angles.len()];
-        let posed = (bones.joints.as_slice(), dofs.as_slice());
-        add_floor(
+        let legs = FloorLegs {
             model,
-            &grid,
-            &standing.floor,
+            grid: &grid,
+            floor: &standing.floor,
             feet,
-            posed,
-            &unseen,
-            &mut equations,
-        );
+            joints: &bones.joints,
+            dofs: &dofs,
+            unseen: &unseen,
+        };
+        legs.add_to(&mut equations);
         (equations, centre, feet.map(|f| f.is_some()))
     }
 
@@ -318,8 +325,15 @@ mod tests {
             };
             let unseen = vec![unseen; pose.angles.len()];
             let mut bent = pose.clone();
-            let posed = (joints.as_slice(), unseen.as_slice());
-            bend_hidden_knees(model, &scene.rest, &grid, &floor, posed, &mut bent);
+            let knees = HiddenKnees {
+                model,
+                rest: &scene.rest,
+                grid: &grid,
+                floor: &floor,
+                joints: &joints,
+                unseen: &unseen,
+            };
+            knees.bend(&mut bent);
             bent
         };
         assert_eq!(&bend(0.12, 0.0), pose, "a knee with readings");

@@ -12,7 +12,7 @@ use super::pose_fit::{
 use super::prediction::{Prediction, predict};
 use super::report::Stopwatch;
 use super::size::from_stature;
-use super::standing::{FloorStance, FootMemory, bend_hidden_knees, floor_below, highest_hips};
+use super::standing::{FloorStance, FootMemory, HiddenKnees, floor_below, highest_hips};
 use super::{
     LostReason, Skipped, Status, StepReport, TrackerModel, TrackerState, TrackingStagesMs,
     Workspace, surface,
@@ -267,8 +267,15 @@ impl SubjectFrame<'_> {
         }
         let fit = fit_pose(&self.context(&workspace.body), pose, schedule, scratch);
         if let Some(standing) = scratch.terms.standing {
-            let last = (scratch.bones.joints.as_slice(), scratch.unseen.as_slice());
-            bend_hidden_knees(model, rest, grid, &standing.floor, last, pose);
+            let knees = HiddenKnees {
+                model,
+                rest,
+                grid,
+                floor: &standing.floor,
+                joints: &scratch.bones.joints,
+                unseen: &scratch.unseen,
+            };
+            knees.bend(pose);
         }
         fit
     }
@@ -323,8 +330,7 @@ impl SubjectFrame<'_> {
         pair(&context, &state.pose, DISPLACEMENT_DISTANCE, 0.0, scratch);
         let (updated, change) = surface::fit(
             &context,
-            &scratch.bones,
-            &scratch.pairing.image,
+            scratch,
             &mut state.shape.displacements,
             &mut state.surface,
             &mut workspace.surface,

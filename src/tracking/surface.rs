@@ -1,8 +1,9 @@
 //! Surface displacements along the rest normals (section 3.3, eq. 13 to 17), by warm-started conjugate gradients.
 
-use super::pose_fit::FitContext;
+use super::pose_fit::{FitContext, FitScratch};
 use crate::body::{BoneTransforms, RestBody, Template, skin};
 use crate::math::{P3, V3};
+use crate::mesh::Csr;
 use crate::par::Par;
 use crate::registration::IndexImage;
 use crate::spatial::Label;
@@ -58,12 +59,11 @@ const COS_NORMAL: f32 = 0.5;
 /// Diagonal of LᵀL of a regular mesh: 1 + 1/degree, for the preconditioner.
 const LAPLACIAN_DIAGONAL: f32 = 1.17;
 
-/// Updates displacements (metres, shape `[vertices]`) from one frame; `image` is the model drawn into the grid. Returns
-/// the number of vertices with a reading and the root mean square of the change, metres.
+/// Updates displacements (metres, shape `[vertices]`) from one frame, at the pose that `paired` holds. Returns the number
+/// of vertices with a reading and the root mean square of the change, metres.
 pub(super) fn fit(
     context: &FitContext<'_>,
-    bones: &BoneTransforms,
-    image: &IndexImage,
+    paired: &FitScratch,
     displacements: &mut Vec<f32>,
     statistics: &mut SurfaceStatistics,
     s: &mut SurfaceScratch,
@@ -72,7 +72,7 @@ pub(super) fn fit(
     displacements.resize(n, 0.0);
     statistics.mean.resize(n, 0.0);
     statistics.spread.resize(n, 0.0);
-    let readings = measure(context, bones, image, s);
+    let readings = measure(context, &paired.bones, &paired.pairing.image, s);
     s.before.clone_from(displacements);
     let (template, rest) = (&context.model.template, &context.body.rest);
     solve(template, rest, displacements, statistics, s);
@@ -176,14 +176,12 @@ fn solve(
         s.diagonal.push(s.weight[i] + temporal(i) + RIDGE);
     }
     // b = ω t + temporal μ; r = b − A d.
-    apply(
+    let system = SurfaceSystem {
         neighbours,
-        &rest.normals,
-        &s.diagonal,
-        d,
-        &mut s.laplacian,
-        &mut s.image,
-    );
+        normals: &rest.normals,
+        diagonal: &s.diagonal,
+    };
+    system.multiply(d, &mut s.laplacian, &mut s.image);
     s.residual.clear();
     for i in 0..n {
         let b = s.weight[i] * s.target[i] + temporal(i) * statistics.mean[i];
@@ -202,14 +200,7 @@ fn solve(
     s.direction.clone_from(&s.preconditioned);
     let mut rz = dot(&s.residual, &s.preconditioned);
     for _ in 0..ITERATIONS {
-        apply(
-            neighbours,
-            &rest.normals,
-            &s.diagonal,
-            &s.direction,
-            &mut s.laplacian,
-            &mut s.image,
-        );
+        system.multiply(&s.direction, &mut s.laplacian, &mut s.image);
         let curvature = dot(&s.direction, &s.image);
         if curvature <= 0.0 || rz <= 0.0 {
             break;
@@ -229,37 +220,76 @@ fn solve(
     }
 }
 
-/// `out = (diagonal + SPATIAL · graph Laplacian + LAPLACIAN · LᵀL) x`, where (L x)ᵢ = nᵢ xᵢ − mean of the
-/// neighbours' nⱼ xⱼ (eq. 14 with the mean for the sum, so that flat parts cost nothing).
-fn apply(
-    neighbours: &crate::mesh::Csr,
-    normals: &[V3],
-    diagonal: &[f32],
-    x: &[f32],
-    laplacian: &mut Vec<V3>,
-    out: &mut Vec<f32>,
-) {
-    let n = x.len();
-    laplacian.clear();
-    out.clear();
-    for i in 0..n {
-        let row = neighbours.row(i);
-        let (mut sum, mut difference) = (V3::zeros(), 0.0);
-        for &j in row {
-            let j = j as usize;
-            sum += normals[j] * x[j];
-            difference += x[i] - x[j];
+/// System matrix of eq. 17: diagonal + SPATIAL · graph Laplacian + LAPLACIAN · LᵀL.
+///
+/// (L x)ᵢ = nᵢ xᵢ − mean of the neighbours' nⱼ xⱼ (eq. 14 with the mean for the sum, so that flat parts cost nothing).
+struct SurfaceSystem<'a> {
+    neighbours: &'a Csr,
+    normals: &'a [V3],
+    diagonal: &'a [f32],
+}
+
+impl SurfaceSystem<'_> {
+    /// Writes the product with `x` into `out`; `laplacian` receives L x.
+    fn multiply(&self, x: &[f32], laplacian: &mut Vec<V3>, out: &mut Vec<f32>) {
+        let (neighbours, normals, diagonal) = (self.neighbours, self.normals, self.diagonal);
+        let n = x.len();
+        laplacian.clear();
+        out.clear();
+        for i in 0..n {
+            let row = neighbours.row(i);
+            let (mut sum, mut difference) = (V3::zeros(), 0.0);
+            for &j in row {
+                let j = j as usize;
+                sum += normals[j] * x[j];
+                difference += x[i] - x[j];
+            }
+            let degree = row.len().max(1) as f32;
+            laplacian.push(normals[i] * x[i] - sum / degree);
+            out.push(diagonal[i] * x[i] + SPATIAL * difference);
         }
-        let degree = row.len().max(1) as f32;
-        laplacian.push(normals[i] * x[i] - sum / degree);
-        out.push(diagonal[i] * x[i] + SPATIAL * difference);
+        for i in 0..n {
+            let mut sum = laplacian[i];
+            for &j in neighbours.row(i) {
+                let j = j as usize;
+                sum -= laplacian[j] / neighbours.row(j).len().max(1) as f32;
+            }
+            out[i] += LAPLACIAN * normals[i].dot(&sum);
+        }
     }
-    for i in 0..n {
-        let mut sum = laplacian[i];
-        for &j in neighbours.row(i) {
-            let j = j as usize;
-            sum -= laplacian[j] / neighbours.row(j).len().max(1) as f32;
-        }
-        out[i] += LAPLACIAN * normals[i].dot(&sum);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::embedded;
+    use rand::{Rng, SeedableRng};
+
+    #[test]
+    fn the_system_is_symmetric_and_positive() {
+        let template = embedded::template();
+        let rest = template.personalise(&Default::default());
+        let n = rest.normals.len();
+        let mut rng = rand_pcg::Pcg32::seed_from_u64(5);
+        let mut random = || -> Vec<f32> { (0..n).map(|_| rng.random_range(-1.0..1.0)).collect() };
+        let (x, y) = (random(), random());
+        let system = SurfaceSystem {
+            neighbours: template.topology().vertex_neighbours(),
+            normals: &rest.normals,
+            diagonal: &vec![RIDGE; n],
+        };
+        let product = |x: &[f32]| {
+            let mut out = Vec::new();
+            system.multiply(x, &mut Vec::new(), &mut out);
+            out
+        };
+        let (xay, yax, xax) = (
+            dot(&x, &product(&y)),
+            dot(&y, &product(&x)),
+            dot(&x, &product(&x)),
+        );
+        assert!((xay - yax).abs() < 1e-5 * xax, "{xay} against {yax}");
+        assert!(xax > f64::from(RIDGE) * dot(&x, &x), "{xax}");
+        assert!(product(&vec![0.0; n]).iter().all(|v| *v == 0.0));
     }
 }

@@ -39,7 +39,7 @@ fn track(template: &Arc<Template>, scene: &Scene) -> TrackOutcome {
     )
 }
 
-/// TrackOutcome, number of joints that `measured` selects, and their mean error (mm).
+/// Outcome, number of joints that `measured` selects, and their mean error (mm).
 fn track_joints(
     template: &Arc<Template>,
     scene: &Scene,

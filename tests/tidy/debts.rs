@@ -12,9 +12,6 @@ pub(crate) const LONG_FUNCTIONS: &[&str] = &[
     "src/cloth/realtime/step.rs",
     "src/cloth/realtime/touch.rs",
     "src/cloth/realtime/untangle.rs",
-    "src/evaluate/stills.rs",
-    "src/evaluate/tracking.rs",
-    "tests/suite/starts.rs",
 ];
 
 /// Files with comments that open with a question word.
@@ -42,20 +39,7 @@ pub(crate) const OPENINGS: &[&str] = &[
     "src/contact/depth_maps.rs",
     "src/contact/near_skin.rs",
     "src/contact/surface.rs",
-    "src/evaluate/ablation.rs",
-    "src/evaluate/stills.rs",
-    "src/evaluate/tracking.rs",
-    "src/spatial/organised.rs",
 ];
 
 /// Type names with a second meaning.
-pub(crate) const TYPE_NAMES: &[&str] = &[
-    "Bounds",
-    "Outcome",
-    "PatchScratch",
-    "Region",
-    "Scene",
-    "Side",
-    "StagesMs",
-    "TruthFile",
-];
+pub(crate) const TYPE_NAMES: &[&str] = &["Bounds", "PatchScratch", "Region", "Scene", "Side"];

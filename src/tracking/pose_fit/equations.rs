@@ -193,9 +193,16 @@ fn add_priors(
     };
     prior.for_each(|row| equations.add_row(row));
     if let Some(standing) = standing {
-        let posed = (joints.as_slice(), scratch.dofs.as_slice());
-        let unseen = &scratch.unseen;
-        add_floor(model, grid, &standing.floor, feet, posed, unseen, equations);
+        let legs = FloorLegs {
+            model,
+            grid,
+            floor: &standing.floor,
+            feet,
+            joints,
+            dofs: &scratch.dofs,
+            unseen: &scratch.unseen,
+        };
+        legs.add_to(equations);
     }
     let centre = scratch.centre();
     for (arm, hand) in model.arms.iter().zip(scratch.terms.hands) {
@@ -248,30 +255,37 @@ fn prior_weights(
     model.stiffness.iter().enumerate().map(weight).collect()
 }
 
-/// Adds the floor residual of both legs; `posed` are the joints and the degrees of freedom about the root joint.
-pub(in crate::tracking) fn add_floor(
-    model: &TrackerModel,
-    grid: &OrganisedCloud,
-    floor: &FloorPlane,
-    feet: [Option<[Vector3<f64>; 2]>; 2],
-    posed: (&[P3d], &[Dof]),
-    unseen: &[f64],
-    equations: &mut NormalEquations,
-) {
-    let (joints, dofs) = posed;
-    for (leg, planted) in model.standing.iter().zip(feet) {
-        let residual = FloorResidual {
-            foot: &leg.foot,
-            floor: *floor,
-            planted,
-            joints,
-            parents: &model.parents,
-            dofs,
-            centre: &joints[0].coords,
-            unseen,
-            grid,
-            weights: FloorWeights::default(),
-        };
-        residual.for_each(|row| equations.add_row(row));
+/// Both legs over a floor.
+pub(in crate::tracking) struct FloorLegs<'a> {
+    pub model: &'a TrackerModel,
+    pub grid: &'a OrganisedCloud,
+    pub floor: &'a FloorPlane,
+    /// Remembered ankle and ball of each planted foot.
+    pub feet: [Option<[Vector3<f64>; 2]>; 2],
+    pub joints: &'a [P3d],
+    /// Degrees of freedom as twists about the root joint.
+    pub dofs: &'a [Dof],
+    /// Share of each angle without readings, 0 to 1.
+    pub unseen: &'a [f64],
+}
+
+impl FloorLegs<'_> {
+    /// Adds the floor residual of both legs to the equations.
+    pub(in crate::tracking) fn add_to(&self, equations: &mut NormalEquations) {
+        for (leg, planted) in self.model.standing.iter().zip(self.feet) {
+            let residual = FloorResidual {
+                foot: &leg.foot,
+                floor: *self.floor,
+                planted,
+                joints: self.joints,
+                parents: &self.model.parents,
+                dofs: self.dofs,
+                centre: &self.joints[0].coords,
+                unseen: self.unseen,
+                grid: self.grid,
+                weights: FloorWeights::default(),
+            };
+            residual.for_each(|row| equations.add_row(row));
+        }
     }
 }

@@ -6,7 +6,7 @@ mod scratch;
 mod solve;
 
 #[cfg(test)]
-pub(super) use equations::add_floor;
+pub(super) use equations::FloorLegs;
 pub(super) use equations::{assemble, for_each_point, pair};
 pub(super) use schedule::{ANNEAL, FitTerms, START, START_TERMS, Schedule, TRACK};
 pub(super) use scratch::{FitContext, FitScratch};
