@@ -1,4 +1,4 @@
-//! The model seen by the camera, as an image of point numbers.
+//! The model seen by the camera, as an image of point indices.
 
 use crate::math::{P3, V3};
 use crate::spatial::OrganisedCloud;

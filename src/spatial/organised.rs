@@ -36,24 +36,26 @@ const SAME_SURFACE_SLOPE: f32 = 0.006;
 /// Neighbouring cells farther apart in depth than this (metres) lie on different surfaces.
 const DISCONTINUITY: f32 = 0.06;
 
-/// Readings of one cell support each other within this part of their distance (2 %) and 20 mm: steep surfaces included.
+/// Readings of one cell support each other within their depth over this (2 %) plus [`SUPPORT`]: steep surfaces included.
 const SUPPORT_SLOPE: u16 = 50;
+/// See [`SUPPORT_SLOPE`], millimetres.
+const SUPPORT: u16 = 20;
 
-/// A picture is thin when one filled cell in so many misses two or three of its four probes; outlines of a person alone
-/// are one in five.
+/// Filled cells per cell that misses two or three of its four probes, at or below which an image is thin. The outlines
+/// of a subject alone give one in five.
 const THIN: usize = 3;
 
 /// A cell whose averaged depth is this far from its first reading (metres) was labelled by a corrupt pixel
 /// and is given up.
 const MISLED: f32 = 0.25;
 
-/// Two readings of one cell that speak for each other.
+/// True for two readings of one cell (millimetres) that support each other.
 fn agree(a: u16, b: u16) -> bool {
-    b > 0 && a.abs_diff(b) <= a / SUPPORT_SLOPE + 20
+    b > 0 && a.abs_diff(b) <= a / SUPPORT_SLOPE + SUPPORT
 }
 
-/// The first of four readings (millimetres) that another one supports, else the first one there is: a lone corrupt
-/// pixel does not speak for its cell.
+/// The first of four readings (millimetres) that another one supports, else the first one there is. A lone corrupt
+/// pixel does not decide the class of its cell.
 fn supported(readings: [u16; 4]) -> u16 {
     let backed = |i: &usize| {
         let a = readings[*i];
@@ -77,7 +79,7 @@ pub struct OrganisedCloud {
     c: [f32; 2],
     /// Depth of each cell, metres; 0 = no reading.
     pub depth: Vec<f32>,
-    /// Most pixels have no reading: a cell must do with what there is.
+    /// Most pixels have no reading: one reading without support is enough for a cell.
     thin: bool,
     /// Class of each cell.
     pub labels: Vec<Label>,
@@ -105,7 +107,7 @@ impl OrganisedCloud {
             normals: vec![V3::zeros(); n],
         }
     }
-    /// This grid was made for that camera and stride.
+    /// True for a grid made for that camera and stride.
     pub fn fits(&self, camera: &Intrinsics, stride: Option<u32>) -> bool {
         let (s, focal) = Self::layout(camera, stride);
         self.stride == s

@@ -14,7 +14,7 @@ const FOREARM_POINTS: usize = 5;
 const SEEN_POINTS: usize = 3;
 /// Depth difference up to which a reading belongs to the forearm, metres.
 const FOREARM_DEPTH: f64 = 0.10;
-/// Arm lengths from the shoulder beyond which a hand belongs to somebody else.
+/// Arm lengths from the shoulder beyond which a hand belongs to another person.
 const STRETCH: f64 = 1.15;
 
 /// True when the subject has readings along the forearm.

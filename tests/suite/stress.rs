@@ -181,8 +181,8 @@ fn a_torso_turns_seen_from_the_waist_up() {
     assert!(worst.to_degrees() <= 15.0 && flagged && out.lost == 0);
 }
 
-/// The paper's other failure: an arm whose sleeve gives no return, in the dark and before a wall. The hand beyond it does,
-/// and tells where the arm goes.
+/// The paper's other failure: an arm whose sleeve gives no return, in the dark and before a wall. The hand beyond it
+/// does, and determines the arm.
 #[test]
 fn an_arm_without_return_follows_its_hand() {
     let (Some(template), Some(data)) = (template(), data()) else {
