@@ -1,7 +1,7 @@
 //! Normal equations of an articulated body, summed per bone: their cost grows with points plus joints, not with
 //! points times joints.
 //!
-//! A point p on bone b moves by S·ξ for the bone's twist ξ = (v, ω), S = [I | −[p]ₓ]. The bone's twist is the sum of
+//! A point p on bone b moves by S·ξ for the bone's twist ξ = (v, ω), S = `[I | −[p]ₓ]`. The bone's twist is the sum of
 //! those of its ancestor joints (eq. 3 and 5 with the dominant bone). So Σ Sᵀ M S and Σ Sᵀ M r over each bone suffice.
 
 use super::Metric;
@@ -77,7 +77,7 @@ impl<T: RealField + Copy> BoneSums<T> {
         }
     }
 
-    /// Moves the isotropic parts into the Hessian: Sᵀ S = [[I, −[p]], [[p], −[p][p]]].
+    /// Moves the isotropic parts into the Hessian: `Sᵀ S = [[I, −[p]], [[p], −[p][p]]]`.
     fn finish(&mut self) {
         let f = self.first;
         let zero = T::zero();

@@ -175,6 +175,8 @@ mod tests {
     use crate::camera::DepthImage;
     use crate::tracking::test_scene::TestScene;
 
+    type Spoil = fn(&mut TrackerState);
+
     struct Session {
         scene: TestScene,
         state: TrackerState,
@@ -260,7 +262,7 @@ mod tests {
         ));
         assert_eq!(s.state, before);
 
-        let faults: [(&str, fn(&mut TrackerState)); 3] = [
+        let faults: [(&str, Spoil); 3] = [
             ("state.shape", |s| s.shape.bone_scales = vec![f64::NAN]),
             ("state.shape.displacements", |s| {
                 s.shape.displacements = vec![f32::INFINITY];

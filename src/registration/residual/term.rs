@@ -13,7 +13,7 @@ pub trait Residual {
     fn for_each(&self, visit: impl FnMut(&Self::Term<'_>));
 }
 
-/// Term of one sample point; its Jacobian by the twist of the point's bone is −[I | −[p]ₓ].
+/// Term of one sample point; its Jacobian by the twist of the point's bone is `−[I | −[p]ₓ]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointTerm {
     /// Model point.

@@ -144,8 +144,10 @@ mod tests {
             body: &body,
             observation: &scan.observation(),
         };
-        let mut scratch = FitScratch::default();
-        scratch.terms = FitTerms::tracking(&scene.model.config);
+        let mut scratch = FitScratch {
+            terms: FitTerms::tracking(&scene.model.config),
+            ..FitScratch::default()
+        };
         fit_pose(&context, pose, &TRACK, &mut scratch)
     }
 
