@@ -10,7 +10,7 @@ mod drawing;
 use drawing::{DrawnMesh, Sheet, Turn, draw};
 use std::path::PathBuf;
 use tryon::body::Template;
-use tryon::cloth::realtime::Config;
+use tryon::cloth::Config;
 use tryon::contact::MapDetail;
 use tryon::dressing::Dressed;
 use tryon::evaluate::dance::{DanceReport, load};
@@ -103,7 +103,7 @@ fn args() -> Args {
             "--edge" => a.outfit.edge = value().parse().expect("metres"),
             "--seconds" => a.seconds = value().parse().expect("seconds"),
             "--threads" => a.threads = value().parse().expect("a number"),
-            "--sharpest" => a.outfit.config.sharpest = value().parse().expect("a share"),
+            "--sharpest" => a.outfit.config.min_fold_ratio = value().parse().expect("a share"),
             "--most-steps" => a.outfit.config.most_steps = value().parse().expect("a number"),
             "--patch" => a.outfit.config.patch = value().parse().expect("a number"),
             "--maps" => {

@@ -6,7 +6,7 @@
 //! `--arms`: degrees below the horizontal; 75 hang, without it they are off the trunk.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
 
-use tryon::cloth::realtime::Config;
+use tryon::cloth::Config;
 use tryon::evaluate::OutfitSpec;
 use tryon::evaluate::rest::{Motion, RestingSubject};
 use tryon::par::with_threads;

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use tryon::body::{Pose, Template, embedded};
 use tryon::camera::{Calibration, ColorImage, RgbdFrame};
-use tryon::cloth::realtime::{self, Config as ClothConfig};
+use tryon::cloth::{self, Config as ClothConfig};
 use tryon::composite::{
     Appearance, BodyView, Config, GarmentView, Input, Limbs, Model, RenderReport, State, Workspace,
     render,
@@ -183,13 +183,13 @@ fn dressed(t: &Tracked, names: &[&str]) -> Vec<Drawn> {
     let mut dressed = dress(&t.template, &rest, &pose, &patterns, &options).unwrap();
     let mut body = Vec::new();
     (t.state.world_from_camera).points_f32(&t.body_camera, &mut body);
-    let mut work = realtime::Workspace::default();
+    let mut work = cloth::Workspace::default();
     for _ in 0..SETTLE {
-        let input = realtime::Input {
+        let input = cloth::Input {
             body: &body,
             dt: 1.0 / 30.0,
         };
-        realtime::step(&dressed.model, &mut dressed.state, &input, &mut work).unwrap();
+        cloth::step(&dressed.model, &mut dressed.state, &input, &mut work).unwrap();
     }
     let camera_from_world = t.state.world_from_camera.inverse();
     let meshes = dressed.model.outfit.garments.iter();

@@ -68,7 +68,7 @@ const MODULES: &[(u8, &str, &str)] = &[
     (
         3,
         "contact",
-        "Candidate pairs, continuous collision, distances and contact energies between moving triangles; it never steps time.",
+        "The collision body (filtered, parts and joints separated, once a pose, the one that is drawn too), candidate pairs (vertex–face, edge–edge), distances, continuous collision, contact energies and constraints; it never steps time.",
     ),
     (
         3,
@@ -88,7 +88,7 @@ const MODULES: &[(u8, &str, &str)] = &[
     (
         4,
         "cloth",
-        "One step of garment motion against a moving body: the real-time and the offline solvers.",
+        "One step of garment motion against a moving body, `filter → collide → solve → commit → sleep`: `model/` (sheet, membrane, bending, partition), `solver/` (explicit, xpbd, implicit behind one trait), `sleep/`, `repair/`.",
     ),
     (
         4,

@@ -1,7 +1,7 @@
 //! Command line of the turntable.
 
 use std::path::PathBuf;
-use tryon::cloth::realtime::Config;
+use tryon::cloth::Config;
 use tryon::dressing::SourceBody;
 use tryon::garment::library;
 
@@ -47,7 +47,7 @@ pub(crate) fn args() -> Args {
         crossings: false,
         folds: true,
         untangle: true,
-        sharpest: Config::default().sharpest,
+        sharpest: Config::default().min_fold_ratio,
         measured: false,
         out: "/tmp/turntable".into(),
     };

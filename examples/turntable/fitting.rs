@@ -7,13 +7,12 @@ use crate::wardrobe::Garment;
 use std::time::Instant;
 use tryon::body::Pose;
 use tryon::body::measure::measure;
-use tryon::cloth::realtime::{Config, Input, RoomyBody, State, StepReport, Workspace, step};
+use tryon::cloth::{Config, Input, State, StepReport, Workspace, step};
 use tryon::dressing::{
     DressError, DressOptions, Dressed, FitMap, FitProbe, GarmentSource, dress_all,
 };
 use tryon::garment::{GarmentMesh, library};
 use tryon::math::{P3, World};
-use tryon::par::Par;
 use tryon::spatial::intersections;
 
 /// Steps a second.
@@ -24,7 +23,6 @@ const CROSSING_COLORS: [[u8; 3]; 2] = [[225, 220, 200], [220, 0, 0]];
 /// A dressed body.
 pub(crate) struct Fitting {
     dressed: Dressed,
-    separated: RoomyBody,
     /// The body of the last step, world, metres.
     body: Vec<P3>,
     probe: Option<FitProbe>,
@@ -56,7 +54,7 @@ fn options(a: &Args, is_tracked: bool) -> DressOptions {
         untangle: a.untangle,
         config: Config {
             self_collision: a.folds,
-            sharpest: a.sharpest,
+            min_fold_ratio: a.sharpest,
             ..config
         },
         ..DressOptions::default()
@@ -93,7 +91,6 @@ impl Fitting {
         };
         let probe = (a.fit).then(|| FitProbe::new(&person.template, &dressed.model));
         let out = Self {
-            separated: RoomyBody::new(&person.template, &options.config).expect("a body"),
             body: posed(&person.template, &person.rest, start),
             probe: probe.map(|p| p.expect("a probe")),
             dressed,
@@ -153,14 +150,7 @@ impl Fitting {
             let (model, state) = (&self.dressed.model, &mut self.dressed.state);
             let report = step(model, state, &input, &mut work).expect("step");
             let crossed = self.crossed();
-            let begun = Instant::now();
-            self.separated.make_room(Par::Rayon, &body);
-            statistics.add(
-                report,
-                vertices,
-                &crossed,
-                begun.elapsed().as_secs_f64() * 1e3,
-            );
+            statistics.add(report, vertices, &crossed);
             self.body = body;
         }
         statistics.print(&self.crossed());
@@ -172,11 +162,11 @@ impl Fitting {
     }
 
     /// The body as cloth met it, or as measured.
-    pub(crate) fn drawn_body(&mut self, a: &Args) -> Vec<P3> {
+    pub(crate) fn drawn_body(&self, a: &Args) -> Vec<P3> {
         if a.measured {
             return self.body.clone();
         }
-        self.separated.make_room(Par::Rayon, &self.body).to_vec()
+        self.dressed.state.collision_body().vertices().to_vec()
     }
 
     /// The garments, painted with crossings or fit as asked for.
@@ -247,8 +237,6 @@ fn crossing_colors(g: &GarmentMesh, positions: &[P3]) -> Vec<[u8; 3]> {
 struct Statistics {
     frames: usize,
     step_ms: f64,
-    /// Separation of the body's parts for drawing, without the first step.
-    separation_ms: f64,
     /// First step after which all vertices slept to the end.
     at_rest: Option<usize>,
     crossed: Vec<usize>,
@@ -256,12 +244,9 @@ struct Statistics {
 }
 
 impl Statistics {
-    fn add(&mut self, report: StepReport, vertices: usize, crossed: &[usize], separation_ms: f64) {
+    fn add(&mut self, report: StepReport, vertices: usize, crossed: &[usize]) {
         self.frames += 1;
         self.step_ms += report.stages_ms.total;
-        if self.last.is_some() {
-            self.separation_ms += separation_ms;
-        }
         self.at_rest = match report.sleeping < vertices {
             true => None,
             false => self.at_rest.or(Some(self.frames)),
@@ -274,9 +259,8 @@ impl Statistics {
     fn print(&self, crossed: &[usize]) {
         let Some(r) = &self.last else { return };
         println!(
-            "  {:.2} ms a step, {:.2} ms separation for drawing, penetration left {:.2} mm, p99 {:.3} max {:.3}",
+            "  {:.2} ms a step, penetration left {:.2} mm, p99 {:.3} max {:.3}",
             self.step_ms / self.frames as f64,
-            self.separation_ms / self.frames as f64,
             r.penetration_left * 1e3,
             r.p99_strain,
             r.max_strain

@@ -1,4 +1,4 @@
-//! What can go wrong with cloth, and where.
+//! Faults of cloth, with the triangle, vertex or setting at fault.
 
 /// A fault of a sheet, an input or a step.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -11,22 +11,22 @@ pub enum ClothError {
         /// Its area, m².
         area: f64,
     },
-    /// A number that is not finite, before or after a step.
+    /// A value that is not finite, before or after a step.
     #[error("{what} {index} is not finite")]
     NotFinite {
-        /// What kind of thing: `cloth vertex`, `body vertex`, …
+        /// Kind: `cloth vertex`, `body vertex`, …
         what: &'static str,
-        /// Which one.
+        /// Its index.
         index: usize,
     },
-    /// An array that does not fit.
+    /// An array of the wrong size.
     #[error("{what}: {got} given, {expected} expected")]
     Count {
-        /// What was counted.
+        /// Kind of elements.
         what: &'static str,
-        /// How many came.
+        /// Number given.
         got: usize,
-        /// How many fit.
+        /// Number expected.
         expected: usize,
     },
     /// A setting that cannot be used.
@@ -34,7 +34,7 @@ pub enum ClothError {
     Field {
         /// Field name.
         field: String,
-        /// What is wrong.
+        /// The fault.
         why: String,
     },
     /// The system of equations could not be factored.
@@ -46,4 +46,14 @@ pub enum ClothError {
     /// The garment is at fault.
     #[error(transparent)]
     Garment(#[from] crate::garment::GarmentError),
+}
+
+impl ClothError {
+    /// A setting that cannot be used.
+    pub(super) fn field(field: &str, why: &str) -> Self {
+        Self::Field {
+            field: field.to_owned(),
+            why: why.to_owned(),
+        }
+    }
 }

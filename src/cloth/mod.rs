@@ -1,13 +1,37 @@
-//! One step of garment motion against a moving body: the real-time and the offline solvers.
+//! One step of garment motion against a moving body, `filter → collide → solve → commit → sleep`: `model/` (sheet, membrane, bending, partition), `solver/` (explicit, xpbd, implicit behind one trait), `sleep/`, `repair/`.
+//!
+//! The real-time simulator follows Ye et al. 2014, section 4, "Near Realtime simulation".
 
+mod collide;
+mod collision;
+mod commit;
+mod config;
+pub(crate) mod contact;
 mod error;
-pub(crate) mod folds;
+mod garment_model;
 pub mod model;
-pub mod realtime;
+mod outfit;
+mod outfit_model;
+mod patch;
+pub(crate) mod repair;
+mod report;
 pub mod scene;
-pub(crate) mod sleeves;
+mod sleep;
+mod solve;
 pub mod solver;
-pub(crate) mod untangle;
+mod state;
+mod step;
+#[cfg(test)]
+mod test_outfit;
+mod workspace;
 
+pub use collision::collision_model;
+pub use config::Config;
 pub use error::ClothError;
 pub use model::{Element, Hinge, Sheet};
+pub use outfit::{AnchorBinding, Outfit};
+pub use outfit_model::Model;
+pub use report::{StagesMs, StepReport};
+pub use state::{GarmentState, State};
+pub use step::{Input, step};
+pub use workspace::Workspace;

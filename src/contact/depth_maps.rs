@@ -24,7 +24,7 @@ const COARSE: f32 = 64.0;
 /// Scale of the map that looks from the real camera; the paper asks for a higher resolution there.
 const FINE: f32 = 128.0;
 
-/// Which maps are fine (8 mm a pixel instead of 16).
+/// Resolution of the depth maps: 8 mm a pixel where fine, else 16.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MapDetail {

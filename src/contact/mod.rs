@@ -1,18 +1,26 @@
-//! Candidate pairs, continuous collision, distances and contact energies between moving triangles; it never steps time.
+//! The collision body (filtered, parts and joints separated, once a pose, the one that is drawn too), candidate pairs (vertex–face, edge–edge), distances, continuous collision, contact energies and constraints; it never steps time.
 
-mod across;
-mod apart;
-mod astray;
-mod buried;
-mod creases;
+mod body_filter;
+mod closest_multistart;
+mod closest_point;
+mod collision_body;
 mod depth_maps;
-mod near_skin;
+mod interior;
+mod joint_clearance;
+mod part_clearance;
+mod proximity_cache;
+mod skin_grid;
 mod surface;
-mod winding;
+#[cfg(test)]
+mod test_shapes;
+mod triangle_fan;
 
-pub use apart::Apart;
-pub use buried::Buried;
-pub use creases::Crease;
+pub use closest_point::ClosestPoint;
+pub use collision_body::{
+    CollisionBody, CollisionConfig, CollisionError, CollisionModel, CollisionParts,
+    CollisionReport, CollisionWorkspace,
+};
 pub use depth_maps::{DepthMaps, MapDetail, MapView};
-pub use near_skin::{Near, NearSkin};
-pub use surface::{Closest, Part, SurfaceFrame, SurfaceModel};
+pub use interior::Interior;
+pub use skin_grid::{SkinCandidates, SkinGrid};
+pub use surface::{Part, SurfaceFrame, SurfaceModel};

@@ -1,7 +1,7 @@
 //! Anchors tied to the skin below them.
 
 use super::waistband::{GarmentOnSkin, spread};
-use crate::cloth::realtime::AnchorBinding;
+use crate::cloth::AnchorBinding;
 use crate::cloth::{ClothError, Sheet};
 use crate::contact::SurfaceFrame;
 use crate::garment::{AnchorKind, Region};
@@ -37,7 +37,7 @@ impl GarmentOnSkin<'_> {
                         vertex,
                         body,
                         weights: c.weights,
-                        height: height(c.signed),
+                        height: height(c.signed_distance),
                         strength: set.strength,
                     }
                 });

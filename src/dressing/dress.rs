@@ -11,8 +11,7 @@ use super::skin::Skin;
 use super::waistband::GarmentOnSkin;
 use crate::body::measure::measure;
 use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
-use crate::cloth::Sheet;
-use crate::cloth::realtime::{AnchorBinding, Model, Outfit, State};
+use crate::cloth::{AnchorBinding, ClothError, Model, Outfit, Sheet, State};
 use crate::garment::{GarmentMesh, Pattern};
 use crate::math::{P3, World};
 use crate::par::Par;
@@ -43,7 +42,7 @@ const FINISHING: usize = 90;
 /// Attempts to settle until the fine garment is free of itself off the arms: hoods may fold in a way that nothing untangles.
 const ATTEMPTS: usize = 4;
 
-/// A dressed body, ready for [`crate::cloth::realtime::step`].
+/// A dressed body, ready for [`crate::cloth::step`].
 #[derive(Debug)]
 pub struct Dressed {
     /// Immutable part; wrap it in an `Arc` to share it.
@@ -130,18 +129,18 @@ pub fn dress_all(
     let bodies = bodies_between(template, rest, &start, pose, count);
     let mut draping = Draping::new(&model, sheets, &bodies[0], options.untangle)?;
     draping.hang();
-    draping.follow(&bodies, substeps);
+    draping.follow(&bodies, substeps)?;
     report.stages_ms.coarse = ms(timer);
     let fine = draping.finish(&mut report)?;
 
     let timer = Instant::now();
     let (positions, anchors) = draping.tie(&fine, &mut report);
-    let (body, buried, apart) = draping.skin.known();
+    let body = draping.skin.into_body();
     report.stages_ms.fine += ms(timer);
 
     let timer = Instant::now();
     model.set_anchors(anchors);
-    let state = State::new(&model, positions, &body)?.on_skin(buried, apart);
+    let state = State::on_body(&model, positions, body)?;
     report.stages_ms.model += ms(timer);
     report.ms = ms(started);
     Ok(Dressed {
@@ -214,7 +213,7 @@ impl<'a> Draping<'a> {
         untangle: bool,
     ) -> Result<Self, DressError> {
         let mut skin = Skin::of(model);
-        skin.show(body);
+        skin.place(body).map_err(ClothError::from)?;
         let offsets: Vec<f64> = (0..sheets.len()).map(|k| model.offset(k)).collect();
         let (mut coarse, mut firsts) = (Vec::new(), Vec::new());
         let (mut anchors, mut drapes) = (Vec::new(), Vec::new());
@@ -258,9 +257,9 @@ impl<'a> Draping<'a> {
         });
     }
     /// Follows the body through its poses.
-    fn follow(&mut self, bodies: &[Vec<P3>], substeps: usize) {
+    fn follow(&mut self, bodies: &[Vec<P3>], substeps: usize) -> Result<(), ClothError> {
         for w in bodies.windows(2) {
-            self.skin.show(&w[1]);
+            self.skin.place(&w[1])?;
             let (skin, anchors) = (&self.skin, &self.anchors);
             self.layers.each(skin, &self.offsets, |k, d, on| {
                 d.follow_skin(&w[0], &w[1]);
@@ -270,6 +269,7 @@ impl<'a> Draping<'a> {
                 d.untangle_at_rest(on, CLEARING);
             });
         }
+        Ok(())
     }
     /// Settles in the tracked pose and refines, again while the fine garments intersect themselves off the arms.
     fn finish(&mut self, report: &mut DressReport) -> Result<Layers, DressError> {

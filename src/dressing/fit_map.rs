@@ -6,8 +6,8 @@
 use super::suggest::FitClass;
 use crate::body::Template;
 use crate::body::parts::{BodySegment, BodySide};
-use crate::cloth::realtime::{Model, State};
 use crate::cloth::{ClothError, Sheet};
+use crate::cloth::{Model, State};
 use crate::contact::{SurfaceFrame, SurfaceModel};
 use crate::garment::{GarmentMesh, Region};
 use crate::math::{P3, V3d};
@@ -176,7 +176,7 @@ impl FitProbe {
             got,
             expected,
         };
-        let surface = model.surface();
+        let surface = model.collision().surface();
         if body.len() != surface.vertices() || body.len() != self.region.len() {
             return Err(count("body vertices", body.len(), self.region.len()));
         }
@@ -250,10 +250,10 @@ impl WornGarment<'_> {
         }
         (0..n)
             .map(|i| {
-                let c = surface.closest_beyond(frame, &self.positions[i], near[i], mask(i));
+                let c = surface.closest_across_parts(frame, &self.positions[i], near[i], mask(i));
                 near[i] = c.vertex;
                 let a = area[i].max(f64::MIN_POSITIVE);
-                let gap = c.signed.max(0.0);
+                let gap = c.signed_distance.max(0.0);
                 let pressure = if gap < self.offset + TOUCH {
                     // −gradient + weight + skin = 0 along the normal.
                     let force = gradient[i] - GRAVITY * self.sheet.mass[i];

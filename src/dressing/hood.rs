@@ -4,7 +4,7 @@
 //! through itself, and three intersecting layers cannot be untangled.
 
 use crate::cloth::Sheet;
-use crate::cloth::folds::{FoldFrame, FoldModel, Search};
+use crate::cloth::contact::self_contact::{Search, SelfContactFrame, SelfContactModel};
 use crate::contact::SurfaceModel;
 use crate::garment::{GarmentError, GarmentMesh, Placement};
 use crate::math::{P3, V3, V3d};
@@ -24,8 +24,8 @@ const MAX_SPEED: f64 = 0.3;
 /// Hood of one garment with its self-contacts.
 #[derive(Debug)]
 pub(super) struct Hood {
-    model: FoldModel,
-    frame: FoldFrame,
+    model: SelfContactModel,
+    frame: SelfContactFrame,
     search: Search,
     /// Its vertices.
     vertices: Vec<u32>,
@@ -74,12 +74,12 @@ impl Hood {
         }
         let parts = mesh.regions.iter().map(|r| r.decisive().0).collect();
         let surface = SurfaceModel::new(mesh.faces.clone(), mesh.topology()?, parts);
-        let model = FoldModel::new(surface, sheet.edges.iter().map(|e| e.1 as f32));
+        let model = SelfContactModel::new(surface, sheet.edges.iter().map(|e| e.1 as f32));
         Ok(Some(Self {
             search: model.search_all(THICKNESS, REACH),
             model,
             vertices,
-            frame: FoldFrame::default(),
+            frame: SelfContactFrame::default(),
             contacts: Vec::new(),
             neighbour_of: vec![u32::MAX; mesh.vertices],
         }))
@@ -101,18 +101,18 @@ impl Hood {
             let p = frame.surface.vertices[v as usize];
             let corner = self
                 .model
-                .corner(frame, v, &p, &self.search, &mut self.neighbour_of);
+                .candidate(frame, v, &p, &self.search, &mut self.neighbour_of);
             let Some(hit) = corner.and_then(|(c, _)| self.model.other_fold(frame, v, &p, c)) else {
                 continue;
             };
             let [a, b, c] = self.model.surface.faces()[hit.face as usize];
-            let far = f64::from(hit.signed.abs());
+            let far = f64::from(hit.signed_distance.abs());
             if far < f64::from(REACH) && ![a, b, c].into_iter().any(&crossing) {
                 let [wa, wb, wc] = hit.weights.map(f64::from);
                 self.contacts.push(FoldContact {
                     vertices: [v, a, b, c],
                     weights: [1.0, -wa, -wb, -wc],
-                    normal: hit.normal.cast() * f64::from(hit.signed).signum(),
+                    normal: hit.normal.cast() * f64::from(hit.signed_distance).signum(),
                     distance: f64::from(self.search.thickness).min(far + SEPARATION),
                 });
             }

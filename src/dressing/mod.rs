@@ -1,7 +1,7 @@
 //! A garment onto a body: panel placement, sewing, size choice, first drape, fit map.
 //!
 //! Panels are mapped around the body in a canonical pose, sewn and draped on a coarse mesh, moved with the body into the
-//! tracked pose, and refined. The result is a model and a state for [`crate::cloth::realtime::step`].
+//! tracked pose, and refined. The result is a model and a state for [`crate::cloth::step`].
 //!
 //! ```
 //! use tryon::body::measure::measure;
@@ -48,7 +48,7 @@ mod source_body;
 mod suggest;
 mod waistband;
 
-pub use crate::cloth::realtime::{AnchorBinding, Outfit};
+pub use crate::cloth::{AnchorBinding, Outfit};
 pub use dress::{Dressed, dress, dress_all};
 pub use error::{DressError, MeshGarmentError};
 pub use fit_map::{FIT_COLORS, FitMap, FitProbe, RegionFit, VertexFit};

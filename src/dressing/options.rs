@@ -1,6 +1,6 @@
 //! Settings and report of dressing.
 
-use crate::cloth::realtime::Config;
+use crate::cloth::Config;
 use crate::garment::Triangulation;
 
 /// Settings of dressing.

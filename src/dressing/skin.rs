@@ -1,91 +1,77 @@
-//! The collision body of the drape.
+//! Collision body of a drape.
 
-use crate::cloth::realtime::Model;
-use crate::cloth::sleeves::{Arms, Line};
-use crate::contact::{Apart, Buried, Closest, Crease, NearSkin, Part, SurfaceFrame, SurfaceModel};
+use crate::cloth::Model;
+use crate::cloth::repair::sleeve_rings::CentreLine;
+use crate::contact::{
+    ClosestPoint, CollisionBody, CollisionError, CollisionWorkspace, Part, SkinGrid, SurfaceFrame,
+    SurfaceModel,
+};
 use crate::math::P3;
-use crate::par::Par;
 
-/// Posed skin with its parts separated, for one drape.
+/// The body of an outfit's model as garments meet it while they are put on.
 #[derive(Debug)]
 pub(super) struct Skin<'a> {
     pub(super) model: &'a SurfaceModel,
-    frame: SurfaceFrame,
-    buried: Buried,
-    apart: Apart,
-    near: NearSkin,
-    arms: &'a Arms,
-    opposite: &'a [Part],
-    creases: &'a [Crease],
-    pressing: &'a [Part],
-    /// Clearance of cloth between parts that press on each other, metres.
-    room: f32,
+    outfit: &'a Model,
+    body: CollisionBody,
+    work: CollisionWorkspace,
+    grid: SkinGrid,
 }
 
 impl<'a> Skin<'a> {
-    /// For the body of a model, not posed yet.
-    pub(super) fn of(model: &'a Model) -> Self {
+    /// Without a pose yet.
+    pub(super) fn of(outfit: &'a Model) -> Self {
         Self {
-            model: model.surface(),
-            frame: SurfaceFrame::default(),
-            buried: Buried::default(),
-            apart: Apart::default(),
-            near: NearSkin::default(),
-            arms: model.arms(),
-            opposite: model.opposite(),
-            creases: model.creases(),
-            pressing: model.pressing(),
-            room: model.room(),
+            model: outfit.collision().surface(),
+            outfit,
+            body: CollisionBody::default(),
+            work: CollisionWorkspace::default(),
+            grid: SkinGrid::default(),
         }
     }
-    /// Moves the body to posed vertices (world, metres).
-    pub(super) fn show(&mut self, body: &[P3]) {
-        self.frame.vertices.clear();
-        self.frame.vertices.extend_from_slice(body);
-        self.apart.make_room(
-            Par::Rayon,
-            self.model,
-            self.pressing,
-            &mut self.frame,
-            self.room,
-        );
-        self.creases
-            .iter()
-            .for_each(|c| c.make_room(&mut self.frame.vertices, self.room));
-        self.model.update_normals(Par::Rayon, &mut self.frame);
-        self.buried
-            .update(Par::Rayon, self.model, self.opposite, &self.frame);
-        self.near.fill(&self.frame);
+    /// Places the body at a pose, world, metres.
+    ///
+    /// # Errors
+    /// A body that does not fit the model.
+    pub(super) fn place(&mut self, posed: &[P3]) -> Result<(), CollisionError> {
+        let collision = self.outfit.collision();
+        self.body.place(collision, posed, &mut self.work)?;
+        self.grid.fill(self.body.frame());
+        Ok(())
     }
     pub(super) fn frame(&self) -> &SurfaceFrame {
-        &self.frame
+        self.body.frame()
     }
     /// Centre lines of the arms.
-    pub(super) fn arm_lines(&self) -> [Line; 2] {
-        self.arms.lines(&self.frame.vertices)
+    pub(super) fn arm_lines(&self) -> [CentreLine; 2] {
+        self.outfit.arms().lines(self.body.vertices())
     }
-    /// Skin inside other skin that it faces: cloth cannot lie there.
-    pub(super) fn holds_nothing(&self, c: &Closest) -> bool {
-        self.buried
-            .holds_nothing(self.model.faces()[c.face as usize])
+    /// The skin at a point lies inside another body part.
+    pub(super) fn is_interior(&self, c: &ClosestPoint) -> bool {
+        let corners = self.model.faces()[c.face as usize];
+        self.body.interior().covers(corners)
     }
-    /// Nearest point of some parts to `p`: by a walk from vertex `start`, or from the grid where that is nearer.
-    pub(super) fn closest(&self, p: &P3, start: u32, mask: Part) -> Closest {
-        let walked = self.model.closest(&self.frame, p, start, mask);
-        let [near, _] = self.near.around(self.model, &self.frame, p, [mask, 0]);
-        near.or_nearer(self.model, &self.frame, p, Some(walked), mask)
-            .unwrap_or(walked)
+    /// The closest point of some parts to `p`: from a walk, or a nearer candidate of the grid.
+    pub(super) fn closest(&self, p: &P3, start: u32, mask: Part) -> ClosestPoint {
+        let walked = self.model.closest(self.frame(), p, start, mask);
+        let [closest, _] = self.nearer(p, [walked; 2], [mask, 0]);
+        closest
     }
-    /// The nearer of walked and grid points, for each of two sets of parts.
-    pub(super) fn nearer(&self, p: &P3, walked: [Closest; 2], masks: [Part; 2]) -> [Closest; 2] {
-        let near = self.near.around(self.model, &self.frame, p, masks);
+    /// Of two masks of parts the points where walks ended, or nearer candidates of the grid.
+    pub(super) fn nearer(
+        &self,
+        p: &P3,
+        walked: [ClosestPoint; 2],
+        masks: [Part; 2],
+    ) -> [ClosestPoint; 2] {
+        let near = self.grid.candidates(self.model, self.frame(), p, masks);
         std::array::from_fn(|k| {
-            let found = near[k].or_nearer(self.model, &self.frame, p, Some(walked[k]), masks[k]);
+            let found = near[k].or_nearer(self.model, self.frame(), p, Some(walked[k]), masks[k]);
             found.unwrap_or(walked[k])
         })
     }
-    /// Separated vertices and the caches of the collision body.
-    pub(super) fn known(self) -> (Vec<P3>, Buried, Apart) {
-        (self.frame.vertices, self.buried, self.apart)
+    /// The collision body, for the state of the simulation.
+    pub(super) fn into_body(self) -> CollisionBody {
+        self.body
     }
 }

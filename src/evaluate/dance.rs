@@ -3,7 +3,7 @@
 use super::inside::Solid;
 use super::{EvaluateError, OutfitSpec, Row};
 use crate::body::{BodyShape, Pose, RestBody, Template, measure};
-use crate::cloth::realtime::{Input, State, Workspace, step};
+use crate::cloth::{Input, State, Workspace, step};
 use crate::dressing::{Dressed, rig_standing, suggest};
 use crate::formats::obj::read_obj;
 use crate::math::{Body, P3, Rigid, World};

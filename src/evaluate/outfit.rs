@@ -1,7 +1,7 @@
 //! Garments of a benchmark and the solver that simulates them.
 
 use crate::body::{Pose, RestBody, Template};
-use crate::cloth::realtime::Config;
+use crate::cloth::Config;
 use crate::dressing::{DressOptions, Dressed, dress};
 use crate::garment::{Size, library};
 use crate::math::World;

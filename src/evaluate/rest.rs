@@ -2,7 +2,7 @@
 
 use super::{EvaluateError, OutfitSpec};
 use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
-use crate::cloth::realtime::{Config, Input, State, StepReport, Workspace, step};
+use crate::cloth::{Config, Input, State, StepReport, Workspace, step};
 use crate::dressing::Dressed;
 use crate::garment::Size;
 use crate::math::{Body, P3, Rigid, V3, V3d, World, log_so3};

@@ -9,7 +9,7 @@ use super::report::{MirrorFrame, StageTimer};
 use crate::body::measure::measure;
 use crate::body::{Pose, Template};
 use crate::camera::{Calibration, ColorImage, RgbdFrame};
-use crate::cloth::realtime;
+use crate::cloth;
 use crate::composite::{self, Appearance, RenderReport};
 use crate::math::P3;
 use crate::tracking::{self, Status, TrackerConfig, TrackerModel, TrackerState};
@@ -151,7 +151,7 @@ impl Mirror {
         &mut self,
         body_camera: &[P3],
         dt: f64,
-    ) -> Result<Option<realtime::StepReport>, MirrorError> {
+    ) -> Result<Option<cloth::StepReport>, MirrorError> {
         let Some(worn) = &mut self.worn else {
             return Ok(None);
         };
@@ -181,11 +181,18 @@ impl Mirror {
                 })
         });
 
+        // Under garments the collision body is drawn: cloth stays off its skin.
+        let mut collision_body = Vec::new();
+        if let Some(worn) = worn {
+            let world = worn.outfit.state.collision_body().vertices();
+            camera_from_world.points_f32(world, &mut collision_body);
+        }
+        let drawn = worn.map(|_| &collision_body[..]);
         let input = composite::Input {
             frame,
             calibration: self.tracker.calibration(),
             garments: &self.garments.views(surfaces),
-            body: body.map(|posed| self.body.view(posed, worn.is_some())),
+            body: body.map(|posed| self.body.view(drawn.unwrap_or(posed))),
             output: None,
         };
         let (state, work) = (&mut self.composite_state, &mut self.composite_work);

@@ -38,5 +38,5 @@ pub use choice::{Choice, SizedGarment};
 pub use clock::{FrameClock, LongGap};
 pub use error::MirrorError;
 pub use outfit::{DressedOutfit, Subject};
-pub use picture::{CameraGarments, DrawnBody, DrawnSurface, library_appearance};
+pub use picture::{CameraGarments, DrawnBody, DrawnSurface, FollowedBody, library_appearance};
 pub use report::MirrorFrame;

@@ -3,7 +3,7 @@
 use super::choice::SizedGarment;
 use crate::body::{Pose, RestBody, Template};
 use crate::cloth::ClothError;
-use crate::cloth::realtime::{Config, Input, Model, State, StepReport, Workspace, step};
+use crate::cloth::{Config, Input, Model, State, StepReport, Workspace, step};
 use crate::dressing::{DressError, DressOptions, GarmentSource, dress_all};
 use crate::math::{Camera, P3, Rigid, World};
 

@@ -1,12 +1,12 @@
 //! Input of the compositor: garments and body in the camera frame.
 
 use crate::body::Template;
-use crate::cloth::realtime::{Config, RoomyBody};
+use crate::cloth::{Config, collision_model};
 use crate::composite::{Appearance, BodyView, GarmentView, Limbs};
+use crate::contact::{CollisionBody, CollisionModel, CollisionWorkspace};
 use crate::garment::library;
 use crate::math::{Camera, P3, Rigid, World};
 use crate::mesh::Face;
-use crate::par::Par;
 use std::sync::Arc;
 
 /// Appearance of a garment of the library; of other names that of its first garment.
@@ -64,13 +64,11 @@ impl CameraGarments {
     }
 }
 
-/// Body of the picture: its limbs for occlusion, its parts separated as cloth met them.
+/// Body of the picture, with its limbs for occlusion. Under garments it is the collision body that cloth met.
 #[derive(Debug)]
 pub struct DrawnBody {
     template: Arc<Template>,
     limbs: Limbs,
-    /// `None` for a template whose mesh is at fault, which only costs finer occlusion.
-    separated: Option<RoomyBody>,
 }
 
 impl DrawnBody {
@@ -78,7 +76,6 @@ impl DrawnBody {
     pub fn new(template: Arc<Template>) -> Self {
         Self {
             limbs: Limbs::of(&template),
-            separated: RoomyBody::new(&template, &Config::tracked()).ok(),
             template,
         }
     }
@@ -88,13 +85,41 @@ impl DrawnBody {
         &self.template
     }
 
-    /// View of a posed body (camera frame, metres). Only under garments are its parts separated.
-    pub fn view<'a>(&'a mut self, posed: &'a [P3], is_dressed: bool) -> BodyView<'a> {
-        let separated = self.separated.as_mut().filter(|_| is_dressed);
+    /// View of a body, camera frame, metres.
+    pub fn view<'a>(&'a self, vertices: &'a [P3]) -> BodyView<'a> {
         BodyView {
-            vertices: separated.map_or(posed, |s| s.make_room(Par::Rayon, posed)),
+            vertices,
             faces: self.template.mesh().faces(),
             limbs: &self.limbs,
         }
+    }
+}
+
+/// Collision body of a picture drawn away from the cloth, updated once a pose from the poses that cloth follows too.
+#[derive(Debug)]
+pub struct FollowedBody {
+    /// `None` for a template whose mesh is at fault, which only costs finer occlusion.
+    model: Option<CollisionModel>,
+    body: CollisionBody,
+    work: CollisionWorkspace,
+}
+
+impl FollowedBody {
+    /// Bodies made from `template`, tracked by a camera.
+    pub fn new(template: &Template) -> Self {
+        Self {
+            model: collision_model(template, &Config::tracked()).ok(),
+            body: CollisionBody::default(),
+            work: CollisionWorkspace::default(),
+        }
+    }
+
+    /// Follows a posed body (camera frame, metres) through `dt` seconds; the posed body itself where it is at fault.
+    pub fn follow<'a>(&'a mut self, posed: &'a [P3], dt: f64) -> &'a [P3] {
+        let Some(model) = &self.model else {
+            return posed;
+        };
+        let updated = self.body.update_vertices(model, posed, dt, &mut self.work);
+        updated.map_or(posed, |_| self.body.vertices())
     }
 }

@@ -1,7 +1,7 @@
 //! Result of one frame and the time of its stages.
 
 use crate::camera::ColorImage;
-use crate::cloth::realtime;
+use crate::cloth;
 use crate::composite::RenderReport;
 use crate::tracking;
 use std::time::Instant;
@@ -18,7 +18,7 @@ pub struct MirrorFrame {
     /// Report of the tracker.
     pub tracking: tracking::StepReport,
     /// Report of the cloth; `None` without a dressed body.
-    pub cloth: Option<realtime::StepReport>,
+    pub cloth: Option<cloth::StepReport>,
     /// Report of the compositor.
     pub render: RenderReport,
 }

@@ -17,4 +17,3 @@ pub use intersections::{Intersection, SelfIntersections, intersections};
 pub use kdtree::PointTree;
 pub use organised::{Label, OrganisedCloud};
 pub use triangle::closest_on_triangle;
-pub(crate) use triangle::ray_crossing;

@@ -3,7 +3,7 @@
 use super::common::{arms_down, posed};
 use crate::common::{DT, step_on};
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
-use tryon::cloth::realtime::{Config, StepReport, Workspace};
+use tryon::cloth::{Config, StepReport, Workspace};
 use tryon::dressing::{DressOptions, dress};
 use tryon::evaluate::Solid;
 use tryon::garment::{Size, Triangulation, library};
@@ -46,7 +46,7 @@ fn bend(
             ..Triangulation::default()
         },
         config: Config {
-            sharpest,
+            min_fold_ratio: sharpest,
             ..Config::default()
         },
         ..DressOptions::default()
@@ -77,7 +77,11 @@ fn bend(
 #[test]
 fn a_long_sleeve_stays_whole_around_an_elbow_that_folds() {
     // 137°: forearm and upper arm lie in each other.
-    let (reports, _, _) = bend("longsleeve", &[("elbow", 2.4)], Config::default().sharpest);
+    let (reports, _, _) = bend(
+        "longsleeve",
+        &[("elbow", 2.4)],
+        Config::default().min_fold_ratio,
+    );
     let worst = |of: fn(&StepReport) -> f64| reports.iter().map(of).fold(0.0, f64::max);
     let (p99, put_back) = (
         worst(|r| r.p99_strain),
@@ -97,7 +101,7 @@ fn a_long_sleeve_stays_whole_around_an_elbow_that_folds() {
 #[test]
 fn trousers_of_someone_who_squats_come_down_again_and_pass_through_themselves_less() {
     let joints = [("hip", -1.3), ("knee", 1.7)];
-    let [free, braced] = [0.0, Config::default().sharpest].map(|sharpest| {
+    let [free, braced] = [0.0, Config::default().min_fold_ratio].map(|sharpest| {
         let (reports, crossed, [before, after]) = bend("trousers", &joints, sharpest);
         let lowest = |x: &[P3]| x.iter().fold(f32::MAX, |l, p| l.min(p.y));
         let mean = crossed[..CALLS].iter().sum::<usize>() / CALLS;
@@ -120,7 +124,7 @@ fn what_a_deep_squat_pushed_through_itself_is_ironed_out() {
         let (_, crossed, _) = bend(
             garment,
             &[("hip", -2.2), ("knee", 2.2)],
-            Config::default().sharpest,
+            Config::default().min_fold_ratio,
         );
         let (most, left) = (
             crossed.iter().max().expect("calls"),

@@ -6,7 +6,7 @@ use nalgebra::UnitQuaternion;
 use rand::{Rng, SeedableRng};
 use std::sync::OnceLock;
 use tryon::body::{BodyShape, Pose, RestBody};
-use tryon::cloth::realtime::{Config, Input, Model, State, StepReport, Workspace, step};
+use tryon::cloth::{Config, Input, Model, State, StepReport, Workspace, step};
 use tryon::dressing::{DressOptions, dress};
 use tryon::garment::{Size, Triangulation, library};
 use tryon::math::{Body, P3, Rigid, V3, V3d, World, log_so3};

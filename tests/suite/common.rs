@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use tryon::body::{BoneTransforms, Pose, RestBody, Template, skin};
 use tryon::cloth::ClothError;
-use tryon::cloth::realtime::{Input, Model, State, StepReport, Workspace, step};
+use tryon::cloth::{Input, Model, State, StepReport, Workspace, step};
 use tryon::evaluate::rest::lower_arms;
 use tryon::math::{Body, P3, Rigid, World};
 use tryon::par::Par;

@@ -2,7 +2,7 @@
 
 use crate::common::shared;
 use tryon::body::parts::vertex_masks;
-use tryon::cloth::realtime::Config;
+use tryon::cloth::Config;
 use tryon::evaluate::OutfitSpec;
 use tryon::evaluate::dance::load;
 

@@ -3,7 +3,7 @@
 use crate::common::{posed, shared};
 use std::path::{Path, PathBuf};
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
-use tryon::cloth::realtime::{Config, Input, Workspace, step};
+use tryon::cloth::{Config, Input, Workspace, step};
 use tryon::dressing::{
     DressError, DressOptions, Dressed, GarmentSource, MeshGarment, SourceBody, dress, dress_all,
 };

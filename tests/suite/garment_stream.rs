@@ -1,7 +1,7 @@
 //! Garments on a moving subject, coded and read back.
 
 use tryon::body::Pose;
-use tryon::cloth::realtime::{self, Input};
+use tryon::cloth::{self, Input};
 use tryon::dressing::{DressOptions, dress};
 use tryon::formats::{POSITION_STEP, PositionCoder};
 use tryon::garment::{Size, library};
@@ -42,14 +42,14 @@ fn moving_garments_take_few_bytes_and_lose_nothing() {
     let meshes = &dressed.model.outfit.garments;
     let coder = |k: usize| PositionCoder::new(meshes[k].vertices, &meshes[k].faces);
     let mut ends: Vec<_> = (0..meshes.len()).map(|k| (coder(k), coder(k))).collect();
-    let mut work = realtime::Workspace::default();
+    let mut work = cloth::Workspace::default();
     let (mut first, mut later, mut vertices, frames) = (0, 0, 0, 60);
     for i in 0..frames {
         let input = Input {
             body: &body(begin + i).1,
             dt: 1.0 / 30.0,
         };
-        realtime::step(&dressed.model, &mut dressed.state, &input, &mut work).unwrap();
+        cloth::step(&dressed.model, &mut dressed.state, &input, &mut work).unwrap();
         for (g, (tx, rx)) in dressed.state.garments.iter().zip(&mut ends) {
             let bytes = tx.encode(&g.positions).unwrap();
             let read = rx.decode(&bytes).unwrap();

@@ -4,7 +4,7 @@ use super::common::{arms_down, posed};
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use tryon::body::measure::measure;
 use tryon::body::{BodyShape, BoneTransforms, RestBody, Template, embedded};
-use tryon::cloth::realtime::{Input, Workspace, step};
+use tryon::cloth::{Input, Workspace, step};
 use tryon::dressing::{DressOptions, Dressed, FitClass, FitProbe, dress, suggest};
 use tryon::formats::fabric_json::read_fabric;
 use tryon::formats::garmentcode::{parse_garmentcode, read_garmentcode};

@@ -1,7 +1,7 @@
 //! Cloth that sleeps by region: what it saves, how far off it is, and that nothing stays behind.
 
 use std::sync::{Mutex, MutexGuard, OnceLock};
-use tryon::cloth::realtime::Config;
+use tryon::cloth::Config;
 use tryon::evaluate::OutfitSpec;
 use tryon::evaluate::rest::{Motion, RestReport, RestingSubject};
 use tryon::par::with_threads;
@@ -135,7 +135,7 @@ fn what_sleeps_does_not_depend_on_threads() {
 fn searches_left_out_change_next_to_nothing() {
     let skip = never(Config::default());
     let ask = Config {
-        skip_far: false,
+        cull_distant: false,
         ..skip.clone()
     };
     let (r, truth) = (

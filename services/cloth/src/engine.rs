@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use tryon::body::measure::{Measurements, measure};
 use tryon::body::{BodyShape, Pose, Template};
-use tryon::cloth::realtime::StepReport;
+use tryon::cloth::StepReport;
 use tryon::dressing::{self, FitProbe, Suggestion};
 use tryon::math::{Camera, Rigid, World};
 use tryon::mirror::{DressedOutfit, FrameClock, LongGap, PosedBody, Subject};

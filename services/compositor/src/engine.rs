@@ -12,7 +12,9 @@ use tryon::composite::{
 use tryon::dressing::FIT_COLORS;
 use tryon::formats::image::{encode_jpeg, encode_png_rgb};
 use tryon::math::{Camera, Rigid, World};
-use tryon::mirror::{CameraGarments, DrawnBody, DrawnSurface, PosedBody};
+use tryon::mirror::{
+    CameraGarments, DrawnBody, DrawnSurface, FollowedBody, FrameClock, LongGap, PosedBody,
+};
 use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::body::pose_from_wire;
@@ -79,7 +81,9 @@ pub(crate) struct Engine {
     state: State,
     work: Workspace,
     posed: PosedBody,
-    body: Option<DrawnBody>,
+    body: Option<(DrawnBody, FollowedBody)>,
+    /// Capture times of the posed bodies.
+    clock: FrameClock,
     garments: CameraGarments,
 }
 
@@ -125,8 +129,16 @@ impl Engine {
         }
         let views = self.garments.views(worn.iter().map(Worn::surface));
         let is_dressed = !views.is_empty();
+        let gap = self.clock.gap(job.exposure.rgbd.time_ns);
+        let posed = self.posed.vertices();
         let body = self.body.as_mut().filter(|_| has_body);
-        let body = body.map(|b| b.view(self.posed.vertices(), is_dressed));
+        let body = body.map(|(drawn, followed)| {
+            drawn.view(if is_dressed {
+                followed.follow(posed, LongGap::Clamped.time_step(gap))
+            } else {
+                posed
+            })
+        });
         let mut images = Sizes::new();
         for &(size, _) in &job.formats {
             if images.iter().any(|(s, _)| *s == size) {
@@ -157,9 +169,10 @@ impl Engine {
         let Ok(pose) = pose_from_wire(wire, b.template.skeleton().dofs()) else {
             return false;
         };
-        let is_known = |d: &DrawnBody| Arc::ptr_eq(d.template(), &b.template);
+        let is_known = |(d, _): &(DrawnBody, _)| Arc::ptr_eq(d.template(), &b.template);
         if !self.body.as_ref().is_some_and(is_known) {
-            self.body = Some(DrawnBody::new(b.template.clone()));
+            let followed = FollowedBody::new(&b.template);
+            self.body = Some((DrawnBody::new(b.template.clone()), followed));
             self.posed = PosedBody::default();
         }
         self.posed.pose(&b.template, &b.shape, &pose);

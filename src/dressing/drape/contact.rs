@@ -2,7 +2,7 @@
 
 use super::context::{DrapeContext, OuterGarment};
 use super::state::Drape;
-use crate::contact::{Closest, Part};
+use crate::contact::{ClosestPoint, Part};
 use crate::dressing::plane::DrapePlane;
 use crate::dressing::skin::Skin;
 use crate::garment::Region;
@@ -74,13 +74,13 @@ impl Drape {
             self.find_outer_planes(k, outer);
         }
     }
-    /// Closest points of the own parts and of the others.
-    fn closest(&self, i: usize, skin: &Skin<'_>) -> [Closest; 2] {
+    /// ClosestPoint points of the own parts and of the others.
+    fn closest(&self, i: usize, skin: &Skin<'_>) -> [ClosestPoint; 2] {
         let (p, near) = (self.point(i), self.nearest[i]);
         let masks = [self.own[i], Region::ALL.0 & !self.own[i]];
         let found = [
             skin.model
-                .closest_beyond(skin.frame(), &p, near[0], masks[0]),
+                .closest_across_parts(skin.frame(), &p, near[0], masks[0]),
             skin.model.closest(skin.frame(), &p, near[1], masks[1]),
         ];
         if self.fine {
@@ -94,27 +94,30 @@ impl Drape {
     fn skin_planes(
         &self,
         i: usize,
-        found: &[Closest; 2],
+        found: &[ClosestPoint; 2],
         context: &DrapeContext<'_>,
     ) -> [DrapePlane; 2] {
         let (skin, offset) = (context.skin, context.offset);
         let facing = found[0]
-            .room(&found[1])
-            .filter(|_| !found[1].rim)
+            .clearance_to(&found[1])
+            .filter(|_| !found[1].on_part_boundary)
             .map(f64::from);
         let room = facing.unwrap_or(f64::INFINITY);
-        let distance = found.map(|c| f64::from(c.signed));
-        let plane = |c: &Closest| DrapePlane {
+        let distance = found.map(|c| f64::from(c.signed_distance));
+        let plane = |c: &ClosestPoint| DrapePlane {
             point: c.point.coords.cast(),
             normal: c.normal.cast(),
             height: offset,
-            near: room >= 0.0 && !c.rim && !skin.holds_nothing(c) && f64::from(c.signed) < REACH,
+            near: room >= 0.0
+                && !c.on_part_boundary
+                && !skin.is_interior(c)
+                && f64::from(c.signed_distance) < REACH,
         };
         let [mut own, mut other] = [plane(&found[0]), plane(&found[1])];
         let untangles = self.untangler.is_some();
-        if self.fine && untangles && (-CLOSED..0.0).contains(&room) && !found[0].rim {
+        if self.fine && untangles && (-CLOSED..0.0).contains(&room) && !found[0].on_part_boundary {
             // At most half-way into skin that lies in other skin; coarse cloth must pass through it on its way out.
-            let held = !skin.holds_nothing(&found[0]);
+            let held = !skin.is_interior(&found[0]);
             (own.near, own.height) = (held && distance[0] < REACH, 0.5 * room);
         }
         let halved = untangles && facing.is_some() && own.near && other.near;
@@ -136,10 +139,10 @@ impl Drape {
             let p = P3::from(self.x[i].cast::<f32>());
             let c = model.closest(frame, &p, *near, self.own[i]);
             *near = c.vertex;
-            let Some(c) = model.under(frame, &p, &c, HEM) else {
+            let Some(c) = model.cover(frame, &p, &c, HEM) else {
                 continue;
             };
-            let reached = c.signed < OUTER_REACH && -f64::from(c.signed) < REACH;
+            let reached = c.signed_distance < OUTER_REACH && -f64::from(c.signed_distance) < REACH;
             if reached && self.pinned[i].is_none() {
                 let plane = DrapePlane {
                     point: c.point.coords.cast(),
@@ -188,7 +191,9 @@ impl Drape {
     pub(in crate::dressing) fn lift_deep(&mut self, skin: &Skin<'_>) {
         for i in 0..self.x.len() {
             let c = skin.closest(&self.point(i), self.nearest[i][0], self.own[i]);
-            let deep = f64::from(c.signed) < -DEEP && !c.rim && !skin.holds_nothing(&c);
+            let deep = f64::from(c.signed_distance) < -DEEP
+                && !c.on_part_boundary
+                && !skin.is_interior(&c);
             if deep && self.pinned[i].is_none() {
                 self.x[i] = c.point.coords.cast();
             }

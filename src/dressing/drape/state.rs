@@ -1,7 +1,7 @@
 //! State of one garment that is being draped.
 
-use crate::cloth::sleeves::Sleeve;
-use crate::cloth::untangle::Untangler;
+use crate::cloth::repair::sleeve_rings::Sleeve;
+use crate::cloth::repair::untangler::Untangler;
 use crate::cloth::{Hinge, Sheet};
 use crate::contact::Part;
 use crate::dressing::hood::Hood;
@@ -88,7 +88,7 @@ impl Drape {
             edges: edges_from_top(mesh, sheet, &x),
             hinges: sheet.hinges.iter().copied().filter(|h| h.w > 0.0).collect(),
             own,
-            sleeves: Sleeve::of(mesh, &sheet.edges),
+            sleeves: Sleeve::find(mesh, &sheet.edges),
             nearest: vec![[u32::MAX; 2]; n],
             planes: vec![[DrapePlane::default(); 2]; n],
             pinned: vec![None; n],
@@ -129,7 +129,7 @@ impl Drape {
     /// True if the last intersections include cloth that is on no arm.
     pub(in crate::dressing) fn crosses_off_arms(&self) -> bool {
         let crosses = |u: &Untangler| {
-            let mut all = u.pushes.iter().zip(&self.own);
+            let mut all = u.displacements.iter().zip(&self.own);
             all.any(|((_, n), own)| *n > 0.0 && !on_arms(*own))
         };
         self.crossings > 0 && self.untangler.as_ref().is_some_and(crosses)
@@ -139,8 +139,8 @@ impl Drape {
         let mut deepest = 0.0f64;
         for i in 0..self.x.len() {
             let c = skin.closest(&self.point(i), self.nearest[i][0], self.own[i]);
-            if !c.rim && !skin.holds_nothing(&c) {
-                deepest = deepest.max(-f64::from(c.signed));
+            if !c.on_part_boundary && !skin.is_interior(&c) {
+                deepest = deepest.max(-f64::from(c.signed_distance));
             }
         }
         let stretch = |e: &EdgeConstraint| {

@@ -100,8 +100,11 @@ impl Drape {
     fn resolve_hood(&mut self, queries: bool, h: f64) {
         let Some(hood) = &mut self.hood else { return };
         if queries {
-            let pushes = self.untangler.as_ref().map_or(&[][..], |u| &u.pushes);
-            let crossing = |v: u32| pushes.get(v as usize).is_some_and(|p| p.1 > 0.0);
+            let moved = self
+                .untangler
+                .as_ref()
+                .map_or(&[][..], |u| &u.displacements[..]);
+            let crossing = |v: u32| moved.get(v as usize).is_some_and(|p| p.1 > 0.0);
             hood.find_contacts(&self.x, crossing);
         }
         let (pinned, inverse) = (&self.pinned, &self.inverse_mass);

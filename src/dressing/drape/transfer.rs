@@ -1,7 +1,7 @@
 //! Motion of a garment with the body between two poses.
 
 use super::state::{Drape, on_arms};
-use crate::cloth::realtime::AnchorBinding;
+use crate::cloth::AnchorBinding;
 use crate::contact::SurfaceFrame;
 use crate::dressing::skin::Skin;
 use crate::math::{P3, V3, V3d};
@@ -46,8 +46,8 @@ impl Drape {
         let targets: Vec<(u32, P3)> = self
             .sleeves
             .iter()
-            .flat_map(|s| s.lost(&lines, at))
-            .flat_map(|f| f.ring.iter().map(move |v| (*v, f.way * at(*v))))
+            .flat_map(|s| s.lost_rings(&lines, at))
+            .flat_map(|f| f.vertices.iter().map(move |v| (*v, f.recovery * at(*v))))
             .collect();
         for (v, to) in targets {
             let i = v as usize;

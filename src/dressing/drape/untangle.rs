@@ -39,13 +39,13 @@ impl Drape {
             return;
         };
         if full_query {
-            untangler.look_anew();
+            untangler.invalidate();
         }
         let (pinned, inverse) = (&self.pinned, &self.inverse_mass);
         let weight = |i: usize| if pinned[i].is_some() { 0.0 } else { inverse[i] };
-        let r = untangler.round(Par::Rayon, &mut self.x, weight, UNTANGLE_STEP, UNTANGLE_GAP);
-        self.crossings = r.crossings;
-        for (i, (push, n)) in untangler.pushes.iter().enumerate() {
+        let r = untangler.iterate(Par::Rayon, &mut self.x, weight, UNTANGLE_STEP, UNTANGLE_GAP);
+        self.crossings = r.intersections;
+        for (i, (push, n)) in untangler.displacements.iter().enumerate() {
             self.before[i] += push;
             self.slack[i] = if *n > 0.0 {
                 (self.slack[i] + SLACK_STEP).min(MAX_SLACK)
@@ -101,8 +101,8 @@ impl Drape {
         if let Some(untangler) = &self.untangler {
             let (pinned, own) = (&self.pinned, &self.own);
             let movable = |v: usize| pinned[v].is_none() && !on_arms(own[v]);
-            let crossed = untangler.crossed().collect();
-            untangler.iron(&mut self.x, crossed, movable, rings);
+            let intersecting = untangler.intersecting().collect();
+            untangler.smooth_locally(&mut self.x, intersecting, movable, rings);
         }
     }
     /// Contracts edges that are stretched by more than [`TAUT`] to that.

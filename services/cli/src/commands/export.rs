@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use std::path::Path;
 use std::process::ExitCode;
 use tryon::body::{BoneTransforms, Pose, embedded, skin};
-use tryon::cloth::realtime;
+use tryon::cloth;
 use tryon::dressing::{DressOptions, dress};
 use tryon::formats::gltf::{GlbMesh, write_glb, write_glb_motion};
 use tryon::formats::obj::write_obj;
@@ -98,7 +98,7 @@ fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
     let garment = &dressed.model.outfit.garments[0];
     let pelvis = start.root.point(&template.skeleton().joints()[0].rest);
     let home = V3::new(pelvis.x as f32, 0.0, pelvis.z as f32);
-    let drawn = |state: &realtime::State| {
+    let drawn = |state: &cloth::State| {
         let mut p = Vec::new();
         garment.render_positions(&state.garments[0].positions, &mut p);
         p.iter_mut().for_each(|p| *p -= home);
@@ -130,14 +130,14 @@ fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
 /// Drawn vertices of the first `count` frames of the routine.
 fn simulate(
     sequence: &Sequence,
-    model: &realtime::Model,
-    mut state: realtime::State,
+    model: &cloth::Model,
+    mut state: cloth::State,
     count: u64,
-    drawn: impl Fn(&realtime::State) -> Vec<P3>,
+    drawn: impl Fn(&cloth::State) -> Vec<P3>,
 ) -> Result<Vec<Vec<P3>>> {
     let (template, rest) = (&sequence.actor().template, sequence.rest());
     let bar = crate::input::progress(Some(count), "simulating");
-    let (mut work, mut body) = (realtime::Workspace::default(), Vec::new());
+    let (mut work, mut body) = (cloth::Workspace::default(), Vec::new());
     let mut frames = Vec::new();
     for i in 0..count {
         let mut bones = BoneTransforms::default();
@@ -149,11 +149,11 @@ fn simulate(
             &bones,
             &mut body,
         );
-        let input = realtime::Input {
+        let input = cloth::Input {
             body: &body,
             dt: 1.0 / FRAMES,
         };
-        realtime::step(model, &mut state, &input, &mut work)?;
+        cloth::step(model, &mut state, &input, &mut work)?;
         frames.push(drawn(&state));
         bar.inc(1);
     }

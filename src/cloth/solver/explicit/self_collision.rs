@@ -4,7 +4,7 @@ use super::constraint::ContactPlane;
 use super::patch_model::PatchModel;
 use super::vec4::V4;
 use crate::cloth::ClothError;
-use crate::cloth::folds::{FoldFrame, FoldModel, Search};
+use crate::cloth::contact::self_contact::{Search, SelfContactFrame, SelfContactModel};
 use crate::cloth::solver::{RunConfig, SheetStart};
 use crate::contact::SurfaceModel;
 use crate::math::{P3, V3};
@@ -27,8 +27,8 @@ pub(super) struct FoldContacts {
 
 /// SubstepSchedule and model of self-contact queries.
 pub(super) struct SelfCollision {
-    model: FoldModel,
-    frame: FoldFrame,
+    model: SelfContactModel,
+    frame: SelfContactFrame,
     search: Search,
     thickness: f32,
     /// Speed of each vertex relative to the rigid motion of the sheet [m/s], and a bound for its neighbours'.
@@ -54,12 +54,12 @@ impl SelfCollision {
         let mesh = TriMesh::new(start.positions.to_vec(), start.faces.to_vec())?;
         let parts = vec![1; start.positions.len()];
         let surface = SurfaceModel::new(start.faces.to_vec(), Topology::new(&mesh)?, parts);
-        let model = FoldModel::new(surface, start.sheet.edges.iter().map(|e| e.1 as f32));
+        let model = SelfContactModel::new(surface, start.sheet.edges.iter().map(|e| e.1 as f32));
         let thickness = config.thickness as f32;
         Ok(Self {
             search: model.search_all(thickness, 0.0),
             model,
-            frame: FoldFrame::default(),
+            frame: SelfContactFrame::default(),
             thickness,
             speeds: Vec::new(),
             max_speed: 0.0,
@@ -117,10 +117,10 @@ impl SelfCollision {
                 continue;
             }
             let x: P3 = self.frame.surface.vertices[v as usize];
-            let corner = self
-                .model
-                .corner(&self.frame, v, &x, &self.search, &mut out.neighbour_of);
-            out.clearance[i] = FoldModel::room(&self.search, corner);
+            let corner =
+                self.model
+                    .candidate(&self.frame, v, &x, &self.search, &mut out.neighbour_of);
+            out.clearance[i] = SelfContactModel::clearance(&self.search, corner);
             let Some((corner, _)) = corner.filter(|_| out.clearance[i] < 0.0) else {
                 continue;
             };

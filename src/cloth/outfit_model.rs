@@ -1,0 +1,122 @@
+//! Immutable data of an outfit on a body.
+
+use super::collision::collision_model;
+use super::config::Config;
+use super::error::ClothError;
+use super::garment_model::GarmentModel;
+use super::model::partition::Partition;
+use super::outfit::{AnchorBinding, Outfit};
+use super::repair::sleeve_rings::Arms;
+use super::sleep::island_model::skin_clusters;
+use crate::body::parts::vertex_masks;
+use crate::body::{SkinWeights, Template};
+use crate::contact::{CollisionModel, MapView};
+
+/// Everything immutable about an outfit on a body. Share it by `Arc`.
+#[derive(Debug)]
+pub struct Model {
+    /// Garments and anchors.
+    pub outfit: Outfit,
+    /// Settings.
+    pub config: Config,
+    pub(super) garments: Vec<GarmentModel>,
+    pub(super) collision: CollisionModel,
+    /// Body vertices in compact clusters.
+    pub(super) skin_clusters: Partition,
+    pub(super) arms: Arms,
+    pub(super) weights: SkinWeights,
+    pub(super) joints: usize,
+    pub(super) views: [MapView; 4],
+}
+
+impl Model {
+    /// Prepares an outfit for simulation on a body made from `template`.
+    ///
+    /// # Errors
+    /// Faults of the garments (triangle or edge named) or of the settings (field named).
+    pub fn new(template: &Template, outfit: Outfit, config: Config) -> Result<Self, ClothError> {
+        config.check()?;
+        check_anchors(template, &outfit)?;
+        let count = outfit.garments.len() as f64;
+        let garment = |(order, g)| {
+            // Evenly between the skin and the outermost layer.
+            GarmentModel::new(g, &config, config.offset * (order + 1) as f64 / count)
+        };
+        let garments = outfit.garments.iter().enumerate().map(garment);
+        let garments = garments.collect::<Result<_, _>>()?;
+        let collision = collision_model(template, &config)?;
+        let mut model = Self {
+            skin_clusters: skin_clusters(collision.surface()),
+            arms: Arms::new(template, &vertex_masks(template)),
+            weights: template.weights().clone(),
+            joints: template.skeleton().len(),
+            views: MapView::around(config.camera_toward, config.map_detail),
+            collision,
+            garments,
+            outfit,
+            config,
+        };
+        model.assign_anchors();
+        Ok(model)
+    }
+    /// Vertices of the body it was made for.
+    pub fn body_vertices(&self) -> usize {
+        self.collision.surface().vertices()
+    }
+    /// Replaces the anchors.
+    pub(crate) fn set_anchors(&mut self, anchors: Vec<Vec<AnchorBinding>>) {
+        self.outfit.anchors = anchors;
+        self.assign_anchors();
+    }
+    fn assign_anchors(&mut self) {
+        for (g, bindings) in self.garments.iter_mut().zip(&self.outfit.anchors) {
+            g.assign_anchors(bindings);
+        }
+    }
+    /// Patch vertex and binding of a patch's anchors.
+    pub(super) fn anchors_of(
+        &self,
+        garment: usize,
+        patch: usize,
+    ) -> impl Iterator<Item = (u32, &AnchorBinding)> {
+        let bindings = &self.outfit.anchors[garment];
+        self.garments[garment].anchors[patch]
+            .iter()
+            .map(move |(i, k)| (*i, &bindings[*k]))
+    }
+    /// The body that garments meet.
+    pub(crate) fn collision(&self) -> &CollisionModel {
+        &self.collision
+    }
+    pub(crate) fn arms(&self) -> &Arms {
+        &self.arms
+    }
+    /// Distance of a garment from the skin, metres.
+    pub(crate) fn offset(&self, garment: usize) -> f64 {
+        self.garments[garment].offset
+    }
+}
+
+/// Checks that there are anchors for every garment, of vertices that exist.
+fn check_anchors(template: &Template, outfit: &Outfit) -> Result<(), ClothError> {
+    if outfit.anchors.len() != outfit.garments.len() {
+        return Err(ClothError::Count {
+            what: "anchor lists",
+            got: outfit.anchors.len(),
+            expected: outfit.garments.len(),
+        });
+    }
+    let body = template.mesh().vertices().len();
+    for (g, anchors) in outfit.garments.iter().zip(&outfit.anchors) {
+        let is_faulty = |a: &&AnchorBinding| {
+            a.vertex as usize >= g.vertices || a.body.iter().any(|v| *v as usize >= body)
+        };
+        if let Some(a) = anchors.iter().find(is_faulty) {
+            return Err(ClothError::field(
+                &format!("anchor of vertex {}", a.vertex),
+                "it names a vertex that does not exist",
+            ));
+        }
+    }
+    Ok(())
+}
