@@ -4,6 +4,7 @@ use super::area::Area;
 use super::captured::{brightness, captured};
 use super::captured_depth::{AreaDepth, depth_from_picture};
 use super::config::Model;
+use super::coverage::remove_biases;
 use super::evidence::{Evidence, PixelDepths};
 use super::hand::{ArmScene, CapturedView, LayerDepths, PosedLimbs};
 use super::input::{Input, RenderError};
@@ -94,6 +95,7 @@ impl<'a> Composition<'a> {
         area: &Area,
     ) -> AreaDepth {
         let config = &model.config;
+        remove_biases(config, &work.surface, &mut work.pixels);
         let is_tracked = (work.body).rasterise(config.par, input, &self.viewport, area);
         let depth = AreaDepth::new(&self.viewport, area, &self.depth);
         collect_evidence(model, work, area, &depth, is_tracked);

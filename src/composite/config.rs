@@ -94,12 +94,12 @@ pub struct Config {
     pub lights: Lights,
     /// Fit of the captured picture into the output.
     pub framing: Framing,
-    /// Displacement of each garment towards the camera from the one inside it, metres: layers that the simulation
-    /// holds less than a millimetre apart would show through each other.
-    pub layer_offset: f32,
-    /// Displacement of inner sides away from the camera, metres: a fold a few millimetres through another, in an
-    /// elbow or an armpit, would show as a dark slit.
-    pub inside_offset: f32,
+    /// Depth bias of each garment over the one inside it, metres: layers a millimetre apart show through each other
+    /// below it. Only for the depth test among garments (docs/decisions, depth biases).
+    pub layer_bias: f32,
+    /// Depth bias of inner sides away from the camera, metres: folds through each other, in elbows or armpits, show
+    /// dark slits below it, linings vanish above it. Only for the depth test among garments.
+    pub inner_bias: f32,
     /// Skips faces behind other garments or behind the garment's own front. Same picture, bit for bit; no effect on
     /// the graphics card, which tests depth in hardware.
     pub skip_hidden: bool,
@@ -123,8 +123,8 @@ impl Default for Config {
             margins: Margins::default(),
             lights: Lights::default(),
             framing: Framing::Cover,
-            layer_offset: 15e-3,
-            inside_offset: 10e-3,
+            layer_bias: 15e-3,
+            inner_bias: 10e-3,
             skip_hidden: true,
             skip_unseen: true,
         }

@@ -1,6 +1,7 @@
 //! Coverage of picture pixels by the samples of the garments' surface.
 
 use super::area::Area;
+use super::config::Config;
 use super::surface::Surface;
 use crate::par::{self, Par};
 use crate::raster::VisibilityBuffer;
@@ -96,4 +97,17 @@ fn reduce_mixed(surface: &Surface, at: impl Iterator<Item = usize>) -> PixelCove
     }
     p.is_simple &= far - p.depth < FOLD_GAP;
     p
+}
+
+/// Removes the biases of layer and side, which order garments among themselves, from the depth of each pixel.
+///
+/// `surface.inner` must be known. Garments then meet the captured scene at the depth of their simulated vertices.
+pub(super) fn remove_biases(config: &Config, surface: &Surface, pixels: &mut [PixelCoverage]) {
+    for p in pixels.iter_mut().filter(|p| p.covered > 0) {
+        let face = p.face as usize;
+        p.depth += config.layer_bias * f32::from(surface.garment[face]);
+        if surface.inner[face] {
+            p.depth -= config.inner_bias;
+        }
+    }
 }

@@ -109,7 +109,7 @@ impl Surface {
             None => nalgebra::Isometry3::identity(),
         };
         for (number, g) in (0..u8::MAX).zip(input.garments) {
-            self.append(g, number, &iso, config.layer_offset * f32::from(number));
+            self.append(g, number, &iso, config.layer_bias * f32::from(number));
         }
         let mut z: Vec<f32> = self
             .vertices
@@ -207,7 +207,7 @@ impl Surface {
         let options = Options {
             par: config.par,
             cull: Cull::None,
-            back_offset: config.inside_offset,
+            back_offset: config.inner_bias,
         };
         if config.skip_hidden {
             let layers: Vec<Range<usize>> = self.layers.iter().map(|l| l.faces.clone()).collect();

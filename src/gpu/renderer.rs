@@ -166,7 +166,7 @@ impl Renderer {
             picture.report.brightness,
         );
         let (viewport, samples) = (&picture.viewport, picture.samples);
-        let data = SceneData::new(viewport, area, samples, config.inside_offset, &shader);
+        let data = SceneData::new(viewport, area, samples, config.inner_bias, &shader);
         self.queue
             .write_buffer(&self.scene, 0, bytemuck::bytes_of(&data));
         for (slot, bytes) in self.storage.iter_mut().zip(geometry(&work.surface)) {

@@ -162,7 +162,7 @@ fn skipping_hidden_faces_and_normals_changes_no_byte() {
 }
 
 #[test]
-fn inside_offset_hides_a_fold_that_passes_through() {
+fn inner_bias_hides_a_fold_that_passes_through() {
     let s = Scenery::new(320, 240, 4);
     let shirt = s.garment();
     // Its front once more, 5 mm nearer and inside out.
@@ -186,9 +186,9 @@ fn inside_offset_hides_a_fold_that_passes_through() {
         ..shirt
     };
     for skip_hidden in [true, false] {
-        let changed = |inside_offset: f32| {
+        let changed = |inner_bias: f32| {
             let model = Model::new(Config {
-                inside_offset,
+                inner_bias,
                 skip_hidden,
                 ..Config::default()
             });
@@ -199,8 +199,45 @@ fn inside_offset_hides_a_fold_that_passes_through() {
                 .filter(|(x, y)| a.at(*x, *y) != b.at(*x, *y))
                 .count()
         };
-        let [shown, hidden] = [changed(0.0), changed(Config::default().inside_offset)];
+        let [shown, hidden] = [changed(0.0), changed(Config::default().inner_bias)];
         assert!(shown > 3000 && hidden < shown / 100, "{shown} {hidden}");
+    }
+}
+
+#[test]
+fn biases_order_garments_and_leave_their_depths() {
+    let s = Scenery::new(320, 240, 4);
+    let shirt = s.garment();
+    // The shirt over three hidden layers, and turned inside out.
+    let small: Vec<_> = (shirt.vertices.iter())
+        .map(|p| P3::new(0.5 * p.x, 0.5 * p.y, p.z))
+        .collect();
+    let under = GarmentView {
+        vertices: &small,
+        ..shirt
+    };
+    let turned: Vec<Face> = shirt.faces.iter().map(|f| [f[0], f[2], f[1]]).collect();
+    let turned = GarmentView {
+        faces: &turned,
+        ..shirt
+    };
+    let depths = |garments: &[GarmentView<'_>]| -> Vec<f32> {
+        let mut work = Workspace::default();
+        let (model, state) = (Model::default(), &mut State::default());
+        render(&model, state, &s.input(garments, None), &mut work).expect("drawn");
+        let covered = work.pixels.iter().filter(|p| p.covered == 9);
+        covered.map(|p| p.depth).collect()
+    };
+    let alone = depths(&[shirt]);
+    assert!(alone.len() > 3000);
+    let median = |mut z: Vec<f32>| *z.select_nth_unstable_by(z.len() / 2, f32::total_cmp).1;
+    let expected = median(alone);
+    for garments in [vec![under, under, under, shirt], vec![turned]] {
+        let got = median(depths(&garments));
+        assert!(
+            (got - expected).abs() < 5e-4,
+            "{got} instead of {expected} m"
+        );
     }
 }
 
