@@ -7,6 +7,7 @@ use super::outfit_model::Model;
 use super::patch::PatchWork;
 use super::report::StepReport;
 use super::state::{GarmentState, State};
+use super::workspace::Workspace;
 use crate::math::V3;
 use crate::par;
 
@@ -31,11 +32,11 @@ struct Outcome {
 pub(super) fn commit(
     model: &Model,
     state: &mut State,
-    patches: &[PatchWork],
-    chunks: &[ContactChunk],
+    work: &Workspace,
     dt: f64,
     report: &mut StepReport,
 ) -> f32 {
+    let (patches, chunks) = (&work.patches, &work.chunks);
     let garments = state.garments.iter_mut();
     let mut all: Vec<_> = garments.map(|g| (g, Outcome::default())).collect();
     par::for_chunks(model.config.par, &mut all, 1, |k, one| {

@@ -310,7 +310,7 @@ impl<'a> AwakeStep<'a> {
         } = self;
         let dt = *dt;
         for_patches(model, &mut work.patches, |_, _, p| follow_sleeping(p, dt));
-        let speed = commit(model, state, &work.patches, &work.chunks, dt, report);
+        let speed = commit(model, state, work, dt, report);
         let steps = |g| self.intervals * substeps(g, self.span);
         report.steps = model.garments.iter().map(steps).max().unwrap_or(0);
         report.speed = f64::from(speed);

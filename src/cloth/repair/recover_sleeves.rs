@@ -17,14 +17,13 @@ pub(in crate::cloth) fn recover_sleeves(
         for sleeve in &m.sleeves {
             let lost = sleeve.lost_rings(&arms, |v| g.positions[v as usize]);
             count += lost.len();
-            let (mut vertices, mut positions) = (Vec::new(), Vec::new());
+            let mut targets = Vec::new();
             for ring in &lost {
-                vertices.extend_from_slice(ring.vertices);
-                let at = |v: &u32| ring.recovery * g.positions[*v as usize];
-                positions.extend(ring.vertices.iter().map(at));
+                let at = |v: &u32| (*v, ring.recovery * g.positions[*v as usize]);
+                targets.extend(ring.vertices.iter().map(at));
             }
-            if !lost.is_empty() {
-                place(model, &m.own, g, skin, &vertices, &positions);
+            if !targets.is_empty() {
+                place(model, &m.own, g, skin, &targets);
             }
         }
     }
@@ -40,15 +39,15 @@ fn place(
     own: &[u8],
     g: &mut GarmentState,
     skin: &SurfaceFrame,
-    vertices: &[u32],
-    positions: &[P3],
+    targets: &[(u32, P3)],
 ) {
-    let masks = vertices.iter().map(|v| &own[*v as usize]);
+    let (vertices, positions): (Vec<usize>, Vec<P3>) =
+        targets.iter().map(|(v, to)| (*v as usize, *to)).unzip();
+    let masks = vertices.iter().map(|v| &own[*v]);
     let surface = model.collision.surface();
-    let nearest = surface.nearest_vertices(model.config.par, skin, positions, masks);
-    for ((v, to), near) in vertices.iter().zip(positions).zip(nearest) {
-        let v = *v as usize;
-        g.positions[v] = *to;
+    let nearest = surface.nearest_vertices(model.config.par, skin, &positions, masks);
+    for ((v, to), near) in vertices.into_iter().zip(positions).zip(nearest) {
+        g.positions[v] = to;
         g.velocities[v] = V3::zeros();
         g.nearest[v][0] = near;
     }

@@ -230,7 +230,10 @@ fn biases_order_garments_and_leave_their_depths() {
     };
     let alone = depths(&[shirt]);
     assert!(alone.len() > 3000);
-    let median = |mut z: Vec<f32>| *z.select_nth_unstable_by(z.len() / 2, f32::total_cmp).1;
+    let median = |mut z: Vec<f32>| {
+        let middle = z.len() / 2;
+        *z.select_nth_unstable_by(middle, f32::total_cmp).1
+    };
     let expected = median(alone);
     for garments in [vec![under, under, under, shirt], vec![turned]] {
         let got = median(depths(&garments));
