@@ -6,6 +6,8 @@
 mod debts;
 #[path = "tidy/imports.rs"]
 mod imports;
+#[path = "tidy/nouns.rs"]
+mod nouns;
 #[path = "tidy/source.rs"]
 mod source;
 
@@ -18,7 +20,7 @@ const MODULES: &[(u8, &str, &str)] = &[
     (
         0,
         "math",
-        "Small fixed-size algebra that nalgebra lacks: so(3)/se(3) maps, twists, polar, PSD projection, stable roots.",
+        "Small fixed-size algebra that nalgebra lacks: so(3)/se(3) maps, twists, polar rotation, PSD projection, derivative check.",
     ),
     (
         0,
@@ -28,7 +30,7 @@ const MODULES: &[(u8, &str, &str)] = &[
     (
         1,
         "mesh",
-        "Triangle meshes and their topology, checked once at construction; normals, boundaries, UVs, isotropic remeshing, neighbour smoothing.",
+        "Triangle meshes and their topology, checked once at construction; normals, boundaries, isotropic remeshing, neighbour smoothing.",
     ),
     (
         1,
@@ -113,7 +115,7 @@ const MODULES: &[(u8, &str, &str)] = &[
     (
         5,
         "synth",
-        "Synthetic people, garments, cameras and sequences with known truth, for the demo, tests and benches.",
+        "Synthetic people, garments, cameras and sequences with known truth.",
     ),
     (
         5,
@@ -277,6 +279,65 @@ fn every_module_opens_with_its_charter() {
             path.display()
         );
     }
+}
+
+/// True if a module holds a file or folder of this path, or declares an item of this name.
+fn is_in_module(module: &str, files: &[SourceFile], name: &str) -> bool {
+    let root = format!("src/{module}/");
+    let is_item = |text: &str| {
+        let kinds = ["struct", "enum", "trait", "fn"];
+        kinds.iter().any(|kind| source::declares(text, kind, name))
+    };
+    let own = files.iter().filter(|f| f.path.starts_with(&root));
+    own.into_iter().any(|f| {
+        let inner = &f.path[root.len()..];
+        inner == name
+            || inner == format!("{name}.rs")
+            || inner.starts_with(&format!("{name}/"))
+            || is_item(&f.text)
+    })
+}
+
+#[test]
+fn each_noun_of_a_charter_is_a_file_or_an_item() {
+    let files = source::rust();
+    let mut faults = Vec::new();
+    for (_, module, charter) in MODULES {
+        if nouns::NOT_BUILT.contains(module) {
+            let root = format!("src/{module}/");
+            if files.iter().filter(|f| f.path.starts_with(&root)).count() > 1 {
+                faults.push(format!(
+                    "`{module}` has code: list the nouns of its charter"
+                ));
+            }
+            continue;
+        }
+        let of_module = nouns::NOUNS.iter().find(|n| n.0 == *module);
+        let of_module = of_module.map_or(&[][..], |n| n.1);
+        for (noun, place) in of_module {
+            if !charter.contains(noun) {
+                faults.push(format!("`{module}`: its charter does not say `{noun}`"));
+            }
+            if !is_in_module(module, &files, place) {
+                faults.push(format!(
+                    "`{module}`: `{noun}` names `{place}`, which is not there"
+                ));
+            }
+        }
+        let listed = charter.split_once(": ").map_or(*charter, |c| c.1);
+        for item in listed.split([',', ';', '→', '⇄']) {
+            if !of_module
+                .iter()
+                .any(|(noun, _)| item.contains(noun) || noun.contains(item.trim()))
+            {
+                faults.push(format!(
+                    "`{module}`: nothing is named for `{}`",
+                    item.trim()
+                ));
+            }
+        }
+    }
+    assert_none(&faults);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Small fixed-size algebra that nalgebra lacks: so(3)/se(3) maps, twists, polar, PSD projection, stable roots.
+//! Small fixed-size algebra that nalgebra lacks: so(3)/se(3) maps, twists, polar rotation, PSD projection, derivative check.
 
 #[cfg(test)]
 pub(crate) mod derivative_check;

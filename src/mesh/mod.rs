@@ -1,4 +1,4 @@
-//! Triangle meshes and their topology, checked once at construction; normals, boundaries, UVs, isotropic remeshing, neighbour smoothing.
+//! Triangle meshes and their topology, checked once at construction; normals, boundaries, isotropic remeshing, neighbour smoothing.
 
 mod distances;
 mod editable;

@@ -1,4 +1,4 @@
-//! Synthetic people, garments, cameras and sequences with known truth, for the demo, tests and benches.
+//! Synthetic people, garments, cameras and sequences with known truth.
 //!
 //! A [`Sequence`] is an [`Actor`] doing a [`Routine`] in a [`Room`] before a camera with a
 //! [`NoiseModel`]. Frames are functions of their number: any order, same bits.

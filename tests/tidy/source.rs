@@ -74,6 +74,14 @@ pub(crate) fn code_without_tests(source: &str) -> String {
     }
 }
 
+/// True if the text declares an item: `declares("pub fn step(", "fn", "step")`.
+pub(crate) fn declares(text: &str, kind: &str, name: &str) -> bool {
+    let ends = |rest: &str| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_');
+    let item = format!("{kind} {name}");
+    let mut found = text.match_indices(&item);
+    found.any(|(at, words)| ends(&text[at + words.len()..]))
+}
+
 /// A function as rustfmt lays it out.
 pub(crate) struct Function {
     pub(crate) name: String,
