@@ -13,7 +13,7 @@ use tryon::body::{Template, import::template_from_smpl};
 use tryon::camera::{NoiseModel, RgbdFrame};
 use tryon::evaluate::stills::stills;
 use tryon::evaluate::tracking::{TrackOutcome, follow, mean, median};
-use tryon::evaluate::{Scene, scenes};
+use tryon::evaluate::{DepthScene, scenes};
 use tryon::formats::npz::read_smpl;
 use tryon::formats::read_motion;
 use tryon::synth::{Actor, Sequence, Setting};
@@ -80,7 +80,7 @@ fn main() {
                 print_stills(template, settings, folder, a.still);
             }
         } else {
-            let scene = Scene::open(folder).expect("a scene");
+            let scene = DepthScene::open(folder).expect("a scene");
             run(&a, &bodies, repeated(scene, a.still), None);
         }
     }
@@ -165,7 +165,7 @@ const UPPER: [UpperClip; 5] = [
     upper(["knees_02_02_f_avg", "subject_f_avg", "cmu_bvh/02_02_makehuman.bvh"], NoiseModel::TimeOfFlight, [1.4, 2.2], 90),
 ];
 
-fn without_feet(data: &Path, spec: &UpperClip) -> Scene {
+fn without_feet(data: &Path, spec: &UpperClip) -> DepthScene {
     let subject = Actor {
         template: scenes::subject(data, spec.body).expect("a body"),
         ..Actor::default()
@@ -184,7 +184,7 @@ fn without_feet(data: &Path, spec: &UpperClip) -> Scene {
     let sequence = Sequence::new(subject, setting)
         .with_clip(motion.at_cmu_rate())
         .expect("a clip of a person");
-    Scene::synthetic(spec.name, &sequence, spec.frames)
+    DepthScene::synthetic(spec.name, &sequence, spec.frames)
 }
 
 /// `paper`, or JSON.
@@ -203,7 +203,7 @@ fn body(path: &Path) -> Arc<Template> {
 }
 
 /// A scene of one frame shown `times` times.
-fn repeated(mut scene: Scene, times: u64) -> Scene {
+fn repeated(mut scene: DepthScene, times: u64) -> DepthScene {
     if let [one] = scene.frames.as_slice() {
         let frame = |i: u64| RgbdFrame {
             sequence: i,
@@ -215,7 +215,7 @@ fn repeated(mut scene: Scene, times: u64) -> Scene {
     scene
 }
 
-fn run(a: &Args, bodies: &[Arc<Template>], mut scene: Scene, subject: Option<&str>) {
+fn run(a: &Args, bodies: &[Arc<Template>], mut scene: DepthScene, subject: Option<&str>) {
     scene.frames.truncate(a.frames);
     if a.nth > 1 {
         scene = scene.every(a.nth);
@@ -233,7 +233,7 @@ fn run(a: &Args, bodies: &[Arc<Template>], mut scene: Scene, subject: Option<&st
     }
 }
 
-fn print_outcome(scene: &Scene, settings: &str, out: &TrackOutcome, stages: bool) {
+fn print_outcome(scene: &DepthScene, settings: &str, out: &TrackOutcome, stages: bool) {
     let size: f64 = out.stages.iter().map(|s| s.size).fold(0.0, f64::max);
     println!(
         "{} {settings}: joints {:.1} mm (worst frame {:.1}), visible {:.1}, whole {:.1}, vertices {:.1} mm, bones {:.1} %, lost {}, found {:?}, step {:.2} ms, pose+skin {:.2}, size {size:.0}, residual {:.2}",

@@ -1,7 +1,7 @@
 //! Ablation of the tracker: one setting changed at a time, run time against error.
 
 use super::tracking::follow;
-use super::{EvaluateError, Row, Scene, scenes};
+use super::{DepthScene, EvaluateError, Row, scenes};
 use crate::body::{Template, embedded};
 use crate::camera::NoiseModel;
 use crate::registration::Association;
@@ -172,9 +172,9 @@ pub fn plan(data: Option<&Path>, extent: Extent) -> Result<Plan, EvaluateError> 
 }
 
 impl SceneOrigin {
-    fn scene(&self) -> Result<Scene, EvaluateError> {
+    fn scene(&self) -> Result<DepthScene, EvaluateError> {
         match self {
-            Self::Folder(path) => Scene::open(path),
+            Self::Folder(path) => DepthScene::open(path),
             Self::Unseen(data, name) => scenes::unseen(data, name),
             Self::Embedded(noise) => {
                 let setting = Setting {
@@ -189,7 +189,7 @@ impl SceneOrigin {
                 } else {
                     "synthetic_tof"
                 };
-                Ok(Scene::synthetic(name, &sequence, EMBEDDED_FRAMES))
+                Ok(DepthScene::synthetic(name, &sequence, EMBEDDED_FRAMES))
             }
         }
     }

@@ -1,13 +1,13 @@
 //! Corruptions of a depth sequence: noise, lost readings, dropped frames, occlusion, clipping.
 
-use super::{Scene, SceneTruth};
+use super::{DepthScene, SceneTruth};
 use crate::camera::DepthImage;
 use rand::Rng;
 
 /// Seed of the corrupted pixels.
 const SEED: u64 = 41;
 
-impl Scene {
+impl DepthScene {
     fn each_pixel(&mut self, mut f: impl FnMut(&mut rand_pcg::Pcg32, &mut u16)) {
         for (i, frame) in self.frames.iter_mut().enumerate() {
             let mut rng = rand_pcg::Pcg32::new(SEED, i as u64);
@@ -116,7 +116,7 @@ impl Scene {
     }
     /// Adds another scene of the same camera: the nearer reading of each pixel counts. Truth stays.
     #[must_use]
-    pub fn with(mut self, other: &Scene) -> Self {
+    pub fn with(mut self, other: &DepthScene) -> Self {
         for (frame, second) in self.frames.iter_mut().zip(&other.frames) {
             for (a, b) in frame.depth.data_mut().iter_mut().zip(second.depth.data()) {
                 if *b > 0 && (*a == 0 || b < a) {
@@ -182,9 +182,9 @@ mod tests {
             color: false,
             ..Setting::default()
         };
-        let scene = Scene::synthetic("still", &Sequence::new(Actor::default(), setting), 5);
+        let scene = DepthScene::synthetic("still", &Sequence::new(Actor::default(), setting), 5);
         let readings =
-            |s: &Scene| s.frames[1].depth.data().iter().filter(|d| **d > 0).count() as f64;
+            |s: &DepthScene| s.frames[1].depth.data().iter().filter(|d| **d > 0).count() as f64;
         let all = readings(&scene);
         assert!((readings(&scene.clone().thinned(0.9)) / all - 0.1).abs() < 0.01);
         let corrupted = scene.clone().corrupted(0.1);

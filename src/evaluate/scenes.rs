@@ -1,6 +1,6 @@
 //! Standard scenes: other bodies, other motions and other noise than the shared sequences have.
 
-use super::{EvaluateError, Scene};
+use super::{DepthScene, EvaluateError};
 use crate::body::Template;
 use crate::body::import::template_from_smpl;
 use crate::camera::NoiseModel;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// When the body cannot be read.
-pub fn hard(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
+pub fn hard(data: &Path) -> Result<Vec<DepthScene>, EvaluateError> {
     let subject = Actor {
         template: subject(data, "subject_f_avg")?,
         ..Actor::default()
@@ -33,9 +33,9 @@ pub fn hard(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
     };
     let frames = 200;
     let upper = Sequence::new(subject.clone(), setting(1.35, 1.25, Routine::Turn));
-    let turn = Scene::synthetic("turn_upper", &upper, frames);
+    let turn = DepthScene::synthetic("turn_upper", &upper, frames);
     let whole = Sequence::new(subject.clone(), setting(1.0, 2.4, Routine::TryOn));
-    let arm = Scene::synthetic("arm_without_return", &whole, frames);
+    let arm = DepthScene::synthetic("arm_without_return", &whole, frames);
     let arm = arm
         .without_return("left_shoulder", "left_elbow", 0.10)
         .without_return("left_elbow", "left_wrist", 0.09);
@@ -44,7 +44,7 @@ pub fn hard(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
         room: Some(Room::default()),
         ..setting(1.0, 2.4, Routine::TryOn)
     };
-    let hole = Scene::synthetic(
+    let hole = DepthScene::synthetic(
         "arm_without_return_room",
         &Sequence::new(subject, walled),
         frames,
@@ -59,7 +59,7 @@ pub fn hard(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
 ///
 /// # Errors
 /// When the body cannot be read.
-pub fn idle(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
+pub fn idle(data: &Path) -> Result<Vec<DepthScene>, EvaluateError> {
     let subject = Actor {
         template: subject(data, "subject_m_heavy")?,
         ..Actor::default()
@@ -71,7 +71,7 @@ pub fn idle(data: &Path) -> Result<Vec<Scene>, EvaluateError> {
             seed: 5,
             ..Setting::default()
         };
-        Scene::synthetic(name, &Sequence::new(subject.clone(), setting), 150)
+        DepthScene::synthetic(name, &Sequence::new(subject.clone(), setting), 150)
     };
     Ok(vec![
         scene("still", Routine::Still),
@@ -175,7 +175,7 @@ pub fn subject(data: &Path, name: &str) -> Result<Arc<Template>, EvaluateError> 
 ///
 /// # Errors
 /// When there is no scene of that name, or its body or motion cannot be read.
-pub fn unseen(data: &Path, name: &str) -> Result<Scene, EvaluateError> {
+pub fn unseen(data: &Path, name: &str) -> Result<DepthScene, EvaluateError> {
     let fault = |why: String| EvaluateError::Scene {
         scene: name.to_owned(),
         why,
@@ -207,5 +207,5 @@ pub fn unseen(data: &Path, name: &str) -> Result<Scene, EvaluateError> {
             .with_clip(motion.at_cmu_rate())
             .map_err(|e| fault(e.to_string()))?;
     }
-    Ok(Scene::synthetic(name, &sequence, frames))
+    Ok(DepthScene::synthetic(name, &sequence, frames))
 }

@@ -140,7 +140,7 @@ pub fn stills(
     steps: u64,
     mut each: impl FnMut(usize, &TrackerModel, &TrackerState, &mut Workspace, &RgbdFrame, f64),
 ) -> Result<StillsOutcome, EvaluateError> {
-    let scene = super::Scene::open(folder)?;
+    let scene = super::DepthScene::open(folder)?;
     let fault = |why: String| EvaluateError::Scene {
         scene: scene.name.clone(),
         why,

@@ -1,6 +1,6 @@
 //! Accuracy and run time of a tracker on a scene: the measures that every table of tracking uses.
 
-use super::{Row, Scene, SceneTruth};
+use super::{DepthScene, Row, SceneTruth};
 use crate::body::{BoneTransforms, Template};
 use crate::camera::Intrinsics;
 use crate::math::{P3, P3d};
@@ -86,7 +86,7 @@ impl TrackOutcome {
         mean(steady(&self.skin_ms))
     }
     /// As a row of a table.
-    pub fn row(&self, scene: &Scene, method: &str) -> Row {
+    pub fn row(&self, scene: &DepthScene, method: &str) -> Row {
         Row::new(&scene.name, method, self.steady_ms())
             .error("joints_mm", mean(&self.joints_mm))
             .error(
@@ -113,10 +113,10 @@ pub fn thread_ms(start: Instant) -> f64 {
     on_processor.unwrap_or_else(|| start.elapsed().as_secs_f64() * 1e3)
 }
 
-/// TruthComparison of tracked frames with the truth of a scene.
+/// Comparison of tracked frames with the truth of a scene.
 struct TruthComparison<'a> {
     template: &'a Template,
-    scene: &'a Scene,
+    scene: &'a DepthScene,
     /// Joint of the template for each joint of the truth.
     joints: Vec<Option<usize>>,
     /// Mean surface errors of each compared frame, millimetres: visible vertices, all, vertices of the same number.
@@ -125,7 +125,7 @@ struct TruthComparison<'a> {
 }
 
 impl<'a> TruthComparison<'a> {
-    fn new(template: &'a Template, scene: &'a Scene) -> Self {
+    fn new(template: &'a Template, scene: &'a DepthScene) -> Self {
         let skeleton = template.skeleton();
         let names = scene.joint_names.iter();
         Self {
@@ -184,7 +184,7 @@ impl<'a> TruthComparison<'a> {
 pub fn follow(
     template: &Arc<Template>,
     config: &TrackerConfig,
-    scene: &Scene,
+    scene: &DepthScene,
     mut each: impl FnMut(usize, &TrackerModel, &TrackerState, &StepReport, &mut Workspace),
 ) -> TrackOutcome {
     let model = TrackerModel::new(template.clone(), scene.calibration.clone(), config.clone());
@@ -229,7 +229,12 @@ pub fn follow(
 }
 
 /// Mean relative error of the lengths of all bones between compared joints, per cent.
-fn bone_error(template: &Template, scene: &Scene, joints: &[Option<usize>], ours: &[P3d]) -> f64 {
+fn bone_error(
+    template: &Template,
+    scene: &DepthScene,
+    joints: &[Option<usize>],
+    ours: &[P3d],
+) -> f64 {
     let Some(truth) = scene.truth.iter().rev().find(|t| !t.joints.is_empty()) else {
         return f64::NAN;
     };

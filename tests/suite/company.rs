@@ -4,7 +4,7 @@ use crate::common::shared;
 use std::sync::Arc;
 use tryon::body::Template;
 use tryon::camera::NoiseModel;
-use tryon::evaluate::Scene;
+use tryon::evaluate::DepthScene;
 use tryon::evaluate::scenes;
 use tryon::evaluate::tracking::{TrackOutcome, follow, mean};
 use tryon::math::P3d;
@@ -22,15 +22,15 @@ fn alone() -> Setting {
     }
 }
 
-fn scene(setting: Setting, frames: u64) -> (Arc<Template>, Scene) {
+fn scene(setting: Setting, frames: u64) -> (Arc<Template>, DepthScene) {
     let actor = Actor::default();
     (
         actor.template.clone(),
-        Scene::synthetic("actor", &Sequence::new(actor, setting), frames),
+        DepthScene::synthetic("actor", &Sequence::new(actor, setting), frames),
     )
 }
 
-fn track(template: &Arc<Template>, scene: &Scene) -> TrackOutcome {
+fn track(template: &Arc<Template>, scene: &DepthScene) -> TrackOutcome {
     follow(
         template,
         &TrackerConfig::default(),
@@ -42,7 +42,7 @@ fn track(template: &Arc<Template>, scene: &Scene) -> TrackOutcome {
 /// Outcome, number of joints that `measured` selects, and their mean error (mm).
 fn track_joints(
     template: &Arc<Template>,
-    scene: &Scene,
+    scene: &DepthScene,
     measured: impl Fn(usize) -> bool,
 ) -> (TrackOutcome, usize, f64) {
     let out = track(template, scene);
@@ -54,7 +54,7 @@ fn track_joints(
     (out, errors.len(), mean(&errors))
 }
 
-fn error_of(out: &TrackOutcome, scene: &Scene, parts: &[&str]) -> f64 {
+fn error_of(out: &TrackOutcome, scene: &DepthScene, parts: &[&str]) -> f64 {
     let of = |part: &&str| {
         out.per_joint_mm[scene
             .joint_names
@@ -77,7 +77,7 @@ const UPPER: [&str; 8] = [
 ];
 
 /// A passer-by, out to the side and back, at `z` metres from the camera.
-fn passer_by(z: f64, frames: u64) -> Scene {
+fn passer_by(z: f64, frames: u64) -> DepthScene {
     let setting = Setting {
         routine: Routine::LeaveAndReturn,
         home: P3d::new(-1.7, 0.0, -z),
@@ -353,7 +353,7 @@ fn each_skip_keeps_its_bound() {
         return;
     };
     let template = scenes::subject(&data, "template").expect("template");
-    let mut dance = Scene::open(&folder).expect("scene");
+    let mut dance = DepthScene::open(&folder).expect("scene");
     dance.frames.truncate(110);
     dance.truth.truncate(110);
     let searches = TrackerConfig {
@@ -370,7 +370,11 @@ fn each_skip_keeps_its_bound() {
     );
 }
 
-fn compare_skips(template: &Arc<Template>, own: &Scene, cases: &[(&str, TrackerConfig, f64, f64)]) {
+fn compare_skips(
+    template: &Arc<Template>,
+    own: &DepthScene,
+    cases: &[(&str, TrackerConfig, f64, f64)],
+) {
     let run = |config: &TrackerConfig| {
         let (mut tracks, mut done) = (vec![], [0usize; 5]);
         let out = follow(
@@ -429,7 +433,7 @@ fn limb_recovery_finds_an_arm_lost_at_low_rate() {
         return;
     };
     let template = scenes::subject(&data, "template").expect("template");
-    let own = Scene::open(&folder).expect("scene").every(4);
+    let own = DepthScene::open(&folder).expect("scene").every(4);
     let error = |rescue| {
         let config = TrackerConfig {
             rescue,

@@ -8,7 +8,7 @@ use crate::tracked::{
 use tryon::body::Pose;
 use tryon::camera::{Calibration, DepthImage, Intrinsics, NoiseModel};
 use tryon::evaluate::tracking::{follow, mean};
-use tryon::evaluate::{Scene, scenes};
+use tryon::evaluate::{DepthScene, scenes};
 use tryon::math::{P3d, Rigid};
 use tryon::synth::Routine;
 use tryon::tracking::{
@@ -21,7 +21,7 @@ fn lost_and_corrupt_pixels_cost_little() {
     let (Some(template), Some(scene)) = (template(), recorded(80)) else {
         return;
     };
-    let error = |s: &Scene| mean(&quiet(&template, s).joints_mm);
+    let error = |s: &DepthScene| mean(&quiet(&template, s).joints_mm);
     let clean = error(&scene);
     let [half, most] = [0.5, 0.9].map(|share| error(&scene.clone().thinned(share)));
     let [few, tenth] = [0.02, 0.1].map(|share| error(&scene.clone().corrupted(share)));

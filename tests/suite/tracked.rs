@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tryon::body::{BoneTransforms, Pose, RestBody, Template, skin};
 use tryon::camera::{DepthImage, Intrinsics, NoiseModel, RgbdFrame};
 use tryon::evaluate::tracking::{TrackOutcome, follow};
-use tryon::evaluate::{Scene, scenes};
+use tryon::evaluate::{DepthScene, scenes};
 use tryon::math::P3d;
 use tryon::par::Par;
 use tryon::raster::{View, VisibilityBuffer, rasterise};
@@ -30,21 +30,25 @@ pub(crate) fn template() -> Option<Arc<Template>> {
 }
 
 /// The first frames of a recorded dance.
-pub(crate) fn recorded(frames: usize) -> Option<Scene> {
-    let mut scene = Scene::open(&shared(CHARLESTON)?).expect("scene");
+pub(crate) fn recorded(frames: usize) -> Option<DepthScene> {
+    let mut scene = DepthScene::open(&shared(CHARLESTON)?).expect("scene");
     scene.frames.truncate(frames);
     scene.truth.truncate(frames);
     Some(scene)
 }
 
 /// Tracks a scene with default settings.
-pub(crate) fn quiet(template: &Arc<Template>, scene: &Scene) -> TrackOutcome {
+pub(crate) fn quiet(template: &Arc<Template>, scene: &DepthScene) -> TrackOutcome {
     let config = TrackerConfig::default();
     follow(template, &config, scene, |_, _, _, _, _| {})
 }
 
 /// A synthetic routine of the body that is tracked: the error is the tracker's own.
-pub(crate) fn own_body(routine: Routine, noise: NoiseModel, frames: u64) -> (Arc<Template>, Scene) {
+pub(crate) fn own_body(
+    routine: Routine,
+    noise: NoiseModel,
+    frames: u64,
+) -> (Arc<Template>, DepthScene) {
     let subject = Actor::default();
     let template = subject.template.clone();
     let setting = Setting {
@@ -54,7 +58,7 @@ pub(crate) fn own_body(routine: Routine, noise: NoiseModel, frames: u64) -> (Arc
         ..Setting::default()
     };
     let sequence = Sequence::new(subject, setting);
-    (template, Scene::synthetic("own", &sequence, frames))
+    (template, DepthScene::synthetic("own", &sequence, frames))
 }
 
 pub(crate) fn fixed_size() -> TrackerConfig {

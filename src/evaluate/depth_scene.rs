@@ -11,7 +11,7 @@ use std::path::Path;
 /// Ground truth of one frame.
 #[derive(Clone, Debug, Default)]
 pub struct SceneTruth {
-    /// Joints in the order of [`Scene::joint_names`], camera frame, metres; empty if there is nobody.
+    /// Joints in the order of [`DepthScene::joint_names`], camera frame, metres; empty if there is nobody.
     pub joints: Vec<P3d>,
     /// Vertices of the person, camera frame, metres; empty where unknown (nine frames of ten).
     pub vertices: Vec<P3>,
@@ -19,7 +19,7 @@ pub struct SceneTruth {
 
 /// Frames of one camera with the truth beside them.
 #[derive(Clone, Debug)]
-pub struct Scene {
+pub struct DepthScene {
     /// Name in tables.
     pub name: String,
     /// The camera.
@@ -43,7 +43,7 @@ struct TruthFile {
     joints: Vec<Vec<[f64; 3]>>,
 }
 
-impl Scene {
+impl DepthScene {
     /// Reads an RGBD folder, with `truth.json` and `truth_vertices.npy` (every tenth frame, relative to joint 0) where
     /// they exist.
     ///
