@@ -13,13 +13,13 @@ use serde::{Deserialize, Serialize};
 /// Mask of the vertices inside another part, and the queries behind it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Interior {
-    sides: ProximityCache<Side>,
+    sides: ProximityCache<SurfaceSide>,
     inside: Vec<bool>,
 }
 
 /// Side of another part's surface on which a vertex lies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-enum Side {
+enum SurfaceSide {
     #[default]
     Outside,
     Inside,
@@ -78,8 +78,8 @@ impl Interior {
         self.inside
             .iter_mut()
             .zip(entries.iter())
-            .for_each(|(i, e)| *i = e.result == Side::Inside);
-        let suspects = entries.iter().any(|e| e.result == Side::Suspect);
+            .for_each(|(i, e)| *i = e.result == SurfaceSide::Inside);
+        let suspects = entries.iter().any(|e| e.result == SurfaceSide::Suspect);
         if !suspects && !self.inside.contains(&true) {
             return;
         }
@@ -92,14 +92,18 @@ impl Interior {
             |v: usize| body.contains(&(frame.vertices[v] + frame.normals[v] * OFF_SKIN));
         par::for_chunks(par, entries, 256, |start, chunk| {
             for (k, e) in chunk.iter_mut().enumerate() {
-                if e.result == Side::Suspect {
+                if e.result == SurfaceSide::Suspect {
                     let inside = is_inside(start + k);
-                    e.result = if inside { Side::Inside } else { Side::Outside };
+                    e.result = if inside {
+                        SurfaceSide::Inside
+                    } else {
+                        SurfaceSide::Outside
+                    };
                 }
             }
         });
         let mut ring: Vec<u32> = (0..entries.len() as u32)
-            .filter(|v| entries[*v as usize].result == Side::Inside)
+            .filter(|v| entries[*v as usize].result == SurfaceSide::Inside)
             .collect();
         ring.iter().for_each(|v| self.inside[*v as usize] = true);
         let mut tested = self.inside.clone();
@@ -107,7 +111,7 @@ impl Interior {
             let mut next = Vec::new();
             for &w in ring.iter().flat_map(|v| model.neighbours(*v)) {
                 let v = w as usize;
-                if entries[v].result == Side::Unknown
+                if entries[v].result == SurfaceSide::Unknown
                     && !std::mem::replace(&mut tested[v], true)
                     && is_inside(v)
                 {
@@ -132,19 +136,30 @@ impl Interior {
 }
 
 /// Side of a vertex by the nearest skin of the other part.
-fn classify(query: &PartQuery<'_>, v: usize, near: u32, hit: &Result<ClosestPoint, f32>) -> Side {
-    let behind = |yes: bool| if yes { Side::Suspect } else { Side::Outside };
+fn classify(
+    query: &PartQuery<'_>,
+    v: usize,
+    near: u32,
+    hit: &Result<ClosestPoint, f32>,
+) -> SurfaceSide {
+    let behind = |yes: bool| {
+        if yes {
+            SurfaceSide::Suspect
+        } else {
+            SurfaceSide::Outside
+        }
+    };
     match hit {
         // Far from the other part's skin: outside or deep inside, unless the part ends there.
         Err(_) => {
             let mut around = query.surface.neighbours(near).iter();
             if around.any(|w| query.surface.part(*w) & query.others[v] == 0) {
-                return Side::Unknown;
+                return SurfaceSide::Unknown;
             }
             let (x, n) = (&query.frame.vertices, near as usize);
             behind((x[v] - x[n]).dot(&query.frame.normals[n]) < 0.0)
         }
-        Ok(c) if c.on_part_boundary => Side::Unknown,
+        Ok(c) if c.on_part_boundary => SurfaceSide::Unknown,
         Ok(c) => behind(c.signed_distance < 0.0),
     }
 }

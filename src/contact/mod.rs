@@ -1,4 +1,6 @@
-//! The collision body (filtered, parts and joints separated, once a pose, the one that is drawn too), candidate pairs (vertex–face, edge–edge), distances, continuous collision, contact energies and constraints; it never steps time.
+//! The collision body of a pose: filtered, parts and joints separated; its closest points, inside tests and virtual depth maps.
+//!
+//! Built once a pose: cloth collides with it, dressing drapes on it, the compositor draws it. Nothing here steps time.
 
 mod body_filter;
 mod closest_multistart;
