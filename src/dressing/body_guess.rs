@@ -36,7 +36,7 @@ const PRIOR: f32 = 0.002;
 const UNDERGROUND: f32 = -0.05;
 /// Scale and arms [rad below the horizontal] at the start.
 const START: [f64; 2] = [1.0, 0.75];
-/// Limits of scale and of arms [rad].
+/// Limits of scale and of arms (rad).
 const LIMITS: [std::ops::Range<f64>; 2] = [0.8..1.15, -0.3..1.4];
 /// First steps of the search (see [`Guess`]), and how often they are halved.
 const STEPS: Guess = [0.04, 0.2, 0.04, 0.02];
@@ -44,7 +44,7 @@ const HALVINGS: usize = 5;
 /// Distance within which skin is searched, metres.
 const ANYWHERE: f32 = 10.0;
 
-/// Scale, arms below the horizontal [rad], shift of the garment up and to the front (m).
+/// Scale, arms below the horizontal (rad), shift of the garment up and to the front (m).
 type Guess = [f64; 4];
 
 /// Frame in which the garment's vertices lie over the skin of `template`.

@@ -10,14 +10,14 @@ use crate::garment::{GarmentError, GarmentMesh, Placement};
 use crate::math::{P3, V3, V3d};
 use crate::par::Par;
 
-/// Distance of two folds [m]; at most a quarter of the edges.
+/// Distance of two folds (m); at most a quarter of the edges.
 const THICKNESS: f32 = 0.01;
-/// Distance below which folds are in contact [m]. With 18 mm, as in worn garments, hoods have a quarter more intersections
+/// Distance below which folds are in contact (m). With 18 mm, as in worn garments, hoods have a quarter more intersections
 /// after a second and a half.
 const REACH: f32 = 0.026;
-/// Separation of nearer folds between two queries [m].
+/// Separation of nearer folds between two queries (m).
 const SEPARATION: f64 = 0.001;
-/// Largest speed [m/s]: two millimetres between two queries. Limited only near other folds, one in seven hoods intersects
+/// Largest speed (m/s): two millimetres between two queries. Limited only near other folds, one in seven hoods intersects
 /// itself.
 const MAX_SPEED: f64 = 0.3;
 
@@ -42,12 +42,12 @@ struct FoldContact {
     weights: [f64; 4],
     /// Unit normal of the triangle, on the vertex's side.
     normal: V3d,
-    /// Distance to keep [m].
+    /// Distance to keep (m).
     distance: f64,
 }
 
 impl FoldContact {
-    /// Signed distance of the vertex from the triangle [m].
+    /// Signed distance of the vertex from the triangle (m).
     fn signed_distance(&self, x: &[V3d]) -> f64 {
         (0..4)
             .map(|k| self.weights[k] * self.normal.dot(&x[self.vertices[k] as usize]))

@@ -9,7 +9,7 @@ pub struct Hinge {
     pub v: [u32; 4],
     /// Coefficients; they sum to zero.
     pub c: [f64; 4],
-    /// Stiffness [N/m].
+    /// Stiffness (N/m).
     pub w: f64,
     /// Length of Σ cₖ xₖ at rest (m); zero for a flat hinge.
     pub rest: f64,

@@ -8,7 +8,7 @@
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
 use std::ops::AddAssign as _;
 
-/// Membrane stiffness [N/m].
+/// Membrane stiffness (N/m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Membrane {
     /// 2D Lamé μ.
@@ -35,24 +35,24 @@ impl Membrane {
             along: [plane(m.stretch_weft), plane(m.stretch_warp)],
         }
     }
-    /// Largest curvature along u and v near rest: the weights of the constant matrix [N/m].
+    /// Largest curvature along u and v near rest: the weights of the constant matrix (N/m).
     pub fn stiffest(&self) -> [f64; 2] {
         [0, 1].map(|d| 2.0 * self.mu + self.lambda + self.along[d])
     }
-    /// Hooke's law for small strain: stress (xx, yy, xy) of strain (xx, yy, xy) [N/m].
+    /// Hooke's law for small strain: stress (xx, yy, xy) of strain (xx, yy, xy) (N/m).
     pub fn hooke(&self) -> Matrix3<f64> {
         let [u, v] = self.stiffest();
         let (c, s) = (self.lambda, 4.0 * self.mu);
         Matrix3::new(u, c, 0.0, c, v, 0.0, 0.0, 0.0, s)
     }
-    /// Energy per rest area [N/m].
+    /// Energy per rest area (N/m).
     pub fn value(&self, f: &Matrix3x2<f64>) -> f64 {
         let (r, s) = polar(f);
         let axis = |d: usize| self.along[d] * (f.column(d).norm() - 1.0).powi(2);
         self.mu * (f - r).norm_squared()
             + 0.5 * (self.lambda * (s.trace() - 2.0).powi(2) + axis(0) + axis(1))
     }
-    /// Derivative of the value by F [N/m].
+    /// Derivative of the value by F (N/m).
     pub fn gradient(&self, f: &Matrix3x2<f64>) -> Matrix3x2<f64> {
         let (r, s) = polar(f);
         let mut g = (f - r) * (2.0 * self.mu) + r * (self.lambda * (s.trace() - 2.0));

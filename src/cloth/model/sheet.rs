@@ -66,9 +66,9 @@ pub struct Sheet {
     pub edges: Vec<([u32; 2], f64)>,
     /// Pattern of the system matrix.
     pub pattern: Arc<SymmetricPattern>,
-    /// Constant part of the system matrix, stiffness without inertia, in pattern order [N/m].
+    /// Constant part of the system matrix, stiffness without inertia, in pattern order (N/m).
     pub stiffness: Vec<f64>,
-    /// Rate of air drag [1/s].
+    /// Rate of air drag (1/s).
     pub damping: f64,
     /// Coulomb coefficient.
     pub friction: f64,
@@ -243,7 +243,7 @@ fn hinges(
     hinges
 }
 
-/// Stiffness near rest in pattern order [N/m].
+/// Stiffness near rest in pattern order (N/m).
 fn constant_stiffness(
     pattern: &SymmetricPattern,
     elements: &[Element],

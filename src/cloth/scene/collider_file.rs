@@ -9,7 +9,7 @@ use std::path::Path;
 /// Norm below which a quaternion is no rotation.
 const SHORTEST_QUATERNION: f64 = 1e-6;
 
-/// Times [s] and placements, in order.
+/// Times (s) and placements, in order.
 type SampledMotion = Vec<(f64, Isometry3<f64>)>;
 
 /// Collider of a scene file.

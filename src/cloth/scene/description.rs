@@ -34,7 +34,7 @@ pub struct Scene {
     pub sheet: Sheet,
     /// Its triangles.
     pub faces: Vec<Face>,
-    /// Start positions in the world (y up), which are the rest shape [m].
+    /// Start positions in the world (y up), which are the rest shape (m).
     pub start: Vec<P3>,
     /// Pinned vertices.
     pub pins: Vec<u32>,
@@ -44,7 +44,7 @@ pub struct Scene {
     pub colliders: Vec<Collider>,
     /// m/s².
     pub gravity: V3d,
-    /// Length [s].
+    /// Length (s).
     pub duration: f64,
     /// Frames a second of the output.
     pub rate: f64,

@@ -47,7 +47,7 @@ struct MaterialFile {
     friction: f64,
 }
 
-/// Longest scene [s] and highest rate [1/s]: beyond them a field is a mistake, and a result would not fit a disk.
+/// Longest scene (s) and highest rate (1/s): beyond them a field is a mistake, and a result would not fit a disk.
 const LONGEST: f64 = 600.0;
 const HIGHEST_RATE: f64 = 1000.0;
 

@@ -23,17 +23,17 @@ pub struct RunReport {
     pub iterations: usize,
     /// Substeps that missed the tolerance at their last iteration.
     pub unconverged: usize,
-    /// Median computing time of a frame [ms].
+    /// Median computing time of a frame (ms).
     pub ms_median: f64,
-    /// Mean computing time of a frame [ms].
+    /// Mean computing time of a frame (ms).
     pub ms_mean: f64,
-    /// Longest computing time of a frame [ms].
+    /// Longest computing time of a frame (ms).
     pub ms_max: f64,
     /// 99th percentile of the edges' stretch at the end.
     pub p99_strain: f64,
-    /// Largest depth of a vertex in a solid over all frames [m].
+    /// Largest depth of a vertex in a solid over all frames (m).
     pub penetration: f64,
-    /// Kinetic plus elastic energy at the end [J].
+    /// Kinetic plus elastic energy at the end (J).
     pub energy_end: f64,
     /// Numeric factorisations.
     pub factorisations: u64,
@@ -103,7 +103,7 @@ pub fn run(
 }
 
 impl RunReport {
-    /// Report of a solver's counters, the times of its frames [ms] and its last positions [m] and velocities [m/s].
+    /// Report of a solver's counters, the times of its frames (ms) and its last positions (m) and velocities (m/s).
     fn new(
         scene: &Scene,
         mut times: Vec<f64>,

@@ -8,20 +8,20 @@ use nalgebra::Isometry3;
 pub enum Primitive {
     /// Ball.
     Sphere {
-        /// Radius [m].
+        /// Radius (m).
         radius: f64,
     },
     /// Ball swept along the frame's y axis.
     Capsule {
-        /// Radius [m].
+        /// Radius (m).
         radius: f64,
-        /// Half the length of the axis [m].
+        /// Half the length of the axis (m).
         half_segment: f64,
     },
 }
 
 impl Primitive {
-    /// Bound of the displacement of any of its points between two placements [m].
+    /// Bound of the displacement of any of its points between two placements (m).
     pub fn max_displacement(&self, from: &Isometry3<f64>, to: &Isometry3<f64>) -> f64 {
         let size = match self {
             Self::Sphere { radius } => *radius,
@@ -33,7 +33,7 @@ impl Primitive {
         let turn = from.rotation.angle_to(&to.rotation);
         (from.translation.vector - to.translation.vector).norm() + turn * size
     }
-    /// Signed distance (negative inside) [m] and outward normal at a point of the solid's frame.
+    /// Signed distance (negative inside) (m) and outward normal at a point of the solid's frame.
     pub fn distance(&self, p: &V3d) -> (f64, V3d) {
         let (radius, axis_point) = match self {
             Self::Sphere { radius } => (*radius, V3d::zeros()),
@@ -60,12 +60,12 @@ pub struct Collider {
     pub shape: Primitive,
     /// Coulomb coefficient.
     pub friction: f64,
-    /// Times [s] and placements, in order; one entry stands still.
+    /// Times (s) and placements, in order; one entry stands still.
     pub motion: Vec<(f64, Isometry3<f64>)>,
 }
 
 impl Collider {
-    /// Placement at time `t` [s]: interpolated between samples, constant beyond them.
+    /// Placement at time `t` (s): interpolated between samples, constant beyond them.
     pub fn placement(&self, t: f64) -> Isometry3<f64> {
         let after = self.motion.partition_point(|(time, _)| *time <= t);
         match (

@@ -29,11 +29,11 @@ pub struct RunConfig {
     pub substeps: usize,
     /// Quasi-Newton: most iterations a substep.
     pub iterations: usize,
-    /// Quasi-Newton: root mean square of an iteration's motion that counts as converged [m].
+    /// Quasi-Newton: root mean square of an iteration's motion that counts as converged (m).
     pub tolerance: f64,
-    /// Distance that cloth keeps from solids [m]. Half a millimetre hides neither rounding nor a fabric's thickness.
+    /// Distance that cloth keeps from solids (m). Half a millimetre hides neither rounding nor a fabric's thickness.
     pub offset: f64,
-    /// Explicit: extrapolation of the positions that forces are evaluated at [substeps].
+    /// Explicit: extrapolation of the positions that forces are evaluated at (substeps).
     pub lookahead: f64,
     /// Explicit and XPBD: substeps between two evaluations of bending; 0 as the sheet allows.
     pub bending_interval: usize,
@@ -46,9 +46,9 @@ pub struct RunConfig {
     pub filter_degree: Option<usize>,
     /// Explicit: contact of the sheet with itself.
     pub self_collision: bool,
-    /// Distance between two folds [m]; less where edges are short.
+    /// Distance between two folds (m); less where edges are short.
     pub thickness: f64,
-    /// Longest time between two queries for other folds [s]; less where they move fast.
+    /// Longest time between two queries for other folds (s); less where they move fast.
     pub fold_search: f64,
 }
 
@@ -77,7 +77,7 @@ impl Default for RunConfig {
 const OFFLINE_SUBSTEPS: usize = 16;
 /// Most iterations of an offline substep: free swinging takes 113 at most, alternating contacts never converge.
 const OFFLINE_ITERATIONS: usize = 400;
-/// Tolerance of the offline solver [m]: far below the resolution of written positions (f32).
+/// Tolerance of the offline solver (m): far below the resolution of written positions (f32).
 const OFFLINE_TOLERANCE: f64 = 1e-8;
 
 impl RunConfig {

@@ -11,11 +11,11 @@ pub struct Environment<'a> {
     pub colliders: &'a [Collider],
     /// m/s².
     pub gravity: V3d,
-    /// Distance that cloth keeps from solids [m].
+    /// Distance that cloth keeps from solids (m).
     pub offset: f64,
     /// Collider that carries the pins; `None` holds them in the world.
     carrier: Option<usize>,
-    /// Pinned vertices, sorted, with their positions in the carrier's frame [m].
+    /// Pinned vertices, sorted, with their positions in the carrier's frame (m).
     pins: Vec<(u32, V3d)>,
 }
 
@@ -49,25 +49,25 @@ impl<'a> Environment<'a> {
             pins,
         }
     }
-    /// Vertices with pins among `vertices`: their index there, and their position in the carrier's frame [m].
+    /// Vertices with pins among `vertices`: their index there, and their position in the carrier's frame (m).
     pub(super) fn pins_among(&self, vertices: &[u32]) -> Vec<(u32, V3d)> {
         let pin = |v: &u32| self.pins.binary_search_by_key(v, |p| p.0).ok();
         let all = (0u32..).zip(vertices);
         all.filter_map(|(i, v)| Some((i, self.pins[pin(v)?].1)))
             .collect()
     }
-    /// Target of a pin at time `t` [m].
+    /// Target of a pin at time `t` (m).
     pub(super) fn pin_target(&self, local: &V3d, t: f64) -> V3d {
         self.carrier.map_or(*local, |c| {
             (self.colliders[c].placement(t) * Point3::from(*local)).coords
         })
     }
-    /// All pinned vertices and their targets at time `t` [m].
+    /// All pinned vertices and their targets at time `t` (m).
     pub(super) fn pin_targets(&self, t: f64) -> impl Iterator<Item = (usize, V3d)> {
         let all = self.pins.iter();
         all.map(move |(v, local)| (*v as usize, self.pin_target(local, t)))
     }
-    /// Largest depth of a vertex in a solid at time `t` [m].
+    /// Largest depth of a vertex in a solid at time `t` (m).
     pub fn deepest(&self, t: f64, x: &[V3d]) -> f64 {
         let depth = |c: &'a Collider| {
             let back = c.placement(t).inverse();
@@ -113,7 +113,7 @@ impl<'a> Environment<'a> {
 }
 
 impl Sweep {
-    /// Signed distance [m] and normal in the solid's frame, at the end of the substep.
+    /// Signed distance (m) and normal in the solid's frame, at the end of the substep.
     fn distance(&self, c: &Collider, p: &V3d) -> (f64, V3d) {
         let local = self.after.inverse_transform_point(&Point3::from(*p));
         c.shape.distance(&local.coords)

@@ -22,7 +22,7 @@ pub struct SheetStart<'a> {
     pub sheet: &'a Sheet,
     /// Triangles.
     pub faces: &'a [Face],
-    /// Positions [m].
+    /// Positions (m).
     pub positions: &'a [P3],
 }
 
@@ -49,12 +49,12 @@ pub struct SolverReport {
 
 /// A time integrator with the state of its sheet.
 pub trait Solver {
-    /// Advances from frame `index − 1` to frame `index`; returns the time reached [s].
+    /// Advances from frame `index − 1` to frame `index`; returns the time reached (s).
     ///
     /// # Errors
     /// A position that is not finite, by vertex.
     fn advance(&mut self, environment: &Environment<'_>, index: usize) -> Result<f64, ClothError>;
-    /// Positions [m] and velocities [m/s], in the order of the sheet.
+    /// Positions (m) and velocities (m/s), in the order of the sheet.
     fn state(&self) -> (Vec<V3d>, Vec<V3d>);
     /// Counters since the start.
     fn report(&self) -> SolverReport;

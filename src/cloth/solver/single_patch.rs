@@ -8,7 +8,7 @@ use super::{Environment, SheetStart, Solver, SolverReport, check_finite};
 use crate::cloth::ClothError;
 use crate::math::V3d;
 
-/// Step so short that nothing is softened [s]: the update is stable at any step.
+/// Step so short that nothing is softened (s): the update is stable at any step.
 const UNSOFTENED_STEP: f64 = 1e-9;
 
 /// Update of the velocities in one substep.

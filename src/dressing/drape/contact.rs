@@ -9,26 +9,26 @@ use crate::garment::Region;
 use crate::math::{P3, V3d};
 use crate::par::Par;
 
-/// Distance beyond which a plane is ignored [m].
+/// Distance beyond which a plane is ignored (m).
 const REACH: f64 = 0.10;
-/// Radius around its point within which a plane approximates the surface [m].
+/// Radius around its point within which a plane approximates the surface (m).
 const PLANE_SIZE: f64 = 0.10;
-/// Distance outside an outer garment beyond which a vertex is not under it [m]: a bell of a skirt stands out less, the other
+/// Distance outside an outer garment beyond which a vertex is not under it (m): a bell of a skirt stands out less, the other
 /// side of the body is farther.
 const OUTER_REACH: f32 = 0.15;
-/// Distance below a hem up to which an inner garment may stand out as far [m]: an edge of the coarse mesh, whose triangles
+/// Distance below a hem up to which an inner garment may stand out as far (m): an edge of the coarse mesh, whose triangles
 /// cross the hem.
 const HEM: f32 = 0.05;
-/// Distance kept under an outer garment [m]: a little more than the 2.5 mm between two layers on the skin.
+/// Distance kept under an outer garment (m): a little more than the 2.5 mm between two layers on the skin.
 const UNDER: f64 = 0.003;
 /// Coulomb coefficient against sliding up the trunk. Sliding down and around is free, as the subject pulls cloth there. With
 /// none, tight hems roll up to the neck.
 const HELD_DOWN: f64 = 0.5;
-/// Largest motion of one projection out of the body [m]: deeper vertices come out over several substeps.
+/// Largest motion of one projection out of the body (m): deeper vertices come out over several substeps.
 const LIFT: f64 = 0.01;
-/// Depth in other skin beyond which skin supports no cloth [m].
+/// Depth in other skin beyond which skin supports no cloth (m).
 const CLOSED: f64 = 0.03;
-/// Depth that is left at the end [m]: a millimetre more than tangled cloth may sink.
+/// Depth that is left at the end (m): a millimetre more than tangled cloth may sink.
 const DEEP: f64 = 0.003;
 
 impl Drape {
@@ -155,7 +155,7 @@ impl Drape {
         }
     }
     /// Projects under outer garments, then out of the body; the planes of a vertex's own parts come last. Tangled cloth may be
-    /// `sunk` under the skin [m].
+    /// `sunk` under the skin (m).
     pub(super) fn project_contacts(&mut self, sunk: f64) {
         for k in 0..self.outer_planes.len() {
             let (i, p) = self.outer_planes[k];
@@ -170,7 +170,7 @@ impl Drape {
             }
         }
     }
-    /// Moves a vertex above a plane; returns the distance [m].
+    /// Moves a vertex above a plane; returns the distance (m).
     fn project_out(&mut self, i: usize, p: &DrapePlane, sunk: f64) -> f64 {
         let d = self.x[i] - p.point;
         let slack = self.slack[i];

@@ -25,7 +25,7 @@ impl OuterGarment {
 #[derive(Clone, Copy, Debug)]
 pub(in crate::dressing) struct DrapeContext<'a> {
     pub(super) skin: &'a Skin<'a>,
-    /// Distance from the skin [m].
+    /// Distance from the skin (m).
     pub(super) offset: f64,
     /// Garments further out.
     pub(super) outer: &'a [OuterGarment],

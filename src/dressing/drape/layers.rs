@@ -26,7 +26,7 @@ impl Layers {
             drapes,
         })
     }
-    /// Applies `f` to every garment, the outermost first; `offsets` from the skin [m].
+    /// Applies `f` to every garment, the outermost first; `offsets` from the skin (m).
     pub(in crate::dressing) fn each(
         &mut self,
         skin: &Skin<'_>,

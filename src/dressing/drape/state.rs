@@ -26,7 +26,7 @@ const AROUND: Region = Region::TRUNK.with(Region::LEFT_LEG).with(Region::RIGHT_L
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EdgeConstraint {
     pub(super) ends: [u32; 2],
-    /// Length at rest [m].
+    /// Length at rest (m).
     pub(super) rest: f64,
     /// m/N.
     pub(super) compliance: f64,
@@ -35,10 +35,10 @@ pub(super) struct EdgeConstraint {
 /// One garment being draped.
 #[derive(Debug, Default)]
 pub(in crate::dressing) struct Drape {
-    /// Positions in the world [m].
+    /// Positions in the world (m).
     pub(in crate::dressing) x: Vec<V3d>,
     pub(super) velocity: Vec<V3d>,
-    /// Positions at the begin of the substep [m].
+    /// Positions at the begin of the substep (m).
     pub(super) before: Vec<V3d>,
     pub(super) inverse_mass: Vec<f64>,
     /// From top to bottom, so that one pass propagates a pull down the whole garment.
@@ -57,7 +57,7 @@ pub(in crate::dressing) struct Drape {
     /// Vertices under an outer garment, each with the plane that bounds it.
     pub(super) outer_planes: Vec<(u32, DrapePlane)>,
     pub(super) pinned: Vec<Option<V3d>>,
-    /// Depth that a vertex may sink below its offset where cloth is tangled between skins [m].
+    /// Depth that a vertex may sink below its offset where cloth is tangled between skins (m).
     pub(super) slack: Vec<f64>,
     /// Present if the sheet is to be untangled.
     pub(super) untangler: Option<Untangler>,
@@ -107,11 +107,11 @@ impl Drape {
         self.hood = Hood::new(mesh, sheet)?;
         Ok(self)
     }
-    /// Positions in single precision [m].
+    /// Positions in single precision (m).
     pub(in crate::dressing) fn positions(&self) -> Vec<P3> {
         self.x.iter().map(|p| P3::from(p.cast::<f32>())).collect()
     }
-    /// Position of one vertex in single precision [m].
+    /// Position of one vertex in single precision (m).
     pub(super) fn point(&self, i: usize) -> P3 {
         P3::from(self.x[i].cast::<f32>())
     }
@@ -134,7 +134,7 @@ impl Drape {
         };
         self.crossings > 0 && self.untangler.as_ref().is_some_and(crosses)
     }
-    /// Largest depth of a vertex under the skin of its own parts [m], and the 99th percentile of the edges' stretch.
+    /// Largest depth of a vertex under the skin of its own parts (m), and the 99th percentile of the edges' stretch.
     pub(in crate::dressing) fn measure(&self, skin: &Skin<'_>) -> (f64, f64) {
         let mut deepest = 0.0f64;
         for i in 0..self.x.len() {

@@ -7,11 +7,11 @@ use crate::math::V3d;
 
 /// m/s².
 const GRAVITY: f64 = 9.81;
-/// Rate of velocity damping [1/s]: a skirt swings out in a quarter of a second.
+/// Rate of velocity damping (1/s): a skirt swings out in a quarter of a second.
 const DAMPING: f64 = 5.0;
-/// Largest speed of cloth that is put on [m/s].
+/// Largest speed of cloth that is put on (m/s).
 const MAX_SPEED: f64 = 2.0;
-/// Largest speed of a fine sheet that was smoothed locally [m/s]. Compressed cloth springs back at 2 m/s, and through itself.
+/// Largest speed of a fine sheet that was smoothed locally (m/s). Compressed cloth springs back at 2 m/s, and through itself.
 const MAX_COMPRESSED_SPEED: f64 = 0.3;
 /// Substeps between two contact queries: cloth at 1 m/s moves 1.6 cm at 2 ms.
 pub(super) const QUERY_INTERVAL: usize = 8;
@@ -114,7 +114,7 @@ impl Drape {
         };
         hood.resolve(&mut self.x, &self.before, weight, h);
     }
-    /// Limits the motion of each vertex in this substep [m].
+    /// Limits the motion of each vertex in this substep (m).
     fn limit_displacement(&mut self, most: f64) {
         for (x, before) in self.x.iter_mut().zip(&self.before) {
             *x = before + (*x - before).cap_magnitude(most);

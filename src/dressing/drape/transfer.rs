@@ -6,7 +6,7 @@ use crate::contact::SurfaceFrame;
 use crate::dressing::skin::Skin;
 use crate::math::{P3, V3, V3d};
 
-/// Distance from the skin up to which cloth follows it [m]; the share fades to zero at twice that.
+/// Distance from the skin up to which cloth follows it (m); the share fades to zero at twice that.
 const FOLLOWING: f64 = 0.04;
 /// The same for sleeves. Smaller, and an arm that bends leaves a wide sleeve.
 const FOLLOWING_SLEEVE: f64 = 0.07;
@@ -25,7 +25,7 @@ impl Drape {
             self.pinned[a.vertex as usize] = Some((on + normal * a.height).cast());
         }
     }
-    /// Moves cloth near the skin with a body that goes from `from` to `to` [m].
+    /// Moves cloth near the skin with a body that goes from `from` to `to` (m).
     pub(in crate::dressing) fn follow_skin(&mut self, from: &[P3], to: &[P3]) {
         for ((x, near), own) in self.x.iter_mut().zip(&self.nearest).zip(&self.own) {
             let v = near[0] as usize;

@@ -6,12 +6,12 @@ use super::step::QUERY_INTERVAL;
 use crate::cloth::solver::xpbd::constraints::project_distance;
 use crate::par::Par;
 
-/// Largest motion of an edge against a triangle in one iteration [m]. A third of it leaves intersections from one pose to the
+/// Largest motion of an edge against a triangle in one iteration (m). A third of it leaves intersections from one pose to the
 /// next.
 const UNTANGLE_STEP: f64 = 0.003;
-/// Distance at which vertices from the wrong side are placed [m].
+/// Distance at which vertices from the wrong side are placed (m).
 const UNTANGLE_GAP: f64 = 0.001;
-/// Growth of a tangled vertex's slack in one iteration, and its limit [m]: between two skins the offset is the only clearance.
+/// Growth of a tangled vertex's slack in one iteration, and its limit (m): between two skins the offset is the only clearance.
 const SLACK_STEP: f64 = 0.001;
 const MAX_SLACK: f64 = 0.005;
 /// Share of the slack that a vertex keeps in an iteration without intersection.
@@ -20,13 +20,13 @@ const SLACK_DECAY: f64 = 0.98;
 const RELAX_INTERVAL: usize = 2;
 /// Iterations with relaxation; later ones only limit stretch.
 const RELAXED: usize = 10;
-/// Time step of a relaxation [s].
+/// Time step of a relaxation (s).
 const RELAX_STEP: f64 = 1e-3;
 /// Iterations without progress before local smoothing, and most smoothings. A hood folds over itself in three layers, none of
 /// which is on the wrong side.
 const STUCK: usize = 16;
 const MAX_SMOOTHINGS: usize = 4;
-/// Depth under the skin that is allowed in later iterations [m]. Deeper shows skin in the armpits of a heavy subject.
+/// Depth under the skin that is allowed in later iterations (m). Deeper shows skin in the armpits of a heavy subject.
 const SUNK: f64 = 0.002;
 /// Stretch ratio that later iterations allow. Below 1.19 (p99) a hood in folds on the neck did not come free.
 const TAUT: f64 = 1.07;

@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 pub(super) struct QuadBlock {
     /// Lengths at rest of ab, ac, bc, ad, bd (m).
     pub(super) rest: [[f32; LANES]; 5],
-    /// Stiffness between their lengthenings [N/m]: of each by itself, ab with the others, ac with bc, ad with bd.
+    /// Stiffness between their lengthenings (N/m): of each by itself, ab with the others, ac with bc, ad with bd.
     pub(super) k: [[f32; LANES]; 11],
     /// a, b, c, d.
     pub(super) v: [Slots; 4],

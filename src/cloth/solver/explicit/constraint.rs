@@ -11,14 +11,14 @@ pub struct ContactPlane {
     pub normal: V4,
     /// Lower bound of `normal · x` at the time of the query (m).
     pub offset: f32,
-    /// Velocity of the surface [m/s].
+    /// Velocity of the surface (m/s).
     pub velocity: V4,
     /// Coulomb coefficient.
     pub friction: f32,
 }
 
 impl ContactPlane {
-    /// Speed of the plane along its normal [m/s].
+    /// Speed of the plane along its normal (m/s).
     #[inline(always)]
     pub(super) fn rate(&self) -> f32 {
         self.normal.dot(self.velocity)
@@ -37,7 +37,7 @@ pub struct Pin {
     pub vertex: u32,
     /// Position at the time of the query (m).
     pub target: V4,
-    /// Velocity of the target [m/s].
+    /// Velocity of the target (m/s).
     pub velocity: V4,
     /// Share of the distance to the target that each substep covers; 1 is rigid.
     pub stiffness: f32,

@@ -5,7 +5,7 @@ use super::patch_model::PatchModel;
 use super::patch_state::{PatchState, Substep};
 use super::vec4::{MAX_VERTICES, V4};
 
-/// Speed that a vertex may gain towards a surface between two searches for reachable planes [m/s]: over 1.7 ms 120 times
+/// Speed that a vertex may gain towards a surface between two searches for reachable planes (m/s): over 1.7 ms 120 times
 /// gravity. Smaller misses contacts; larger keeps planes out of reach.
 const SPEED_GAIN: f32 = 2.0;
 /// Share of a penetration that one substep removes. Larger jitters; smaller leaves cloth inside for longer.
@@ -13,9 +13,9 @@ const RECOVERED: f32 = 0.2;
 
 /// Velocity of one vertex against a plane, split into normal and tangential parts.
 struct Approach {
-    /// Normal velocity relative to the surface [m/s].
+    /// Normal velocity relative to the surface (m/s).
     normal: f32,
-    /// Least normal velocity that violates nothing by the end of the substep [m/s].
+    /// Least normal velocity that violates nothing by the end of the substep (m/s).
     least: f32,
     /// Distance from the plane (m).
     gap: f32,
@@ -32,7 +32,7 @@ impl Approach {
             gap,
         }
     }
-    /// Tangential velocity relative to the surface [m/s].
+    /// Tangential velocity relative to the surface (m/s).
     #[inline(always)]
     fn slip(&self, p: &ContactPlane, v: V4) -> V4 {
         v - p.velocity - p.normal.scale(self.normal)

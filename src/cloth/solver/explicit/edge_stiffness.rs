@@ -8,7 +8,7 @@ use nalgebra::{Matrix2, Matrix3, Vector2};
 pub(crate) struct TriangleSprings {
     /// Corners.
     pub(crate) v: [u32; 3],
-    /// Stiffness between the lengthenings of the edges [N/m].
+    /// Stiffness between the lengthenings of the edges (N/m).
     pub(crate) stiffness: Matrix3<f64>,
     /// Lengths at rest (m).
     pub(crate) rest: [f64; 3],

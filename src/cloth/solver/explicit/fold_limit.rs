@@ -18,11 +18,11 @@ pub struct FoldLimit {
     share: [f32; 2],
 }
 
-/// Closing speed that two vertices may gain until the next search for active limits [m/s]. Smaller misses some.
+/// Closing speed that two vertices may gain until the next search for active limits (m/s). Smaller misses some.
 const SPEED_GAIN: f32 = 0.3;
 /// Share of a violation that one substep removes. Larger jitters.
 const RECOVERED: f32 = 0.2;
-/// Largest opening speed of a violated limit [m/s].
+/// Largest opening speed of a violated limit (m/s).
 const RECOVERY_SPEED: f32 = 1.0;
 /// Shortest distance that has a direction (m).
 const SHORTEST: f32 = 1e-6;

@@ -29,7 +29,7 @@ impl PatchState {
         }
         self.scratch.is_predicted = false;
     }
-    /// Positions after a substep. No vertex moves faster than `max_speed` [m/s]: contradicting planes would raise speeds
+    /// Positions after a substep. No vertex moves faster than `max_speed` (m/s): contradicting planes would raise speeds
     /// beyond all numbers. The next substep must have the same length and lookahead.
     pub fn integrate_positions(&mut self, f: &PatchModel, step: &Substep, max_speed: f32) {
         wide!(integrate_position(self, f: &PatchModel, step: &Substep, max_speed: f32));

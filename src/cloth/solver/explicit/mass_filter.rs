@@ -78,7 +78,7 @@ impl MassFilter {
         let inverse_mass = sheet.mass.iter().map(|m| 1.0 / m).collect();
         Self::new(ends, &own, inverse_mass, degree)
     }
-    /// Filter with weights in proportion to the `stiffness` of each edge [N/m]. Regions stiffer for their mass than most
+    /// Filter with weights in proportion to the `stiffness` of each edge (N/m). Regions stiffer for their mass than most
     /// are normalised by themselves, so that one sliver does not weaken the filter elsewhere.
     fn new(ends: Vec<[u32; 2]>, stiffness: &[f64], inverse_mass: Vec<f64>, degree: usize) -> Self {
         let mut around = vec![0.0; inverse_mass.len()];

@@ -80,7 +80,7 @@ impl Default for PatchScratch {
 }
 
 impl PatchState {
-    /// Replaces positions (m) and velocities [m/s]; nothing sleeps.
+    /// Replaces positions (m) and velocities (m/s); nothing sleeps.
     pub fn reset(
         &mut self,
         positions: impl Iterator<Item = V4>,
@@ -124,7 +124,7 @@ impl PatchState {
             }
         }
     }
-    /// Scales velocities above `limit` down to it [m/s].
+    /// Scales velocities above `limit` down to it (m/s).
     pub fn limit_speed(&mut self, limit: f32, except: &Exemptions<'_>) {
         let flags = except.fixed.iter().zip(except.unlimited);
         for (v, (fixed, unlimited)) in self.velocity.iter_mut().zip(flags) {

@@ -16,7 +16,7 @@ use nalgebra::Matrix3;
 #[derive(Debug, Default)]
 pub(super) struct FoldContacts {
     pub(super) planes: Vec<ContactPlane>,
-    /// Distance that other folds may approach each vertex before the next query [m].
+    /// Distance that other folds may approach each vertex before the next query (m).
     clearance: Vec<f32>,
     neighbour_of: Vec<u32>,
     /// Owned vertices within the thickness of another fold.
@@ -31,13 +31,13 @@ pub(super) struct SelfCollision {
     frame: SelfContactFrame,
     search: Search,
     thickness: f32,
-    /// Speed of each vertex relative to the rigid motion of the sheet [m/s], and a bound for its neighbours'.
+    /// Speed of each vertex relative to the rigid motion of the sheet (m/s), and a bound for its neighbours'.
     speeds: Vec<f32>,
     max_speed: f32,
     span: f32,
     /// Planes of the last query.
     pub(super) planes: usize,
-    /// Substeps between two contact queries, their length [s], and most contact queries between two fold queries.
+    /// Substeps between two contact queries, their length (s), and most contact queries between two fold queries.
     interval: usize,
     h: f32,
     max_intervals: usize,
@@ -135,8 +135,8 @@ impl SelfCollision {
     }
 }
 
-/// Fills `speeds` with the vertices' speeds relative to the nearest rigid motion of the sheet [m/s]; returns the angular
-/// speed of that [rad/s]. Rigid motion brings no folds together.
+/// Fills `speeds` with the vertices' speeds relative to the nearest rigid motion of the sheet (m/s); returns the angular
+/// speed of that (rad/s). Rigid motion brings no folds together.
 fn relative_speeds(x: &[P3], v: &[V3], speeds: &mut Vec<f32>) -> f32 {
     let n = x.len().max(1) as f32;
     let centre = x.iter().fold(V3::zeros(), |a, p| a + p.coords) / n;

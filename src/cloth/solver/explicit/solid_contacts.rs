@@ -7,12 +7,12 @@ use crate::cloth::solver::collider::Collider;
 use crate::math::V3d;
 use nalgebra::Point3;
 
-/// Speed at which penetrations of solids recover at most [m/s]. Faster throws cloth off.
+/// Speed at which penetrations of solids recover at most (m/s). Faster throws cloth off.
 pub(in super::super) const RECOVERY_SPEED: f32 = 1.0;
-/// Clearance below which a solid counts as near, beyond twice the possible approach [m]: a gain of 1 m/s in 1 ms is 1 mm.
+/// Clearance below which a solid counts as near, beyond twice the possible approach (m): a gain of 1 m/s in 1 ms is 1 mm.
 const CLEARANCE: f64 = 2e-3;
 
-/// Distance that each vertex may approach each solid before the next query [m].
+/// Distance that each vertex may approach each solid before the next query (m).
 #[derive(Debug, Default)]
 pub(in super::super) struct SolidContacts(Vec<f32>);
 

@@ -15,9 +15,9 @@ use crate::cloth::solver::{
 use crate::math::V3d;
 use crate::par::Par;
 
-/// Largest recovery speed of cloth in cloth, where a solid may be in the way [m/s].
+/// Largest recovery speed of cloth in cloth, where a solid may be in the way (m/s).
 const CLOTH_RECOVERY_SPEED: f32 = 0.3;
-/// Stable step above which a sheet needs no mass filter [s]. Larger filters coarse sheets visibly; smaller spends time on
+/// Stable step above which a sheet needs no mass filter (s). Larger filters coarse sheets visibly; smaller spends time on
 /// invisible waves.
 const UNFILTERED_STEP: f64 = 1.0 / 4200.0;
 
@@ -48,7 +48,7 @@ struct SubstepSchedule {
 /// Substeps between two queries for other folds.
 #[derive(Clone, Copy)]
 struct SubstepRange {
-    /// Begin of the frame [s].
+    /// Begin of the frame (s).
     frame_begin: f64,
     /// First substep, since the frame began.
     first: usize,
@@ -215,7 +215,7 @@ impl SheetPatch {
     }
     fn substep(&mut self, f: &PatchModel, schedule: &SubstepSchedule, s: usize, count: usize) {
         let h = schedule.h as f32;
-        if s % schedule.bending_interval == 0 {
+        if s.is_multiple_of(schedule.bending_interval) {
             let kept = schedule.bending_interval.min(count - s) as f32;
             self.state
                 .update_bending(f, h * kept * 0.5, schedule.filter_degree);

@@ -35,7 +35,7 @@ pub struct StableSheet {
     pub(super) ends: Vec<[u32; 2]>,
     pub(super) rest: Vec<f32>,
     pub(super) triangles: Vec<EdgeTriangle>,
-    /// Vertex pairs with the bending stiffness between them [N/m].
+    /// Vertex pairs with the bending stiffness between them (N/m).
     pub(super) bend: Vec<([u32; 2], f32)>,
     pub(super) bent: Vec<CurvedHinge>,
     pub(super) diagonals: Vec<Diagonal>,
@@ -51,7 +51,7 @@ pub struct StableSheet {
 const MARGIN: f64 = 1.3;
 /// Share of its stiffness below which an element counts as soft. Affects reports only.
 const SOFT: f64 = 0.99;
-/// Angle of a hinge that counts as flat at rest [rad]: rounding of the coordinates of a flat sheet.
+/// Angle of a hinge that counts as flat at rest (rad): rounding of the coordinates of a flat sheet.
 const FLAT: f64 = 1e-4;
 /// Fewest and most substeps between two evaluations of bending. Fewer cost more than narrow hinges need; more gain little.
 const BENDING_INTERVAL: [usize; 2] = [3, 6];
@@ -183,7 +183,7 @@ fn triangles(
     all.filter_map(triangle).collect()
 }
 
-/// Pairs of vertices with the bending stiffness between them [N/m], and hinges that are bent at rest.
+/// Pairs of vertices with the bending stiffness between them (N/m), and hinges that are bent at rest.
 type Bending = (Vec<([u32; 2], f32)>, Vec<CurvedHinge>);
 
 fn bending(

@@ -24,7 +24,7 @@ const MAX_PRODUCTS: usize = 60;
 #[derive(Clone, Copy, Debug)]
 struct Spring {
     ends: [usize; 2],
-    /// Length at rest [m].
+    /// Length at rest (m).
     rest: f64,
     /// N/m.
     stiffness: f64,

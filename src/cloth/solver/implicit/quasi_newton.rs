@@ -10,9 +10,9 @@ use crate::math::V3d;
 /// Spring from a vertex to a target (pins, contacts).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Hold {
-    /// Target [m].
+    /// Target (m).
     pub(super) target: V3d,
-    /// Stiffness [N/m]; zero means no hold.
+    /// Stiffness (N/m); zero means no hold.
     pub(super) stiffness: f64,
 }
 
@@ -21,7 +21,7 @@ pub(super) struct Hold {
 pub(super) struct QuasiNewton {
     factor: Factor,
     values: Vec<f64>,
-    /// Step size [s] and hold stiffness [N/m] of the current factor; empty when there is none.
+    /// Step size (s) and hold stiffness (N/m) of the current factor; empty when there is none.
     made_for: (f64, Vec<f64>),
     gradient: Vec<V3d>,
     rhs: Vec<[f64; 3]>,
@@ -41,7 +41,7 @@ impl QuasiNewton {
             factorisations: 0,
         }
     }
-    /// Factors the matrix for a step size [s] and hold stiffness [N/m], shape `[vertices]`, unless it is current.
+    /// Factors the matrix for a step size (s) and hold stiffness (N/m), shape `[vertices]`, unless it is current.
     ///
     /// # Errors
     /// A matrix that is not positive definite, which only non-finite input can cause.
@@ -66,7 +66,7 @@ impl QuasiNewton {
         Ok(())
     }
     /// One iteration from `x` towards the minimum with inertial target `y`; holds must have the prepared stiffness.
-    /// Returns the root mean square of the vertices' motion [m].
+    /// Returns the root mean square of the vertices' motion (m).
     pub(super) fn iterate(
         &mut self,
         sheet: &Sheet,
@@ -96,7 +96,7 @@ impl QuasiNewton {
     }
 }
 
-/// Diagonal of the sheet's matrix at each vertex [N/m]: the natural unit of a hold's stiffness.
+/// Diagonal of the sheet's matrix at each vertex (N/m): the natural unit of a hold's stiffness.
 pub(super) fn hold_unit(sheet: &Sheet, h: f64) -> Vec<f64> {
     (0..sheet.mass.len())
         .map(|i| sheet.mass[i] / (h * h) + sheet.stiffness[sheet.pattern.diagonal_slot(i)])

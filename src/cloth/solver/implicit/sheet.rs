@@ -15,7 +15,7 @@ const CONTACT_STIFFNESS: f64 = 2.0;
 /// Substeps a frame when none are asked for.
 const DEFAULT_SUBSTEPS: usize = 8;
 
-/// Positions [m] and velocities [m/s].
+/// Positions (m) and velocities (m/s).
 type Kinematics = (Vec<V3d>, Vec<V3d>);
 
 /// A sheet by a prefactorised quasi-Newton iteration.
@@ -25,7 +25,7 @@ pub(in super::super) struct ImplicitSolver<'a> {
     substeps: usize,
     rate: f64,
     iteration: QuasiNewton,
-    /// Typical stiffness of each vertex [N/m].
+    /// Typical stiffness of each vertex (N/m).
     unit: Vec<f64>,
     x: Vec<V3d>,
     v: Vec<V3d>,
@@ -38,9 +38,9 @@ pub(in super::super) struct ImplicitSolver<'a> {
 /// Implicit Euler step that a substep is equivalent to.
 struct EulerStep {
     h: f64,
-    /// Positions [m] and velocities [m/s] that it starts from.
+    /// Positions (m) and velocities (m/s) that it starts from.
     from: Kinematics,
-    /// Positions under inertia and gravity alone [m].
+    /// Positions under inertia and gravity alone (m).
     inertial: Vec<V3d>,
 }
 

@@ -6,7 +6,7 @@ use crate::cloth::solver::explicit::V4;
 use crate::math::V3d;
 use nalgebra::{Matrix3, Vector3};
 
-/// Brings an edge that is longer than `least` towards a length [m]; `w`: inverse masses of its ends.
+/// Brings an edge that is longer than `least` towards a length (m); `w`: inverse masses of its ends.
 #[inline]
 pub(crate) fn project_distance(
     x: &mut [V3d],
@@ -44,7 +44,7 @@ pub(crate) fn project_hinge(x: &mut [V3d], hinge: &Hinge, w: [f64; 4], complianc
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TriangleConstraint {
     pub(crate) v: [u32; 3],
-    /// Lengths at rest [m].
+    /// Lengths at rest (m).
     pub(crate) rest: [f32; 3],
     /// Compliance between the edges: the inverse of their stiffness, over the square of the step.
     pub(crate) compliance: Matrix3<f32>,

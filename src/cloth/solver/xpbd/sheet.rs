@@ -72,7 +72,7 @@ pub(in super::super) fn solver(
 impl VelocityUpdate for TrianglePass {
     fn update(&mut self, model: &PatchModel, state: &mut PatchState, pins: &[Pin], s: usize) {
         let h = self.h;
-        if s % self.bending_interval == 0 {
+        if s.is_multiple_of(self.bending_interval) {
             state.update_bending(model, h * self.bending_interval as f32 * 0.5, 0);
         }
         state.integrate_external(model, h, self.gravity);
