@@ -17,7 +17,7 @@ use crate::contact::{CollisionModel, MapView};
 pub struct Model {
     /// Garments and anchors.
     pub outfit: Outfit,
-    /// Settings.
+    /// Settings; [`Self::replace_config`] changes those of the collision body too.
     pub config: Config,
     pub(super) garments: Vec<GarmentModel>,
     pub(super) collision: CollisionModel,
@@ -62,6 +62,11 @@ impl Model {
     /// Vertices of the body it was made for.
     pub fn body_vertices(&self) -> usize {
         self.collision.surface().vertices()
+    }
+    /// Replaces the settings of later steps and returns the last ones. Substeps, patches and offsets stay.
+    pub fn replace_config(&mut self, config: Config) -> Config {
+        self.collision.set_config(config.collision());
+        std::mem::replace(&mut self.config, config)
     }
     /// Replaces the anchors.
     pub(crate) fn set_anchors(&mut self, anchors: Vec<Vec<AnchorBinding>>) {

@@ -87,6 +87,10 @@ impl CollisionModel {
             config,
         })
     }
+    /// Replaces the settings.
+    pub fn set_config(&mut self, config: CollisionConfig) {
+        self.config = config;
+    }
     /// Connectivity and parts.
     pub fn surface(&self) -> &SurfaceModel {
         &self.surface

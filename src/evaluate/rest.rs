@@ -135,7 +135,7 @@ impl RestingSubject {
         steps: usize,
         noise: f32,
     ) -> Result<RestReport, EvaluateError> {
-        let before = std::mem::replace(&mut self.dressed.model.config, config.clone());
+        let before = self.dressed.model.replace_config(config.clone());
         let mut state: State = self.dressed.state.clone();
         let (mut work, mut report) = (Workspace::default(), RestReport::default());
         let total: usize = state.garments.iter().map(|g| g.positions.len()).sum();
@@ -165,7 +165,7 @@ impl RestingSubject {
             }
             report.last = r;
         }
-        self.dressed.model.config = before;
+        self.dressed.model.replace_config(before);
         Ok(report)
     }
 }
