@@ -17,8 +17,7 @@ use crate::contact::{CollisionModel, MapView};
 pub struct Model {
     /// Garments and anchors.
     pub outfit: Outfit,
-    /// Settings; [`Self::replace_config`] changes those of the collision body too.
-    pub config: Config,
+    pub(super) config: Config,
     pub(super) garments: Vec<GarmentModel>,
     pub(super) collision: CollisionModel,
     /// Body vertices in compact clusters.
@@ -63,7 +62,11 @@ impl Model {
     pub fn body_vertices(&self) -> usize {
         self.collision.surface().vertices()
     }
-    /// Replaces the settings of later steps and returns the last ones. Substeps, patches and offsets stay.
+    /// Settings of its steps.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+    /// Replaces the settings of later steps, those of the collision body too, and returns the last ones. Substeps, patches and offsets stay.
     pub fn replace_config(&mut self, config: Config) -> Config {
         self.collision.set_config(config.collision());
         std::mem::replace(&mut self.config, config)

@@ -11,7 +11,7 @@ use crate::par;
 pub(super) struct PatchWork {
     pub(super) motion: PatchState,
     pub(super) asleep: Vec<bool>,
-    /// Stretched beyond [`TAUT`](super::solve): exempt from fold and speed limits.
+    /// Stretched beyond [`super::collide`]'s `TAUT`: exempt from fold and speed limits.
     pub(super) taut: Vec<bool>,
     /// Stretched beyond the ratio at which contact constraints are released.
     pub(super) overstretched: Vec<bool>,

@@ -241,7 +241,7 @@ fn misfit(pattern: &Pattern, body: &Measurements) -> Option<Misfit> {
     let tightest = girth_eases(pattern, body)
         .into_iter()
         .map(|r| {
-            let gives = r.garment * pattern.material.give();
+            let gives = r.garment * pattern.material.comfortable_strain();
             let lower = if held && r.place == "waist" {
                 SITS_LOWER
             } else {
@@ -396,7 +396,7 @@ mod tests {
     #[test]
     fn sizes_that_cannot_be_closed_or_held_up_are_refused_with_the_missing_girth() {
         let p = library::pattern("tshirt", Size::S).expect("pattern");
-        let give = p.material.give();
+        let give = p.material.comfortable_strain();
         let mut b = body(1.0);
         b.hip = 0.5;
         b.chest = p.finished[0] * (1.0 + give) - 0.001;
@@ -423,7 +423,11 @@ mod tests {
         .expect_err("too small");
         assert!(none.to_string().contains("no size"), "{none}");
         // A knit gives more than denim.
-        let give = |n: &str| crate::garment::Material::preset(n).expect("preset").give();
+        let give = |n: &str| {
+            crate::garment::Material::preset(n)
+                .expect("preset")
+                .comfortable_strain()
+        };
         assert!(give("jersey") > 0.1 && give("denim") < 0.05);
     }
 

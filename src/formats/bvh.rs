@@ -62,7 +62,7 @@ impl<'a> Words<'a> {
             None => Err(self.fault(format!("the file ends where {what} should be"))),
         }
     }
-    fn expect(&mut self, word: &str) -> Result<(), FormatError> {
+    fn require(&mut self, word: &str) -> Result<(), FormatError> {
         let got = self.next(&format!("`{word}`"))?;
         if got.eq_ignore_ascii_case(word) {
             Ok(())
@@ -107,14 +107,14 @@ pub(super) fn parse_bvh(text: &str, origin: &Path) -> Result<MotionClip, FormatE
         words: Box::new(words),
         line: 1,
     };
-    w.expect("HIERARCHY")?;
-    w.expect("ROOT")?;
+    w.require("HIERARCHY")?;
+    w.require("ROOT")?;
     let joints = hierarchy(&mut w)?;
-    w.expect("MOTION")?;
-    w.expect("Frames:")?;
+    w.require("MOTION")?;
+    w.require("Frames:")?;
     let count = w.count("number of frames")?;
-    w.expect("Frame")?;
-    w.expect("Time:")?;
+    w.require("Frame")?;
+    w.require("Time:")?;
     let period = w.number("frame time")?;
     if period <= 0.0 {
         return Err(w.fault(format!(
@@ -167,8 +167,8 @@ fn hierarchy(w: &mut Words<'_>) -> Result<Vec<BvhJoint>, FormatError> {
     let mut name = w.next("the root's name")?.to_owned();
     loop {
         // `name` has just been read: its block follows.
-        w.expect("{")?;
-        w.expect("OFFSET")?;
+        w.require("{")?;
+        w.require("OFFSET")?;
         let offset = V3d::new(
             w.number("offset")?,
             w.number("offset")?,
@@ -201,7 +201,7 @@ fn hierarchy(w: &mut Words<'_>) -> Result<Vec<BvhJoint>, FormatError> {
                 }
                 "JOINT" => break w.next("a joint's name")?.to_owned(),
                 "END" => {
-                    w.expect("Site")?;
+                    w.require("Site")?;
                     break format!("{}_end", joints[at].name);
                 }
                 "}" => {

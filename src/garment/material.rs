@@ -104,7 +104,7 @@ impl Material {
     /// Strain of the fabric around the body above which it feels too tight. At that strain its tension, in the softer
     /// direction, presses a trunk of 15 cm radius with 0.7 kPa (Laplace, p = T/r), half the pressure of a tolerated
     /// waistband; it is at most the comfortable strain of skin.
-    pub fn give(&self) -> f64 {
+    pub fn comfortable_strain(&self) -> f64 {
         /// Tension at 0.7 kPa on a radius of 15 cm, N/m.
         const TENSION: f64 = 105.0;
         /// Comfortable strain of skin (Kirk & Ibrahim 1966).

@@ -191,7 +191,11 @@ fn still_cloth_sleeps_and_wakes() {
     // Awake, it would have stayed where it is to within a millimetre or two.
     let Dressed { mut model, .. } = d;
     let before = state.garments.clone();
-    model.config.sleep = false;
+    let config = model.config().clone();
+    model.replace_config(Config {
+        sleep: false,
+        ..config.clone()
+    });
     for _ in 0..30 {
         step_on(&model, &mut state, &d.body, &mut work).expect("a step");
     }
@@ -205,7 +209,7 @@ fn still_cloth_sleeps_and_wakes() {
         let rms = (sum / a.positions.len() as f64).sqrt();
         assert!(rms < 5e-3, "{rms}");
     }
-    model.config.sleep = true;
+    model.replace_config(config);
     let body = moved(&d.body, V3::new(0.01, 0.0, 0.0));
     let r = step_on(&model, &mut state, &body, &mut work).expect("a step");
     assert_eq!(r.sleeping, 0, "a centimetre wakes it");
@@ -252,7 +256,8 @@ fn cloth_on_a_body_that_sways_rides_asleep() {
             .collect::<Vec<_>>()
     };
     let mut run = |sleep: bool| {
-        d.model.config.sleep = sleep;
+        let config = d.model.config().clone();
+        d.model.replace_config(Config { sleep, ..config });
         let (mut state, mut work, mut slept) = (d.state.clone(), Workspace::default(), 0);
         for i in 0..300 {
             let r = step_on(&d.model, &mut state, &swaying(i), &mut work).expect("a step");

@@ -10,7 +10,8 @@ use tryon::formats::image::read_png_depth;
 use tryon::formats::npz::read_smpl;
 use tryon::par::with_threads;
 use tryon::tracking::{
-    LostReason, Status, StepError, TrackerConfig, TrackerModel, TrackerState, Workspace, step,
+    LostReason, Status, StepError, StepReport, TrackerConfig, TrackerModel, TrackerState,
+    Workspace, step,
 };
 
 #[derive(serde::Deserialize)]
@@ -94,7 +95,7 @@ fn follow_with(
     for i in which {
         let mut depth = s.depth(i);
         change(i, &mut depth);
-        step(&model, &mut state, &frame(i as u64, depth), &mut workspace).expect("step");
+        step_depth(&model, &mut state, (i, depth), &mut workspace);
         if i >= 30 {
             assert!(state.status.is_live(), "frame {i}: {:?}", state.status);
             sum += s.error(i, template, &joints(&model, &state));
@@ -110,6 +111,16 @@ const SEQUENCES: [(&str, usize, f64); 3] = [
     ("sequences/jacks_f_avg_kinect1_room", 180, 10.5),
     ("sequences/sword_m_tall_tof_noroom_upper", 150, 15.5),
 ];
+
+/// Tracks depth image number `i` of a stream.
+fn step_depth(
+    model: &TrackerModel,
+    state: &mut TrackerState,
+    (i, depth): (usize, DepthImage),
+    workspace: &mut Workspace,
+) -> StepReport {
+    step(model, state, &frame(i as u64, depth), workspace).expect("step")
+}
 
 #[test]
 fn sequences_are_followed_to_the_end() {
@@ -181,24 +192,17 @@ fn a_person_leaves_and_comes_back() {
     let (model, mut state) = tracker(&template, s.camera);
     let mut workspace = Workspace::default();
     for i in 0..40 {
-        step(
-            &model,
-            &mut state,
-            &frame(i as u64, s.depth(i)),
-            &mut workspace,
-        )
-        .expect("step");
+        step_depth(&model, &mut state, (i, s.depth(i)), &mut workspace);
     }
     assert!(state.status.is_live());
     let kept = state.pose.clone();
     for i in 40..55 {
-        let report = step(
+        let report = step_depth(
             &model,
             &mut state,
-            &frame(i as u64, DepthImage::empty(640, 480)),
+            (i, DepthImage::empty(640, 480)),
             &mut workspace,
-        )
-        .expect("step");
+        );
         assert_eq!(
             state.status,
             Status::Lost {
@@ -212,13 +216,7 @@ fn a_person_leaves_and_comes_back() {
         );
     }
     for i in 55..65 {
-        step(
-            &model,
-            &mut state,
-            &frame(i as u64, s.depth(i)),
-            &mut workspace,
-        )
-        .expect("step");
+        step_depth(&model, &mut state, (i, s.depth(i)), &mut workspace);
     }
     assert!(state.status.is_live(), "{:?}", state.status);
     let error = s.error(64, &template, &joints(&model, &state));
@@ -247,13 +245,7 @@ fn threads_and_restarts_change_no_bit() {
                     state = state.clone();
                     workspace = Workspace::default();
                 }
-                step(
-                    &model,
-                    &mut state,
-                    &frame(i as u64, s.depth(i)),
-                    &mut workspace,
-                )
-                .expect("step");
+                step_depth(&model, &mut state, (i, s.depth(i)), &mut workspace);
             }
         })
         .expect("pool");
@@ -288,7 +280,7 @@ fn degenerate_frames_are_answered_without_panic() {
     .enumerate()
     {
         let depth = DepthImage::new(640, 480, data).expect("size");
-        step(&model, &mut state, &frame(i as u64, depth), &mut workspace).expect("step");
+        step_depth(&model, &mut state, (i, depth), &mut workspace);
         assert_eq!(state.status, Status::Searching, "frame {i}");
         assert!(state.pose.is_finite());
     }
@@ -308,23 +300,11 @@ fn degenerate_frames_are_answered_without_panic() {
     };
     let (model, mut state) = tracker(&template, s.camera);
     for i in 0..3 {
-        step(
-            &model,
-            &mut state,
-            &frame(i as u64, s.depth(i)),
-            &mut workspace,
-        )
-        .expect("step");
+        step_depth(&model, &mut state, (i, s.depth(i)), &mut workspace);
     }
     state.pose.angles[3] = f64::NAN;
     for i in 3..20 {
-        step(
-            &model,
-            &mut state,
-            &frame(i as u64, s.depth(i)),
-            &mut workspace,
-        )
-        .expect("step");
+        step_depth(&model, &mut state, (i, s.depth(i)), &mut workspace);
     }
     assert!(
         state.status.is_live() && state.pose.is_finite(),
@@ -345,15 +325,12 @@ fn a_still_of_a_real_woman_fits() {
     let depth = read_png_depth(Path::new(&s.folder.join("depth/000000.png"))).expect("depth");
     let mut last = None;
     for i in 0..10 {
-        last = Some(
-            step(
-                &model,
-                &mut state,
-                &frame(i as u64, depth.clone()),
-                &mut workspace,
-            )
-            .expect("step"),
-        );
+        last = Some(step_depth(
+            &model,
+            &mut state,
+            (i, depth.clone()),
+            &mut workspace,
+        ));
     }
     let report = last.expect("ten steps");
     eprintln!(

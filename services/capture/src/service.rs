@@ -1,4 +1,4 @@
-//! The rpcs: find the camera, tell it, answer.
+//! The rpcs: find the camera, send it a command, answer.
 
 use crate::camera::{self, Command, Handle};
 use std::collections::BTreeMap;
@@ -33,8 +33,8 @@ impl Capture {
     }
 
     pub(crate) async fn autostart(&self, name: &str) {
-        // A camera that cannot be opened is listed as failed, and its task has said so.
-        let _ = self.tell(name, Command::Start).await;
+        // A camera that cannot be opened is listed as failed, and its task has logged why.
+        let _ = self.send(name, Command::Start).await;
     }
 
     fn find(&self, name: &str) -> Result<&Handle, Status> {
@@ -43,19 +43,19 @@ impl Capture {
             .ok_or_else(|| not_found("camera", name))
     }
 
-    async fn tell<T>(
+    async fn send<T>(
         &self,
         name: &str,
         command: impl FnOnce(oneshot::Sender<Result<T, Status>>) -> Command,
     ) -> Result<T, Status> {
-        let (answer, heard) = oneshot::channel();
+        let (answer, reply) = oneshot::channel();
         let gone = |_| unavailable("capture", "shutting down");
         self.find(name)?
             .commands
             .send(command(answer))
             .await
             .map_err(|_| unavailable("capture", "shutting down"))?;
-        heard.await.map_err(gone)?
+        reply.await.map_err(gone)?
     }
 }
 
@@ -77,7 +77,7 @@ impl CaptureService for Capture {
         &self,
         r: Request<GetCalibrationRequest>,
     ) -> Result<Response<GetCalibrationResponse>, Status> {
-        let c = self.tell(&r.get_ref().camera, Command::Calibration).await?;
+        let c = self.send(&r.get_ref().camera, Command::Calibration).await?;
         Ok(Response::new(GetCalibrationResponse {
             calibration: Some(calibration_to_wire(&c)),
         }))
@@ -87,7 +87,7 @@ impl CaptureService for Capture {
         &self,
         r: Request<StartCameraRequest>,
     ) -> Result<Response<StartCameraResponse>, Status> {
-        let info = self.tell(&r.get_ref().camera, Command::Start).await?;
+        let info = self.send(&r.get_ref().camera, Command::Start).await?;
         Ok(Response::new(StartCameraResponse { info: Some(info) }))
     }
 
@@ -95,7 +95,7 @@ impl CaptureService for Capture {
         &self,
         r: Request<StopCameraRequest>,
     ) -> Result<Response<StopCameraResponse>, Status> {
-        let info = self.tell(&r.get_ref().camera, Command::Stop).await?;
+        let info = self.send(&r.get_ref().camera, Command::Stop).await?;
         Ok(Response::new(StopCameraResponse { info: Some(info) }))
     }
 
@@ -117,7 +117,7 @@ impl CaptureService for Capture {
         }
         let folder = self.recordings.clone();
         let file = self
-            .tell(&r.camera, |answer| Command::Record { folder, answer })
+            .send(&r.camera, |answer| Command::Record { folder, answer })
             .await?;
         Ok(Response::new(StartRecordingResponse { file }))
     }
@@ -127,7 +127,7 @@ impl CaptureService for Capture {
         r: Request<StopRecordingRequest>,
     ) -> Result<Response<StopRecordingResponse>, Status> {
         let done = self
-            .tell(&r.get_ref().camera, Command::EndRecording)
+            .send(&r.get_ref().camera, Command::EndRecording)
             .await?;
         Ok(Response::new(StopRecordingResponse {
             file: done.file,

@@ -3,7 +3,7 @@
 //! Contact keeps a fold on its side, also where that is the wrong one. So each garment is queried as a whole from time to
 //! time, and intersecting cloth moves apart a little. Where that does not help for some queries, it is smoothed locally.
 
-use super::untangler::Untangler;
+use super::untangler::{UNTANGLE_GAP, UNTANGLE_STEP, Untangler};
 use crate::cloth::config::Config;
 use crate::cloth::outfit_model::Model;
 use crate::cloth::state::{GarmentState, State};
@@ -11,9 +11,8 @@ use crate::contact::SurfaceFrame;
 use crate::garment::Region;
 use crate::math::{P3, V3d};
 
-/// Iterations of a query, and the step of each, metres.
+/// Iterations of a query.
 const ITERATIONS: usize = 8;
-const STEP: f64 = 0.003;
 /// Largest displacement of a query, metres. With 5 mm armpits without clearance for two layers stretch by 18 %.
 const MAX_DISPLACEMENT: f64 = 0.003;
 /// Intersection counter from which on a vertex is smoothed, and its largest value: four more queries after it is free.
@@ -22,8 +21,6 @@ const MAX_COUNT: u8 = 6;
 /// Rings around a stuck vertex that are smoothed, and their largest displacement, metres.
 const SMOOTHED_RINGS: usize = 2;
 const MAX_SMOOTHING: f64 = 0.015;
-/// Distance at which wrong-side vertices are placed, metres.
-const GAP: f64 = 0.001;
 /// Height above the skin below which nothing is moved, metres: less than a fabric's thickness.
 const MIN_HEIGHT: f64 = 5e-4;
 /// Distance beyond which skin does not constrain the displacement, metres.
@@ -113,7 +110,13 @@ impl UntangleWork {
         g.intersection_count.resize(self.x.len(), 0);
         let mut found = 0;
         for r in 0..ITERATIONS {
-            let report = sheet.iterate(model.config.par, &mut self.x, weight, STEP, GAP);
+            let report = sheet.iterate(
+                model.config.par,
+                &mut self.x,
+                weight,
+                UNTANGLE_STEP,
+                UNTANGLE_GAP,
+            );
             if r == 0 {
                 found = report.intersections;
                 for (n, is_found) in g.intersection_count.iter_mut().zip(sheet.intersecting()) {

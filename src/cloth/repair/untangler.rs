@@ -9,6 +9,12 @@ use crate::mesh::Face;
 use crate::par::Par;
 use crate::spatial::SelfIntersections;
 
+/// Largest motion of an edge against a triangle in one iteration (m). A third of it leaves intersections from one pose to
+/// the next.
+pub(crate) const UNTANGLE_STEP: f64 = 0.003;
+/// Distance at which vertices from the wrong side are placed (m).
+pub(crate) const UNTANGLE_GAP: f64 = 0.001;
+
 /// Least sine of the angle between an edge and a triangle: flatter ones would displace the contour without bound.
 const MIN_SINE: f64 = 0.05;
 /// Turn of the contour (length of a sum of unit vectors) below which the displacement is less than a whole step.

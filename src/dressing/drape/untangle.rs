@@ -3,14 +3,10 @@
 use super::context::DrapeContext;
 use super::state::{Drape, on_arms};
 use super::step::QUERY_INTERVAL;
+use crate::cloth::repair::untangler::{UNTANGLE_GAP, UNTANGLE_STEP};
 use crate::cloth::solver::xpbd::constraints::project_distance;
 use crate::par::Par;
 
-/// Largest motion of an edge against a triangle in one iteration (m). A third of it leaves intersections from one pose to the
-/// next.
-const UNTANGLE_STEP: f64 = 0.003;
-/// Distance at which vertices from the wrong side are placed (m).
-const UNTANGLE_GAP: f64 = 0.001;
 /// Growth of a tangled vertex's slack in one iteration, and its limit (m): between two skins the offset is the only clearance.
 const SLACK_STEP: f64 = 0.001;
 const MAX_SLACK: f64 = 0.005;
@@ -27,9 +23,9 @@ const RELAX_STEP: f64 = 1e-3;
 const STUCK: usize = 16;
 const MAX_SMOOTHINGS: usize = 4;
 /// Depth under the skin that is allowed in later iterations (m). Deeper shows skin in the armpits of a heavy subject.
-const SUNK: f64 = 0.002;
+const ALLOWED_DEPTH: f64 = 0.002;
 /// Stretch ratio that later iterations allow. Below 1.19 (p99) a hood in folds on the neck did not come free.
-const TAUT: f64 = 1.07;
+const MAX_STRETCH: f64 = 1.07;
 
 impl Drape {
     /// One untangling iteration, which changes no velocities. A full query finds new intersections, else only the last ones
@@ -84,7 +80,7 @@ impl Drape {
             }
             if k >= RELAXED {
                 self.limit_stretch();
-                self.project_contacts(SUNK);
+                self.project_contacts(ALLOWED_DEPTH);
             } else if k % RELAX_INTERVAL == 0 {
                 for backwards in [false, true] {
                     self.project_edges(RELAX_STEP, backwards);
@@ -105,12 +101,12 @@ impl Drape {
             untangler.smooth_locally(&mut self.x, intersecting, movable, rings);
         }
     }
-    /// Contracts edges that are stretched by more than [`TAUT`] to that.
+    /// Contracts edges that are stretched by more than [`MAX_STRETCH`] to that.
     fn limit_stretch(&mut self) {
         for k in 0..self.edges.len() {
             let e = self.edges[k];
             let w = e.ends.map(|v| self.weight(v));
-            let length = TAUT * e.rest;
+            let length = MAX_STRETCH * e.rest;
             project_distance(&mut self.x, e.ends, w, (length, length), 0.0);
         }
     }
