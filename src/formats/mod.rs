@@ -10,6 +10,7 @@ pub mod gltf;
 pub mod image;
 mod mcap_file;
 pub mod mhclo;
+pub mod morph_target;
 mod motion;
 mod motion_clip;
 pub mod npy;
