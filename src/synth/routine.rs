@@ -1,5 +1,6 @@
 //! Routines of the synthetic actor: keyframes of torso and arms, a path for the pelvis, feet that step under it.
 
+use super::posture::Posture;
 use super::stance::{Limb, Rig, Stance};
 use crate::math::{P3d, V3d, exp_so3};
 use nalgebra::UnitQuaternion;
@@ -17,6 +18,8 @@ pub enum Routine {
     Turn,
     /// Stands still in the calibration pose.
     Still,
+    /// A posture held without breath or sway.
+    Hold(Posture),
     /// An empty room.
     Empty,
 }
@@ -217,7 +220,7 @@ impl Routine {
             Self::TryOn => &TRY_ON,
             Self::LeaveAndReturn => &LEAVE,
             Self::Turn => &TURN,
-            Self::Still | Self::Empty => &TRY_ON[..1],
+            Self::Still | Self::Hold(_) | Self::Empty => &TRY_ON[..1],
         }
     }
     fn key(self, t: f64) -> Key {
@@ -272,6 +275,9 @@ impl Routine {
 
     /// The stance at `t` seconds; `home` is where the routine starts, on the floor.
     pub(super) fn stance(self, rig: &Rig, home: P3d, t: f64) -> Stance {
+        if let Self::Hold(posture) = self {
+            return posture.stance(rig, home);
+        }
         let k = self.key(t);
         // Breath and sway: a few millimetres and tenths of a degree.
         let sway = [(0.9 * t).sin(), (1.3 * t + 1.0).sin(), (1.57 * t).sin()];

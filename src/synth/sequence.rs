@@ -46,6 +46,8 @@ pub struct Setting {
     pub world_from_camera: Rigid<World, Camera>,
     /// Start of the actor on the floor, world.
     pub home: P3d,
+    /// Turn of the actor about the vertical through `home`, radians; 0 faces the camera.
+    pub turn: f64,
     /// Walls and floor; `None` for a person alone in the dark.
     pub room: Option<Room>,
     /// Noise of the depth image.
@@ -67,6 +69,7 @@ impl Default for Setting {
             camera: Intrinsics::KINECT_V1,
             world_from_camera: Self::tilted(1.0, 3.0, 0.0),
             home: P3d::new(0.0, 0.0, -2.4),
+            turn: 0.0,
             room: Some(Room::default()),
             noise: NoiseModel::KinectV1,
             routine: Routine::TryOn,
@@ -201,8 +204,10 @@ impl Sequence {
             None => self.setting.routine.stance(&self.rig, home, time),
         };
         let in_world = self.rig.pose(&stance);
+        let turn = UnitQuaternion::from_axis_angle(&V3d::y_axis(), self.setting.turn);
+        let turned: Rigid<World, World> = Rigid::from_parts(home.coords - turn * home.coords, turn);
         let pose = Pose {
-            root: camera_from_world * in_world.root,
+            root: camera_from_world * turned * in_world.root,
             angles: in_world.angles,
         };
         let mut bones = BoneTransforms::default();
@@ -224,6 +229,16 @@ impl Sequence {
             joints: bones.joints,
             vertices,
         }
+    }
+
+    /// Depth of frame `i` before noise (metres along the optical axis, row-major, infinity for no surface), and its truth.
+    pub fn surface_depth(&self, i: u64) -> (Vec<f32>, Truth) {
+        let truth = self.truth(i);
+        let mut depth = self.background.depth.clone();
+        if truth.present {
+            self.draw(&truth, &mut depth, None);
+        }
+        (depth, truth)
     }
 
     /// Frame `i` and its truth.

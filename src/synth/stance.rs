@@ -150,6 +150,10 @@ impl Rig {
             .as_ref()
             .map_or(1.0, |l| l.length[0] + l.length[1])
     }
+    /// From hip to knee, metres; one half without legs.
+    pub(super) fn thigh_length(&self) -> f64 {
+        self.legs[0].as_ref().map_or(0.5, |l| l.length[0])
+    }
     /// Height of the ankle above the sole, metres.
     pub(super) fn ankle_height(&self) -> f64 {
         self.ankle_height
@@ -180,6 +184,12 @@ impl Rig {
         if height.is_finite() {
             stance.pelvis.y = height;
         }
+        self.plant(stance, soles);
+    }
+
+    /// Leg directions that bring the feet from a given pelvis to `soles`, as in [`Rig::stand`].
+    pub(super) fn plant(&self, stance: &mut Stance, soles: [(P3d, f64); 2]) {
+        let hips = self.hips.map(|h| stance.heading * h);
         for s in 0..2 {
             let Some(leg) = &self.legs[s] else { continue };
             let yaw = UnitQuaternion::from_axis_angle(&V3d::y_axis(), soles[s].1);
