@@ -268,6 +268,30 @@ pub(crate) enum BenchWhat {
     Tracking(BenchTrackingArgs),
     /// Cloth solvers on the standard scenes: small steps, XPBD, quasi-Newton, the paper's mass-spring step.
     Cloth(BenchClothArgs),
+    /// Tracking of everyone who walks in: people, postures and sides from nothing, stills and recordings.
+    People(BenchPeopleArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchPeopleArgs {
+    /// Folder for people.md and people.json.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Folder with bodies, motions and recordings; without it their rows are skipped.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: Option<PathBuf>,
+    /// Only these rows: unlike, shops, poses, sides, limb, stills, shared, uva.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(crate) only: Vec<String>,
+    /// A fraction of the cases of each row: two minutes instead of many.
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// The third of the cases that is kept apart, instead of the other two thirds.
+    #[arg(long)]
+    pub(crate) unseen: bool,
+    /// Folder for a contact sheet per row: depth with true (green) and tracked (red) joints.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) pictures: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

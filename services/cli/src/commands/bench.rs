@@ -1,11 +1,12 @@
 //! `tryon bench`: run time against error, as tables and plots.
 
-use crate::args::{BenchArgs, BenchClothArgs, BenchTrackingArgs, BenchWhat};
+use crate::args::{BenchArgs, BenchClothArgs, BenchPeopleArgs, BenchTrackingArgs, BenchWhat};
 use crate::input;
 use anyhow::Result;
 use std::process::ExitCode;
 use tryon::evaluate::ablation::{self, Extent};
 use tryon::evaluate::cloth::ClothBench;
+use tryon::evaluate::people::{self, CaseSet, PeoplePlan};
 use tryon::evaluate::{self, Row, Table};
 use tryon::par::with_threads;
 
@@ -17,6 +18,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
     match &args.what {
         BenchWhat::Tracking(a) => tracking(a),
         BenchWhat::Cloth(a) => cloth(a),
+        BenchWhat::People(a) => people(a),
     }
 }
 
@@ -55,6 +57,38 @@ fn cloth(args: &BenchClothArgs) -> Result<ExitCode> {
     let table = evaluate::cloth::cloth(&args.scenes, &bench, |_| bar.inc(1))?;
     bar.finish_and_clear();
     finish(&table, &args.out)
+}
+
+fn people(args: &BenchPeopleArgs) -> Result<ExitCode> {
+    let cases = if args.unseen {
+        CaseSet::Unseen
+    } else {
+        CaseSet::Seen
+    };
+    let plan = PeoplePlan {
+        data: args.data.clone(),
+        cases,
+        quick: args.quick,
+        only: args.only.clone(),
+        pictures: args.pictures.clone(),
+    };
+    let bar = input::progress(None, "measuring");
+    let mut table = with_threads(1, || {
+        people::run(&plan, |row| {
+            bar.set_message(format!("{row} done"));
+            bar.inc(1);
+        })
+    })??;
+    bar.finish_and_clear();
+    table.command = std::env::args().collect::<Vec<_>>().join(" ");
+    for file in table.write(&args.out)? {
+        println!("{}", file.display());
+    }
+    print!("{}", table.to_markdown());
+    for skipped in &table.skipped {
+        eprintln!("SKIPPED: {skipped}");
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Writes the table and prints the paths of its files.
