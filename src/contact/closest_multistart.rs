@@ -1,6 +1,6 @@
 //! Closest point from several starts, for walks that end on the wrong side of the trunk.
 
-use super::{ClosestPoint, Part, SurfaceFrame, SurfaceModel};
+use super::{ClosestPoint, SearchExtent, SurfaceFrame, SurfaceModel};
 use crate::math::P3;
 
 /// Depth beyond which a result is distrusted, metres: a point outside the skin a step ago is not deeper.
@@ -16,11 +16,10 @@ impl SurfaceModel {
         frame: &SurfaceFrame,
         p: &P3,
         start: u32,
-        mask: Part,
-        reach: f32,
+        extent: SearchExtent,
         others: impl Iterator<Item = u32>,
     ) -> (u32, Result<ClosestPoint, f32>) {
-        let from = |start: u32| self.closest_within(frame, p, start, mask, reach);
+        let from = |start: u32| self.closest_within(frame, p, start, extent);
         let walked = from(start);
         let deep = |c: ClosestPoint| c.signed_distance < -DISTRUSTED_DEPTH;
         if !walked.1.is_ok_and(deep) {
@@ -51,8 +50,12 @@ mod tests {
         let n = n as u32;
         // 2 mm outside the right ball, 22 mm deep in the left one.
         let x = P3::new(0.028, 0.0, 0.0);
+        let extent = SearchExtent {
+            mask: 1,
+            reach: 0.04,
+        };
         let query = |x: &P3, others: &[u32]| {
-            surface.closest_multistart(&frame, x, 0, 1, 0.04, others.iter().copied())
+            surface.closest_multistart(&frame, x, 0, extent, others.iter().copied())
         };
         let near = |c: &ClosestPoint, d: f32| (c.signed_distance - d).abs() < 1e-3;
         let lost = query(&x, &[]).1.expect("skin");
@@ -68,7 +71,7 @@ mod tests {
         // Plausible depth: the other starts are not evaluated.
         let shallow = P3::new(-0.045, 0.0, 0.0);
         let none = std::iter::from_fn(|| -> Option<u32> { panic!("evaluated") });
-        let stays = surface.closest_multistart(&frame, &shallow, 0, 1, 0.04, none);
+        let stays = surface.closest_multistart(&frame, &shallow, 0, extent, none);
         assert!(near(&stays.1.expect("skin"), -0.005));
         assert!(
             query(&P3::new(-0.3, 0.0, 0.0), &[n]).1.is_err(),

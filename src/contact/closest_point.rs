@@ -34,6 +34,15 @@ impl ClosestPoint {
     }
 }
 
+/// Extent of a search for the closest point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SearchExtent {
+    /// Parts that the search is confined to.
+    pub mask: Part,
+    /// Largest distance that counts, metres.
+    pub reach: f32,
+}
+
 /// Longest walk, edges (30 cm on a body of 13k vertices): a longer one began at a lost start.
 const MAX_WALK: usize = 40;
 /// Slack between the nearest vertex and the closest point of the faces around it, metres: an edge of the body.
@@ -150,15 +159,15 @@ impl SurfaceModel {
         self.closest_around(frame, p, v, mask)
     }
 
-    /// End of a walk, and the closest point if it can be within `reach` metres, else its least distance beyond reach.
+    /// End of a walk, and the closest point if it can be within reach, else its least distance beyond that, metres.
     pub fn closest_within(
         &self,
         frame: &SurfaceFrame,
         p: &P3,
         start: u32,
-        mask: Part,
-        reach: f32,
+        extent: SearchExtent,
     ) -> (u32, Result<ClosestPoint, f32>) {
+        let SearchExtent { mask, reach } = extent;
         let v = self.walk(frame, p, start, mask);
         let beyond = (frame.vertices[v as usize] - p).norm() - EDGE - reach;
         if beyond > 0.0 {

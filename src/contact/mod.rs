@@ -17,7 +17,7 @@ mod surface;
 mod test_shapes;
 mod triangle_fan;
 
-pub use closest_point::ClosestPoint;
+pub use closest_point::{ClosestPoint, SearchExtent};
 pub use collision_body::{
     CollisionBody, CollisionConfig, CollisionError, CollisionModel, CollisionParts,
     CollisionReport, CollisionWorkspace,

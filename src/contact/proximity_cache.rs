@@ -2,7 +2,7 @@
 //!
 //! A vertex is queried again only when it and the other part may have moved through the clearance of its last query.
 
-use super::{ClosestPoint, Part, SurfaceFrame, SurfaceModel};
+use super::{ClosestPoint, Part, SearchExtent, SurfaceFrame, SurfaceModel};
 use crate::math::P3;
 use crate::par::{self, Par};
 use serde::{Deserialize, Serialize};
@@ -79,7 +79,8 @@ impl<T: Copy + Default + Send + Sync> ProximityCache<T> {
                 if let Some(start) = starts.get(v) {
                     e.nearest = *start;
                 }
-                let (nearest, hit) = surface.closest_within(frame, p, e.nearest, mask, reach);
+                let extent = SearchExtent { mask, reach };
+                let (nearest, hit) = surface.closest_within(frame, p, e.nearest, extent);
                 *e = Proximity {
                     nearest,
                     clearance: hit.err().unwrap_or(0.0),

@@ -7,7 +7,7 @@ use crate::cloth::outfit_model::Model;
 use crate::cloth::patch::{PatchWork, v4};
 use crate::cloth::solver::explicit::ContactPlane;
 use crate::cloth::state::GarmentState;
-use crate::contact::{ClosestPoint, DepthMaps, Interior, SurfaceFrame, SurfaceModel};
+use crate::contact::{ClosestPoint, DepthMaps, Interior, SearchExtent, SurfaceFrame, SurfaceModel};
 use crate::garment::Region;
 use crate::math::{P3, V3};
 
@@ -122,7 +122,11 @@ impl BodyContacts<'_> {
         let nearest = &self.garments[c.garment].nearest;
         let starts = around.map(|w| nearest[*w as usize][side]);
         let start = c.nearest[q.j][side];
-        let (near, hit) = surface.closest_multistart(self.now, &q.x, start, mask, wanted, starts);
+        let extent = SearchExtent {
+            mask,
+            reach: wanted,
+        };
+        let (near, hit) = surface.closest_multistart(self.now, &q.x, start, extent, starts);
         c.nearest[q.j][side] = near;
         let mut hit = match hit {
             Ok(hit) => hit,

@@ -7,6 +7,7 @@ use super::chunk::ContactChunk;
 use super::self_contact::{SelfContactFrame, contact_plane};
 use crate::cloth::outfit_model::Model;
 use crate::cloth::patch::PatchWork;
+use crate::contact::SearchExtent;
 use crate::math::{P3, V3};
 use crate::par::{self, Par};
 
@@ -116,7 +117,11 @@ impl ClothContacts<'_> {
                     &self.sheets[outer],
                 );
                 let start = c.layers[outer][j];
-                let (near, hit) = g.closest_within(&s.surface, &x, start, own, LAYER_DEPTH);
+                let extent = SearchExtent {
+                    mask: own,
+                    reach: LAYER_DEPTH,
+                };
+                let (near, hit) = g.closest_within(&s.surface, &x, start, extent);
                 c.layers[outer][j] = near;
                 let cover = hit.ok().and_then(|hit| g.cover(&s.surface, &x, &hit, HEM));
                 let Some(cover) = cover else { continue };

@@ -3,7 +3,7 @@
 use super::chunk::ContactChunk;
 use crate::cloth::outfit_model::Model;
 use crate::cloth::patch::{PatchWork, v4};
-use crate::contact::{CollisionBody, SkinGrid, SurfaceFrame, SurfaceModel};
+use crate::contact::{CollisionBody, SearchExtent, SkinGrid, SurfaceFrame, SurfaceModel};
 use crate::math::P3;
 
 /// Height above the skin to which cloth is projected, metres: less than a fabric's thickness.
@@ -65,8 +65,11 @@ impl SkinProjection<'_> {
         for side in [1, 0].into_iter().filter(|s| masks[*s] != 0) {
             // Skin of other parts is far from most cloth.
             let reach = if side == 1 { MAX_OTHER_DEPTH } else { f32::MAX };
-            let start = c.nearest[j][side];
-            let (vertex, walked) = surface.closest_within(skin, &x, start, masks[side], reach);
+            let extent = SearchExtent {
+                mask: masks[side],
+                reach,
+            };
+            let (vertex, walked) = surface.closest_within(skin, &x, c.nearest[j][side], extent);
             let found = near[side].or_nearer(surface, skin, &x, walked.ok(), masks[side]);
             c.nearest[j][side] = found.map_or(vertex, |hit| hit.vertex);
             let Some(hit) = found else { continue };
