@@ -4,7 +4,7 @@
 //! body supports both; two folds of one garment push each other. No constraint needs a common solution.
 
 use super::chunk::ContactChunk;
-use super::self_contact::{SelfContactFrame, contact_plane};
+use super::self_contact::SelfContactFrame;
 use crate::cloth::outfit_model::Model;
 use crate::cloth::patch::PatchWork;
 use crate::contact::SearchExtent;
@@ -95,7 +95,9 @@ impl ClothContacts<'_> {
                 c.is_alone[j] = true;
                 continue;
             };
-            if let Some((plane, distance)) = g.plane(s, i, v, &x, corner, &search) {
+            let hit = g.other_fold(s, v, &x, corner);
+            let plane = hit.and_then(|hit| g.plane(s, i, v, &hit, &search));
+            if let Some((plane, distance)) = plane {
                 c.cloth_planes.push(plane);
                 c.report.cloth_contacts += usize::from(distance <= search.thickness);
             }
@@ -128,7 +130,7 @@ impl ClothContacts<'_> {
                 let inside = -cover.signed_distance;
                 if inside < LAYER_REACH && inside > -LAYER_DEPTH {
                     c.cloth_planes
-                        .push(contact_plane(g, s, i, &cover, -1.0, LAYER_GAP));
+                        .push(s.contact_plane(g, i, &cover, -1.0, LAYER_GAP));
                     c.report.cloth_contacts += usize::from(inside < LAYER_GAP);
                 }
             }

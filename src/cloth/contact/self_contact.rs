@@ -63,6 +63,28 @@ impl SelfContactFrame {
             .to_array();
         V3::new(x, y, z)
     }
+    /// Plane of vertex `i`, `gap` metres from a closest point on its `side`, with the velocity of its triangle.
+    pub(crate) fn contact_plane(
+        &self,
+        g: &SurfaceModel,
+        i: usize,
+        hit: &ClosestPoint,
+        side: f32,
+        gap: f32,
+    ) -> ContactPlane {
+        let corners = g.faces()[hit.face as usize];
+        let velocity = (0..3).fold(V3::zeros(), |a, k| {
+            a + self.velocity(g, corners[k]) * hit.weights[k]
+        });
+        let n = hit.normal * side;
+        ContactPlane {
+            vertex: i as u32,
+            normal: V4::new(n.x, n.y, n.z),
+            offset: n.dot(&hit.point.coords) + gap,
+            velocity: V4::new(velocity.x, velocity.y, velocity.z),
+            friction: FRICTION,
+        }
+    }
 }
 
 /// Velocity of a vertex after some smoothing iterations over neighbours, m/s.
@@ -218,19 +240,17 @@ impl SelfContactModel {
             .any(|&c| c == v || g.neighbours(v).contains(&c));
         (!same && !g.is_on_border(&hit)).then_some(hit)
     }
-    /// Contact plane of vertex `v` at `x` with the triangles around a corner of another fold, and their distance, metres.
-    /// The plane names the vertex `i`.
+    /// Contact plane of vertex `v` with its closest point on another fold, and their distance, metres. The plane names
+    /// the vertex `i`.
     pub(crate) fn plane(
         &self,
         frame: &SelfContactFrame,
         i: usize,
         v: u32,
-        x: &P3,
-        corner: u32,
+        hit: &ClosestPoint,
         search: &Search,
     ) -> Option<(ContactPlane, f32)> {
         let g = &self.surface;
-        let hit = self.other_fold(frame, v, x, corner)?;
         let far = hit.signed_distance.abs();
         if !(far < search.reach) {
             return None;
@@ -247,7 +267,7 @@ impl SelfContactModel {
             true => search.thickness,
             false => far,
         };
-        let mut plane = contact_plane(g, frame, i, &hit, side, gap);
+        let mut plane = frame.contact_plane(g, i, hit, side, gap);
         let own = frame.velocity(g, v);
         let own = V4::new(own.x, own.y, own.z);
         plane.velocity = (plane.velocity + own).scale(0.5);
@@ -256,28 +276,5 @@ impl SelfContactModel {
             return None;
         }
         Some((plane, far))
-    }
-}
-
-/// Plane `gap` metres from a closest point on its `side`, with the velocity of its triangle.
-pub(crate) fn contact_plane(
-    g: &SurfaceModel,
-    frame: &SelfContactFrame,
-    i: usize,
-    hit: &ClosestPoint,
-    side: f32,
-    gap: f32,
-) -> ContactPlane {
-    let corners = g.faces()[hit.face as usize];
-    let velocity = (0..3).fold(V3::zeros(), |a, k| {
-        a + frame.velocity(g, corners[k]) * hit.weights[k]
-    });
-    let n = hit.normal * side;
-    ContactPlane {
-        vertex: i as u32,
-        normal: V4::new(n.x, n.y, n.z),
-        offset: n.dot(&hit.point.coords) + gap,
-        velocity: V4::new(velocity.x, velocity.y, velocity.z),
-        friction: FRICTION,
     }
 }

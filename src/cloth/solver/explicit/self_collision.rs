@@ -124,9 +124,8 @@ impl SelfCollision {
             let Some((corner, _)) = corner.filter(|_| out.clearance[i] < 0.0) else {
                 continue;
             };
-            let plane = self
-                .model
-                .plane(&self.frame, i, v, &x, corner, &self.search);
+            let hit = self.model.other_fold(&self.frame, v, &x, corner);
+            let plane = hit.and_then(|hit| self.model.plane(&self.frame, i, v, &hit, &self.search));
             if let Some((plane, distance)) = plane {
                 out.planes.push(plane);
                 out.touching += usize::from(i < f.owned && distance <= self.search.thickness);
