@@ -5,7 +5,7 @@ use super::contact::body_contact::BodyContacts;
 use super::contact::cloth_contact::{ClothContacts, gather_sheets};
 use super::outfit_model::Model;
 use super::patch::for_patches;
-use super::solver::explicit::{Exemptions, FoldLimit};
+use super::solver::explicit::{Exemptions, FoldActivation, FoldLimit};
 use super::state::State;
 use super::workspace::Workspace;
 use crate::contact::SurfaceFrame;
@@ -75,12 +75,15 @@ pub(super) fn collide(
         p.motion
             .find_overstretched(patch, OVERSTRETCHED, &mut p.overstretched);
         p.motion.find_overstretched(patch, TAUT, &mut p.taut);
-        let exempt = Exemptions {
-            fixed: &p.pinned,
-            unlimited: &p.taut,
+        let activation = FoldActivation {
+            ratio: model.config.min_fold_ratio as f32,
+            span,
+            except: Exemptions {
+                fixed: &p.pinned,
+                unlimited: &p.taut,
+            },
         };
-        let ratio = model.config.min_fold_ratio as f32;
-        FoldLimit::find_active(patch, &p.motion, ratio, span, &exempt, &mut p.fold_limits);
+        FoldLimit::find_active(patch, &p.motion, &activation, &mut p.fold_limits);
     });
     let patches = &*patches;
     par::for_chunks(par, chunks, 1, |_, c| {

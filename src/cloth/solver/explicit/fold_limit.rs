@@ -18,6 +18,17 @@ pub struct FoldLimit {
     share: [f32; 2],
 }
 
+/// Condition under which a fold limit is active.
+#[derive(Clone, Copy, Debug)]
+pub struct FoldActivation<'a> {
+    /// Minimal over flat distance of a pair; 0: no limits.
+    pub ratio: f32,
+    /// Time until the next search for active limits (s).
+    pub span: f32,
+    /// Vertices without limits.
+    pub except: Exemptions<'a>,
+}
+
 /// Closing speed that two vertices may gain until the next search for active limits (m/s). Smaller misses some.
 const SPEED_GAIN: f32 = 0.3;
 /// Share of a violation that one substep removes. Larger jitters.
@@ -30,19 +41,17 @@ const SHORTEST: f32 = 1e-6;
 const WIDEST: f32 = 0.02;
 
 impl FoldLimit {
-    /// Limits that may become active within `span` seconds: pairs that may come nearer than `ratio` times their flat
-    /// distance; none where that is 0.
+    /// Limits that may become active until the next search: pairs that may come nearer than `ratio` times their flat
+    /// distance.
     pub fn find_active(
         f: &PatchModel,
         state: &PatchState,
-        ratio: f32,
-        span: f32,
-        except: &Exemptions<'_>,
+        activation: &FoldActivation<'_>,
         out: &mut Vec<Self>,
     ) {
         out.clear();
-        if ratio > 0.0 {
-            let active = |d| Self::if_active(d, f, state, ratio, span, except);
+        if activation.ratio > 0.0 {
+            let active = |d| Self::if_active(d, f, state, activation);
             out.extend(f.diagonals.iter().filter_map(active));
         }
     }
@@ -51,10 +60,13 @@ impl FoldLimit {
         diagonal: &Diagonal,
         f: &PatchModel,
         state: &PatchState,
-        ratio: f32,
-        span: f32,
-        except: &Exemptions<'_>,
+        activation: &FoldActivation<'_>,
     ) -> Option<Self> {
+        let FoldActivation {
+            ratio,
+            span,
+            except,
+        } = *activation;
         let Diagonal { ends, flat } = *diagonal;
         let [a, b] = ends.map(|v| v as usize);
         let d = state.position(b) - state.position(a);
@@ -204,22 +216,18 @@ mod tests {
         fn run(&mut self, ratio: f32, held: Option<usize>) -> f64 {
             let n = self.flat.len();
             let fixed: Vec<bool> = (0..n).map(|i| Some(i) == held).collect();
-            let except = Exemptions {
-                fixed: &fixed,
-                unlimited: &vec![false; n],
+            let activation = FoldActivation {
+                ratio,
+                span: SEARCH_EVERY as f32 * H,
+                except: Exemptions {
+                    fixed: &fixed,
+                    unlimited: &vec![false; n],
+                },
             };
             let (mut limits, mut sharpest) = (Vec::new(), f64::INFINITY);
             for k in 0..STEPS {
                 if k % SEARCH_EVERY == 0 {
-                    let span = SEARCH_EVERY as f32 * H;
-                    FoldLimit::find_active(
-                        &self.model,
-                        &self.state,
-                        ratio,
-                        span,
-                        &except,
-                        &mut limits,
-                    );
+                    FoldLimit::find_active(&self.model, &self.state, &activation, &mut limits);
                 }
                 self.step(&limits, held, k % 3 == 0);
                 sharpest = sharpest.min(self.sharpest());

@@ -36,7 +36,7 @@ mod tests;
 mod vec4;
 
 pub use constraint::{ContactPlane, Pin};
-pub use fold_limit::FoldLimit;
+pub use fold_limit::{FoldActivation, FoldLimit};
 pub use patch_model::PatchModel;
 pub use patch_state::{Exemptions, PatchState, Substep};
 pub use stable_sheet::{StableSheet, StepSpec};

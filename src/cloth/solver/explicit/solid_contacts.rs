@@ -5,7 +5,7 @@ use super::patch_state::PatchState;
 use crate::cloth::solver::Environment;
 use crate::cloth::solver::collider::Collider;
 use crate::math::V3d;
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 
 /// Speed at which penetrations of solids recover at most (m/s). Faster throws cloth off.
 pub(in super::super) const RECOVERY_SPEED: f32 = 1.0;
@@ -30,53 +30,73 @@ impl SolidContacts {
         self.0.resize(n * environment.colliders.len(), 0.0);
         let all = environment.colliders.iter();
         for (collider, clear) in all.zip(self.0.chunks_mut(n.max(1))) {
-            find_planes(
-                collider,
-                environment.offset,
-                state,
-                (t, span),
-                clear,
-                planes,
-            );
+            let motion = SolidMotion::new(collider, environment.offset, (t, span));
+            motion.find_planes(state, clear, planes);
         }
     }
 }
 
-fn find_planes(
-    c: &Collider,
+/// Motion of one solid during the `span` seconds until the next query.
+struct SolidMotion<'a> {
+    solid: &'a Collider,
+    /// Distance that cloth keeps from it (m).
     offset: f64,
-    state: &PatchState,
-    (t, span): (f64, f64),
-    clearance: &mut [f32],
-    planes: &mut Vec<ContactPlane>,
-) {
-    let (now, then) = (c.placement(t), c.placement(t + span));
-    let change = then * now.inverse();
-    let fastest = c.shape.max_displacement(&now, &then) / span;
-    for (i, clearance) in clearance.iter_mut().enumerate() {
-        let v = state.velocity[i];
-        let travel = ((f64::from(v.dot(v).sqrt()) + fastest) * span) as f32;
-        if *clearance > travel {
-            *clearance -= travel;
-            continue;
+    /// Placement now.
+    now: Isometry3<f64>,
+    /// Displacement until the next query, in the world.
+    change: Isometry3<f64>,
+    /// Largest speed of its surface (m/s).
+    fastest: f64,
+    span: f64,
+}
+
+impl<'a> SolidMotion<'a> {
+    fn new(solid: &'a Collider, offset: f64, (t, span): (f64, f64)) -> Self {
+        let (now, then) = (solid.placement(t), solid.placement(t + span));
+        Self {
+            solid,
+            offset,
+            now,
+            change: then * now.inverse(),
+            fastest: solid.shape.max_displacement(&now, &then) / span,
+            span,
         }
-        let x = Point3::from(state.position(i).to_f64());
-        let (d, normal) = c.shape.distance(&now.inverse_transform_point(&x).coords);
-        let reach = offset + CLEARANCE + 2.0 * f64::from(travel);
-        *clearance = (d - reach).max(0.0) as f32;
-        if d > reach {
-            continue;
+    }
+
+    /// Adds the planes of the vertices near the solid; `clearance` is that of each vertex from it.
+    fn find_planes(
+        &self,
+        state: &PatchState,
+        clearance: &mut [f32],
+        planes: &mut Vec<ContactPlane>,
+    ) {
+        let Self { now, span, .. } = *self;
+        for (i, clearance) in clearance.iter_mut().enumerate() {
+            let v = state.velocity[i];
+            let travel = ((f64::from(v.dot(v).sqrt()) + self.fastest) * span) as f32;
+            if *clearance > travel {
+                *clearance -= travel;
+                continue;
+            }
+            let x = Point3::from(state.position(i).to_f64());
+            let local = now.inverse_transform_point(&x).coords;
+            let (d, normal) = self.solid.shape.distance(&local);
+            let reach = self.offset + CLEARANCE + 2.0 * f64::from(travel);
+            *clearance = (d - reach).max(0.0) as f32;
+            if d > reach {
+                continue;
+            }
+            let normal = now.rotation * normal;
+            let on = x - normal * d;
+            let velocity: V3d = (self.change * on - on) / span;
+            planes.push(ContactPlane {
+                vertex: i as u32,
+                normal: normal.into(),
+                offset: (normal.dot(&on.coords) + self.offset) as f32,
+                velocity: velocity.into(),
+                friction: self.solid.friction as f32,
+            });
         }
-        let normal = now.rotation * normal;
-        let on = x - normal * d;
-        let velocity: V3d = (change * on - on) / span;
-        planes.push(ContactPlane {
-            vertex: i as u32,
-            normal: normal.into(),
-            offset: (normal.dot(&on.coords) + offset) as f32,
-            velocity: velocity.into(),
-            friction: c.friction as f32,
-        });
     }
 }
 
