@@ -11,16 +11,23 @@ pub struct CgReport {
     pub relative_residual: f64,
 }
 
+/// End of an iteration, by what comes first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StopCriterion {
+    /// Relative residual ‖b − A x‖ / ‖b‖.
+    pub residual: f64,
+    /// Products with the matrix.
+    pub iterations: usize,
+}
+
 /// Solves `A x = b` from the initial `x` with the inverse diagonal blocks as preconditioner.
-/// Stops at `tolerance` (relative residual) or after `most` products. A search direction without positive curvature
-/// ends the iteration at the current `x`.
+/// A search direction without positive curvature ends the iteration at the current `x`.
 pub fn conjugate_gradient(
     mut apply: impl FnMut(&[Vector3<f64>], &mut [Vector3<f64>]),
     inverse_blocks: &[Matrix3<f64>],
     b: &[Vector3<f64>],
     x: &mut [Vector3<f64>],
-    tolerance: f64,
-    most: usize,
+    stop: StopCriterion,
 ) -> CgReport {
     let n = b.len();
     let dot = |p: &[Vector3<f64>], q: &[Vector3<f64>]| {
@@ -34,7 +41,7 @@ pub fn conjugate_gradient(
     let norm_b = dot(b, b).sqrt().max(f64::MIN_POSITIVE);
     let mut rz = dot(&r, &z);
     let mut iterations = 0;
-    while iterations < most && dot(&r, &r).sqrt() > tolerance * norm_b {
+    while iterations < stop.iterations && dot(&r, &r).sqrt() > stop.residual * norm_b {
         apply(&p, &mut ap);
         iterations += 1;
         let curvature = dot(&p, &ap);
@@ -80,14 +87,12 @@ mod tests {
         };
         let b: Vec<_> = (0..n).map(|i| Vector3::new(1.0, i as f64, -0.5)).collect();
         let mut x = vec![Vector3::zeros(); n];
-        let report = conjugate_gradient(
-            apply,
-            &vec![Matrix3::identity() / 2.5; n],
-            &b,
-            &mut x,
-            1e-12,
-            3 * n,
-        );
+        let stop = StopCriterion {
+            residual: 1e-12,
+            iterations: 3 * n,
+        };
+        let inverse = vec![Matrix3::identity() / 2.5; n];
+        let report = conjugate_gradient(apply, &inverse, &b, &mut x, stop);
         assert!(
             report.relative_residual < 1e-11 && report.iterations <= 3 * n,
             "{report:?}"

@@ -5,7 +5,7 @@ mod conjugate_gradient;
 mod pattern;
 
 pub use cholesky::{Factor, SymbolicFactor};
-pub use conjugate_gradient::{CgReport, conjugate_gradient};
+pub use conjugate_gradient::{CgReport, StopCriterion, conjugate_gradient};
 pub use pattern::SymmetricPattern;
 
 /// Error of a linear system.

@@ -8,17 +8,19 @@ use crate::cloth::solver::single_patch::{
     SinglePatchSolver, VelocityUpdate, local_numbers, whole_sheet,
 };
 use crate::cloth::solver::{Environment, RunConfig, SheetStart};
-use crate::linear::conjugate_gradient;
+use crate::linear::{StopCriterion, conjugate_gradient};
 use crate::math::V3d;
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
 
 /// Substeps a frame when none are asked for.
 const DEFAULT_SUBSTEPS: usize = 8;
-/// Relative residual of the linear solve. Larger is visibly soft; smaller changes nothing visible.
-const RESIDUAL: f64 = 1e-3;
-/// Most products of the linear solve: reached only by the finest meshes.
-const MAX_PRODUCTS: usize = 60;
+/// End of the linear solve. A larger residual is visibly soft, a smaller one changes nothing visible; only the finest
+/// meshes reach the number of iterations.
+const STOP: StopCriterion = StopCriterion {
+    residual: 1e-3,
+    iterations: 60,
+};
 
 /// Spring between two vertices in local numbers.
 #[derive(Clone, Copy, Debug)]
@@ -161,14 +163,7 @@ impl VelocityUpdate for Springs {
                 out[i] = p[i] * self.mass[i];
             }
         };
-        conjugate_gradient(
-            product,
-            &inverse,
-            &system.right,
-            &mut change,
-            RESIDUAL,
-            MAX_PRODUCTS,
-        );
+        conjugate_gradient(product, &inverse, &system.right, &mut change, STOP);
         for i in 0..n {
             state.velocity[i] = (v[i] + change[i]).into();
         }
