@@ -32,16 +32,25 @@ pub struct Material {
     pub source: String,
 }
 
+/// Linear elastic solid, the same in all directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IsotropicSolid {
+    /// Young's modulus, Pa.
+    pub young: f64,
+    /// Poisson ratio.
+    pub poisson: f64,
+    /// Mass of a cubic metre, kg/m³.
+    pub density: f64,
+}
+
 impl Material {
-    /// An isotropic sheet of Young's modulus `young` (Pa), Poisson ratio, volume density (kg/m³) and thickness (m).
-    pub fn isotropic(
-        name: &str,
-        young: f64,
-        poisson: f64,
-        density: f64,
-        thickness: f64,
-        source: &str,
-    ) -> Self {
+    /// Sheet of an isotropic solid with this thickness, metres.
+    pub fn isotropic(name: &str, solid: IsotropicSolid, thickness: f64, source: &str) -> Self {
+        let IsotropicSolid {
+            young,
+            poisson,
+            density,
+        } = solid;
         let membrane = young * thickness;
         Self {
             name: name.to_owned(),

@@ -15,7 +15,7 @@ mod union_find;
 
 pub use error::GarmentError;
 pub use flat_triangle::rest_area;
-pub use material::Material;
+pub use material::{IsotropicSolid, Material};
 pub use mesh::{AnchorKind, AnchorSet, GarmentMesh, Region, RenderMesh, Triangulation};
 pub use outline::{Curve, PanelEdge};
 pub use pattern::{Anchor, Dart, GarmentKind, Panel, Pattern, Placement, Seam, Side};

@@ -1,10 +1,19 @@
 //! Fabrics by name.
 
-use super::{GarmentError, Material};
+use super::{GarmentError, IsotropicSolid, Material};
 
 /// Source of the presets.
 const CIPC: &str = "Codim-IPC fabric table (ipc-sim/Codim-IPC, FEMDiscreteShellBase.py, Apache-2.0), plane-stress membrane \
                     E·h and E·h³/12; friction and damping are estimates";
+
+/// Row of that table: Young's modulus (Pa), Poisson ratio, density (kg/m³).
+const fn solid(young: f64, poisson: f64, density: f64) -> IsotropicSolid {
+    IsotropicSolid {
+        young,
+        poisson,
+        density,
+    }
+}
 
 impl Material {
     /// Names of the presets.
@@ -45,7 +54,7 @@ impl Material {
                 bending: 8e-6,
                 friction: 0.4,
                 damping: 1.0,
-                ..Self::isotropic("jersey", 1.2e6, 0.071, 543.292_683, 0.000_328, CIPC)
+                ..Self::isotropic("jersey", solid(1.2e6, 0.071, 543.292_683), 0.000_328, CIPC)
             },
             // Sweatshirt fleece, 300 g/m². KES-F, double knits: 5e-5 to 2e-4 N·m.
             "fleece" => Self {
@@ -53,7 +62,7 @@ impl Material {
                 bending: 8e-5,
                 friction: 0.45,
                 damping: 1.5,
-                ..Self::isotropic("fleece", 1.2e6, 0.071, 543.292_683, 0.000_6, CIPC)
+                ..Self::isotropic("fleece", solid(1.2e6, 0.071, 543.292_683), 0.000_6, CIPC)
             },
             _ => return None,
         })
@@ -68,7 +77,7 @@ impl Material {
                 bending: 4e-5,      // KES-F, denim: 2e-5 to 1e-4 N·m
                 friction: 0.45,
                 damping: 1.5,
-                ..Self::isotropic("denim", 2_448_000.0, 0.2, 400.0, 0.000_66, CIPC)
+                ..Self::isotropic("denim", solid(2_448_000.0, 0.2, 400.0), 0.000_66, CIPC)
             },
             // Bending is twice that of a light denim: edges of 21 mm do not resolve finer folds, and a softer sheet
             // crumples at every edge (seen, not measured).
@@ -77,7 +86,7 @@ impl Material {
                 bending: 1e-4,
                 friction: 0.25,
                 damping: 2.0,
-                ..Self::isotropic("twill", 2_448_000.0, 0.2, 400.0, 0.000_66, CIPC)
+                ..Self::isotropic("twill", solid(2_448_000.0, 0.2, 400.0), 0.000_66, CIPC)
             },
             // Weft, warp and base modulus of the table.
             "canvas" => Self {
@@ -86,7 +95,7 @@ impl Material {
                 area_density: 0.294, // stored as 294: grams
                 bending: 2e-4,
                 friction: 0.5,
-                ..Self::isotropic("canvas", 2_009_000.0, 0.2, 294.0, 0.000_53, CIPC)
+                ..Self::isotropic("canvas", solid(2_009_000.0, 0.2, 294.0), 0.000_53, CIPC)
             },
             _ => return None,
         })
@@ -97,21 +106,29 @@ impl Material {
                 bending: 1e-5, // KES-F, shirting: 4e-6 to 1.5e-5 N·m
                 ..Self::isotropic(
                     "cotton",
-                    821_000.0 * 4.0,
-                    0.243,
-                    472.641_509,
+                    solid(821_000.0 * 4.0, 0.243, 472.641_509),
                     0.000_318,
                     CIPC,
                 )
             },
             "wool" => Self {
                 bending: 2e-5, // KES-F, suiting: 5e-6 to 3e-5 N·m
-                ..Self::isotropic("wool", 170_000.0, 0.277, 413.380_282, 0.000_568, CIPC)
+                ..Self::isotropic(
+                    "wool",
+                    solid(170_000.0, 0.277, 413.380_282),
+                    0.000_568,
+                    CIPC,
+                )
             },
             "polyester" => Self {
                 bending: 5e-6, // KES-F, linings: 1e-6 to 8e-6 N·m
                 friction: 0.2,
-                ..Self::isotropic("polyester", 478_000.0, 0.381, 653.174_603, 0.000_252, CIPC)
+                ..Self::isotropic(
+                    "polyester",
+                    solid(478_000.0, 0.381, 653.174_603),
+                    0.000_252,
+                    CIPC,
+                )
             },
             "silk" => Self {
                 stretch_warp: 4_971_000.0 * 0.000_18,
@@ -120,7 +137,7 @@ impl Material {
                 bending: 2e-6,       // KES-F, silk habutai: 1e-6 to 4e-6 N·m
                 friction: 0.2,
                 damping: 0.5,
-                ..Self::isotropic("silk", 570_000.0, 0.3, 461.0, 0.000_18, CIPC)
+                ..Self::isotropic("silk", solid(570_000.0, 0.3, 461.0), 0.000_18, CIPC)
             },
             _ => return None,
         })

@@ -5,7 +5,7 @@ use super::description::{Scene, SceneError};
 use crate::cloth::Sheet;
 use crate::formats::FormatError;
 use crate::formats::obj::{parse_obj, read_obj};
-use crate::garment::Material;
+use crate::garment::{IsotropicSolid, Material};
 use crate::math::{P3, V3d};
 use crate::mesh::TriMesh;
 use serde::Deserialize;
@@ -148,14 +148,12 @@ impl SceneFile {
 /// Sheet whose rest shape is the mesh.
 fn sheet(mesh: &TriMesh, m: &MaterialFile) -> Result<Sheet, SceneError> {
     // The membrane is given as force per width, so any thickness makes the same sheet.
-    let mut material = Material::isotropic(
-        &m.name,
-        m.young_membrane / m.thickness,
-        m.poisson,
-        m.area_density / m.thickness,
-        m.thickness,
-        "scene file",
-    );
+    let solid = IsotropicSolid {
+        young: m.young_membrane / m.thickness,
+        poisson: m.poisson,
+        density: m.area_density / m.thickness,
+    };
+    let mut material = Material::isotropic(&m.name, solid, m.thickness, "scene file");
     (material.bending, material.friction, material.damping) = (m.bending_rigidity, m.friction, 0.0);
     let rest: Vec<[[f64; 2]; 3]> = (0..mesh.faces().len())
         .map(|f| flat(&mesh.corners(f)))

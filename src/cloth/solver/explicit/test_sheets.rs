@@ -3,13 +3,18 @@
 use super::halo::HaloExchange;
 use super::{ContactPlane, PatchModel, PatchState, Pin, StableSheet, StepSpec, Substep, V4};
 use crate::cloth::Sheet;
-use crate::garment::Material;
+use crate::garment::{IsotropicSolid, Material};
 use crate::math::V3d;
 use crate::mesh::Face;
 
 /// An isotropic sheet without air drag: 0.18 kg/m², 1000 N/m, Poisson 0.25.
 pub(super) fn cotton(bending: f64) -> Material {
-    let mut m = Material::isotropic("test", 1000.0 / 3e-4, 0.25, 0.18 / 3e-4, 3e-4, "test");
+    let solid = IsotropicSolid {
+        young: 1000.0 / 3e-4,
+        poisson: 0.25,
+        density: 0.18 / 3e-4,
+    };
+    let mut m = Material::isotropic("test", solid, 3e-4, "test");
     (m.bending, m.damping) = (bending, 0.0);
     m
 }
