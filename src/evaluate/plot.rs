@@ -2,6 +2,7 @@
 
 use super::{EvaluateError, Table};
 use plotters::prelude::*;
+use std::ops::Range;
 
 /// Size of a plot, pixels.
 const SIZE: (u32, u32) = (860, 520);
@@ -44,28 +45,21 @@ pub fn run_time_against_error(table: &Table, error: &str) -> Result<Option<Strin
         lo..hi
     };
     let mut svg = String::new();
-    draw(
-        &mut svg,
-        table,
-        error,
-        &series,
-        span(|p| p.0),
-        span(|p| p.1),
-    )
-    .map_err(|e| EvaluateError::Plot {
+    let axes = [span(|p| p.0), span(|p| p.1)];
+    draw(&mut svg, table, error, &series, axes).map_err(|e| EvaluateError::Plot {
         error: error.to_owned(),
         why: e.to_string(),
     })?;
     Ok(Some(svg))
 }
 
+/// Draws the series over the `axes`, x then y.
 fn draw(
     svg: &mut String,
     table: &Table,
     error: &str,
     series: &[(String, Vec<(f64, f64)>)],
-    x: std::ops::Range<f64>,
-    y: std::ops::Range<f64>,
+    [x, y]: [Range<f64>; 2],
 ) -> Result<(), Box<dyn std::error::Error>> {
     let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
