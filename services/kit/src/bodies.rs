@@ -32,6 +32,28 @@ pub enum News {
     Gone(String),
 }
 
+/// Session of the subscription.
+struct FollowedSession {
+    id: String,
+    /// Camera to open the session with, before each stream.
+    camera: Option<CameraKey>,
+}
+
+impl FollowedSession {
+    /// Opens the session if it has a camera.
+    async fn open(&self, client: &mut TrackingServiceClient<Channel>) -> Result<(), tonic::Status> {
+        if let Some(key) = &self.camera {
+            let message = OpenSessionRequest {
+                session_id: self.id.clone(),
+                store: key.store().into(),
+                camera: key.camera().into(),
+            };
+            client.open_session(request(message)).await?;
+        }
+        Ok(())
+    }
+}
+
 /// Follows `session` until the receiver of `news` is gone. With `open`, each stream opens the session first.
 ///
 /// The newest state wins. Shapes are never lost: they are joined to states before the queue drops any.
@@ -44,14 +66,17 @@ pub async fn follow(
 ) {
     let mut client =
         TrackingServiceClient::new(channel).max_decoding_message_size(MAX_TEMPLATE_BYTES);
+    let session = FollowedSession {
+        id: session,
+        camera: open,
+    };
     let mut wait = pauses();
     while !news.is_closed() {
         let mut any = false;
-        let why =
-            match one_stream(&mut client, &session, open.as_ref(), &pool, &news, &mut any).await {
-                Ok(()) => "the session was closed".into(),
-                Err(why) => why,
-            };
+        let why = match one_stream(&mut client, &session, &pool, &news, &mut any).await {
+            Ok(()) => "the session was closed".into(),
+            Err(why) => why,
+        };
         if any {
             wait = pauses();
         }
@@ -64,21 +89,13 @@ pub async fn follow(
 
 async fn one_stream(
     client: &mut TrackingServiceClient<Channel>,
-    session: &str,
-    open: Option<&CameraKey>,
+    session: &FollowedSession,
     pool: &Pool,
     news: &latest::Sender<News>,
     any: &mut bool,
 ) -> Result<(), String> {
     let said = |s: tonic::Status| s.message().to_owned();
-    if let Some(key) = open {
-        let message = OpenSessionRequest {
-            session_id: session.into(),
-            store: key.store().into(),
-            camera: key.camera().into(),
-        };
-        client.open_session(request(message)).await.map_err(said)?;
-    }
+    session.open(client).await.map_err(said)?;
     let template = client
         .get_body_template(request(GetBodyTemplateRequest::default()))
         .await;
@@ -95,7 +112,7 @@ async fn one_stream(
     let template = Arc::new(template);
     let call = client
         .stream_body_states(StreamBodyStatesRequest {
-            session_id: session.into(),
+            session_id: session.id.clone(),
         })
         .await;
     let mut states = call.map_err(said)?.into_inner();

@@ -8,7 +8,6 @@ use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
 use std::process::ExitCode;
 use tryon::body::BoneTransforms;
-use tryon::camera::RgbdFrame;
 use tryon::formats::obj::write_obj;
 use tryon::formats::{RgbdSource, open_recording};
 use tryon::par::with_threads;
@@ -83,7 +82,14 @@ fn track_all(
             .with_context(|| format!("frame {index}"))?;
         let ms = started.elapsed().as_secs_f64() * 1e3;
         live += u64::from(state.status.is_live());
-        serde_json::to_writer(&mut *out, &line(index, &frame, model, &state, &report, ms))?;
+        let tracked = TrackedFrame {
+            index,
+            time_ns: frame.time_ns,
+            state: &state,
+            report: &report,
+            ms,
+        };
+        serde_json::to_writer(&mut *out, &tracked.line(model))?;
         out.write_all(b"\n")?;
         if let Some(dir) = &args.meshes {
             let (vertices, _) = workspace.posed(model, &state);
@@ -107,46 +113,52 @@ fn track_all(
     Ok(())
 }
 
-/// Output line of one frame.
-fn line(
+/// Result of one frame.
+struct TrackedFrame<'a> {
     index: usize,
-    frame: &RgbdFrame,
-    model: &TrackerModel,
-    state: &TrackerState,
-    report: &StepReport,
+    time_ns: u64,
+    state: &'a TrackerState,
+    report: &'a StepReport,
+    /// Time of the step, milliseconds.
     ms: f64,
-) -> serde_json::Value {
-    let skeleton = model.template().skeleton();
-    let rest = model.template().personalise(&state.shape);
-    let mut bones = BoneTransforms::default();
-    state.pose.bones(skeleton, &rest, &mut bones);
-    let joints: BTreeMap<&str, [f64; 3]> = skeleton
-        .joints()
-        .iter()
-        .zip(&bones.joints)
-        .map(|(j, p)| (j.name.as_str(), [p.x, p.y, p.z]))
-        .collect();
-    let scales: BTreeMap<&str, f64> = skeleton
-        .joints()
-        .iter()
-        .zip(&state.shape.bone_scales)
-        .map(|(j, s)| (j.name.as_str(), *s))
-        .collect();
-    json!({
-        "frame": index,
-        "time_ns": frame.time_ns,
-        "status": state.status,
-        "joints": joints,
-        "pose": state.pose,
-        "scales": scales,
-        "shape": state.shape.coefficients,
-        "residual_mm": report.residual_mm,
-        "visible_points": report.visible_points,
-        "iterations": report.iterations,
-        "converged": report.converged,
-        "pose_age": report.pose_age,
-        "skipped": report.skipped,
-        "ms": ms,
-        "stages_ms": report.stages_ms,
-    })
+}
+
+impl TrackedFrame<'_> {
+    /// Output line.
+    fn line(&self, model: &TrackerModel) -> serde_json::Value {
+        let Self { state, report, .. } = self;
+        let skeleton = model.template().skeleton();
+        let rest = model.template().personalise(&state.shape);
+        let mut bones = BoneTransforms::default();
+        state.pose.bones(skeleton, &rest, &mut bones);
+        let joints: BTreeMap<&str, [f64; 3]> = skeleton
+            .joints()
+            .iter()
+            .zip(&bones.joints)
+            .map(|(j, p)| (j.name.as_str(), [p.x, p.y, p.z]))
+            .collect();
+        let scales: BTreeMap<&str, f64> = skeleton
+            .joints()
+            .iter()
+            .zip(&state.shape.bone_scales)
+            .map(|(j, s)| (j.name.as_str(), *s))
+            .collect();
+        json!({
+            "frame": self.index,
+            "time_ns": self.time_ns,
+            "status": state.status,
+            "joints": joints,
+            "pose": state.pose,
+            "scales": scales,
+            "shape": state.shape.coefficients,
+            "residual_mm": report.residual_mm,
+            "visible_points": report.visible_points,
+            "iterations": report.iterations,
+            "converged": report.converged,
+            "pose_age": report.pose_age,
+            "skipped": report.skipped,
+            "ms": self.ms,
+            "stages_ms": report.stages_ms,
+        })
+    }
 }
