@@ -13,14 +13,13 @@ use tryon::raster::{
     Cull, Options, View, VisibilityBuffer, rasterise, rasterise_reference, rasterise_with,
 };
 
-/// A closed ellipsoid.
+/// Adds a closed ellipsoid.
 fn ellipsoid(
     centre: [f32; 3],
     radius: [f32; 3],
     around: u32,
     down: u32,
-    v: &mut Vec<P3>,
-    f: &mut Vec<Face>,
+    (v, f): &mut (Vec<P3>, Vec<Face>),
 ) {
     let base = v.len() as u32;
     for i in 0..=down {
@@ -44,28 +43,26 @@ fn ellipsoid(
 
 /// Trunk, head, arms and legs: 13,240 vertices, 26,000 faces, as many as the paper's template.
 fn figure() -> (Vec<P3>, Vec<Face>) {
-    let (mut v, mut f) = (Vec::new(), Vec::new());
-    ellipsoid([0.0, 0.0, 2.5], [0.18, 0.32, 0.12], 60, 60, &mut v, &mut f);
-    ellipsoid([0.0, -0.5, 2.5], [0.09, 0.13, 0.1], 40, 40, &mut v, &mut f);
+    let mut mesh = (Vec::new(), Vec::new());
+    ellipsoid([0.0, 0.0, 2.5], [0.18, 0.32, 0.12], 60, 60, &mut mesh);
+    ellipsoid([0.0, -0.5, 2.5], [0.09, 0.13, 0.1], 40, 40, &mut mesh);
     for side in [-1.0, 1.0] {
         ellipsoid(
             [side * 0.1, 0.7, 2.5],
             [0.08, 0.45, 0.08],
             40,
             60,
-            &mut v,
-            &mut f,
+            &mut mesh,
         );
         ellipsoid(
             [side * 0.35, 0.0, 2.5],
             [0.06, 0.4, 0.06],
             30,
             50,
-            &mut v,
-            &mut f,
+            &mut mesh,
         );
     }
-    (v, f)
+    mesh
 }
 
 fn raster(c: &mut Criterion) {

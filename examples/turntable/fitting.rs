@@ -70,11 +70,11 @@ impl Fitting {
     pub(crate) fn dress(
         a: &Args,
         person: &Person,
-        start: &Pose<World>,
         outfit: &str,
         body: &str,
         size: &str,
     ) -> Option<Self> {
+        let start = &start_pose(a, person);
         let measures = measure(&person.template, &person.rest).expect("measurable");
         let worn: Vec<Garment> = (outfit.split('+'))
             .map(|g| Garment::load(a, g, body, size, &measures))

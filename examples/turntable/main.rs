@@ -58,8 +58,8 @@ fn outfit(a: &Args, outfit: &str, body: &str, size: &str) -> (Vec<DrawnMesh>, Tu
         y,
         centre,
     };
-    let start = fitting::start_pose(a, &person);
-    let Some(mut fitting) = Fitting::dress(a, &person, &start, outfit, body, size) else {
+    let Some(mut fitting) = Fitting::dress(a, &person, outfit, body, size) else {
+        let start = fitting::start_pose(a, &person);
         let vertices = person::posed(&template, &person.rest, &start);
         let y = height_range(&vertices);
         return (
