@@ -157,6 +157,8 @@ const DOORS: &[(&str, &[&str])] = &[
 const MAX_LINES: usize = 600;
 /// Longest function, lines from `fn` to its closing brace. Around 30 is the aim.
 const MAX_FUNCTION_LINES: usize = 80;
+/// Most parameters of a function without `self`; more are a struct with a meaning of its own.
+const MAX_PARAMETERS: usize = 5;
 /// Longest document, bytes: what a person reads in one sitting.
 const MAX_DOCUMENT_BYTES: usize = 20_000;
 /// Words that no comment opens with: a comment says what a thing is, by the field's term.
@@ -351,6 +353,22 @@ fn functions_fit_a_head() {
 }
 
 #[test]
+fn functions_have_few_parameters() {
+    let mut faults = Vec::new();
+    for file in source::rust() {
+        for f in source::signatures(&code(&file.text)) {
+            if f.parameters > MAX_PARAMETERS {
+                faults.push(format!(
+                    "{}:{}: `{}` has {} parameters (at most {MAX_PARAMETERS})",
+                    file.path, f.line, f.name, f.parameters
+                ));
+            }
+        }
+    }
+    assert_none(&faults);
+}
+
+#[test]
 fn comments_say_what_a_thing_is() {
     let mut faults = Vec::new();
     for file in source::rust() {
@@ -477,6 +495,17 @@ fn the_scanner_finds_circles_through_reexports_and_none_through_tests() {
     let [module, a, _, c] = all;
     let all = [module, a, file("src/m/b.rs", tested), c];
     assert!(imports::circles(&imports::Library::new(&all).imports()).is_empty());
+}
+
+#[test]
+fn the_scanner_counts_parameters_without_self() {
+    let text = "fn f<T, U: Fn(T, u8) -> u8>(\n    &'a mut self,\n    (a, b): (T, u8),\n    f: impl Fn(u8, u8) -> u8,\n) {}\npub(crate) const fn g();\nfn h(self: Arc<Self>, x: [u8; 2], _: &str);\n";
+    let found = source::signatures(text);
+    let found: Vec<_> = found
+        .iter()
+        .map(|f| (&f.name[..], f.line, f.parameters))
+        .collect();
+    assert_eq!(found, [("f", 1, 2), ("g", 6, 0), ("h", 7, 2)]);
 }
 
 #[test]

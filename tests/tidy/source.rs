@@ -1,4 +1,4 @@
-//! The repository's text: files, code without comments and tests, functions and their lengths.
+//! The repository's text: files, code without comments and tests, functions, their lengths and parameters.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -116,6 +116,63 @@ pub(crate) fn functions(source: &str) -> Vec<Function> {
         }
     }
     found
+}
+
+/// A function as declared.
+pub(crate) struct Signature {
+    pub(crate) name: String,
+    /// Line of `fn`, from 1.
+    pub(crate) line: usize,
+    /// Number of parameters without `self`.
+    pub(crate) parameters: usize,
+}
+
+/// Functions with or without a body, nested ones too.
+pub(crate) fn signatures(code: &str) -> Vec<Signature> {
+    let lines: Vec<&str> = code.lines().collect();
+    let mut found = Vec::new();
+    for (n, line) in lines.iter().enumerate() {
+        if let Some(name) = function_name(line) {
+            found.push(Signature {
+                name,
+                line: n + 1,
+                parameters: parameters(&lines[n..].join("\n")),
+            });
+        }
+    }
+    found
+}
+
+/// Number of parameters without `self` of the function that opens the text.
+fn parameters(text: &str) -> usize {
+    let (mut depth, mut start, mut list) = (0_usize, 0, Vec::new());
+    for (at, c) in text.char_indices() {
+        match c {
+            '(' | '[' | '{' | '<' => {
+                if depth == 0 {
+                    start = at + 1;
+                    list.clear(); // generics, or `pub(crate)`
+                }
+                depth += 1;
+            }
+            ',' if depth == 1 => {
+                list.push(&text[start..at]);
+                start = at + 1;
+            }
+            '>' if text[..at].ends_with('-') => {}
+            ')' | ']' | '}' | '>' => {
+                depth = depth.saturating_sub(1);
+                if depth == 0 && c == ')' && !text[..start].ends_with("pub(") {
+                    list.push(&text[start..at]);
+                    break;
+                }
+            }
+            _ => {}
+        }
+    }
+    let is_self = |p: &str| p.ends_with("self") || p.starts_with("self:");
+    let list = list.iter().map(|p| p.trim());
+    list.filter(|p| !p.is_empty() && !is_self(p)).count()
 }
 
 /// Name declared by a line that opens a function, with any qualifiers before `fn`.
