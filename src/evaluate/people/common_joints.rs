@@ -94,12 +94,19 @@ pub(super) struct FrameError {
 
 impl FrameError {
     pub(super) fn new(ours: &Points, truth: &Points) -> Self {
+        Self::among(ours, truth, |_| true)
+    }
+    /// Errors of the joints whose true position is wanted; NaN when none is.
+    pub(super) fn among(ours: &Points, truth: &Points, is_wanted: impl Fn(&P3d) -> bool) -> Self {
         let off = errors_mm(ours, truth);
-        let k = (0..COUNT).fold(0, |a, b| if off[b] > off[a] { b } else { a });
+        let wanted: Vec<usize> = (0..COUNT).filter(|&k| is_wanted(&truth[k])).collect();
+        let worst = wanted.iter().copied();
+        let worst = worst.max_by(|&a, &b| off[a].total_cmp(&off[b]));
+        let values: Vec<f64> = wanted.iter().map(|&k| off[k]).collect();
         Self {
-            mean: mean(&off),
-            worst: off[k],
-            joint: JOINTS[k].0,
+            mean: mean(&values),
+            worst: worst.map_or(f64::NAN, |k| off[k]),
+            joint: worst.map_or("none", |k| JOINTS[k].0),
         }
     }
     /// Mean over 120 mm, or a joint over 300 mm.
@@ -176,6 +183,17 @@ mod tests {
         lost[4] += V3d::new(0.0, 0.35, 0.0);
         let error = FrameError::new(&lost, &offsets.convert(&truth));
         assert!(error.is_bad() && error.joint == "left wrist");
+    }
+
+    #[test]
+    fn only_wanted_joints_count() {
+        let truth = figure();
+        let mut ours = truth;
+        ours[10] += V3d::new(1.0, 0.0, 0.0);
+        let above = |p: &P3d| p.y < -0.6;
+        assert!(FrameError::among(&ours, &truth, above).worst < 1e-9);
+        let none = FrameError::among(&ours, &truth, |_| false);
+        assert!(none.mean.is_nan() && none.is_bad());
     }
 
     #[test]

@@ -6,14 +6,14 @@ use super::contact_sheet::ContactSheet;
 use super::person::Person;
 use super::session::TrackedSession;
 use crate::body::embedded;
-use crate::camera::{DepthImage, NoiseModel};
+use crate::camera::{DepthImage, Intrinsics, NoiseModel};
 use crate::math::P3d;
 use crate::synth::{Posture, Room, Routine, Sequence, Setting};
 use rand::{Rng, SeedableRng};
 
 /// Frames until a person must be found.
 const FRAMES: u64 = 10;
-/// Found: mean joint error and greatest, millimetres.
+/// Found: mean joint error and greatest of the joints in view, millimetres.
 const FOUND_MEAN: f64 = 60.0;
 const FOUND_WORST: f64 = 200.0;
 /// Turn to either side, radians, and distances, metres.
@@ -88,6 +88,13 @@ fn still(person: &Person, setting: Setting) -> Still {
     }
 }
 
+/// A joint in the picture: of the others nothing can be known.
+fn is_in_view(camera: &Intrinsics, p: &P3d) -> bool {
+    let q = camera.project(&p.cast());
+    let (w, h) = (camera.width as f32, camera.height as f32);
+    p.z > 0.0 && (0.0..w).contains(&q.x) && (0.0..h).contains(&q.y)
+}
+
 /// Measures the row on `people`.
 pub(super) fn measure(people: &[Person], sheet: &mut ContactSheet) -> Vec<Bar> {
     let mut hits: [Vec<bool>; POSES.len()] = Default::default();
@@ -101,7 +108,10 @@ pub(super) fn measure(people: &[Person], sheet: &mut ContactSheet) -> Vec<Bar> {
             let truth = offsets
                 .as_ref()
                 .map_or(still.truth, |o| o.convert(&still.truth));
-            let error = still.found.map(|f| FrameError::new(&f, &truth));
+            let camera = still.sequence.setting().camera;
+            let error = still
+                .found
+                .map(|f| FrameError::among(&f, &truth, |p| is_in_view(&camera, p)));
             let is_found = error.is_some_and(|e| e.mean < FOUND_MEAN && e.worst < FOUND_WORST);
             hits[k].push(is_found);
             if !is_found {
@@ -109,7 +119,6 @@ pub(super) fn measure(people: &[Person], sheet: &mut ContactSheet) -> Vec<Bar> {
                 let worst = error.map_or(9999.0, |e| e.worst);
                 misses[k].push((format!("{} ({name})", person.name), worst));
             }
-            let camera = still.sequence.setting().camera;
             sheet.add(&camera, &still.depth, Some(&truth), still.found.as_ref());
         }
     }
