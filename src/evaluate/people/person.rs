@@ -47,7 +47,9 @@ impl Person {
     }
 
     fn new(name: String, template: Arc<Template>, shape: BodyShape, is_foreign: bool) -> Self {
-        let appearance = name.bytes().fold(7u64, |h, b| h * 31 + u64::from(b));
+        let appearance = name
+            .bytes()
+            .fold(7u64, |h, b| h.wrapping_mul(31).wrapping_add(u64::from(b)));
         Self {
             common: CommonJoints::new(template.skeleton()),
             name,
