@@ -10,6 +10,7 @@ mod depth_scene;
 mod error;
 mod inside;
 mod outfit;
+pub mod parts;
 pub mod people;
 mod plot;
 pub mod rest;

@@ -3,7 +3,7 @@
 use super::TrackerConfig;
 use super::leg::{Leg, legs};
 use super::limb::{self, Limb};
-use crate::body::parts::{BodySegment, BodySide};
+use crate::body::parts::{BodyPart, BodySegment, BodySide};
 use crate::body::{JointMotion, SkinWeights, Template};
 use crate::camera::Calibration;
 use crate::math::{P3, V3};
@@ -136,6 +136,18 @@ impl TrackerModel {
             below_knee,
             seen_shares,
         }
+    }
+    /// Arms and legs with their parts, for a skeleton that has them.
+    pub(super) fn limbs(&self) -> impl Iterator<Item = (BodyPart, &Limb)> {
+        let parts = [
+            (BodyPart::LeftArm, &self.arms[0]),
+            (BodyPart::RightArm, &self.arms[1]),
+            (BodyPart::LeftLeg, &self.legs[0]),
+            (BodyPart::RightLeg, &self.legs[1]),
+        ];
+        parts
+            .into_iter()
+            .filter_map(|(part, limb)| limb.as_ref().map(|l| (part, l)))
     }
     /// Template of the tracked body.
     pub fn template(&self) -> &Arc<Template> {
