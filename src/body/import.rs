@@ -247,25 +247,12 @@ mod tests {
     use super::*;
     use crate::body::{BodyShape, Pose};
     use crate::formats::npz::read_smpl;
+    use crate::formats::shared_data;
     use crate::math::{Body, Rigid};
-    use std::path::PathBuf;
+    use std::path::{Path, PathBuf};
 
     fn makehuman(file: &str) -> Option<PathBuf> {
-        let root = std::env::var_os("TRYON_SHARED").map_or_else(
-            || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"),
-            PathBuf::from,
-        );
-        let path = root.join("data/body/makehuman_smpl_layout").join(file);
-        if path.exists() {
-            return Some(path);
-        }
-        assert!(
-            std::env::var_os("TRYON_REQUIRE_ALL").is_none(),
-            "{} is missing",
-            path.display()
-        );
-        eprintln!("SKIPPED: {} is missing", path.display());
-        None
+        shared_data(Path::new("body/makehuman_smpl_layout").join(file))
     }
 
     #[test]

@@ -404,7 +404,6 @@ impl AmcPose {
 mod tests {
     use super::*;
     use crate::formats::read_motion;
-    use std::path::PathBuf;
 
     const ASF: &str = ":version 1.10\n:units\n length 0.0254\n angle deg\n:root\n order TX TY TZ RX RY RZ\n:bonedata\n begin\n  id 1\n  name thigh\n  direction 0 -1 0\n  length 2\n  axis 0 0 90 XYZ\n  dof rx\n end\n begin\n  id 2\n  name shin\n  direction 0 -1 0\n  length 1\n  axis 0 0 0 XYZ\n  dof rz\n end\n:hierarchy\n begin\n  root thigh\n  thigh shin\n end\n";
 
@@ -453,21 +452,9 @@ mod tests {
 
     #[test]
     fn shared_clips_keep_bone_lengths_and_human_proportions() {
-        let root = std::env::var_os("TRYON_SHARED")
-            .map_or_else(
-                || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"),
-                PathBuf::from,
-            )
-            .join("data/motion");
-        if !root.exists() {
-            assert!(
-                std::env::var_os("TRYON_REQUIRE_ALL").is_none(),
-                "{} is missing",
-                root.display()
-            );
-            eprintln!("SKIPPED: {} is missing", root.display());
+        let Some(root) = crate::formats::shared_data("motion") else {
             return;
-        }
+        };
         for (file, frames, names) in [
             ("cmu_asf_amc/02_07.amc", 0, ["lfemur", "ltibia", "lfoot"]),
             ("cmu_asf_amc/93_04.amc", 0, ["lfemur", "ltibia", "lfoot"]),

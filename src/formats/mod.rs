@@ -21,6 +21,8 @@ mod recording;
 mod rgbd_folder;
 mod rgbd_source;
 pub mod sewn_obj;
+#[cfg(test)]
+mod shared_data;
 
 pub use error::FormatError;
 pub use mcap_file::{McapReader, McapWriter};
@@ -30,3 +32,5 @@ pub use position_codec::{PositionCoder, STEP as POSITION_STEP};
 pub use recording::open_recording;
 pub use rgbd_folder::{RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};
 pub use rgbd_source::RgbdSource;
+#[cfg(test)]
+pub(crate) use shared_data::shared_data;

@@ -8,8 +8,8 @@ use std::path::Path;
 
 /// Largest text, bytes; the largest shared target has 600 kB.
 const MAX_BYTES: u64 = 64 << 20;
-/// Metres in the file's unit (decimetre).
-const UNIT: f32 = 0.1;
+/// Metres in MakeHuman's unit, the decimetre.
+pub const MAKEHUMAN_UNIT: f32 = 0.1;
 
 /// Offsets of vertices, metres.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -73,7 +73,7 @@ pub fn parse_morph_target(text: &str, origin: &Path) -> Result<MorphTarget, Form
         let (Some(vertex), &[x, y, z]) = (vertex, numbers.as_slice()) else {
             return Err(fault());
         };
-        let offset = [x, y, z].map(|c| c * UNIT);
+        let offset = [x, y, z].map(|c| c * MAKEHUMAN_UNIT);
         if !offset.iter().all(|c| c.is_finite()) {
             return Err(fault());
         }

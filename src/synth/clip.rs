@@ -215,26 +215,11 @@ impl Performance {
 
 #[cfg(test)]
 mod tests {
-    use crate::formats::{MotionClip, read_motion};
+    use crate::formats::{MotionClip, read_motion, shared_data};
     use crate::synth::{Actor, Sequence, Setting};
-    use std::path::PathBuf;
 
     fn shared(name: &str) -> Option<MotionClip> {
-        let root = std::env::var_os("TRYON_SHARED")
-            .map_or_else(
-                || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"),
-                PathBuf::from,
-            )
-            .join("data/motion");
-        if !root.exists() {
-            assert!(
-                std::env::var_os("TRYON_REQUIRE_ALL").is_none(),
-                "{} is missing",
-                root.display()
-            );
-            eprintln!("SKIPPED: {} is missing", root.display());
-            return None;
-        }
+        let root = shared_data("motion")?;
         Some(read_motion(&root.join(name)).expect(name))
     }
 

@@ -46,20 +46,6 @@ pub struct Physique {
     pub covering: Option<Covering>,
 }
 
-impl Default for Physique {
-    /// No change.
-    fn default() -> Self {
-        Self {
-            belly: None,
-            legs: 1.0,
-            head: 1.0,
-            scale: 1.0,
-            stoop: 0.0,
-            covering: None,
-        }
-    }
-}
-
 /// Share of the stoop of each joint of the spine; the neck takes [`NECK`] of it back.
 const SPINE: [(&str, f64); 3] = [("spine1", 0.25), ("spine2", 0.4), ("spine3", 0.35)];
 const NECK: f64 = -0.8;
@@ -71,6 +57,16 @@ const COAT: [f32; 3] = [0.07, 0.10, 0.04];
 const HAIR: [f32; 2] = [0.035, 0.065];
 
 impl Physique {
+    /// No change.
+    pub const UNCHANGED: Self = Self {
+        belly: None,
+        legs: 1.0,
+        head: 1.0,
+        scale: 1.0,
+        stoop: 0.0,
+        covering: None,
+    };
+
     /// A template of the changed body. `arrays` hold the base body; its regressor places the joints.
     ///
     /// # Errors

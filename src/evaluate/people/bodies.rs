@@ -3,7 +3,7 @@
 use super::person::Person;
 use crate::body::Template;
 use crate::evaluate::EvaluateError;
-use crate::formats::morph_target::read_morph_target;
+use crate::formats::morph_target::{MAKEHUMAN_UNIT, read_morph_target};
 use crate::formats::npz::{SmplArrays, read_smpl};
 use crate::formats::obj::read_obj;
 use crate::synth::{Belly, Covering, Physique};
@@ -16,8 +16,6 @@ pub(super) const FOLDER: &str = "body/makehuman_hm08_cc0";
 const RIGGED: &str = "body/makehuman_smpl_layout/template.npz";
 /// Base mesh below [`FOLDER`].
 const BASE: &str = "makehuman_app/3dobjs/base.obj";
-/// Metres in MakeHuman's unit.
-const UNIT: f32 = 0.1;
 
 /// Recipe of a body: sex, shares of muscle and weight targets, measures, and changes.
 struct Recipe {
@@ -30,14 +28,7 @@ struct Recipe {
     physique: Physique,
 }
 
-const PLAIN: Physique = Physique {
-    belly: None,
-    legs: 1.0,
-    head: 1.0,
-    scale: 1.0,
-    stoop: 0.0,
-    covering: None,
-};
+const PLAIN: Physique = Physique::UNCHANGED;
 
 const fn belly(depth: f32, height: f32, radius: [f32; 2]) -> Option<Belly> {
     Some(Belly {
@@ -184,7 +175,9 @@ impl<'a> MorphBase<'a> {
             .map_err(|e| e.to_string())?
             .mesh;
         let body = mesh.vertices().iter().take(rigged.vertices.len());
-        let vertices: Vec<[f32; 3]> = body.map(|p| [p.x, p.y, p.z].map(|c| c * UNIT)).collect();
+        let vertices: Vec<[f32; 3]> = body
+            .map(|p| [p.x, p.y, p.z].map(|c| c * MAKEHUMAN_UNIT))
+            .collect();
         if vertices.len() < rigged.vertices.len() {
             return Err(format!("{BASE}: {} vertices", vertices.len()));
         }
@@ -257,24 +250,7 @@ pub(super) fn bodies(data: Option<&Path>) -> Result<Vec<Person>, EvaluateError> 
 mod tests {
     use super::*;
     use crate::body::measure::measure;
-    use std::path::PathBuf;
-
-    fn shared() -> Option<PathBuf> {
-        let root = std::env::var_os("TRYON_SHARED").map_or_else(
-            || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"),
-            PathBuf::from,
-        );
-        let data = root.join("data");
-        if data.join(FOLDER).exists() {
-            return Some(data);
-        }
-        assert!(
-            std::env::var_os("TRYON_REQUIRE_ALL").is_none(),
-            "{FOLDER} is missing"
-        );
-        eprintln!("SKIPPED: {FOLDER} is missing");
-        None
-    }
+    use crate::formats::shared_data;
 
     #[test]
     fn no_data_is_no_body() {
@@ -285,8 +261,9 @@ mod tests {
 
     #[test]
     fn the_average_woman_is_that_of_the_rigged_set() {
-        let Some(data) = shared() else { return };
-        let folder = data.join(FOLDER);
+        let (Some(folder), Some(data)) = (shared_data(FOLDER), shared_data("")) else {
+            return;
+        };
         let base = MorphBase::read(&data, &folder).expect("base");
         let average = Recipe {
             name: "average",
@@ -309,7 +286,9 @@ mod tests {
 
     #[test]
     fn bodies_have_the_measures_that_their_names_say() {
-        let Some(data) = shared() else { return };
+        let Some(data) = shared_data(FOLDER).and(shared_data("")) else {
+            return;
+        };
         let people = bodies(Some(&data)).expect("bodies");
         let of = |name: &str| {
             let actor = &people.iter().find(|p| p.name == name).expect(name).actor;

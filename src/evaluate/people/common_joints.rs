@@ -55,10 +55,15 @@ pub(super) fn torso(p: &Points) -> P3d {
     P3d::from((p[0].coords + p[1].coords + p[6].coords + p[7].coords) / 4.0)
 }
 
+/// From the right to the left shoulder and hip, summed, metres.
+fn to_the_left(p: &Points) -> V3d {
+    (p[0] - p[1]) + (p[6] - p[7])
+}
+
 /// Axes of the torso (left, up, front) as columns; identity for a degenerate one.
 pub(super) fn torso_axes(p: &Points) -> Matrix3<f64> {
     let up = (p[0] - p[6]) + (p[1] - p[7]);
-    let left = (p[0] - p[1]) + (p[6] - p[7]);
+    let left = to_the_left(p);
     let axes = || {
         let y = up.try_normalize(f64::EPSILON)?;
         let z = left.cross(&y).try_normalize(f64::EPSILON)?;
@@ -70,7 +75,7 @@ pub(super) fn torso_axes(p: &Points) -> Matrix3<f64> {
 /// Angle between the headings of two torsos about the vertical `up`, radians.
 pub(super) fn heading_error(ours: &Points, truth: &Points, up: &V3d) -> f64 {
     let level = |p: &Points| {
-        let left = (p[0] - p[1]) + (p[6] - p[7]);
+        let left = to_the_left(p);
         left - up * left.dot(up)
     };
     level(ours).angle(&level(truth))
@@ -80,6 +85,11 @@ pub(super) fn heading_error(ours: &Points, truth: &Points, up: &V3d) -> f64 {
 pub(super) fn errors_mm(ours: &Points, truth: &Points) -> [f64; COUNT] {
     std::array::from_fn(|k| (ours[k] - truth[k]).norm() * 1e3)
 }
+
+/// Largest mean and joint error of a usable pose, millimetres; the limits of the real recordings' judges.
+const USABLE_MEAN: f64 = 120.0;
+/// See [`USABLE_MEAN`].
+const USABLE_WORST: f64 = 300.0;
 
 /// Errors of one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,9 +119,9 @@ impl FrameError {
             joint: worst.map_or("none", |k| JOINTS[k].0),
         }
     }
-    /// Mean over 120 mm, or a joint over 300 mm.
+    /// Mean or worst joint above the limits of a usable pose; also without any joint.
     pub(super) fn is_bad(&self) -> bool {
-        !(self.mean <= 120.0 && self.worst <= 300.0)
+        !(self.mean <= USABLE_MEAN && self.worst <= USABLE_WORST)
     }
 }
 

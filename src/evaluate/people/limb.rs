@@ -32,8 +32,7 @@ const JUMPS: [[Posture; 2]; 8] = [
     [Posture::HandsJoined, Posture::HandsOnHips],
 ];
 
-fn sequence(case: usize, posture: Posture) -> Sequence {
-    let person = Person::random(FIRST_PERSON + case);
+fn sequence(person: &Person, case: usize, posture: Posture) -> Sequence {
     let setting = Setting {
         world_from_camera: Setting::tilted(1.1, 4.0, 0.0),
         turn: 0.2 * (case % 5) as f64 - 0.4,
@@ -44,13 +43,13 @@ fn sequence(case: usize, posture: Posture) -> Sequence {
         seed: 300 + case as u64,
         ..Setting::default()
     };
-    Sequence::new(person.actor, setting)
+    Sequence::new(person.actor.clone(), setting)
 }
 
 /// Frames until all joints of each arm are within [`FOUND`]; [`AFTER`] when they never are.
 fn jump(case: usize, sheet: &mut ContactSheet) -> [f64; 2] {
     let person = Person::random(FIRST_PERSON + case);
-    let [from, to] = JUMPS[case % JUMPS.len()].map(|p| sequence(case, p));
+    let [from, to] = JUMPS[case % JUMPS.len()].map(|p| sequence(&person, case, p));
     let mut session = TrackedSession::new(&embedded::template(), from.calibration());
     let set = from.setting().clone();
     let (surface, _) = from.surface_depth(0);

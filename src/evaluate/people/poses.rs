@@ -16,6 +16,8 @@ const FRAMES: u64 = 10;
 /// Found: mean joint error and greatest of the joints in view, millimetres.
 const FOUND_MEAN: f64 = 60.0;
 const FOUND_WORST: f64 = 200.0;
+/// Stands for the error of a lost person, millimetres: above every measured one.
+const LOST: f64 = 9999.0;
 /// Turn to either side, radians, and distances, metres.
 const TURN: f64 = 0.35;
 const AWAY: [f64; 2] = [2.1, 2.8];
@@ -116,7 +118,7 @@ pub(super) fn measure(people: &[Person], sheet: &mut ContactSheet) -> Vec<Bar> {
             hits[k].push(is_found);
             if !is_found {
                 let name = error.map_or("lost".to_owned(), |e| e.joint.to_owned());
-                let worst = error.map_or(9999.0, |e| e.worst);
+                let worst = error.map_or(LOST, |e| e.worst);
                 misses[k].push((format!("{} ({name})", person.name), worst));
             }
             sheet.add(&camera, &still.depth, Some(&truth), still.found.as_ref());

@@ -19,6 +19,8 @@ use std::f64::consts::{FRAC_PI_4, TAU};
 const SIDES: usize = 8;
 /// Frames until size and shape no longer change, with a margin.
 const FRAMES: u64 = 72;
+/// Stands for the heading of a lost person, degrees: above every measured one.
+const LOST: f64 = 999.0;
 /// Garment whose size is suggested.
 const GARMENT: &str = "tshirt";
 
@@ -86,7 +88,7 @@ pub(super) fn measure(people: &[Person], sheet: &mut ContactSheet) -> Vec<Bar> {
                 let off = if s.is_live {
                     s.heading.to_degrees()
                 } else {
-                    999.0
+                    LOST
                 };
                 wrong.push((format!("{} from {}°", person.name, 45 * k), off));
             }

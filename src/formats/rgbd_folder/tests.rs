@@ -5,7 +5,6 @@ use crate::formats::image::write_png_depth;
 use crate::math::Rigid;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::fs;
-use std::path::PathBuf;
 
 const TINY: Intrinsics = Intrinsics {
     width: 4,
@@ -182,21 +181,9 @@ fn reading_continues_after_a_bad_frame() {
 
 #[test]
 fn shared_recordings_open() {
-    let root = std::env::var_os("TRYON_SHARED")
-        .map_or_else(
-            || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"),
-            PathBuf::from,
-        )
-        .join("data");
-    if !root.exists() {
-        assert!(
-            std::env::var_os("TRYON_REQUIRE_ALL").is_none(),
-            "{} is missing",
-            root.display()
-        );
-        eprintln!("SKIPPED: {} is missing", root.display());
+    let Some(root) = crate::formats::shared_data("") else {
         return;
-    }
+    };
     for (name, frames, color) in [
         ("rgbd/depthkit_still", 1, true),
         ("rgbd/itop_stills", 64, false),
