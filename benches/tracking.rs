@@ -16,7 +16,7 @@ use tryon::registration::{
     Association, Dof, Metric, ModelPoints, NormalEquations, Observation, PairingConfig,
     PairingScratch, pair_surfaces,
 };
-use tryon::segment::{Contour, SegmentScratch, contour, find_person, find_planes};
+use tryon::segment::{Contour, PersonChoice, SegmentScratch, contour, find_person, find_planes};
 use tryon::spatial::{OrganisedCloud, PointTree};
 use tryon::synth::{Actor, Routine, Sequence, Setting};
 use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
@@ -44,7 +44,7 @@ fn segmentation(c: &mut Criterion) {
     c.bench_function("segment/person and outline", |b| {
         b.iter(|| {
             grid.sample(&frame.depth, 8.0);
-            let person = find_person(&mut grid, &planes, None, &mut scratch);
+            let person = find_person(&mut grid, &planes, PersonChoice::Ranked(0), &mut scratch);
             grid.refine(&frame.depth, &person.cells);
             contour(&grid, &person.cells, &mut edges);
             person.cells.len()
@@ -54,7 +54,7 @@ fn segmentation(c: &mut Criterion) {
     c.bench_function("segment/no reading at all", |b| {
         b.iter(|| {
             grid.sample(&empty, 8.0);
-            find_person(&mut grid, &planes, None, &mut scratch)
+            find_person(&mut grid, &planes, PersonChoice::Ranked(0), &mut scratch)
                 .cells
                 .len()
         });
@@ -108,7 +108,13 @@ fn readings() -> Readings {
     let mut grid = OrganisedCloud::new(&sequence.calibration().depth, None);
     grid.sample(&frame.depth, 8.0);
     let planes = find_planes(&grid);
-    let cells = find_person(&mut grid, &planes, None, &mut SegmentScratch::default()).cells;
+    let cells = find_person(
+        &mut grid,
+        &planes,
+        PersonChoice::Ranked(0),
+        &mut SegmentScratch::default(),
+    )
+    .cells;
     grid.refine(&frame.depth, &cells);
     let mut edges = Contour::default();
     contour(&grid, &cells, &mut edges);

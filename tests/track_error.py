@@ -44,7 +44,7 @@ def main() -> int:
         if not live:
             lost.append(k)
             continue
-        got = np.array([record["joints"].get(n, [np.nan] * 3) for n in names])
+        got = np.array([record.get("joints", {}).get(n, [np.nan] * 3) for n in names])
         errors.append(np.linalg.norm(got - wanted[k], axis=1) * 1000.0)
     if not errors:
         print("no frame to compare", file=sys.stderr)

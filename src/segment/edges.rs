@@ -58,13 +58,18 @@ pub fn contour(cloud: &OrganisedCloud, cells: &[u32], out: &mut Contour) {
 mod tests {
     use super::*;
     use crate::segment::fixture::room;
-    use crate::segment::{SegmentScratch, find_person, find_planes};
+    use crate::segment::{PersonChoice, SegmentScratch, find_person, find_planes};
 
     #[test]
     fn edges_between_arm_and_chest_belong_to_the_arm() {
         let mut cloud = room(0.0, true);
         let scene = find_planes(&cloud);
-        let found = find_person(&mut cloud, &scene, None, &mut SegmentScratch::default());
+        let found = find_person(
+            &mut cloud,
+            &scene,
+            PersonChoice::Ranked(0),
+            &mut SegmentScratch::default(),
+        );
         let columns = cloud.size().0;
         // An "arm": four rows across the middle, 20 cm nearer.
         let middle = found.cells[found.cells.len() / 2] as usize / columns;

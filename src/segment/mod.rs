@@ -13,6 +13,6 @@ mod planes;
 
 pub use edges::{Contour, contour};
 pub use extremities::{Extremity, extremities};
-pub use person::{PersonPrior, PersonSearch, SegmentScratch, find_person};
+pub use person::{PersonChoice, PersonPrior, PersonSearch, SegmentScratch, find_person};
 pub use plane_search::find_planes;
 pub use planes::{ScenePlane, ScenePlanes};

@@ -42,6 +42,15 @@ const UPRIGHT: f32 = 0.8;
 /// Rank penalty of such a component, metres of distance.
 const LOW_COST: f32 = 1.5;
 
+/// Selection among the components of the size of a body.
+#[derive(Clone, Copy, Debug)]
+pub enum PersonChoice {
+    /// The largest one near a predicted place.
+    Near(PersonPrior),
+    /// The one of this rank, 0 for the most likely; ranks beyond the last start again.
+    Ranked(usize),
+}
+
 /// Predicted place of the person, from the last frame.
 #[derive(Clone, Copy, Debug)]
 pub struct PersonPrior {
@@ -60,6 +69,8 @@ pub struct PersonSearch {
     pub cut_below: bool,
     /// Middles of hands beyond sleeves that give no return, camera frame, metres.
     pub hands: Vec<P3>,
+    /// Components of the size of a body; 0 with a predicted place.
+    pub rivals: usize,
     /// Cells that are neither floor nor background.
     pub candidates: usize,
     /// Connected components among them.
@@ -73,12 +84,11 @@ pub struct SegmentScratch {
     components: ComponentMap,
 }
 
-/// Labels floor, background and the person in a sampled cloud. With a prior the component nearest to it wins;
-/// without one, the nearest component of the size of a body.
+/// Labels floor, background and the person in a sampled cloud.
 pub fn find_person(
     cloud: &mut OrganisedCloud,
     scene: &ScenePlanes,
-    prior: Option<PersonPrior>,
+    choice: PersonChoice,
     scratch: &mut SegmentScratch,
 ) -> PersonSearch {
     let mut out = PersonSearch::default();
@@ -95,13 +105,15 @@ pub fn find_person(
     scratch.components.update(cloud, &up);
     let map = &scratch.components;
     out.components = map.list.len();
-    let cut = || {
-        map.list
-            .iter()
-            .filter(|c| prior.is_none() && is_cut(c, cloud, map))
-            .min_by(|a, b| a.centre.z.total_cmp(&b.centre.z).then(a.id.cmp(&b.id)))
+    let main = match choice {
+        PersonChoice::Near(prior) => nearest(&map.list, prior),
+        PersonChoice::Ranked(rank) => {
+            let ranked = ranked(cloud, map);
+            out.rivals = ranked.len();
+            ranked.get(rank % ranked.len().max(1)).copied()
+        }
     };
-    let Some(main) = choose(&map.list, prior).or_else(cut) else {
+    let Some(main) = main else {
         return out;
     };
 
@@ -166,8 +178,17 @@ fn label_removed_background(cloud: &mut OrganisedCloud, scene: &ScenePlanes) -> 
     removed
 }
 
-/// Body-sized component nearest to the prior, or the nearest to the camera by rank.
-fn choose(components: &[Component], prior: Option<PersonPrior>) -> Option<&Component> {
+/// The largest component near the predicted place.
+fn nearest(components: &[Component], prior: PersonPrior) -> Option<&Component> {
+    let off = |c: &Component| (c.centre - prior.centre).norm();
+    components
+        .iter()
+        .filter(|c| c.area > PRIOR_SHARE * LEAST_AREA && c.area < MOST_AREA && off(c) < prior.reach)
+        .max_by(|a, b| a.area.total_cmp(&b.area).then(b.id.cmp(&a.id)))
+}
+
+/// All components of the size of a body, the most likely first; those that a side of the image cuts last.
+fn ranked<'a>(cloud: &OrganisedCloud, map: &'a ComponentMap) -> Vec<&'a Component> {
     let sized = |c: &&Component| {
         let size = c.hi - c.lo;
         (LEAST_AREA..MOST_AREA).contains(&c.area)
@@ -175,38 +196,24 @@ fn choose(components: &[Component], prior: Option<PersonPrior>) -> Option<&Compo
             && size.x < MOST_WIDTH
             && (c.side_cells as f32) < SIDE_SHARE * c.rows as f32
     };
-    if let Some(prior) = prior {
-        let off = |c: &Component| (c.centre - prior.centre).norm();
-        return components
-            .iter()
-            .filter(|c| {
-                c.area > PRIOR_SHARE * LEAST_AREA && c.area < MOST_AREA && off(c) < prior.reach
-            })
-            .max_by(|a, b| a.area.total_cmp(&b.area).then(b.id.cmp(&a.id)));
-    }
     // A component on a side or at the top is more likely a wall, a door or a shelf.
-    let rank = |c: &Component| {
-        let side = if c.side_cells > RIM_CELLS {
-            SIDE_COST
-        } else {
-            0.0
-        };
-        let top = if c.top_cells > RIM_CELLS {
-            TOP_COST
-        } else {
-            0.0
-        };
-        let low = if c.hi.y - c.lo.y < UPRIGHT {
-            LOW_COST
-        } else {
-            0.0
-        };
-        c.centre.z + side + top + low
+    let cost = |c: &Component| {
+        let penalty = |applies: bool, cost: f32| if applies { cost } else { 0.0 };
+        c.centre.z
+            + penalty(c.side_cells > RIM_CELLS, SIDE_COST)
+            + penalty(c.top_cells > RIM_CELLS, TOP_COST)
+            + penalty(c.hi.y - c.lo.y < UPRIGHT, LOW_COST)
     };
-    components
-        .iter()
-        .filter(sized)
-        .min_by(|a, b| rank(a).total_cmp(&rank(b)).then(a.id.cmp(&b.id)))
+    let by = |key: &dyn Fn(&Component) -> f32, list: &mut Vec<&Component>| {
+        list.sort_by(|a, b| key(a).total_cmp(&key(b)).then(a.id.cmp(&b.id)));
+    };
+    let mut whole: Vec<&Component> = map.list.iter().filter(sized).collect();
+    by(&cost, &mut whole);
+    let is_cut = |c: &&Component| !sized(c) && is_cut(c, cloud, map);
+    let mut cut: Vec<&Component> = map.list.iter().filter(is_cut).collect();
+    by(&|c| c.centre.z, &mut cut);
+    whole.extend(cut);
+    whole
 }
 
 /// The main component and the parts that its own limbs cut off: near it in the image and in depth. Shape `[components]`.
@@ -264,7 +271,12 @@ mod tests {
     fn a_box_in_a_room_is_segmented_with_and_without_a_prior() {
         let mut cloud = room(0.1, true);
         let scene = find_planes(&cloud);
-        let found = find_person(&mut cloud, &scene, None, &mut SegmentScratch::default());
+        let found = find_person(
+            &mut cloud,
+            &scene,
+            PersonChoice::Ranked(0),
+            &mut SegmentScratch::default(),
+        );
         // 0.4 × 1.7 m at 2.5 m with a focal length of 131 cells, less 20 mm of floor.
         let expected = 0.4 * 1.68 * (131.25f32 / 2.5).powi(2);
         assert!(
@@ -281,7 +293,7 @@ mod tests {
         let again = find_person(
             &mut cloud,
             &scene,
-            Some(prior),
+            PersonChoice::Near(prior),
             &mut SegmentScratch::default(),
         );
         assert_eq!(again.cells, found.cells);
@@ -311,14 +323,14 @@ mod tests {
         let found = find_person(
             &mut at_the_rim(true),
             &ScenePlanes::default(),
-            None,
+            PersonChoice::Ranked(0),
             &mut scratch,
         );
         assert!(found.cells.len() > 500, "{} cells", found.cells.len());
         let door = find_person(
             &mut at_the_rim(false),
             &ScenePlanes::default(),
-            None,
+            PersonChoice::Ranked(0),
             &mut scratch,
         );
         assert!(
@@ -351,7 +363,12 @@ mod tests {
         for hole in [true, false] {
             let mut cloud = sleeve(hole);
             let scene = find_planes(&cloud);
-            let found = find_person(&mut cloud, &scene, None, &mut SegmentScratch::default());
+            let found = find_person(
+                &mut cloud,
+                &scene,
+                PersonChoice::Ranked(0),
+                &mut SegmentScratch::default(),
+            );
             assert!(
                 !found.cells.is_empty() && found.hands.len() == usize::from(hole),
                 "{hole}: {:?}",
@@ -369,15 +386,20 @@ mod tests {
         let scene = find_planes(&cloud);
         let mut scratch = SegmentScratch::default();
         assert!(
-            find_person(&mut cloud, &scene, None, &mut scratch)
+            find_person(&mut cloud, &scene, PersonChoice::Ranked(0), &mut scratch)
                 .cells
                 .is_empty()
         );
         cloud.depth.fill(0.0);
         assert!(
-            find_person(&mut cloud, &ScenePlanes::default(), None, &mut scratch)
-                .cells
-                .is_empty()
+            find_person(
+                &mut cloud,
+                &ScenePlanes::default(),
+                PersonChoice::Ranked(0),
+                &mut scratch
+            )
+            .cells
+            .is_empty()
         );
     }
 }

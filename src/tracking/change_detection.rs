@@ -182,6 +182,7 @@ mod tests {
             explained: 0.9,
             matched: 0.9,
             quality: 0.8,
+            agreement: Default::default(),
             confidence: Vec::new(),
             pose_age: 0,
             skipped: Skipped::default(),

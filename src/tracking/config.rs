@@ -42,6 +42,8 @@ pub struct TrackerConfig {
     pub adapt_size: bool,
     /// Search an arm again when the body explains too few readings.
     pub rescue: bool,
+    /// Take a frame for live only if body and readings agree (see [`super::Agreement`]).
+    pub judge: bool,
     /// Let feet out of view stand on the floor, or on an estimated one.
     pub standing: bool,
     /// Frames over which size and shape are adapted.
@@ -100,6 +102,7 @@ impl Default for TrackerConfig {
             free_space: 0.0,
             adapt_size: true,
             rescue: true,
+            judge: true,
             standing: true,
             calibration_frames: 60,
             displacements: true,
@@ -136,6 +139,7 @@ impl TrackerConfig {
             converged: 3e-3,
             edge_weight: 0.3,
             rescue: false,
+            judge: false,
             standing: false,
             displaced_pose: true,
             predict: false,

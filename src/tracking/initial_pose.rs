@@ -6,6 +6,7 @@ use crate::body::Pose;
 use crate::math::{P3, Rigid, principal_axes};
 use crate::registration::Observation;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use std::f64::consts::PI;
 
 /// Landmarks of the subject's silhouette.
 #[derive(Clone, Copy, Debug)]
@@ -28,10 +29,17 @@ const SOLES: f64 = 0.02;
 const AFLOAT: f64 = 0.1;
 /// Share of the largest distance to the silhouette above which a cell is torso.
 const TORSO_SHARE: [u32; 2] = [8, 10];
-/// Turns about the vertical to try, radians; the paper asks for a frontal view.
+/// Turns about the vertical to try, radians, for either facing.
 const YAWS: [f64; 3] = [0.0, 0.6, -0.6];
-/// Best trunks that get arms and a full fit; each costs a third of the search.
-const TRUNK_FINALISTS: usize = 2;
+/// Turns of bodies that face the camera and that face away.
+const FACINGS: [f64; 2] = [0.0, PI];
+/// Best trunks of each facing that get arms and a full fit; each costs a quarter of the search. Front and back of a trunk
+/// cost nearly the same, so that they compare only after the full fit.
+const FINALISTS: [usize; 2] = [2, 1];
+/// Turn from a pose of a moment ago beyond which a start must be clearly better, radians.
+const TURN: f64 = 1.75;
+/// Factor on the cost of such a start.
+const TURN_COST: f64 = 1.5;
 /// Iterations of a trunk's fit: enough to rank yaws.
 const TRUNK_ITERATIONS: usize = 3;
 /// Longest pairs by which trunks and final poses compare, metres.
@@ -140,16 +148,20 @@ fn upright(up: &Vector3<f64>, yaw: f64) -> UnitQuaternion<f64> {
     facing * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw)
 }
 
-/// Finds the initial pose and its fit.
+/// Finds the initial pose and its fit. `recent` is the root's rotation of a moment ago: nobody turns around between two
+/// frames, while front and back may cost the same.
 pub(super) fn initial_pose(
     context: &FitContext<'_>,
     outline: &Outline,
-    up: &Vector3<f64>,
+    (up, recent): (&Vector3<f64>, Option<UnitQuaternion<f64>>),
     scratch: &mut FitScratch,
 ) -> Option<(Pose, FitReport)> {
-    let mut best = trunks(context, outline, up, scratch);
-    best.sort_by(|a, b| a.0.total_cmp(&b.0));
-    best.truncate(TRUNK_FINALISTS);
+    let mut best = Vec::new();
+    for (facing, finalists) in FACINGS.into_iter().zip(FINALISTS) {
+        let mut trunks = trunks(context, outline, (up, facing), scratch);
+        trunks.sort_by(|a, b| a.0.total_cmp(&b.0));
+        best.extend(trunks.into_iter().take(finalists));
+    }
     let hypotheses = Hypotheses::new(context, &outline.torso);
     // Outlines tell little between hypotheses and cost the most.
     let terms = scratch.terms;
@@ -163,22 +175,25 @@ pub(super) fn initial_pose(
         }
     }
     scratch.terms = terms;
-    let mut winner: Option<(Pose, FitReport)> = None;
+    let mut winner: Option<(f64, Pose, FitReport)> = None;
     for (_, mut pose) in best {
         fit_pose(context, &mut pose, &START, scratch);
         let fit = evaluate(context, &pose, REACH[1], scratch);
-        if winner.as_ref().is_none_or(|(_, w)| fit.cost < w.cost) {
-            winner = Some((pose, fit));
+        let rotation = pose.root.iso().rotation;
+        let has_turned = recent.is_some_and(|r| r.angle_to(&rotation) > TURN);
+        let cost = fit.cost * if has_turned { TURN_COST } else { 1.0 };
+        if winner.as_ref().is_none_or(|(least, ..)| cost < *least) {
+            winner = Some((cost, pose, fit));
         }
     }
-    winner
+    winner.map(|(_, pose, fit)| (pose, fit))
 }
 
-/// Rest poses at each lean and yaw after a short fit, with their costs.
+/// Rest poses at each lean and yaw about a facing after a short fit, with their costs.
 fn trunks(
     context: &FitContext<'_>,
     outline: &Outline,
-    up: &Vector3<f64>,
+    (up, facing): (&Vector3<f64>, f64),
     scratch: &mut FitScratch,
 ) -> Vec<(f64, Pose)> {
     let skeleton = context.model.template.skeleton();
@@ -189,7 +204,7 @@ fn trunks(
     let mut out = Vec::new();
     for lean in leans(context.observation, up, outline) {
         for yaw in YAWS {
-            let root = trunk_root(context, outline, &lean, upright(&lean, yaw));
+            let root = trunk_root(context, outline, &lean, upright(&lean, facing + yaw));
             let mut pose = Pose::rest(skeleton, root);
             fit_pose(context, &mut pose, &schedule, scratch);
             let cost = evaluate(context, &pose, REACH[0], scratch).cost;

@@ -25,6 +25,7 @@
 //! # Ok::<(), tryon::tracking::StepError>(())
 //! ```
 
+mod agreement;
 mod calibration;
 mod change_detection;
 mod confidence;
@@ -55,6 +56,7 @@ mod test_scene;
 mod workspace;
 
 pub use crate::registration::residual::SurfaceNormals;
+pub use agreement::Agreement;
 pub use confidence::{ConfidenceReason, JointConfidence};
 pub use config::TrackerConfig;
 pub use model::TrackerModel;

@@ -1,5 +1,6 @@
 //! Report and error of a step.
 
+use super::agreement::Agreement;
 use super::confidence::JointConfidence;
 use super::status::Status;
 use serde::{Deserialize, Serialize};
@@ -86,6 +87,8 @@ pub struct StepReport {
     pub matched: f64,
     /// Quality of the frame, 0 to 1: the smaller of `explained` and `matched`, reduced by the residual.
     pub quality: f64,
+    /// Agreement of the body with the frame; that of a body without a pose is 0 throughout.
+    pub agreement: Agreement,
     /// Confidence of each joint of the skeleton; empty without a live pose.
     pub confidence: Vec<JointConfidence>,
     /// Frames since the pose was measured; 0 for a live pose.

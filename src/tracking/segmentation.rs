@@ -2,7 +2,7 @@
 
 use super::{TrackerModel, TrackerState, Workspace};
 use crate::camera::RgbdFrame;
-use crate::segment::{PersonPrior, PersonSearch, contour, find_person, find_planes};
+use crate::segment::{PersonChoice, PersonPrior, PersonSearch, contour, find_person, find_planes};
 use crate::spatial::OrganisedCloud;
 
 /// Frames without a subject after which the scene planes are searched again.
@@ -31,11 +31,15 @@ pub(super) fn segment(
             state.set_scene(scene);
         }
     }
-    let prior = state.status.is_live().then_some(PersonPrior {
-        centre: state.centre,
-        reach: REACH,
-    });
-    let mut person = find_person(grid, &state.scene, prior, &mut workspace.segment);
+    let choice = if state.is_following() {
+        PersonChoice::Near(PersonPrior {
+            centre: state.centre,
+            reach: REACH,
+        })
+    } else {
+        PersonChoice::Ranked(state.attempts as usize)
+    };
+    let mut person = find_person(grid, &state.scene, choice, &mut workspace.segment);
     if person.cells.len() >= LEAST_CELLS {
         grid.refine(&frame.depth, &person.cells);
         person.cells.retain(|&c| grid.depth[c as usize] > 0.0);

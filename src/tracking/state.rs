@@ -41,6 +41,12 @@ pub struct TrackerState {
     pub(super) size: SizeEstimate,
     pub(super) surface: SurfaceStatistics,
     pub(super) bad_frames: u32,
+    /// Frames in a row in which the body disagreed with the frame.
+    #[serde(default)]
+    pub(super) disagreeing: u32,
+    /// Failed searches in a row; each tries the next of the components of a body's size.
+    #[serde(default)]
+    pub(super) attempts: u32,
     /// Frames in a row in which the root hardly moved while calibrating.
     pub(super) steady: u32,
     /// Frames since the subject was found.
@@ -101,6 +107,8 @@ impl TrackerState {
             size: SizeEstimate::default(),
             surface: SurfaceStatistics::default(),
             bad_frames: 0,
+            disagreeing: 0,
+            attempts: 0,
             steady: 0,
             calibration_age: 0,
             centre: P3::origin(),
@@ -144,6 +152,10 @@ impl TrackerState {
         self.world_from_camera = scene.world_from_camera(ASSUMED_HEIGHT);
         self.scene = scene;
         self.scene_age = Some(0);
+    }
+    /// True with a pose to follow: live, or in doubt for a few frames.
+    pub(super) fn is_following(&self) -> bool {
+        self.status.is_live() || self.disagreeing > 0
     }
     /// True once size and shape no longer change.
     pub(super) fn calibrated(&self, config: &TrackerConfig) -> bool {

@@ -10,6 +10,8 @@ pub enum LostReason {
     NoPerson,
     /// The body explains too little of the readings.
     Residual,
+    /// The body lies in measured free space, or leaves much of the subject uncovered.
+    Disagreement,
     /// The result of a step was not finite and was discarded.
     NotFinite,
 }

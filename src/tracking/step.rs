@@ -67,8 +67,13 @@ pub fn step(
             },
             up: state.world_from_camera.inverse().vector(&Vector3::y()),
         };
-        if let Err(reason) = subject.track(state, workspace, &mut log) {
-            lose(state, reason);
+        let searched = !state.is_following();
+        match subject.track(state, workspace, &mut log) {
+            Ok(()) => state.attempts = 0,
+            Err(reason) => {
+                state.attempts += u32::from(searched);
+                lose(state, reason);
+            }
         }
         workspace.contour = contour;
     }
@@ -166,7 +171,7 @@ fn lose(state: &mut TrackerState, reason: LostReason) {
     if state.status != Status::Searching {
         state.status = Status::Lost { reason };
     }
-    state.bad_frames = 0;
+    (state.bad_frames, state.disagreeing) = (0, 0);
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! One subject in view (Algorithm 1): find or predict → fit → recover → calibrate → filter → commit → displacements.
 
+use super::agreement::Agreement;
 use super::calibration::{SizeCalibration, count_steady, live_status};
 use super::confidence::confidence;
 use super::hand_assignment::assign_hands;
@@ -30,6 +31,12 @@ use nalgebra::Vector3;
 const LEAST_EXPLAINED: f64 = 0.45;
 /// Share of visible points with a reading below which a frame is bad.
 const LEAST_MATCHED: f64 = 0.35;
+/// Share of the area above which body and frame disagree; see docs/decisions/043. Good tracks stay below 0.16.
+const MOST_WRONG: f32 = 0.2;
+/// Frames in doubt before the search begins anew.
+const DOUBT: u32 = 2;
+/// Age of a last pose up to which it tells front from back at the next start, frames.
+const RECENT: u32 = 15;
 /// Bad frames in a row that lose the subject.
 const PATIENCE: u32 = 8;
 /// Frames without the subject after which the next one is measured anew.
@@ -69,6 +76,7 @@ impl StepLog {
             explained: 0.0,
             matched: 0.0,
             quality: 0.0,
+            agreement: Agreement::default(),
             confidence: Vec::new(),
             pose_age: 0,
             skipped: Skipped {
@@ -128,7 +136,8 @@ impl SubjectFrame<'_> {
     ) -> Result<(), LostReason> {
         let config = &self.model.config;
         workspace.fit.pairing.forget();
-        let found = !state.status.is_live();
+        let found = !state.is_following();
+        let before = found.then(|| (state.size.clone(), state.shape.clone()));
         let start = if found {
             self.find(state, workspace, log)?
         } else {
@@ -182,7 +191,16 @@ impl SubjectFrame<'_> {
         }
         let context = self.context(&workspace.body);
         log.report.confidence = confidence(&context, &pose, &workspace.fit);
+        let measure = &mut workspace.agreement;
+        log.report.agreement = measure.measure(&context, &pose, &mut workspace.fit);
+        let agrees = !config.judge || log.report.agreement.wrong() <= MOST_WRONG;
+        if let Some(before) = before.filter(|_| !agrees) {
+            // Another thing's size is no start for the next search.
+            (state.size, state.shape) = before;
+            return Err(LostReason::Disagreement);
+        }
         self.commit(state, workspace, pose, &fit);
+        count_doubt(state, agrees)?;
         self.update_displacements(good, state, workspace, log);
         Ok(())
     }
@@ -212,8 +230,10 @@ impl SubjectFrame<'_> {
             state.shape = from_stature(self.model, stature);
         }
         workspace.body.update(self.model, &state.shape);
+        let is_recent = state.status != Status::Searching && state.pose_age <= RECENT;
+        let recent = is_recent.then_some(state.pose.root.iso().rotation);
         let (context, scratch) = (self.context(&workspace.body), &mut workspace.fit);
-        let found = outline.and_then(|o| initial_pose(&context, &o, &self.up, scratch));
+        let found = outline.and_then(|o| initial_pose(&context, &o, (&self.up, recent), scratch));
         log.report.stages_ms.place = log.watch.lap();
         let (pose, _) = found
             .filter(|(_, fit)| fit.explained >= LEAST_EXPLAINED)
@@ -289,7 +309,7 @@ impl SubjectFrame<'_> {
         fit: &FitReport,
     ) {
         let skeleton = self.model.template.skeleton();
-        let found = !state.status.is_live();
+        let found = !state.is_following();
         let root = skeleton.joints()[0].rest;
         let moved = (pose.root.point(&root) - state.pose.root.point(&root)).norm();
         count_steady(state, (!found).then_some(moved));
@@ -344,6 +364,19 @@ impl SubjectFrame<'_> {
         *wait = *interval;
         log.report.stages_ms.surface = log.watch.lap();
     }
+}
+
+/// Counts frames in doubt: their pose is followed, but not live.
+fn count_doubt(state: &mut TrackerState, agrees: bool) -> Result<(), LostReason> {
+    let reason = LostReason::Disagreement;
+    state.disagreeing = if agrees { 0 } else { state.disagreeing + 1 };
+    if state.disagreeing > DOUBT {
+        return Err(reason);
+    }
+    if !agrees {
+        state.status = Status::Lost { reason };
+    }
+    Ok(())
 }
 
 /// Mean of the readings of `cells`, camera frame, metres.

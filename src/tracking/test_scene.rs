@@ -109,6 +109,16 @@ impl DepthScan {
         }
     }
 
+    /// Takes cells without a reading for background that was removed.
+    pub(super) fn background_removed(mut self) -> Self {
+        for (label, z) in self.grid.labels.iter_mut().zip(&self.grid.depth) {
+            if *z == 0.0 {
+                *label = Label::Background;
+            }
+        }
+        self
+    }
+
     pub(super) fn observation(&self) -> Observation<'_> {
         Observation {
             grid: &self.grid,

@@ -1,5 +1,6 @@
 //! Scratch and caches of a step. Dropping a workspace changes no result.
 
+use super::agreement::AgreementScratch;
 use super::personal_body::PersonalBody;
 use super::pose_fit::FitScratch;
 use super::surface::SurfaceScratch;
@@ -18,6 +19,7 @@ pub struct Workspace {
     pub(super) contour: Contour,
     pub(super) body: PersonalBody,
     pub(super) fit: FitScratch,
+    pub(super) agreement: AgreementScratch,
     pub(super) surface: SurfaceScratch,
     posed: Vec<P3>,
 }

@@ -437,6 +437,7 @@ fn limb_recovery_finds_an_arm_lost_at_low_rate() {
     let error = |rescue| {
         let config = TrackerConfig {
             rescue,
+            judge: false,
             ..TrackerConfig::default()
         };
         mean(&follow(&template, &config, &own, |_, _, _, _, _| {}).joints_mm)

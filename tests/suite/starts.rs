@@ -2,6 +2,7 @@
 
 use crate::tracked::{bones, frame, picture};
 use nalgebra::{UnitQuaternion, Vector3};
+use std::f64::consts::PI;
 use tryon::body::{Pose, embedded};
 use tryon::camera::{Calibration, Intrinsics};
 use tryon::math::{Camera, Rigid};
@@ -159,4 +160,15 @@ fn a_start_needs_no_calibration_pose() {
         }
     }
     assert!(all == 36 && found >= 34, "{found} of {all}");
+}
+
+/// Front and back of a standing body differ by little more than feet and the bend of the arms.
+#[test]
+fn a_subject_seen_from_behind_is_found_facing_away() {
+    for yaw in [PI, PI - 0.5, PI + 0.6] {
+        for of in [&ARMS, &LEGS] {
+            let off = mean_error_mm(&[], yaw, of);
+            assert!(off < 40.0, "turned by {yaw}: {off} mm");
+        }
+    }
 }

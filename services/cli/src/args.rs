@@ -139,6 +139,10 @@ pub(crate) struct TrackArgs {
     /// Also write the tracked surface of every frame as OBJ into this folder.
     #[arg(long, value_name = "DIR")]
     pub(crate) meshes: Option<PathBuf>,
+    /// Also draw the body over every depth image as PNG into this folder: green on the measured surface, red in free
+    /// space, blue behind it, orange where nothing was measured; grey alone without a live pose.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) overlay: Option<PathBuf>,
     /// Worker threads; 0 means one per core.
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub(crate) threads: usize,

@@ -144,7 +144,7 @@ fn status_to_wire(status: Status) -> (TrackingStatus, DegradedReason) {
         Status::Lost { reason } => {
             let why = match reason {
                 LostReason::NoPerson => DegradedReason::PersonLeft,
-                LostReason::Residual => DegradedReason::TrackingLost,
+                LostReason::Residual | LostReason::Disagreement => DegradedReason::TrackingLost,
                 LostReason::NotFinite => DegradedReason::StepFailed,
             };
             (TrackingStatus::Lost, why)

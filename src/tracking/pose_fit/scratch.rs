@@ -93,6 +93,14 @@ impl FitScratch {
         }
     }
 
+    /// Poses the samples and draws them into the index image.
+    pub(in crate::tracking) fn draw(&mut self, context: &FitContext<'_>, pose: &Pose) {
+        self.pose_samples(context, pose);
+        let grid = context.observation.grid;
+        let image = &mut self.pairing.image;
+        image.draw(grid, &self.positions, &self.normals, context.model.spacing);
+    }
+
     /// Poses the samples: positions by all weights, normals by the dominant bone.
     pub(super) fn pose_samples(&mut self, context: &FitContext<'_>, pose: &Pose) {
         let (model, samples) = (context.model, &context.body.samples);

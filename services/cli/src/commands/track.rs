@@ -8,10 +8,15 @@ use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
 use std::process::ExitCode;
 use tryon::body::BoneTransforms;
+use tryon::camera::{ColorImage, RgbdFrame};
+use tryon::evaluate::overlay;
+use tryon::formats::image::write_png_rgb;
 use tryon::formats::obj::write_obj;
 use tryon::formats::{RgbdSource, open_recording};
 use tryon::par::with_threads;
-use tryon::tracking::{StepReport, TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+use tryon::tracking::{
+    Status, StepReport, TrackerConfig, TrackerModel, TrackerState, Workspace, step,
+};
 
 /// Runs the command.
 ///
@@ -34,7 +39,7 @@ pub(crate) fn run(args: &TrackArgs) -> Result<ExitCode> {
             start.facing_yaw_deg.to_radians(),
         );
     }
-    if let Some(dir) = &args.meshes {
+    for dir in args.meshes.iter().chain(&args.overlay) {
         input::create_dir(dir)?;
     }
     let file = std::fs::File::create(&args.out)
@@ -96,6 +101,10 @@ fn track_all(
             let faces = model.template().mesh().faces();
             write_obj(&dir.join(format!("{index:06}.obj")), vertices, faces, None)?;
         }
+        if let Some(dir) = &args.overlay {
+            let picture = drawn(model, &state, &frame, &mut workspace);
+            write_png_rgb(&dir.join(format!("{index:06}.png")), &picture)?;
+        }
         bar.inc(1);
         index += 1;
     }
@@ -111,6 +120,22 @@ fn track_all(
         args.out.display()
     );
     Ok(())
+}
+
+/// The body over its depth image; the depth image alone without a live pose.
+fn drawn(
+    model: &TrackerModel,
+    state: &TrackerState,
+    frame: &RgbdFrame,
+    workspace: &mut Workspace,
+) -> ColorImage {
+    let camera = &model.calibration().depth;
+    if !state.status.is_live() {
+        return overlay(&frame.depth, camera, &[], &[]);
+    }
+    let (vertices, _) = workspace.posed(model, state);
+    let faces = model.template().mesh().faces();
+    overlay(&frame.depth, camera, vertices, faces)
 }
 
 /// Result of one frame.
@@ -143,15 +168,12 @@ impl TrackedFrame<'_> {
             .zip(&state.shape.bone_scales)
             .map(|(j, s)| (j.name.as_str(), *s))
             .collect();
-        json!({
+        let mut line = json!({
             "frame": self.index,
             "time_ns": self.time_ns,
             "status": state.status,
-            "joints": joints,
-            "pose": state.pose,
-            "scales": scales,
-            "shape": state.shape.coefficients,
             "residual_mm": report.residual_mm,
+            "agreement": report.agreement,
             "visible_points": report.visible_points,
             "iterations": report.iterations,
             "converged": report.converged,
@@ -159,6 +181,14 @@ impl TrackedFrame<'_> {
             "skipped": report.skipped,
             "ms": self.ms,
             "stages_ms": report.stages_ms,
-        })
+        });
+        // Before anybody was found there is no body to speak of.
+        if state.status != Status::Searching {
+            line["joints"] = json!(joints);
+            line["pose"] = json!(state.pose);
+            line["scales"] = json!(scales);
+            line["shape"] = json!(state.shape.coefficients);
+        }
+        line
     }
 }
