@@ -16,6 +16,7 @@ use tryon::registration::{
     Association, Dof, Metric, ModelPoints, NormalEquations, Observation, PairingConfig,
     PairingScratch, pair_surfaces,
 };
+use tryon::segment::part_forest::{PartForest, PartScratch, PersonCells};
 use tryon::segment::{Contour, PersonChoice, SegmentScratch, contour, find_person, find_planes};
 use tryon::spatial::{OrganisedCloud, PointTree};
 use tryon::synth::{Actor, Routine, Sequence, Setting};
@@ -246,6 +247,37 @@ fn equations(c: &mut Criterion) {
     });
 }
 
+fn parts(c: &mut Criterion) {
+    let sequence = subject(Routine::TryOn);
+    let (frame, _) = sequence.frame(0);
+    let mut grid = OrganisedCloud::new(&sequence.calibration().depth, None);
+    grid.sample(&frame.depth, 8.0);
+    let planes = find_planes(&grid);
+    let cells = find_person(
+        &mut grid,
+        &planes,
+        PersonChoice::Ranked(0),
+        &mut SegmentScratch::default(),
+    )
+    .cells;
+    grid.refine(&frame.depth, &cells);
+    let (forest, mut scratch) = (PartForest::embedded(), PartScratch::default());
+    let person = |cells| PersonCells {
+        cloud: &grid,
+        cells,
+        up: V3::new(0.0, -1.0, 0.0),
+    };
+    c.bench_function("parts/classify", |b| {
+        b.iter(|| forest.classify(&person(&cells), &mut scratch).len());
+    });
+    c.bench_function("parts/propose", |b| {
+        b.iter(|| forest.propose(&person(&cells), &mut scratch).len());
+    });
+    c.bench_function("parts/nobody", |b| {
+        b.iter(|| forest.propose(&person(&[]), &mut scratch).len());
+    });
+}
+
 fn whole_step(c: &mut Criterion) {
     for (name, routine) in [("still person", Routine::Still), ("nobody", Routine::Empty)] {
         let sequence = subject(routine);
@@ -279,6 +311,7 @@ criterion_group!(
     segmentation,
     correspondences,
     equations,
+    parts,
     whole_step
 );
 criterion_main!(benches);

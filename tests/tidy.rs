@@ -73,7 +73,7 @@ const MODULES: &[(u8, &str, &str)] = &[
     (
         3,
         "segment",
-        "The pixels of the person: floor, background, nearest body, edges.",
+        "The pixels of the person: floor, background, nearest body, edges, body parts.",
     ),
     (
         3,

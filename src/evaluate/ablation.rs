@@ -108,7 +108,7 @@ pub fn variants() -> Vec<Variant> {
         add("last pose", &calm.to_string(), &|c| c.calm = calm);
     }
     add("hidden feet on the floor", "off", &|c| c.standing = false);
-    add("lost arms looked for", "off", &|c| c.rescue = false);
+    add("repairs of lost limbs", "off", &|c| c.rescue = false);
     add("precision of sums", "f64", &|_| {});
     add("precision of sums", "f32", &|c| c.single_precision = true);
     add("edges", "0.1", &|c| c.edge_weight = 0.1);

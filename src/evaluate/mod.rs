@@ -11,6 +11,8 @@ mod error;
 mod inside;
 mod outfit;
 mod overlay;
+pub mod parts;
+pub mod parts_recorded;
 pub mod people;
 mod plot;
 pub mod rest;

@@ -56,20 +56,22 @@ pub struct StillsOutcome {
     pub start_ms: Vec<f64>,
 }
 
+/// Joints of stills, relative to a root, metres.
 #[derive(serde::Deserialize)]
-struct JointsFile {
-    joint_names: Vec<String>,
-    frames: Vec<TruthFrame>,
+pub(super) struct JointsFile {
+    pub(super) joint_names: Vec<String>,
+    pub(super) frames: Vec<TruthFrame>,
 }
 
+/// Joints of one still.
 #[derive(serde::Deserialize)]
-struct TruthFrame {
-    frame: usize,
-    joints: Vec<[f64; 3]>,
+pub(super) struct TruthFrame {
+    pub(super) frame: usize,
+    pub(super) joints: Vec<[f64; 3]>,
 }
 
 impl JointsFile {
-    fn read(path: &Path) -> Result<Self, String> {
+    pub(super) fn read(path: &Path) -> Result<Self, String> {
         let text = std::fs::read_to_string(path).map_err(|e| e.to_string())?;
         serde_json::from_str(&text).map_err(|e| e.to_string())
     }

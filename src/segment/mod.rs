@@ -1,4 +1,4 @@
-//! The pixels of the person: floor, background, nearest body, edges.
+//! The pixels of the person: floor, background, nearest body, edges, body parts.
 
 mod components;
 mod edges;
@@ -6,6 +6,7 @@ mod extremities;
 #[cfg(test)]
 mod fixture;
 mod hands;
+pub mod part_forest;
 mod person;
 mod plane_bands;
 mod plane_search;

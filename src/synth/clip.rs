@@ -153,6 +153,11 @@ impl Performance {
         }
     }
 
+    /// Stance after a share of the clip, 0 to 1.
+    pub(super) fn moment(&self, rig: &Rig, share: f64) -> Stance {
+        self.clip_stance(rig, P3d::origin(), share * self.clip.seconds())
+    }
+
     fn clip_stance(&self, rig: &Rig, home: P3d, t: f64) -> Stance {
         let (n, at) = (self.clip.frames.len(), &self.at);
         let place = (t / self.clip.period).clamp(0.0, (n - 1) as f64);

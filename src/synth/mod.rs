@@ -5,6 +5,7 @@
 
 mod clip;
 mod furniture;
+pub mod labelled;
 mod paint;
 mod physique;
 mod posture;

@@ -40,7 +40,7 @@ pub struct TrackerConfig {
     pub free_space: f64,
     /// Adapt the body's size and shape at the start.
     pub adapt_size: bool,
-    /// Search an arm again when the body explains too few readings.
+    /// Try the proposals of the part forest where body and readings disagree.
     pub rescue: bool,
     /// Take a frame for live only if body and readings agree (see [`super::Agreement`]).
     pub judge: bool,

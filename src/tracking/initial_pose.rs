@@ -1,5 +1,6 @@
 //! Initial pose: trunk by outline and principal axes, then hypotheses of yaw, arms and legs.
 
+use super::body_proposals::BodyProposals;
 use super::hypotheses::Hypotheses;
 use super::pose_fit::{FitContext, FitReport, FitScratch, START, Schedule, evaluate, fit_pose};
 use crate::body::Pose;
@@ -42,6 +43,8 @@ const TURN: f64 = 1.75;
 const TURN_COST: f64 = 1.5;
 /// Iterations of a trunk's fit: enough to rank yaws.
 const TRUNK_ITERATIONS: usize = 3;
+/// Cost of a fitted proposal above which the search goes on, m² per point: a lost foot costs as little as that.
+const POOR: f64 = 1.5e-4;
 /// Longest pairs by which trunks and final poses compare, metres.
 const REACH: [f32; 2] = [0.15, 0.10];
 /// Ratio of the first two variances above which the body is long enough for its axis to be its lean.
@@ -148,45 +151,99 @@ fn upright(up: &Vector3<f64>, yaw: f64) -> UnitQuaternion<f64> {
     facing * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw)
 }
 
-/// Finds the initial pose and its fit. `recent` is the root's rotation of a moment ago: nobody turns around between two
-/// frames, while front and back may cost the same.
+/// Knowledge of a start besides its readings.
+pub(super) struct StartPrior<'a> {
+    /// Unit direction against gravity, camera frame.
+    pub up: &'a Vector3<f64>,
+    /// Root's rotation of a moment ago: nobody turns around between two frames, while front and back may cost the same.
+    pub recent: Option<UnitQuaternion<f64>>,
+    /// Proposals of the part forest.
+    pub proposals: &'a BodyProposals,
+}
+
+/// A fitted start and the cost by which starts compare.
+struct FittedStart {
+    cost: f64,
+    pose: Pose,
+    fit: FitReport,
+}
+
+/// Finds the initial pose and its fit: among the proposals, and by a search of its own where those are in doubt or fit
+/// badly.
 pub(super) fn initial_pose(
     context: &FitContext<'_>,
     outline: &Outline,
-    (up, recent): (&Vector3<f64>, Option<UnitQuaternion<f64>>),
+    prior: &StartPrior<'_>,
     scratch: &mut FitScratch,
 ) -> Option<(Pose, FitReport)> {
-    let mut best = Vec::new();
+    // Outlines tell little between hypotheses and cost the most.
+    let terms = scratch.terms;
+    scratch.terms.edge_weight = 0.0;
+    let proposed = prior.proposals.poses(context, scratch);
+    scratch.terms = terms;
+    let mut best = prior.best(context, proposed, scratch);
+    let is_poor = |b: &FittedStart| b.fit.cost > POOR;
+    if prior.proposals.is_doubtful() || best.as_ref().is_none_or(is_poor) {
+        scratch.terms.edge_weight = 0.0;
+        let proposed = best.as_ref().filter(|_| !prior.proposals.is_doubtful());
+        let proposed = proposed.map(|b| b.pose.clone());
+        let searched = searched(context, outline, (prior.up, proposed), scratch);
+        scratch.terms = terms;
+        let other = prior.best(context, searched, scratch);
+        best = best
+            .into_iter()
+            .chain(other)
+            .min_by(|a, b| a.cost.total_cmp(&b.cost));
+    }
+    best.map(|b| (b.pose, b.fit))
+}
+
+impl StartPrior<'_> {
+    /// Fits all poses; the one of least cost.
+    fn best(
+        &self,
+        context: &FitContext<'_>,
+        poses: Vec<Pose>,
+        scratch: &mut FitScratch,
+    ) -> Option<FittedStart> {
+        let fitted = |mut pose: Pose| {
+            fit_pose(context, &mut pose, &START, scratch);
+            let fit = evaluate(context, &pose, REACH[1], scratch);
+            let rotation = pose.root.iso().rotation;
+            let has_turned = self.recent.is_some_and(|r| r.angle_to(&rotation) > TURN);
+            let turn_cost = if has_turned { TURN_COST } else { 1.0 };
+            let cost = fit.cost * turn_cost * self.proposals.facing_cost(&pose);
+            FittedStart { cost, pose, fit }
+        };
+        let fitted = poses.into_iter().map(fitted);
+        fitted.min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
+}
+
+/// The best trunks of either facing and the proposed pose, with the arms and legs of least cost.
+fn searched(
+    context: &FitContext<'_>,
+    outline: &Outline,
+    (up, proposed): (&Vector3<f64>, Option<Pose>),
+    scratch: &mut FitScratch,
+) -> Vec<Pose> {
+    let mut best: Vec<(f64, Pose)> = proposed.map(|p| (0.0, p)).into_iter().collect();
     for (facing, finalists) in FACINGS.into_iter().zip(FINALISTS) {
         let mut trunks = trunks(context, outline, (up, facing), scratch);
         trunks.sort_by(|a, b| a.0.total_cmp(&b.0));
         best.extend(trunks.into_iter().take(finalists));
     }
     let hypotheses = Hypotheses::new(context, &outline.torso);
-    // Outlines tell little between hypotheses and cost the most.
-    let terms = scratch.terms;
-    scratch.terms.edge_weight = 0.0;
-    for (_, pose) in &mut best {
+    let with_limbs = |(_, mut pose): (f64, Pose)| {
         for side in 0..2 {
-            *pose = hypotheses.choose_arm(pose, side, scratch);
+            pose = hypotheses.choose_arm(&pose, side, scratch);
         }
         for side in 0..2 {
-            *pose = hypotheses.choose_leg(pose, side, scratch);
+            pose = hypotheses.choose_leg(&pose, side, scratch);
         }
-    }
-    scratch.terms = terms;
-    let mut winner: Option<(f64, Pose, FitReport)> = None;
-    for (_, mut pose) in best {
-        fit_pose(context, &mut pose, &START, scratch);
-        let fit = evaluate(context, &pose, REACH[1], scratch);
-        let rotation = pose.root.iso().rotation;
-        let has_turned = recent.is_some_and(|r| r.angle_to(&rotation) > TURN);
-        let cost = fit.cost * if has_turned { TURN_COST } else { 1.0 };
-        if winner.as_ref().is_none_or(|(least, ..)| cost < *least) {
-            winner = Some((cost, pose, fit));
-        }
-    }
-    winner.map(|(_, pose, fit)| (pose, fit))
+        pose
+    };
+    best.into_iter().map(with_limbs).collect()
 }
 
 /// Rest poses at each lean and yaw about a facing after a short fit, with their costs.

@@ -3,10 +3,12 @@
 use super::TrackerConfig;
 use super::leg::{Leg, legs};
 use super::limb::{self, Limb};
-use crate::body::parts::{BodySegment, BodySide};
+use super::part_classes::PartClasses;
+use crate::body::parts::{BodyPart, BodySegment, BodySide};
 use crate::body::{JointMotion, SkinWeights, Template};
 use crate::camera::Calibration;
 use crate::math::{P3, V3};
+use crate::segment::part_forest::PartForest;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -56,6 +58,9 @@ pub struct TrackerModel {
     pub(super) chest: usize,
     /// End point or joint of the head; the root for a skeleton without.
     pub(super) crown: usize,
+    /// Classifier of body parts, and its classes on the template.
+    pub(super) forest: Arc<PartForest>,
+    pub(super) part_classes: PartClasses,
     /// Angles of knees, ankles and feet.
     pub(super) below_knee: Vec<bool>,
     /// Share of the rest-pose prior left for each angle when its bone is in full view.
@@ -115,6 +120,7 @@ impl TrackerModel {
             .unwrap_or(0);
         let below_knee = per_angle(&template, |s| s.is_leg() && s != BodySegment::Thigh);
         let seen_shares = per_angle(&template, seen_share);
+        let part_classes = PartClasses::new(&template);
         Self {
             template,
             calibration,
@@ -133,9 +139,23 @@ impl TrackerModel {
             parts,
             chest,
             crown,
+            forest: PartForest::embedded(),
+            part_classes,
             below_knee,
             seen_shares,
         }
+    }
+    /// Arms and legs with their parts, for a skeleton that has them.
+    pub(super) fn limbs(&self) -> impl Iterator<Item = (BodyPart, &Limb)> {
+        let parts = [
+            (BodyPart::LeftArm, &self.arms[0]),
+            (BodyPart::RightArm, &self.arms[1]),
+            (BodyPart::LeftLeg, &self.legs[0]),
+            (BodyPart::RightLeg, &self.legs[1]),
+        ];
+        parts
+            .into_iter()
+            .filter_map(|(part, limb)| limb.as_ref().map(|l| (part, l)))
     }
     /// Template of the tracked body.
     pub fn template(&self) -> &Arc<Template> {

@@ -1,7 +1,7 @@
 //! State of a tracker from frame to frame.
 
 use super::change_detection::DepthReference;
-use super::limb_recovery::LimbRecovery;
+use super::repair::RepairTimer;
 use super::size::SizeEstimate;
 use super::standing::FootMemory;
 use super::status::Status;
@@ -64,8 +64,8 @@ pub struct TrackerState {
     /// Remembered places of the feet.
     #[serde(default)]
     pub(super) feet: Option<FootMemory>,
-    #[serde(default, rename = "rescue")]
-    pub(super) recovery: LimbRecovery,
+    #[serde(default)]
+    pub(super) repair: RepairTimer,
     /// Processed frames in a row in which hardly anything moved.
     #[serde(default)]
     pub(super) still: u32,
@@ -116,7 +116,7 @@ impl TrackerState {
             highest_hips: None,
             drift: Vec::new(),
             feet: None,
-            recovery: LimbRecovery::default(),
+            repair: RepairTimer::default(),
             still: 0,
             reference: None,
             surface_due: [0; 2],

@@ -1,16 +1,18 @@
 //! One subject in view (Algorithm 1): find or predict → fit → recover → calibrate → filter → commit → displacements.
 
 use super::agreement::Agreement;
+use super::body_proposals::BodyProposals;
 use super::calibration::{SizeCalibration, count_steady, live_status};
 use super::confidence::confidence;
 use super::hand_assignment::assign_hands;
-use super::initial_pose::{initial_pose, outline};
+use super::initial_pose::{StartPrior, initial_pose, outline};
 use super::personal_body::PersonalBody;
 use super::pose_filter::filter_pose;
 use super::pose_fit::{
     ANNEAL, FitContext, FitReport, FitTerms, START, START_TERMS, Schedule, TRACK, fit_pose, pair,
 };
 use super::prediction::{Prediction, predict};
+use super::repair::Repair;
 use super::report::Stopwatch;
 use super::size::from_stature;
 use super::standing::{FloorStance, FootMemory, HiddenKnees, floor_below, highest_hips};
@@ -24,6 +26,7 @@ use crate::math::{Camera, P3};
 use crate::registration::Observation;
 use crate::registration::residual::FloorPlane;
 use crate::segment::PersonSearch;
+use crate::segment::part_forest::PartScratch;
 use crate::spatial::OrganisedCloud;
 use nalgebra::Vector3;
 
@@ -154,13 +157,6 @@ impl SubjectFrame<'_> {
         let first = if found { &START } else { &schedule };
         let mut fit = self.fit(&mut pose, first, workspace);
         log.report.stages_ms.pose = log.watch.lap();
-        if config.rescue && !found && state.recovery.is_due(&fit) {
-            let (context, scratch) = (self.context(&workspace.body), &mut workspace.fit);
-            let recovery = &mut state.recovery;
-            let found = recovery.search(&context, &mut pose, &schedule, scratch);
-            fit = found.unwrap_or(fit);
-            log.report.stages_ms.place = log.watch.lap();
-        }
         let good =
             fit.explained >= LEAST_EXPLAINED && fit.matched >= LEAST_MATCHED && pose.is_finite();
         if good && !state.calibrated(config) {
@@ -193,6 +189,9 @@ impl SubjectFrame<'_> {
         log.report.confidence = confidence(&context, &pose, &workspace.fit);
         let measure = &mut workspace.agreement;
         log.report.agreement = measure.measure(&context, &pose, &mut workspace.fit);
+        if config.rescue {
+            self.repair(state, workspace, (&mut pose, &mut fit), log);
+        }
         let agrees = !config.judge || log.report.agreement.wrong() <= MOST_WRONG;
         if let Some(before) = before.filter(|_| !agrees) {
             // Another thing's size is no start for the next search.
@@ -232,8 +231,14 @@ impl SubjectFrame<'_> {
         workspace.body.update(self.model, &state.shape);
         let is_recent = state.status != Status::Searching && state.pose_age <= RECENT;
         let recent = is_recent.then_some(state.pose.root.iso().rotation);
+        let proposals = self.proposals(&mut workspace.parts);
         let (context, scratch) = (self.context(&workspace.body), &mut workspace.fit);
-        let found = outline.and_then(|o| initial_pose(&context, &o, (&self.up, recent), scratch));
+        let prior = StartPrior {
+            up: &self.up,
+            recent,
+            proposals: &proposals,
+        };
+        let found = outline.and_then(|o| initial_pose(&context, &o, &prior, scratch));
         log.report.stages_ms.place = log.watch.lap();
         let (pose, _) = found
             .filter(|(_, fit)| fit.explained >= LEAST_EXPLAINED)
@@ -244,6 +249,49 @@ impl SubjectFrame<'_> {
             pose,
             is_fine: false,
         })
+    }
+
+    /// Proposals of the part forest for this frame.
+    fn proposals(&self, scratch: &mut PartScratch) -> BodyProposals {
+        BodyProposals::new(self.model, &self.observation, &self.up, scratch)
+    }
+
+    /// Replaces pose and fit by better ones at proposed places where they disagree with the frame or, at times, with the
+    /// proposals, and writes them to the report.
+    fn repair(
+        &self,
+        state: &mut TrackerState,
+        workspace: &mut Workspace,
+        (pose, fit): (&mut Pose<Camera>, &mut FitReport),
+        log: &mut StepLog,
+    ) {
+        let disagrees = state.repair.is_due(&log.report.agreement);
+        if !disagrees && !state.repair.is_check_due() {
+            return;
+        }
+        let proposals = self.proposals(&mut workspace.parts);
+        let is_contradicted = proposals.contradict(self.model, &workspace.fit.bones);
+        if !disagrees && !is_contradicted {
+            return;
+        }
+        let repair = Repair {
+            context: self.context(&workspace.body),
+            proposals: &proposals,
+            pose,
+            agreement: log.report.agreement,
+            is_contradicted,
+        };
+        let repaired = repair.search(&mut workspace.fit, &mut workspace.agreement);
+        let found = repaired.is_some();
+        if let Some(better) = repaired {
+            (*pose, *fit) = (better.pose, better.fit);
+            log.add_fit(self.model, state, fit);
+            log.report.agreement = better.agreement;
+            let context = self.context(&workspace.body);
+            log.report.confidence = confidence(&context, pose, &workspace.fit);
+        }
+        state.repair.record(found, log.report.agreement.wrong());
+        log.report.stages_ms.place += log.watch.lap();
     }
 
     /// Sets the residuals of a tracked frame and predicts its pose.

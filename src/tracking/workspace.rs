@@ -8,6 +8,7 @@ use super::{TrackerModel, TrackerState};
 use crate::body::{BodyShape, BoneTransforms, RestBody, skin};
 use crate::math::P3;
 use crate::par::Par;
+use crate::segment::part_forest::PartScratch;
 use crate::segment::{Contour, SegmentScratch};
 use crate::spatial::OrganisedCloud;
 
@@ -20,6 +21,7 @@ pub struct Workspace {
     pub(super) body: PersonalBody,
     pub(super) fit: FitScratch,
     pub(super) agreement: AgreementScratch,
+    pub(super) parts: PartScratch,
     pub(super) surface: SurfaceScratch,
     posed: Vec<P3>,
 }

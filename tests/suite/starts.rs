@@ -42,7 +42,11 @@ fn mean_error_mm(angles: &Angles<'_>, yaw: f64, of: &[&str]) -> f64 {
         let frame = frame(i, depth.clone());
         step(&model, &mut state, &frame, &mut workspace).expect("a step");
     }
-    assert!(state.status.is_live(), "{:?}", state.status);
+    assert!(
+        state.status.is_live(),
+        "{angles:?} at {yaw}: {:?}",
+        state.status
+    );
     let (_, found) = workspace.posed(&model, &state);
     let off = |j: &&str| {
         let j = skeleton.index(j).expect("a joint");

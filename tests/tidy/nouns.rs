@@ -127,6 +127,7 @@ pub(crate) const NOUNS: &[(&str, &[Noun])] = &[
             ("background", "plane_bands.rs"),
             ("nearest body", "components.rs"),
             ("edges", "edges.rs"),
+            ("body parts", "part_forest"),
         ],
     ),
     (

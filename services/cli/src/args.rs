@@ -45,6 +45,8 @@ pub(crate) enum Command {
     Record(RecordArgs),
     /// Publish a recording as if it were a live camera.
     Replay(ReplayArgs),
+    /// Train the classifier of body parts on synthetic people, and score it on others.
+    TrainParts(TrainPartsArgs),
     /// Run time against error, methods side by side: tables as CSV and JSON, plots as SVG.
     Bench(BenchArgs),
     /// Check this machine: cores, memory, graphics adapter, ports, shared data; report expected faults.
@@ -325,6 +327,49 @@ pub(crate) struct BenchTrackingArgs {
     /// One scene, a third of its frames, a few variants: a minute instead of many.
     #[arg(long)]
     pub(crate) quick: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct TrainPartsArgs {
+    /// Forest to write (with --score: to read); the same bytes for the same flags on any number of threads.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+    /// Score the forest in FILE instead of training one.
+    #[arg(long)]
+    pub(crate) score: bool,
+    /// Folder with itop_stills and msr_action3d, for the score.
+    #[arg(long, value_name = "DIR", requires = "score")]
+    pub(crate) recordings: Option<PathBuf>,
+    /// Training images.
+    #[arg(long, default_value_t = 14_000, value_name = "N")]
+    pub(crate) images: usize,
+    /// Labelled cells an image.
+    #[arg(long, default_value_t = 220, value_name = "N")]
+    pub(crate) cells: usize,
+    /// Trees.
+    #[arg(long, default_value_t = 3, value_name = "N")]
+    pub(crate) trees: usize,
+    /// Splits from the root to the deepest leaf.
+    #[arg(long, default_value_t = 18, value_name = "N")]
+    pub(crate) depth: usize,
+    /// Most splits of a tree.
+    #[arg(long, default_value_t = 27_000, value_name = "N")]
+    pub(crate) splits: usize,
+    /// Random features per node.
+    #[arg(long, default_value_t = 112, value_name = "N")]
+    pub(crate) features: usize,
+    /// Folder with motion clips (.bvh, .amc with .asf) for part of the poses.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) motions: Option<PathBuf>,
+    /// Synthetic images of the score.
+    #[arg(long, default_value_t = 1200, value_name = "N")]
+    pub(crate) test_images: usize,
+    /// Seed of all random numbers.
+    #[arg(long, default_value_t = 1, value_name = "S")]
+    pub(crate) seed: u64,
+    /// Worker threads; 0 means one per core.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub(crate) threads: usize,
 }
 
 #[derive(Debug, Args)]

@@ -32,6 +32,7 @@ fn main() -> ExitCode {
         Command::Export(a) => commands::export::run(&a),
         Command::Record(a) => commands::record::run(&a),
         Command::Replay(a) => commands::replay::run(&a),
+        Command::TrainParts(a) => commands::train_parts::run(&a),
         Command::Bench(a) => commands::bench::run(&a),
         Command::Doctor(a) => commands::doctor::run(&a),
     };

@@ -11,4 +11,5 @@ pub(crate) mod replay;
 pub(crate) mod run;
 pub(crate) mod simulate;
 pub(crate) mod track;
+pub(crate) mod train_parts;
 pub(crate) mod up;

@@ -1,0 +1,377 @@
+//! Random labelled frames: people of any shape and pose before any camera, with the class and the depth of every cell.
+//!
+//! A person is a function of seed and number. Each person is seen in several poses.
+
+mod people;
+mod stances;
+mod training;
+mod viewpoint;
+
+use super::clip::{ClipError, Performance};
+use super::stance::Rig;
+use crate::body::{BoneTransforms, RestBody, Template, skin};
+use crate::camera::DepthImage;
+use crate::formats::MotionClip;
+use crate::math::{P3, P3d, V3, V3d};
+use crate::par::Par;
+use crate::raster::{Cull, Options, View, VisibilityBuffer, rasterise_with};
+use crate::segment::part_forest::PersonCells;
+use crate::spatial::{Label, OrganisedCloud};
+use crate::tracking::{PartClasses, yaw_of_joints};
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use std::sync::Arc;
+use viewpoint::Viewpoint;
+
+pub use training::{TrainingPlan, train_parts};
+
+/// Label of a cell whose class the render does not give.
+pub const NO_CLASS: u8 = u8::MAX;
+/// Frames of one person: a shape costs as much as a frame.
+pub const FRAMES_PER_PERSON: usize = 4;
+/// Farthest reading, metres.
+const FARTHEST: f32 = 8.0;
+/// Surfaces nearer than this are clipped, metres.
+const NEAR: f32 = 0.2;
+/// Fewest cells of a frame.
+const LEAST_CELLS: usize = 150;
+/// Largest difference between a cell's depth and the surface that labels it, metres.
+const SAME_SURFACE: f32 = 0.06;
+/// Share of frames whose lowest cells are lost to the floor, and up to which height, metres.
+const FLOOR_LOSS: f64 = 0.5;
+/// See [`FLOOR_LOSS`].
+const FLOOR_HEIGHT: [f64; 2] = [0.02, 0.06];
+/// Share of frames that lose cells at the outline, and of those cells.
+const OUTLINE_LOSS: [f64; 2] = [0.3, 0.5];
+/// Share of frames in which furniture hides everything on one side of a border.
+const HIDDEN: f64 = 0.15;
+/// Heights of a horizontal border, share of the way from pelvis to head (a table, a counter); and distances of a vertical
+/// one from the pelvis, metres.
+const BORDERS: [[f64; 2]; 2] = [[-0.3, 0.4], [0.02, 0.3]];
+/// Share of horizontal borders.
+const TABLES: f64 = 0.6;
+/// Tries for a frame that shows enough of the person.
+const TRIES: usize = 8;
+
+/// A frame with its truth.
+#[derive(Clone, Debug)]
+pub struct LabelledFrame {
+    /// The depth image on the tracker's grid.
+    pub cloud: OrganisedCloud,
+    /// The person's cells that have a reading, ascending.
+    pub cells: Vec<u32>,
+    /// Class of each of them; [`NO_CLASS`] where unknown.
+    pub labels: Vec<u8>,
+    /// Unit direction against gravity, camera frame.
+    pub up: V3,
+    /// Posed joints, camera frame, metres.
+    pub joints: Vec<P3d>,
+    /// Turn of the torso about gravity from facing the camera to the subject's left, radians; `None` for one that lies.
+    pub yaw: Option<f64>,
+}
+
+impl LabelledFrame {
+    /// The person's cells.
+    pub fn person(&self) -> PersonCells<'_> {
+        PersonCells {
+            cloud: &self.cloud,
+            cells: &self.cells,
+            up: self.up,
+        }
+    }
+}
+
+/// Source of labelled frames.
+#[derive(Clone, Debug)]
+pub struct LabelledFrames {
+    template: Arc<Template>,
+    classes: PartClasses,
+    clips: Vec<Performance>,
+    seed: u64,
+}
+
+impl LabelledFrames {
+    /// Frames of a template; poses come from the clips, from the try-on routine and from random key poses.
+    ///
+    /// # Errors
+    /// Names the joint that a clip lacks.
+    pub fn new(
+        template: Arc<Template>,
+        clips: Vec<MotionClip>,
+        seed: u64,
+    ) -> Result<Self, ClipError> {
+        Ok(Self {
+            classes: PartClasses::new(&template),
+            template,
+            clips: clips
+                .into_iter()
+                .map(Performance::new)
+                .collect::<Result<_, _>>()?,
+            seed,
+        })
+    }
+    /// Classes of the template.
+    pub fn classes(&self) -> &PartClasses {
+        &self.classes
+    }
+
+    /// The frames of one person, at most [`FRAMES_PER_PERSON`].
+    pub fn person(&self, number: u64) -> Vec<LabelledFrame> {
+        let mut rng = Pcg64Mcg::new(u128::from(self.seed) << 64 | u128::from(number) << 1 | 1);
+        let mut rng = Pcg64Mcg::seed_from_u64(rng.random());
+        let rest = people::draw(&self.template, &self.classes, &mut rng);
+        let rig = Rig::new(self.template.skeleton(), &rest);
+        let mut out = Vec::with_capacity(FRAMES_PER_PERSON);
+        for _ in 0..FRAMES_PER_PERSON {
+            out.extend((0..TRIES).find_map(|_| self.frame(&rest, &rig, &mut rng)));
+        }
+        out
+    }
+
+    /// One frame; `None` if it shows too little.
+    fn frame(&self, rest: &RestBody, rig: &Rig, rng: &mut Pcg64Mcg) -> Option<LabelledFrame> {
+        let (mut vertices, mut joints) = self.pose(rest, rig, rng);
+        let lowest = vertices.iter().map(|v| v.y).fold(f32::INFINITY, f32::min);
+        let drop = V3::new(0.0, -lowest, 0.0);
+        let height = |p: &P3d| p.y - f64::from(lowest);
+        let (head, pelvis) = (self.template.skeleton().index("head")?, 0);
+        let view = Viewpoint::draw([height(&joints[pelvis]), height(&joints[head])], rng);
+        let to_camera = view.world_from_camera.inverse();
+        let place = V3d::new(view.place[0], 0.0, view.place[1]);
+        for j in &mut joints {
+            *j = to_camera.point(&(*j + drop.cast::<f64>() + place));
+        }
+        let rotation = to_camera.iso().cast::<f32>();
+        let place = drop + place.cast::<f32>();
+        vertices
+            .iter_mut()
+            .for_each(|v| *v = rotation * (*v + place));
+        let up = to_camera.vector(&V3d::y()).cast::<f32>();
+        self.capture(&view, &vertices, rng)
+            .map(|(cloud, cells, labels)| LabelledFrame {
+                cloud,
+                cells,
+                labels,
+                yaw: yaw_of_joints(&self.classes, &joints, &up),
+                up,
+                joints,
+            })
+    }
+
+    /// Vertices and joints of a random pose, world frame, pelvis over the origin.
+    fn pose(&self, rest: &RestBody, rig: &Rig, rng: &mut Pcg64Mcg) -> (Vec<P3>, Vec<P3d>) {
+        let skeleton = self.template.skeleton();
+        let mut bones = BoneTransforms::default();
+        for _ in 0..TRIES {
+            let stance = stances::draw(rig, &self.clips, rng);
+            rig.pose(&stance).bones(skeleton, rest, &mut bones);
+            if !stances::penetrates(skeleton, &bones.joints) || rng.random_bool(0.1) {
+                break;
+            }
+        }
+        let mut vertices = Vec::new();
+        let weights = self.template.weights();
+        skin(Par::Seq, &rest.vertices, weights, &bones, &mut vertices);
+        (vertices, bones.joints)
+    }
+
+    /// Depth image of the vertices with noise, on the grid; cells and their labels.
+    fn capture(
+        &self,
+        view: &Viewpoint,
+        vertices: &[P3],
+        rng: &mut Pcg64Mcg,
+    ) -> Option<(OrganisedCloud, Vec<u32>, Vec<u8>)> {
+        let camera = view.camera;
+        let options = Options {
+            par: Par::Seq,
+            cull: Cull::Back,
+            ..Options::default()
+        };
+        let pinhole = View::Perspective { camera, near: NEAR };
+        let mut buffer = VisibilityBuffer::default();
+        let faces = self.template.mesh().faces();
+        rasterise_with(options, &pinhole, vertices, faces, &mut buffer);
+        let mut image = view.noise.apply(&camera, &buffer.depth, rng.random(), 0);
+        if let Some(step) = view.quantum {
+            image = quantised(&image, step);
+        }
+        let mut cloud = OrganisedCloud::new(&camera, None);
+        cloud.sample(&image, FARTHEST);
+        let mut cells = self.cells(view, &cloud, rng);
+        refine(&mut cloud, &image, &mut cells);
+        if cells.len() < LEAST_CELLS {
+            return None;
+        }
+        let of = |c: &u32| self.label(&buffer, &cloud, *c as usize);
+        let labels = cells.iter().map(of).collect();
+        Some((cloud, cells, labels))
+    }
+
+    /// Cells with a reading, without those lost to the floor and at the outline.
+    fn cells(&self, view: &Viewpoint, cloud: &OrganisedCloud, rng: &mut Pcg64Mcg) -> Vec<u32> {
+        let floor = if rng.random_bool(FLOOR_LOSS) {
+            rng.random_range(FLOOR_HEIGHT[0]..FLOOR_HEIGHT[1])
+        } else {
+            0.0
+        };
+        let loss = rng.random_bool(OUTLINE_LOSS[0]);
+        let columns = cloud.size().0 as i32;
+        let border = HiddenSide::draw(view, rng);
+        let mut keep = |c: &u32| {
+            let cell = *c as usize;
+            if cloud.depth[cell] <= 0.0 {
+                return false;
+            }
+            let p = view
+                .world_from_camera
+                .point(&cloud.centre(cell).cast::<f64>());
+            if p.y < floor || border.is_some_and(|b| b.hides(&p)) {
+                return false;
+            }
+            let (u, v) = (*c as i32 % columns, *c as i32 / columns);
+            let empty = |du: i32, dv: i32| {
+                let k = cloud.cell(u + du, v + dv);
+                k.is_some_and(|k| cloud.depth[k] <= 0.0)
+            };
+            let outline = empty(-1, 0) || empty(1, 0) || empty(0, -1) || empty(0, 1);
+            !(loss && outline && rng.random_bool(OUTLINE_LOSS[1]))
+        };
+        let mut cells: Vec<u32> = (0..cloud.depth.len() as u32).collect();
+        cells.retain(|c| keep(c));
+        cells
+    }
+
+    /// Class of the rendered surface in a cell at the cell's depth.
+    fn label(&self, buffer: &VisibilityBuffer, cloud: &OrganisedCloud, cell: usize) -> u8 {
+        let (columns, s) = (cloud.size().0, cloud.stride() as usize);
+        let (u, v) = (cell % columns * s, cell / columns * s);
+        let z = cloud.depth[cell];
+        let (mut best, mut least) = (NO_CLASS, SAME_SURFACE);
+        for (du, dv) in [(1, 1), (1, 3), (3, 1), (3, 3), (2, 2)] {
+            let (du, dv) = (du * s / 4, dv * s / 4);
+            let k = (v + dv) * buffer.width as usize + u + du;
+            let off = (buffer.depth[k] - z).abs();
+            if buffer.face[k] != VisibilityBuffer::NONE && off < least {
+                let face = self.template.mesh().faces()[buffer.face[k] as usize];
+                best = self.classes.of_vertex()[face[0] as usize];
+                least = off;
+            }
+        }
+        best
+    }
+}
+
+/// Half-space of the world that furniture hides: points whose product with `normal` is below `offset`.
+#[derive(Clone, Copy, Debug)]
+struct HiddenSide {
+    normal: V3d,
+    offset: f64,
+}
+
+impl HiddenSide {
+    /// A random border, in some frames.
+    fn draw(view: &Viewpoint, rng: &mut Pcg64Mcg) -> Option<Self> {
+        if !rng.random_bool(HIDDEN) {
+            return None;
+        }
+        if rng.random_bool(TABLES) {
+            let [pelvis, head] = view.heights;
+            let share = rng.random_range(BORDERS[0][0]..BORDERS[0][1]);
+            return Some(Self {
+                normal: V3d::y(),
+                offset: pelvis + share * (head - pelvis),
+            });
+        }
+        let side = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
+        let away = rng.random_range(BORDERS[1][0]..BORDERS[1][1]);
+        let normal = V3d::x() * side;
+        Some(Self {
+            normal,
+            offset: side * view.place[0] - away,
+        })
+    }
+    fn hides(&self, p: &P3d) -> bool {
+        self.normal.dot(&p.coords) < self.offset
+    }
+}
+
+/// Depth rounded to multiples of a step, millimetres.
+fn quantised(image: &DepthImage, step: u16) -> DepthImage {
+    let round = |d: &u16| (d.saturating_add(step / 2) / step).saturating_mul(step);
+    let data = image.data().iter().map(round).collect();
+    // The sizes are those of the image.
+    DepthImage::new(image.width(), image.height(), data).unwrap_or_else(|_| image.clone())
+}
+
+/// Refines the person's cells and drops those that lose their reading.
+fn refine(cloud: &mut OrganisedCloud, image: &DepthImage, cells: &mut Vec<u32>) {
+    for &c in cells.iter() {
+        cloud.labels[c as usize] = Label::Person;
+    }
+    cloud.refine(image, cells);
+    cells.retain(|c| cloud.depth[*c as usize] > 0.0);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::embedded;
+    use crate::tracking::part_classes::PART_CLASSES;
+
+    /// Largest distance of a part's skin from its anchor, metres: half a thigh under a wide coat.
+    const PART_REACH: f64 = 0.45;
+
+    fn frames(seed: u64) -> LabelledFrames {
+        LabelledFrames::new(embedded::template(), vec![], seed).expect("no clips")
+    }
+
+    #[test]
+    fn labels_lie_about_their_anchors() {
+        let frames = frames(5);
+        let (mut cells, mut unknown) = (0, 0);
+        let mut seen = [0usize; PART_CLASSES];
+        for frame in (0..12).flat_map(|i| frames.person(i)) {
+            assert_eq!(frame.cells.len(), frame.labels.len());
+            assert!(frame.cells.is_sorted() && frame.cells.len() >= LEAST_CELLS);
+            for (&cell, &label) in frame.cells.iter().zip(&frame.labels) {
+                cells += 1;
+                if label == NO_CLASS {
+                    unknown += 1;
+                    continue;
+                }
+                seen[usize::from(label)] += 1;
+                let anchor = frames
+                    .classes()
+                    .anchor_of(label, &frame.joints)
+                    .expect("a joint");
+                let p = frame.cloud.centre(cell as usize).cast::<f64>();
+                let off = (p - anchor).norm();
+                assert!(off < PART_REACH, "class {label}: {off}");
+            }
+        }
+        assert!(
+            20 * unknown < cells,
+            "{unknown} of {cells} cells without a class"
+        );
+        assert!(seen.iter().all(|n| *n > 0), "{seen:?}");
+    }
+
+    #[test]
+    fn frames_are_a_function_of_seed_and_number() {
+        let look = |seed: u64| {
+            let person = frames(seed).person(7);
+            let of = |f: LabelledFrame| (f.cells, f.labels, f.cloud.depth, f.joints);
+            person.into_iter().map(of).collect::<Vec<_>>()
+        };
+        assert_eq!(look(1), look(1));
+        assert_ne!(look(1), look(2));
+    }
+
+    #[test]
+    fn coarse_depth_is_a_multiple_of_its_step() {
+        let image = DepthImage::new(4, 1, vec![0, 1004, 1006, u16::MAX]).expect("sizes agree");
+        assert_eq!(quantised(&image, 12).data()[..3], [0, 1008, 1008]);
+        assert_eq!(quantised(&image, 10).data()[1], 1000);
+    }
+}

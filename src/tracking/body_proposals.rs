@@ -1,0 +1,179 @@
+//! Proposals of the part forest for one frame: joints, facing, and poses of the body from them.
+
+use super::TrackerModel;
+use super::facing::{Facing, facing};
+use super::joint_proposals::JointProposals;
+use super::part_classes::PartKind;
+use super::pose_fit::{FitContext, FitScratch, evaluate};
+use super::proposed_pose::ProposedPoses;
+use crate::body::parts::{BodyPart, BodySide};
+use crate::body::{BoneTransforms, Pose};
+use crate::math::{P3, V3};
+use crate::registration::Observation;
+use crate::segment::part_forest::{PartScratch, PersonCells};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use std::f64::consts::PI;
+
+/// Longest pair in comparisons of poses, metres.
+const REACH: f32 = 0.15;
+/// Confidence above which the facing isn't doubted; 1 to 3 of 100 are wrong beyond it.
+const SURE: f32 = 0.95;
+/// Confidence below which the facing may be anything.
+const DOUBTFUL: f32 = 0.6;
+/// Confidence of a proposed hand or foot that can contradict a pose, and the distance beyond which it does, metres.
+const HEAVY: f32 = 0.35;
+/// See [`HEAVY`].
+const FAR: f64 = 0.25;
+/// Factor on the cost that a limb elsewhere undercuts.
+const CHEAPER: f64 = 0.98;
+/// Factor on the cost of a pose that faces away from a certain facing, less 1.
+const AGAINST_FACING: f64 = 0.5;
+
+/// Proposals of one frame.
+pub(super) struct BodyProposals {
+    joints: JointProposals,
+    flipped: JointProposals,
+    facing: Option<Facing>,
+    /// Unit direction against gravity, camera frame.
+    up: Vector3<f64>,
+}
+
+impl BodyProposals {
+    /// Classifies the subject's cells. `up` is the unit direction against gravity, camera frame.
+    pub(super) fn new(
+        model: &TrackerModel,
+        observation: &Observation<'_>,
+        up: &Vector3<f64>,
+        scratch: &mut PartScratch,
+    ) -> Self {
+        let person = PersonCells {
+            cloud: observation.grid,
+            cells: observation.cells,
+            up: V3::new(up.x as f32, up.y as f32, up.z as f32),
+        };
+        let found = model.forest.propose(&person, scratch);
+        let joints = JointProposals::new(&model.part_classes, &found);
+        Self {
+            flipped: joints.flipped(&model.part_classes),
+            joints,
+            facing: facing(&person, &scratch.yaw),
+            up: *up,
+        }
+    }
+
+    /// Factor on a pose's cost: 1 along the facing, more beyond a quarter turn from it.
+    pub(super) fn facing_cost(&self, pose: &Pose) -> f64 {
+        let facing = self.facing.filter(|_| !self.is_doubtful());
+        let confidence = facing.map_or(0.0, |f| f64::from(f.confidence));
+        1.0 + AGAINST_FACING * confidence * f64::from(u8::from(self.faces_away(pose)))
+    }
+
+    /// True for a pose more than a quarter turn from the facing.
+    pub(super) fn faces_away(&self, pose: &Pose) -> bool {
+        let front = pose.root.iso().rotation * Vector3::z();
+        self.facing
+            .is_some_and(|f| front.dot(&f.front.cast()) < 0.0)
+    }
+
+    /// True where a hand or foot of `bones` is far from all its heavy proposals.
+    pub(super) fn contradict(&self, model: &TrackerModel, bones: &BoneTransforms) -> bool {
+        let ends = [PartKind::Hand, PartKind::Foot].into_iter();
+        let mut classes =
+            ends.flat_map(|k| [BodySide::Left, BodySide::Right].map(|side| k.class(side)));
+        classes.any(|class| {
+            let is_heavy = self.joints.of_class(class).any(|(_, w)| w > HEAVY);
+            let Some(end) = model.part_classes.anchor_of(class, &bones.joints) else {
+                return false;
+            };
+            let is_far = |(p, _): (P3, f32)| (p.cast::<f64>() - end).norm() > FAR;
+            is_heavy && self.joints.of_class(class).all(is_far)
+        })
+    }
+
+    /// The body at its proposed joints as seen, and in doubt of the facing otherwise; trunk by its joints or upright, each
+    /// limb at the proposal of least cost.
+    pub(super) fn poses(&self, context: &FitContext<'_>, scratch: &mut FitScratch) -> Vec<Pose> {
+        let mut out = Vec::new();
+        for (joints, turn) in self.hypotheses() {
+            let poses = proposed(context, joints);
+            let upright = self.facing.and_then(|f| self.upright(&f.front.cast()));
+            let along = upright.and_then(|u| poses.trunk_along(u * about_body(turn)));
+            for trunk in poses.trunk().into_iter().chain(along) {
+                out.push(with_limbs(context, joints, &trunk, scratch).unwrap_or(trunk));
+            }
+        }
+        out
+    }
+
+    /// True where the facing may be anything: half a body, a profile.
+    pub(super) fn is_doubtful(&self) -> bool {
+        self.facing.is_none_or(|f| f.confidence < DOUBTFUL)
+    }
+
+    /// Joints as seen, and exchanged where the facing isn't sure, each with the turn of an upright trunk from the facing,
+    /// radians.
+    fn hypotheses(&self) -> impl Iterator<Item = (&JointProposals, f64)> {
+        let is_sure = self.facing.is_some_and(|f| f.confidence > SURE);
+        let flipped = (!is_sure).then_some((&self.flipped, PI));
+        std::iter::once((&self.joints, 0.0)).chain(flipped)
+    }
+
+    /// Rotation of an upright body with a given level front, camera frame.
+    fn upright(&self, front: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
+        let side = self.up.cross(front).try_normalize(f64::EPSILON)?;
+        let axes = Matrix3::from_columns(&[side, self.up, side.cross(&self.up)]);
+        let rotation = Rotation3::from_matrix_unchecked(axes);
+        Some(UnitQuaternion::from_rotation_matrix(&rotation))
+    }
+
+    /// `pose` with each limb moved to its proposed place where that costs less; `None` where it nowhere does.
+    pub(super) fn limbs_of(
+        &self,
+        context: &FitContext<'_>,
+        pose: &Pose,
+        scratch: &mut FitScratch,
+    ) -> Option<Pose> {
+        let joints = if self.faces_away(pose) {
+            &self.flipped
+        } else {
+            &self.joints
+        };
+        with_limbs(context, joints, pose, scratch)
+    }
+}
+
+/// Turn about the body's upright, radians.
+fn about_body(turn: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turn)
+}
+
+/// `pose` with each limb at its proposal of least cost; `None` where all stay.
+fn with_limbs(
+    context: &FitContext<'_>,
+    joints: &JointProposals,
+    pose: &Pose,
+    scratch: &mut FitScratch,
+) -> Option<Pose> {
+    use BodyPart::*;
+    let mut least = evaluate(context, pose, REACH, scratch).cost;
+    let mut best = None;
+    for part in [LeftLeg, RightLeg, LeftArm, RightArm] {
+        let others = proposed(context, joints).limb_poses(best.as_ref().unwrap_or(pose), part);
+        least *= CHEAPER;
+        for other in others {
+            let cost = evaluate(context, &other, REACH, scratch).cost;
+            if cost < least {
+                (least, best) = (cost, Some(other));
+            }
+        }
+    }
+    best
+}
+
+fn proposed<'a>(context: &FitContext<'a>, proposals: &'a JointProposals) -> ProposedPoses<'a> {
+    ProposedPoses {
+        model: context.model,
+        rest: &context.body.rest,
+        proposals,
+    }
+}

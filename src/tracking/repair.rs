@@ -1,0 +1,188 @@
+//! Repair of a pose that disagrees with its frame: limbs, then whole bodies, are tried where the part forest proposes them.
+
+use super::agreement::{Agreement, AgreementScratch};
+use super::body_proposals::BodyProposals;
+use super::pose_fit::{
+    ANNEAL, FitContext, FitReport, FitScratch, FitTerms, START_TERMS, Schedule, TRACK, evaluate,
+    fit_pose,
+};
+use crate::body::Pose;
+use serde::{Deserialize, Serialize};
+
+/// Timer of the repairs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct RepairTimer {
+    /// Frames until the next repair.
+    wait: u32,
+    /// Frames to wait after it.
+    interval: u32,
+    /// Share of the area that was wrong after the last one.
+    wrong: f32,
+    /// Frames since the last check of the proposals.
+    unchecked: u32,
+}
+
+/// Interval between checks of a pose that agrees, frames.
+const CHECKED: u32 = 8;
+/// Wrong share of the area above which a repair is tried; good tracks have 0.01 to 0.13.
+const WRONG: f32 = 0.08;
+/// Wrong share of the area above which the whole body is tried, not limbs alone.
+const BODY_WRONG: f32 = 0.12;
+/// Share of a part in free space above which one is tried.
+const PART_WRONG: f32 = 0.4;
+/// Shortest and longest wait after a repair without success, frames: loose clothes never agree.
+const WAIT: [u32; 2] = [1, 120];
+/// Factor on the wrong share from which there is no waiting.
+const WORSE: f32 = 1.5;
+/// Factor on the cost that a better pose undercuts.
+const CHEAPER: f64 = 0.95;
+/// Factor on the wrong share that a better pose undercuts: cost alone takes a fast arm for a bent one.
+const AGREES: f32 = 0.7;
+/// Turn beyond which a better pose must be clearly better, radians, and the factor on its cost.
+const TURN: (f64, f64) = (1.75, 1.5);
+/// Longest pair in comparisons, metres.
+const REACH: f32 = 0.10;
+/// Fit of a proposal.
+const FIT: Schedule = TRACK;
+/// One iteration that leaves pairs and equations of the pose in the scratch.
+const SETTLE: Schedule = Schedule {
+    iterations: 1,
+    ahead: ANNEAL,
+    ..TRACK
+};
+
+impl RepairTimer {
+    /// Records a frame's agreement; true when a repair is due.
+    pub(super) fn is_due(&mut self, agreement: &Agreement) -> bool {
+        self.wait = self.wait.saturating_sub(1);
+        let wrong = agreement.wrong();
+        if wrong <= WRONG && agreement.parts.iter().all(|p| *p <= PART_WRONG) {
+            self.interval = self.interval.saturating_sub(1);
+            self.wrong *= f32::from(u8::from(self.interval > 0));
+            return false;
+        }
+        self.wait == 0 || wrong > WORSE * self.wrong
+    }
+
+    /// True a few times a second: an arm inside the torso disagrees with nothing, only with its proposals.
+    pub(super) fn is_check_due(&mut self) -> bool {
+        self.unchecked = (self.unchecked + 1) % CHECKED;
+        self.unchecked == 0
+    }
+
+    /// Records the result of a repair.
+    pub(super) fn record(&mut self, found: bool, wrong: f32) {
+        self.interval = if found {
+            0
+        } else {
+            (2 * self.interval).clamp(WAIT[0], WAIT[1])
+        };
+        (self.wait, self.wrong) = (self.interval, wrong);
+    }
+}
+
+/// One disagreeing pose with the proposals of its frame.
+pub(super) struct Repair<'a> {
+    pub context: FitContext<'a>,
+    pub proposals: &'a BodyProposals,
+    pub pose: &'a Pose,
+    pub agreement: Agreement,
+    /// A hand or foot is far from where it is proposed: the new pose need not agree better than this one.
+    pub is_contradicted: bool,
+}
+
+/// A better pose.
+pub(super) struct RepairedPose {
+    pub pose: Pose,
+    pub fit: FitReport,
+    pub agreement: Agreement,
+}
+
+impl Repair<'_> {
+    /// The pose with limbs, or the body, where they are proposed and fitted, if that costs less and agrees better.
+    pub(super) fn search(
+        &self,
+        scratch: &mut FitScratch,
+        measure: &mut AgreementScratch,
+    ) -> Option<RepairedPose> {
+        let now = evaluate(&self.context, self.pose, REACH, scratch);
+        let most = CHEAPER * now.cost * self.proposals.facing_cost(self.pose);
+        let rated = self
+            .candidates(scratch)
+            .into_iter()
+            .map(|pose| (self.cost(&pose, scratch), pose));
+        let (_, mut pose) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        fit_pose(&self.context, &mut pose, &FIT, scratch);
+        if self.cost(&pose, scratch) > most || !pose.is_finite() {
+            return None;
+        }
+        let agreement = measure.measure(&self.context, &pose, scratch);
+        let share = if self.is_contradicted { 1.0 } else { AGREES };
+        if agreement.wrong() > share * self.agreement.wrong() {
+            return None;
+        }
+        let fit = fit_pose(&self.context, &mut pose, &SETTLE, scratch);
+        Some(RepairedPose {
+            pose,
+            fit,
+            agreement,
+        })
+    }
+
+    /// Cost of a fitted candidate with its priors on facing and turn.
+    fn cost(&self, pose: &Pose, scratch: &mut FitScratch) -> f64 {
+        let fit = evaluate(&self.context, pose, REACH, scratch);
+        let turn = |p: &Pose| p.root.iso().rotation;
+        let turned = turn(pose).angle_to(&turn(self.pose)) > TURN.0;
+        fit.cost * self.proposals.facing_cost(pose) * if turned { TURN.1 } else { 1.0 }
+    }
+
+    fn candidates(&self, scratch: &mut FitScratch) -> Vec<Pose> {
+        let terms = scratch.terms;
+        // Outlines tell little between hypotheses and cost the most.
+        scratch.terms = FitTerms {
+            edge_weight: 0.0,
+            ..START_TERMS
+        };
+        let limbs = self.proposals.limbs_of(&self.context, self.pose, scratch);
+        let mut out: Vec<Pose> = limbs.into_iter().collect();
+        if self.agreement.wrong() > BODY_WRONG || self.proposals.faces_away(self.pose) {
+            out.extend(self.proposals.poses(&self.context, scratch));
+        }
+        scratch.terms = terms;
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn repairs_follow_disagreement_at_growing_intervals() {
+        let agreement = |in_free_space| Agreement {
+            in_free_space,
+            ..Agreement::default()
+        };
+        let mut timer = RepairTimer::default();
+        assert!((0..100).all(|_| !timer.is_due(&agreement(0.03))), "good");
+        let mut due = vec![];
+        for frame in 0..20 {
+            if timer.is_due(&agreement(0.1)) {
+                due.push(frame);
+                timer.record(false, 0.1);
+            }
+        }
+        assert_eq!(due, [0, 1, 3, 7, 15]);
+        assert!(timer.is_due(&agreement(0.2)), "worse than after the last");
+        timer.record(false, 0.2);
+        let good = (0..200).map(|_| timer.is_due(&agreement(0.0)));
+        assert_eq!(good.filter(|due| *due).count(), 0);
+        let part = Agreement {
+            parts: [0.0, 0.5, 0.0, 0.0, 0.0],
+            ..agreement(0.01)
+        };
+        assert!(!timer.is_due(&agreement(0.0)));
+        assert!(timer.is_due(&part), "a limb in the air after a good frame");
+    }
+}
