@@ -248,19 +248,7 @@ fn equations(c: &mut Criterion) {
 }
 
 fn parts(c: &mut Criterion) {
-    let sequence = subject(Routine::TryOn);
-    let (frame, _) = sequence.frame(0);
-    let mut grid = OrganisedCloud::new(&sequence.calibration().depth, None);
-    grid.sample(&frame.depth, 8.0);
-    let planes = find_planes(&grid);
-    let cells = find_person(
-        &mut grid,
-        &planes,
-        PersonChoice::Ranked(0),
-        &mut SegmentScratch::default(),
-    )
-    .cells;
-    grid.refine(&frame.depth, &cells);
+    let Readings { grid, cells, .. } = readings();
     let (forest, mut scratch) = (PartForest::embedded(), PartScratch::default());
     let person = |cells| PersonCells {
         cloud: &grid,

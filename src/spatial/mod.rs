@@ -2,6 +2,7 @@
 
 mod brute;
 mod bvh;
+mod chessboard;
 mod hash_grid;
 mod intersections;
 mod kdtree;
@@ -12,6 +13,7 @@ pub use brute::nearest_brute_force;
 #[cfg(test)]
 pub(crate) use brute::two_boxes;
 pub use bvh::{Bvh, Position, SurfacePoint};
+pub use chessboard::chessboard_distances;
 pub use hash_grid::HashGrid;
 pub use intersections::{Intersection, SelfIntersections, intersections};
 pub use kdtree::PointTree;

@@ -7,7 +7,7 @@ use super::TrackerModel;
 use super::pose_fit::{FitContext, FitScratch};
 use crate::body::Pose;
 use crate::registration::{IndexImage, Observation};
-use crate::spatial::{Label, OrganisedCloud};
+use crate::spatial::{Label, OrganisedCloud, chessboard_distances};
 use serde::{Deserialize, Serialize};
 
 /// Number of [`BodyPart`](crate::body::parts::BodyPart)s.
@@ -86,8 +86,9 @@ impl AgreementScratch {
         let grid = observation.grid;
         let is_subject = |k: usize| grid.labels[k] == Label::Person && grid.depth[k] > 0.0;
         let is_body = |k: usize| image.index[k] != IndexImage::NONE;
-        distances(grid, is_subject, &mut self.to_subject);
-        distances(grid, is_body, &mut self.to_body);
+        let nothing = |_| u16::MAX;
+        chessboard_distances(grid, is_subject, nothing, &mut self.to_subject);
+        chessboard_distances(grid, is_body, nothing, &mut self.to_body);
         let seam = seam(observation);
 
         let (mut area, mut uncovered) = (0u32, 0u32);
@@ -139,27 +140,6 @@ fn seam(observation: &Observation<'_>) -> u16 {
     let focal = grid.focal()[0].max(grid.focal()[1]);
     let cells = SEAM * focal * n / f32::max(sum, f32::MIN_POSITIVE);
     (cells.round().min(f32::from(u16::MAX)) as u16).max(LEAST_SEAM)
-}
-
-/// Chessboard distance of every cell to the nearest cell of a set, cells; saturates where there is none.
-fn distances(grid: &OrganisedCloud, is_in: impl Fn(usize) -> bool, out: &mut Vec<u16>) {
-    let (columns, rows) = grid.size();
-    out.clear();
-    out.extend((0..columns * rows).map(|k| if is_in(k) { 0 } else { u16::MAX }));
-    let mut relax = |k: usize, neighbours: [(i32, i32); 4]| {
-        let (u, v) = ((k % columns) as i32, (k / columns) as i32);
-        for (du, dv) in neighbours {
-            if let Some(n) = grid.cell(u + du, v + dv) {
-                out[k] = out[k].min(out[n].saturating_add(1));
-            }
-        }
-    };
-    for k in 0..columns * rows {
-        relax(k, [(-1, 0), (0, -1), (-1, -1), (1, -1)]);
-    }
-    for k in (0..columns * rows).rev() {
-        relax(k, [(1, 0), (0, 1), (1, 1), (-1, 1)]);
-    }
 }
 
 #[cfg(test)]

@@ -8,24 +8,30 @@ use super::pose_fit::{FitContext, FitScratch, evaluate};
 use super::proposed_pose::ProposedPoses;
 use crate::body::parts::{BodyPart, BodySide};
 use crate::body::{BoneTransforms, Pose};
-use crate::math::{P3, V3};
+use crate::math::P3;
 use crate::registration::Observation;
 use crate::segment::part_forest::{PartScratch, PersonCells};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
-/// Longest pair in comparisons of poses, metres.
+/// Longest pair in comparisons of poses that are not fitted yet, metres.
 const REACH: f32 = 0.15;
 /// Confidence above which the facing isn't doubted; 1 to 3 of 100 are wrong beyond it.
 const SURE: f32 = 0.95;
 /// Confidence below which the facing may be anything.
 const DOUBTFUL: f32 = 0.6;
-/// Confidence of a proposed hand or foot that can contradict a pose, and the distance beyond which it does, metres.
+/// Confidence of a proposed hand or foot that can contradict a pose, and the distance beyond which it does, metres: a third
+/// of the proposed hands are wrong, and right ones lie within 10 cm.
 const HEAVY: f32 = 0.35;
 /// See [`HEAVY`].
 const FAR: f64 = 0.25;
 /// Factor on the cost that a limb elsewhere undercuts.
 const CHEAPER: f64 = 0.98;
+/// Turn from a pose of a moment ago beyond which another must be clearly better, radians: nobody turns around between two
+/// frames, while front and back may cost the same.
+const TURN: f64 = 1.75;
+/// Factor on the cost of such a pose.
+const TURN_COST: f64 = 1.5;
 /// Factor on the cost of a pose that faces away from a certain facing, less 1.
 const AGAINST_FACING: f64 = 0.5;
 
@@ -49,7 +55,7 @@ impl BodyProposals {
         let person = PersonCells {
             cloud: observation.grid,
             cells: observation.cells,
-            up: V3::new(up.x as f32, up.y as f32, up.z as f32),
+            up: up.cast(),
         };
         let found = model.forest.propose(&person, scratch);
         let joints = JointProposals::new(&model.part_classes, &found);
@@ -61,11 +67,17 @@ impl BodyProposals {
         }
     }
 
-    /// Factor on a pose's cost: 1 along the facing, more beyond a quarter turn from it.
-    pub(super) fn facing_cost(&self, pose: &Pose) -> f64 {
-        let facing = self.facing.filter(|_| !self.is_doubtful());
-        let confidence = facing.map_or(0.0, |f| f64::from(f.confidence));
-        1.0 + AGAINST_FACING * confidence * f64::from(u8::from(self.faces_away(pose)))
+    /// Factor on a pose's cost by its root's rotation: 1 along the facing and near that of a moment ago, more beyond a
+    /// quarter turn from the one and after a turn around from the other.
+    pub(super) fn prior_cost(&self, pose: &Pose, recent: Option<UnitQuaternion<f64>>) -> f64 {
+        let rotation = pose.root.iso().rotation;
+        let has_turned = recent.is_some_and(|r| r.angle_to(&rotation) > TURN);
+        let turn_cost = if has_turned { TURN_COST } else { 1.0 };
+        let confidence = match self.facing {
+            Some(f) if !self.is_doubtful() && self.faces_away(pose) => f64::from(f.confidence),
+            _ => 0.0,
+        };
+        turn_cost * (1.0 + AGAINST_FACING * confidence)
     }
 
     /// True for a pose more than a quarter turn from the facing.
@@ -96,7 +108,7 @@ impl BodyProposals {
         let mut out = Vec::new();
         for (joints, turn) in self.hypotheses() {
             let poses = proposed(context, joints);
-            let upright = self.facing.and_then(|f| self.upright(&f.front.cast()));
+            let upright = self.facing.map(|f| upright(&self.up, &f.front.cast()));
             let along = upright.and_then(|u| poses.trunk_along(u * about_body(turn)));
             for trunk in poses.trunk().into_iter().chain(along) {
                 out.push(with_limbs(context, joints, &trunk, scratch).unwrap_or(trunk));
@@ -118,14 +130,6 @@ impl BodyProposals {
         std::iter::once((&self.joints, 0.0)).chain(flipped)
     }
 
-    /// Rotation of an upright body with a given level front, camera frame.
-    fn upright(&self, front: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
-        let side = self.up.cross(front).try_normalize(f64::EPSILON)?;
-        let axes = Matrix3::from_columns(&[side, self.up, side.cross(&self.up)]);
-        let rotation = Rotation3::from_matrix_unchecked(axes);
-        Some(UnitQuaternion::from_rotation_matrix(&rotation))
-    }
-
     /// `pose` with each limb moved to its proposed place where that costs less; `None` where it nowhere does.
     pub(super) fn limbs_of(
         &self,
@@ -142,8 +146,18 @@ impl BodyProposals {
     }
 }
 
+/// Rotation of an upright body with a given front, made level; one along the view is taken for the camera's −z.
+pub(super) fn upright(up: &Vector3<f64>, front: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let level = front - up * up.dot(front);
+    let z = level
+        .try_normalize(f64::EPSILON)
+        .unwrap_or_else(|| -Vector3::z());
+    let axes = Matrix3::from_columns(&[up.cross(&z), *up, z]);
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes))
+}
+
 /// Turn about the body's upright, radians.
-fn about_body(turn: f64) -> UnitQuaternion<f64> {
+pub(super) fn about_body(turn: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turn)
 }
 

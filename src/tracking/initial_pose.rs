@@ -1,12 +1,16 @@
-//! Initial pose: trunk by outline and principal axes, then hypotheses of yaw, arms and legs.
+//! Initial pose: the part forest's proposals, and in doubt trunks by outline and principal axes with hypotheses of arms and
+//! legs.
 
-use super::body_proposals::BodyProposals;
+use super::body_proposals::{BodyProposals, about_body, upright};
 use super::hypotheses::Hypotheses;
-use super::pose_fit::{FitContext, FitReport, FitScratch, START, Schedule, evaluate, fit_pose};
+use super::pose_fit::{
+    FitContext, FitReport, FitScratch, HYPOTHESIS_TERMS, START, Schedule, evaluate, fit_pose,
+};
 use crate::body::Pose;
 use crate::math::{P3, Rigid, principal_axes};
 use crate::registration::Observation;
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use crate::spatial::chessboard_distances;
+use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
 /// Landmarks of the subject's silhouette.
@@ -37,10 +41,6 @@ const FACINGS: [f64; 2] = [0.0, PI];
 /// Best trunks of each facing that get arms and a full fit; each costs a quarter of the search. Front and back of a trunk
 /// cost nearly the same, so that they compare only after the full fit.
 const FINALISTS: [usize; 2] = [2, 1];
-/// Turn from a pose of a moment ago beyond which a start must be clearly better, radians.
-const TURN: f64 = 1.75;
-/// Factor on the cost of such a start.
-const TURN_COST: f64 = 1.5;
 /// Iterations of a trunk's fit: enough to rank yaws.
 const TRUNK_ITERATIONS: usize = 3;
 /// Cost of a fitted proposal above which the search goes on, m² per point: a lost foot costs as little as that.
@@ -61,36 +61,18 @@ fn points<'a>(observation: &'a Observation<'_>) -> impl Iterator<Item = (usize, 
         .map(|c| (c, grid.points[c]))
 }
 
-/// Chessboard distance of each cell to the nearest cell outside the subject, in cells. Cells beyond the image rim count
-/// as outside, except below: a torso cut by the lower rim continues.
+/// Distance of each cell to the nearest cell outside the subject, cells. Cells beyond the image's rim count as outside,
+/// except below: a torso cut by the lower rim continues.
 fn silhouette_distance(observation: &Observation<'_>) -> Vec<u16> {
     let grid = observation.grid;
     let (columns, rows) = grid.size();
-    let mut distance = vec![0u16; columns * rows];
+    let mut is_subject = vec![false; columns * rows];
     for &c in observation.cells {
-        distance[c as usize] = u16::MAX;
+        is_subject[c as usize] = true;
     }
-    let mut relax = |cell: usize, neighbours: [(i32, i32); 4]| {
-        if distance[cell] == 0 {
-            return;
-        }
-        let (u, v) = ((cell % columns) as i32, (cell / columns) as i32);
-        let least = neighbours
-            .iter()
-            .map(|(du, dv)| match grid.cell(u + du, v + dv) {
-                Some(k) => distance[k],
-                None if v + dv >= rows as i32 => u16::MAX - 1,
-                None => 0,
-            })
-            .min();
-        distance[cell] = distance[cell].min(least.unwrap_or(0).saturating_add(1));
-    };
-    for c in 0..columns * rows {
-        relax(c, [(-1, 0), (0, -1), (-1, -1), (1, -1)]);
-    }
-    for c in (0..columns * rows).rev() {
-        relax(c, [(1, 0), (0, 1), (1, 1), (-1, 1)]);
-    }
+    let beyond = |row: i32| if row >= rows as i32 { u16::MAX } else { 0 };
+    let mut distance = Vec::new();
+    chessboard_distances(grid, |k| !is_subject[k], beyond, &mut distance);
     distance
 }
 
@@ -139,16 +121,8 @@ pub(super) fn outline(
 }
 
 /// Rotation of an upright body that faces the camera, turned by `yaw` about the vertical.
-fn upright(up: &Vector3<f64>, yaw: f64) -> UnitQuaternion<f64> {
-    let back = Vector3::z();
-    // The body's z is the camera's −z, made level.
-    let z = (-(back - up * up.dot(&back)))
-        .try_normalize(f64::EPSILON)
-        .unwrap_or_else(|| -Vector3::z());
-    let x = up.cross(&z);
-    let m = Matrix3::from_columns(&[x, *up, z]);
-    let facing = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(m));
-    facing * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw)
+fn facing_camera(up: &Vector3<f64>, yaw: f64) -> UnitQuaternion<f64> {
+    upright(up, &-Vector3::z()) * about_body(yaw)
 }
 
 /// Knowledge of a start besides its readings.
@@ -176,19 +150,15 @@ pub(super) fn initial_pose(
     prior: &StartPrior<'_>,
     scratch: &mut FitScratch,
 ) -> Option<(Pose, FitReport)> {
-    // Outlines tell little between hypotheses and cost the most.
-    let terms = scratch.terms;
-    scratch.terms.edge_weight = 0.0;
-    let proposed = prior.proposals.poses(context, scratch);
-    scratch.terms = terms;
+    let proposed = scratch.with_terms(HYPOTHESIS_TERMS, |s| prior.proposals.poses(context, s));
     let mut best = prior.best(context, proposed, scratch);
     let is_poor = |b: &FittedStart| b.fit.cost > POOR;
     if prior.proposals.is_doubtful() || best.as_ref().is_none_or(is_poor) {
-        scratch.terms.edge_weight = 0.0;
         let proposed = best.as_ref().filter(|_| !prior.proposals.is_doubtful());
         let proposed = proposed.map(|b| b.pose.clone());
-        let searched = searched(context, outline, (prior.up, proposed), scratch);
-        scratch.terms = terms;
+        let searched = scratch.with_terms(HYPOTHESIS_TERMS, |s| {
+            searched(context, outline, (prior.up, proposed), s)
+        });
         let other = prior.best(context, searched, scratch);
         best = best
             .into_iter()
@@ -209,10 +179,7 @@ impl StartPrior<'_> {
         let fitted = |mut pose: Pose| {
             fit_pose(context, &mut pose, &START, scratch);
             let fit = evaluate(context, &pose, REACH[1], scratch);
-            let rotation = pose.root.iso().rotation;
-            let has_turned = self.recent.is_some_and(|r| r.angle_to(&rotation) > TURN);
-            let turn_cost = if has_turned { TURN_COST } else { 1.0 };
-            let cost = fit.cost * turn_cost * self.proposals.facing_cost(&pose);
+            let cost = fit.cost * self.proposals.prior_cost(&pose, self.recent);
             FittedStart { cost, pose, fit }
         };
         let fitted = poses.into_iter().map(fitted);
@@ -261,7 +228,7 @@ fn trunks(
     let mut out = Vec::new();
     for lean in leans(context.observation, up, outline) {
         for yaw in YAWS {
-            let root = trunk_root(context, outline, &lean, upright(&lean, facing + yaw));
+            let root = trunk_root(context, outline, &lean, facing_camera(&lean, facing + yaw));
             let mut pose = Pose::rest(skeleton, root);
             fit_pose(context, &mut pose, &schedule, scratch);
             let cost = evaluate(context, &pose, REACH[0], scratch).cost;

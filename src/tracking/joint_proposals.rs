@@ -60,27 +60,10 @@ impl JointProposals {
         anchors.sort_by(|a, b| a.class.cmp(&b.class).then(b.weight.total_cmp(&a.weight)));
         Self { anchors }
     }
-    /// Places of a joint that is an anchor by itself (shoulder, elbow, hip, knee, ankle, neck), heaviest first.
-    pub fn of_joint(&self, joint: usize) -> impl Iterator<Item = (P3, f32)> + '_ {
-        let own = self.anchors.iter().filter(move |a| a.joints == [joint; 2]);
-        own.map(|a| (a.position, a.weight))
-    }
     /// Places of a class's anchor, heaviest first.
     pub fn of_class(&self, class: u8) -> impl Iterator<Item = (P3, f32)> + '_ {
         let own = self.anchors.iter().filter(move |a| a.class == class);
         own.map(|a| (a.position, a.weight))
-    }
-    /// Places of hands, heaviest first.
-    pub fn hands(&self, side: BodySide) -> impl Iterator<Item = (P3, f32)> + '_ {
-        self.of_class(PartKind::Hand.class(side))
-    }
-    /// Places of the middle of the head.
-    pub fn head(&self) -> impl Iterator<Item = (P3, f32)> + '_ {
-        self.of_class(PartKind::Head.class(BodySide::Left))
-    }
-    /// Places of the neck.
-    pub fn neck(&self) -> impl Iterator<Item = (P3, f32)> + '_ {
-        self.of_class(NECK_CLASS)
     }
 }
 

@@ -68,7 +68,6 @@ pub use facing::{Facing, facing, yaw_of_joints, yaw_of_trunk};
 pub use joint_proposals::{JointProposals, ProposedAnchor};
 pub use model::TrackerModel;
 pub use part_classes::PartClasses;
-pub use proposed_pose::ProposedPoses;
 pub use report::{Skipped, StepError, StepReport, TrackingStagesMs};
 pub use size::SizeEstimate;
 pub use state::TrackerState;

@@ -18,13 +18,13 @@ const LEAST_END: f32 = 0.1;
 
 /// Poses that proposals of one frame suggest for a body.
 #[derive(Clone, Copy)]
-pub struct ProposedPoses<'a> {
+pub(super) struct ProposedPoses<'a> {
     /// Tracker of the body.
-    pub model: &'a TrackerModel,
+    pub(super) model: &'a TrackerModel,
     /// The body in its rest pose.
-    pub rest: &'a RestBody,
+    pub(super) rest: &'a RestBody,
     /// Proposals of one frame.
-    pub proposals: &'a JointProposals,
+    pub(super) proposals: &'a JointProposals,
 }
 
 /// A limb with the classes of its end and its hinge.
@@ -38,20 +38,8 @@ struct LimbClasses<'a> {
 type WeightedPair = (Vector3<f64>, Vector3<f64>, f64);
 
 impl ProposedPoses<'_> {
-    /// The trunk at its proposed joints with each limb at its heaviest proposal; `None` with too few joints of the trunk.
-    pub fn pose(&self) -> Option<Pose> {
-        let mut pose = self.trunk()?;
-        let parts: Vec<BodyPart> = self.model.limbs().map(|(part, _)| part).collect();
-        for part in parts {
-            if let Some(first) = self.limb_poses(&pose, part).into_iter().next() {
-                pose = first;
-            }
-        }
-        Some(pose)
-    }
-
     /// Rest pose with the trunk at its proposed joints; `None` with too few of them.
-    pub fn trunk(&self) -> Option<Pose> {
+    pub(super) fn trunk(&self) -> Option<Pose> {
         let pairs = self.trunk_pairs();
         if pairs.len() < LEAST_JOINTS {
             return None;
@@ -63,7 +51,7 @@ impl ProposedPoses<'_> {
 
     /// Rest pose of a given rotation with the trunk at its proposed joints, for half a body, whose few joints lie on a line;
     /// `None` without a joint.
-    pub fn trunk_along(&self, rotation: UnitQuaternion<f64>) -> Option<Pose> {
+    pub(super) fn trunk_along(&self, rotation: UnitQuaternion<f64>) -> Option<Pose> {
         let pairs = self.trunk_pairs();
         let total: f64 = pairs.iter().map(|p| p.2).sum();
         let sum: Vector3<f64> = pairs.iter().map(|(a, b, w)| (b - rotation * a) * *w).sum();
@@ -92,7 +80,7 @@ impl ProposedPoses<'_> {
 
     /// `pose` with one limb at each proposed end within its length, heaviest first: its hinge at each proposed place, then
     /// free; straight through the hinge without an end.
-    pub fn limb_poses(&self, pose: &Pose, part: BodyPart) -> Vec<Pose> {
+    pub(super) fn limb_poses(&self, pose: &Pose, part: BodyPart) -> Vec<Pose> {
         let Some(classes) = self.classes(part) else {
             return vec![];
         };
@@ -170,6 +158,17 @@ mod tests {
     use crate::tracking::PartClasses;
     use crate::tracking::part_classes::PART_CLASSES;
     use crate::tracking::test_scene::TestScene;
+
+    impl ProposedPoses<'_> {
+        /// The trunk at its proposed joints with each limb at its heaviest proposal.
+        fn pose(&self) -> Option<Pose> {
+            let with_limb = |pose: Pose, (part, _): (BodyPart, &Limb)| {
+                let first = self.limb_poses(&pose, part).into_iter().next();
+                first.unwrap_or(pose)
+            };
+            Some(self.model.limbs().fold(self.trunk()?, with_limb))
+        }
+    }
 
     /// Proposals of a pose without error.
     fn exact(scene: &TestScene, classes: &PartClasses, pose: &Pose) -> JointProposals {

@@ -3,7 +3,7 @@
 use super::agreement::{Agreement, AgreementScratch};
 use super::body_proposals::BodyProposals;
 use super::pose_fit::{
-    ANNEAL, FitContext, FitReport, FitScratch, FitTerms, START_TERMS, Schedule, TRACK, evaluate,
+    ANNEAL, FitContext, FitReport, FitScratch, HYPOTHESIS_TERMS, Schedule, TRACK, evaluate,
     fit_pose,
 };
 use crate::body::Pose;
@@ -22,13 +22,14 @@ pub(super) struct RepairTimer {
     unchecked: u32,
 }
 
-/// Interval between checks of a pose that agrees, frames.
+/// Interval between checks of a pose that agrees, frames: a check costs 2 ms, half a step.
 const CHECKED: u32 = 8;
-/// Wrong share of the area above which a repair is tried; good tracks have 0.01 to 0.13.
+/// Wrong share of the area above which a repair is tried. Good tracks have 0.01 to 0.13 (decision 043); half of the frames
+/// of a good upper body pass 0.06.
 const WRONG: f32 = 0.08;
-/// Wrong share of the area above which the whole body is tried, not limbs alone.
+/// Wrong share of the area above which the whole body is tried, not limbs alone; it costs three times as much.
 const BODY_WRONG: f32 = 0.12;
-/// Share of a part in free space above which one is tried.
+/// Share of a part in free space above which one is tried; the forearms of a good upper body reach 0.39.
 const PART_WRONG: f32 = 0.4;
 /// Shortest and longest wait after a repair without success, frames: loose clothes never agree.
 const WAIT: [u32; 2] = [1, 120];
@@ -38,12 +39,8 @@ const WORSE: f32 = 1.5;
 const CHEAPER: f64 = 0.95;
 /// Factor on the wrong share that a better pose undercuts: cost alone takes a fast arm for a bent one.
 const AGREES: f32 = 0.7;
-/// Turn beyond which a better pose must be clearly better, radians, and the factor on its cost.
-const TURN: (f64, f64) = (1.75, 1.5);
 /// Longest pair in comparisons, metres.
 const REACH: f32 = 0.10;
-/// Fit of a proposal.
-const FIT: Schedule = TRACK;
 /// One iteration that leaves pairs and equations of the pose in the scratch.
 const SETTLE: Schedule = Schedule {
     iterations: 1,
@@ -105,14 +102,13 @@ impl Repair<'_> {
         scratch: &mut FitScratch,
         measure: &mut AgreementScratch,
     ) -> Option<RepairedPose> {
-        let now = evaluate(&self.context, self.pose, REACH, scratch);
-        let most = CHEAPER * now.cost * self.proposals.facing_cost(self.pose);
-        let rated = self
-            .candidates(scratch)
-            .into_iter()
-            .map(|pose| (self.cost(&pose, scratch), pose));
+        let most = CHEAPER * self.cost(self.pose, scratch);
+        let candidates = scratch
+            .with_terms(HYPOTHESIS_TERMS, |s| self.candidates(s))
+            .into_iter();
+        let rated = candidates.map(|pose| (self.cost(&pose, scratch), pose));
         let (_, mut pose) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        fit_pose(&self.context, &mut pose, &FIT, scratch);
+        fit_pose(&self.context, &mut pose, &TRACK, scratch);
         if self.cost(&pose, scratch) > most || !pose.is_finite() {
             return None;
         }
@@ -129,27 +125,19 @@ impl Repair<'_> {
         })
     }
 
-    /// Cost of a fitted candidate with its priors on facing and turn.
+    /// Cost of a pose with its priors on facing and turn.
     fn cost(&self, pose: &Pose, scratch: &mut FitScratch) -> f64 {
         let fit = evaluate(&self.context, pose, REACH, scratch);
-        let turn = |p: &Pose| p.root.iso().rotation;
-        let turned = turn(pose).angle_to(&turn(self.pose)) > TURN.0;
-        fit.cost * self.proposals.facing_cost(pose) * if turned { TURN.1 } else { 1.0 }
+        let recent = self.pose.root.iso().rotation;
+        fit.cost * self.proposals.prior_cost(pose, Some(recent))
     }
 
     fn candidates(&self, scratch: &mut FitScratch) -> Vec<Pose> {
-        let terms = scratch.terms;
-        // Outlines tell little between hypotheses and cost the most.
-        scratch.terms = FitTerms {
-            edge_weight: 0.0,
-            ..START_TERMS
-        };
         let limbs = self.proposals.limbs_of(&self.context, self.pose, scratch);
         let mut out: Vec<Pose> = limbs.into_iter().collect();
         if self.agreement.wrong() > BODY_WRONG || self.proposals.faces_away(self.pose) {
             out.extend(self.proposals.poses(&self.context, scratch));
         }
-        scratch.terms = terms;
         out
     }
 }

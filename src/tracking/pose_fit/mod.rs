@@ -8,6 +8,8 @@ mod solve;
 #[cfg(test)]
 pub(super) use equations::FloorLegs;
 pub(super) use equations::{assemble, for_each_point, pair};
-pub(super) use schedule::{ANNEAL, FitTerms, START, START_TERMS, Schedule, TRACK};
+pub(super) use schedule::{
+    ANNEAL, FitTerms, HYPOTHESIS_TERMS, START, START_TERMS, Schedule, TRACK,
+};
 pub(super) use scratch::{FitContext, FitScratch};
 pub(super) use solve::{FitReport, evaluate, fit_pose, limit};

@@ -71,6 +71,12 @@ pub(in crate::tracking) const START_TERMS: FitTerms = FitTerms {
     hands: [None; 2],
 };
 
+/// For comparisons of many hypotheses: outlines tell little between them and cost the most.
+pub(in crate::tracking) const HYPOTHESIS_TERMS: FitTerms = FitTerms {
+    edge_weight: 0.0,
+    ..START_TERMS
+};
+
 impl FitTerms {
     /// From frame to frame, as configured.
     pub(in crate::tracking) fn tracking(config: &TrackerConfig) -> Self {

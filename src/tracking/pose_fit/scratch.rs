@@ -56,6 +56,18 @@ impl Default for FitScratch {
 }
 
 impl FitScratch {
+    /// Runs `work` with other terms.
+    pub(in crate::tracking) fn with_terms<T>(
+        &mut self,
+        terms: FitTerms,
+        work: impl FnOnce(&mut Self) -> T,
+    ) -> T {
+        let before = std::mem::replace(&mut self.terms, terms);
+        let result = work(self);
+        self.terms = before;
+        result
+    }
+
     /// Information of the last normal equations on a joint angle, per point, priors included; 0 before any.
     pub(in crate::tracking) fn information(&self, angle: usize) -> f64 {
         let unknown = ROOT_UNKNOWNS + angle;

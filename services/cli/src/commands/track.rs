@@ -152,6 +152,24 @@ impl TrackedFrame<'_> {
     /// Output line.
     fn line(&self, model: &TrackerModel) -> serde_json::Value {
         let Self { state, report, .. } = self;
+        let mut line = json!({
+            "frame": self.index,
+            "time_ns": self.time_ns,
+            "status": state.status,
+            "residual_mm": report.residual_mm,
+            "agreement": report.agreement,
+            "visible_points": report.visible_points,
+            "iterations": report.iterations,
+            "converged": report.converged,
+            "pose_age": report.pose_age,
+            "skipped": report.skipped,
+            "ms": self.ms,
+            "stages_ms": report.stages_ms,
+        });
+        // Before anybody was found there is no body to speak of.
+        if state.status == Status::Searching {
+            return line;
+        }
         let skeleton = model.template().skeleton();
         let rest = model.template().personalise(&state.shape);
         let mut bones = BoneTransforms::default();
@@ -168,27 +186,10 @@ impl TrackedFrame<'_> {
             .zip(&state.shape.bone_scales)
             .map(|(j, s)| (j.name.as_str(), *s))
             .collect();
-        let mut line = json!({
-            "frame": self.index,
-            "time_ns": self.time_ns,
-            "status": state.status,
-            "residual_mm": report.residual_mm,
-            "agreement": report.agreement,
-            "visible_points": report.visible_points,
-            "iterations": report.iterations,
-            "converged": report.converged,
-            "pose_age": report.pose_age,
-            "skipped": report.skipped,
-            "ms": self.ms,
-            "stages_ms": report.stages_ms,
-        });
-        // Before anybody was found there is no body to speak of.
-        if state.status != Status::Searching {
-            line["joints"] = json!(joints);
-            line["pose"] = json!(state.pose);
-            line["scales"] = json!(scales);
-            line["shape"] = json!(state.shape.coefficients);
-        }
+        line["joints"] = json!(joints);
+        line["pose"] = json!(state.pose);
+        line["scales"] = json!(scales);
+        line["shape"] = json!(state.shape.coefficients);
         line
     }
 }
