@@ -135,9 +135,8 @@ impl DepthWindow<'_> {
         let u = (column + (SHIFT as f32 + 0.5)) as i32 - SHIFT;
         let v = (row + (SHIFT as f32 + 0.5)) as i32 - SHIFT;
         let inside = (u as u32) < u32::from(self.columns) && (v as u32) < u32::from(self.rows);
-        let k = v as usize * usize::from(self.columns) + u as usize;
         if inside {
-            i32::from(self.depth[k])
+            i32::from(self.depth[v as usize * usize::from(self.columns) + u as usize])
         } else {
             i32::from(NOTHING)
         }
