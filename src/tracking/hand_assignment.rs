@@ -12,6 +12,8 @@ const FOLLOWED: f64 = 0.15;
 const FOREARM_POINTS: usize = 5;
 /// See [`FOREARM_POINTS`].
 const SEEN_POINTS: usize = 3;
+/// Points in measured free space from which on an arm does not lead to its hand.
+const AIR_POINTS: usize = 2;
 /// Depth difference up to which a reading belongs to the forearm, metres.
 const FOREARM_DEPTH: f64 = 0.10;
 /// Arm lengths from the shoulder beyond which a hand belongs to another person.
@@ -66,10 +68,16 @@ pub(super) fn assign_hands(
             .filter(is_own)
             .min_by(|a, b| distance(a).total_cmp(&distance(b)));
         if let Some(hand) = hand {
+            let mut reached = pose.clone();
             if distance(&hand) > FOLLOWED {
-                arm.reach(skeleton, rest, pose, &hand, None);
+                arm.reach(skeleton, rest, &mut reached, &hand, None);
+                reached.bones(skeleton, rest, &mut bones);
             }
-            *found = Some(hand);
+            // A fragment of something else, with nothing but air on the way to it, is no hand.
+            if arm.misplaced_points(&bones, grid, None) < AIR_POINTS {
+                (*pose, *found) = (reached, Some(hand));
+            }
+            pose.bones(skeleton, rest, &mut bones);
         }
     }
     out

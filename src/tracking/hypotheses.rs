@@ -2,6 +2,7 @@
 
 use super::limb::Limb;
 use super::pose_fit::{FitContext, FitScratch, evaluate};
+use crate::body::parts::BodyPart;
 use crate::body::{BoneTransforms, JointMotion, Pose};
 use crate::math::{P3, P3d, exp_so3, log_so3};
 use crate::segment::{Extremity, extremities};
@@ -19,6 +20,8 @@ const UPPER_ARMS: [[f64; 3]; 9] = [
     [0.3, -0.1, 0.95],
     [0.75, -0.2, 0.6],
 ];
+/// Directions of a thigh that stands or sits, as [`UPPER_ARMS`].
+const RESTING_LEGS: [[f64; 3]; 2] = [[0.05, -1.0, 0.0], [0.1, -0.8, 0.5]];
 /// Bends of the elbow in the first pass over arms, radians.
 const BENDS: [f64; 2] = [0.1, 1.4];
 /// Bends of elbow or knee in the second pass, radians.
@@ -270,6 +273,44 @@ impl<'a> Hypotheses<'a> {
             .map(|p| (parent.inverse() * (p - root)).normalize())
             .collect()
     }
+}
+
+/// `pose` with one arm or leg where it may rest unseen, as little of it as possible in measured free space or the trunk;
+/// `None` where it is out of them already.
+pub(super) fn resting_limb(
+    context: &FitContext<'_>,
+    pose: &Pose,
+    part: BodyPart,
+    bones: &mut BoneTransforms,
+) -> Option<Pose> {
+    let (limbs, directions): (_, &[[f64; 3]]) = match part {
+        BodyPart::LeftArm | BodyPart::RightArm => (&context.model.arms, &UPPER_ARMS),
+        BodyPart::LeftLeg | BodyPart::RightLeg => (&context.model.legs, &RESTING_LEGS),
+        BodyPart::Trunk => return None,
+    };
+    let side = usize::from(matches!(part, BodyPart::RightArm | BodyPart::RightLeg));
+    let limb = limbs[side].as_ref()?;
+    let hypotheses = Hypotheses {
+        context: *context,
+        extremities: Vec::new(),
+    };
+    let sign = outward_sign(side);
+    let all = directions.iter().flat_map(|d| BENDS.map(|bend| (d, bend)));
+    let mut misplaced = |pose: &Pose| {
+        pose.bones(context.model.template.skeleton(), &context.body.rest, bones);
+        let trunk = context.model.trunk.and_then(|t| t.column(bones));
+        limb.misplaced_points(bones, context.observation.grid, trunk.as_ref())
+    };
+    let now = misplaced(pose);
+    let aimed = all.map(|(d, bend)| {
+        let direction = Vector3::new(d[0] * sign, d[1], d[2]).normalize();
+        hypotheses.aimed(pose, limb, direction, (bend, 0.0))
+    });
+    let rated = aimed.map(|pose| (misplaced(&pose), pose));
+    let least = rated.min_by_key(|(points, _)| *points);
+    least
+        .filter(|(points, _)| *points < now)
+        .map(|(_, pose)| pose)
 }
 
 /// Sign of the outward x direction of a side (0 left, 1 right).

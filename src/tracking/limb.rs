@@ -3,6 +3,8 @@
 use crate::body::parts::{BodyPart, LimbJoints};
 use crate::body::{BoneTransforms, JointMotion, Pose, RestBody, Skeleton, Template};
 use crate::math::{P3d, exp_so3, log_so3};
+use crate::registration::residual::EllipticColumn;
+use crate::spatial::{Label, OrganisedCloud};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// One arm or leg of the template.
@@ -28,6 +30,11 @@ pub(super) struct Limb {
 const HAND: f64 = 0.7;
 /// Share of the way from ankle to toes, for a foot that hangs or points at the camera.
 const FOOT: f64 = 0.5;
+
+/// Points of a bone that are tested for free space, and the depth by which they lie before a reading, metres.
+const AIR_SAMPLES: usize = 5;
+/// See [`AIR_SAMPLES`].
+const AIR: f64 = 0.10;
 
 /// The arms of a template, left and right; `None` for one without.
 pub(super) fn arms(template: &Template) -> [Option<Limb>; 2] {
@@ -65,6 +72,35 @@ impl Limb {
     /// Point of hand or foot that a reading of it stands for, camera frame, metres.
     pub(super) fn hand(&self, bones: &BoneTransforms) -> P3d {
         bones.joints[self.end] + (bones.joints[self.tip] - bones.joints[self.end]) * self.middle
+    }
+    /// Hinge, middle of the lower bone, end, and point of hand or foot, camera frame, metres.
+    pub(super) fn lower_points(&self, bones: &BoneTransforms) -> [P3d; 4] {
+        let [hinge, end] = [self.hinge, self.end].map(|j| bones.joints[j]);
+        [hinge, nalgebra::center(&hinge, &end), end, self.hand(bones)]
+    }
+    /// Points of its bones, out of [`AIR_SAMPLES`] each, where it cannot be: inside the trunk, or before another
+    /// measured surface.
+    pub(super) fn misplaced_points(
+        &self,
+        bones: &BoneTransforms,
+        grid: &OrganisedCloud,
+        trunk: Option<&EllipticColumn>,
+    ) -> usize {
+        let [root, hinge] = [self.root, self.hinge].map(|j| bones.joints[j]);
+        let along = |(from, to): (P3d, P3d)| {
+            (1..=AIR_SAMPLES).map(move |k| from + (to - from) * (k as f64 / AIR_SAMPLES as f64))
+        };
+        let is_in_air = |p: &P3d| {
+            let cell = grid.cell_of(&p.cast()).and_then(|(u, v)| grid.cell(u, v));
+            // A sleeve without return looks like a background that was removed.
+            let is_measured = |c: &usize| grid.labels[*c] != Label::Unknown && grid.depth[*c] > 0.0;
+            let cell = cell.filter(is_measured);
+            cell.is_some_and(|c| p.z < f64::from(grid.depth[c]) - AIR)
+        };
+        let bones = [(root, hinge), (hinge, self.hand(bones))];
+        let points = bones.into_iter().flat_map(along);
+        let is_inside = |p: &P3d| trunk.is_some_and(|t| t.inside(p).is_some());
+        points.filter(|p| is_in_air(p) || is_inside(p)).count()
     }
     /// Length of the stretched limb from root to tip, metres.
     pub(super) fn length(&self, rest: &RestBody) -> f64 {

@@ -58,6 +58,7 @@ mod subject;
 mod surface;
 #[cfg(test)]
 mod test_scene;
+mod trunk;
 mod workspace;
 
 pub use crate::registration::residual::SurfaceNormals;

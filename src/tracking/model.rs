@@ -4,6 +4,7 @@ use super::TrackerConfig;
 use super::leg::{Leg, legs};
 use super::limb::{self, Limb};
 use super::part_classes::PartClasses;
+use super::trunk::Trunk;
 use crate::body::parts::{BodyPart, BodySegment, BodySide};
 use crate::body::{JointMotion, SkinWeights, Template};
 use crate::camera::Calibration;
@@ -50,6 +51,8 @@ pub struct TrackerModel {
     pub(super) standing: Vec<Leg>,
     /// Arms, left and right, for hands beyond sleeves without return.
     pub(super) arms: [Option<Limb>; 2],
+    /// The trunk, which arms do not enter; `None` without arms.
+    pub(super) trunk: Option<Trunk>,
     /// Legs, left and right, for feet found at the start.
     pub(super) legs: [Option<Limb>; 2],
     /// [`BodyPart`](crate::body::parts::BodyPart) of each joint, as a number, for the pose filter.
@@ -109,6 +112,7 @@ impl TrackerModel {
         let stiffness = per_angle(&template, stiffness);
         let standing = legs(&template);
         let arms = limb::arms(&template);
+        let trunk = Trunk::new(&template, &arms);
         let legs = limb::legs(&template);
         let parts = (0..skeleton.len())
             .map(|j| template.parts().part(j) as usize)
@@ -134,6 +138,7 @@ impl TrackerModel {
             tied,
             stiffness,
             standing,
+            trunk,
             arms,
             legs,
             parts,

@@ -2,11 +2,13 @@
 
 use super::agreement::{Agreement, AgreementScratch};
 use super::body_proposals::BodyProposals;
+use super::hypotheses::resting_limb;
 use super::pose_fit::{
     ANNEAL, FitContext, FitReport, FitScratch, HYPOTHESIS_TERMS, Schedule, TRACK, evaluate,
     fit_pose,
 };
 use crate::body::Pose;
+use crate::body::parts::BodyPart;
 use serde::{Deserialize, Serialize};
 
 /// Timer of the repairs.
@@ -20,6 +22,9 @@ pub(super) struct RepairTimer {
     wrong: f32,
     /// Frames since the last check of the proposals.
     unchecked: u32,
+    /// Frames in a row with a part in the air.
+    #[serde(default)]
+    in_air: u32,
 }
 
 /// Interval between checks of a pose that agrees, frames: a check costs 2 ms, half a step.
@@ -37,6 +42,12 @@ const WAIT: [u32; 2] = [1, 120];
 const WORSE: f32 = 1.5;
 /// Factor on the cost that a better pose undercuts.
 const CHEAPER: f64 = 0.95;
+/// Frames after which a limb in the air rests unseen: fast ones lag by three (jacks).
+const STUCK: u32 = 4;
+/// Share of a part in free space above which it is then tried there.
+const PART_IN_AIR: f32 = 0.15;
+/// Factor on the cost that such a pose keeps below: what is unseen has no cost.
+const NO_DEARER: f64 = 1.05;
 /// Factor on the wrong share that a better pose undercuts: cost alone takes a fast arm for a bent one.
 const AGREES: f32 = 0.7;
 /// Longest pair in comparisons, metres.
@@ -53,12 +64,19 @@ impl RepairTimer {
     pub(super) fn is_due(&mut self, agreement: &Agreement) -> bool {
         self.wait = self.wait.saturating_sub(1);
         let wrong = agreement.wrong();
-        if wrong <= WRONG && agreement.parts.iter().all(|p| *p <= PART_WRONG) {
+        let is_in_air = agreement.parts.iter().any(|p| *p > PART_WRONG);
+        self.in_air = if is_in_air { self.in_air + 1 } else { 0 };
+        if wrong <= WRONG && !is_in_air {
             self.interval = self.interval.saturating_sub(1);
             self.wrong *= f32::from(u8::from(self.interval > 0));
             return false;
         }
-        self.wait == 0 || wrong > WORSE * self.wrong
+        self.wait == 0 || wrong > WORSE * self.wrong || self.in_air == STUCK
+    }
+
+    /// True once a limb has been in the air for longer than a fast one is behind its readings.
+    pub(super) fn is_stuck(&self) -> bool {
+        self.in_air >= STUCK
     }
 
     /// True a few times a second: an arm inside the torso disagrees with nothing, only with its proposals.
@@ -86,6 +104,8 @@ pub(super) struct Repair<'a> {
     pub agreement: Agreement,
     /// A hand or foot is far from where it is proposed: the new pose need not agree better than this one.
     pub is_contradicted: bool,
+    /// A limb has been in the air for a while: unless it is found, it rests unseen.
+    pub is_stuck: bool,
 }
 
 /// A better pose.
@@ -102,18 +122,37 @@ impl Repair<'_> {
         scratch: &mut FitScratch,
         measure: &mut AgreementScratch,
     ) -> Option<RepairedPose> {
-        let most = CHEAPER * self.cost(self.pose, scratch);
+        let cost = self.cost(self.pose, scratch);
+        if self.is_stuck
+            && let Some(pose) = self.out_of_the_air(scratch)
+        {
+            let kept = self.fitted(pose, (NO_DEARER * cost, AGREES), scratch, measure);
+            if kept.is_some() {
+                return kept;
+            }
+        }
         let candidates = scratch
             .with_terms(HYPOTHESIS_TERMS, |s| self.candidates(s))
             .into_iter();
         let rated = candidates.map(|pose| (self.cost(&pose, scratch), pose));
-        let (_, mut pose) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (_, pose) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let share = if self.is_contradicted { 1.0 } else { AGREES };
+        self.fitted(pose, (CHEAPER * cost, share), scratch, measure)
+    }
+
+    /// A pose after a fit, if it costs at most `most` and has at most `share` of the wrong area of the present one.
+    fn fitted(
+        &self,
+        mut pose: Pose,
+        (most, share): (f64, f32),
+        scratch: &mut FitScratch,
+        measure: &mut AgreementScratch,
+    ) -> Option<RepairedPose> {
         fit_pose(&self.context, &mut pose, &TRACK, scratch);
         if self.cost(&pose, scratch) > most || !pose.is_finite() {
             return None;
         }
         let agreement = measure.measure(&self.context, &pose, scratch);
-        let share = if self.is_contradicted { 1.0 } else { AGREES };
         if agreement.wrong() > share * self.agreement.wrong() {
             return None;
         }
@@ -130,6 +169,16 @@ impl Repair<'_> {
         let fit = evaluate(&self.context, pose, REACH, scratch);
         let recent = self.pose.root.iso().rotation;
         fit.cost * self.proposals.prior_cost(pose, Some(recent))
+    }
+
+    /// The pose with each limb in the air where it may rest unseen; `None` without such a limb.
+    fn out_of_the_air(&self, scratch: &mut FitScratch) -> Option<Pose> {
+        let parts = BodyPart::ALL.into_iter().zip(self.agreement.parts);
+        let in_air = parts.filter(|(_, free)| *free > PART_IN_AIR);
+        in_air.fold(None, |best, (part, _)| {
+            let pose = best.as_ref().unwrap_or(self.pose);
+            resting_limb(&self.context, pose, part, &mut scratch.bones).or(best)
+        })
     }
 
     fn candidates(&self, scratch: &mut FitScratch) -> Vec<Pose> {

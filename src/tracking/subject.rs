@@ -280,6 +280,7 @@ impl SubjectFrame<'_> {
             pose,
             agreement: log.report.agreement,
             is_contradicted,
+            is_stuck: state.repair.is_stuck(),
         };
         let repaired = repair.search(&mut workspace.fit, &mut workspace.agreement);
         let found = repaired.is_some();

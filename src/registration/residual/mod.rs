@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 mod check;
+mod clearance;
 mod edge;
 mod floor;
 mod free_space;
@@ -10,6 +11,7 @@ mod prior;
 mod surface;
 mod term;
 
+pub use clearance::{ClearanceResidual, EllipticColumn};
 pub use edge::EdgeResidual;
 pub use floor::{FloorPlane, FloorResidual, FloorWeights, FootChain, is_in_view};
 pub use free_space::FreeSpaceResidual;

@@ -5,8 +5,8 @@ use super::scratch::{FitContext, FitScratch};
 use crate::body::Pose;
 use crate::math::P3d;
 use crate::registration::residual::{
-    EdgeResidual, FloorPlane, FloorResidual, FloorWeights, FreeSpaceResidual, HandResidual,
-    PointTerm, Residual, RestPoseResidual, SurfaceMetric, SurfaceResidual,
+    ClearanceResidual, EdgeResidual, FloorPlane, FloorResidual, FloorWeights, FreeSpaceResidual,
+    HandResidual, PointTerm, Residual, RestPoseResidual, SurfaceMetric, SurfaceResidual,
 };
 use crate::registration::{
     Dof, EdgeSide, NormalEquations, PairingConfig, PairingStats, ROOT_UNKNOWNS, pair_edges,
@@ -38,6 +38,8 @@ const PLANTED_LEG_PULL: f64 = 2e-6;
 /// Weight of a detected hand, per point. It decides against arms without a reading (2·10⁻⁶ per squared radian) and hardly
 /// moves seen ones (10⁻³).
 const HAND_WEIGHT: f64 = 1e-3;
+/// Weight of a point of an arm inside the trunk, per point, likewise.
+const CLEARANCE_WEIGHT: f64 = 1e-3;
 
 /// Sums over the pairs of the surface residual.
 #[derive(Clone, Copy, Debug, Default)]
@@ -170,7 +172,7 @@ pub(in crate::tracking) fn assemble(
     sums
 }
 
-/// Adds rest pose, floor and hands to the equations of the readings; updates the unseen shares.
+/// Adds rest pose, floor, trunk and hands to the equations of the readings; updates the unseen shares.
 fn add_priors(
     context: &FitContext<'_>,
     pose: &Pose,
@@ -204,6 +206,7 @@ fn add_priors(
         };
         legs.add_to(equations);
     }
+    add_clearance(model, scratch, equations);
     let centre = scratch.centre();
     for (arm, hand) in model.arms.iter().zip(scratch.terms.hands) {
         let (Some(arm), Some(target)) = (arm, hand) else {
@@ -218,6 +221,27 @@ fn add_priors(
             weight: HAND_WEIGHT,
         };
         residual.for_each(|row| equations.add_row(row));
+    }
+}
+
+/// Pushes both arms out of the trunk.
+fn add_clearance(model: &TrackerModel, scratch: &FitScratch, equations: &mut NormalEquations) {
+    let Some(column) = model.trunk.and_then(|t| t.column(&scratch.bones)) else {
+        return;
+    };
+    let centre = scratch.centre();
+    for arm in model.arms.iter().flatten() {
+        for point in arm.lower_points(&scratch.bones) {
+            let residual = ClearanceResidual {
+                angles: &arm.angles,
+                dofs: &scratch.dofs,
+                centre: &centre,
+                point,
+                column: &column,
+                weight: CLEARANCE_WEIGHT,
+            };
+            residual.for_each(|row| equations.add_row(row));
+        }
     }
 }
 

@@ -1,0 +1,100 @@
+//! The trunk as a column that arms do not enter.
+
+use super::limb::Limb;
+use crate::body::parts::{BodyPart, TrunkFrame};
+use crate::body::{BodyShape, BoneTransforms, Template};
+use crate::registration::residual::EllipticColumn;
+
+/// Share of the section that counts as inside: hands press into clothes and soft bodies.
+const SLACK: f64 = 0.65;
+/// Half axis of an ellipse over the standard deviation of points on it.
+const HALF_AXIS: f64 = std::f64::consts::SQRT_2;
+
+/// Trunk between the hips and the shoulders.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Trunk {
+    /// Left and right shoulder.
+    shoulders: [usize; 2],
+    /// Half axes of the section across and to the front, and its centre before the line from pelvis to shoulders, as
+    /// shares of the distance between the shoulders.
+    half: [f64; 2],
+    front: f64,
+}
+
+impl Trunk {
+    /// The trunk of a template with these arms, root joint at the pelvis; `None` for one without arms.
+    pub(super) fn new(template: &Template, arms: &[Option<Limb>; 2]) -> Option<Self> {
+        let shoulders = [arms[0].as_ref()?.root, arms[1].as_ref()?.root];
+        let rest = template.personalise(&BodyShape::default()).joints;
+        let frame = TrunkFrame::new(rest[0], shoulders.map(|j| rest[j]))?;
+        let weights = template.weights();
+        let vertices = template.mesh().vertices().iter().enumerate();
+        let is_trunk = |v: usize| template.parts().part(weights.dominant(v)) == BodyPart::Trunk;
+        let local = vertices.filter(|(v, _)| is_trunk(*v));
+        let local = local.map(|(_, p)| frame.local(&p.cast()));
+        let inside: Vec<_> = local
+            .filter(|p| (0.0..frame.height).contains(&p[1]))
+            .collect();
+        let n = inside.len().max(1) as f64;
+        let mean = |k: usize| inside.iter().map(|p| p[k]).sum::<f64>() / n;
+        let half = |k: usize| {
+            let centre = mean(k);
+            let variance = inside.iter().map(|p| (p[k] - centre).powi(2)).sum::<f64>() / n;
+            HALF_AXIS * variance.sqrt() / frame.width
+        };
+        Some(Self {
+            shoulders,
+            half: [half(0), half(2)],
+            front: mean(2) / frame.width,
+        })
+    }
+
+    /// The column of a posed body; `None` where its shoulders meet its pelvis.
+    pub(super) fn column(&self, bones: &BoneTransforms) -> Option<EllipticColumn> {
+        let shoulders = self.shoulders.map(|j| bones.joints[j]);
+        let frame = TrunkFrame::new(bones.joints[0], shoulders)?;
+        Some(EllipticColumn {
+            base: frame.pelvis + frame.axes[2] * (self.front * frame.width),
+            axes: frame.axes,
+            half: self.half.map(|h| SLACK * h * frame.width),
+            height: frame.height,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::{Pose, embedded};
+    use crate::math::{Body, Camera, Rigid};
+    use crate::tracking::limb;
+
+    #[test]
+    fn arms_at_rest_are_outside_and_a_point_in_the_chest_is_inside() {
+        let template = embedded::template();
+        let arms = limb::arms(&template);
+        let trunk = Trunk::new(&template, &arms).expect("a trunk");
+        let pose = Pose::rest(template.skeleton(), Rigid::<Camera, Body>::identity());
+        let mut bones = BoneTransforms::default();
+        pose.bones(
+            template.skeleton(),
+            &template.personalise(&Default::default()),
+            &mut bones,
+        );
+        let column = trunk.column(&bones).expect("a column");
+        let [across, front] = column.half;
+        assert!(
+            (0.1..0.2).contains(&across) && (0.07..0.15).contains(&front),
+            "{column:?}"
+        );
+        let middle = column.base + column.axes[1] * (0.5 * column.height);
+        assert!(
+            column
+                .inside(&(middle + column.axes[2] * (0.5 * front)))
+                .is_some()
+        );
+        for arm in arms.iter().flatten() {
+            assert_eq!(column.inside(&arm.hand(&bones)), None);
+        }
+    }
+}
