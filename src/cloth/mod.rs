@@ -54,6 +54,7 @@ pub use error::ClothError;
 pub use model::{Element, Hinge, Sheet};
 pub use outfit::{AnchorBinding, Outfit};
 pub use outfit_model::Model;
+pub use repair::reference::WornReference;
 pub use report::{StagesMs, StepReport};
 pub use state::{GarmentState, State};
 pub use step::{Input, step};

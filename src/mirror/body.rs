@@ -1,5 +1,6 @@
 //! Posed surface of one body, with its rest shape kept until the shape changes.
 
+use super::arm_clearance::ArmClearance;
 use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use crate::math::P3;
 use crate::par::Par;
@@ -10,6 +11,8 @@ use std::sync::Arc;
 pub struct PosedBody {
     rest: RestBody,
     shape: Option<Arc<BodyShape>>,
+    /// `None` before the first pose, and for a template without arms.
+    arms: Option<ArmClearance>,
     bones: BoneTransforms,
     vertices: Vec<P3>,
 }
@@ -24,7 +27,7 @@ impl PosedBody {
         }
     }
 
-    /// Skins the body in `pose`; `true` when the rest shape was computed anew.
+    /// Skins the body in `pose`, arms that overlap the trunk beside it; `true` when the rest shape was computed anew.
     ///
     /// Shapes are compared by pointer. A body belongs to one template for its whole life.
     pub fn pose<F>(&mut self, template: &Template, shape: &Arc<BodyShape>, pose: &Pose<F>) -> bool {
@@ -33,8 +36,15 @@ impl PosedBody {
             self.rest = template.personalise(shape);
             self.shape = Some(Arc::clone(shape));
         }
+        if !is_known || self.arms.is_none() {
+            self.arms = ArmClearance::new(template, &self.rest);
+        }
 
-        pose.bones(template.skeleton(), &self.rest, &mut self.bones);
+        if let Some(arms) = &self.arms {
+            arms.separate(template, &self.rest, pose, &mut self.bones);
+        } else {
+            pose.bones(template.skeleton(), &self.rest, &mut self.bones);
+        }
         skin(
             Par::Rayon,
             &self.rest.vertices,

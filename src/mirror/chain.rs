@@ -1,5 +1,6 @@
 //! The chain of one person in front of one camera.
 
+use super::body::PosedBody;
 use super::choice::Choice;
 use super::clock::{FrameClock, LongGap};
 use super::error::MirrorError;
@@ -7,7 +8,7 @@ use super::outfit::{DressedOutfit, Subject};
 use super::picture::{CameraGarments, DrawnBody, DrawnSurface, library_appearance};
 use super::report::{MirrorFrame, StageTimer};
 use crate::body::measure::measure;
-use crate::body::{Pose, Template};
+use crate::body::{BodyShape, Pose, Template};
 use crate::camera::{Calibration, ColorImage, RgbdFrame};
 use crate::cloth;
 use crate::composite::{self, Appearance, RenderReport};
@@ -23,6 +24,8 @@ pub struct Mirror {
     tracking_work: tracking::Workspace,
     clock: FrameClock,
     worn: Option<Worn>,
+    shape: Arc<BodyShape>,
+    posed: PosedBody,
     body: DrawnBody,
     garments: CameraGarments,
     compositor: composite::Model,
@@ -50,6 +53,8 @@ impl Mirror {
             tracking_work: tracking::Workspace::default(),
             clock: FrameClock::default(),
             worn: None,
+            shape: Arc::default(),
+            posed: PosedBody::default(),
             body,
             garments: CameraGarments::default(),
             compositor: composite::Model::default(),
@@ -60,7 +65,7 @@ impl Mirror {
     }
 
     /// Takes one frame through tracking, dressing, cloth and compositing. The subject is dressed in the first frame in
-    /// which the tracker is live.
+    /// which the tracker is live. The picture is the plain one while nobody is tracked and while garments are put on again.
     ///
     /// # Errors
     /// A frame that does not fit the camera, or a garment that cannot be put on.
@@ -72,6 +77,7 @@ impl Mirror {
 
         let dt = LongGap::Nominal.time_step(self.clock.gap(frame.time_ns));
         let body = self.live_body();
+        self.worn.take_if(|w| w.outfit.is_past_mending());
         if body.is_some() && self.worn.is_none() && !self.choices.is_empty() {
             self.worn = Some(self.dress()?);
             timer.lap("dressing");
@@ -85,11 +91,13 @@ impl Mirror {
             timer.lap("cloth");
         }
 
-        let (picture, render) = self.draw(frame, body.as_deref())?;
+        let is_worn = self.worn.as_ref().is_none_or(|w| w.outfit.is_worn());
+        let shown = body.as_deref().filter(|_| is_worn);
+        let (picture, render) = self.draw(frame, shown)?;
         timer.lap("composite");
         Ok(MirrorFrame {
             picture,
-            is_dressed: cloth.is_some(),
+            is_dressed: cloth.is_some() && is_worn,
             stages_ms: timer.stages_ms,
             tracking,
             cloth,
@@ -112,8 +120,17 @@ impl Mirror {
         &self.notes
     }
 
+    /// The body that cloth meets, camera frame, metres; `None` while nobody is live.
     fn live_body(&mut self) -> Option<Vec<P3>> {
-        (self.tracked.status == Status::Tracking).then(|| self.posed_body().to_vec())
+        if self.tracked.status != Status::Tracking {
+            return None;
+        }
+        if *self.shape != self.tracked.shape {
+            self.shape = Arc::new(self.tracked.shape.clone());
+        }
+        let template = self.tracker.template();
+        self.posed.pose(template, &self.shape, &self.tracked.pose);
+        Some(self.posed.vertices().to_vec())
     }
 
     fn dress(&mut self) -> Result<Worn, MirrorError> {

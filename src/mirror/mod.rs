@@ -23,6 +23,7 @@
 //! # }
 //! ```
 
+mod arm_clearance;
 mod body;
 mod chain;
 mod choice;
@@ -31,6 +32,7 @@ mod error;
 mod outfit;
 mod picture;
 mod report;
+mod wear;
 
 pub use body::PosedBody;
 pub use chain::Mirror;

@@ -1,7 +1,10 @@
 //! An outfit on a body: put on once, then stepped with every posed body.
 
+use super::arm_clearance::ArmClearance;
 use super::choice::SizedGarment;
-use crate::body::{Pose, RestBody, Template};
+use super::wear::WearWatch;
+use crate::body::parts::vertex_masks;
+use crate::body::{BoneTransforms, Pose, RestBody, Template};
 use crate::cloth::ClothError;
 use crate::cloth::{Config, Input, Model, State, StepReport, Workspace, step};
 use crate::dressing::{DressError, DressOptions, GarmentSource, dress_all};
@@ -28,11 +31,12 @@ pub struct DressedOutfit {
     /// State after the last step.
     pub state: State,
     work: Workspace,
+    wear: WearWatch,
     worn: Vec<SizedGarment>,
 }
 
 impl DressedOutfit {
-    /// Puts garments on; takes about a second. With `any_size` also those that do not fit.
+    /// Puts garments on, on arms beside the trunk as [`PosedBody`](super::PosedBody) has them; takes about a second. With `any_size` also those that do not fit.
     ///
     /// # Errors
     /// Faults of the garments or the pose; without `any_size` a garment that does not fit.
@@ -47,14 +51,20 @@ impl DressedOutfit {
             any_size,
             ..DressOptions::default()
         };
+        let Subject { template, rest, .. } = subject;
+        let arms = ArmClearance::new(template, rest);
+        let mut bones = BoneTransforms::default();
+        let pose = arms.map(|arms| arms.separate(template, rest, subject.pose, &mut bones));
         let dressed = dress_all(
-            subject.template,
-            subject.rest,
-            subject.pose,
+            template,
+            rest,
+            pose.as_ref().unwrap_or(subject.pose),
             &wear,
             &options,
         )?;
+        let masks = vertex_masks(subject.template);
         Ok(Self {
+            wear: WearWatch::new(&dressed.model, &dressed.state, masks),
             model: dressed.model,
             state: dressed.state,
             work: Workspace::default(),
@@ -68,7 +78,22 @@ impl DressedOutfit {
     /// A body of another size or with a vertex that is not finite; a time step that is not positive.
     pub fn step(&mut self, body: &[P3], dt: f64) -> Result<StepReport, ClothError> {
         let input = Input { body, dt };
-        step(&self.model, &mut self.state, &input, &mut self.work)
+        let before = self.state.collision_body().vertices();
+        let jumped = self.wear.has_jumped(before, body, dt);
+        let report = step(&self.model, &mut self.state, &input, &mut self.work)?;
+        let (model, state) = (&self.model, &mut self.state);
+        self.wear.judge(model, state, &report, jumped);
+        Ok(report)
+    }
+
+    /// False while the outfit is put on again, after a jump of the body or a fault of the cloth; it isn't shown then.
+    pub fn is_worn(&self) -> bool {
+        self.wear.is_worn()
+    }
+
+    /// True once that has failed several times: it must be dressed anew, in the pose that the body has now.
+    pub fn is_past_mending(&self) -> bool {
+        self.wear.is_past_mending()
     }
 
     /// Index of the chosen garment that garment `k` of the outfit is made from. The outfit is ordered by layer, and a

@@ -4,7 +4,7 @@
 //!               Opened                     GarmentsOn
 //!   Opening ───────────────► Calibrating ────────────► Live
 //!      │                      ▲   │   ▲                │  │
-//!      │ Failed(service,      │   │   └─ OutfitChanged ┘  │
+//!      │ Failed(service,      │   │   └─── OutfitOff ──┘  │
 //!      │        camera)       │   │ Failed(fault)         │ Failed(fault)
 //!      ▼                      │   ▼                       ▼
 //!   Degraded(fault) ──────────┴─ Degraded(fault) ◄────────┘

@@ -135,8 +135,8 @@ pub enum Event {
     PersonFound,
     /// Garments exist for a frame that is young enough.
     GarmentsOn,
-    /// Another outfit was chosen, perhaps an empty one.
-    OutfitChanged,
+    /// Garments are put on, or put on again: none can be shown.
+    OutfitOff,
     /// A fault is present; repeated while it lasts.
     Failed(Fault),
     /// The service shuts down.

@@ -9,7 +9,7 @@ pub fn transition(state: State, event: Event) -> State {
         (Closed, _) | (_, Event::Close) | (Draining, Event::Drained) => Closed,
         (Draining, _) | (_, Event::Drain) => Draining,
 
-        (Opening, Event::Opened) | (Live, Event::OutfitChanged) => Calibrating,
+        (Opening, Event::Opened) | (Live, Event::OutfitOff) => Calibrating,
         (Degraded(fault), Event::Opened) if fault.is_service() => Calibrating,
         (Degraded(Fault::CameraSilent), Event::CameraBack) => Calibrating,
         (Degraded(fault), Event::PersonFound) if fault.is_person() => Calibrating,
@@ -41,7 +41,7 @@ fn after_fault(state: State, fault: Fault) -> State {
 mod tests {
     use super::*;
     use Event::{
-        CameraBack, Close, Drain, Drained, Failed, GarmentsOn, Opened, OutfitChanged, PersonFound,
+        CameraBack, Close, Drain, Drained, Failed, GarmentsOn, Opened, OutfitOff, PersonFound,
     };
     use Fault::{
         CameraSilent, ClothUnavailable, NoPerson, PersonLeft, StepFailed, TrackingLost,
@@ -52,7 +52,7 @@ mod tests {
     /// The whole table as text, written independently of the code: one row a state, one column an event.
     /// `.` stays; letters are states; digits are `Degraded` in the order of [`Fault::ALL`].
     const EXPECTED: &[(&str, &str)] = &[
-        // state, columns: Opened CameraBack PersonFound GarmentsOn OutfitChanged Drain Drained Close | 8 faults
+        // state, columns: Opened CameraBack PersonFound GarmentsOn OutfitOff Drain Drained Close | 8 faults
         ("O", "C....D.X01...5.."),
         ("C", "...L.D.X01234567"),
         ("L", "....CD.X01334567"),
@@ -93,7 +93,7 @@ mod tests {
             CameraBack,
             PersonFound,
             GarmentsOn,
-            OutfitChanged,
+            OutfitOff,
             Drain,
             Drained,
             Close,
@@ -154,7 +154,7 @@ mod tests {
         assert_eq!(run(&silent), Degraded(CameraSilent));
         assert_eq!(run(&[&silent[..], &[CameraBack]].concat()), Calibrating);
         assert_eq!(
-            run(&[Opened, OutfitChanged, GarmentsOn, OutfitChanged]),
+            run(&[Opened, OutfitOff, GarmentsOn, OutfitOff]),
             Calibrating
         );
         assert_eq!(run(&[Opened, Drain, GarmentsOn, Opened]), Draining);

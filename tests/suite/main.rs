@@ -16,3 +16,4 @@ mod starts;
 mod stress;
 mod tracked;
 mod tracking;
+mod wear;

@@ -2182,7 +2182,8 @@ pub enum ClothStatus {
     Unspecified = 0,
     /// No calibrated body; `reason` is set.
     Waiting = 1,
-    /// Garments are being sewn and draped.
+    /// Garments are being sewn and draped, or put on again after a jump of the body or a fault of the cloth; `detail` says
+    /// which. Messages have no garments until they are on.
     Dressing = 2,
     /// Positions belong to `frame`.
     Live = 3,

@@ -202,6 +202,16 @@ impl Worn {
         Ok(update)
     }
 
+    /// False while the outfit is put on again after a jump of the body or a fault of the cloth.
+    pub(crate) fn is_shown(&self) -> bool {
+        self.outfit.is_worn()
+    }
+
+    /// True once it must be dressed anew.
+    pub(crate) fn is_past_mending(&self) -> bool {
+        self.outfit.is_past_mending()
+    }
+
     /// Immutable part of every garment, for keyframes.
     pub(crate) fn garments(&self) -> &Arc<[Arc<WornGarment>]> {
         &self.garments

@@ -312,25 +312,35 @@ impl Task {
         }
         let Some(mut worn) = self.worn.take() else {
             return match self.dressing {
-                Some(_) => dressing(&body).into(),
+                Some(_) => dressing(&body, "garments are being put on").into(),
                 None => failed(wanted.revision, "the outfit could not be put on".into()).into(),
             };
         };
+        let stepped = body.clone();
         let step = move || {
-            let placed = worn.step(&body);
+            let placed = worn.step(&stepped);
             (worn, placed)
         };
         match self.setup.ctx.pool.run(step).await {
             Ok((worn, placed)) => {
-                self.worn = Some(worn);
-                match placed {
+                let update = match placed {
                     Ok(p) => {
                         record_stages("cloth", &p.frame.stages);
                         metrics::counter!("tryon_cloth_steps").increment(1);
-                        live(p, self.on)
+                        if worn.is_shown() {
+                            live(p, self.on)
+                        } else {
+                            dressing(&body, "garments are being put on again").into()
+                        }
                     }
                     Err(why) => waiting(DegradedReason::StepFailed, why).into(),
+                };
+                if worn.is_past_mending() {
+                    self.undress();
+                } else {
+                    self.worn = Some(worn);
                 }
+                update
             }
             Err(why) => {
                 tracing::error!(session = self.setup.id, %why, "a step was lost");
@@ -361,11 +371,8 @@ impl Task {
     }
 }
 
-fn dressing(body: &Body) -> GarmentFrame {
-    let mut f = waiting(
-        DegradedReason::Unspecified,
-        "garments are being put on".into(),
-    );
+fn dressing(body: &Body, detail: &str) -> GarmentFrame {
+    let mut f = waiting(DegradedReason::Unspecified, detail.into());
     f.set_status(ClothStatus::Dressing);
     (f.frame, f.world_from_camera) = (body.state.frame, body.state.world_from_camera);
     f

@@ -1,6 +1,7 @@
 //! Repair of worn garments: intersections, sleeves that lost their arm, and bodies that teleport.
 
 pub(super) mod recover_sleeves;
+pub(super) mod reference;
 pub(crate) mod sleeve_rings;
 mod smooth_locally;
 pub(super) mod teleport;

@@ -92,24 +92,27 @@ impl Teleport<'_> {
         nearest: &[[u32; 2]],
         positions: &mut [P3],
     ) {
-        let motions: Vec<Matrix3x4<f64>> =
-            joint_motions(self.weights, self.joints, self.from, self.to)
-                .iter()
-                .map(|m| m.to_homogeneous().fixed_view::<3, 4>(0, 0).into_owned())
-                .collect();
+        let motions = self.motions();
         let weights = self.cloth_weights(edges, nearest);
         for (p, w) in positions.iter_mut().zip(weights.chunks(self.joints)) {
-            let m = motions
-                .iter()
-                .zip(w)
-                .fold(Matrix3x4::zeros(), |s, (m, w)| s + m * *w);
-            let q: Point3<f64> = Point3::from(m * p.cast::<f64>().to_homogeneous());
-            *p = q.cast();
+            *p = blend(&motions, w, p);
         }
     }
 
+    /// Rigid motion of each joint.
+    pub(super) fn motions(&self) -> Vec<Matrix3x4<f64>> {
+        joint_motions(self.weights, self.joints, self.from, self.to)
+            .iter()
+            .map(|m| m.to_homogeneous().fixed_view::<3, 4>(0, 0).into_owned())
+            .collect()
+    }
+
     /// Smoothed skin weights of cloth, shape `[vertices][joints]`.
-    fn cloth_weights(&self, edges: &[([u32; 2], f64)], nearest: &[[u32; 2]]) -> Vec<f64> {
+    pub(super) fn cloth_weights(
+        &self,
+        edges: &[([u32; 2], f64)],
+        nearest: &[[u32; 2]],
+    ) -> Vec<f64> {
         let (n, j, skin) = (nearest.len(), self.joints, self.weights);
         let mut weights = vec![0.0f64; n * j];
         for (i, near) in nearest.iter().enumerate() {
@@ -139,6 +142,14 @@ impl Teleport<'_> {
         }
         weights
     }
+}
+
+/// A point moved by the weighted mean of the joints' motions.
+pub(super) fn blend(motions: &[Matrix3x4<f64>], weights: &[f64], p: &P3) -> P3 {
+    let bound = motions.iter().zip(weights).filter(|(_, w)| **w > 0.0);
+    let m = bound.fold(Matrix3x4::zeros(), |s, (m, w)| s + m * *w);
+    let q: Point3<f64> = Point3::from(m * p.cast::<f64>().to_homogeneous());
+    q.cast()
 }
 
 #[cfg(test)]

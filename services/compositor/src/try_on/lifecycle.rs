@@ -201,6 +201,27 @@ mod tests {
     use super::*;
 
     #[tokio::test]
+    async fn garments_that_are_put_on_again_leave_a_plain_mirror_until_they_are_back() {
+        let mut life = Lifecycle::new("t".into(), SilenceLimits::default());
+        life.on_frame();
+        life.on_tracking();
+        life.on_cloth(true);
+        life.apply(Event::GarmentsOn);
+        assert!(life.state().shows_garments());
+
+        life.on_cloth(false);
+        life.apply(Event::OutfitOff);
+        life.check();
+        assert_eq!(
+            life.state(),
+            State::Calibrating,
+            "no fault, no frozen picture"
+        );
+        life.apply(Event::GarmentsOn);
+        assert_eq!(life.state(), State::Live);
+    }
+
+    #[tokio::test]
     async fn a_hidden_fault_comes_up_once_the_one_before_it_is_gone() {
         let mut life = Lifecycle::new("t".into(), SilenceLimits::default());
         life.on_frame();

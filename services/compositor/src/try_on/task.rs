@@ -20,8 +20,8 @@ use tryon_kit::sessions::unix_ns;
 use tryon_kit::status::unavailable;
 use tryon_kit::telemetry::record_stages;
 use tryon_proto::v1::{
-    BodyState, FrameId, GarmentFit, GarmentFrame, Picture, PictureCodec, TrackingStatus,
-    TryOnState, TryOnStatus,
+    BodyState, ClothStatus, FrameId, GarmentFit, GarmentFrame, Picture, PictureCodec,
+    TrackingStatus, TryOnState, TryOnStatus,
 };
 
 /// Interval of the checks for silence.
@@ -234,6 +234,9 @@ impl Task {
             upstream::News::Gone(why) => self.life.on_cloth_gone(why),
             upstream::News::Status(frame) => {
                 self.life.on_cloth(false);
+                if frame.status() == ClothStatus::Dressing {
+                    self.life.apply(Event::OutfitOff);
+                }
                 // Reasons other than its own step reach this service from tracking.
                 if life::from_wire(frame.reason()) == Some(Fault::StepFailed) {
                     self.life.fail(Fault::StepFailed, &frame.detail);

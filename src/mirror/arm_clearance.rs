@@ -1,0 +1,218 @@
+//! Arms that overlap the trunk, turned outwards until cloth fits between.
+//!
+//! A tracked body wears the clothes of its person on its trunk, so that arms at its sides reach into it, by half their
+//! thickness on real recordings. No sleeve fits there.
+
+use crate::body::parts::{BodyPart, LimbJoints, TrunkFrame};
+use crate::body::{BoneTransforms, Pose, RestBody, Template};
+use crate::math::{P3d, V3d, exp_so3, log_so3};
+use nalgebra::UnitQuaternion;
+
+/// Bands of the trunk between pelvis and shoulders.
+const BANDS: usize = 8;
+/// Points of the upper arm, as shares of the bone: armpits are no overlap, and elbows and forearms, turned out too, would
+/// leave the picture's arms.
+const UPPER: [f64; 2] = [0.4, 0.6];
+/// Turns of the shoulder, each by the deepest point.
+const TURNS: usize = 3;
+/// Largest turn of a shoulder, radians: an arm through the chest is a fault of tracking, and stays.
+const MOST_TURN: f64 = 0.35;
+
+/// One upper arm: the joints at its ends, and its radius, metres.
+#[derive(Clone, Copy, Debug)]
+struct UpperArm {
+    joints: LimbJoints,
+    radius: f64,
+}
+
+/// Trunk and arms of one rest body.
+#[derive(Clone, Debug)]
+pub(super) struct ArmClearance {
+    arms: [UpperArm; 2],
+    /// Elliptic section of each band: half axes across and to the front, and the centre's place to the front, metres.
+    sections: [[f64; 3]; BANDS],
+}
+
+impl ArmClearance {
+    /// `None` for a template without arms.
+    pub(super) fn new(template: &Template, rest: &RestBody) -> Option<Self> {
+        let limbs = [BodyPart::LeftArm, BodyPart::RightArm].map(|arm| template.parts().limb(arm));
+        let joints = [limbs[0]?, limbs[1]?];
+        let frame = TrunkFrame::new(rest.joints[0], joints.map(|j| rest.joints[j.root]))?;
+        let arms = joints.map(|joints| UpperArm {
+            radius: radius(template, rest, [joints.root, joints.hinge]),
+            joints,
+        });
+        Some(Self {
+            sections: sections(template, rest, &frame),
+            arms,
+        })
+    }
+
+    /// The pose with both arms beside the trunk; the same pose where they are already. `bones` become those of the result.
+    pub(super) fn separate<F>(
+        &self,
+        template: &Template,
+        rest: &RestBody,
+        pose: &Pose<F>,
+        bones: &mut BoneTransforms,
+    ) -> Pose<F> {
+        let skeleton = template.skeleton();
+        let mut pose = pose.clone();
+        pose.bones(skeleton, rest, bones);
+        let shoulders = self.arms.map(|a| bones.joints[a.joints.root]);
+        let Some(frame) = TrunkFrame::new(bones.joints[0], shoulders) else {
+            return pose;
+        };
+        for arm in &self.arms {
+            let root = arm.joints.root;
+            let parent = skeleton.joints()[root].parent;
+            let parent = parent.map_or(pose.root.iso().rotation, |p| bones.bones[p].rotation);
+            let before = exp_so3(&pose.rotation_vector(skeleton, root));
+            let mut turn = UnitQuaternion::identity();
+            for _ in 0..TURNS {
+                let Some(more) = self.turn(arm, &frame, bones) else {
+                    break;
+                };
+                turn = more * turn;
+                let angle = turn.angle();
+                if angle > MOST_TURN {
+                    turn = UnitQuaternion::identity().slerp(&turn, MOST_TURN / angle);
+                }
+                let local = parent.inverse() * turn * parent * before;
+                let at = skeleton.dof_offset(root);
+                pose.angles[at..at + 3].copy_from_slice(log_so3(&local).as_slice());
+                pose.bones(skeleton, rest, bones);
+            }
+        }
+        pose
+    }
+
+    /// Least turn of the shoulder that brings the deepest point of an arm out of the trunk; `None` when all are outside.
+    fn turn(
+        &self,
+        arm: &UpperArm,
+        frame: &TrunkFrame,
+        bones: &BoneTransforms,
+    ) -> Option<UnitQuaternion<f64>> {
+        let [root, hinge] = [arm.joints.root, arm.joints.hinge].map(|j| bones.joints[j]);
+        let points = UPPER.map(|t| root + (hinge - root) * t);
+        let pushes = points.iter();
+        let pushes = pushes.filter_map(|p| Some((p - root, self.push(frame, p, arm.radius)?)));
+        let (lever, push) = pushes.max_by(|a, b| a.1.norm().total_cmp(&b.1.norm()))?;
+        let rotation = lever.cross(&push) / lever.norm_squared().max(f64::MIN_POSITIVE);
+        Some(UnitQuaternion::from_scaled_axis(rotation))
+    }
+
+    /// Shortest way, about, from a point of an arm of radius `r` out of the trunk's section; `None` outside of it.
+    fn push(&self, frame: &TrunkFrame, p: &P3d, r: f64) -> Option<V3d> {
+        let [across, up, front] = frame.local(p);
+        let [half_across, half_front, centre] = self.section(up / frame.height)?;
+        let half = [half_across, half_front].map(|h| h + r);
+        let at = [across, front - centre];
+        let scaled = [at[0] / half[0], at[1] / half[1]];
+        let share = scaled[0].hypot(scaled[1]);
+        if share >= 1.0 {
+            return None;
+        }
+        let slope = [scaled[0] / half[0], scaled[1] / half[1]];
+        let length = slope[0].hypot(slope[1]).max(f64::MIN_POSITIVE);
+        // First-order distance to the level set: value over slope, per metre.
+        let depth = share * (1.0 - share) / length;
+        let out = frame.axes[0] * (slope[0] / length) + frame.axes[2] * (slope[1] / length);
+        Some(out * depth)
+    }
+
+    /// Section at a share of the height; `None` above the shoulders, and that of the pelvis below it.
+    fn section(&self, height: f64) -> Option<[f64; 3]> {
+        if height >= 1.0 {
+            return None;
+        }
+        let at = (height * BANDS as f64 - 0.5).clamp(0.0, (BANDS - 1) as f64);
+        let (k, t) = (
+            (at as usize).min(BANDS - 2),
+            at - at.floor().min((BANDS - 2) as f64),
+        );
+        let [a, b] = [self.sections[k], self.sections[k + 1]];
+        Some(std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t))
+    }
+}
+
+/// Mean distance of the vertices of a bone from its axis, metres.
+fn radius(template: &Template, rest: &RestBody, [from, to]: [usize; 2]) -> f64 {
+    let (a, b) = (rest.joints[from], rest.joints[to]);
+    let Some(along) = (b - a).try_normalize(f64::EPSILON) else {
+        return 0.0;
+    };
+    let weights = template.weights();
+    let of = (0..rest.vertices.len()).filter(|v| weights.dominant(*v) == from);
+    let distances = of.map(|v| {
+        let d = rest.vertices[v].cast::<f64>() - a;
+        (d - along * along.dot(&d)).norm()
+    });
+    let (sum, n) = distances.fold((0.0, 0.0), |(s, n), d| (s + d, n + 1.0));
+    sum / f64::max(n, 1.0)
+}
+
+/// Sections of the trunk of a rest body.
+fn sections(template: &Template, rest: &RestBody, frame: &TrunkFrame) -> [[f64; 3]; BANDS] {
+    let weights = template.weights();
+    let mut bands: [Vec<[f64; 2]>; BANDS] = Default::default();
+    for (v, p) in rest.vertices.iter().enumerate() {
+        if template.parts().part(weights.dominant(v)) != BodyPart::Trunk {
+            continue;
+        }
+        let [across, up, front] = frame.local(&p.cast());
+        let band = up / frame.height * BANDS as f64;
+        if (0.0..BANDS as f64).contains(&band) {
+            bands[band as usize].push([across, front]);
+        }
+    }
+    bands.map(|points| {
+        let n = points.len().max(1) as f64;
+        let centre = points.iter().map(|p| p[1]).sum::<f64>() / n;
+        let square = |f: &dyn Fn(&[f64; 2]) -> f64| points.iter().map(f).sum::<f64>() / n;
+        // The variance of points on an ellipse is half the square of its half axis.
+        let [across, front] = [
+            square(&|p| p[0] * p[0]),
+            square(&|p| (p[1] - centre).powi(2)),
+        ];
+        [(2.0 * across).sqrt(), (2.0 * front).sqrt(), centre]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::{BodyShape, embedded};
+    use crate::math::{Body, Rigid, World};
+
+    /// Step by which the upper arms are lowered from the rest pose, and the number of steps, radians.
+    const STEP: f64 = 0.1;
+    /// See [`STEP`].
+    const STEPS: usize = 12;
+
+    #[test]
+    fn arms_in_the_trunk_are_turned_out_as_far_as_they_must_and_others_keep_their_bits() {
+        let template = embedded::template();
+        let rest = template.personalise(&BodyShape::default());
+        let clearance = ArmClearance::new(&template, &rest).expect("arms");
+        let mut bones = BoneTransforms::default();
+        let mut lowered = Pose::rest(template.skeleton(), Rigid::<World, Body>::identity());
+        let (mut last, mut turned) = (f64::INFINITY, 0);
+        for k in 0..STEPS {
+            let turn = STEP * k as f64;
+            lowered.set(template.skeleton(), "left_shoulder", &[0.0, 0.0, -turn]);
+            lowered.set(template.skeleton(), "right_shoulder", &[0.0, 0.0, turn]);
+            let result = clearance.separate(&template, &rest, &lowered, &mut bones);
+            assert!(k > 0 || result == lowered, "arms at rest are free");
+            turned += usize::from(result != lowered);
+            let elbows = clearance.arms.map(|a| bones.joints[a.joints.hinge].x.abs());
+            assert!((elbows[0] - elbows[1]).abs() < 0.01, "{elbows:?} m");
+            assert!(elbows[0] > 0.15, "after {turn} rad: {elbows:?} m");
+            assert!(elbows[0] < last + 0.01, "after {turn} rad: {elbows:?} m");
+            last = elbows[0];
+        }
+        assert!((1..STEPS).contains(&turned), "{turned} poses were changed");
+    }
+}

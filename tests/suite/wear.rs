@@ -1,0 +1,98 @@
+//! Outfits that are put on again: jumps of the body, and cloth that is past mending.
+
+use crate::common::{DT, arms_down, posed};
+use tryon::body::measure::measure;
+use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
+use tryon::cloth::WornReference;
+use tryon::evaluate::rest::lower_arms;
+use tryon::math::{Rigid, V3, World};
+use tryon::mirror::{Choice, DressedOutfit, Subject};
+
+/// Steps within which an outfit is shown again: half a second.
+const HALF_A_SECOND: usize = 15;
+
+struct Fitting {
+    template: Template,
+    rest: RestBody,
+    outfit: DressedOutfit,
+}
+
+/// A pullover on the mean body with its arms down.
+fn fitting() -> Fitting {
+    let template = embedded::template();
+    let rest = template.personalise(&BodyShape::default());
+    let measures = measure(&template, &rest).expect("measures");
+    let choice = Choice::library("longsleeve", None).expect("a garment");
+    let subject = Subject {
+        template: &template,
+        rest: &rest,
+        pose: &arms_down(&template, &rest),
+        world_from_camera: Rigid::identity(),
+    };
+    let worn = vec![choice.sized(&measures).expect("a size")];
+    let outfit = DressedOutfit::put_on(&subject, worn, false).expect("dressed");
+    Fitting {
+        template: (*template).clone(),
+        rest,
+        outfit,
+    }
+}
+
+impl Fitting {
+    /// Steps on a pose until the outfit is shown; the hidden steps.
+    fn until_worn(&mut self, pose: &Pose<World>) -> usize {
+        let body = posed(&self.template, &self.rest, pose);
+        let shown = (0..100).position(|_| {
+            self.outfit.step(&body, DT).expect("a step");
+            self.outfit.is_worn()
+        });
+        shown.expect("shown again")
+    }
+}
+
+#[test]
+fn arms_that_jump_hide_the_outfit_until_its_sleeves_are_on_them() {
+    let mut f = fitting();
+    let down = arms_down(&f.template, &f.rest);
+    assert_eq!(f.until_worn(&down), 0, "an outfit at rest is worn");
+    let reference = WornReference::new(&f.outfit.model, &f.outfit.state);
+
+    let mut raised = down.clone();
+    lower_arms(&f.template, &f.rest, -0.6, &mut raised);
+    let hidden = f.until_worn(&raised);
+    assert!(
+        (1..=HALF_A_SECOND).contains(&hidden),
+        "{hidden} hidden steps"
+    );
+    let offset = reference.limb_offset(&f.outfit.model, &f.outfit.state);
+    assert!(offset < 0.05, "sleeves are {offset} m off the arms");
+}
+
+#[test]
+fn a_sleeve_that_is_caught_is_put_on_again_and_one_that_slips_for_a_moment_is_not() {
+    let mut f = fitting();
+    let down = arms_down(&f.template, &f.rest);
+    f.until_worn(&down);
+    let body = posed(&f.template, &f.rest, &down);
+    let reference = WornReference::new(&f.outfit.model, &f.outfit.state);
+    let arm = f.rest.vertices.iter().map(|p| p.x).fold(0.0, f32::max);
+
+    let mut hold = |steps: usize| {
+        let hidden = (0..steps).map(|_| {
+            for p in &mut f.outfit.state.garments[0].positions {
+                if p.x > 0.25 * arm {
+                    *p += V3::new(0.4, 0.4, 0.3);
+                }
+            }
+            f.outfit.step(&body, DT).expect("a step");
+            usize::from(!f.outfit.is_worn())
+        });
+        hidden.sum::<usize>()
+    };
+    assert_eq!(hold(1), 0, "a moment is left to the simulator");
+    assert!(hold(12) > 0, "a rag was shown");
+    let hidden = f.until_worn(&down);
+    assert!(hidden <= HALF_A_SECOND, "{hidden} hidden steps");
+    let offset = reference.limb_offset(&f.outfit.model, &f.outfit.state);
+    assert!(offset < 0.05, "the sleeve is {offset} m off the arm");
+}
