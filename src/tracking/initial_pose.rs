@@ -20,7 +20,7 @@ pub(super) struct Outline {
     pub torso: P3,
     /// Top of the head, camera frame, metres.
     pub crown: P3,
-    /// Height from sole to crown, metres; `None` when cut off below without a known floor.
+    /// Height from sole to crown, metres; `None` when cut off below, or short, without a known floor.
     pub stature: Option<f64>,
 }
 
@@ -32,6 +32,8 @@ const HEAD_BESIDE: f32 = 0.22;
 const SOLES: f64 = 0.02;
 /// Height of a floor above the lowest reading from which it is another floor than the subject's, metres.
 const AFLOAT: f64 = 0.1;
+/// Height below which somebody not known to stand on a floor may lack the legs (black trousers), metres.
+const SHORTEST: f64 = 1.3;
 /// Share of the largest distance to the silhouette above which a cell is torso.
 const TORSO_SHARE: [u32; 2] = [8, 10];
 /// Turns about the vertical to try, radians, for either facing.
@@ -112,7 +114,8 @@ pub(super) fn outline(
     let over_floor = floor
         .map(|f| f64::from(height(&crown)) + f)
         .filter(|h| *h > visible_height - AFLOAT);
-    let stature = over_floor.or((!cut_below).then_some(visible_height));
+    let is_whole = !cut_below && visible_height > SHORTEST;
+    let stature = over_floor.or(is_whole.then_some(visible_height));
     Some(Outline {
         torso,
         crown,

@@ -25,10 +25,14 @@ pub struct SizeEstimate {
 
 /// Weight λₛ of eq. 23, per point, m²: bones tied by symmetry differ by a tenth of what single ones do.
 const TIE: f64 = 5e-3;
-/// Largest coefficient, standard deviations.
-const MOST_DEVIATIONS: f64 = 3.0;
+/// Largest coefficient, standard deviations: a child is eight below the mean of adults.
+const MOST_DEVIATIONS: f64 = 8.0;
+/// Statures of adults, metres.
+const ADULTS: std::ops::Range<f64> = 1.3..2.2;
+/// Statures of children, metres, which are also heights of adults who crouch or sit.
+const CHILDREN: std::ops::Range<f64> = 0.9..1.3;
 /// Bounds of a bone's scale.
-const SCALES: [f64; 2] = [0.7, 1.4];
+const SCALES: [f64; 2] = [0.5, 1.4];
 /// Longest pair and kernel width in the first frames, metres: feet of a wrong stature start 10 cm away.
 const START: (f32, f64) = (0.15, 0.08);
 /// The same after [`SEARCHING`] frames.
@@ -308,9 +312,24 @@ fn frame_information(
         .then_some((reduced, gradient))
 }
 
+/// Shapes for a first pose of somebody this tall, metres, `known` where that isn't seen or is no stature: a child, or an adult
+/// who crouches.
+pub(super) fn first_shapes(
+    model: &TrackerModel,
+    stature: Option<f64>,
+    known: &BodyShape,
+) -> Vec<BodyShape> {
+    let sized = |s: f64| from_stature(model, s);
+    match stature {
+        Some(s) if ADULTS.contains(&s) => vec![sized(s)],
+        Some(s) if CHILDREN.contains(&s) => vec![known.clone(), sized(s)],
+        _ => vec![known.clone()],
+    }
+}
+
 /// Most likely shape of a stature (metres from sole to crown): along the shape space if there is one, else all bones
 /// alike.
-pub(super) fn from_stature(model: &TrackerModel, stature: f64) -> BodyShape {
+fn from_stature(model: &TrackerModel, stature: f64) -> BodyShape {
     let template = &model.template;
     let Some((lo, hi)) = template.mesh().bounds() else {
         return BodyShape::default();
@@ -342,4 +361,36 @@ pub(super) fn from_stature(model: &TrackerModel, stature: f64) -> BodyShape {
         shape.bone_scales = vec![wanted / own; model.parents.len()];
     }
     shape
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracking::test_scene::TestScene;
+
+    #[test]
+    fn a_small_person_may_be_a_child_of_that_stature_or_crouch() {
+        let model = TestScene::new(200, 480).model;
+        let known = BodyShape {
+            coefficients: vec![0.5],
+            ..BodyShape::default()
+        };
+        let shapes = |s| first_shapes(&model, s, &known);
+        let same = vec![known.clone()];
+        assert_eq!(shapes(None), same);
+        assert_eq!(shapes(Some(0.5)), same, "a bag has no stature");
+        for (stature, count) in [(1.0, 2), (1.2, 2), (1.5, 1), (2.0, 1)] {
+            let shapes = shapes(Some(stature));
+            assert_eq!(shapes.len(), count, "{stature} m");
+            assert!(count == 1 || shapes[0] == known);
+            let heights = model.template.personalise(&shapes[count - 1]).vertices;
+            let heights = heights.iter().map(|p| f64::from(p.y));
+            let (lo, hi) = heights.fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(y), h.max(y)));
+            assert!(
+                (hi - lo - stature).abs() < 0.02,
+                "{} for {stature} m",
+                hi - lo
+            );
+        }
+    }
 }

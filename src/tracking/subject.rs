@@ -14,7 +14,7 @@ use super::pose_fit::{
 use super::prediction::{Prediction, predict};
 use super::repair::Repair;
 use super::report::Stopwatch;
-use super::size::from_stature;
+use super::size::first_shapes;
 use super::standing::{FloorStance, FootMemory, HiddenKnees, floor_below, highest_hips};
 use super::{
     LostReason, Skipped, Status, StepReport, TrackerModel, TrackerState, TrackingStagesMs,
@@ -44,8 +44,6 @@ const RECENT: u32 = 15;
 const PATIENCE: u32 = 8;
 /// Frames without the subject after which the next one is measured anew.
 const FORGET: u32 = 150;
-/// Statures that are trusted for a first size, metres.
-const STATURES: std::ops::Range<f64> = 1.3..2.2;
 /// Residual that halves the quality of a frame, metres.
 const POOR_RESIDUAL: f64 = 0.02;
 /// Longest pair when the body is drawn for displacements, metres (paper, section 3.3).
@@ -185,10 +183,7 @@ impl SubjectFrame<'_> {
         if state.bad_frames > PATIENCE {
             return Err(LostReason::Residual);
         }
-        let context = self.context(&workspace.body);
-        log.report.confidence = confidence(&context, &pose, &workspace.fit);
-        let measure = &mut workspace.agreement;
-        log.report.agreement = measure.measure(&context, &pose, &mut workspace.fit);
+        self.assess(&pose, workspace, log);
         if config.rescue {
             self.repair(state, workspace, (&mut pose, &mut fit), log);
         }
@@ -202,6 +197,14 @@ impl SubjectFrame<'_> {
         count_doubt(state, agrees)?;
         self.update_displacements(good, state, workspace, log);
         Ok(())
+    }
+
+    /// Writes confidence and agreement of a fitted pose to the report.
+    fn assess(&self, pose: &Pose<Camera>, workspace: &mut Workspace, log: &mut StepLog) {
+        let context = self.context(&workspace.body);
+        log.report.confidence = confidence(&context, pose, &workspace.fit);
+        let measure = &mut workspace.agreement;
+        log.report.agreement = measure.measure(&context, pose, &mut workspace.fit);
     }
 
     /// Finds the subject anew: first size from the stature, then an initial pose.
@@ -219,30 +222,28 @@ impl SubjectFrame<'_> {
         let floor = state.floor_known.then_some(camera_height);
         let up = self.up.cast();
         let outline = outline(&self.observation, &up, self.person.cut_below, floor);
-        let stature = outline
-            .and_then(|o| o.stature)
-            .filter(|s| STATURES.contains(s));
-        if let Some(stature) = stature
-            && state.size.frames == 0
-            && self.model.config.adapt_size
-        {
-            state.shape = from_stature(self.model, stature);
-        }
-        workspace.body.update(self.model, &state.shape);
+        let is_unknown = state.size.frames == 0 && self.model.config.adapt_size;
+        let stature = outline.and_then(|o| o.stature).filter(|_| is_unknown);
+        let shapes = first_shapes(self.model, stature, &state.shape);
         let is_recent = state.status != Status::Searching && state.pose_age <= RECENT;
         let recent = is_recent.then_some(state.pose.root.iso().rotation);
         let proposals = self.proposals(&mut workspace.parts);
-        let (context, scratch) = (self.context(&workspace.body), &mut workspace.fit);
         let prior = StartPrior {
             up: &self.up,
             recent,
             proposals: &proposals,
         };
-        let found = outline.and_then(|o| initial_pose(&context, &o, &prior, scratch));
+        let starts = shapes.into_iter().filter_map(|shape| {
+            workspace.body.update(self.model, &shape);
+            let (context, scratch) = (self.context(&workspace.body), &mut workspace.fit);
+            let (pose, fit) = initial_pose(&context, &outline?, &prior, scratch)?;
+            (fit.explained >= LEAST_EXPLAINED).then_some((fit.cost, pose, shape))
+        });
+        let best = starts.min_by(|a, b| a.0.total_cmp(&b.0));
         log.report.stages_ms.place = log.watch.lap();
-        let (pose, _) = found
-            .filter(|(_, fit)| fit.explained >= LEAST_EXPLAINED)
-            .ok_or(LostReason::Residual)?;
+        let (_, pose, shape) = best.ok_or(LostReason::Residual)?;
+        workspace.body.update(self.model, &shape);
+        state.shape = shape;
         (state.before, state.highest_hips, state.feet) = (None, None, None);
         state.drift.clear();
         Ok(Prediction {
