@@ -1,6 +1,7 @@
 //! Affine map of each bone from one body to another: turned, stretched to the other's length and widened to its girth.
 
 use super::body_sections::BodySections;
+use crate::body::parts::mean_radius;
 use crate::body::{Joint, Template};
 use crate::math::{P3, P3d, V3d};
 use nalgebra::{Matrix3, UnitQuaternion, center};
@@ -49,20 +50,6 @@ fn ratio(from: Option<f64>, to: Option<f64>) -> f64 {
         (Some(a), Some(b)) if a > SHORTEST => (b / a).clamp(RATIO[0], RATIO[1]),
         _ => 1.0,
     }
-}
-
-/// Mean distance of the vertices of `joint` from the line a–b, metres.
-fn mean_radius(template: &Template, vertices: &[P3], joint: &str, [a, b]: [P3d; 2]) -> Option<f64> {
-    let j = template.skeleton().index(joint)?;
-    let u = (b - a).try_normalize(0.0)?;
-    let (sum, count) = (0..vertices.len())
-        .filter(|i| template.weights().dominant(*i) == j)
-        .map(|i| {
-            let d: V3d = vertices[i].cast::<f64>() - a;
-            (d - u * u.dot(&d)).norm()
-        })
-        .fold((0.0, 0.0), |(s, c), r| (s + r, c + 1.0));
-    (count > 0.0).then(|| sum / count)
 }
 
 struct BodyPair<'a> {
@@ -135,9 +122,12 @@ impl BodyPair<'_> {
         let ([a, c], [b, d]) = (self.both(joint)?, self.both(end)?);
         let (u, v) = ((b - a).try_normalize(0.0)?, (d - c).try_normalize(0.0)?);
         let along = ratio(Some((b - a).norm()), Some((d - c).norm()));
+        let radius = |body: &Template, vertices: &[P3], bone| {
+            mean_radius(body, vertices, body.skeleton().index(joint)?, bone)
+        };
         let around = ratio(
-            mean_radius(self.source, self.source.mesh().vertices(), joint, [a, b]),
-            mean_radius(self.target, &self.sections.vertices, joint, [c, d]),
+            radius(self.source, self.source.mesh().vertices(), [a, b]),
+            radius(self.target, &self.sections.vertices, [c, d]),
         );
         let q = UnitQuaternion::rotation_between(&u, &v)?.to_rotation_matrix();
         let stretch = Matrix3::identity() * around + u * u.transpose() * (along - around);

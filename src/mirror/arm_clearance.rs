@@ -3,17 +3,18 @@
 //! A tracked body wears the clothes of its person on its trunk, so that arms at its sides reach into it, by half their
 //! thickness on real recordings. No sleeve fits there.
 
-use crate::body::parts::{BodyPart, LimbJoints, TrunkFrame};
+use crate::body::parts::{BodyPart, EllipticSection, LimbJoints, TrunkFrame, mean_radius};
 use crate::body::{BoneTransforms, Pose, RestBody, Template};
 use crate::math::{P3d, V3d, exp_so3, log_so3};
+use crate::registration::residual::EllipticColumn;
 use nalgebra::UnitQuaternion;
 
-/// Bands of the trunk between pelvis and shoulders.
+/// Bands of the trunk between pelvis and shoulders, 6 cm each: waist and chest differ.
 const BANDS: usize = 8;
 /// Points of the upper arm, as shares of the bone: armpits are no overlap, and elbows and forearms, turned out too, would
 /// leave the picture's arms.
 const UPPER: [f64; 2] = [0.4, 0.6];
-/// Turns of the shoulder, each by the deepest point.
+/// Turns of the shoulder, each by the deepest point to first order: the third is below a millimetre.
 const TURNS: usize = 3;
 /// Largest turn of a shoulder, radians: an arm through the chest is a fault of tracking, and stays.
 const MOST_TURN: f64 = 0.35;
@@ -29,8 +30,8 @@ struct UpperArm {
 #[derive(Clone, Debug)]
 pub(super) struct ArmClearance {
     arms: [UpperArm; 2],
-    /// Elliptic section of each band: half axes across and to the front, and the centre's place to the front, metres.
-    sections: [[f64; 3]; BANDS],
+    /// Section of each band, metres.
+    sections: [EllipticSection; BANDS],
 }
 
 impl ArmClearance {
@@ -39,9 +40,13 @@ impl ArmClearance {
         let limbs = [BodyPart::LeftArm, BodyPart::RightArm].map(|arm| template.parts().limb(arm));
         let joints = [limbs[0]?, limbs[1]?];
         let frame = TrunkFrame::new(rest.joints[0], joints.map(|j| rest.joints[j.root]))?;
-        let arms = joints.map(|joints| UpperArm {
-            radius: radius(template, rest, [joints.root, joints.hinge]),
-            joints,
+        let arms = joints.map(|joints| {
+            let bone = [joints.root, joints.hinge].map(|j| rest.joints[j]);
+            let radius = mean_radius(template, &rest.vertices, joints.root, bone);
+            UpperArm {
+                radius: radius.unwrap_or(0.0),
+                joints,
+            }
         });
         Some(Self {
             sections: sections(template, rest, &frame),
@@ -104,81 +109,42 @@ impl ArmClearance {
         Some(UnitQuaternion::from_scaled_axis(rotation))
     }
 
-    /// Shortest way, about, from a point of an arm of radius `r` out of the trunk's section; `None` outside of it.
+    /// Shortest way, to first order, from a point of an arm of radius `r` out of the trunk; `None` outside of it.
     fn push(&self, frame: &TrunkFrame, p: &P3d, r: f64) -> Option<V3d> {
-        let [across, up, front] = frame.local(p);
-        let [half_across, half_front, centre] = self.section(up / frame.height)?;
-        let half = [half_across, half_front].map(|h| h + r);
-        let at = [across, front - centre];
-        let scaled = [at[0] / half[0], at[1] / half[1]];
-        let share = scaled[0].hypot(scaled[1]);
-        if share >= 1.0 {
-            return None;
-        }
-        let slope = [scaled[0] / half[0], scaled[1] / half[1]];
-        let length = slope[0].hypot(slope[1]).max(f64::MIN_POSITIVE);
-        // First-order distance to the level set: value over slope, per metre.
-        let depth = share * (1.0 - share) / length;
-        let out = frame.axes[0] * (slope[0] / length) + frame.axes[2] * (slope[1] / length);
-        Some(out * depth)
+        let [_, up, _] = frame.local(p);
+        let section = self.section(up / frame.height);
+        let column = EllipticColumn {
+            base: frame.pelvis + frame.axes[2] * section.front,
+            axes: frame.axes,
+            half: section.half.map(|h| h + r),
+            height: frame.height,
+        };
+        let (share, gradient) = column.inside(p)?;
+        Some(gradient * ((1.0 - share) / gradient.norm_squared()))
     }
 
-    /// Section at a share of the height; `None` above the shoulders, and that of the pelvis below it.
-    fn section(&self, height: f64) -> Option<[f64; 3]> {
-        if height >= 1.0 {
-            return None;
-        }
+    /// Section at a share of the height, between the middles of the bands.
+    fn section(&self, height: f64) -> EllipticSection {
         let at = (height * BANDS as f64 - 0.5).clamp(0.0, (BANDS - 1) as f64);
-        let (k, t) = (
-            (at as usize).min(BANDS - 2),
-            at - at.floor().min((BANDS - 2) as f64),
-        );
+        let k = (at as usize).min(BANDS - 2);
+        let t = at - k as f64;
         let [a, b] = [self.sections[k], self.sections[k + 1]];
-        Some(std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t))
+        let between = |a: f64, b: f64| a + (b - a) * t;
+        EllipticSection {
+            half: [0, 1].map(|i| between(a.half[i], b.half[i])),
+            front: between(a.front, b.front),
+        }
     }
-}
-
-/// Mean distance of the vertices of a bone from its axis, metres.
-fn radius(template: &Template, rest: &RestBody, [from, to]: [usize; 2]) -> f64 {
-    let (a, b) = (rest.joints[from], rest.joints[to]);
-    let Some(along) = (b - a).try_normalize(f64::EPSILON) else {
-        return 0.0;
-    };
-    let weights = template.weights();
-    let of = (0..rest.vertices.len()).filter(|v| weights.dominant(*v) == from);
-    let distances = of.map(|v| {
-        let d = rest.vertices[v].cast::<f64>() - a;
-        (d - along * along.dot(&d)).norm()
-    });
-    let (sum, n) = distances.fold((0.0, 0.0), |(s, n), d| (s + d, n + 1.0));
-    sum / f64::max(n, 1.0)
 }
 
 /// Sections of the trunk of a rest body.
-fn sections(template: &Template, rest: &RestBody, frame: &TrunkFrame) -> [[f64; 3]; BANDS] {
-    let weights = template.weights();
-    let mut bands: [Vec<[f64; 2]>; BANDS] = Default::default();
-    for (v, p) in rest.vertices.iter().enumerate() {
-        if template.parts().part(weights.dominant(v)) != BodyPart::Trunk {
-            continue;
-        }
-        let [across, up, front] = frame.local(&p.cast());
-        let band = up / frame.height * BANDS as f64;
-        if (0.0..BANDS as f64).contains(&band) {
-            bands[band as usize].push([across, front]);
-        }
+fn sections(template: &Template, rest: &RestBody, frame: &TrunkFrame) -> [EllipticSection; BANDS] {
+    let mut bands: [Vec<[f64; 3]>; BANDS] = Default::default();
+    for p in frame.skin(template, &rest.vertices) {
+        let band = (p[1] / frame.height * BANDS as f64) as usize;
+        bands[band.min(BANDS - 1)].push(p);
     }
-    bands.map(|points| {
-        let n = points.len().max(1) as f64;
-        let centre = points.iter().map(|p| p[1]).sum::<f64>() / n;
-        let square = |f: &dyn Fn(&[f64; 2]) -> f64| points.iter().map(f).sum::<f64>() / n;
-        // The variance of points on an ellipse is half the square of its half axis.
-        let [across, front] = [
-            square(&|p| p[0] * p[0]),
-            square(&|p| (p[1] - centre).powi(2)),
-        ];
-        [(2.0 * across).sqrt(), (2.0 * front).sqrt(), centre]
-    })
+    bands.map(|points| EllipticSection::around(&points))
 }
 
 #[cfg(test)]

@@ -30,9 +30,6 @@ pub struct Agreement {
     pub uncovered: f32,
     /// Share of the visible surface of each [`BodyPart`](crate::body::parts::BodyPart) in free space, 0 to 1; 0 for a part out of view.
     pub parts: [f32; PARTS],
-    /// Free-space area of the largest part that lies there for the most, as a share of the common area: a limb in the air.
-    #[serde(default)]
-    pub limb_in_air: f32,
 }
 
 impl Agreement {
@@ -112,12 +109,10 @@ impl AgreementScratch {
         let judged = parts.iter().filter(|p| p.has_return());
         let free: u32 = judged.map(|p| p.free).sum();
         let area = area.max(1) as f32;
-        let in_air = parts.iter().filter(|p| 2 * p.free > p.all).map(|p| p.free);
         Agreement {
             in_free_space: free as f32 / area,
             uncovered: uncovered as f32 / area,
             parts: parts.map(|p| p.free as f32 / p.all.max(1) as f32),
-            limb_in_air: in_air.max().unwrap_or(0) as f32 / area,
         }
     }
 

@@ -283,13 +283,14 @@ pub(super) fn resting_limb(
     part: BodyPart,
     bones: &mut BoneTransforms,
 ) -> Option<Pose> {
-    let (limbs, directions): (_, &[[f64; 3]]) = match part {
-        BodyPart::LeftArm | BodyPart::RightArm => (&context.model.arms, &UPPER_ARMS),
-        BodyPart::LeftLeg | BodyPart::RightLeg => (&context.model.legs, &RESTING_LEGS),
+    let (_, limb) = context.model.limbs().find(|(p, _)| *p == part)?;
+    let (side, directions): (usize, &[[f64; 3]]) = match part {
+        BodyPart::LeftArm => (0, &UPPER_ARMS),
+        BodyPart::RightArm => (1, &UPPER_ARMS),
+        BodyPart::LeftLeg => (0, &RESTING_LEGS),
+        BodyPart::RightLeg => (1, &RESTING_LEGS),
         BodyPart::Trunk => return None,
     };
-    let side = usize::from(matches!(part, BodyPart::RightArm | BodyPart::RightLeg));
-    let limb = limbs[side].as_ref()?;
     let hypotheses = Hypotheses {
         context: *context,
         extremities: Vec::new(),

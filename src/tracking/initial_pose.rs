@@ -6,6 +6,7 @@ use super::hypotheses::Hypotheses;
 use super::pose_fit::{
     FitContext, FitReport, FitScratch, HYPOTHESIS_TERMS, START, Schedule, evaluate, fit_pose,
 };
+use super::size::ADULTS;
 use crate::body::Pose;
 use crate::math::{P3, Rigid, principal_axes};
 use crate::registration::Observation;
@@ -32,8 +33,6 @@ const HEAD_BESIDE: f32 = 0.22;
 const SOLES: f64 = 0.02;
 /// Height of a floor above the lowest reading from which it is another floor than the subject's, metres.
 const AFLOAT: f64 = 0.1;
-/// Height below which somebody not known to stand on a floor may lack the legs (black trousers), metres.
-const SHORTEST: f64 = 1.3;
 /// Share of the largest distance to the silhouette above which a cell is torso.
 const TORSO_SHARE: [u32; 2] = [8, 10];
 /// Turns about the vertical to try, radians, for either facing.
@@ -114,7 +113,8 @@ pub(super) fn outline(
     let over_floor = floor
         .map(|f| f64::from(height(&crown)) + f)
         .filter(|h| *h > visible_height - AFLOAT);
-    let is_whole = !cut_below && visible_height > SHORTEST;
+    // Shorter, somebody not known to stand on a floor may lack the legs (black trousers).
+    let is_whole = !cut_below && visible_height > ADULTS.start;
     let stature = over_floor.or(is_whole.then_some(visible_height));
     Some(Outline {
         torso,

@@ -28,9 +28,9 @@ const TIE: f64 = 5e-3;
 /// Largest coefficient, standard deviations: a child is eight below the mean of adults.
 const MOST_DEVIATIONS: f64 = 8.0;
 /// Statures of adults, metres.
-const ADULTS: std::ops::Range<f64> = 1.3..2.2;
+pub(super) const ADULTS: std::ops::Range<f64> = 1.3..2.2;
 /// Statures of children, metres, which are also heights of adults who crouch or sit.
-const CHILDREN: std::ops::Range<f64> = 0.9..1.3;
+const CHILDREN: std::ops::Range<f64> = 0.9..ADULTS.start;
 /// Bounds of a bone's scale.
 const SCALES: [f64; 2] = [0.5, 1.4];
 /// Longest pair and kernel width in the first frames, metres: feet of a wrong stature start 10 cm away.

@@ -1,14 +1,12 @@
 //! The trunk as a column that arms do not enter.
 
 use super::limb::Limb;
-use crate::body::parts::{BodyPart, TrunkFrame};
+use crate::body::parts::{EllipticSection, TrunkFrame};
 use crate::body::{BodyShape, BoneTransforms, Template};
 use crate::registration::residual::EllipticColumn;
 
 /// Share of the section that counts as inside: hands press into clothes and soft bodies.
 const SLACK: f64 = 0.65;
-/// Half axis of an ellipse over the standard deviation of points on it.
-const HALF_AXIS: f64 = std::f64::consts::SQRT_2;
 
 /// Trunk between the hips and the shoulders.
 #[derive(Clone, Copy, Debug)]
@@ -27,25 +25,12 @@ impl Trunk {
         let shoulders = [arms[0].as_ref()?.root, arms[1].as_ref()?.root];
         let rest = template.personalise(&BodyShape::default()).joints;
         let frame = TrunkFrame::new(rest[0], shoulders.map(|j| rest[j]))?;
-        let weights = template.weights();
-        let vertices = template.mesh().vertices().iter().enumerate();
-        let is_trunk = |v: usize| template.parts().part(weights.dominant(v)) == BodyPart::Trunk;
-        let local = vertices.filter(|(v, _)| is_trunk(*v));
-        let local = local.map(|(_, p)| frame.local(&p.cast()));
-        let inside: Vec<_> = local
-            .filter(|p| (0.0..frame.height).contains(&p[1]))
-            .collect();
-        let n = inside.len().max(1) as f64;
-        let mean = |k: usize| inside.iter().map(|p| p[k]).sum::<f64>() / n;
-        let half = |k: usize| {
-            let centre = mean(k);
-            let variance = inside.iter().map(|p| (p[k] - centre).powi(2)).sum::<f64>() / n;
-            HALF_AXIS * variance.sqrt() / frame.width
-        };
+        let skin = frame.skin(template, template.mesh().vertices());
+        let section = EllipticSection::around(&skin);
         Some(Self {
             shoulders,
-            half: [half(0), half(2)],
-            front: mean(2) / frame.width,
+            half: section.half.map(|h| h / frame.width),
+            front: section.front / frame.width,
         })
     }
 

@@ -203,7 +203,7 @@ impl Worn {
     }
 
     /// False while the outfit is put on again after a jump of the body or a fault of the cloth.
-    pub(crate) fn is_shown(&self) -> bool {
+    pub(crate) fn is_worn(&self) -> bool {
         self.outfit.is_worn()
     }
 

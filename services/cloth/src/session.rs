@@ -327,7 +327,7 @@ impl Task {
                     Ok(p) => {
                         record_stages("cloth", &p.frame.stages);
                         metrics::counter!("tryon_cloth_steps").increment(1);
-                        if worn.is_shown() {
+                        if worn.is_worn() {
                             live(p, self.on)
                         } else {
                             dressing(&body, "garments are being put on again").into()

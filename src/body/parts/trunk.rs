@@ -1,6 +1,11 @@
-//! Upright frame of the trunk.
+//! Upright frame and elliptic sections of the trunk.
 
-use crate::math::{P3d, V3d};
+use super::BodyPart;
+use crate::body::Template;
+use crate::math::{P3, P3d, V3d};
+
+/// Half axis of an ellipse over the standard deviation of points on it.
+const HALF_AXIS: f64 = std::f64::consts::SQRT_2;
 
 /// Frame of a trunk between pelvis and shoulders.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,11 +42,63 @@ impl TrunkFrame {
     pub fn local(&self, p: &P3d) -> [f64; 3] {
         self.axes.map(|a| a.dot(&(p - self.pelvis)))
     }
+
+    /// Coordinates of those of a body's `vertices` (metres) that belong to the trunk and lie between pelvis and shoulders.
+    pub fn skin(&self, template: &Template, vertices: &[P3]) -> Vec<[f64; 3]> {
+        let weights = template.weights();
+        let is_trunk = |v: usize| template.parts().part(weights.dominant(v)) == BodyPart::Trunk;
+        let trunk = vertices.iter().enumerate().filter(|(v, _)| is_trunk(*v));
+        let local = trunk.map(|(_, p)| self.local(&p.cast()));
+        let between = local.filter(|p| (0.0..self.height).contains(&p[1]));
+        between.collect()
+    }
+}
+
+/// Ellipse whose axes are those of a [`TrunkFrame`], metres.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EllipticSection {
+    /// Half axes across and to the front.
+    pub half: [f64; 2],
+    /// Place of its centre to the front.
+    pub front: f64,
+}
+
+impl EllipticSection {
+    /// The ellipse around which these points lie; of no size without points.
+    pub fn around(points: &[[f64; 3]]) -> Self {
+        let n = points.len().max(1) as f64;
+        let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / n;
+        let half = |k: usize| {
+            let centre = mean(k);
+            let variance = points.iter().map(|p| (p[k] - centre).powi(2)).sum::<f64>() / n;
+            HALF_AXIS * variance.sqrt()
+        };
+        Self {
+            half: [half(0), half(2)],
+            front: mean(2),
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn points_of_an_ellipse_give_its_axes_and_none_give_nothing() {
+        let turns = (0..64).map(|k| std::f64::consts::TAU * f64::from(k) / 64.0);
+        let points: Vec<_> = turns
+            .map(|t| [0.2 * t.cos(), 0.3, 0.1 * t.sin() + 0.05])
+            .collect();
+        let section = EllipticSection::around(&points);
+        let off = [
+            section.half[0] - 0.2,
+            section.half[1] - 0.1,
+            section.front - 0.05,
+        ];
+        assert!(off.iter().all(|d| d.abs() < 1e-12), "{section:?}");
+        assert_eq!(EllipticSection::around(&[]), EllipticSection::default());
+    }
 
     #[test]
     fn axes_are_the_subjects_and_shoulders_at_the_pelvis_have_none() {

@@ -2,7 +2,7 @@
 
 use super::{BodyPart, BodySegment};
 use crate::body::{Joint, Template};
-use crate::math::{P3, V3};
+use crate::math::{P3, P3d, V3};
 
 /// A connected component with at most this share of a body's vertices is no skin (mannequin: pegs 0.04 %, hands 3.8 %).
 const SMALLEST_COMPONENT: f64 = 1e-3;
@@ -23,6 +23,24 @@ pub fn vertex_masks(template: &Template) -> Vec<u8> {
         }
     };
     (0..component.len()).map(mask).collect()
+}
+
+/// Mean distance of the vertices of a bone (of `joint`) from the line a–b, metres; `None` without vertices or line.
+pub fn mean_radius(
+    template: &Template,
+    vertices: &[P3],
+    joint: usize,
+    [a, b]: [P3d; 2],
+) -> Option<f64> {
+    let u = (b - a).try_normalize(0.0)?;
+    let (sum, count) = (0..vertices.len())
+        .filter(|i| template.weights().dominant(*i) == joint)
+        .map(|i| {
+            let d = vertices[i].cast::<f64>() - a;
+            (d - u * u.dot(&d)).norm()
+        })
+        .fold((0.0, 0.0), |(s, c), r| (s + r, c + 1.0));
+    (count > 0.0).then(|| sum / count)
 }
 
 /// Mask of the part that each vertex may penetrate, given [`vertex_masks`]; shape `[vertices]`.

@@ -4,6 +4,7 @@
 //! for a while, leaves cloth that no step can mend; skin, however, always tells where the cloth was put on.
 
 use super::teleport::{Teleport, blend};
+use crate::cloth::commit::percentile;
 use crate::cloth::outfit_model::Model;
 use crate::cloth::state::State;
 use crate::garment::Region;
@@ -17,7 +18,7 @@ const LIMBS: [Region; 4] = [
     Region::LEFT_LEG,
     Region::RIGHT_LEG,
 ];
-/// Every so many vertices are compared.
+/// Every so many vertices are compared: a median needs no more.
 const STRIDE: usize = 4;
 
 /// An outfit at rest on its body, as it was put on.
@@ -94,8 +95,7 @@ fn teleport<'a>(model: &'a Model, from: &'a [P3], to: &'a [P3]) -> Teleport<'a> 
 
 /// Median; 0 of nothing.
 fn median(mut values: Vec<f32>) -> f32 {
-    values.sort_unstable_by(f32::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+    percentile(&mut values, 50).unwrap_or(0.0)
 }
 
 #[cfg(test)]

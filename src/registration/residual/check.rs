@@ -1,8 +1,8 @@
 //! Finite-difference checks of residuals on a small posed chain.
 
 use super::{
-    EdgeResidual, FreeSpaceResidual, PointTerm, Residual, RowTerm, SurfaceMetric, SurfaceNormals,
-    SurfaceResidual,
+    EdgeResidual, FreeSpaceResidual, LimbMotion, PointTerm, Residual, RowTerm, SurfaceMetric,
+    SurfaceNormals, SurfaceResidual,
 };
 use crate::camera::Intrinsics;
 use crate::math::derivative_check::{DerivativeCheck, Derivatives, Rows};
@@ -57,6 +57,15 @@ impl Chain {
             joints,
             dofs,
             centre,
+        }
+    }
+
+    /// The chain as a limb that all its angles move.
+    pub(super) fn limb(&self) -> LimbMotion<'_> {
+        LimbMotion {
+            angles: &self.angles,
+            dofs: &self.dofs,
+            centre: &self.centre,
         }
     }
 

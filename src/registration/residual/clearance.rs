@@ -1,8 +1,7 @@
 //! Clearance residual: a point of an arm inside the trunk is pushed out of it, the shortest way along the section.
 
-use super::{Residual, RowTerm};
+use super::{LimbMotion, Residual, RowTerm};
 use crate::math::P3d;
-use crate::registration::{Dof, ROOT_UNKNOWNS};
 use nalgebra::Vector3;
 
 /// Share of the way from axis to surface within which the direction out isn't known.
@@ -36,12 +35,8 @@ impl EllipticColumn {
 /// One point of an arm and the trunk, which stays.
 #[derive(Clone, Copy)]
 pub struct ClearanceResidual<'a> {
-    /// Joint angles that move the point.
-    pub angles: &'a [usize],
-    /// All degrees of freedom, as twists about `centre`.
-    pub dofs: &'a [Dof],
-    /// Origin of the twists.
-    pub centre: &'a Vector3<f64>,
+    /// The arm.
+    pub arm: LimbMotion<'a>,
     /// Point of the arm.
     pub point: P3d,
     /// The trunk.
@@ -58,15 +53,9 @@ impl Residual for ClearanceResidual<'_> {
             return;
         };
         let depth = self.column.half[1];
-        let at = self.point.coords - self.centre;
-        let slope = |&a: &usize| {
-            let velocity = self.dofs[ROOT_UNKNOWNS + a].twist.velocity_at(&at);
-            depth * gradient.dot(&velocity)
-        };
-        let slopes: Vec<f64> = self.angles.iter().map(slope).collect();
         visit(&RowTerm {
-            angles: self.angles,
-            slopes: &slopes,
+            angles: self.arm.angles,
+            slopes: &self.arm.slopes(&self.point, &(gradient * depth)),
             residual: depth * (1.0 - share),
             weight: self.weight,
         });
@@ -92,9 +81,7 @@ mod tests {
         let column = column();
         Chain::check_rows(|chain, x, weight, visit| {
             let clearance = ClearanceResidual {
-                angles: &chain.angles,
-                dofs: &chain.dofs,
-                centre: &chain.centre,
+                arm: chain.limb(),
                 point: chain.moved(x)[3],
                 column: &column,
                 weight,

@@ -6,7 +6,8 @@ use crate::body::Pose;
 use crate::math::P3d;
 use crate::registration::residual::{
     ClearanceResidual, EdgeResidual, FloorPlane, FloorResidual, FloorWeights, FreeSpaceResidual,
-    HandResidual, PointTerm, Residual, RestPoseResidual, SurfaceMetric, SurfaceResidual,
+    HandResidual, LimbMotion, PointTerm, Residual, RestPoseResidual, SurfaceMetric,
+    SurfaceResidual,
 };
 use crate::registration::{
     Dof, EdgeSide, NormalEquations, PairingConfig, PairingStats, ROOT_UNKNOWNS, pair_edges,
@@ -15,6 +16,7 @@ use crate::registration::{
 use crate::spatial::OrganisedCloud;
 use crate::tracking::TrackerModel;
 use crate::tracking::kinematics::linearise;
+use crate::tracking::limb::Limb;
 use crate::tracking::standing::planted;
 use nalgebra::Vector3;
 
@@ -213,14 +215,25 @@ fn add_priors(
             continue;
         };
         let residual = HandResidual {
-            angles: &arm.angles,
-            dofs: &scratch.dofs,
-            centre: &centre,
+            arm: limb_motion(arm, scratch, &centre),
             hand: arm.hand(&scratch.bones),
             target,
             weight: HAND_WEIGHT,
         };
         residual.for_each(|row| equations.add_row(row));
+    }
+}
+
+/// Motion of a limb in the last linearisation, about `centre`.
+fn limb_motion<'a>(
+    limb: &'a Limb,
+    scratch: &'a FitScratch,
+    centre: &'a Vector3<f64>,
+) -> LimbMotion<'a> {
+    LimbMotion {
+        angles: &limb.angles,
+        dofs: &scratch.dofs,
+        centre,
     }
 }
 
@@ -233,9 +246,7 @@ fn add_clearance(model: &TrackerModel, scratch: &FitScratch, equations: &mut Nor
     for arm in model.arms.iter().flatten() {
         for point in arm.lower_points(&scratch.bones) {
             let residual = ClearanceResidual {
-                angles: &arm.angles,
-                dofs: &scratch.dofs,
-                centre: &centre,
+                arm: limb_motion(arm, scratch, &centre),
                 point,
                 column: &column,
                 weight: CLEARANCE_WEIGHT,
