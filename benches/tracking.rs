@@ -45,7 +45,7 @@ fn segmentation(c: &mut Criterion) {
     c.bench_function("segment/person and outline", |b| {
         b.iter(|| {
             grid.sample(&frame.depth, 8.0);
-            let person = find_person(&mut grid, &planes, PersonChoice::Ranked(0), &mut scratch);
+            let person = find_person(&mut grid, &planes, PersonChoice::First, &mut scratch);
             grid.refine(&frame.depth, &person.cells);
             contour(&grid, &person.cells, &mut edges);
             person.cells.len()
@@ -55,7 +55,7 @@ fn segmentation(c: &mut Criterion) {
     c.bench_function("segment/no reading at all", |b| {
         b.iter(|| {
             grid.sample(&empty, 8.0);
-            find_person(&mut grid, &planes, PersonChoice::Ranked(0), &mut scratch)
+            find_person(&mut grid, &planes, PersonChoice::First, &mut scratch)
                 .cells
                 .len()
         });
@@ -112,7 +112,7 @@ fn readings() -> Readings {
     let cells = find_person(
         &mut grid,
         &planes,
-        PersonChoice::Ranked(0),
+        PersonChoice::First,
         &mut SegmentScratch::default(),
     )
     .cells;

@@ -92,7 +92,7 @@ impl RecordedPerson {
         let mut cells = find_person(
             &mut cloud,
             planes,
-            PersonChoice::Ranked(0),
+            PersonChoice::First,
             &mut SegmentScratch::default(),
         )
         .cells;

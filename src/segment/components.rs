@@ -1,5 +1,6 @@
 //! Connected components of the cells that are neither floor nor background.
 
+use super::refusals::CandidateBox;
 use crate::math::{P3, principal_axes};
 use crate::spatial::{Label, OrganisedCloud};
 use nalgebra::Vector3;
@@ -44,6 +45,15 @@ impl Component {
             side_cells: 0,
             rows: 0,
             top_cells: 0,
+        }
+    }
+
+    /// Its place and size.
+    pub(super) fn candidate(&self) -> CandidateBox {
+        CandidateBox {
+            centre: self.centre,
+            lo: self.lo,
+            hi: self.hi,
         }
     }
 }

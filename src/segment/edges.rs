@@ -67,7 +67,7 @@ mod tests {
         let found = find_person(
             &mut cloud,
             &scene,
-            PersonChoice::Ranked(0),
+            PersonChoice::First,
             &mut SegmentScratch::default(),
         );
         let columns = cloud.size().0;

@@ -2,8 +2,10 @@
 
 use super::ScenePlanes;
 use super::components::{Component, ComponentMap, RIM_CELLS};
+use super::expected_body::{ExpectedBody, drop_others};
 use super::hands::{BodyComponents, find_hands};
 use super::plane_bands::PlaneBands;
+use super::refusals::{CandidateBox, Refusals};
 use crate::math::P3;
 use crate::spatial::{Label, OrganisedCloud};
 use nalgebra::Vector3;
@@ -44,20 +46,29 @@ const LOW_COST: f32 = 1.5;
 
 /// Selection among the components of the size of a body.
 #[derive(Clone, Copy, Debug)]
-pub enum PersonChoice {
-    /// The largest one near a predicted place.
-    Near(PersonPrior),
-    /// The one of this rank, 0 for the most likely; ranks beyond the last start again.
-    Ranked(usize),
+pub enum PersonChoice<'a> {
+    /// The most likely one.
+    First,
+    /// The one that covers most of a predicted body, or the largest one near its place.
+    Near(PersonPrior<'a>),
+    /// The most likely one among those least often refused.
+    Untried {
+        /// Candidates that were nobody.
+        refusals: &'a Refusals,
+        /// Place of a person lost a moment ago; nobody elsewhere is taken.
+        recent: Option<PersonPrior<'a>>,
+    },
 }
 
 /// Predicted place of the person, from the last frame.
 #[derive(Clone, Copy, Debug)]
-pub struct PersonPrior {
+pub struct PersonPrior<'a> {
     /// Middle of the body, camera frame, metres.
     pub centre: P3,
     /// Largest displacement since, metres.
     pub reach: f32,
+    /// Depth of the body in each cell, infinity beside it, metres, shape `[cells]`; empty when unknown.
+    pub body: &'a [f32],
 }
 
 /// Result of the segmentation.
@@ -69,8 +80,10 @@ pub struct PersonSearch {
     pub cut_below: bool,
     /// Middles of hands beyond sleeves that give no return, camera frame, metres.
     pub hands: Vec<P3>,
-    /// Components of the size of a body; 0 with a predicted place.
+    /// Components of the size of a body, refused ones that wait included; 0 with a predicted place.
     pub rivals: usize,
+    /// Main component of the person.
+    pub candidate: Option<CandidateBox>,
     /// Cells that are neither floor nor background.
     pub candidates: usize,
     /// Connected components among them.
@@ -82,13 +95,15 @@ pub struct PersonSearch {
 pub struct SegmentScratch {
     bands: PlaneBands,
     components: ComponentMap,
+    /// Distance of each cell to the predicted body, cells.
+    to_body: Vec<u16>,
 }
 
 /// Labels floor, background and the person in a sampled cloud.
 pub fn find_person(
     cloud: &mut OrganisedCloud,
     scene: &ScenePlanes,
-    choice: PersonChoice,
+    choice: PersonChoice<'_>,
     scratch: &mut SegmentScratch,
 ) -> PersonSearch {
     let mut out = PersonSearch::default();
@@ -105,21 +120,40 @@ pub fn find_person(
     scratch.components.update(cloud, &up);
     let map = &scratch.components;
     out.components = map.list.len();
+    let expected = ExpectedBody(match choice {
+        PersonChoice::Near(prior) => prior.body,
+        _ => &[],
+    });
     let main = match choice {
-        PersonChoice::Near(prior) => nearest(&map.list, prior),
-        PersonChoice::Ranked(rank) => {
+        PersonChoice::Near(prior) => {
+            let covering = expected.covering(cloud, map, PRIOR_SHARE * LEAST_AREA);
+            covering.or_else(|| nearest(&map.list, prior))
+        }
+        PersonChoice::First => {
             let ranked = ranked(cloud, map);
             out.rivals = ranked.len();
-            ranked.get(rank % ranked.len().max(1)).copied()
+            ranked.first().copied()
+        }
+        PersonChoice::Untried { refusals, recent } => {
+            let ranked = ranked(cloud, map);
+            out.rivals = ranked.len();
+            untried(&ranked, refusals, recent)
         }
     };
     let Some(main) = main else {
         return out;
     };
+    out.candidate = Some(main.candidate());
 
-    let members = with_limbs(cloud, map, main);
+    let mut members = with_limbs(cloud, map, main);
+    let to_body = &mut scratch.to_body;
+    let limit = expected.split_limit(cloud, map, &members, to_body);
+    if let Some(limit) = limit {
+        drop_others(map, main, (to_body, limit), &mut members);
+    }
     for i in 0..cloud.depth.len() {
-        if map.member(i, &members).is_some() {
+        let is_near = limit.is_none_or(|limit| to_body[i] <= limit);
+        if is_near && map.member(i, &members).is_some() {
             cloud.labels[i] = Label::Person;
             out.cells.push(i as u32);
         }
@@ -179,12 +213,30 @@ fn label_removed_background(cloud: &mut OrganisedCloud, scene: &ScenePlanes) -> 
 }
 
 /// The largest component near the predicted place.
-fn nearest(components: &[Component], prior: PersonPrior) -> Option<&Component> {
+fn nearest<'a>(components: &'a [Component], prior: PersonPrior<'_>) -> Option<&'a Component> {
     let off = |c: &Component| (c.centre - prior.centre).norm();
     components
         .iter()
         .filter(|c| c.area > PRIOR_SHARE * LEAST_AREA && c.area < MOST_AREA && off(c) < prior.reach)
         .max_by(|a, b| a.area.total_cmp(&b.area).then(b.id.cmp(&a.id)))
+}
+
+/// The first of the least often refused components, of those that need not wait.
+fn untried<'a>(
+    ranked: &[&'a Component],
+    refusals: &Refusals,
+    recent: Option<PersonPrior<'_>>,
+) -> Option<&'a Component> {
+    let count = |c: &Component| match refusals.of(&c.candidate()) {
+        Some(refusal) => (refusal.wait == 0).then_some(refusal.count),
+        None => Some(0),
+    };
+    ranked
+        .iter()
+        .filter(|c| recent.is_none_or(|p| (c.centre - p.centre).norm() < p.reach))
+        .filter_map(|c| Some((count(c)?, *c)))
+        .min_by_key(|(count, _)| *count)
+        .map(|(_, c)| c)
 }
 
 /// All components of the size of a body, the most likely first; those that a side of the image cuts last.
@@ -274,7 +326,7 @@ mod tests {
         let found = find_person(
             &mut cloud,
             &scene,
-            PersonChoice::Ranked(0),
+            PersonChoice::First,
             &mut SegmentScratch::default(),
         );
         // 0.4 × 1.7 m at 2.5 m with a focal length of 131 cells, less 20 mm of floor.
@@ -288,6 +340,7 @@ mod tests {
         let prior = PersonPrior {
             centre: P3::new(0.0, 0.2, 2.5),
             reach: 0.5,
+            body: &[],
         };
         cloud.labels.fill(Label::Unknown);
         let again = find_person(
@@ -323,14 +376,14 @@ mod tests {
         let found = find_person(
             &mut at_the_rim(true),
             &ScenePlanes::default(),
-            PersonChoice::Ranked(0),
+            PersonChoice::First,
             &mut scratch,
         );
         assert!(found.cells.len() > 500, "{} cells", found.cells.len());
         let door = find_person(
             &mut at_the_rim(false),
             &ScenePlanes::default(),
-            PersonChoice::Ranked(0),
+            PersonChoice::First,
             &mut scratch,
         );
         assert!(
@@ -366,7 +419,7 @@ mod tests {
             let found = find_person(
                 &mut cloud,
                 &scene,
-                PersonChoice::Ranked(0),
+                PersonChoice::First,
                 &mut SegmentScratch::default(),
             );
             assert!(
@@ -386,7 +439,7 @@ mod tests {
         let scene = find_planes(&cloud);
         let mut scratch = SegmentScratch::default();
         assert!(
-            find_person(&mut cloud, &scene, PersonChoice::Ranked(0), &mut scratch)
+            find_person(&mut cloud, &scene, PersonChoice::First, &mut scratch)
                 .cells
                 .is_empty()
         );
@@ -395,7 +448,7 @@ mod tests {
             find_person(
                 &mut cloud,
                 &ScenePlanes::default(),
-                PersonChoice::Ranked(0),
+                PersonChoice::First,
                 &mut scratch
             )
             .cells

@@ -1,7 +1,10 @@
 //! Segmentation stage of a step: scene planes, the subject's cells and their outline.
 
-use super::{TrackerModel, TrackerState, Workspace};
+use super::person_evidence::Verdict;
+use super::pose_fit::FitContext;
+use super::{Status, TrackerModel, TrackerState, Workspace};
 use crate::camera::RgbdFrame;
+use crate::registration::Observation;
 use crate::segment::{PersonChoice, PersonPrior, PersonSearch, contour, find_person, find_planes};
 use crate::spatial::OrganisedCloud;
 
@@ -9,6 +12,13 @@ use crate::spatial::OrganisedCloud;
 const SCENE_INTERVAL: u32 = 60;
 /// Reach of the search around the last position, metres: six times a sprint between two frames.
 const REACH: f32 = 0.8;
+/// Age of a last pose up to which a lost person is searched near it alone, frames: nobody leaves and is replaced within a
+/// second.
+const RECALL: u32 = 30;
+/// Reach of that search at first, metres: somebody beside the lost person is farther away.
+const RECENT_REACH: f32 = 0.3;
+/// Its growth per frame, metres: a brisk walk.
+const WALK: f32 = 0.04;
 /// Least number of cells of a subject; fewer are a thing or noise.
 pub(super) const LEAST_CELLS: usize = 60;
 
@@ -31,13 +41,29 @@ pub(super) fn segment(
             state.set_scene(scene);
         }
     }
-    let choice = if state.is_following() {
-        PersonChoice::Near(PersonPrior {
-            centre: state.centre,
-            reach: REACH,
-        })
+    let body = if state.is_following() {
+        draw_last(model, state, grid, workspace);
+        workspace.fit.pairing.image.depth.as_slice()
     } else {
-        PersonChoice::Ranked(state.attempts as usize)
+        &[]
+    };
+    let prior = PersonPrior {
+        centre: state.centre,
+        reach: REACH,
+        body,
+    };
+    let choice = if state.is_following() {
+        PersonChoice::Near(prior)
+    } else {
+        state.refusals.age();
+        let is_recent = matches!(state.status, Status::Lost { .. })
+            && state.pose_age <= RECALL
+            && state.belief.verdict == Verdict::Person;
+        let reach = REACH.min(RECENT_REACH + WALK * state.pose_age as f32);
+        PersonChoice::Untried {
+            refusals: &state.refusals,
+            recent: is_recent.then_some(PersonPrior { reach, ..prior }),
+        }
     };
     let mut person = find_person(grid, &state.scene, choice, &mut workspace.segment);
     if person.cells.len() >= LEAST_CELLS {
@@ -46,4 +72,26 @@ pub(super) fn segment(
         contour(grid, &person.cells, &mut workspace.contour);
     }
     person
+}
+
+/// Draws the body of the last pose into the grid.
+fn draw_last(
+    model: &TrackerModel,
+    state: &TrackerState,
+    grid: &OrganisedCloud,
+    workspace: &mut Workspace,
+) {
+    workspace.body.update(model, &state.shape);
+    let context = FitContext {
+        model,
+        body: &workspace.body,
+        observation: &Observation {
+            grid,
+            cells: &[],
+            false_edges: &[],
+            true_edges: &[],
+            tree: None,
+        },
+    };
+    workspace.fit.draw(&context, &state.pose);
 }

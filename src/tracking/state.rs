@@ -1,6 +1,7 @@
 //! State of a tracker from frame to frame.
 
 use super::change_detection::DepthReference;
+use super::person_evidence::{PersonBelief, Verdict};
 use super::repair::RepairTimer;
 use super::size::SizeEstimate;
 use super::standing::FootMemory;
@@ -9,7 +10,7 @@ use super::surface::SurfaceStatistics;
 use super::{TrackerConfig, TrackerModel};
 use crate::body::{BodyShape, Pose};
 use crate::math::{Camera, P3, Rigid, World};
-use crate::segment::ScenePlanes;
+use crate::segment::{Refusals, ScenePlanes};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -44,9 +45,12 @@ pub struct TrackerState {
     /// Frames in a row in which the body disagreed with the frame.
     #[serde(default)]
     pub(super) disagreeing: u32,
-    /// Failed searches in a row; each tries the next of the components of a body's size.
+    /// Candidates that were nobody.
     #[serde(default)]
-    pub(super) attempts: u32,
+    pub(super) refusals: Refusals,
+    /// Test whether the subject is a person.
+    #[serde(default)]
+    pub(super) belief: PersonBelief,
     /// Frames in a row in which the root hardly moved while calibrating.
     pub(super) steady: u32,
     /// Frames since the subject was found.
@@ -77,7 +81,7 @@ pub struct TrackerState {
 }
 
 /// Height of a camera whose floor is unknown, metres: the usual mount of a kiosk.
-const ASSUMED_HEIGHT: f64 = 1.2;
+pub(super) const ASSUMED_HEIGHT: f64 = 1.2;
 /// Root of the rest pose before any was found, camera frame, metres: standing at 2 m.
 const START: Vector3<f64> = Vector3::new(0.0, 0.9, 2.0);
 
@@ -108,7 +112,8 @@ impl TrackerState {
             surface: SurfaceStatistics::default(),
             bad_frames: 0,
             disagreeing: 0,
-            attempts: 0,
+            refusals: Refusals::default(),
+            belief: PersonBelief::default(),
             steady: 0,
             calibration_age: 0,
             centre: P3::origin(),
@@ -130,6 +135,7 @@ impl TrackerState {
         let pelvis = skeleton.joints()[0].rest.coords;
         self.pose = Pose::rest(skeleton, Rigid::from_parts(root - turned * pelvis, turned));
         self.status = Status::Calibrating;
+        self.belief = PersonBelief::given();
         self.centre = P3::from(root.cast::<f32>());
         self.before = None;
         self.reference = None;
@@ -143,6 +149,7 @@ impl TrackerState {
             floor_known: self.floor_known,
             scene: self.scene.clone(),
             scene_age: self.scene_age,
+            refusals: self.refusals.clone(),
             frames: self.frames,
             ..fresh
         };
@@ -155,7 +162,7 @@ impl TrackerState {
     }
     /// True with a pose to follow: live, or in doubt for a few frames.
     pub(super) fn is_following(&self) -> bool {
-        self.status.is_live() || self.disagreeing > 0
+        self.status.is_live() || self.disagreeing > 0 || self.belief.verdict == Verdict::Unsure
     }
     /// True once size and shape no longer change.
     pub(super) fn calibrated(&self, config: &TrackerConfig) -> bool {

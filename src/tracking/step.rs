@@ -1,15 +1,19 @@
 //! One frame (Algorithm 1): segment → track the subject → keep a reference for change detection.
 
 use super::change_detection::DepthReference;
+use super::gravity::rolled_camera;
 use super::kinematics::motion;
+use super::person_evidence::Verdict;
 use super::prediction::AT_REST;
 use super::report::Stopwatch;
 use super::segmentation::{LEAST_CELLS, segment};
+use super::state::ASSUMED_HEIGHT;
 use super::subject::{StepLog, SubjectFrame};
 use super::{LostReason, Status, StepError, StepReport, TrackerModel, TrackerState, Workspace};
-use crate::camera::RgbdFrame;
+use crate::camera::{DepthImage, RgbdFrame};
 use crate::math::P3;
 use crate::registration::{Association, Observation};
+use crate::segment::{CandidateBox, PersonSearch};
 use crate::spatial::{OrganisedCloud, PointTree};
 use nalgebra::Vector3;
 
@@ -54,24 +58,36 @@ pub fn step(
         let has_tree = model.config.association == Association::KdTree;
         let points = person.cells.iter().map(|&c| grid.points[c as usize]);
         let tree = has_tree.then(|| PointTree::new(&points.collect::<Vec<P3>>()));
+        let observation = Observation {
+            grid: &grid,
+            cells: &person.cells,
+            false_edges: &contour.false_edges,
+            true_edges: &contour.true_edges,
+            tree: tree.as_ref(),
+        };
+        let searched = !state.is_following();
+        if searched && !state.floor_known {
+            let scratch = &mut workspace.parts;
+            state.world_from_camera = rolled_camera(model, &observation, ASSUMED_HEIGHT, scratch);
+        }
         let subject = SubjectFrame {
             model,
             frame,
             person: &person,
-            observation: Observation {
-                grid: &grid,
-                cells: &person.cells,
-                false_edges: &contour.false_edges,
-                true_edges: &contour.true_edges,
-                tree: tree.as_ref(),
-            },
+            observation,
             up: state.world_from_camera.inverse().vector(&Vector3::y()),
         };
-        let searched = !state.is_following();
         match subject.track(state, workspace, &mut log) {
-            Ok(()) => state.attempts = 0,
+            Ok(()) => {
+                let is_tested = state.belief.verdict != Verdict::Unsure;
+                if let Some(candidate) = person.candidate.filter(|_| is_tested) {
+                    state.refusals.forget(&candidate);
+                }
+            }
             Err(reason) => {
-                state.attempts += u32::from(searched);
+                if let Some(candidate) = person.candidate {
+                    refuse(state, candidate, reason);
+                }
                 lose(state, reason);
             }
         }
@@ -81,17 +97,27 @@ pub fn step(
     report.status = state.status;
     report.pose_age = state.pose_age;
     if model.config.skip_unchanged {
-        let depth = &frame.depth;
-        state.reference = if nobody {
-            let stride = EMPTY_STRIDE * grid.stride();
-            Some(DepthReference::of_image(depth, stride, &report))
-        } else {
-            is_at_rest(model, state)
-                .then(|| DepthReference::of_cells(depth, &grid, &person.cells, &report))
-        };
+        state.reference = reference(model, state, (&frame.depth, &grid), &person, &report);
     }
     workspace.grid = Some(grid);
     Ok(report)
+}
+
+/// Reference of later frames, which are skipped while nothing changes.
+fn reference(
+    model: &TrackerModel,
+    state: &mut TrackerState,
+    (depth, grid): (&DepthImage, &OrganisedCloud),
+    person: &PersonSearch,
+    report: &StepReport,
+) -> Option<DepthReference> {
+    if person.cells.len() >= LEAST_CELLS {
+        return is_at_rest(model, state)
+            .then(|| DepthReference::of_cells(depth, grid, &person.cells, report));
+    }
+    // A waiting candidate is tried again though nothing changes.
+    (person.rivals == 0)
+        .then(|| DepthReference::of_image(depth, EMPTY_STRIDE * grid.stride(), report))
 }
 
 fn check(model: &TrackerModel, state: &TrackerState, frame: &RgbdFrame) -> Result<(), StepError> {
@@ -165,6 +191,15 @@ fn is_at_rest(model: &TrackerModel, state: &mut TrackerState) -> bool {
         && moved < AT_REST
 }
 
+/// Remembers a candidate that was refused, and what spoke against it.
+fn refuse(state: &mut TrackerState, candidate: CandidateBox, reason: LostReason) {
+    let log_odds = match reason {
+        LostReason::Disagreement => state.belief.log_odds,
+        _ => state.refusals.log_odds(&candidate),
+    };
+    state.refusals.record(candidate, log_odds.min(0.0));
+}
+
 fn lose(state: &mut TrackerState, reason: LostReason) {
     state.pose_age = state.pose_age.saturating_add(1);
     state.before = None;
@@ -172,12 +207,12 @@ fn lose(state: &mut TrackerState, reason: LostReason) {
         state.status = Status::Lost { reason };
     }
     (state.bad_frames, state.disagreeing) = (0, 0);
+    state.belief.lose();
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::DepthImage;
     use crate::tracking::test_scene::TestScene;
 
     type Spoil = fn(&mut TrackerState);

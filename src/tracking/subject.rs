@@ -6,6 +6,7 @@ use super::calibration::{SizeCalibration, count_steady, live_status};
 use super::confidence::confidence;
 use super::hand_assignment::assign_hands;
 use super::initial_pose::{StartPrior, initial_pose, outline};
+use super::person_evidence::{PersonBelief, PersonEvidence, Verdict};
 use super::personal_body::PersonalBody;
 use super::pose_filter::filter_pose;
 use super::pose_fit::{
@@ -184,17 +185,26 @@ impl SubjectFrame<'_> {
             return Err(LostReason::Residual);
         }
         self.assess(&pose, workspace, log);
+        let mut classified = found;
         if config.rescue {
-            self.repair(state, workspace, (&mut pose, &mut fit), log);
+            classified |= self.repair(state, workspace, (&mut pose, &mut fit), log);
+        }
+        if config.judge {
+            self.test_person(state, workspace, &pose, (found, classified, fit.matched));
         }
         let agrees = !config.judge || log.report.agreement.wrong() <= MOST_WRONG;
-        if let Some(before) = before.filter(|_| !agrees) {
+        let is_nobody = config.judge && state.belief.verdict == Verdict::Nobody;
+        if is_nobody || found && !agrees {
             // Another thing's size is no start for the next search.
-            (state.size, state.shape) = before;
+            (state.size, state.shape) = before.unwrap_or_default();
             return Err(LostReason::Disagreement);
         }
+        let status = state.status;
         self.commit(state, workspace, pose, &fit);
         count_doubt(state, agrees)?;
+        if state.belief.verdict == Verdict::Unsure {
+            state.status = status;
+        }
         self.update_displacements(good, state, workspace, log);
         Ok(())
     }
@@ -258,22 +268,22 @@ impl SubjectFrame<'_> {
     }
 
     /// Replaces pose and fit by better ones at proposed places where they disagree with the frame or, at times, with the
-    /// proposals, and writes them to the report.
+    /// proposals, and writes them to the report. True with proposals of this frame in the scratch.
     fn repair(
         &self,
         state: &mut TrackerState,
         workspace: &mut Workspace,
         (pose, fit): (&mut Pose<Camera>, &mut FitReport),
         log: &mut StepLog,
-    ) {
+    ) -> bool {
         let disagrees = state.repair.is_due(&log.report.agreement);
         if !disagrees && !state.repair.is_check_due() {
-            return;
+            return false;
         }
         let proposals = self.proposals(&mut workspace.parts);
         let is_contradicted = proposals.contradict(self.model, &workspace.fit.bones);
         if !disagrees && !is_contradicted {
-            return;
+            return true;
         }
         let repair = Repair {
             context: self.context(&workspace.body),
@@ -294,6 +304,34 @@ impl SubjectFrame<'_> {
         }
         state.repair.record(found, log.report.agreement.wrong());
         log.report.stages_ms.place += log.watch.lap();
+        true
+    }
+
+    /// Tests the subject where it was just found or isn't sure, and where its cells are classified anyway.
+    fn test_person(
+        &self,
+        state: &mut TrackerState,
+        workspace: &mut Workspace,
+        pose: &Pose<Camera>,
+        (found, classified, matched): (bool, bool, f64),
+    ) {
+        if !classified && state.belief.verdict != Verdict::Unsure {
+            return;
+        }
+        if !classified {
+            self.proposals(&mut workspace.parts);
+        }
+        let scratch = &mut workspace.fit;
+        scratch.draw(&self.context(&workspace.body), pose);
+        let (image, map) = (&scratch.pairing.image, &workspace.parts.map);
+        let (model, observation) = (self.model, &self.observation);
+        let evidence = PersonEvidence::measure(model, observation, image, map, matched as f32);
+        if found {
+            let candidate = self.person.candidate.as_ref();
+            let refused = candidate.map_or(0.0, |c| state.refusals.log_odds(c));
+            state.belief = PersonBelief::start(refused);
+        }
+        state.belief.update(evidence);
     }
 
     /// Sets the residuals of a tracked frame and predicts its pose.
