@@ -15,6 +15,7 @@ use tryon::mesh::{Topology, TriMesh, vertex_normals};
 use tryon::mirror::{Mirror, MirrorFrame};
 use tryon::par::{Par, with_threads};
 use tryon::raster::{View, VisibilityBuffer, rasterise};
+use tryon::tracking::{LostReason, Status};
 
 /// Time between the repetitions of a still picture (ns): 30 a second.
 const STILL_INTERVAL_NS: u64 = 33_333_333;
@@ -25,6 +26,8 @@ struct Report {
     frames: usize,
     pictures: usize,
     dressed_frames: usize,
+    /// Frames by the tracker's status.
+    statuses: BTreeMap<&'static str, usize>,
     bad_frames: Vec<String>,
     sizes: Vec<String>,
     stages_ms: BTreeMap<String, Summary>,
@@ -42,6 +45,7 @@ struct Measured {
     residual_mm: Vec<f64>,
     penetration_mm: Vec<f64>,
     dressed: usize,
+    statuses: BTreeMap<&'static str, usize>,
 }
 
 impl Measured {
@@ -52,11 +56,16 @@ impl Measured {
         let depth = seen.cloth.as_ref().map_or(0.0, |c| c.penetration_left);
         self.penetration_mm.push(depth * 1e3);
         self.dressed += usize::from(seen.is_dressed);
+        *self
+            .statuses
+            .entry(words(seen.tracking.status))
+            .or_default() += 1;
     }
 
     fn into_report(self, report: Report) -> Report {
         Report {
             dressed_frames: self.dressed,
+            statuses: self.statuses,
             stages_ms: self.stages_ms.summaries(),
             skipped: self.skipped.summaries(),
             residual_mm: Summary::of(&self.residual_mm),
@@ -64,6 +73,35 @@ impl Measured {
             peak_memory_bytes: peak_memory(),
             ..report
         }
+    }
+}
+
+/// A tracker's status and the reason for it.
+fn words(status: Status) -> &'static str {
+    match status {
+        Status::Searching => "searching for a person",
+        Status::Calibrating => "calibrating",
+        Status::Tracking => "tracking",
+        Status::Lost { reason } => match reason {
+            LostReason::NoPerson => "lost: nobody of a body's size",
+            LostReason::Residual => "lost: the body explains too little of the picture",
+            LostReason::Disagreement => "lost: the body contradicts the picture, or is no person",
+            LostReason::NotFinite => "lost: the fit was not finite",
+        },
+    }
+}
+
+/// Why nobody was dressed: the frames by status, and what dressing waits for.
+fn reason(statuses: &BTreeMap<&'static str, usize>) -> String {
+    let tally = statuses.iter().map(|(words, n)| format!("{words} in {n}"));
+    let tally = tally.collect::<Vec<_>>().join("; ");
+    let calibrating = words(Status::Calibrating);
+    if statuses.contains_key(calibrating) {
+        format!(
+            "{tally}; a body is dressed once its size is known: 15 frames of somebody, six in a row without walking"
+        )
+    } else {
+        tally
     }
 }
 
@@ -118,8 +156,9 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
     );
     if report.dressed_frames == 0 {
         eprintln!(
-            "tryon: nobody was dressed: no person was tracked in {}",
-            args.input.display()
+            "tryon: nobody was dressed in {}: {}",
+            args.input.display(),
+            reason(&report.statuses)
         );
         return Ok(ExitCode::FAILURE);
     }
@@ -261,4 +300,23 @@ fn depth_picture(frame: &RgbdFrame) -> ColorImage {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nobody_dressed_has_a_reason() {
+        let searching = words(Status::Searching);
+        let calibrating = words(Status::Calibrating);
+        let alone = reason(&BTreeMap::from([(searching, 9)]));
+        assert_eq!(alone, "searching for a person in 9");
+        let short = reason(&BTreeMap::from([(searching, 2), (calibrating, 7)]));
+        assert!(
+            short.contains("calibrating in 7; searching for a person in 2"),
+            "{short}"
+        );
+        assert!(short.contains("once its size is known"), "{short}");
+    }
 }
