@@ -5,7 +5,7 @@ use super::person_evidence::{PersonBelief, Verdict};
 use super::repair::RepairTimer;
 use super::size::SizeEstimate;
 use super::standing::FootMemory;
-use super::status::Status;
+use super::status::{LostReason, Status};
 use super::surface::SurfaceStatistics;
 use super::{TrackerConfig, TrackerModel};
 use crate::body::{BodyShape, Pose};
@@ -127,14 +127,16 @@ impl TrackerState {
             surface_due: [0; 2],
         }
     }
-    /// Starts from a rough pose instead of a search: the root joint at `root` (camera frame, metres), upright, facing the
+    /// Searches around a rough place first, for somebody upright: the root joint at `root` (camera frame, metres), facing the
     /// camera and turned by `yaw` radians about the vertical.
     pub fn start_at(&mut self, model: &TrackerModel, root: Vector3<f64>, yaw: f64) {
         let turned = facing_camera() * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw);
         let skeleton = model.template().skeleton();
         let pelvis = skeleton.joints()[0].rest.coords;
         self.pose = Pose::rest(skeleton, Rigid::from_parts(root - turned * pelvis, turned));
-        self.status = Status::Calibrating;
+        self.status = Status::Lost {
+            reason: LostReason::NoPerson,
+        };
         self.belief = PersonBelief::given();
         self.centre = P3::from(root.cast::<f32>());
         self.before = None;

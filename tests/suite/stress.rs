@@ -348,7 +348,7 @@ fn a_rough_start_settles() {
     let seeds = if long() { 1000 } else { 12 };
     let model = TrackerModel::new(template.clone(), scene.calibration.clone(), fixed_size());
     let mut workspace = Workspace::default();
-    let mut good = 0;
+    let (mut good, mut at_once) = (0, 0);
     for seed in 0..seeds {
         let mut rng = rand_pcg::Pcg32::seed_from_u64(seed);
         let mut random = |scale: f64| (rng.random::<f64>() * 2.0 - 1.0) * scale;
@@ -362,8 +362,9 @@ fn a_rough_start_settles() {
             .iter_mut()
             .for_each(|a| *a += random(20f64.to_radians()));
         state.pose.clamp_to_limits(template.skeleton());
-        for frame in &scene.frames {
+        for (i, frame) in scene.frames.iter().enumerate() {
             step(&model, &mut state, frame, &mut workspace).expect("step");
+            at_once += u64::from(i == 0 && state.status.is_live());
         }
         let j = joints(&model, &state);
         let names = &scene.joint_names;
@@ -378,6 +379,7 @@ fn a_rough_start_settles() {
     }
     eprintln!("{good} of {seeds} rough starts are below 10 mm after ten frames");
     assert!(f64::from(good) >= 0.95 * seeds as f64, "{good} of {seeds}");
+    assert_eq!(at_once, seeds, "live in the first frame");
 }
 
 #[test]
