@@ -150,8 +150,12 @@ try {
   const stages = await page.$$eval('#d-stages th', (all) => all.map((t) => t.textContent));
   must(stages.length >= 3, `latency by stage: ${stages.join(', ')}`);
   console.log(`    ${await page.textContent('#d-rate')} pictures a second, ${await page.textContent('#d-p50')} ms at the half, ${await page.textContent('#d-p99')} ms at 99 %`);
-  await page.waitForFunction(() => document.querySelectorAll('#d-fit .fit').length > 0);
-  const fits = await page.$$eval('#d-fit tr', (all) => all.map((t) => t.textContent));
+  // Read at once: the table is empty again while garments are put on.
+  const shown = await page.waitForFunction(() => {
+    const rows = [...document.querySelectorAll('#d-fit tr')].map((t) => t.textContent);
+    return document.querySelectorAll('#d-fit .fit').length > 0 && rows;
+  });
+  const fits = await shown.jsonValue();
   must(fits.length >= 3, `fit by region: ${fits.join(', ')}`);
   const said = await page.$$eval('[data-fit-of]', (all) => all.map((p) => p.textContent).filter((t) => t !== ''));
   must(said.length > 0, `fit in words: ${said.join('; ')}`);
