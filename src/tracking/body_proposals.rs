@@ -44,6 +44,18 @@ pub(super) struct BodyProposals {
     up: Vector3<f64>,
 }
 
+/// The subject's cells, as the part forest reads them; `up` is the unit vector against gravity, camera frame.
+pub(super) fn person_cells<'a>(
+    observation: &Observation<'a>,
+    up: &Vector3<f64>,
+) -> PersonCells<'a> {
+    PersonCells {
+        cloud: observation.grid,
+        cells: observation.cells,
+        up: up.cast(),
+    }
+}
+
 impl BodyProposals {
     /// Classifies the subject's cells. `up` is the unit direction against gravity, camera frame.
     pub(super) fn new(
@@ -52,11 +64,7 @@ impl BodyProposals {
         up: &Vector3<f64>,
         scratch: &mut PartScratch,
     ) -> Self {
-        let person = PersonCells {
-            cloud: observation.grid,
-            cells: observation.cells,
-            up: up.cast(),
-        };
+        let person = person_cells(observation, up);
         let found = model.forest.propose(&person, scratch);
         let joints = JointProposals::new(&model.part_classes, &found);
         Self {

@@ -4,9 +4,11 @@
 //! surest for the right roll.
 
 use super::TrackerModel;
+use super::body_proposals::person_cells;
+use super::state::ASSUMED_HEIGHT;
 use crate::math::{Camera, Rigid, World};
 use crate::registration::Observation;
-use crate::segment::part_forest::{PartScratch, PersonCells};
+use crate::segment::part_forest::PartScratch;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// Directions against gravity, camera frame: upright, on either side, upside down.
@@ -20,19 +22,14 @@ const UPS: [[f64; 3]; 4] = [
 /// certain in one as in the other.
 const SURER: f32 = 1.15;
 
-/// Pose of a level camera `height` metres above the floor at the roll in which the subject's cells are surest.
+/// Pose of a level camera at the assumed height above the floor, at the roll in which the subject's cells are surest.
 pub(super) fn rolled_camera(
     model: &TrackerModel,
     observation: &Observation<'_>,
-    height: f64,
     scratch: &mut PartScratch,
 ) -> Rigid<World, Camera> {
     let mut certainty = |up: &Vector3<f64>| {
-        let person = PersonCells {
-            cloud: observation.grid,
-            cells: observation.cells,
-            up: up.cast(),
-        };
+        let person = person_cells(observation, up);
         let map = model.forest.classify(&person, scratch);
         let most = (0..map.len()).map(|i| map.shares(i).iter().copied().fold(0.0, f32::max));
         most.sum::<f32>()
@@ -42,7 +39,7 @@ pub(super) fn rolled_camera(
     let rated = others.map(|up| (certainty(&up), up));
     let surest = rated.into_iter().filter(|r| r.0 > least);
     let up = surest.max_by(|a, b| a.0.total_cmp(&b.0));
-    level_camera(&up.map_or(upright, |r| r.1), height)
+    level_camera(&up.map_or(upright, |r| r.1), ASSUMED_HEIGHT)
 }
 
 /// Pose of a camera with a level view for its direction against gravity.
@@ -65,7 +62,7 @@ mod tests {
     fn up_in(scene: &TestScene, image: &DepthImage) -> Vector3<f64> {
         let scan = DepthScan::new(&scene.model, image).background_removed();
         let scratch = &mut PartScratch::default();
-        let camera = rolled_camera(&scene.model, &scan.observation(), 1.2, scratch);
+        let camera = rolled_camera(&scene.model, &scan.observation(), scratch);
         camera.inverse().vector(&Vector3::y())
     }
 

@@ -7,7 +7,6 @@ use super::person_evidence::Verdict;
 use super::prediction::AT_REST;
 use super::report::Stopwatch;
 use super::segmentation::{LEAST_CELLS, segment};
-use super::state::ASSUMED_HEIGHT;
 use super::subject::{StepLog, SubjectFrame};
 use super::{LostReason, Status, StepError, StepReport, TrackerModel, TrackerState, Workspace};
 use crate::camera::{DepthImage, RgbdFrame};
@@ -65,10 +64,9 @@ pub fn step(
             true_edges: &contour.true_edges,
             tree: tree.as_ref(),
         };
-        let searched = !state.is_following();
-        if searched && !state.floor_known {
+        if !state.is_following() && !state.floor_known {
             let scratch = &mut workspace.parts;
-            state.world_from_camera = rolled_camera(model, &observation, ASSUMED_HEIGHT, scratch);
+            state.world_from_camera = rolled_camera(model, &observation, scratch);
         }
         let subject = SubjectFrame {
             model,

@@ -1,7 +1,7 @@
 //! One subject in view (Algorithm 1): find or predict → fit → recover → calibrate → filter → commit → displacements.
 
 use super::agreement::Agreement;
-use super::body_proposals::BodyProposals;
+use super::body_proposals::{BodyProposals, person_cells};
 use super::calibration::{SizeCalibration, count_steady, live_status};
 use super::confidence::confidence;
 use super::hand_assignment::assign_hands;
@@ -319,7 +319,8 @@ impl SubjectFrame<'_> {
             return;
         }
         if !classified {
-            self.proposals(&mut workspace.parts);
+            let person = person_cells(&self.observation, &self.up);
+            self.model.forest.classify(&person, &mut workspace.parts);
         }
         let scratch = &mut workspace.fit;
         scratch.draw(&self.context(&workspace.body), pose);
