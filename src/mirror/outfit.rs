@@ -86,7 +86,7 @@ impl DressedOutfit {
         Ok(report)
     }
 
-    /// False while the outfit is put on again, after a jump of the body or a fault of the cloth; it isn't shown then.
+    /// False while the outfit is put on again after a jump of the body; it isn't shown then.
     pub fn is_worn(&self) -> bool {
         self.wear.is_worn()
     }

@@ -7,46 +7,62 @@ use crate::math::P3;
 /// Stretch that one edge in a hundred exceeds in a garment that is caught or torn: dances reach 0.25 for a frame.
 const MOST_STRAIN: f64 = 0.25;
 /// Largest median distance of a limb's cloth from where skin would carry it, metres: dances reach 63 mm.
-const MOST_OFFSET: f32 = 0.1;
-/// Unfit steps in a row after which an outfit is put on again: a sleeve finds its arm within nine, mostly within two.
-const PATIENCE: u32 = 5;
-/// Steps in which an outfit that was put on again settles, at least, and those after which it is put on once more: both
-/// within the half second that a return may take.
-const SETTLING: [u32; 2] = [4, 12];
-/// Times that an outfit is put on again in vain before it must be dressed anew: a return takes 0.4 s, dressing 0.3 to 0.7 s.
-const RETRIES: u32 = 3;
+const MOST_OFFSET: f32 = 0.08;
+/// Steps in a row with a sleeve off after which an outfit is put on again: cloth puts it back in the next one, or never.
+const PATIENCE: u32 = 2;
+/// Steps in which an outfit that was put on again settles: a sleeve that comes off then isn't left to cloth. After a jump it isn't
+/// shown.
+const SETTLING: u32 = 4;
+/// Unfit steps of an outfit that doesn't settle after which it must be dressed anew, which takes 0.3 to 0.7 s: one second.
+const MOST_VAIN: u32 = 30;
 /// Mean displacement of a body part that is a jump, metres, and its least speed, m/s: a fast arm moves by 0.2 m in 1/30 s.
 const JUMP: f32 = 0.25;
 /// See [`JUMP`].
 const JUMP_SPEED: f64 = 7.0;
+
+/// Fit of an outfit after one step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fit {
+    /// Worn as it was put on.
+    Worn,
+    /// Part of a sleeve is off its arm: cloth puts it back in the next step.
+    SleeveOff,
+    /// Past what cloth can be, or off its limbs.
+    Torn,
+}
 
 /// Fitness of an outfit over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct WearState {
     /// Unfit steps in a row.
     unfit: u32,
-    /// Steps since the outfit was put on again; `None` while it is worn.
+    /// Steps since the outfit was put on again; `None` once it has settled.
     settling: Option<u32>,
-    /// Times in a row that it was put on again in vain.
-    retries: u32,
+    /// Steps for which it isn't shown.
+    hidden: u32,
+    /// Unfit steps before it settled.
+    vain: u32,
 }
 
 impl WearState {
     /// Takes the result of a step; true when the outfit must be put on again.
-    fn advance(&mut self, is_fit: bool, jumped: bool) -> bool {
-        self.unfit = if is_fit { 0 } else { self.unfit + 1 };
-        let settling = self.settling.map(|n| n + 1);
-        let is_late = settling.map_or(self.unfit >= PATIENCE, |n| n >= SETTLING[1] && !is_fit);
-        if jumped || is_late {
-            self.retries += u32::from(is_late && settling.is_some());
-            (self.unfit, self.settling) = (0, Some(0));
-            return true;
-        }
-        self.settling = settling.filter(|n| *n < SETTLING[0] || !is_fit);
-        if self.settling.is_none() && is_fit {
-            self.retries = 0;
-        }
-        false
+    fn advance(&mut self, fit: Fit, jumped: bool) -> bool {
+        let is_unfit = fit != Fit::Worn;
+        self.unfit = if is_unfit { self.unfit + 1 } else { 0 };
+        let patience = self.settling.map_or(PATIENCE, |_| 1);
+        let put_on = jumped || fit == Fit::Torn || self.unfit >= patience;
+        let settled = self.settling.map(|n| n + 1).filter(|n| *n < SETTLING);
+        self.settling = if put_on { Some(0) } else { settled };
+        self.hidden = if jumped {
+            SETTLING
+        } else {
+            self.hidden.saturating_sub(1)
+        };
+        self.vain = match self.settling {
+            Some(_) => self.vain + u32::from(is_unfit),
+            None => 0,
+        };
+        put_on
     }
 }
 
@@ -71,12 +87,12 @@ impl WearWatch {
 
     /// True while the outfit sits as it was put on.
     pub(super) fn is_worn(&self) -> bool {
-        self.state.settling.is_none()
+        self.state.hidden == 0
     }
 
     /// True once putting it on again doesn't help: it was put on in a pose that the body never had.
     pub(super) fn is_past_mending(&self) -> bool {
-        self.state.retries >= RETRIES
+        self.state.vain >= MOST_VAIN
     }
 
     /// True when a part of the body moves from `before` to `now` (metres) in `dt` seconds as no limb can.
@@ -100,10 +116,14 @@ impl WearWatch {
         report: &StepReport,
         jumped: bool,
     ) {
-        let is_fit = report.p99_strain <= MOST_STRAIN
-            && report.sleeves_put_back == 0
-            && self.reference.limb_offset(model, state) <= MOST_OFFSET;
-        if self.state.advance(is_fit, jumped) {
+        let is_torn = report.p99_strain > MOST_STRAIN
+            || self.reference.limb_offset(model, state) > MOST_OFFSET;
+        let fit = match WornReference::lost_sleeve_rings(model, state) {
+            _ if is_torn => Fit::Torn,
+            0 => Fit::Worn,
+            _ => Fit::SleeveOff,
+        };
+        if self.state.advance(fit, jumped) {
             self.reference.put_on(model, state);
         }
     }
@@ -113,41 +133,52 @@ impl WearWatch {
 mod tests {
     use super::*;
 
-    /// Takes `steps` that are all `is_fit`; the number of times that the outfit is put on again.
-    fn run(state: &mut WearState, steps: u32, is_fit: bool) -> u32 {
-        let put_on = (0..steps).map(|_| u32::from(state.advance(is_fit, false)));
+    /// Takes `steps` of one fit; the number of times that the outfit is put on again.
+    fn run(state: &mut WearState, steps: u32, fit: Fit) -> u32 {
+        let put_on = (0..steps).map(|_| u32::from(state.advance(fit, false)));
         put_on.sum()
     }
 
     #[test]
-    fn short_faults_are_left_to_the_simulator_and_long_ones_end_in_a_hidden_return() {
+    fn a_sleeve_put_back_is_left_to_cloth_once_and_put_on_again_when_it_stays_off() {
         let mut state = WearState::default();
-        assert_eq!(run(&mut state, PATIENCE - 1, false), 0);
-        assert_eq!(run(&mut state, 1, true), 0);
+        assert_eq!(run(&mut state, PATIENCE - 1, Fit::SleeveOff), 0);
+        run(&mut state, 1, Fit::Worn);
         assert_eq!(state, WearState::default());
 
-        assert_eq!(run(&mut state, PATIENCE, false), 1);
-        assert_eq!(state.settling, Some(0));
-        assert_eq!(run(&mut state, SETTLING[0] - 1, true), 0);
-        assert!(state.settling.is_some(), "shown while it settles");
-        run(&mut state, 1, true);
+        assert_eq!(run(&mut state, PATIENCE, Fit::SleeveOff), 1);
+        assert_eq!(run(&mut state, SETTLING - 1, Fit::Worn), 0);
+        assert_eq!(run(&mut state, 1, Fit::SleeveOff), 1, "it had not settled");
+        run(&mut state, SETTLING, Fit::Worn);
         assert_eq!(state, WearState::default());
     }
 
     #[test]
-    fn a_jump_returns_at_once_and_is_no_vain_return() {
+    fn a_torn_garment_is_put_on_again_at_once_and_shown() {
         let mut state = WearState::default();
-        assert!((0..50).all(|_| state.advance(false, true)));
-        assert_eq!((state.settling, state.retries), (Some(0), 0));
+        assert_eq!(run(&mut state, 3, Fit::Torn), 3);
+        assert_eq!((state.settling, state.hidden, state.vain), (Some(0), 0, 3));
+        run(&mut state, SETTLING, Fit::Worn);
+        assert_eq!(state, WearState::default());
+    }
+
+    #[test]
+    fn after_a_jump_nothing_is_shown_until_it_has_settled() {
+        let mut state = WearState::default();
+        assert!((0..50).all(|_| state.advance(Fit::Worn, true)));
+        assert_eq!(state.vain, 0);
+        run(&mut state, SETTLING - 1, Fit::Worn);
+        assert_eq!(state.hidden, 1);
+        run(&mut state, 1, Fit::Worn);
+        assert_eq!(state, WearState::default());
     }
 
     #[test]
     fn an_outfit_that_never_fits_is_past_mending_until_it_fits() {
         let mut state = WearState::default();
-        run(&mut state, PATIENCE, false);
-        assert_eq!(run(&mut state, RETRIES * SETTLING[1], false), RETRIES);
-        assert_eq!(state.retries, RETRIES);
-        run(&mut state, SETTLING[0], true);
+        assert_eq!(run(&mut state, MOST_VAIN, Fit::Torn), MOST_VAIN);
+        assert_eq!(state.vain, MOST_VAIN);
+        run(&mut state, SETTLING, Fit::Worn);
         assert_eq!(state, WearState::default());
     }
 }

@@ -202,7 +202,7 @@ impl Worn {
         Ok(update)
     }
 
-    /// False while the outfit is put on again after a jump of the body or a fault of the cloth.
+    /// False while the outfit is put on again after a jump of the body.
     pub(crate) fn is_worn(&self) -> bool {
         self.outfit.is_worn()
     }

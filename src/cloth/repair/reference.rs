@@ -3,6 +3,7 @@
 //! Contact, untangling and the recovery of sleeves mend small faults. A body that jumps, or an arm that is tracked wrongly
 //! for a while, leaves cloth that no step can mend; skin, however, always tells where the cloth was put on.
 
+use super::sleeve_rings::Sleeve;
 use super::teleport::{Teleport, blend};
 use crate::cloth::commit::percentile;
 use crate::cloth::outfit_model::Model;
@@ -56,6 +57,17 @@ impl WornReference {
             }
         }
         largest
+    }
+
+    /// Number of sleeve rings that do not enclose their arm.
+    pub fn lost_sleeve_rings(model: &Model, state: &State) -> usize {
+        let arms = model.arms.lines(state.body.vertices());
+        let garments = state.garments.iter().zip(&model.garments);
+        let lost = garments.map(|(g, m)| {
+            let of = |sleeve: &Sleeve| sleeve.lost_rings(&arms, |v| g.positions[v as usize]).len();
+            m.sleeves.iter().map(of).sum::<usize>()
+        });
+        lost.sum()
     }
 
     /// Puts the garments of `state` where skin carries them from the reference to its body, at rest.
