@@ -56,6 +56,8 @@ pub enum Fault {
     PersonLeft,
     /// A person is visible, but the tracker does not explain the frame.
     TrackingLost,
+    /// The person sits: garments are draped on people who stand.
+    PersonSits,
     /// The cloth service does not answer.
     ClothUnavailable,
     /// The garments are older than [`SilenceLimits::garments_age_ns`](super::SilenceLimits::garments_age_ns).
@@ -66,12 +68,13 @@ pub enum Fault {
 
 impl Fault {
     /// All faults, in order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::CameraSilent,
         Self::TrackingUnavailable,
         Self::NoPerson,
         Self::PersonLeft,
         Self::TrackingLost,
+        Self::PersonSits,
         Self::ClothUnavailable,
         Self::GarmentsLate,
         Self::StepFailed,
@@ -80,9 +83,11 @@ impl Fault {
     pub fn stage(self) -> ChainStage {
         match self {
             Self::CameraSilent => ChainStage::Camera,
-            Self::TrackingUnavailable | Self::NoPerson | Self::PersonLeft | Self::TrackingLost => {
-                ChainStage::Tracking
-            }
+            Self::TrackingUnavailable
+            | Self::NoPerson
+            | Self::PersonLeft
+            | Self::TrackingLost
+            | Self::PersonSits => ChainStage::Tracking,
             Self::ClothUnavailable | Self::GarmentsLate => ChainStage::Cloth,
             Self::StepFailed => ChainStage::Picture,
         }
@@ -95,6 +100,7 @@ impl Fault {
             Self::NoPerson => "nobody is in front of the camera",
             Self::PersonLeft => "the person has left the picture",
             Self::TrackingLost => "the body cannot be followed",
+            Self::PersonSits => "the person sits",
             Self::ClothUnavailable => "the cloth service does not answer",
             Self::GarmentsLate => "the garments lag behind the body",
             Self::StepFailed => "a step failed on this frame",
@@ -104,9 +110,12 @@ impl Fault {
     pub(super) fn is_service(self) -> bool {
         matches!(self, Self::TrackingUnavailable | Self::ClothUnavailable)
     }
-    /// True if the tracked person is missing.
+    /// True if nobody is there to be dressed.
     pub(super) fn is_person(self) -> bool {
-        matches!(self, Self::NoPerson | Self::PersonLeft | Self::TrackingLost)
+        matches!(
+            self,
+            Self::NoPerson | Self::PersonLeft | Self::TrackingLost | Self::PersonSits
+        )
     }
 }
 

@@ -3,8 +3,11 @@
 use crate::body::embedded;
 use crate::body::parts::BodySegment;
 use crate::body::{BodyShape, Template};
-use crate::math::P3;
+use crate::camera::Intrinsics;
+use crate::math::{Camera, P3, Rigid, World};
 use crate::mesh::Face;
+use crate::par::Par;
+use crate::raster::{Cull, Options, View, VisibilityBuffer, rasterise_with};
 use std::f32::consts::{PI, TAU};
 
 /// Kind of a piece.
@@ -73,6 +76,13 @@ impl Piece {
     }
 }
 
+/// Keeps the nearer of two depth images, pixel by pixel.
+pub fn overlay(depth: &mut [f32], other: &[f32]) {
+    for (d, o) in depth.iter_mut().zip(other) {
+        *d = d.min(*o);
+    }
+}
+
 /// Triangles of a piece; both sides are seen.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct FurnitureMesh {
@@ -80,6 +90,8 @@ pub(super) struct FurnitureMesh {
     pub(super) faces: Vec<Face>,
 }
 
+/// Surfaces nearer than this are clipped, metres: no depth camera sees them.
+pub(super) const NEAR: f32 = 0.2;
 /// Sides of a round section.
 const SIDES: u32 = 12;
 
@@ -95,6 +107,32 @@ impl FurnitureMesh {
             );
         }
         self
+    }
+
+    /// The same, world to camera.
+    pub(super) fn seen_from(mut self, world_from_camera: &Rigid<World, Camera>) -> Self {
+        let mut seen = Vec::new();
+        world_from_camera
+            .inverse()
+            .points_f32(&self.vertices, &mut seen);
+        self.vertices = seen;
+        self
+    }
+
+    /// Draws it (camera frame) over a depth image, where it is nearer.
+    pub(super) fn draw(&self, camera: &Intrinsics, depth: &mut [f32]) {
+        let view = View::Perspective {
+            camera: *camera,
+            near: NEAR,
+        };
+        let options = Options {
+            par: Par::Seq,
+            cull: Cull::None,
+            ..Options::default()
+        };
+        let mut buffer = VisibilityBuffer::default();
+        rasterise_with(options, &view, &self.vertices, &self.faces, &mut buffer);
+        overlay(depth, &buffer.depth);
     }
 
     /// Adds another surface.

@@ -18,11 +18,11 @@ mod stance;
 
 pub use crate::camera::NoiseModel;
 pub use clip::ClipError;
-pub use furniture::Piece;
+pub use furniture::{Piece, overlay};
 pub use physique::{Belly, Covering, Physique};
 pub use posture::Posture;
 pub use room::Room;
 pub use routine::Routine;
 pub use sequence::{Actor, Sequence, Setting, Truth};
-pub use shop::{PLACES, Shop, overlay};
+pub use shop::{PLACES, Shop};
 pub use source::SynthSource;

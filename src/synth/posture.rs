@@ -21,6 +21,8 @@ pub enum Posture {
     Crouching,
     /// Kneeling on the right knee.
     OneKnee,
+    /// Seated on a chair, hands on the thighs.
+    Sitting,
 }
 
 const fn v(x: f64, y: f64, z: f64) -> V3d {
@@ -68,6 +70,12 @@ const FOREARM_ON_KNEE: Limb = [
     v(-0.10, -0.62, 0.78),
 ];
 
+const ON_THIGH: Limb = [
+    v(0.14, -0.95, 0.28),
+    v(-0.05, -0.42, 0.90),
+    v(-0.05, -0.30, 0.95),
+];
+
 /// Half distance between the feet, metres; wider where the posture needs it.
 const HALF_STANCE: f64 = 0.125;
 const HALF_SQUAT: f64 = 0.19;
@@ -77,13 +85,15 @@ const SQUAT: f64 = 0.50;
 const KNEE_RADIUS: f64 = 0.055;
 /// Turn of the kneeling foot about the body's x axis, radians: instep to the floor.
 const TOES_BACK: f64 = 2.6;
+/// Height of the root joint of somebody seated, metres: 10 cm above the seat of a chair.
+const SEATED: f64 = 0.57;
 /// Lean of the trunk in squat and kneel, degrees.
 const SQUAT_LEAN: f64 = 24.0;
 const KNEEL_LEAN: f64 = 6.0;
 
 impl Posture {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Standing,
         Self::HandsJoined,
         Self::ArmsCrossed,
@@ -91,6 +101,7 @@ impl Posture {
         Self::Overhead,
         Self::Crouching,
         Self::OneKnee,
+        Self::Sitting,
     ];
 
     fn arms(self) -> ArmDirections {
@@ -102,6 +113,7 @@ impl Posture {
             Self::Overhead => [STRAIGHT_UP; 2],
             Self::Crouching => [FOREARM_ON_KNEE; 2],
             Self::OneKnee => [FOREARM_ON_KNEE, HANGING],
+            Self::Sitting => [ON_THIGH; 2],
         }
     }
 
@@ -139,6 +151,14 @@ impl Posture {
                 rig.plant(&mut stance, soles);
             }
             Self::OneKnee => kneel(rig, home, &mut stance),
+            Self::Sitting => {
+                let ahead = rig.thigh_length();
+                stance.pelvis.y = SEATED;
+                rig.plant(
+                    &mut stance,
+                    [sole(HALF_STANCE, ahead), sole(-HALF_STANCE, ahead)],
+                );
+            }
             _ => rig.stand(
                 &mut stance,
                 [sole(HALF_STANCE, 0.0), sole(-HALF_STANCE, 0.0)],
@@ -230,6 +250,12 @@ mod tests {
     fn knees_bend_in_squat_and_kneel() {
         let (s, t) = held(Posture::Crouching);
         assert!(at(&s, &t, "pelvis").y < 0.65 && at(&s, &t, "left_knee").y > 0.35);
+        let (s, t) = held(Posture::Sitting);
+        let (knee, pelvis) = (at(&s, &t, "left_knee"), at(&s, &t, "pelvis"));
+        assert!(
+            (knee.y - pelvis.y).abs() < 0.15 && knee.z > pelvis.z + 0.3,
+            "{knee} {pelvis}"
+        );
         let (s, t) = held(Posture::OneKnee);
         let (left, right) = (at(&s, &t, "left_knee"), at(&s, &t, "right_knee"));
         assert!(right.y < 0.12 && left.y > 0.35, "{left} {right}");

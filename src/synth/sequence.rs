@@ -1,7 +1,9 @@
 //! Frames of a synthetic actor, with ground truth.
 
 use super::clip::{ClipError, Performance};
+use super::furniture::{NEAR, Piece};
 use super::paint::{Colors, Paint};
+use super::posture::Posture;
 use super::room::{Background, Room};
 use super::routine::Routine;
 use super::stance::Rig;
@@ -131,8 +133,6 @@ pub struct Sequence {
     performance: Option<Arc<Performance>>,
 }
 
-/// Surfaces nearer than this are clipped, metres: no depth camera sees them.
-const NEAR: f32 = 0.2;
 /// Light from above, in front and a little from the left; and a weak one from the right. World frame.
 const KEY_LIGHT: [f64; 3] = [-0.45, 0.75, 0.55];
 const FILL_LIGHT: [f64; 3] = [0.8, 0.2, 0.5];
@@ -142,6 +142,20 @@ const SHADE: [f32; 4] = [0.42, 0.10, 0.52, 0.14];
 const SHADOW: [f32; 2] = [0.16, 0.55];
 /// Darkness of these shadows in their middle.
 const SHADOW_DEPTH: [f32; 2] = [0.45, 0.30];
+
+/// The room, with a chair under somebody who sits.
+fn background(setting: &Setting) -> Background {
+    let (camera, place) = (&setting.camera, &setting.world_from_camera);
+    let mut room = Room::draw(setting.room.as_ref(), camera, place);
+    if setting.routine == Routine::Hold(Posture::Sitting) {
+        let at = setting.home.cast::<f32>();
+        let chair = Piece::Chair
+            .surface()
+            .placed([at.x, 0.0, at.z], setting.turn as f32);
+        chair.seen_from(place).draw(camera, &mut room.depth);
+    }
+    room
+}
 
 impl Sequence {
     /// Prepares everything that does not change from frame to frame.
@@ -156,11 +170,7 @@ impl Sequence {
                 &rest,
                 Colors::pick(actor.appearance),
             ),
-            background: Room::draw(
-                setting.room.as_ref(),
-                &setting.camera,
-                &setting.world_from_camera,
-            ),
+            background: background(&setting),
             calibration: Calibration::registered(setting.camera),
             rest,
             performance: None,

@@ -1,18 +1,14 @@
 //! Rooms of shops: a camera at a till, a mirror or a shelf, walls, furniture and the places where people stand.
 
-use super::furniture::{FurnitureMesh, Piece, hand};
+use super::furniture::{NEAR, Piece, hand};
 use super::room::Room;
 use super::sequence::Setting;
 use crate::camera::NoiseModel;
 use crate::math::{P3, P3d, V3d};
-use crate::par::Par;
-use crate::raster::{Cull, Options, View, VisibilityBuffer, rasterise_with};
 use rand::{Rng, SeedableRng};
 
 /// People that stand before the camera at most.
 pub const PLACES: usize = 3;
-/// Surfaces nearer than this are clipped, metres.
-const NEAR: f32 = 0.2;
 /// Distance of the first place from the camera, metres.
 const AWAY: [f64; 2] = [1.0, 4.0];
 /// Height of the camera, metres.
@@ -137,7 +133,7 @@ impl Shop {
                 let y = p.y + up - 0.12;
                 *p = P3::new(c * p.x + s * y, s * p.x - c * y, away + p.z);
             }
-            self.draw(&mesh, &mut depth);
+            mesh.draw(&self.setting.camera, &mut depth);
         }
         depth
     }
@@ -178,14 +174,9 @@ impl Shop {
     /// Draws a piece into the room.
     fn place(&mut self, piece: Piece, at: &P3d, yaw: f32) {
         let at = [at.x as f32, 0.0, at.z as f32];
-        let mut mesh = piece.surface().placed(at, yaw);
-        let mut moved = Vec::new();
-        let camera_from_world = self.setting.world_from_camera.inverse();
-        camera_from_world.points_f32(&mesh.vertices, &mut moved);
-        mesh.vertices = moved;
-        let mut depth = std::mem::take(&mut self.depth);
-        self.draw(&mesh, &mut depth);
-        self.depth = depth;
+        let mesh = piece.surface().placed(at, yaw);
+        let mesh = mesh.seen_from(&self.setting.world_from_camera);
+        mesh.draw(&self.setting.camera, &mut self.depth);
         self.pieces.push(piece);
     }
 
@@ -225,29 +216,6 @@ impl Shop {
             let q = camera.project(&p.cast());
             p.z > f64::from(NEAR) && (0.0..w).contains(&q.x) && (0.0..h).contains(&q.y)
         })
-    }
-
-    /// Draws a surface in the camera frame over a depth image.
-    fn draw(&self, mesh: &FurnitureMesh, depth: &mut [f32]) {
-        let view = View::Perspective {
-            camera: self.setting.camera,
-            near: NEAR,
-        };
-        let options = Options {
-            par: Par::Seq,
-            cull: Cull::None,
-            ..Options::default()
-        };
-        let mut buffer = VisibilityBuffer::default();
-        rasterise_with(options, &view, &mesh.vertices, &mesh.faces, &mut buffer);
-        overlay(depth, &buffer.depth);
-    }
-}
-
-/// Keeps the nearer of two depth images, pixel by pixel.
-pub fn overlay(depth: &mut [f32], other: &[f32]) {
-    for (d, o) in depth.iter_mut().zip(other) {
-        *d = d.min(*o);
     }
 }
 

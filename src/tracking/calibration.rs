@@ -183,8 +183,11 @@ pub(super) fn count_steady(state: &mut TrackerState, moved: Option<f64>) {
     };
 }
 
-/// `Calibrating` until size has seen some frames and the pose is steady, then `Tracking`.
+/// `Sitting` for who sits; `Calibrating` until size has seen some frames and the pose is steady, then `Tracking`.
 pub(super) fn live_status(model: &TrackerModel, state: &TrackerState) -> Status {
+    if state.seat.is_taken {
+        return Status::Sitting;
+    }
     let settling = state.status != Status::Tracking
         && state.steady < STEADY_FRAMES
         && state.calibration_age < LONGEST;

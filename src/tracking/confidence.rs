@@ -1,5 +1,6 @@
 //! Confidence of each joint and its limiting reason, from the last pairing and normal equations.
 
+use super::agreement::Agreement;
 use super::pose_fit::{FitContext, FitScratch};
 use crate::body::{JointMotion, Pose};
 use crate::spatial::Label;
@@ -17,6 +18,8 @@ pub enum ConfidenceReason {
     Ambiguous,
     /// Its bone projects to cells without readings (black trousers, shiny surfaces).
     NoReturn,
+    /// Much of its limb lies in measured free space: it is somewhere else.
+    InFreeSpace,
     /// Its bone is occluded or outside the image.
     Unseen,
 }
@@ -42,14 +45,17 @@ const NO_RETURN_FACTOR: f32 = 0.5;
 const AMBIGUOUS_FACTOR: f32 = 0.7;
 /// See [`NO_RETURN_FACTOR`].
 const AT_LIMIT_FACTOR: f32 = 0.8;
+/// Share of a body part in free space from which its joints say so: outlines of well tracked limbs reach 0.2.
+const FREE: f32 = 0.25;
 /// Depth behind the drawn model from which a model point is occluded by it, metres.
 const HIDDEN: f32 = 0.05;
 
-/// Confidence of every joint of the skeleton.
+/// Confidence of every joint of the skeleton, in a pose that agrees with its frame so far.
 pub(super) fn confidence(
     context: &FitContext<'_>,
     pose: &Pose,
     scratch: &FitScratch,
+    agreement: &Agreement,
 ) -> Vec<JointConfidence> {
     let model = context.model;
     let skeleton = model.template.skeleton();
@@ -75,7 +81,10 @@ pub(super) fn confidence(
             pose.angles[k] - limits[k][0] < LIMIT || limits[k][1] - pose.angles[k] < LIMIT
         });
         let share = readings[bone] as f32 / (readings[bone] as f32 + HALF_SURE);
-        let (reason, value) = if readings[bone] == 0 && missing[bone] == 0 {
+        let free = agreement.parts[model.parts[j]];
+        let (reason, value) = if free > FREE {
+            (ConfidenceReason::InFreeSpace, (1.0 - free) * share)
+        } else if readings[bone] == 0 && missing[bone] == 0 {
             (ConfidenceReason::Unseen, 0.0)
         } else if readings[bone] == 0 {
             (ConfidenceReason::NoReturn, 0.0)
@@ -119,4 +128,41 @@ fn samples_without_return(context: &FitContext<'_>, scratch: &FitScratch) -> Vec
         }
     }
     counts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracking::agreement::AgreementScratch;
+    use crate::tracking::personal_body::PersonalBody;
+    use crate::tracking::pose_fit::{TRACK, fit_pose};
+    use crate::tracking::test_scene::{DepthScan, TestScene};
+
+    #[test]
+    fn a_limb_in_the_air_says_so_and_the_others_do_not() {
+        let scene = TestScene::new(1000, 480);
+        let skeleton = scene.model.template.skeleton();
+        let scan = DepthScan::new(&scene.model, &scene.depth(&scene.pose)).background_removed();
+        let mut body = PersonalBody::default();
+        body.update(&scene.model, &Default::default());
+        let context = FitContext {
+            model: &scene.model,
+            body: &body,
+            observation: &scan.observation(),
+        };
+        let mut scratch = FitScratch::default();
+        let mut pose = scene.pose.clone();
+        fit_pose(&context, &mut pose, &TRACK, &mut scratch);
+        pose.set(skeleton, "left_shoulder", &[0.0, 0.0, 1.2]);
+        let agreement = AgreementScratch::default().measure(&context, &pose, &mut scratch);
+        let joints = confidence(&context, &pose, &scratch, &agreement);
+
+        let of = |name: &str| joints[skeleton.index(name).expect(name)];
+        for (left, right) in [("left_elbow", "right_elbow"), ("left_wrist", "right_wrist")] {
+            let (left, right) = (of(left), of(right));
+            assert_eq!(left.reason, ConfidenceReason::InFreeSpace);
+            assert_ne!(right.reason, ConfidenceReason::InFreeSpace);
+            assert!(left.value < 0.6 * right.value, "{left:?} {right:?}");
+        }
+    }
 }

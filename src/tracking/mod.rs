@@ -50,6 +50,7 @@ mod prediction;
 mod proposed_pose;
 mod repair;
 mod report;
+mod seat;
 mod segmentation;
 mod size;
 mod standing;

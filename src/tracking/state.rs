@@ -3,6 +3,7 @@
 use super::change_detection::DepthReference;
 use super::person_evidence::{PersonBelief, Verdict};
 use super::repair::RepairTimer;
+use super::seat::Seat;
 use super::size::SizeEstimate;
 use super::standing::FootMemory;
 use super::status::{LostReason, Status};
@@ -68,6 +69,9 @@ pub struct TrackerState {
     /// Remembered places of the feet.
     #[serde(default)]
     pub(super) feet: Option<FootMemory>,
+    /// Posture of the subject.
+    #[serde(default)]
+    pub(super) seat: Seat,
     #[serde(default)]
     pub(super) repair: RepairTimer,
     /// Processed frames in a row in which hardly anything moved.
@@ -121,6 +125,7 @@ impl TrackerState {
             highest_hips: None,
             drift: Vec::new(),
             feet: None,
+            seat: Seat::default(),
             repair: RepairTimer::default(),
             still: 0,
             reference: None,

@@ -26,6 +26,8 @@ pub enum Status {
     Calibrating,
     /// A subject is tracked.
     Tracking,
+    /// A subject is tracked who sits: garments are draped on people who stand.
+    Sitting,
     /// The subject was lost; the last good pose is kept.
     Lost {
         /// Reason.
@@ -36,6 +38,6 @@ pub enum Status {
 impl Status {
     /// True with a pose of this very frame.
     pub fn is_live(&self) -> bool {
-        matches!(self, Self::Calibrating | Self::Tracking)
+        matches!(self, Self::Calibrating | Self::Tracking | Self::Sitting)
     }
 }

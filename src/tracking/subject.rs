@@ -15,11 +15,12 @@ use super::pose_fit::{
 use super::prediction::{Prediction, predict};
 use super::repair::Repair;
 use super::report::Stopwatch;
+use super::seat::{Seat, sits};
 use super::size::first_shapes;
 use super::standing::{FloorStance, FootMemory, HiddenKnees, floor_below, highest_hips};
 use super::{
-    LostReason, Skipped, Status, StepReport, TrackerModel, TrackerState, TrackingStagesMs,
-    Workspace, surface,
+    JointConfidence, LostReason, Skipped, Status, StepReport, TrackerModel, TrackerState,
+    TrackingStagesMs, Workspace, surface,
 };
 use crate::body::{BoneTransforms, Pose};
 use crate::camera::RgbdFrame;
@@ -200,7 +201,7 @@ impl SubjectFrame<'_> {
             return Err(LostReason::Disagreement);
         }
         let status = state.status;
-        self.commit(state, workspace, pose, &fit);
+        self.commit(state, workspace, pose, (&fit, &log.report.confidence));
         count_doubt(state, agrees)?;
         if state.belief.verdict == Verdict::Unsure {
             state.status = status;
@@ -212,9 +213,10 @@ impl SubjectFrame<'_> {
     /// Writes confidence and agreement of a fitted pose to the report.
     fn assess(&self, pose: &Pose<Camera>, workspace: &mut Workspace, log: &mut StepLog) {
         let context = self.context(&workspace.body);
-        log.report.confidence = confidence(&context, pose, &workspace.fit);
-        let measure = &mut workspace.agreement;
-        log.report.agreement = measure.measure(&context, pose, &mut workspace.fit);
+        let (measure, fit) = (&mut workspace.agreement, &mut workspace.fit);
+        let agreement = measure.measure(&context, pose, fit);
+        log.report.confidence = confidence(&context, pose, fit, &agreement);
+        log.report.agreement = agreement;
     }
 
     /// Finds the subject anew: first size from the stature, then an initial pose.
@@ -255,6 +257,7 @@ impl SubjectFrame<'_> {
         workspace.body.update(self.model, &shape);
         state.shape = shape;
         (state.before, state.highest_hips, state.feet) = (None, None, None);
+        state.seat = Seat::default();
         state.drift.clear();
         Ok(Prediction {
             pose,
@@ -300,7 +303,7 @@ impl SubjectFrame<'_> {
             log.add_fit(self.model, state, fit);
             log.report.agreement = better.agreement;
             let context = self.context(&workspace.body);
-            log.report.confidence = confidence(&context, pose, &workspace.fit);
+            log.report.confidence = confidence(&context, pose, &workspace.fit, &better.agreement);
         }
         state.repair.record(found, log.report.agreement.wrong());
         log.report.stages_ms.place += log.watch.lap();
@@ -395,7 +398,7 @@ impl SubjectFrame<'_> {
         state: &mut TrackerState,
         workspace: &Workspace,
         pose: Pose<Camera>,
-        fit: &FitReport,
+        (fit, confidence): (&FitReport, &[JointConfidence]),
     ) {
         let skeleton = self.model.template.skeleton();
         let found = !state.is_following();
@@ -409,8 +412,10 @@ impl SubjectFrame<'_> {
         state.pose_age = 0;
         state.centre = centre(self.observation.grid, &self.person.cells);
         state.quality = [fit.explained, fit.residual];
-        state.status = live_status(self.model, state);
         let joints = &workspace.fit.bones.joints;
+        let sits = sits(self.model, &self.up, joints, confidence);
+        state.seat.update(sits);
+        state.status = live_status(self.model, state);
         state.highest_hips = highest_hips(self.model, &self.up, state.highest_hips, joints);
         let mut bones = BoneTransforms::default();
         state.pose.bones(skeleton, &workspace.body.rest, &mut bones);

@@ -11,6 +11,7 @@ mod dressing_meshes;
 mod drift;
 mod garment_stream;
 mod garments;
+mod seat;
 mod sleep;
 mod starts;
 mod stress;

@@ -189,6 +189,8 @@ pub enum DegradedReason {
     GarmentsLate = 7,
     /// A computation failed on this frame; the last good state is kept.
     StepFailed = 8,
+    /// The person in view sits: garments are draped on people who stand.
+    PersonSits = 9,
 }
 impl DegradedReason {
     /// String value of the enum field names used in the ProtoBuf definition.
@@ -206,6 +208,7 @@ impl DegradedReason {
             Self::ClothUnavailable => "DEGRADED_REASON_CLOTH_UNAVAILABLE",
             Self::GarmentsLate => "DEGRADED_REASON_GARMENTS_LATE",
             Self::StepFailed => "DEGRADED_REASON_STEP_FAILED",
+            Self::PersonSits => "DEGRADED_REASON_PERSON_SITS",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
@@ -220,6 +223,7 @@ impl DegradedReason {
             "DEGRADED_REASON_CLOTH_UNAVAILABLE" => Some(Self::ClothUnavailable),
             "DEGRADED_REASON_GARMENTS_LATE" => Some(Self::GarmentsLate),
             "DEGRADED_REASON_STEP_FAILED" => Some(Self::StepFailed),
+            "DEGRADED_REASON_PERSON_SITS" => Some(Self::PersonSits),
             _ => None,
         }
     }
@@ -1233,7 +1237,7 @@ pub struct BodyState {
     pub frame: ::core::option::Option<FrameId>,
     #[prost(enumeration = "TrackingStatus", tag = "3")]
     pub status: i32,
-    /// Set for SEARCHING and LOST.
+    /// Set for SEARCHING, LOST and SITTING.
     #[prost(enumeration = "DegradedReason", tag = "4")]
     pub reason: i32,
     /// The reason in words, for logs; never shown to users.
@@ -1340,6 +1344,8 @@ pub enum TrackingStatus {
     Tracking = 3,
     /// Pose and shape are the last good ones, `age_frames` old; `reason` is set.
     Lost = 4,
+    /// Pose and shape belong to `frame`, but the person sits, and garments are draped on people who stand; `reason` is set.
+    Sitting = 5,
 }
 impl TrackingStatus {
     /// String value of the enum field names used in the ProtoBuf definition.
@@ -1353,6 +1359,7 @@ impl TrackingStatus {
             Self::Calibrating => "TRACKING_STATUS_CALIBRATING",
             Self::Tracking => "TRACKING_STATUS_TRACKING",
             Self::Lost => "TRACKING_STATUS_LOST",
+            Self::Sitting => "TRACKING_STATUS_SITTING",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
@@ -1363,6 +1370,7 @@ impl TrackingStatus {
             "TRACKING_STATUS_CALIBRATING" => Some(Self::Calibrating),
             "TRACKING_STATUS_TRACKING" => Some(Self::Tracking),
             "TRACKING_STATUS_LOST" => Some(Self::Lost),
+            "TRACKING_STATUS_SITTING" => Some(Self::Sitting),
             _ => None,
         }
     }
@@ -2182,7 +2190,7 @@ pub enum ClothStatus {
     Unspecified = 0,
     /// No calibrated body; `reason` is set.
     Waiting = 1,
-    /// Garments are being sewn and draped, or put on again after a jump of the body or a fault of the cloth; `detail` says
+    /// Garments are being sewn and draped, or put on again after a jump of the body; `detail` says
     /// which. Messages have no garments until they are on.
     Dressing = 2,
     /// Positions belong to `frame`.

@@ -3,7 +3,7 @@
 use crate::pattern::Pattern;
 use std::path::Path;
 use tryon::formats::{RgbdSource, open_recording};
-use tryon::synth::{Actor, Routine, Sequence, Setting, SynthSource};
+use tryon::synth::{Actor, Posture, Routine, Sequence, Setting, SynthSource};
 
 /// A source ready to be read.
 pub type OpenSource = Box<dyn RgbdSource>;
@@ -34,16 +34,17 @@ pub fn open(name: &str) -> Result<OpenSource, SourceError> {
     }
 }
 
-/// `try-on` (the default), `leave`, `still` or `empty`, without end.
+/// `try-on` (the default), `leave`, `still`, `seated` or `empty`, without end.
 fn synth(clip: &str) -> Result<OpenSource, String> {
     let routine = match clip {
         "" | "try-on" => Routine::TryOn,
         "leave" => Routine::LeaveAndReturn,
         "still" => Routine::Still,
+        "seated" => Routine::Hold(Posture::Sitting),
         "empty" => Routine::Empty,
         other => {
             return Err(format!(
-                "`{other}` is no routine; there are try-on, leave, still and empty"
+                "`{other}` is no routine; there are try-on, leave, still, seated and empty"
             ));
         }
     };

@@ -227,7 +227,7 @@ pub(crate) struct ExportArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct RecordArgs {
-    /// Source of the frames: `synth` (or `synth:leave`, `synth:still`, `synth:empty`), a recording to convert, or
+    /// Source of the frames: `synth` (or `synth:leave`, `synth:still`, `synth:seated`, `synth:empty`), a recording to convert, or
     /// `bus:STORE/CAMERA`, a camera that runs now.
     #[arg(long, default_value = "synth", value_name = "SOURCE")]
     pub(crate) source: String,

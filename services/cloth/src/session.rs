@@ -256,7 +256,7 @@ impl Task {
                     "the body is being measured".into(),
                 ))
             }
-            (TrackingStatus::Lost, _) => {
+            (TrackingStatus::Lost | TrackingStatus::Sitting, _) => {
                 let mut f = waiting(state.reason(), state.detail.clone());
                 f.set_status(ClothStatus::Holding);
                 for_frame(f)

@@ -141,6 +141,7 @@ fn status_to_wire(status: Status) -> (TrackingStatus, DegradedReason) {
         Status::Searching => (TrackingStatus::Searching, DegradedReason::NoPerson),
         Status::Calibrating => (TrackingStatus::Calibrating, DegradedReason::Unspecified),
         Status::Tracking => (TrackingStatus::Tracking, DegradedReason::Unspecified),
+        Status::Sitting => (TrackingStatus::Sitting, DegradedReason::PersonSits),
         Status::Lost { reason } => {
             let why = match reason {
                 LostReason::NoPerson => DegradedReason::PersonLeft,

@@ -9,6 +9,7 @@ use crate::body::embedded;
 use crate::camera::{DepthImage, Intrinsics, NoiseModel};
 use crate::math::P3d;
 use crate::synth::{Posture, Room, Routine, Sequence, Setting};
+use crate::tracking::Status;
 use rand::{Rng, SeedableRng};
 
 /// Frames until a person must be found.
@@ -40,8 +41,12 @@ const POSES: [(&str, Posture, f64, bool); 8] = [
     ("one knee", Posture::OneKnee, 0.0, false),
 ];
 
-/// One still: last depth image, truth, and joints of a live pose.
+/// Somebody on a chair, who is said to sit; the others aren't.
+const SEATED: (&str, Posture, f64, bool) = ("sitting", Posture::Sitting, 0.0, false);
+
+/// One still: last depth image, truth, joints of a live pose, and the last status.
 struct Still {
+    status: Status,
     sequence: Sequence,
     depth: DepthImage,
     truth: Points,
@@ -50,7 +55,7 @@ struct Still {
 
 /// Setting of case `pose` of person `index`: distance, turn and noise drawn from the case's numbers.
 fn setting(index: usize, pose: usize) -> Setting {
-    let (_, posture, turn, waist_up) = POSES[pose];
+    let (_, posture, turn, waist_up) = *POSES.get(pose).unwrap_or(&SEATED);
     let mut rng = rand_pcg::Pcg32::seed_from_u64(SEED + (index * POSES.len() + pose) as u64);
     let turn = turn + rng.random_range(-TURN..TURN);
     let away = if waist_up {
@@ -83,6 +88,7 @@ fn still(person: &Person, setting: Setting) -> Still {
         found = session.track(picture(i));
     }
     Still {
+        status: session.state.status,
         depth: picture(0),
         truth: person.points(&truth),
         found,
@@ -101,7 +107,10 @@ fn is_in_view(camera: &Intrinsics, p: &P3d) -> bool {
 pub(super) fn measure(people: &[Person], sheet: &mut ContactSheet) -> Vec<Bar> {
     let mut hits: [Vec<bool>; POSES.len()] = Default::default();
     let mut misses: [Vec<(String, f64)>; POSES.len()] = Default::default();
+    let (mut seated, mut others) = (Vec::new(), Vec::new());
     for (index, person) in people.iter().enumerate() {
+        let status = still(person, setting(index, POSES.len())).status;
+        seated.push((person.name.clone(), status));
         let stills: Vec<Still> = (0..POSES.len())
             .map(|k| still(person, setting(index, k)))
             .collect();
@@ -116,6 +125,7 @@ pub(super) fn measure(people: &[Person], sheet: &mut ContactSheet) -> Vec<Bar> {
                 .map(|f| FrameError::among(&f, &truth, |p| is_in_view(&camera, p)));
             let is_found = error.is_some_and(|e| e.mean < FOUND_MEAN && e.worst < FOUND_WORST);
             hits[k].push(is_found);
+            others.push((format!("{} {}", person.name, POSES[k].0), still.status));
             if !is_found {
                 let name = error.map_or("lost".to_owned(), |e| e.joint.to_owned());
                 let worst = error.map_or(LOST, |e| e.worst);
@@ -135,7 +145,20 @@ pub(super) fn measure(people: &[Person], sheet: &mut ContactSheet) -> Vec<Bar> {
         Bar::new("poses", format!("found, {} [%]", p.0), percent(h), cases)
             .worst(greatest(m, " mm"))
     });
-    std::iter::once(all).chain(each).collect()
+    let ends = [
+        seat_bar("said to sit, who sits [%]", &seated, true),
+        seat_bar("said to sit, who doesn't [%]", &others, false),
+    ];
+    std::iter::once(all).chain(each).chain(ends).collect()
+}
+
+/// Share of the cases that are said to sit; names those that are not as `expected`, with their status.
+fn seat_bar(measure: &str, cases: &[(String, Status)], expected: bool) -> Bar {
+    let sits = |status: &Status| *status == Status::Sitting;
+    let wrong = cases.iter().filter(|(_, status)| sits(status) != expected);
+    let names = wrong.map(|(name, status)| format!("{name} ({status:?})"));
+    let share = percent(cases.iter().map(|(_, status)| sits(status)));
+    Bar::new("poses", measure, share, cases.len()).worst(names.collect())
 }
 
 /// Offsets of a foreign skeleton: the median over this person's live poses.

@@ -82,6 +82,7 @@ fn words(status: Status) -> &'static str {
         Status::Searching => "searching for a person",
         Status::Calibrating => "calibrating",
         Status::Tracking => "tracking",
+        Status::Sitting => "sitting",
         Status::Lost { reason } => match reason {
             LostReason::NoPerson => "lost: nobody of a body's size",
             LostReason::Residual => "lost: the body explains too little of the picture",

@@ -134,6 +134,7 @@ export const Reason = Object.freeze({
   CLOTH_UNAVAILABLE: 6,
   GARMENTS_LATE: 7,
   STEP_FAILED: 8,
+  PERSON_SITS: 9,
 });
 
 // google.rpc, for the details of an error.

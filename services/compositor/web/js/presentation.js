@@ -12,6 +12,7 @@ const REASONS = {
   [Reason.NO_PERSON]: ['nobody in view', 'Step in front of the mirror.'],
   [Reason.PERSON_LEFT]: ['you stepped out of view', 'Come back into the picture to go on.'],
   [Reason.TRACKING_LOST]: ['we lost track of you', 'Face the mirror, arms slightly away from your body.'],
+  [Reason.PERSON_SITS]: ['you are sitting', 'Stand up to see the garments on you.'],
   [Reason.CAMERA_SILENT]: ['the camera is silent', 'We are waiting for its next picture.'],
   [Reason.TRACKING_UNAVAILABLE]: ['body tracking is restarting', 'You see yourself without garments until it is back.'],
   [Reason.CLOTH_UNAVAILABLE]: ['the fitting room is restarting', 'You see yourself without garments until it is back.'],

@@ -119,6 +119,20 @@ fn a_person_who_leaves_degrades_with_the_reason_and_comes_back_live() {
 }
 
 #[test]
+fn a_person_who_sits_is_told_so_and_not_dressed() {
+    let kiosk = Kiosk::start("synth:seated", 10.0);
+    client(async {
+        let mut w = Watcher::open(&kiosk, "seat", "front", &["tshirt"]).await;
+        w.degraded(DegradedReason::PersonSits).await;
+        let p = w.picture(TryOnState::Degraded).await;
+        assert_eq!(
+            (p.reason(), p.outfit_revision),
+            (DegradedReason::PersonSits, 0)
+        );
+    });
+}
+
+#[test]
 fn an_empty_room_says_nobody_is_there() {
     let kiosk = Kiosk::start("synth:empty", 10.0);
     client(async {
