@@ -197,7 +197,9 @@ impl SubjectFrame<'_> {
         let is_nobody = config.judge && state.belief.verdict == Verdict::Nobody;
         if is_nobody || found && !agrees {
             // Another thing's size is no start for the next search.
-            (state.size, state.shape) = before.unwrap_or_default();
+            if let Some(before) = before {
+                (state.size, state.shape) = before;
+            }
             return Err(LostReason::Disagreement);
         }
         let status = state.status;
