@@ -19,10 +19,10 @@ use super::seat::{Seat, sits};
 use super::size::first_shapes;
 use super::standing::{FloorStance, FootMemory, HiddenKnees, floor_below, highest_hips};
 use super::{
-    JointConfidence, LostReason, Skipped, Status, StepReport, TrackerModel, TrackerState,
-    TrackingStagesMs, Workspace, surface,
+    JointConfidence, LostReason, SizeEstimate, Skipped, Status, StepReport, TrackerModel,
+    TrackerState, TrackingStagesMs, Workspace, surface,
 };
-use crate::body::{BoneTransforms, Pose};
+use crate::body::{BodyShape, BoneTransforms, Pose};
 use crate::camera::RgbdFrame;
 use crate::math::{Camera, P3};
 use crate::registration::Observation;
@@ -140,7 +140,7 @@ impl SubjectFrame<'_> {
         let config = &self.model.config;
         workspace.fit.pairing.forget();
         let found = !state.is_following();
-        let before = found.then(|| (state.size.clone(), state.shape.clone()));
+        let before = size_before(state, found);
         let start = if found {
             self.find(state, workspace, log)?
         } else {
@@ -196,7 +196,6 @@ impl SubjectFrame<'_> {
         let agrees = !config.judge || log.report.agreement.wrong() <= MOST_WRONG;
         let is_nobody = config.judge && state.belief.verdict == Verdict::Nobody;
         if is_nobody || found && !agrees {
-            // Another thing's size is no start for the next search.
             if let Some(before) = before {
                 (state.size, state.shape) = before;
             }
@@ -459,6 +458,17 @@ impl SubjectFrame<'_> {
         };
         *wait = *interval;
         log.report.stages_ms.surface = log.watch.lap();
+    }
+}
+
+/// Size and shape after a refusal: those from before the search, if a person had them. None: as they are.
+///
+/// Another thing's size is no start for the next search.
+fn size_before(state: &TrackerState, found: bool) -> Option<(SizeEstimate, BodyShape)> {
+    match (found, state.belief.verdict) {
+        (true, _) => Some((state.size.clone(), state.shape.clone())),
+        (false, Verdict::Person) => None,
+        (false, _) => Some(Default::default()),
     }
 }
 
