@@ -1,9 +1,9 @@
 //! Posed surface of one body, with its rest shape kept until the shape changes.
 
-use super::arm_clearance::ArmClearance;
 use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use crate::math::P3;
 use crate::par::Par;
+use crate::tracking::ArmClearance;
 use std::sync::Arc;
 
 /// Skinned surface of a tracked body and the buffers to pose it again.

@@ -23,7 +23,6 @@
 //! # }
 //! ```
 
-mod arm_clearance;
 mod body;
 mod chain;
 mod choice;

@@ -1,6 +1,5 @@
 //! An outfit on a body: put on once, then stepped with every posed body.
 
-use super::arm_clearance::ArmClearance;
 use super::choice::SizedGarment;
 use super::wear::WearWatch;
 use crate::body::parts::vertex_masks;
@@ -9,6 +8,7 @@ use crate::cloth::ClothError;
 use crate::cloth::{Config, Input, Model, State, StepReport, Workspace, step};
 use crate::dressing::{DressError, DressOptions, GarmentSource, dress_all};
 use crate::math::{Camera, P3, Rigid, World};
+use crate::tracking::ArmClearance;
 
 /// Tracked body that is dressed.
 #[derive(Clone, Copy, Debug)]

@@ -26,11 +26,13 @@
 //! ```
 
 mod agreement;
+mod arm_clearance;
 mod body_proposals;
 mod calibration;
 mod change_detection;
 mod confidence;
 mod config;
+mod extrapolation;
 mod facing;
 mod gravity;
 mod hand_assignment;
@@ -66,10 +68,12 @@ mod workspace;
 
 pub use crate::registration::residual::SurfaceNormals;
 pub use agreement::Agreement;
+pub use arm_clearance::ArmClearance;
 pub use confidence::{ConfidenceReason, JointConfidence};
 pub use config::TrackerConfig;
 pub use facing::{Facing, facing, yaw_of_joints, yaw_of_trunk};
 pub use joint_proposals::{JointProposals, ProposedAnchor};
+pub use kinematics::{apply, linearise};
 pub use model::TrackerModel;
 pub use part_classes::PartClasses;
 pub use report::{Skipped, StepError, StepReport, TrackingStagesMs};

@@ -1,7 +1,7 @@
 //! Pose filter: fuses the last pose with the frame's fit by their uncertainties, per body part, like a Kalman filter of
 //! constant position. A subject at rest shows no sensor noise; a moving part is followed within two frames.
 
-use super::kinematics::advance_angles;
+use super::extrapolation::advance_angles;
 use super::model::TrackerModel;
 use super::pose_fit::limit;
 use crate::body::parts::BodyPart;

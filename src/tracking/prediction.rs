@@ -2,7 +2,7 @@
 //! pose.
 
 use super::TrackerState;
-use super::kinematics::{extrapolate, motion};
+use super::extrapolation::{extrapolate, motion};
 use super::pose_fit::{FitContext, FitReport, FitScratch, TRACK, evaluate, limit};
 use crate::body::Pose;
 

@@ -1,8 +1,8 @@
 //! One frame (Algorithm 1): segment → track the subject → keep a reference for change detection.
 
 use super::change_detection::DepthReference;
+use super::extrapolation::motion;
 use super::gravity::rolled_camera;
-use super::kinematics::motion;
 use super::person_evidence::Verdict;
 use super::prediction::AT_REST;
 use super::report::Stopwatch;

@@ -6,7 +6,8 @@ use super::scratch::{FitContext, FitScratch};
 use crate::body::Pose;
 use crate::registration::PairingStats;
 use crate::tracking::TrackerModel;
-use crate::tracking::kinematics::{LEVER, apply};
+use crate::tracking::extrapolation::LEVER;
+use crate::tracking::kinematics::apply;
 
 /// Width of the kernel in comparisons of poses, metres.
 const COMPARED_SIGMA: f64 = 0.05;

@@ -28,7 +28,7 @@ struct UpperArm {
 
 /// Trunk and arms of one rest body.
 #[derive(Clone, Debug)]
-pub(super) struct ArmClearance {
+pub struct ArmClearance {
     arms: [UpperArm; 2],
     /// Section of each band, metres.
     sections: [EllipticSection; BANDS],
@@ -36,7 +36,7 @@ pub(super) struct ArmClearance {
 
 impl ArmClearance {
     /// `None` for a template without arms.
-    pub(super) fn new(template: &Template, rest: &RestBody) -> Option<Self> {
+    pub fn new(template: &Template, rest: &RestBody) -> Option<Self> {
         let limbs = [BodyPart::LeftArm, BodyPart::RightArm].map(|arm| template.parts().limb(arm));
         let joints = [limbs[0]?, limbs[1]?];
         let frame = TrunkFrame::new(rest.joints[0], joints.map(|j| rest.joints[j.root]))?;
@@ -55,7 +55,7 @@ impl ArmClearance {
     }
 
     /// The pose with both arms beside the trunk; the same pose where they are already. `bones` become those of the result.
-    pub(super) fn separate<F>(
+    pub fn separate<F>(
         &self,
         template: &Template,
         rest: &RestBody,
