@@ -95,6 +95,18 @@ pub(super) struct Leaf {
 }
 
 impl Leaf {
+    /// Squared distances of `p` from the triangles' boxes; NaN for absent ones.
+    fn distances_squared(&self, p: &P3) -> [f32; LEAF] {
+        let axis = |d: usize| {
+            let (low, high) = (f32x8::from(self.low[d]), f32x8::from(self.high[d]));
+            let beyond = (low - f32x8::splat(p[d])).fast_max(f32x8::splat(p[d]) - high);
+            // NaN boxes stay NaN.
+            let outside = beyond.simd_gt(f32x8::splat(0.0));
+            outside.select(beyond, beyond * f32x8::splat(0.0))
+        };
+        let [a, b, c] = [axis(0), axis(1), axis(2)];
+        (a * a + b * b + c * c).to_array()
+    }
     /// Triangles whose boxes overlap `b`.
     pub(super) fn overlapping(&self, b: &Bounds) -> impl Iterator<Item = u32> + '_ {
         let axis = |d: usize| {
@@ -111,6 +123,9 @@ impl Leaf {
         })
     }
 }
+
+/// Nodes that wait in a search for a closest point: one a level, of at most 2³² triangles.
+const DEPTH: usize = 40;
 
 /// The point of a surface closest to a query.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -270,33 +285,79 @@ impl Bvh {
 
     /// The surface point closest to `p`; `None` for an empty mesh.
     pub fn closest(&self, x: &[P3], p: &P3) -> Option<SurfacePoint> {
-        let bound = std::cell::Cell::new(f32::INFINITY);
-        let mut best = None;
-        self.traverse(
-            |n| n.distance_squared(p) < bound.get(),
-            |_, leaf| {
-                for face in self.leaves[leaf as usize]
-                    .faces
-                    .iter()
-                    .filter(|f| **f != NONE)
-                {
-                    let corners = self.corners(*face, x);
-                    let w = closest_on_triangle(p, corners);
-                    let sum = |k: usize| corners[k].coords * w[k];
-                    let point = P3::from(sum(0) + sum(1) + sum(2));
-                    let square = (point - p).norm_squared();
-                    if square < bound.get() {
-                        bound.set(square);
-                        best = Some(SurfacePoint {
-                            face: *face,
-                            point,
-                            distance: square.sqrt(),
-                        });
-                    }
+        self.closest_near(x, p, None)
+    }
+
+    /// [`Bvh::closest`], faster from the triangle `near`, whose distance bounds the search.
+    pub fn closest_near(&self, x: &[P3], p: &P3, near: Option<u32>) -> Option<SurfacePoint> {
+        let mut best = near
+            .filter(|f| (*f as usize) < self.faces.len())
+            .map(|f| self.point_of_face(x, p, f));
+        let mut bound = best.map_or(f32::INFINITY, |b| b.distance * b.distance);
+        // Nodes to visit with their distances; the nearer child is visited first.
+        let mut stack = [(0.0f32, 0u32); DEPTH];
+        let mut top = usize::from(!self.nodes.is_empty());
+        while top > 0 {
+            top -= 1;
+            let (distance, k) = stack[top];
+            if distance >= bound {
+                continue;
+            }
+            let node = &self.nodes[k as usize];
+            if node.leaf != NONE {
+                self.closest_of_leaf(x, p, node.leaf, (&mut bound, &mut best));
+                continue;
+            }
+            let children = [k + 1, self.nodes[k as usize + 1].skip];
+            let [left, right] =
+                children.map(|c| (self.nodes[c as usize].bounds.distance_squared(p), c));
+            let (first, second) = if left.0 <= right.0 {
+                (left, right)
+            } else {
+                (right, left)
+            };
+            for child in [second, first] {
+                if child.0 < bound && top < DEPTH {
+                    stack[top] = child;
+                    top += 1;
                 }
-            },
-        );
+            }
+        }
         best
+    }
+
+    fn point_of_face(&self, x: &[P3], p: &P3, face: u32) -> SurfacePoint {
+        let corners = self.corners(face, x);
+        let w = closest_on_triangle(p, corners);
+        let sum = |k: usize| corners[k].coords * w[k];
+        let point = P3::from(sum(0) + sum(1) + sum(2));
+        SurfacePoint {
+            face,
+            point,
+            distance: (point - p).norm(),
+        }
+    }
+
+    fn closest_of_leaf(
+        &self,
+        x: &[P3],
+        p: &P3,
+        leaf: u32,
+        (bound, best): (&mut f32, &mut Option<SurfacePoint>),
+    ) {
+        let leaf = &self.leaves[leaf as usize];
+        let boxes = leaf.distances_squared(p);
+        for (face, distance) in leaf.faces.iter().zip(boxes) {
+            // Absent triangles have NaN distances.
+            if distance < *bound {
+                let found = self.point_of_face(x, p, *face);
+                let square = found.distance * found.distance;
+                if square < *bound {
+                    *bound = square;
+                    *best = Some(found);
+                }
+            }
+        }
     }
 }
 
