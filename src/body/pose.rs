@@ -2,7 +2,7 @@
 
 use super::{JointMotion, RestBody, Skeleton};
 use crate::math::{Body, Camera, Rigid, exp_so3};
-use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Pose of a body in frame `F` (the depth camera unless said otherwise).
@@ -65,6 +65,15 @@ impl<F> Pose<F> {
             }
         }
     }
+    /// Rotations of the joints relative to their parents, of joint 0 relative to `F`, shape `[joints]`.
+    pub fn local_rotations(&self, skeleton: &Skeleton) -> Vec<UnitQuaternion<f64>> {
+        let local = |j| exp_so3(&self.rotation_vector(skeleton, j));
+        let mut out: Vec<_> = (0..skeleton.len()).map(local).collect();
+        if let Some(root) = out.first_mut() {
+            *root = self.root.iso().rotation * *root;
+        }
+        out
+    }
     /// Forward kinematics (eq. 2): transforms of all bones of the personalised rest body.
     pub fn bones(&self, skeleton: &Skeleton, rest: &RestBody, out: &mut BoneTransforms) {
         out.bones.clear();
@@ -99,5 +108,170 @@ impl<F> Pose<F> {
     /// Has finite numbers only.
     pub fn is_finite(&self) -> bool {
         self.root.is_finite() && self.angles.iter().all(|a| a.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::{BodyShape, SkinWeights, embedded, skin};
+    use crate::formats::gltf::skinned::decoded::posed_meshes;
+    use crate::formats::gltf::{
+        GlbInterpolation, GlbJoint, GlbJointMotion, GlbMesh, GlbMorphMotion, GlbMorphTarget,
+        SkinnedGlb, SkinnedMesh, encode_skinned_glb,
+    };
+    use crate::math::{P3, V3, World};
+    use crate::mesh::Face;
+    use crate::par::Par;
+    use nalgebra::distance;
+    use rand::{Rng, SeedableRng};
+    use rand_pcg::Pcg64Mcg;
+    use std::path::Path;
+
+    /// Times of the poses.
+    const SECONDS: [f64; 3] = [0.0, 0.04, 0.08];
+
+    /// Poses over time of a rest surface that has displacements of its own at each time.
+    struct Clip<'a> {
+        skeleton: &'a Skeleton,
+        rest: &'a RestBody,
+        weights: &'a SkinWeights,
+        faces: &'a [Face],
+        poses: Vec<Pose<World>>,
+        /// Shape `[times][vertices]`.
+        frames: Vec<Vec<V3>>,
+    }
+
+    impl Clip<'_> {
+        /// Fills poses, within the limits of joints, and displacements at random.
+        fn randomise(&mut self, rng: &mut Pcg64Mcg) {
+            for _ in SECONDS {
+                let mut vector = |size: f64| Vector3::from_fn(|_, _| rng.random_range(-size..size));
+                let root = Rigid::from_parts(vector(2.0), exp_so3(&vector(1.5)));
+                let mut pose = Pose::rest(self.skeleton, root);
+                for (angle, [lo, hi]) in pose.angles.iter_mut().zip(self.skeleton.limits()) {
+                    *angle = lo + (hi - lo) * rng.random::<f64>();
+                }
+                self.poses.push(pose);
+                let mut delta = || V3::from_fn(|_, _| rng.random_range(-0.02..0.02));
+                let frame = self.rest.vertices.iter().map(|_| delta()).collect();
+                self.frames.push(frame);
+            }
+        }
+
+        /// The clip as glTF: the body with its displacements, and its bare rest surface.
+        fn glb(&self) -> Vec<u8> {
+            let joints: Vec<GlbJoint<'_>> = self
+                .skeleton
+                .joints()
+                .iter()
+                .zip(&self.rest.joints)
+                .map(|(joint, rest)| GlbJoint {
+                    name: &joint.name,
+                    parent: joint.parent,
+                    rest: *rest,
+                })
+                .collect();
+            let roots = self
+                .poses
+                .iter()
+                .map(|p| p.root.point(&self.rest.joints[0]));
+            let roots: Vec<_> = roots.collect();
+            let rotations = self.poses.iter().map(|p| p.local_rotations(self.skeleton));
+            let rotations: Vec<_> = rotations.collect();
+            let names = ["frame 0", "frame 1", "frame 2"];
+            let targets: Vec<GlbMorphTarget<'_>> = names
+                .iter()
+                .zip(&self.frames)
+                .map(|(name, deltas)| GlbMorphTarget { name, deltas })
+                .collect();
+            let one_a_frame = [
+                vec![1.0, 0.0, 0.0],
+                vec![0.0, 1.0, 0.0],
+                vec![0.0, 0.0, 1.0],
+            ];
+
+            let bare = SkinnedMesh {
+                surface: GlbMesh {
+                    name: "bare",
+                    vertices: &self.rest.vertices,
+                    faces: self.faces,
+                    uv: &[],
+                    color: [200, 150, 120],
+                },
+                colors: &[],
+                joints: &self.weights.joints,
+                weights: &self.weights.weights,
+                targets: &[],
+                target_weights: &[],
+                target_motion: None,
+            };
+            let displaced = SkinnedMesh {
+                surface: GlbMesh {
+                    name: "displaced",
+                    ..bare.surface
+                },
+                targets: &targets,
+                target_motion: Some(GlbMorphMotion {
+                    seconds: &SECONDS,
+                    weights: &one_a_frame,
+                    interpolation: GlbInterpolation::Step,
+                }),
+                ..bare
+            };
+            let scene = SkinnedGlb {
+                joints: &joints,
+                meshes: &[displaced, bare],
+                motion: Some(GlbJointMotion {
+                    seconds: &SECONDS,
+                    roots: &roots,
+                    rotations: &rotations,
+                }),
+            };
+            encode_skinned_glb(&scene, Path::new("clip.glb")).expect("encodes")
+        }
+
+        /// Skinned vertices of a rest surface at a time.
+        fn skinned(&self, time: usize, rest: &[P3]) -> Vec<P3> {
+            let (mut bones, mut out) = (BoneTransforms::default(), Vec::new());
+            self.poses[time].bones(self.skeleton, self.rest, &mut bones);
+            skin(Par::Seq, rest, self.weights, &bones, &mut out);
+            out
+        }
+    }
+
+    #[test]
+    fn a_skinned_gltf_file_reproduces_poses() {
+        let template = embedded::template();
+        let shape = BodyShape {
+            coefficients: vec![1.5, -1.0],
+            ..BodyShape::default()
+        };
+        let mut clip = Clip {
+            skeleton: template.skeleton(),
+            rest: &template.personalise(&shape),
+            weights: template.weights(),
+            faces: template.mesh().faces(),
+            poses: Vec::new(),
+            frames: Vec::new(),
+        };
+        clip.randomise(&mut Pcg64Mcg::seed_from_u64(7));
+
+        let bytes = clip.glb();
+        for (time, seconds) in SECONDS.iter().enumerate() {
+            let rest = &clip.rest.vertices;
+            let moved = rest.iter().zip(&clip.frames[time]).map(|(p, d)| p + d);
+            let moved: Vec<P3> = moved.collect();
+            let found = posed_meshes(&bytes, *seconds as f32);
+            assert_eq!(found.len(), 2);
+            for (mesh, rest) in found.iter().zip([&moved, rest]) {
+                let expected = clip.skinned(time, rest);
+                assert_eq!(mesh.vertices.len(), expected.len());
+                for (i, (p, q)) in mesh.vertices.iter().zip(&expected).enumerate() {
+                    let error = distance(p, q);
+                    assert!(error < 1e-5, "{}, vertex {i}: {error} m", mesh.name);
+                }
+            }
+        }
     }
 }

@@ -16,13 +16,16 @@ mod motion_clip;
 pub mod npy;
 pub mod npz;
 pub mod obj;
+mod obj_records;
 mod position_codec;
 mod recording;
 mod rgbd_folder;
 mod rgbd_source;
+pub mod scan;
 pub mod sewn_obj;
 #[cfg(test)]
 mod shared_data;
+mod sibling;
 
 pub use error::FormatError;
 pub use mcap_file::{McapReader, McapWriter};

@@ -2,6 +2,7 @@
 
 use super::FormatError;
 use super::image::read_limited;
+use super::obj_records::{ObjFaults, parse_records};
 use crate::math::P3;
 use crate::mesh::{Face, TriMesh};
 use std::fmt::Write as _;
@@ -69,94 +70,15 @@ pub fn read_obj(path: &Path) -> Result<ObjMesh, FormatError> {
 /// # Errors
 /// As [`read_obj`].
 pub fn parse_obj(text: &str, origin: &Path) -> Result<ObjMesh, FormatError> {
-    let (mut vertices, mut uv) = (Vec::<P3>::new(), Vec::<[f32; 2]>::new());
-    let (mut faces, mut face_uv) = (Vec::<Face>::new(), Vec::<Face>::new());
-    let mut all_textured = true;
-    for (number, line) in text.lines().enumerate() {
-        let at = |what: &str, why: String| {
-            FormatError::field(origin, format!("line {}: {what}", number + 1), why)
-        };
-        let mut words = line.split_whitespace();
-        match words.next() {
-            Some("v") => {
-                let [x, y, z] = numbers(words).map_err(|why| at("vertex", why))?;
-                vertices.push(P3::new(x, y, z));
-            }
-            Some("vt") => uv.push(numbers(words).map_err(|why| at("texture coordinate", why))?),
-            Some("f") => {
-                let name = format!("face {}", faces.len());
-                let (mut corner, mut texture) = (Vec::new(), Vec::new());
-                for word in words.take_while(|w| !w.starts_with('#')) {
-                    let mut parts = word.split('/');
-                    corner.push(
-                        index(parts.next(), vertices.len())
-                            .map_err(|why| at(&name, format!("vertex {why}")))?,
-                    );
-                    match parts.next().filter(|p| !p.is_empty()) {
-                        None => all_textured = false,
-                        part => texture.push(
-                            index(part, uv.len())
-                                .map_err(|why| at(&name, format!("texture coordinate {why}")))?,
-                        ),
-                    }
-                }
-                if corner.len() < 3 {
-                    return Err(at(
-                        &name,
-                        format!("{} corners; a face needs at least 3", corner.len()),
-                    ));
-                }
-                for k in 1..corner.len() - 1 {
-                    let f = [corner[0], corner[k], corner[k + 1]];
-                    if f[0] == f[1] || f[1] == f[2] || f[0] == f[2] {
-                        return Err(at(&name, "a vertex is used twice".into()));
-                    }
-                    faces.push(f);
-                    if texture.len() == corner.len() {
-                        face_uv.push([texture[0], texture[k], texture[k + 1]]);
-                    }
-                }
-            }
-            _ => {}
-        }
-    }
-    if !all_textured {
-        face_uv.clear();
-    }
-    let mesh = TriMesh::new(vertices, faces)
+    let records = parse_records(text, origin, ObjFaults::Refused)?;
+    let face_uv: Option<Vec<Face>> = records.face_uv.into_iter().collect();
+    let mesh = TriMesh::new(records.vertices, records.faces)
         .map_err(|e| FormatError::field(origin, "mesh", e.to_string()))?;
-    Ok(ObjMesh { mesh, uv, face_uv })
-}
-
-fn numbers<'a, const N: usize>(words: impl Iterator<Item = &'a str>) -> Result<[f32; N], String> {
-    let mut out = [0.0; N];
-    let mut words = words;
-    for (k, slot) in out.iter_mut().enumerate() {
-        let word = words
-            .next()
-            .ok_or_else(|| format!("{k} numbers; {N} are needed"))?;
-        let value: f32 = word.parse().map_err(|_| format!("`{word}` is no number"))?;
-        if !value.is_finite() {
-            return Err(format!("`{word}` is not finite"));
-        }
-        *slot = value;
-    }
-    Ok(out)
-}
-
-/// Index of an element: OBJ counts from 1, negative numbers count back from the last element so far.
-fn index(word: Option<&str>, count: usize) -> Result<u32, String> {
-    let word = word.unwrap_or("");
-    let i: i64 = word
-        .parse()
-        .map_err(|_| format!("index `{word}` is no whole number"))?;
-    let at = if i < 0 { count as i64 + i } else { i - 1 };
-    if i == 0 || at < 0 || at >= count as i64 {
-        return Err(format!(
-            "index {i} is out of range (the file has {count} so far, counted from 1)"
-        ));
-    }
-    u32::try_from(at).map_err(|_| format!("index {i} is too large"))
+    Ok(ObjMesh {
+        mesh,
+        uv: records.uv,
+        face_uv: face_uv.unwrap_or_default(),
+    })
 }
 
 /// Writes positions, faces and, if given, one texture coordinate a vertex.

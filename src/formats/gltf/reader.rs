@@ -1,18 +1,19 @@
-//! Meshes from glTF. Every accessor is checked against the size of its buffer before it is read.
+//! Meshes from glTF, and the same with the base colours of their vertices for scans.
 
+use super::accessors::Accessors;
+use super::base_colors::BaseColors;
+use super::uri::MAX_BYTES;
 use crate::formats::FormatError;
 use crate::formats::image::read_limited;
 use crate::math::P3;
-use crate::mesh::{Face, TriMesh};
-use ::gltf::accessor::{DataType, Dimensions};
+use crate::mesh::{Face, MeshError, TriMesh};
+use ::gltf::accessor::DataType;
 use ::gltf::mesh::Mode;
-use ::gltf::{Accessor, Gltf, Node, Primitive, Semantic};
+use ::gltf::{Document, Gltf, Node, Primitive, Semantic};
 use nalgebra::Matrix4;
 use std::ops::Range;
-use std::path::{Component, Path};
+use std::path::Path;
 
-/// Largest file; a garment of 100,000 vertices takes 4 MB without its textures.
-const MAX_BYTES: u64 = 512 << 20;
 /// Deepest scene; deeper ones are cycles.
 const MAX_DEPTH: usize = 64;
 /// Most nodes of a scene; nodes shared by many parents multiply.
@@ -44,13 +45,26 @@ pub struct GltfPart {
     pub double_sided: bool,
 }
 
+/// Scene as stored: positions may be non-finite and faces degenerate; indices are in range.
+pub(in crate::formats) struct GltfScan {
+    /// Positions of all primitives, node transforms applied.
+    pub(in crate::formats) points: Vec<P3>,
+    /// Triangles.
+    pub(in crate::formats) faces: Vec<Face>,
+    /// Base colours, sRGB, 0 to 255, shape `[points]`; NaN where a primitive has none.
+    pub(in crate::formats) colors: Vec<[f32; 3]>,
+}
+
 /// Triangles read so far, and the buffers they come from.
 struct SceneReader<'a> {
     path: &'a Path,
-    buffers: Vec<Vec<u8>>,
+    accessors: &'a Accessors,
+    /// Present for scans, which have colours and unchecked geometry.
+    base_colors: Option<BaseColors<'a>>,
     vertices: Vec<P3>,
     faces: Vec<Face>,
     uv: Vec<[f32; 2]>,
+    colors: Vec<[f32; 3]>,
     parts: Vec<GltfPart>,
     nodes: usize,
 }
@@ -68,52 +82,9 @@ pub fn read_glb(path: &Path) -> Result<GltfModel, FormatError> {
 /// # Errors
 /// As [`read_glb`].
 pub fn parse_gltf(bytes: &[u8], origin: &Path) -> Result<GltfModel, FormatError> {
-    check_container(bytes, origin)?;
-    check_positions(bytes, origin)?;
-    let Gltf { document, blob } =
-        Gltf::from_slice(bytes).map_err(|e| FormatError::field(origin, "gltf", e.to_string()))?;
-    let mut blob = blob;
-    let mut buffers = Vec::new();
-    for b in document.buffers() {
-        let field = format!("buffer {}", b.index());
-        let data = match b.source() {
-            ::gltf::buffer::Source::Bin => blob.take().ok_or_else(|| {
-                FormatError::field(origin, &field, "the file has no binary chunk")
-            })?,
-            ::gltf::buffer::Source::Uri(uri) => external(uri, origin, &field)?,
-        };
-        if data.len() < b.length() {
-            let why = format!("{} bytes, {} announced", data.len(), b.length());
-            return Err(FormatError::field(origin, field, why));
-        }
-        buffers.push(data);
-    }
-    let mut file = SceneReader {
-        path: origin,
-        buffers,
-        vertices: Vec::new(),
-        faces: Vec::new(),
-        uv: Vec::new(),
-        parts: Vec::new(),
-        nodes: 0,
-    };
-    let scene = document
-        .default_scene()
-        .or_else(|| document.scenes().next());
-    let scene = scene.ok_or_else(|| FormatError::field(origin, "scene", "none"))?;
-    for node in scene.nodes() {
-        file.node(&node, &Matrix4::identity(), 0)?;
-    }
-    if file.vertices.len() > MAX_VERTICES {
-        return Err(FormatError::field(
-            origin,
-            "meshes",
-            format!("more than {MAX_VERTICES} vertices"),
-        ));
-    }
-    if file.faces.is_empty() {
-        return Err(FormatError::field(origin, "meshes", "no triangles"));
-    }
+    let (document, accessors) = open(bytes, origin)?;
+    let mut file = SceneReader::new(origin, &accessors);
+    file.scene(&document)?;
     let SceneReader {
         vertices,
         faces,
@@ -127,6 +98,49 @@ pub fn parse_gltf(bytes: &[u8], origin: &Path) -> Result<GltfModel, FormatError>
     let mesh = TriMesh::new(vertices, faces)
         .map_err(|e| FormatError::field(origin, "mesh", e.to_string()))?;
     Ok(GltfModel { mesh, uv, parts })
+}
+
+/// Reads all triangles of the default scene with the base colours of their vertices.
+///
+/// # Errors
+/// As [`read_glb`], except for positions that are not finite and degenerate faces; names a texture that is missing.
+pub(in crate::formats) fn read_gltf_scan(path: &Path) -> Result<GltfScan, FormatError> {
+    let (document, accessors) = open(&read_limited(path, MAX_BYTES)?, path)?;
+    let mut file = SceneReader::new(path, &accessors);
+    file.base_colors = Some(BaseColors::new(path, &document, &accessors));
+    file.scene(&document)?;
+    Ok(GltfScan {
+        points: file.vertices,
+        faces: file.faces,
+        colors: file.colors,
+    })
+}
+
+/// Checks the container, parses the document and reads its buffers.
+fn open(bytes: &[u8], origin: &Path) -> Result<(Document, Accessors), FormatError> {
+    check_container(bytes, origin)?;
+    check_positions(bytes, origin)?;
+    let Gltf { document, blob } =
+        Gltf::from_slice(bytes).map_err(|e| FormatError::field(origin, "gltf", e.to_string()))?;
+    let accessors = Accessors::read(&document, blob, origin)?;
+    Ok((document, accessors))
+}
+
+/// Checks the vertex indices of faces, which may be degenerate.
+fn check_range(faces: &[Face], vertices: usize) -> Result<(), String> {
+    let mut corners = faces
+        .iter()
+        .enumerate()
+        .flat_map(|(f, c)| c.iter().map(move |i| (f, *i)));
+    match corners.find(|(_, i)| *i as usize >= vertices) {
+        None => Ok(()),
+        Some((face, index)) => Err(MeshError::IndexOutOfRange {
+            face,
+            index,
+            vertices,
+        }
+        .to_string()),
+    }
 }
 
 /// Checks the lengths of header and chunks against the number of bytes.
@@ -198,53 +212,43 @@ fn check_positions(bytes: &[u8], origin: &Path) -> Result<(), FormatError> {
     Ok(())
 }
 
-/// Bytes of a data URI, or of a file in the folder of `origin`.
-fn external(uri: &str, origin: &Path, field: &str) -> Result<Vec<u8>, FormatError> {
-    if let Some(data) = uri.strip_prefix("data:") {
-        let text = data.split_once(";base64,").map(|d| d.1);
-        let bytes = text.and_then(base64);
-        return bytes
-            .ok_or_else(|| FormatError::field(origin, field, "a data URI that is no base64"));
-    }
-    let relative = Path::new(uri);
-    if !relative
-        .components()
-        .all(|c| matches!(c, Component::Normal(_)))
-    {
-        return Err(FormatError::field(
-            origin,
-            field,
-            format!("`{uri}` leads out of the folder"),
-        ));
-    }
-    read_limited(&origin.with_file_name("").join(relative), MAX_BYTES)
-}
-
-/// Decodes base64 (RFC 4648, section 4).
-fn base64(text: &str) -> Option<Vec<u8>> {
-    let mut out = Vec::with_capacity(text.len() / 4 * 3);
-    let (mut bits, mut have) = (0u32, 0);
-    for c in text.trim_end_matches('=').bytes() {
-        let value = match c {
-            b'A'..=b'Z' => c - b'A',
-            b'a'..=b'z' => c - b'a' + 26,
-            b'0'..=b'9' => c - b'0' + 52,
-            b'+' => 62,
-            b'/' => 63,
-            _ => return None,
-        };
-        bits = bits << 6 | u32::from(value);
-        have += 6;
-        if have >= 8 {
-            have -= 8;
-            out.push((bits >> have) as u8);
-            bits &= (1 << have) - 1;
+impl<'a> SceneReader<'a> {
+    fn new(path: &'a Path, accessors: &'a Accessors) -> Self {
+        Self {
+            path,
+            accessors,
+            base_colors: None,
+            vertices: Vec::new(),
+            faces: Vec::new(),
+            uv: Vec::new(),
+            colors: Vec::new(),
+            parts: Vec::new(),
+            nodes: 0,
         }
     }
-    Some(out)
-}
 
-impl SceneReader<'_> {
+    /// Reads the default scene, or the first.
+    fn scene(&mut self, document: &Document) -> Result<(), FormatError> {
+        let path = self.path;
+        let fault = |field: &str, why: String| Err(FormatError::field(path, field, why));
+        let scene = document
+            .default_scene()
+            .or_else(|| document.scenes().next());
+        let Some(scene) = scene else {
+            return fault("scene", "none".into());
+        };
+        for node in scene.nodes() {
+            self.node(&node, &Matrix4::identity(), 0)?;
+        }
+        if self.vertices.len() > MAX_VERTICES {
+            return fault("meshes", format!("more than {MAX_VERTICES} vertices"));
+        }
+        if self.faces.is_empty() {
+            return fault("meshes", "no triangles".into());
+        }
+        Ok(())
+    }
+
     /// Adds a node and its children; `above` is the transform of the parent.
     fn node(
         &mut self,
@@ -296,6 +300,7 @@ impl SceneReader<'_> {
             .get(&Semantic::Positions)
             .ok_or_else(|| fault("POSITION", "missing".into()))?;
         let positions: Vec<[f32; 3]> = self
+            .accessors
             .floats(&positions)
             .map_err(|why| fault("POSITION", why))?;
         let vertices: Vec<P3> = positions
@@ -303,9 +308,10 @@ impl SceneReader<'_> {
             .map(|v| place.transform_point(&P3::from(v)))
             .collect();
         let uv = match p.get(&Semantic::TexCoords(0)) {
-            Some(a) if a.data_type() == DataType::F32 => {
-                self.floats(&a).map_err(|why| fault("TEXCOORD_0", why))?
-            }
+            Some(a) if a.data_type() == DataType::F32 => self
+                .accessors
+                .floats(&a)
+                .map_err(|why| fault("TEXCOORD_0", why))?,
             _ => Vec::new(),
         };
         if !uv.is_empty() && uv.len() != vertices.len() {
@@ -315,7 +321,10 @@ impl SceneReader<'_> {
             ));
         }
         let corners: Vec<u32> = match p.indices() {
-            Some(a) => self.indices(&a).map_err(|why| fault("indices", why))?,
+            Some(a) => self
+                .accessors
+                .indices(&a)
+                .map_err(|why| fault("indices", why))?,
             None => (0..vertices.len() as u32).collect(),
         };
         if !corners.len().is_multiple_of(3) {
@@ -328,12 +337,18 @@ impl SceneReader<'_> {
             .chunks_exact(3)
             .map(|c| [c[0], c[1], c[2]])
             .collect();
-        // Checked alone first, so that an error names the primitive's own face and vertex.
-        let mesh = TriMesh::new(vertices, faces).map_err(|e| fault("mesh", e.to_string()))?;
-        let (base, first) = (self.vertices.len() as u32, self.faces.len());
-        self.vertices.extend(mesh.vertices());
-        self.faces
-            .extend(mesh.faces().iter().map(|f| f.map(|i| i + base)));
+        let first = self.faces.len();
+        if let Some(base_colors) = &mut self.base_colors {
+            check_range(&faces, vertices.len()).map_err(|why| fault("mesh", why))?;
+            let colors = base_colors.of_primitive(p, vertices.len());
+            self.colors
+                .extend(colors.map_err(|why| fault("base colour", why))?);
+            self.append(&vertices, &faces);
+        } else {
+            // Checked alone first, so that an error names the primitive's own face and vertex.
+            let mesh = TriMesh::new(vertices, faces).map_err(|e| fault("mesh", e.to_string()))?;
+            self.append(mesh.vertices(), mesh.faces());
+        }
         self.uv.extend(uv);
         let material = p.material();
         self.parts.push(GltfPart {
@@ -345,99 +360,10 @@ impl SceneReader<'_> {
         Ok(())
     }
 
-    /// Bytes of each element of an accessor.
-    fn elements<'s>(&'s self, a: &Accessor<'_>, size: usize) -> Result<Vec<&'s [u8]>, String> {
-        if a.sparse().is_some() {
-            return Err("sparse accessors are not supported; export without them".into());
-        }
-        let view = a.view().ok_or("no buffer view")?;
-        let stride = view.stride().unwrap_or(size).max(size);
-        let buffer = self
-            .buffers
-            .get(view.buffer().index())
-            .ok_or("no such buffer")?;
-        let end = view
-            .offset()
-            .checked_add(view.length())
-            .filter(|e| *e <= buffer.len());
-        let data = &buffer[view.offset().min(buffer.len())
-            ..end.ok_or("the buffer view is longer than its buffer")?];
-        let data = data
-            .get(a.offset()..)
-            .ok_or("it starts beyond its buffer view")?;
-        let need = a
-            .count()
-            .checked_sub(1)
-            .and_then(|n| n.checked_mul(stride))
-            .and_then(|n| n.checked_add(size));
-        match need {
-            None => Ok(Vec::new()),
-            Some(need) if need > data.len() => Err(format!(
-                "{} elements are more than its buffer view holds",
-                a.count()
-            )),
-            Some(_) => Ok((0..a.count())
-                .map(|i| &data[i * stride..i * stride + size])
-                .collect()),
-        }
-    }
-    fn floats<const N: usize>(&self, a: &Accessor<'_>) -> Result<Vec<[f32; N]>, String> {
-        if a.data_type() != DataType::F32 || a.dimensions().multiplicity() != N {
-            return Err(format!(
-                "{:?} of {:?}, expected {N} floats",
-                a.dimensions(),
-                a.data_type()
-            ));
-        }
-        let float = |e: &[u8], k: usize| {
-            f32::from_le_bytes([e[4 * k], e[4 * k + 1], e[4 * k + 2], e[4 * k + 3]])
-        };
-        Ok(self
-            .elements(a, 4 * N)?
-            .into_iter()
-            .map(|e| std::array::from_fn(|k| float(e, k)))
-            .collect())
-    }
-    fn indices(&self, a: &Accessor<'_>) -> Result<Vec<u32>, String> {
-        if a.dimensions() != Dimensions::Scalar {
-            return Err("expected scalars".into());
-        }
-        Ok(match a.data_type() {
-            DataType::U8 => self
-                .elements(a, 1)?
-                .into_iter()
-                .map(|e| u32::from(e[0]))
-                .collect(),
-            DataType::U16 => self
-                .elements(a, 2)?
-                .into_iter()
-                .map(|e| u16::from_le_bytes([e[0], e[1]]).into())
-                .collect(),
-            DataType::U32 => self
-                .elements(a, 4)?
-                .into_iter()
-                .map(|e| u32::from_le_bytes([e[0], e[1], e[2], e[3]]))
-                .collect(),
-            other => return Err(format!("{other:?}, expected unsigned integers")),
-        })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn base64_matches_the_vectors_of_rfc_4648() {
-        for (text, want) in [
-            ("", ""),
-            ("Zg==", "f"),
-            ("Zm8=", "fo"),
-            ("Zm9v", "foo"),
-            ("Zm9vYmFy", "foobar"),
-        ] {
-            assert_eq!(base64(text).as_deref(), Some(want.as_bytes()));
-        }
-        assert_eq!(base64("Zm9*"), None);
+    /// Adds the vertices and faces of a primitive.
+    fn append(&mut self, vertices: &[P3], faces: &[Face]) {
+        let base = self.vertices.len() as u32;
+        self.vertices.extend(vertices);
+        self.faces.extend(faces.iter().map(|f| f.map(|i| i + base)));
     }
 }

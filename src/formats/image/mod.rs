@@ -7,6 +7,7 @@ mod files;
 mod jpeg;
 mod limits;
 mod png_file;
+mod sample;
 
 pub use depth_codec::{decode_depth, encode_depth};
 pub use files::{decode_color, read_color, read_png_depth, write_png_depth, write_png_rgb};
@@ -14,3 +15,4 @@ pub use jpeg::{decode_jpeg, encode_jpeg};
 pub use limits::{MAX_PIXELS, MAX_SIDE};
 pub(super) use limits::{check_size, read_limited};
 pub use png_file::{decode_png_color, decode_png_depth, encode_png_depth, encode_png_rgb};
+pub(super) use sample::sample_texture;

@@ -1,0 +1,21 @@
+//! Triangle mesh of a coloured scan, as its file stores it.
+
+use crate::math::{P3, V3};
+use crate::mesh::Face;
+
+/// Coloured scan in the units and axes of its file.
+///
+/// Face indices are in range. Positions may be non-finite and faces degenerate: later stages filter both.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ScanMesh {
+    /// Positions, shape `[points]`.
+    pub points: Vec<P3>,
+    /// Triangles; polygons are fanned.
+    pub faces: Vec<Face>,
+    /// Normals as a PLY file stores them, shape `[points]`; empty if absent and for other formats.
+    pub normals: Vec<V3>,
+    /// Colours, sRGB, shape `[points]`; empty if absent.
+    ///
+    /// A point without a finite colour has the mean colour of the scan.
+    pub colors: Vec<[u8; 3]>,
+}

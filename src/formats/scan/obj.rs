@@ -1,0 +1,32 @@
+//! Scans from OBJ: colours of the vertices, or else of the texture.
+
+use super::colors::{is_finite, quantized, white};
+use super::mesh::ScanMesh;
+use super::texture::corner_colors;
+use crate::formats::FormatError;
+use crate::formats::image::read_limited;
+use crate::formats::obj_records::{ObjFaults, parse_records};
+use std::path::Path;
+
+/// Largest OBJ scan, bytes; a scan of 5 million vertices takes about 1 GB.
+const MAX_BYTES: u64 = 2 << 30;
+
+/// Reads an `.obj` scan; vertex colours (`v x y z r g b`) win over materials.
+///
+/// # Errors
+/// Names the line at fault, or the material library or texture that is missing.
+pub(super) fn read_obj_scan(path: &Path) -> Result<ScanMesh, FormatError> {
+    let bytes = read_limited(path, MAX_BYTES)?;
+    let records = parse_records(&String::from_utf8_lossy(&bytes), path, ObjFaults::Kept)?;
+    let colors = if records.colors.iter().any(is_finite) {
+        quantized(&records.colors, white(&records.colors))
+    } else {
+        quantized(&corner_colors(&records, path)?, 255.0)
+    };
+    Ok(ScanMesh {
+        points: records.vertices,
+        faces: records.faces,
+        normals: Vec::new(),
+        colors,
+    })
+}
