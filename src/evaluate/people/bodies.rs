@@ -219,6 +219,12 @@ impl<'a> MorphBase<'a> {
     }
 }
 
+/// True for a body with a coat or long hair as part of its surface.
+pub(super) fn is_covered(name: &str) -> bool {
+    let recipe = RECIPES.iter().find(|r| r.name == name);
+    recipe.is_some_and(|r| r.physique.covering.is_some())
+}
+
 /// All bodies; none without `data` or without the base mesh in it.
 ///
 /// # Errors

@@ -18,6 +18,7 @@ pub use bars::{Bar, BarTable};
 pub use plan::{CaseSet, PeoplePlan};
 
 use super::EvaluateError;
+use crate::synth::Actor;
 use bodies::bodies;
 use contact_sheet::ContactSheet;
 use std::path::Path;
@@ -36,6 +37,16 @@ pub const ROWS: [(&str, Option<&str>); 8] = [
 
 /// Frames of each shared sequence in a quick run.
 const QUICK_FRAMES: usize = 90;
+
+/// Bare bodies far outside the embedded body's shape space, by name; none without MakeHuman's base mesh in `data`.
+///
+/// # Errors
+/// Names the body whose files cannot be read.
+pub fn unlike_actors(data: &Path) -> Result<Vec<(String, Actor)>, EvaluateError> {
+    let bare = bodies(Some(data))?.into_iter();
+    let bare = bare.filter(|p| !bodies::is_covered(&p.name));
+    Ok(bare.map(|p| (p.name, p.actor)).collect())
+}
 
 /// Measures the rows of a plan; `done` receives the name of each row after it.
 ///

@@ -1,0 +1,43 @@
+//! Dressed, coloured 4D scans with truth per point: the judge of garment capture.
+//!
+//! A [`ScanScene`] dresses a body, simulates its garments over a motion and scans the visible surface with a ring of
+//! virtual cameras. Scans are functions of the scene: the same bits every time.
+//!
+//! ```no_run
+//! use tryon::evaluate::scans::{ScanScene, write_scan_folder};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scene = ScanScene {
+//!     scans: 3,
+//!     ..ScanScene::library(&["trousers", "tshirt"])?
+//! };
+//! for scan in scene.scans()? {
+//!     assert_eq!(scan.points.len(), scan.labels.len());
+//! }
+//! write_scan_folder("scans".as_ref(), &scene)?;
+//! # Ok(())
+//! # }
+//! ```
+
+mod cloth_run;
+mod defects;
+mod motion;
+mod paint;
+mod points;
+mod sampling;
+mod scanner;
+mod scene;
+mod surface;
+#[cfg(test)]
+mod tests;
+mod view;
+mod write;
+
+pub use cloth_run::ScanGarment;
+pub use defects::ScanDefects;
+pub use motion::ScanMotion;
+pub use paint::ScanPalette;
+pub use points::{SKIN_LABEL, STRAY_LABEL};
+pub use scanner::ScannerSetting;
+pub use scene::{ScanScene, TrueGarment, TrueScan};
+pub use write::write_scan_folder;
