@@ -92,11 +92,6 @@ const MODULES: &[(u8, &str, &str)] = &[
     ),
     (
         4,
-        "clothcap",
-        "Garments from scans: alignment, segmentation, multi-part templates, undressing, retargeting.",
-    ),
-    (
-        4,
         "composite",
         "The captured image and the garments in one picture: visibility, shading, edges.",
     ),
@@ -114,6 +109,11 @@ const MODULES: &[(u8, &str, &str)] = &[
         5,
         "synth",
         "Synthetic people, garments, cameras and sequences with known truth.",
+    ),
+    (
+        5,
+        "clothcap",
+        "Garments from scans: alignment, segmentation, multi-part templates, undressing, retargeting.",
     ),
     (
         5,

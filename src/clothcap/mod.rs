@@ -1,1 +1,32 @@
 //! Garments from scans: alignment, segmentation, multi-part templates, undressing, retargeting.
+
+pub mod align;
+pub mod archive;
+mod capture;
+mod dress_body;
+mod error;
+mod layers;
+pub mod mrf;
+pub mod multi;
+mod part_colors;
+pub mod picture;
+mod population;
+pub mod retarget;
+pub mod scan;
+pub mod segment;
+mod segmenter;
+#[cfg(test)]
+mod test_scans;
+#[cfg(test)]
+mod tests;
+mod undress;
+mod unpose;
+mod virtual_camera;
+
+pub use capture::{CaptureConfig, CapturedOutfit, FrameCapture, FrameReport, OutfitCapture};
+pub use dress_body::{BodyDresser, DressedPose};
+pub use error::CaptureError;
+pub use population::population;
+pub use segmenter::{ScanSegmenter, SegmentedScan};
+pub use undress::Undressed;
+pub use unpose::{blended, unpose};

@@ -9,6 +9,7 @@ mod company;
 mod dance;
 mod dressing_meshes;
 mod drift;
+mod garment_capture;
 mod garment_stream;
 mod garments;
 mod seat;

@@ -37,6 +37,8 @@ pub(crate) enum Command {
     Simulate(SimulateArgs),
     /// Draw garment meshes (in the camera's frame) into one captured picture.
     Composite(CompositeArgs),
+    /// Garments from 3D scans of a person: align, segment, capture, and dress other bodies.
+    Clothcap(ClothcapArgs),
     /// Check a body, garment or recording made elsewhere and convert it to this product's own form.
     Import(ImportArgs),
     /// Write the embedded body or a garment to OBJ, glTF or JSON.
@@ -276,6 +278,30 @@ pub(crate) enum BenchWhat {
     Cloth(BenchClothArgs),
     /// Tracking of everyone who walks in: people, postures and sides from nothing, stills and recordings.
     People(BenchPeopleArgs),
+    /// Garment capture on dressed scans with truth: labels, boundaries, surfaces, the body below, other bodies.
+    Clothcap(BenchClothcapArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchClothcapArgs {
+    /// Folder for clothcap.csv, .json and .svg.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Only scenes whose name contains one of these.
+    #[arg(long, value_name = "TEXT", value_delimiter = ',')]
+    pub(crate) only: Vec<String>,
+    /// The third of the scenes that is kept apart, instead of the other two thirds.
+    #[arg(long)]
+    pub(crate) unseen: bool,
+    /// Also without prior and without smoothness.
+    #[arg(long)]
+    pub(crate) ablation: bool,
+    /// Bodies that each outfit is retargeted to.
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    pub(crate) bodies: usize,
+    /// Worker threads; 0 means one per core.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub(crate) threads: usize,
 }
 
 #[derive(Debug, Args)]
@@ -377,4 +403,131 @@ pub(crate) struct DoctorArgs {
     /// Print JSON instead of text.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ClothcapArgs {
+    /// Stage to run.
+    #[command(subcommand)]
+    pub(crate) what: ClothcapWhat,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum ClothcapWhat {
+    /// Align the body template to each scan: NAME.ply and report.json.
+    Align(ClothcapAlignArgs),
+    /// Label the points of each scan by garment: NAME.ply with `label`, and labels.json.
+    Segment(ClothcapSegmentArgs),
+    /// Capture the garments and the body under them. A stopped capture continues where it ended.
+    Capture(ClothcapCaptureArgs),
+    /// Dress other bodies in a capture: NAME.glb with skin and morph targets, report.json, a contact sheet.
+    Retarget(ClothcapRetargetArgs),
+}
+
+/// Scans of one subject.
+#[derive(Debug, Args)]
+pub(crate) struct ScanArgs {
+    /// A scan (.ply, .obj, .glb, .gltf), or a folder of them: a sequence.
+    #[arg(long, value_name = "DIR|FILE")]
+    pub(crate) scans: PathBuf,
+    /// Body template in SMPL layout; the embedded body without it.
+    #[arg(long, value_name = "NPZ")]
+    pub(crate) body: Option<PathBuf>,
+    /// Metres per unit of the scans; without it unit and up axis are found.
+    #[arg(long, value_name = "METRES")]
+    pub(crate) unit: Option<f64>,
+    /// Direction against gravity in the scans (with --unit).
+    #[arg(long, value_name = "AXIS", default_value = "y", requires = "unit")]
+    pub(crate) up: UpAxis,
+    /// Worker threads; 0 means one per core.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub(crate) threads: usize,
+}
+
+/// Direction against gravity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum UpAxis {
+    X,
+    Y,
+    Z,
+    #[value(name = "-x")]
+    MinusX,
+    #[value(name = "-y")]
+    MinusY,
+    #[value(name = "-z")]
+    MinusZ,
+}
+
+impl UpAxis {
+    /// Unit vector.
+    pub(crate) fn vector(self) -> [f64; 3] {
+        match self {
+            Self::X => [1.0, 0.0, 0.0],
+            Self::Y => [0.0, 1.0, 0.0],
+            Self::Z => [0.0, 0.0, 1.0],
+            Self::MinusX => [-1.0, 0.0, 0.0],
+            Self::MinusY => [0.0, -1.0, 0.0],
+            Self::MinusZ => [0.0, 0.0, -1.0],
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ClothcapAlignArgs {
+    #[command(flatten)]
+    pub(crate) scans: ScanArgs,
+    /// Folder for results.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ClothcapSegmentArgs {
+    #[command(flatten)]
+    pub(crate) scans: ScanArgs,
+    /// Garments worn: some of top, under, bottom, one_piece, shoes with commas between, or a JSON file
+    /// {"garments": [...]}; without it they are found.
+    #[arg(long, value_name = "NAMES|FILE")]
+    pub(crate) prior: Option<String>,
+    /// Folder for results.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ClothcapCaptureArgs {
+    #[command(flatten)]
+    pub(crate) scans: ScanArgs,
+    /// Garments worn, as for segment; without it they are found.
+    #[arg(long, value_name = "NAMES|FILE")]
+    pub(crate) prior: Option<String>,
+    /// Folder for results: capture.json, frames/, pictures/, report.json.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+#[command(group(clap::ArgGroup::new("bodies").required(true).args(["body", "population"])))]
+pub(crate) struct ClothcapRetargetArgs {
+    /// Folder of a capture.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) capture: PathBuf,
+    /// Body in SMPL layout.
+    #[arg(long, value_name = "NPZ")]
+    pub(crate) body: Option<PathBuf>,
+    /// Number of bodies drawn from the shape space.
+    #[arg(long, value_name = "N")]
+    pub(crate) population: Option<usize>,
+    /// Motion clip (.bvh, or .amc beside its .asf) instead of the captured poses.
+    #[arg(long, value_name = "CLIP")]
+    pub(crate) motion: Option<PathBuf>,
+    /// Seed of the population.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Folder for results.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Worker threads; 0 means one per core.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub(crate) threads: usize,
 }

@@ -470,3 +470,124 @@ fn a_pattern_of_another_make_is_worn_in_a_real_picture() {
         .contains("half.json")
     );
 }
+
+/// Scans of a T-shirt and trousers, and a folder beside them.
+fn dressed_scans(folder: &Path, scans: usize) -> PathBuf {
+    use tryon::evaluate::scans::{ScanScene, write_scan_folder};
+    let mut scene = ScanScene::library(&["trousers", "tshirt"]).unwrap();
+    (scene.scans, scene.scanner.points) = (scans, 20_000);
+    let out = folder.join("scans");
+    write_scan_folder(&out, &scene).unwrap();
+    out
+}
+
+#[test]
+fn garments_are_captured_from_scans_and_fit_other_bodies() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = dressed_scans(folder.path(), 2);
+    let scans = scans.to_str().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+
+    let done = tryon(&[
+        "clothcap",
+        "segment",
+        "--scans",
+        scans,
+        "--out",
+        &at("labels"),
+    ]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let names: Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("labels/labels.json")).unwrap())
+            .unwrap();
+    assert_eq!(
+        (&names["1"]["name"], &names["2"]["name"]),
+        (&json!("top"), &json!("bottom"))
+    );
+
+    let capture = [
+        "clothcap",
+        "capture",
+        "--scans",
+        scans,
+        "--out",
+        &at("capture"),
+    ];
+    let done = tryon(&capture);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let header = std::fs::metadata(folder.path().join("capture/capture.json")).unwrap();
+    // A second run finds everything done.
+    let again = tryon(&capture);
+    assert!(again.status.success(), "{}", text(&again.stderr));
+    let after = std::fs::metadata(folder.path().join("capture/capture.json")).unwrap();
+    assert_eq!(header.modified().unwrap(), after.modified().unwrap());
+
+    let done = tryon(&[
+        "clothcap",
+        "retarget",
+        "--capture",
+        &at("capture"),
+        "--population",
+        "2",
+        "--out",
+        &at("bodies"),
+    ]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let report: Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("bodies/report.json")).unwrap())
+            .unwrap();
+    let bodies = report["bodies"].as_array().unwrap();
+    assert_eq!(bodies.len(), 2);
+    for garment in bodies.iter().flat_map(|b| b["frames"].as_array().unwrap()) {
+        for report in garment.as_array().unwrap() {
+            assert_eq!(report["inside"], 0, "{report}");
+        }
+    }
+    let glb = std::fs::read(folder.path().join("bodies/0001.glb")).unwrap();
+    assert_eq!(&glb[..4], b"glTF");
+    assert!(folder.path().join("bodies/sheet.png").exists());
+}
+
+#[test]
+fn scans_that_show_nobody_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let out = out.to_str().unwrap();
+    let capture = |scans: &Path| {
+        refused(&[
+            "clothcap",
+            "capture",
+            "--scans",
+            scans.to_str().unwrap(),
+            "--out",
+            out,
+        ])
+    };
+    let empty = folder.path().join("empty");
+    std::fs::create_dir_all(&empty).unwrap();
+    assert!(capture(&empty).contains("empty"));
+
+    let cut = folder.path().join("cut.ply");
+    std::fs::write(
+        &cut,
+        "ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\n",
+    )
+    .unwrap();
+    assert!(capture(&cut).contains("cut.ply"));
+
+    let mut post = String::from(
+        "ply\nformat ascii 1.0\nelement vertex 2000\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+    );
+    for i in 0..2000 {
+        let angle = f64::from(i) * 2.4;
+        post += &format!(
+            "{} {} {}\n",
+            0.05 * angle.cos(),
+            f64::from(i) * 9e-4,
+            0.05 * angle.sin()
+        );
+    }
+    let file = folder.path().join("post.ply");
+    std::fs::write(&file, post).unwrap();
+    assert!(capture(&file).contains("no person"));
+}

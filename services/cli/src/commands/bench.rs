@@ -1,11 +1,14 @@
 //! `tryon bench`: run time against error, as tables and plots.
 
-use crate::args::{BenchArgs, BenchClothArgs, BenchPeopleArgs, BenchTrackingArgs, BenchWhat};
+use crate::args::{
+    BenchArgs, BenchClothArgs, BenchClothcapArgs, BenchPeopleArgs, BenchTrackingArgs, BenchWhat,
+};
 use crate::input;
 use anyhow::Result;
 use std::process::ExitCode;
 use tryon::evaluate::ablation::{self, Extent};
 use tryon::evaluate::cloth::ClothBench;
+use tryon::evaluate::garment_capture::{CaptureVariant, capture_scenes, measure};
 use tryon::evaluate::people::{self, CaseSet, PeoplePlan};
 use tryon::evaluate::{self, Row, Table};
 use tryon::par::with_threads;
@@ -19,6 +22,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
         BenchWhat::Tracking(a) => tracking(a),
         BenchWhat::Cloth(a) => cloth(a),
         BenchWhat::People(a) => people(a),
+        BenchWhat::Clothcap(a) => clothcap(a),
     }
 }
 
@@ -89,6 +93,28 @@ fn people(args: &BenchPeopleArgs) -> Result<ExitCode> {
         eprintln!("SKIPPED: {skipped}");
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn clothcap(args: &BenchClothcapArgs) -> Result<ExitCode> {
+    let mut scenes = capture_scenes()?;
+    scenes.retain(|s| s.is_unseen == args.unseen);
+    scenes.retain(|s| args.only.is_empty() || args.only.iter().any(|o| s.name.contains(o)));
+    let mut variants = CaptureVariant::all();
+    if !args.ablation {
+        variants.truncate(1);
+    }
+    let bar = input::progress(Some((scenes.len() * variants.len()) as u64), "capturing");
+    let command = std::env::args().collect::<Vec<_>>().join(" ");
+    let mut table = Table::new("clothcap", command, "first scan, everything");
+    for scene in &scenes {
+        for variant in &variants {
+            let row = with_threads(args.threads, || measure(scene, variant, args.bodies))??;
+            table.rows.push(row);
+            bar.inc(1);
+        }
+    }
+    bar.finish_and_clear();
+    finish(&table, &args.out)
 }
 
 /// Writes the table and prints the paths of its files.

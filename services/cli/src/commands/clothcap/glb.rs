@@ -1,0 +1,170 @@
+//! Dressed bodies as glTF: body and garments on one skin, a morph target a captured scan, and the motion.
+
+use anyhow::{Context, Result};
+use std::path::Path;
+use tryon::body::{RestBody, Template};
+use tryon::clothcap::archive::CaptureHeader;
+use tryon::clothcap::picture::part_color;
+use tryon::clothcap::{DressedPose, unpose};
+use tryon::formats::gltf::{
+    GlbInterpolation, GlbJoint, GlbJointMotion, GlbMesh, GlbMorphMotion, GlbMorphTarget,
+    SkinnedGlb, SkinnedMesh, write_skinned_glb,
+};
+use tryon::math::{P3, P3d, V3};
+
+/// Dressed body in each frame of a motion.
+pub(super) struct DressedMotion<'a> {
+    pub(super) template: &'a Template,
+    pub(super) header: &'a CaptureHeader,
+    pub(super) body: &'a RestBody,
+    pub(super) frames: &'a [DressedPose],
+    /// Time of each frame, seconds.
+    pub(super) seconds: &'a [f64],
+}
+
+/// One mesh at rest and its changes from frame to frame.
+struct RestMesh {
+    name: String,
+    nodes: Vec<usize>,
+    vertices: Vec<P3>,
+    /// Displacements of each later frame from the first.
+    targets: Vec<Vec<V3>>,
+    colors: Vec<[u8; 3]>,
+    faces: Vec<[u32; 3]>,
+}
+
+/// Joints and weights of each vertex.
+type SkinRows = (Vec<[u8; 4]>, Vec<[f32; 4]>);
+
+impl RestMesh {
+    /// Morph targets, named after the scans; the first scan is the mesh itself.
+    fn morph_targets<'a>(&'a self, scans: &'a [String]) -> Vec<GlbMorphTarget<'a>> {
+        let named = self.targets.iter().enumerate();
+        named
+            .map(|(k, deltas)| GlbMorphTarget {
+                name: scans.get(k + 1).map_or("frame", String::as_str),
+                deltas,
+            })
+            .collect()
+    }
+}
+
+impl DressedMotion<'_> {
+    /// Writes body and garments to one file.
+    pub(super) fn write(&self, path: &Path) -> Result<()> {
+        let skeleton = self.template.skeleton();
+        let joints: Vec<GlbJoint<'_>> = skeleton
+            .joints()
+            .iter()
+            .zip(&self.body.joints)
+            .map(|(j, rest)| GlbJoint {
+                name: &j.name,
+                parent: j.parent,
+                rest: *rest,
+            })
+            .collect();
+        let rotations: Vec<_> = self
+            .frames
+            .iter()
+            .map(|f| f.pose.local_rotations(skeleton))
+            .collect();
+        let roots: Vec<P3d> = self
+            .frames
+            .iter()
+            .map(|f| f.pose.root.point(&self.body.joints[0]))
+            .collect();
+        let meshes = self.rest_meshes();
+        // Frame k shows target k − 1 alone; the first one none.
+        let count = self.frames.len();
+        let shown = |k: usize| (1..count).map(|t| f32::from(u8::from(t == k))).collect();
+        let shown: Vec<Vec<f32>> = (0..count).map(shown).collect();
+        let rows: Vec<SkinRows> = meshes.iter().map(|m| self.skin_rows(&m.nodes)).collect();
+        let targets: Vec<Vec<GlbMorphTarget<'_>>> = meshes
+            .iter()
+            .map(|m| m.morph_targets(&self.header.scans))
+            .collect();
+        let skinned: Vec<SkinnedMesh<'_>> = meshes
+            .iter()
+            .zip(&rows)
+            .zip(&targets)
+            .map(|((m, (joints, weights)), targets)| SkinnedMesh {
+                surface: GlbMesh {
+                    name: &m.name,
+                    vertices: &m.vertices,
+                    faces: &m.faces,
+                    uv: &[],
+                    color: [255; 3],
+                },
+                colors: &m.colors,
+                joints,
+                weights,
+                targets,
+                target_weights: &[],
+                target_motion: (!targets.is_empty()).then_some(GlbMorphMotion {
+                    seconds: self.seconds,
+                    weights: &shown,
+                    interpolation: GlbInterpolation::Step,
+                }),
+            })
+            .collect();
+        let glb = SkinnedGlb {
+            joints: &joints,
+            meshes: &skinned,
+            motion: Some(GlbJointMotion {
+                seconds: self.seconds,
+                roots: &roots,
+                rotations: &rotations,
+            }),
+        };
+        write_skinned_glb(path, &glb).with_context(|| format!("{}", path.display()))
+    }
+
+    fn skin_rows(&self, nodes: &[usize]) -> SkinRows {
+        let weights = self.template.weights();
+        let joints = nodes.iter().map(|v| weights.joints[*v]).collect();
+        (joints, nodes.iter().map(|v| weights.weights[*v]).collect())
+    }
+
+    fn rest_meshes(&self) -> Vec<RestMesh> {
+        let all: Vec<usize> = (0..self.template.mesh().vertices().len()).collect();
+        let mut out = vec![self.rest_mesh("body".into(), all, |f| &f.body)];
+        out[0].faces = self.template.mesh().faces().to_vec();
+        out[0].colors = vec![part_color(0); out[0].vertices.len()];
+        let outfit = &self.header.outfit;
+        for (k, part) in outfit.cloth.parts.iter().enumerate() {
+            let nodes = part.nodes.iter().map(|v| *v as usize).collect();
+            let mut mesh = self.rest_mesh(part.slot.name().into(), nodes, |f| &f.garments[k]);
+            mesh.faces.clone_from(&part.faces);
+            mesh.colors.clone_from(&outfit.colors[k]);
+            out.push(mesh);
+        }
+        out
+    }
+
+    fn rest_mesh(
+        &self,
+        name: String,
+        nodes: Vec<usize>,
+        posed: impl Fn(&DressedPose) -> &Vec<P3>,
+    ) -> RestMesh {
+        let rest = |f: &DressedPose| {
+            unpose(
+                self.template.weights(),
+                &f.bones,
+                nodes.iter().copied(),
+                posed(f),
+            )
+        };
+        let mut frames = self.frames.iter().map(rest);
+        let vertices = frames.next().unwrap_or_default();
+        let change = |f: Vec<P3>| f.iter().zip(&vertices).map(|(a, b)| a - b).collect();
+        RestMesh {
+            name,
+            targets: frames.map(change).collect(),
+            vertices,
+            nodes,
+            colors: Vec::new(),
+            faces: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! `tryon clothcap retarget`: captured garments on other bodies.
+
+use super::glb::DressedMotion;
+use crate::args::ClothcapRetargetArgs;
+use crate::{input, report};
+use anyhow::{Context, Result, ensure};
+use serde_json::json;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+use tryon::body::{BodyShape, Pose, RestBody, Template};
+use tryon::clothcap::align::Aligner;
+use tryon::clothcap::archive::{CaptureArchive, CaptureHeader, FrameDisplacements};
+use tryon::clothcap::picture::{Painted, PicturePanel, heading, part_color, sheet};
+use tryon::clothcap::scan::{BodyScan, ScanFrame};
+use tryon::clothcap::{BodyDresser, DressedPose, population};
+use tryon::formats::image::write_png_rgb;
+use tryon::formats::npz::read_smpl;
+use tryon::formats::read_motion;
+use tryon::formats::scan::ScanMesh;
+use tryon::math::{P3, World};
+use tryon::par::with_threads;
+use tryon::synth::{Actor, Sequence, Setting};
+
+/// Frames a second of captures and motions.
+const RATE: f64 = 30.0;
+/// Columns of the contact sheet.
+const COLUMNS: usize = 5;
+/// Most bodies on the contact sheet.
+const MOST_ON_SHEET: usize = 20;
+
+/// Runs the command.
+pub(super) fn run(args: &ClothcapRetargetArgs) -> Result<()> {
+    input::create_dir(&args.out)?;
+    with_threads(args.threads, || retarget_all(args))?
+}
+
+/// Captured frames: pose and displacements.
+struct CapturedFrames {
+    /// Times, seconds.
+    seconds: Vec<f64>,
+    poses: Vec<Pose<World>>,
+    displacements: Vec<FrameDisplacements>,
+}
+
+fn retarget_all(args: &ClothcapRetargetArgs) -> Result<()> {
+    let template = tryon::body::embedded::template();
+    let (archive, header) = CaptureArchive::open(&args.capture)?;
+    ensure!(
+        header.template == template.name(),
+        "{}: captured on the body `{}`, only `{}` is supported",
+        args.capture.display(),
+        header.template,
+        template.name()
+    );
+    let mut frames = read_frames(&archive, &header)?;
+    if let Some(path) = &args.motion {
+        frames = on_motion(path, &template, frames)?;
+    }
+    let bodies = bodies(args, &template)?;
+    let bar = input::progress(Some(bodies.len() as u64), "dressing");
+    let mut dresser = BodyDresser::new(template.clone(), &header.outfit.cloth)?;
+    let mut rows = Vec::new();
+    let mut shown = Vec::new();
+    for (name, body) in &bodies {
+        let started = Instant::now();
+        let mut dressed = Vec::new();
+        for (pose, d) in frames.poses.iter().zip(&frames.displacements) {
+            dressed.push(dresser.dress(body, d, pose).with_context(|| name.clone())?);
+        }
+        let motion = DressedMotion {
+            template: &template,
+            header: &header,
+            body,
+            frames: &dressed,
+            seconds: &frames.seconds,
+        };
+        motion.write(&args.out.join(format!("{name}.glb")))?;
+        rows.push(json!({
+            "body": name,
+            "frames": dressed.iter().map(|f| &f.reports).collect::<Vec<_>>(),
+            "ms": started.elapsed().as_secs_f64() * 1e3,
+        }));
+        // Many bodies show their first pose, one or two some poses of their motion.
+        let each = (MOST_ON_SHEET / bodies.len()).clamp(1, dressed.len());
+        let every = dressed.len().div_ceil(each);
+        let room = MOST_ON_SHEET.saturating_sub(shown.len());
+        shown.extend(dressed.into_iter().step_by(every).take(room));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    contact_sheet(&template, &header, &shown, &args.out.join("sheet.png"))?;
+    let report = json!({
+        "capture": args.capture,
+        "bodies": rows,
+        "peak_memory_bytes": report::peak_memory(),
+    });
+    report::write(&args.out.join("report.json"), &report)?;
+    println!("{} bodies dressed, in {}", bodies.len(), args.out.display());
+    Ok(())
+}
+
+fn read_frames(archive: &CaptureArchive, header: &CaptureHeader) -> Result<CapturedFrames> {
+    let mut out = CapturedFrames {
+        seconds: Vec::new(),
+        poses: Vec::new(),
+        displacements: Vec::new(),
+    };
+    let garments = header.outfit.cloth.parts.len();
+    for scan in &header.scans {
+        let Some(record) = archive.record(scan)? else {
+            continue;
+        };
+        out.seconds.push(out.poses.len() as f64 / RATE);
+        out.poses.push(record.body.pose);
+        out.displacements
+            .push(archive.displacements(scan, garments)?);
+    }
+    ensure!(!out.poses.is_empty(), "the capture has no finished scan");
+    Ok(out)
+}
+
+/// The first scan's garments in the poses of a clip.
+fn on_motion(
+    path: &Path,
+    template: &Arc<Template>,
+    frames: CapturedFrames,
+) -> Result<CapturedFrames> {
+    let clip = read_motion(path)?.at_cmu_rate();
+    let count = (clip.seconds() * RATE).floor() as u64;
+    let setting = Setting {
+        rate: RATE,
+        ..Setting::default()
+    };
+    let actor = Actor {
+        template: template.clone(),
+        ..Actor::default()
+    };
+    let world_from_camera = setting.world_from_camera;
+    let sequence = Sequence::new(actor, setting)
+        .with_clip(clip)
+        .with_context(|| format!("{}", path.display()))?;
+    let pose = |i| {
+        let pose = sequence.truth(i).pose;
+        Pose::<World> {
+            root: world_from_camera * pose.root,
+            angles: pose.angles,
+        }
+    };
+    let first = frames.displacements.into_iter().next();
+    let first = first.context("the capture has no finished scan")?;
+    let poses: Vec<_> = (0..count.max(1)).map(pose).collect();
+    Ok(CapturedFrames {
+        seconds: (0..poses.len()).map(|i| i as f64 / RATE).collect(),
+        displacements: vec![first; poses.len()],
+        poses,
+    })
+}
+
+/// Named bodies of the command.
+fn bodies(
+    args: &ClothcapRetargetArgs,
+    template: &Arc<Template>,
+) -> Result<Vec<(String, RestBody)>> {
+    if let Some(path) = &args.body {
+        let name = path.file_stem().map(|s| s.to_string_lossy().into_owned());
+        let body = other_body(path, template)?;
+        return Ok(vec![(name.unwrap_or_else(|| "body".into()), body)]);
+    }
+    let count = args.population.unwrap_or(0);
+    ensure!(count > 0, "--population: at least one body");
+    let named = |(k, shape): (usize, BodyShape)| (format!("{k:04}"), template.personalise(&shape));
+    let all = population(template, count, args.seed)
+        .into_iter()
+        .enumerate();
+    Ok(all.map(named).collect())
+}
+
+/// Body of another topology: the template fitted to its surface, in the rest pose.
+fn other_body(path: &Path, template: &Arc<Template>) -> Result<RestBody> {
+    let arrays = read_smpl(path)?;
+    let file = ScanMesh {
+        points: arrays.vertices.iter().map(|p| P3::from(*p)).collect(),
+        faces: arrays.faces.clone(),
+        ..ScanMesh::default()
+    };
+    let scan = BodyScan::new(&file, &ScanFrame::default())
+        .with_context(|| format!("{}", path.display()))?;
+    let mut aligner = Aligner::new(template.clone())?;
+    aligner
+        .align(&scan)
+        .with_context(|| format!("{}", path.display()))?;
+    let clothed = aligner.clothed().context("no body was fitted")?;
+    let shaped = template.personalise(&BodyShape {
+        displacements: Vec::new(),
+        ..clothed.body.shape.clone()
+    });
+    Ok(RestBody {
+        vertices: clothed.rest.clone(),
+        ..shaped
+    })
+}
+
+fn contact_sheet(
+    template: &Template,
+    header: &CaptureHeader,
+    shown: &[DressedPose],
+    out: &Path,
+) -> Result<()> {
+    let skin = vec![part_color(0); template.mesh().vertices().len()];
+    let front = heading(&header.outfit.body);
+    let panels: Vec<PicturePanel<'_>> = shown
+        .iter()
+        .map(|d| {
+            let mut meshes = vec![Painted {
+                points: &d.body,
+                faces: template.mesh().faces(),
+                colors: &skin,
+            }];
+            let parts = header.outfit.cloth.parts.iter().zip(&header.outfit.colors);
+            for ((part, colors), points) in parts.zip(&d.garments) {
+                meshes.push(Painted {
+                    points,
+                    faces: &part.faces,
+                    colors,
+                });
+            }
+            PicturePanel { meshes, yaw: front }
+        })
+        .collect();
+    Ok(write_png_rgb(out, &sheet(&panels, COLUMNS))?)
+}

@@ -1,0 +1,223 @@
+//! Single-mesh alignment of a sequence: the first scan gives the clothed template, later ones are coupled to it.
+
+use super::free_surface::{FreeSurface, SurfaceFitConfig, SurfaceMatch};
+use super::model_fit::{AlignedBody, FitStage, ModelFit};
+use super::start::{Start, find_person};
+use crate::body::{BoneTransforms, Template};
+use crate::clothcap::scan::BodyScan;
+use crate::clothcap::{CaptureError, unpose};
+use crate::math::P3;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// BodyScan points in a fit of the model.
+const SAMPLES: usize = 6000;
+/// BodyScan points in a fit of a later pose.
+const LATER_SAMPLES: usize = 3000;
+/// Stages of a later pose.
+const LATER: [FitStage; 2] = [FitStage::posed(0.08, 8), FitStage::posed(0.03, 6)];
+/// Mean robust distance above which a later pose is lost and the person is searched anew, metres.
+const LOST: f64 = 0.03;
+
+/// Alignment of one scan.
+#[derive(Clone, Debug)]
+pub struct Alignment {
+    /// Body model.
+    pub body: AlignedBody,
+    /// Bones of its pose.
+    pub bones: BoneTransforms,
+    /// Posed surface that the free one is coupled to: body model, later clothed template. Shape `[vertices]`, world, metres.
+    pub model: Vec<P3>,
+    /// Free surface, shape `[vertices]`, world, metres.
+    pub surface: Vec<P3>,
+    /// Place of each scan point on it, shape `[points]`.
+    pub matches: Vec<SurfaceMatch>,
+    /// Report.
+    pub report: AlignmentReport,
+}
+
+/// Report of one alignment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct AlignmentReport {
+    /// Mean robust distance of scan points from the body model, metres.
+    pub model_error: f64,
+    /// Mean distance of explained scan points from the free surface, metres.
+    pub surface_error: f64,
+    /// Share of scan points that the surface explains.
+    pub explained: f64,
+    /// The person was searched from nothing.
+    pub searched: bool,
+}
+
+/// Clothed template of the subject (eq. 8).
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ClothedTemplate {
+    /// Rest vertices, shape `[vertices]`, metres.
+    pub rest: Vec<P3>,
+    /// Body of the first scan; its shape gives the joints.
+    pub body: AlignedBody,
+}
+
+/// Aligns the scans of one subject in order.
+#[derive(Debug)]
+pub struct Aligner {
+    template: Arc<Template>,
+    free: FreeSurface,
+    clothed: Option<ClothedTemplate>,
+    /// Person of the first scan, if found before.
+    start: Option<Start>,
+    /// Pose of the last scan.
+    last: Option<AlignedBody>,
+}
+
+impl Aligner {
+    /// Aligner before the first scan.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] for a template too large.
+    pub fn new(template: Arc<Template>) -> Result<Self, CaptureError> {
+        Ok(Self {
+            free: FreeSurface::new(&template)?,
+            template,
+            clothed: None,
+            start: None,
+            last: None,
+        })
+    }
+
+    /// Aligner that continues after a first scan.
+    ///
+    /// # Errors
+    /// As [`Aligner::new`].
+    pub fn resume(
+        template: Arc<Template>,
+        clothed: ClothedTemplate,
+        last: AlignedBody,
+    ) -> Result<Self, CaptureError> {
+        Ok(Self {
+            clothed: Some(clothed),
+            last: Some(last),
+            ..Self::new(template)?
+        })
+    }
+
+    /// Clothed template, once a scan is aligned.
+    pub fn clothed(&self) -> Option<&ClothedTemplate> {
+        self.clothed.as_ref()
+    }
+
+    /// Starts the first scan at a person found before.
+    pub fn start_at(&mut self, start: Start) {
+        self.start = Some(start);
+    }
+
+    /// Aligns the next scan.
+    ///
+    /// # Errors
+    /// [`CaptureError::NoPerson`] if the scan shows none.
+    pub fn align(&mut self, scan: &BodyScan) -> Result<Alignment, CaptureError> {
+        let out = match self.clothed.take() {
+            None => self.first(scan)?,
+            Some(clothed) => {
+                let result = self.later(scan, &clothed);
+                self.clothed = Some(clothed);
+                result?
+            }
+        };
+        self.last = Some(out.body.clone());
+        Ok(out)
+    }
+
+    fn first(&mut self, scan: &BodyScan) -> Result<Alignment, CaptureError> {
+        let template = self.template.clone();
+        let start = match self.start.take() {
+            Some(start) => start,
+            None => find_person(&template, scan)?,
+        };
+        let mut fit = ModelFit::new(&template, scan, SAMPLES);
+        let mut body = start.body;
+        for stage in &FitStage::FINE {
+            fit.run(&mut body, stage)?;
+        }
+        let out = self.released(scan, &mut fit, body, &SurfaceFitConfig::default())?;
+        let nodes = 0..out.surface.len();
+        self.clothed = Some(ClothedTemplate {
+            rest: unpose(template.weights(), &out.bones, nodes, &out.surface),
+            body: out.body.clone(),
+        });
+        Ok(Alignment {
+            report: AlignmentReport {
+                searched: true,
+                ..out.report
+            },
+            ..out
+        })
+    }
+
+    /// Stage 2: pose by the clothed template, then the free surface coupled to it (eq. 9, 10).
+    fn later(
+        &mut self,
+        scan: &BodyScan,
+        clothed: &ClothedTemplate,
+    ) -> Result<Alignment, CaptureError> {
+        let template = self.template.clone();
+        let mut fit = ModelFit::new(&template, scan, LATER_SAMPLES).with_clothed(&clothed.rest);
+        let mut body = AlignedBody {
+            pose: self.last.as_ref().unwrap_or(&clothed.body).pose.clone(),
+            shape: clothed.body.shape.clone(),
+        };
+        for stage in &LATER {
+            fit.run(&mut body, stage)?;
+        }
+        let searched = !(fit.error(&body) < LOST);
+        if searched {
+            let found = find_person(&template, scan)?;
+            let mut other = AlignedBody {
+                pose: found.body.pose,
+                shape: clothed.body.shape.clone(),
+            };
+            for stage in &LATER {
+                fit.run(&mut other, stage)?;
+            }
+            if fit.error(&other) < fit.error(&body) {
+                body = other;
+            }
+        }
+        let out = self.released(scan, &mut fit, body, &SurfaceFitConfig::later())?;
+        Ok(Alignment {
+            report: AlignmentReport {
+                searched,
+                ..out.report
+            },
+            ..out
+        })
+    }
+
+    /// Releases the surface from the model.
+    fn released(
+        &mut self,
+        scan: &BodyScan,
+        fit: &mut ModelFit<'_>,
+        body: AlignedBody,
+        config: &SurfaceFitConfig,
+    ) -> Result<Alignment, CaptureError> {
+        let model_error = fit.error(&body);
+        let (model, bones) = fit.posed(&body);
+        let mut surface = model.clone();
+        let report = self.free.run(scan, &model, &mut surface, config)?;
+        let points = scan.points.len().max(1) as f64;
+        Ok(Alignment {
+            body,
+            bones,
+            model,
+            surface,
+            matches: self.free.matches().to_vec(),
+            report: AlignmentReport {
+                model_error,
+                surface_error: report.error,
+                explained: report.paired as f64 / points,
+                searched: false,
+            },
+        })
+    }
+}

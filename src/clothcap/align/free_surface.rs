@@ -1,0 +1,283 @@
+//! Free surface of a single-mesh alignment (eq. 3 to 5): vertices follow the scan, edges stay near those of the body model.
+
+use super::model_fit::{corner_weights, is_bare};
+use super::quadratic::{QuadraticEnergy, Stencil};
+use crate::body::Template;
+use crate::clothcap::CaptureError;
+use crate::clothcap::scan::BodyScan;
+use crate::math::{P3, V3};
+use crate::mesh::{Face, vertex_normals};
+use crate::par::{self, Par};
+use crate::registration::GemanMcClure;
+use crate::spatial::Bvh;
+
+/// Weight of an edge of an even mesh in the Dirichlet energy of a displacement: the cotangent of 60°.
+const EDGE: f64 = 0.577;
+/// Coupling of hands, feet and head beside 1 elsewhere (w of eq. 5): scans are noisy there and no cloth covers them.
+const FIRM: f64 = 8.0;
+/// Pull to the model's vertices beside that of the data: settles what no point and no edge determines.
+const ANCHOR: f64 = 1e-4;
+/// Smallest cosine between normals of a pair, for oriented scans.
+const NORMALS: f32 = 0.2;
+/// Motion below which a stage ends: mean over all vertices, metres.
+const CONVERGED: f32 = 5e-5;
+
+/// Kernel and coupling of one stage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceStage {
+    /// Coupling length, metres: displacements that vary over shorter distances are suppressed. Its square is w_c of eq. 3
+    /// for data weighted by area.
+    pub coupling: f64,
+    /// Width of the Geman–McClure kernel, metres.
+    pub sigma: f64,
+    /// Most iterations.
+    pub iterations: usize,
+}
+
+/// Stages of a free-surface fit, coarse to fine.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceFitConfig {
+    /// Stages.
+    pub stages: Vec<SurfaceStage>,
+    /// Most scan points in an iteration; the others are matched in the end.
+    pub points: usize,
+}
+
+impl SurfaceFitConfig {
+    /// Stages of a later frame, which starts at the clothed template in its pose (eq. 9).
+    pub fn later() -> Self {
+        let stage = |coupling, sigma, iterations| SurfaceStage {
+            coupling,
+            sigma,
+            iterations,
+        };
+        Self {
+            stages: vec![stage(0.04, 0.05, 3), stage(0.012, 0.03, 3)],
+            ..Self::default()
+        }
+    }
+}
+
+impl Default for SurfaceFitConfig {
+    fn default() -> Self {
+        let stage = |coupling, sigma, iterations| SurfaceStage {
+            coupling,
+            sigma,
+            iterations,
+        };
+        Self {
+            stages: vec![
+                stage(0.10, 0.08, 4),
+                stage(0.05, 0.06, 4),
+                stage(0.025, 0.04, 4),
+                stage(0.012, 0.03, 4),
+            ],
+            points: 30_000,
+        }
+    }
+}
+
+/// Report of a fit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SurfaceFitReport {
+    /// Solves.
+    pub iterations: usize,
+    /// Mean distance of paired scan points from the surface, metres.
+    pub error: f64,
+    /// BodyScan points with a partner in the last iteration.
+    pub paired: usize,
+}
+
+/// Free surface over the mesh of a template.
+#[derive(Debug)]
+pub struct FreeSurface {
+    energy: QuadraticEnergy,
+    edges: Vec<[u32; 2]>,
+    faces: Vec<Face>,
+    around: crate::mesh::Csr,
+    bvh: Bvh,
+    area: f64,
+    matches: Vec<SurfaceMatch>,
+}
+
+impl FreeSurface {
+    /// Prepares the system of a template.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] for a mesh too large.
+    pub fn new(template: &Template) -> Result<Self, CaptureError> {
+        let firm = firmness(template);
+        let edges: Vec<[u32; 2]> = template.topology().edges().iter().map(|e| e.v).collect();
+        let stencil = |e: &[u32; 2]| {
+            let w = 0.5 * (firm[e[0] as usize] + firm[e[1] as usize]);
+            Stencil::edge(*e, EDGE * w)
+        };
+        let mesh = template.mesh();
+        let stencils = edges.iter().map(stencil).collect();
+        Ok(Self {
+            energy: QuadraticEnergy::new(mesh.vertices().len(), stencils, mesh.faces())?,
+            edges,
+            faces: mesh.faces().to_vec(),
+            around: template.topology().vertex_faces().clone(),
+            bvh: Bvh::new(mesh.faces(), mesh.vertices()),
+            area: mesh.area(),
+            matches: Vec::new(),
+        })
+    }
+
+    /// Moves `surface` onto the scan; `model` is the posed body it is coupled to. Shapes `[vertices]`, metres.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`].
+    pub fn run(
+        &mut self,
+        scan: &BodyScan,
+        model: &[P3],
+        surface: &mut Vec<P3>,
+        config: &SurfaceFitConfig,
+    ) -> Result<SurfaceFitReport, CaptureError> {
+        let mut report = SurfaceFitReport::default();
+        let stride = (scan.points.len() / config.points.max(1)).max(1);
+        // Each point stands for its share of the area, each vertex for its own.
+        let per_point = self.area / scan.points.len().div_ceil(stride).max(1) as f64;
+        let per_vertex = ANCHOR * self.area / model.len().max(1) as f64;
+        for stage in &config.stages {
+            let kernel = GemanMcClure { sigma: stage.sigma };
+            for _ in 0..stage.iterations {
+                let matches = self.pair(scan, stride, surface, &kernel);
+                report = SurfaceFitReport {
+                    iterations: report.iterations + 1,
+                    ..measure(&matches)
+                };
+                self.energy.reset();
+                for (k, e) in self.edges.iter().enumerate() {
+                    let d = (model[e[0] as usize] - model[e[1] as usize]).cast::<f64>();
+                    let scale = stage.coupling * stage.coupling;
+                    self.energy.add_stencil(k, scale, d.into());
+                }
+                for (v, p) in model.iter().enumerate() {
+                    self.energy.add_vertex(v as u32, per_vertex, p);
+                }
+                for (m, p) in matches.iter().zip(scan.points.iter().step_by(stride)) {
+                    if m.weight > 0.0 {
+                        let weight = per_point * m.weight;
+                        self.energy.add_face_point(m.face, m.corners, weight, p);
+                    }
+                }
+                let moved = self.energy.minimise("free surface")?;
+                let sum: f32 = moved
+                    .iter()
+                    .zip(&*surface)
+                    .map(|(a, b)| (a - b).norm())
+                    .sum();
+                *surface = moved;
+                if sum < CONVERGED * model.len() as f32 {
+                    break;
+                }
+            }
+        }
+        let last = config.stages.last().map_or(0.03, |s| s.sigma);
+        self.matches = self.pair(scan, 1, surface, &GemanMcClure { sigma: last });
+        Ok(SurfaceFitReport {
+            iterations: report.iterations,
+            ..measure(&self.matches)
+        })
+    }
+
+    /// Place of each scan point on the surface of the last run, shape `[points]`.
+    pub fn matches(&self) -> &[SurfaceMatch] {
+        &self.matches
+    }
+
+    /// Matches of every `stride`-th scan point.
+    fn pair(
+        &mut self,
+        scan: &BodyScan,
+        stride: usize,
+        surface: &[P3],
+        kernel: &GemanMcClure,
+    ) -> Vec<SurfaceMatch> {
+        self.bvh.refit(surface);
+        let mut normals = Vec::new();
+        vertex_normals(Par::Rayon, surface, &self.faces, &self.around, &mut normals);
+        let mut out = Vec::new();
+        par::map_into(
+            Par::Rayon,
+            scan.points.len().div_ceil(stride),
+            256,
+            &mut out,
+            |k| {
+                let i = k * stride;
+                let p = &scan.points[i];
+                let Some(found) = self.bvh.closest(surface, p) else {
+                    return SurfaceMatch::default();
+                };
+                let face = &self.faces[found.face as usize];
+                let corners = corner_weights(surface, face, &found.point);
+                let normal: V3 = (0..3).map(|k| normals[face[k] as usize] * corners[k]).sum();
+                let cos = normal.dot(&scan.normals[i]);
+                let cos = if scan.oriented { cos } else { cos.abs() };
+                let e2 = f64::from(found.distance * found.distance);
+                let known = scan.normals[i] != V3::zeros();
+                SurfaceMatch {
+                    face: found.face,
+                    corners,
+                    distance: found.distance,
+                    weight: if known && cos < NORMALS {
+                        0.0
+                    } else {
+                        kernel.weight(e2)
+                    },
+                }
+            },
+        );
+        out
+    }
+}
+
+/// Place of a scan point on the surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SurfaceMatch {
+    /// Triangle.
+    pub face: u32,
+    /// Barycentric coordinates in it.
+    pub corners: [f32; 3],
+    /// Distance, metres.
+    pub distance: f32,
+    /// Robust weight; 0 for a point that the surface does not explain.
+    pub weight: f64,
+}
+
+impl SurfaceMatch {
+    /// Corner of the triangle with the largest share, 0 to 2.
+    pub fn nearest_corner(&self) -> usize {
+        let [a, b, c] = self.corners;
+        if a >= b && a >= c {
+            0
+        } else if b >= c {
+            1
+        } else {
+            2
+        }
+    }
+}
+
+fn measure(matches: &[SurfaceMatch]) -> SurfaceFitReport {
+    let good = matches.iter().filter(|m| m.weight > 0.0);
+    let (sum, n) = good.fold((0.0, 0), |(s, n), m| (s + f64::from(m.distance), n + 1));
+    SurfaceFitReport {
+        iterations: 0,
+        error: sum / f64::from(n.max(1)),
+        paired: n as usize,
+    }
+}
+
+/// Coupling of each vertex: [`FIRM`] for hands, feet and head, else 1.
+fn firmness(template: &Template) -> Vec<f64> {
+    (0..template.mesh().vertices().len())
+        .map(|v| {
+            let segment = template.parts().segment(template.weights().dominant(v));
+            if is_bare(segment) { FIRM } else { 1.0 }
+        })
+        .collect()
+}

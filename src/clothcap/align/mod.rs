@@ -1,0 +1,17 @@
+//! Single-mesh alignment (section 5.1): body model, then free surface, first of one scan, then of a sequence.
+
+mod aligner;
+mod free_surface;
+mod model_fit;
+mod quadratic;
+mod shape_unknowns;
+mod start;
+
+pub use aligner::{Aligner, Alignment, AlignmentReport, ClothedTemplate};
+pub use free_surface::{
+    FreeSurface, SurfaceFitConfig, SurfaceFitReport, SurfaceMatch, SurfaceStage,
+};
+pub(super) use model_fit::corner_weights;
+pub use model_fit::{AlignedBody, FitStage, ModelFit, ModelFitReport};
+pub use quadratic::{QuadraticEnergy, Stencil};
+pub use start::{Start, find_frame, find_person};

@@ -1,0 +1,553 @@
+//! Pose, bone lengths and shape coefficients that explain a scan: eq. 3 with infinite coupling, and the poses of eq. 9.
+
+use super::shape_unknowns::ShapeUnknowns;
+use crate::body::parts::BodySegment;
+use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
+use crate::clothcap::CaptureError;
+use crate::clothcap::scan::BodyScan;
+use crate::math::{P3, V3, World};
+use crate::mesh::{Face, face_normal};
+use crate::par::{self, Par};
+use crate::registration::{Dof, GemanMcClure};
+use crate::spatial::Bvh;
+use crate::tracking::{apply, linearise};
+use nalgebra::{DMatrix, DVector, Vector3};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Standard deviation of a scan point from the body, metres, and number of independent ones: neighbours share the cloth
+/// between. Their ratio weighs data against priors.
+const DEVIATION: f64 = 0.012;
+/// See [`DEVIATION`].
+const INDEPENDENT: f64 = 800.0;
+/// Standard deviations of joint angles from those of the start, radians: of joints of the spine, collars, hands and feet,
+/// and of the others.
+const ANGLES: [f64; 2] = [0.35, 1.2];
+/// Step of the difference quotient of a shape coefficient and of a bone's scale.
+const STEP: f64 = 0.02;
+/// Smallest cosine between normals of a pair, for oriented scans.
+const NORMALS: f32 = 0.3;
+/// Weight of tangential beside normal distances: limbs move along themselves only by it.
+const TANGENTIAL: f64 = 0.05;
+/// Thickness of a fabric with the air below it where it lies on the body, metres.
+const THICKNESS: f64 = 0.003;
+/// Weight of cloth outside the body beside cloth inside of it: garments hang away from the body, never into it.
+const LOOSE: f64 = 0.06;
+/// The same before the garments are known. At 1 a body slides down until it fills wide trousers.
+const UNKNOWN: f64 = 0.3;
+/// Weight of heads, hands and feet, which mostly are bare, beside the rest (w of eq. 5).
+const BARE: f64 = 2.0;
+/// Share of its diagonal added to the normal matrix.
+const DAMPING: f64 = 1e-3;
+/// Update below which a stage ends, metres at a lever of 25 cm.
+const CONVERGED: f64 = 5e-4;
+/// See [`CONVERGED`].
+const LEVER: f64 = 0.25;
+/// Rows of the Jacobian in one product.
+const CHUNK: usize = 256;
+
+/// Posed and shaped body in the frame of the scan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AlignedBody {
+    /// Pose.
+    pub pose: Pose<World>,
+    /// Shape coefficients and bone scales.
+    pub shape: BodyShape,
+}
+
+/// Unknowns, kernel and length of one stage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitStage {
+    /// Width of the Geman–McClure kernel, metres.
+    pub sigma: f64,
+    /// Most iterations.
+    pub iterations: usize,
+    /// Fit shape coefficients and bone scales too.
+    pub shape: bool,
+    /// Factor on the standard deviations of joint angles from those of the start.
+    pub freedom: f64,
+}
+
+impl FitStage {
+    /// Stages that compare starts.
+    pub const START: [Self; 2] = [Self::stage(0.15, 6, false), Self::stage(0.08, 6, true)];
+    /// Stages after the start.
+    pub const FINE: [Self; 3] = [
+        Self::stage(0.10, 10, true),
+        Self::stage(0.05, 12, true),
+        Self::stage(0.03, 12, true),
+    ];
+
+    /// Stage of pose and shape.
+    pub const fn shaped(sigma: f64, iterations: usize, freedom: f64) -> Self {
+        Self {
+            freedom,
+            ..Self::stage(sigma, iterations, true)
+        }
+    }
+
+    /// Stage of the pose alone.
+    pub const fn posed(sigma: f64, iterations: usize) -> Self {
+        Self::stage(sigma, iterations, false)
+    }
+
+    const fn stage(sigma: f64, iterations: usize, shape: bool) -> Self {
+        Self {
+            sigma,
+            iterations,
+            shape,
+            freedom: 1.0,
+        }
+    }
+}
+
+/// Report of one stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ModelFitReport {
+    /// Iterations.
+    pub iterations: usize,
+    /// Last update fell below the bound.
+    pub converged: bool,
+    /// Mean robust distance of paired points from the surface, metres.
+    pub error: f64,
+    /// Points with a partner.
+    pub paired: usize,
+}
+
+/// A scan point on the surface.
+#[derive(Clone, Copy, Debug, Default)]
+struct Match {
+    face: u32,
+    corners: [f32; 3],
+    point: Vector3<f64>,
+    normal: Vector3<f64>,
+    /// BodyScan point minus surface point.
+    residual: Vector3<f64>,
+    weight: f64,
+}
+
+/// Fit of the body model to some points of a scan.
+#[derive(Debug)]
+pub struct ModelFit<'a> {
+    template: &'a Arc<Template>,
+    /// Rest vertices that replace the template's: the clothed template of eq. 8.
+    clothed: Option<&'a [P3]>,
+    points: Vec<P3>,
+    normals: Vec<V3>,
+    oriented: bool,
+    /// Points on cloth: the body lies inside, loosely; empty if none do.
+    covered: Vec<bool>,
+    stride: usize,
+    /// Vertices of head, hands and feet.
+    bare: Vec<bool>,
+    bvh: Bvh,
+    posed: Vec<P3>,
+    bones: BoneTransforms,
+    deviations: Vec<f64>,
+}
+
+impl<'a> ModelFit<'a> {
+    /// Prepares a fit to about `samples` evenly chosen points.
+    pub fn new(template: &'a Arc<Template>, scan: &BodyScan, samples: usize) -> Self {
+        let stride = (scan.points.len() / samples.max(1)).max(1);
+        let pick = |v: &[P3]| v.iter().step_by(stride).copied().collect::<Vec<_>>();
+        let mesh = template.mesh();
+        Self {
+            template,
+            clothed: None,
+            points: pick(&scan.points),
+            normals: scan.normals.iter().step_by(stride).copied().collect(),
+            oriented: scan.oriented,
+            covered: Vec::new(),
+            stride,
+            bare: (0..mesh.vertices().len())
+                .map(|v| template.parts().segment(template.weights().dominant(v)))
+                .map(is_bare)
+                .collect(),
+            bvh: Bvh::new(mesh.faces(), mesh.vertices()),
+            posed: Vec::new(),
+            bones: BoneTransforms::default(),
+            deviations: angle_deviations(template),
+        }
+    }
+
+    /// The same with rest vertices of a clothed template; shape is then not fitted.
+    pub fn with_clothed(mut self, rest: &'a [P3]) -> Self {
+        self.clothed = Some(rest);
+        self
+    }
+
+    /// The same with scan points on cloth, shape `[points]` of the scan: the body stays inside of them (section 5.4).
+    pub fn with_covered(mut self, covered: &[bool]) -> Self {
+        self.covered = covered.iter().step_by(self.stride).copied().collect();
+        self
+    }
+
+    fn rest(&self, shape: &BodyShape) -> RestBody {
+        let all: Vec<u32> = match self.clothed {
+            Some(_) => Vec::new(),
+            None => (0..self.template.mesh().vertices().len() as u32).collect(),
+        };
+        let (vertices, joints) = self.template.personalise_some(shape, &all);
+        RestBody {
+            vertices: self.clothed.map_or(vertices, <[P3]>::to_vec),
+            joints,
+            ..RestBody::default()
+        }
+    }
+
+    fn pose_vertices(&self, body: &AlignedBody, out: &mut Vec<P3>, bones: &mut BoneTransforms) {
+        let rest = self.rest(&body.shape);
+        let skeleton = self.template.skeleton();
+        body.pose.bones(skeleton, &rest, bones);
+        skin(
+            Par::Rayon,
+            &rest.vertices,
+            self.template.weights(),
+            bones,
+            out,
+        );
+    }
+
+    /// Posed vertices of a body, metres, shape `[vertices]`.
+    pub fn posed(&self, body: &AlignedBody) -> (Vec<P3>, BoneTransforms) {
+        let (mut out, mut bones) = (Vec::new(), BoneTransforms::default());
+        self.pose_vertices(body, &mut out, &mut bones);
+        (out, bones)
+    }
+
+    /// Mean robust distance of all points from the surface, metres.
+    pub fn error(&mut self, body: &AlignedBody) -> f64 {
+        const SIGMA: f64 = 0.10;
+        self.place(body);
+        let kernel = GemanMcClure { sigma: SIGMA };
+        let sum: f64 = self
+            .matches(&kernel)
+            .iter()
+            .map(|m| match m.weight > 0.0 {
+                true => kernel.value(m.residual.norm_squared()),
+                false => SIGMA * SIGMA,
+            })
+            .sum();
+        (sum / self.points.len().max(1) as f64).sqrt()
+    }
+
+    fn place(&mut self, body: &AlignedBody) {
+        let mut posed = std::mem::take(&mut self.posed);
+        let mut bones = std::mem::take(&mut self.bones);
+        self.pose_vertices(body, &mut posed, &mut bones);
+        self.bvh.refit(&posed);
+        (self.posed, self.bones) = (posed, bones);
+    }
+
+    fn matches(&self, kernel: &GemanMcClure) -> Vec<Match> {
+        let mut out = Vec::new();
+        par::map_into(Par::Rayon, self.points.len(), 128, &mut out, |i| {
+            self.pair(i, kernel).unwrap_or_default()
+        });
+        out
+    }
+
+    fn pair(&self, i: usize, kernel: &GemanMcClure) -> Option<Match> {
+        let p = self.points[i];
+        let found = self.bvh.closest(&self.posed, &p)?;
+        let face = self.template.mesh().faces()[found.face as usize];
+        let normal = face_normal(&self.posed, &face).try_normalize(f32::MIN_POSITIVE)?;
+        let cos = normal.dot(&self.normals[i]);
+        let cos = if self.oriented { cos } else { cos.abs() };
+        // A zero normal is unknown and pairs with any.
+        if cos < NORMALS && self.normals[i] != V3::zeros() {
+            return None;
+        }
+        let mut residual = (p - found.point).cast::<f64>();
+        let mut weight = kernel.weight(residual.norm_squared());
+        let is_outside = residual.dot(&normal.cast()) > 0.0;
+        if self.covered.get(i).copied().unwrap_or(false) {
+            residual -= normal.cast() * THICKNESS;
+            weight *= if is_outside { LOOSE } else { 1.0 };
+        } else if self.bare[face[0] as usize] {
+            weight *= BARE;
+        } else if is_outside && self.covered.is_empty() && self.clothed.is_none() {
+            weight *= UNKNOWN;
+        }
+        Some(Match {
+            face: found.face,
+            corners: corner_weights(&self.posed, &face, &found.point),
+            point: found.point.coords.cast(),
+            normal: normal.cast(),
+            residual,
+            weight,
+        })
+    }
+
+    /// Runs one stage; `body` is start and result.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] if the normal matrix is singular or not finite.
+    pub fn run(
+        &mut self,
+        body: &mut AlignedBody,
+        stage: &FitStage,
+    ) -> Result<ModelFitReport, CaptureError> {
+        let start = body.clone();
+        let kernel = GemanMcClure { sigma: stage.sigma };
+        let mut report = ModelFitReport::default();
+        let shaped = stage.shape && self.clothed.is_none();
+        let unknowns = ShapeUnknowns::new(self.template, &mut body.shape, shaped);
+        for _ in 0..stage.iterations {
+            self.place(body);
+            let matches = self.matches(&kernel);
+            report.iterations += 1;
+            report.paired = matches.iter().filter(|m| m.weight > 0.0).count();
+            report.error = robust_mean(&matches, &kernel);
+            let prior = Prior {
+                start: &start,
+                unknowns: &unknowns,
+                freedom: stage.freedom,
+            };
+            let update = self.solve(body, &prior, &matches)?;
+            let moved = self.update(body, &unknowns, &update);
+            if moved < CONVERGED {
+                report.converged = true;
+                break;
+            }
+        }
+        Ok(report)
+    }
+
+    fn solve(
+        &self,
+        body: &AlignedBody,
+        prior: &Prior<'_>,
+        matches: &[Match],
+    ) -> Result<DVector<f64>, CaptureError> {
+        let centre = self.bones.joints[0].coords;
+        let mut dofs = Vec::new();
+        let skeleton = self.template.skeleton();
+        linearise(skeleton, &self.bones, &body.pose, &centre, &mut dofs);
+        let fields = self.shape_fields(body, prior.unknowns);
+        let rows = JacobianRows {
+            fit: self,
+            dofs: &dofs,
+            fields: &fields,
+            centre,
+        };
+        let n = dofs.len() + prior.unknowns.len();
+        let (mut h, mut g) = rows.normal_equations(matches, n);
+        let per_point = INDEPENDENT / self.points.len().max(1) as f64 / (DEVIATION * DEVIATION);
+        h *= per_point;
+        g *= per_point;
+        self.add_priors(body, prior, (&mut h, &mut g));
+        for i in 0..n {
+            h[(i, i)] += DAMPING * h[(i, i)] + 1e-6;
+        }
+        let fault = |why: &str| CaptureError::Solve {
+            stage: "body model",
+            why: why.into(),
+        };
+        let factor = h
+            .cholesky()
+            .ok_or_else(|| fault("singular normal matrix"))?;
+        let x = factor.solve(&g);
+        if x.iter().all(|v| v.is_finite()) {
+            Ok(x)
+        } else {
+            Err(fault("the update is not finite"))
+        }
+    }
+
+    fn add_priors(
+        &self,
+        body: &AlignedBody,
+        prior: &Prior<'_>,
+        (h, g): (&mut DMatrix<f64>, &mut DVector<f64>),
+    ) {
+        for (k, deviation) in self.deviations.iter().enumerate() {
+            let (i, w) = (6 + k, (deviation * prior.freedom).powi(-2));
+            h[(i, i)] += w;
+            g[i] += w * (prior.start.pose.angles[k] - body.pose.angles[k]);
+        }
+        let first = 6 + self.deviations.len();
+        for (k, u) in prior.unknowns.all.iter().enumerate() {
+            let (value, mean, deviation) = u.prior(&body.shape);
+            let w = 1.0 / (deviation * deviation);
+            h[(first + k, first + k)] += w;
+            g[first + k] += w * (mean - value);
+        }
+    }
+
+    /// Displacement of each posed vertex per unit of each shape unknown.
+    fn shape_fields(&self, body: &AlignedBody, unknowns: &ShapeUnknowns) -> Vec<Vec<V3>> {
+        let (mut moved, mut bones) = (Vec::new(), BoneTransforms::default());
+        unknowns
+            .all
+            .iter()
+            .map(|u| {
+                let mut changed = body.clone();
+                *u.of(&mut changed.shape) += STEP;
+                self.pose_vertices(&changed, &mut moved, &mut bones);
+                moved
+                    .iter()
+                    .zip(&self.posed)
+                    .map(|(a, b)| (a - b) / STEP as f32)
+                    .collect()
+            })
+            .collect()
+    }
+
+    /// Applies an update; its size, metres.
+    fn update(&self, body: &mut AlignedBody, unknowns: &ShapeUnknowns, x: &DVector<f64>) -> f64 {
+        let first = 6 + self.deviations.len();
+        let centre = self.bones.joints[0].coords;
+        let skeleton = self.template.skeleton();
+        apply(skeleton, &mut body.pose, &centre, x);
+        body.pose.clamp_to_limits(skeleton);
+        let angles = x.rows(3, first - 3).amax() * LEVER;
+        let mut moved = x.rows(0, 3).amax().max(angles);
+        for (k, u) in unknowns.all.iter().enumerate() {
+            let [low, high] = u.limits();
+            let value = u.of(&mut body.shape);
+            *value = (*value + x[first + k]).clamp(low, high);
+            moved = moved.max(0.02 * x[first + k].abs());
+        }
+        moved
+    }
+}
+
+/// Prior of one stage.
+struct Prior<'a> {
+    start: &'a AlignedBody,
+    unknowns: &'a ShapeUnknowns,
+    freedom: f64,
+}
+
+/// Jacobian of the matches.
+struct JacobianRows<'a> {
+    fit: &'a ModelFit<'a>,
+    dofs: &'a [Dof],
+    fields: &'a [Vec<V3>],
+    centre: Vector3<f64>,
+}
+
+impl JacobianRows<'_> {
+    /// Jᵀ W J and Jᵀ W r over all matches, summed in a fixed order.
+    fn normal_equations(&self, matches: &[Match], n: usize) -> (DMatrix<f64>, DVector<f64>) {
+        let good: Vec<&Match> = matches.iter().filter(|m| m.weight > 0.0).collect();
+        let mut sums = Vec::new();
+        let chunks = good.len().div_ceil(CHUNK);
+        par::map_into(Par::Rayon, chunks, 1, &mut sums, |c| {
+            let some = &good[c * CHUNK..((c + 1) * CHUNK).min(good.len())];
+            // Rows along the normal and two tangents, scaled by the roots of their weights.
+            let mut j = DMatrix::<f64>::zeros(3 * some.len(), n);
+            let mut r = DVector::<f64>::zeros(3 * some.len());
+            for (k, m) in some.iter().enumerate() {
+                self.fill(m, 3 * k, (&mut j, &mut r));
+            }
+            Some((j.tr_mul(&j), j.tr_mul(&r)))
+        });
+        let mut total = (DMatrix::zeros(n, n), DVector::zeros(n));
+        for (h, g) in sums.into_iter().flatten() {
+            total.0 += h;
+            total.1 += g;
+        }
+        total
+    }
+
+    fn fill(&self, m: &Match, row: usize, (j, r): (&mut DMatrix<f64>, &mut DVector<f64>)) {
+        let face = self.fit.template.mesh().faces()[m.face as usize];
+        let influence = self.influence(&face, m.corners);
+        let across = if m.normal.x.abs() < 0.8 {
+            Vector3::x()
+        } else {
+            Vector3::y()
+        };
+        let t = m.normal.cross(&across).normalize();
+        let axes = [
+            (m.normal, (m.weight * (1.0 + TANGENTIAL)).sqrt()),
+            (t, (m.weight * TANGENTIAL).sqrt()),
+            (m.normal.cross(&t), (m.weight * TANGENTIAL).sqrt()),
+        ];
+        let lever = m.point - self.centre;
+        for (k, (axis, weight)) in axes.into_iter().enumerate() {
+            r[row + k] = weight * axis.dot(&m.residual);
+            let moment = lever.cross(&axis);
+            for (c, dof) in self.dofs.iter().enumerate() {
+                let share = influence[dof.bone];
+                if share > 0.0 {
+                    let motion = axis.dot(&dof.twist.linear) + moment.dot(&dof.twist.angular);
+                    j[(row + k, c)] = weight * share * motion;
+                }
+            }
+            for (c, field) in self.fields.iter().enumerate() {
+                let moved: V3 = (0..3).map(|i| field[face[i] as usize] * m.corners[i]).sum();
+                j[(row + k, self.dofs.len() + c)] = weight * axis.dot(&moved.cast());
+            }
+        }
+    }
+
+    /// Share of a surface point that moves with each bone or one below it.
+    fn influence(&self, face: &Face, corners: [f32; 3]) -> Vec<f64> {
+        let weights = self.fit.template.weights();
+        let joints = self.fit.template.skeleton().joints();
+        let mut share = vec![0.0; joints.len()];
+        for (v, c) in face.iter().zip(corners) {
+            let v = *v as usize;
+            for k in 0..4 {
+                share[usize::from(weights.joints[v][k])] += f64::from(weights.weights[v][k] * c);
+            }
+        }
+        for j in (0..joints.len()).rev() {
+            if let Some(p) = joints[j].parent {
+                share[p] += share[j];
+            }
+        }
+        share
+    }
+}
+
+/// Mostly bare: head, hands and feet.
+pub(super) fn is_bare(segment: BodySegment) -> bool {
+    use BodySegment::*;
+    matches!(segment, Head | Hand | Fingers | Foot | Toes)
+}
+
+fn robust_mean(matches: &[Match], kernel: &GemanMcClure) -> f64 {
+    let good = matches.iter().filter(|m| m.weight > 0.0);
+    let (sum, n) = good.fold((0.0, 0usize), |(s, n), m| {
+        (s + kernel.value(m.residual.norm_squared()), n + 1)
+    });
+    (sum / n.max(1) as f64).sqrt()
+}
+
+/// Barycentric coordinates of a point of a face.
+pub(in crate::clothcap) fn corner_weights(vertices: &[P3], face: &Face, p: &P3) -> [f32; 3] {
+    let [a, b, c] = face.map(|v| vertices[v as usize]);
+    let (u, v, w) = (b - a, c - a, p - a);
+    let (uu, uv, vv) = (u.dot(&u), u.dot(&v), v.dot(&v));
+    let (wu, wv) = (w.dot(&u), w.dot(&v));
+    let det = uu * vv - uv * uv;
+    if !(det > f32::MIN_POSITIVE) {
+        return [1.0, 0.0, 0.0];
+    }
+    let s = ((vv * wu - uv * wv) / det).clamp(0.0, 1.0);
+    let t = ((uu * wv - uv * wu) / det).clamp(0.0, 1.0 - s);
+    [1.0 - s - t, s, t]
+}
+
+fn angle_deviations(template: &Template) -> Vec<f64> {
+    use BodySegment::*;
+    let skeleton = template.skeleton();
+    let mut out = vec![ANGLES[1]; skeleton.dofs()];
+    for (j, joint) in skeleton.joints().iter().enumerate() {
+        let segment = template.parts().segment(j);
+        let is_stiff = matches!(
+            segment,
+            Abdomen | Chest | Neck | Head | Collar | Hand | Fingers | Foot | Toes
+        );
+        let at = skeleton.dof_offset(j);
+        for slot in &mut out[at..at + joint.motion.dofs()] {
+            *slot = ANGLES[usize::from(!is_stiff)];
+        }
+    }
+    out
+}

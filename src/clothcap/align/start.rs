@@ -1,0 +1,137 @@
+//! Start of an alignment: the tracker's poses in virtual depth images around the scan, without an A-pose.
+
+use super::model_fit::{AlignedBody, FitStage, ModelFit};
+use crate::body::{Pose, Template};
+use crate::clothcap::CaptureError;
+use crate::clothcap::scan::{BodyScan, ScanFrame};
+use crate::clothcap::virtual_camera::{VirtualCamera, bounds};
+use crate::formats::scan::ScanMesh;
+use crate::math::{Body, Rigid, World};
+use crate::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+use std::f64::consts::FRAC_PI_2;
+use std::sync::Arc;
+
+/// Virtual cameras around the scan. With four, one sees the person within 45° of the front.
+const VIEWS: usize = 4;
+/// Frames that the tracker gets of one view: it finds the person in the first and measures the size in the others.
+const FRAMES: usize = 3;
+/// BodyScan points in the comparison of starts.
+const SAMPLES: usize = 1500;
+/// Mean robust distance above which a start explains no person, metres. Right starts in wide clothes stay below half of it.
+const WORST: f64 = 0.05;
+
+/// A start and its quality.
+#[derive(Clone, Debug)]
+pub struct Start {
+    /// Pose and shape.
+    pub body: AlignedBody,
+    /// Mean robust distance of scan points from the body, metres.
+    pub error: f64,
+    /// Starts that were compared.
+    pub compared: usize,
+}
+
+/// Mean robust distance below which a unit and up axis is taken without trying others, metres.
+const CERTAIN: f64 = 0.035;
+
+/// Finds unit, up axis and person of a scan file: of all frames in which it is as large as a person, the one that a body
+/// explains best.
+///
+/// # Errors
+/// [`CaptureError::NoPersonSize`], [`CaptureError::TooFewPoints`], [`CaptureError::NoPerson`].
+pub fn find_frame(
+    template: &Arc<Template>,
+    file: &ScanMesh,
+) -> Result<(ScanFrame, Start), CaptureError> {
+    let mut best: Option<(ScanFrame, Start)> = None;
+    let mut fault = None;
+    for frame in ScanFrame::candidates(&file.points)? {
+        let scan = BodyScan::new(file, &frame)?;
+        match find_person(template, &scan) {
+            Ok(start) if best.as_ref().is_none_or(|b| start.error < b.1.error) => {
+                let is_certain = start.error < CERTAIN;
+                best = Some((frame, start));
+                if is_certain {
+                    break;
+                }
+            }
+            Ok(_) => {}
+            Err(e) => fault = fault.or(Some(e)),
+        }
+    }
+    let nobody = || CaptureError::NoPerson {
+        why: "it has no upright frame".into(),
+    };
+    best.ok_or_else(|| fault.unwrap_or_else(nobody))
+}
+
+/// Finds the person in a scan from nothing: any upright pose, any direction.
+///
+/// # Errors
+/// [`CaptureError::NoPerson`].
+pub fn find_person(template: &Arc<Template>, scan: &BodyScan) -> Result<Start, CaptureError> {
+    let ends = bounds(&scan.points);
+    let mut fit = ModelFit::new(template, scan, SAMPLES);
+    let mut best: Option<Start> = None;
+    let mut compared = 0;
+    for view in 0..VIEWS {
+        let camera = VirtualCamera::around(ends, view as f64 * FRAC_PI_2);
+        let Some(start) = tracked(template, scan, &camera) else {
+            continue;
+        };
+        compared += 1;
+        let mut body = start;
+        for stage in FitStage::START {
+            fit.run(&mut body, &stage)?;
+        }
+        let error = fit.error(&body);
+        if best.as_ref().is_none_or(|b| error < b.error) {
+            best = Some(Start {
+                body,
+                error,
+                compared,
+            });
+        }
+    }
+    let why = |why: String| CaptureError::NoPerson { why };
+    let mut best = best.ok_or_else(|| why("no view of it shows one to the tracker".into()))?;
+    if !(best.error < WORST) {
+        let mm = best.error * 1e3;
+        return Err(why(format!("the best body lies {mm:.0} mm off it")));
+    }
+    best.compared = compared;
+    Ok(best)
+}
+
+/// Pose and shape of the person in one view; `None` if nobody is seen there.
+fn tracked(
+    template: &Arc<Template>,
+    scan: &BodyScan,
+    camera: &VirtualCamera,
+) -> Option<AlignedBody> {
+    let config = TrackerConfig {
+        skip_unchanged: false,
+        displacements: false,
+        ..TrackerConfig::default()
+    };
+    let model = TrackerModel::new(template.clone(), camera.calibration.clone(), config);
+    let mut state = TrackerState::new(&model);
+    let mut workspace = Workspace::default();
+    let mut frame = camera.frame(scan);
+    for k in 0..FRAMES {
+        frame.sequence = k as u64;
+        frame.time_ns = k as u64 * 33_000_000;
+        step(&model, &mut state, &frame, &mut workspace).ok()?;
+    }
+    if !state.status.is_live() {
+        return None;
+    }
+    let root: Rigid<World, Body> = camera.world_from_camera * state.pose.root;
+    Some(AlignedBody {
+        pose: Pose {
+            root,
+            angles: state.pose.angles.clone(),
+        },
+        shape: state.shape.clone(),
+    })
+}

@@ -1,0 +1,228 @@
+//! Folder of a capture: the outfit, and each scan once it is done. A capture that was stopped continues there.
+
+use super::align::{AlignedBody, ClothedTemplate};
+use super::capture::{CapturedOutfit, FrameCapture, FrameReport};
+use super::scan::ScanFrame;
+use super::unpose::unpose;
+use crate::body::Template;
+use crate::formats::FormatError;
+use crate::formats::npy::{read_npy, write_npy};
+use crate::math::V3;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Version of the layout. A folder of another one is refused.
+const VERSION: u32 = 1;
+/// File of [`CaptureHeader`].
+const HEADER: &str = "capture.json";
+/// Folder of the scans' results.
+const FRAMES: &str = "frames";
+
+/// Outfit of a capture and the state that later scans start from.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct CaptureHeader {
+    /// Version of the layout.
+    pub version: u32,
+    /// Name of the body template.
+    pub template: String,
+    /// Unit and axes of the scans.
+    pub frame: ScanFrame,
+    /// Outfit.
+    pub outfit: CapturedOutfit,
+    /// Clothed template of the single-mesh alignment.
+    pub clothed: ClothedTemplate,
+    /// Names of all scans, in order.
+    pub scans: Vec<String>,
+}
+
+/// Result of one scan.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FrameRecord {
+    /// Name of the scan.
+    pub scan: String,
+    /// Pose and shape of the body under the cloth.
+    pub body: AlignedBody,
+    /// Report.
+    pub report: FrameReport,
+}
+
+/// Displacements of one scan, rest pose, metres.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FrameDisplacements {
+    /// Of the undressed body from the minimally clothed shape (eq. 22), shape `[vertices]`.
+    pub body: Vec<V3>,
+    /// Of each garment from the undressed body (eq. 23), shape `[garments][vertices]`.
+    pub garments: Vec<Vec<V3>>,
+}
+
+impl FrameDisplacements {
+    /// Displacements of a captured scan.
+    pub fn of(template: &Template, frame: &FrameCapture) -> Self {
+        let undressed = &frame.undressed;
+        let all = 0..undressed.vertices.len();
+        let rest = unpose(
+            template.weights(),
+            &undressed.bones,
+            all,
+            &undressed.vertices,
+        );
+        let shape = template.personalise(&undressed.body.shape).vertices;
+        Self {
+            body: rest.iter().zip(&shape).map(|(a, b)| a - b).collect(),
+            garments: frame.displacements.clone(),
+        }
+    }
+}
+
+/// Folder of one capture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CaptureArchive {
+    folder: PathBuf,
+}
+
+impl CaptureArchive {
+    /// Opens or creates a folder.
+    ///
+    /// # Errors
+    /// A folder that cannot be created.
+    pub fn new(folder: &Path) -> Result<Self, FormatError> {
+        let frames = folder.join(FRAMES);
+        std::fs::create_dir_all(&frames).map_err(|e| FormatError::io(&frames, e))?;
+        Ok(Self {
+            folder: folder.to_owned(),
+        })
+    }
+
+    /// Opens an existing folder.
+    ///
+    /// # Errors
+    /// A folder without a header.
+    pub fn open(folder: &Path) -> Result<(Self, CaptureHeader), FormatError> {
+        let archive = Self {
+            folder: folder.to_owned(),
+        };
+        let header = archive.header()?.ok_or_else(|| {
+            FormatError::field(
+                &archive.folder.join(HEADER),
+                HEADER,
+                "the folder holds no capture",
+            )
+        })?;
+        Ok((archive, header))
+    }
+
+    /// Header; `None` before the first scan is done.
+    ///
+    /// # Errors
+    /// A header of another version, or one that cannot be read.
+    pub fn header(&self) -> Result<Option<CaptureHeader>, FormatError> {
+        let path = self.folder.join(HEADER);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let header: CaptureHeader = read_json(&path)?;
+        if header.version != VERSION {
+            let why = format!("{}, this program reads {VERSION}", header.version);
+            return Err(FormatError::field(&path, "version", why));
+        }
+        Ok(Some(header))
+    }
+
+    /// Writes the header.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_header(&self, header: &CaptureHeader) -> Result<(), FormatError> {
+        let header = CaptureHeader {
+            version: VERSION,
+            ..header.clone()
+        };
+        write_json(&self.folder.join(HEADER), &header)
+    }
+
+    fn record_path(&self, scan: &str) -> PathBuf {
+        self.folder.join(FRAMES).join(format!("{scan}.json"))
+    }
+
+    fn array_path(&self, scan: &str, name: &str) -> PathBuf {
+        self.folder.join(FRAMES).join(format!("{scan}.{name}.npy"))
+    }
+
+    /// Result of a scan; `None` if it isn't done.
+    ///
+    /// # Errors
+    /// A record that cannot be read.
+    pub fn record(&self, scan: &str) -> Result<Option<FrameRecord>, FormatError> {
+        let path = self.record_path(scan);
+        if path.exists() {
+            read_json(&path).map(Some)
+        } else {
+            Ok(None)
+        }
+    }
+
+    /// Writes the result of a scan, the record last: a record stands for a whole result.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_frame(
+        &self,
+        record: &FrameRecord,
+        displacements: &FrameDisplacements,
+    ) -> Result<(), FormatError> {
+        let scan = &record.scan;
+        write_vectors(&self.array_path(scan, "body"), &displacements.body)?;
+        for (k, garment) in displacements.garments.iter().enumerate() {
+            write_vectors(&self.array_path(scan, &format!("garment{k}")), garment)?;
+        }
+        write_json(&self.record_path(scan), record)
+    }
+
+    /// Displacements of a scan with so many garments.
+    ///
+    /// # Errors
+    /// A missing or damaged array.
+    pub fn displacements(
+        &self,
+        scan: &str,
+        garments: usize,
+    ) -> Result<FrameDisplacements, FormatError> {
+        let garment = |k| read_vectors(&self.array_path(scan, &format!("garment{k}")));
+        Ok(FrameDisplacements {
+            body: read_vectors(&self.array_path(scan, "body"))?,
+            garments: (0..garments).map(garment).collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+fn write_vectors(path: &Path, vectors: &[V3]) -> Result<(), FormatError> {
+    let flat: Vec<f32> = vectors.iter().flat_map(|v| [v.x, v.y, v.z]).collect();
+    write_npy(path, &[vectors.len() as u64, 3], flat.into_iter())
+}
+
+fn read_vectors(path: &Path) -> Result<Vec<V3>, FormatError> {
+    let (shape, flat) = read_npy(path)?;
+    if shape.len() != 2 || shape[1] != 3 {
+        let why = format!("{shape:?}, expected [vertices, 3]");
+        return Err(FormatError::field(path, "shape", why));
+    }
+    Ok(flat
+        .chunks_exact(3)
+        .map(|c| V3::new(c[0], c[1], c[2]))
+        .collect())
+}
+
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, FormatError> {
+    let text = std::fs::read_to_string(path).map_err(|e| FormatError::io(path, e))?;
+    serde_json::from_str(&text).map_err(|e| FormatError::field(path, "json", e.to_string()))
+}
+
+/// Writes beside the file and renames, so that a kill leaves the old one or the new one.
+fn write_json(path: &Path, value: &impl Serialize) -> Result<(), FormatError> {
+    let text = serde_json::to_string(value)
+        .map_err(|e| FormatError::field(path, "json", e.to_string()))?;
+    let beside = path.with_extension("json.part");
+    std::fs::write(&beside, text).map_err(|e| FormatError::io(&beside, e))?;
+    std::fs::rename(&beside, path).map_err(|e| FormatError::io(path, e))
+}

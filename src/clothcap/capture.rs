@@ -1,0 +1,305 @@
+//! Capture of a sequence: align → segment → fit the parts → undress, scan by scan.
+
+use super::CaptureError;
+use super::align::{AlignedBody, Alignment, AlignmentReport, ClothedTemplate, Start};
+use super::layers::tuck_hidden;
+use super::multi::{ClothPart, MultiCloth, PartFit, PartFitConfig, PartScan};
+use super::part_colors::part_colors;
+use super::retarget::{PenetrationSolver, SolidBody, pose_part};
+use super::scan::BodyScan;
+use super::segment::{LabelConfig, Labelling};
+use super::segmenter::{ScanSegmenter, SegmentedScan};
+use super::undress::{Undressed, Undresser, WornGarments, minimally_clothed};
+use super::unpose::unpose;
+use crate::body::{BoneTransforms, Template};
+use crate::math::{P3, V3};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Capture of one scan.
+#[derive(Clone, Debug)]
+pub struct FrameCapture {
+    /// Single-mesh alignment.
+    pub alignment: Alignment,
+    /// Part of each scan point, shape `[points]`: 0 for skin and hair, then one a garment.
+    pub labels: Vec<u8>,
+    /// Posed vertices of each garment, world, metres.
+    pub garments: Vec<Vec<P3>>,
+    /// Body under the cloth.
+    pub undressed: Undressed,
+    /// Displacements of each garment from the undressed body in the rest pose (eq. 23), metres.
+    pub displacements: Vec<Vec<V3>>,
+    /// Report.
+    pub report: FrameReport,
+}
+
+/// Report of one scan.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FrameReport {
+    /// Single-mesh alignment.
+    pub alignment: AlignmentReport,
+    /// Mean distance of each garment's scan points from it, metres.
+    pub part_errors: Vec<f64>,
+    /// Mean distance of the scan's boundary points from each garment's rings, metres.
+    pub boundary_errors: Vec<f64>,
+}
+
+/// Outfit found in the first scan.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct CapturedOutfit {
+    /// Labels, slots and appearances.
+    pub labelling: Labelling,
+    /// Garments.
+    pub cloth: MultiCloth,
+    /// Rest vertices of each garment (L of eq. 15), metres.
+    pub rest: Vec<Vec<P3>>,
+    /// Colours of each garment's vertices, sRGB.
+    pub colors: Vec<Vec<[u8; 3]>>,
+    /// Minimally clothed shape with the first pose.
+    pub body: AlignedBody,
+}
+
+/// Settings of a capture.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CaptureConfig {
+    /// Segmentation.
+    pub labels: LabelConfig,
+    /// Fit of the parts.
+    pub parts: PartFitConfig,
+}
+
+/// Captures the scans of one subject in one outfit, in order.
+#[derive(Debug)]
+pub struct OutfitCapture {
+    template: Arc<Template>,
+    config: CaptureConfig,
+    segmenter: ScanSegmenter,
+    undresser: Undresser,
+    solid: SolidBody,
+    outfit: Option<CapturedOutfit>,
+}
+
+impl OutfitCapture {
+    /// Capture before the first scan.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] for a template too large.
+    pub fn new(template: Arc<Template>, config: CaptureConfig) -> Result<Self, CaptureError> {
+        Ok(Self {
+            segmenter: ScanSegmenter::new(template.clone(), config.labels.clone())?,
+            undresser: Undresser::new(template.clone())?,
+            solid: SolidBody::new(&template)?,
+            template,
+            config,
+            outfit: None,
+        })
+    }
+
+    /// Capture that continues after a first scan; `last` is the body of the scan before.
+    ///
+    /// # Errors
+    /// As [`OutfitCapture::new`].
+    pub fn resume(
+        template: Arc<Template>,
+        config: CaptureConfig,
+        outfit: CapturedOutfit,
+        state: (ClothedTemplate, AlignedBody),
+    ) -> Result<Self, CaptureError> {
+        let (labels, first) = (config.labels.clone(), outfit.labelling.clone());
+        Ok(Self {
+            segmenter: ScanSegmenter::resume(template.clone(), labels, first, state)?,
+            outfit: Some(outfit),
+            ..Self::new(template, config)?
+        })
+    }
+
+    /// Clothed template, once a scan is captured.
+    pub fn clothed(&self) -> Option<&ClothedTemplate> {
+        self.segmenter.clothed()
+    }
+
+    /// Outfit, once a scan is captured.
+    pub fn outfit(&self) -> Option<&CapturedOutfit> {
+        self.outfit.as_ref()
+    }
+
+    /// Starts the first scan at a person found before.
+    pub fn start_at(&mut self, start: Start) {
+        self.segmenter.start_at(start);
+    }
+
+    /// Captures the next scan: segment → fit the parts → undress → displacements.
+    ///
+    /// # Errors
+    /// [`CaptureError::NoPerson`], or [`CaptureError::NoGarment`] if the first scan shows none.
+    pub fn frame(&mut self, scan: &BodyScan) -> Result<FrameCapture, CaptureError> {
+        let segmented = self.segmenter.step(scan)?;
+        let covered = segmented.covered();
+        let fitter = PartFitter {
+            template: &self.template,
+            scan,
+            segmented: &segmented,
+            config: &self.config.parts,
+        };
+        let alignment = &segmented.alignment;
+        let (outfit, fitted) = match self.outfit.take() {
+            Some(outfit) => {
+                let fitted = fitter.later(&outfit)?;
+                (outfit, fitted)
+            }
+            None => {
+                let mcs = minimally_clothed(&self.template, scan, &covered, &alignment.body)?;
+                fitter.first(mcs)?
+            }
+        };
+        let body = AlignedBody {
+            pose: alignment.body.pose.clone(),
+            shape: outfit.body.shape.clone(),
+        };
+        let worn = WornGarments {
+            cloth: &outfit.cloth,
+            vertices: &fitted.vertices,
+        };
+        let undressed = self.undresser.run((scan, &covered), worn, body)?;
+        let garments = self.freed(&outfit, &fitted.vertices, &undressed)?;
+        let out = FrameCapture {
+            labels: segmented.parts(),
+            displacements: displacements(&self.template, &outfit.cloth, &garments, &undressed),
+            report: FrameReport {
+                alignment: alignment.report,
+                part_errors: fitted.errors,
+                boundary_errors: fitted.boundary_errors,
+            },
+            alignment: segmented.alignment,
+            garments,
+            undressed,
+        };
+        self.outfit = Some(outfit);
+        Ok(out)
+    }
+
+    /// Garments moved out of the undressed body where the fit left them inside, so that retargeting onto it moves nothing.
+    fn freed(
+        &mut self,
+        outfit: &CapturedOutfit,
+        fitted: &[Vec<P3>],
+        undressed: &Undressed,
+    ) -> Result<Vec<Vec<P3>>, CaptureError> {
+        self.solid.place(&undressed.vertices)?;
+        let mut out = fitted.to_vec();
+        for (part, vertices) in outfit.cloth.parts.iter().zip(&mut out) {
+            PenetrationSolver::new(part)?.run(&self.solid, vertices)?;
+        }
+        tuck_hidden(&outfit.cloth, &mut out, self.solid.vertices());
+        Ok(out)
+    }
+}
+
+/// Garments on one scan.
+#[derive(Debug, Default)]
+struct FittedParts {
+    vertices: Vec<Vec<P3>>,
+    errors: Vec<f64>,
+    boundary_errors: Vec<f64>,
+}
+
+/// Fit of all parts to one segmented scan.
+struct PartFitter<'a> {
+    template: &'a Template,
+    scan: &'a BodyScan,
+    segmented: &'a SegmentedScan,
+    config: &'a PartFitConfig,
+}
+
+impl PartFitter<'_> {
+    /// Parts of the first scan, coupled to the body model (eq. 18), and the outfit that they make.
+    fn first(&self, body: AlignedBody) -> Result<(CapturedOutfit, FittedParts), CaptureError> {
+        let segmented = self.segmented;
+        let cloth = MultiCloth::new(self.template, &segmented.labelling);
+        if cloth.parts.is_empty() {
+            return Err(CaptureError::NoGarment);
+        }
+        let alignment = &segmented.alignment;
+        let mut fitted = FittedParts::default();
+        for part in &cloth.parts {
+            let pick = |v: &[P3]| {
+                part.nodes
+                    .iter()
+                    .map(|i| v[*i as usize])
+                    .collect::<Vec<_>>()
+            };
+            let model = pick(&alignment.model);
+            self.fit(part, &model, pick(&alignment.surface), &mut fitted)?;
+        }
+        let parts = cloth.parts.iter().zip(&fitted.vertices);
+        let rest = parts.map(|(part, v)| rest(self.template, &alignment.bones, part, v));
+        let colors = cloth
+            .parts
+            .iter()
+            .map(|part| part_colors(part, &segmented.nodes, self.scan));
+        let outfit = CapturedOutfit {
+            rest: rest.collect(),
+            colors: colors.collect(),
+            labelling: segmented.labelling.clone(),
+            body,
+            cloth,
+        };
+        Ok((outfit, fitted))
+    }
+
+    /// Parts of a later scan, coupled to the posed multi-cloth template (eq. 21).
+    fn later(&self, outfit: &CapturedOutfit) -> Result<FittedParts, CaptureError> {
+        let mut fitted = FittedParts::default();
+        let bones = &self.segmented.alignment.bones;
+        for (part, rest) in outfit.cloth.parts.iter().zip(&outfit.rest) {
+            let model = pose_part(part, self.template.weights(), bones, rest);
+            self.fit(part, &model, model.clone(), &mut fitted)?;
+        }
+        Ok(fitted)
+    }
+
+    fn fit(
+        &self,
+        part: &ClothPart,
+        model: &[P3],
+        start: Vec<P3>,
+        out: &mut FittedParts,
+    ) -> Result<(), CaptureError> {
+        let points = PartScan::new(self.scan, &self.segmented.labels, part.label);
+        let mut vertices = start;
+        let report = PartFit::new(part, model)?.run(&points, model, &mut vertices, self.config)?;
+        out.vertices.push(vertices);
+        out.errors.push(report.error);
+        out.boundary_errors.push(report.boundary_error);
+        Ok(())
+    }
+}
+
+fn rest(template: &Template, bones: &BoneTransforms, part: &ClothPart, posed: &[P3]) -> Vec<P3> {
+    let nodes = part.nodes.iter().map(|v| *v as usize);
+    unpose(template.weights(), bones, nodes, posed)
+}
+
+/// Rest displacements of each garment from the undressed body (eq. 23).
+fn displacements(
+    template: &Template,
+    cloth: &MultiCloth,
+    garments: &[Vec<P3>],
+    undressed: &Undressed,
+) -> Vec<Vec<V3>> {
+    let all = 0..undressed.vertices.len();
+    let body = unpose(
+        template.weights(),
+        &undressed.bones,
+        all,
+        &undressed.vertices,
+    );
+    let parts = cloth.parts.iter().zip(garments);
+    parts
+        .map(|(part, vertices)| {
+            let above = rest(template, &undressed.bones, part, vertices);
+            let below = part.nodes.iter().map(|v| body[*v as usize]);
+            above.iter().zip(below).map(|(a, b)| a - b).collect()
+        })
+        .collect()
+}

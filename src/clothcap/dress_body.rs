@@ -1,0 +1,155 @@
+//! A new body in the captured outfit (eq. 24, 25), in the captured or any other pose.
+
+use super::CaptureError;
+use super::archive::FrameDisplacements;
+use super::layers::tuck_hidden;
+use super::multi::MultiCloth;
+use super::retarget::{PenetrationSolver, RetargetReport, SolidBody, on_body, pose_part};
+use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
+use crate::math::{P3, V3, World};
+use crate::par::Par;
+use crate::tracking::ArmClearance;
+use std::sync::Arc;
+
+/// Dressed body in one pose.
+#[derive(Clone, Debug)]
+pub struct DressedPose {
+    /// Pose, with arms turned out where they had to be.
+    pub pose: Pose<World>,
+    /// Bones of the pose.
+    pub bones: BoneTransforms,
+    /// Posed body, its pressing parts apart, world, metres.
+    pub body: Vec<P3>,
+    /// Posed garments, world, metres.
+    pub garments: Vec<Vec<P3>>,
+    /// Report of each garment.
+    pub reports: Vec<RetargetReport>,
+}
+
+/// Dresses bodies of one template in one outfit.
+#[derive(Debug)]
+pub struct BodyDresser<'a> {
+    template: Arc<Template>,
+    cloth: &'a MultiCloth,
+    solid: SolidBody,
+    solvers: Vec<PenetrationSolver>,
+}
+
+impl<'a> BodyDresser<'a> {
+    /// Prepares the systems of all garments.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] for a garment too large.
+    pub fn new(template: Arc<Template>, cloth: &'a MultiCloth) -> Result<Self, CaptureError> {
+        Ok(Self {
+            solid: SolidBody::new(&template)?,
+            solvers: cloth
+                .parts
+                .iter()
+                .map(PenetrationSolver::new)
+                .collect::<Result<_, _>>()?,
+            template,
+            cloth,
+        })
+    }
+
+    /// Dresses a rest body with the displacements of one scan and poses it, garments free of penetration. Where a wider
+    /// body leaves no room for sleeves, its arms are turned outwards.
+    ///
+    /// # Errors
+    /// [`CaptureError::Displacements`] for those of another outfit.
+    pub fn dress(
+        &mut self,
+        target: &RestBody,
+        displacements: &FrameDisplacements,
+        pose: &Pose<World>,
+    ) -> Result<DressedPose, CaptureError> {
+        let inside = |d: &DressedPose| d.reports.iter().map(|r| r.inside).sum::<usize>();
+        let first = self.dress_as_posed(target, displacements, pose)?;
+        if inside(&first) == 0 {
+            return Ok(first);
+        }
+        let Some(arms) = ArmClearance::new(&self.template, target) else {
+            return Ok(first);
+        };
+        let apart = arms.separate(&self.template, target, pose, &mut BoneTransforms::default());
+        let second = self.dress_as_posed(target, displacements, &apart)?;
+        Ok(if inside(&second) < inside(&first) {
+            second
+        } else {
+            first
+        })
+    }
+
+    /// [`BodyDresser::dress`] in exactly the given pose.
+    fn dress_as_posed(
+        &mut self,
+        target: &RestBody,
+        displacements: &FrameDisplacements,
+        pose: &Pose<World>,
+    ) -> Result<DressedPose, CaptureError> {
+        self.check(target, displacements)?;
+        let weights = self.template.weights();
+        let moved = |(p, d): (&P3, &V3)| p + d;
+        let rest: Vec<P3> = target
+            .vertices
+            .iter()
+            .zip(&displacements.body)
+            .map(moved)
+            .collect();
+        let mut bones = BoneTransforms::default();
+        pose.bones(self.template.skeleton(), target, &mut bones);
+        let mut body = Vec::new();
+        skin(Par::Rayon, &rest, weights, &bones, &mut body);
+        self.solid.place(&body)?;
+        let (mut garments, mut reports) = (Vec::new(), Vec::new());
+        let parts = self.cloth.parts.iter().zip(&displacements.garments);
+        for ((part, d), solver) in parts.zip(&mut self.solvers) {
+            let mut vertices = pose_part(part, weights, &bones, &on_body(part, d, &rest));
+            reports.push(solver.run(&self.solid, &mut vertices)?);
+            garments.push(vertices);
+        }
+        tuck_hidden(self.cloth, &mut garments, self.solid.vertices());
+        Ok(DressedPose {
+            pose: pose.clone(),
+            bones,
+            body: self.solid.vertices().to_vec(),
+            garments,
+            reports,
+        })
+    }
+
+    fn check(
+        &self,
+        target: &RestBody,
+        displacements: &FrameDisplacements,
+    ) -> Result<(), CaptureError> {
+        let fault = |why: String| Err(CaptureError::Displacements { why });
+        let n = self.template.mesh().vertices().len();
+        if target.vertices.len() != n || displacements.body.len() != n {
+            return fault(format!(
+                "{} body vertices and {} displacements, the template has {n}",
+                target.vertices.len(),
+                displacements.body.len()
+            ));
+        }
+        let parts = &self.cloth.parts;
+        if displacements.garments.len() != parts.len() {
+            return fault(format!(
+                "{} garments, the outfit has {}",
+                displacements.garments.len(),
+                parts.len()
+            ));
+        }
+        let sizes = parts.iter().zip(&displacements.garments).enumerate();
+        for (k, (part, d)) in sizes {
+            if part.nodes.len() != d.len() {
+                let (got, want) = (d.len(), part.nodes.len());
+                return fault(format!(
+                    "garment {k}: {got} displacements, it has {want} vertices"
+                ));
+            }
+        }
+        Ok(())
+    }
+}

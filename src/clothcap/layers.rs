@@ -1,0 +1,57 @@
+//! Layers of an outfit: hidden vertices of an inner garment lie between the body and the garment above.
+
+use super::multi::MultiCloth;
+use crate::math::P3;
+
+/// Place of a hidden vertex between skin and the garment above, 0 to 1.
+const DEPTH: f32 = 0.5;
+
+/// Moves hidden vertices below the garments above them. Shapes `[garments][vertices]` and `[body vertices]`, metres.
+pub(super) fn tuck_hidden(cloth: &MultiCloth, garments: &mut [Vec<P3>], body: &[P3]) {
+    for inner in 0..cloth.parts.len() {
+        for (i, node) in cloth.parts[inner].nodes.iter().enumerate() {
+            if !cloth.parts[inner].hidden[i] {
+                continue;
+            }
+            let above = cloth.parts.iter().enumerate().filter(|(k, _)| *k != inner);
+            let above = above.filter_map(|(k, part)| {
+                let at = part.nodes.binary_search(node).ok()?;
+                (!part.hidden[at]).then(|| garments[k][at])
+            });
+            let skin = body[*node as usize];
+            let nearest = above.min_by(|a, b| (a - skin).norm().total_cmp(&(b - skin).norm()));
+            if let Some(p) = nearest {
+                garments[inner][i] = skin + (p - skin) * DEPTH;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clothcap::multi::ClothPart;
+    use crate::clothcap::segment::Slot;
+
+    #[test]
+    fn hidden_vertices_lie_halfway() {
+        let part = |slot, nodes: &[u32], hidden: &[bool]| ClothPart {
+            slot,
+            label: 2,
+            nodes: nodes.to_vec(),
+            faces: Vec::new(),
+            rings: Vec::new(),
+            hidden: hidden.to_vec(),
+        };
+        let cloth = MultiCloth {
+            parts: vec![
+                part(Slot::Top, &[1, 2], &[false, false]),
+                part(Slot::Under, &[0, 1], &[false, true]),
+            ],
+        };
+        let z = |z: f32| P3::new(0.0, 0.0, z);
+        let mut garments = vec![vec![z(0.02), z(0.03)], vec![z(0.05), z(0.07)]];
+        tuck_hidden(&cloth, &mut garments, &[z(0.0); 3]);
+        assert_eq!(garments, [vec![z(0.02), z(0.03)], vec![z(0.05), z(0.01)]]);
+    }
+}

@@ -1,0 +1,285 @@
+//! Fit of one part to its scan points (eq. 15 to 21): data, boundary, coupling, Laplacian and boundary smoothness.
+
+use super::part::ClothPart;
+use crate::clothcap::CaptureError;
+use crate::clothcap::align::corner_weights;
+use crate::clothcap::align::{QuadraticEnergy, Stencil};
+use crate::clothcap::scan::BodyScan;
+use crate::math::{P3, V3};
+use crate::mesh::{Csr, face_normal};
+use crate::par::{self, Par};
+use crate::registration::GemanMcClure;
+use crate::spatial::Bvh;
+
+/// Smallest cosine between normals of a pair.
+const NORMALS: f32 = 0.2;
+/// Cotangent of 60°, see the free surface.
+const EDGE: f64 = 0.577;
+/// Pull to the start beside the data's: settles what no term determines.
+const ANCHOR: f64 = 1e-4;
+/// Distance up to which a boundary point of the scan belongs to a ring, metres.
+const RING_REACH: f32 = 0.06;
+
+/// Weights of a part's energy; lengths whose squares weigh terms against data by area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PartFitConfig {
+    /// Width of the Geman–McClure kernel, metres.
+    pub sigma: f64,
+    /// Coupling length, metres (w_c of eq. 15).
+    pub coupling: f64,
+    /// Length of the Laplacian, metres (w_s).
+    pub laplacian: f64,
+    /// Weight of a boundary point beside a surface point (w_b). The paper's is 0.02 of the data's, per point.
+    pub boundary: f64,
+    /// Weight of boundary smoothness beside a surface point (w_a).
+    pub smoothness: f64,
+    /// Iterations.
+    pub iterations: usize,
+}
+
+impl Default for PartFitConfig {
+    fn default() -> Self {
+        Self {
+            sigma: 0.03,
+            coupling: 0.012,
+            laplacian: 0.006,
+            boundary: 2.0,
+            smoothness: 2.0,
+            iterations: 8,
+        }
+    }
+}
+
+/// Report of a fit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PartFitReport {
+    /// Mean distance of the part's scan points from it, metres.
+    pub error: f64,
+    /// Mean distance of the scan's boundary points from the rings, metres; 0 without any.
+    pub boundary_error: f64,
+    /// BodyScan points with a partner.
+    pub paired: usize,
+}
+
+/// BodyScan points of one part.
+#[derive(Clone, Debug, Default)]
+pub struct PartScan {
+    points: Vec<P3>,
+    normals: Vec<V3>,
+    oriented: bool,
+    /// Points between the part's label and another one.
+    boundary: Vec<P3>,
+}
+
+impl PartScan {
+    /// Points with a label, and the middles of the scan's edges to other labels.
+    pub fn new(scan: &BodyScan, labels: &[u8], label: u8) -> Self {
+        let own = |i: &usize| labels[*i] == label;
+        let some: Vec<usize> = (0..scan.points.len()).filter(own).collect();
+        let sides = |f: &[u32; 3]| [[f[0], f[1]], [f[1], f[2]], [f[2], f[0]]];
+        let crosses = |e: &[u32; 2]| {
+            let [a, b] = e.map(|v| labels[v as usize]);
+            a == label && b != label
+        };
+        let middle = |e: [u32; 2]| {
+            let [a, b] = e.map(|v| scan.points[v as usize]);
+            nalgebra::center(&a, &b)
+        };
+        let edges = scan.faces.iter().flat_map(sides).filter(crosses);
+        Self {
+            points: some.iter().map(|i| scan.points[*i]).collect(),
+            normals: some.iter().map(|i| scan.normals[*i]).collect(),
+            oriented: scan.oriented,
+            boundary: edges.map(middle).collect(),
+        }
+    }
+}
+
+/// System of one part.
+#[derive(Debug)]
+pub struct PartFit<'a> {
+    part: &'a ClothPart,
+    energy: QuadraticEnergy,
+    edges: Vec<[u32; 2]>,
+    /// Stencils: edges, then Laplacians, then rings.
+    ranges: [usize; 3],
+    bvh: Bvh,
+}
+
+impl<'a> PartFit<'a> {
+    /// Prepares the system; `rest` are the part's vertices in any pose, metres.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] for a part too large.
+    pub fn new(part: &'a ClothPart, rest: &[P3]) -> Result<Self, CaptureError> {
+        let n = part.nodes.len();
+        let sides = |f: &[u32; 3]| [[f[0], f[1]], [f[1], f[2]], [f[2], f[0]]];
+        let mut edges: Vec<[u32; 2]> = part.faces.iter().flat_map(sides).collect();
+        edges.iter_mut().for_each(|e| e.sort_unstable());
+        edges.sort_unstable();
+        edges.dedup();
+        let both: Vec<(u32, u32)> = edges
+            .iter()
+            .flat_map(|e| [(e[0], e[1]), (e[1], e[0])])
+            .collect();
+        let around = Csr::from_pairs(n, &both);
+        let mut on_ring = vec![false; n];
+        part.rings
+            .iter()
+            .flat_map(|r| &r.vertices)
+            .for_each(|v| on_ring[*v as usize] = true);
+        let mut stencils: Vec<Stencil> = edges.iter().map(|e| Stencil::edge(*e, EDGE)).collect();
+        let laplacian = |v: u32| {
+            let row = around.row(v as usize);
+            let mut vertices = vec![v];
+            vertices.extend(row);
+            let mut factors = vec![1.0];
+            factors.extend(row.iter().map(|_| -1.0 / row.len() as f64));
+            Stencil {
+                vertices,
+                factors,
+                weight: 1.0,
+            }
+        };
+        let inner = (0..n as u32).filter(|v| !on_ring[*v as usize]);
+        stencils.extend(inner.map(laplacian));
+        let second = stencils.len();
+        for ring in &part.rings {
+            let k = ring.vertices.len();
+            stencils.extend((0..k).map(|i| Stencil {
+                vertices: [k + i - 1, i, i + 1].map(|j| ring.vertices[j % k]).to_vec(),
+                factors: vec![1.0, -2.0, 1.0],
+                weight: 1.0,
+            }));
+        }
+        Ok(Self {
+            ranges: [edges.len(), second, stencils.len()],
+            energy: QuadraticEnergy::new(n, stencils, &part.faces)?,
+            bvh: Bvh::new(&part.faces, rest),
+            part,
+            edges,
+        })
+    }
+
+    /// Moves `surface` onto the points; `model` is the posed multi-cloth model it is coupled to. Shapes `[vertices]`, metres.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`].
+    pub fn run(
+        &mut self,
+        scan: &PartScan,
+        model: &[P3],
+        surface: &mut Vec<P3>,
+        config: &PartFitConfig,
+    ) -> Result<PartFitReport, CaptureError> {
+        let area = area(self.part, model);
+        let vertex = area / model.len().max(1) as f64;
+        let point = area / scan.points.len().max(1) as f64;
+        let mut report = PartFitReport::default();
+        for k in 0..=config.iterations {
+            let matches = self.pair(scan, surface, config);
+            report.error = mean_distance(&matches);
+            report.paired = matches.len();
+            if k == config.iterations {
+                break;
+            }
+            self.energy.reset();
+            for (i, e) in self.edges.iter().enumerate() {
+                let d = (model[e[0] as usize] - model[e[1] as usize]).cast::<f64>();
+                self.energy
+                    .add_stencil(i, config.coupling * config.coupling, d.into());
+            }
+            // A Laplacian of size δ on an even mesh bends like δ / h², so its weight is length⁴ / h⁴ by area.
+            let bend = (config.laplacian * config.laplacian / vertex).powi(2) * vertex;
+            (self.ranges[0]..self.ranges[1])
+                .for_each(|i| self.energy.add_stencil(i, bend, [0.0; 3]));
+            let smooth = config.smoothness * vertex;
+            (self.ranges[1]..self.ranges[2])
+                .for_each(|i| self.energy.add_stencil(i, smooth, [0.0; 3]));
+            for (v, p) in model.iter().enumerate() {
+                self.energy.add_vertex(v as u32, ANCHOR * vertex, p);
+            }
+            for m in &matches {
+                self.energy
+                    .add_face_point(m.face, m.corners, point * m.weight, &m.target);
+            }
+            report.boundary_error = self.add_boundary(scan, surface, config.boundary * vertex);
+            *surface = self.energy.minimise("garment part")?;
+        }
+        Ok(report)
+    }
+
+    fn pair(&mut self, scan: &PartScan, surface: &[P3], config: &PartFitConfig) -> Vec<PartMatch> {
+        self.bvh.refit(surface);
+        let kernel = GemanMcClure {
+            sigma: config.sigma,
+        };
+        let mut out = Vec::new();
+        par::map_into(Par::Rayon, scan.points.len(), 256, &mut out, |i| {
+            let p = scan.points[i];
+            let found = self.bvh.closest(surface, &p)?;
+            let face = &self.part.faces[found.face as usize];
+            let normal = face_normal(surface, face).try_normalize(f32::MIN_POSITIVE)?;
+            let cos = normal.dot(&scan.normals[i]);
+            let cos = if scan.oriented { cos } else { cos.abs() };
+            let known = scan.normals[i] != V3::zeros();
+            (!known || cos > NORMALS).then(|| PartMatch {
+                face: found.face,
+                corners: corner_weights(surface, face, &found.point),
+                target: p,
+                distance: found.distance,
+                weight: kernel.weight(f64::from(found.distance * found.distance)),
+            })
+        });
+        out.into_iter().flatten().collect()
+    }
+
+    /// Pulls each ring vertex to the mean of the scan's boundary points nearest to it; their mean distance, metres.
+    fn add_boundary(&mut self, scan: &PartScan, surface: &[P3], weight: f64) -> f64 {
+        let ring: Vec<u32> = self
+            .part
+            .rings
+            .iter()
+            .flat_map(|r| r.vertices.clone())
+            .collect();
+        let mut sums = vec![(V3::zeros(), 0.0f32); ring.len()];
+        let (mut total, mut count) = (0.0, 0.0);
+        for p in &scan.boundary {
+            let distance = |v: &u32| (surface[*v as usize] - p).norm_squared();
+            let near = ring
+                .iter()
+                .enumerate()
+                .map(|(k, v)| (distance(v), k))
+                .min_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((d, k)) = near.filter(|(d, _)| *d < RING_REACH * RING_REACH) {
+                sums[k].0 += p.coords;
+                sums[k].1 += 1.0;
+                total += f64::from(d.sqrt());
+                count += 1.0;
+            }
+        }
+        for (v, (sum, n)) in ring.iter().zip(&sums).filter(|(_, s)| s.1 > 0.0) {
+            self.energy.add_vertex(*v, weight, &P3::from(sum / *n));
+        }
+        if count > 0.0 { total / count } else { 0.0 }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct PartMatch {
+    face: u32,
+    corners: [f32; 3],
+    target: P3,
+    distance: f32,
+    weight: f64,
+}
+
+fn mean_distance(matches: &[PartMatch]) -> f64 {
+    let sum: f64 = matches.iter().map(|m| f64::from(m.distance)).sum();
+    sum / matches.len().max(1) as f64
+}
+
+fn area(part: &ClothPart, vertices: &[P3]) -> f64 {
+    let twice = |f| f64::from(face_normal(vertices, f).norm());
+    0.5 * part.faces.iter().map(twice).sum::<f64>()
+}

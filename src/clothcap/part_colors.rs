@@ -1,0 +1,50 @@
+//! Colours of a garment's vertices: means of the scan points there, spread over vertices without any.
+
+use super::multi::ClothPart;
+use super::scan::BodyScan;
+use super::segment::NodeColors;
+use crate::mesh::Csr;
+
+/// Colour of a garment without a coloured point, sRGB.
+const GREY: f32 = 160.0;
+
+/// Colours of a part's vertices, sRGB, shape `[vertices]`.
+pub(super) fn part_colors(part: &ClothPart, nodes: &NodeColors, scan: &BodyScan) -> Vec<[u8; 3]> {
+    let sides = |f: &[u32; 3]| [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])];
+    let both = |(a, b): (u32, u32)| [(a, b), (b, a)];
+    let pairs: Vec<(u32, u32)> = part.faces.iter().flat_map(sides).flat_map(both).collect();
+    let around = Csr::from_pairs(part.nodes.len(), &pairs);
+    let own = |(v, hidden): (&u32, &bool)| {
+        let row = nodes.points.row(*v as usize);
+        let colors = row.iter().filter_map(|p| scan.colors.get(*p as usize));
+        let all: Vec<[f32; 3]> = colors.map(|c| c.map(f32::from)).collect();
+        // Points over a hidden vertex belong to the garment above.
+        (!hidden).then(|| mean(&all)).flatten()
+    };
+    let mut known: Vec<Option<[f32; 3]>> = part.nodes.iter().zip(&part.hidden).map(own).collect();
+    loop {
+        let before = known.clone();
+        let spread = |v: usize| {
+            let near = around.row(v).iter().filter_map(|w| before[*w as usize]);
+            mean(&near.collect::<Vec<_>>())
+        };
+        let mut is_changed = false;
+        for v in 0..known.len() {
+            if known[v].is_none() {
+                known[v] = spread(v);
+                is_changed |= known[v].is_some();
+            }
+        }
+        if !is_changed {
+            break;
+        }
+    }
+    let rounded = |c: &Option<[f32; 3]>| c.unwrap_or([GREY; 3]).map(|v| v.round() as u8);
+    known.iter().map(rounded).collect()
+}
+
+fn mean(all: &[[f32; 3]]) -> Option<[f32; 3]> {
+    let n = all.len() as f32;
+    let sum = |k: usize| all.iter().map(|c| c[k]).sum::<f32>();
+    (!all.is_empty()).then(|| std::array::from_fn(|k| sum(k) / n))
+}

@@ -1,0 +1,269 @@
+//! Pictures of the stages: coloured meshes from the front, side and back, in rows.
+
+use super::align::AlignedBody;
+use super::capture::{CapturedOutfit, FrameCapture};
+use super::scan::BodyScan;
+use crate::body::Template;
+use crate::camera::ColorImage;
+use crate::math::{P3, V3};
+use crate::mesh::Face;
+use crate::par::Par;
+use crate::raster::{Options, View, VisibilityBuffer, interpolate, rasterise_with};
+use nalgebra::{Rotation3, Vector3};
+
+/// Scale, pixels a metre.
+const SCALE: f32 = 300.0;
+/// Width and height of a panel, metres.
+const PANEL: [f32; 2] = [1.3, 2.0];
+/// Height of the panel's lower rim over the lowest vertex, metres.
+const BELOW: f32 = 0.06;
+/// Background, sRGB.
+const PAPER: [u8; 3] = [245, 245, 245];
+/// Direction of the light in the picture: from the left above, behind the viewer.
+const LIGHT: [f32; 3] = [-0.4, 0.6, 0.7];
+/// Brightness without direct light.
+const AMBIENT: f32 = 0.35;
+/// Smallest and largest side of a point of a cloud, pixels.
+const DOT: i32 = 2;
+
+/// Coloured mesh, or cloud if it has no faces.
+#[derive(Clone, Copy, Debug)]
+pub struct Painted<'a> {
+    /// Positions, world, metres.
+    pub points: &'a [P3],
+    /// Triangles.
+    pub faces: &'a [Face],
+    /// Colours, sRGB, shape `[points]`.
+    pub colors: &'a [[u8; 3]],
+}
+
+/// One panel: meshes seen from a direction.
+#[derive(Clone, Debug)]
+pub struct PicturePanel<'a> {
+    /// Meshes in one picture.
+    pub meshes: Vec<Painted<'a>>,
+    /// Direction of the viewer about the vertical, radians; 0 is +z.
+    pub yaw: f32,
+}
+
+/// Colours of parts, sRGB: skin, then garments.
+pub const PART_COLORS: [[u8; 3]; 7] = [
+    [230, 190, 160],
+    [70, 110, 200],
+    [225, 215, 90],
+    [90, 160, 90],
+    [200, 90, 80],
+    [170, 90, 190],
+    [90, 190, 200],
+];
+/// Directions of a stage: front, side, back, radians about the vertical from the body's front.
+const VIEWS: [f32; 3] = [0.0, 1.2, std::f32::consts::PI];
+
+/// Colour of a part.
+pub fn part_color(part: u8) -> [u8; 3] {
+    PART_COLORS[usize::from(part) % PART_COLORS.len()]
+}
+
+/// Stages of one scan, a row each from the front, side and back: scan, aligned surface, labels, garments, body below,
+/// dressed. `front` is the body's direction about the vertical, radians.
+pub fn stages(
+    template: &Template,
+    scan: &BodyScan,
+    frame: &FrameCapture,
+    outfit: &CapturedOutfit,
+) -> ColorImage {
+    let faces = template.mesh().faces();
+    let front = heading(&frame.alignment.body);
+    let skin = vec![part_color(0); template.mesh().vertices().len()];
+    let grey = vec![[190, 190, 200]; skin.len()];
+    let labels: Vec<[u8; 3]> = frame.labels.iter().map(|p| part_color(*p)).collect();
+    let plain = vec![[160; 3]; scan.points.len()];
+    let of_scan = |colors| Painted {
+        points: &scan.points,
+        faces: &scan.faces,
+        colors,
+    };
+    let captured = if scan.colors.is_empty() {
+        &plain
+    } else {
+        &scan.colors
+    };
+    let body = Painted {
+        points: &frame.undressed.vertices,
+        faces,
+        colors: &skin,
+    };
+    let parts = outfit.cloth.parts.iter().zip(&frame.garments);
+    let garments: Vec<Painted<'_>> = parts
+        .zip(&outfit.colors)
+        .map(|((part, points), colors)| Painted {
+            points,
+            faces: &part.faces,
+            colors,
+        })
+        .collect();
+    let aligned = Painted {
+        points: &frame.alignment.surface,
+        faces,
+        colors: &grey,
+    };
+    let dressed = [&[body][..], &garments].concat();
+    let columns = [
+        vec![of_scan(captured)],
+        vec![aligned],
+        vec![of_scan(&labels)],
+        garments,
+        vec![body],
+        dressed,
+    ];
+    let panels: Vec<PicturePanel<'_>> = VIEWS
+        .iter()
+        .flat_map(|view| {
+            columns.iter().map(move |meshes| PicturePanel {
+                meshes: meshes.clone(),
+                yaw: front + view,
+            })
+        })
+        .collect();
+    sheet(&panels, columns.len())
+}
+
+/// Direction that a body faces, radians about the vertical from +z.
+pub fn heading(body: &AlignedBody) -> f32 {
+    let z = body.pose.root.vector(&Vector3::z());
+    z.x.atan2(z.z) as f32
+}
+
+/// Draws panels side by side, `columns` a row.
+pub fn sheet(panels: &[PicturePanel<'_>], columns: usize) -> ColorImage {
+    let columns = columns.clamp(1, panels.len().max(1));
+    let [w, h] = PANEL.map(|m| (m * SCALE) as u32);
+    let rows = panels.len().div_ceil(columns) as u32;
+    let mut out = ColorImage::filled(w * columns as u32, h * rows, PAPER);
+    let stride = out.width() as usize;
+    for (k, panel) in panels.iter().enumerate() {
+        let (column, row) = (k % columns, k / columns);
+        let picture = draw(panel, [w, h]);
+        for y in 0..h as usize {
+            let from = 3 * y * w as usize;
+            let to = 3 * ((row * h as usize + y) * stride + column * w as usize);
+            let line = &picture[from..from + 3 * w as usize];
+            out.data_mut()[to..to + line.len()].copy_from_slice(line);
+        }
+    }
+    out
+}
+
+/// Rows of one panel.
+fn draw(panel: &PicturePanel<'_>, [w, h]: [u32; 2]) -> Vec<u8> {
+    let turn = Rotation3::from_axis_angle(&V3::y_axis(), -panel.yaw);
+    let finite = |p: &&P3| p.iter().all(|c| c.is_finite());
+    let all = || panel.meshes.iter().flat_map(|m| m.points).filter(finite);
+    let low = all().map(|p| p.y).fold(f32::MAX, f32::min);
+    let n = all().count().max(1) as f32;
+    let middle = turn * P3::from(all().map(|p| p.coords).sum::<V3>() / n);
+    let view = View::Orthographic {
+        width: w,
+        height: h,
+        left: middle.x - 0.5 * PANEL[0],
+        top: -(low - BELOW + PANEL[1]),
+        pixels_per_metre: SCALE,
+    };
+    let mut pixels: Vec<u8> = PAPER.repeat((w * h) as usize);
+    let mut depth = vec![f32::INFINITY; (w * h) as usize];
+    for mesh in &panel.meshes {
+        // The viewer's axes: x right, y down, z away.
+        let seen: Vec<P3> = mesh
+            .points
+            .iter()
+            .map(|p| turn * p)
+            .map(|q| P3::new(q.x, -q.y, -q.z))
+            .collect();
+        let mut target = Target {
+            view: &view,
+            pixels: &mut pixels,
+            depth: &mut depth,
+        };
+        if mesh.faces.is_empty() {
+            target.dots(&seen, mesh.colors);
+        } else {
+            target.surface(&seen, mesh);
+        }
+    }
+    pixels
+}
+
+struct Target<'a> {
+    view: &'a View,
+    pixels: &'a mut [u8],
+    depth: &'a mut [f32],
+}
+
+impl Target<'_> {
+    fn put(&mut self, at: usize, z: f32, color: [f32; 3]) {
+        if z < self.depth[at] {
+            self.depth[at] = z;
+            for (out, c) in self.pixels[3 * at..3 * at + 3].iter_mut().zip(color) {
+                *out = c.round().clamp(0.0, 255.0) as u8;
+            }
+        }
+    }
+
+    fn surface(&mut self, seen: &[P3], mesh: &Painted<'_>) {
+        let mut normals = vec![V3::zeros(); seen.len()];
+        for f in mesh.faces {
+            let [a, b, c] = f.map(|v| seen[v as usize]);
+            let n = (b - a).cross(&(c - a));
+            f.iter().for_each(|v| normals[*v as usize] += n);
+        }
+        let mut buffer = VisibilityBuffer::default();
+        let options = Options {
+            par: Par::Rayon,
+            ..Options::default()
+        };
+        rasterise_with(options, self.view, seen, mesh.faces, &mut buffer);
+        let light = V3::new(LIGHT[0], -LIGHT[1], -LIGHT[2]).normalize();
+        let (w, h) = self.view.size();
+        for v in 0..h {
+            for u in 0..w {
+                let Some((id, b)) = interpolate(self.view, seen, mesh.faces, &buffer, [u, v])
+                else {
+                    continue;
+                };
+                let f = mesh.faces[id as usize];
+                let sum = |g: &dyn Fn(usize) -> V3| -> V3 {
+                    (0..3).map(|k| g(f[k] as usize) * b[k]).sum()
+                };
+                let n = sum(&|i| {
+                    normals[i]
+                        .try_normalize(f32::MIN_POSITIVE)
+                        .unwrap_or_default()
+                });
+                let n = n.try_normalize(f32::MIN_POSITIVE).unwrap_or_default();
+                // Both sides of cloth are lit.
+                let n = if n.z > 0.0 { -n } else { n };
+                let lit = AMBIENT + (1.0 - AMBIENT) * n.dot(&light).max(0.0);
+                let color = sum(&|i| V3::from(mesh.colors[i].map(f32::from)));
+                let at = (v * w + u) as usize;
+                self.put(at, buffer.depth[at], (color * lit).into());
+            }
+        }
+    }
+
+    fn dots(&mut self, seen: &[P3], colors: &[[u8; 3]]) {
+        let (w, h) = self.view.size();
+        for (p, c) in seen.iter().zip(colors) {
+            let Some([x, y, z]) = self.view.project(p) else {
+                continue;
+            };
+            for dy in 0..DOT {
+                for dx in 0..DOT {
+                    let (u, v) = (x as i32 + dx, y as i32 + dy);
+                    if (0..w as i32).contains(&u) && (0..h as i32).contains(&v) {
+                        self.put(v as usize * w as usize + u as usize, z, c.map(f32::from));
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! A population: bodies drawn from the shape space (section 6.4).
+
+use crate::body::embedded::RANGE;
+use crate::body::{BodyShape, Template};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Shapes of `count` bodies, the same for the same seed: normally distributed coefficients within the sound range.
+pub fn population(template: &Template, count: usize, seed: u64) -> Vec<BodyShape> {
+    let mut rng = rand_pcg::Pcg32::seed_from_u64(seed);
+    let directions = template.shape_space().map_or(0, |s| s.names.len());
+    let coefficient = |rng: &mut rand_pcg::Pcg32| -> f64 {
+        let x: f64 = StandardNormal.sample(rng);
+        x.clamp(-RANGE, RANGE)
+    };
+    (0..count)
+        .map(|_| BodyShape {
+            coefficients: (0..directions).map(|_| coefficient(&mut rng)).collect(),
+            ..BodyShape::default()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::embedded;
+
+    #[test]
+    fn bodies_differ_and_repeat() {
+        let template = embedded::template();
+        let some = population(&template, 20, 1);
+        assert_eq!(some, population(&template, 20, 1));
+        assert_ne!(some, population(&template, 20, 2));
+        let heights = some.iter().map(|s| {
+            let body = template.personalise(s);
+            body.vertices.iter().map(|p| p.y).fold(f32::MIN, f32::max)
+        });
+        let (low, high) = heights.fold((f32::MAX, f32::MIN), |(l, h), y| (l.min(y), h.max(y)));
+        assert!(high - low > 0.1);
+    }
+}

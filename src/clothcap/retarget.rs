@@ -1,0 +1,289 @@
+//! Retargeting (eq. 23 to 25): captured cloth as displacements from the body, on new bodies in any pose, free of penetration.
+
+use super::CaptureError;
+use super::align::{QuadraticEnergy, Stencil};
+use super::multi::ClothPart;
+use super::unpose::blended;
+use crate::body::{BoneTransforms, SkinWeights, Template};
+use crate::cloth::{Config, collision_model};
+use crate::contact::{ClosestPoint, CollisionBody, CollisionModel, CollisionWorkspace, Part};
+use crate::math::{P3, V3};
+use crate::mesh::Face;
+use crate::par::{self, Par};
+use crate::spatial::Bvh;
+use serde::{Deserialize, Serialize};
+
+/// Distance that cloth keeps from the skin, metres.
+const MARGIN: f32 = 0.003;
+/// Distance below which a vertex is pushed, metres. Between the two lies what smoothing gives back.
+const LEAST: f32 = 0.001;
+/// Rounds of pushing and smoothing, and of pushing alone.
+const ROUNDS: [usize; 2] = [5, 10];
+/// Weight of a pushed vertex beside that of an edge.
+const PUSH: f64 = 4.0;
+/// Pull of each vertex to its place without contact.
+const ANCHOR: f64 = 0.05;
+
+/// Report of one retargeting.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RetargetReport {
+    /// Vertices inside the body before they were pushed.
+    pub inside_before: usize,
+    /// Vertices inside the body afterwards.
+    pub inside: usize,
+    /// Solves.
+    pub solves: usize,
+    /// Largest displacement by pushing, metres.
+    pub largest_push: f32,
+}
+
+/// Vertices of a garment over a rest body (eq. 25), metres; `body` has the template's vertices.
+pub fn on_body(part: &ClothPart, displacements: &[V3], body: &[P3]) -> Vec<P3> {
+    let below = part.nodes.iter().map(|v| body[*v as usize]);
+    below.zip(displacements).map(|(p, d)| p + d).collect()
+}
+
+/// Posed vertices of a garment, with the skinning of its body vertices.
+pub fn pose_part(
+    part: &ClothPart,
+    weights: &SkinWeights,
+    bones: &BoneTransforms,
+    rest: &[P3],
+) -> Vec<P3> {
+    let nodes = part.nodes.iter().map(|v| *v as usize);
+    nodes
+        .zip(rest)
+        .map(|(v, p)| blended(weights, bones, v).transform_point(&p.cast()).cast())
+        .collect()
+}
+
+/// Body that garments stay outside of: its pressing parts and bent joints apart, as it is drawn.
+#[derive(Debug)]
+pub struct SolidBody {
+    model: CollisionModel,
+    body: CollisionBody,
+    work: CollisionWorkspace,
+    bvh: Bvh,
+}
+
+impl SolidBody {
+    /// Body of a template at rest.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] for a template whose mesh cannot collide.
+    pub fn new(template: &Template) -> Result<Self, CaptureError> {
+        let mesh = template.mesh();
+        let model = collision_model(template, &Config::default()).map_err(fault)?;
+        let mut out = Self {
+            model,
+            body: CollisionBody::default(),
+            work: CollisionWorkspace::default(),
+            bvh: Bvh::new(mesh.faces(), mesh.vertices()),
+        };
+        out.place(mesh.vertices())?;
+        Ok(out)
+    }
+
+    /// Places the body at a pose: posed vertices, metres, shape `[vertices]`.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] for another template's vertices or values that are not finite.
+    pub fn place(&mut self, posed: &[P3]) -> Result<(), CaptureError> {
+        self.body
+            .place(&self.model, posed, &mut self.work)
+            .map_err(fault)?;
+        self.bvh.refit(self.body.vertices());
+        Ok(())
+    }
+
+    /// The same without separating its parts, so that surface and body agree vertex by vertex.
+    ///
+    /// # Errors
+    /// As [`SolidBody::place`].
+    pub fn place_unseparated(&mut self, posed: &[P3]) -> Result<(), CaptureError> {
+        self.model.check(posed).map_err(fault)?;
+        self.body = CollisionBody::unfiltered(posed);
+        self.bvh.refit(posed);
+        Ok(())
+    }
+
+    /// Closest point of the skin near body vertex `node`.
+    pub fn below(&self, p: &P3, node: u32) -> ClosestPoint {
+        let surface = self.model.surface();
+        surface.closest(self.body.frame(), p, node, Part::MAX)
+    }
+
+    /// Vertices as garments meet them and as they are drawn, metres.
+    pub fn vertices(&self) -> &[P3] {
+        self.body.vertices()
+    }
+
+    /// Membership in the body's interior of each point, by ray parity.
+    pub fn contains(&self, points: &[P3]) -> Vec<bool> {
+        let mut inside = Vec::new();
+        par::map_into(Par::Rayon, points.len(), 128, &mut inside, |i| {
+            self.bvh.winding_number(self.body.vertices(), &points[i]) > 0
+        });
+        inside
+    }
+
+    /// Place outside of the skin near body vertex `node` for a point closer than [`LEAST`]; `None` for others.
+    fn outside(&self, p: &P3, node: u32) -> Option<P3> {
+        let hit = self.below(p, node);
+        (hit.signed_distance < LEAST).then(|| hit.point + hit.normal * MARGIN)
+    }
+
+    /// The same by the closest point of the whole skin, for a point in its interior.
+    fn outside_of_all(&self, p: &P3) -> Option<P3> {
+        let hit = self.bvh.closest(self.body.vertices(), p)?;
+        let out = (hit.point - p).try_normalize(f32::MIN_POSITIVE)?;
+        Some(hit.point + out * MARGIN)
+    }
+}
+
+fn fault(e: impl std::fmt::Display) -> CaptureError {
+    CaptureError::Solve {
+        stage: "collision body",
+        why: e.to_string(),
+    }
+}
+
+/// System that moves one garment out of bodies.
+#[derive(Debug)]
+pub struct PenetrationSolver {
+    nodes: Vec<u32>,
+    edges: Vec<[u32; 2]>,
+    energy: QuadraticEnergy,
+}
+
+impl PenetrationSolver {
+    /// Prepares the system of a garment.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] for a garment too large.
+    pub fn new(part: &ClothPart) -> Result<Self, CaptureError> {
+        let edges = edges(&part.faces);
+        let stencils = edges.iter().map(|e| Stencil::edge(*e, 1.0)).collect();
+        Ok(Self {
+            energy: QuadraticEnergy::new(part.nodes.len(), stencils, &[])?,
+            nodes: part.nodes.clone(),
+            edges,
+        })
+    }
+
+    /// Moves vertices out of the body with the least change of edges; afterwards none is inside unless the report says so.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`].
+    pub fn run(
+        &mut self,
+        body: &SolidBody,
+        vertices: &mut Vec<P3>,
+    ) -> Result<RetargetReport, CaptureError> {
+        let wanted = vertices.clone();
+        let mut report = RetargetReport {
+            inside_before: count(&body.contains(vertices)),
+            ..RetargetReport::default()
+        };
+        let mut pushed: Vec<Option<P3>> = vec![None; vertices.len()];
+        for _ in 0..ROUNDS[0] {
+            if !self.push(body, vertices, &mut pushed) {
+                break;
+            }
+            *vertices = self.relax(&wanted, &pushed)?;
+            report.solves += 1;
+        }
+        for _ in 0..ROUNDS[1] {
+            let mut left = vec![None; vertices.len()];
+            let is_near = self.push(body, vertices, &mut left);
+            let inside = body.contains(vertices);
+            if !is_near && count(&inside) == 0 {
+                break;
+            }
+            for (v, p) in vertices.iter_mut().enumerate() {
+                let out = if inside[v] {
+                    body.outside_of_all(p)
+                } else {
+                    None
+                };
+                *p = left[v].or(out).unwrap_or(*p);
+            }
+        }
+        self.gather(body, vertices);
+        report.inside = count(&body.contains(vertices));
+        let moved = vertices.iter().zip(&wanted).map(|(a, b)| (a - b).norm());
+        report.largest_push = moved.fold(0.0, f32::max);
+        Ok(report)
+    }
+
+    /// Moves vertices that are still inside towards neighbours outside: in a fold of the skin, where pushing out of one side
+    /// is pushing into the other, cloth bunches up.
+    fn gather(&self, body: &SolidBody, vertices: &mut [P3]) {
+        /// Shares of the way that are tried.
+        const WAY: [f32; 4] = [0.25, 0.5, 0.75, 1.0];
+        let mut inside = body.contains(vertices);
+        loop {
+            let before = count(&inside);
+            for &[a, b] in &self.edges {
+                for [v, w] in [[a, b], [b, a]].map(|e| e.map(|v| v as usize)) {
+                    if !inside[v] || inside[w] {
+                        continue;
+                    }
+                    let way = vertices[w] - vertices[v];
+                    let tried: Vec<P3> = WAY.iter().map(|t| vertices[v] + way * *t).collect();
+                    let free = body.contains(&tried).iter().position(|b| !b);
+                    if let Some(k) = free {
+                        (vertices[v], inside[v]) = (tried[k], false);
+                    }
+                }
+            }
+            if count(&inside) == before {
+                break;
+            }
+        }
+    }
+
+    /// Targets of vertices that are too near; true if there is any.
+    fn push(&self, body: &SolidBody, vertices: &[P3], targets: &mut [Option<P3>]) -> bool {
+        let mut out = Vec::new();
+        par::map_into(Par::Rayon, vertices.len(), 128, &mut out, |v| {
+            body.outside(&vertices[v], self.nodes[v])
+        });
+        let mut any = false;
+        for (slot, p) in targets.iter_mut().zip(out) {
+            any |= p.is_some();
+            *slot = p.or(*slot);
+        }
+        any
+    }
+
+    /// Vertices with the wanted edges, through the pushed places.
+    fn relax(&mut self, wanted: &[P3], pushed: &[Option<P3>]) -> Result<Vec<P3>, CaptureError> {
+        self.energy.reset();
+        for (k, e) in self.edges.iter().enumerate() {
+            let d = (wanted[e[0] as usize] - wanted[e[1] as usize]).cast::<f64>();
+            self.energy.add_stencil(k, 1.0, d.into());
+        }
+        for (v, (p, push)) in wanted.iter().zip(pushed).enumerate() {
+            self.energy.add_vertex(v as u32, ANCHOR, p);
+            if let Some(q) = push {
+                self.energy.add_vertex(v as u32, PUSH, q);
+            }
+        }
+        self.energy.minimise("retargeting")
+    }
+}
+
+fn count(inside: &[bool]) -> usize {
+    inside.iter().filter(|b| **b).count()
+}
+
+/// Edges of some faces, each once.
+pub(super) fn edges(faces: &[Face]) -> Vec<[u32; 2]> {
+    let sides = |f: &Face| [[f[0], f[1]], [f[1], f[2]], [f[2], f[0]]];
+    let mut edges: Vec<[u32; 2]> = faces.iter().flat_map(sides).collect();
+    edges.iter_mut().for_each(|e| e.sort_unstable());
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}

@@ -1,0 +1,347 @@
+//! A scan made ready: finite points in metres, y up, with normals and colours.
+
+use super::CaptureError;
+use crate::formats::scan::ScanMesh;
+use crate::math::{P3, V3};
+use crate::mesh::Face;
+use crate::spatial::HashGrid;
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Least number of points of a person. Fewer leave whole limbs without one.
+const LEAST_POINTS: usize = 500;
+/// Heights of people with raised arms or without feet, metres.
+const HEIGHTS: [f64; 2] = [0.7, 2.6];
+/// Units of scans, metres: metre, centimetre, millimetre, inch, decimetre.
+const UNITS: [f64; 5] = [1.0, 0.01, 0.001, 0.0254, 0.1];
+/// Share of points left out at each end of an extent: strays.
+const STRAYS: f64 = 0.005;
+/// Share of the largest extent from which on an axis may be the upright one; arms spread are as wide as a person is tall.
+const UPRIGHT: f64 = 0.7;
+/// Neighbours of a point in the plane of its normal.
+const NEIGHBOURS: usize = 12;
+/// Radius of that search as a multiple of the mean distance between points.
+const REACH: f32 = 3.0;
+
+/// Units and axes of a scan file.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ScanFrame {
+    /// Metres per unit of the file.
+    pub metres_per_unit: f64,
+    /// Direction against gravity in the file's axes, unit vector.
+    pub up: [f64; 3],
+}
+
+impl Default for ScanFrame {
+    /// Metres, y up.
+    fn default() -> Self {
+        Self {
+            metres_per_unit: 1.0,
+            up: [0.0, 1.0, 0.0],
+        }
+    }
+}
+
+impl ScanFrame {
+    /// Rotation from the file's axes to y up.
+    pub fn rotation(&self) -> Rotation3<f64> {
+        let up = Vector3::from(self.up);
+        // Opposite directions leave the axis open; a half turn about x keeps left and right.
+        Rotation3::rotation_between(&up, &Vector3::y())
+            .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
+    }
+
+    /// Frames in which points could be an upright person, most likely first.
+    ///
+    /// # Errors
+    /// [`CaptureError::NoPersonSize`] without any.
+    pub fn candidates(points: &[P3]) -> Result<Vec<Self>, CaptureError> {
+        let extent = extent(points);
+        let largest = extent.iter().copied().fold(0.0, f32::max);
+        let is_person =
+            |unit: &f64| (HEIGHTS[0]..=HEIGHTS[1]).contains(&(f64::from(largest) * unit));
+        let mut all = Vec::new();
+        for &metres_per_unit in UNITS.iter().filter(|u| is_person(u)) {
+            let mut axes: Vec<usize> = (0..3)
+                .filter(|&a| f64::from(extent[a]) >= UPRIGHT * f64::from(largest))
+                .collect();
+            axes.sort_by(|&a, &b| extent[b].total_cmp(&extent[a]));
+            for axis in axes {
+                for sign in [1.0, -1.0] {
+                    let mut up = [0.0; 3];
+                    up[axis] = sign;
+                    all.push(Self {
+                        metres_per_unit,
+                        up,
+                    });
+                }
+            }
+        }
+        if all.is_empty() {
+            return Err(CaptureError::NoPersonSize { extent });
+        }
+        // The convention of this field first: y up.
+        all.sort_by_key(|f| f.up != [0.0, 1.0, 0.0]);
+        Ok(all)
+    }
+}
+
+/// Extent of a cloud along x, y, z without its strays.
+fn extent(points: &[P3]) -> [f32; 3] {
+    std::array::from_fn(|axis| {
+        let mut values: Vec<f32> = points
+            .iter()
+            .map(|p| p[axis])
+            .filter(|v| v.is_finite())
+            .collect();
+        values.sort_by(f32::total_cmp);
+        let at = |share: f64| {
+            let last = values.len().saturating_sub(1);
+            values
+                .get((share * last as f64).round() as usize)
+                .copied()
+                .unwrap_or(0.0)
+        };
+        at(1.0 - STRAYS) - at(STRAYS)
+    })
+}
+
+/// A scan: finite points, metres, y up.
+#[derive(Clone, Debug, Default)]
+pub struct BodyScan {
+    /// Points, shape `[points]`.
+    pub points: Vec<P3>,
+    /// Unit normals, outward where `oriented`; zero where undefined. Shape `[points]`.
+    pub normals: Vec<V3>,
+    /// Colours, sRGB, shape `[points]`; empty if absent.
+    pub colors: Vec<[u8; 3]>,
+    /// Triangles between kept points.
+    pub faces: Vec<Face>,
+    /// Point of each row of the file; `u32::MAX` for a row left out. Equal positions share a point.
+    pub point_of_row: Vec<u32>,
+    /// Normals point outwards.
+    pub oriented: bool,
+}
+
+impl BodyScan {
+    /// Converts a file to metres with y up; non-finite points and repeated positions are left out.
+    ///
+    /// # Errors
+    /// [`CaptureError::TooFewPoints`].
+    pub fn new(file: &ScanMesh, frame: &ScanFrame) -> Result<Self, CaptureError> {
+        let turn = frame.rotation();
+        let mut seen = std::collections::HashMap::new();
+        let mut scan = Self::default();
+        for (row, p) in file.points.iter().enumerate() {
+            if !p.iter().all(|v| v.is_finite()) {
+                scan.point_of_row.push(u32::MAX);
+                continue;
+            }
+            let key = [p.x, p.y, p.z].map(f32::to_bits);
+            let next = scan.points.len() as u32;
+            let point = *seen.entry(key).or_insert(next);
+            if point == next {
+                let q = turn * (p.cast::<f64>() * frame.metres_per_unit);
+                scan.points.push(q.cast());
+                if let Some(c) = file.colors.get(row) {
+                    scan.colors.push(*c);
+                }
+                if let Some(n) = file.normals.get(row) {
+                    let n = (turn * n.cast::<f64>()).cast::<f32>();
+                    let unit = n.try_normalize(f32::MIN_POSITIVE);
+                    scan.normals.push(
+                        unit.filter(|n| n.iter().all(|v| v.is_finite()))
+                            .unwrap_or_default(),
+                    );
+                }
+            }
+            scan.point_of_row.push(point);
+        }
+        if scan.points.len() < LEAST_POINTS {
+            return Err(CaptureError::TooFewPoints {
+                points: scan.points.len(),
+                least: LEAST_POINTS,
+            });
+        }
+        let corner = |v: &u32| scan.point_of_row.get(*v as usize).copied();
+        scan.faces = file
+            .faces
+            .iter()
+            .filter_map(|f| Some([corner(&f[0])?, corner(&f[1])?, corner(&f[2])?]))
+            .filter(|f| f.iter().all(|v| *v != u32::MAX))
+            .filter(|f| f[0] != f[1] && f[1] != f[2] && f[0] != f[2])
+            .collect();
+        scan.find_normals();
+        Ok(scan)
+    }
+
+    /// Normals from faces, else from the file, else from neighbours.
+    fn find_normals(&mut self) {
+        if !self.faces.is_empty() {
+            self.normals = face_normals(&self.points, &self.faces);
+            self.oriented = true;
+        } else if self.normals.len() == self.points.len() {
+            self.oriented = true;
+        } else {
+            self.normals = plane_normals(&self.points);
+            self.oriented = false;
+        }
+        if self.oriented && is_inside_out(&self.points, &self.normals) {
+            self.normals.iter_mut().for_each(|n| *n = -*n);
+            self.faces.iter_mut().for_each(|f| f.swap(1, 2));
+        }
+    }
+
+    /// Label of each row of the file from one a point; `absent` for rows left out.
+    pub fn rows<T: Copy>(&self, of_points: &[T], absent: T) -> Vec<T> {
+        let label = |p: &u32| of_points.get(*p as usize).copied().unwrap_or(absent);
+        self.point_of_row.iter().map(label).collect()
+    }
+}
+
+/// Normals of most of a person point at its middle: the file has the other orientation.
+fn is_inside_out(points: &[P3], normals: &[V3]) -> bool {
+    let n = points.len().max(1) as f32;
+    let middle = points.iter().map(|p| p.coords).sum::<V3>() / n;
+    let outwards = points
+        .iter()
+        .zip(normals)
+        .map(|(p, n)| f64::from(n.dot(&(p.coords - middle))));
+    outwards.sum::<f64>() < 0.0
+}
+
+/// Mean of the normals of the faces around each point, by area.
+fn face_normals(points: &[P3], faces: &[Face]) -> Vec<V3> {
+    let mut sums = vec![V3::zeros(); points.len()];
+    for f in faces {
+        let [a, b, c] = f.map(|v| points[v as usize]);
+        let n = (b - a).cross(&(c - a));
+        f.iter().for_each(|v| sums[*v as usize] += n);
+    }
+    sums.iter()
+        .map(|n| n.try_normalize(f32::MIN_POSITIVE).unwrap_or_default())
+        .collect()
+}
+
+/// Normal of the plane through each point and its neighbours, of either sign; zero with fewer than three.
+fn plane_normals(points: &[P3]) -> Vec<V3> {
+    let spacing = mean_spacing(points);
+    let mut grid = HashGrid::default();
+    // Searches reach half a cell, and may find a point twice.
+    grid.fill(points, 2.0 * REACH * spacing);
+    points
+        .iter()
+        .map(|p| {
+            let mut near = Vec::new();
+            grid.within(p, REACH * spacing, |i, d| near.push((d, i)));
+            near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            near.dedup();
+            near.truncate(NEIGHBOURS);
+            if near.len() < 3 {
+                return V3::zeros();
+            }
+            let at = |i: u32| points[i as usize].coords.cast::<f64>();
+            let mean = near.iter().map(|n| at(n.1)).sum::<Vector3<f64>>() / near.len() as f64;
+            let scatter: Matrix3<f64> = near
+                .iter()
+                .map(|n| at(n.1) - mean)
+                .map(|d| d * d.transpose())
+                .sum();
+            let eigen = scatter.symmetric_eigen();
+            let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+            normal.into_owned().cast()
+        })
+        .collect()
+}
+
+/// Typical distance between neighbouring points of a surface, metres: by the number of occupied cells of 3 cm.
+pub(super) fn mean_spacing(points: &[P3]) -> f32 {
+    const CELL: f32 = 0.03;
+    let cells: std::collections::HashSet<[i32; 3]> = points
+        .iter()
+        .map(|p| [p.x, p.y, p.z].map(|v| (v / CELL).floor() as i32))
+        .collect();
+    // A surface crosses about 1.5 cells for each square of a cell's side.
+    let area = cells.len() as f32 * CELL * CELL / 1.5;
+    (area / points.len().max(1) as f32).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cylinder of 1.7 m about `axis`, in units of `unit` metres.
+    fn cylinder(axis: usize, unit: f32) -> Vec<P3> {
+        (0..4000)
+            .map(|i| {
+                let angle = i as f32 * 2.4;
+                let mut p = [0.2 * angle.cos(), 0.15 * angle.sin(), 0.0];
+                p[2] = 1.7 * i as f32 / 4000.0;
+                let mut q = P3::origin();
+                (0..3).for_each(|k| q[(axis + 1 + k) % 3] = p[k] / unit);
+                q
+            })
+            .collect()
+    }
+
+    #[test]
+    fn unit_and_axis_are_found() {
+        for (axis, unit) in [(1, 1.0), (2, 0.01), (0, 0.001)] {
+            let frames = ScanFrame::candidates(&cylinder(axis, unit)).expect("a person");
+            assert_eq!(frames.len(), 2, "{frames:?}");
+            assert!((frames[0].metres_per_unit - f64::from(unit)).abs() < 1e-9);
+            assert_eq!(frames[0].up[axis].abs(), 1.0);
+            let file = ScanMesh {
+                points: cylinder(axis, unit),
+                ..ScanMesh::default()
+            };
+            let scan = BodyScan::new(&file, &frames[0]).expect("enough points");
+            let top = scan.points.iter().map(|p| p.y).fold(f32::MIN, f32::max);
+            let low = scan.points.iter().map(|p| p.y).fold(f32::MAX, f32::min);
+            assert!((top - low - 1.7).abs() < 0.01);
+        }
+        let small: Vec<P3> = cylinder(1, 1.0).iter().map(|p| p * 3.7).collect();
+        assert!(matches!(
+            ScanFrame::candidates(&small),
+            Err(CaptureError::NoPersonSize { .. })
+        ));
+    }
+
+    #[test]
+    fn rows_left_out_keep_their_place() {
+        let mut points = cylinder(1, 1.0);
+        points[7] = P3::new(f32::NAN, 0.0, 0.0);
+        points[9] = points[8];
+        let file = ScanMesh {
+            points: points.clone(),
+            faces: vec![[6, 7, 8], [8, 9, 10], [10, 11, 12]],
+            ..ScanMesh::default()
+        };
+        let scan = BodyScan::new(&file, &ScanFrame::default()).expect("enough points");
+        assert_eq!(scan.points.len(), points.len() - 2);
+        assert_eq!(scan.point_of_row[7], u32::MAX);
+        assert_eq!(scan.point_of_row[9], scan.point_of_row[8]);
+        let mut corners = scan.faces[0];
+        corners.sort_unstable();
+        assert_eq!((scan.faces.len(), corners), (1, [8, 9, 10]));
+        let labels: Vec<u8> = (0..scan.points.len()).map(|i| (i % 3) as u8).collect();
+        let rows = scan.rows(&labels, 255);
+        assert_eq!((rows[7], rows[8] == rows[9]), (255, true));
+    }
+
+    #[test]
+    fn clouds_get_normals_of_either_sign() {
+        let points = cylinder(1, 1.0);
+        let file = ScanMesh {
+            points,
+            ..ScanMesh::default()
+        };
+        let scan = BodyScan::new(&file, &ScanFrame::default()).expect("enough points");
+        assert!(!scan.oriented);
+        let radial = scan.points.iter().zip(&scan.normals).filter(|(p, n)| {
+            let out = V3::new(p.x / 0.0225, 0.0, p.z / 0.04).normalize();
+            n.dot(&out).abs() > 0.9
+        });
+        assert!(radial.count() > 3500);
+    }
+}

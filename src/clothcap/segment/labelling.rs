@@ -1,0 +1,412 @@
+//! Labels of the template's nodes: appearance, garment prior and smoothness in one energy (eq. 11), number of garments included.
+
+use super::color_mixture::{ColorMixture, k_means};
+use super::node_colors::NodeColors;
+use super::prior::{BodyRegion, Slot};
+use crate::body::Template;
+use crate::clothcap::CaptureError;
+use crate::clothcap::mrf::{ExpansionConfig, MrfModel};
+use crate::math::P3;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// Cost of a label change between neighbours of equal colour, nats (ψ of eq. 14).
+const SMOOTHNESS: f32 = 2.0;
+/// Share of it left between neighbours of different colour, and the difference that halves the rest.
+const CONTRAST: [f32; 2] = [0.25, 0.10];
+/// Cost of another label than in the first frame, nats: garments slide over the body by little.
+const CHANGE: f32 = 1.0;
+/// Turns of appearances and labels.
+const TURNS: usize = 5;
+/// Modes of skin, hair and what hands hold.
+const SKIN_MODES: usize = 6;
+/// Mean cost above that of its own appearance from which a region is no skin, nats.
+const DISTINCT: f64 = 0.8;
+/// Least share of torso and arms that is a garment of its own.
+const LEAST_SHARE: f64 = 0.06;
+/// Difference of mean colours, in standard deviations, from which two clusters are two garments.
+const SEPARATION: f64 = 2.0;
+
+/// Setting of a segmentation.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LabelConfig {
+    /// Garments; `None` finds them.
+    pub slots: Option<Vec<Slot>>,
+    /// Leave out the garment prior (ablation).
+    pub without_prior: bool,
+    /// Leave out the smoothness (ablation).
+    pub without_smoothness: bool,
+}
+
+/// Labels of a template's nodes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Labelling {
+    /// Slot of each label; label 0 is [`Slot::Skin`], label 1 [`Slot::Hair`].
+    pub slots: Vec<Slot>,
+    /// Label of each node, shape `[nodes]`.
+    pub labels: Vec<u8>,
+    /// ColorMixture of each label; `None` without a coloured point.
+    pub appearances: Vec<Option<ColorMixture>>,
+    /// Energy per node, nats.
+    pub energy: f64,
+}
+
+impl Labelling {
+    /// Takes over the labels of scan points: each node with points gets that of most of them.
+    pub fn adopt(&mut self, nodes: &NodeColors, scan_labels: &[u8]) {
+        for (v, label) in self.labels.iter_mut().enumerate() {
+            let mut counts = vec![0usize; self.slots.len()];
+            let row = nodes.points.row(v).iter();
+            row.for_each(|p| counts[usize::from(scan_labels[*p as usize])] += 1);
+            let most = counts.iter().copied().max().unwrap_or(0);
+            if most > counts[usize::from(*label)] {
+                *label = counts.iter().position(|n| *n == most).unwrap_or(0) as u8;
+            }
+        }
+    }
+
+    /// Part of each label in the output: 0 for skin and hair, then one a garment.
+    pub fn parts(&self) -> Vec<u8> {
+        let mut next = 0;
+        self.slots
+            .iter()
+            .map(|s| {
+                next += u8::from(s.is_garment());
+                if s.is_garment() { next } else { 0 }
+            })
+            .collect()
+    }
+}
+
+/// Labels the nodes of a template.
+///
+/// # Errors
+/// [`CaptureError::Solve`] for an energy that is not finite.
+pub fn label_nodes(
+    template: &Template,
+    nodes: &NodeColors,
+    config: &LabelConfig,
+) -> Result<Labelling, CaptureError> {
+    let labeller = Labeller::new(template, nodes, config);
+    if let Some(garments) = &config.slots {
+        let mut slots = vec![Slot::Skin, Slot::Hair];
+        slots.extend(garments.iter().filter(|s| s.is_garment()));
+        return labeller.run(slots);
+    }
+    let all = labeller.run(vec![
+        Slot::Skin,
+        Slot::Hair,
+        Slot::Top,
+        Slot::Bottom,
+        Slot::Shoes,
+    ])?;
+    let mut slots = labeller.worn(&all);
+    if slots.contains(&Slot::Top) && labeller.has_second_top(&all) {
+        slots.push(Slot::Under);
+    }
+    if slots == all.slots {
+        return Ok(all);
+    }
+    labeller.run(slots)
+}
+
+/// Labels the nodes of a later frame with the appearances of the first one; `before` are the labels there.
+///
+/// # Errors
+/// As [`label_nodes`].
+pub fn relabel_nodes(
+    template: &Template,
+    nodes: &NodeColors,
+    before: &Labelling,
+    config: &LabelConfig,
+) -> Result<Labelling, CaptureError> {
+    let labeller = Labeller::new(template, nodes, config);
+    let mut unary = labeller.unary(&before.slots, &before.appearances);
+    let count = before.slots.len();
+    for (v, own) in before.labels.iter().enumerate() {
+        for l in (0..count).filter(|l| *l != usize::from(*own)) {
+            unary[v * count + l] += CHANGE;
+        }
+    }
+    let (labels, energy) = labeller.expand(&unary, &before.labels)?;
+    Ok(Labelling {
+        slots: before.slots.clone(),
+        appearances: before.appearances.clone(),
+        labels,
+        energy,
+    })
+}
+
+struct Labeller<'a> {
+    nodes: &'a NodeColors,
+    config: &'a LabelConfig,
+    regions: Vec<BodyRegion>,
+    /// Scalp: back and top of the head.
+    hair: Vec<bool>,
+    edges: Vec<[u32; 2]>,
+    weights: Vec<f32>,
+}
+
+impl<'a> Labeller<'a> {
+    fn new(template: &Template, nodes: &'a NodeColors, config: &'a LabelConfig) -> Self {
+        let edges: Vec<[u32; 2]> = template.topology().edges().iter().map(|e| e.v).collect();
+        let smoothness = if config.without_smoothness {
+            0.0
+        } else {
+            SMOOTHNESS
+        };
+        let weight = |e: &[u32; 2]| {
+            let [a, b] = e.map(|v| nodes.means[v as usize]);
+            let [floor, half] = CONTRAST;
+            let contrast = match (a, b) {
+                (Some(a), Some(b)) => ((a - b).norm() as f32 / half).powi(2),
+                _ => 0.0,
+            };
+            smoothness * (floor + (1.0 - floor) / (1.0 + contrast))
+        };
+        let regions = BodyRegion::of_vertices(template);
+        Self {
+            nodes,
+            config,
+            hair: scalp(template, &regions),
+            regions,
+            weights: edges.iter().map(weight).collect(),
+            edges,
+        }
+    }
+
+    fn count(&self) -> usize {
+        self.regions.len()
+    }
+
+    /// Turns of appearances and labels from a start by body regions.
+    fn run(&self, slots: Vec<Slot>) -> Result<Labelling, CaptureError> {
+        let mut labels = self.first_labels(&slots);
+        let mut out = None;
+        for _ in 0..TURNS {
+            let appearances = self.appearances(&slots, &labels);
+            let unary = self.unary(&slots, &appearances);
+            let (next, energy) = self.expand(&unary, &labels)?;
+            let settled = next == labels;
+            labels = next;
+            out = Some((appearances, energy));
+            if settled {
+                break;
+            }
+        }
+        let (appearances, energy) = out.unwrap_or_default();
+        Ok(Labelling {
+            slots,
+            labels,
+            appearances,
+            energy,
+        })
+    }
+
+    /// Labels of least energy from a start, and the energy per node.
+    fn expand(&self, unary: &[f32], start: &[u8]) -> Result<(Vec<u8>, f64), CaptureError> {
+        let model = MrfModel {
+            edges: &self.edges,
+            weights: &self.weights,
+        };
+        let mut next: Vec<u32> = start.iter().map(|l| u32::from(*l)).collect();
+        let report = model
+            .expand(unary, &mut next, &ExpansionConfig::default())
+            .map_err(|e| CaptureError::Solve {
+                stage: "segmentation",
+                why: e.to_string(),
+            })?;
+        let labels = next.iter().map(|l| *l as u8).collect();
+        Ok((labels, report.energy / self.count().max(1) as f64))
+    }
+
+    /// Start: the likely label of each region; arms and shins go to the nearer of skin and their garment.
+    fn first_labels(&self, slots: &[Slot]) -> Vec<u8> {
+        let index = |slot: Slot| slots.iter().position(|s| *s == slot).map(|i| i as u8);
+        let any = |all: &[Slot]| all.iter().find_map(|s| index(*s)).unwrap_or(0);
+        let torso = any(&[Slot::Top, Slot::OnePiece]);
+        let legs = any(&[Slot::Bottom, Slot::OnePiece]);
+        let mean = |wanted: &dyn Fn(BodyRegion) -> bool| {
+            let all = (0..self.count()).filter(|v| wanted(self.regions[*v]));
+            let colors: Vec<_> = all.filter_map(|v| self.nodes.means[v]).collect();
+            let n = colors.len().max(1) as f64;
+            colors.iter().sum::<Vector3<f64>>() / n
+        };
+        let hands = mean(&|r| r == BodyRegion::Hand);
+        let chest = mean(&BodyRegion::is_torso);
+        let thighs = mean(&|r| r == BodyRegion::Thigh);
+        let nearer = |v: usize, garment: Vector3<f64>, label: u8| match self.nodes.means[v] {
+            Some(c) if (c - garment).norm() < (c - hands).norm() => label,
+            Some(_) => 0,
+            None => label,
+        };
+        let mut labels: Vec<u8> = (0..self.count())
+            .map(|v| match self.regions[v] {
+                BodyRegion::Head if self.hair[v] => index(Slot::Hair).unwrap_or(0),
+                BodyRegion::Head | BodyRegion::Neck | BodyRegion::Hand => 0,
+                BodyRegion::Chest | BodyRegion::Abdomen => torso,
+                BodyRegion::Pelvis | BodyRegion::Thigh => legs,
+                BodyRegion::UpperArm | BodyRegion::Forearm => nearer(v, chest, torso),
+                BodyRegion::Shin => nearer(v, thighs, legs),
+                BodyRegion::Foot => index(Slot::Shoes).unwrap_or(0),
+            })
+            .collect();
+        if let (Some(under), Some(top)) = (index(Slot::Under), index(Slot::Top)) {
+            self.split_top(&mut labels, top, under);
+        }
+        labels
+    }
+
+    /// Gives one of two colours of torso and arms to the second garment: the one that the torso has less of.
+    fn split_top(&self, labels: &mut [u8], top: u8, under: u8) {
+        let (some, owner) = self.torso_clusters();
+        let torso_share = |k: usize| {
+            let torso = some.iter().zip(&owner).filter(|(_, o)| **o == k);
+            torso.filter(|(v, _)| self.regions[**v].is_torso()).count()
+        };
+        let second = usize::from(torso_share(0) > torso_share(1));
+        for (v, o) in some.iter().zip(&owner) {
+            labels[*v] = if *o == second { under } else { top };
+        }
+    }
+
+    /// Nodes of torso and arms that are no skin, and their cluster of two.
+    fn torso_clusters(&self) -> (Vec<usize>, Vec<usize>) {
+        let skin = self.skin_appearance();
+        let is_skin = |v: usize| {
+            let cost = skin
+                .as_ref()
+                .map_or(f64::INFINITY, |s| self.nodes.cost(v, s));
+            self.regions[v].is_arm() && cost < 0.0
+        };
+        let some: Vec<usize> = (0..self.count())
+            .filter(|v| self.regions[*v].is_torso() || self.regions[*v].is_arm())
+            .filter(|v| self.nodes.means[*v].is_some() && !is_skin(*v))
+            .collect();
+        let colors: Vec<_> = some.iter().filter_map(|v| self.nodes.means[*v]).collect();
+        let owner = k_means(&colors, 2);
+        (some, owner)
+    }
+
+    fn skin_appearance(&self) -> Option<ColorMixture> {
+        let bare = |v: &usize| {
+            let face = self.regions[*v] == BodyRegion::Head && !self.hair[*v];
+            face || self.regions[*v] == BodyRegion::Hand
+        };
+        let colors = self.nodes.of((0..self.count()).filter(bare));
+        ColorMixture::fit_modes(&colors, SKIN_MODES)
+    }
+
+    fn appearances(&self, slots: &[Slot], labels: &[u8]) -> Vec<Option<ColorMixture>> {
+        (0..slots.len())
+            .map(|l| {
+                let own = (0..self.count()).filter(|v| usize::from(labels[*v]) == l);
+                let colors = self.nodes.of(own);
+                if slots[l] == Slot::Skin {
+                    ColorMixture::fit_modes(&colors, SKIN_MODES)
+                } else {
+                    ColorMixture::fit(&colors)
+                }
+            })
+            .collect()
+    }
+
+    /// Costs of all labels at all nodes (eq. 12), shape `[nodes, labels]`.
+    fn unary(&self, slots: &[Slot], appearances: &[Option<ColorMixture>]) -> Vec<f32> {
+        let mut out = Vec::with_capacity(self.count() * slots.len());
+        for v in 0..self.count() {
+            for (slot, appearance) in slots.iter().zip(appearances) {
+                let color = appearance.as_ref().map_or(0.0, |a| self.nodes.cost(v, a));
+                let prior = if self.config.without_prior {
+                    0.0
+                } else {
+                    slot.cost(self.regions[v])
+                };
+                out.push(color as f32 + prior);
+            }
+        }
+        out
+    }
+
+    /// Slots of a labelling that are worn: those whose nodes do not look like skin.
+    fn worn(&self, all: &Labelling) -> Vec<Slot> {
+        let skin = self.skin_appearance();
+        let is_worn = |l: usize| {
+            let own: Vec<usize> = (0..self.count())
+                .filter(|v| usize::from(all.labels[*v]) == l)
+                .filter(|v| !self.nodes.points.row(*v).is_empty())
+                .collect();
+            let (Some(skin), Some(look)) = (&skin, &all.appearances[l]) else {
+                return !own.is_empty();
+            };
+            let excess = own
+                .iter()
+                .map(|v| self.nodes.cost(*v, skin) - self.nodes.cost(*v, look));
+            excess.sum::<f64>() > DISTINCT * own.len().max(1) as f64
+        };
+        (0..all.slots.len())
+            .filter(|l| !all.slots[*l].is_garment() || is_worn(*l))
+            .map(|l| all.slots[l])
+            .collect()
+    }
+
+    /// Torso and arms have two colours, far apart, each in one place and not enclosed by the other like a print.
+    fn has_second_top(&self, _all: &Labelling) -> bool {
+        let (some, owner) = self.torso_clusters();
+        let colors = |k: usize| -> Vec<Vector3<f64>> {
+            let own = some.iter().zip(&owner).filter(|(_, o)| **o == k);
+            own.filter_map(|(v, _)| self.nodes.means[*v]).collect()
+        };
+        let (a, b) = (colors(0), colors(1));
+        let least = LEAST_SHARE * some.len() as f64;
+        if (a.len() as f64) < least || (b.len() as f64) < least {
+            return false;
+        }
+        let (Some(a), Some(b)) = (
+            ColorMixture::fit_modes(&a, 1),
+            ColorMixture::fit_modes(&b, 1),
+        ) else {
+            return false;
+        };
+        let ((ma, sa), (mb, sb)) = (a.spread(), b.spread());
+        if (ma - mb).norm() < SEPARATION * (sa + sb) {
+            return false;
+        }
+        self.is_coherent(&some, &owner)
+    }
+
+    /// Neighbours mostly share their cluster; stripes and checks do not.
+    fn is_coherent(&self, some: &[usize], owner: &[usize]) -> bool {
+        /// Largest share of edges between clusters.
+        const MOST_MIXED: f64 = 0.12;
+        let mut of = vec![usize::MAX; self.count()];
+        some.iter().zip(owner).for_each(|(v, o)| of[*v] = *o);
+        let inner = self.edges.iter().map(|e| e.map(|v| of[v as usize]));
+        let inner: Vec<_> = inner.filter(|[a, b]| *a < 2 && *b < 2).collect();
+        let mixed = inner.iter().filter(|[a, b]| a != b).count();
+        (mixed as f64) < MOST_MIXED * inner.len() as f64
+    }
+}
+
+/// Back and top of the head, where hair grows; shape `[vertices]`.
+fn scalp(template: &Template, regions: &[BodyRegion]) -> Vec<bool> {
+    /// Height of the hairline between chin and crown.
+    const HAIRLINE: f32 = 0.78;
+    let vertices = template.mesh().vertices();
+    let head = || {
+        vertices
+            .iter()
+            .zip(regions)
+            .filter(|(_, r)| **r == BodyRegion::Head)
+    };
+    let (low, high) = head().fold((f32::MAX, f32::MIN), |(l, h), (p, _)| {
+        (l.min(p.y), h.max(p.y))
+    });
+    let middle = head().map(|(p, _)| p.z).sum::<f32>() / head().count().max(1) as f32;
+    let is_scalp = |p: &P3| p.z < middle || p.y > low + HAIRLINE * (high - low);
+    vertices
+        .iter()
+        .zip(regions)
+        .map(|(p, r)| *r == BodyRegion::Head && is_scalp(p))
+        .collect()
+}

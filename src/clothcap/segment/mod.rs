@@ -1,0 +1,13 @@
+//! Body-model aided segmentation (section 5.2): labels of the template, then of the scan, and the rings between them.
+
+mod color_mixture;
+mod labelling;
+mod node_colors;
+mod prior;
+mod scan_labels;
+
+pub use color_mixture::{ColorMixture, hsv_cone, k_means};
+pub use labelling::{LabelConfig, Labelling, label_nodes, relabel_nodes};
+pub use node_colors::NodeColors;
+pub use prior::{BodyRegion, IMPOSSIBLE, Slot};
+pub use scan_labels::label_scan;

@@ -1,0 +1,133 @@
+//! Labels carried from the template to the scan, with boundaries drawn along the scan's own colours.
+
+use super::color_mixture::hsv_cone;
+use super::labelling::Labelling;
+use super::prior::IMPOSSIBLE;
+use crate::clothcap::CaptureError;
+use crate::clothcap::align::SurfaceMatch;
+use crate::clothcap::mrf::{ExpansionConfig, MrfModel};
+use crate::clothcap::scan::{BodyScan, mean_spacing};
+use crate::mesh::{Csr, Face};
+use crate::spatial::HashGrid;
+
+/// Width of the band about the template's boundaries in which the scan decides, rings of nodes.
+const BAND: u32 = 3;
+/// Cost of another label than the template's within the band, nats a ring.
+const PULL: f32 = 0.7;
+/// Cost of a label change between neighbours of equal colour, nats, and the share left across a change of colour.
+const SMOOTHNESS: [f32; 2] = [2.0, 0.2];
+/// Difference of colours that halves the rest.
+const CONTRAST: f32 = 0.08;
+/// Neighbours of a point of a cloud.
+const NEIGHBOURS: usize = 6;
+
+/// Labels the points of a scan; `topology` gives the nodes' neighbours. Shape `[points]`.
+///
+/// # Errors
+/// [`CaptureError::Solve`] for an energy that is not finite.
+pub fn label_scan(
+    scan: &BodyScan,
+    matches: &[SurfaceMatch],
+    (faces, neighbours): (&[Face], &Csr),
+    labelling: &Labelling,
+) -> Result<Vec<u8>, CaptureError> {
+    let node_of = |m: &SurfaceMatch| faces[m.face as usize][m.nearest_corner()] as usize;
+    let start = matches
+        .iter()
+        .map(|m| u32::from(labelling.labels[node_of(m)]));
+    let mut labels: Vec<u32> = start.collect();
+    if scan.colors.is_empty() {
+        return Ok(labels.iter().map(|l| *l as u8).collect());
+    }
+    let depth = label_depths(neighbours, labelling);
+    let colors: Vec<_> = scan.colors.iter().map(|c| hsv_cone(*c)).collect();
+    let count = labelling.slots.len();
+    let mut unary = Vec::with_capacity(labels.len() * count);
+    for (i, m) in matches.iter().enumerate() {
+        let node = node_of(m);
+        for (l, appearance) in labelling.appearances.iter().enumerate() {
+            let color = appearance
+                .as_ref()
+                .map_or(0.0, |a| a.cost(&colors[i]) as f32);
+            // Rings from the node to the nearest one of this label.
+            let pull = match depth[node * count + l] {
+                0 => 0.0,
+                d if d <= BAND => PULL * d as f32,
+                _ => IMPOSSIBLE,
+            };
+            unary.push(color + pull);
+        }
+    }
+    let edges = scan_edges(scan);
+    let weights: Vec<f32> = edges
+        .iter()
+        .map(|e| {
+            let d = (colors[e[0] as usize] - colors[e[1] as usize]).norm() as f32 / CONTRAST;
+            let [full, rest] = SMOOTHNESS;
+            full * (rest + (1.0 - rest) / (1.0 + d * d))
+        })
+        .collect();
+    let model = MrfModel {
+        edges: &edges,
+        weights: &weights,
+    };
+    model
+        .expand(&unary, &mut labels, &ExpansionConfig::default())
+        .map_err(|e| CaptureError::Solve {
+            stage: "labels of the scan",
+            why: e.to_string(),
+        })?;
+    Ok(labels.iter().map(|l| *l as u8).collect())
+}
+
+/// Rings from each node to the nearest one of each label, at most one beyond [`BAND`]; shape `[nodes, labels]`.
+fn label_depths(neighbours: &Csr, labelling: &Labelling) -> Vec<u32> {
+    let count = labelling.slots.len();
+    let nodes = labelling.labels.len();
+    let mut depth = vec![BAND + 1; nodes * count];
+    for (v, l) in labelling.labels.iter().enumerate() {
+        depth[v * count + usize::from(*l)] = 0;
+    }
+    for ring in 1..=BAND {
+        for v in 0..nodes {
+            for l in 0..count {
+                let reached = |w: &u32| depth[*w as usize * count + l] == ring - 1;
+                if depth[v * count + l] > ring && neighbours.row(v).iter().any(reached) {
+                    depth[v * count + l] = ring;
+                }
+            }
+        }
+    }
+    depth
+}
+
+/// Edges of the faces, or between near points of a cloud; each once.
+fn scan_edges(scan: &BodyScan) -> Vec<[u32; 2]> {
+    let mut edges: Vec<[u32; 2]> = if scan.faces.is_empty() {
+        let reach = 2.0 * mean_spacing(&scan.points);
+        let mut grid = HashGrid::default();
+        // Searches reach half a cell, and may find a point twice.
+        grid.fill(&scan.points, 2.0 * reach);
+        let mut out = Vec::new();
+        for (i, p) in scan.points.iter().enumerate() {
+            let mut near = Vec::new();
+            grid.within(p, reach, |j, d| {
+                if j != i as u32 {
+                    near.push((d, j));
+                }
+            });
+            near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            near.dedup();
+            let some = near.iter().take(NEIGHBOURS);
+            out.extend(some.map(|(_, j)| [*j.min(&(i as u32)), *j.max(&(i as u32))]));
+        }
+        out
+    } else {
+        let sides = |f: &Face| [[f[0], f[1]], [f[1], f[2]], [f[2], f[0]]];
+        let all = scan.faces.iter().flat_map(sides);
+        all.map(|[a, b]| [a.min(b), a.max(b)]).collect()
+    };
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}

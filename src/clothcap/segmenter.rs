@@ -1,0 +1,119 @@
+//! Scans of one subject, aligned and segmented in order.
+
+use super::CaptureError;
+use super::align::{AlignedBody, Aligner, Alignment, ClothedTemplate, Start};
+use super::scan::BodyScan;
+use super::segment::{LabelConfig, Labelling, NodeColors, label_nodes, label_scan, relabel_nodes};
+use crate::body::Template;
+use std::sync::Arc;
+
+/// Aligned and labelled scan.
+#[derive(Clone, Debug)]
+pub struct SegmentedScan {
+    /// Single-mesh alignment.
+    pub alignment: Alignment,
+    /// Scan points and their colours at the template's nodes.
+    pub nodes: NodeColors,
+    /// Labels of the nodes.
+    pub labelling: Labelling,
+    /// Label of each scan point, shape `[points]`.
+    pub labels: Vec<u8>,
+}
+
+impl SegmentedScan {
+    /// Part of each scan point, shape `[points]`: 0 for skin and hair, then one a garment.
+    pub fn parts(&self) -> Vec<u8> {
+        let parts = self.labelling.parts();
+        self.labels.iter().map(|l| parts[usize::from(*l)]).collect()
+    }
+
+    /// Membership in a garment of each scan point, shape `[points]`.
+    pub fn covered(&self) -> Vec<bool> {
+        let is_garment = |l: &u8| self.labelling.slots[usize::from(*l)].is_garment();
+        self.labels.iter().map(is_garment).collect()
+    }
+}
+
+/// Aligns and segments scans; the first one gives the clothed template and the appearances of the garments.
+#[derive(Debug)]
+pub struct ScanSegmenter {
+    template: Arc<Template>,
+    config: LabelConfig,
+    aligner: Aligner,
+    first: Option<Labelling>,
+}
+
+impl ScanSegmenter {
+    /// Segmenter before the first scan.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] for a template too large.
+    pub fn new(template: Arc<Template>, config: LabelConfig) -> Result<Self, CaptureError> {
+        Ok(Self {
+            aligner: Aligner::new(template.clone())?,
+            template,
+            config,
+            first: None,
+        })
+    }
+
+    /// Segmenter that continues after a first scan with this labelling; `last` is the body of the scan before.
+    ///
+    /// # Errors
+    /// As [`ScanSegmenter::new`].
+    pub fn resume(
+        template: Arc<Template>,
+        config: LabelConfig,
+        first: Labelling,
+        (clothed, last): (ClothedTemplate, AlignedBody),
+    ) -> Result<Self, CaptureError> {
+        Ok(Self {
+            aligner: Aligner::resume(template.clone(), clothed, last)?,
+            template,
+            config,
+            first: Some(first),
+        })
+    }
+
+    /// Starts the first scan at a person found before.
+    pub fn start_at(&mut self, start: Start) {
+        self.aligner.start_at(start);
+    }
+
+    /// Clothed template, once a scan is aligned.
+    pub fn clothed(&self) -> Option<&ClothedTemplate> {
+        self.aligner.clothed()
+    }
+
+    /// Aligns and segments the next scan.
+    ///
+    /// # Errors
+    /// [`CaptureError::NoPerson`], or [`CaptureError::NoGarment`] if the first scan shows none.
+    pub fn step(&mut self, scan: &BodyScan) -> Result<SegmentedScan, CaptureError> {
+        let alignment = self.aligner.align(scan)?;
+        let mesh = self.template.mesh();
+        let count = mesh.vertices().len();
+        let nodes = NodeColors::new(scan, &alignment.matches, mesh.faces(), count);
+        let mut labelling = match &self.first {
+            None => label_nodes(&self.template, &nodes, &self.config)?,
+            Some(first) => relabel_nodes(&self.template, &nodes, first, &self.config)?,
+        };
+        let around = (mesh.faces(), self.template.topology().vertex_neighbours());
+        let labels = label_scan(scan, &alignment.matches, around, &labelling)?;
+        labelling.adopt(&nodes, &labels);
+        if !labelling
+            .labels
+            .iter()
+            .any(|l| labelling.slots[usize::from(*l)].is_garment())
+        {
+            return Err(CaptureError::NoGarment);
+        }
+        self.first.get_or_insert_with(|| labelling.clone());
+        Ok(SegmentedScan {
+            alignment,
+            nodes,
+            labelling,
+            labels,
+        })
+    }
+}

@@ -1,0 +1,152 @@
+//! Dressed scans for unit tests: the embedded body in a pose, thickened and coloured where it wears something.
+
+use super::scan::{BodyScan, ScanFrame};
+use super::segment::BodyRegion;
+use crate::body::{BodyShape, BoneTransforms, Pose, embedded, skin};
+use crate::formats::scan::ScanMesh;
+use crate::math::{P3, Rigid, V3, World};
+use crate::mesh::{Face, Topology, vertex_normals};
+use crate::par::Par;
+use nalgebra::{UnitQuaternion, Vector3};
+use rand::{Rng, SeedableRng};
+
+/// Points of a test scan.
+const POINTS: usize = 20_000;
+/// Thickness of shirt and trousers, metres.
+const SHIRT: f32 = 0.010;
+const TROUSERS: f32 = 0.014;
+
+/// Scan with its truth.
+pub(super) struct TestScan {
+    pub(super) file: ScanMesh,
+    /// 0 skin, 1 shirt, 2 trousers, 3 shoes; shape `[points]`.
+    pub(super) labels: Vec<u8>,
+    /// Body without cloth, shape `[vertices]`.
+    pub(super) body: Vec<P3>,
+}
+
+impl TestScan {
+    /// Somebody who stands with one arm bent, turned by `yaw` radians, in a shirt of `shirt` and trousers of `trousers`.
+    pub(super) fn new(yaw: f64, shirt: [u8; 3], trousers: [u8; 3]) -> Self {
+        let template = embedded::template();
+        let shape = BodyShape {
+            coefficients: vec![0.7, -0.4, 0.6],
+            ..BodyShape::default()
+        };
+        let rest = template.personalise(&shape);
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw);
+        let root = Rigid::from_parts(Vector3::new(0.2, 0.0, -0.1), turn);
+        let mut pose = Pose::<World>::rest(template.skeleton(), root);
+        pose.set(template.skeleton(), "left_shoulder", &[0.0, -0.3, -0.3]);
+        pose.set(template.skeleton(), "left_elbow", &[0.9]);
+        pose.set(template.skeleton(), "right_hip", &[-0.25]);
+        let mut bones = BoneTransforms::default();
+        pose.bones(template.skeleton(), &rest, &mut bones);
+        let mut body = Vec::new();
+        skin(
+            Par::Seq,
+            &rest.vertices,
+            template.weights(),
+            &bones,
+            &mut body,
+        );
+
+        let faces = template.mesh().faces();
+        let topology = Topology::new(template.mesh()).expect("a manifold");
+        let mut normals = Vec::new();
+        vertex_normals(
+            Par::Seq,
+            &body,
+            faces,
+            topology.vertex_faces(),
+            &mut normals,
+        );
+        let labels: Vec<u8> = BodyRegion::of_vertices(&template)
+            .iter()
+            .map(|r| match r {
+                BodyRegion::Chest | BodyRegion::Abdomen | BodyRegion::UpperArm => 1,
+                BodyRegion::Pelvis | BodyRegion::Thigh | BodyRegion::Shin => 2,
+                BodyRegion::Foot => 3,
+                _ => 0,
+            })
+            .collect();
+        let thickness = [0.0, SHIRT, TROUSERS, 0.004];
+        let surface: Vec<P3> = (0..body.len())
+            .map(|v| body[v] + normals[v] * thickness[usize::from(labels[v])])
+            .collect();
+        let painted = PaintedSurface {
+            vertices: &surface,
+            normals: &normals,
+            labels: &labels,
+            colors: [[205, 160, 130], shirt, trousers, [60, 45, 40]],
+        };
+        let (file, labels) = painted.sample(faces);
+        Self { file, labels, body }
+    }
+
+    /// The scan as it is read, metres and y up.
+    pub(super) fn scan(&self) -> BodyScan {
+        BodyScan::new(&self.file, &ScanFrame::default()).expect("a scan")
+    }
+}
+
+/// Surface with a label a vertex and a colour a label.
+struct PaintedSurface<'a> {
+    vertices: &'a [P3],
+    normals: &'a [V3],
+    labels: &'a [u8],
+    colors: [[u8; 3]; 4],
+}
+
+impl PaintedSurface<'_> {
+    /// Points of even density, and their labels.
+    fn sample(&self, faces: &[Face]) -> (ScanMesh, Vec<u8>) {
+        let mut rng = rand_pcg::Pcg32::seed_from_u64(9);
+        let areas: Vec<f64> = faces
+            .iter()
+            .scan(0.0, |sum, f| {
+                let [a, b, c] = f.map(|v| self.vertices[v as usize]);
+                *sum += f64::from((b - a).cross(&(c - a)).norm());
+                Some(*sum)
+            })
+            .collect();
+        let total = areas.last().copied().unwrap_or(0.0);
+        let mut file = ScanMesh::default();
+        let mut point_labels = Vec::new();
+        for _ in 0..POINTS {
+            let at = rng.random::<f64>() * total;
+            let face = faces[areas.partition_point(|a| *a < at).min(faces.len() - 1)];
+            let (mut u, mut v): (f32, f32) = (rng.random(), rng.random());
+            if u + v > 1.0 {
+                (u, v) = (1.0 - u, 1.0 - v);
+            }
+            let w = [1.0 - u - v, u, v];
+            let sum = |x: &dyn Fn(usize) -> V3| -> V3 {
+                (0..3).map(|k| x(face[k] as usize) * w[k]).sum()
+            };
+            let most = (0..3)
+                .max_by(|a, b| w[*a].total_cmp(&w[*b]))
+                .expect("three");
+            let label = self.labels[face[most] as usize];
+            file.points
+                .push(P3::from(sum(&|i| self.vertices[i].coords)));
+            file.normals.push(sum(&|i| self.normals[i]).normalize());
+            let shade = 0.85 + 0.3 * rng.random::<f32>();
+            file.colors.push(
+                self.colors[usize::from(label)].map(|c| (f32::from(c) * shade).min(255.0) as u8),
+            );
+            point_labels.push(label);
+        }
+        (file, point_labels)
+    }
+}
+
+/// F1 of one label.
+pub(super) fn f1(truth: &[u8], found: &[u8], label: u8) -> f64 {
+    let count = |f: &dyn Fn(u8, u8) -> bool| {
+        truth.iter().zip(found).filter(|(t, g)| f(**t, **g)).count() as f64
+    };
+    let both = count(&|t, g| t == label && g == label);
+    let either = count(&|t, _| t == label) + count(&|_, g| g == label);
+    2.0 * both / either.max(1.0)
+}

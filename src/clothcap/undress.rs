@@ -1,0 +1,202 @@
+//! Body under the cloth (section 5.4): inside of all garments, tight to the visible skin, near the minimally clothed shape.
+
+use super::CaptureError;
+use super::align::{AlignedBody, FitStage, ModelFit, QuadraticEnergy, Stencil, corner_weights};
+use super::multi::MultiCloth;
+use super::retarget::SolidBody;
+use super::scan::BodyScan;
+use crate::body::{BoneTransforms, Template};
+use crate::math::{P3, V3};
+use crate::mesh::face_normal;
+use crate::par::{self, Par};
+use crate::registration::GemanMcClure;
+use crate::spatial::Bvh;
+use std::sync::Arc;
+
+/// Scan points in the fit of the shape.
+const SAMPLES: usize = 6000;
+/// Stages of the shape's fit.
+const STAGES: [FitStage; 2] = [
+    FitStage::shaped(0.05, 10, FREEDOM),
+    FitStage::shaped(0.03, 12, FREEDOM),
+];
+/// Freedom of the pose: the aligned one is right to a few degrees, and loose cloth does not hold limbs.
+const FREEDOM: f64 = 0.1;
+/// Distance that the body keeps below cloth, metres.
+const MARGIN: f32 = 0.003;
+/// Coupling length to the minimally clothed shape, metres.
+const COUPLING: f64 = 0.03;
+/// Width of the kernel on skin, metres.
+const SIGMA: f64 = 0.02;
+/// Iterations of the free surface.
+const ITERATIONS: usize = 6;
+/// Pull to the minimally clothed shape beside the data's.
+const ANCHOR: f64 = 0.02;
+/// Weight of a garment vertex that the body comes through, beside its area.
+const PUSH: f64 = 4.0;
+/// Smallest cosine between normals of a pair.
+const NORMALS: f32 = 0.2;
+/// Cotangent of 60°.
+const EDGE: f64 = 0.577;
+
+/// Body under the cloth of one scan.
+#[derive(Clone, Debug)]
+pub struct Undressed {
+    /// Minimally clothed shape with its pose.
+    pub body: AlignedBody,
+    /// Bones of its pose.
+    pub bones: BoneTransforms,
+    /// Posed vertices, world, metres, shape `[vertices]`.
+    pub vertices: Vec<P3>,
+}
+
+/// Minimally clothed shape of the subject from one scan; `covered` tells its points on garments, shape `[points]`.
+///
+/// # Errors
+/// [`CaptureError::Solve`].
+pub(super) fn minimally_clothed(
+    template: &Arc<Template>,
+    scan: &BodyScan,
+    covered: &[bool],
+    start: &AlignedBody,
+) -> Result<AlignedBody, CaptureError> {
+    let mut fit = ModelFit::new(template, scan, SAMPLES).with_covered(covered);
+    let mut body = start.clone();
+    for stage in &STAGES {
+        fit.run(&mut body, stage)?;
+    }
+    Ok(body)
+}
+
+/// Garments of one scan, posed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WornGarments<'a> {
+    /// Topology and body vertices.
+    pub(super) cloth: &'a MultiCloth,
+    /// Posed vertices of each, world, metres.
+    pub(super) vertices: &'a [Vec<P3>],
+}
+
+/// Estimates bodies under the cloth of the scans of one subject.
+#[derive(Debug)]
+pub(super) struct Undresser {
+    template: Arc<Template>,
+    energy: QuadraticEnergy,
+    edges: Vec<[u32; 2]>,
+    bvh: Bvh,
+    solid: SolidBody,
+}
+
+impl Undresser {
+    /// Prepares the system of a template.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] for a template too large.
+    pub(super) fn new(template: Arc<Template>) -> Result<Self, CaptureError> {
+        let mesh = template.mesh();
+        let edges: Vec<[u32; 2]> = template.topology().edges().iter().map(|e| e.v).collect();
+        let stencils = edges.iter().map(|e| Stencil::edge(*e, EDGE)).collect();
+        Ok(Self {
+            energy: QuadraticEnergy::new(mesh.vertices().len(), stencils, mesh.faces())?,
+            bvh: Bvh::new(mesh.faces(), mesh.vertices()),
+            solid: SolidBody::new(&template)?,
+            edges,
+            template,
+        })
+    }
+
+    /// Body under the cloth of one scan, near the minimally clothed shape `body` in its pose.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`].
+    pub(super) fn run(
+        &mut self,
+        (scan, covered): (&BodyScan, &[bool]),
+        garments: WornGarments<'_>,
+        body: AlignedBody,
+    ) -> Result<Undressed, CaptureError> {
+        let template = self.template.clone();
+        let (model, bones) = ModelFit::new(&template, scan, 1).posed(&body);
+        let mut vertices = model.clone();
+        for _ in 0..ITERATIONS {
+            self.begin(&model);
+            self.add_skin(scan, covered, &vertices);
+            self.add_garments(garments, &vertices)?;
+            vertices = self.energy.minimise("body under cloth")?;
+        }
+        Ok(Undressed {
+            body,
+            bones,
+            vertices,
+        })
+    }
+
+    fn area_of_vertex(&self) -> f64 {
+        let mesh = self.template.mesh();
+        mesh.area() / mesh.vertices().len().max(1) as f64
+    }
+
+    fn begin(&mut self, model: &[P3]) {
+        self.energy.reset();
+        for (k, e) in self.edges.iter().enumerate() {
+            let d = (model[e[0] as usize] - model[e[1] as usize]).cast::<f64>();
+            self.energy.add_stencil(k, COUPLING * COUPLING, d.into());
+        }
+        let anchor = ANCHOR * self.area_of_vertex();
+        for (v, p) in model.iter().enumerate() {
+            self.energy.add_vertex(v as u32, anchor, p);
+        }
+    }
+
+    /// Pulls the body to the visible skin.
+    fn add_skin(&mut self, scan: &BodyScan, covered: &[bool], vertices: &[P3]) {
+        self.bvh.refit(vertices);
+        let faces = self.template.mesh().faces();
+        let kernel = GemanMcClure { sigma: SIGMA };
+        let mut matches = Vec::new();
+        par::map_into(Par::Rayon, scan.points.len(), 256, &mut matches, |i| {
+            let p = scan.points[i];
+            let found = self.bvh.closest(vertices, &p).filter(|_| !covered[i])?;
+            let face = faces[found.face as usize];
+            let normal = face_normal(vertices, &face).try_normalize(f32::MIN_POSITIVE)?;
+            let cos = normal.dot(&scan.normals[i]);
+            let cos = if scan.oriented { cos } else { cos.abs() };
+            if cos < NORMALS && scan.normals[i] != V3::zeros() {
+                return None;
+            }
+            let weight = kernel.weight(f64::from(found.distance * found.distance));
+            let corners = corner_weights(vertices, &face, &found.point);
+            Some((found.face, corners, weight, p))
+        });
+        let point = self.template.mesh().area() / scan.points.len().max(1) as f64;
+        for (face, corners, weight, p) in matches.into_iter().flatten() {
+            self.energy
+                .add_face_point(face, corners, point * weight, &p);
+        }
+    }
+
+    /// Pushes the body below garments that it comes through.
+    fn add_garments(
+        &mut self,
+        garments: WornGarments<'_>,
+        vertices: &[P3],
+    ) -> Result<(), CaptureError> {
+        self.solid.place_unseparated(vertices)?;
+        let weight = PUSH * self.area_of_vertex();
+        for (part, own) in garments.cloth.parts.iter().zip(garments.vertices) {
+            let mut hits = Vec::new();
+            par::map_into(Par::Rayon, own.len(), 128, &mut hits, |i| {
+                let hit = self.solid.below(&own[i], part.nodes[i]);
+                (!part.hidden[i] && hit.signed_distance < MARGIN).then_some(hit)
+            });
+            for (p, hit) in own.iter().zip(hits) {
+                if let Some(hit) = hit {
+                    let target = p - hit.normal * MARGIN;
+                    self.energy
+                        .add_face_point(hit.face, hit.weights, weight, &target);
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,135 @@
+//! Depth images of a scan from virtual cameras around it, so that the tracker can find the person in it.
+
+use super::scan::{BodyScan, mean_spacing};
+use crate::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+use crate::math::{Camera, P3, Rigid, World};
+use crate::par::Par;
+use crate::raster::{Options, View, VisibilityBuffer, rasterise_with};
+use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+
+/// Columns, rows and focal length, pixels: those of the sensors that the tracker is made for.
+const SIZE: [u32; 2] = [480, 640];
+const FOCAL: f32 = 525.0;
+/// Share of the rows that the person fills.
+const FILL: f32 = 0.72;
+/// Nearest surface drawn, metres.
+const NEAR: f32 = 0.1;
+/// Side of a point of a cloud as a multiple of the distance between points: closes the gaps.
+const SPLAT: f32 = 2.5;
+
+/// A camera with its depth image of a scan.
+#[derive(Clone, Debug)]
+pub(super) struct VirtualCamera {
+    /// Projection.
+    pub calibration: Calibration,
+    /// Pose.
+    pub world_from_camera: Rigid<World, Camera>,
+}
+
+impl VirtualCamera {
+    /// Camera that sees the whole of `bounds` from the direction `yaw` about the vertical, radians; 0 looks along −z.
+    pub(super) fn around([low, high]: [P3; 2], yaw: f64) -> Self {
+        let [width, height] = SIZE;
+        let depth = Intrinsics {
+            width,
+            height,
+            fx: f64::from(FOCAL),
+            fy: f64::from(FOCAL),
+            cx: f64::from(width - 1) / 2.0,
+            cy: f64::from(height - 1) / 2.0,
+        };
+        let extent = high - low;
+        let across = extent.x.max(extent.z);
+        let share = (extent.y / height as f32).max(across / width as f32);
+        let distance = f64::from((share * FOCAL / FILL + 0.5 * across).max(1.0));
+        let middle = nalgebra::center(&low, &high).cast::<f64>();
+        let around = Rotation3::from_axis_angle(&Vector3::y_axis(), yaw);
+        // Camera axes in the world: x to the right of the picture, y down, z towards the person.
+        let axes = Matrix3::new(1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0);
+        let rotation = around * Rotation3::from_matrix_unchecked(axes);
+        let place = middle + around * Vector3::new(0.0, 0.0, distance);
+        Self {
+            calibration: Calibration::registered(depth),
+            world_from_camera: Rigid::from_parts(
+                place.coords,
+                UnitQuaternion::from_rotation_matrix(&rotation),
+            ),
+        }
+    }
+
+    /// Depth image of a scan, millimetres; 0 beside it.
+    pub(super) fn frame(&self, scan: &BodyScan) -> RgbdFrame {
+        let camera = self.calibration.depth;
+        let mut points = Vec::new();
+        let camera_from_world = self.world_from_camera.inverse();
+        camera_from_world.points_f32(&scan.points, &mut points);
+        let mut depth = DepthImage::empty(camera.width, camera.height);
+        if scan.faces.is_empty() {
+            splat(&camera, &points, depth.data_mut());
+        } else {
+            let view = View::Perspective { camera, near: NEAR };
+            let mut buffer = VisibilityBuffer::default();
+            let options = Options {
+                par: Par::Rayon,
+                ..Options::default()
+            };
+            rasterise_with(options, &view, &points, &scan.faces, &mut buffer);
+            for (d, z) in depth.data_mut().iter_mut().zip(&buffer.depth) {
+                *d = to_millimetres(*z);
+            }
+        }
+        RgbdFrame {
+            sequence: 0,
+            time_ns: 0,
+            depth,
+            color: None,
+        }
+    }
+}
+
+/// Draws each point of a cloud as a square that faces the camera.
+fn splat(camera: &Intrinsics, points: &[P3], depth: &mut [u16]) {
+    let side = SPLAT * mean_spacing(points);
+    for p in points.iter().filter(|p| p.z > NEAR) {
+        let q = camera.project(p);
+        let half = (0.5 * side * camera.fx as f32 / p.z).max(0.5);
+        let range = |middle: f32, size: u32| {
+            let low = (middle - half).ceil().clamp(0.0, size as f32) as u32;
+            let high = (middle + half).floor().clamp(-1.0, size as f32 - 1.0);
+            low..(high + 1.0) as u32
+        };
+        for row in range(q.y, camera.height) {
+            for column in range(q.x, camera.width) {
+                let slot = &mut depth[(row * camera.width + column) as usize];
+                let z = to_millimetres(p.z);
+                if z > 0 && (*slot == 0 || z < *slot) {
+                    *slot = z;
+                }
+            }
+        }
+    }
+}
+
+fn to_millimetres(z: f32) -> u16 {
+    if z.is_finite() && z > 0.0 {
+        (z * 1e3).round().min(f32::from(u16::MAX)) as u16
+    } else {
+        0
+    }
+}
+
+/// Bounds of a scan without its outermost half per cent a side, metres: strays do not count.
+pub(super) fn bounds(points: &[P3]) -> [P3; 2] {
+    const STRAYS: f64 = 0.002;
+    let mut ends = [Point3::origin(); 2];
+    for axis in 0..3 {
+        let mut values: Vec<f32> = points.iter().map(|p| p[axis]).collect();
+        values.sort_by(f32::total_cmp);
+        let last = values.len().saturating_sub(1) as f64;
+        for (end, share) in ends.iter_mut().zip([STRAYS, 1.0 - STRAYS]) {
+            let at = (share * last).round() as usize;
+            end[axis] = values.get(at).copied().unwrap_or(0.0);
+        }
+    }
+    ends
+}

@@ -1,0 +1,144 @@
+//! Scenes of the capture bench: bodies, outfits, motions and colours.
+
+use crate::body::BodyShape;
+use crate::evaluate::EvaluateError;
+use crate::evaluate::scans::{
+    ScanDefects, ScanGarment, ScanMotion, ScanPalette, ScanScene, ScannerSetting,
+};
+use crate::mirror::Choice;
+use crate::synth::{Actor, Routine};
+
+/// Named scene.
+#[derive(Clone, Debug)]
+pub struct CaptureScene {
+    /// Name in the table.
+    pub name: String,
+    /// Its scans.
+    pub scene: ScanScene,
+    /// Kept apart from development.
+    pub is_unseen: bool,
+}
+
+/// Points of a scan.
+const POINTS: usize = 60_000;
+/// Scans of a scene and their rate, Hz.
+const SCANS: usize = 3;
+/// See [`SCANS`].
+const RATE: f64 = 5.0;
+
+/// One scene: name, garments with their layers, shape coefficients, colours.
+type SceneSpec = (
+    &'static str,
+    &'static [(&'static str, usize)],
+    &'static [f64],
+    ScanPalette,
+);
+
+/// Outfits on bodies of several shapes; every third is unseen.
+const SCENES: [SceneSpec; 9] = [
+    (
+        "tshirt and trousers",
+        &[("trousers", 0), ("tshirt", 1)],
+        &[0.0],
+        ScanPalette::Distinct,
+    ),
+    (
+        "long sleeves tucked",
+        &[("longsleeve", 0), ("trousers", 1)],
+        &[1.0, -0.5, 1.0],
+        ScanPalette::Distinct,
+    ),
+    (
+        "tank and skirt",
+        &[("tank", 0), ("skirt", 1)],
+        &[-0.5, 0.0, -1.0],
+        ScanPalette::Distinct,
+    ),
+    (
+        "low contrast",
+        &[("trousers", 0), ("tshirt", 1)],
+        &[0.5, 1.0, 0.5],
+        ScanPalette::LowContrast,
+    ),
+    (
+        "one colour",
+        &[("trousers", 0), ("longsleeve", 1)],
+        &[0.0, 0.5, 1.0],
+        ScanPalette::Uniform,
+    ),
+    (
+        "dress",
+        &[("dress", 0)],
+        &[-0.3, 0.3, -1.0],
+        ScanPalette::Distinct,
+    ),
+    (
+        "heavy",
+        &[("trousers", 0), ("tshirt", 1)],
+        &[0.0, 2.0, 0.5],
+        ScanPalette::Distinct,
+    ),
+    (
+        "vest over sleeves",
+        &[("longsleeve", 0), ("trousers", 1), ("tank", 2)],
+        &[0.5, 0.0, 1.0],
+        ScanPalette::Distinct,
+    ),
+    (
+        "hooded top and shorts",
+        &[("shorts", 0), ("hoodie", 1)],
+        &[1.2, -1.0, 0.0],
+        ScanPalette::Distinct,
+    ),
+];
+
+/// Scenes of the bench.
+///
+/// # Errors
+/// A garment that the library lacks.
+pub fn capture_scenes() -> Result<Vec<CaptureScene>, EvaluateError> {
+    let scene = |(k, spec): (usize, &SceneSpec)| -> Result<CaptureScene, EvaluateError> {
+        let (name, outfit, shape, palette) = spec;
+        let garment = |(name, layer): &(&str, usize)| -> Result<ScanGarment, EvaluateError> {
+            Ok(ScanGarment {
+                choice: Choice::library(name, None).map_err(|e| EvaluateError::Scene {
+                    scene: (*name).into(),
+                    why: e.to_string(),
+                })?,
+                layer: Some(*layer as _),
+            })
+        };
+        let actor = Actor {
+            shape: BodyShape {
+                coefficients: shape.to_vec(),
+                ..BodyShape::default()
+            },
+            appearance: k as u64,
+            ..Actor::default()
+        };
+        Ok(CaptureScene {
+            name: (*name).into(),
+            scene: ScanScene {
+                actor,
+                garments: outfit.iter().map(garment).collect::<Result<_, _>>()?,
+                motion: ScanMotion::Play {
+                    routine: Routine::TryOn,
+                    start: 0.4,
+                },
+                palette: *palette,
+                scanner: ScannerSetting {
+                    points: POINTS,
+                    noise: 1e-3,
+                    ..ScannerSetting::default()
+                },
+                defects: ScanDefects::default(),
+                scans: SCANS,
+                rate: RATE,
+                edge: 0.021,
+                seed: 100 + k as u64,
+            },
+            is_unseen: k % 3 == 2,
+        })
+    };
+    SCENES.iter().enumerate().map(scene).collect()
+}

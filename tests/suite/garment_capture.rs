@@ -1,0 +1,226 @@
+//! Garment capture: the real scan against hand-made labels, synthetic ones against their truth, and scans that are damaged.
+
+use crate::common::shared;
+use rand::{Rng, SeedableRng};
+use std::path::Path;
+use std::sync::Arc;
+use tryon::body::{Template, embedded};
+use tryon::clothcap::align::find_frame;
+use tryon::clothcap::scan::{BodyScan, ScanFrame};
+use tryon::clothcap::segment::{LabelConfig, Slot};
+use tryon::clothcap::{CaptureError, ScanSegmenter, SegmentedScan};
+use tryon::evaluate::garment_capture::{CaptureVariant, capture_scenes, measure};
+use tryon::evaluate::scans::{SKIN_LABEL, TrueScan};
+use tryon::formats::scan::{ScanMesh, read_scan};
+use tryon::math::P3;
+
+/// Unsigned bytes of an npy file.
+fn bytes_of_npy(path: &Path) -> Vec<u8> {
+    let all = std::fs::read(path).expect("readable");
+    let header = usize::from(u16::from_le_bytes([all[8], all[9]]));
+    all[10 + header..].to_vec()
+}
+
+/// F1 of some true labels against some found ones; rows with label 255 are not judged.
+fn f1(truth: &[u8], found: &[u8], (wanted, ours): (&[u8], &[u8])) -> f64 {
+    let judged = truth.iter().zip(found).filter(|(t, _)| **t != 255);
+    let (mut both, mut either) = (0.0, 0.0);
+    for (t, f) in judged {
+        let (t, f) = (wanted.contains(t), ours.contains(f));
+        both += f64::from(u8::from(t && f));
+        either += f64::from(u8::from(t)) + f64::from(u8::from(f));
+    }
+    2.0 * both / f64::max(either, 1.0)
+}
+
+fn segmented(
+    file: &ScanMesh,
+    config: LabelConfig,
+) -> Result<(SegmentedScan, Vec<u8>), CaptureError> {
+    let template = embedded::template();
+    let (frame, start) = find_frame(&template, file)?;
+    let scan = BodyScan::new(file, &frame)?;
+    let mut segmenter = ScanSegmenter::new(template, config)?;
+    segmenter.start_at(start);
+    let found = segmenter.step(&scan)?;
+    let rows = scan.rows(&found.parts(), 0);
+    Ok((found, rows))
+}
+
+/// Hand-made labels: 0 skin, 1 waistcoat, 2 shirt and tie, 3 trousers, 4 shoes.
+#[test]
+fn a_real_mans_waistcoat_shirt_and_trousers_are_found() {
+    let Some(folder) = shared("scans/liam") else {
+        return;
+    };
+    let file = read_scan(&folder.join("00000.ply")).expect("a scan");
+    let truth = bytes_of_npy(&folder.join("00000.labels.npy"));
+    let (found, rows) = segmented(&file, LabelConfig::default()).expect("garments");
+    assert!(found.alignment.report.surface_error < 0.005);
+
+    let part = |slot: Slot| {
+        let at = found.labelling.slots.iter().position(|s| *s == slot);
+        at.map(|l| found.labelling.parts()[l]).expect("a part")
+    };
+    let (top, under, bottom) = (part(Slot::Top), part(Slot::Under), part(Slot::Bottom));
+    let scores = [
+        f1(&truth, &rows, (&[1, 2], &[top, under])),
+        f1(&truth, &rows, (&[3], &[bottom])),
+        f1(&truth, &rows, (&[1], &[top])),
+        f1(&truth, &rows, (&[2], &[under])),
+    ];
+    println!("F1: top, trousers, waistcoat, shirt {scores:.3?}");
+    assert!(0.5 * (scores[0] + scores[1]) > 0.90, "{scores:?}");
+    assert!(
+        (scores[1] + scores[2] + scores[3]) / 3.0 > 0.75,
+        "{scores:?}"
+    );
+}
+
+#[test]
+fn a_synthetic_outfit_meets_the_bars() {
+    let scenes = capture_scenes().expect("scenes");
+    let mut scene = scenes.into_iter().next().expect("a scene");
+    scene.scene.scans = 2;
+    let whole = &CaptureVariant::all()[0];
+    let row = measure(&scene, whole, 3).expect("measured");
+    let error = |name| row.get(name).unwrap_or(f64::NAN);
+    println!("{row:?}");
+    assert!(error("F1") > 0.93);
+    assert!(error("boundary_mm") < 10.0);
+    assert!(error("surface_mm") < 3.0);
+    assert!(error("garment_mm") < 4.0);
+    assert!(error("body_mm") < 14.0);
+    assert!(error("own_body_max_mm") < 0.1);
+    assert_eq!(error("inside"), 0.0);
+}
+
+/// First scan of a T-shirt and trousers.
+fn dressed() -> TrueScan {
+    let mut scene = capture_scenes().expect("scenes").remove(0).scene;
+    (scene.scans, scene.scanner.points) = (1, 30_000);
+    scene.scans().expect("a scan").remove(0)
+}
+
+fn mesh_of(scan: &TrueScan) -> ScanMesh {
+    ScanMesh {
+        points: scan.points.clone(),
+        faces: Vec::new(),
+        normals: scan.normals.clone(),
+        colors: scan.colors.clone(),
+    }
+}
+
+/// Keeps some rows.
+fn keep(file: &ScanMesh, labels: &[u8], wanted: impl Fn(usize) -> bool) -> (ScanMesh, Vec<u8>) {
+    let rows: Vec<usize> = (0..file.points.len()).filter(|i| wanted(*i)).collect();
+    let mesh = ScanMesh {
+        points: rows.iter().map(|i| file.points[*i]).collect(),
+        normals: rows.iter().map(|i| file.normals[*i]).collect(),
+        colors: rows.iter().map(|i| file.colors[*i]).collect(),
+        faces: Vec::new(),
+    };
+    (mesh, rows.iter().map(|i| labels[*i]).collect())
+}
+
+fn covered_f1(truth: &[u8], rows: &[u8]) -> f64 {
+    let is_covered = |l: &u8| u8::from(*l != SKIN_LABEL);
+    let (t, f): (Vec<u8>, Vec<u8>) = (
+        truth.iter().map(is_covered).collect(),
+        rows.iter().map(is_covered).collect(),
+    );
+    f1(&t, &f, (&[1], &[1]))
+}
+
+#[test]
+fn damaged_scans_are_captured_too() {
+    let truth = dressed();
+    let file = mesh_of(&truth);
+    let score = |what: &str, file: &ScanMesh, labels: &[u8]| {
+        let (_, rows) = segmented(file, LabelConfig::default()).expect(what);
+        let score = covered_f1(labels, &rows);
+        println!("{what}: F1 of what is covered {score:.3}");
+        score
+    };
+
+    let mut flipped = file.clone();
+    flipped.normals.iter_mut().for_each(|n| *n = -*n);
+    assert!(score("flipped normals", &flipped, &truth.labels) > 0.9);
+
+    let mut doubled = file.clone();
+    doubled.points.extend_from_slice(&file.points);
+    doubled.normals.extend_from_slice(&file.normals);
+    doubled.colors.extend_from_slice(&file.colors);
+    assert!(score("duplicate points", &doubled, &truth.labels.repeat(2)) > 0.9);
+
+    let mut spoiled = file.clone();
+    let mut rng = rand_pcg::Pcg32::seed_from_u64(4);
+    for p in &mut spoiled.points {
+        if rng.random::<f32>() < 0.05 {
+            p.y = f32::NAN;
+        }
+    }
+    assert!(score("points that are not finite", &spoiled, &truth.labels) > 0.9);
+
+    // Balls of 15 cm are missing, 60 % of the points in all.
+    let mut missing = vec![false; file.points.len()];
+    while missing.iter().filter(|m| **m).count() * 10 < 6 * missing.len() {
+        let middle = file.points[rng.random_range(0..file.points.len())];
+        for (m, p) in missing.iter_mut().zip(&file.points) {
+            *m |= (p - middle).norm() < 0.15;
+        }
+    }
+    let (holed, labels) = keep(&file, &truth.labels, |i| !missing[i]);
+    assert!(score("60 % missing", &holed, &labels) > 0.8);
+
+    let mut inches = file.clone();
+    for p in &mut inches.points {
+        *p = P3::new(p.x, p.z, -p.y) / 0.0254;
+    }
+    inches.normals.clear();
+    assert!(score("inches, z down, no normals", &inches, &truth.labels) > 0.85);
+}
+
+#[test]
+fn scans_without_a_dressed_person_are_refused_or_reported() {
+    let template: Arc<Template> = embedded::template();
+    let mut rng = rand_pcg::Pcg32::seed_from_u64(8);
+    // A box of the size of a wardrobe.
+    let sides = [0.8f32, 1.8, 0.5];
+    let points = (0..20_000)
+        .map(|_| {
+            let mut p = [0.0f32; 3].map(|_| rng.random::<f32>() - 0.5);
+            let side = rng.random_range(0..3);
+            p[side] = if p[side] > 0.0 { 0.5 } else { -0.5 };
+            P3::new(p[0] * sides[0], p[1] * sides[1], p[2] * sides[2])
+        })
+        .collect();
+    let wardrobe = ScanMesh {
+        points,
+        ..ScanMesh::default()
+    };
+    let refused = find_frame(&template, &wardrobe).map(|f| f.1.error);
+    assert!(
+        matches!(refused, Err(CaptureError::NoPerson { .. })),
+        "{refused:?}"
+    );
+
+    let few = ScanMesh {
+        points: vec![P3::new(0.0, 1.7, 0.0), P3::origin(), P3::new(0.1, 0.9, 0.0)],
+        ..ScanMesh::default()
+    };
+    let refused = BodyScan::new(&few, &ScanFrame::default());
+    assert!(matches!(
+        refused,
+        Err(CaptureError::TooFewPoints { points: 3, .. })
+    ));
+
+    // One colour throughout: no garment is told from skin, or the ones that shape and prior suggest.
+    let truth = dressed();
+    let mut plain = mesh_of(&truth);
+    plain.colors.fill([128, 120, 110]);
+    match segmented(&plain, LabelConfig::default()) {
+        Ok((found, _)) => println!("one colour: {:?}", found.labelling.slots),
+        Err(e) => assert_eq!(e, CaptureError::NoGarment),
+    }
+}
