@@ -110,6 +110,10 @@ impl<'a> BodyDresser<'a> {
             garments.push(vertices);
         }
         tuck_hidden(self.cloth, &mut garments, self.solid.vertices());
+        for (vertices, report) in garments.iter().zip(&mut reports) {
+            let inside = self.solid.contains(vertices);
+            report.inside = inside.iter().filter(|b| **b).count();
+        }
         Ok(DressedPose {
             pose: pose.clone(),
             bones,

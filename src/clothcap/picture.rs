@@ -1,11 +1,10 @@
 //! Pictures of the stages: coloured meshes from the front, side and back, in rows.
 
-use super::align::AlignedBody;
 use super::capture::{CapturedOutfit, FrameCapture};
 use super::scan::BodyScan;
-use crate::body::Template;
+use crate::body::{Pose, Template};
 use crate::camera::ColorImage;
-use crate::math::{P3, V3};
+use crate::math::{P3, V3, World};
 use crate::mesh::Face;
 use crate::par::Par;
 use crate::raster::{Options, View, VisibilityBuffer, interpolate, rasterise_with};
@@ -73,7 +72,7 @@ pub fn stages(
     outfit: &CapturedOutfit,
 ) -> ColorImage {
     let faces = template.mesh().faces();
-    let front = heading(&frame.alignment.body);
+    let front = heading(&frame.alignment.body.pose);
     let skin = vec![part_color(0); template.mesh().vertices().len()];
     let grey = vec![[190, 190, 200]; skin.len()];
     let labels: Vec<[u8; 3]> = frame.labels.iter().map(|p| part_color(*p)).collect();
@@ -129,8 +128,8 @@ pub fn stages(
 }
 
 /// Direction that a body faces, radians about the vertical from +z.
-pub fn heading(body: &AlignedBody) -> f32 {
-    let z = body.pose.root.vector(&Vector3::z());
+pub fn heading(pose: &Pose<World>) -> f32 {
+    let z = pose.root.vector(&Vector3::z());
     z.x.atan2(z.z) as f32
 }
 

@@ -152,6 +152,8 @@ fn fault(e: impl std::fmt::Display) -> CaptureError {
 #[derive(Debug)]
 pub struct PenetrationSolver {
     nodes: Vec<u32>,
+    /// Vertices under another garment, which are placed below it afterwards.
+    hidden: Vec<bool>,
     edges: Vec<[u32; 2]>,
     energy: QuadraticEnergy,
 }
@@ -167,6 +169,7 @@ impl PenetrationSolver {
         Ok(Self {
             energy: QuadraticEnergy::new(part.nodes.len(), stencils, &[])?,
             nodes: part.nodes.clone(),
+            hidden: part.hidden.clone(),
             edges,
         })
     }
@@ -182,7 +185,7 @@ impl PenetrationSolver {
     ) -> Result<RetargetReport, CaptureError> {
         let wanted = vertices.clone();
         let mut report = RetargetReport {
-            inside_before: count(&body.contains(vertices)),
+            inside_before: count(&self.inside(body, vertices)),
             ..RetargetReport::default()
         };
         let mut pushed: Vec<Option<P3>> = vec![None; vertices.len()];
@@ -196,7 +199,7 @@ impl PenetrationSolver {
         for _ in 0..ROUNDS[1] {
             let mut left = vec![None; vertices.len()];
             let is_near = self.push(body, vertices, &mut left);
-            let inside = body.contains(vertices);
+            let inside = self.inside(body, vertices);
             if !is_near && count(&inside) == 0 {
                 break;
             }
@@ -210,10 +213,19 @@ impl PenetrationSolver {
             }
         }
         self.gather(body, vertices);
-        report.inside = count(&body.contains(vertices));
+        report.inside = count(&self.inside(body, vertices));
         let moved = vertices.iter().zip(&wanted).map(|(a, b)| (a - b).norm());
         report.largest_push = moved.fold(0.0, f32::max);
         Ok(report)
+    }
+
+    /// Membership in the body's interior of each vertex that is not hidden.
+    fn inside(&self, body: &SolidBody, vertices: &[P3]) -> Vec<bool> {
+        let mut inside = body.contains(vertices);
+        for (i, hidden) in inside.iter_mut().zip(&self.hidden) {
+            *i &= !hidden;
+        }
+        inside
     }
 
     /// Moves vertices that are still inside towards neighbours outside: in a fold of the skin, where pushing out of one side
@@ -221,7 +233,7 @@ impl PenetrationSolver {
     fn gather(&self, body: &SolidBody, vertices: &mut [P3]) {
         /// Shares of the way that are tried.
         const WAY: [f32; 4] = [0.25, 0.5, 0.75, 1.0];
-        let mut inside = body.contains(vertices);
+        let mut inside = self.inside(body, vertices);
         loop {
             let before = count(&inside);
             for &[a, b] in &self.edges {
@@ -248,6 +260,7 @@ impl PenetrationSolver {
         let mut out = Vec::new();
         par::map_into(Par::Rayon, vertices.len(), 128, &mut out, |v| {
             body.outside(&vertices[v], self.nodes[v])
+                .filter(|_| !self.hidden[v])
         });
         let mut any = false;
         for (slot, p) in targets.iter_mut().zip(out) {

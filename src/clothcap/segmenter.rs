@@ -92,8 +92,7 @@ impl ScanSegmenter {
     pub fn step(&mut self, scan: &BodyScan) -> Result<SegmentedScan, CaptureError> {
         let alignment = self.aligner.align(scan)?;
         let mesh = self.template.mesh();
-        let count = mesh.vertices().len();
-        let nodes = NodeColors::new(scan, &alignment.matches, mesh.faces(), count);
+        let nodes = NodeColors::new(scan, &alignment, &self.template);
         let mut labelling = match &self.first {
             None => label_nodes(&self.template, &nodes, &self.config)?,
             Some(first) => relabel_nodes(&self.template, &nodes, first, &self.config)?,

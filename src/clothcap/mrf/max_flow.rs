@@ -13,7 +13,7 @@ mod tests;
 
 use super::MrfError;
 
-/// Largest capacity [1]: the sum of an edge's two residuals stays within i32.
+/// Largest capacity: the sum of an edge's two residuals stays within i32.
 pub const MAX_CAPACITY: i32 = i32::MAX / 2;
 
 /// Largest number of nodes, and of edges: two arcs per edge and two parent codes fit a u32.
@@ -42,7 +42,7 @@ const SINK: usize = 1;
 struct FlowArc {
     /// Node at the far end.
     head: u32,
-    /// Residual capacity [1].
+    /// Residual capacity.
     residual: i32,
 }
 
@@ -61,7 +61,7 @@ struct FlowNode {
     current: u32,
     /// Signed depth: 1 at source roots, −1 at sink roots, 0 outside both trees.
     level: i32,
-    /// Residual capacity from the source if positive, to the sink if negative [1].
+    /// Residual capacity from the source if positive, to the sink if negative.
     excess: i32,
 }
 
@@ -139,25 +139,25 @@ impl MaxFlow {
         })
     }
 
-    /// Capacities of an edge from its first node to its second and back [1], clamped to
+    /// Capacities of an edge from its first node to its second and back, clamped to
     /// 0..=[`MAX_CAPACITY`]. They count down to residuals in `solve`, so each solve needs them again.
     pub fn set_edge(&mut self, edge: usize, forward: i32, backward: i32) {
         self.arcs[2 * edge].residual = forward.clamp(0, MAX_CAPACITY);
         self.arcs[2 * edge + 1].residual = backward.clamp(0, MAX_CAPACITY);
     }
 
-    /// Terminal capacity of a node [1]: from the source if positive, to the sink if negative.
+    /// Terminal capacity of a node: from the source if positive, to the sink if negative.
     /// Values beyond ±[`MAX_CAPACITY`] are clamped.
     pub fn set_terminal(&mut self, node: usize, excess: i32) {
         self.nodes[node].excess = excess.clamp(-MAX_CAPACITY, MAX_CAPACITY);
     }
 
-    /// Residual capacity of an edge from its first node to its second [1].
+    /// Residual capacity of an edge from its first node to its second.
     pub fn residual(&self, edge: usize) -> i32 {
         self.arcs[2 * edge].residual
     }
 
-    /// Residual terminal capacity of a node [1], signed as in [`Self::set_terminal`].
+    /// Residual terminal capacity of a node, signed as in [`Self::set_terminal`].
     pub fn excess(&self, node: usize) -> i32 {
         self.nodes[node].excess
     }
@@ -167,7 +167,7 @@ impl MaxFlow {
         self.nodes[node].level > 0
     }
 
-    /// Maximum flow [1] for the capacities set since the last solve.
+    /// Maximum flow for the capacities set since the last solve.
     pub fn solve(&mut self) -> i64 {
         self.plant_trees();
 

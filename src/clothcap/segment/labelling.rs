@@ -16,6 +16,8 @@ const SMOOTHNESS: f32 = 2.0;
 const CONTRAST: [f32; 2] = [0.25, 0.10];
 /// Cost of another label than in the first frame, nats: garments slide over the body by little.
 const CHANGE: f32 = 1.0;
+/// Difference of heights over the body that halves it: hems lie on what is below.
+const STEP: f32 = 0.003;
 /// Turns of appearances and labels.
 const TURNS: usize = 5;
 /// Modes of skin, hair and what hands hold.
@@ -162,6 +164,8 @@ impl<'a> Labeller<'a> {
                 (Some(a), Some(b)) => ((a - b).norm() as f32 / half).powi(2),
                 _ => 0.0,
             };
+            let [a, b] = e.map(|v| nodes.heights[v as usize]);
+            let contrast = contrast + ((a - b) / STEP).powi(2);
             smoothness * (floor + (1.0 - floor) / (1.0 + contrast))
         };
         let regions = BodyRegion::of_vertices(template);
@@ -298,17 +302,48 @@ impl<'a> Labeller<'a> {
     }
 
     fn appearances(&self, slots: &[Slot], labels: &[u8]) -> Vec<Option<ColorMixture>> {
-        (0..slots.len())
+        let own = |l: usize| (0..self.count()).filter(move |v| usize::from(labels[*v]) == l);
+        let mut out: Vec<Option<ColorMixture>> = (0..slots.len())
             .map(|l| {
-                let own = (0..self.count()).filter(|v| usize::from(labels[*v]) == l);
-                let colors = self.nodes.of(own);
+                // Sleeves taken for skin would make skin look like sleeves.
                 if slots[l] == Slot::Skin {
-                    ColorMixture::fit_modes(&colors, SKIN_MODES)
-                } else {
-                    ColorMixture::fit(&colors)
+                    return self.skin_appearance();
                 }
+                ColorMixture::fit(&self.nodes.of(own(l)))
             })
-            .collect()
+            .collect();
+        // Garments of one colour share an appearance: else each keeps the shades of the nodes that it began with.
+        let garments = (0..slots.len()).filter(|l| slots[*l].is_garment());
+        let garments: Vec<usize> = garments.collect();
+        for (k, &a) in garments.iter().enumerate() {
+            for &b in &garments[..k] {
+                let (Some(one), Some(other)) = (&out[a], &out[b]) else {
+                    continue;
+                };
+                let excess = self.excess(own(a), (one, other)) + self.excess(own(b), (other, one));
+                if excess < 2.0 * DISTINCT {
+                    let both = ColorMixture::fit(&self.nodes.of(own(a).chain(own(b))));
+                    (out[a], out[b]) = (both.clone(), both);
+                }
+            }
+        }
+        out
+    }
+
+    /// Mean cost of another appearance above that of their own at some nodes, nats.
+    fn excess(
+        &self,
+        nodes: impl Iterator<Item = usize>,
+        (own, other): (&ColorMixture, &ColorMixture),
+    ) -> f64 {
+        let seen = nodes.filter(|v| !self.nodes.points.row(*v).is_empty());
+        let (sum, n) = seen.fold((0.0, 0usize), |(s, n), v| {
+            (
+                s + self.nodes.cost(v, other) - self.nodes.cost(v, own),
+                n + 1,
+            )
+        });
+        sum / n.max(1) as f64
     }
 
     /// Costs of all labels at all nodes (eq. 12), shape `[nodes, labels]`.
@@ -362,17 +397,7 @@ impl<'a> Labeller<'a> {
         if (a.len() as f64) < least || (b.len() as f64) < least {
             return false;
         }
-        let (Some(a), Some(b)) = (
-            ColorMixture::fit_modes(&a, 1),
-            ColorMixture::fit_modes(&b, 1),
-        ) else {
-            return false;
-        };
-        let ((ma, sa), (mb, sb)) = (a.spread(), b.spread());
-        if (ma - mb).norm() < SEPARATION * (sa + sb) {
-            return false;
-        }
-        self.is_coherent(&some, &owner)
+        separation(&a, &b) > SEPARATION && self.is_coherent(&some, &owner)
     }
 
     /// Neighbours mostly share their cluster; stripes and checks do not.
@@ -386,6 +411,21 @@ impl<'a> Labeller<'a> {
         let mixed = inner.iter().filter(|[a, b]| a != b).count();
         (mixed as f64) < MOST_MIXED * inner.len() as f64
     }
+}
+
+/// Distance of the means of two sets of colours, in standard deviations along it. Halves of one Gaussian have 1.3, of an
+/// even distribution 1.7.
+fn separation(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
+    let mean = |all: &[Vector3<f64>]| all.iter().sum::<Vector3<f64>>() / all.len().max(1) as f64;
+    let (ma, mb) = (mean(a), mean(b));
+    let Some(axis) = (ma - mb).try_normalize(f64::MIN_POSITIVE) else {
+        return 0.0;
+    };
+    let deviation = |all: &[Vector3<f64>], m: &Vector3<f64>| {
+        let squares = all.iter().map(|c| (c - m).dot(&axis).powi(2));
+        (squares.sum::<f64>() / all.len().max(1) as f64).sqrt()
+    };
+    (ma - mb).norm() / (deviation(a, &ma) + deviation(b, &mb)).max(f64::MIN_POSITIVE)
 }
 
 /// Back and top of the head, where hair grows; shape `[vertices]`.

@@ -1,9 +1,11 @@
 //! Colours of the scan gathered at the nodes of the template (B of eq. 12).
 
 use super::color_mixture::{ColorMixture, hsv_cone};
-use crate::clothcap::align::SurfaceMatch;
+use crate::body::Template;
+use crate::clothcap::align::Alignment;
 use crate::clothcap::scan::BodyScan;
-use crate::mesh::{Csr, Face};
+use crate::mesh::{Csr, vertex_normals};
+use crate::par::Par;
 use nalgebra::Vector3;
 
 /// Distance up to which a scan point belongs to the surface below it, metres.
@@ -20,11 +22,15 @@ pub struct NodeColors {
     pub colors: Vec<Vector3<f64>>,
     /// Mean colour of each node; `None` without points.
     pub means: Vec<Option<Vector3<f64>>>,
+    /// Height of the aligned surface over the body model at each node, metres.
+    pub heights: Vec<f32>,
 }
 
 impl NodeColors {
     /// Gathers the points of a scan at the nearest corners of their faces.
-    pub fn new(scan: &BodyScan, matches: &[SurfaceMatch], faces: &[Face], nodes: usize) -> Self {
+    pub fn new(scan: &BodyScan, alignment: &Alignment, template: &Template) -> Self {
+        let (matches, faces) = (&alignment.matches, template.mesh().faces());
+        let nodes = alignment.surface.len();
         let mut pairs = Vec::new();
         for (i, m) in matches.iter().enumerate() {
             if m.weight > 0.0 && m.distance < NEAR {
@@ -44,6 +50,7 @@ impl NodeColors {
             (0..nodes).map(mean).collect()
         };
         Self {
+            heights: heights(alignment, template),
             points,
             colors,
             means,
@@ -70,4 +77,17 @@ impl NodeColors {
             .sum();
         sum / row.len() as f64 * (row.len() as f64).min(INDEPENDENT)
     }
+}
+
+/// Height of the free surface over the surface that it is coupled to, along its normals, metres.
+fn heights(alignment: &Alignment, template: &Template) -> Vec<f32> {
+    let (faces, around) = (template.mesh().faces(), template.topology().vertex_faces());
+    let mut normals = Vec::new();
+    vertex_normals(Par::Rayon, &alignment.model, faces, around, &mut normals);
+    let moved = alignment
+        .surface
+        .iter()
+        .zip(&alignment.model)
+        .map(|(a, b)| a - b);
+    moved.zip(&normals).map(|(d, n)| d.dot(n)).collect()
 }

@@ -128,7 +128,7 @@ impl Slot {
             (Self::Top | Self::Under, UpperArm) => 0.2,
             (Self::Top | Self::Under, Forearm) => 0.4,
             (Self::Top | Self::Under, Neck) => 0.8,
-            (Self::Top | Self::Under, Pelvis) => 1.0,
+            (Self::Top | Self::Under, Pelvis) => 0.1,
             (Self::Top | Self::Under, Thigh) => 3.0,
             (Self::Top | Self::Under, Shin) => 8.0,
             (Self::Top | Self::Under, Head | Hand) => 6.0,
@@ -136,7 +136,7 @@ impl Slot {
 
             (Self::Bottom, Pelvis | Thigh) => 0.0,
             (Self::Bottom, Shin) => 0.3,
-            (Self::Bottom, Abdomen) => 1.2,
+            (Self::Bottom, Abdomen) => 0.3,
             (Self::Bottom, Foot) => 2.0,
             (Self::Bottom, Chest) => 8.0,
             (Self::Bottom, _) => IMPOSSIBLE,

@@ -20,6 +20,8 @@ pub(super) struct DressedMotion<'a> {
     pub(super) frames: &'a [DressedPose],
     /// Time of each frame, seconds.
     pub(super) seconds: &'a [f64],
+    /// A morph target a frame after the first; without, the skin alone moves the garments.
+    pub(super) has_targets: bool,
 }
 
 /// One mesh at rest and its changes from frame to frame.
@@ -158,9 +160,14 @@ impl DressedMotion<'_> {
         let mut frames = self.frames.iter().map(rest);
         let vertices = frames.next().unwrap_or_default();
         let change = |f: Vec<P3>| f.iter().zip(&vertices).map(|(a, b)| a - b).collect();
+        let targets = if self.has_targets {
+            frames.map(change).collect()
+        } else {
+            Vec::new()
+        };
         RestMesh {
             name,
-            targets: frames.map(change).collect(),
+            targets,
             vertices,
             nodes,
             colors: Vec::new(),

@@ -74,6 +74,7 @@ fn retarget_all(args: &ClothcapRetargetArgs) -> Result<()> {
             body,
             frames: &dressed,
             seconds: &frames.seconds,
+            has_targets: args.motion.is_none(),
         };
         motion.write(&args.out.join(format!("{name}.glb")))?;
         rows.push(json!({
@@ -208,7 +209,6 @@ fn contact_sheet(
     out: &Path,
 ) -> Result<()> {
     let skin = vec![part_color(0); template.mesh().vertices().len()];
-    let front = heading(&header.outfit.body);
     let panels: Vec<PicturePanel<'_>> = shown
         .iter()
         .map(|d| {
@@ -225,7 +225,10 @@ fn contact_sheet(
                     colors,
                 });
             }
-            PicturePanel { meshes, yaw: front }
+            PicturePanel {
+                meshes,
+                yaw: heading(&d.pose),
+            }
         })
         .collect();
     Ok(write_png_rgb(out, &sheet(&panels, COLUMNS))?)
