@@ -506,6 +506,34 @@ pub(crate) struct ClothcapCaptureArgs {
     pub(crate) out: PathBuf,
 }
 
+/// One of several jobs of a batch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Shard {
+    /// Number of this job, from 0.
+    pub(crate) index: usize,
+    /// Number of jobs.
+    pub(crate) count: usize,
+}
+
+impl std::str::FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let fault = || format!("`{text}`: expected K/N with K below N, for example 2/8");
+        let (index, count) = text.split_once('/').ok_or_else(fault)?;
+        let number = |t: &str| t.parse::<usize>().map_err(|_| fault());
+        let shard = Self {
+            index: number(index)?,
+            count: number(count)?,
+        };
+        if shard.index < shard.count {
+            Ok(shard)
+        } else {
+            Err(fault())
+        }
+    }
+}
+
 #[derive(Debug, Args)]
 #[command(group(clap::ArgGroup::new("bodies").required(true).args(["body", "population"])))]
 pub(crate) struct ClothcapRetargetArgs {
@@ -518,6 +546,9 @@ pub(crate) struct ClothcapRetargetArgs {
     /// Number of bodies drawn from the shape space.
     #[arg(long, value_name = "N")]
     pub(crate) population: Option<usize>,
+    /// Only the bodies K, K + N, K + 2N …, as K/N: independent jobs of one batch. Bodies that are done are left alone.
+    #[arg(long, value_name = "K/N", default_value = "0/1")]
+    pub(crate) shard: Shard,
     /// Motion clip (.bvh, or .amc beside its .asf) instead of the captured poses.
     #[arg(long, value_name = "CLIP")]
     pub(crate) motion: Option<PathBuf>,

@@ -126,6 +126,16 @@ pub(crate) fn rough_start(path: &Path) -> Result<RoughStart> {
     Ok(start)
 }
 
+/// Reads a JSON file.
+///
+/// # Errors
+/// A file that cannot be read or is no JSON.
+pub(crate) fn json(path: &Path) -> Result<serde_json::Value> {
+    let text =
+        std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    serde_json::from_str(&text).with_context(|| format!("{} is no JSON", path.display()))
+}
+
 /// Progress bar over frames; silent when standard error is no terminal.
 pub(crate) fn progress(frames: Option<u64>, what: &'static str) -> ProgressBar {
     let (bar, template) = match frames {

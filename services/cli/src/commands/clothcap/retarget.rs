@@ -1,10 +1,10 @@
 //! `tryon clothcap retarget`: captured garments on other bodies.
 
 use super::glb::DressedMotion;
-use crate::args::ClothcapRetargetArgs;
+use crate::args::{ClothcapRetargetArgs, Shard};
 use crate::{input, report};
 use anyhow::{Context, Result, ensure};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -57,48 +57,116 @@ fn retarget_all(args: &ClothcapRetargetArgs) -> Result<()> {
     if let Some(path) = &args.motion {
         frames = on_motion(path, &template, frames)?;
     }
-    let bodies = bodies(args, &template)?;
+    let mut bodies = bodies(args, &template)?;
+    let Shard { index, count } = args.shard;
+    bodies = bodies.into_iter().skip(index).step_by(count).collect();
+    ensure!(
+        !bodies.is_empty(),
+        "--shard {index}/{count}: no body is left for this job"
+    );
     let bar = input::progress(Some(bodies.len() as u64), "dressing");
-    let mut dresser = BodyDresser::new(template.clone(), &header.outfit.cloth)?;
+    let mut batch = Batch {
+        args,
+        header: &header,
+        frames: &frames,
+        dresser: BodyDresser::new(template.clone(), &header.outfit.cloth)?,
+        template: &template,
+        bodies: bodies.len(),
+        shown: Vec::new(),
+    };
     let mut rows = Vec::new();
-    let mut shown = Vec::new();
     for (name, body) in &bodies {
+        rows.push(batch.dress(name, body)?);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let suffix = if count > 1 {
+        format!("_{index}")
+    } else {
+        String::new()
+    };
+    if !batch.shown.is_empty() {
+        let sheet = args.out.join(format!("sheet{suffix}.png"));
+        contact_sheet(&template, &header, &batch.shown, &sheet)?;
+    }
+    let report = json!({
+        "capture": args.capture,
+        "bodies": rows,
+        "peak_memory_bytes": report::peak_memory(),
+    });
+    report::write(&args.out.join(format!("report{suffix}.json")), &report)?;
+    println!("{} bodies dressed, in {}", bodies.len(), args.out.display());
+    Ok(())
+}
+
+/// Bodies of one job.
+struct Batch<'a> {
+    args: &'a ClothcapRetargetArgs,
+    template: &'a Arc<Template>,
+    header: &'a CaptureHeader,
+    frames: &'a CapturedFrames,
+    dresser: BodyDresser<'a>,
+    bodies: usize,
+    /// Poses for the contact sheet.
+    shown: Vec<DressedPose>,
+}
+
+impl Batch<'_> {
+    /// Dresses one body in all frames and writes it, unless that is done; its row of the report.
+    fn dress(&mut self, name: &str, body: &RestBody) -> Result<Value> {
+        let (args, frames) = (self.args, self.frames);
+        let path = args.out.join(format!("{name}.json"));
+        let job = json!({
+            "capture": args.capture,
+            "body": args.body,
+            "seed": args.seed,
+            "motion": args.motion,
+            "scans": self.header.scans,
+        });
+        if let Some(row) = done(&path, &job)? {
+            return Ok(row);
+        }
         let started = Instant::now();
         let mut dressed = Vec::new();
         for (pose, d) in frames.poses.iter().zip(&frames.displacements) {
-            dressed.push(dresser.dress(body, d, pose).with_context(|| name.clone())?);
+            let frame = self.dresser.dress(body, d, pose);
+            dressed.push(frame.with_context(|| name.to_owned())?);
         }
         let motion = DressedMotion {
-            template: &template,
-            header: &header,
+            template: self.template,
+            header: self.header,
             body,
             frames: &dressed,
             seconds: &frames.seconds,
             has_targets: args.motion.is_none(),
         };
         motion.write(&args.out.join(format!("{name}.glb")))?;
-        rows.push(json!({
+        let row = json!({
             "body": name,
+            "job": job,
             "frames": dressed.iter().map(|f| &f.reports).collect::<Vec<_>>(),
             "ms": started.elapsed().as_secs_f64() * 1e3,
-        }));
+        });
+        // Last of the body's files: it stands for a whole result.
+        report::write(&path, &row)?;
+
         // Many bodies show their first pose, one or two some poses of their motion.
-        let each = (MOST_ON_SHEET / bodies.len()).clamp(1, dressed.len());
+        let each = (MOST_ON_SHEET / self.bodies).clamp(1, dressed.len());
         let every = dressed.len().div_ceil(each);
-        let room = MOST_ON_SHEET.saturating_sub(shown.len());
-        shown.extend(dressed.into_iter().step_by(every).take(room));
-        bar.inc(1);
+        let room = MOST_ON_SHEET.saturating_sub(self.shown.len());
+        self.shown
+            .extend(dressed.into_iter().step_by(every).take(room));
+        Ok(row)
     }
-    bar.finish_and_clear();
-    contact_sheet(&template, &header, &shown, &args.out.join("sheet.png"))?;
-    let report = json!({
-        "capture": args.capture,
-        "bodies": rows,
-        "peak_memory_bytes": report::peak_memory(),
-    });
-    report::write(&args.out.join("report.json"), &report)?;
-    println!("{} bodies dressed, in {}", bodies.len(), args.out.display());
-    Ok(())
+}
+
+/// Result of a body that was dressed before by the same job.
+fn done(path: &Path, job: &Value) -> Result<Option<Value>> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let row = input::json(path)?;
+    Ok((row["job"] == *job).then_some(row))
 }
 
 fn read_frames(archive: &CaptureArchive, header: &CaptureHeader) -> Result<CapturedFrames> {

@@ -1,0 +1,131 @@
+//! `tryon clothcap` from outside: its files, its batches and its refusals.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use tryon::evaluate::scans::{ScanScene, write_scan_folder};
+
+fn clothcap(args: &[&str]) -> Output {
+    let mut c = Command::new(env!("CARGO_BIN_EXE_tryon"));
+    c.arg("clothcap").args(args).output().unwrap()
+}
+
+#[track_caller]
+fn succeeds(args: &[&str]) {
+    let out = clothcap(args);
+    let err = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{args:?}: {err}");
+}
+
+fn json_of(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+fn changed(path: &Path) -> std::time::SystemTime {
+    std::fs::metadata(path).unwrap().modified().unwrap()
+}
+
+/// Scans of a T-shirt and trousers in a folder.
+fn dressed_scans(folder: &Path, scans: usize) -> PathBuf {
+    let mut scene = ScanScene::library(&["trousers", "tshirt"]).unwrap();
+    (scene.scans, scene.scanner.points) = (scans, 20_000);
+    let out = folder.join("scans");
+    write_scan_folder(&out, &scene).unwrap();
+    out
+}
+
+#[test]
+fn garments_are_captured_from_scans() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = dressed_scans(folder.path(), 2);
+    let scans = scans.to_str().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+
+    succeeds(&["segment", "--scans", scans, "--out", &at("labels")]);
+    let names = json_of(&folder.path().join("labels/labels.json"));
+    assert_eq!(names["1"]["name"], json!("top"));
+    assert_eq!(names["2"]["name"], json!("bottom"));
+
+    let out = at("capture");
+    let capture = ["capture", "--scans", scans, "--out", &out];
+    succeeds(&capture);
+    let header = folder.path().join("capture/capture.json");
+    let before = changed(&header);
+    // A second run finds everything done.
+    succeeds(&capture);
+    assert_eq!(changed(&header), before);
+}
+
+#[test]
+fn jobs_of_a_batch_share_the_bodies_and_leave_what_is_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = dressed_scans(folder.path(), 1);
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (outfit, bodies) = (at("outfit"), at("bodies"));
+    succeeds(&[
+        "capture",
+        "--scans",
+        scans.to_str().unwrap(),
+        "--out",
+        &outfit,
+    ]);
+
+    let retarget = |count: &str, shard: &str| {
+        let job = ["--population", count, "--shard", shard];
+        let files = ["retarget", "--capture", &outfit, "--out", &bodies];
+        clothcap(&[&files[..], &job].concat())
+    };
+    assert!(retarget("2", "0/1").status.success());
+    let report = json_of(&folder.path().join("bodies/report.json"));
+    let rows = report["bodies"].as_array().unwrap();
+    assert_eq!(rows.len(), 2);
+    for frame in rows.iter().flat_map(|b| b["frames"].as_array().unwrap()) {
+        for garment in frame.as_array().unwrap() {
+            assert_eq!(garment["inside"], 0, "{garment}");
+        }
+    }
+    let file = folder.path().join("bodies/0001.glb");
+    assert_eq!(&std::fs::read(&file).unwrap()[..4], b"glTF");
+
+    let before = changed(&file);
+    assert!(retarget("3", "0/2").status.success());
+    assert!(retarget("3", "1/2").status.success());
+    assert_eq!(changed(&file), before);
+    assert!(folder.path().join("bodies/0002.glb").exists());
+    assert_eq!(retarget("3", "2/2").status.code(), Some(2));
+}
+
+#[test]
+fn scans_that_show_nobody_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let out = out.to_str().unwrap();
+    let refused = |scans: &Path| {
+        let done = clothcap(&["capture", "--scans", scans.to_str().unwrap(), "--out", out]);
+        let err = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert_eq!(done.status.code(), Some(1), "{err}");
+        assert!(!err.contains("panicked"), "{err}");
+        err
+    };
+    let empty = folder.path().join("empty");
+    std::fs::create_dir_all(&empty).unwrap();
+    assert!(refused(&empty).contains("empty"));
+
+    let cut = folder.path().join("cut.ply");
+    let header = "ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\n";
+    std::fs::write(&cut, header).unwrap();
+    assert!(refused(&cut).contains("cut.ply"));
+
+    let mut post = String::from(
+        "ply\nformat ascii 1.0\nelement vertex 2000\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+    );
+    for i in 0..2000 {
+        let angle = f64::from(i) * 2.4;
+        let [x, z] = [0.05 * angle.cos(), 0.05 * angle.sin()];
+        post += &format!("{x} {} {z}\n", f64::from(i) * 9e-4);
+    }
+    let file = folder.path().join("post.ply");
+    std::fs::write(&file, post).unwrap();
+    assert!(refused(&file).contains("no person"));
+}
