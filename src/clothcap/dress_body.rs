@@ -110,7 +110,10 @@ impl<'a> BodyDresser<'a> {
             garments.push(vertices);
         }
         tuck_hidden(self.cloth, &mut garments, self.solid.vertices());
-        for (vertices, report) in garments.iter().zip(&mut reports) {
+        let all = garments.iter_mut().zip(&mut reports).zip(&self.solvers);
+        for ((vertices, report), solver) in all {
+            let inside = self.solid.contains(vertices);
+            solver.gather(&self.solid, vertices, inside);
             let inside = self.solid.contains(vertices);
             report.inside = inside.iter().filter(|b| **b).count();
         }

@@ -212,7 +212,8 @@ impl PenetrationSolver {
                 *p = left[v].or(out).unwrap_or(*p);
             }
         }
-        self.gather(body, vertices);
+        let inside = self.inside(body, vertices);
+        self.gather(body, vertices, inside);
         report.inside = count(&self.inside(body, vertices));
         let moved = vertices.iter().zip(&wanted).map(|(a, b)| (a - b).norm());
         report.largest_push = moved.fold(0.0, f32::max);
@@ -230,10 +231,9 @@ impl PenetrationSolver {
 
     /// Moves vertices that are still inside towards neighbours outside: in a fold of the skin, where pushing out of one side
     /// is pushing into the other, cloth bunches up.
-    fn gather(&self, body: &SolidBody, vertices: &mut [P3]) {
+    pub(super) fn gather(&self, body: &SolidBody, vertices: &mut [P3], mut inside: Vec<bool>) {
         /// Shares of the way that are tried.
         const WAY: [f32; 4] = [0.25, 0.5, 0.75, 1.0];
-        let mut inside = self.inside(body, vertices);
         loop {
             let before = count(&inside);
             for &[a, b] in &self.edges {
