@@ -1,8 +1,9 @@
 //! Folder of a capture: the outfit, and each scan once it is done. A capture that was stopped continues there.
 
-use super::align::{AlignedBody, ClothedTemplate};
-use super::capture::{CapturedOutfit, FrameCapture, FrameReport};
-use super::scan::ScanFrame;
+use super::align::AlignedBody;
+use super::capture::{FrameCapture, FrameReport};
+pub use super::capture_header::CaptureHeader;
+use super::capture_header::{check_body, check_header};
 use super::unpose::unpose;
 use crate::body::Template;
 use crate::formats::FormatError;
@@ -18,23 +19,6 @@ const VERSION: u32 = 1;
 const HEADER: &str = "capture.json";
 /// Folder of the scans' results.
 const FRAMES: &str = "frames";
-
-/// Outfit of a capture and the state that later scans start from.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct CaptureHeader {
-    /// Version of the layout.
-    pub version: u32,
-    /// Name of the body template.
-    pub template: String,
-    /// Unit and axes of the scans.
-    pub frame: ScanFrame,
-    /// Outfit.
-    pub outfit: CapturedOutfit,
-    /// Clothed template of the single-mesh alignment.
-    pub clothed: ClothedTemplate,
-    /// Names of all scans, in order.
-    pub scans: Vec<String>,
-}
 
 /// Result of one scan.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -98,11 +82,11 @@ impl CaptureArchive {
     ///
     /// # Errors
     /// A folder without a header.
-    pub fn open(folder: &Path) -> Result<(Self, CaptureHeader), FormatError> {
+    pub fn open(folder: &Path, template: &Template) -> Result<(Self, CaptureHeader), FormatError> {
         let archive = Self {
             folder: folder.to_owned(),
         };
-        let header = archive.header()?.ok_or_else(|| {
+        let header = archive.header(template)?.ok_or_else(|| {
             FormatError::field(
                 &archive.folder.join(HEADER),
                 HEADER,
@@ -115,8 +99,8 @@ impl CaptureArchive {
     /// Header; `None` before the first scan is done.
     ///
     /// # Errors
-    /// A header of another version, or one that cannot be read.
-    pub fn header(&self) -> Result<Option<CaptureHeader>, FormatError> {
+    /// A header of another version or body, one that cannot be read, or a field that does not fit the others.
+    pub fn header(&self, template: &Template) -> Result<Option<CaptureHeader>, FormatError> {
         let path = self.folder.join(HEADER);
         if !path.exists() {
             return Ok(None);
@@ -126,6 +110,7 @@ impl CaptureArchive {
             let why = format!("{}, this program reads {VERSION}", header.version);
             return Err(FormatError::field(&path, "version", why));
         }
+        check_header(&header, template).map_err(|(f, why)| FormatError::field(&path, f, why))?;
         Ok(Some(header))
     }
 
@@ -152,14 +137,20 @@ impl CaptureArchive {
     /// Result of a scan; `None` if it isn't done.
     ///
     /// # Errors
-    /// A record that cannot be read.
-    pub fn record(&self, scan: &str) -> Result<Option<FrameRecord>, FormatError> {
+    /// A record that cannot be read, or whose body is not the template's.
+    pub fn record(
+        &self,
+        scan: &str,
+        template: &Template,
+    ) -> Result<Option<FrameRecord>, FormatError> {
         let path = self.record_path(scan);
-        if path.exists() {
-            read_json(&path).map(Some)
-        } else {
-            Ok(None)
+        if !path.exists() {
+            return Ok(None);
         }
+        let record: FrameRecord = read_json(&path)?;
+        let checked = check_body(&record.body, template, "body");
+        checked.map_err(|(f, why)| FormatError::field(&path, f, why))?;
+        Ok(Some(record))
     }
 
     /// Writes the result of a scan, the record last: a record stands for a whole result.
@@ -206,6 +197,13 @@ fn read_vectors(path: &Path) -> Result<Vec<V3>, FormatError> {
     if shape.len() != 2 || shape[1] != 3 {
         let why = format!("{shape:?}, expected [vertices, 3]");
         return Err(FormatError::field(path, "shape", why));
+    }
+    if let Some(at) = flat.iter().position(|v| !v.is_finite()) {
+        return Err(FormatError::field(
+            path,
+            format!("row {}", at / 3),
+            "not finite",
+        ));
     }
     Ok(flat
         .chunks_exact(3)

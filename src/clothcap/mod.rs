@@ -3,8 +3,10 @@
 pub mod align;
 pub mod archive;
 mod capture;
+mod capture_header;
 mod dress_body;
 mod error;
+mod face_edges;
 mod layers;
 pub mod mrf;
 pub mod multi;

@@ -1,19 +1,16 @@
 //! Colours of a garment's vertices: means of the scan points there, spread over vertices without any.
 
+use super::face_edges::{edges, neighbours};
 use super::multi::ClothPart;
 use super::scan::BodyScan;
 use super::segment::NodeColors;
-use crate::mesh::Csr;
 
 /// Colour of a garment without a coloured point, sRGB.
 const GREY: f32 = 160.0;
 
 /// Colours of a part's vertices, sRGB, shape `[vertices]`.
 pub(super) fn part_colors(part: &ClothPart, nodes: &NodeColors, scan: &BodyScan) -> Vec<[u8; 3]> {
-    let sides = |f: &[u32; 3]| [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])];
-    let both = |(a, b): (u32, u32)| [(a, b), (b, a)];
-    let pairs: Vec<(u32, u32)> = part.faces.iter().flat_map(sides).flat_map(both).collect();
-    let around = Csr::from_pairs(part.nodes.len(), &pairs);
+    let around = neighbours(part.nodes.len(), &edges(&part.faces));
     let own = |(v, hidden): (&u32, &bool)| {
         let row = nodes.points.row(*v as usize);
         let colors = row.iter().filter_map(|p| scan.colors.get(*p as usize));

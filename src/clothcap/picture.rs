@@ -22,7 +22,7 @@ const PAPER: [u8; 3] = [245, 245, 245];
 const LIGHT: [f32; 3] = [-0.4, 0.6, 0.7];
 /// Brightness without direct light.
 const AMBIENT: f32 = 0.35;
-/// Smallest and largest side of a point of a cloud, pixels.
+/// Side of a point of a cloud, pixels.
 const DOT: i32 = 2;
 
 /// Coloured mesh, or cloud if it has no faces.

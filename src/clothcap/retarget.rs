@@ -2,13 +2,13 @@
 
 use super::CaptureError;
 use super::align::{QuadraticEnergy, Stencil};
+use super::face_edges::edges;
 use super::multi::ClothPart;
 use super::unpose::blended;
 use crate::body::{BoneTransforms, SkinWeights, Template};
 use crate::cloth::{Config, collision_model};
 use crate::contact::{ClosestPoint, CollisionBody, CollisionModel, CollisionWorkspace, Part};
 use crate::math::{P3, V3};
-use crate::mesh::Face;
 use crate::par::{self, Par};
 use crate::spatial::Bvh;
 use serde::{Deserialize, Serialize};
@@ -289,14 +289,4 @@ impl PenetrationSolver {
 
 fn count(inside: &[bool]) -> usize {
     inside.iter().filter(|b| **b).count()
-}
-
-/// Edges of some faces, each once.
-pub(super) fn edges(faces: &[Face]) -> Vec<[u32; 2]> {
-    let sides = |f: &Face| [[f[0], f[1]], [f[1], f[2]], [f[2], f[0]]];
-    let mut edges: Vec<[u32; 2]> = faces.iter().flat_map(sides).collect();
-    edges.iter_mut().for_each(|e| e.sort_unstable());
-    edges.sort_unstable();
-    edges.dedup();
-    edges
 }

@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 const LEAST_POINTS: usize = 500;
 /// Heights of people with raised arms or without feet, metres.
 const HEIGHTS: [f64; 2] = [0.7, 2.6];
+/// Largest extent of a scan that is worked on, metres: half a person, and one with a piece of the room.
+const USABLE: [f64; 2] = [0.3, 20.0];
 /// Units of scans, metres: metre, centimetre, millimetre, inch, decimetre.
 const UNITS: [f64; 5] = [1.0, 0.01, 0.001, 0.0254, 0.1];
 /// Share of points left out at each end of an extent: strays.
@@ -89,20 +91,20 @@ impl ScanFrame {
 /// Extent of a cloud along x, y, z without its strays.
 fn extent(points: &[P3]) -> [f32; 3] {
     std::array::from_fn(|axis| {
-        let mut values: Vec<f32> = points
-            .iter()
-            .map(|p| p[axis])
-            .filter(|v| v.is_finite())
-            .collect();
-        values.sort_by(f32::total_cmp);
-        let at = |share: f64| {
-            let last = values.len().saturating_sub(1);
-            values
-                .get((share * last as f64).round() as usize)
-                .copied()
-                .unwrap_or(0.0)
-        };
-        at(1.0 - STRAYS) - at(STRAYS)
+        let [low, high] = inner_range(points, axis, STRAYS);
+        high - low
+    })
+}
+
+/// Range of the finite coordinates along an axis without a share of the points at each end.
+pub(super) fn inner_range(points: &[P3], axis: usize, strays: f64) -> [f32; 2] {
+    let finite = points.iter().map(|p| p[axis]).filter(|v| v.is_finite());
+    let mut values: Vec<f32> = finite.collect();
+    values.sort_by(f32::total_cmp);
+    let last = values.len().saturating_sub(1) as f64;
+    [strays, 1.0 - strays].map(|share| {
+        let at = (share * last).round() as usize;
+        values.get(at).copied().unwrap_or(0.0)
     })
 }
 
@@ -127,7 +129,7 @@ impl BodyScan {
     /// Converts a file to metres with y up; non-finite points and repeated positions are left out.
     ///
     /// # Errors
-    /// [`CaptureError::TooFewPoints`].
+    /// [`CaptureError::TooFewPoints`]; [`CaptureError::NoPersonSize`] if the frame makes it no person's size.
     pub fn new(file: &ScanMesh, frame: &ScanFrame) -> Result<Self, CaptureError> {
         let turn = frame.rotation();
         let mut seen = std::collections::HashMap::new();
@@ -162,6 +164,16 @@ impl BodyScan {
                 points: scan.points.len(),
                 least: LEAST_POINTS,
             });
+        }
+        let largest = extent(&scan.points).into_iter().fold(0.0, f32::max);
+        if !(USABLE[0]..=USABLE[1]).contains(&f64::from(largest)) {
+            return Err(CaptureError::NoPersonSize {
+                extent: extent(&file.points),
+            });
+        }
+        if scan.colors.len() != scan.points.len() {
+            // Colours of some points only say nothing of the others.
+            scan.colors.clear();
         }
         let corner = |v: &u32| scan.point_of_row.get(*v as usize).copied();
         scan.faces = file

@@ -86,7 +86,7 @@ fn a_stopped_capture_continues_where_it_ended() {
 
     let folder = tempfile::tempdir().expect("a folder");
     let archive = CaptureArchive::new(folder.path()).expect("an archive");
-    assert!(archive.header().expect("readable").is_none());
+    assert!(archive.header(&template).expect("readable").is_none());
     let header = CaptureHeader {
         version: 0,
         template: template.name().into(),
@@ -106,14 +106,24 @@ fn a_stopped_capture_continues_where_it_ended() {
         .write_frame(&record, &displacements)
         .expect("written");
 
-    let (archive, header) = CaptureArchive::open(folder.path()).expect("a capture");
-    let record = archive.record("a").expect("readable").expect("done");
-    assert!(archive.record("b").expect("readable").is_none());
+    let (archive, header) = CaptureArchive::open(folder.path(), &template).expect("a capture");
+    let record = archive
+        .record("a", &template)
+        .expect("readable")
+        .expect("done");
+    assert!(archive.record("b", &template).expect("readable").is_none());
     let garments = header.outfit.cloth.parts.len();
     assert_eq!(
         archive.displacements("a", garments).expect("readable"),
         displacements
     );
+    let mut damaged = header.clone();
+    damaged.outfit.cloth.parts[0].nodes.push(u32::MAX);
+    archive.write_header(&damaged).expect("written");
+    let refused = archive
+        .header(&template)
+        .expect_err("a vertex out of range");
+    assert!(refused.to_string().contains("parts[0].nodes"), "{refused}");
     let state = (header.clothed, record.body);
     let mut resumed =
         OutfitCapture::resume(template, CaptureConfig::default(), header.outfit, state)

@@ -1,13 +1,15 @@
 //! Body under the cloth (section 5.4): inside of all garments, tight to the visible skin, near the minimally clothed shape.
 
 use super::CaptureError;
-use super::align::{AlignedBody, FitStage, ModelFit, QuadraticEnergy, Stencil, corner_weights};
+use super::align::{
+    AlignedBody, EVEN_EDGE, FitStage, ModelFit, QuadraticEnergy, ScanNormal, Stencil,
+    closest_facing,
+};
 use super::multi::MultiCloth;
 use super::retarget::SolidBody;
 use super::scan::BodyScan;
 use crate::body::{BoneTransforms, Template};
-use crate::math::{P3, V3};
-use crate::mesh::face_normal;
+use crate::math::P3;
 use crate::par::{self, Par};
 use crate::registration::GemanMcClure;
 use crate::spatial::Bvh;
@@ -36,8 +38,6 @@ const ANCHOR: f64 = 0.02;
 const PUSH: f64 = 4.0;
 /// Smallest cosine between normals of a pair.
 const NORMALS: f32 = 0.2;
-/// Cotangent of 60°.
-const EDGE: f64 = 0.577;
 
 /// Body under the cloth of one scan.
 #[derive(Clone, Debug)]
@@ -95,7 +95,7 @@ impl Undresser {
     pub(super) fn new(template: Arc<Template>) -> Result<Self, CaptureError> {
         let mesh = template.mesh();
         let edges: Vec<[u32; 2]> = template.topology().edges().iter().map(|e| e.v).collect();
-        let stencils = edges.iter().map(|e| Stencil::edge(*e, EDGE)).collect();
+        let stencils = edges.iter().map(|e| Stencil::edge(*e, EVEN_EDGE)).collect();
         Ok(Self {
             energy: QuadraticEnergy::new(mesh.vertices().len(), stencils, mesh.faces())?,
             bvh: Bvh::new(mesh.faces(), mesh.vertices()),
@@ -151,22 +151,20 @@ impl Undresser {
     /// Pulls the body to the visible skin.
     fn add_skin(&mut self, scan: &BodyScan, covered: &[bool], vertices: &[P3]) {
         self.bvh.refit(vertices);
-        let faces = self.template.mesh().faces();
         let kernel = GemanMcClure { sigma: SIGMA };
         let mut matches = Vec::new();
         par::map_into(Par::Rayon, scan.points.len(), 256, &mut matches, |i| {
             let p = scan.points[i];
-            let found = self.bvh.closest(vertices, &p).filter(|_| !covered[i])?;
-            let face = faces[found.face as usize];
-            let normal = face_normal(vertices, &face).try_normalize(f32::MIN_POSITIVE)?;
-            let cos = normal.dot(&scan.normals[i]);
-            let cos = if scan.oriented { cos } else { cos.abs() };
-            if cos < NORMALS && scan.normals[i] != V3::zeros() {
+            let normal = ScanNormal {
+                normal: scan.normals[i],
+                oriented: scan.oriented,
+            };
+            if covered[i] {
                 return None;
             }
+            let (found, _) = closest_facing((&self.bvh, vertices), &p, normal, NORMALS)?;
             let weight = kernel.weight(f64::from(found.distance * found.distance));
-            let corners = corner_weights(vertices, &face, &found.point);
-            Some((found.face, corners, weight, p))
+            Some((found.face, found.weights, weight, p))
         });
         let point = self.template.mesh().area() / scan.points.len().max(1) as f64;
         for (face, corners, weight, p) in matches.into_iter().flatten() {

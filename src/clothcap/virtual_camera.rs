@@ -1,11 +1,11 @@
 //! Depth images of a scan from virtual cameras around it, so that the tracker can find the person in it.
 
-use super::scan::{BodyScan, mean_spacing};
+use super::scan::{BodyScan, inner_range, mean_spacing};
 use crate::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
 use crate::math::{Camera, P3, Rigid, World};
 use crate::par::Par;
 use crate::raster::{Options, View, VisibilityBuffer, rasterise_with};
-use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// Columns, rows and focal length, pixels: those of the sensors that the tracker is made for.
 const SIZE: [u32; 2] = [480, 640];
@@ -118,18 +118,15 @@ fn to_millimetres(z: f32) -> u16 {
     }
 }
 
-/// Bounds of a scan without its outermost half per cent a side, metres: strays do not count.
+/// Share of points left out at each end of an axis: strays.
+const STRAYS: f64 = 0.002;
+
+/// Bounds of a scan without its strays, metres.
 pub(super) fn bounds(points: &[P3]) -> [P3; 2] {
-    const STRAYS: f64 = 0.002;
-    let mut ends = [Point3::origin(); 2];
+    let mut ends = [P3::origin(); 2];
     for axis in 0..3 {
-        let mut values: Vec<f32> = points.iter().map(|p| p[axis]).collect();
-        values.sort_by(f32::total_cmp);
-        let last = values.len().saturating_sub(1) as f64;
-        for (end, share) in ends.iter_mut().zip([STRAYS, 1.0 - STRAYS]) {
-            let at = (share * last).round() as usize;
-            end[axis] = values.get(at).copied().unwrap_or(0.0);
-        }
+        let [low, high] = inner_range(points, axis, STRAYS);
+        (ends[0][axis], ends[1][axis]) = (low, high);
     }
     ends
 }

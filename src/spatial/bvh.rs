@@ -132,6 +132,8 @@ const DEPTH: usize = 40;
 pub struct SurfacePoint {
     /// Triangle.
     pub face: u32,
+    /// Barycentric weights of its corners.
+    pub weights: [f32; 3],
     /// The point, metres.
     pub point: P3,
     /// Distance from the query, metres.
@@ -328,11 +330,12 @@ impl Bvh {
 
     fn point_of_face(&self, x: &[P3], p: &P3, face: u32) -> SurfacePoint {
         let corners = self.corners(face, x);
-        let w = closest_on_triangle(p, corners);
-        let sum = |k: usize| corners[k].coords * w[k];
+        let weights = closest_on_triangle(p, corners);
+        let sum = |k: usize| corners[k].coords * weights[k];
         let point = P3::from(sum(0) + sum(1) + sum(2));
         SurfacePoint {
             face,
+            weights,
             point,
             distance: (point - p).norm(),
         }

@@ -59,49 +59,9 @@ pub(super) fn motion(skeleton: &Skeleton, from: &Pose, to: &Pose) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{Joint, RestBody};
     use crate::tracking::kinematics::apply;
-    use nalgebra::{DVector, Point3, UnitQuaternion, Vector3};
-
-    fn arm() -> (Skeleton, RestBody, Pose) {
-        let ball = JointMotion::Ball {
-            limits: [[-3.0, 3.0]; 3],
-        };
-        let hinge = JointMotion::Hinge {
-            axis: [0.0, 0.6, 0.8],
-            limits: [-3.0, 3.0],
-        };
-        let joint = |name: &str, parent, x: f64, motion| Joint {
-            name: name.into(),
-            parent,
-            rest: Point3::new(x, 0.1 * x, 0.0),
-            motion,
-        };
-        let skeleton = Skeleton::new(vec![
-            joint("pelvis", None, 0.0, JointMotion::Fixed),
-            joint("shoulder", Some(0), 0.2, ball),
-            joint("elbow", Some(1), 0.5, hinge),
-            joint("end", Some(2), 0.8, JointMotion::Fixed),
-        ])
-        .expect("valid");
-        let joints = skeleton.joints().iter().map(|j| j.rest).collect();
-        let mut pose = Pose::rest(
-            &skeleton,
-            Rigid::from_parts(
-                Vector3::new(0.1, -0.2, 2.0),
-                UnitQuaternion::from_euler_angles(0.3, 2.8, 0.1),
-            ),
-        );
-        pose.angles = vec![0.4, -0.7, 0.9, 0.5];
-        (
-            skeleton,
-            RestBody {
-                joints,
-                ..Default::default()
-            },
-            pose,
-        )
-    }
+    use crate::tracking::kinematics::tests::arm;
+    use nalgebra::{DVector, Vector3};
 
     #[test]
     fn extrapolation_continues_a_steady_motion() {

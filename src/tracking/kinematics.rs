@@ -79,12 +79,13 @@ pub fn apply<F>(skeleton: &Skeleton, pose: &mut Pose<F>, centre: &Vector3<f64>, 
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::body::{Joint, RestBody};
     use nalgebra::{Point3, UnitQuaternion};
 
-    fn arm() -> (Skeleton, RestBody, Pose) {
+    /// A trunk with one arm, posed.
+    pub(in crate::tracking) fn arm() -> (Skeleton, RestBody, Pose) {
         let ball = JointMotion::Ball {
             limits: [[-3.0, 3.0]; 3],
         };

@@ -1,7 +1,8 @@
 //! Free surface of a single-mesh alignment (eq. 3 to 5): vertices follow the scan, edges stay near those of the body model.
 
-use super::model_fit::{corner_weights, is_bare};
-use super::quadratic::{QuadraticEnergy, Stencil};
+use super::model_fit::is_bare;
+use super::pairing::ScanNormal;
+use super::quadratic::{EVEN_EDGE, QuadraticEnergy, Stencil};
 use crate::body::Template;
 use crate::clothcap::CaptureError;
 use crate::clothcap::scan::BodyScan;
@@ -11,8 +12,6 @@ use crate::par::{self, Par};
 use crate::registration::GemanMcClure;
 use crate::spatial::Bvh;
 
-/// Weight of an edge of an even mesh in the Dirichlet energy of a displacement: the cotangent of 60°.
-const EDGE: f64 = 0.577;
 /// Coupling of hands, feet and head beside 1 elsewhere (w of eq. 5): scans are noisy there and no cloth covers them.
 const FIRM: f64 = 8.0;
 /// Pull to the model's vertices beside that of the data: settles what no point and no edge determines.
@@ -110,7 +109,7 @@ impl FreeSurface {
         let edges: Vec<[u32; 2]> = template.topology().edges().iter().map(|e| e.v).collect();
         let stencil = |e: &[u32; 2]| {
             let w = 0.5 * (firm[e[0] as usize] + firm[e[1] as usize]);
-            Stencil::edge(*e, EDGE * w)
+            Stencil::edge(*e, EVEN_EDGE * w)
         };
         let mesh = template.mesh();
         let stencils = edges.iter().map(stencil).collect();
@@ -213,20 +212,21 @@ impl FreeSurface {
                     return SurfaceMatch::default();
                 };
                 let face = &self.faces[found.face as usize];
-                let corners = corner_weights(surface, face, &found.point);
+                let corners = found.weights;
                 let normal: V3 = (0..3).map(|k| normals[face[k] as usize] * corners[k]).sum();
-                let cos = normal.dot(&scan.normals[i]);
-                let cos = if scan.oriented { cos } else { cos.abs() };
+                let of_scan = ScanNormal {
+                    normal: scan.normals[i],
+                    oriented: scan.oriented,
+                };
                 let e2 = f64::from(found.distance * found.distance);
-                let known = scan.normals[i] != V3::zeros();
                 SurfaceMatch {
                     face: found.face,
                     corners,
                     distance: found.distance,
-                    weight: if known && cos < NORMALS {
-                        0.0
-                    } else {
+                    weight: if of_scan.agrees(&normal, NORMALS) {
                         kernel.weight(e2)
+                    } else {
+                        0.0
                     },
                 }
             },

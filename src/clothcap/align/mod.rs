@@ -3,6 +3,7 @@
 mod aligner;
 mod free_surface;
 mod model_fit;
+mod pairing;
 mod quadratic;
 mod shape_unknowns;
 mod start;
@@ -11,7 +12,8 @@ pub use aligner::{Aligner, Alignment, AlignmentReport, ClothedTemplate};
 pub use free_surface::{
     FreeSurface, SurfaceFitConfig, SurfaceFitReport, SurfaceMatch, SurfaceStage,
 };
-pub(super) use model_fit::corner_weights;
 pub use model_fit::{AlignedBody, FitStage, ModelFit, ModelFitReport};
+pub(super) use pairing::{ScanNormal, closest_facing};
+pub(super) use quadratic::EVEN_EDGE;
 pub use quadratic::{QuadraticEnergy, Stencil};
 pub use start::{Start, find_frame, find_person};

@@ -1,12 +1,13 @@
 //! Pose, bone lengths and shape coefficients that explain a scan: eq. 3 with infinite coupling, and the poses of eq. 9.
 
+use super::pairing::{ScanNormal, closest_facing};
 use super::shape_unknowns::ShapeUnknowns;
 use crate::body::parts::BodySegment;
 use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use crate::clothcap::CaptureError;
 use crate::clothcap::scan::BodyScan;
 use crate::math::{P3, V3, World};
-use crate::mesh::{Face, face_normal};
+use crate::mesh::Face;
 use crate::par::{self, Par};
 use crate::registration::{Dof, GemanMcClure};
 use crate::spatial::Bvh;
@@ -250,15 +251,13 @@ impl<'a> ModelFit<'a> {
 
     fn pair(&self, i: usize, kernel: &GemanMcClure) -> Option<Match> {
         let p = self.points[i];
-        let found = self.bvh.closest(&self.posed, &p)?;
-        let face = self.template.mesh().faces()[found.face as usize];
-        let normal = face_normal(&self.posed, &face).try_normalize(f32::MIN_POSITIVE)?;
-        let cos = normal.dot(&self.normals[i]);
-        let cos = if self.oriented { cos } else { cos.abs() };
-        // A zero normal is unknown and pairs with any.
-        if cos < NORMALS && self.normals[i] != V3::zeros() {
-            return None;
-        }
+        let normal = ScanNormal {
+            normal: self.normals[i],
+            oriented: self.oriented,
+        };
+        let surface = (&self.bvh, self.posed.as_slice());
+        let (found, normal) = closest_facing(surface, &p, normal, NORMALS)?;
+        let face = self.bvh.faces()[found.face as usize];
         let mut residual = (p - found.point).cast::<f64>();
         let mut weight = kernel.weight(residual.norm_squared());
         let is_outside = residual.dot(&normal.cast()) > 0.0;
@@ -272,7 +271,7 @@ impl<'a> ModelFit<'a> {
         }
         Some(Match {
             face: found.face,
-            corners: corner_weights(&self.posed, &face, &found.point),
+            corners: found.weights,
             point: found.point.coords.cast(),
             normal: normal.cast(),
             residual,
@@ -517,21 +516,6 @@ fn robust_mean(matches: &[Match], kernel: &GemanMcClure) -> f64 {
         (s + kernel.value(m.residual.norm_squared()), n + 1)
     });
     (sum / n.max(1) as f64).sqrt()
-}
-
-/// Barycentric coordinates of a point of a face.
-pub(in crate::clothcap) fn corner_weights(vertices: &[P3], face: &Face, p: &P3) -> [f32; 3] {
-    let [a, b, c] = face.map(|v| vertices[v as usize]);
-    let (u, v, w) = (b - a, c - a, p - a);
-    let (uu, uv, vv) = (u.dot(&u), u.dot(&v), v.dot(&v));
-    let (wu, wv) = (w.dot(&u), w.dot(&v));
-    let det = uu * vv - uv * uv;
-    if !(det > f32::MIN_POSITIVE) {
-        return [1.0, 0.0, 0.0];
-    }
-    let s = ((vv * wu - uv * wv) / det).clamp(0.0, 1.0);
-    let t = ((uu * wv - uv * wu) / det).clamp(0.0, 1.0 - s);
-    [1.0 - s - t, s, t]
 }
 
 fn angle_deviations(template: &Template) -> Vec<f64> {

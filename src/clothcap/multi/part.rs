@@ -2,6 +2,7 @@
 
 use crate::body::Template;
 use crate::body::parts::BodySide;
+use crate::clothcap::face_edges::sides;
 use crate::clothcap::segment::{BodyRegion, Labelling, Slot};
 use crate::mesh::Face;
 use serde::{Deserialize, Serialize};
@@ -184,7 +185,6 @@ fn drop_fans(faces: &mut Vec<Face>) {
 
 /// Directed edges with one face.
 fn boundary_edges(faces: &[Face]) -> Vec<[u32; 2]> {
-    let sides = |f: &Face| [[f[0], f[1]], [f[1], f[2]], [f[2], f[0]]];
     let all: BTreeSet<[u32; 2]> = faces.iter().flat_map(sides).collect();
     let open = |e: &&[u32; 2]| !all.contains(&[e[1], e[0]]);
     all.iter().filter(open).copied().collect()

@@ -2,19 +2,17 @@
 
 use super::part::ClothPart;
 use crate::clothcap::CaptureError;
-use crate::clothcap::align::corner_weights;
-use crate::clothcap::align::{QuadraticEnergy, Stencil};
+use crate::clothcap::align::{EVEN_EDGE, QuadraticEnergy, ScanNormal, Stencil, closest_facing};
+use crate::clothcap::face_edges::{edges, neighbours, sides};
 use crate::clothcap::scan::BodyScan;
 use crate::math::{P3, V3};
-use crate::mesh::{Csr, face_normal};
+use crate::mesh::face_normal;
 use crate::par::{self, Par};
 use crate::registration::GemanMcClure;
 use crate::spatial::Bvh;
 
 /// Smallest cosine between normals of a pair.
 const NORMALS: f32 = 0.2;
-/// Cotangent of 60°, see the free surface.
-const EDGE: f64 = 0.577;
 /// Pull to the start beside the data's: settles what no term determines.
 const ANCHOR: f64 = 1e-4;
 /// Distance up to which a boundary point of the scan belongs to a ring, metres.
@@ -76,7 +74,6 @@ impl PartScan {
     pub fn new(scan: &BodyScan, labels: &[u8], label: u8) -> Self {
         let own = |i: &usize| labels[*i] == label;
         let some: Vec<usize> = (0..scan.points.len()).filter(own).collect();
-        let sides = |f: &[u32; 3]| [[f[0], f[1]], [f[1], f[2]], [f[2], f[0]]];
         let crosses = |e: &[u32; 2]| {
             let [a, b] = e.map(|v| labels[v as usize]);
             a == label && b != label
@@ -113,22 +110,15 @@ impl<'a> PartFit<'a> {
     /// [`CaptureError::Solve`] for a part too large.
     pub fn new(part: &'a ClothPart, rest: &[P3]) -> Result<Self, CaptureError> {
         let n = part.nodes.len();
-        let sides = |f: &[u32; 3]| [[f[0], f[1]], [f[1], f[2]], [f[2], f[0]]];
-        let mut edges: Vec<[u32; 2]> = part.faces.iter().flat_map(sides).collect();
-        edges.iter_mut().for_each(|e| e.sort_unstable());
-        edges.sort_unstable();
-        edges.dedup();
-        let both: Vec<(u32, u32)> = edges
-            .iter()
-            .flat_map(|e| [(e[0], e[1]), (e[1], e[0])])
-            .collect();
-        let around = Csr::from_pairs(n, &both);
+        let edges = edges(&part.faces);
+        let around = neighbours(n, &edges);
         let mut on_ring = vec![false; n];
         part.rings
             .iter()
             .flat_map(|r| &r.vertices)
             .for_each(|v| on_ring[*v as usize] = true);
-        let mut stencils: Vec<Stencil> = edges.iter().map(|e| Stencil::edge(*e, EDGE)).collect();
+        let mut stencils: Vec<Stencil> =
+            edges.iter().map(|e| Stencil::edge(*e, EVEN_EDGE)).collect();
         let laplacian = |v: u32| {
             let row = around.row(v as usize);
             let mut vertices = vec![v];
@@ -217,15 +207,14 @@ impl<'a> PartFit<'a> {
         let mut out = Vec::new();
         par::map_into(Par::Rayon, scan.points.len(), 256, &mut out, |i| {
             let p = scan.points[i];
-            let found = self.bvh.closest(surface, &p)?;
-            let face = &self.part.faces[found.face as usize];
-            let normal = face_normal(surface, face).try_normalize(f32::MIN_POSITIVE)?;
-            let cos = normal.dot(&scan.normals[i]);
-            let cos = if scan.oriented { cos } else { cos.abs() };
-            let known = scan.normals[i] != V3::zeros();
-            (!known || cos > NORMALS).then(|| PartMatch {
+            let normal = ScanNormal {
+                normal: scan.normals[i],
+                oriented: scan.oriented,
+            };
+            let (found, _) = closest_facing((&self.bvh, surface), &p, normal, NORMALS)?;
+            Some(PartMatch {
                 face: found.face,
-                corners: corner_weights(surface, face, &found.point),
+                corners: found.weights,
                 target: p,
                 distance: found.distance,
                 weight: kernel.weight(f64::from(found.distance * found.distance)),

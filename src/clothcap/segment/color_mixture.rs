@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Modes of a mixture. Prints, folds and shadows need a few; more do not change labels of Liam's frames.
+/// Modes of a mixture: prints, folds and shadows need a few. Not tuned.
 const MODES: usize = 4;
 /// Iterations of k-means before, and of expectation maximisation.
 const ITERATIONS: [usize; 2] = [8, 8];
@@ -66,8 +66,6 @@ impl Mode {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ColorMixture {
     modes: Vec<Mode>,
-    mean: Vector3<f64>,
-    deviation: f64,
 }
 
 impl ColorMixture {
@@ -85,12 +83,9 @@ impl ColorMixture {
             .filter(|c| c.iter().all(|v| v.is_finite()))
             .copied()
             .collect();
-        let n = some.len() as f64;
         if some.is_empty() {
             return None;
         }
-        let mean = some.iter().sum::<Vector3<f64>>() / n;
-        let variance = some.iter().map(|c| (c - mean).norm_squared()).sum::<f64>() / n;
         let owners = k_means(&some, modes);
         let k = owners.iter().max().map_or(1, |m| m + 1);
         let mut shares = vec![vec![0.0; k]; some.len()];
@@ -99,8 +94,6 @@ impl ColorMixture {
         }
         let mut out = Self {
             modes: maximise(&some, &shares),
-            mean,
-            deviation: variance.sqrt(),
         };
         for _ in 0..ITERATIONS[1] {
             for (s, c) in shares.iter_mut().zip(&some) {
@@ -119,11 +112,6 @@ impl ColorMixture {
     pub fn cost(&self, c: &Vector3<f64>) -> f64 {
         let density: f64 = self.modes.iter().map(|m| m.density(c)).sum();
         -((1.0 - OUTLIERS) * density + OUTLIERS).ln()
-    }
-
-    /// Mean colour and standard deviation from it.
-    pub fn spread(&self) -> (Vector3<f64>, f64) {
-        (self.mean, self.deviation)
     }
 }
 

@@ -103,7 +103,7 @@ pub fn label_nodes(
         Slot::Shoes,
     ])?;
     let mut slots = labeller.worn(&all);
-    if slots.contains(&Slot::Top) && labeller.has_second_top(&all) {
+    if slots.contains(&Slot::Top) && labeller.has_second_top() {
         slots.push(Slot::Under);
     }
     if slots == all.slots {
@@ -386,7 +386,7 @@ impl<'a> Labeller<'a> {
     }
 
     /// Torso and arms have two colours, far apart, each in one place and not enclosed by the other like a print.
-    fn has_second_top(&self, _all: &Labelling) -> bool {
+    fn has_second_top(&self) -> bool {
         let (some, owner) = self.torso_clusters();
         let colors = |k: usize| -> Vec<Vector3<f64>> {
             let own = some.iter().zip(&owner).filter(|(_, o)| **o == k);

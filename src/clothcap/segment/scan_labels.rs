@@ -5,6 +5,7 @@ use super::labelling::Labelling;
 use super::prior::IMPOSSIBLE;
 use crate::clothcap::CaptureError;
 use crate::clothcap::align::SurfaceMatch;
+use crate::clothcap::face_edges::edges;
 use crate::clothcap::mrf::{ExpansionConfig, MrfModel};
 use crate::clothcap::scan::{BodyScan, mean_spacing};
 use crate::mesh::{Csr, Face};
@@ -103,31 +104,28 @@ fn label_depths(neighbours: &Csr, labelling: &Labelling) -> Vec<u32> {
 
 /// Edges of the faces, or between near points of a cloud; each once.
 fn scan_edges(scan: &BodyScan) -> Vec<[u32; 2]> {
-    let mut edges: Vec<[u32; 2]> = if scan.faces.is_empty() {
-        let reach = 2.0 * mean_spacing(&scan.points);
-        let mut grid = HashGrid::default();
-        // Searches reach half a cell, and may find a point twice.
-        grid.fill(&scan.points, 2.0 * reach);
-        let mut out = Vec::new();
-        for (i, p) in scan.points.iter().enumerate() {
-            let mut near = Vec::new();
-            grid.within(p, reach, |j, d| {
-                if j != i as u32 {
-                    near.push((d, j));
-                }
-            });
-            near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            near.dedup();
-            let some = near.iter().take(NEIGHBOURS);
-            out.extend(some.map(|(_, j)| [*j.min(&(i as u32)), *j.max(&(i as u32))]));
-        }
-        out
-    } else {
-        let sides = |f: &Face| [[f[0], f[1]], [f[1], f[2]], [f[2], f[0]]];
-        let all = scan.faces.iter().flat_map(sides);
-        all.map(|[a, b]| [a.min(b), a.max(b)]).collect()
-    };
-    edges.sort_unstable();
-    edges.dedup();
-    edges
+    if !scan.faces.is_empty() {
+        return edges(&scan.faces);
+    }
+    let reach = 2.0 * mean_spacing(&scan.points);
+    let mut grid = HashGrid::default();
+    // Searches reach half a cell, and may find a point twice.
+    grid.fill(&scan.points, 2.0 * reach);
+    let mut out = Vec::new();
+    for (i, p) in scan.points.iter().enumerate() {
+        let i = i as u32;
+        let mut near = Vec::new();
+        grid.within(p, reach, |j, d| {
+            if j != i {
+                near.push((d, j));
+            }
+        });
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        near.dedup();
+        let some = near.iter().take(NEIGHBOURS);
+        out.extend(some.map(|(_, j)| [*j.min(&i), *j.max(&i)]));
+    }
+    out.sort_unstable();
+    out.dedup();
+    out
 }

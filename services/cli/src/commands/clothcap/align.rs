@@ -2,7 +2,7 @@
 
 use super::scans::Scans;
 use crate::args::ClothcapAlignArgs;
-use crate::{input, report};
+use crate::input;
 use anyhow::{Context, Result};
 use serde_json::json;
 use std::time::Instant;
@@ -47,13 +47,7 @@ fn align_all(args: &ClothcapAlignArgs) -> Result<()> {
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let report = json!({
-        "template": scans.template.name(),
-        "frame": scans.frame,
-        "scans": rows,
-        "peak_memory_bytes": report::peak_memory(),
-    });
-    report::write(&args.out.join("report.json"), &report)?;
+    scans.write_report(&rows, &args.out)?;
     println!("{} scans aligned, in {}", rows.len(), args.out.display());
     Ok(())
 }

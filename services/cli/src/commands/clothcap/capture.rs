@@ -2,7 +2,7 @@
 
 use super::scans::{Scans, label_config};
 use crate::args::ClothcapCaptureArgs;
-use crate::{input, report};
+use crate::input;
 use anyhow::{Context, Result, ensure};
 use serde_json::json;
 use std::path::Path;
@@ -29,7 +29,7 @@ fn capture_all(args: &ClothcapCaptureArgs) -> Result<()> {
         ..CaptureConfig::default()
     };
     let archive = CaptureArchive::new(&args.out)?;
-    let header = archive.header()?;
+    let header = archive.header(&*input::template(args.scans.body.as_deref())?)?;
     let mut scans = match &header {
         Some(h) => Scans::reopen(&args.scans, h.frame)?,
         None => Scans::open(&args.scans)?,
@@ -58,13 +58,7 @@ fn capture_all(args: &ClothcapCaptureArgs) -> Result<()> {
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let report = json!({
-        "template": scans.template.name(),
-        "frame": scans.frame,
-        "scans": rows,
-        "peak_memory_bytes": report::peak_memory(),
-    });
-    report::write(&args.out.join("report.json"), &report)?;
+    scans.write_report(&rows, &args.out)?;
     println!("{} scans captured, in {}", names.len(), args.out.display());
     Ok(())
 }
@@ -106,7 +100,11 @@ impl CaptureJob {
         (name, names): (&str, &[String]),
         out: &Path,
     ) -> Result<serde_json::Value> {
-        if let Some(record) = self.archive.record(name)?.filter(|_| self.header.is_some()) {
+        if let Some(record) = self
+            .archive
+            .record(name, &scans.template)?
+            .filter(|_| self.header.is_some())
+        {
             let report = serde_json::to_value(&record.report)?;
             self.last = Some(record);
             return Ok(report);

@@ -45,15 +45,8 @@ struct CapturedFrames {
 
 fn retarget_all(args: &ClothcapRetargetArgs) -> Result<()> {
     let template = tryon::body::embedded::template();
-    let (archive, header) = CaptureArchive::open(&args.capture)?;
-    ensure!(
-        header.template == template.name(),
-        "{}: captured on the body `{}`, only `{}` is supported",
-        args.capture.display(),
-        header.template,
-        template.name()
-    );
-    let mut frames = read_frames(&archive, &header)?;
+    let (archive, header) = CaptureArchive::open(&args.capture, &template)?;
+    let mut frames = read_frames(&archive, &header, &template)?;
     if let Some(path) = &args.motion {
         frames = on_motion(path, &template, frames)?;
     }
@@ -169,7 +162,11 @@ fn done(path: &Path, job: &Value) -> Result<Option<Value>> {
     Ok((row["job"] == *job).then_some(row))
 }
 
-fn read_frames(archive: &CaptureArchive, header: &CaptureHeader) -> Result<CapturedFrames> {
+fn read_frames(
+    archive: &CaptureArchive,
+    header: &CaptureHeader,
+    template: &Template,
+) -> Result<CapturedFrames> {
     let mut out = CapturedFrames {
         seconds: Vec::new(),
         poses: Vec::new(),
@@ -177,7 +174,7 @@ fn read_frames(archive: &CaptureArchive, header: &CaptureHeader) -> Result<Captu
     };
     let garments = header.outfit.cloth.parts.len();
     for scan in &header.scans {
-        let Some(record) = archive.record(scan)? else {
+        let Some(record) = archive.record(scan, template)? else {
             continue;
         };
         out.seconds.push(out.poses.len() as f64 / RATE);

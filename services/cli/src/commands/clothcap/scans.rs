@@ -1,9 +1,10 @@
 //! Scans of a command: files, unit and axes, person of the first one, garments given by name.
 
 use crate::args::ScanArgs;
-use crate::input;
+use crate::{input, report};
 use anyhow::{Context, Result, ensure};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tryon::body::Template;
@@ -58,6 +59,17 @@ impl Scans {
         BodyScan::new(&mesh, &self.frame).with_context(|| format!("{}", file.display()))
     }
 
+    /// Writes report.json with a row a scan.
+    pub(super) fn write_report(&self, rows: &[Value], out: &Path) -> Result<()> {
+        let report = json!({
+            "template": self.template.name(),
+            "frame": self.frame,
+            "scans": rows,
+            "peak_memory_bytes": report::peak_memory(),
+        });
+        report::write(&out.join("report.json"), &report)
+    }
+
     /// Name of a scan in results.
     pub(super) fn name(file: &Path) -> String {
         let stem = file.file_stem().map(|s| s.to_string_lossy().into_owned());
@@ -82,7 +94,7 @@ fn found(
 }
 
 /// Garments of `--prior`: slots by name, or a JSON file with them.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PriorFile {
     garments: Vec<Slot>,
