@@ -12,9 +12,10 @@ use crate::math::V3;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Version of the layout. A folder of another one is refused.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// File of [`CaptureHeader`].
 const HEADER: &str = "capture.json";
 /// Folder of the scans' results.
@@ -82,7 +83,10 @@ impl CaptureArchive {
     ///
     /// # Errors
     /// A folder without a header.
-    pub fn open(folder: &Path, template: &Template) -> Result<(Self, CaptureHeader), FormatError> {
+    pub fn open(
+        folder: &Path,
+        template: &Arc<Template>,
+    ) -> Result<(Self, CaptureHeader), FormatError> {
         let archive = Self {
             folder: folder.to_owned(),
         };
@@ -100,7 +104,7 @@ impl CaptureArchive {
     ///
     /// # Errors
     /// A header of another version or body, one that cannot be read, or a field that does not fit the others.
-    pub fn header(&self, template: &Template) -> Result<Option<CaptureHeader>, FormatError> {
+    pub fn header(&self, template: &Arc<Template>) -> Result<Option<CaptureHeader>, FormatError> {
         let path = self.folder.join(HEADER);
         if !path.exists() {
             return Ok(None);

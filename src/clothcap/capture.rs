@@ -9,6 +9,7 @@ use super::retarget::{PenetrationSolver, SolidBody, pose_part};
 use super::scan::BodyScan;
 use super::segment::{LabelConfig, Labelling};
 use super::segmenter::{ScanSegmenter, SegmentedScan};
+use super::topology::ClothTemplate;
 use super::undress::{Undressed, Undresser, WornGarments, minimally_clothed};
 use super::unpose::unpose;
 use crate::body::{BoneTransforms, Template};
@@ -113,6 +114,11 @@ impl OutfitCapture {
         })
     }
 
+    /// Template of the surface, with or without legs joined.
+    pub fn cloth(&self) -> &ClothTemplate {
+        self.segmenter.cloth()
+    }
+
     /// Clothed template, once a scan is captured.
     pub fn clothed(&self) -> Option<&ClothedTemplate> {
         self.segmenter.clothed()
@@ -136,7 +142,7 @@ impl OutfitCapture {
         let segmented = self.segmenter.step(scan)?;
         let covered = segmented.covered();
         let fitter = PartFitter {
-            template: &self.template,
+            cloth: self.segmenter.cloth(),
             scan,
             segmented: &segmented,
             config: &self.config.parts,
@@ -164,7 +170,12 @@ impl OutfitCapture {
         let garments = self.freed(&outfit, &fitted.vertices, &undressed)?;
         let out = FrameCapture {
             labels: segmented.parts(),
-            displacements: displacements(&self.template, &outfit.cloth, &garments, &undressed),
+            displacements: displacements(
+                self.segmenter.cloth(),
+                &outfit.cloth,
+                &garments,
+                &undressed,
+            ),
             report: FrameReport {
                 alignment: alignment.report,
                 part_errors: fitted.errors,
@@ -205,7 +216,7 @@ struct FittedParts {
 
 /// Fit of all parts to one segmented scan.
 struct PartFitter<'a> {
-    template: &'a Template,
+    cloth: &'a ClothTemplate,
     scan: &'a BodyScan,
     segmented: &'a SegmentedScan,
     config: &'a PartFitConfig,
@@ -215,7 +226,7 @@ impl PartFitter<'_> {
     /// Parts of the first scan, coupled to the body model (eq. 18), and the outfit that they make.
     fn first(&self, body: AlignedBody) -> Result<(CapturedOutfit, FittedParts), CaptureError> {
         let segmented = self.segmented;
-        let cloth = MultiCloth::new(self.template, &segmented.labelling);
+        let cloth = MultiCloth::new(self.cloth, &segmented.labelling);
         if cloth.parts.is_empty() {
             return Err(CaptureError::NoGarment);
         }
@@ -232,7 +243,7 @@ impl PartFitter<'_> {
             self.fit(part, &model, pick(&alignment.surface), &mut fitted)?;
         }
         let parts = cloth.parts.iter().zip(&fitted.vertices);
-        let rest = parts.map(|(part, v)| rest(self.template, &alignment.bones, part, v));
+        let rest = parts.map(|(part, v)| rest(self.cloth, &alignment.bones, part, v));
         let colors = cloth
             .parts
             .iter()
@@ -252,7 +263,7 @@ impl PartFitter<'_> {
         let mut fitted = FittedParts::default();
         let bones = &self.segmented.alignment.bones;
         for (part, rest) in outfit.cloth.parts.iter().zip(&outfit.rest) {
-            let model = pose_part(part, self.template.weights(), bones, rest);
+            let model = pose_part(part, self.cloth.template().weights(), bones, rest);
             self.fit(part, &model, model.clone(), &mut fitted)?;
         }
         Ok(fitted)
@@ -275,29 +286,29 @@ impl PartFitter<'_> {
     }
 }
 
-fn rest(template: &Template, bones: &BoneTransforms, part: &ClothPart, posed: &[P3]) -> Vec<P3> {
+fn rest(cloth: &ClothTemplate, bones: &BoneTransforms, part: &ClothPart, posed: &[P3]) -> Vec<P3> {
     let nodes = part.nodes.iter().map(|v| *v as usize);
-    unpose(template.weights(), bones, nodes, posed)
+    unpose(cloth.template().weights(), bones, nodes, posed)
 }
 
 /// Rest displacements of each garment from the undressed body (eq. 23).
 fn displacements(
-    template: &Template,
+    surface: &ClothTemplate,
     cloth: &MultiCloth,
     garments: &[Vec<P3>],
     undressed: &Undressed,
 ) -> Vec<Vec<V3>> {
     let all = 0..undressed.vertices.len();
-    let body = unpose(
-        template.weights(),
+    let body = surface.extend(&unpose(
+        surface.template().weights(),
         &undressed.bones,
         all,
         &undressed.vertices,
-    );
+    ));
     let parts = cloth.parts.iter().zip(garments);
     parts
         .map(|(part, vertices)| {
-            let above = rest(template, &undressed.bones, part, vertices);
+            let above = rest(surface, &undressed.bones, part, vertices);
             let below = part.nodes.iter().map(|v| body[*v as usize]);
             above.iter().zip(below).map(|(a, b)| a - b).collect()
         })

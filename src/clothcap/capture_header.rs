@@ -5,9 +5,11 @@ use super::align::{AlignedBody, ClothedTemplate};
 use super::capture::CapturedOutfit;
 use super::multi::ClothPart;
 use super::scan::ScanFrame;
+use super::topology::ClothTemplate;
 use crate::body::Template;
 use crate::math::P3;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Outfit of a capture and the state that later scans start from.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -65,8 +67,8 @@ pub(super) fn check_body(
 }
 
 /// Checks a header.
-pub(super) fn check_header(header: &CaptureHeader, template: &Template) -> Result<(), Fault> {
-    let count = template.mesh().vertices().len();
+pub(super) fn check_header(header: &CaptureHeader, template: &Arc<Template>) -> Result<(), Fault> {
+    let bodies = template.mesh().vertices().len();
     check(header.template == template.name(), "template", || {
         format!("{}, expected {}", header.template, template.name())
     })?;
@@ -76,6 +78,15 @@ pub(super) fn check_header(header: &CaptureHeader, template: &Template) -> Resul
         && frame.up.iter().all(|v| v.is_finite())
         && frame.up.iter().any(|v| *v != 0.0);
     check(is_frame, "frame", || "no unit and up axis".into())?;
+    let legs = header.clothed.legs;
+    check(
+        header.outfit.cloth.legs == legs,
+        "outfit.cloth.legs",
+        || format!("{:?}, clothed.legs is {legs:?}", header.outfit.cloth.legs),
+    )?;
+    let surface = ClothTemplate::new(template, legs);
+    let surface = surface.map_err(|e| ("clothed.legs".to_owned(), e.to_string()))?;
+    let count = surface.template().mesh().vertices().len();
     check_body(&header.clothed.body, template, "clothed.body")?;
     check_count(header.clothed.rest.len(), count, "clothed.rest")?;
     check_finite(&header.clothed.rest, "clothed.rest")?;
@@ -101,7 +112,12 @@ pub(super) fn check_header(header: &CaptureHeader, template: &Template) -> Resul
     check_count(outfit.rest.len(), parts, "outfit.rest")?;
     check_count(outfit.colors.len(), parts, "outfit.colors")?;
     for (k, part) in outfit.cloth.parts.iter().enumerate() {
-        check_part(part, count, slots, &format!("outfit.cloth.parts[{k}]"))?;
+        check_part(
+            part,
+            (count, bodies),
+            slots,
+            &format!("outfit.cloth.parts[{k}]"),
+        )?;
         check_count(
             outfit.rest[k].len(),
             part.nodes.len(),
@@ -117,7 +133,12 @@ pub(super) fn check_header(header: &CaptureHeader, template: &Template) -> Resul
     Ok(())
 }
 
-fn check_part(part: &ClothPart, count: usize, slots: usize, field: &str) -> Result<(), Fault> {
+fn check_part(
+    part: &ClothPart,
+    (count, bodies): (usize, usize),
+    slots: usize,
+    field: &str,
+) -> Result<(), Fault> {
     let own = part.nodes.len();
     let at = |name: &str| format!("{field}.{name}");
     check(usize::from(part.label) < slots, &at("label"), || {
@@ -128,6 +149,11 @@ fn check_part(part: &ClothPart, count: usize, slots: usize, field: &str) -> Resu
     let last = part.nodes.last().map_or(0, |v| *v as usize);
     check(last < count, &at("nodes"), || {
         format!("vertex {last} of {count}")
+    })?;
+    check_count(part.below.len(), own, &at("below"))?;
+    let beyond = part.below.iter().position(|v| *v as usize >= bodies);
+    check(beyond.is_none(), &at("below"), || {
+        format!("entry {beyond:?}: the body has {bodies} vertices")
     })?;
     check_count(part.hidden.len(), own, &at("hidden"))?;
     let is_face = |f: &[u32; 3]| {

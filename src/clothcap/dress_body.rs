@@ -5,6 +5,7 @@ use super::archive::FrameDisplacements;
 use super::layers::tuck_hidden;
 use super::multi::MultiCloth;
 use super::retarget::{PenetrationSolver, RetargetReport, SolidBody, on_body, pose_part};
+use super::topology::ClothTemplate;
 use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
 use crate::math::{P3, V3, World};
 use crate::par::Par;
@@ -30,6 +31,7 @@ pub struct DressedPose {
 #[derive(Debug)]
 pub struct BodyDresser<'a> {
     template: Arc<Template>,
+    surface: ClothTemplate,
     cloth: &'a MultiCloth,
     solid: SolidBody,
     solvers: Vec<PenetrationSolver>,
@@ -39,9 +41,10 @@ impl<'a> BodyDresser<'a> {
     /// Prepares the systems of all garments.
     ///
     /// # Errors
-    /// [`CaptureError::Solve`] for a garment too large.
+    /// [`CaptureError::Solve`] for a garment too large, [`CaptureError::Topology`] for a body without legs under a skirt.
     pub fn new(template: Arc<Template>, cloth: &'a MultiCloth) -> Result<Self, CaptureError> {
         Ok(Self {
+            surface: ClothTemplate::new(&template, cloth.legs)?,
             solid: SolidBody::new(&template)?,
             solvers: cloth
                 .parts
@@ -51,6 +54,11 @@ impl<'a> BodyDresser<'a> {
             template,
             cloth,
         })
+    }
+
+    /// Surface that the garments are parts of.
+    pub fn surface(&self) -> &ClothTemplate {
+        &self.surface
     }
 
     /// Dresses a rest body with the displacements of one scan and poses it, garments free of penetration. Where a wider
@@ -102,6 +110,10 @@ impl<'a> BodyDresser<'a> {
         let mut body = Vec::new();
         skin(Par::Rayon, &rest, weights, &bones, &mut body);
         self.solid.place(&body)?;
+        let (rest, weights) = (
+            self.surface.extend(&rest),
+            self.surface.template().weights(),
+        );
         let (mut garments, mut reports) = (Vec::new(), Vec::new());
         let parts = self.cloth.parts.iter().zip(&displacements.garments);
         for ((part, d), solver) in parts.zip(&mut self.solvers) {

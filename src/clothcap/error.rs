@@ -26,6 +26,12 @@ pub enum CaptureError {
     /// Nothing but skin is found.
     #[error("no garment is found on the person")]
     NoGarment,
+    /// Body whose legs cannot be joined in one tube.
+    #[error("a skirt's template: {why}")]
+    Topology {
+        /// Part of the body at fault.
+        why: String,
+    },
     /// Displacements that belong to another outfit or body.
     #[error("displacements: {why}")]
     Displacements {

@@ -18,7 +18,7 @@ pub(super) fn tuck_hidden(cloth: &MultiCloth, garments: &mut [Vec<P3>], body: &[
                 let at = part.nodes.binary_search(node).ok()?;
                 (!part.hidden[at]).then(|| garments[k][at])
             });
-            let skin = body[*node as usize];
+            let skin = body[cloth.parts[inner].below[i] as usize];
             let nearest = above.min_by(|a, b| (a - skin).norm().total_cmp(&(b - skin).norm()));
             if let Some(p) = nearest {
                 garments[inner][i] = skin + (p - skin) * DEPTH;
@@ -39,6 +39,7 @@ mod tests {
             slot,
             label: 2,
             nodes: nodes.to_vec(),
+            below: nodes.to_vec(),
             faces: Vec::new(),
             rings: Vec::new(),
             hidden: hidden.to_vec(),
@@ -48,6 +49,7 @@ mod tests {
                 part(Slot::Top, &[1, 2], &[false, false]),
                 part(Slot::Under, &[0, 1], &[false, true]),
             ],
+            ..MultiCloth::default()
         };
         let z = |z: f32| P3::new(0.0, 0.0, z);
         let mut garments = vec![vec![z(0.02), z(0.03)], vec![z(0.05), z(0.07)]];

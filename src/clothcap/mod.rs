@@ -21,6 +21,7 @@ mod segmenter;
 mod test_scans;
 #[cfg(test)]
 mod tests;
+pub mod topology;
 mod undress;
 mod unpose;
 mod virtual_camera;

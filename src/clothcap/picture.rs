@@ -2,7 +2,8 @@
 
 use super::capture::{CapturedOutfit, FrameCapture};
 use super::scan::BodyScan;
-use crate::body::{Pose, Template};
+use super::topology::ClothTemplate;
+use crate::body::Pose;
 use crate::camera::ColorImage;
 use crate::math::{P3, V3, World};
 use crate::mesh::Face;
@@ -66,15 +67,15 @@ pub fn part_color(part: u8) -> [u8; 3] {
 /// Stages of one scan, a row each from the front, side and back: scan, aligned surface, labels, garments, body below,
 /// dressed. `front` is the body's direction about the vertical, radians.
 pub fn stages(
-    template: &Template,
+    cloth: &ClothTemplate,
     scan: &BodyScan,
     frame: &FrameCapture,
     outfit: &CapturedOutfit,
 ) -> ColorImage {
-    let faces = template.mesh().faces();
+    let (skin_mesh, surface) = (cloth.body().mesh(), cloth.template().mesh());
     let front = heading(&frame.alignment.body.pose);
-    let skin = vec![part_color(0); template.mesh().vertices().len()];
-    let grey = vec![[190, 190, 200]; skin.len()];
+    let skin = vec![part_color(0); skin_mesh.vertices().len()];
+    let grey = vec![[190, 190, 200]; surface.vertices().len()];
     let labels: Vec<[u8; 3]> = frame.labels.iter().map(|p| part_color(*p)).collect();
     let plain = vec![[160; 3]; scan.points.len()];
     let of_scan = |colors| Painted {
@@ -89,7 +90,7 @@ pub fn stages(
     };
     let body = Painted {
         points: &frame.undressed.vertices,
-        faces,
+        faces: skin_mesh.faces(),
         colors: &skin,
     };
     let parts = outfit.cloth.parts.iter().zip(&frame.garments);
@@ -103,7 +104,7 @@ pub fn stages(
         .collect();
     let aligned = Painted {
         points: &frame.alignment.surface,
-        faces,
+        faces: surface.faces(),
         colors: &grey,
     };
     let dressed = [&[body][..], &garments].concat();

@@ -37,13 +37,13 @@ pub struct RetargetReport {
     pub largest_push: f32,
 }
 
-/// Vertices of a garment over a rest body (eq. 25), metres; `body` has the template's vertices.
+/// Vertices of a garment over a rest body (eq. 25), metres; `body` has the clothed template's vertices.
 pub fn on_body(part: &ClothPart, displacements: &[V3], body: &[P3]) -> Vec<P3> {
     let below = part.nodes.iter().map(|v| body[*v as usize]);
     below.zip(displacements).map(|(p, d)| p + d).collect()
 }
 
-/// Posed vertices of a garment, with the skinning of its body vertices.
+/// Posed vertices of a garment, with the skinning of its template's vertices.
 pub fn pose_part(
     part: &ClothPart,
     weights: &SkinWeights,
@@ -151,7 +151,8 @@ fn fault(e: impl std::fmt::Display) -> CaptureError {
 /// System that moves one garment out of bodies.
 #[derive(Debug)]
 pub struct PenetrationSolver {
-    nodes: Vec<u32>,
+    /// Body vertex next to each vertex.
+    below: Vec<u32>,
     /// Vertices under another garment, which are placed below it afterwards.
     hidden: Vec<bool>,
     edges: Vec<[u32; 2]>,
@@ -168,7 +169,7 @@ impl PenetrationSolver {
         let stencils = edges.iter().map(|e| Stencil::edge(*e, 1.0)).collect();
         Ok(Self {
             energy: QuadraticEnergy::new(part.nodes.len(), stencils, &[])?,
-            nodes: part.nodes.clone(),
+            below: part.below.clone(),
             hidden: part.hidden.clone(),
             edges,
         })
@@ -259,7 +260,7 @@ impl PenetrationSolver {
     fn push(&self, body: &SolidBody, vertices: &[P3], targets: &mut [Option<P3>]) -> bool {
         let mut out = Vec::new();
         par::map_into(Par::Rayon, vertices.len(), 128, &mut out, |v| {
-            body.outside(&vertices[v], self.nodes[v])
+            body.outside(&vertices[v], self.below[v])
                 .filter(|_| !self.hidden[v])
         });
         let mut any = false;

@@ -4,6 +4,7 @@ use super::CaptureError;
 use super::align::{AlignedBody, Aligner, Alignment, ClothedTemplate, Start};
 use super::scan::BodyScan;
 use super::segment::{LabelConfig, Labelling, NodeColors, label_nodes, label_scan, relabel_nodes};
+use super::topology::ClothTemplate;
 use crate::body::Template;
 use std::sync::Arc;
 
@@ -37,7 +38,6 @@ impl SegmentedScan {
 /// Aligns and segments scans; the first one gives the clothed template and the appearances of the garments.
 #[derive(Debug)]
 pub struct ScanSegmenter {
-    template: Arc<Template>,
     config: LabelConfig,
     aligner: Aligner,
     first: Option<Labelling>,
@@ -50,8 +50,7 @@ impl ScanSegmenter {
     /// [`CaptureError::Solve`] for a template too large.
     pub fn new(template: Arc<Template>, config: LabelConfig) -> Result<Self, CaptureError> {
         Ok(Self {
-            aligner: Aligner::new(template.clone())?,
-            template,
+            aligner: Aligner::new(template)?,
             config,
             first: None,
         })
@@ -68,8 +67,7 @@ impl ScanSegmenter {
         (clothed, last): (ClothedTemplate, AlignedBody),
     ) -> Result<Self, CaptureError> {
         Ok(Self {
-            aligner: Aligner::resume(template.clone(), clothed, last)?,
-            template,
+            aligner: Aligner::resume(template, clothed, last)?,
             config,
             first: Some(first),
         })
@@ -78,6 +76,11 @@ impl ScanSegmenter {
     /// Starts the first scan at a person found before.
     pub fn start_at(&mut self, start: Start) {
         self.aligner.start_at(start);
+    }
+
+    /// Template of the surface, with or without legs joined.
+    pub fn cloth(&self) -> &ClothTemplate {
+        self.aligner.cloth()
     }
 
     /// Clothed template, once a scan is aligned.
@@ -91,13 +94,17 @@ impl ScanSegmenter {
     /// [`CaptureError::NoPerson`], or [`CaptureError::NoGarment`] if the first scan shows none.
     pub fn step(&mut self, scan: &BodyScan) -> Result<SegmentedScan, CaptureError> {
         let alignment = self.aligner.align(scan)?;
-        let mesh = self.template.mesh();
-        let nodes = NodeColors::new(scan, &alignment, &self.template);
+        let cloth = self.aligner.cloth();
+        let template = cloth.template();
+        let nodes = NodeColors::new(scan, &alignment, template);
         let mut labelling = match &self.first {
-            None => label_nodes(&self.template, &nodes, &self.config)?,
-            Some(first) => relabel_nodes(&self.template, &nodes, first, &self.config)?,
+            None => label_nodes(cloth, &nodes, &self.config)?,
+            Some(first) => relabel_nodes(cloth, &nodes, first, &self.config)?,
         };
-        let around = (mesh.faces(), self.template.topology().vertex_neighbours());
+        let around = (
+            template.mesh().faces(),
+            template.topology().vertex_neighbours(),
+        );
         let labels = label_scan(scan, &alignment.matches, around, &labelling)?;
         labelling.adopt(&nodes, &labels);
         if !labelling

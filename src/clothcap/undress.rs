@@ -184,7 +184,7 @@ impl Undresser {
         for (part, own) in garments.cloth.parts.iter().zip(garments.vertices) {
             let mut hits = Vec::new();
             par::map_into(Par::Rayon, own.len(), 128, &mut hits, |i| {
-                let hit = self.solid.below(&own[i], part.nodes[i]);
+                let hit = self.solid.below(&own[i], part.below[i]);
                 (!part.hidden[i] && hit.signed_distance < MARGIN).then_some(hit)
             });
             for (p, hit) in own.iter().zip(hits) {

@@ -6,11 +6,15 @@ use std::path::Path;
 use std::sync::Arc;
 use tryon::body::{Template, embedded};
 use tryon::clothcap::align::find_frame;
+use tryon::clothcap::archive::FrameDisplacements;
 use tryon::clothcap::scan::{BodyScan, ScanFrame};
 use tryon::clothcap::segment::{LabelConfig, Slot};
-use tryon::clothcap::{CaptureError, ScanSegmenter, SegmentedScan};
+use tryon::clothcap::{
+    BodyDresser, CaptureConfig, CaptureError, OutfitCapture, ScanSegmenter, SegmentedScan,
+    population,
+};
 use tryon::evaluate::garment_capture::{CaptureVariant, capture_scenes, measure};
-use tryon::evaluate::scans::{SKIN_LABEL, TrueScan};
+use tryon::evaluate::scans::{SKIN_LABEL, ScanScene, TrueScan};
 use tryon::formats::scan::{ScanMesh, read_scan};
 use tryon::math::P3;
 
@@ -222,5 +226,56 @@ fn scans_without_a_dressed_person_are_refused_or_reported() {
     match segmented(&plain, LabelConfig::default()) {
         Ok((found, _)) => println!("one colour: {:?}", found.labelling.slots),
         Err(e) => assert_eq!(e, CaptureError::NoGarment),
+    }
+}
+
+#[test]
+fn a_dress_is_one_garment_around_both_legs() {
+    let scenes = capture_scenes().expect("scenes");
+    let scene = scenes
+        .into_iter()
+        .find(|s| s.name == "dress on a tall woman")
+        .expect("the scene");
+    let scans = ScanScene {
+        scans: 1,
+        ..scene.scene
+    }
+    .scans()
+    .expect("a scan");
+    let TrueScan {
+        points,
+        faces,
+        normals,
+        colors,
+        ..
+    } = scans.into_iter().next().expect("one");
+    let file = ScanMesh {
+        points,
+        faces,
+        normals,
+        colors,
+    };
+    let template = embedded::template();
+    let (frame, start) = find_frame(&template, &file).expect("a person");
+    let scan = BodyScan::new(&file, &frame).expect("a scan");
+    let mut capture =
+        OutfitCapture::new(template.clone(), CaptureConfig::default()).expect("capture");
+    capture.start_at(start);
+    let captured = capture.frame(&scan).expect("a dress");
+    let outfit = capture.outfit().expect("an outfit");
+    let slots: Vec<Slot> = outfit.cloth.parts.iter().map(|p| p.slot).collect();
+    assert_eq!(slots, [Slot::OnePiece]);
+    let dress = &outfit.cloth.parts[0];
+    let hems = dress.rings.iter().filter(|r| r.name == "hem").count();
+    assert_eq!(hems, 1, "one hem around both legs");
+
+    // Wider hips push it outwards; nothing is inside, and it stays one tube.
+    let mut dresser = BodyDresser::new(template.clone(), &outfit.cloth).expect("dresser");
+    let displacements = FrameDisplacements::of(&template, &captured);
+    for shape in population(&template, 5, 4) {
+        let body = template.personalise(&shape);
+        let pose = &captured.undressed.body.pose;
+        let dressed = dresser.dress(&body, &displacements, pose).expect("dressed");
+        assert_eq!(dressed.reports[0].inside, 0);
     }
 }

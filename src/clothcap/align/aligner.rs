@@ -1,10 +1,12 @@
 //! Single-mesh alignment of a sequence: the first scan gives the clothed template, later ones are coupled to it.
 
 use super::free_surface::{FreeSurface, SurfaceFitConfig, SurfaceMatch};
+use super::legs::leg_topology;
 use super::model_fit::{AlignedBody, FitStage, ModelFit};
 use super::start::{Start, find_person};
 use crate::body::{BoneTransforms, Template};
 use crate::clothcap::scan::BodyScan;
+use crate::clothcap::topology::{ClothTemplate, LegTopology};
 use crate::clothcap::{CaptureError, unpose};
 use crate::math::P3;
 use serde::{Deserialize, Serialize};
@@ -56,12 +58,16 @@ pub struct ClothedTemplate {
     pub rest: Vec<P3>,
     /// Body of the first scan; its shape gives the joints.
     pub body: AlignedBody,
+    /// Course of the cloth around the legs.
+    #[serde(default)]
+    pub legs: LegTopology,
 }
 
 /// Aligns the scans of one subject in order.
 #[derive(Debug)]
 pub struct Aligner {
     template: Arc<Template>,
+    cloth: ClothTemplate,
     free: FreeSurface,
     clothed: Option<ClothedTemplate>,
     /// Person of the first scan, if found before.
@@ -77,6 +83,7 @@ impl Aligner {
     /// [`CaptureError::Solve`] for a template too large.
     pub fn new(template: Arc<Template>) -> Result<Self, CaptureError> {
         Ok(Self {
+            cloth: ClothTemplate::new(&template, LegTopology::Apart)?,
             free: FreeSurface::new(&template)?,
             template,
             clothed: None,
@@ -94,11 +101,27 @@ impl Aligner {
         clothed: ClothedTemplate,
         last: AlignedBody,
     ) -> Result<Self, CaptureError> {
+        let mut out = Self::new(template)?;
+        out.cut(clothed.legs)?;
         Ok(Self {
             clothed: Some(clothed),
             last: Some(last),
-            ..Self::new(template)?
+            ..out
         })
+    }
+
+    /// Takes the surface of a topology.
+    fn cut(&mut self, legs: LegTopology) -> Result<(), CaptureError> {
+        if legs != self.cloth.legs() {
+            self.cloth = ClothTemplate::new(&self.template, legs)?;
+            self.free = FreeSurface::new(self.cloth.template())?;
+        }
+        Ok(())
+    }
+
+    /// Template of the surface, with or without legs joined.
+    pub fn cloth(&self) -> &ClothTemplate {
+        &self.cloth
     }
 
     /// Clothed template, once a scan is aligned.
@@ -139,9 +162,13 @@ impl Aligner {
         for stage in &FitStage::FINE {
             fit.run(&mut body, stage)?;
         }
+        self.cut(leg_topology(&template, scan, &body)?)?;
+        let template = self.cloth.template().clone();
+        let mut fit = ModelFit::new(&template, scan, SAMPLES);
         let out = self.released(scan, &mut fit, body, &SurfaceFitConfig::default())?;
         let nodes = 0..out.surface.len();
         self.clothed = Some(ClothedTemplate {
+            legs: self.cloth.legs(),
             rest: unpose(template.weights(), &out.bones, nodes, &out.surface),
             body: out.body.clone(),
         });
@@ -160,7 +187,7 @@ impl Aligner {
         scan: &BodyScan,
         clothed: &ClothedTemplate,
     ) -> Result<Alignment, CaptureError> {
-        let template = self.template.clone();
+        let template = self.cloth.template().clone();
         let mut fit = ModelFit::new(&template, scan, LATER_SAMPLES).with_clothed(&clothed.rest);
         let mut body = AlignedBody {
             pose: self.last.as_ref().unwrap_or(&clothed.body).pose.clone(),
@@ -171,7 +198,7 @@ impl Aligner {
         }
         let searched = !(fit.error(&body) < LOST);
         if searched {
-            let found = find_person(&template, scan)?;
+            let found = find_person(&self.template, scan)?;
             let mut other = AlignedBody {
                 pose: found.body.pose,
                 shape: clothed.body.shape.clone(),

@@ -2,6 +2,7 @@
 
 mod aligner;
 mod free_surface;
+mod legs;
 mod model_fit;
 mod pairing;
 mod quadratic;

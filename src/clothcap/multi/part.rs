@@ -4,6 +4,7 @@ use crate::body::Template;
 use crate::body::parts::BodySide;
 use crate::clothcap::face_edges::sides;
 use crate::clothcap::segment::{BodyRegion, Labelling, Slot};
+use crate::clothcap::topology::{ClothTemplate, LegTopology};
 use crate::mesh::Face;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -29,8 +30,10 @@ pub struct ClothPart {
     pub slot: Slot,
     /// Label of it in the segmentation.
     pub label: u8,
-    /// Body vertex of each vertex, ascending.
+    /// Vertex of the clothed template of each vertex, ascending.
     pub nodes: Vec<u32>,
+    /// Body vertex next to each vertex.
+    pub below: Vec<u32>,
     /// Triangles over the part's own vertices.
     pub faces: Vec<Face>,
     /// Boundaries.
@@ -44,11 +47,15 @@ pub struct ClothPart {
 pub struct MultiCloth {
     /// Garments, in the order of their labels.
     pub parts: Vec<ClothPart>,
+    /// Course of the cloth around the legs.
+    #[serde(default)]
+    pub legs: LegTopology,
 }
 
 impl MultiCloth {
     /// Cuts the template along the labels of its nodes.
-    pub fn new(template: &Template, labelling: &Labelling) -> Self {
+    pub fn new(cloth: &ClothTemplate, labelling: &Labelling) -> Self {
+        let template = cloth.template();
         let regions = BodyRegion::of_vertices(template);
         let garments = labelling.slots.iter().enumerate();
         let parts = garments
@@ -62,10 +69,11 @@ impl MultiCloth {
                 let hidden: Vec<bool> = (0..own.len())
                     .map(|v| !own[v] && *slot == Slot::Under && is_under(labelling, &regions, v))
                     .collect();
-                ClothPart::new(template, (l as u8, *slot), &own, &hidden)
+                ClothPart::new(cloth, (l as u8, *slot), &own, &hidden)
             });
         Self {
             parts: parts.collect(),
+            legs: cloth.legs(),
         }
     }
 }
@@ -79,13 +87,14 @@ fn is_under(labelling: &Labelling, regions: &[BodyRegion], v: usize) -> bool {
 impl ClothPart {
     /// Part of the nodes `own` and `hidden`; `None` if too small.
     fn new(
-        template: &Template,
+        cloth: &ClothTemplate,
         (label, slot): (u8, Slot),
         own: &[bool],
         hidden: &[bool],
     ) -> Option<Self> {
         let within = |v: u32| own[v as usize] || hidden[v as usize];
         // A face with two corners within belongs to the part: its third corner joins it, so that parts meet without gaps.
+        let template = cloth.template();
         let mut faces: Vec<Face> = template
             .mesh()
             .faces()
@@ -116,6 +125,7 @@ impl ClothPart {
             slot,
             label,
             hidden: nodes.iter().map(|v| hidden[*v as usize]).collect(),
+            below: nodes.iter().map(|v| cloth.body_vertex(*v)).collect(),
             nodes,
             faces: local,
             rings,
@@ -276,7 +286,8 @@ mod tests {
     #[test]
     fn rings_are_found_and_named() {
         let template = embedded::template();
-        let cloth = MultiCloth::new(&template, &labelling(&template));
+        let cloth = ClothTemplate::new(&template, LegTopology::Apart).expect("the body itself");
+        let cloth = MultiCloth::new(&cloth, &labelling(&template));
         let names = |k: usize| {
             let mut all: Vec<&str> = cloth.parts[k]
                 .rings
@@ -293,7 +304,8 @@ mod tests {
     #[test]
     fn boundary_vertices_lie_on_one_ring_once() {
         let template = embedded::template();
-        for part in MultiCloth::new(&template, &labelling(&template)).parts {
+        let cloth = ClothTemplate::new(&template, LegTopology::Apart).expect("the body itself");
+        for part in MultiCloth::new(&cloth, &labelling(&template)).parts {
             let mut all: Vec<u32> = part.rings.iter().flat_map(|r| r.vertices.clone()).collect();
             let count = all.len();
             assert_eq!(count, boundary_edges(&part.faces).len());

@@ -6,6 +6,7 @@ use super::prior::{BodyRegion, Slot};
 use crate::body::Template;
 use crate::clothcap::CaptureError;
 use crate::clothcap::mrf::{ExpansionConfig, MrfModel};
+use crate::clothcap::topology::ClothTemplate;
 use crate::math::P3;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -17,17 +18,15 @@ const CONTRAST: [f32; 2] = [0.25, 0.10];
 /// Cost of another label than in the first frame, nats: garments slide over the body by little.
 const CHANGE: f32 = 1.0;
 /// Difference of heights over the body that halves it: hems lie on what is below.
-const STEP: f32 = 0.003;
+pub(super) const STEP: f32 = 0.003;
 /// Turns of appearances and labels.
 const TURNS: usize = 5;
 /// Modes of skin, hair and what hands hold.
-const SKIN_MODES: usize = 6;
+pub(super) const SKIN_MODES: usize = 6;
 /// Mean cost above that of its own appearance from which a region is no skin, nats.
-const DISTINCT: f64 = 0.8;
-/// Least share of torso and arms that is a garment of its own.
-const LEAST_SHARE: f64 = 0.06;
-/// Difference of mean colours, in standard deviations, from which two clusters are two garments.
-const SEPARATION: f64 = 2.0;
+pub(super) const DISTINCT: f64 = 0.8;
+/// Cost of a garment at a node of the tube between the legs that no scan point is near, nats: below a hem there is nothing.
+const EMPTY: f32 = 2.0;
 
 /// Setting of a segmentation.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -80,49 +79,17 @@ impl Labelling {
     }
 }
 
-/// Labels the nodes of a template.
-///
-/// # Errors
-/// [`CaptureError::Solve`] for an energy that is not finite.
-pub fn label_nodes(
-    template: &Template,
-    nodes: &NodeColors,
-    config: &LabelConfig,
-) -> Result<Labelling, CaptureError> {
-    let labeller = Labeller::new(template, nodes, config);
-    if let Some(garments) = &config.slots {
-        let mut slots = vec![Slot::Skin, Slot::Hair];
-        slots.extend(garments.iter().filter(|s| s.is_garment()));
-        return labeller.run(slots);
-    }
-    let all = labeller.run(vec![
-        Slot::Skin,
-        Slot::Hair,
-        Slot::Top,
-        Slot::Bottom,
-        Slot::Shoes,
-    ])?;
-    let mut slots = labeller.worn(&all);
-    if slots.contains(&Slot::Top) && labeller.has_second_top() {
-        slots.push(Slot::Under);
-    }
-    if slots == all.slots {
-        return Ok(all);
-    }
-    labeller.run(slots)
-}
-
 /// Labels the nodes of a later frame with the appearances of the first one; `before` are the labels there.
 ///
 /// # Errors
 /// As [`label_nodes`].
 pub fn relabel_nodes(
-    template: &Template,
+    cloth: &ClothTemplate,
     nodes: &NodeColors,
     before: &Labelling,
     config: &LabelConfig,
 ) -> Result<Labelling, CaptureError> {
-    let labeller = Labeller::new(template, nodes, config);
+    let labeller = Labeller::new(cloth, nodes, config);
     let mut unary = labeller.unary(&before.slots, &before.appearances);
     let count = before.slots.len();
     for (v, own) in before.labels.iter().enumerate() {
@@ -139,18 +106,28 @@ pub fn relabel_nodes(
     })
 }
 
-struct Labeller<'a> {
-    nodes: &'a NodeColors,
+/// Costs and smoothness of one frame's labels.
+pub(super) struct Labeller<'a> {
+    pub(super) nodes: &'a NodeColors,
     config: &'a LabelConfig,
-    regions: Vec<BodyRegion>,
+    pub(super) regions: Vec<BodyRegion>,
     /// Scalp: back and top of the head.
     hair: Vec<bool>,
-    edges: Vec<[u32; 2]>,
+    /// Nodes of the garment of the legs, which reaches up to the torso.
+    pub(super) bottom: Vec<bool>,
+    /// Nodes between the legs without a scan point.
+    empty: Vec<bool>,
+    pub(super) edges: Vec<[u32; 2]>,
     weights: Vec<f32>,
 }
 
 impl<'a> Labeller<'a> {
-    fn new(template: &Template, nodes: &'a NodeColors, config: &'a LabelConfig) -> Self {
+    pub(super) fn new(
+        cloth: &ClothTemplate,
+        nodes: &'a NodeColors,
+        config: &'a LabelConfig,
+    ) -> Self {
+        let template = cloth.template();
         let edges: Vec<[u32; 2]> = template.topology().edges().iter().map(|e| e.v).collect();
         let smoothness = if config.without_smoothness {
             0.0
@@ -173,18 +150,22 @@ impl<'a> Labeller<'a> {
             nodes,
             config,
             hair: scalp(template, &regions),
+            bottom: vec![false; regions.len()],
+            empty: (0..regions.len())
+                .map(|v| cloth.is_between(v) && nodes.points.row(v).is_empty())
+                .collect(),
             regions,
             weights: edges.iter().map(weight).collect(),
             edges,
         }
     }
 
-    fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.regions.len()
     }
 
     /// Turns of appearances and labels from a start by body regions.
-    fn run(&self, slots: Vec<Slot>) -> Result<Labelling, CaptureError> {
+    pub(super) fn run(&self, slots: Vec<Slot>) -> Result<Labelling, CaptureError> {
         let mut labels = self.first_labels(&slots);
         let mut out = None;
         for _ in 0..TURNS {
@@ -225,7 +206,7 @@ impl<'a> Labeller<'a> {
     }
 
     /// Start: the likely label of each region; arms and shins go to the nearer of skin and their garment.
-    fn first_labels(&self, slots: &[Slot]) -> Vec<u8> {
+    pub(super) fn first_labels(&self, slots: &[Slot]) -> Vec<u8> {
         let index = |slot: Slot| slots.iter().position(|s| *s == slot).map(|i| i as u8);
         let any = |all: &[Slot]| all.iter().find_map(|s| index(*s)).unwrap_or(0);
         let torso = any(&[Slot::Top, Slot::OnePiece]);
@@ -275,7 +256,7 @@ impl<'a> Labeller<'a> {
     }
 
     /// Nodes of torso and arms that are no skin, and their cluster of two.
-    fn torso_clusters(&self) -> (Vec<usize>, Vec<usize>) {
+    pub(super) fn torso_clusters(&self) -> (Vec<usize>, Vec<usize>) {
         let skin = self.skin_appearance();
         let is_skin = |v: usize| {
             let cost = skin
@@ -285,14 +266,14 @@ impl<'a> Labeller<'a> {
         };
         let some: Vec<usize> = (0..self.count())
             .filter(|v| self.regions[*v].is_torso() || self.regions[*v].is_arm())
-            .filter(|v| self.nodes.means[*v].is_some() && !is_skin(*v))
+            .filter(|v| self.nodes.means[*v].is_some() && !is_skin(*v) && !self.bottom[*v])
             .collect();
         let colors: Vec<_> = some.iter().filter_map(|v| self.nodes.means[*v]).collect();
         let owner = k_means(&colors, 2);
         (some, owner)
     }
 
-    fn skin_appearance(&self) -> Option<ColorMixture> {
+    pub(super) fn skin_appearance(&self) -> Option<ColorMixture> {
         let bare = |v: &usize| {
             let face = self.regions[*v] == BodyRegion::Head && !self.hair[*v];
             face || self.regions[*v] == BodyRegion::Hand
@@ -331,7 +312,7 @@ impl<'a> Labeller<'a> {
     }
 
     /// Mean cost of another appearance above that of their own at some nodes, nats.
-    fn excess(
+    pub(super) fn excess(
         &self,
         nodes: impl Iterator<Item = usize>,
         (own, other): (&ColorMixture, &ColorMixture),
@@ -357,75 +338,16 @@ impl<'a> Labeller<'a> {
                 } else {
                     slot.cost(self.regions[v])
                 };
-                out.push(color as f32 + prior);
+                let empty = if self.empty[v] && slot.is_garment() {
+                    EMPTY
+                } else {
+                    0.0
+                };
+                out.push(color as f32 + prior + empty);
             }
         }
         out
     }
-
-    /// Slots of a labelling that are worn: those whose nodes do not look like skin.
-    fn worn(&self, all: &Labelling) -> Vec<Slot> {
-        let skin = self.skin_appearance();
-        let is_worn = |l: usize| {
-            let own: Vec<usize> = (0..self.count())
-                .filter(|v| usize::from(all.labels[*v]) == l)
-                .filter(|v| !self.nodes.points.row(*v).is_empty())
-                .collect();
-            let (Some(skin), Some(look)) = (&skin, &all.appearances[l]) else {
-                return !own.is_empty();
-            };
-            let excess = own
-                .iter()
-                .map(|v| self.nodes.cost(*v, skin) - self.nodes.cost(*v, look));
-            excess.sum::<f64>() > DISTINCT * own.len().max(1) as f64
-        };
-        (0..all.slots.len())
-            .filter(|l| !all.slots[*l].is_garment() || is_worn(*l))
-            .map(|l| all.slots[l])
-            .collect()
-    }
-
-    /// Torso and arms have two colours, far apart, each in one place and not enclosed by the other like a print.
-    fn has_second_top(&self) -> bool {
-        let (some, owner) = self.torso_clusters();
-        let colors = |k: usize| -> Vec<Vector3<f64>> {
-            let own = some.iter().zip(&owner).filter(|(_, o)| **o == k);
-            own.filter_map(|(v, _)| self.nodes.means[*v]).collect()
-        };
-        let (a, b) = (colors(0), colors(1));
-        let least = LEAST_SHARE * some.len() as f64;
-        if (a.len() as f64) < least || (b.len() as f64) < least {
-            return false;
-        }
-        separation(&a, &b) > SEPARATION && self.is_coherent(&some, &owner)
-    }
-
-    /// Neighbours mostly share their cluster; stripes and checks do not.
-    fn is_coherent(&self, some: &[usize], owner: &[usize]) -> bool {
-        /// Largest share of edges between clusters.
-        const MOST_MIXED: f64 = 0.12;
-        let mut of = vec![usize::MAX; self.count()];
-        some.iter().zip(owner).for_each(|(v, o)| of[*v] = *o);
-        let inner = self.edges.iter().map(|e| e.map(|v| of[v as usize]));
-        let inner: Vec<_> = inner.filter(|[a, b]| *a < 2 && *b < 2).collect();
-        let mixed = inner.iter().filter(|[a, b]| a != b).count();
-        (mixed as f64) < MOST_MIXED * inner.len() as f64
-    }
-}
-
-/// Distance of the means of two sets of colours, in standard deviations along it. Halves of one Gaussian have 1.3, of an
-/// even distribution 1.7.
-fn separation(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
-    let mean = |all: &[Vector3<f64>]| all.iter().sum::<Vector3<f64>>() / all.len().max(1) as f64;
-    let (ma, mb) = (mean(a), mean(b));
-    let Some(axis) = (ma - mb).try_normalize(f64::MIN_POSITIVE) else {
-        return 0.0;
-    };
-    let deviation = |all: &[Vector3<f64>], m: &Vector3<f64>| {
-        let squares = all.iter().map(|c| (c - m).dot(&axis).powi(2));
-        (squares.sum::<f64>() / all.len().max(1) as f64).sqrt()
-    };
-    (ma - mb).norm() / (deviation(a, &ma) + deviation(b, &mb)).max(f64::MIN_POSITIVE)
 }
 
 /// Back and top of the head, where hair grows; shape `[vertices]`.

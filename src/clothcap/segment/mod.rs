@@ -3,11 +3,13 @@
 mod color_mixture;
 mod labelling;
 mod node_colors;
+mod outfit;
 mod prior;
 mod scan_labels;
 
 pub use color_mixture::{ColorMixture, hsv_cone, k_means};
-pub use labelling::{LabelConfig, Labelling, label_nodes, relabel_nodes};
+pub use labelling::{LabelConfig, Labelling, relabel_nodes};
 pub use node_colors::NodeColors;
+pub use outfit::label_nodes;
 pub use prior::{BodyRegion, IMPOSSIBLE, Slot};
 pub use scan_labels::label_scan;

@@ -4,6 +4,7 @@ use super::color_mixture::{ColorMixture, hsv_cone};
 use crate::body::Template;
 use crate::clothcap::align::Alignment;
 use crate::clothcap::scan::BodyScan;
+use crate::math::V3;
 use crate::mesh::{Csr, vertex_normals};
 use crate::par::Par;
 use nalgebra::Vector3;
@@ -22,8 +23,11 @@ pub struct NodeColors {
     pub colors: Vec<Vector3<f64>>,
     /// Mean colour of each node; `None` without points.
     pub means: Vec<Option<Vector3<f64>>>,
-    /// Height of the aligned surface over the body model at each node, metres.
+    /// Height of the scan over the body model at each node, metres.
     pub heights: Vec<f32>,
+    /// The same above the mean of its neighbours, metres: opposite signs
+    /// on both sides of a hem, none where cloth flares.
+    pub steps: Vec<f32>,
 }
 
 impl NodeColors {
@@ -49,8 +53,10 @@ impl NodeColors {
         } else {
             (0..nodes).map(mean).collect()
         };
+        let heights = heights(alignment, template, (scan, &points));
         Self {
-            heights: heights(alignment, template),
+            steps: steps(&heights, template.topology().vertex_neighbours()),
+            heights,
             points,
             colors,
             means,
@@ -79,15 +85,39 @@ impl NodeColors {
     }
 }
 
-/// Height of the free surface over the surface that it is coupled to, along its normals, metres.
-fn heights(alignment: &Alignment, template: &Template) -> Vec<f32> {
+/// Heights above the mean of their neighbours, metres.
+fn steps(heights: &[f32], around: &Csr) -> Vec<f32> {
+    let step = |(v, h): (usize, &f32)| {
+        let near = around.row(v).iter().map(|w| heights[*w as usize]);
+        h - mean(near).unwrap_or(*h)
+    };
+    heights.iter().enumerate().map(step).collect()
+}
+
+fn mean(values: impl Iterator<Item = f32>) -> Option<f32> {
+    let (sum, n) = values.fold((0.0, 0), |(s, n), v| (s + v, n + 1));
+    (n > 0).then(|| sum / n as f32)
+}
+
+/// Height of the scan over the surface that the free one is coupled to, along its normals, metres: of the free surface,
+/// with the mean of what it leaves of the node's points.
+fn heights(
+    alignment: &Alignment,
+    template: &Template,
+    (scan, points): (&BodyScan, &Csr),
+) -> Vec<f32> {
     let (faces, around) = (template.mesh().faces(), template.topology().vertex_faces());
     let mut normals = Vec::new();
     vertex_normals(Par::Rayon, &alignment.model, faces, around, &mut normals);
-    let moved = alignment
-        .surface
-        .iter()
-        .zip(&alignment.model)
-        .map(|(a, b)| a - b);
-    moved.zip(&normals).map(|(d, n)| d.dot(n)).collect()
+    let height = |v: usize| {
+        let left = points.row(v).iter().map(|p| {
+            let m = &alignment.matches[*p as usize];
+            let corners = faces[m.face as usize].map(|c| alignment.surface[c as usize].coords);
+            let on: V3 = (0..3).map(|k| corners[k] * m.corners[k]).sum();
+            (scan.points[*p as usize].coords - on).dot(&normals[v])
+        });
+        let fitted = (alignment.surface[v] - alignment.model[v]).dot(&normals[v]);
+        fitted + mean(left).unwrap_or(0.0)
+    };
+    (0..alignment.surface.len()).map(height).collect()
 }

@@ -35,7 +35,7 @@ type SceneSpec = (
 );
 
 /// Outfits on bodies of several shapes; every third is unseen.
-const SCENES: [SceneSpec; 9] = [
+const SCENES: [SceneSpec; 12] = [
     (
         "tshirt and trousers",
         &[("trousers", 0), ("tshirt", 1)],
@@ -49,8 +49,8 @@ const SCENES: [SceneSpec; 9] = [
         ScanPalette::Distinct,
     ),
     (
-        "tank and skirt",
-        &[("tank", 0), ("skirt", 1)],
+        "T-shirt and skirt",
+        &[("tshirt", 0), ("skirt", 1)],
         &[-0.5, 0.0, -1.0],
         ScanPalette::Distinct,
     ),
@@ -89,6 +89,24 @@ const SCENES: [SceneSpec; 9] = [
         &[("shorts", 0), ("hoodie", 1)],
         &[1.2, -1.0, 0.0],
         ScanPalette::Distinct,
+    ),
+    (
+        "long sleeves and skirt",
+        &[("longsleeve", 0), ("skirt", 1)],
+        &[0.3, 0.5, -1.0],
+        ScanPalette::Distinct,
+    ),
+    (
+        "dress on a tall woman",
+        &[("dress", 0)],
+        &[1.0, -0.5, -1.0],
+        ScanPalette::Distinct,
+    ),
+    (
+        "top and skirt of one colour",
+        &[("skirt", 0), ("tshirt", 1)],
+        &[-0.5, 1.0, -0.8],
+        ScanPalette::Uniform,
     ),
 ];
 

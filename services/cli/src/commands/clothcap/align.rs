@@ -33,7 +33,7 @@ fn align_all(args: &ClothcapAlignArgs) -> Result<()> {
             .with_context(|| format!("{}", file.display()))?;
         let mesh = PlyMesh {
             points: &aligned.surface,
-            faces: scans.template.mesh().faces(),
+            faces: aligner.cloth().template().mesh().faces(),
             ..PlyMesh::default()
         };
         write_ply(&args.out.join(format!("{name}.ply")), &mesh)?;

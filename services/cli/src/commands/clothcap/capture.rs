@@ -161,7 +161,8 @@ impl CaptureJob {
         out: &Path,
     ) -> Result<()> {
         let header = self.header.as_ref().context("no header")?;
-        let picture = stages(&scans.template, scan, frame, &header.outfit);
+        let capture = self.capture.as_ref().context("no capture")?;
+        let picture = stages(capture.cloth(), scan, frame, &header.outfit);
         write_png_rgb(&out.join(PICTURES).join(format!("{name}.png")), &picture)?;
         let record = FrameRecord {
             scan: name.to_owned(),

@@ -2,9 +2,10 @@
 
 use anyhow::{Context, Result};
 use std::path::Path;
-use tryon::body::{RestBody, Template};
+use tryon::body::{RestBody, SkinWeights};
 use tryon::clothcap::archive::CaptureHeader;
 use tryon::clothcap::picture::part_color;
+use tryon::clothcap::topology::ClothTemplate;
 use tryon::clothcap::{DressedPose, unpose};
 use tryon::formats::gltf::{
     GlbInterpolation, GlbJoint, GlbJointMotion, GlbMesh, GlbMorphMotion, GlbMorphTarget,
@@ -14,7 +15,7 @@ use tryon::math::{P3, P3d, V3};
 
 /// Dressed body in each frame of a motion.
 pub(super) struct DressedMotion<'a> {
-    pub(super) template: &'a Template,
+    pub(super) surface: &'a ClothTemplate,
     pub(super) header: &'a CaptureHeader,
     pub(super) body: &'a RestBody,
     pub(super) frames: &'a [DressedPose],
@@ -54,7 +55,7 @@ impl RestMesh {
 impl DressedMotion<'_> {
     /// Writes body and garments to one file.
     pub(super) fn write(&self, path: &Path) -> Result<()> {
-        let skeleton = self.template.skeleton();
+        let skeleton = self.surface.body().skeleton();
         let joints: Vec<GlbJoint<'_>> = skeleton
             .joints()
             .iter()
@@ -121,16 +122,22 @@ impl DressedMotion<'_> {
         write_skinned_glb(path, &glb).with_context(|| format!("{}", path.display()))
     }
 
+    /// Weights of all vertices of the clothed template, those of the body among them.
+    fn weights(&self) -> &SkinWeights {
+        self.surface.template().weights()
+    }
+
     fn skin_rows(&self, nodes: &[usize]) -> SkinRows {
-        let weights = self.template.weights();
+        let weights = self.weights();
         let joints = nodes.iter().map(|v| weights.joints[*v]).collect();
         (joints, nodes.iter().map(|v| weights.weights[*v]).collect())
     }
 
     fn rest_meshes(&self) -> Vec<RestMesh> {
-        let all: Vec<usize> = (0..self.template.mesh().vertices().len()).collect();
+        let body = self.surface.body().mesh();
+        let all: Vec<usize> = (0..body.vertices().len()).collect();
         let mut out = vec![self.rest_mesh("body".into(), all, |f| &f.body)];
-        out[0].faces = self.template.mesh().faces().to_vec();
+        out[0].faces = body.faces().to_vec();
         out[0].colors = vec![part_color(0); out[0].vertices.len()];
         let outfit = &self.header.outfit;
         for (k, part) in outfit.cloth.parts.iter().enumerate() {
@@ -149,14 +156,8 @@ impl DressedMotion<'_> {
         nodes: Vec<usize>,
         posed: impl Fn(&DressedPose) -> &Vec<P3>,
     ) -> RestMesh {
-        let rest = |f: &DressedPose| {
-            unpose(
-                self.template.weights(),
-                &f.bones,
-                nodes.iter().copied(),
-                posed(f),
-            )
-        };
+        let rest =
+            |f: &DressedPose| unpose(self.weights(), &f.bones, nodes.iter().copied(), posed(f));
         let mut frames = self.frames.iter().map(rest);
         let vertices = frames.next().unwrap_or_default();
         let change = |f: Vec<P3>| f.iter().zip(&vertices).map(|(a, b)| a - b).collect();

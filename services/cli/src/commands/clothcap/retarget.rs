@@ -63,7 +63,6 @@ fn retarget_all(args: &ClothcapRetargetArgs) -> Result<()> {
         header: &header,
         frames: &frames,
         dresser: BodyDresser::new(template.clone(), &header.outfit.cloth)?,
-        template: &template,
         bodies: bodies.len(),
         shown: Vec::new(),
     };
@@ -95,7 +94,6 @@ fn retarget_all(args: &ClothcapRetargetArgs) -> Result<()> {
 /// Bodies of one job.
 struct Batch<'a> {
     args: &'a ClothcapRetargetArgs,
-    template: &'a Arc<Template>,
     header: &'a CaptureHeader,
     frames: &'a CapturedFrames,
     dresser: BodyDresser<'a>,
@@ -126,7 +124,7 @@ impl Batch<'_> {
             dressed.push(frame.with_context(|| name.to_owned())?);
         }
         let motion = DressedMotion {
-            template: self.template,
+            surface: self.dresser.surface(),
             header: self.header,
             body,
             frames: &dressed,

@@ -44,7 +44,7 @@ fn segment_all(args: &ClothcapSegmentArgs) -> Result<()> {
     }
     bar.finish_and_clear();
     let labelling = first.context("no scan was segmented")?;
-    let cloth = MultiCloth::new(&scans.template, &labelling);
+    let cloth = MultiCloth::new(segmenter.cloth(), &labelling);
     let parts = parts(&labelling, &cloth);
     report::write(&args.out.join("labels.json"), &parts)?;
     println!(
