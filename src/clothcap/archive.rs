@@ -67,6 +67,11 @@ pub struct CaptureArchive {
 }
 
 impl CaptureArchive {
+    /// True for a folder that holds a capture.
+    pub fn is_in(folder: &Path) -> bool {
+        folder.join(HEADER).is_file()
+    }
+
     /// Opens or creates a folder.
     ///
     /// # Errors
@@ -174,19 +179,21 @@ impl CaptureArchive {
         write_json(&self.record_path(scan), record)
     }
 
-    /// Displacements of a scan with so many garments.
+    /// Displacements of a scan.
     ///
     /// # Errors
-    /// A missing or damaged array.
+    /// A missing or damaged array, or one with other vertices than the outfit.
     pub fn displacements(
         &self,
         scan: &str,
-        garments: usize,
+        header: &CaptureHeader,
     ) -> Result<FrameDisplacements, FormatError> {
-        let garment = |k| read_vectors(&self.array_path(scan, &format!("garment{k}")));
+        let read = |name: &str, count| read_vectors(&self.array_path(scan, name), count);
+        let parts = header.outfit.cloth.parts.iter().enumerate();
+        let garments = parts.map(|(k, part)| read(&format!("garment{k}"), part.nodes.len()));
         Ok(FrameDisplacements {
-            body: read_vectors(&self.array_path(scan, "body"))?,
-            garments: (0..garments).map(garment).collect::<Result<_, _>>()?,
+            body: read("body", header.clothed.rest.len())?,
+            garments: garments.collect::<Result<_, _>>()?,
         })
     }
 }
@@ -196,10 +203,11 @@ fn write_vectors(path: &Path, vectors: &[V3]) -> Result<(), FormatError> {
     write_npy(path, &[vectors.len() as u64, 3], flat.into_iter())
 }
 
-fn read_vectors(path: &Path) -> Result<Vec<V3>, FormatError> {
+/// Reads so many vectors.
+fn read_vectors(path: &Path, count: usize) -> Result<Vec<V3>, FormatError> {
     let (shape, flat) = read_npy(path)?;
-    if shape.len() != 2 || shape[1] != 3 {
-        let why = format!("{shape:?}, expected [vertices, 3]");
+    if shape != [count as u64, 3] {
+        let why = format!("{shape:?}, expected [{count}, 3]");
         return Err(FormatError::field(path, "shape", why));
     }
     if let Some(at) = flat.iter().position(|v| !v.is_finite()) {

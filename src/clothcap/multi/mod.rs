@@ -2,6 +2,7 @@
 
 mod part;
 mod part_fit;
+mod trim;
 
 pub use part::{ClothPart, MultiCloth, Ring};
 pub use part_fit::{PartFit, PartFitConfig, PartFitReport, PartScan};

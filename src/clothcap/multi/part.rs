@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Least number of faces of a piece; smaller ones are errors of the labels.
-const LEAST_FACES: usize = 40;
+pub(super) const LEAST_FACES: usize = 40;
 /// Least number of vertices of a ring that gets a name; smaller ones are holes.
 const LEAST_RING: usize = 12;
 
@@ -102,7 +102,7 @@ impl ClothPart {
             .filter(|f| f.iter().filter(|v| within(**v)).count() >= 2)
             .copied()
             .collect();
-        drop_small_pieces(&mut faces);
+        drop_small_pieces(&mut faces, LEAST_FACES);
         drop_fans(&mut faces);
         if faces.len() < LEAST_FACES {
             return None;
@@ -147,8 +147,8 @@ impl ClothPart {
     }
 }
 
-/// Leaves out connected pieces with few faces.
-fn drop_small_pieces(faces: &mut Vec<Face>) {
+/// Leaves out connected pieces with fewer than `least` faces.
+pub(super) fn drop_small_pieces(faces: &mut Vec<Face>, least: usize) {
     let mut parent: BTreeMap<u32, u32> = BTreeMap::new();
     fn root(parent: &mut BTreeMap<u32, u32>, v: u32) -> u32 {
         let mut r = v;
@@ -170,12 +170,12 @@ fn drop_small_pieces(faces: &mut Vec<Face>) {
     roots
         .iter()
         .for_each(|r| *sizes.entry(*r).or_default() += 1);
-    let mut keep = roots.iter().map(|r| sizes[r] >= LEAST_FACES);
+    let mut keep = roots.iter().map(|r| sizes[r] >= least);
     faces.retain(|_| keep.next().unwrap_or(false));
 }
 
 /// Leaves out faces at vertices where two fans of faces meet, so that every boundary vertex lies on one ring once.
-fn drop_fans(faces: &mut Vec<Face>) {
+pub(super) fn drop_fans(faces: &mut Vec<Face>) {
     loop {
         let mut out: BTreeMap<u32, usize> = BTreeMap::new();
         for [a, _] in boundary_edges(faces) {
@@ -194,7 +194,7 @@ fn drop_fans(faces: &mut Vec<Face>) {
 }
 
 /// Directed edges with one face.
-fn boundary_edges(faces: &[Face]) -> Vec<[u32; 2]> {
+pub(super) fn boundary_edges(faces: &[Face]) -> Vec<[u32; 2]> {
     let all: BTreeSet<[u32; 2]> = faces.iter().flat_map(sides).collect();
     let open = |e: &&[u32; 2]| !all.contains(&[e[1], e[0]]);
     all.iter().filter(open).copied().collect()

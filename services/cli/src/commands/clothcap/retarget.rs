@@ -170,15 +170,13 @@ fn read_frames(
         poses: Vec::new(),
         displacements: Vec::new(),
     };
-    let garments = header.outfit.cloth.parts.len();
     for scan in &header.scans {
         let Some(record) = archive.record(scan, template)? else {
             continue;
         };
         out.seconds.push(out.poses.len() as f64 / RATE);
         out.poses.push(record.body.pose);
-        out.displacements
-            .push(archive.displacements(scan, garments)?);
+        out.displacements.push(archive.displacements(scan, header)?);
     }
     ensure!(!out.poses.is_empty(), "the capture has no finished scan");
     Ok(out)
