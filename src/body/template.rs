@@ -1,8 +1,10 @@
 //! The body template: mesh, skeleton, weights and shape space of one body.
 
 use super::parts::BodyParts;
-use super::{BodyError, ShapeSpace, Skeleton, SkinWeights};
+use super::{BodyError, Joint, ShapeSpace, Skeleton, SkinWeights};
+use crate::math::P3;
 use crate::mesh::{Topology, TriMesh};
+use nalgebra::Point3;
 
 /// A rigged body in its rest pose: y up, facing +z, metres. Immutable; share it by `Arc`.
 #[derive(Clone, Debug)]
@@ -82,6 +84,30 @@ impl Template {
             weights,
             shape_space,
         })
+    }
+    /// One body as a template of its own, without shape space: vertices of shape `[vertices]` and joints of shape `[joints]`
+    /// of its rest pose, metres.
+    ///
+    /// # Errors
+    /// As [`Template::new`].
+    pub fn at_rest(
+        &self,
+        name: &str,
+        vertices: Vec<P3>,
+        joints: &[Point3<f64>],
+    ) -> Result<Self, BodyError> {
+        let moved = self.skeleton.joints().iter().zip(joints);
+        let moved = moved.map(|(joint, rest)| Joint {
+            rest: *rest,
+            ..joint.clone()
+        });
+        Self::new(
+            name,
+            self.mesh.with_vertices(vertices)?,
+            Skeleton::new(moved.collect())?,
+            self.weights.clone(),
+            None,
+        )
     }
     /// Name.
     pub fn name(&self) -> &str {

@@ -3,9 +3,7 @@
 use super::error::MeshGarmentError;
 use super::file_frame::{FileFrame, bounds};
 use super::skin_binding::skin_normals;
-use crate::body::{
-    BodyError, BodyShape, BoneTransforms, Joint, Pose, RestBody, Skeleton, Template, skin,
-};
+use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use crate::math::{Body, P3, Rigid, V3, World, log_so3};
 use crate::par::Par;
 use crate::spatial::PointTree;
@@ -68,21 +66,7 @@ pub(super) fn guess(
         return Err(MeshGarmentError::NotFound(why.into()));
     }
     let (vertices, bones) = fit.stand(&q);
-    let joints = template.skeleton().joints().iter().zip(&bones.joints);
-    let joints = joints
-        .map(|(joint, rest)| Joint {
-            rest: *rest,
-            ..joint.clone()
-        })
-        .collect();
-    let mesh = template.mesh().with_vertices(vertices);
-    let made = Template::new(
-        "guessed",
-        mesh.map_err(BodyError::Mesh)?,
-        Skeleton::new(joints)?,
-        template.weights().clone(),
-        None,
-    )?;
+    let made = template.at_rest("guessed", vertices, &bones.joints)?;
     Ok((Arc::new(made), fit.frame(&q)))
 }
 

@@ -111,8 +111,13 @@ impl SectionStack {
             .or_else(|| self.sections.iter().flatten().copied().next())
             .unwrap_or_default()
     }
+    /// True for a height between the lowest and the highest cross-section, metres.
+    pub(super) fn covers(&self, y: f32) -> bool {
+        let height = self.sections.len().saturating_sub(1) as f32 * SPACING;
+        !self.sections.is_empty() && (self.bottom..=self.bottom + height).contains(&y)
+    }
     /// Height in `range` (m) at which `key` of the cross-section is smallest.
-    fn argmin(&self, range: Range<f32>, key: impl Fn(&CrossSection) -> f32) -> f32 {
+    pub(super) fn argmin(&self, range: Range<f32>, key: impl Fn(&CrossSection) -> f32) -> f32 {
         let n = ((range.end - range.start) / SPACING).max(0.0) as usize;
         (0..=n)
             .map(|i| range.start + i as f32 * SPACING)

@@ -32,6 +32,7 @@ mod drape;
 mod dress;
 mod error;
 mod file_frame;
+mod finished;
 mod fit_map;
 mod hood;
 mod mesh_garment;
@@ -51,13 +52,11 @@ mod waistband;
 pub use crate::cloth::{AnchorBinding, Outfit};
 pub use dress::{Dressed, dress, dress_all};
 pub use error::{DressError, MeshGarmentError};
+pub use finished::{FinishedGarment, HangsFrom, Hem};
 pub use fit_map::{FIT_COLORS, FitMap, FitProbe, RegionFit, VertexFit};
 pub use mesh_garment::MeshGarment;
 pub use options::{DressMs, DressOptions, DressReport};
 pub use rig_standing::rig_standing;
 pub use sew::GarmentSource;
 pub use source_body::SourceBody;
-pub use suggest::{
-    FitClass, GirthEase, Misfit, Suggestion, assess, check_wearable, girth_eases, hem_height,
-    suggest,
-};
+pub use suggest::{FitClass, GirthEase, Misfit, Suggestion, assess, check_wearable, suggest};

@@ -2,13 +2,14 @@
 
 use super::body_sections::BodySections;
 use super::error::DressError;
+use super::finished::FinishedGarment;
 use super::mesh_garment::MeshGarment;
 use super::options::DressOptions;
 use super::place::place;
 use super::suggest::check_wearable;
 use crate::body::Template;
 use crate::body::measure::Measurements;
-use crate::garment::{AnchorKind, GarmentMesh, Pattern, Triangulation};
+use crate::garment::{AnchorKind, GarmentMesh, Pattern, Size, Triangulation, library};
 use crate::math::P3;
 
 /// Edge length of the mesh that is draped first over that of the garment: four times fewer vertices.
@@ -74,6 +75,9 @@ impl Sewing<'_> {
             match garment {
                 GarmentSource::Pattern(p) => sheets.push(self.sew_pattern(p)?),
                 GarmentSource::Mesh(m) => {
+                    if let Some(finished) = m.finished() {
+                        self.check(&finished, |s| m.finished_in(s))?;
+                    }
                     sheets.extend(m.retargeted(self.template, self.sections).into_iter().map(
                         |(garment, positions)| PlacedSheet {
                             garment,
@@ -87,10 +91,22 @@ impl Sewing<'_> {
         sheets.sort_by_key(|s| !s.is_rigid());
         Ok(sheets)
     }
+    /// Checks that the body can wear a garment, where that is asked for.
+    fn check(
+        &self,
+        garment: &FinishedGarment,
+        of_size: impl Fn(Size) -> Option<FinishedGarment>,
+    ) -> Result<(), DressError> {
+        let measures = self.measures.filter(|_| !self.options.any_size);
+        let checked = measures.map(|m| check_wearable(garment, of_size, m));
+        Ok(checked.unwrap_or(Ok(()))?)
+    }
     fn sew_pattern(&self, pattern: &Pattern) -> Result<PlacedSheet, DressError> {
-        if let Some(m) = self.measures.filter(|_| !self.options.any_size) {
-            check_wearable(pattern, m)?;
-        }
+        let of_size = |s| {
+            let other = library::pattern(&pattern.name, s).ok()?;
+            Some(FinishedGarment::from(&other))
+        };
+        self.check(&FinishedGarment::from(pattern), of_size)?;
         let fine = &self.options.triangulation;
         // Slim triangles are allowed: nothing is simulated on this mesh later.
         let coarse = GarmentMesh::sew(

@@ -24,6 +24,8 @@ pub struct SourceBody {
     /// All vertices of its file, in the file's unit: MakeHuman's clothes are bound to helpers beyond the skin too.
     pub(super) file: Vec<P3>,
     frame: FileFrame,
+    /// False for a guess: a guess has no size.
+    pub(super) is_known: bool,
     /// Its origin in words, for people.
     pub description: String,
 }
@@ -46,6 +48,7 @@ impl SourceBody {
                 template: Arc::new(template),
                 file,
                 frame: FileFrame::METRES,
+                is_known: true,
                 description: name,
             });
         }
@@ -68,6 +71,7 @@ impl SourceBody {
             template: Arc::new(template),
             file: mesh.vertices().to_vec(),
             frame,
+            is_known: true,
             description: format!("{name}, skeleton found within {:.0} mm", fit * 1e3),
         })
     }
@@ -88,8 +92,19 @@ impl SourceBody {
             template,
             file: Vec::new(),
             frame,
+            is_known: false,
             description,
         })
+    }
+    /// A body in its rest pose: a template that stands upright, y up, metres.
+    pub fn of_template(template: Arc<Template>) -> Self {
+        Self {
+            file: template.mesh().vertices().to_vec(),
+            frame: FileFrame::METRES,
+            is_known: true,
+            description: template.name().to_owned(),
+            template,
+        }
     }
     /// The same body under a garment whose file has a unit and place of its own.
     pub(super) fn under(self, garment: &[P3]) -> Self {

@@ -1,7 +1,8 @@
 //! Size choice: ease of each size on a measured body, with its reason in words.
 
+use super::finished::FinishedGarment;
 use crate::body::measure::Measurements;
-use crate::garment::{GarmentError, GarmentKind, Pattern, Placement, Size, library};
+use crate::garment::{GarmentError, GarmentKind, Size, library};
 
 /// Class of the fit at one place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -54,36 +55,30 @@ pub struct Suggestion {
     pub reason: String,
 }
 
-/// Least ease at chest, waist and hip, metres: a waistband needs none, it sits lower on a fuller body.
-const LEAST: [f64; 3] = [0.04, -0.03, 0.02];
-/// Ease beyond [`LEAST`] from which a place counts as loose, metres: two sizes of the table.
+/// Ease beyond the least from which a place counts as loose, metres: two sizes of the table.
 const LOOSE: f64 = 0.14;
-/// Height of the high point of the shoulder over stature: cervicale height 1.521 m at 1.756 m (ANSUR II, men; women's
-/// 0.864), a finger below.
-const SHOULDER_POINT: f64 = 0.862;
-/// Height of the natural waist over stature (ANSUR II: waist height, natural indentation, 1.08 m at 1.756 m).
-const WAIST_HEIGHT: f64 = 0.62;
 /// Height of the middle of the knee over stature (ANSUR II: 0.49 m at 1.756 m).
 const KNEE_HEIGHT: f64 = 0.279;
-/// Crotch of trousers below the body's, metres.
-pub(super) const CROTCH_CLEARANCE: f64 = 0.012;
-/// Height of the crotch point of trousers without an inseam, panel coordinates, metres.
-pub(super) const DEFAULT_RISE: f64 = -0.29;
 /// Hem height from which trousers are shorts, metres.
 const SHORTS: f64 = 0.25;
 
-/// Ease at chest, waist and hip of a pattern on a body, where the pattern has a girth.
-pub fn girth_eases(pattern: &Pattern, body: &Measurements) -> Vec<GirthEase> {
-    let girths = [body.chest, body.natural_waist, body.hip];
+/// Girths of a body at chest, waist and hip, metres.
+pub(super) fn body_girths(body: &Measurements) -> [f64; 3] {
+    [body.chest, body.natural_waist, body.hip]
+}
+
+/// Ease at chest, waist and hip of a garment on a body, where the garment has a girth.
+fn girth_eases(garment: &FinishedGarment, body: &Measurements) -> Vec<GirthEase> {
+    let girths = body_girths(body);
     (0..3)
-        .filter(|&k| pattern.finished[k] > 0.0)
+        .filter(|&k| garment.girths[k] > 0.0)
         .map(|k| {
-            let spare = pattern.finished[k] - girths[k] - LEAST[k];
+            let spare = garment.girths[k] - girths[k] - garment.least_ease[k];
             GirthEase {
                 place: ["chest", "waist", "hip"][k],
                 body: girths[k],
-                garment: pattern.finished[k],
-                least_ease: LEAST[k],
+                garment: garment.girths[k],
+                least_ease: garment.least_ease[k],
                 fit: if spare < 0.0 {
                     FitClass::Tight
                 } else if spare > LOOSE {
@@ -96,62 +91,29 @@ pub fn girth_eases(pattern: &Pattern, body: &Measurements) -> Vec<GirthEase> {
         .collect()
 }
 
-/// Height of the lowest hem of a pattern on a body, metres above the floor.
-pub fn hem_height(pattern: &Pattern, body: &Measurements) -> f64 {
-    let lowest = |wanted: &dyn Fn(Placement) -> bool| {
-        let panels = pattern.panels.iter().filter(|p| wanted(p.placement));
-        panels
-            .flat_map(|p| p.edges.iter().map(|e| e.from[1]))
-            .reduce(f64::min)
-    };
-    let trunk = lowest(&|p| matches!(p, Placement::TrunkFront | Placement::TrunkBack));
-    let skirt = lowest(&|p| matches!(p, Placement::SkirtFront | Placement::SkirtBack));
-    let leg = lowest(&|p| matches!(p, Placement::LegFront(_) | Placement::LegBack(_)));
-    let from_shoulder = SHOULDER_POINT * body.stature;
-    match (trunk, skirt, leg) {
-        (Some(t), Some(s), _) => from_shoulder + t + s,
-        (Some(t), None, _) => from_shoulder + t,
-        (None, Some(s), _) => WAIST_HEIGHT * body.stature + s,
-        (None, None, Some(l)) => {
-            // The inner corner of the crotch is the highest point of the inseam.
-            let crotch = pattern
-                .panels
-                .iter()
-                .filter_map(|p| {
-                    p.edge("inseam")
-                        .map(|i| p.edges[i].from[1].max(p.end(i)[1]))
-                })
-                .fold(f64::MIN, f64::max);
-            body.inseam - CROTCH_CLEARANCE + l
-                - if crotch > f64::MIN {
-                    crotch
-                } else {
-                    DEFAULT_RISE
-                }
-        }
-        (None, None, None) => 0.0,
-    }
-    .max(0.0)
-}
-
-/// The smallest size with enough ease everywhere; the largest when none has.
+/// The smallest size of a garment of the library with enough ease everywhere; the largest when none has.
 ///
 /// # Errors
 /// Unknown garment.
 pub fn suggest(garment: &str, body: &Measurements) -> Result<Suggestion, GarmentError> {
-    let mut last = None;
-    for size in Size::ALL {
-        let p = library::pattern(garment, size)?;
-        let s = assess(&p, body);
-        let fits = s.girths.iter().all(|r| r.fit != FitClass::Tight);
-        if fits {
-            return Ok(s);
-        }
-        last = Some(s);
-    }
-    let mut s = last.ok_or_else(|| GarmentError::UnknownSize(garment.to_owned()))?;
-    s.reason.push_str(" (our largest; it will be tight)");
-    Ok(s)
+    let of_size = |s| library::pattern(garment, s).map(|p| FinishedGarment::from(&p));
+    let sizes = Size::ALL.into_iter().map(of_size);
+    let sizes = sizes.collect::<Result<Vec<_>, _>>()?;
+    first_with_ease(&sizes, body).ok_or_else(|| GarmentError::UnknownSize(garment.to_owned()))
+}
+
+/// The first of some sizes, smallest first, with enough ease everywhere; the last when none has, `None` without sizes.
+pub(super) fn first_with_ease(
+    sizes: &[FinishedGarment],
+    body: &Measurements,
+) -> Option<Suggestion> {
+    let is_worn = |s: &Suggestion| s.girths.iter().all(|r| r.fit != FitClass::Tight);
+    let mut assessed = sizes.iter().map(|g| assess(g, body));
+    assessed.find(is_worn).or_else(|| {
+        let mut last = assess(sizes.last()?, body);
+        last.reason.push_str(" (our largest; it will be tight)");
+        Some(last)
+    })
 }
 
 /// A size that cannot be worn, with the nearest one that can.
@@ -207,26 +169,29 @@ fn advice(better: Option<Size>) -> String {
 /// Girth that a waistband may lack, metres: it sits lower, or its button moves.
 const SITS_LOWER: f64 = 0.03;
 
-/// Checks that a body can wear a pattern: it closes with the stretch of its fabric, and is held up.
+/// Checks that a body can wear a garment: it closes with the stretch of its fabric, and is held up. `of_size` gives its
+/// other sizes.
 ///
 /// # Errors
-/// The missing girth, and the nearest size of the library that can be worn.
-pub fn check_wearable(pattern: &Pattern, body: &Measurements) -> Result<(), Misfit> {
-    let fault = misfit(pattern, body);
+/// The missing girth, and the nearest size that can be worn.
+pub fn check_wearable(
+    garment: &FinishedGarment,
+    of_size: impl Fn(Size) -> Option<FinishedGarment>,
+    body: &Measurements,
+) -> Result<(), Misfit> {
+    let fault = misfit(garment, body);
     fault.map_or(Ok(()), |mut m| {
-        let wears = |s: &Size| {
-            library::pattern(&pattern.name, *s).is_ok_and(|p| misfit(&p, body).is_none())
-        };
+        let wears = |s: &Size| of_size(*s).is_some_and(|g| misfit(&g, body).is_none());
         // The nearest in the direction that is least_ease.
         let found = match m {
             Misfit::TooSmall { .. } => Size::ALL
                 .into_iter()
-                .filter(|s| *s > pattern.size)
+                .filter(|s| *s > garment.size)
                 .find(wears),
             Misfit::TooLarge { .. } => Size::ALL
                 .into_iter()
                 .rev()
-                .filter(|s| *s < pattern.size)
+                .filter(|s| *s < garment.size)
                 .find(wears),
         };
         let (Misfit::TooSmall { better, .. } | Misfit::TooLarge { better, .. }) = &mut m;
@@ -235,13 +200,13 @@ pub fn check_wearable(pattern: &Pattern, body: &Measurements) -> Result<(), Misf
     })
 }
 
-fn misfit(pattern: &Pattern, body: &Measurements) -> Option<Misfit> {
-    let (garment, size) = (pattern.name.clone(), pattern.size);
-    let held = matches!(pattern.kind, GarmentKind::Skirt | GarmentKind::Trousers);
-    let tightest = girth_eases(pattern, body)
+fn misfit(finished: &FinishedGarment, body: &Measurements) -> Option<Misfit> {
+    let (garment, size) = (finished.name.clone(), finished.size);
+    let held = matches!(finished.kind, GarmentKind::Skirt | GarmentKind::Trousers);
+    let tightest = girth_eases(finished, body)
         .into_iter()
         .map(|r| {
-            let gives = r.garment * pattern.material.comfortable_strain();
+            let gives = r.garment * finished.material.comfortable_strain();
             let lower = if held && r.place == "waist" {
                 SITS_LOWER
             } else {
@@ -252,7 +217,7 @@ fn misfit(pattern: &Pattern, body: &Measurements) -> Option<Misfit> {
         .filter(|(lacks, ..)| *lacks > 0.0)
         .max_by(|a, b| a.0.total_cmp(&b.0));
     if let Some((lacks, gives, r)) = tightest {
-        let fabric = pattern.material.name.clone();
+        let fabric = finished.material.name.clone();
         let (body, girth) = (r.body, r.garment);
         return Some(Misfit::TooSmall {
             garment,
@@ -266,7 +231,7 @@ fn misfit(pattern: &Pattern, body: &Measurements) -> Option<Misfit> {
             better: None,
         });
     }
-    let (body, girth) = (body.hip, pattern.finished[1]);
+    let (body, girth) = (body.hip, finished.girths[1]);
     (held && girth > body).then_some(Misfit::TooLarge {
         garment,
         size,
@@ -276,13 +241,13 @@ fn misfit(pattern: &Pattern, body: &Measurements) -> Option<Misfit> {
     })
 }
 
-/// Fit of one pattern on a body, in numbers and in a sentence.
-pub fn assess(pattern: &Pattern, body: &Measurements) -> Suggestion {
-    let girths = girth_eases(pattern, body);
-    let body_girths = [body.chest, body.natural_waist, body.hip];
+/// Fit of a garment on a body, in numbers and in a sentence.
+pub fn assess(garment: &FinishedGarment, body: &Measurements) -> Suggestion {
+    let girths = girth_eases(garment, body);
+    let girths_below = body_girths(body);
     let ease: [f64; 3] = std::array::from_fn(|k| {
-        if pattern.finished[k] > 0.0 {
-            pattern.finished[k] - body_girths[k]
+        if garment.girths[k] > 0.0 {
+            garment.girths[k] - girths_below[k]
         } else {
             f64::NAN
         }
@@ -290,14 +255,14 @@ pub fn assess(pattern: &Pattern, body: &Measurements) -> Suggestion {
     let tightest = girths
         .iter()
         .min_by(|a, b| (a.ease() - a.least_ease).total_cmp(&(b.ease() - b.least_ease)));
-    let (what, leaves) = match pattern.kind {
+    let (what, leaves) = match garment.kind {
         GarmentKind::Top => ("top", "leaves"),
         GarmentKind::Skirt => ("skirt", "leaves"),
         GarmentKind::Trousers => ("trousers", "leave"),
         GarmentKind::Dress => ("dress", "leaves"),
     };
-    let hem = hem_height(pattern, body);
-    let length = match pattern.kind {
+    let hem = garment.hem.map_or(0.0, |hem| hem.height(body));
+    let length = match garment.kind {
         GarmentKind::Top => (hem - body.inseam, "the crotch"),
         GarmentKind::Skirt | GarmentKind::Dress => (hem - KNEE_HEIGHT * body.stature, "the knee"),
         GarmentKind::Trousers if hem > SHORTS => (hem - KNEE_HEIGHT * body.stature, "the knee"),
@@ -312,14 +277,14 @@ pub fn assess(pattern: &Pattern, body: &Measurements) -> Suggestion {
         )
     });
     Suggestion {
-        size: pattern.size,
+        size: garment.size,
         ease,
         girths,
         hem,
         length,
         reason: format!(
             "{}: {ease_text}the hem ends {}",
-            pattern.size,
+            garment.size,
             relative(length.0, length.1)
         ),
     }
@@ -350,6 +315,11 @@ mod tests {
             inseam: 0.80,
             ..Measurements::default()
         }
+    }
+
+    fn cut(garment: &str, size: Size) -> Option<FinishedGarment> {
+        let pattern = library::pattern(garment, size).ok()?;
+        Some(FinishedGarment::from(&pattern))
     }
 
     #[test]
@@ -383,9 +353,9 @@ mod tests {
 
     #[test]
     fn ease_is_the_difference_of_girths_and_classes_follow_it() {
-        let p = library::pattern("tshirt", Size::M).expect("pattern");
+        let p = cut("tshirt", Size::M).expect("a size");
         let s = assess(&p, &body(1.0));
-        assert!((s.ease[0] - (p.finished[0] - 0.88)).abs() < 1e-12 && s.ease[1].is_nan());
+        assert!((s.ease[0] - (p.girths[0] - 0.88)).abs() < 1e-12 && s.ease[1].is_nan());
         let fit = |g: f64| assess(&p, &body(g)).girths[0].fit;
         assert_eq!(
             [fit(1.3), fit(1.1), fit(0.8)],
@@ -395,14 +365,16 @@ mod tests {
 
     #[test]
     fn sizes_that_cannot_be_closed_or_held_up_are_refused_with_the_missing_girth() {
-        let p = library::pattern("tshirt", Size::S).expect("pattern");
+        let wearable =
+            |g: &FinishedGarment, b: &Measurements| check_wearable(g, |s| cut(&g.name, s), b);
+        let p = cut("tshirt", Size::S).expect("a size");
         let give = p.material.comfortable_strain();
         let mut b = body(1.0);
         b.hip = 0.5;
-        b.chest = p.finished[0] * (1.0 + give) - 0.001;
-        assert_eq!(check_wearable(&p, &b), Ok(()), "worn tight");
+        b.chest = p.girths[0] * (1.0 + give) - 0.001;
+        assert_eq!(wearable(&p, &b), Ok(()), "worn tight");
         b.chest += 0.0505;
-        let e = check_wearable(&p, &b).expect_err("too small");
+        let e = wearable(&p, &b).expect_err("too small");
         let text = e.to_string();
         assert!(
             text.contains("tshirt S cannot be closed: at the chest it lacks 5 cm")
@@ -410,17 +382,12 @@ mod tests {
             "{text}"
         );
         // A waistband closes with less than its hips, and slides off if it is wider than these.
-        let skirt = library::pattern("skirt", Size::Xl).expect("pattern");
+        let skirt = cut("skirt", Size::Xl).expect("a size");
         let slim = body(0.9);
-        let e = check_wearable(&skirt, &slim)
-            .expect_err("too large")
-            .to_string();
+        let e = wearable(&skirt, &slim).expect_err("too large").to_string();
         assert!(e.contains("slide off") && e.contains("can be worn"), "{e}");
-        let none = check_wearable(
-            &library::pattern("skirt", Size::Xxl).expect("pattern"),
-            &body(2.0),
-        )
-        .expect_err("too small");
+        let skirt = cut("skirt", Size::Xxl).expect("a size");
+        let none = wearable(&skirt, &body(2.0)).expect_err("too small");
         assert!(none.to_string().contains("no size"), "{none}");
         // A knit gives more than denim.
         let give = |n: &str| {
@@ -433,11 +400,12 @@ mod tests {
 
     #[test]
     fn hems_follow_legs_and_stature() {
-        let trousers = library::pattern("trousers", Size::M).expect("pattern");
+        let trousers = cut("trousers", Size::M).expect("a size");
+        let height = |b: &Measurements| trousers.hem.expect("a hem").height(b);
         let mut b = body(1.0);
-        let low = hem_height(&trousers, &b);
+        let low = height(&b);
         b.inseam += 0.05;
-        assert!((hem_height(&trousers, &b) - low - 0.05).abs() < 1e-12);
+        assert!((height(&b) - low - 0.05).abs() < 1e-12);
         assert!(assess(&trousers, &b).reason.contains("the floor"));
     }
 }

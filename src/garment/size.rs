@@ -128,9 +128,46 @@ pub fn size_table() -> [SizeRow; 6] {
     })
 }
 
+impl Size {
+    /// Row of the size table.
+    pub fn row(self) -> SizeRow {
+        size_table()[self as usize]
+    }
+
+    /// Size whose body is nearest: girths of chest, waist and hip, metres; `None` where a girth does not count.
+    pub fn nearest(girths: [Option<f64>; 3]) -> Self {
+        let off = |s: &Self| -> f64 {
+            let of_size = s.row().body.girths();
+            let both = girths.iter().zip(of_size);
+            both.filter_map(|(g, of)| Some((g.as_ref()? - of).powi(2)))
+                .sum()
+        };
+        let nearest = |a: &Self, b: &Self| off(a).total_cmp(&off(b));
+        Self::ALL.into_iter().min_by(nearest).unwrap_or_default()
+    }
+}
+
+impl BodyMeasures {
+    /// Girths of chest, waist and hip, metres.
+    pub fn girths(&self) -> [f64; 3] {
+        [self.chest, self.waist, self.hip]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bodies_of_the_table_have_their_own_size_by_any_of_their_girths() {
+        for row in size_table() {
+            let [chest, waist, hip] = row.body.girths().map(Some);
+            assert_eq!(Size::nearest([chest, waist, hip]), row.size);
+            assert_eq!(Size::nearest([chest, None, None]), row.size);
+            assert_eq!(Size::nearest([None, waist, hip]), row.size);
+        }
+        assert_eq!(Size::nearest([Some(3.0), None, None]), Size::Xxl);
+    }
 
     #[test]
     fn sizes_grow_and_parse() {

@@ -5,7 +5,7 @@ use super::choice::Choice;
 use super::clock::{FrameClock, LongGap};
 use super::error::MirrorError;
 use super::outfit::{DressedOutfit, Subject};
-use super::picture::{CameraGarments, DrawnBody, DrawnSurface, library_appearance};
+use super::picture::{CameraGarments, DrawnBody, DrawnSurface};
 use super::report::{MirrorFrame, StageTimer};
 use crate::body::measure::measure;
 use crate::body::{BodyShape, Pose, Template};
@@ -153,10 +153,15 @@ impl Mirror {
             world_from_camera,
         };
         let outfit = DressedOutfit::put_on(&subject, sized, false).map_err(MirrorError::Dress)?;
-        let garments = &outfit.model.outfit.garments;
-        let appearances = garments
-            .iter()
-            .map(|g| library_appearance(&g.name))
+        let appearance = |k: usize| {
+            let source = outfit.source(k).map(|s| &outfit.worn()[s]);
+            source.map_or_else(Appearance::default, |garment| Appearance {
+                base: garment.color(),
+                ..Appearance::default()
+            })
+        };
+        let appearances = (0..outfit.model.outfit.garments.len())
+            .map(appearance)
             .collect();
         Ok(Worn {
             outfit,

@@ -1,7 +1,7 @@
 //! Garments chosen for a person and the size in which each is worn.
 
 use crate::body::measure::Measurements;
-use crate::dressing::{GarmentSource, MeshGarment, suggest};
+use crate::dressing::{FinishedGarment, GarmentSource, MeshGarment, suggest};
 use crate::garment::{GarmentError, Pattern, Size, library};
 use std::sync::Arc;
 
@@ -18,7 +18,12 @@ pub enum Choice {
     /// Pattern in the size it was drawn in.
     Pattern(Box<Pattern>),
     /// Mesh made on another body.
-    Mesh(Arc<MeshGarment>),
+    Mesh {
+        /// Garment.
+        garment: Arc<MeshGarment>,
+        /// Size; `None` for the suggested one. A garment in one size is made to measure.
+        size: Option<Size>,
+    },
 }
 
 impl Choice {
@@ -34,6 +39,14 @@ impl Choice {
         })
     }
 
+    /// Mesh garment; a size is ignored by a garment in one size.
+    pub fn mesh(garment: MeshGarment, size: Option<Size>) -> Self {
+        Self::Mesh {
+            garment: Arc::new(garment),
+            size,
+        }
+    }
+
     /// The garment in the size in which this body wears it.
     ///
     /// # Errors
@@ -45,12 +58,7 @@ impl Choice {
         };
         Ok(match self {
             Self::Pattern(pattern) => cut(pattern.clone(), Vec::new()),
-            Self::Mesh(mesh) => SizedGarment {
-                item: WornItem::Mesh(Arc::clone(mesh)),
-                notes: (mesh.notes.iter())
-                    .map(|n| format!("{}: {n}", mesh.name))
-                    .collect(),
-            },
+            Self::Mesh { garment, size } => sized_mesh(garment, *size, body),
             Self::Library {
                 name,
                 size: Some(size),
@@ -61,6 +69,26 @@ impl Choice {
                 cut(Box::new(library::pattern(name, found.size)?), vec![note])
             }
         })
+    }
+}
+
+/// A mesh garment in a size, the suggested one without; made to measure where it comes in one size.
+fn sized_mesh(garment: &Arc<MeshGarment>, size: Option<Size>, body: &Measurements) -> SizedGarment {
+    let name = &garment.name;
+    let mut notes: Vec<String> = garment
+        .notes
+        .iter()
+        .map(|n| format!("{name}: {n}"))
+        .collect();
+    let suggested = garment.suggest(body).filter(|_| size.is_none());
+    if let Some(found) = &suggested {
+        notes.push(format!("{name}: {} ({})", found.size, found.reason));
+    }
+    let size = size.or(suggested.map(|s| s.size));
+    let sized = size.and_then(|s| garment.in_size(s)).map(Arc::new);
+    SizedGarment {
+        item: WornItem::Mesh(sized.unwrap_or_else(|| Arc::clone(garment))),
+        notes,
     }
 }
 
@@ -93,6 +121,23 @@ impl SizedGarment {
             WornItem::Pattern(p) => Some(p),
             WornItem::Mesh(_) => None,
         }
+    }
+
+    /// Measures in its size; `None` for a mesh that is made to measure.
+    pub fn finished(&self) -> Option<FinishedGarment> {
+        match &self.item {
+            WornItem::Pattern(p) => Some(FinishedGarment::from(&**p)),
+            WornItem::Mesh(m) => m.finished(),
+        }
+    }
+
+    /// Colour unless another is chosen, sRGB: its own, or the library's for its name.
+    pub fn color(&self) -> [u8; 3] {
+        let own = match &self.item {
+            WornItem::Pattern(_) => None,
+            WornItem::Mesh(m) => m.color,
+        };
+        own.unwrap_or_else(|| library::dye(self.name()))
     }
 
     pub(super) fn wear(&self) -> GarmentSource<'_> {

@@ -24,6 +24,7 @@
 //! ```
 
 mod body;
+mod captured;
 mod chain;
 mod choice;
 mod clock;
@@ -34,6 +35,7 @@ mod report;
 mod wear;
 
 pub use body::PosedBody;
+pub use captured::CapturedWardrobe;
 pub use chain::Mirror;
 pub use choice::{Choice, SizedGarment};
 pub use clock::{FrameClock, LongGap};

@@ -3,6 +3,7 @@
 #![allow(clippy::print_stdout)] // and say what they measured
 
 mod bending;
+mod captured_garments;
 mod cloth;
 mod common;
 mod company;

@@ -54,7 +54,7 @@ pub fn fit_to_wire(
 mod tests {
     use super::*;
     use tryon::body::measure::Measurements;
-    use tryon::dressing::{RegionFit as Region, assess};
+    use tryon::dressing::{FinishedGarment, RegionFit as Region, assess};
     use tryon::garment::{Size, library};
 
     #[test]
@@ -83,7 +83,7 @@ mod tests {
             inseam: 0.8,
             ..Measurements::default()
         };
-        let cut = assess(&pattern, &body);
+        let cut = assess(&FinishedGarment::from(&pattern), &body);
         let wire = fit_to_wire("tshirt", "S", &map, Some(&cut));
         let [chest, waist, thigh] = &wire.regions[..] else {
             panic!("{wire:?}")

@@ -111,7 +111,7 @@ pub struct GarmentInfo {
     /// Title for people.
     #[prost(string, tag = "2")]
     pub title: ::prost::alloc::string::String,
-    /// "top" or "bottom".
+    /// "top" or "bottom"; captured garments also "under" (below a top) and "shoes". One of each is worn.
     #[prost(string, tag = "3")]
     pub category: ::prost::alloc::string::String,
     /// Smallest first.

@@ -66,9 +66,13 @@ pub(crate) struct DemoArgs {
     /// Folder for pictures and report.json (with --headless).
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     pub(crate) out: PathBuf,
-    /// Garments to wear.
+    /// Garments to wear: names of the library, or those under which --wardrobe is offered.
     #[arg(long = "garment", value_name = "NAME", default_values_t = ["tshirt".to_owned(), "skirt".to_owned()])]
     pub(crate) garments: Vec<String>,
+    /// Folder of garments to offer beside the library: meshes and captures, as `cloth.garments` of the configuration. The
+    /// garments of a capture are CAPTURE_top, CAPTURE_under, CAPTURE_bottom …, by the name of its folder.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) wardrobe: Option<PathBuf>,
     /// Address of the mirror page.
     #[arg(long, default_value = "127.0.0.1:8080", value_name = "ADDR")]
     pub(crate) listen: std::net::SocketAddr,
@@ -96,14 +100,16 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "REC")]
     pub(crate) input: PathBuf,
     /// Garments: names (see `tryon export --list`), pattern files (.json, ours or GarmentCode's), layered as they say, or
-    /// meshes (.obj with or without stitches, .glb, .gltf, MakeHuman's .mhclo).
-    #[arg(long = "garment", value_name = "NAME|FILE", required = true)]
+    /// meshes (.obj with or without stitches, .glb, .gltf, MakeHuman's .mhclo), or captures (the folder that `tryon
+    /// clothcap capture` wrote for all its garments, FOLDER/top, FOLDER/under, FOLDER/bottom … for one).
+    #[arg(long = "garment", value_name = "NAME|FILE|CAPTURE", required = true)]
     pub(crate) garments: Vec<String>,
     /// The body that mesh garments were made on (.npz in SMPL layout, or an .obj that stands upright; MakeHuman clothes:
     /// its base mesh with the helpers). Without it the garment's own place and size are guessed from.
     #[arg(long, value_name = "NPZ|OBJ")]
     pub(crate) garment_body: Option<PathBuf>,
-    /// Size for all garments of the library; without it each is chosen from the tracked body.
+    /// Size for all garments but pattern files and meshes on a guessed body; without it each is chosen from the tracked
+    /// body.
     #[arg(long, value_name = "SIZE")]
     pub(crate) size: Option<String>,
     /// Folder for frame pictures and report.json.

@@ -1,6 +1,6 @@
 //! Inputs that several commands share: bodies, garments, rough starts, and the progress bar over frames.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Deserialize;
 use std::path::Path;
@@ -11,7 +11,7 @@ use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
 use tryon::formats::npz::read_smpl;
 use tryon::garment::import::from_garmentcode;
 use tryon::garment::{Material, Pattern, Size, Triangulation};
-use tryon::mirror::Choice;
+use tryon::mirror::{CapturedWardrobe, Choice};
 
 /// Body to track: an SMPL-layout npz, or the embedded one.
 ///
@@ -54,7 +54,8 @@ pub(crate) fn pattern(path: &Path) -> Result<Pattern> {
     .with_context(|| path.display().to_string())
 }
 
-/// Garments by library name, pattern file or mesh file; `size` for those of the library, `body` under the meshes.
+/// Garments by library name, pattern file, mesh file or capture; `size` for all but pattern files, `body` under the
+/// mesh files.
 ///
 /// # Errors
 /// Names the unknown garment or size, or the fault in a file.
@@ -68,17 +69,55 @@ pub(crate) fn choices(
         .map(SourceBody::read)
         .transpose()
         .context("--garment-body")?;
-    let choice = |name: &String| {
+    let mut chosen = Vec::new();
+    for name in names {
         let path = Path::new(name);
-        Ok(if name.ends_with(".json") {
-            Choice::Pattern(Box::new(pattern(path)?))
+        if let Some((folder, own)) = capture(path) {
+            let garments = captured_garments(folder, own)?;
+            chosen.extend(garments.into_iter().map(|g| Choice::mesh(g, size)));
+        } else if name.ends_with(".json") {
+            chosen.push(Choice::Pattern(Box::new(pattern(path)?)));
         } else if is_mesh(path) {
-            Choice::Mesh(Arc::new(mesh_garment(path, body.clone())?))
+            chosen.push(Choice::mesh(mesh_garment(path, body.clone())?, size));
         } else {
-            Choice::library(name, size)?
-        })
+            chosen.push(Choice::library(name, size)?);
+        }
+    }
+    Ok(chosen)
+}
+
+/// Folder of a capture, and the name of the one garment of it where the path is `FOLDER/NAME`.
+fn capture(path: &Path) -> Option<(&Path, Option<&str>)> {
+    if CapturedWardrobe::is_in(path) {
+        return Some((path, None));
+    }
+    let (folder, own) = (path.parent()?, path.file_name()?.to_str()?);
+    let is_garment = !path.exists() && CapturedWardrobe::is_in(folder);
+    is_garment.then_some((folder, Some(own)))
+}
+
+/// Cotton garments of a capture: all, or one by name.
+fn captured_garments(folder: &Path, own: Option<&str>) -> Result<Vec<MeshGarment>> {
+    let captured = CapturedWardrobe::read(folder, &embedded::template())?;
+    let names = captured.names();
+    let is_wanted = |k: &usize| own.is_none_or(|own| names[*k] == own);
+    let wanted: Vec<usize> = (0..names.len()).filter(is_wanted).collect();
+    ensure!(
+        !wanted.is_empty(),
+        "{} has no garment {}; there are {}",
+        folder.display(),
+        own.unwrap_or_default(),
+        names.join(", ")
+    );
+    let edge = Triangulation::default().edge_length;
+    let cotton = Material::preset("cotton")?;
+    let title = folder.file_name().unwrap_or_default().to_string_lossy();
+    let garment = |k: usize| {
+        let name = format!("{title}_{}", names[k]);
+        let made = captured.garment(k, &name, &cotton, edge);
+        made.with_context(|| format!("{}: {}", folder.display(), names[k]))
     };
-    names.iter().map(choice).collect()
+    wanted.into_iter().map(garment).collect()
 }
 
 fn is_mesh(path: &Path) -> bool {

@@ -1,6 +1,6 @@
 //! Dressing and stepping: the computing half of a session, between the wire and `tryon::mirror`.
 
-use crate::library::{self, Library};
+use crate::library::{Library, rgb};
 use std::sync::Arc;
 use std::time::Instant;
 use tryon::body::measure::{Measurements, measure};
@@ -73,7 +73,7 @@ pub(crate) struct Worn {
     clock: FrameClock,
     garments: Arc<[Arc<WornGarment>]>,
     fit: FitProbe,
-    /// Room of each garment on the body; `None` for meshes.
+    /// Room of each garment on the body; `None` for those made to measure.
     ease: Vec<Option<Suggestion>>,
     /// Time of the stream since the fit was measured (s).
     fit_age: f64,
@@ -101,8 +101,8 @@ impl From<v1::GarmentFrame> for Update {
 fn ease(outfit: &DressedOutfit, measures: &Measurements) -> Vec<Option<Suggestion>> {
     (0..outfit.model.outfit.garments.len())
         .map(|k| {
-            let pattern = outfit.worn()[outfit.source(k)?].pattern()?;
-            Some(dressing::assess(pattern, measures))
+            let garment = outfit.worn()[outfit.source(k)?].finished()?;
+            Some(dressing::assess(&garment, measures))
         })
         .collect()
 }
@@ -151,17 +151,13 @@ fn worn_garment(
     let mesh = &outfit.model.outfit.garments[k];
     let source = outfit.source(k).ok_or("a garment has lost its name")?;
     let choice = &choices[source];
-    let is_cut = outfit.worn()[source].pattern().is_some();
-    let color = choice
-        .color_rgb
-        .unwrap_or_else(|| library::own_color(&choice.garment));
+    let worn = &outfit.worn()[source];
+    let color = choice.color_rgb.unwrap_or_else(|| rgb(worn.color()));
     Ok(Arc::new(WornGarment {
         garment: choice.garment.clone(),
-        size: if is_cut {
-            mesh.size.to_string()
-        } else {
-            String::new()
-        },
+        size: worn
+            .finished()
+            .map_or_else(String::new, |g| g.size.to_string()),
         vertices: mesh.vertices,
         drawn: mesh.render.vertex.clone(),
         faces: mesh.render.faces.clone(),

@@ -4,6 +4,7 @@
 //! garments on the compute pool and sends each reader a keyframe and then positions.
 
 mod engine;
+mod folder;
 mod library;
 mod service;
 mod session;

@@ -1,19 +1,19 @@
 //! Garments on offer: those of the library and of the configured folder, as the wire lists them.
 
+use crate::folder::{GarmentFolder, name_of};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
+use tryon::body::embedded;
+use tryon::clothcap::segment::Slot;
 use tryon::dressing::{MeshGarment, SourceBody};
 use tryon::garment::{GarmentKind, Material, Size, Triangulation, library};
-use tryon::mirror::Choice;
+use tryon::mirror::{CapturedWardrobe, Choice};
 use tryon_kit::config::ClothConfig;
 use tryon_kit::server::StartError;
 use tryon_proto::convert::WireError;
 use tryon_proto::keys::is_name;
 use tryon_proto::v1::{GarmentChoice, GarmentInfo};
-
-/// Endings of mesh garment files.
-const MESHES: [&str; 4] = ["mhclo", "obj", "glb", "gltf"];
 
 /// Title of a garment for people.
 fn title(name: &str) -> String {
@@ -26,10 +26,19 @@ fn title(name: &str) -> String {
     }
 }
 
-/// Colour of a garment unless another is chosen, 0x00RRGGBB.
-pub(crate) fn own_color(garment: &str) -> u32 {
-    let [r, g, b] = library::dye(garment);
+/// Colour on the wire, 0x00RRGGBB.
+pub(crate) fn rgb([r, g, b]: [u8; 3]) -> u32 {
     u32::from_be_bytes([0, r, g, b])
+}
+
+/// Category of a captured garment.
+fn category(slot: Slot) -> &'static str {
+    match slot {
+        Slot::Under => "under",
+        Slot::Shoes => "shoes",
+        Slot::Bottom => "bottom",
+        Slot::Skin | Slot::Hair | Slot::Top | Slot::OnePiece => "top",
+    }
 }
 
 /// The size of that name, in any case.
@@ -39,10 +48,50 @@ fn size(name: &str) -> Option<Size> {
         .find(|s| s.to_string().eq_ignore_ascii_case(name))
 }
 
+/// Materials of the garments of the folder.
+struct Materials<'a> {
+    all: Material,
+    single: BTreeMap<&'a str, Material>,
+}
+
+impl<'a> Materials<'a> {
+    fn new(config: &'a ClothConfig) -> Result<Self, StartError> {
+        let material =
+            |key: &str, name: &str| Material::preset(name).map_err(|e| fault(key, e.to_string()));
+        let mut single = BTreeMap::new();
+        for (garment, name) in &config.garment_materials {
+            let key = format!("garment_materials.{garment}");
+            single.insert(garment.as_str(), material(&key, name)?);
+        }
+        Ok(Self {
+            all: material("garments_material", &config.garments_material)?,
+            single,
+        })
+    }
+    fn of(&self, garment: &str) -> &Material {
+        self.single.get(garment).unwrap_or(&self.all)
+    }
+}
+
+/// Fault of a key of the configuration.
+fn fault(key: &str, why: String) -> StartError {
+    StartError::Config {
+        key: format!("cloth.{key}"),
+        why,
+    }
+}
+
+/// Garment of the folder.
+#[derive(Debug)]
+struct OfferedMesh {
+    garment: Arc<MeshGarment>,
+    category: &'static str,
+}
+
 /// Everything that can be worn.
 #[derive(Debug, Default)]
 pub(crate) struct Library {
-    meshes: BTreeMap<String, Arc<MeshGarment>>,
+    meshes: BTreeMap<String, OfferedMesh>,
 }
 
 impl Library {
@@ -51,25 +100,14 @@ impl Library {
     /// # Errors
     /// A folder, body or material that cannot be used, by its key.
     pub(crate) fn read(config: &ClothConfig) -> Result<Self, StartError> {
-        let fault = |key: &str, why: String| StartError::Config {
-            key: format!("cloth.{key}"),
-            why,
-        };
-        let material =
-            |key: &str, name: &str| Material::preset(name).map_err(|e| fault(key, e.to_string()));
-        let all = material("garments_material", &config.garments_material)?;
-        let mut single = BTreeMap::new();
-        for (garment, name) in &config.garment_materials {
-            let key = format!("garment_materials.{garment}");
-            single.insert(garment.as_str(), material(&key, name)?);
-        }
+        let materials = Materials::new(config)?;
         let mut found = Self::default();
         if config.garments.as_os_str().is_empty() {
             return Ok(found);
         }
         let unreadable =
             |e: std::io::Error| fault("garments", format!("{}: {e}", config.garments.display()));
-        let files = files(&config.garments).map_err(unreadable)?;
+        let folder = GarmentFolder::list(&config.garments).map_err(unreadable)?;
         let body = &config.garments_body;
         let body = (!body.as_os_str().is_empty())
             .then(|| SourceBody::read(body))
@@ -80,17 +118,19 @@ impl Library {
                 format!("{}: {e}", config.garments_body.display()),
             )
         })?;
-        for file in files {
-            let name = name_of(&file);
-            let material = single.get(name.as_str()).unwrap_or(&all);
-            match found.add(&name, &file, body.clone(), material) {
-                Ok(notes) => {
-                    tracing::info!(garment = name, file = %file.display(), notes, "offered")
-                }
-                Err(why) => tracing::error!(file = %file.display(), why, "a garment is left out"),
-            }
+        for file in &folder.files {
+            let name = name_of(file);
+            let added = found.add_file(&name, file, body.clone(), materials.of(&name));
+            report(file, added.map(|notes| vec![(name, notes)]));
         }
-        if let Some(garment) = single.keys().find(|g| !found.meshes.contains_key(**g)) {
+        for capture in &folder.captures {
+            report(capture, found.add_capture(capture, &materials));
+        }
+        if let Some(garment) = materials
+            .single
+            .keys()
+            .find(|g| !found.meshes.contains_key(**g))
+        {
             tracing::warn!(
                 garment,
                 "cloth.garment_materials names a garment that the folder does not offer"
@@ -99,32 +139,75 @@ impl Library {
         Ok(found)
     }
 
-    fn add(
+    /// Adds the garment of a file; its notes.
+    fn add_file(
         &mut self,
         name: &str,
         file: &Path,
         body: Option<SourceBody>,
         material: &Material,
     ) -> Result<String, String> {
+        self.check_name(name)?;
+        let edge = Triangulation::default().edge_length;
+        let garment = MeshGarment::read_on(file, body, material, edge)
+            .map_err(|e| e.to_string())?
+            .named(name);
+        let category = if garment.layer() > 0 { "top" } else { "bottom" };
+        Ok(self.offer(garment, category))
+    }
+
+    /// Adds the garments of a capture as `CAPTURE_SLOT`; their names and notes. All or none.
+    fn add_capture(
+        &mut self,
+        folder: &Path,
+        materials: &Materials<'_>,
+    ) -> Result<Vec<(String, String)>, String> {
+        let captured = CapturedWardrobe::read(folder, &embedded::template());
+        let captured = captured.map_err(|e| e.to_string())?;
+        let edge = Triangulation::default().edge_length;
+        let mut made = Vec::new();
+        for (k, own) in captured.names().iter().enumerate() {
+            let name = format!("{}_{own}", name_of(folder));
+            self.check_name(&name)?;
+            let garment = captured.garment(k, &name, materials.of(&name), edge);
+            let garment = garment.map_err(|e| format!("{}: {own}: {e}", folder.display()))?;
+            made.push((garment, category(captured.slot(k))));
+        }
+        let offered = made.into_iter().map(|(garment, category)| {
+            let name = garment.name.clone();
+            (name, self.offer(garment, category))
+        });
+        Ok(offered.collect())
+    }
+
+    fn check_name(&self, name: &str) -> Result<(), String> {
         if !is_name(name) {
-            return Err("its name has none of [a-z0-9_-], or more than 64 characters".into());
+            return Err(format!(
+                "the name {name} has none of [a-z0-9_-], or more than 64 characters"
+            ));
         }
         if library::names().contains(&name) || self.meshes.contains_key(name) {
             return Err(format!("there is another garment named {name}"));
         }
-        let edge = Triangulation::default().edge_length;
-        let wear = MeshGarment::read_on(file, body, material, edge)
-            .map_err(|e| e.to_string())?
-            .named(name);
-        let notes = wear.notes.join("; ");
-        self.meshes.insert(name.to_owned(), Arc::new(wear));
-        Ok(notes)
+        Ok(())
     }
 
-    /// A checked wire choice in the terms of the chain. Without a size, and for meshes, the body decides.
+    /// Offers a garment; its notes.
+    fn offer(&mut self, garment: MeshGarment, category: &'static str) -> String {
+        let notes = garment.notes.join("; ");
+        let name = garment.name.clone();
+        let garment = Arc::new(garment);
+        self.meshes.insert(name, OfferedMesh { garment, category });
+        notes
+    }
+
+    /// A checked wire choice in the terms of the chain. Without a size the body decides.
     pub(crate) fn choice(&self, c: &GarmentChoice) -> Choice {
         match self.meshes.get(&c.garment) {
-            Some(mesh) => Choice::Mesh(Arc::clone(mesh)),
+            Some(mesh) => Choice::Mesh {
+                garment: Arc::clone(&mesh.garment),
+                size: size(&c.size),
+            },
             None => Choice::Library {
                 name: c.garment.clone(),
                 size: size(&c.size),
@@ -134,23 +217,26 @@ impl Library {
 
     /// Every garment, sorted by name.
     pub(crate) fn garments(&self) -> Vec<GarmentInfo> {
-        let info = |name: &str, over: bool, sizes: Vec<String>| GarmentInfo {
-            name: name.into(),
-            title: title(name),
-            category: if over { "top" } else { "bottom" }.into(),
-            sizes,
-            color_rgb: own_color(name),
-        };
+        let every = || Size::ALL.iter().map(Size::to_string).collect();
         let cut = library::names().iter().map(|name| {
             let kind = library::pattern(name, Size::M).map(|p| p.kind);
             let over = matches!(kind, Ok(GarmentKind::Top | GarmentKind::Dress));
-            info(name, over, Size::ALL.iter().map(Size::to_string).collect())
+            GarmentInfo {
+                name: (*name).into(),
+                title: title(name),
+                category: if over { "top" } else { "bottom" }.into(),
+                sizes: every(),
+                color_rgb: rgb(library::dye(name)),
+            }
         });
-        // Meshes are fitted to the body: they come in one size.
-        let made = self
-            .meshes
-            .iter()
-            .map(|(name, m)| info(name, m.layer() > 0, Vec::new()));
+        // Meshes on a body that is only guessed are made to measure: they come in one size.
+        let made = self.meshes.iter().map(|(name, mesh)| GarmentInfo {
+            name: name.clone(),
+            title: title(name),
+            category: mesh.category.into(),
+            sizes: mesh.garment.own_size().map_or_else(Vec::new, |_| every()),
+            color_rgb: rgb(mesh.garment.color.unwrap_or_else(|| library::dye(name))),
+        });
         let mut all: Vec<GarmentInfo> = cut.chain(made).collect();
         all.sort_by(|a, b| a.name.cmp(&b.name));
         all
@@ -168,15 +254,16 @@ impl Library {
                     why,
                 ))
             };
-            let is_mesh = self.meshes.contains_key(&c.garment);
-            if !is_mesh && !library::names().contains(&c.garment.as_str()) {
+            let mesh = self.meshes.get(&c.garment);
+            if mesh.is_none() && !library::names().contains(&c.garment.as_str()) {
                 let all: Vec<String> = self.garments().into_iter().map(|g| g.name).collect();
                 return fault(
                     "garment",
                     format!("`{}` is not known; there are {}", c.garment, all.join(", ")),
                 );
             }
-            if is_mesh && !c.size.is_empty() {
+            let is_single = mesh.is_some_and(|m| m.garment.own_size().is_none());
+            if is_single && !c.size.is_empty() {
                 return fault(
                     "size",
                     format!("`{}` comes in one size; leave it empty", c.garment),
@@ -198,53 +285,16 @@ impl Library {
     }
 }
 
-/// Garment files of a folder and of the folders in it, in the order of their paths. The mesh that an `.mhclo` binds is no
-/// garment of its own.
-fn files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
-    let list = |folder: &Path| -> std::io::Result<Vec<PathBuf>> {
-        std::fs::read_dir(folder)?
-            .map(|entry| Ok(entry?.path()))
-            .collect()
-    };
-    let mut all = list(folder)?;
-    for inner in all.clone().iter().filter(|p| p.is_dir()) {
-        all.extend(list(inner)?);
-    }
-    let kind = |p: &Path| {
-        p.extension()
-            .and_then(|e| e.to_str())
-            .map(str::to_ascii_lowercase)
-    };
-    all.retain(|p| p.is_file() && kind(p).is_some_and(|k| MESHES.contains(&k.as_str())));
-    let bound: Vec<PathBuf> = all
-        .iter()
-        .filter(|p| kind(p).as_deref() == Some("mhclo"))
-        .cloned()
-        .collect();
-    all.retain(|p| {
-        kind(p).as_deref() == Some("mhclo")
-            || !bound
-                .iter()
-                .any(|b| b.with_extension("") == p.with_extension(""))
-    });
-    all.sort();
-    Ok(all)
-}
-
-/// Name of the garment in a file: lower case, with `_` for every other character.
-fn name_of(file: &Path) -> String {
-    let stem = file
-        .file_stem()
-        .map_or_else(String::new, |s| s.to_string_lossy().to_lowercase());
-    stem.chars()
-        .map(|c| {
-            if c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' {
-                c
-            } else {
-                '_'
+/// Logs the garments of a file or capture, or why it has none.
+fn report(from: &Path, added: Result<Vec<(String, String)>, String>) {
+    match added {
+        Ok(offered) => {
+            for (garment, notes) in offered {
+                tracing::info!(garment, file = %from.display(), notes, "offered");
             }
-        })
-        .collect()
+        }
+        Err(why) => tracing::error!(file = %from.display(), why, "a garment is left out"),
+    }
 }
 
 #[cfg(test)]
@@ -322,6 +372,8 @@ mod tests {
         std::fs::write(dir.join("more/torn.obj"), tube(true)).expect("written");
         std::fs::write(dir.join("tshirt.obj"), tube(false)).expect("written");
         std::fs::write(dir.join("notes.txt"), "no garment").expect("written");
+        std::fs::create_dir_all(dir.join("scan")).expect("folder");
+        std::fs::write(dir.join("scan/capture.json"), "{\"version\": 1}").expect("written");
         let mut config = ClothConfig {
             garments: dir.clone(),
             ..ClothConfig::default()
@@ -330,19 +382,26 @@ mod tests {
             .garment_materials
             .insert("tube_skirt".into(), "denim".into());
         let found = Library::read(&config);
-        let torn = Library::default().add(
+        let torn = Library::default().add_file(
             "torn",
             &dir.join("more/torn.obj"),
             None,
             &Material::preset("cotton").expect("preset"),
         );
+        let cotton = Materials::new(&config).expect("materials");
+        let damaged = Library::default().add_capture(&dir.join("scan"), &cotton);
         std::fs::remove_dir_all(&dir).expect("removed");
+        let damaged = damaged.expect_err("no template");
+        assert!(
+            damaged.contains("capture.json") && damaged.contains("template"),
+            "{damaged}"
+        );
         let library = found.expect("read");
         let names: Vec<&String> = library.meshes.keys().collect();
         assert_eq!(
             names,
             ["tube_skirt"],
-            "the torn one and the one named like ours are left out"
+            "the torn one, the damaged capture and the one named like ours are left out"
         );
         let info = library
             .garments()

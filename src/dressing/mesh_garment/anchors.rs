@@ -7,6 +7,8 @@ use crate::math::P3;
 
 /// Height of the anchored ring at the top of cloth without an opening there, metres.
 const RING: f32 = 0.025;
+/// Rise of an opening from which it is no band, metres: waistbands rise by 3 cm to the back.
+const LEVEL: f32 = 0.08;
 /// Half width of the anchored strip on a shoulder, metres.
 const STRIP: f32 = 0.012;
 /// Inner end of the strip, share of the way from the neck to the shoulder joint.
@@ -14,18 +16,30 @@ const INNER: f32 = 0.3;
 
 /// One firm set: an open jacket slides off a body without friction.
 pub(super) fn anchors(template: &Template, shape: &PieceShape, x: &[P3]) -> Vec<AnchorSet> {
-    let (kind, vertices) = match shape.support {
-        Support::Opening => (AnchorKind::Band, highest_opening(&shape.openings, x)),
-        Support::Shoulders => (AnchorKind::Shoulders, on_shoulders(template, x)),
+    let vertices = match shape.support {
+        Support::Opening => highest_opening(&shape.openings, x),
+        Support::Shoulders => on_shoulders(template, x),
     };
     let Some(vertices) = vertices else {
         return Vec::new();
+    };
+    // Spread evenly, an opening that is not level would be stretched: it is tied where it lies.
+    let kind = if shape.support == Support::Opening && rise(&vertices, x) < LEVEL {
+        AnchorKind::Band
+    } else {
+        AnchorKind::Shoulders
     };
     vec![AnchorSet {
         kind,
         vertices,
         strength: 1.0,
     }]
+}
+
+/// Difference of the heights of some vertices, metres.
+fn rise(vertices: &[u32], x: &[P3]) -> f32 {
+    let heights = || vertices.iter().map(|v| x[*v as usize].y);
+    heights().fold(f32::MIN, f32::max) - heights().fold(f32::MAX, f32::min)
 }
 
 /// Vertices within [`RING`] of the highest.

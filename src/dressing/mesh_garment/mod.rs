@@ -2,9 +2,12 @@
 
 mod anchors;
 mod classifier;
+mod grading;
 mod layers;
 mod piece;
 mod read;
+mod sizing;
+mod skin_lift;
 mod surface;
 
 pub use read::MeshGarment;

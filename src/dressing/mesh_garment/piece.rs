@@ -2,6 +2,8 @@
 
 use super::anchors::anchors;
 use super::classifier::{LEGS, PieceClassifier, PieceShape, Support};
+use super::grading::{Grading, LimbShares};
+use super::skin_lift::SkinLift;
 use super::surface::{follow_both_legs, orient_outwards, unroll};
 use crate::dressing::retarget::Retargeting;
 use crate::dressing::skin_binding::SkinBinding;
@@ -11,7 +13,8 @@ use crate::garment::import::{
     coarsen, from_mesh, median_edge, panels_in_metres, some_faces, unfold,
 };
 use crate::garment::{
-    AnchorKind, AnchorSet, GarmentError, GarmentKind, GarmentMesh, Material, Region, rest_area,
+    AnchorKind, AnchorSet, GarmentError, GarmentKind, GarmentMesh, Material, Region, Size,
+    rest_area,
 };
 use crate::math::P3;
 use crate::mesh::{Face, Topology, TriMesh, face_normal, remesh};
@@ -30,11 +33,20 @@ const COLLAPSED: f64 = 0.2;
 pub(super) struct GarmentPiece {
     pub(super) garment: GarmentMesh,
     /// Metres, frame of the source body.
-    positions: Vec<P3>,
+    pub(super) positions: Vec<P3>,
     pub(super) binding: SkinBinding,
-    /// Flat panels keep their shape and are graded to the body's size; other meshes take the shape of the body, as the
-    /// programs of their makers do.
-    graded: bool,
+    rest: RestShape,
+}
+
+/// Origin of a piece's rest shape on another body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum RestShape {
+    /// Taken from the other body, as the programs of their makers do.
+    Fitted,
+    /// Flat panels that keep their shape and are scaled to the body.
+    Scaled,
+    /// That of a size, on any body.
+    Sized,
 }
 
 /// Settings that all pieces of a garment share.
@@ -92,7 +104,11 @@ impl PieceBuilder<'_> {
             garment,
             positions: x,
             binding,
-            graded: made.flat,
+            rest: if made.flat {
+                RestShape::Scaled
+            } else {
+                RestShape::Fitted
+            },
         };
         Ok((piece, note))
     }
@@ -123,7 +139,7 @@ impl PieceBuilder<'_> {
             garment,
             binding: SkinBinding::new(self.classifier.template, &positions, |_| Vec::new()),
             positions,
-            graded: false,
+            rest: RestShape::Fitted,
         }))
     }
     /// A mesh without flat panels gets even triangles.
@@ -196,45 +212,77 @@ fn merge(pieces: &[SewnObj]) -> Option<SewnObj> {
 }
 
 impl GarmentPiece {
-    fn is_rigid(&self) -> bool {
+    pub(super) fn is_rigid(&self) -> bool {
         let mut anchors = self.garment.anchors.iter();
         anchors.any(|a| a.kind == AnchorKind::Rigid)
     }
-    /// The piece on another body: its mesh, and positions in the canonical pose (m). `lift` puts points above the skin:
-    /// a rest shape taken below it would be too tight for good.
+    /// The piece on another body: its mesh, and positions in the canonical pose (m). `lift` puts points above the skin.
     pub(super) fn retargeted(
         &self,
         map: &Retargeting,
-        lift: impl Fn(P3) -> P3,
+        lift: &SkinLift<'_>,
     ) -> (GarmentMesh, Vec<P3>) {
         let (binding, rigid) = (&self.binding, self.is_rigid());
         let x: Vec<P3> = (0..self.positions.len())
             .map(|i| {
                 let p = map.point(&self.positions[i], &binding.joints[i], &binding.vertices[i]);
-                if rigid { p } else { lift(p) }
+                if rigid { p } else { lift.lifted(p) }
             })
             .collect();
         let mut garment = self.garment.clone();
-        if self.graded {
-            let area = |x: &[P3]| {
-                let faces = garment.faces.iter();
-                faces
-                    .map(|f| f64::from(face_normal(x, f).norm()))
-                    .sum::<f64>()
-            };
-            let grade = (area(&x) / area(&self.positions).max(f64::MIN_POSITIVE)).sqrt();
-            for c in garment.rest.iter_mut().flatten().flatten() {
-                *c *= grade;
-            }
-        } else {
-            for (rest, f) in garment.rest.iter_mut().zip(&garment.faces) {
-                let t = unfold(f.map(|v| x[v as usize].coords.cast()));
-                if rest_area(&t) > COLLAPSED * rest_area(rest) {
-                    *rest = t;
-                }
-            }
+        match self.rest {
+            RestShape::Scaled => self.scale_rest(&x, &mut garment),
+            RestShape::Fitted => take_rest(&x, &mut garment),
+            RestShape::Sized => {}
         }
         (garment, x)
+    }
+    /// Scales flat panels by the square root of the change of area, from the source body to positions `x`.
+    fn scale_rest(&self, x: &[P3], garment: &mut GarmentMesh) {
+        let area = |x: &[P3]| {
+            let faces = garment.faces.iter();
+            faces
+                .map(|f| f64::from(face_normal(x, f).norm()))
+                .sum::<f64>()
+        };
+        let grade = (area(x) / area(&self.positions).max(f64::MIN_POSITIVE)).sqrt();
+        for c in garment.rest.iter_mut().flatten().flatten() {
+            *c *= grade;
+        }
+    }
+    /// The piece in a size, its rest shape fixed: that over the source body at `x` (m, off its skin), graded.
+    pub(super) fn in_size(&self, size: Size, grading: &Grading<'_>, x: &[P3]) -> Self {
+        let mut out = self.clone();
+        out.garment.size = size;
+        if self.is_rigid() {
+            return out;
+        }
+        if self.rest == RestShape::Fitted {
+            take_rest(x, &mut out.garment);
+        }
+        let shares: Vec<LimbShares> = self
+            .binding
+            .joints
+            .iter()
+            .map(|row| grading.limbs.shares(row))
+            .collect();
+        for (rest, f) in out.garment.rest.iter_mut().zip(&self.garment.faces) {
+            let of_face = f.map(|v| shares[v as usize]);
+            let mean = std::array::from_fn(|k| of_face.iter().map(|s| s[k]).sum::<f64>() / 3.0);
+            *rest = grading.graded(rest, f.map(|v| x[v as usize]), &mean);
+        }
+        out.rest = RestShape::Sized;
+        out
+    }
+}
+
+/// Takes the rest shape of all triangles that have not collapsed from positions `x`, metres.
+fn take_rest(x: &[P3], garment: &mut GarmentMesh) {
+    for (rest, f) in garment.rest.iter_mut().zip(&garment.faces) {
+        let t = unfold(f.map(|v| x[v as usize].coords.cast()));
+        if rest_area(&t) > COLLAPSED * rest_area(rest) {
+            *rest = t;
+        }
     }
 }
 

@@ -3,24 +3,24 @@
 use super::classifier::PieceClassifier;
 use super::layers::by_layer;
 use super::piece::{GarmentPiece, PieceBuilder};
+use super::sizing::{Sizing, SourceCloth};
+use super::skin_lift::SkinLift;
 use crate::body::Template;
+use crate::body::measure::Measurements;
 use crate::dressing::body_sections::BodySections;
 use crate::dressing::error::MeshGarmentError;
+use crate::dressing::finished::FinishedGarment;
 use crate::dressing::retarget::Retargeting;
-use crate::dressing::skin_binding::skin_normals;
 use crate::dressing::source_body::SourceBody;
+use crate::dressing::suggest::Suggestion;
+use crate::formats::obj::ObjMesh;
 use crate::formats::sewn_obj::SewnObj;
 use crate::garment::import::{read_mesh, split};
-use crate::garment::{GarmentError, GarmentKind, GarmentMesh, Material};
+use crate::garment::{GarmentError, GarmentKind, GarmentMesh, Material, Size};
 use crate::math::P3;
-use crate::spatial::PointTree;
+use crate::mesh::TriMesh;
 use std::path::Path;
 use std::sync::Arc;
-
-/// Least height of cloth above the skin at the start, metres.
-const ABOVE: f32 = 0.006;
-/// Distance from the skin within which cloth is lifted, metres.
-const NEAR: f32 = 0.04;
 
 /// A garment file and the body that it was made on, ready for [`dress_all`](crate::dressing::dress_all).
 #[derive(Clone, Debug)]
@@ -29,9 +29,17 @@ pub struct MeshGarment {
     pub name: String,
     /// Findings about the file and decisions about its pieces, for people.
     pub notes: Vec<String>,
+    /// Colour, sRGB; `None` where nobody said.
+    pub color: Option<[u8; 3]>,
     source: Arc<Template>,
     /// Innermost first.
     pieces: Vec<GarmentPiece>,
+    /// Order on the body; `None` for that of its kind.
+    layer: Option<u8>,
+    /// Absent for a garment on a guessed body, and for one without cloth.
+    sizing: Option<Arc<Sizing>>,
+    /// Size that it is in; `None` while it is made to measure.
+    size: Option<Size>,
 }
 
 impl MeshGarment {
@@ -72,33 +80,135 @@ impl MeshGarment {
             Some(b) => b,
             None => SourceBody::guess(raw)?,
         };
-        let mut notes = vec![format!("made on {}", source.description)];
+        let sewn = in_metres(file.sewn, &source)
+            .map_err(|why| MeshGarmentError::Piece { piece: 0, why })?;
+        let mut out = Self::build(&file.name, &sewn, source, material, edge)?;
         if file.turned > 0 {
-            notes.push(format!(
+            out.notes.push(format!(
                 "{} faces turned over to agree with their neighbours",
                 file.turned
             ));
         }
-        let sewn = in_metres(file.sewn, &source)
-            .map_err(|why| MeshGarmentError::Piece { piece: 0, why })?;
+        Ok(out)
+    }
+    /// A garment over a body in its rest pose, `mesh` in the frame of the body, metres; its triangles get edges of `edge`
+    /// metres.
+    ///
+    /// # Errors
+    /// A fault of the mesh, by its edge, face or vertex.
+    pub fn on_body(
+        name: &str,
+        mesh: TriMesh,
+        body: SourceBody,
+        material: &Material,
+        edge: f64,
+    ) -> Result<Self, MeshGarmentError> {
+        let obj = ObjMesh {
+            mesh,
+            uv: Vec::new(),
+            face_uv: Vec::new(),
+        };
+        let sewn = SewnObj {
+            obj,
+            stitches: Vec::new(),
+        };
+        Self::build(name, &sewn, body, material, edge)
+    }
+    /// Pieces of a surface in the frame of the body, metres.
+    fn build(
+        name: &str,
+        sewn: &SewnObj,
+        source: SourceBody,
+        material: &Material,
+        edge: f64,
+    ) -> Result<Self, MeshGarmentError> {
+        let mut notes = vec![format!("made on {}", source.description)];
         let classifier = PieceClassifier::new(&source.template);
         let builder = PieceBuilder {
             classifier: &classifier,
-            name: &file.name,
+            name,
             material,
             edge,
         };
-        let pieces = build(&builder, &sewn, &mut notes)?;
+        let pieces = build(&builder, sewn, &mut notes)?;
         if pieces.is_empty() {
-            let why = format!("{}: no piece with an area", path.display());
+            let why = format!("{name}: no piece with an area");
             return Err(MeshGarmentError::Nothing(why));
         }
-        Ok(Self {
-            name: file.name,
+        let mut out = Self {
+            name: name.to_owned(),
             notes,
+            color: None,
             source: source.template.clone(),
             pieces,
+            layer: None,
+            sizing: None,
+            size: None,
+        };
+        if source.is_known {
+            out.add_sizes(material);
+        }
+        Ok(out)
+    }
+    /// Measures the garment on its body.
+    fn add_sizes(&mut self, material: &Material) {
+        let cloth = SourceCloth {
+            name: &self.name,
+            material,
+            pieces: &self.pieces,
+            positions: &self.off_skin(),
+        };
+        self.sizing = Sizing::new(&self.source, &cloth).map(Arc::new);
+        if let Some(sizing) = &self.sizing {
+            self.notes.push(format!("made in size {}", sizing.size()));
+        }
+    }
+    /// Vertices of each piece off the skin of the source body, metres.
+    fn off_skin(&self) -> Vec<Vec<P3>> {
+        let lift = SkinLift::new(&self.source, self.source.mesh().vertices());
+        let lifted = |p: &GarmentPiece| p.positions.iter().map(|p| lift.lifted(*p)).collect();
+        self.pieces.iter().map(lifted).collect()
+    }
+    /// Size of the body that it was made on; `None` for a garment in one size, made to measure.
+    pub fn own_size(&self) -> Option<Size> {
+        self.sizing.as_ref().map(|s| s.size())
+    }
+    /// The garment in a size: its rest shape is that on its own body, graded by the steps of the size table. `None` for a
+    /// garment in one size.
+    pub fn in_size(&self, size: Size) -> Option<Self> {
+        let sizing = self.sizing.as_ref()?;
+        let grading = sizing.grading(size);
+        let pieces = self.pieces.iter().zip(self.off_skin());
+        let pieces = pieces.map(|(p, x)| p.in_size(size, &grading, &x));
+        Some(Self {
+            pieces: pieces.collect(),
+            size: Some(size),
+            ..self.clone()
         })
+    }
+    /// Measures in the size that it is in; `None` while it is made to measure.
+    pub fn finished(&self) -> Option<FinishedGarment> {
+        self.finished_in(self.size?)
+    }
+    /// Measures in a size.
+    pub(in crate::dressing) fn finished_in(&self, size: Size) -> Option<FinishedGarment> {
+        let finished = self.sizing.as_ref()?.finished(size);
+        Some(FinishedGarment {
+            name: self.name.clone(),
+            ..finished
+        })
+    }
+    /// Size for a body: that of the body, or the first larger one with enough ease. `None` for a garment in one size.
+    pub fn suggest(&self, body: &Measurements) -> Option<Suggestion> {
+        self.sizing.as_ref()?.suggest(body)
+    }
+    /// The same in another place in the order of garments, 0 innermost.
+    #[must_use]
+    pub fn in_layer(self, layer: u8) -> Self {
+        Self {
+            layer: Some(layer),
+            ..self
+        }
     }
     /// The same under another name, which its garments get too.
     #[must_use]
@@ -109,8 +219,11 @@ impl MeshGarment {
         self.name = name.to_owned();
         self
     }
-    /// Layer among other garments: tops and dresses lie over skirts and trousers.
+    /// Layer among other garments: tops and dresses lie over skirts and trousers unless it says otherwise.
     pub fn layer(&self) -> u8 {
+        self.layer.unwrap_or_else(|| self.layer_of_kind())
+    }
+    fn layer_of_kind(&self) -> u8 {
         let is_outer =
             |p: &GarmentPiece| matches!(p.garment.kind, GarmentKind::Top | GarmentKind::Dress);
         u8::from(self.pieces.iter().any(is_outer))
@@ -127,14 +240,9 @@ impl MeshGarment {
     ) -> Vec<(GarmentMesh, Vec<P3>)> {
         let map = Retargeting::new(&self.source, template, sections);
         let skin = &sections.vertices;
-        let normals = skin_normals(template, skin);
-        let tree = PointTree::new(skin);
-        let lift = |p: P3| match tree.nearest(&p, NEAR) {
-            Some((i, _)) => p + normals[i] * (ABOVE - normals[i].dot(&(p - skin[i]))).max(0.0),
-            None => p,
-        };
+        let lift = SkinLift::new(template, skin);
         let pieces = self.pieces.iter();
-        pieces.map(|p| p.retargeted(&map, lift)).collect()
+        pieces.map(|p| p.retargeted(&map, &lift)).collect()
     }
 }
 

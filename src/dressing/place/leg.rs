@@ -4,7 +4,7 @@ use super::outline::PanelOutline;
 use super::placed_body::{PlacedBody, ends, sign};
 use super::tube::{Ellipse, HALF_PANELS};
 use crate::dressing::body_sections::BodySections;
-use crate::dressing::suggest::{CROTCH_CLEARANCE, DEFAULT_RISE};
+use crate::dressing::finished::{CROTCH_CLEARANCE, DEFAULT_RISE};
 use crate::garment::{Panel, Side};
 use crate::math::P3;
 use std::f32::consts::{FRAC_PI_2, PI};

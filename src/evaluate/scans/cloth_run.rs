@@ -122,7 +122,7 @@ impl<'a> ClothRun<'a> {
     }
 }
 
-/// Garments of any size on a body, each pattern in the size that was chosen or that fits best.
+/// Garments of any size on a body, each pattern in the size that was chosen or that fits best, meshes made to measure.
 fn put_on(
     (template, rest): (&Template, &RestBody),
     pose: &Pose<World>,
@@ -142,7 +142,7 @@ fn put_on(
     let sources = garments.iter().zip(&patterns);
     let sources: Vec<GarmentSource<'_>> = sources
         .filter_map(|(garment, pattern)| match (&garment.choice, pattern) {
-            (Choice::Mesh(mesh), _) => Some(GarmentSource::Mesh(mesh)),
+            (Choice::Mesh { garment, .. }, _) => Some(GarmentSource::Mesh(garment)),
             (_, pattern) => pattern.as_ref().map(GarmentSource::Pattern),
         })
         .collect();

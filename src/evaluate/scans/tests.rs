@@ -10,7 +10,7 @@ use crate::mesh::Face;
 use crate::mirror::Choice;
 use crate::spatial::Bvh;
 use crate::synth::{Actor, Posture, Routine};
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 /// A quick scene: coarse cloth, a few thousand points, two scans 0.1 s apart.
 fn scene() -> ScanScene {
@@ -227,7 +227,7 @@ fn clothes_by_others_are_worn_on_bodies_by_others() {
     let (_, actor) = (actors.into_iter().find(|(name, _)| name == "muscular")).expect("a body");
     let scene = ScanScene {
         actor,
-        garments: vec![Choice::Mesh(Arc::new(mesh)).into()],
+        garments: vec![Choice::mesh(mesh, None).into()],
         ..bare()
     };
     let scan = scene.scans().expect("scans").remove(0);

@@ -58,8 +58,11 @@ struct Report {
 /// # Errors
 /// When a service cannot start or a result cannot be written.
 pub(crate) fn run(args: &DemoArgs) -> Result<ExitCode> {
-    for name in &args.garments {
-        library::pattern(name, Size::default())?;
+    // The names of a folder are those under which the cloth service offers its garments.
+    if args.wardrobe.is_none() {
+        for name in &args.garments {
+            library::pattern(name, Size::default())?;
+        }
     }
     // The recorder must be installed before the first counter.
     let _ = telemetry::metrics();
@@ -84,6 +87,7 @@ fn configuration(args: &DemoArgs) -> Result<Config> {
     (c.capture.address, c.capture.admin) = (any_port, any_port);
     (c.tracking.address, c.tracking.admin) = (any_port, any_port);
     (c.cloth.address, c.cloth.admin) = (any_port, any_port);
+    c.cloth.garments = args.wardrobe.clone().unwrap_or_default();
     c.compositor.admin = any_port;
     c.compositor.address = if args.headless { any_port } else { args.listen };
     for camera in &mut c.capture.cameras {

@@ -1,7 +1,7 @@
 // What the user wants to wear: at most one garment of each category, inner layers first. Pure.
 
 /** Order of layers: what is not listed goes on top. */
-const LAYERS = ['bottom', 'top'];
+const LAYERS = ['shoes', 'bottom', 'under', 'top'];
 
 const layer = (category) => {
   const at = LAYERS.indexOf(category);

@@ -182,10 +182,13 @@ pub struct ClothConfig {
     pub idle_s: u64,
     /// Most simulations at a time.
     pub max_simulations: usize,
-    /// Folder of mesh garments (`.obj`, `.glb`, `.gltf`, `.mhclo`), with one level of folders in it; empty for none. They
-    /// are offered under their files' names beside the library. A faulty file is left out and logged.
+    /// Folder of mesh garments (`.obj`, `.glb`, `.gltf`, `.mhclo`) and captures (folders that `tryon clothcap capture`
+    /// wrote), with one level of folders in it; empty for none. Meshes are offered under their files' names beside the
+    /// library, garments of a capture as `FOLDER_top`, `FOLDER_under`, `FOLDER_bottom` … A fault is logged, and its file or
+    /// capture left out.
     pub garments: PathBuf,
-    /// Body that the garments of the folder were made on (`.obj` or SMPL-layout `.npz`); empty: a guess for each.
+    /// Body that the mesh garments of the folder were made on (`.obj` or SMPL-layout `.npz`): they come in sizes then.
+    /// Empty: a guess for each, and one size made to measure. A capture has its own.
     pub garments_body: PathBuf,
     /// Material of the garments of the folder: `cotton` or another preset.
     pub garments_material: String,

@@ -1,0 +1,134 @@
+//! Captured garments as garments to wear: each part of a capture on the undressed body of its own subject.
+
+use crate::body::Template;
+use crate::clothcap::archive::{CaptureArchive, CaptureHeader, FrameDisplacements};
+use crate::clothcap::multi::ClothPart;
+use crate::clothcap::retarget::on_body;
+use crate::clothcap::segment::Slot;
+use crate::dressing::{MeshGarment, MeshGarmentError, SourceBody};
+use crate::formats::FormatError;
+use crate::garment::Material;
+use crate::math::P3;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Garments of one capture, on its subject's body under them in the rest pose (eq. 22 to 25).
+#[derive(Debug)]
+pub struct CapturedWardrobe {
+    header: CaptureHeader,
+    displacements: FrameDisplacements,
+    body: SourceBody,
+    /// Vertices of the body, metres, shape `[vertices]`.
+    skin: Vec<P3>,
+    /// Names of the parts.
+    names: Vec<String>,
+}
+
+impl CapturedWardrobe {
+    /// True for a folder that holds a capture.
+    pub fn is_in(folder: &Path) -> bool {
+        CaptureArchive::is_in(folder)
+    }
+
+    /// Reads a capture of bodies of `template`; the garments are those of its first finished scan.
+    ///
+    /// # Errors
+    /// A file of the capture, by its field, or a capture without a finished scan.
+    pub fn read(folder: &Path, template: &Template) -> Result<Self, FormatError> {
+        let (archive, header) = CaptureArchive::open(folder, template)?;
+        let mut records = header
+            .scans
+            .iter()
+            .map(|scan| archive.record(scan, template));
+        let first = records.find_map(Result::transpose).ok_or_else(|| {
+            FormatError::field(folder, "scans", "the capture has no finished scan")
+        })??;
+        let displacements = archive.displacements(&first.scan, &header)?;
+
+        let rest = template.personalise(&first.body.shape);
+        let moved = rest.vertices.iter().zip(&displacements.body);
+        let skin: Vec<P3> = moved.map(|(p, d)| p + d).collect();
+        let title = format!("the subject of {}", folder.display());
+        let body = template.at_rest(&title, skin.clone(), &rest.joints);
+        let body = body.map_err(|e| FormatError::field(folder, "body", e.to_string()))?;
+        Ok(Self {
+            names: names(&header.outfit.cloth.parts),
+            body: SourceBody::of_template(Arc::new(body)),
+            header,
+            displacements,
+            skin,
+        })
+    }
+
+    /// Names of the garments, unique in the capture: `top`, `under`, `bottom` …
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Place on the body of garment `k`.
+    pub fn slot(&self, k: usize) -> Slot {
+        self.header.outfit.cloth.parts[k].slot
+    }
+
+    /// Garment `k` of a material, under a name of its own; its triangles get edges of `edge` metres.
+    ///
+    /// # Errors
+    /// A fault of its mesh, by its edge, face or vertex.
+    pub fn garment(
+        &self,
+        k: usize,
+        name: &str,
+        material: &Material,
+        edge: f64,
+    ) -> Result<MeshGarment, MeshGarmentError> {
+        let outfit = &self.header.outfit;
+        let part = &outfit.cloth.parts[k];
+        let vertices = on_body(part, &self.displacements.garments[k], &self.skin);
+        let mesh = part.trimmed(&vertices).ok_or_else(|| {
+            MeshGarmentError::Nothing(format!("{name}: nothing is left of its narrow strips"))
+        })?;
+        let made = MeshGarment::on_body(name, mesh, self.body.clone(), material, edge)?;
+        let mut garment = made.in_layer(layer(part.slot));
+        garment.color = color(part, &outfit.colors[k]);
+        Ok(garment)
+    }
+}
+
+/// Slot of each part, numbered where a slot has several.
+fn names(parts: &[ClothPart]) -> Vec<String> {
+    let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
+    let name = |part: &ClothPart| {
+        let count = seen.entry(part.slot.name()).or_default();
+        *count += 1;
+        match count {
+            1 => part.slot.name().to_owned(),
+            n => format!("{}_{n}", part.slot.name()),
+        }
+    };
+    parts.iter().map(name).collect()
+}
+
+/// Order on the body, 0 innermost.
+fn layer(slot: Slot) -> u8 {
+    match slot {
+        Slot::Skin | Slot::Hair | Slot::Shoes | Slot::Bottom => 0,
+        Slot::Under | Slot::OnePiece => 1,
+        Slot::Top => 2,
+    }
+}
+
+/// Median of the colours that the scan saw, sRGB.
+fn color(part: &ClothPart, colors: &[[u8; 3]]) -> Option<[u8; 3]> {
+    let seen = colors
+        .iter()
+        .zip(&part.hidden)
+        .filter(|(_, hidden)| !**hidden);
+    let seen: Vec<[u8; 3]> = seen.map(|(c, _)| *c).collect();
+    let median = |k: usize| {
+        let mut channel: Vec<u8> = seen.iter().map(|c| c[k]).collect();
+        channel.sort_unstable();
+        channel[channel.len() / 2]
+    };
+    (!seen.is_empty()).then(|| std::array::from_fn(median))
+}
