@@ -5,6 +5,7 @@ use crate::clothcap::archive::{CaptureArchive, CaptureHeader, FrameDisplacements
 use crate::clothcap::multi::ClothPart;
 use crate::clothcap::retarget::on_body;
 use crate::clothcap::segment::Slot;
+use crate::clothcap::topology::ClothTemplate;
 use crate::dressing::{MeshGarment, MeshGarmentError, SourceBody};
 use crate::formats::FormatError;
 use crate::garment::Material;
@@ -19,8 +20,8 @@ pub struct CapturedWardrobe {
     header: CaptureHeader,
     displacements: FrameDisplacements,
     body: SourceBody,
-    /// Vertices of the body, metres, shape `[vertices]`.
-    skin: Vec<P3>,
+    /// Vertices of the clothed template on the body, metres, shape `[vertices]`.
+    surface: Vec<P3>,
     /// Names of the parts.
     names: Vec<String>,
 }
@@ -35,7 +36,7 @@ impl CapturedWardrobe {
     ///
     /// # Errors
     /// A file of the capture, by its field, or a capture without a finished scan.
-    pub fn read(folder: &Path, template: &Template) -> Result<Self, FormatError> {
+    pub fn read(folder: &Path, template: &Arc<Template>) -> Result<Self, FormatError> {
         let (archive, header) = CaptureArchive::open(folder, template)?;
         let mut records = header
             .scans
@@ -50,14 +51,18 @@ impl CapturedWardrobe {
         let moved = rest.vertices.iter().zip(&displacements.body);
         let skin: Vec<P3> = moved.map(|(p, d)| p + d).collect();
         let title = format!("the subject of {}", folder.display());
-        let body = template.at_rest(&title, skin.clone(), &rest.joints);
+        let cloth = ClothTemplate::new(template, header.outfit.cloth.legs);
+        let cloth =
+            cloth.map_err(|e| FormatError::field(folder, "outfit.cloth.legs", e.to_string()))?;
+        let surface = cloth.extend(&skin);
+        let body = template.at_rest(&title, skin, &rest.joints);
         let body = body.map_err(|e| FormatError::field(folder, "body", e.to_string()))?;
         Ok(Self {
             names: names(&header.outfit.cloth.parts),
             body: SourceBody::of_template(Arc::new(body)),
             header,
             displacements,
-            skin,
+            surface,
         })
     }
 
@@ -84,7 +89,7 @@ impl CapturedWardrobe {
     ) -> Result<MeshGarment, MeshGarmentError> {
         let outfit = &self.header.outfit;
         let part = &outfit.cloth.parts[k];
-        let vertices = on_body(part, &self.displacements.garments[k], &self.skin);
+        let vertices = on_body(part, &self.displacements.garments[k], &self.surface);
         let mesh = part.trimmed(&vertices).ok_or_else(|| {
             MeshGarmentError::Nothing(format!("{name}: nothing is left of its narrow strips"))
         })?;

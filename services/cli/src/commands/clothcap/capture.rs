@@ -29,7 +29,7 @@ fn capture_all(args: &ClothcapCaptureArgs) -> Result<()> {
         ..CaptureConfig::default()
     };
     let archive = CaptureArchive::new(&args.out)?;
-    let header = archive.header(&*input::template(args.scans.body.as_deref())?)?;
+    let header = archive.header(&input::template(args.scans.body.as_deref())?)?;
     let mut scans = match &header {
         Some(h) => Scans::reopen(&args.scans, h.frame)?,
         None => Scans::open(&args.scans)?,
