@@ -22,6 +22,7 @@ mod test_scans;
 #[cfg(test)]
 mod tests;
 pub mod topology;
+pub mod turn;
 mod undress;
 mod unpose;
 mod virtual_camera;

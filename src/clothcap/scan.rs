@@ -159,12 +159,7 @@ impl BodyScan {
             }
             scan.point_of_row.push(point);
         }
-        if scan.points.len() < LEAST_POINTS {
-            return Err(CaptureError::TooFewPoints {
-                points: scan.points.len(),
-                least: LEAST_POINTS,
-            });
-        }
+        let mut scan = scan.checked()?;
         let largest = extent(&scan.points).into_iter().fold(0.0, f32::max);
         if !(USABLE[0]..=USABLE[1]).contains(&f64::from(largest)) {
             return Err(CaptureError::NoPersonSize {
@@ -185,6 +180,20 @@ impl BodyScan {
             .collect();
         scan.find_normals();
         Ok(scan)
+    }
+
+    /// The scan, if it has the points of a person.
+    ///
+    /// # Errors
+    /// [`CaptureError::TooFewPoints`].
+    pub(super) fn checked(self) -> Result<Self, CaptureError> {
+        if self.points.len() < LEAST_POINTS {
+            return Err(CaptureError::TooFewPoints {
+                points: self.points.len(),
+                least: LEAST_POINTS,
+            });
+        }
+        Ok(self)
     }
 
     /// Normals from faces, else from the file, else from neighbours.

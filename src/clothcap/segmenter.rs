@@ -3,7 +3,7 @@
 use super::CaptureError;
 use super::align::{AlignedBody, Aligner, Alignment, ClothedTemplate, Start};
 use super::scan::BodyScan;
-use super::segment::{LabelConfig, Labelling, NodeColors, label_nodes, label_scan, relabel_nodes};
+use super::segment::{LabelConfig, Labelling, NodeColors, label_nodes, label_scan, relabel_nodes, seen_slices};
 use super::topology::ClothTemplate;
 use crate::body::Template;
 use std::sync::Arc;
@@ -107,6 +107,7 @@ impl ScanSegmenter {
         );
         let labels = label_scan(scan, &alignment.matches, around, &labelling)?;
         labelling.adopt(&nodes, &labels);
+        labelling.leave_unseen(&seen_slices(template, &nodes));
         if !labelling
             .labels
             .iter()

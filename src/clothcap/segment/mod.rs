@@ -6,6 +6,7 @@ mod node_colors;
 mod outfit;
 mod prior;
 mod scan_labels;
+mod unseen;
 
 pub use color_mixture::{ColorMixture, hsv_cone, k_means};
 pub use labelling::{LabelConfig, Labelling, relabel_nodes};
@@ -13,3 +14,4 @@ pub use node_colors::NodeColors;
 pub use outfit::label_nodes;
 pub use prior::{BodyRegion, IMPOSSIBLE, Slot};
 pub use scan_labels::label_scan;
+pub use unseen::seen_slices;

@@ -28,7 +28,8 @@ pub enum Slot {
 }
 
 /// Region of the body that priors speak of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum BodyRegion {
     /// Head with hair.
     Head,
@@ -55,6 +56,21 @@ pub enum BodyRegion {
 }
 
 impl BodyRegion {
+    /// All of them, downwards.
+    pub const ALL: [Self; 11] = [
+        Self::Head,
+        Self::Neck,
+        Self::Chest,
+        Self::UpperArm,
+        Self::Forearm,
+        Self::Hand,
+        Self::Abdomen,
+        Self::Pelvis,
+        Self::Thigh,
+        Self::Shin,
+        Self::Foot,
+    ];
+
     fn of(segment: BodySegment) -> Self {
         match segment {
             BodySegment::Head => Self::Head,
@@ -161,12 +177,9 @@ mod tests {
 
     #[test]
     fn every_region_has_a_likely_label_and_is_found_on_the_body() {
-        use BodyRegion::*;
         let found = BodyRegion::of_vertices(&embedded::template());
         let slots = [Slot::Skin, Slot::Top, Slot::Bottom, Slot::Shoes];
-        for region in [
-            Head, Neck, Chest, Abdomen, Pelvis, UpperArm, Forearm, Hand, Thigh, Shin, Foot,
-        ] {
+        for region in BodyRegion::ALL {
             assert!(found.contains(&region), "{region:?}");
             let least = slots
                 .map(|s| s.cost(region))
@@ -174,6 +187,6 @@ mod tests {
                 .fold(f32::MAX, f32::min);
             assert!(least <= 0.5, "{region:?}: {least}");
         }
-        assert_eq!(Slot::Shoes.cost(Head), IMPOSSIBLE);
+        assert_eq!(Slot::Shoes.cost(BodyRegion::Head), IMPOSSIBLE);
     }
 }

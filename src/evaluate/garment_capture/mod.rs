@@ -2,8 +2,10 @@
 
 mod scenes;
 mod score;
+mod turn;
 
 pub use scenes::{CaptureScene, capture_scenes};
+pub use turn::{TurnFilm, TurnScene, measure_turn, turn_scenes};
 
 use super::scans::TrueScan;
 use super::{EvaluateError, Row};

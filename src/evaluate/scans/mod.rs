@@ -21,6 +21,7 @@
 
 mod cloth_run;
 mod defects;
+mod depth_camera;
 mod motion;
 mod paint;
 mod points;
@@ -35,6 +36,7 @@ mod write;
 
 pub use cloth_run::ScanGarment;
 pub use defects::ScanDefects;
+pub use depth_camera::{DepthCamera, FilmedFrame};
 pub use motion::ScanMotion;
 pub use paint::ScanPalette;
 pub use points::{SKIN_LABEL, STRAY_LABEL};

@@ -26,6 +26,17 @@ pub enum ScanMotion {
         /// Angular velocity, counter-clockwise seen from above (rad/s).
         speed: f64,
     },
+    /// Turn about the vertical while a routine plays: limbs and trunk move too.
+    Turn {
+        /// Routine.
+        routine: Routine,
+        /// Time in the routine at the first scan (s).
+        start: f64,
+        /// Time from the first scan to the begin of the turn (s).
+        delay: f64,
+        /// Angular velocity, counter-clockwise seen from above (rad/s).
+        speed: f64,
+    },
     /// Recorded motion.
     Clip {
         /// Joints over time.
@@ -54,13 +65,17 @@ pub(super) struct PoseTrack {
     stride: u64,
     /// Turn between two poses (rad).
     turn: f64,
+    /// Poses before the turn begins.
+    delay: f64,
 }
 
 impl PoseTrack {
     /// Poses of an actor at `rate` (1/s).
     pub(super) fn new(actor: &Actor, motion: &ScanMotion, rate: f64) -> Result<Self, ClipError> {
         let routine = match motion {
-            ScanMotion::Play { routine, .. } | ScanMotion::TurnOnSpot { routine, .. } => *routine,
+            ScanMotion::Play { routine, .. }
+            | ScanMotion::TurnOnSpot { routine, .. }
+            | ScanMotion::Turn { routine, .. } => *routine,
             ScanMotion::Clip { .. } => Routine::Still,
         };
         let setting = Setting {
@@ -73,10 +88,16 @@ impl PoseTrack {
             ..Setting::default()
         };
         let mut sequence = Sequence::new(actor.clone(), setting);
-        let (mut start, mut speed) = (0.0, 0.0);
+        let (mut start, mut delay, mut speed) = (0.0, 0.0, 0.0);
         match motion {
             ScanMotion::Play { start: at, .. } => start = *at,
             ScanMotion::TurnOnSpot { speed: rate, .. } => speed = *rate,
+            ScanMotion::Turn {
+                start: at,
+                delay: wait,
+                speed: rate,
+                ..
+            } => (start, delay, speed) = (*at, *wait, *rate),
             ScanMotion::Clip { clip, start: at } => {
                 sequence = sequence.with_clip((**clip).clone())?;
                 start = CLIP_LEAD + at;
@@ -87,13 +108,14 @@ impl PoseTrack {
             first: (start * rate).round().max(0.0) as u64,
             stride: u64::from(!matches!(motion, ScanMotion::TurnOnSpot { .. })),
             turn: speed / rate,
+            delay: delay * rate,
         })
     }
 
     /// Pose number `index` in the world: y up, floor at y = 0.
     pub(super) fn pose(&self, index: u64) -> Pose<World> {
         let truth = self.sequence.truth(self.first + self.stride * index);
-        let turn = UnitQuaternion::from_axis_angle(&V3d::y_axis(), self.turn * index as f64);
+        let turn = UnitQuaternion::from_axis_angle(&V3d::y_axis(), self.turn * (index as f64 - self.delay).max(0.0));
         // The camera of the sequence is the world itself.
         let turned: Rigid<World, crate::math::Camera> = Rigid::from_parts(V3d::zeros(), turn);
         Pose {

@@ -2,6 +2,7 @@
 
 use super::cloth_run::{ClothRun, ScanGarment};
 use super::defects::ScanDefects;
+use super::depth_camera::{DepthCamera, FilmedFrame};
 use super::motion::{PoseTrack, ScanMotion};
 use super::paint::{ScanPalette, ScenePaint};
 use super::points::ScanPoints;
@@ -80,6 +81,15 @@ pub struct TrueGarment {
     pub faces: Vec<Face>,
 }
 
+/// Subject at the time of one scan.
+pub(super) struct SceneMoment<'a> {
+    pub(super) index: usize,
+    pub(super) surface: &'a SceneSurface,
+    pub(super) paint: &'a ScenePaint,
+    run: &'a ClothRun<'a>,
+    pose: &'a Pose<World>,
+}
+
 /// Scan with its truth. Arrays of points have the shape `[points]`.
 #[derive(Clone, Debug)]
 pub struct TrueScan {
@@ -156,6 +166,52 @@ impl ScanScene {
         &self,
         mut each: impl FnMut(TrueScan) -> Result<(), EvaluateError>,
     ) -> Result<(), EvaluateError> {
+        self.play(|moment| {
+            let seed = ScanSeed {
+                scene: self.seed,
+                scan: moment.index as u64,
+            };
+            let mut points = self.scanner.scan(moment.surface, moment.paint, seed);
+            (self.defects).apply(&mut points, moment.surface.center(), seed);
+            each(self.truth(&moment, points))
+        })
+    }
+
+    /// Films the subject with one depth camera; `each` receives frames with the label of each pixel and the truth, which has
+    /// scan points in the frames for which `is_scanned` is true.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn film(
+        &self,
+        camera: &DepthCamera,
+        is_scanned: impl Fn(usize) -> bool,
+        mut each: impl FnMut(FilmedFrame) -> Result<(), EvaluateError>,
+    ) -> Result<(), EvaluateError> {
+        self.play(|moment| {
+            let (frame, labels) = camera.shoot(&moment, self.seed, self.rate);
+            let seed = ScanSeed {
+                scene: self.seed,
+                scan: moment.index as u64,
+            };
+            let points = match is_scanned(moment.index) {
+                true => self.scanner.scan(moment.surface, moment.paint, seed),
+                false => ScanPoints::default(),
+            };
+            let truth = self.truth(&moment, points);
+            each(FilmedFrame {
+                frame,
+                labels,
+                truth,
+            })
+        })
+    }
+
+    /// Dresses the subject and simulates its motion; `each` receives the subject at the time of each scan.
+    fn play(
+        &self,
+        mut each: impl FnMut(SceneMoment<'_>) -> Result<(), EvaluateError>,
+    ) -> Result<(), EvaluateError> {
         if !(self.rate > 0.0 && self.rate.is_finite()) {
             return Err(fault(format!("rate: {} is not positive", self.rate)));
         }
@@ -180,24 +236,19 @@ impl ScanScene {
                 }
             }
             let surface = SceneSurface::new(&run, template, &rest, self.defects.has_object);
-            let seed = ScanSeed {
-                scene: self.seed,
-                scan: index as u64,
-            };
-            let mut points = self.scanner.scan(&surface, &paint, seed);
-            self.defects.apply(&mut points, surface.center(), seed);
-            each(self.truth(index, points, &run, &pose))?;
+            each(SceneMoment {
+                index,
+                surface: &surface,
+                paint: &paint,
+                run: &run,
+                pose: &pose,
+            })?;
         }
         Ok(())
     }
 
-    fn truth(
-        &self,
-        index: usize,
-        points: ScanPoints,
-        run: &ClothRun<'_>,
-        pose: &Pose<World>,
-    ) -> TrueScan {
+    fn truth(&self, moment: &SceneMoment<'_>, points: ScanPoints) -> TrueScan {
+        let (index, run, pose) = (moment.index, moment.run, moment.pose);
         let is_lost = |c: &[f32; 3]| c.iter().any(|c| c.is_nan());
         let lost = (0..).zip(&points.colors).filter(|(_, c)| is_lost(c));
         let garment = |(mesh, vertices): (&GarmentMesh, &[P3])| TrueGarment {

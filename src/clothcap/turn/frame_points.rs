@@ -1,0 +1,170 @@
+//! Points of one frame on the tracked subject, with normals from local planes of the depth image.
+
+use crate::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
+use crate::clothcap::scan::BodyScan;
+use crate::math::{Camera, P3, Rigid, V3, World};
+use crate::par::{self, Par};
+use crate::spatial::PointTree;
+use nalgebra::{Matrix3, Vector3};
+
+/// Distance from the tracked body within which a reading is the subject for certain, metres.
+const CERTAIN: f32 = 0.05;
+/// Farthest that cloth and hair stand off the tracked body, metres.
+const FARTHEST: f32 = 0.16;
+/// Height over a known floor below which readings are floor, metres.
+const FLOOR: f32 = 0.03;
+/// Largest step of depth between neighbouring pixels of one surface, as a share of the depth.
+const STEP: f32 = 0.02;
+/// Half the side of the window of a local plane, pixels: at 2 m, 11 mm to either side.
+const WINDOW: i32 = 3;
+/// Least readings of a local plane.
+const LEAST: usize = 20;
+/// Pixels beside a step of depth that are left out: sensors mix both surfaces there.
+const RIM: i32 = 2;
+/// Least cosine between normal and ray: at 75° a pixel of error is 15 mm of depth.
+const GRAZING: f32 = 0.26;
+
+/// Points of a frame on the subject whose tracked body is `posed`; camera frame, metres. Readings near the floor are left
+/// out where it is known.
+pub(super) fn camera_points(
+    frame: &RgbdFrame,
+    calibration: &Calibration,
+    posed: &[P3],
+    floor: Option<&Rigid<World, Camera>>,
+) -> BodyScan {
+    let image = DepthReader {
+        depth: &frame.depth,
+        camera: &calibration.depth,
+    };
+    let mask = image.subject(posed, floor);
+    let pixels: Vec<usize> = (0..mask.len()).filter(|i| mask[*i]).collect();
+    let mut local = Vec::new();
+    par::map_into(Par::Rayon, pixels.len(), 256, &mut local, |k| {
+        image.local_plane(pixels[k], &mask)
+    });
+    let mut out = BodyScan {
+        oriented: true,
+        ..BodyScan::default()
+    };
+    for (point, normal) in local.into_iter().flatten() {
+        if let Some(color) = &frame.color {
+            out.colors.push(color_at(color, calibration, &point));
+        }
+        out.point_of_row.push(out.points.len() as u32);
+        out.points.push(point);
+        out.normals.push(normal);
+    }
+    out
+}
+
+/// Colour where a point of the depth camera is seen; black outside of the image.
+fn color_at(image: &ColorImage, calibration: &Calibration, point: &P3) -> [u8; 3] {
+    let camera = calibration.color.as_ref().unwrap_or(&calibration.depth);
+    let at = calibration.color_from_depth.point(&point.cast()).cast();
+    let q = camera.project(&at);
+    let (u, v) = (q.x.round(), q.y.round());
+    let inside = u >= 0.0 && v >= 0.0 && u < image.width() as f32 && v < image.height() as f32;
+    if inside {
+        image.at(u as u32, v as u32)
+    } else {
+        [0; 3]
+    }
+}
+
+/// Depth image with its camera.
+struct DepthReader<'a> {
+    depth: &'a DepthImage,
+    camera: &'a Intrinsics,
+}
+
+impl DepthReader<'_> {
+    fn at(&self, i: usize) -> (i32, i32) {
+        let width = self.depth.width() as usize;
+        ((i % width) as i32, (i / width) as i32)
+    }
+
+    /// Metres; 0 without a reading.
+    fn z(&self, u: i32, v: i32) -> f32 {
+        f32::from(self.depth.at(u, v)) * 1e-3
+    }
+
+    fn point(&self, i: usize) -> P3 {
+        let (u, v) = self.at(i);
+        self.camera.unproject(u as f32, v as f32, self.z(u, v))
+    }
+
+    /// Pixels of the subject: connected to readings on the tracked body, off it by less than cloth stands off.
+    fn subject(&self, posed: &[P3], floor: Option<&Rigid<World, Camera>>) -> Vec<bool> {
+        let tree = PointTree::new(posed);
+        let up = floor.map(|w| (w.inverse().vector(&Vector3::y()).cast::<f32>(), w));
+        let above = |p: &P3| match &up {
+            Some((up, w)) => up.dot(&p.coords) + w.iso().translation.vector.y as f32 > FLOOR,
+            None => true,
+        };
+        let mut off = Vec::new();
+        par::map_into(Par::Rayon, self.depth.data().len(), 512, &mut off, |i| {
+            let p = self.point(i);
+            if p.z <= 0.0 || !above(&p) {
+                return f32::INFINITY;
+            }
+            tree.nearest(&p, FARTHEST).map_or(f32::INFINITY, |(_, d2)| d2.sqrt())
+        });
+        let mut mask: Vec<bool> = off.iter().map(|d| *d < CERTAIN).collect();
+        let mut open: Vec<usize> = (0..mask.len()).filter(|i| mask[*i]).collect();
+        let width = self.depth.width() as i32;
+        while let Some(i) = open.pop() {
+            let (u, v) = self.at(i);
+            for (du, dv) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
+                let (a, b) = (self.z(u, v), self.z(u + du, v + dv));
+                let j = ((v + dv) * width + u + du) as usize;
+                if b > 0.0 && !mask[j] && off[j].is_finite() && (a - b).abs() < STEP * a {
+                    mask[j] = true;
+                    open.push(j);
+                }
+            }
+        }
+        mask
+    }
+
+    /// Point and unit normal of the plane through the readings about a pixel; `None` at rims and grazing angles.
+    fn local_plane(&self, i: usize, mask: &[bool]) -> Option<(P3, V3)> {
+        let (u, v) = self.at(i);
+        let z = self.z(u, v);
+        let width = self.depth.width() as i32;
+        let (mut h, mut g) = (Matrix3::<f32>::zeros(), Vector3::<f32>::zeros());
+        let mut count = 0;
+        for dv in -WINDOW..=WINDOW {
+            for du in -WINDOW..=WINDOW {
+                let other = self.z(u + du, v + dv);
+                let is_near = du.abs() <= RIM && dv.abs() <= RIM;
+                if other <= 0.0 || (other - z).abs() > 2.0 * STEP * z {
+                    if is_near {
+                        return None;
+                    }
+                    continue;
+                }
+                if !mask[((v + dv) * width + u + du) as usize] {
+                    continue;
+                }
+                // Inverse depth of a plane is linear in the pixel.
+                let row = Vector3::new(1.0, du as f32, dv as f32);
+                h += row * row.transpose();
+                g += row / other;
+                count += 1;
+            }
+        }
+        if count < LEAST {
+            return None;
+        }
+        let [a, b, c] = h.cholesky()?.solve(&g).into();
+        let camera = self.camera;
+        let (fx, fy) = (camera.fx as f32, camera.fy as f32);
+        let (x, y) = (u as f32 - camera.cx as f32, v as f32 - camera.cy as f32);
+        // 1/z = a + b (u' − u) + c (v' − v) is the plane n · p = 1 with these components.
+        let plane = V3::new(b * fx, c * fy, a - b * x - c * y);
+        let point = camera.unproject(u as f32, v as f32, 1.0 / a);
+        let normal = -plane.try_normalize(f32::MIN_POSITIVE)?;
+        let cosine = -normal.dot(&point.coords.normalize());
+        (a > 0.0 && cosine > GRAZING).then_some((point, normal))
+    }
+}

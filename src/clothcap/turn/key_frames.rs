@@ -1,0 +1,158 @@
+//! Tracking of a recording, and the frames that show the subject at evenly spaced yaws.
+
+use super::TurnError;
+use super::frame_points::camera_points;
+use crate::body::{BodyShape, Pose, Template};
+use crate::camera::{Calibration, RgbdFrame};
+use crate::clothcap::scan::BodyScan;
+use crate::math::{Camera, P3, Rigid, V3, World};
+use crate::tracking::{
+    PartClasses, TrackerConfig, TrackerModel, TrackerState, Workspace, step, yaw_of_joints,
+};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+/// Key frames of a whole turn: one every 15°, so that each place is seen by eight within 60° of its normal.
+const BINS: usize = 24;
+/// Steps on the first frame before the others: the tracker finds the subject in one and measures its size in the next.
+const FIRST_STEPS: u64 = 3;
+/// Time between these steps, nanoseconds.
+const STEP_NS: u64 = 33_000_000;
+
+/// Frame that shows the subject at one yaw.
+#[derive(Clone, Debug)]
+pub struct KeyFrame {
+    /// Number in the recording, from 0.
+    pub frame: usize,
+    /// Yaw of the tracked body from facing the camera to its left, radians, within ±π.
+    pub yaw: f64,
+    /// Quality of the tracked pose, 0 to 1.
+    pub quality: f64,
+    /// Tracked pose.
+    pub pose: Pose<Camera>,
+    /// Points on the subject, camera frame, metres.
+    pub points: BodyScan,
+}
+
+/// Key frames of a recording.
+#[derive(Clone, Debug)]
+pub struct KeyFrames {
+    /// Key frames by yaw; never empty.
+    pub frames: Vec<KeyFrame>,
+    /// Shape that the tracker found, displacements included.
+    pub shape: BodyShape,
+    /// Upright world of the recording.
+    pub world_from_camera: Rigid<World, Camera>,
+    /// Frames of the recording.
+    pub count: usize,
+    /// Frames with a tracked subject.
+    pub live: usize,
+}
+
+/// Tracks the frames of a recording in order and keeps the best one of each yaw.
+pub struct TurnTracker {
+    model: TrackerModel,
+    state: TrackerState,
+    workspace: Workspace,
+    classes: PartClasses,
+    best: Vec<Option<KeyFrame>>,
+    count: usize,
+    live: usize,
+}
+
+impl TurnTracker {
+    /// Tracker before the first frame.
+    pub fn new(template: Arc<Template>, calibration: Calibration) -> Self {
+        let config = TrackerConfig {
+            skip_unchanged: false,
+            ..TrackerConfig::default()
+        };
+        let model = TrackerModel::new(template, calibration, config);
+        Self {
+            state: TrackerState::new(&model),
+            workspace: Workspace::default(),
+            classes: PartClasses::new(model.template()),
+            best: vec![None; BINS],
+            count: 0,
+            live: 0,
+            model,
+        }
+    }
+
+    /// Tracks the next frame.
+    ///
+    /// # Errors
+    /// [`TurnError::Frame`] for one that does not fit the camera.
+    pub fn step(&mut self, frame: &RgbdFrame) -> Result<(), TurnError> {
+        let steps = if self.count == 0 { FIRST_STEPS } else { 1 };
+        let lead = (FIRST_STEPS - 1) * STEP_NS;
+        let mut quality = 0.0;
+        for k in 0..steps {
+            let mut frame = frame.clone();
+            frame.time_ns = frame.time_ns.saturating_add(lead - (steps - 1 - k) * STEP_NS);
+            let report = step(&self.model, &mut self.state, &frame, &mut self.workspace);
+            quality = report.map_err(|source| TurnError::Frame { frame: self.count, source })?.quality;
+        }
+        if self.state.status.is_live() {
+            self.live += 1;
+            self.keep(frame, quality);
+        }
+        self.count += 1;
+        Ok(())
+    }
+
+    /// Keeps the frame if it is the best one of its yaw.
+    fn keep(&mut self, frame: &RgbdFrame, quality: f64) {
+        let (posed, bones) = self.workspace.posed(&self.model, &self.state);
+        let up = self.state.world_from_camera.inverse().vector(&nalgebra::Vector3::y());
+        let yaw = yaw_of_joints(&self.classes, &bones.joints, &up.cast::<f32>()).unwrap_or(0.0);
+        let bin = (yaw.rem_euclid(TAU) / TAU * BINS as f64).round() as usize % BINS;
+        if self.best[bin].as_ref().is_some_and(|b| b.quality >= quality) {
+            return;
+        }
+        let floor = self.state.floor_known.then_some(&self.state.world_from_camera);
+        let points = camera_points(frame, self.model.calibration(), posed, floor);
+        self.best[bin] = Some(KeyFrame {
+            frame: self.count,
+            yaw,
+            quality,
+            pose: self.state.pose.clone(),
+            points,
+        });
+    }
+
+    /// Key frames of the recording.
+    ///
+    /// # Errors
+    /// [`TurnError::Empty`], [`TurnError::Nobody`].
+    pub fn finish(self) -> Result<KeyFrames, TurnError> {
+        if self.count == 0 {
+            return Err(TurnError::Empty);
+        }
+        let mut frames: Vec<KeyFrame> = self.best.into_iter().flatten().collect();
+        frames.retain(|k| !k.points.points.is_empty());
+        if frames.is_empty() {
+            return Err(TurnError::Nobody { frames: self.count });
+        }
+        frames.sort_by(|a, b| a.yaw.total_cmp(&b.yaw));
+        Ok(KeyFrames {
+            frames,
+            shape: self.state.shape,
+            world_from_camera: self.state.world_from_camera,
+            count: self.count,
+            live: self.live,
+        })
+    }
+}
+
+/// Points and normals taken to another frame.
+pub(super) fn moved<A, B>(scan: &BodyScan, to: &Rigid<A, B>) -> BodyScan {
+    let iso: nalgebra::Isometry3<f32> = to.iso().cast();
+    let points = scan.points.iter().map(|p: &P3| iso * p).collect();
+    let normals = scan.normals.iter().map(|n: &V3| iso * n).collect();
+    BodyScan {
+        points,
+        normals,
+        ..scan.clone()
+    }
+}

@@ -1,0 +1,305 @@
+//! Joint registration of all frames: one twist per frame and part of the body, so that what two frames see of one place meets.
+//!
+//! Point-to-plane distances between each point and the nearest ones of frames at near yaws, in one Gauss–Newton system over
+//! all frames: errors of the tracked poses are spread around the turn and its end meets its begin.
+
+use super::fused_cloud::FusedPoint;
+use crate::body::Template;
+use crate::body::parts::BodyPart;
+use crate::clothcap::CaptureError;
+use crate::math::{P3, P3d};
+use crate::par::{self, Par};
+use crate::registration::GemanMcClure;
+use crate::spatial::PointTree;
+use nalgebra::{DMatrix, DVector, Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
+use std::f64::consts::TAU;
+
+/// Points of a frame that are paired in an iteration.
+const SAMPLES: usize = 900;
+/// Frames whose yaws differ by less see one place, radians.
+const OVERLAP: f64 = 1.1;
+/// Smallest cosine between the normals of a pair.
+const NORMALS: f32 = 0.7;
+/// Longest pair and width of the kernel, metres, from the first to the last iteration.
+const REACH: [f64; 2] = [0.08, 0.02];
+/// See [`REACH`].
+const SIGMA: [f64; 2] = [0.04, 0.01];
+/// Iterations.
+const ITERATIONS: usize = 14;
+/// Standard deviation of a pair, metres, and number of independent ones in a frame: neighbours share noise and cloth.
+const DEVIATION: f64 = 0.01;
+/// See [`DEVIATION`].
+const INDEPENDENT: f64 = 300.0;
+/// Distance that parts may move apart at their joint, metres.
+const JOINT: f64 = 0.004;
+/// Turn of a part against the trunk in one iteration, radians.
+const BEND: f64 = 0.05;
+/// Motion of a frame in one iteration, metres and radians.
+const STEP: f64 = 0.1;
+/// The same of the reference: its points stay where they were seen.
+const HELD: f64 = 1e-4;
+/// Unknowns of a part in a frame.
+const DOFS: usize = 6;
+
+/// Parts of the body that move as one: trunk, head, arms, legs.
+#[derive(Debug)]
+pub(super) struct MovingParts {
+    /// Part of each bone.
+    of_bone: Vec<usize>,
+    /// Joint that ties each part to the trunk; the trunk's own is unused.
+    joints: Vec<usize>,
+}
+
+impl MovingParts {
+    pub(super) fn new(template: &Template) -> Self {
+        let skeleton = template.skeleton();
+        let limbs = [
+            BodyPart::LeftArm,
+            BodyPart::RightArm,
+            BodyPart::LeftLeg,
+            BodyPart::RightLeg,
+        ];
+        let mut joints = vec![0];
+        joints.extend(skeleton.index("head"));
+        joints.extend(limbs.iter().filter_map(|l| template.parts().limb(*l)).map(|l| l.root));
+        let mut of_bone = vec![0; skeleton.len()];
+        for (bone, joint) in skeleton.joints().iter().enumerate() {
+            let own = joints.iter().skip(1).position(|j| *j == bone);
+            of_bone[bone] = match (own, joint.parent) {
+                (Some(k), _) => k + 1,
+                (None, Some(parent)) => of_bone[parent],
+                (None, None) => 0,
+            };
+        }
+        Self { of_bone, joints }
+    }
+
+    fn len(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Part of a bone.
+    pub(super) fn of(&self, bone: usize) -> usize {
+        self.of_bone[bone]
+    }
+}
+
+/// Points of one frame in the pose of the reference.
+pub(super) struct RegisteredFrame {
+    /// Points.
+    pub(super) points: Vec<FusedPoint>,
+    /// Yaw at which they were seen, radians.
+    pub(super) yaw: f64,
+    /// Joints as each part moves them: trunk's and own position, metres.
+    joints: Vec<[P3d; 2]>,
+    /// Mean robust distance from other frames, metres.
+    pub(super) error: f64,
+}
+
+impl RegisteredFrame {
+    pub(super) fn new(
+        points: Vec<FusedPoint>,
+        yaw: f64,
+        (parts, joints): (&MovingParts, &[P3d]),
+    ) -> Self {
+        Self {
+            points,
+            yaw,
+            joints: parts.joints.iter().map(|j| [joints[*j]; 2]).collect(),
+            error: 0.0,
+        }
+    }
+}
+
+/// A point of one frame and the plane of another through the nearest point.
+#[derive(Clone, Copy)]
+struct ViewPair {
+    frames: [usize; 2],
+    points: [usize; 2],
+    weight: f64,
+    distance: f64,
+}
+
+/// Moves the points of all frames until they meet; those of `reference` stay. Frames get their errors before any motion
+/// from the first call of [`measure`].
+///
+/// # Errors
+/// [`CaptureError::Solve`].
+pub(super) fn register(
+    frames: &mut [RegisteredFrame],
+    parts: &MovingParts,
+    reference: usize,
+    iterations: usize,
+) -> Result<(), CaptureError> {
+    for k in 0..iterations {
+        let t = k as f64 / (ITERATIONS - 1).max(1) as f64;
+        let between = |[a, b]: [f64; 2]| a * (b / a).powf(t.min(1.0));
+        let pairs = pair(frames, between(REACH), between(SIGMA));
+        let update = solve(frames, parts, reference, &pairs)?;
+        apply(frames, parts, &update);
+    }
+    measure(frames);
+    Ok(())
+}
+
+/// Iterations of a whole registration.
+pub(super) const fn iterations() -> usize {
+    ITERATIONS
+}
+
+/// Sets the error of each frame.
+pub(super) fn measure(frames: &mut [RegisteredFrame]) {
+    let pairs = pair(frames, REACH[0], SIGMA[0]);
+    for (k, frame) in frames.iter_mut().enumerate() {
+        let own = || pairs.iter().filter(|p| p.frames[0] == k);
+        let sum: f64 = own().map(|p| p.distance.abs()).sum();
+        frame.error = sum / own().count().max(1) as f64;
+    }
+}
+
+fn overlap(a: f64, b: f64) -> bool {
+    let d = (a - b).rem_euclid(TAU);
+    d.min(TAU - d) < OVERLAP
+}
+
+fn pair(frames: &[RegisteredFrame], reach: f64, sigma: f64) -> Vec<ViewPair> {
+    let clouds: Vec<Vec<P3>> = frames
+        .iter()
+        .map(|f| f.points.iter().map(|p| p.point).collect())
+        .collect();
+    let trees: Vec<PointTree> = clouds.iter().map(|c| PointTree::new(c)).collect();
+    let kernel = GemanMcClure { sigma };
+    let mut out = Vec::new();
+    for (a, frame) in frames.iter().enumerate() {
+        let stride = (frame.points.len() / SAMPLES).max(1);
+        let mut found = Vec::new();
+        par::map_into(Par::Rayon, frame.points.len().div_ceil(stride), 32, &mut found, |k| {
+            let i = k * stride;
+            let p = &frame.points[i];
+            let others = (0..frames.len()).filter(|b| *b != a && overlap(frame.yaw, frames[*b].yaw));
+            let near = others.filter_map(|b| {
+                let (j, _) = trees[b].nearest(&p.point, reach as f32)?;
+                let q = &frames[b].points[j];
+                let distance = f64::from(q.normal.dot(&(p.point - q.point)));
+                (p.normal.dot(&q.normal) > NORMALS).then(|| ViewPair {
+                    frames: [a, b],
+                    points: [i, j],
+                    weight: kernel.weight(distance * distance) * f64::from(p.weight * q.weight),
+                    distance,
+                })
+            });
+            near.collect::<Vec<_>>()
+        });
+        out.extend(found.into_iter().flatten());
+    }
+    out
+}
+
+/// Twists of all frames and parts, shape `[frames × parts × 6]`: translation, then rotation about the origin.
+fn solve(
+    frames: &[RegisteredFrame],
+    parts: &MovingParts,
+    reference: usize,
+    pairs: &[ViewPair],
+) -> Result<DVector<f64>, CaptureError> {
+    let n = frames.len() * parts.len() * DOFS;
+    let (mut h, mut g) = (DMatrix::<f64>::zeros(n, n), DVector::<f64>::zeros(n));
+    let scale = INDEPENDENT * frames.len() as f64
+        / (pairs.len().max(1) as f64 * DEVIATION * DEVIATION);
+    for p in pairs {
+        let q = &frames[p.frames[1]].points[p.points[1]];
+        let normal = q.normal.cast::<f64>();
+        let mut row: Vec<(usize, f64)> = Vec::with_capacity(48);
+        for (side, sign) in [(0, 1.0), (1, -1.0)] {
+            let point = &frames[p.frames[side]].points[p.points[side]];
+            let moment = point.point.coords.cast::<f64>().cross(&normal);
+            for (part, share) in point.parts() {
+                let first = (p.frames[side] * parts.len() + part) * DOFS;
+                for c in 0..3 {
+                    row.push((first + c, sign * share * normal[c]));
+                    row.push((first + 3 + c, sign * share * moment[c]));
+                }
+            }
+        }
+        let weight = scale * p.weight;
+        for (i, a) in &row {
+            g[*i] -= weight * a * p.distance;
+            for (j, b) in &row {
+                h[(*i, *j)] += weight * a * b;
+            }
+        }
+    }
+    add_priors(frames, parts, reference, (&mut h, &mut g));
+    let fault = |why: &str| CaptureError::Solve {
+        stage: "registration of frames",
+        why: why.into(),
+    };
+    let factor = h.cholesky().ok_or_else(|| fault("singular normal matrix"))?;
+    let x = factor.solve(&g);
+    match x.iter().all(|v| v.is_finite()) {
+        true => Ok(x),
+        false => Err(fault("the update is not finite")),
+    }
+}
+
+fn add_priors(
+    frames: &[RegisteredFrame],
+    parts: &MovingParts,
+    reference: usize,
+    (h, g): (&mut DMatrix<f64>, &mut DVector<f64>),
+) {
+    for (k, frame) in frames.iter().enumerate() {
+        let at = |part: usize| (k * parts.len() + part) * DOFS;
+        let step = if k == reference { HELD } else { STEP };
+        for i in at(0)..at(parts.len()) {
+            h[(i, i)] += 1.0 / (step * step);
+        }
+        for part in 1..parts.len() {
+            let [of_trunk, own] = frame.joints[part];
+            // Joint stays one: trunk's motion of it less the part's.
+            for axis in 0..3 {
+                let e = Vector3::from_fn(|i, _| f64::from(u8::from(i == axis)));
+                let mut row = Vec::with_capacity(12);
+                for (first, joint, sign) in [(at(0), of_trunk, 1.0), (at(part), own, -1.0)] {
+                    let moment = joint.coords.cross(&e);
+                    row.push((first + axis, sign));
+                    row.extend((0..3).map(|c| (first + 3 + c, sign * moment[c])));
+                }
+                add_row((h, g), &row, of_trunk[axis] - own[axis], JOINT);
+                let turn = [(at(0) + 3 + axis, 1.0), (at(part) + 3 + axis, -1.0)];
+                add_row((h, g), &turn, 0.0, BEND);
+            }
+        }
+    }
+}
+
+fn add_row(
+    (h, g): (&mut DMatrix<f64>, &mut DVector<f64>),
+    row: &[(usize, f64)],
+    residual: f64,
+    deviation: f64,
+) {
+    let weight = 1.0 / (deviation * deviation);
+    for (i, a) in row {
+        g[*i] -= weight * a * residual;
+        for (j, b) in row {
+            h[(*i, *j)] += weight * a * b;
+        }
+    }
+}
+
+fn apply(frames: &mut [RegisteredFrame], parts: &MovingParts, update: &DVector<f64>) {
+    for (k, frame) in frames.iter_mut().enumerate() {
+        let motion = |part: usize| -> Isometry3<f64> {
+            let first = (k * parts.len() + part) * DOFS;
+            let x: Vector6<f64> = update.fixed_rows::<6>(first).into_owned();
+            let turn = UnitQuaternion::from_scaled_axis(Vector3::new(x[3], x[4], x[5]));
+            Isometry3::from_parts(Translation3::new(x[0], x[1], x[2]), turn)
+        };
+        let motions: Vec<_> = (0..parts.len()).map(motion).collect();
+        frame.points.iter_mut().for_each(|p| p.blend(&motions));
+        for (part, joint) in frame.joints.iter_mut().enumerate() {
+            *joint = [motions[0] * joint[0], motions[part] * joint[1]];
+        }
+    }
+}

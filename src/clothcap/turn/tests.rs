@@ -1,0 +1,1 @@
+//! Fusion of exact views of a rigid, posed body.
