@@ -3,7 +3,9 @@
 use super::CaptureError;
 use super::align::{AlignedBody, Aligner, Alignment, ClothedTemplate, Start};
 use super::scan::BodyScan;
-use super::segment::{LabelConfig, Labelling, NodeColors, label_nodes, label_scan, relabel_nodes, seen_slices};
+use super::segment::{
+    LabelConfig, Labelling, NodeColors, label_nodes, label_scan, relabel_nodes, seen_slices,
+};
 use super::topology::ClothTemplate;
 use crate::body::Template;
 use std::sync::Arc;

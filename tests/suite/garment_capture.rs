@@ -13,7 +13,9 @@ use tryon::clothcap::{
     BodyDresser, CaptureConfig, CaptureError, OutfitCapture, ScanSegmenter, SegmentedScan,
     population,
 };
-use tryon::evaluate::garment_capture::{CaptureVariant, capture_scenes, measure};
+use tryon::evaluate::garment_capture::{
+    CaptureVariant, capture_scenes, measure, measure_turn_scene, turn_scenes,
+};
 use tryon::evaluate::scans::{SKIN_LABEL, ScanScene, TrueScan};
 use tryon::formats::scan::{ScanMesh, read_scan};
 use tryon::math::P3;
@@ -278,4 +280,20 @@ fn a_dress_is_one_garment_around_both_legs() {
         let dressed = dresser.dress(&body, &displacements, pose).expect("dressed");
         assert_eq!(dressed.reports[0].inside, 0);
     }
+}
+
+#[test]
+fn one_camera_captures_the_garments_of_a_subject_who_turns() {
+    let scenes = turn_scenes().expect("scenes");
+    let rows = measure_turn_scene(&scenes[0]).expect("a film");
+    let error = |row: usize, name: &str| {
+        let found = rows[row].errors.iter().find(|(n, _)| n == name);
+        found.map_or(f64::INFINITY, |(_, e)| *e)
+    };
+    let garment = [0, 1].map(|row| error(row, "garment_mm"));
+    assert!(
+        garment[1] < 12.0 && garment[1] < garment[0],
+        "{garment:?} mm"
+    );
+    assert!(error(1, "F1") > 0.9, "{:?}", rows[1]);
 }

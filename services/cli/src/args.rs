@@ -431,11 +431,18 @@ pub(crate) enum ClothcapWhat {
 }
 
 /// Scans of one subject.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct ScanArgs {
     /// A scan (.ply, .obj, .glb, .gltf), or a folder of them: a sequence.
     #[arg(long, value_name = "DIR|FILE")]
     pub(crate) scans: PathBuf,
+    #[command(flatten)]
+    pub(crate) frame: ScanFrameArgs,
+}
+
+/// Body, units and axes of scans.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct ScanFrameArgs {
     /// Body template in SMPL layout; the embedded body without it.
     #[arg(long, value_name = "NPZ")]
     pub(crate) body: Option<PathBuf>,
@@ -501,13 +508,21 @@ pub(crate) struct ClothcapSegmentArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(group(clap::ArgGroup::new("source").required(true).args(["scans", "input"])))]
 pub(crate) struct ClothcapCaptureArgs {
+    /// A scan (.ply, .obj, .glb, .gltf), or a folder of them: a sequence.
+    #[arg(long, value_name = "DIR|FILE")]
+    pub(crate) scans: Option<PathBuf>,
+    /// A recording (MCAP or a folder) of one colour and depth camera before which the subject turns around once; one frame
+    /// gives what it shows, completed from the body.
+    #[arg(long, value_name = "REC", conflicts_with = "unit")]
+    pub(crate) input: Option<PathBuf>,
     #[command(flatten)]
-    pub(crate) scans: ScanArgs,
+    pub(crate) frame: ScanFrameArgs,
     /// Garments worn, as for segment; without it they are found.
     #[arg(long, value_name = "NAMES|FILE")]
     pub(crate) prior: Option<String>,
-    /// Folder for results: capture.json, frames/, pictures/, report.json.
+    /// Folder for results: capture.json, frames/, pictures/, report.json; of a recording also turn.ply and turn.json.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
 }

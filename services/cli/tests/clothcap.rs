@@ -5,6 +5,8 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tryon::evaluate::scans::{ScanScene, write_scan_folder};
+use tryon::formats::RgbdFolderWriter;
+use tryon::synth::{Actor, Routine, Sequence, Setting};
 
 fn clothcap(args: &[&str]) -> Output {
     let mut c = Command::new(env!("CARGO_BIN_EXE_tryon"));
@@ -128,4 +130,39 @@ fn scans_that_show_nobody_are_refused_by_name() {
     let file = folder.path().join("post.ply");
     std::fs::write(&file, post).unwrap();
     assert!(refused(&file).contains("no person"));
+}
+
+#[test]
+fn a_recording_or_scans_are_wanted_and_recordings_without_people_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let out = at("out");
+    let capture = |args: &[&str]| clothcap(&[&["capture", "--out", &out], args].concat());
+    assert_eq!(capture(&[]).status.code(), Some(2));
+    assert_eq!(
+        capture(&["--scans", "a", "--input", "b"]).status.code(),
+        Some(2)
+    );
+    assert_eq!(
+        capture(&["--input", "b", "--unit", "1"]).status.code(),
+        Some(2)
+    );
+
+    let setting = Setting {
+        routine: Routine::Empty,
+        ..Setting::default()
+    };
+    let room = Sequence::new(Actor::default(), setting);
+    let recording = folder.path().join("room");
+    let mut writer = RgbdFolderWriter::create(&recording, room.calibration()).unwrap();
+    for k in 0..2 {
+        writer.write(&room.frame(k).0).unwrap();
+    }
+    drop(writer);
+    for (input, reason) in [("absent", "absent"), ("room", "nobody is found")] {
+        let done = capture(&["--input", &at(input)]);
+        let err = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert_eq!(done.status.code(), Some(1), "{err}");
+        assert!(err.contains(reason) && !err.contains("panicked"), "{err}");
+    }
 }

@@ -55,6 +55,13 @@ pub enum BodyRegion {
     Foot,
 }
 
+impl std::fmt::Display for BodyRegion {
+    /// Its name in files.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.serialize(f)
+    }
+}
+
 impl BodyRegion {
     /// All of them, downwards.
     pub const ALL: [Self; 11] = [

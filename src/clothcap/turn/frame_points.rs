@@ -12,7 +12,7 @@ const CERTAIN: f32 = 0.05;
 /// Farthest that cloth and hair stand off the tracked body, metres.
 const FARTHEST: f32 = 0.16;
 /// Height over a known floor below which readings are floor, metres.
-const FLOOR: f32 = 0.03;
+const FLOOR: f32 = 0.025;
 /// Largest step of depth between neighbouring pixels of one surface, as a share of the depth.
 const STEP: f32 = 0.02;
 /// Half the side of the window of a local plane, pixels: at 2 m, 11 mm to either side.
@@ -107,7 +107,8 @@ impl DepthReader<'_> {
             if p.z <= 0.0 || !above(&p) {
                 return f32::INFINITY;
             }
-            tree.nearest(&p, FARTHEST).map_or(f32::INFINITY, |(_, d2)| d2.sqrt())
+            tree.nearest(&p, FARTHEST)
+                .map_or(f32::INFINITY, |(_, d2)| d2.sqrt())
         });
         let mut mask: Vec<bool> = off.iter().map(|d| *d < CERTAIN).collect();
         let mut open: Vec<usize> = (0..mask.len()).filter(|i| mask[*i]).collect();

@@ -18,8 +18,8 @@ const FARTHEST: f32 = 0.06;
 const NORMALS: f32 = 0.3;
 /// Least determinant of a blended transform: folded joints blend to nothing.
 const FLAT: f64 = 1e-3;
-/// Least weight of a fused point: one frontal reading.
-const LEAST_WEIGHT: f32 = 1.0;
+/// Weight above which a point of several frames is kept: two grazing readings or half a frontal one.
+const LEAST_WEIGHT: f32 = 0.3;
 
 /// Point in the pose of the reference.
 #[derive(Clone, Copy, Debug)]
@@ -56,7 +56,11 @@ impl FusedPoint {
 }
 
 /// Two parts with the largest skin weights at a place of a face, and the share of the first.
-fn largest_parts(weights: &SkinWeights, parts: &MovingParts, at: (&Face, [f32; 3])) -> ([usize; 2], f32) {
+fn largest_parts(
+    weights: &SkinWeights,
+    parts: &MovingParts,
+    at: (&Face, [f32; 3]),
+) -> ([usize; 2], f32) {
     let mut shares: BTreeMap<usize, f32> = BTreeMap::new();
     for (v, corner) in at.0.iter().zip(at.1) {
         let v = *v as usize;
@@ -68,7 +72,10 @@ fn largest_parts(weights: &SkinWeights, parts: &MovingParts, at: (&Face, [f32; 3
     all.sort_by(|a, b| b.1.total_cmp(&a.1));
     let first = all.first().copied().unwrap_or((0, 1.0));
     let second = all.get(1).copied().unwrap_or((first.0, 0.0));
-    ([first.0, second.0], first.1 / (first.1 + second.1).max(f32::MIN_POSITIVE))
+    (
+        [first.0, second.0],
+        first.1 / (first.1 + second.1).max(f32::MIN_POSITIVE),
+    )
 }
 
 /// Pose in which points were seen, or to which they go.
@@ -136,8 +143,7 @@ struct CellSum {
 }
 
 /// Mean of the points in each cell of `cell` metres, apart by the octant of their normals, as a scan. Colours are those of the
-/// most frontal reading: means would blur prints and hems. Of several frames, cells with less than one frontal reading are left
-/// out.
+/// most frontal reading: means would blur prints and hems. Of several frames, cells with few readings are left out.
 pub(super) fn merged<'a>(
     points: impl Iterator<Item = &'a FusedPoint>,
     cell: f32,
@@ -160,7 +166,7 @@ pub(super) fn merged<'a>(
         ..BodyScan::default()
     };
     let is_colored = cells.values().all(|s| s.color.is_some());
-    let least = LEAST_WEIGHT * frames.min(2) as f32 - LEAST_WEIGHT;
+    let least = if frames > 1 { LEAST_WEIGHT } else { 0.0 };
     for sum in cells.values().filter(|s| s.weight > least) {
         let Some(normal) = sum.normal.try_normalize(f32::MIN_POSITIVE) else {
             continue;

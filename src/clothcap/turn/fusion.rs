@@ -111,7 +111,12 @@ fn key_reports(
         tracked_error: *tracked,
         registered_error: frame.error,
     };
-    keys.frames.iter().zip(frames).zip(tracked).map(one).collect()
+    keys.frames
+        .iter()
+        .zip(frames)
+        .zip(tracked)
+        .map(one)
+        .collect()
 }
 
 /// Tracked body of a frame in the world, without displacements.
@@ -148,7 +153,13 @@ fn posed_as(
     let one = |key: &KeyFrame| {
         let bones = bones_of(key);
         let mut vertices = Vec::new();
-        skin(Par::Rayon, &rest.vertices, template.weights(), &bones, &mut vertices);
+        skin(
+            Par::Rayon,
+            &rest.vertices,
+            template.weights(),
+            &bones,
+            &mut vertices,
+        );
         let from = PosedSurface {
             vertices: &vertices,
             bones: &bones,
@@ -177,7 +188,10 @@ fn unmatched(template: &Template, matches: &[SurfaceMatch]) -> Vec<BodyRegion> {
     let faces = template.mesh().faces();
     let regions = BodyRegion::of_vertices(template);
     let mut seen = vec![false; regions.len()];
-    for m in matches.iter().filter(|m| m.weight > 0.0 && m.distance < NEAR) {
+    for m in matches
+        .iter()
+        .filter(|m| m.weight > 0.0 && m.distance < NEAR)
+    {
         for v in faces[m.face as usize] {
             seen[v as usize] = true;
         }

@@ -89,9 +89,16 @@ impl TurnTracker {
         let mut quality = 0.0;
         for k in 0..steps {
             let mut frame = frame.clone();
-            frame.time_ns = frame.time_ns.saturating_add(lead - (steps - 1 - k) * STEP_NS);
+            frame.time_ns = frame
+                .time_ns
+                .saturating_add(lead - (steps - 1 - k) * STEP_NS);
             let report = step(&self.model, &mut self.state, &frame, &mut self.workspace);
-            quality = report.map_err(|source| TurnError::Frame { frame: self.count, source })?.quality;
+            quality = report
+                .map_err(|source| TurnError::Frame {
+                    frame: self.count,
+                    source,
+                })?
+                .quality;
         }
         if self.state.status.is_live() {
             self.live += 1;
@@ -104,13 +111,23 @@ impl TurnTracker {
     /// Keeps the frame if it is the best one of its yaw.
     fn keep(&mut self, frame: &RgbdFrame, quality: f64) {
         let (posed, bones) = self.workspace.posed(&self.model, &self.state);
-        let up = self.state.world_from_camera.inverse().vector(&nalgebra::Vector3::y());
+        let up = self
+            .state
+            .world_from_camera
+            .inverse()
+            .vector(&nalgebra::Vector3::y());
         let yaw = yaw_of_joints(&self.classes, &bones.joints, &up.cast::<f32>()).unwrap_or(0.0);
         let bin = (yaw.rem_euclid(TAU) / TAU * BINS as f64).round() as usize % BINS;
-        if self.best[bin].as_ref().is_some_and(|b| b.quality >= quality) {
+        if self.best[bin]
+            .as_ref()
+            .is_some_and(|b| b.quality >= quality)
+        {
             return;
         }
-        let floor = self.state.floor_known.then_some(&self.state.world_from_camera);
+        let floor = self
+            .state
+            .floor_known
+            .then_some(&self.state.world_from_camera);
         let points = camera_points(frame, self.model.calibration(), posed, floor);
         self.best[bin] = Some(KeyFrame {
             frame: self.count,

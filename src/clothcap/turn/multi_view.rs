@@ -32,8 +32,9 @@ const DEVIATION: f64 = 0.01;
 const INDEPENDENT: f64 = 300.0;
 /// Distance that parts may move apart at their joint, metres.
 const JOINT: f64 = 0.004;
-/// Turn of a part against the trunk in one iteration, radians.
-const BEND: f64 = 0.05;
+/// Turn of a part against the trunk, beyond that of the tracked pose, radians. Legs and head are nearly round: without a
+/// bound they spin.
+const BEND: f64 = 0.08;
 /// Motion of a frame in one iteration, metres and radians.
 const STEP: f64 = 0.1;
 /// The same of the reference: its points stay where they were seen.
@@ -61,7 +62,12 @@ impl MovingParts {
         ];
         let mut joints = vec![0];
         joints.extend(skeleton.index("head"));
-        joints.extend(limbs.iter().filter_map(|l| template.parts().limb(*l)).map(|l| l.root));
+        joints.extend(
+            limbs
+                .iter()
+                .filter_map(|l| template.parts().limb(*l))
+                .map(|l| l.root),
+        );
         let mut of_bone = vec![0; skeleton.len()];
         for (bone, joint) in skeleton.joints().iter().enumerate() {
             let own = joints.iter().skip(1).position(|j| *j == bone);
@@ -92,6 +98,8 @@ pub(super) struct RegisteredFrame {
     pub(super) yaw: f64,
     /// Joints as each part moves them: trunk's and own position, metres.
     joints: Vec<[P3d; 2]>,
+    /// Turn of each part so far, radians.
+    turns: Vec<Vector3<f64>>,
     /// Mean robust distance from other frames, metres.
     pub(super) error: f64,
 }
@@ -106,6 +114,7 @@ impl RegisteredFrame {
             points,
             yaw,
             joints: parts.joints.iter().map(|j| [joints[*j]; 2]).collect(),
+            turns: vec![Vector3::zeros(); parts.len()],
             error: 0.0,
         }
     }
@@ -120,8 +129,7 @@ struct ViewPair {
     distance: f64,
 }
 
-/// Moves the points of all frames until they meet; those of `reference` stay. Frames get their errors before any motion
-/// from the first call of [`measure`].
+/// Moves the points of all frames until they meet; those of `reference` stay.
 ///
 /// # Errors
 /// [`CaptureError::Solve`].
@@ -173,23 +181,30 @@ fn pair(frames: &[RegisteredFrame], reach: f64, sigma: f64) -> Vec<ViewPair> {
     for (a, frame) in frames.iter().enumerate() {
         let stride = (frame.points.len() / SAMPLES).max(1);
         let mut found = Vec::new();
-        par::map_into(Par::Rayon, frame.points.len().div_ceil(stride), 32, &mut found, |k| {
-            let i = k * stride;
-            let p = &frame.points[i];
-            let others = (0..frames.len()).filter(|b| *b != a && overlap(frame.yaw, frames[*b].yaw));
-            let near = others.filter_map(|b| {
-                let (j, _) = trees[b].nearest(&p.point, reach as f32)?;
-                let q = &frames[b].points[j];
-                let distance = f64::from(q.normal.dot(&(p.point - q.point)));
-                (p.normal.dot(&q.normal) > NORMALS).then(|| ViewPair {
-                    frames: [a, b],
-                    points: [i, j],
-                    weight: kernel.weight(distance * distance) * f64::from(p.weight * q.weight),
-                    distance,
-                })
-            });
-            near.collect::<Vec<_>>()
-        });
+        par::map_into(
+            Par::Rayon,
+            frame.points.len().div_ceil(stride),
+            32,
+            &mut found,
+            |k| {
+                let i = k * stride;
+                let p = &frame.points[i];
+                let others =
+                    (0..frames.len()).filter(|b| *b != a && overlap(frame.yaw, frames[*b].yaw));
+                let near = others.filter_map(|b| {
+                    let (j, _) = trees[b].nearest(&p.point, reach as f32)?;
+                    let q = &frames[b].points[j];
+                    let distance = f64::from(q.normal.dot(&(p.point - q.point)));
+                    (p.normal.dot(&q.normal) > NORMALS).then(|| ViewPair {
+                        frames: [a, b],
+                        points: [i, j],
+                        weight: kernel.weight(distance * distance) * f64::from(p.weight * q.weight),
+                        distance,
+                    })
+                });
+                near.collect::<Vec<_>>()
+            },
+        );
         out.extend(found.into_iter().flatten());
     }
     out
@@ -204,8 +219,8 @@ fn solve(
 ) -> Result<DVector<f64>, CaptureError> {
     let n = frames.len() * parts.len() * DOFS;
     let (mut h, mut g) = (DMatrix::<f64>::zeros(n, n), DVector::<f64>::zeros(n));
-    let scale = INDEPENDENT * frames.len() as f64
-        / (pairs.len().max(1) as f64 * DEVIATION * DEVIATION);
+    let scale =
+        INDEPENDENT * frames.len() as f64 / (pairs.len().max(1) as f64 * DEVIATION * DEVIATION);
     for p in pairs {
         let q = &frames[p.frames[1]].points[p.points[1]];
         let normal = q.normal.cast::<f64>();
@@ -234,7 +249,9 @@ fn solve(
         stage: "registration of frames",
         why: why.into(),
     };
-    let factor = h.cholesky().ok_or_else(|| fault("singular normal matrix"))?;
+    let factor = h
+        .cholesky()
+        .ok_or_else(|| fault("singular normal matrix"))?;
     let x = factor.solve(&g);
     match x.iter().all(|v| v.is_finite()) {
         true => Ok(x),
@@ -267,7 +284,8 @@ fn add_priors(
                 }
                 add_row((h, g), &row, of_trunk[axis] - own[axis], JOINT);
                 let turn = [(at(0) + 3 + axis, 1.0), (at(part) + 3 + axis, -1.0)];
-                add_row((h, g), &turn, 0.0, BEND);
+                let bend = frame.turns[0][axis] - frame.turns[part][axis];
+                add_row((h, g), &turn, bend, BEND);
             }
         }
     }
@@ -300,6 +318,7 @@ fn apply(frames: &mut [RegisteredFrame], parts: &MovingParts, update: &DVector<f
         frame.points.iter_mut().for_each(|p| p.blend(&motions));
         for (part, joint) in frame.joints.iter_mut().enumerate() {
             *joint = [motions[0] * joint[0], motions[part] * joint[1]];
+            frame.turns[part] += motions[part].rotation.scaled_axis();
         }
     }
 }

@@ -50,7 +50,10 @@ impl TurnReport {
         let mut yaws: Vec<f64> = self.used.iter().map(|k| k.yaw_degrees).collect();
         yaws.sort_by(f64::total_cmp);
         let next = yaws.iter().cycle().skip(1);
-        let gaps = yaws.iter().zip(next).map(|(a, b)| (b - a).rem_euclid(360.0));
+        let gaps = yaws
+            .iter()
+            .zip(next)
+            .map(|(a, b)| (b - a).rem_euclid(360.0));
         let largest = gaps.fold(0.0, f64::max);
         let gap = if yaws.len() < 2 { 360.0 } else { largest };
         self.yaw_coverage_degrees = 360.0 - gap;
@@ -79,6 +82,9 @@ mod tests {
         assert_eq!(of(&[]), (0.0, false));
         assert_eq!(of(&[30.0]), (0.0, false));
         assert_eq!(of(&[-40.0, 0.0, 40.0]), (80.0, false));
-        assert_eq!(of(&[-150.0, -100.0, -50.0, 0.0, 50.0, 100.0, 150.0]).1, true);
+        assert_eq!(
+            of(&[-150.0, -100.0, -50.0, 0.0, 50.0, 100.0, 150.0]).1,
+            true
+        );
     }
 }

@@ -5,7 +5,7 @@ mod score;
 mod turn;
 
 pub use scenes::{CaptureScene, capture_scenes};
-pub use turn::{TurnFilm, TurnScene, measure_turn, turn_scenes};
+pub use turn::{TurnFilm, TurnScene, measure_turn, measure_turn_scene, turn_scenes};
 
 use super::scans::TrueScan;
 use super::{EvaluateError, Row};

@@ -187,6 +187,28 @@ impl TurnFilm {
     }
 }
 
+/// Films, tracks and captures a scene from the tracked poses and from the registered ones: a row each.
+///
+/// # Errors
+/// Scenes that cannot be made, or in which nobody is tracked.
+pub fn measure_turn_scene(scene: &TurnScene) -> Result<Vec<Row>, EvaluateError> {
+    let film = TurnFilm::shoot(scene)?;
+    let keys = film.track().map_err(|e| EvaluateError::Scene {
+        scene: scene.name.clone(),
+        why: e.to_string(),
+    })?;
+    let whole = TurnConfig::default();
+    let tracked = TurnConfig {
+        iterations: 0,
+        ..whole.clone()
+    };
+    let methods = [("tracked poses", tracked), ("registered", whole)];
+    Ok(methods
+        .iter()
+        .map(|(name, config)| measure_turn(&film, &keys, name, config))
+        .collect())
+}
+
 impl TurnFilm {
     /// Tracks the subject.
     ///
@@ -219,10 +241,7 @@ pub fn measure_turn(
     }
 }
 
-fn capture(
-    keys: &KeyFrames,
-    config: &TurnConfig,
-) -> Result<(FusedTurn, FrameCapture), TurnError> {
+fn capture(keys: &KeyFrames, config: &TurnConfig) -> Result<(FusedTurn, FrameCapture), TurnError> {
     let template = embedded::template();
     let fused = fuse(&template, keys, config)?;
     let mut capture = OutfitCapture::new(template, CaptureConfig::default())?;

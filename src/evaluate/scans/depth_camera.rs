@@ -4,9 +4,7 @@ use super::STRAY_LABEL;
 use super::paint::shade;
 use super::scene::{SceneMoment, TrueScan};
 use super::surface::SceneSurface;
-use crate::camera::{
-    Calibration, ColorImage, DepthImage, Intrinsics, NoiseModel, RgbdFrame,
-};
+use crate::camera::{Calibration, ColorImage, DepthImage, Intrinsics, NoiseModel, RgbdFrame};
 use crate::math::{Camera, P3, P3d, Rigid, V3d, World};
 use crate::mesh::Face;
 use crate::par::Par;
@@ -36,8 +34,10 @@ impl Default for DepthCamera {
     /// A Kinect v1 mounted upright, one metre high and 1.9 m from the subject.
     fn default() -> Self {
         let wide = Intrinsics::KINECT_V1;
-        let at: Rigid<World, World> =
-            Rigid::from_parts(V3d::new(0.0, 0.0, 1.9), nalgebra::UnitQuaternion::identity());
+        let at: Rigid<World, World> = Rigid::from_parts(
+            V3d::new(0.0, 0.0, 1.9),
+            nalgebra::UnitQuaternion::identity(),
+        );
         Self {
             intrinsics: Intrinsics {
                 width: wide.height,
@@ -149,8 +149,18 @@ fn lit(moment: &SceneMoment<'_>, face: &Face, weights: [f32; 3], eye: &P3) -> [u
 /// Adds two triangles of floor, then two of wall.
 fn add_room(vertices: &mut Vec<P3>, faces: &mut Vec<Face>) {
     let quads = [
-        [[-ROOM, 0.0, WALL], [ROOM, 0.0, WALL], [ROOM, 0.0, ROOM], [-ROOM, 0.0, ROOM]],
-        [[-ROOM, 0.0, WALL], [ROOM, 0.0, WALL], [ROOM, ROOM, WALL], [-ROOM, ROOM, WALL]],
+        [
+            [-ROOM, 0.0, WALL],
+            [ROOM, 0.0, WALL],
+            [ROOM, 0.0, ROOM],
+            [-ROOM, 0.0, ROOM],
+        ],
+        [
+            [-ROOM, 0.0, WALL],
+            [ROOM, 0.0, WALL],
+            [ROOM, ROOM, WALL],
+            [-ROOM, ROOM, WALL],
+        ],
     ];
     for quad in quads {
         let first = vertices.len() as u32;

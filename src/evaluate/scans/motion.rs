@@ -115,7 +115,10 @@ impl PoseTrack {
     /// Pose number `index` in the world: y up, floor at y = 0.
     pub(super) fn pose(&self, index: u64) -> Pose<World> {
         let truth = self.sequence.truth(self.first + self.stride * index);
-        let turn = UnitQuaternion::from_axis_angle(&V3d::y_axis(), self.turn * (index as f64 - self.delay).max(0.0));
+        let turn = UnitQuaternion::from_axis_angle(
+            &V3d::y_axis(),
+            self.turn * (index as f64 - self.delay).max(0.0),
+        );
         // The camera of the sequence is the world itself.
         let turned: Rigid<World, crate::math::Camera> = Rigid::from_parts(V3d::zeros(), turn);
         Pose {

@@ -8,7 +8,9 @@ use anyhow::Result;
 use std::process::ExitCode;
 use tryon::evaluate::ablation::{self, Extent};
 use tryon::evaluate::cloth::ClothBench;
-use tryon::evaluate::garment_capture::{CaptureVariant, capture_scenes, measure};
+use tryon::evaluate::garment_capture::{
+    CaptureVariant, capture_scenes, measure, measure_turn_scene, turn_scenes,
+};
 use tryon::evaluate::people::{self, CaseSet, PeoplePlan};
 use tryon::evaluate::{self, Row, Table};
 use tryon::par::with_threads;
@@ -98,12 +100,16 @@ fn people(args: &BenchPeopleArgs) -> Result<ExitCode> {
 fn clothcap(args: &BenchClothcapArgs) -> Result<ExitCode> {
     let mut scenes = capture_scenes()?;
     scenes.retain(|s| s.is_unseen == args.unseen);
-    scenes.retain(|s| args.only.is_empty() || args.only.iter().any(|o| s.name.contains(o)));
+    let is_wanted = |name: &str| args.only.is_empty() || args.only.iter().any(|o| name.contains(o));
+    scenes.retain(|s| is_wanted(&s.name));
+    let mut turns = turn_scenes()?;
+    turns.retain(|s| s.is_unseen == args.unseen && is_wanted(&s.name));
     let mut variants = CaptureVariant::all();
     if !args.ablation {
         variants.truncate(1);
     }
-    let bar = input::progress(Some((scenes.len() * variants.len()) as u64), "capturing");
+    let runs = scenes.len() * variants.len() + turns.len();
+    let bar = input::progress(Some(runs as u64), "capturing");
     let command = std::env::args().collect::<Vec<_>>().join(" ");
     let mut table = Table::new("clothcap", command, "first scan, everything");
     for scene in &scenes {
@@ -112,6 +118,11 @@ fn clothcap(args: &BenchClothcapArgs) -> Result<ExitCode> {
             table.rows.push(row);
             bar.inc(1);
         }
+    }
+    for scene in &turns {
+        let rows = with_threads(args.threads, || measure_turn_scene(scene))??;
+        table.rows.extend(rows);
+        bar.inc(1);
     }
     bar.finish_and_clear();
     finish(&table, &args.out)

@@ -13,7 +13,7 @@ use tryon::par::with_threads;
 /// Runs the command.
 pub(super) fn run(args: &ClothcapAlignArgs) -> Result<()> {
     input::create_dir(&args.out)?;
-    with_threads(args.scans.threads, || align_all(args))?
+    with_threads(args.scans.frame.threads, || align_all(args))?
 }
 
 fn align_all(args: &ClothcapAlignArgs) -> Result<()> {

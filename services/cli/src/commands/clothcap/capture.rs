@@ -1,7 +1,8 @@
-//! `tryon clothcap capture`: garments and the body under them, from scans.
+//! `tryon clothcap capture`: garments and the body under them, from scans or from one camera.
 
 use super::scans::{Scans, label_config};
-use crate::args::ClothcapCaptureArgs;
+use super::turn;
+use crate::args::{ClothcapCaptureArgs, ScanArgs};
 use crate::input;
 use anyhow::{Context, Result, ensure};
 use serde_json::json;
@@ -17,7 +18,7 @@ use tryon::par::with_threads;
 /// Runs the command.
 pub(super) fn run(args: &ClothcapCaptureArgs) -> Result<()> {
     input::create_dir(&args.out.join(PICTURES))?;
-    with_threads(args.scans.threads, || capture_all(args))?
+    with_threads(args.frame.threads, || capture_all(args))?
 }
 
 /// Folder of the stages' pictures.
@@ -29,11 +30,8 @@ fn capture_all(args: &ClothcapCaptureArgs) -> Result<()> {
         ..CaptureConfig::default()
     };
     let archive = CaptureArchive::new(&args.out)?;
-    let header = archive.header(&input::template(args.scans.body.as_deref())?)?;
-    let mut scans = match &header {
-        Some(h) => Scans::reopen(&args.scans, h.frame)?,
-        None => Scans::open(&args.scans)?,
-    };
+    let header = archive.header(&input::template(args.frame.body.as_deref())?)?;
+    let mut scans = opened(args, header.as_ref())?;
     let names: Vec<String> = scans.files.iter().map(|f| Scans::name(f)).collect();
     if let Some(h) = &header {
         ensure!(
@@ -59,8 +57,27 @@ fn capture_all(args: &ClothcapCaptureArgs) -> Result<()> {
     }
     bar.finish_and_clear();
     scans.write_report(&rows, &args.out)?;
+    if let Some(report) = &scans.turn {
+        turn::print_unseen(report);
+    }
     println!("{} scans captured, in {}", names.len(), args.out.display());
     Ok(())
+}
+
+/// Scans of the command, or the one that is fused from its recording.
+fn opened(args: &ClothcapCaptureArgs, header: Option<&CaptureHeader>) -> Result<Scans> {
+    let scans = match (&args.input, &args.scans) {
+        (Some(recording), _) => return turn::fused(recording, &args.frame, &args.out),
+        (None, scans) => scans.clone().context("neither --scans nor --input")?,
+    };
+    let scans = ScanArgs {
+        scans,
+        frame: args.frame.clone(),
+    };
+    match header {
+        Some(h) => Scans::reopen(&scans, h.frame),
+        None => Scans::open(&scans),
+    }
 }
 
 /// Capture that continues where a stopped one ended.

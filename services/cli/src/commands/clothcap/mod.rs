@@ -1,4 +1,4 @@
-//! `tryon clothcap`: garments from scans, onto any body.
+//! `tryon clothcap`: garments from scans or one camera, onto any body.
 
 mod align;
 mod capture;
@@ -6,6 +6,7 @@ mod glb;
 mod retarget;
 mod scans;
 mod segment;
+mod turn;
 
 use crate::args::{ClothcapArgs, ClothcapWhat};
 use anyhow::Result;

@@ -12,6 +12,7 @@ use tryon::clothcap::CaptureError;
 use tryon::clothcap::align::{Start, find_frame, find_person};
 use tryon::clothcap::scan::{BodyScan, ScanFrame};
 use tryon::clothcap::segment::{LabelConfig, Slot};
+use tryon::clothcap::turn::TurnReport;
 use tryon::formats::scan::{ScanMesh, read_scan, scan_files};
 
 /// Scans of one subject and the frame they share.
@@ -24,12 +25,14 @@ pub(super) struct Scans {
     pub(super) frame: ScanFrame,
     /// Person of the first scan.
     pub(super) start: Option<Start>,
+    /// Report of the turn that the scan is fused from.
+    pub(super) turn: Option<TurnReport>,
 }
 
 impl Scans {
     /// Lists the scans and finds unit, up axis and person of the first one, as far as they are not given.
     pub(super) fn open(args: &ScanArgs) -> Result<Self> {
-        let template = input::template(args.body.as_deref())?;
+        let template = input::template(args.frame.body.as_deref())?;
         let files = scan_files(&args.scans)?;
         let first = &files[0];
         let file = read_scan(first)?;
@@ -40,16 +43,18 @@ impl Scans {
             files,
             frame,
             start: Some(start),
+            turn: None,
         })
     }
 
     /// The same with a frame known from before; nothing is searched.
     pub(super) fn reopen(args: &ScanArgs, frame: ScanFrame) -> Result<Self> {
         Ok(Self {
-            template: input::template(args.body.as_deref())?,
+            template: input::template(args.frame.body.as_deref())?,
             files: scan_files(&args.scans)?,
             frame,
             start: None,
+            turn: None,
         })
     }
 
@@ -65,6 +70,7 @@ impl Scans {
             "template": self.template.name(),
             "frame": self.frame,
             "scans": rows,
+            "turn": self.turn,
             "peak_memory_bytes": report::peak_memory(),
         });
         report::write(&out.join("report.json"), &report)
@@ -82,12 +88,12 @@ fn found(
     template: &Arc<Template>,
     file: &ScanMesh,
 ) -> Result<(ScanFrame, Start), CaptureError> {
-    let Some(metres_per_unit) = args.unit else {
+    let Some(metres_per_unit) = args.frame.unit else {
         return find_frame(template, file);
     };
     let frame = ScanFrame {
         metres_per_unit,
-        up: args.up.vector(),
+        up: args.frame.up.vector(),
     };
     let scan = BodyScan::new(file, &frame)?;
     Ok((frame, find_person(template, &scan)?))

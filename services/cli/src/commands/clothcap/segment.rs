@@ -16,7 +16,7 @@ use tryon::par::with_threads;
 /// Runs the command.
 pub(super) fn run(args: &ClothcapSegmentArgs) -> Result<()> {
     input::create_dir(&args.out)?;
-    with_threads(args.scans.threads, || segment_all(args))?
+    with_threads(args.scans.frame.threads, || segment_all(args))?
 }
 
 fn segment_all(args: &ClothcapSegmentArgs) -> Result<()> {
