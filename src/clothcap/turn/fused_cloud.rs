@@ -1,6 +1,6 @@
 //! Points of many poses in one: each point moves with the surface that it lies on.
 
-use super::multi_view::MovingParts;
+use super::moving_parts::MovingParts;
 use crate::body::{BoneTransforms, SkinWeights, Template};
 use crate::clothcap::align::{ScanNormal, closest_facing};
 use crate::clothcap::blended;

@@ -2,7 +2,8 @@
 
 use super::fused_cloud::{PosedSurface, merged, reposed};
 use super::key_frames::{KeyFrame, KeyFrames, moved};
-use super::multi_view::{self, MovingParts, RegisteredFrame, measure, register};
+use super::moving_parts::MovingParts;
+use super::multi_view::{self, RegisteredFrame, measure, register};
 use super::{KeyFrameReport, TurnError, TurnReport};
 use crate::body::{BodyShape, BoneTransforms, Pose, Template, skin};
 use crate::clothcap::align::{

@@ -9,6 +9,7 @@ mod frame_points;
 mod fused_cloud;
 mod fusion;
 mod key_frames;
+mod moving_parts;
 mod multi_view;
 mod report;
 #[cfg(test)]

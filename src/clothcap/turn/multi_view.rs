@@ -4,8 +4,7 @@
 //! all frames: errors of the tracked poses are spread around the turn and its end meets its begin.
 
 use super::fused_cloud::FusedPoint;
-use crate::body::Template;
-use crate::body::parts::BodyPart;
+use super::moving_parts::MovingParts;
 use crate::clothcap::CaptureError;
 use crate::math::{P3, P3d};
 use crate::par::{self, Par};
@@ -31,64 +30,16 @@ const DEVIATION: f64 = 0.01;
 /// See [`DEVIATION`].
 const INDEPENDENT: f64 = 300.0;
 /// Distance that parts may move apart at their joint, metres.
-const JOINT: f64 = 0.004;
+const JOINT: f64 = 0.01;
 /// Turn of a part against the trunk, beyond that of the tracked pose, radians. Legs and head are nearly round: without a
 /// bound they spin.
-const BEND: f64 = 0.08;
+const BEND: f64 = 0.2;
 /// Motion of a frame in one iteration, metres and radians.
 const STEP: f64 = 0.1;
 /// The same of the reference: its points stay where they were seen.
 const HELD: f64 = 1e-4;
 /// Unknowns of a part in a frame.
 const DOFS: usize = 6;
-
-/// Parts of the body that move as one: trunk, head, arms, legs.
-#[derive(Debug)]
-pub(super) struct MovingParts {
-    /// Part of each bone.
-    of_bone: Vec<usize>,
-    /// Joint that ties each part to the trunk; the trunk's own is unused.
-    joints: Vec<usize>,
-}
-
-impl MovingParts {
-    pub(super) fn new(template: &Template) -> Self {
-        let skeleton = template.skeleton();
-        let limbs = [
-            BodyPart::LeftArm,
-            BodyPart::RightArm,
-            BodyPart::LeftLeg,
-            BodyPart::RightLeg,
-        ];
-        let mut joints = vec![0];
-        joints.extend(skeleton.index("head"));
-        joints.extend(
-            limbs
-                .iter()
-                .filter_map(|l| template.parts().limb(*l))
-                .map(|l| l.root),
-        );
-        let mut of_bone = vec![0; skeleton.len()];
-        for (bone, joint) in skeleton.joints().iter().enumerate() {
-            let own = joints.iter().skip(1).position(|j| *j == bone);
-            of_bone[bone] = match (own, joint.parent) {
-                (Some(k), _) => k + 1,
-                (None, Some(parent)) => of_bone[parent],
-                (None, None) => 0,
-            };
-        }
-        Self { of_bone, joints }
-    }
-
-    fn len(&self) -> usize {
-        self.joints.len()
-    }
-
-    /// Part of a bone.
-    pub(super) fn of(&self, bone: usize) -> usize {
-        self.of_bone[bone]
-    }
-}
 
 /// Points of one frame in the pose of the reference.
 pub(super) struct RegisteredFrame {

@@ -1,8 +1,7 @@
 //! One colour and depth camera before the subject: frames as a sensor delivers them, with the label of each pixel.
 
 use super::STRAY_LABEL;
-use super::paint::shade;
-use super::scene::{SceneMoment, TrueScan};
+use super::paint::{ScenePaint, shade};
 use super::surface::SceneSurface;
 use crate::camera::{Calibration, ColorImage, DepthImage, Intrinsics, NoiseModel, RgbdFrame};
 use crate::math::{Camera, P3, P3d, Rigid, V3d, World};
@@ -52,35 +51,23 @@ impl Default for DepthCamera {
     }
 }
 
-/// Frame of a film with its truth.
-#[derive(Clone, Debug)]
-pub struct FilmedFrame {
-    /// Depth and colour.
-    pub frame: RgbdFrame,
-    /// Garment from 1, [`SKIN_LABEL`](super::SKIN_LABEL), or [`STRAY_LABEL`] beside the subject. Shape `[pixels]`.
-    pub labels: Vec<u8>,
-    /// True surfaces; scan points where wanted.
-    pub truth: TrueScan,
-}
-
 impl DepthCamera {
     /// Calibration of the frames.
     pub fn calibration(&self) -> Calibration {
         Calibration::registered(self.intrinsics)
     }
 
-    /// Frame and labels of the subject at one time.
+    /// Frame number `index` of a painted surface, `rate` a second, and the label of each pixel.
     pub(super) fn shoot(
         &self,
-        moment: &SceneMoment<'_>,
-        seed: u64,
-        rate: f64,
+        (surface, paint): (&SceneSurface, &ScenePaint),
+        index: usize,
+        (seed, rate): (u64, f64),
     ) -> (RgbdFrame, Vec<u8>) {
         let view = View::Perspective {
             camera: self.intrinsics,
             near: NEAR,
         };
-        let surface = moment.surface;
         let mut drawn = surface.drawn.clone();
         let mut faces = surface.faces.clone();
         add_room(&mut drawn, &mut faces);
@@ -105,7 +92,7 @@ impl DepthCamera {
                     let weights = barycentrics(&view, at, pixel[0], pixel[1]);
                     let label = surface.labels[corners[0] as usize];
                     let weights = weights.unwrap_or([1.0, 0.0, 0.0]);
-                    (label, lit(moment, corners, weights, &eye))
+                    (label, lit((surface, paint), corners, weights, &eye))
                 }
                 Some(_) => {
                     let wall = face as usize >= surface.faces.len() + 2;
@@ -117,11 +104,11 @@ impl DepthCamera {
             color.extend(rgb);
         }
         let depth: DepthImage =
-            (self.noise).apply(&self.intrinsics, &buffer.depth, seed, moment.index as u64);
+            (self.noise).apply(&self.intrinsics, &buffer.depth, seed, index as u64);
         let color = ColorImage::new(width, self.intrinsics.height, color);
         let frame = RgbdFrame {
-            sequence: moment.index as u64,
-            time_ns: (moment.index as f64 / rate * 1e9) as u64,
+            sequence: index as u64,
+            time_ns: (index as f64 / rate * 1e9) as u64,
             depth,
             color: color.ok(),
         };
@@ -130,8 +117,12 @@ impl DepthCamera {
 }
 
 /// Colour of a place on the surface, lit from fixed directions.
-fn lit(moment: &SceneMoment<'_>, face: &Face, weights: [f32; 3], eye: &P3) -> [u8; 3] {
-    let surface = moment.surface;
+fn lit(
+    (surface, paint): (&SceneSurface, &ScenePaint),
+    face: &Face,
+    weights: [f32; 3],
+    eye: &P3,
+) -> [u8; 3] {
     let normal = SceneSurface::blend(&surface.normals, face, weights);
     let place = SceneSurface::place(&surface.drawn, face, weights);
     let normal = if normal.dot(&(eye - place)) < 0.0 {
@@ -142,7 +133,7 @@ fn lit(moment: &SceneMoment<'_>, face: &Face, weights: [f32; 3], eye: &P3) -> [u
     let normal = normal.try_normalize(f32::MIN_POSITIVE).unwrap_or_default();
     let material = SceneSurface::blend(&surface.material, face, weights);
     let light = shade(&normal, 1.0);
-    let color = (moment.paint).color(surface.labels[face[0] as usize], &material);
+    let color = paint.color(surface.labels[face[0] as usize], &material);
     color.map(|c| (c * light).clamp(0.0, 255.0) as u8)
 }
 

@@ -22,6 +22,7 @@
 mod cloth_run;
 mod defects;
 mod depth_camera;
+mod film;
 mod motion;
 mod paint;
 mod points;
@@ -36,7 +37,8 @@ mod write;
 
 pub use cloth_run::ScanGarment;
 pub use defects::ScanDefects;
-pub use depth_camera::{DepthCamera, FilmedFrame};
+pub use depth_camera::DepthCamera;
+pub use film::FilmedFrame;
 pub use motion::ScanMotion;
 pub use paint::ScanPalette;
 pub use points::{SKIN_LABEL, STRAY_LABEL};

@@ -2,7 +2,6 @@
 
 use super::cloth_run::{ClothRun, ScanGarment};
 use super::defects::ScanDefects;
-use super::depth_camera::{DepthCamera, FilmedFrame};
 use super::motion::{PoseTrack, ScanMotion};
 use super::paint::{ScanPalette, ScenePaint};
 use super::points::ScanPoints;
@@ -177,38 +176,8 @@ impl ScanScene {
         })
     }
 
-    /// Films the subject with one depth camera; `each` receives frames with the label of each pixel and the truth, which has
-    /// scan points in the frames for which `is_scanned` is true.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
-    pub fn film(
-        &self,
-        camera: &DepthCamera,
-        is_scanned: impl Fn(usize) -> bool,
-        mut each: impl FnMut(FilmedFrame) -> Result<(), EvaluateError>,
-    ) -> Result<(), EvaluateError> {
-        self.play(|moment| {
-            let (frame, labels) = camera.shoot(&moment, self.seed, self.rate);
-            let seed = ScanSeed {
-                scene: self.seed,
-                scan: moment.index as u64,
-            };
-            let points = match is_scanned(moment.index) {
-                true => self.scanner.scan(moment.surface, moment.paint, seed),
-                false => ScanPoints::default(),
-            };
-            let truth = self.truth(&moment, points);
-            each(FilmedFrame {
-                frame,
-                labels,
-                truth,
-            })
-        })
-    }
-
     /// Dresses the subject and simulates its motion; `each` receives the subject at the time of each scan.
-    fn play(
+    pub(super) fn play(
         &self,
         mut each: impl FnMut(SceneMoment<'_>) -> Result<(), EvaluateError>,
     ) -> Result<(), EvaluateError> {
@@ -247,7 +216,8 @@ impl ScanScene {
         Ok(())
     }
 
-    fn truth(&self, moment: &SceneMoment<'_>, points: ScanPoints) -> TrueScan {
+    /// Truth of one time with the scan points of it.
+    pub(super) fn truth(&self, moment: &SceneMoment<'_>, points: ScanPoints) -> TrueScan {
         let (index, run, pose) = (moment.index, moment.run, moment.pose);
         let is_lost = |c: &[f32; 3]| c.iter().any(|c| c.is_nan());
         let lost = (0..).zip(&points.colors).filter(|(_, c)| is_lost(c));

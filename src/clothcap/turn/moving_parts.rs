@@ -1,0 +1,53 @@
+//! Parts of the body that move as one while the subject turns.
+
+use crate::body::Template;
+use crate::body::parts::BodyPart;
+
+/// Parts of the body that move as one: trunk, head, arms, legs.
+#[derive(Debug)]
+pub(super) struct MovingParts {
+    /// Part of each bone.
+    of_bone: Vec<usize>,
+    /// Joint that ties each part to the trunk; the trunk's own is unused.
+    pub(super) joints: Vec<usize>,
+}
+
+impl MovingParts {
+    pub(super) fn new(template: &Template) -> Self {
+        let skeleton = template.skeleton();
+        let limbs = [
+            BodyPart::LeftArm,
+            BodyPart::RightArm,
+            BodyPart::LeftLeg,
+            BodyPart::RightLeg,
+        ];
+        let mut joints = vec![0];
+        joints.extend(skeleton.index("head"));
+        joints.extend(
+            limbs
+                .iter()
+                .filter_map(|l| template.parts().limb(*l))
+                .map(|l| l.root),
+        );
+        let mut of_bone = vec![0; skeleton.len()];
+        for (bone, joint) in skeleton.joints().iter().enumerate() {
+            let own = joints.iter().skip(1).position(|j| *j == bone);
+            of_bone[bone] = match (own, joint.parent) {
+                (Some(k), _) => k + 1,
+                (None, Some(parent)) => of_bone[parent],
+                (None, None) => 0,
+            };
+        }
+        Self { of_bone, joints }
+    }
+
+    /// Number of parts.
+    pub(super) fn len(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Part of a bone.
+    pub(super) fn of(&self, bone: usize) -> usize {
+        self.of_bone[bone]
+    }
+}
