@@ -30,10 +30,10 @@ const DEVIATION: f64 = 0.01;
 /// See [`DEVIATION`].
 const INDEPENDENT: f64 = 300.0;
 /// Distance that parts may move apart at their joint, metres.
-const JOINT: f64 = 0.01;
+const JOINT: f64 = 0.03;
 /// Turn of a part against the trunk, beyond that of the tracked pose, radians. Legs and head are nearly round: without a
 /// bound they spin.
-const BEND: f64 = 0.2;
+const BEND: f64 = 0.5;
 /// Motion of a frame in one iteration, metres and radians.
 const STEP: f64 = 0.1;
 /// The same of the reference: its points stay where they were seen.

@@ -85,9 +85,9 @@ const SCENES: [TurnSpec; 6] = [
         HANGING,
     ),
     (
-        "turn: tank and trousers",
-        &[("tank", 0), ("trousers", 1)],
-        &[-0.5, 0.0, -1.0],
+        "turn: sleeves over trousers",
+        &[("trousers", 0), ("longsleeve", 1)],
+        &[0.0, 0.5, 1.0],
         RAISED,
     ),
     (

@@ -11,8 +11,8 @@ use tryon::body::Template;
 use tryon::clothcap::align::{AlignedBody, Start};
 use tryon::clothcap::scan::ScanFrame;
 use tryon::clothcap::turn::{FusedTurn, TurnConfig, TurnReport, TurnTracker, fuse};
+use tryon::formats::open_recording;
 use tryon::formats::scan::{PlyMesh, write_ply};
-use tryon::formats::{RgbdSource, open_recording};
 
 /// Fused scan in the output folder, and the person in it.
 const SCAN: &str = "turn.ply";
