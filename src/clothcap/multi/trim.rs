@@ -176,6 +176,7 @@ mod tests {
         let part = ClothPart {
             slot: Slot::Top,
             label: 1,
+            below: (0..x.len() as u32).collect(),
             nodes: (0..x.len() as u32).collect(),
             faces,
             rings: Vec::new(),
