@@ -78,6 +78,9 @@ pub struct OutfitCapture {
     undresser: Undresser,
     solid: SolidBody,
     outfit: Option<CapturedOutfit>,
+    /// Systems of the outfit's garments, kept from scan to scan.
+    fits: Vec<PartFit>,
+    solvers: Vec<PenetrationSolver>,
 }
 
 impl OutfitCapture {
@@ -93,6 +96,8 @@ impl OutfitCapture {
             template,
             config,
             outfit: None,
+            fits: Vec::new(),
+            solvers: Vec::new(),
         })
     }
 
@@ -141,7 +146,8 @@ impl OutfitCapture {
     pub fn frame(&mut self, scan: &BodyScan) -> Result<FrameCapture, CaptureError> {
         let segmented = self.segmenter.step(scan)?;
         let covered = segmented.covered();
-        let fitter = PartFitter {
+        let mut fitter = PartFitter {
+            fits: &mut self.fits,
             cloth: self.segmenter.cloth(),
             scan,
             segmented: &segmented,
@@ -198,8 +204,11 @@ impl OutfitCapture {
     ) -> Result<Vec<Vec<P3>>, CaptureError> {
         self.solid.place(&undressed.vertices)?;
         let mut out = fitted.to_vec();
-        for (part, vertices) in outfit.cloth.parts.iter().zip(&mut out) {
-            PenetrationSolver::new(part)?.run(&self.solid, vertices)?;
+        for (k, (part, vertices)) in outfit.cloth.parts.iter().zip(&mut out).enumerate() {
+            if k == self.solvers.len() {
+                self.solvers.push(PenetrationSolver::new(part)?);
+            }
+            self.solvers[k].run(&self.solid, vertices)?;
         }
         tuck_hidden(&outfit.cloth, &mut out, self.solid.vertices());
         Ok(out)
@@ -216,6 +225,8 @@ struct FittedParts {
 
 /// Fit of all parts to one segmented scan.
 struct PartFitter<'a> {
+    /// Systems of the garments so far.
+    fits: &'a mut Vec<PartFit>,
     cloth: &'a ClothTemplate,
     scan: &'a BodyScan,
     segmented: &'a SegmentedScan,
@@ -224,7 +235,7 @@ struct PartFitter<'a> {
 
 impl PartFitter<'_> {
     /// Parts of the first scan, coupled to the body model (eq. 18), and the outfit that they make.
-    fn first(&self, body: AlignedBody) -> Result<(CapturedOutfit, FittedParts), CaptureError> {
+    fn first(&mut self, body: AlignedBody) -> Result<(CapturedOutfit, FittedParts), CaptureError> {
         let segmented = self.segmented;
         let cloth = MultiCloth::new(self.cloth, &segmented.labelling);
         if cloth.parts.is_empty() {
@@ -259,7 +270,7 @@ impl PartFitter<'_> {
     }
 
     /// Parts of a later scan, coupled to the posed multi-cloth template (eq. 21).
-    fn later(&self, outfit: &CapturedOutfit) -> Result<FittedParts, CaptureError> {
+    fn later(&mut self, outfit: &CapturedOutfit) -> Result<FittedParts, CaptureError> {
         let mut fitted = FittedParts::default();
         let bones = &self.segmented.alignment.bones;
         for (part, rest) in outfit.cloth.parts.iter().zip(&outfit.rest) {
@@ -270,7 +281,7 @@ impl PartFitter<'_> {
     }
 
     fn fit(
-        &self,
+        &mut self,
         part: &ClothPart,
         model: &[P3],
         start: Vec<P3>,
@@ -278,7 +289,11 @@ impl PartFitter<'_> {
     ) -> Result<(), CaptureError> {
         let points = PartScan::new(self.scan, &self.segmented.labels, part.label);
         let mut vertices = start;
-        let report = PartFit::new(part, model)?.run(&points, model, &mut vertices, self.config)?;
+        let k = out.vertices.len();
+        if k == self.fits.len() {
+            self.fits.push(PartFit::new(part, model)?);
+        }
+        let report = self.fits[k].run(&points, model, &mut vertices, self.config)?;
         out.vertices.push(vertices);
         out.errors.push(report.error);
         out.boundary_errors.push(report.boundary_error);

@@ -76,7 +76,8 @@ pub(super) fn check_header(header: &CaptureHeader, template: &Arc<Template>) -> 
     let is_frame = frame.metres_per_unit > 0.0
         && frame.metres_per_unit.is_finite()
         && frame.up.iter().all(|v| v.is_finite())
-        && frame.up.iter().any(|v| *v != 0.0);
+        && frame.up.iter().any(|v| *v != 0.0)
+        && frame.floor.is_none_or(f64::is_finite);
     check(is_frame, "frame", || "no unit and up axis".into())?;
     let legs = header.clothed.legs;
     check(

@@ -7,6 +7,7 @@ mod capture_header;
 mod dress_body;
 mod error;
 mod face_edges;
+mod floor;
 mod layers;
 pub mod mrf;
 pub mod multi;

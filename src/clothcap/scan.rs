@@ -1,6 +1,7 @@
 //! A scan made ready: finite points in metres, y up, with normals and colours.
 
 use super::CaptureError;
+use super::floor::Floor;
 use crate::formats::scan::ScanMesh;
 use crate::math::{P3, V3};
 use crate::mesh::Face;
@@ -32,6 +33,9 @@ pub struct ScanFrame {
     pub metres_per_unit: f64,
     /// Direction against gravity in the file's axes, unit vector.
     pub up: [f64; 3],
+    /// Height along it, in the file's units, below which points belong to the floor.
+    #[serde(default)]
+    pub floor: Option<f64>,
 }
 
 impl Default for ScanFrame {
@@ -40,6 +44,7 @@ impl Default for ScanFrame {
         Self {
             metres_per_unit: 1.0,
             up: [0.0, 1.0, 0.0],
+            floor: None,
         }
     }
 }
@@ -53,11 +58,49 @@ impl ScanFrame {
             .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
     }
 
-    /// Frames in which points could be an upright person, most likely first.
+    /// The same frame with the floor that points stand on, if they do.
+    pub fn with_floor(self, points: &[P3]) -> Self {
+        /// Least cosine between the floor's normal and the upright axis.
+        const LEVEL: f64 = 0.98;
+        let up: Vector3<f64> = self.up.into();
+        let floor = Floor::find(points).filter(|f| f.up.cast::<f64>().dot(&up) > LEVEL);
+        Self {
+            floor: floor.map(|f| f64::from(f.top())),
+            ..self
+        }
+    }
+
+    /// Frames in which points could be an upright person, most likely first; a floor tells the axis.
     ///
     /// # Errors
     /// [`CaptureError::NoPersonSize`] without any.
     pub fn candidates(points: &[P3]) -> Result<Vec<Self>, CaptureError> {
+        let Some(floor) = Floor::find(points) else {
+            return Self::along_axes(points);
+        };
+        let up = floor.up.cast::<f64>();
+        let turn = Self {
+            up: up.into(),
+            ..Self::default()
+        };
+        let turn = turn.rotation().cast::<f32>();
+        let person = points.iter().filter(|p| !floor.holds(p));
+        let person: Vec<P3> = person.map(|p| turn * p).collect();
+        let upright = |f: &Self| f.up == Self::default().up;
+        let mut all = Self::along_axes(&person)?;
+        all.retain(upright);
+        for frame in &mut all {
+            (frame.up, frame.floor) = (up.into(), Some(f64::from(floor.top())));
+        }
+        if all.is_empty() {
+            let extent = extent(&person);
+            return Err(CaptureError::NoPersonSize { extent });
+        }
+        Ok(all)
+    }
+
+    /// Frames with an upright axis of the file.
+    fn along_axes(points: &[P3]) -> Result<Vec<Self>, CaptureError> {
         let extent = extent(points);
         let largest = extent.iter().copied().fold(0.0, f32::max);
         let is_person =
@@ -75,6 +118,7 @@ impl ScanFrame {
                     all.push(Self {
                         metres_per_unit,
                         up,
+                        floor: None,
                     });
                 }
             }
@@ -126,16 +170,22 @@ pub struct BodyScan {
 }
 
 impl BodyScan {
-    /// Converts a file to metres with y up; non-finite points and repeated positions are left out.
+    /// Converts a file to metres with y up; non-finite points, repeated positions and the floor are left out.
     ///
     /// # Errors
     /// [`CaptureError::TooFewPoints`]; [`CaptureError::NoPersonSize`] if the frame makes it no person's size.
     pub fn new(file: &ScanMesh, frame: &ScanFrame) -> Result<Self, CaptureError> {
         let turn = frame.rotation();
+        let up: Vector3<f64> = frame.up.into();
+        let is_floor = |p: &P3| {
+            frame
+                .floor
+                .is_some_and(|top| up.dot(&p.coords.cast::<f64>()) < top)
+        };
         let mut seen = std::collections::HashMap::new();
         let mut scan = Self::default();
         for (row, p) in file.points.iter().enumerate() {
-            if !p.iter().all(|v| v.is_finite()) {
+            if !p.iter().all(|v| v.is_finite()) || is_floor(p) {
                 scan.point_of_row.push(u32::MAX);
                 continue;
             }

@@ -32,6 +32,8 @@ const COUPLING: f64 = 0.03;
 const SIGMA: f64 = 0.02;
 /// Iterations of the free surface.
 const ITERATIONS: usize = 6;
+/// Most scan points in an iteration.
+const POINTS: usize = 30_000;
 /// Pull to the minimally clothed shape beside the data's.
 const ANCHOR: f64 = 0.02;
 /// Weight of a garment vertex that the body comes through, beside its area.
@@ -153,7 +155,10 @@ impl Undresser {
         self.bvh.refit(vertices);
         let kernel = GemanMcClure { sigma: SIGMA };
         let mut matches = Vec::new();
-        par::map_into(Par::Rayon, scan.points.len(), 256, &mut matches, |i| {
+        let stride = scan.points.len().div_ceil(POINTS).max(1);
+        let count = scan.points.len().div_ceil(stride);
+        par::map_into(Par::Rayon, count, 256, &mut matches, |k| {
+            let i = k * stride;
             let p = scan.points[i];
             let normal = ScanNormal {
                 normal: scan.normals[i],
@@ -166,7 +171,7 @@ impl Undresser {
             let weight = kernel.weight(f64::from(found.distance * found.distance));
             Some((found.face, found.weights, weight, p))
         });
-        let point = self.template.mesh().area() / scan.points.len().max(1) as f64;
+        let point = self.template.mesh().area() / count.max(1) as f64;
         for (face, corners, weight, p) in matches.into_iter().flatten() {
             self.energy
                 .add_face_point(face, corners, point * weight, &p);

@@ -1,6 +1,7 @@
 //! Garment capture: the real scan against hand-made labels, synthetic ones against their truth, and scans that are damaged.
 
 use crate::common::shared;
+use nalgebra::Rotation3;
 use rand::{Rng, SeedableRng};
 use std::path::Path;
 use std::sync::Arc;
@@ -18,7 +19,7 @@ use tryon::evaluate::garment_capture::{
 };
 use tryon::evaluate::scans::{SKIN_LABEL, ScanScene, TrueScan};
 use tryon::formats::scan::{ScanMesh, read_scan};
-use tryon::math::P3;
+use tryon::math::{P3, V3};
 
 /// Unsigned bytes of an npy file.
 fn bytes_of_npy(path: &Path) -> Vec<u8> {
@@ -185,6 +186,102 @@ fn damaged_scans_are_captured_too() {
     }
     inches.normals.clear();
     assert!(score("inches, z down, no normals", &inches, &truth.labels) > 0.85);
+}
+
+#[test]
+fn a_floor_and_what_hands_hold_are_no_garments() {
+    let truth = dressed();
+    let mut file = mesh_of(&truth);
+    let mut rng = rand_pcg::Pcg32::seed_from_u64(9);
+    let lowest = file.points.iter().map(|p| p.y).fold(f32::MAX, f32::min);
+    let mut add = |p: P3, normal: V3, color: [u8; 3]| {
+        file.points.push(p);
+        file.normals.push(normal);
+        file.colors.push(color);
+    };
+    for _ in 0..12_000 {
+        let [x, z] = [(); 2].map(|()| 4.0 * (rng.random::<f32>() - 0.5));
+        add(P3::new(x, lowest, z), V3::y(), [90, 80, 70]);
+    }
+    // A box of 12 cm at the left hand, the farthest point along x.
+    let hand = truth
+        .points
+        .iter()
+        .max_by(|a, b| a.x.total_cmp(&b.x))
+        .expect("points");
+    for _ in 0..800 {
+        let mut p = [(); 3].map(|()| rng.random::<f32>() - 0.5);
+        let side = rng.random_range(0..3);
+        p[side] = 0.5f32.copysign(p[side]);
+        let mut normal = V3::zeros();
+        normal[side] = p[side].signum();
+        add(hand + V3::from(p) * 0.12, normal, [200, 40, 160]);
+    }
+    // The camera looked down.
+    let tilt = Rotation3::from_axis_angle(&V3::x_axis(), 0.2);
+    file.points.iter_mut().for_each(|p| *p = tilt * *p);
+    file.normals.iter_mut().for_each(|n| *n = tilt * *n);
+    let (found, rows) = segmented(&file, LabelConfig::default()).expect("a person on a floor");
+    let count = truth.points.len();
+    assert!(
+        covered_f1(&truth.labels, &rows[..count]) > 0.9,
+        "{:?}",
+        found.labelling.slots
+    );
+    let floor = rows[count..count + 12_000]
+        .iter()
+        .filter(|l| **l != 0)
+        .count();
+    assert!(floor < 200, "{floor} points of the floor are worn");
+}
+
+#[test]
+fn a_subject_who_turned_around_between_two_scans_is_found_again() {
+    let truth = dressed();
+    let file = mesh_of(&truth);
+    let template = embedded::template();
+    let (frame, start) = find_frame(&template, &file).expect("a person");
+    let mut segmenter = ScanSegmenter::new(template, LabelConfig::default()).expect("a segmenter");
+    segmenter.start_at(start);
+    segmenter
+        .step(&BodyScan::new(&file, &frame).expect("a scan"))
+        .expect("garments");
+
+    let mut turned = file.clone();
+    let turn = Rotation3::from_axis_angle(&V3::y_axis(), std::f32::consts::PI);
+    turned.points.iter_mut().for_each(|p| *p = turn * *p);
+    turned.normals.iter_mut().for_each(|n| *n = turn * *n);
+    let scan = BodyScan::new(&turned, &frame).expect("a scan");
+    let found = segmenter.step(&scan).expect("garments");
+    let report = found.alignment.report;
+    assert!(report.surface_error < 0.002, "{report:?}");
+    let rows = scan.rows(&found.parts(), 0);
+    assert!(covered_f1(&truth.labels, &rows) > 0.9);
+}
+
+#[test]
+fn a_wrong_prior_and_half_a_person_give_what_can_be_found() {
+    let truth = dressed();
+    let file = mesh_of(&truth);
+    // A dress that is none: one garment covers what two cover.
+    let prior = |slots: &[Slot]| LabelConfig {
+        slots: Some(slots.to_vec()),
+        ..LabelConfig::default()
+    };
+    let (found, rows) = segmented(&file, prior(&[Slot::OnePiece])).expect("one garment");
+    assert_eq!(found.labelling.parts().iter().max(), Some(&1));
+    assert!(covered_f1(&truth.labels, &rows) > 0.9);
+
+    let hips = 0.95;
+    let (half, labels) = keep(&file, &truth.labels, |i| file.points[i].y > hips);
+    match segmented(&half, LabelConfig::default()) {
+        Ok((_, rows)) => {
+            let score = covered_f1(&labels, &rows);
+            println!("half a person: F1 of what is covered {score:.3}");
+            assert!(score > 0.8, "{score}");
+        }
+        Err(e) => assert!(matches!(e, CaptureError::NoPerson { .. }), "{e}"),
+    }
 }
 
 #[test]

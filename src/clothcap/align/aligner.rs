@@ -4,12 +4,14 @@ use super::free_surface::{FreeSurface, SurfaceFitConfig, SurfaceMatch};
 use super::legs::leg_topology;
 use super::model_fit::{AlignedBody, FitStage, ModelFit};
 use super::start::{Start, find_person};
-use crate::body::{BoneTransforms, Template};
+use crate::body::{BoneTransforms, Pose, Template};
 use crate::clothcap::scan::BodyScan;
 use crate::clothcap::topology::{ClothTemplate, LegTopology};
 use crate::clothcap::{CaptureError, unpose};
-use crate::math::P3;
+use crate::math::{P3, Rigid, World};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
 /// BodyScan points in a fit of the model.
@@ -18,6 +20,8 @@ const SAMPLES: usize = 6000;
 const LATER_SAMPLES: usize = 3000;
 /// Stages of a later pose.
 const LATER: [FitStage; 2] = [FitStage::posed(0.08, 8), FitStage::posed(0.03, 6)];
+/// Turns about the vertical between two scans that are tried, radians.
+const TURNS: [f64; 3] = [FRAC_PI_2, PI, -FRAC_PI_2];
 /// Mean robust distance above which a later pose is lost and the person is searched anew, metres.
 const LOST: f64 = 0.03;
 
@@ -189,10 +193,8 @@ impl Aligner {
     ) -> Result<Alignment, CaptureError> {
         let template = self.cloth.template().clone();
         let mut fit = ModelFit::new(&template, scan, LATER_SAMPLES).with_clothed(&clothed.rest);
-        let mut body = AlignedBody {
-            pose: self.last.as_ref().unwrap_or(&clothed.body).pose.clone(),
-            shape: clothed.body.shape.clone(),
-        };
+        let last = &self.last.as_ref().unwrap_or(&clothed.body).pose;
+        let mut body = self.turned(last, clothed, &mut fit);
         for stage in &LATER {
             fit.run(&mut body, stage)?;
         }
@@ -218,6 +220,38 @@ impl Aligner {
             },
             ..out
         })
+    }
+
+    /// Body of the first scan in the last pose, turned about the vertical to the direction that fits best: a back looks
+    /// much like a front to closest points.
+    fn turned(
+        &self,
+        last: &Pose<World>,
+        clothed: &ClothedTemplate,
+        fit: &mut ModelFit<'_>,
+    ) -> AlignedBody {
+        let pelvis = last.root.point(&self.template.skeleton().joints()[0].rest);
+        let turned = |turn: f64| {
+            let axis = Vector3::y() * turn;
+            let about = Isometry3::rotation_wrt_point(UnitQuaternion::new(axis), pelvis);
+            AlignedBody {
+                pose: Pose {
+                    root: Rigid::new(about * last.root.iso()),
+                    angles: last.angles.clone(),
+                },
+                shape: clothed.body.shape.clone(),
+            }
+        };
+        let mut best = turned(0.0);
+        let mut least = fit.error(&best);
+        for turn in TURNS {
+            let other = turned(turn);
+            let error = fit.error(&other);
+            if error < least {
+                (best, least) = (other, error);
+            }
+        }
+        best
     }
 
     /// Releases the surface from the model.

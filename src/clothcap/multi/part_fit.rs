@@ -15,6 +15,8 @@ use crate::spatial::Bvh;
 const NORMALS: f32 = 0.2;
 /// Pull to the start beside the data's: settles what no term determines.
 const ANCHOR: f64 = 1e-4;
+/// Mean motion of the vertices below which the fit ends, metres.
+const CONVERGED: f32 = 5e-5;
 /// Distance up to which a boundary point of the scan belongs to a ring, metres.
 const RING_REACH: f32 = 0.06;
 
@@ -31,8 +33,10 @@ pub struct PartFitConfig {
     pub boundary: f64,
     /// Weight of boundary smoothness beside a surface point (w_a).
     pub smoothness: f64,
-    /// Iterations.
+    /// Most iterations.
     pub iterations: usize,
+    /// Most scan points in an iteration.
+    pub points: usize,
 }
 
 impl Default for PartFitConfig {
@@ -44,6 +48,7 @@ impl Default for PartFitConfig {
             boundary: 2.0,
             smoothness: 2.0,
             iterations: 8,
+            points: 15_000,
         }
     }
 }
@@ -57,6 +62,8 @@ pub struct PartFitReport {
     pub boundary_error: f64,
     /// BodyScan points with a partner.
     pub paired: usize,
+    /// Solves.
+    pub iterations: usize,
 }
 
 /// BodyScan points of one part.
@@ -94,8 +101,8 @@ impl PartScan {
 
 /// System of one part.
 #[derive(Debug)]
-pub struct PartFit<'a> {
-    part: &'a ClothPart,
+pub struct PartFit {
+    part: ClothPart,
     energy: QuadraticEnergy,
     edges: Vec<[u32; 2]>,
     /// Stencils: edges, then Laplacians, then rings.
@@ -103,12 +110,12 @@ pub struct PartFit<'a> {
     bvh: Bvh,
 }
 
-impl<'a> PartFit<'a> {
+impl PartFit {
     /// Prepares the system; `rest` are the part's vertices in any pose, metres.
     ///
     /// # Errors
     /// [`CaptureError::Solve`] for a part too large.
-    pub fn new(part: &'a ClothPart, rest: &[P3]) -> Result<Self, CaptureError> {
+    pub fn new(part: &ClothPart, rest: &[P3]) -> Result<Self, CaptureError> {
         let n = part.nodes.len();
         let edges = edges(&part.faces);
         let around = neighbours(n, &edges);
@@ -146,7 +153,7 @@ impl<'a> PartFit<'a> {
             ranges: [edges.len(), second, stencils.len()],
             energy: QuadraticEnergy::new(n, stencils, &part.faces)?,
             bvh: Bvh::new(&part.faces, rest),
-            part,
+            part: part.clone(),
             edges,
         })
     }
@@ -162,17 +169,13 @@ impl<'a> PartFit<'a> {
         surface: &mut Vec<P3>,
         config: &PartFitConfig,
     ) -> Result<PartFitReport, CaptureError> {
-        let area = area(self.part, model);
+        let area = area(&self.part, model);
         let vertex = area / model.len().max(1) as f64;
-        let point = area / scan.points.len().max(1) as f64;
+        let stride = scan.points.len().div_ceil(config.points.max(1)).max(1);
+        let point = area / scan.points.len().div_ceil(stride).max(1) as f64;
         let mut report = PartFitReport::default();
-        for k in 0..=config.iterations {
-            let matches = self.pair(scan, surface, config);
-            report.error = mean_distance(&matches);
-            report.paired = matches.len();
-            if k == config.iterations {
-                break;
-            }
+        while report.iterations < config.iterations {
+            let matches = self.pair((scan, stride), surface, config);
             self.energy.reset();
             for (i, e) in self.edges.iter().enumerate() {
                 let d = (model[e[0] as usize] - model[e[1] as usize]).cast::<f64>();
@@ -194,18 +197,35 @@ impl<'a> PartFit<'a> {
                     .add_face_point(m.face, m.corners, point * m.weight, &m.target);
             }
             report.boundary_error = self.add_boundary(scan, surface, config.boundary * vertex);
-            *surface = self.energy.minimise("garment part")?;
+            let moved = self.energy.minimise("garment part")?;
+            report.iterations += 1;
+            let settled = mean_motion(&moved, surface) < CONVERGED;
+            *surface = moved;
+            if settled {
+                break;
+            }
         }
+        let matches = self.pair((scan, 1), surface, config);
+        report.error = mean_distance(&matches);
+        report.paired = matches.len();
         Ok(report)
     }
 
-    fn pair(&mut self, scan: &PartScan, surface: &[P3], config: &PartFitConfig) -> Vec<PartMatch> {
+    /// Places of every `stride`-th point.
+    fn pair(
+        &mut self,
+        (scan, stride): (&PartScan, usize),
+        surface: &[P3],
+        config: &PartFitConfig,
+    ) -> Vec<PartMatch> {
         self.bvh.refit(surface);
         let kernel = GemanMcClure {
             sigma: config.sigma,
         };
         let mut out = Vec::new();
-        par::map_into(Par::Rayon, scan.points.len(), 256, &mut out, |i| {
+        let count = scan.points.len().div_ceil(stride);
+        par::map_into(Par::Rayon, count, 256, &mut out, |k| {
+            let i = k * stride;
             let p = scan.points[i];
             let normal = ScanNormal {
                 normal: scan.normals[i],
@@ -261,6 +281,12 @@ struct PartMatch {
     target: P3,
     distance: f32,
     weight: f64,
+}
+
+/// Mean way of the vertices between two iterations, metres.
+fn mean_motion(moved: &[P3], before: &[P3]) -> f32 {
+    let way = moved.iter().zip(before).map(|(a, b)| (a - b).norm());
+    way.sum::<f32>() / moved.len().max(1) as f32
 }
 
 fn mean_distance(matches: &[PartMatch]) -> f64 {

@@ -94,7 +94,9 @@ fn found(
     let frame = ScanFrame {
         metres_per_unit,
         up: args.frame.up.vector(),
+        floor: None,
     };
+    let frame = frame.with_floor(&file.points);
     let scan = BodyScan::new(file, &frame)?;
     Ok((frame, find_person(template, &scan)?))
 }

@@ -1,0 +1,185 @@
+//! Floor below a person in a scan: a plane that the rest stands on.
+
+use crate::math::{P3, V3};
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+/// Points that planes are searched among.
+const SAMPLES: usize = 2000;
+/// Planes that are tried; three points lie on a floor of a tenth of all once in 1000.
+const TRIALS: usize = 6000;
+/// Distance of a floor's points from its plane, as a share of the cloud's extent: 13 mm for a person.
+const THICKNESS: f32 = 0.007;
+/// Least share of the points that make a floor.
+const LEAST_SHARE: f64 = 0.08;
+/// Most of the other points that lie below it, as a share of all.
+const MOST_BELOW: f64 = 0.01;
+/// Least height of what stands on it beside its width: a person's back is a plane too, with nothing standing on it.
+const UPRIGHT: f32 = 0.7;
+/// Least width of a floor beside the height of what stands on it: soles are none.
+const LEAST_WIDTH: f32 = 0.25;
+/// Share of points left out at each end of an extent: strays.
+const STRAYS: f64 = 0.01;
+
+/// Plane with everything else on one side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Floor {
+    /// Unit normal towards what stands on it.
+    pub(super) up: V3,
+    /// Height of the plane along the normal, units of the cloud.
+    height: f32,
+    thickness: f32,
+}
+
+impl Floor {
+    /// Floor of a cloud; points that are not finite are passed over.
+    pub(super) fn find(points: &[P3]) -> Option<Self> {
+        let finite: Vec<P3> = points
+            .iter()
+            .filter(|p| p.iter().all(|c| c.is_finite()))
+            .copied()
+            .collect();
+        let stride = finite.len().div_ceil(SAMPLES).max(1);
+        let some: Vec<P3> = finite.into_iter().step_by(stride).collect();
+        if some.len() < 100 {
+            return None;
+        }
+        let extent = (0..3)
+            .map(|a| spread(some.iter().map(|p| p[a])))
+            .fold(0.0, f32::max);
+        let mut random = Pcg32::seed_from_u64(1);
+        let mut best: Option<(usize, Self)> = None;
+        for _ in 0..TRIALS {
+            let corners = [(); 3].map(|()| some[random.random_range(0..some.len())]);
+            let Some(plane) = Self::through(corners, THICKNESS * extent) else {
+                continue;
+            };
+            // A plane that cuts through the cloud is no floor: most trials end after a few points.
+            let Some((floor, on)) = plane.support(&some) else {
+                continue;
+            };
+            if best.as_ref().is_none_or(|(n, _)| on > *n) {
+                best = Some((on, floor));
+            }
+        }
+        let (on, floor) = best?;
+        let is_large = on as f64 >= LEAST_SHARE * some.len() as f64;
+        (is_large && floor.carries(&some)).then_some(floor)
+    }
+
+    fn through([a, b, c]: [P3; 3], thickness: f32) -> Option<Self> {
+        let up = (b - a).cross(&(c - a)).try_normalize(f32::MIN_POSITIVE)?;
+        Some(Self {
+            up,
+            height: up.dot(&a.coords),
+            thickness,
+        })
+    }
+
+    /// Height of a point over the plane, units of the cloud.
+    fn over(&self, p: &P3) -> f32 {
+        self.up.dot(&p.coords) - self.height
+    }
+
+    /// Is part of the floor, or lies below it.
+    pub(super) fn holds(&self, p: &P3) -> bool {
+        self.over(p) < self.thickness
+    }
+
+    /// Height along the normal up to which points belong to it, units of the cloud.
+    pub(super) fn top(&self) -> f32 {
+        self.height + self.thickness
+    }
+
+    /// The plane turned to the side of the other points, and the number of points on it; `None` with points on both sides.
+    fn support(mut self, points: &[P3]) -> Option<(Self, usize)> {
+        let most = (MOST_BELOW * points.len() as f64) as usize;
+        let (mut above, mut below, mut on) = (0, 0, 0);
+        for p in points {
+            let over = self.over(p);
+            if over.abs() < self.thickness {
+                on += 1;
+            } else if over > 0.0 {
+                above += 1;
+            } else {
+                below += 1;
+            }
+            if above.min(below) > most {
+                return None;
+            }
+        }
+        if below > above {
+            (self.up, self.height) = (-self.up, -self.height);
+        }
+        Some((self, on))
+    }
+
+    /// It is wide, and what is not on it stands upright.
+    fn carries(&self, points: &[P3]) -> bool {
+        let (on, rest): (Vec<&P3>, Vec<&P3>) = points.iter().partition(|p| self.holds(p));
+        let tall = spread(rest.iter().map(|p| self.over(p)));
+        let aside = self.up.cross(&V3::x());
+        let aside = if aside.norm() > 0.5 {
+            aside
+        } else {
+            self.up.cross(&V3::z())
+        }
+        .normalize();
+        let wide = [aside, self.up.cross(&aside)]
+            .map(|axis| [&on, &rest].map(|part| spread(part.iter().map(|p| axis.dot(&p.coords)))));
+        let is_wide = wide.iter().all(|[on, _]| *on > LEAST_WIDTH * tall);
+        is_wide && wide.iter().all(|[_, rest]| tall >= UPRIGHT * rest)
+    }
+}
+
+/// Range of some values without strays.
+fn spread(values: impl Iterator<Item = f32>) -> f32 {
+    let mut all: Vec<f32> = values.collect();
+    all.sort_by(f32::total_cmp);
+    let last = all.len().saturating_sub(1) as f64;
+    let [low, high] =
+        [STRAYS, 1.0 - STRAYS].map(|share| all.get((share * last).round() as usize).copied());
+    high.zip(low).map_or(0.0, |(h, l)| h - l)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::embedded;
+
+    /// The template's vertices, and a floor of `size` metres under its feet, with `count` points, turned by `tilt` about x.
+    fn person_on_floor(size: f32, count: usize, tilt: f32) -> Vec<P3> {
+        let template = embedded::template();
+        let mut points = template.mesh().vertices().to_vec();
+        let lowest = points.iter().map(|p| p.y).fold(f32::MAX, f32::min);
+        let mut random = Pcg32::seed_from_u64(3);
+        for _ in 0..count {
+            let [x, z] = [(); 2].map(|()| (random.random::<f32>() - 0.5) * size);
+            points.push(P3::new(
+                x,
+                lowest + 0.01 * (random.random::<f32>() - 0.5),
+                z,
+            ));
+        }
+        let turn = nalgebra::Rotation3::from_axis_angle(&V3::x_axis(), tilt);
+        points.iter().map(|p| turn * p).collect()
+    }
+
+    #[test]
+    fn a_floor_is_found_with_its_up_and_people_have_none() {
+        for (size, tilt) in [(1.5, 0.0), (4.0, 0.3), (3.0, 3.0)] {
+            let points = person_on_floor(size, 4000, tilt);
+            let floor = Floor::find(&points).expect("a floor");
+            let up = nalgebra::Rotation3::from_axis_angle(&V3::x_axis(), tilt) * V3::y();
+            assert!(floor.up.dot(&up) > 0.999, "{size} {tilt}: {:?}", floor.up);
+            let kept = points.iter().filter(|p| !floor.holds(p)).count();
+            let person = points.len() - 4000;
+            assert!(
+                kept <= person && kept * 10 > person * 9,
+                "{kept} of {person}"
+            );
+        }
+        assert_eq!(Floor::find(&person_on_floor(1.0, 0, 0.0)), None);
+        assert_eq!(Floor::find(&[]), None);
+    }
+}
