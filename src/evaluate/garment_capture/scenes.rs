@@ -139,6 +139,7 @@ pub fn capture_scenes() -> Result<Vec<CaptureScene>, EvaluateError> {
             scene: ScanScene {
                 actor,
                 garments: outfit.iter().map(garment).collect::<Result<_, _>>()?,
+                skinned: Vec::new(),
                 motion: ScanMotion::Play {
                     routine: Routine::TryOn,
                     start: 0.4,

@@ -128,6 +128,7 @@ pub fn turn_scenes() -> Result<Vec<TurnScene>, EvaluateError> {
             scene: ScanScene {
                 actor,
                 garments: outfit.iter().map(garment).collect::<Result<_, _>>()?,
+                skinned: Vec::new(),
                 motion: ScanMotion::Turn {
                     routine: *routine,
                     start: *start,

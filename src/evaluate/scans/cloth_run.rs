@@ -1,5 +1,6 @@
 //! Garments put on a subject and simulated from pose to pose.
 
+use super::skinned::{BoundGarment, SkinnedGarment};
 use crate::body::measure::measure;
 use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
 use crate::cloth::{Input, Workspace, step};
@@ -38,6 +39,7 @@ pub(super) struct ClothRun<'a> {
     rest: &'a RestBody,
     /// `None` for a subject without garments.
     dressed: Option<Dressed>,
+    skinned: Vec<BoundGarment>,
     work: Workspace,
     bones: BoneTransforms,
     body: Vec<P3>,
@@ -52,10 +54,12 @@ impl<'a> ClothRun<'a> {
     pub(super) fn new(
         (template, rest): (&'a Template, &'a RestBody),
         pose: &Pose<World>,
-        garments: &[ScanGarment],
+        (garments, skinned): (&[ScanGarment], &[SkinnedGarment]),
         (edge, dt): (f64, f64),
     ) -> Result<Self, String> {
+        let bound = skinned.iter().map(|g| g.bind(template, rest));
         let mut run = Self {
+            skinned: bound.collect::<Result<_, _>>()?,
             template,
             rest,
             dressed: None,
@@ -85,6 +89,9 @@ impl<'a> ClothRun<'a> {
             &self.bones,
             &mut self.body,
         );
+        for garment in &mut self.skinned {
+            garment.pose(&self.bones);
+        }
         let Some(dressed) = &mut self.dressed else {
             return Ok(());
         };
@@ -112,13 +119,14 @@ impl<'a> ClothRun<'a> {
         &self.bones.joints
     }
 
-    /// Garments with the positions of their simulation vertices, innermost first.
+    /// Garments with the positions of their simulation vertices, innermost first; skinned ones lie over simulated ones.
     pub(super) fn garments(&self) -> impl Iterator<Item = (&GarmentMesh, &[P3])> {
-        self.dressed.iter().flat_map(|d| {
+        let simulated = self.dressed.iter().flat_map(|d| {
             let meshes = d.model.outfit.garments.iter();
             let states = d.state.garments.iter().map(|g| g.positions.as_slice());
             meshes.zip(states)
-        })
+        });
+        simulated.chain(self.skinned.iter().map(BoundGarment::surface))
     }
 }
 

@@ -29,6 +29,7 @@ mod points;
 mod sampling;
 mod scanner;
 mod scene;
+mod skinned;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -44,4 +45,5 @@ pub use paint::ScanPalette;
 pub use points::{SKIN_LABEL, STRAY_LABEL};
 pub use scanner::ScannerSetting;
 pub use scene::{ScanScene, TrueGarment, TrueScan};
+pub use skinned::{GarmentParts, SkinnedGarment};
 pub use write::write_scan_folder;

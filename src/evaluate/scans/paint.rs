@@ -80,6 +80,8 @@ const LIGHT: [f32; 3] = [0.35, 0.75, 0.55];
 const FILL: [f32; 3] = [-0.6, 0.3, -0.7];
 /// Shares of ambient light, light and weaker light.
 const SHADE: [f32; 3] = [0.50, 0.42, 0.20];
+/// Change of red, green and blue in a light that is wholly warm.
+const WARMTH: [f32; 3] = [0.5, 0.0, -0.5];
 /// Brightness of a place that no camera sees, over that of an open one.
 const OCCLUDED: f32 = 0.55;
 
@@ -126,11 +128,17 @@ impl ScenePaint {
     }
 }
 
-/// Brightness at a normal, for the share of cameras that see the place.
+/// Brightness at a normal in white light, for the share of cameras that see the place.
 pub(super) fn shade(normal: &V3, openness: f32) -> f32 {
+    tinted_shade(normal, openness, 0.0).y
+}
+
+/// Brightness of red, green and blue; `tint` is the share by which the light is warmer and the weaker one colder.
+pub(super) fn tinted_shade(normal: &V3, openness: f32, tint: f32) -> V3 {
     let toward = |d: [f32; 3]| normal.dot(&V3::from(d).normalize()).max(0.0);
-    let light = SHADE[0] + SHADE[1] * toward(LIGHT) + SHADE[2] * toward(FILL);
-    light * (OCCLUDED + (1.0 - OCCLUDED) * openness)
+    let (light, fill) = (SHADE[1] * toward(LIGHT), SHADE[2] * toward(FILL));
+    let open = OCCLUDED + (1.0 - OCCLUDED) * openness;
+    V3::from(WARMTH).map(|w| (SHADE[0] + light * (1.0 + tint * w) + fill * (1.0 - tint * w)) * open)
 }
 
 impl GarmentPaint {

@@ -1,6 +1,6 @@
 //! Virtual body scanner: visible points or triangles of a surface, with noise.
 
-use super::paint::{ScenePaint, shade};
+use super::paint::{ScenePaint, tinted_shade};
 use super::points::ScanPoints;
 use super::sampling::{SurfaceSample, sample, visible_mesh};
 use super::surface::SceneSurface;
@@ -21,6 +21,8 @@ pub struct ScannerSetting {
     pub normal_noise: f64,
     /// Standard deviation of colour components, of 255.
     pub color_noise: f64,
+    /// Colour of the lights: share by which the main light is warmer and the fill light colder than white.
+    pub light_tint: f32,
     /// Output of the visible triangles in place of a cloud.
     pub is_meshed: bool,
 }
@@ -33,6 +35,7 @@ impl Default for ScannerSetting {
             noise: 7e-4,
             normal_noise: 0.08,
             color_noise: 3.0,
+            light_tint: 0.0,
             is_meshed: false,
         }
     }
@@ -79,8 +82,8 @@ impl ScannerSetting {
             let samples = sample(surface, &ring, &candidates, self.points, &mut rng);
             (samples, Vec::new())
         };
-        let brightness: Vec<f32> = (surface.normals.iter().zip(&openness))
-            .map(|(n, open)| shade(n, *open))
+        let brightness: Vec<V3> = (surface.normals.iter().zip(&openness))
+            .map(|(n, open)| tinted_shade(n, *open, self.light_tint))
             .collect();
         let mut out = ScanPoints {
             faces,
@@ -104,14 +107,14 @@ impl ScannerSetting {
 fn lit_color(
     surface: &SceneSurface,
     paint: &ScenePaint,
-    brightness: &[f32],
+    brightness: &[V3],
     s: &SurfaceSample,
 ) -> [f32; 3] {
     let face = &surface.faces[s.face as usize];
     let material = SceneSurface::blend(&surface.material, face, s.weights);
-    let light = face.map(|v| brightness[v as usize]);
-    let light: f32 = light.iter().zip(s.weights).map(|(l, w)| l * w).sum();
-    paint.color(s.label, &material).map(|c| c * light)
+    let light = SceneSurface::blend(brightness, face, s.weights);
+    let color = paint.color(s.label, &material);
+    std::array::from_fn(|k| color[k] * light[k])
 }
 
 /// Normally distributed number.

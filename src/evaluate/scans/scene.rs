@@ -6,6 +6,7 @@ use super::motion::{PoseTrack, ScanMotion};
 use super::paint::{ScanPalette, ScenePaint};
 use super::points::ScanPoints;
 use super::scanner::{ScanSeed, ScannerSetting};
+use super::skinned::SkinnedGarment;
 use super::surface::SceneSurface;
 use super::view::MAX_GARMENT;
 use crate::body::{BodyShape, Pose};
@@ -29,6 +30,8 @@ pub struct ScanScene {
     pub actor: Actor,
     /// Outfit.
     pub garments: Vec<ScanGarment>,
+    /// Garments that follow the bones, innermost first, over those of `garments`.
+    pub skinned: Vec<SkinnedGarment>,
     /// Motion.
     pub motion: ScanMotion,
     /// Colours of the garments.
@@ -53,6 +56,7 @@ impl Default for ScanScene {
         Self {
             actor: Actor::default(),
             garments: Vec::new(),
+            skinned: Vec::new(),
             motion: ScanMotion::default(),
             palette: ScanPalette::default(),
             scanner: ScannerSetting::default(),
@@ -113,6 +117,8 @@ pub struct TrueScan {
     ///
     /// Parts that press on each other are apart, as cloth meets them; elsewhere it is the skinned pose.
     pub body: Vec<P3>,
+    /// Triangles of the body, those of the subject's template.
+    pub body_faces: Vec<Face>,
     /// True garments, innermost first.
     pub garments: Vec<TrueGarment>,
     /// Pose of the template.
@@ -191,7 +197,8 @@ impl ScanScene {
         let track = PoseTrack::new(&self.actor, &self.motion, rate).map_err(fault)?;
         let mut pose = track.pose(0);
         let (body, detail) = ((&**template, &rest), (self.edge, 1.0 / rate));
-        let mut run = ClothRun::new(body, &pose, &self.garments, detail).map_err(fault)?;
+        let garments = (&self.garments[..], &self.skinned[..]);
+        let mut run = ClothRun::new(body, &pose, garments, detail).map_err(fault)?;
         let count = run.garments().count();
         if count > MAX_GARMENT {
             return Err(fault(format!("{count} garments do not fit the labels")));
@@ -241,6 +248,7 @@ impl ScanScene {
             faces: points.faces,
             labels: points.labels,
             body: run.body().to_vec(),
+            body_faces: self.actor.template.mesh().faces().to_vec(),
             garments: run.garments().map(garment).collect(),
             pose: pose.clone(),
             shape: self.actor.shape.clone(),
