@@ -293,6 +293,9 @@ pub(crate) struct BenchClothcapArgs {
     /// Folder for clothcap.csv, .json and .svg.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
+    /// Folder with clothes, bodies and motions made by others; without it their scenes are skipped.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: Option<PathBuf>,
     /// Only scenes whose name contains one of these.
     #[arg(long, value_name = "TEXT", value_delimiter = ',')]
     pub(crate) only: Vec<String>,

@@ -1,9 +1,11 @@
 //! Garment capture against truth: labels, boundaries, surfaces, the body below, other bodies; run time against error.
 
+mod made_scenes;
 mod scenes;
 mod score;
 mod turn;
 
+pub use made_scenes::{MadeScenes, made_scenes};
 pub use scenes::{CaptureScene, capture_scenes};
 pub use turn::{TurnFilm, TurnScene, measure_turn, measure_turn_scene, turn_scenes};
 
@@ -148,7 +150,7 @@ fn run(
         } else {
             out.later_ms += ms / (scans.len() - 1) as f64;
         }
-        out.add(template, (&scan, &captured), truth, share);
+        out.add((&scan, &captured), truth, share);
         first.get_or_insert((frame, captured));
     }
     if let (Some((_, captured)), Some(outfit)) = (&first, capture.outfit()) {
@@ -159,20 +161,14 @@ fn run(
 }
 
 impl SceneRun {
-    fn add(
-        &mut self,
-        template: &Template,
-        (scan, captured): (&BodyScan, &FrameCapture),
-        truth: &TrueScan,
-        share: f64,
-    ) {
+    fn add(&mut self, (scan, captured): (&BodyScan, &FrameCapture), truth: &TrueScan, share: f64) {
         let rows = scan.rows(&captured.labels, 0);
         let labels = score_labels(&truth.points, &truth.labels, &rows);
         self.labels.f1 += share * labels.f1;
         self.labels.boundary += share * labels.boundary;
         self.surface += share * captured.report.alignment.surface_error;
-        let faces = template.mesh().faces();
-        self.body += share * mean_distance(&captured.undressed.vertices, &truth.body, faces);
+        let (body, faces) = (&truth.body, &truth.body_faces);
+        self.body += share * mean_distance(&captured.undressed.vertices, body, faces);
         let mut garment = (0.0, 0.0);
         for (k, vertices) in captured.garments.iter().enumerate() {
             let Some(label) = labels.true_label(k as u8 + 1) else {

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use tryon::evaluate::ablation::{self, Extent};
 use tryon::evaluate::cloth::ClothBench;
 use tryon::evaluate::garment_capture::{
-    CaptureVariant, capture_scenes, measure, measure_turn_scene, turn_scenes,
+    CaptureVariant, capture_scenes, made_scenes, measure, measure_turn_scene, turn_scenes,
 };
 use tryon::evaluate::people::{self, CaseSet, PeoplePlan};
 use tryon::evaluate::{self, Row, Table};
@@ -99,6 +99,8 @@ fn people(args: &BenchPeopleArgs) -> Result<ExitCode> {
 
 fn clothcap(args: &BenchClothcapArgs) -> Result<ExitCode> {
     let mut scenes = capture_scenes()?;
+    let made = made_scenes(args.data.as_deref())?;
+    scenes.extend(made.scenes);
     scenes.retain(|s| s.is_unseen == args.unseen);
     let is_wanted = |name: &str| args.only.is_empty() || args.only.iter().any(|o| name.contains(o));
     scenes.retain(|s| is_wanted(&s.name));
@@ -125,6 +127,9 @@ fn clothcap(args: &BenchClothcapArgs) -> Result<ExitCode> {
         bar.inc(1);
     }
     bar.finish_and_clear();
+    for skipped in &made.skipped {
+        eprintln!("SKIPPED: {skipped}");
+    }
     finish(&table, &args.out)
 }
 
