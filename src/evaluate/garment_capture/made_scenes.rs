@@ -296,15 +296,18 @@ mod tests {
         else {
             return;
         };
-        let made = made_scenes(Some(&data)).expect("scenes");
-        assert_eq!(made.skipped, Vec::<String>::new());
-        let mut scene = made.scenes.into_iter().next().expect("a scene").scene;
-        (scene.scans, scene.scanner.points) = (1, 8000);
-        let scan = scene.scans().expect("a scan").remove(0);
-        assert_eq!(scan.garments.len(), 3, "shirt, trousers, shoes");
-        for label in 0..=3 {
-            let of = scan.labels.iter().filter(|l| **l == label).count();
-            assert!(of > 80, "label {label}: {of} points");
+        // Shirt, trousers and shoes that are simulated; jacket, shirt, scarf, trousers and shoes that follow the bones.
+        for (spec, garments) in SPECS.iter().zip([3u8, 5]) {
+            let missing = spec.files(&data).into_iter().find(|p| !p.exists());
+            assert_eq!(missing, None);
+            let mut scene = spec.scene(&data, SEED).expect(spec.name);
+            (scene.scans, scene.scanner.points) = (1, 8000);
+            let scan = scene.scans().expect("a scan").remove(0);
+            assert_eq!(scan.garments.len(), usize::from(garments));
+            for label in 0..=garments {
+                let of = scan.labels.iter().filter(|l| **l == label).count();
+                assert!(of > 80, "{}, label {label}: {of} points", spec.name);
+            }
         }
     }
 }

@@ -13,6 +13,9 @@ use crate::par::Par;
 /// Steps at the first pose before the first scan: dressed cloth still sways.
 const SETTLING_STEPS: usize = 12;
 
+/// Least distance of a skinned garment from the skin or the skinned garment below it, at rest (m).
+const SKINNED_GAP: f32 = 3e-3;
+
 /// Garment of a scanned outfit.
 #[derive(Clone, Debug)]
 pub struct ScanGarment {
@@ -57,7 +60,9 @@ impl<'a> ClothRun<'a> {
         (garments, skinned): (&[ScanGarment], &[SkinnedGarment]),
         (edge, dt): (f64, f64),
     ) -> Result<Self, String> {
-        let bound = skinned.iter().map(|g| g.bind(template, rest));
+        let gaps = (1..).map(|layer: u16| SKINNED_GAP * f32::from(layer));
+        let bound = skinned.iter().zip(gaps);
+        let bound = bound.map(|(g, gap)| g.bind((template, rest), gap));
         let mut run = Self {
             skinned: bound.collect::<Result<_, _>>()?,
             template,

@@ -123,11 +123,12 @@ impl SkinnedGarment {
         })
     }
 
-    /// The garment moved with the skin below it from the source body to a subject of the same topology.
+    /// The garment moved with the skin below it from the source body to a subject of the same topology, and off the skin by
+    /// `gap` (m) at least.
     pub(super) fn bind(
         &self,
-        template: &Template,
-        rest: &RestBody,
+        (template, rest): (&Template, &RestBody),
+        gap: f32,
     ) -> Result<BoundGarment, String> {
         let count = rest.vertices.len();
         let source = self
@@ -155,14 +156,27 @@ impl SkinnedGarment {
             shifts = smoothed(Par::Rayon, &self.neighbours, &shifts);
             weights = smoothed(Par::Rayon, &self.neighbours, &weights);
         }
+        let skin = Bvh::new(faces, &rest.vertices);
+        let lifted = |(p, shift): (&P3, &V3)| lift(&skin, &rest.vertices, p + shift, gap);
         let moved = self.positions.iter().zip(&shifts);
         Ok(BoundGarment {
             mesh: self.mesh.clone(),
-            rest: moved.map(|(p, shift)| p + shift).collect(),
+            rest: moved.map(lifted).collect(),
             weights,
             posed: Vec::new(),
         })
     }
+}
+
+/// A point, or the one at `gap` (m) over the surface where it lies lower.
+fn lift(surface: &Bvh, vertices: &[P3], p: P3, gap: f32) -> P3 {
+    let Some(below) = surface.closest(vertices, &p) else {
+        return p;
+    };
+    let [a, b, c] = surface.faces()[below.face as usize].map(|v| vertices[v as usize]);
+    let normal = (b - a).cross(&(c - a)).try_normalize(0.0);
+    let normal = normal.filter(|n| n.dot(&(p - below.point)) < gap);
+    normal.map_or(p, |n| below.point + n * gap)
 }
 
 /// Adds `share` of the joint weights of a skin vertex.
