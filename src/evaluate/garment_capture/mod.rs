@@ -1,13 +1,16 @@
 //! Garment capture against truth: labels, boundaries, surfaces, the body below, other bodies; run time against error.
 
+mod hems;
 mod made_scenes;
 mod scenes;
 mod score;
 mod turn;
+mod variant;
 
 pub use made_scenes::{MadeScenes, made_scenes};
 pub use scenes::{CaptureScene, capture_scenes};
 pub use turn::{TurnFilm, TurnScene, measure_turn, measure_turn_scene, turn_scenes};
+pub use variant::CaptureVariant;
 
 use super::scans::TrueScan;
 use super::{EvaluateError, Row};
@@ -15,58 +18,18 @@ use crate::body::{Template, embedded};
 use crate::clothcap::align::find_frame;
 use crate::clothcap::archive::FrameDisplacements;
 use crate::clothcap::scan::BodyScan;
-use crate::clothcap::segment::LabelConfig;
 use crate::clothcap::{
-    BodyDresser, CaptureConfig, CaptureError, FrameCapture, OutfitCapture, population,
+    BodyDresser, CaptureError, CapturedOutfit, FrameCapture, OutfitCapture, population,
 };
 use crate::formats::scan::ScanMesh;
 use crate::math::P3;
+use hems::{distance_from_rings, seen_hems};
 use score::{LabelScore, largest_distance, mean_distance, score_labels};
 use std::sync::Arc;
 use std::time::Instant;
 
 /// Seed of the bodies that garments are retargeted to.
 const BODIES_SEED: u64 = 11;
-
-/// Variant of the method, for ablation.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CaptureVariant {
-    /// Name in the table.
-    pub name: &'static str,
-    /// Settings.
-    pub config: CaptureConfig,
-}
-
-impl CaptureVariant {
-    /// The method as it ships, and without each of its parts.
-    pub fn all() -> Vec<Self> {
-        let with = |name, labels| Self {
-            name,
-            config: CaptureConfig {
-                labels,
-                ..CaptureConfig::default()
-            },
-        };
-        let whole = LabelConfig::default;
-        vec![
-            with("whole", whole()),
-            with(
-                "without prior",
-                LabelConfig {
-                    without_prior: true,
-                    ..whole()
-                },
-            ),
-            with(
-                "without smoothness",
-                LabelConfig {
-                    without_smoothness: true,
-                    ..whole()
-                },
-            ),
-        ]
-    }
-}
 
 /// Captures the scans of a scene and compares with their truth: one row.
 ///
@@ -77,12 +40,65 @@ pub fn measure(
     variant: &CaptureVariant,
     bodies: usize,
 ) -> Result<Row, EvaluateError> {
-    let scans = scene.scene.scans()?;
+    let scans = variant.scanned(&scene.scene).scans()?;
+    Ok(measure_scans((&scene.name, &scans), variant, bodies))
+}
+
+/// Measures variants on a scene, in order; `each` receives the rows. Scans of one resolution are made once, and variants
+/// that differ in their names only are run once.
+///
+/// # Errors
+/// As [`measure`].
+pub fn measure_all(
+    scene: &CaptureScene,
+    variants: &[CaptureVariant],
+    bodies: usize,
+    mut each: impl FnMut(Row),
+) -> Result<(), EvaluateError> {
+    let mut made: Option<(Option<usize>, Vec<TrueScan>)> = None;
+    let mut rows: Vec<Row> = Vec::new();
+    for (k, variant) in variants.iter().enumerate() {
+        let same = variants[..k].iter().position(|v| v.is_same_run(variant));
+        let row = match same {
+            Some(at) => labelled(rows[at].clone(), variant),
+            None => {
+                let scans = match made.take().filter(|(points, _)| *points == variant.points) {
+                    Some((_, scans)) => scans,
+                    None => variant.scanned(&scene.scene).scans()?,
+                };
+                let row = measure_scans((&scene.name, &scans), variant, bodies);
+                made = Some((variant.points, scans));
+                row
+            }
+        };
+        each(row.clone());
+        rows.push(row);
+    }
+    Ok(())
+}
+
+fn measure_scans(
+    (name, scans): (&str, &[TrueScan]),
+    variant: &CaptureVariant,
+    bodies: usize,
+) -> Row {
     let template = embedded::template();
-    let row = |ms| Row::new(&scene.name, variant.name, ms).with("scans", scans.len());
-    match run(&template, &scans, variant, bodies) {
-        Ok(run) => Ok(run.row(row(run.first_ms))),
-        Err(e) => Ok(row(0.0).with("fault", e)),
+    let row = |ms| labelled(Row::new(name, "", ms).with("scans", scans.len()), variant);
+    match run(&template, scans, variant, bodies) {
+        // The first scan's search of the person hides what a sweep changes.
+        Ok(run) if variant.value.is_some() => run.row(row(run.later_ms)),
+        Ok(run) => run.row(row(run.first_ms)),
+        Err(e) => row(0.0).with("fault", e),
+    }
+}
+
+/// A row under the name of a variant.
+fn labelled(mut row: Row, variant: &CaptureVariant) -> Row {
+    row.method = variant.name.into();
+    row.parameters.retain(|(name, _)| name != "value");
+    match variant.value {
+        Some(value) => row.with("value", value),
+        None => row,
     }
 }
 
@@ -91,7 +107,11 @@ pub fn measure(
 struct SceneRun {
     labels: LabelScore,
     surface: f64,
-    garment: f64,
+    garment: Mean,
+    hem: Mean,
+    /// The same of the parts' vertices on the single mesh.
+    single: Mean,
+    single_hem: Mean,
     body: f64,
     own: f64,
     inside: usize,
@@ -100,12 +120,33 @@ struct SceneRun {
     later_ms: f64,
 }
 
+/// Mean with weights.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mean {
+    sum: f64,
+    weight: f64,
+}
+
+impl Mean {
+    fn add(&mut self, value: f64, weight: usize) {
+        self.sum += value * weight as f64;
+        self.weight += weight as f64;
+    }
+    /// 0 of nothing.
+    fn value(self) -> f64 {
+        self.sum / self.weight.max(1.0)
+    }
+}
+
 impl SceneRun {
     fn row(&self, row: Row) -> Row {
         row.error("F1", self.labels.f1)
             .error("boundary_mm", 1e3 * self.labels.boundary)
             .error("surface_mm", 1e3 * self.surface)
-            .error("garment_mm", 1e3 * self.garment)
+            .error("garment_mm", 1e3 * self.garment.value())
+            .error("single_garment_mm", 1e3 * self.single.value())
+            .error("hem_mm", 1e3 * self.hem.value())
+            .error("single_hem_mm", 1e3 * self.single_hem.value())
             .error("body_mm", 1e3 * self.body)
             .error("own_body_max_mm", 1e3 * self.own)
             .error("inside", self.inside as f64)
@@ -120,7 +161,8 @@ fn run(
     variant: &CaptureVariant,
     bodies: usize,
 ) -> Result<SceneRun, CaptureError> {
-    let mut capture = OutfitCapture::new(template.clone(), variant.config.clone())?;
+    let garments = scans.first().map_or(&[][..], |s| &s.garments);
+    let mut capture = OutfitCapture::new(template.clone(), variant.config(garments))?;
     let mut out = SceneRun::default();
     let share = 1.0 / scans.len().max(1) as f64;
     let mut first = None;
@@ -150,7 +192,10 @@ fn run(
         } else {
             out.later_ms += ms / (scans.len() - 1) as f64;
         }
-        out.add((&scan, &captured), truth, share);
+        let labels = out.add((&scan, &captured), truth, share);
+        if let Some(outfit) = capture.outfit() {
+            out.add_garments(outfit, &captured, truth, &labels);
+        }
         first.get_or_insert((frame, captured));
     }
     if let (Some((_, captured)), Some(outfit)) = (&first, capture.outfit()) {
@@ -161,7 +206,12 @@ fn run(
 }
 
 impl SceneRun {
-    fn add(&mut self, (scan, captured): (&BodyScan, &FrameCapture), truth: &TrueScan, share: f64) {
+    fn add(
+        &mut self,
+        (scan, captured): (&BodyScan, &FrameCapture),
+        truth: &TrueScan,
+        share: f64,
+    ) -> LabelScore {
         let rows = scan.rows(&captured.labels, 0);
         let labels = score_labels(&truth.points, &truth.labels, &rows);
         self.labels.f1 += share * labels.f1;
@@ -169,17 +219,35 @@ impl SceneRun {
         self.surface += share * captured.report.alignment.surface_error;
         let (body, faces) = (&truth.body, &truth.body_faces);
         self.body += share * mean_distance(&captured.undressed.vertices, body, faces);
-        let mut garment = (0.0, 0.0);
-        for (k, vertices) in captured.garments.iter().enumerate() {
-            let Some(label) = labels.true_label(k as u8 + 1) else {
+        labels
+    }
+
+    /// Garments of one scan beside the true ones: as parts, and cut out of the single mesh along the same rings.
+    fn add_garments(
+        &mut self,
+        outfit: &CapturedOutfit,
+        captured: &FrameCapture,
+        truth: &TrueScan,
+        labels: &LabelScore,
+    ) {
+        let numbers = outfit.labelling.parts();
+        for (part, vertices) in outfit.cloth.parts.iter().zip(&captured.garments) {
+            let Some(label) = labels.true_label(numbers[usize::from(part.label)]) else {
                 continue;
             };
             let real = &truth.garments[usize::from(label) - 1];
-            garment.0 +=
-                mean_distance(vertices, &real.vertices, &real.faces) * vertices.len() as f64;
-            garment.1 += vertices.len() as f64;
+            let points = truth.points.iter().zip(&truth.labels);
+            let own: Vec<P3> = points.filter(|p| *p.1 == label).map(|p| *p.0).collect();
+            let hems = seen_hems(real, &own);
+            let surface = &captured.alignment.surface;
+            let single: Vec<P3> = part.nodes.iter().map(|v| surface[*v as usize]).collect();
+            let distance = |v: &[P3]| mean_distance(v, &real.vertices, &real.faces);
+            let hem = |v: &[P3]| distance_from_rings(&hems, &part.rings, v);
+            self.garment.add(distance(vertices), vertices.len());
+            self.single.add(distance(&single), single.len());
+            self.hem.add(hem(vertices), hems.len());
+            self.single_hem.add(hem(&single), hems.len());
         }
-        self.garment += share * garment.0 / garment.1.max(1.0);
     }
 
     /// Onto its own body and onto others.

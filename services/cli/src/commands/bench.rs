@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use tryon::evaluate::ablation::{self, Extent};
 use tryon::evaluate::cloth::ClothBench;
 use tryon::evaluate::garment_capture::{
-    CaptureVariant, capture_scenes, made_scenes, measure, measure_turn_scene, turn_scenes,
+    CaptureVariant, capture_scenes, made_scenes, measure_all, measure_turn_scene, turn_scenes,
 };
 use tryon::evaluate::people::{self, CaseSet, PeoplePlan};
 use tryon::evaluate::{self, Row, Table};
@@ -105,21 +105,29 @@ fn clothcap(args: &BenchClothcapArgs) -> Result<ExitCode> {
     let is_wanted = |name: &str| args.only.is_empty() || args.only.iter().any(|o| name.contains(o));
     scenes.retain(|s| is_wanted(&s.name));
     let mut turns = turn_scenes()?;
-    turns.retain(|s| s.is_unseen == args.unseen && is_wanted(&s.name));
-    let mut variants = CaptureVariant::all();
-    if !args.ablation {
-        variants.truncate(1);
-    }
+    // Turns have one variant only.
+    turns.retain(|s| !args.sweep && s.is_unseen == args.unseen && is_wanted(&s.name));
+    let variants = match (args.sweep, args.ablation) {
+        (true, _) => CaptureVariant::sweep(),
+        (_, true) => CaptureVariant::all(),
+        _ => vec![CaptureVariant::whole()],
+    };
     let runs = scenes.len() * variants.len() + turns.len();
     let bar = input::progress(Some(runs as u64), "capturing");
     let command = std::env::args().collect::<Vec<_>>().join(" ");
-    let mut table = Table::new("clothcap", command, "first scan, everything");
+    let run_time = if args.sweep {
+        "a later scan, everything"
+    } else {
+        "first scan, everything"
+    };
+    let mut table = Table::new("clothcap", command, run_time);
     for scene in &scenes {
-        for variant in &variants {
-            let row = with_threads(args.threads, || measure(scene, variant, args.bodies))??;
-            table.rows.push(row);
-            bar.inc(1);
-        }
+        with_threads(args.threads, || {
+            measure_all(scene, &variants, args.bodies, |row| {
+                table.rows.push(row);
+                bar.inc(1);
+            })
+        })??;
     }
     for scene in &turns {
         let rows = with_threads(args.threads, || measure_turn_scene(scene))??;
