@@ -4,16 +4,32 @@ use crate::clothcap::multi::Ring;
 use crate::evaluate::scans::TrueGarment;
 use crate::math::P3;
 use crate::mesh::Face;
-use crate::spatial::PointTree;
+use crate::spatial::HashGrid;
 use std::collections::BTreeSet;
 
-/// Distance from a scan point of the garment up to which a hem is seen, metres; farther ones lie under other garments.
-const SEEN: f32 = 0.015;
+/// Radius around a hem in which scan points tell whether it is seen, metres.
+const AROUND: f32 = 0.015;
+/// Least share of the garment's own points there. Hems under other garments show where cloth pokes through.
+const LEAST_OWN: f64 = 0.25;
 
-/// Seen part of a garment's boundary: ends and middles of its boundary edges, metres. `points` are the garment's own.
-pub(super) fn seen_hems(garment: &TrueGarment, points: &[P3]) -> Vec<P3> {
-    let tree = PointTree::new(points);
-    let is_seen = |p: &P3| tree.nearest(p, SEEN).is_some();
+/// Seen part of a garment's boundary: ends and middles of its boundary edges, metres. `points` and their labels are those of
+/// the scan, `label` is the garment's.
+pub(super) fn seen_hems(
+    garment: &TrueGarment,
+    (points, labels): (&[P3], &[u8]),
+    label: u8,
+) -> Vec<P3> {
+    let mut grid = HashGrid::default();
+    // Searches reach half a cell.
+    grid.fill(points, 2.0 * AROUND);
+    let is_seen = |p: &P3| {
+        let (mut own, mut all) = (0, 0);
+        grid.within(p, AROUND, |i, _| {
+            own += usize::from(labels[i as usize] == label);
+            all += 1;
+        });
+        own > 0 && own as f64 >= LEAST_OWN * f64::from(all)
+    };
     let ends = |[a, b]: [u32; 2]| {
         let [a, b] = [a, b].map(|v| garment.vertices[v as usize]);
         [a, nalgebra::center(&a, &b)]
@@ -72,8 +88,13 @@ mod tests {
 
     #[test]
     fn hems_under_other_garments_are_not_seen() {
-        let own = [P3::new(1.0, 0.0, 0.0), P3::new(1.0, 1.0, 0.005)];
-        let seen = seen_hems(&square(), &own);
+        let mut points = vec![P3::new(1.0, 0.0, 0.0), P3::new(1.0, 1.0, 0.005)];
+        // Cloth of another garment, through which one point of this one pokes.
+        points.extend((0..9).map(|k| P3::new(-1.0, -1.0, 0.001 * k as f32)));
+        let mut labels = vec![2; points.len()];
+        labels[2] = 1;
+        labels[..2].fill(1);
+        let seen = seen_hems(&square(), (&points, &labels), 1);
         assert_eq!(seen, [P3::new(1.0, 0.0, 0.0), P3::new(1.0, 1.0, 0.0)]);
     }
 
@@ -88,7 +109,7 @@ mod tests {
             .iter()
             .map(|p| P3::new(p.x, p.y, 0.25))
             .collect();
-        let hems = seen_hems(&square(), &square().vertices);
+        let hems = seen_hems(&square(), (&square().vertices, &[1; 4]), 1);
         let found = distance_from_rings(&hems, &[ring], &lifted);
         assert!((found - 0.25).abs() < 1e-6, "{found}");
         assert_eq!(distance_from_rings(&hems, &[], &lifted), 0.0);

@@ -236,9 +236,7 @@ impl SceneRun {
                 continue;
             };
             let real = &truth.garments[usize::from(label) - 1];
-            let points = truth.points.iter().zip(&truth.labels);
-            let own: Vec<P3> = points.filter(|p| *p.1 == label).map(|p| *p.0).collect();
-            let hems = seen_hems(real, &own);
+            let hems = seen_hems(real, (&truth.points, &truth.labels), label);
             let surface = &captured.alignment.surface;
             let single: Vec<P3> = part.nodes.iter().map(|v| surface[*v as usize]).collect();
             let distance = |v: &[P3]| mean_distance(v, &real.vertices, &real.faces);
