@@ -302,10 +302,11 @@ pub(crate) struct BenchClothcapArgs {
     /// The third of the scenes that is kept apart, instead of the other two thirds.
     #[arg(long)]
     pub(crate) unseen: bool,
-    /// Also without prior, without smoothness, and with the number of garments given.
+    /// Also without prior, without smoothness, and with the number of garments given; turns are left out.
     #[arg(long)]
     pub(crate) ablation: bool,
-    /// Run time against error instead: points of the scans, lengths and iterations of the part fit. Minutes a scene.
+    /// Run time against error instead: points of the scans, lengths and iterations of the part fit; turns are left out.
+    /// Minutes a scene.
     #[arg(long, conflicts_with = "ablation")]
     pub(crate) sweep: bool,
     /// Bodies that each outfit is retargeted to.

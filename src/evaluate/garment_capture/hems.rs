@@ -20,7 +20,7 @@ pub(super) fn seen_hems(
     label: u8,
 ) -> Vec<P3> {
     let mut grid = HashGrid::default();
-    // Searches reach half a cell.
+    // Searches reach half a cell. Points found twice hardly change the share.
     grid.fill(points, 2.0 * AROUND);
     let is_seen = |p: &P3| {
         let (mut own, mut all) = (0, 0);

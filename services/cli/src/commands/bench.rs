@@ -106,7 +106,8 @@ fn clothcap(args: &BenchClothcapArgs) -> Result<ExitCode> {
     scenes.retain(|s| is_wanted(&s.name));
     let mut turns = turn_scenes()?;
     // Turns have one variant only.
-    turns.retain(|s| !args.sweep && s.is_unseen == args.unseen && is_wanted(&s.name));
+    let has_variants = args.ablation || args.sweep;
+    turns.retain(|s| !has_variants && s.is_unseen == args.unseen && is_wanted(&s.name));
     let variants = match (args.sweep, args.ablation) {
         (true, _) => CaptureVariant::sweep(),
         (_, true) => CaptureVariant::all(),
