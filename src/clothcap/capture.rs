@@ -291,7 +291,10 @@ impl PartFitter<'_> {
         let mut vertices = start;
         let k = out.vertices.len();
         if k == self.fits.len() {
-            self.fits.push(PartFit::new(part, model)?);
+            // The order of its faces must not depend on the scan at which a capture was continued.
+            let template = self.cloth.template().mesh().vertices();
+            let rest: Vec<P3> = part.nodes.iter().map(|v| template[*v as usize]).collect();
+            self.fits.push(PartFit::new(part, &rest)?);
         }
         let report = self.fits[k].run(&points, model, &mut vertices, self.config)?;
         out.vertices.push(vertices);

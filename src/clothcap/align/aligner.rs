@@ -1,5 +1,6 @@
 //! Single-mesh alignment of a sequence: the first scan gives the clothed template, later ones are coupled to it.
 
+use super::arms::search_lost_arms;
 use super::free_surface::{FreeSurface, SurfaceFitConfig, SurfaceMatch};
 use super::legs::leg_topology;
 use super::model_fit::{AlignedBody, FitStage, ModelFit};
@@ -166,6 +167,11 @@ impl Aligner {
         for stage in &FitStage::FINE {
             fit.run(&mut body, stage)?;
         }
+        if search_lost_arms(&template, scan, &mut fit, &mut body)? {
+            for stage in &FitStage::FINE[1..] {
+                fit.run(&mut body, stage)?;
+            }
+        }
         self.cut(leg_topology(&template, scan, &body)?)?;
         let template = self.cloth.template().clone();
         let mut fit = ModelFit::new(&template, scan, SAMPLES);
@@ -197,6 +203,9 @@ impl Aligner {
         let mut body = self.turned(last, clothed, &mut fit);
         for stage in &LATER {
             fit.run(&mut body, stage)?;
+        }
+        if search_lost_arms(&self.template, scan, &mut fit, &mut body)? {
+            fit.run(&mut body, &LATER[1])?;
         }
         let searched = !(fit.error(&body) < LOST);
         if searched {
