@@ -82,7 +82,7 @@ impl Labelling {
 /// Labels the nodes of a later frame with the appearances of the first one; `before` are the labels there.
 ///
 /// # Errors
-/// As [`label_nodes`].
+/// As [`label_nodes`](super::label_nodes).
 pub fn relabel_nodes(
     cloth: &ClothTemplate,
     nodes: &NodeColors,

@@ -12,7 +12,7 @@ use crate::evaluate::EvaluateError;
 pub struct FilmedFrame {
     /// Depth and colour.
     pub frame: RgbdFrame,
-    /// Garment from 1, [`SKIN_LABEL`](super::SKIN_LABEL), or [`STRAY_LABEL`] beside the subject. Shape `[pixels]`.
+    /// Garment from 1, [`SKIN_LABEL`](super::SKIN_LABEL), or [`STRAY_LABEL`](super::STRAY_LABEL) beside the subject. Shape `[pixels]`.
     pub labels: Vec<u8>,
     /// True surfaces; scan points where wanted.
     pub truth: TrueScan,
