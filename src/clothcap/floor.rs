@@ -132,14 +132,21 @@ impl Floor {
     }
 }
 
-/// Range of some values without strays.
+/// Length of the range of some values without strays.
 fn spread(values: impl Iterator<Item = f32>) -> f32 {
+    let [low, high] = inner_range(values, STRAYS);
+    high - low
+}
+
+/// Range of some finite values without a share of them at each end; zeros without any.
+pub(super) fn inner_range(values: impl Iterator<Item = f32>, strays: f64) -> [f32; 2] {
     let mut all: Vec<f32> = values.collect();
     all.sort_by(f32::total_cmp);
     let last = all.len().saturating_sub(1) as f64;
-    let [low, high] =
-        [STRAYS, 1.0 - STRAYS].map(|share| all.get((share * last).round() as usize).copied());
-    high.zip(low).map_or(0.0, |(h, l)| h - l)
+    [strays, 1.0 - strays].map(|share| {
+        let at = (share * last).round() as usize;
+        all.get(at).copied().unwrap_or(0.0)
+    })
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! A scan made ready: finite points in metres, y up, with normals and colours.
 
 use super::CaptureError;
-use super::floor::Floor;
+use super::floor::{Floor, inner_range};
 use crate::formats::scan::ScanMesh;
 use crate::math::{P3, V3};
 use crate::mesh::Face;
@@ -135,21 +135,15 @@ impl ScanFrame {
 /// Extent of a cloud along x, y, z without its strays.
 fn extent(points: &[P3]) -> [f32; 3] {
     std::array::from_fn(|axis| {
-        let [low, high] = inner_range(points, axis, STRAYS);
+        let [low, high] = axis_range(points, axis, STRAYS);
         high - low
     })
 }
 
 /// Range of the finite coordinates along an axis without a share of the points at each end.
-pub(super) fn inner_range(points: &[P3], axis: usize, strays: f64) -> [f32; 2] {
+pub(super) fn axis_range(points: &[P3], axis: usize, strays: f64) -> [f32; 2] {
     let finite = points.iter().map(|p| p[axis]).filter(|v| v.is_finite());
-    let mut values: Vec<f32> = finite.collect();
-    values.sort_by(f32::total_cmp);
-    let last = values.len().saturating_sub(1) as f64;
-    [strays, 1.0 - strays].map(|share| {
-        let at = (share * last).round() as usize;
-        values.get(at).copied().unwrap_or(0.0)
-    })
+    inner_range(finite, strays)
 }
 
 /// A scan: finite points, metres, y up.

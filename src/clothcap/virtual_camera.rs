@@ -1,6 +1,6 @@
 //! Depth images of a scan from virtual cameras around it, so that the tracker can find the person in it.
 
-use super::scan::{BodyScan, inner_range, mean_spacing};
+use super::scan::{BodyScan, axis_range, mean_spacing};
 use crate::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
 use crate::math::{Camera, P3, Rigid, World};
 use crate::par::Par;
@@ -125,7 +125,7 @@ const STRAYS: f64 = 0.002;
 pub(super) fn bounds(points: &[P3]) -> [P3; 2] {
     let mut ends = [P3::origin(); 2];
     for axis in 0..3 {
-        let [low, high] = inner_range(points, axis, STRAYS);
+        let [low, high] = axis_range(points, axis, STRAYS);
         (ends[0][axis], ends[1][axis]) = (low, high);
     }
     ends

@@ -29,7 +29,7 @@ const RATE: f64 = 5.0;
 /// One scene: name, garments with their layers, shape coefficients, colours.
 type SceneSpec = (
     &'static str,
-    &'static [(&'static str, usize)],
+    &'static [(&'static str, u8)],
     &'static [f64],
     ScanPalette,
 );
@@ -110,6 +110,36 @@ const SCENES: [SceneSpec; 12] = [
     ),
 ];
 
+/// Garments of the library with their layers.
+///
+/// # Errors
+/// A garment that the library lacks.
+pub(super) fn library_outfit(outfit: &[(&str, u8)]) -> Result<Vec<ScanGarment>, EvaluateError> {
+    let garment = |(name, layer): &(&str, u8)| {
+        let choice = Choice::library(name, None).map_err(|e| EvaluateError::Scene {
+            scene: (*name).into(),
+            why: e.to_string(),
+        })?;
+        Ok(ScanGarment {
+            choice,
+            layer: Some(*layer),
+        })
+    };
+    outfit.iter().map(garment).collect()
+}
+
+/// Actor of scene `k` with these shape coefficients.
+pub(super) fn shaped_actor(coefficients: &[f64], k: usize) -> Actor {
+    Actor {
+        shape: BodyShape {
+            coefficients: coefficients.to_vec(),
+            ..BodyShape::default()
+        },
+        appearance: k as u64,
+        ..Actor::default()
+    }
+}
+
 /// Scenes of the bench.
 ///
 /// # Errors
@@ -117,28 +147,11 @@ const SCENES: [SceneSpec; 12] = [
 pub fn capture_scenes() -> Result<Vec<CaptureScene>, EvaluateError> {
     let scene = |(k, spec): (usize, &SceneSpec)| -> Result<CaptureScene, EvaluateError> {
         let (name, outfit, shape, palette) = spec;
-        let garment = |(name, layer): &(&str, usize)| -> Result<ScanGarment, EvaluateError> {
-            Ok(ScanGarment {
-                choice: Choice::library(name, None).map_err(|e| EvaluateError::Scene {
-                    scene: (*name).into(),
-                    why: e.to_string(),
-                })?,
-                layer: Some(*layer as _),
-            })
-        };
-        let actor = Actor {
-            shape: BodyShape {
-                coefficients: shape.to_vec(),
-                ..BodyShape::default()
-            },
-            appearance: k as u64,
-            ..Actor::default()
-        };
         Ok(CaptureScene {
             name: (*name).into(),
             scene: ScanScene {
-                actor,
-                garments: outfit.iter().map(garment).collect::<Result<_, _>>()?,
+                actor: shaped_actor(shape, k),
+                garments: library_outfit(outfit)?,
                 skinned: Vec::new(),
                 motion: ScanMotion::Play {
                     routine: Routine::TryOn,

@@ -1,19 +1,19 @@
 //! Garments from one depth camera before which a dressed subject turns around, against truth.
 
+use super::scenes::{library_outfit, shaped_actor};
 use super::score::{mean_distance, score_labels};
-use crate::body::{BodyShape, embedded};
+use crate::body::embedded;
 use crate::clothcap::turn::{FusedTurn, KeyFrames, TurnConfig, TurnError, TurnTracker, fuse};
 use crate::clothcap::{CaptureConfig, FrameCapture, OutfitCapture};
 use crate::evaluate::scans::{
-    DepthCamera, FilmedFrame, ScanDefects, ScanGarment, ScanMotion, ScanPalette, ScanScene,
-    ScannerSetting, TrueScan,
+    DepthCamera, FilmedFrame, ScanDefects, ScanMotion, ScanPalette, ScanScene, ScannerSetting,
+    TrueScan,
 };
 use crate::evaluate::{EvaluateError, Row};
 use crate::math::{P3, Rigid, World};
 use crate::mesh::Face;
-use crate::mirror::Choice;
 use crate::spatial::PointTree;
-use crate::synth::{Actor, Routine};
+use crate::synth::Routine;
 use std::f64::consts::TAU;
 use std::time::Instant;
 
@@ -105,29 +105,11 @@ const SCENES: [TurnSpec; 6] = [
 pub fn turn_scenes() -> Result<Vec<TurnScene>, EvaluateError> {
     let scene = |(k, spec): (usize, &TurnSpec)| -> Result<TurnScene, EvaluateError> {
         let (name, outfit, shape, (routine, start)) = spec;
-        let garment = |(name, layer): &(&str, u8)| -> Result<ScanGarment, EvaluateError> {
-            let choice = Choice::library(name, None).map_err(|e| EvaluateError::Scene {
-                scene: (*name).into(),
-                why: e.to_string(),
-            })?;
-            Ok(ScanGarment {
-                choice,
-                layer: Some(*layer),
-            })
-        };
-        let actor = Actor {
-            shape: BodyShape {
-                coefficients: shape.to_vec(),
-                ..BodyShape::default()
-            },
-            appearance: k as u64,
-            ..Actor::default()
-        };
         Ok(TurnScene {
             name: (*name).into(),
             scene: ScanScene {
-                actor,
-                garments: outfit.iter().map(garment).collect::<Result<_, _>>()?,
+                actor: shaped_actor(shape, k),
+                garments: library_outfit(outfit)?,
                 skinned: Vec::new(),
                 motion: ScanMotion::Turn {
                     routine: *routine,
