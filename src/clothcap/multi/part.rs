@@ -280,6 +280,7 @@ mod tests {
             labels,
             appearances: vec![None; 4],
             energy: 0.0,
+            is_top_long: false,
         }
     }
 

@@ -1,8 +1,8 @@
 //! Labels of the template's nodes: appearance, garment prior and smoothness in one energy (eq. 11), number of garments included.
 
-use super::color_mixture::{ColorMixture, k_means};
+use super::color_mixture::ColorMixture;
 use super::node_colors::NodeColors;
-use super::prior::{BodyRegion, Slot};
+use super::prior::{BodyRegion, LONG_TOP, Slot};
 use crate::body::Template;
 use crate::clothcap::CaptureError;
 use crate::clothcap::mrf::{ExpansionConfig, MrfModel};
@@ -14,11 +14,11 @@ use serde::{Deserialize, Serialize};
 /// Cost of a label change between neighbours of equal colour, nats (ψ of eq. 14).
 const SMOOTHNESS: f32 = 2.0;
 /// Share of it left between neighbours of different colour, and the difference that halves the rest.
-const CONTRAST: [f32; 2] = [0.25, 0.10];
+const CONTRAST: [f32; 2] = [0.1, 0.10];
 /// Cost of another label than in the first frame, nats: garments slide over the body by little.
 const CHANGE: f32 = 1.0;
-/// Difference of heights over the body that halves it: hems lie on what is below.
-pub(super) const STEP: f32 = 0.003;
+/// Step down from the upper to the lower node that halves it, metres: hems lie on what is below.
+const STEP: f32 = 0.003;
 /// Turns of appearances and labels.
 const TURNS: usize = 5;
 /// Modes of skin, hair and what hands hold.
@@ -50,6 +50,9 @@ pub struct Labelling {
     pub appearances: Vec<Option<ColorMixture>>,
     /// Energy per node, nats.
     pub energy: f64,
+    /// The top reaches down to the thighs.
+    #[serde(default)]
+    pub is_top_long: bool,
 }
 
 impl Labelling {
@@ -89,7 +92,8 @@ pub fn relabel_nodes(
     before: &Labelling,
     config: &LabelConfig,
 ) -> Result<Labelling, CaptureError> {
-    let labeller = Labeller::new(cloth, nodes, config);
+    let mut labeller = Labeller::new(cloth, nodes, config);
+    labeller.is_top_long = before.is_top_long;
     let mut unary = labeller.unary(&before.slots, &before.appearances);
     let count = before.slots.len();
     for (v, own) in before.labels.iter().enumerate() {
@@ -103,6 +107,7 @@ pub fn relabel_nodes(
         appearances: before.appearances.clone(),
         labels,
         energy,
+        is_top_long: before.is_top_long,
     })
 }
 
@@ -115,6 +120,10 @@ pub(super) struct Labeller<'a> {
     hair: Vec<bool>,
     /// Nodes of the garment of the legs, which reaches up to the torso.
     pub(super) bottom: Vec<bool>,
+    /// Nodes of torso and arms in one of two garments there; `true` for the one that the torso has less of.
+    pub(super) second_top: Vec<Option<bool>>,
+    /// Tops reach down to the thighs.
+    pub(super) is_top_long: bool,
     /// Nodes between the legs without a scan point.
     empty: Vec<bool>,
     pub(super) edges: Vec<[u32; 2]>,
@@ -141,8 +150,7 @@ impl<'a> Labeller<'a> {
                 (Some(a), Some(b)) => ((a - b).norm() as f32 / half).powi(2),
                 _ => 0.0,
             };
-            let [a, b] = e.map(|v| nodes.heights[v as usize]);
-            let contrast = contrast + ((a - b) / STEP).powi(2);
+            let contrast = contrast + (step_down(template, nodes, *e).max(0.0) / STEP).powi(2);
             smoothness * (floor + (1.0 - floor) / (1.0 + contrast))
         };
         let regions = BodyRegion::of_vertices(template);
@@ -151,6 +159,8 @@ impl<'a> Labeller<'a> {
             config,
             hair: scalp(template, &regions),
             bottom: vec![false; regions.len()],
+            second_top: vec![None; regions.len()],
+            is_top_long: false,
             empty: (0..regions.len())
                 .map(|v| cloth.is_between(v) && nodes.points.row(v).is_empty())
                 .collect(),
@@ -185,6 +195,7 @@ impl<'a> Labeller<'a> {
             labels,
             appearances,
             energy,
+            is_top_long: self.is_top_long,
         })
     }
 
@@ -237,40 +248,11 @@ impl<'a> Labeller<'a> {
             })
             .collect();
         if let (Some(under), Some(top)) = (index(Slot::Under), index(Slot::Top)) {
-            self.split_top(&mut labels, top, under);
+            for (label, second) in labels.iter_mut().zip(&self.second_top) {
+                *label = second.map_or(*label, |s| if s { under } else { top });
+            }
         }
         labels
-    }
-
-    /// Gives one of two colours of torso and arms to the second garment: the one that the torso has less of.
-    fn split_top(&self, labels: &mut [u8], top: u8, under: u8) {
-        let (some, owner) = self.torso_clusters();
-        let torso_share = |k: usize| {
-            let torso = some.iter().zip(&owner).filter(|(_, o)| **o == k);
-            torso.filter(|(v, _)| self.regions[**v].is_torso()).count()
-        };
-        let second = usize::from(torso_share(0) > torso_share(1));
-        for (v, o) in some.iter().zip(&owner) {
-            labels[*v] = if *o == second { under } else { top };
-        }
-    }
-
-    /// Nodes of torso and arms that are no skin, and their cluster of two.
-    pub(super) fn torso_clusters(&self) -> (Vec<usize>, Vec<usize>) {
-        let skin = self.skin_appearance();
-        let is_skin = |v: usize| {
-            let cost = skin
-                .as_ref()
-                .map_or(f64::INFINITY, |s| self.nodes.cost(v, s));
-            self.regions[v].is_arm() && cost < 0.0
-        };
-        let some: Vec<usize> = (0..self.count())
-            .filter(|v| self.regions[*v].is_torso() || self.regions[*v].is_arm())
-            .filter(|v| self.nodes.means[*v].is_some() && !is_skin(*v) && !self.bottom[*v])
-            .collect();
-        let colors: Vec<_> = some.iter().filter_map(|v| self.nodes.means[*v]).collect();
-        let owner = k_means(&colors, 2);
-        (some, owner)
     }
 
     pub(super) fn skin_appearance(&self) -> Option<ColorMixture> {
@@ -327,17 +309,22 @@ impl<'a> Labeller<'a> {
         sum / n.max(1) as f64
     }
 
+    fn prior(&self, slot: Slot, region: BodyRegion) -> f32 {
+        let is_long = self.is_top_long && region == BodyRegion::Thigh;
+        match slot {
+            _ if self.config.without_prior => 0.0,
+            Slot::Top | Slot::Under if is_long => LONG_TOP[1],
+            _ => slot.cost(region),
+        }
+    }
+
     /// Costs of all labels at all nodes (eq. 12), shape `[nodes, labels]`.
     fn unary(&self, slots: &[Slot], appearances: &[Option<ColorMixture>]) -> Vec<f32> {
         let mut out = Vec::with_capacity(self.count() * slots.len());
         for v in 0..self.count() {
             for (slot, appearance) in slots.iter().zip(appearances) {
                 let color = appearance.as_ref().map_or(0.0, |a| self.nodes.cost(v, a));
-                let prior = if self.config.without_prior {
-                    0.0
-                } else {
-                    slot.cost(self.regions[v])
-                };
+                let prior = self.prior(*slot, self.regions[v]);
                 let empty = if self.empty[v] && slot.is_garment() {
                     EMPTY
                 } else {
@@ -348,6 +335,13 @@ impl<'a> Labeller<'a> {
         }
         out
     }
+}
+
+/// Step from the upper to the lower end of an edge of the rest pose, metres.
+pub(super) fn step_down(template: &Template, nodes: &NodeColors, edge: [u32; 2]) -> f32 {
+    let [a, b] = edge.map(|v| template.mesh().vertices()[v as usize].y);
+    let [p, q] = edge.map(|v| nodes.steps[v as usize]);
+    if a > b { p - q } else { q - p }
 }
 
 /// Back and top of the head, where hair grows; shape `[vertices]`.

@@ -6,6 +6,7 @@ mod node_colors;
 mod outfit;
 mod prior;
 mod scan_labels;
+mod torso;
 mod unseen;
 
 pub use color_mixture::{ColorMixture, hsv_cone, k_means};

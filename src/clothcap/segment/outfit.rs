@@ -1,22 +1,19 @@
 //! Number and kinds of the garments of an outfit, found by the labels that each choice leads to.
 
 use super::color_mixture::ColorMixture;
-use super::labelling::{DISTINCT, LabelConfig, Labeller, Labelling, SKIN_MODES, STEP};
+use super::labelling::{DISTINCT, LabelConfig, Labeller, Labelling, SKIN_MODES};
 use super::node_colors::NodeColors;
 use super::prior::{BodyRegion, Slot};
 use crate::clothcap::CaptureError;
 use crate::clothcap::topology::{ClothTemplate, LegTopology};
-use nalgebra::Vector3;
 
 /// The same for feet beside shins: they lie in another light. Bare ones have up to 3.1, shoes of `scans/liam` 7.6.
 const DISTINCT_SHOES: f64 = 5.0;
-/// Least share of torso and arms that is a garment of its own.
-const LEAST_SHARE: f64 = 0.06;
-/// Difference of mean colours, in standard deviations, from which two clusters are two garments.
-const SEPARATION: f64 = 2.0;
-/// Mean step at a hem from which one garment lies over the other, metres. A dress has 0.00004, tops over bottoms have 0.0004
-/// to 0.0015.
-const LEAST_OVERLAP: f64 = 0.0003;
+/// Mean step at a hem from which one garment lies over the other, metres. A dress has 0.0009 along its deepest folds, tops over
+/// bottoms have 0.0012 to 0.008.
+const LEAST_OVERLAP: f64 = 0.0012;
+/// Largest step that counts, metres.
+const MOST_OVERLAP: f64 = 0.01;
 
 /// Labels the nodes of a template.
 ///
@@ -42,7 +39,7 @@ pub fn label_nodes(
     ])?;
     let mut slots = labeller.worn(&all);
     labeller.leave_out_bottom(&all);
-    if slots.contains(&Slot::Top) && labeller.has_second_top() {
+    if slots.contains(&Slot::Top) && labeller.find_second_top() {
         slots.push(Slot::Under);
     }
     let out = if slots == all.slots {
@@ -50,16 +47,29 @@ pub fn label_nodes(
     } else {
         labeller.run(slots)?
     };
-    // Overalls are rarer than trousers and a top of one colour, skirts and tops of one colour rarer than dresses.
-    if cloth.legs() == LegTopology::Joined && labeller.is_one_piece(&out) {
-        let slots = out.slots.iter().filter(|s| **s != Slot::Bottom);
-        let whole = |s: &Slot| if *s == Slot::Top { Slot::OnePiece } else { *s };
-        return labeller.run(slots.map(whole).collect());
+    if labeller.is_alike(&out) {
+        return labeller.draw_hem(out, cloth.legs());
     }
     Ok(out)
 }
 
 impl Labeller<'_> {
+    /// End of a top over a bottom of its colour: high, low on the thighs, or none.
+    fn draw_hem(&mut self, high: Labelling, legs: LegTopology) -> Result<Labelling, CaptureError> {
+        self.is_top_long = true;
+        let low = self.run(high.slots.clone())?;
+        let [up, down] = [&high, &low].map(|found| self.overlap(found));
+        let best = if down > up { low } else { high };
+        self.is_top_long = best.is_top_long;
+        // Overalls are rarer than trousers and a top of one colour, skirts and tops of one colour rarer than dresses.
+        if legs == LegTopology::Joined && up.max(down) < LEAST_OVERLAP {
+            let slots = best.slots.iter().filter(|s| **s != Slot::Bottom);
+            let whole = |s: &Slot| if *s == Slot::Top { Slot::OnePiece } else { *s };
+            return self.run(slots.map(whole).collect());
+        }
+        Ok(best)
+    }
+
     /// Keeps what was found to be trousers or a skirt from being taken for a second garment of the torso.
     fn leave_out_bottom(&mut self, found: &Labelling) {
         let is_bottom = |l: &u8| found.slots[usize::from(*l)] == Slot::Bottom;
@@ -101,25 +111,9 @@ impl Labeller<'_> {
             .collect()
     }
 
-    /// Torso and arms have two colours, far apart, each in one place and not enclosed by the other like a print.
-    fn has_second_top(&self) -> bool {
-        let (some, owner) = self.torso_clusters();
-        let colors = |k: usize| -> Vec<Vector3<f64>> {
-            let own = some.iter().zip(&owner).filter(|(_, o)| **o == k);
-            own.filter_map(|(v, _)| self.nodes.means[*v]).collect()
-        };
-        let (a, b) = (colors(0), colors(1));
-        let least = LEAST_SHARE * some.len() as f64;
-        if (a.len() as f64) < least || (b.len() as f64) < least {
-            return false;
-        }
-        separation(&a, &b) > SEPARATION && self.is_coherent(&some, &owner)
-    }
-
-    /// Torso and legs look alike, and where top and bottom meet nothing lies over the other all around.
-    fn is_one_piece(&self, found: &Labelling) -> bool {
-        let at = |slot: Slot| found.slots.iter().position(|s| *s == slot);
-        let (Some(top), Some(bottom)) = (at(Slot::Top), at(Slot::Bottom)) else {
+    /// Top and bottom of a labelling look alike.
+    fn is_alike(&self, found: &Labelling) -> bool {
+        let Some([top, bottom]) = ends(found) else {
             return false;
         };
         let start = self.first_labels(&found.slots);
@@ -135,51 +129,31 @@ impl Labeller<'_> {
         };
         let excess =
             self.excess(upper.into_iter(), (&a, &b)) + self.excess(lower.into_iter(), (&b, &a));
-        excess < 2.0 * DISTINCT && self.overlap(&found.labels, [top, bottom]).abs() < LEAST_OVERLAP
+        excess < 2.0 * DISTINCT
     }
 
-    /// Mean step from one label down to another where they meet, metres.
-    fn overlap(&self, labels: &[u8], [upper, lower]: [usize; 2]) -> f64 {
+    /// Mean step down from top to bottom where they meet, metres.
+    fn overlap(&self, found: &Labelling) -> f64 {
+        let Some(ends) = ends(found) else {
+            return 0.0;
+        };
         let steps = self.edges.iter().filter_map(|e| {
-            let [a, b] = e.map(|v| usize::from(labels[v as usize]));
+            let labels = e.map(|v| usize::from(found.labels[v as usize]));
             let [p, q] = e.map(|v| self.nodes.steps[v as usize]);
-            let step = if [a, b] == [upper, lower] {
-                p - q
-            } else if [a, b] == [lower, upper] {
-                q - p
-            } else {
-                return None;
+            let step = match labels {
+                l if l == ends => p - q,
+                [b, a] if [a, b] == ends => q - p,
+                _ => return None,
             };
-            Some(f64::from(step.clamp(-STEP, STEP)))
+            Some(f64::from(step).clamp(-MOST_OVERLAP, MOST_OVERLAP))
         });
         let (sum, n) = steps.fold((0.0, 0), |(s, n), x| (s + x, n + 1));
         sum / f64::from(n.max(1))
     }
-
-    /// Neighbours mostly share their cluster; stripes and checks do not.
-    fn is_coherent(&self, some: &[usize], owner: &[usize]) -> bool {
-        /// Largest share of edges between clusters.
-        const MOST_MIXED: f64 = 0.12;
-        let mut of = vec![usize::MAX; self.count()];
-        some.iter().zip(owner).for_each(|(v, o)| of[*v] = *o);
-        let inner = self.edges.iter().map(|e| e.map(|v| of[v as usize]));
-        let inner: Vec<_> = inner.filter(|[a, b]| *a < 2 && *b < 2).collect();
-        let mixed = inner.iter().filter(|[a, b]| a != b).count();
-        (mixed as f64) < MOST_MIXED * inner.len() as f64
-    }
 }
 
-/// Distance of the means of two sets of colours, in standard deviations along it. Halves of one Gaussian have 1.3, of an
-/// even distribution 1.7.
-fn separation(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
-    let mean = |all: &[Vector3<f64>]| all.iter().sum::<Vector3<f64>>() / all.len().max(1) as f64;
-    let (ma, mb) = (mean(a), mean(b));
-    let Some(axis) = (ma - mb).try_normalize(f64::MIN_POSITIVE) else {
-        return 0.0;
-    };
-    let deviation = |all: &[Vector3<f64>], m: &Vector3<f64>| {
-        let squares = all.iter().map(|c| (c - m).dot(&axis).powi(2));
-        (squares.sum::<f64>() / all.len().max(1) as f64).sqrt()
-    };
-    (ma - mb).norm() / (deviation(a, &ma) + deviation(b, &mb)).max(f64::MIN_POSITIVE)
+/// Labels of top and bottom.
+fn ends(found: &Labelling) -> Option<[usize; 2]> {
+    let at = |slot: Slot| found.slots.iter().position(|s| *s == slot);
+    Some([at(Slot::Top)?, at(Slot::Bottom)?])
 }

@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 /// Cost of an impossible label, nats: no colour outweighs it.
 pub const IMPOSSIBLE: f32 = 60.0;
 
+/// Cost of a top at a thigh, nats, and that of one which is known to reach there.
+pub(super) const LONG_TOP: [f32; 2] = [3.0, 0.3];
+
 /// Place of a label on the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -151,15 +154,15 @@ impl Slot {
             (Self::Top | Self::Under, UpperArm) => 0.2,
             (Self::Top | Self::Under, Forearm) => 0.4,
             (Self::Top | Self::Under, Neck) => 0.8,
-            (Self::Top | Self::Under, Pelvis) => 0.1,
-            (Self::Top | Self::Under, Thigh) => 3.0,
+            (Self::Top | Self::Under, Pelvis) => 0.0,
+            (Self::Top | Self::Under, Thigh) => LONG_TOP[0],
             (Self::Top | Self::Under, Shin) => 8.0,
             (Self::Top | Self::Under, Head | Hand) => 6.0,
             (Self::Top | Self::Under, Foot) => IMPOSSIBLE,
 
             (Self::Bottom, Pelvis | Thigh) => 0.0,
             (Self::Bottom, Shin) => 0.3,
-            (Self::Bottom, Abdomen) => 0.3,
+            (Self::Bottom, Abdomen) => 1.0,
             (Self::Bottom, Foot) => 2.0,
             (Self::Bottom, Chest) => 8.0,
             (Self::Bottom, _) => IMPOSSIBLE,

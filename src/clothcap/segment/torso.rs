@@ -1,0 +1,267 @@
+//! Garments of the torso: the two colours of torso and arms that are least like shades or prints of each other.
+
+use super::color_mixture::{ColorMixture, k_means};
+use super::labelling::Labeller;
+use nalgebra::Vector3;
+
+/// Clusters in which the colours of torso and arms start; each way to join them to two is tried.
+const CLUSTERS: usize = 6;
+/// Least share of torso and arms that is a garment of its own.
+const LEAST_SHARE: f64 = 0.04;
+/// Least step of colour where two garments meet, in standard deviations of their colours: light fades, cloth ends. Shades of
+/// one garment have up to 0.86, the garments of `scans/liam` 1.7, jackets over shirts 1.4 to 1.9.
+const LEAST_STEP: f64 = 1.1;
+/// Largest ratio of edges between two garments to those within the smaller one: stripes, checks and spots have more than 0.8.
+const MOST_MIXED: f64 = 0.5;
+/// Least share of its border at which a garment meets skin or the garment of the legs: prints meet their own garment only.
+const LEAST_FREE: f64 = 0.05;
+/// Mean cost above that of their own appearance from which colours are no skin, nats: bare arms have up to 2.0, shirts in an
+/// open jacket from 7.7.
+const LEAST_UNLIKE_SKIN: f64 = 4.0;
+/// Brightness added before colours are divided by it: hues of dark colours are noise.
+const DARK: f64 = 0.1;
+/// Weight of the logarithm of brightness beside hue and saturation: light changes it, dyes do too.
+const BRIGHTNESS: f64 = 0.4;
+
+/// Two sets of nodes, and the ways in which they look like two garments.
+#[derive(Debug)]
+struct TorsoPair {
+    nodes: [Vec<usize>; 2],
+    /// See [`LEAST_STEP`].
+    step: f64,
+}
+
+impl Labeller<'_> {
+    /// Looks for two garments on torso and arms, and keeps which node is whose.
+    pub(super) fn find_second_top(&mut self) -> bool {
+        let (some, inner) = self.torso_nodes();
+        let colors: Vec<_> = inner
+            .iter()
+            .filter_map(|v| self.without_light(*v))
+            .collect();
+        let owner = k_means(&colors, CLUSTERS);
+        let count = owner.iter().max().map_or(0, |k| k + 1);
+        // The last cluster stays on one side: the other half of the ways says the same.
+        let ways = 1..1usize << count.saturating_sub(1);
+        let pairs = ways.filter_map(|way| {
+            let side = |wanted: usize| {
+                let own = inner.iter().zip(&owner);
+                own.filter(|(_, k)| way >> **k & 1 == wanted)
+                    .map(|(v, _)| *v)
+                    .collect()
+            };
+            self.torso_pair([side(0), side(1)])
+        });
+        let best = pairs.max_by(|a, b| a.step.total_cmp(&b.step));
+        let Some(TorsoPair { nodes: [a, b], .. }) = best else {
+            return false;
+        };
+        let on_torso = |all: &[usize]| all.iter().filter(|v| self.regions[**v].is_torso()).count();
+        let (first, second) = if on_torso(&a) >= on_torso(&b) {
+            (a, b)
+        } else {
+            (b, a)
+        };
+        let [first, second] = [first, second].map(|all| mean(&self.colors(&all)));
+        for v in some {
+            let is_second = self
+                .without_light(v)
+                .map(|c| (c - second).norm() < (c - first).norm());
+            self.second_top[v] = is_second;
+        }
+        true
+    }
+
+    /// Two sets of nodes as garments; `None` if they are shades, prints or skin.
+    fn torso_pair(&self, nodes: [Vec<usize>; 2]) -> Option<TorsoPair> {
+        let [a, b] = nodes.each_ref().map(Vec::len);
+        if (a.min(b) as f64) < LEAST_SHARE * (a + b) as f64 {
+            return None;
+        }
+        let mut side = vec![None; self.count()];
+        for (k, all) in nodes.iter().enumerate() {
+            all.iter().for_each(|v| side[*v] = Some(k));
+        }
+        let colors = nodes.each_ref().map(|all| self.colors(all));
+        let (axis, spread) = separation(&colors)?;
+        let meets = self.meetings(&side, &axis);
+        let mixed = meets.between as f64 / meets.within.into_iter().min()?.max(1) as f64;
+        let step = meets.step / meets.between.max(1) as f64 / spread;
+        let free =
+            |k: usize| meets.free[k] as f64 >= LEAST_FREE * (meets.free[k] + meets.between) as f64;
+        let is_pair = mixed < MOST_MIXED && step >= LEAST_STEP && free(0) && free(1);
+        let is_worn = || nodes.iter().all(|all| self.is_unlike_skin(all));
+        (is_pair && is_worn()).then_some(TorsoPair { nodes, step })
+    }
+
+    /// Edges within and between two sides, and from each to anything else.
+    fn meetings(&self, side: &[Option<usize>], axis: &Vector3<f64>) -> Meetings {
+        let mut out = Meetings::default();
+        for [p, q] in self.edges.iter().map(|e| e.map(|v| v as usize)) {
+            match (side[p], side[q]) {
+                (Some(a), Some(b)) if a == b => out.within[a] += 1,
+                (Some(_), Some(_)) => {
+                    let colors = self.without_light(p).zip(self.without_light(q));
+                    out.step += colors.map_or(0.0, |(a, b)| (a - b).dot(axis).abs());
+                    out.between += 1;
+                }
+                (Some(k), None) if self.nodes.means[q].is_some() => out.free[k] += 1,
+                (None, Some(k)) if self.nodes.means[p].is_some() => out.free[k] += 1,
+                _ => (),
+            }
+        }
+        out
+    }
+
+    fn is_unlike_skin(&self, nodes: &[usize]) -> bool {
+        let own = ColorMixture::fit(&self.nodes.of(nodes.iter().copied()));
+        let (Some(own), Some(skin)) = (own, self.skin_appearance()) else {
+            return true;
+        };
+        self.excess(nodes.iter().copied(), (&own, &skin)) > LEAST_UNLIKE_SKIN
+    }
+
+    /// Seen nodes of torso and arms that are neither skin nor the garment of the legs, and those of them that do not border on
+    /// these: their colours are mixed.
+    fn torso_nodes(&self) -> (Vec<usize>, Vec<usize>) {
+        let skin = self.skin_appearance();
+        let is_skin = |v: usize| {
+            let cost = skin
+                .as_ref()
+                .map_or(f64::INFINITY, |s| self.nodes.cost(v, s));
+            self.regions[v].is_arm() && cost < 0.0
+        };
+        let other: Vec<bool> = (0..self.count())
+            .map(|v| self.bottom[v] || is_skin(v))
+            .collect();
+        let mut near = other.clone();
+        for [p, q] in self.edges.iter().map(|e| e.map(|v| v as usize)) {
+            near[p] |= other[q];
+            near[q] |= other[p];
+        }
+        let region = |v: &usize| self.regions[*v];
+        let all: Vec<usize> = (0..self.count())
+            .filter(|v| region(v).is_torso() || region(v).is_arm())
+            .filter(|v| self.nodes.means[*v].is_some() && !other[*v])
+            .collect();
+        let inner = all.iter().filter(|v| !near[**v]).copied().collect();
+        (all, inner)
+    }
+
+    fn colors(&self, nodes: &[usize]) -> Vec<Vector3<f64>> {
+        nodes
+            .iter()
+            .filter_map(|v| self.without_light(*v))
+            .collect()
+    }
+
+    /// Mean colour of a node with little of its light left: hue and saturation, and the logarithm of brightness.
+    fn without_light(&self, node: usize) -> Option<Vector3<f64>> {
+        self.nodes.means[node].map(|c| {
+            let bright = c.z + DARK;
+            Vector3::new(c.x / bright, c.y / bright, BRIGHTNESS * bright.ln())
+        })
+    }
+}
+
+/// Edges of the template within and between two sets of nodes.
+#[derive(Clone, Copy, Debug, Default)]
+struct Meetings {
+    within: [usize; 2],
+    between: usize,
+    free: [usize; 2],
+    /// Sum of the differences of colour between them.
+    step: f64,
+}
+
+fn mean(all: &[Vector3<f64>]) -> Vector3<f64> {
+    all.iter().sum::<Vector3<f64>>() / all.len().max(1) as f64
+}
+
+/// Direction between the means of two sets of colours, and the sum of their standard deviations along it.
+fn separation([a, b]: &[Vec<Vector3<f64>>; 2]) -> Option<(Vector3<f64>, f64)> {
+    let axis = (mean(a) - mean(b)).try_normalize(f64::MIN_POSITIVE)?;
+    let deviation = |all: &[Vector3<f64>]| {
+        let middle = mean(all);
+        let squares = all.iter().map(|c| (c - middle).dot(&axis).powi(2));
+        (squares.sum::<f64>() / all.len().max(1) as f64).sqrt()
+    };
+    Some((axis, (deviation(a) + deviation(b)).max(f64::MIN_POSITIVE)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::embedded;
+    use crate::clothcap::segment::{BodyRegion, LabelConfig, NodeColors, hsv_cone};
+    use crate::clothcap::topology::{ClothTemplate, LegTopology};
+    use crate::math::P3;
+    use crate::mesh::{Csr, vertex_normals};
+    use crate::par::Par;
+
+    const SKIN: [f32; 3] = [205.0, 150.0, 120.0];
+    const NAVY: [f32; 3] = [44.0, 52.0, 86.0];
+    const WHITE: [f32; 3] = [228.0, 228.0, 224.0];
+
+    /// Looks for a second garment where each node of torso and arms has a colour of its place, the rest that of skin; light comes
+    /// from above and in front.
+    fn finds_two(color: impl Fn(&P3, BodyRegion) -> [f32; 3]) -> bool {
+        let cloth = ClothTemplate::new(&embedded::template(), LegTopology::Apart).expect("small");
+        let mesh = cloth.template().mesh();
+        let regions = BodyRegion::of_vertices(cloth.template());
+        let around = cloth.template().topology().vertex_faces();
+        let mut normals = Vec::new();
+        vertex_normals(
+            Par::Rayon,
+            mesh.vertices(),
+            mesh.faces(),
+            around,
+            &mut normals,
+        );
+        let colors: Vec<_> = (0..regions.len())
+            .map(|v| {
+                let is_dressed = regions[v].is_torso() || regions[v].is_arm();
+                let base = if is_dressed {
+                    color(&mesh.vertices()[v], regions[v])
+                } else {
+                    SKIN
+                };
+                let light = 0.6 + 0.25 * normals[v].y.max(0.0) + 0.15 * normals[v].z.max(0.0);
+                let grain = 1.0 + 0.02 * ((v * 7919) % 13) as f32 / 13.0;
+                hsv_cone(base.map(|c| (c * light * grain) as u8))
+            })
+            .collect();
+        let pairs: Vec<_> = (0..regions.len() as u32).map(|v| (v, v)).collect();
+        let nodes = NodeColors {
+            points: Csr::from_pairs(regions.len(), &pairs),
+            means: colors.iter().copied().map(Some).collect(),
+            colors,
+            heights: vec![0.0; regions.len()],
+            steps: vec![0.0; regions.len()],
+        };
+        let config = LabelConfig::default();
+        Labeller::new(&cloth, &nodes, &config).find_second_top()
+    }
+
+    #[test]
+    fn a_shirt_in_an_open_jacket_and_its_sleeves_are_garments() {
+        let is_open = |p: &P3| p.x.abs() < 0.06 && p.z > 0.0;
+        assert!(finds_two(|p, _| if is_open(p) { WHITE } else { NAVY }));
+        assert!(finds_two(|_, r| if r.is_arm() { WHITE } else { NAVY }));
+    }
+
+    #[test]
+    fn shades_stripes_prints_and_bare_arms_are_none() {
+        assert!(!finds_two(|_, _| NAVY));
+        let stripe = |p: &P3| (p.y / 0.04).rem_euclid(2.0) < 1.0;
+        assert!(!finds_two(|p, _| if stripe(p) { WHITE } else { NAVY }));
+        let print = |p: &P3, r: BodyRegion| r == BodyRegion::Chest && p.z > 0.0 && p.x.abs() < 0.09;
+        let is_low = |p: &P3| p.y < 1.30;
+        assert!(!finds_two(|p, r| if print(p, r) && is_low(p) {
+            WHITE
+        } else {
+            NAVY
+        }));
+        assert!(!finds_two(|_, r| if r.is_arm() { SKIN } else { NAVY }));
+    }
+}
