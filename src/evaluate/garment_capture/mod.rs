@@ -107,7 +107,10 @@ fn labelled(mut row: Row, variant: &CaptureVariant) -> Row {
 struct SceneRun {
     labels: LabelScore,
     surface: f64,
+    /// Seen vertices.
     garment: Mean,
+    /// Vertices below another garment, completed from the body.
+    hidden: Mean,
     hem: Mean,
     /// The same of the parts' vertices on the single mesh.
     single: Mean,
@@ -144,6 +147,7 @@ impl SceneRun {
             .error("boundary_mm", 1e3 * self.labels.boundary)
             .error("surface_mm", 1e3 * self.surface)
             .error("garment_mm", 1e3 * self.garment.value())
+            .error("hidden_mm", 1e3 * self.hidden.value())
             .error("single_garment_mm", 1e3 * self.single.value())
             .error("hem_mm", 1e3 * self.hem.value())
             .error("single_hem_mm", 1e3 * self.single_hem.value())
@@ -239,10 +243,19 @@ impl SceneRun {
             let hems = seen_hems(real, (&truth.points, &truth.labels), label);
             let surface = &captured.alignment.surface;
             let single: Vec<P3> = part.nodes.iter().map(|v| surface[*v as usize]).collect();
-            let distance = |v: &[P3]| mean_distance(v, &real.vertices, &real.faces);
             let hem = |v: &[P3]| distance_from_rings(&hems, &part.rings, v);
-            self.garment.add(distance(vertices), vertices.len());
-            self.single.add(distance(&single), single.len());
+            let add = |mean: &mut Mean, all: &[P3], hidden: bool| {
+                let some = all.iter().zip(&part.hidden);
+                let some = some.filter(|(_, h)| **h == hidden).map(|(p, _)| *p);
+                let some: Vec<P3> = some.collect();
+                if !some.is_empty() {
+                    let distance = mean_distance(&some, &real.vertices, &real.faces);
+                    mean.add(distance, some.len());
+                }
+            };
+            add(&mut self.garment, vertices, false);
+            add(&mut self.hidden, vertices, true);
+            add(&mut self.single, &single, false);
             self.hem.add(hem(vertices), hems.len());
             self.single_hem.add(hem(&single), hems.len());
         }
