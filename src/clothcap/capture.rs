@@ -2,7 +2,7 @@
 
 use super::CaptureError;
 use super::align::{AlignedBody, Alignment, AlignmentReport, ClothedTemplate, Start};
-use super::layers::tuck_hidden;
+use super::layers::clear_body;
 use super::multi::{ClothPart, MultiCloth, PartFit, PartFitConfig, PartScan};
 use super::part_colors::part_colors;
 use super::retarget::{PenetrationSolver, SolidBody, pose_part};
@@ -204,13 +204,10 @@ impl OutfitCapture {
     ) -> Result<Vec<Vec<P3>>, CaptureError> {
         self.solid.place(&undressed.vertices)?;
         let mut out = fitted.to_vec();
-        for (k, (part, vertices)) in outfit.cloth.parts.iter().zip(&mut out).enumerate() {
-            if k == self.solvers.len() {
-                self.solvers.push(PenetrationSolver::new(part)?);
-            }
-            self.solvers[k].run(&self.solid, vertices)?;
+        for part in &outfit.cloth.parts[self.solvers.len()..] {
+            self.solvers.push(PenetrationSolver::new(part)?);
         }
-        tuck_hidden(&outfit.cloth, &mut out, self.solid.vertices());
+        clear_body(&outfit.cloth, &mut self.solvers, &self.solid, &mut out)?;
         Ok(out)
     }
 }

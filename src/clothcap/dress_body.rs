@@ -2,7 +2,7 @@
 
 use super::CaptureError;
 use super::archive::FrameDisplacements;
-use super::layers::tuck_hidden;
+use super::layers::clear_body;
 use super::multi::MultiCloth;
 use super::retarget::{PenetrationSolver, RetargetReport, SolidBody, on_body, pose_part};
 use super::topology::ClothTemplate;
@@ -114,21 +114,11 @@ impl<'a> BodyDresser<'a> {
             self.surface.extend(&rest),
             self.surface.template().weights(),
         );
-        let (mut garments, mut reports) = (Vec::new(), Vec::new());
         let parts = self.cloth.parts.iter().zip(&displacements.garments);
-        for ((part, d), solver) in parts.zip(&mut self.solvers) {
-            let mut vertices = pose_part(part, weights, &bones, &on_body(part, d, &rest));
-            reports.push(solver.run(&self.solid, &mut vertices)?);
-            garments.push(vertices);
-        }
-        tuck_hidden(self.cloth, &mut garments, self.solid.vertices());
-        let all = garments.iter_mut().zip(&mut reports).zip(&self.solvers);
-        for ((vertices, report), solver) in all {
-            let inside = self.solid.contains(vertices);
-            solver.gather(&self.solid, vertices, inside);
-            let inside = self.solid.contains(vertices);
-            report.inside = inside.iter().filter(|b| **b).count();
-        }
+        let posed =
+            parts.map(|(part, d)| pose_part(part, weights, &bones, &on_body(part, d, &rest)));
+        let mut garments: Vec<Vec<P3>> = posed.collect();
+        let reports = clear_body(self.cloth, &mut self.solvers, &self.solid, &mut garments)?;
         Ok(DressedPose {
             pose: pose.clone(),
             bones,

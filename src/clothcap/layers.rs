@@ -1,13 +1,39 @@
-//! Layers of an outfit: hidden vertices of an inner garment lie between the body and the garment above.
+//! Layers of an outfit: body below, hidden vertices of an inner garment between it and the garment above.
 
+use super::CaptureError;
 use super::multi::MultiCloth;
+use super::retarget::{PenetrationSolver, RetargetReport, SolidBody};
 use crate::math::P3;
 
 /// Place of a hidden vertex between skin and the garment above, 0 to 1.
 const DEPTH: f32 = 0.5;
 
+/// Moves posed garments out of a body: those seen with the least change of edges, then hidden vertices below the garments
+/// above them. A garment that is free keeps its bits. Shape `[garments][vertices]`, metres.
+///
+/// # Errors
+/// [`CaptureError::Solve`].
+pub(super) fn clear_body(
+    cloth: &MultiCloth,
+    solvers: &mut [PenetrationSolver],
+    body: &SolidBody,
+    garments: &mut [Vec<P3>],
+) -> Result<Vec<RetargetReport>, CaptureError> {
+    let mut reports = Vec::new();
+    for (solver, vertices) in solvers.iter_mut().zip(garments.iter_mut()) {
+        reports.push(solver.run(body, vertices)?);
+    }
+    tuck_hidden(cloth, garments, body.vertices());
+    for ((solver, vertices), report) in solvers.iter().zip(garments).zip(&mut reports) {
+        let inside = body.contains(vertices);
+        solver.gather(body, vertices, inside);
+        report.inside = body.contains(vertices).iter().filter(|b| **b).count();
+    }
+    Ok(reports)
+}
+
 /// Moves hidden vertices below the garments above them. Shapes `[garments][vertices]` and `[body vertices]`, metres.
-pub(super) fn tuck_hidden(cloth: &MultiCloth, garments: &mut [Vec<P3>], body: &[P3]) {
+fn tuck_hidden(cloth: &MultiCloth, garments: &mut [Vec<P3>], body: &[P3]) {
     for inner in 0..cloth.parts.len() {
         for (i, node) in cloth.parts[inner].nodes.iter().enumerate() {
             if !cloth.parts[inner].hidden[i] {

@@ -17,6 +17,8 @@ use serde::{Deserialize, Serialize};
 const MARGIN: f32 = 0.003;
 /// Distance below which a vertex is pushed, metres. Between the two lies what smoothing gives back.
 const LEAST: f32 = 0.001;
+/// Tolerance of [`LEAST`] for a garment that was free before it was unposed and posed again, metres.
+const ROUNDING: f32 = 1e-5;
 /// Rounds of pushing and smoothing, and of pushing alone.
 const ROUNDS: [usize; 2] = [5, 10];
 /// Weight of a pushed vertex beside that of an edge.
@@ -122,15 +124,26 @@ impl SolidBody {
     pub fn contains(&self, points: &[P3]) -> Vec<bool> {
         let mut inside = Vec::new();
         par::map_into(Par::Rayon, points.len(), 128, &mut inside, |i| {
-            self.bvh.winding_number(self.body.vertices(), &points[i]) > 0
+            self.encloses(&points[i])
         });
         inside
     }
 
-    /// Place outside of the skin near body vertex `node` for a point closer than [`LEAST`]; `None` for others.
-    fn outside(&self, p: &P3, node: u32) -> Option<P3> {
+    /// Place outside of the skin near body vertex `node` for a point closer than `least`; `None` for others, and for points
+    /// outside of the body in a fold of the skin too narrow for a better place.
+    fn outside(&self, p: &P3, node: u32, least: f32) -> Option<P3> {
         let hit = self.below(p, node);
-        (hit.signed_distance < LEAST).then(|| hit.point + hit.normal * MARGIN)
+        if hit.signed_distance >= least {
+            return None;
+        }
+        let place = hit.point + hit.normal * MARGIN;
+        let is_free = self.below(&place, node).signed_distance >= LEAST && !self.encloses(&place);
+        (is_free || self.encloses(p)).then_some(place)
+    }
+
+    /// Membership of one point in the body's interior.
+    fn encloses(&self, p: &P3) -> bool {
+        self.bvh.winding_number(self.body.vertices(), p) > 0
     }
 
     /// The same by the closest point of the whole skin, for a point in its interior.
@@ -176,6 +189,7 @@ impl PenetrationSolver {
     }
 
     /// Moves vertices out of the body with the least change of edges; afterwards none is inside unless the report says so.
+    /// The result is a fixed point: run again, nothing moves.
     ///
     /// # Errors
     /// [`CaptureError::Solve`].
@@ -184,41 +198,56 @@ impl PenetrationSolver {
         body: &SolidBody,
         vertices: &mut Vec<P3>,
     ) -> Result<RetargetReport, CaptureError> {
-        let wanted = vertices.clone();
+        let inside_before = count(&self.inside(body, vertices));
         let mut report = RetargetReport {
-            inside_before: count(&self.inside(body, vertices)),
+            inside_before,
             ..RetargetReport::default()
         };
         let mut pushed: Vec<Option<P3>> = vec![None; vertices.len()];
+        let is_near = self.push((body, LEAST - ROUNDING), vertices, &mut pushed);
+        if !is_near && inside_before == 0 {
+            return Ok(report);
+        }
+        let wanted = vertices.clone();
         for _ in 0..ROUNDS[0] {
-            if !self.push(body, vertices, &mut pushed) {
+            if !self.push((body, LEAST), vertices, &mut pushed) {
                 break;
             }
             *vertices = self.relax(&wanted, &pushed)?;
             report.solves += 1;
         }
-        for _ in 0..ROUNDS[1] {
-            let mut left = vec![None; vertices.len()];
-            let is_near = self.push(body, vertices, &mut left);
-            let inside = self.inside(body, vertices);
-            if !is_near && count(&inside) == 0 {
-                break;
-            }
-            for (v, p) in vertices.iter_mut().enumerate() {
-                let out = if inside[v] {
-                    body.outside_of_all(p)
-                } else {
-                    None
-                };
-                *p = left[v].or(out).unwrap_or(*p);
-            }
-        }
+        self.project(body, vertices);
         let inside = self.inside(body, vertices);
         self.gather(body, vertices, inside);
+        self.push_out(body, vertices);
         report.inside = count(&self.inside(body, vertices));
         let moved = vertices.iter().zip(&wanted).map(|(a, b)| (a - b).norm());
         report.largest_push = moved.fold(0.0, f32::max);
         Ok(report)
+    }
+
+    /// Moves what smoothing left inside or too near, each vertex by itself.
+    fn project(&self, body: &SolidBody, vertices: &mut [P3]) {
+        for _ in 0..ROUNDS[1] {
+            let is_near = self.push_out(body, vertices);
+            let inside = self.inside(body, vertices);
+            if !is_near && count(&inside) == 0 {
+                break;
+            }
+            for (p, _) in vertices.iter_mut().zip(&inside).filter(|(_, i)| **i) {
+                *p = body.outside_of_all(p).unwrap_or(*p);
+            }
+        }
+    }
+
+    /// Moves vertices that are too near to their places outside; true if there is any.
+    fn push_out(&self, body: &SolidBody, vertices: &mut [P3]) -> bool {
+        let mut places = vec![None; vertices.len()];
+        let any = self.push((body, LEAST), vertices, &mut places);
+        for (p, place) in vertices.iter_mut().zip(places) {
+            *p = place.unwrap_or(*p);
+        }
+        any
     }
 
     /// Membership in the body's interior of each vertex that is not hidden.
@@ -256,12 +285,17 @@ impl PenetrationSolver {
         }
     }
 
-    /// Targets of vertices that are too near; true if there is any.
-    fn push(&self, body: &SolidBody, vertices: &[P3], targets: &mut [Option<P3>]) -> bool {
+    /// Targets of vertices nearer than a distance; true if there is any.
+    fn push(
+        &self,
+        (body, least): (&SolidBody, f32),
+        vertices: &[P3],
+        targets: &mut [Option<P3>],
+    ) -> bool {
         let mut out = Vec::new();
         par::map_into(Par::Rayon, vertices.len(), 128, &mut out, |v| {
-            body.outside(&vertices[v], self.below[v])
-                .filter(|_| !self.hidden[v])
+            let place = || body.outside(&vertices[v], self.below[v], least);
+            (!self.hidden[v]).then(place).flatten()
         });
         let mut any = false;
         for (slot, p) in targets.iter_mut().zip(out) {
