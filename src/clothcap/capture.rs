@@ -10,7 +10,7 @@ use super::scan::BodyScan;
 use super::segment::{LabelConfig, Labelling};
 use super::segmenter::{ScanSegmenter, SegmentedScan};
 use super::topology::ClothTemplate;
-use super::undress::{Undressed, Undresser, WornGarments, minimally_clothed};
+use super::undress::{Undressed, Undresser, WornGarments, minimally_clothed, posed_under_cloth};
 use super::unpose::unpose;
 use crate::body::{BoneTransforms, Template};
 use crate::math::{P3, V3};
@@ -154,25 +154,28 @@ impl OutfitCapture {
             config: &self.config.parts,
         };
         let alignment = &segmented.alignment;
-        let (outfit, fitted) = match self.outfit.take() {
+        let (outfit, fitted, body) = match self.outfit.take() {
             Some(outfit) => {
                 let fitted = fitter.later(&outfit)?;
-                (outfit, fitted)
+                let start = AlignedBody {
+                    pose: alignment.body.pose.clone(),
+                    shape: outfit.body.shape.clone(),
+                };
+                let body = posed_under_cloth(&self.template, scan, &covered, start)?;
+                (outfit, fitted, body)
             }
             None => {
-                let mcs = minimally_clothed(&self.template, scan, &covered, &alignment.body)?;
-                fitter.first(mcs)?
+                let body = minimally_clothed(&self.template, scan, &covered, &alignment.body)?;
+                let (outfit, fitted) = fitter.first(body.clone())?;
+                (outfit, fitted, body)
             }
-        };
-        let body = AlignedBody {
-            pose: alignment.body.pose.clone(),
-            shape: outfit.body.shape.clone(),
         };
         let worn = WornGarments {
             cloth: &outfit.cloth,
             vertices: &fitted.vertices,
         };
         let undressed = self.undresser.run((scan, &covered), worn, body)?;
+        self.segmenter.follow(&undressed.body);
         let garments = self.freed(&outfit, &fitted.vertices, &undressed)?;
         let out = FrameCapture {
             labels: segmented.parts(),

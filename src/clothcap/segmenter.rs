@@ -80,6 +80,11 @@ impl ScanSegmenter {
         self.aligner.start_at(start);
     }
 
+    /// Starts the next scan in the pose of a body, that of the last scan under its cloth.
+    pub(super) fn follow(&mut self, body: &AlignedBody) {
+        self.aligner.follow(body);
+    }
+
     /// Template of the surface, with or without legs joined.
     pub fn cloth(&self) -> &ClothTemplate {
         self.aligner.cloth()

@@ -24,6 +24,13 @@ const STAGES: [FitStage; 2] = [
 ];
 /// Freedom of the pose: the aligned one is right to a few degrees, and loose cloth does not hold limbs.
 const FREEDOM: f64 = 0.1;
+/// Scan points in the fit of a later pose.
+const LATER_SAMPLES: usize = 3000;
+/// Stage of a later pose.
+const LATER: FitStage = FitStage {
+    freedom: FREEDOM,
+    ..FitStage::posed(0.03, 8)
+};
 /// Distance that the body keeps below cloth, metres.
 const MARGIN: f32 = 0.003;
 /// Coupling length to the minimally clothed shape, metres.
@@ -67,6 +74,23 @@ pub(super) fn minimally_clothed(
     for stage in &STAGES {
         fit.run(&mut body, stage)?;
     }
+    Ok(body)
+}
+
+/// Minimally clothed body in a later scan, from the aligned pose: that one belongs to the clothed template, whose joints
+/// lie elsewhere. The shape stays.
+///
+/// # Errors
+/// [`CaptureError::Solve`].
+pub(super) fn posed_under_cloth(
+    template: &Arc<Template>,
+    scan: &BodyScan,
+    covered: &[bool],
+    start: AlignedBody,
+) -> Result<AlignedBody, CaptureError> {
+    let mut fit = ModelFit::new(template, scan, LATER_SAMPLES).with_covered(covered);
+    let mut body = start;
+    fit.run(&mut body, &LATER)?;
     Ok(body)
 }
 

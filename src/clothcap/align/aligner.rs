@@ -139,6 +139,11 @@ impl Aligner {
         self.start = Some(start);
     }
 
+    /// Starts the next scan in the pose of a body.
+    pub(in crate::clothcap) fn follow(&mut self, body: &AlignedBody) {
+        self.last = Some(body.clone());
+    }
+
     /// Aligns the next scan.
     ///
     /// # Errors
