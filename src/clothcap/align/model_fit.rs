@@ -184,7 +184,8 @@ impl<'a> ModelFit<'a> {
         self
     }
 
-    fn rest(&self, shape: &BodyShape) -> RestBody {
+    /// Rest body of a shape, metres.
+    pub(super) fn rest(&self, shape: &BodyShape) -> RestBody {
         let all: Vec<u32> = match self.clothed {
             Some(_) => Vec::new(),
             None => (0..self.template.mesh().vertices().len() as u32).collect(),
