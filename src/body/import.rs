@@ -1,6 +1,8 @@
 //! Import of SMPL-layout arrays as a template with anatomical joints.
 
-use super::{BodyError, Joint, JointMotion, ShapeSpace, Skeleton, SkinWeights, Template};
+use super::{
+    BodyError, Joint, JointMotion, PoseShapes, ShapeSpace, Skeleton, SkinWeights, Template,
+};
 use crate::formats::npz::{SmplArrays, regress};
 use crate::math::{P3, V3};
 use crate::mesh::TriMesh;
@@ -82,7 +84,11 @@ pub fn template_from_smpl(name: &str, arrays: &SmplArrays) -> Result<Template, B
         motion: JointMotion::Fixed,
     }));
     let shape_space = (!arrays.shape_directions.is_empty()).then(|| shape_space(arrays, &ends));
-    Template::new(name, mesh, Skeleton::new(joints)?, weights, shape_space)
+    let template = Template::new(name, mesh, Skeleton::new(joints)?, weights, shape_space)?;
+    if arrays.pose_directions.is_empty() {
+        return Ok(template);
+    }
+    template.with_pose_shapes(PoseShapes::new(n, j, arrays.pose_directions.clone())?)
 }
 
 /// End point of a limb: a vertex of the surface.
@@ -245,7 +251,7 @@ fn hinge(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{BodyShape, Pose};
+    use crate::body::{BodyShape, BoneTransforms, Pose};
     use crate::formats::npz::read_smpl;
     use crate::formats::shared_data;
     use crate::math::{Body, Rigid};
@@ -253,6 +259,39 @@ mod tests {
 
     fn makehuman(file: &str) -> Option<PathBuf> {
         shared_data(Path::new("body/makehuman_smpl_layout").join(file))
+    }
+
+    /// One entry of `posedirs`: the rotation of the left elbow, row 0, column 1, moves a vertex of its forearm along z.
+    #[test]
+    fn pose_directions_are_read_row_by_row() {
+        let Some(path) = makehuman("template.npz") else {
+            return;
+        };
+        const SIZE: f32 = 0.05;
+        let mut arrays = read_smpl(path).expect("readable");
+        let (n, j) = (arrays.vertices.len(), arrays.parents.len());
+        let plain = template_from_smpl("plain", &arrays).expect("valid");
+        let elbow = plain.skeleton().index("left_elbow").expect("known");
+        let vertex = (0..n)
+            .find(|v| plain.weights().dominant(*v) == elbow)
+            .expect("a forearm");
+        let features = 9 * (j - 1);
+        arrays.pose_directions = vec![0.0; n * 3 * features];
+        arrays.pose_directions[(vertex * 3 + 2) * features + 9 * (elbow - 1) + 1] = SIZE;
+        let shaped = template_from_smpl("shaped", &arrays).expect("valid");
+
+        let mut pose = Pose::<Body>::rest(shaped.skeleton(), Rigid::identity());
+        pose.set(shaped.skeleton(), "left_elbow", &[0.9]);
+        let mut bones = BoneTransforms::default();
+        let body = shaped.personalise(&BodyShape::default());
+        pose.bones(shaped.skeleton(), &body, &mut bones);
+        let offsets = shaped.pose_offsets(&bones).expect("an elbow is bent");
+        let turn = pose.local_rotations(shaped.skeleton())[elbow];
+        let entry = turn.to_rotation_matrix().matrix()[(0, 1)] as f32;
+        assert!(entry.abs() > 0.1, "{entry}");
+        let found = offsets.of(vertex);
+        assert!((found - V3::z() * (SIZE * entry)).norm() < 1e-6, "{found}");
+        assert_eq!(offsets.of(vertex + 1), V3::zeros());
     }
 
     #[test]

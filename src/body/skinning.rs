@@ -1,13 +1,24 @@
 //! Linear blend skinning with at most four joints a vertex (eq. 4).
 
 use super::{BoneTransforms, SkinWeights};
-use crate::math::P3;
+use crate::math::{P3, V3};
 use crate::par::{self, Par};
 
 /// Poses `rest` vertices: `out[i] = Σ wᵢⱼ · boneⱼ · rest[i]`. Shapes `[vertices]`.
 pub fn skin(
     par: Par,
     rest: &[P3],
+    weights: &SkinWeights,
+    bones: &BoneTransforms,
+    out: &mut Vec<P3>,
+) {
+    skin_moved(par, (rest, &[]), weights, bones, out);
+}
+
+/// The same for rest vertices moved by offsets before; missing ones count as zero. Shapes `[vertices]`.
+pub fn skin_moved(
+    par: Par,
+    (rest, offsets): (&[P3], &[V3]),
     weights: &SkinWeights,
     bones: &BoneTransforms,
     out: &mut Vec<P3>,
@@ -22,7 +33,8 @@ pub fn skin(
         })
         .collect();
     par::map_into(par, rest.len(), 1024, out, |i| {
-        let (j, w, p) = (&weights.joints[i], &weights.weights[i], &rest[i]);
+        let (j, w) = (&weights.joints[i], &weights.weights[i]);
+        let p = offsets.get(i).map_or(rest[i], |o| rest[i] + o);
         let mut a = [[0.0f32; 4]; 4];
         for k in 0..4 {
             if w[k] > 0.0 {

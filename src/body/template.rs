@@ -1,10 +1,12 @@
 //! The body template: mesh, skeleton, weights and shape space of one body.
 
 use super::parts::BodyParts;
-use super::{BodyError, Joint, ShapeSpace, Skeleton, SkinWeights};
+use super::pose_shapes::ENTRIES;
+use super::{BodyError, Joint, PoseShapes, ShapeSpace, Skeleton, SkinWeights};
 use crate::math::P3;
 use crate::mesh::{Topology, TriMesh};
 use nalgebra::Point3;
+use std::sync::Arc;
 
 /// A rigged body in its rest pose: y up, facing +z, metres. Immutable; share it by `Arc`.
 #[derive(Clone, Debug)]
@@ -16,6 +18,8 @@ pub struct Template {
     skeleton: Skeleton,
     weights: SkinWeights,
     shape_space: Option<ShapeSpace>,
+    /// Shared by the templates of one model's bodies: SMPL's are 17 MB.
+    pose_shapes: Option<Arc<PoseShapes>>,
 }
 
 impl Template {
@@ -83,9 +87,10 @@ impl Template {
             skeleton,
             weights,
             shape_space,
+            pose_shapes: None,
         })
     }
-    /// One body as a template of its own, without shape space: vertices of shape `[vertices]` and joints of shape `[joints]`
+    /// One body as a template of its own, without shape space, with its pose blend shapes: vertices of shape `[vertices]` and joints of shape `[joints]`
     /// of its rest pose, metres.
     ///
     /// # Errors
@@ -101,14 +106,35 @@ impl Template {
             rest: *rest,
             ..joint.clone()
         });
-        Self::new(
+        let made = Self::new(
             name,
             self.mesh.with_vertices(vertices)?,
             Skeleton::new(moved.collect())?,
             self.weights.clone(),
             None,
-        )
+        )?;
+        Ok(Self {
+            pose_shapes: self.pose_shapes.clone(),
+            ..made
+        })
     }
+    /// The same body with pose blend shapes.
+    ///
+    /// # Errors
+    /// Shapes of another number of vertices, or of more joints.
+    pub fn with_pose_shapes(mut self, shapes: PoseShapes) -> Result<Self, BodyError> {
+        let (vertices, joints) = (self.mesh.vertices().len(), self.skeleton.len());
+        let is_empty = shapes.features() == 0;
+        let fits = is_empty || shapes.vertices() == vertices;
+        if !fits || shapes.features() > ENTRIES * (joints - 1) {
+            let why = format!("do not fit {vertices} vertices and {joints} joints");
+            let array = "posedirs".into();
+            return Err(BodyError::Array { array, why });
+        }
+        self.pose_shapes = (!is_empty).then(|| Arc::new(shapes));
+        Ok(self)
+    }
+
     /// Name.
     pub fn name(&self) -> &str {
         &self.name
@@ -136,5 +162,9 @@ impl Template {
     /// Directions of body shape, if the template has any.
     pub fn shape_space(&self) -> Option<&ShapeSpace> {
         self.shape_space.as_ref()
+    }
+    /// Pose blend shapes, if the template has any.
+    pub fn pose_shapes(&self) -> Option<&PoseShapes> {
+        self.pose_shapes.as_deref()
     }
 }

@@ -4,7 +4,7 @@ use super::align::AlignedBody;
 use super::capture::{FrameCapture, FrameReport};
 pub use super::capture_header::CaptureHeader;
 use super::capture_header::{check_body, check_header};
-use super::unpose::unpose;
+use super::unpose::unpose_shaped;
 use crate::body::Template;
 use crate::formats::FormatError;
 use crate::formats::npy::{read_npy, write_npy};
@@ -46,12 +46,7 @@ impl FrameDisplacements {
     pub fn of(template: &Template, frame: &FrameCapture) -> Self {
         let undressed = &frame.undressed;
         let all = 0..undressed.vertices.len();
-        let rest = unpose(
-            template.weights(),
-            &undressed.bones,
-            all,
-            &undressed.vertices,
-        );
+        let rest = unpose_shaped(template, &undressed.bones, all, &undressed.vertices);
         let shape = template.personalise(&undressed.body.shape).vertices;
         Self {
             body: rest.iter().zip(&shape).map(|(a, b)| a - b).collect(),

@@ -11,7 +11,7 @@ use super::segment::{LabelConfig, Labelling};
 use super::segmenter::{ScanSegmenter, SegmentedScan};
 use super::topology::ClothTemplate;
 use super::undress::{Undressed, Undresser, WornGarments, minimally_clothed, posed_under_cloth};
-use super::unpose::unpose;
+use super::unpose::unpose_shaped;
 use crate::body::{BoneTransforms, Template};
 use crate::math::{P3, V3};
 use serde::{Deserialize, Serialize};
@@ -274,7 +274,7 @@ impl PartFitter<'_> {
         let mut fitted = FittedParts::default();
         let bones = &self.segmented.alignment.bones;
         for (part, rest) in outfit.cloth.parts.iter().zip(&outfit.rest) {
-            let model = pose_part(part, self.cloth.template().weights(), bones, rest);
+            let model = pose_part(part, self.cloth.template(), bones, rest);
             self.fit(part, &model, model.clone(), &mut fitted)?;
         }
         Ok(fitted)
@@ -306,7 +306,7 @@ impl PartFitter<'_> {
 
 fn rest(cloth: &ClothTemplate, bones: &BoneTransforms, part: &ClothPart, posed: &[P3]) -> Vec<P3> {
     let nodes = part.nodes.iter().map(|v| *v as usize);
-    unpose(cloth.template().weights(), bones, nodes, posed)
+    unpose_shaped(cloth.template(), bones, nodes, posed)
 }
 
 /// Rest displacements of each garment from the undressed body (eq. 23).
@@ -317,8 +317,8 @@ fn displacements(
     undressed: &Undressed,
 ) -> Vec<Vec<V3>> {
     let all = 0..undressed.vertices.len();
-    let body = surface.extend(&unpose(
-        surface.template().weights(),
+    let body = surface.extend(&unpose_shaped(
+        surface.body(),
         &undressed.bones,
         all,
         &undressed.vertices,

@@ -6,7 +6,7 @@ use super::layers::clear_body;
 use super::multi::MultiCloth;
 use super::retarget::{PenetrationSolver, RetargetReport, SolidBody, on_body, pose_part};
 use super::topology::ClothTemplate;
-use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
+use crate::body::{BoneTransforms, Pose, RestBody, Template};
 use crate::math::{P3, V3, World};
 use crate::par::Par;
 use crate::tracking::ArmClearance;
@@ -97,7 +97,6 @@ impl<'a> BodyDresser<'a> {
         pose: &Pose<World>,
     ) -> Result<DressedPose, CaptureError> {
         self.check(target, displacements)?;
-        let weights = self.template.weights();
         let moved = |(p, d): (&P3, &V3)| p + d;
         let rest: Vec<P3> = target
             .vertices
@@ -108,15 +107,13 @@ impl<'a> BodyDresser<'a> {
         let mut bones = BoneTransforms::default();
         pose.bones(self.template.skeleton(), target, &mut bones);
         let mut body = Vec::new();
-        skin(Par::Rayon, &rest, weights, &bones, &mut body);
+        self.template
+            .pose_vertices(Par::Rayon, &rest, &bones, &mut body);
         self.solid.place(&body)?;
-        let (rest, weights) = (
-            self.surface.extend(&rest),
-            self.surface.template().weights(),
-        );
+        let (rest, template) = (self.surface.extend(&rest), self.surface.template());
         let parts = self.cloth.parts.iter().zip(&displacements.garments);
         let posed =
-            parts.map(|(part, d)| pose_part(part, weights, &bones, &on_body(part, d, &rest)));
+            parts.map(|(part, d)| pose_part(part, template, &bones, &on_body(part, d, &rest)));
         let mut garments: Vec<Vec<P3>> = posed.collect();
         let reports = clear_body(self.cloth, &mut self.solvers, &self.solid, &mut garments)?;
         Ok(DressedPose {

@@ -34,4 +34,4 @@ pub use error::CaptureError;
 pub use population::population;
 pub use segmenter::{ScanSegmenter, SegmentedScan};
 pub use undress::Undressed;
-pub use unpose::{blended, unpose};
+pub use unpose::{blended, unpose, unpose_shaped};

@@ -5,7 +5,7 @@ use super::align::{QuadraticEnergy, Stencil};
 use super::face_edges::edges;
 use super::multi::ClothPart;
 use super::unpose::blended;
-use crate::body::{BoneTransforms, SkinWeights, Template};
+use crate::body::{BoneTransforms, Template};
 use crate::cloth::{Config, collision_model};
 use crate::contact::{ClosestPoint, CollisionBody, CollisionModel, CollisionWorkspace, Part};
 use crate::math::{P3, V3};
@@ -45,17 +45,23 @@ pub fn on_body(part: &ClothPart, displacements: &[V3], body: &[P3]) -> Vec<P3> {
     below.zip(displacements).map(|(p, d)| p + d).collect()
 }
 
-/// Posed vertices of a garment, with the skinning of its template's vertices.
+/// Posed vertices of a garment, with pose blend shapes and skinning of its template's vertices.
 pub fn pose_part(
     part: &ClothPart,
-    weights: &SkinWeights,
+    template: &Template,
     bones: &BoneTransforms,
     rest: &[P3],
 ) -> Vec<P3> {
     let nodes = part.nodes.iter().map(|v| *v as usize);
+    let offsets = template.pose_offsets(bones);
+    let shaped = |v: usize, p: &P3| offsets.as_ref().map_or(*p, |o| p + o.of(v)).cast();
+    let weights = template.weights();
     nodes
         .zip(rest)
-        .map(|(v, p)| blended(weights, bones, v).transform_point(&p.cast()).cast())
+        .map(|(v, p)| {
+            let blend = blended(weights, bones, v);
+            blend.transform_point(&shaped(v, p)).cast()
+        })
         .collect()
 }
 

@@ -33,6 +33,9 @@ pub struct SmplArrays {
     pub joint_regressor: Vec<f32>,
     /// `shapedirs`: offsets per unit of each coefficient, metres, shape `(B, V)`; empty if absent.
     pub shape_directions: Vec<Vec<[f32; 3]>>,
+    /// `posedirs`: offsets per entry of R − I of each joint but the root, metres, row-major, shape `(V, 3, 9 (J − 1))`; empty
+    /// if absent.
+    pub pose_directions: Vec<f32>,
     /// `joint_names`, shape `(J)`; SMPL's own names if absent.
     pub joint_names: Vec<String>,
 }
@@ -249,8 +252,7 @@ fn to_c_order(shape: &[usize], data: &[f64]) -> Vec<f64> {
     out
 }
 
-/// Reads the arrays of an SMPL-layout body and checks that they fit each other. `posedirs` is not read: pose
-/// correctives are not used.
+/// Reads the arrays of an SMPL-layout body and checks that they fit each other.
 ///
 /// # Errors
 /// [`FormatError`] naming the file and the array at fault.
@@ -266,6 +268,8 @@ pub fn read_smpl(path: impl AsRef<Path>) -> Result<SmplArrays, FormatError> {
     let weights = weights.ok_or_else(|| a.missing("weights"))?;
     let regressor = a.shaped("J_regressor", &[j, n])?.unwrap_or_default();
     let joint_regressor: Vec<f32> = regressor.iter().map(|x| *x as f32).collect();
+    let posedirs = a.shaped("posedirs", &[n, 3, 9 * (j - 1)])?;
+    let pose_directions = posedirs.unwrap_or_default();
     let joints = match a.shaped("J", &[j, 3])? {
         Some(joints) => joints.as_chunks::<3>().0.to_vec(),
         None if joint_regressor.is_empty() => {
@@ -279,6 +283,7 @@ pub fn read_smpl(path: impl AsRef<Path>) -> Result<SmplArrays, FormatError> {
         joints,
         joint_regressor,
         shape_directions: a.shape_directions(n)?,
+        pose_directions: pose_directions.iter().map(|x| *x as f32).collect(),
         joint_names: a.joint_names(j)?,
         vertices,
         parents,
@@ -405,7 +410,9 @@ mod tests {
             ("kintree_table", &[2, 1], &[4_294_967_295.0, 0.0]),
             ("J", &[1, 3], &[0.0, 0.5, 0.0]),
         ];
-        for (name, s, d) in arrays {
+        let known = arrays.iter().any(|(name, ..)| *name == replace);
+        let added = (!known && !shape.is_empty()).then_some((replace, shape, data));
+        for (name, s, d) in arrays.into_iter().chain(added) {
             let (s, d) = if name == replace {
                 (shape, data)
             } else {
@@ -440,6 +447,7 @@ mod tests {
             ("weights", vec![2, 1], vec![1.0, 1.0]),
             ("kintree_table", vec![2, 1], vec![7.0, 0.0]),
             ("J", vec![2, 3], vec![0.0; 6]),
+            ("posedirs", vec![3, 3, 9], vec![0.0; 81]),
         ] {
             let e = read_smpl(write(dir.path(), name, &shape, &data))
                 .expect_err("must be refused")

@@ -74,6 +74,7 @@ impl Physique {
     pub fn template(&self, name: &str, arrays: &SmplArrays) -> Result<Template, BodyError> {
         let mut arrays = SmplArrays {
             shape_directions: Vec::new(),
+            pose_directions: Vec::new(),
             ..arrays.clone()
         };
         stand_on_floor(&mut arrays.vertices);

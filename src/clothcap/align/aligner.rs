@@ -8,7 +8,7 @@ use super::start::{Start, find_person};
 use crate::body::{BoneTransforms, Pose, Template};
 use crate::clothcap::scan::BodyScan;
 use crate::clothcap::topology::{ClothTemplate, LegTopology};
-use crate::clothcap::{CaptureError, unpose};
+use crate::clothcap::{CaptureError, unpose_shaped};
 use crate::math::{P3, Rigid, World};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -184,7 +184,7 @@ impl Aligner {
         let nodes = 0..out.surface.len();
         self.clothed = Some(ClothedTemplate {
             legs: self.cloth.legs(),
-            rest: unpose(template.weights(), &out.bones, nodes, &out.surface),
+            rest: unpose_shaped(&template, &out.bones, nodes, &out.surface),
             body: out.body.clone(),
         });
         Ok(Alignment {

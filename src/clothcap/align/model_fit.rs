@@ -3,7 +3,7 @@
 use super::pairing::{ScanNormal, closest_facing};
 use super::shape_unknowns::ShapeUnknowns;
 use crate::body::parts::BodySegment;
-use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
+use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin_moved};
 use crate::clothcap::CaptureError;
 use crate::clothcap::scan::BodyScan;
 use crate::math::{P3, V3, World};
@@ -198,23 +198,30 @@ impl<'a> ModelFit<'a> {
         }
     }
 
-    fn pose_vertices(&self, body: &AlignedBody, out: &mut Vec<P3>, bones: &mut BoneTransforms) {
+    /// Poses a body; `offsets` are its pose blend shapes where they are known, since shape leaves them as they are.
+    fn pose_vertices(
+        &self,
+        body: &AlignedBody,
+        offsets: Option<&[V3]>,
+        (out, bones): (&mut Vec<P3>, &mut BoneTransforms),
+    ) {
         let rest = self.rest(&body.shape);
-        let skeleton = self.template.skeleton();
-        body.pose.bones(skeleton, &rest, bones);
-        skin(
-            Par::Rayon,
-            &rest.vertices,
-            self.template.weights(),
-            bones,
-            out,
-        );
+        body.pose.bones(self.template.skeleton(), &rest, bones);
+        match offsets {
+            Some(offsets) => {
+                let moved = (rest.vertices.as_slice(), offsets);
+                skin_moved(Par::Rayon, moved, self.template.weights(), bones, out);
+            }
+            None => self
+                .template
+                .pose_vertices(Par::Rayon, &rest.vertices, bones, out),
+        }
     }
 
     /// Posed vertices of a body, metres, shape `[vertices]`.
     pub fn posed(&self, body: &AlignedBody) -> (Vec<P3>, BoneTransforms) {
         let (mut out, mut bones) = (Vec::new(), BoneTransforms::default());
-        self.pose_vertices(body, &mut out, &mut bones);
+        self.pose_vertices(body, None, (&mut out, &mut bones));
         (out, bones)
     }
 
@@ -237,7 +244,7 @@ impl<'a> ModelFit<'a> {
     fn place(&mut self, body: &AlignedBody) {
         let mut posed = std::mem::take(&mut self.posed);
         let mut bones = std::mem::take(&mut self.bones);
-        self.pose_vertices(body, &mut posed, &mut bones);
+        self.pose_vertices(body, None, (&mut posed, &mut bones));
         self.bvh.refit(&posed);
         (self.posed, self.bones) = (posed, bones);
     }
@@ -379,13 +386,15 @@ impl<'a> ModelFit<'a> {
     /// Displacement of each posed vertex per unit of each shape unknown.
     fn shape_fields(&self, body: &AlignedBody, unknowns: &ShapeUnknowns) -> Vec<Vec<V3>> {
         let (mut moved, mut bones) = (Vec::new(), BoneTransforms::default());
+        let offsets = self.template.pose_offsets(&self.bones);
+        let offsets = offsets.map_or_else(Vec::new, |o| o.all(Par::Rayon));
         unknowns
             .all
             .iter()
             .map(|u| {
                 let mut changed = body.clone();
                 *u.of(&mut changed.shape) += STEP;
-                self.pose_vertices(&changed, &mut moved, &mut bones);
+                self.pose_vertices(&changed, Some(&offsets), (&mut moved, &mut bones));
                 moved
                     .iter()
                     .zip(&self.posed)
@@ -421,7 +430,8 @@ struct Prior<'a> {
     freedom: f64,
 }
 
-/// Jacobian of the matches.
+/// Jacobian of the matches. Pose blend shapes are in the residuals and left out here: muscles and folds of skin move by a
+/// centimetre while a joint turns by a radian, limbs by 25 cm.
 struct JacobianRows<'a> {
     fit: &'a ModelFit<'a>,
     dofs: &'a [Dof],

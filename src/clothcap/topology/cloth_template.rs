@@ -3,7 +3,7 @@
 use super::meridian::{Crotch, leg_vertices, meridians};
 use super::strip::{Between, Strip};
 use crate::body::parts::BodySide;
-use crate::body::{ShapeSpace, SkinWeights, Template};
+use crate::body::{BodyError, ShapeSpace, SkinWeights, Template};
 use crate::clothcap::CaptureError;
 use crate::math::{P3, V3};
 use crate::mesh::{Face, TriMesh};
@@ -243,8 +243,17 @@ fn extended(body: &Template, between: &[Between], faces: Vec<Face>) -> Result<Te
         ..s.clone()
     });
     let mesh = mesh.map_err(|e| e.to_string())?;
-    Template::new(body.name(), mesh, body.skeleton().clone(), weights, shape)
-        .map_err(|e| e.to_string())
+    let fault = |e: BodyError| e.to_string();
+    let made = Template::new(body.name(), mesh, body.skeleton().clone(), weights, shape);
+    let made = made.map_err(fault)?;
+    match body.pose_shapes() {
+        Some(shapes) => {
+            let between = between.iter().map(|b| (b.ends, b.share));
+            let shapes = shapes.extended(between);
+            made.with_pose_shapes(shapes).map_err(fault)
+        }
+        None => Ok(made),
+    }
 }
 
 #[cfg(test)]
