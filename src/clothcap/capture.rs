@@ -6,7 +6,7 @@ use super::layers::clear_body;
 use super::multi::{ClothPart, MultiCloth, PartFit, PartFitConfig, PartScan};
 use super::part_colors::part_colors;
 use super::retarget::{PenetrationSolver, SolidBody, pose_part};
-use super::scan::BodyScan;
+use super::scan::{BodyScan, LeftOut};
 use super::segment::{LabelConfig, Labelling};
 use super::segmenter::{ScanSegmenter, SegmentedScan};
 use super::topology::ClothTemplate;
@@ -43,6 +43,9 @@ pub struct FrameReport {
     pub part_errors: Vec<f64>,
     /// Mean distance of the scan's boundary points from each garment's rings, metres.
     pub boundary_errors: Vec<f64>,
+    /// Rows of the scan's file that are no point.
+    #[serde(default)]
+    pub left_out: LeftOut,
 }
 
 /// Outfit found in the first scan.
@@ -189,6 +192,7 @@ impl OutfitCapture {
                 alignment: alignment.report,
                 part_errors: fitted.errors,
                 boundary_errors: fitted.boundary_errors,
+                left_out: scan.left_out,
             },
             alignment: segmented.alignment,
             garments,

@@ -21,6 +21,10 @@ const UNITS: [f64; 5] = [1.0, 0.01, 0.001, 0.0254, 0.1];
 const STRAYS: f64 = 0.005;
 /// Share of the largest extent from which on an axis may be the upright one; arms spread are as wide as a person is tall.
 const UPRIGHT: f64 = 0.7;
+/// Largest coordinate, metres: single precision resolves a millimetre up to it.
+const FARTHEST: f64 = 8e3;
+/// Largest distance between the points of two scans that are the same but for noise, metres.
+const UNCHANGED: f32 = 1e-4;
 /// Neighbours of a point in the plane of its normal.
 const NEIGHBOURS: usize = 12;
 /// Radius of that search as a multiple of the mean distance between points.
@@ -161,6 +165,19 @@ pub struct BodyScan {
     pub point_of_row: Vec<u32>,
     /// Normals point outwards.
     pub oriented: bool,
+    /// Rows of the file that are no point.
+    pub left_out: LeftOut,
+}
+
+/// Counts of the rows of a file that are left out of its scan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// Coordinates that are not finite, or farther from the origin than single precision resolves.
+    pub not_finite: usize,
+    /// Below the top of the floor.
+    pub floor: usize,
+    /// Positions that another row has.
+    pub repeated: usize,
 }
 
 impl BodyScan {
@@ -176,10 +193,14 @@ impl BodyScan {
                 .floor
                 .is_some_and(|top| up.dot(&p.coords.cast::<f64>()) < top)
         };
+        let farthest = FARTHEST / frame.metres_per_unit;
         let mut seen = std::collections::HashMap::new();
         let mut scan = Self::default();
         for (row, p) in file.points.iter().enumerate() {
-            if !p.iter().all(|v| v.is_finite()) || is_floor(p) {
+            let is_usable = p.iter().all(|v| f64::from(v.abs()) < farthest);
+            if !is_usable || is_floor(p) {
+                scan.left_out.not_finite += usize::from(!is_usable);
+                scan.left_out.floor += usize::from(is_usable);
                 scan.point_of_row.push(u32::MAX);
                 continue;
             }
@@ -200,6 +221,8 @@ impl BodyScan {
                             .unwrap_or_default(),
                     );
                 }
+            } else {
+                scan.left_out.repeated += 1;
             }
             scan.point_of_row.push(point);
         }
@@ -255,6 +278,15 @@ impl BodyScan {
             self.normals.iter_mut().for_each(|n| *n = -*n);
             self.faces.iter_mut().for_each(|f| f.swap(1, 2));
         }
+    }
+
+    /// The same points in the same colours, none farther from its place in the other scan than noise.
+    pub fn is_unchanged(&self, other: &Self) -> bool {
+        let near = |(p, q): (&P3, &P3)| (p - q).norm_squared() <= UNCHANGED * UNCHANGED;
+        self.points.len() == other.points.len()
+            && self.colors == other.colors
+            && self.faces == other.faces
+            && self.points.iter().zip(&other.points).all(near)
     }
 
     /// Label of each row of the file from one a point; `absent` for rows left out.
@@ -385,6 +417,12 @@ mod tests {
         let scan = BodyScan::new(&file, &ScanFrame::default()).expect("enough points");
         assert_eq!(scan.points.len(), points.len() - 2);
         assert_eq!(scan.point_of_row[7], u32::MAX);
+        let left_out = LeftOut {
+            not_finite: 1,
+            floor: 0,
+            repeated: 1,
+        };
+        assert_eq!(scan.left_out, left_out);
         assert_eq!(scan.point_of_row[9], scan.point_of_row[8]);
         let mut corners = scan.faces[0];
         corners.sort_unstable();

@@ -188,6 +188,67 @@ fn damaged_scans_are_captured_too() {
     assert!(score("inches, z down, no normals", &inches, &truth.labels) > 0.85);
 }
 
+/// PLY text of a scan with float colours; a share of the rows has coordinates or colours that are not numbers.
+fn spoiled_ply(file: &ScanMesh, (coordinates, colors): (f32, f32), value: &str) -> String {
+    let mut rng = rand_pcg::Pcg32::seed_from_u64(6);
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         property float red\nproperty float green\nproperty float blue\nend_header\n",
+        file.points.len()
+    );
+    for (p, c) in file.points.iter().zip(&file.colors) {
+        let mut row = [p.x, p.y, p.z].map(|v| v.to_string()).to_vec();
+        row.extend(c.map(|v| (f32::from(v) / 255.0).to_string()));
+        if rng.random::<f32>() < coordinates {
+            row[rng.random_range(0..3)] = value.into();
+        }
+        if rng.random::<f32>() < colors {
+            row[3 + rng.random_range(0..3)] = value.into();
+        }
+        text += &(row.join(" ") + "\n");
+    }
+    text
+}
+
+#[test]
+fn coordinates_and_colours_that_are_not_numbers_are_counted_or_refused() {
+    let truth = dressed();
+    let (file, _) = keep(&mesh_of(&truth), &truth.labels, |i| i % 3 == 0);
+    let template: Arc<Template> = embedded::template();
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("spoiled.ply");
+    for value in ["nan", "-inf", "1e30"] {
+        for shares in [(0.3, 0.3), (1.0, 0.0), (0.0, 1.0)] {
+            std::fs::write(&path, spoiled_ply(&file, shares, value)).expect("written");
+            let scan = read_scan(&path).expect("readable");
+            let found = find_frame(&template, &scan).and_then(|(frame, start)| {
+                let scan = BodyScan::new(&scan, &frame)?;
+                let mut capture = OutfitCapture::new(template.clone(), CaptureConfig::default())?;
+                capture.start_at(start);
+                capture.frame(&scan)
+            });
+            let what = format!("{value}, shares {shares:?}");
+            match found {
+                Ok(frame) => {
+                    let left_out = frame.report.left_out.not_finite;
+                    let share = left_out as f32 / file.points.len() as f32;
+                    println!("{what}: {left_out} points left out");
+                    assert!((share - shares.0).abs() < 0.02, "{what}: {share}");
+                    let mut all = frame.garments.iter().flatten();
+                    assert!(all.all(|p| p.iter().all(|c| c.is_finite())), "{what}");
+                }
+                Err(e) => {
+                    println!("{what}: {e}");
+                    // Finite numbers say that the scan is that large, or all but black.
+                    use CaptureError::{NoGarment, NoPersonSize};
+                    let is_huge = value == "1e30" && matches!(e, NoPersonSize { .. } | NoGarment);
+                    assert!(shares.0 > 0.9 || is_huge, "{what}: {e}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn a_floor_and_what_hands_hold_are_no_garments() {
     let truth = dressed();
