@@ -174,6 +174,30 @@ impl CaptureArchive {
         write_json(&self.record_path(scan), record)
     }
 
+    /// Gives a scan that is unchanged the result of the one before; its record says so.
+    ///
+    /// # Errors
+    /// A result that cannot be read or written.
+    pub fn repeat(
+        &self,
+        before: &FrameRecord,
+        scan: &str,
+        header: &CaptureHeader,
+    ) -> Result<FrameRecord, FormatError> {
+        let displacements = self.displacements(&before.scan, header)?;
+        let report = FrameReport {
+            repeated: true,
+            ..before.report.clone()
+        };
+        let record = FrameRecord {
+            scan: scan.to_owned(),
+            body: before.body.clone(),
+            report,
+        };
+        self.write_frame(&record, &displacements)?;
+        Ok(record)
+    }
+
     /// Displacements of a scan.
     ///
     /// # Errors

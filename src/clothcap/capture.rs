@@ -1,7 +1,9 @@
 //! Capture of a sequence: align → segment → fit the parts → undress, scan by scan.
 
 use super::CaptureError;
-use super::align::{AlignedBody, Alignment, AlignmentReport, ClothedTemplate, Start};
+use super::align::{
+    AlignedBody, Alignment, AlignmentReport, ClothedTemplate, QueryCounts, SETTLED, Start,
+};
 use super::layers::clear_body;
 use super::multi::{ClothPart, MultiCloth, PartFit, PartFitConfig, PartScan};
 use super::part_colors::part_colors;
@@ -10,12 +12,17 @@ use super::scan::{BodyScan, LeftOut};
 use super::segment::{LabelConfig, Labelling};
 use super::segmenter::{ScanSegmenter, SegmentedScan};
 use super::topology::ClothTemplate;
-use super::undress::{Undressed, Undresser, WornGarments, minimally_clothed, posed_under_cloth};
+use super::undress::{
+    ShapeScan, Undressed, Undresser, WornGarments, minimally_clothed, posed_under_cloth,
+};
 use super::unpose::unpose_shaped;
-use crate::body::{BoneTransforms, Template};
+use crate::body::{BodyShape, BoneTransforms, Template};
 use crate::math::{P3, V3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+
+/// Mean robust distance of a scan from the body model above which it says nothing of the subject's shape, metres.
+const MISALIGNED: f64 = 0.03;
 
 /// Capture of one scan.
 #[derive(Clone, Debug)]
@@ -43,9 +50,15 @@ pub struct FrameReport {
     pub part_errors: Vec<f64>,
     /// Mean distance of the scan's boundary points from each garment's rings, metres.
     pub boundary_errors: Vec<f64>,
+    /// Nearest-point queries of the garments' fits.
+    #[serde(default)]
+    pub queries: QueryCounts,
     /// Rows of the scan's file that are no point.
     #[serde(default)]
     pub left_out: LeftOut,
+    /// The scan is the one before, but for its noise: the capture is a copy of that one's.
+    #[serde(default)]
+    pub repeated: bool,
 }
 
 /// Outfit found in the first scan.
@@ -70,6 +83,10 @@ pub struct CaptureConfig {
     pub labels: LabelConfig,
     /// Fit of the parts.
     pub parts: PartFitConfig,
+    /// Nothing is skipped: every point is searched in every iteration, every turn tried.
+    pub without_skips: bool,
+    /// Shape of the subject from a scan in minimal clothing; without it the clothed scans give it.
+    pub minimal: Option<BodyShape>,
 }
 
 /// Captures the scans of one subject in one outfit, in order.
@@ -81,6 +98,8 @@ pub struct OutfitCapture {
     undresser: Undresser,
     solid: SolidBody,
     outfit: Option<CapturedOutfit>,
+    /// Further scans that the minimally clothed shape is fitted to.
+    shape_scans: Vec<BodyScan>,
     /// Systems of the outfit's garments, kept from scan to scan.
     fits: Vec<PartFit>,
     solvers: Vec<PenetrationSolver>,
@@ -92,13 +111,26 @@ impl OutfitCapture {
     /// # Errors
     /// [`CaptureError::Solve`] for a template too large.
     pub fn new(template: Arc<Template>, config: CaptureConfig) -> Result<Self, CaptureError> {
+        let segmenter = ScanSegmenter::new(template.clone(), config.labels.clone())?;
+        Self::with_segmenter(template, config, segmenter)
+    }
+
+    fn with_segmenter(
+        template: Arc<Template>,
+        config: CaptureConfig,
+        mut segmenter: ScanSegmenter,
+    ) -> Result<Self, CaptureError> {
+        if config.without_skips {
+            segmenter.skip_nothing();
+        }
         Ok(Self {
-            segmenter: ScanSegmenter::new(template.clone(), config.labels.clone())?,
+            segmenter,
             undresser: Undresser::new(template.clone())?,
             solid: SolidBody::new(&template)?,
             template,
             config,
             outfit: None,
+            shape_scans: Vec::new(),
             fits: Vec::new(),
             solvers: Vec::new(),
         })
@@ -115,10 +147,10 @@ impl OutfitCapture {
         state: (ClothedTemplate, AlignedBody),
     ) -> Result<Self, CaptureError> {
         let (labels, first) = (config.labels.clone(), outfit.labelling.clone());
+        let segmenter = ScanSegmenter::resume(template.clone(), labels, first, state)?;
         Ok(Self {
-            segmenter: ScanSegmenter::resume(template.clone(), labels, first, state)?,
             outfit: Some(outfit),
-            ..Self::new(template, config)?
+            ..Self::with_segmenter(template, config, segmenter)?
         })
     }
 
@@ -142,6 +174,12 @@ impl OutfitCapture {
         self.segmenter.start_at(start);
     }
 
+    /// Scans beside the first one that the minimally clothed shape is fitted to, any of the sequence. Each costs its alignment
+    /// and segmentation once more; it counts only before the first scan.
+    pub fn add_shape_scan(&mut self, scan: BodyScan) {
+        self.shape_scans.push(scan);
+    }
+
     /// Captures the next scan: segment → fit the parts → undress → displacements.
     ///
     /// # Errors
@@ -149,12 +187,31 @@ impl OutfitCapture {
     pub fn frame(&mut self, scan: &BodyScan) -> Result<FrameCapture, CaptureError> {
         let segmented = self.segmenter.step(scan)?;
         let covered = segmented.covered();
+        let subject = match (&self.outfit, &self.config.minimal) {
+            (Some(outfit), _) => outfit.body.clone(),
+            (None, Some(shape)) => {
+                let start = AlignedBody {
+                    shape: shape.clone(),
+                    ..segmented.alignment.body.clone()
+                };
+                posed_under_cloth(&self.template, scan, &covered, start)?
+            }
+            (None, None) => self.subject(scan, &segmented)?,
+        };
+
+        // The first scan makes the outfit; nothing is skipped in it.
+        let skips = self.outfit.is_some() && !self.config.without_skips;
+        let parts = PartFitConfig {
+            settled: if skips { SETTLED } else { 0.0 },
+            ..self.config.parts
+        };
         let mut fitter = PartFitter {
             fits: &mut self.fits,
             cloth: self.segmenter.cloth(),
             scan,
             segmented: &segmented,
-            config: &self.config.parts,
+            near: nearest_nodes(&segmented, self.segmenter.cloth()),
+            config: &parts,
         };
         let alignment = &segmented.alignment;
         let (outfit, fitted, body) = match self.outfit.take() {
@@ -168,9 +225,8 @@ impl OutfitCapture {
                 (outfit, fitted, body)
             }
             None => {
-                let body = minimally_clothed(&self.template, scan, &covered, &alignment.body)?;
-                let (outfit, fitted) = fitter.first(body.clone())?;
-                (outfit, fitted, body)
+                let (outfit, fitted) = fitter.first(subject.clone())?;
+                (outfit, fitted, subject)
             }
         };
         let worn = WornGarments {
@@ -192,7 +248,9 @@ impl OutfitCapture {
                 alignment: alignment.report,
                 part_errors: fitted.errors,
                 boundary_errors: fitted.boundary_errors,
+                queries: fitted.queries,
                 left_out: scan.left_out,
+                repeated: false,
             },
             alignment: segmented.alignment,
             garments,
@@ -200,6 +258,38 @@ impl OutfitCapture {
         };
         self.outfit = Some(outfit);
         Ok(out)
+    }
+
+    /// Minimally clothed shape from the first scan and those beside it in which the subject is found.
+    fn subject(
+        &mut self,
+        scan: &BodyScan,
+        first: &SegmentedScan,
+    ) -> Result<AlignedBody, CaptureError> {
+        let scans = std::mem::take(&mut self.shape_scans);
+        let mut others: Vec<(SegmentedScan, &BodyScan)> = Vec::new();
+        if let Some(clothed) = self.segmenter.clothed().filter(|_| !scans.is_empty()) {
+            let state = (clothed.clone(), first.alignment.body.clone());
+            let (labels, labelling) = (self.config.labels.clone(), first.labelling.clone());
+            let mut segmenter =
+                ScanSegmenter::resume(self.template.clone(), labels, labelling, state)?;
+            // A scan of this sequence that shows nobody is reported where it is captured.
+            let all = scans.iter().map(|s| (segmenter.step(s), s));
+            let found = all.filter_map(|(segmented, s)| Some((segmented.ok()?, s)));
+            let fits = |s: &SegmentedScan| s.alignment.report.model_error < MISALIGNED;
+            others = found.filter(|(s, _)| fits(s)).collect();
+        }
+        let all = std::iter::once((first, scan)).chain(others.iter().map(|(s, b)| (s, *b)));
+        let covered: Vec<Vec<bool>> = all.clone().map(|(s, _)| s.covered()).collect();
+        let shape_scans: Vec<ShapeScan<'_>> = all
+            .zip(&covered)
+            .map(|((s, scan), covered)| ShapeScan {
+                scan,
+                covered,
+                body: &s.alignment.body,
+            })
+            .collect();
+        minimally_clothed(&self.template, &shape_scans)
     }
 
     /// Garments moved out of the undressed body where the fit left them inside, so that retargeting onto it moves nothing.
@@ -225,6 +315,7 @@ struct FittedParts {
     vertices: Vec<Vec<P3>>,
     errors: Vec<f64>,
     boundary_errors: Vec<f64>,
+    queries: QueryCounts,
 }
 
 /// Fit of all parts to one segmented scan.
@@ -234,6 +325,8 @@ struct PartFitter<'a> {
     cloth: &'a ClothTemplate,
     scan: &'a BodyScan,
     segmented: &'a SegmentedScan,
+    /// Vertex of the clothed template that each scan point lies near, shape `[points]`.
+    near: Vec<u32>,
     config: &'a PartFitConfig,
 }
 
@@ -291,7 +384,8 @@ impl PartFitter<'_> {
         start: Vec<P3>,
         out: &mut FittedParts,
     ) -> Result<(), CaptureError> {
-        let points = PartScan::new(self.scan, &self.segmented.labels, part.label);
+        let segmented = self.segmented;
+        let points = PartScan::new(self.scan, (&segmented.labels, &self.near), part.label);
         let mut vertices = start;
         let k = out.vertices.len();
         if k == self.fits.len() {
@@ -304,8 +398,18 @@ impl PartFitter<'_> {
         out.vertices.push(vertices);
         out.errors.push(report.error);
         out.boundary_errors.push(report.boundary_error);
+        out.queries += report.queries;
         Ok(())
     }
+}
+
+/// Vertex of the clothed template nearest to each scan point on the single mesh, shape `[points]`.
+fn nearest_nodes(segmented: &SegmentedScan, cloth: &ClothTemplate) -> Vec<u32> {
+    let faces = cloth.template().mesh().faces();
+    let matches = segmented.alignment.matches.iter();
+    matches
+        .map(|m| faces[m.face as usize][m.nearest_corner()])
+        .collect()
 }
 
 fn rest(cloth: &ClothTemplate, bones: &BoneTransforms, part: &ClothPart, posed: &[P3]) -> Vec<P3> {

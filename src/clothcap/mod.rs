@@ -33,5 +33,5 @@ pub use dress_body::{BodyDresser, DressedPose};
 pub use error::CaptureError;
 pub use population::population;
 pub use segmenter::{ScanSegmenter, SegmentedScan};
-pub use undress::Undressed;
+pub use undress::{Undressed, minimal_shape};
 pub use unpose::{blended, unpose, unpose_shaped};

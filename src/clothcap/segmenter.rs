@@ -75,6 +75,11 @@ impl ScanSegmenter {
         })
     }
 
+    /// Skips nothing from now on.
+    pub fn skip_nothing(&mut self) {
+        self.aligner.skip_nothing();
+    }
+
     /// Starts the first scan at a person found before.
     pub fn start_at(&mut self, start: Start) {
         self.aligner.start_at(start);

@@ -162,3 +162,91 @@ fn displacements_of_another_outfit_are_refused() {
     let refused = dresser.dress(&body, &FrameDisplacements::default(), &pose);
     assert!(matches!(refused, Err(CaptureError::Displacements { .. })));
 }
+
+/// Mean distance between corresponding vertices of all garments, metres.
+fn mean_change(a: &FrameCapture, b: &FrameCapture) -> f64 {
+    let pairs = a.garments.iter().flatten().zip(b.garments.iter().flatten());
+    let (sum, n) = pairs.fold((0.0, 0), |(s, n), (p, q)| {
+        (s + f64::from((p - q).norm()), n + 1)
+    });
+    sum / f64::from(n)
+}
+
+#[test]
+fn skipping_is_counted_and_changes_garments_by_less_than_a_tenth_of_a_millimetre() {
+    let template = embedded::template();
+    let scans = [0.6, 0.7].map(|yaw| TestScan::new(yaw, BLUE, GREY).scan());
+    let captured = |without_skips| {
+        let config = CaptureConfig {
+            without_skips,
+            ..CaptureConfig::default()
+        };
+        let mut capture = OutfitCapture::new(template.clone(), config).expect("a capture");
+        scans
+            .each_ref()
+            .map(|scan| capture.frame(scan).expect("captured"))
+    };
+    let (whole, some) = (captured(true), captured(false));
+    // Nothing is skipped in the first scan.
+    assert_eq!(whole[0].garments, some[0].garments);
+    assert_eq!(some[0].report.queries.skipped, 0);
+    let change = mean_change(&whole[1], &some[1]);
+    assert!(change < 1e-4, "{change}");
+    assert_eq!(whole[1].report.queries.skipped, 0);
+    assert_eq!(whole[1].report.alignment.queries.skipped, 0);
+    let report = &some[1].report;
+    let (parts, single) = (report.queries, report.alignment.queries);
+    println!("{change} m, {parts:?} {single:?}");
+    assert!(parts.skipped > 0 && single.skipped > 0, "{report:?}");
+}
+
+#[test]
+fn an_unchanged_scan_repeats_what_its_capture_would_give() {
+    let template = embedded::template();
+    let scans = [0.6, 0.7].map(|yaw| TestScan::new(yaw, BLUE, GREY).scan());
+    let mut noisy = scans[1].clone();
+    for (k, p) in noisy.points.iter_mut().enumerate() {
+        p.x += 5e-5 * (k as f32).sin();
+    }
+    assert!(noisy.is_unchanged(&scans[1]) && !noisy.is_unchanged(&scans[0]));
+    let mut recoloured = scans[1].clone();
+    recoloured.colors[0] = [1, 2, 3];
+    assert!(!recoloured.is_unchanged(&scans[1]));
+    let mut capture = OutfitCapture::new(template, CaptureConfig::default()).expect("a capture");
+    capture.frame(&scans[0]).expect("captured");
+    let second = capture.frame(&scans[1]).expect("captured");
+    let third = capture.frame(&noisy).expect("captured");
+    // Poses converge to half a millimetre from wherever they start, here from that of the second scan.
+    let change = mean_change(&second, &third);
+    assert!(change < 5e-4, "{change}");
+}
+
+#[test]
+fn several_scans_give_one_shape_and_a_minimal_scan_overrides_them() {
+    let template = embedded::template();
+    let truths = [0.6, 0.7, 0.8].map(|yaw| TestScan::new(yaw, BLUE, GREY));
+    let scans = truths.each_ref().map(TestScan::scan);
+    let mut capture =
+        OutfitCapture::new(template.clone(), CaptureConfig::default()).expect("a capture");
+    scans[1..]
+        .iter()
+        .for_each(|s| capture.add_shape_scan(s.clone()));
+    let frame = capture.frame(&scans[0]).expect("captured");
+    let off = mean_distance(&frame.undressed.vertices, &truths[0].body);
+    assert!(off < 0.008, "body under cloth: {off:.4} m");
+
+    let shape = BodyShape {
+        coefficients: vec![0.7, -0.4, 0.6],
+        ..BodyShape::default()
+    };
+    let config = CaptureConfig {
+        minimal: Some(shape.clone()),
+        ..CaptureConfig::default()
+    };
+    let mut capture = OutfitCapture::new(template, config).expect("a capture");
+    let known = capture.frame(&scans[0]).expect("captured");
+    assert_eq!(known.undressed.body.shape, shape);
+    let less = mean_distance(&known.undressed.vertices, &truths[0].body);
+    println!("body {off:.4} m from three scans, {less:.4} m with the minimal shape");
+    assert!(less < off, "{less} {off}");
+}

@@ -3,12 +3,12 @@
 use super::CaptureError;
 use super::align::{
     AlignedBody, EVEN_EDGE, FitStage, ModelFit, QuadraticEnergy, ScanNormal, Stencil,
-    closest_facing,
+    closest_facing, fit_shared_shape,
 };
 use super::multi::MultiCloth;
 use super::retarget::SolidBody;
 use super::scan::BodyScan;
-use crate::body::{BoneTransforms, Template};
+use crate::body::{BodyShape, BoneTransforms, Template};
 use crate::math::P3;
 use crate::par::{self, Par};
 use crate::registration::GemanMcClure;
@@ -59,22 +59,52 @@ pub struct Undressed {
     pub vertices: Vec<P3>,
 }
 
-/// Minimally clothed shape of the subject from one scan; `covered` tells its points on garments, shape `[points]`.
+/// Scan that the minimally clothed shape is fitted to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ShapeScan<'a> {
+    /// Scan.
+    pub(super) scan: &'a BodyScan,
+    /// Points on garments, shape `[points]`.
+    pub(super) covered: &'a [bool],
+    /// Aligned body.
+    pub(super) body: &'a AlignedBody,
+}
+
+/// Minimally clothed shape of the subject, with its pose in the first scan: inside of the cloth of all scans, tight where
+/// any shows skin.
 ///
 /// # Errors
 /// [`CaptureError::Solve`].
 pub(super) fn minimally_clothed(
     template: &Arc<Template>,
-    scan: &BodyScan,
-    covered: &[bool],
-    start: &AlignedBody,
+    scans: &[ShapeScan<'_>],
 ) -> Result<AlignedBody, CaptureError> {
-    let mut fit = ModelFit::new(template, scan, SAMPLES).with_covered(covered);
-    let mut body = start.clone();
+    let fit = |s: &ShapeScan<'_>| ModelFit::new(template, s.scan, SAMPLES).with_covered(s.covered);
+    let mut fits: Vec<ModelFit<'_>> = scans.iter().map(fit).collect();
+    let mut bodies: Vec<AlignedBody> = scans.iter().map(|s| s.body.clone()).collect();
     for stage in &STAGES {
+        fit_shared_shape(template, &mut fits, &mut bodies, stage)?;
+    }
+    bodies.into_iter().next().ok_or(CaptureError::NoGarment)
+}
+
+/// Shape of the subject from a scan in minimal clothing (section 5.4), `start` a person found in it.
+///
+/// # Errors
+/// [`CaptureError::Solve`].
+pub fn minimal_shape(
+    template: &Arc<Template>,
+    scan: &BodyScan,
+    start: &AlignedBody,
+) -> Result<BodyShape, CaptureError> {
+    let mut body = start.clone();
+    // All of it counts as skin: tight, on both sides.
+    let skin = vec![false; scan.points.len()];
+    let mut fit = ModelFit::new(template, scan, SAMPLES).with_covered(&skin);
+    for stage in FitStage::FINE.iter().chain(&STAGES) {
         fit.run(&mut body, stage)?;
     }
-    Ok(body)
+    Ok(body.shape)
 }
 
 /// Minimally clothed body in a later scan, from the aligned pose: that one belongs to the clothed template, whose joints

@@ -1,6 +1,7 @@
 //! Single-mesh alignment of a sequence: the first scan gives the clothed template, later ones are coupled to it.
 
 use super::arms::search_lost_arms;
+use super::face_cache::QueryCounts;
 use super::free_surface::{FreeSurface, SurfaceFitConfig, SurfaceMatch};
 use super::legs::leg_topology;
 use super::model_fit::{AlignedBody, FitStage, ModelFit};
@@ -23,6 +24,8 @@ const LATER_SAMPLES: usize = 3000;
 const LATER: [FitStage; 2] = [FitStage::posed(0.08, 8), FitStage::posed(0.03, 6)];
 /// Turns about the vertical between two scans that are tried, radians.
 const TURNS: [f64; 3] = [FRAC_PI_2, PI, -FRAC_PI_2];
+/// Mean robust distance in the last pose below which no turn is tried, metres: a back is farther from a front.
+const FACING: f64 = 0.02;
 /// Mean robust distance above which a later pose is lost and the person is searched anew, metres.
 const LOST: f64 = 0.03;
 
@@ -54,6 +57,12 @@ pub struct AlignmentReport {
     pub explained: f64,
     /// The person was searched from nothing.
     pub searched: bool,
+    /// Nearest-point queries of the free surface.
+    #[serde(default)]
+    pub queries: QueryCounts,
+    /// Turns about the vertical that were not tried, since the last pose fits.
+    #[serde(default)]
+    pub turns_skipped: usize,
 }
 
 /// Clothed template of the subject (eq. 8).
@@ -79,6 +88,8 @@ pub struct Aligner {
     start: Option<Start>,
     /// Pose of the last scan.
     last: Option<AlignedBody>,
+    /// Settled points keep their faces, and turns are tried only where they may help.
+    skips: bool,
 }
 
 impl Aligner {
@@ -94,6 +105,7 @@ impl Aligner {
             clothed: None,
             start: None,
             last: None,
+            skips: true,
         })
     }
 
@@ -132,6 +144,11 @@ impl Aligner {
     /// Clothed template, once a scan is aligned.
     pub fn clothed(&self) -> Option<&ClothedTemplate> {
         self.clothed.as_ref()
+    }
+
+    /// Skips nothing from now on: every point is searched in every iteration, every turn tried.
+    pub fn skip_nothing(&mut self) {
+        self.skips = false;
     }
 
     /// Starts the first scan at a person found before.
@@ -203,9 +220,10 @@ impl Aligner {
         clothed: &ClothedTemplate,
     ) -> Result<Alignment, CaptureError> {
         let template = self.cloth.template().clone();
-        let mut fit = ModelFit::new(&template, scan, LATER_SAMPLES).with_clothed(&clothed.rest);
+        let fit = ModelFit::new(&template, scan, LATER_SAMPLES).with_clothed(&clothed.rest);
+        let mut fit = fit.with_starts(self.skips);
         let last = &self.last.as_ref().unwrap_or(&clothed.body).pose;
-        let mut body = self.turned(last, clothed, &mut fit);
+        let (mut body, turns_skipped) = self.turned(last, clothed, &mut fit);
         for stage in &LATER {
             fit.run(&mut body, stage)?;
         }
@@ -230,6 +248,7 @@ impl Aligner {
         Ok(Alignment {
             report: AlignmentReport {
                 searched,
+                turns_skipped,
                 ..out.report
             },
             ..out
@@ -237,13 +256,13 @@ impl Aligner {
     }
 
     /// Body of the first scan in the last pose, turned about the vertical to the direction that fits best: a back looks
-    /// much like a front to closest points.
+    /// much like a front to closest points. Beside it the number of turns that were not tried.
     fn turned(
         &self,
         last: &Pose<World>,
         clothed: &ClothedTemplate,
         fit: &mut ModelFit<'_>,
-    ) -> AlignedBody {
+    ) -> (AlignedBody, usize) {
         let pelvis = last.root.point(&self.template.skeleton().joints()[0].rest);
         let turned = |turn: f64| {
             let axis = Vector3::y() * turn;
@@ -258,6 +277,9 @@ impl Aligner {
         };
         let mut best = turned(0.0);
         let mut least = fit.error(&best);
+        if self.skips && least < FACING {
+            return (best, TURNS.len());
+        }
         for turn in TURNS {
             let other = turned(turn);
             let error = fit.error(&other);
@@ -265,7 +287,7 @@ impl Aligner {
                 (best, least) = (other, error);
             }
         }
-        best
+        (best, 0)
     }
 
     /// Releases the surface from the model.
@@ -279,7 +301,12 @@ impl Aligner {
         let model_error = fit.error(&body);
         let (model, bones) = fit.posed(&body);
         let mut surface = model.clone();
-        let report = self.free.run(scan, &model, &mut surface, config)?;
+        let settled = if self.skips { config.settled } else { 0.0 };
+        let config = SurfaceFitConfig {
+            settled,
+            ..config.clone()
+        };
+        let report = self.free.run(scan, &model, &mut surface, &config)?;
         let points = scan.points.len().max(1) as f64;
         Ok(Alignment {
             body,
@@ -292,6 +319,8 @@ impl Aligner {
                 surface_error: report.error,
                 explained: report.paired as f64 / points,
                 searched: false,
+                queries: report.queries,
+                turns_skipped: 0,
             },
         })
     }

@@ -1,5 +1,6 @@
 //! Free surface of a single-mesh alignment (eq. 3 to 5): vertices follow the scan, edges stay near those of the body model.
 
+use super::face_cache::{FaceCache, Found, QueryCounts};
 use super::model_fit::is_bare;
 use super::pairing::ScanNormal;
 use super::quadratic::{EVEN_EDGE, QuadraticEnergy, Stencil};
@@ -21,6 +22,10 @@ const NORMALS: f32 = 0.2;
 /// Motion below which a stage ends: mean over all vertices, metres.
 const CONVERGED: f32 = 5e-5;
 
+/// Motion of a face up to which points keep it, metres: closest points change by less than by noise. At 1 mm hems of
+/// low contrast are 1 mm worse.
+pub(in crate::clothcap) const SETTLED: f32 = 5e-4;
+
 /// Kernel and coupling of one stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceStage {
@@ -40,6 +45,8 @@ pub struct SurfaceFitConfig {
     pub stages: Vec<SurfaceStage>,
     /// Most scan points in an iteration; the others are matched in the end.
     pub points: usize,
+    /// Motion of a face up to which the points on it keep it without a search, metres; 0 searches always.
+    pub settled: f32,
 }
 
 impl SurfaceFitConfig {
@@ -52,6 +59,7 @@ impl SurfaceFitConfig {
         };
         Self {
             stages: vec![stage(0.04, 0.05, 3), stage(0.012, 0.03, 3)],
+            settled: SETTLED,
             ..Self::default()
         }
     }
@@ -72,6 +80,7 @@ impl Default for SurfaceFitConfig {
                 stage(0.012, 0.03, 4),
             ],
             points: 30_000,
+            settled: 0.0,
         }
     }
 }
@@ -85,6 +94,8 @@ pub struct SurfaceFitReport {
     pub error: f64,
     /// BodyScan points with a partner in the last iteration.
     pub paired: usize,
+    /// Nearest-point queries.
+    pub queries: QueryCounts,
 }
 
 /// Free surface over the mesh of a template.
@@ -137,13 +148,14 @@ impl FreeSurface {
     ) -> Result<SurfaceFitReport, CaptureError> {
         let mut report = SurfaceFitReport::default();
         let stride = (scan.points.len() / config.points.max(1)).max(1);
+        let mut cache = FaceCache::new(scan.points.len(), stride, config.settled);
         // Each point stands for its share of the area, each vertex for its own.
         let per_point = self.area / scan.points.len().div_ceil(stride).max(1) as f64;
         let per_vertex = ANCHOR * self.area / model.len().max(1) as f64;
         for stage in &config.stages {
             let kernel = GemanMcClure { sigma: stage.sigma };
             for _ in 0..stage.iterations {
-                let matches = self.pair(scan, stride, surface, &kernel);
+                let matches = self.pair((scan, stride), surface, &kernel, &mut cache);
                 report = SurfaceFitReport {
                     iterations: report.iterations + 1,
                     ..measure(&matches)
@@ -163,6 +175,7 @@ impl FreeSurface {
                         self.energy.add_face_point(m.face, m.corners, weight, p);
                     }
                 }
+
                 let moved = self.energy.minimise("free surface")?;
                 let sum: f32 = moved
                     .iter()
@@ -176,9 +189,14 @@ impl FreeSurface {
             }
         }
         let last = config.stages.last().map_or(0.03, |s| s.sigma);
-        self.matches = self.pair(scan, 1, surface, &GemanMcClure { sigma: last });
+        let kernel = GemanMcClure { sigma: last };
+        // Labels are read off these matches: each is searched.
+        cache.search_all();
+        cache.spread(&scan.faces);
+        self.matches = self.pair((scan, 1), surface, &kernel, &mut cache);
         Ok(SurfaceFitReport {
             iterations: report.iterations,
+            queries: cache.counts(),
             ..measure(&self.matches)
         })
     }
@@ -191,47 +209,45 @@ impl FreeSurface {
     /// Matches of every `stride`-th scan point.
     fn pair(
         &mut self,
-        scan: &BodyScan,
-        stride: usize,
+        (scan, stride): (&BodyScan, usize),
         surface: &[P3],
         kernel: &GemanMcClure,
+        cache: &mut FaceCache,
     ) -> Vec<SurfaceMatch> {
         self.bvh.refit(surface);
+        cache.advance(&self.faces, surface);
         let mut normals = Vec::new();
         vertex_normals(Par::Rayon, surface, &self.faces, &self.around, &mut normals);
-        let mut out = Vec::new();
-        par::map_into(
-            Par::Rayon,
-            scan.points.len().div_ceil(stride),
-            256,
-            &mut out,
-            |k| {
-                let i = k * stride;
-                let p = &scan.points[i];
-                let Some(found) = self.bvh.closest(surface, p) else {
-                    return SurfaceMatch::default();
-                };
-                let face = &self.faces[found.face as usize];
-                let corners = found.weights;
-                let normal: V3 = (0..3).map(|k| normals[face[k] as usize] * corners[k]).sum();
-                let of_scan = ScanNormal {
-                    normal: scan.normals[i],
-                    oriented: scan.oriented,
-                };
-                let e2 = f64::from(found.distance * found.distance);
-                SurfaceMatch {
-                    face: found.face,
-                    corners,
-                    distance: found.distance,
-                    weight: if of_scan.agrees(&normal, NORMALS) {
-                        kernel.weight(e2)
-                    } else {
-                        0.0
-                    },
-                }
-            },
-        );
-        out
+        let mut found = Vec::new();
+        let count = scan.points.len().div_ceil(stride);
+        par::map_into(Par::Rayon, count, 256, &mut found, |k| {
+            let i = k * stride;
+            cache.closest(i, (&self.bvh, surface), &scan.points[i])
+        });
+        let matched = |(k, found): (usize, &Option<Found>)| {
+            let Some(found) = found else {
+                return SurfaceMatch::default();
+            };
+            let i = k * stride;
+            cache.keep(i, found);
+            let found = &found.point;
+            let face = &self.faces[found.face as usize];
+            let corners = found.weights;
+            let normal: V3 = (0..3).map(|k| normals[face[k] as usize] * corners[k]).sum();
+            let of_scan = ScanNormal {
+                normal: scan.normals[i],
+                oriented: scan.oriented,
+            };
+            let e2 = f64::from(found.distance * found.distance);
+            let agrees = of_scan.agrees(&normal, NORMALS);
+            SurfaceMatch {
+                face: found.face,
+                corners,
+                distance: found.distance,
+                weight: if agrees { kernel.weight(e2) } else { 0.0 },
+            }
+        };
+        found.iter().enumerate().map(matched).collect()
     }
 }
 
@@ -267,6 +283,7 @@ fn measure(matches: &[SurfaceMatch]) -> SurfaceFitReport {
     let (sum, n) = good.fold((0.0, 0), |(s, n), m| (s + f64::from(m.distance), n + 1));
     SurfaceFitReport {
         iterations: 0,
+        queries: QueryCounts::default(),
         error: sum / f64::from(n.max(1)),
         paired: n as usize,
     }

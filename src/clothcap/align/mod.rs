@@ -2,15 +2,21 @@
 
 mod aligner;
 mod arms;
+mod body_equations;
+mod face_cache;
 mod free_surface;
 mod legs;
 mod model_fit;
 mod pairing;
 mod quadratic;
 mod shape_unknowns;
+mod shared_shape;
 mod start;
 
 pub use aligner::{Aligner, Alignment, AlignmentReport, ClothedTemplate};
+pub use face_cache::QueryCounts;
+pub(super) use face_cache::{FaceCache, Found};
+pub(super) use free_surface::SETTLED;
 pub use free_surface::{
     FreeSurface, SurfaceFitConfig, SurfaceFitReport, SurfaceMatch, SurfaceStage,
 };
@@ -18,4 +24,5 @@ pub use model_fit::{AlignedBody, FitStage, ModelFit, ModelFitReport};
 pub(super) use pairing::{ScanNormal, closest_facing};
 pub(super) use quadratic::EVEN_EDGE;
 pub use quadratic::{QuadraticEnergy, Stencil};
+pub(super) use shared_shape::fit_shared_shape;
 pub use start::{Start, find_frame, find_person};

@@ -24,12 +24,22 @@ impl ScanNormal {
 
 /// Surface point closest to a scan point, and the unit normal of its face; `None` if the normals differ.
 pub(in crate::clothcap) fn closest_facing(
-    (bvh, surface): (&Bvh, &[P3]),
+    surface: (&Bvh, &[P3]),
     point: &P3,
     normal: ScanNormal,
     least: f32,
 ) -> Option<(SurfacePoint, V3)> {
-    let found = bvh.closest(surface, point)?;
+    closest_facing_near(surface, (point, None), normal, least)
+}
+
+/// The same, faster from a face that may lie near the point.
+pub(in crate::clothcap) fn closest_facing_near(
+    (bvh, surface): (&Bvh, &[P3]),
+    (point, near): (&P3, Option<u32>),
+    normal: ScanNormal,
+    least: f32,
+) -> Option<(SurfacePoint, V3)> {
+    let found = bvh.closest_near(surface, point, near)?;
     let face = &bvh.faces()[found.face as usize];
     let own = face_normal(surface, face).try_normalize(f32::MIN_POSITIVE)?;
     normal.agrees(&own, least).then_some((found, own))

@@ -2,14 +2,16 @@
 
 use super::part::ClothPart;
 use crate::clothcap::CaptureError;
-use crate::clothcap::align::{EVEN_EDGE, QuadraticEnergy, ScanNormal, Stencil, closest_facing};
+use crate::clothcap::align::{
+    EVEN_EDGE, FaceCache, Found, QuadraticEnergy, QueryCounts, ScanNormal, Stencil,
+};
 use crate::clothcap::face_edges::{edges, neighbours, sides};
 use crate::clothcap::scan::BodyScan;
 use crate::math::{P3, V3};
 use crate::mesh::face_normal;
 use crate::par::{self, Par};
 use crate::registration::GemanMcClure;
-use crate::spatial::Bvh;
+use crate::spatial::{Bvh, PointTree};
 
 /// Smallest cosine between normals of a pair.
 const NORMALS: f32 = 0.2;
@@ -37,6 +39,8 @@ pub struct PartFitConfig {
     pub iterations: usize,
     /// Most scan points in an iteration.
     pub points: usize,
+    /// Motion of a face up to which the points on it keep it without a search, metres; 0 searches always.
+    pub settled: f32,
 }
 
 impl Default for PartFitConfig {
@@ -49,6 +53,7 @@ impl Default for PartFitConfig {
             smoothness: 2.0,
             iterations: 8,
             points: 15_000,
+            settled: 0.0,
         }
     }
 }
@@ -64,6 +69,8 @@ pub struct PartFitReport {
     pub paired: usize,
     /// Solves.
     pub iterations: usize,
+    /// Nearest-point queries.
+    pub queries: QueryCounts,
 }
 
 /// BodyScan points of one part.
@@ -74,11 +81,14 @@ pub struct PartScan {
     oriented: bool,
     /// Points between the part's label and another one.
     boundary: Vec<P3>,
+    /// Vertex of the clothed template that each point may lie near.
+    near: Vec<u32>,
 }
 
 impl PartScan {
-    /// Points with a label, and the middles of the scan's edges to other labels.
-    pub fn new(scan: &BodyScan, labels: &[u8], label: u8) -> Self {
+    /// Points with a label, and the middles of the scan's edges to other labels. `near` gives the vertex of the clothed
+    /// template that each point of the scan may lie near: searches start there.
+    pub fn new(scan: &BodyScan, (labels, near): (&[u8], &[u32]), label: u8) -> Self {
         let own = |i: &usize| labels[*i] == label;
         let some: Vec<usize> = (0..scan.points.len()).filter(own).collect();
         let crosses = |e: &[u32; 2]| {
@@ -95,6 +105,7 @@ impl PartScan {
             normals: some.iter().map(|i| scan.normals[*i]).collect(),
             oriented: scan.oriented,
             boundary: edges.map(middle).collect(),
+            near: some.iter().map(|i| near[*i]).collect(),
         }
     }
 }
@@ -108,6 +119,8 @@ pub struct PartFit {
     /// Stencils: edges, then Laplacians, then rings.
     ranges: [usize; 3],
     bvh: Bvh,
+    /// A face at each vertex.
+    face_at: Vec<u32>,
 }
 
 impl PartFit {
@@ -149,7 +162,12 @@ impl PartFit {
                 weight: 1.0,
             }));
         }
+        let mut face_at = vec![0; n];
+        for (k, f) in part.faces.iter().enumerate() {
+            f.iter().for_each(|v| face_at[*v as usize] = k as u32);
+        }
         Ok(Self {
+            face_at,
             ranges: [edges.len(), second, stencils.len()],
             energy: QuadraticEnergy::new(n, stencils, &part.faces)?,
             bvh: Bvh::new(&part.faces, rest),
@@ -174,8 +192,9 @@ impl PartFit {
         let stride = scan.points.len().div_ceil(config.points.max(1)).max(1);
         let point = area / scan.points.len().div_ceil(stride).max(1) as f64;
         let mut report = PartFitReport::default();
+        let mut cache = self.cache(scan, stride, config);
         while report.iterations < config.iterations {
-            let matches = self.pair((scan, stride), surface, config);
+            let matches = self.pair((scan, stride), surface, config, &mut cache);
             self.energy.reset();
             for (i, e) in self.edges.iter().enumerate() {
                 let d = (model[e[0] as usize] - model[e[1] as usize]).cast::<f64>();
@@ -197,6 +216,7 @@ impl PartFit {
                     .add_face_point(m.face, m.corners, point * m.weight, &m.target);
             }
             report.boundary_error = self.add_boundary(scan, surface, config.boundary * vertex);
+
             let moved = self.energy.minimise("garment part")?;
             report.iterations += 1;
             let settled = mean_motion(&moved, surface) < CONVERGED;
@@ -205,10 +225,23 @@ impl PartFit {
                 break;
             }
         }
-        let matches = self.pair((scan, 1), surface, config);
+        cache.search_all();
+        let matches = self.pair((scan, 1), surface, config, &mut cache);
+        report.queries = cache.counts();
         report.error = mean_distance(&matches);
         report.paired = matches.len();
         Ok(report)
+    }
+
+    /// Cache whose searches start at the faces near which the single mesh had the points.
+    fn cache(&self, scan: &PartScan, stride: usize, config: &PartFitConfig) -> FaceCache {
+        let mut cache = FaceCache::new(scan.points.len(), stride, config.settled);
+        for (i, node) in scan.near.iter().enumerate() {
+            if let Ok(v) = self.part.nodes.binary_search(node) {
+                cache.start_at(i, self.face_at[v]);
+            }
+        }
+        cache
     }
 
     /// Places of every `stride`-th point.
@@ -217,30 +250,38 @@ impl PartFit {
         (scan, stride): (&PartScan, usize),
         surface: &[P3],
         config: &PartFitConfig,
+        cache: &mut FaceCache,
     ) -> Vec<PartMatch> {
         self.bvh.refit(surface);
+        cache.advance(&self.part.faces, surface);
         let kernel = GemanMcClure {
             sigma: config.sigma,
         };
-        let mut out = Vec::new();
+        let mut found = Vec::new();
         let count = scan.points.len().div_ceil(stride);
-        par::map_into(Par::Rayon, count, 256, &mut out, |k| {
+        par::map_into(Par::Rayon, count, 256, &mut found, |k| {
             let i = k * stride;
-            let p = scan.points[i];
-            let normal = ScanNormal {
+            cache.closest(i, (&self.bvh, surface), &scan.points[i])
+        });
+        let matched = |(k, found): (usize, Option<Found>)| {
+            let (i, found) = (k * stride, found?);
+            cache.keep(i, &found);
+            let found = found.point;
+            let of_scan = ScanNormal {
                 normal: scan.normals[i],
                 oriented: scan.oriented,
             };
-            let (found, _) = closest_facing((&self.bvh, surface), &p, normal, NORMALS)?;
-            Some(PartMatch {
+            let face = &self.part.faces[found.face as usize];
+            let own = face_normal(surface, face).try_normalize(f32::MIN_POSITIVE)?;
+            of_scan.agrees(&own, NORMALS).then(|| PartMatch {
                 face: found.face,
                 corners: found.weights,
-                target: p,
+                target: scan.points[i],
                 distance: found.distance,
                 weight: kernel.weight(f64::from(found.distance * found.distance)),
             })
-        });
-        out.into_iter().flatten().collect()
+        };
+        found.into_iter().enumerate().filter_map(matched).collect()
     }
 
     /// Pulls each ring vertex to the mean of the scan's boundary points nearest to it; their mean distance, metres.
@@ -251,16 +292,12 @@ impl PartFit {
             .iter()
             .flat_map(|r| r.vertices.clone())
             .collect();
+        let places: Vec<P3> = ring.iter().map(|v| surface[*v as usize]).collect();
+        let tree = PointTree::new(&places);
         let mut sums = vec![(V3::zeros(), 0.0f32); ring.len()];
         let (mut total, mut count) = (0.0, 0.0);
         for p in &scan.boundary {
-            let distance = |v: &u32| (surface[*v as usize] - p).norm_squared();
-            let near = ring
-                .iter()
-                .enumerate()
-                .map(|(k, v)| (distance(v), k))
-                .min_by(|a, b| a.0.total_cmp(&b.0));
-            if let Some((d, k)) = near.filter(|(d, _)| *d < RING_REACH * RING_REACH) {
+            if let Some((k, d)) = tree.nearest(p, RING_REACH) {
                 sums[k].0 += p.coords;
                 sums[k].1 += 1.0;
                 total += f64::from(d.sqrt());

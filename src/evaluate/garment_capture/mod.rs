@@ -172,12 +172,7 @@ fn run(
     let mut first = None;
     for (k, truth) in scans.iter().enumerate() {
         let started = Instant::now();
-        let file = ScanMesh {
-            points: truth.points.clone(),
-            faces: truth.faces.clone(),
-            normals: truth.normals.clone(),
-            colors: truth.colors.clone(),
-        };
+        let file = mesh_of(truth);
         let (frame, start) = match &first {
             None => {
                 let (frame, start) = find_frame(template, &file)?;
@@ -189,6 +184,11 @@ fn run(
             capture.start_at(start);
         }
         let scan = BodyScan::new(&file, &frame)?;
+        if k == 0 {
+            for other in &scans[1..] {
+                capture.add_shape_scan(BodyScan::new(&mesh_of(other), &frame)?);
+            }
+        }
         let captured = capture.frame(&scan)?;
         let ms = started.elapsed().as_secs_f64() * 1e3;
         if k == 0 {
@@ -207,6 +207,15 @@ fn run(
         out.retarget(&mut dresser, (template, captured), bodies)?;
     }
     Ok(out)
+}
+
+fn mesh_of(scan: &TrueScan) -> ScanMesh {
+    ScanMesh {
+        points: scan.points.clone(),
+        faces: scan.faces.clone(),
+        normals: scan.normals.clone(),
+        colors: scan.colors.clone(),
+    }
 }
 
 impl SceneRun {

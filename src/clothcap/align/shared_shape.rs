@@ -1,0 +1,66 @@
+//! One shape of a subject from several scans, each with a pose of its own (section 5.4): the poses are eliminated from the
+//! normal equations of each scan, and what is left is summed.
+
+use super::body_equations::BodyEquations;
+use super::model_fit::{AlignedBody, CONVERGED, FitStage, Match, ModelFit, Prior};
+use super::shape_unknowns::ShapeUnknowns;
+use crate::body::{Pose, Template};
+use crate::clothcap::CaptureError;
+use crate::math::World;
+use crate::registration::GemanMcClure;
+use nalgebra::{DMatrix, DVector};
+
+/// Fits one shape to several scans; `bodies` are start and result, their shapes equal in the end. Shapes `[scans]`.
+///
+/// # Errors
+/// [`CaptureError::Solve`].
+pub(in crate::clothcap) fn fit_shared_shape(
+    template: &Template,
+    fits: &mut [ModelFit<'_>],
+    bodies: &mut [AlignedBody],
+    stage: &FitStage,
+) -> Result<(), CaptureError> {
+    let Some(first) = bodies.first() else {
+        return Ok(());
+    };
+    let mut shape = first.shape.clone();
+    let unknowns = ShapeUnknowns::new(template, &mut shape, true);
+    bodies.iter_mut().for_each(|b| b.shape = shape.clone());
+    let starts: Vec<Pose<World>> = bodies.iter().map(|b| b.pose.clone()).collect();
+    let kernel = GemanMcClure { sigma: stage.sigma };
+    for _ in 0..stage.iterations {
+        let mut all: Vec<Vec<Match>> = Vec::new();
+        for (fit, body) in fits.iter_mut().zip(&*bodies) {
+            fit.place(body);
+            all.push(fit.matches(&kernel));
+        }
+        let n = unknowns.len();
+        let mut sum = BodyEquations {
+            h: DMatrix::zeros(n, n),
+            g: DVector::zeros(n),
+        };
+        let mut updates = Vec::new();
+        for (k, (fit, matches)) in fits.iter().zip(&all).enumerate() {
+            let prior = Prior {
+                start: &starts[k],
+                unknowns: &unknowns,
+                freedom: stage.freedom,
+            };
+            let system = fit.system(&bodies[k], &prior, matches);
+            let (reduced, back) = system.eliminate_pose(n)?;
+            sum.h += reduced.h;
+            sum.g += reduced.g;
+            updates.push(back);
+        }
+        sum.add_shape_prior(&bodies[0].shape, &unknowns);
+        let step = sum.solve()?;
+        let mut moved = 0.0f64;
+        for ((fit, body), back) in fits.iter().zip(&mut *bodies).zip(&updates) {
+            moved = moved.max(fit.update(body, &unknowns, &back.with(&step)));
+        }
+        if moved < CONVERGED {
+            break;
+        }
+    }
+    Ok(())
+}
