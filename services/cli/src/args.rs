@@ -529,6 +529,13 @@ pub(crate) struct ClothcapCaptureArgs {
     /// Garments worn, as for segment; without it they are found.
     #[arg(long, value_name = "NAMES|FILE")]
     pub(crate) prior: Option<String>,
+    /// A scan of the subject in minimal clothing: it gives the body under the clothes. Without it up to four scans of the
+    /// sequence do.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) minimal: Option<PathBuf>,
+    /// Skips nothing: no point keeps its place from iteration to iteration, no unchanged scan the result of the one before.
+    #[arg(long)]
+    pub(crate) no_skip: bool,
     /// Folder for results: capture.json, frames/, pictures/, report.json; of a recording also turn.ply and turn.json.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,

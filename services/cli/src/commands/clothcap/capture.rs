@@ -6,7 +6,7 @@ use crate::args::{ClothcapCaptureArgs, ScanArgs};
 use crate::input;
 use anyhow::{Context, Result, ensure};
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tryon::clothcap::archive::{CaptureArchive, CaptureHeader, FrameDisplacements, FrameRecord};
 use tryon::clothcap::picture::stages;
@@ -25,10 +25,6 @@ pub(super) fn run(args: &ClothcapCaptureArgs) -> Result<()> {
 const PICTURES: &str = "pictures";
 
 fn capture_all(args: &ClothcapCaptureArgs) -> Result<()> {
-    let config = CaptureConfig {
-        labels: label_config(args.prior.as_deref())?,
-        ..CaptureConfig::default()
-    };
     let archive = CaptureArchive::new(&args.out)?;
     let header = archive.header(&input::template(args.frame.body.as_deref())?)?;
     let mut scans = opened(args, header.as_ref())?;
@@ -40,6 +36,16 @@ fn capture_all(args: &ClothcapCaptureArgs) -> Result<()> {
             args.out.display()
         );
     }
+    let minimal = match (&args.minimal, &header) {
+        (Some(file), None) => Some(scans.minimal_shape(file)?),
+        _ => None,
+    };
+    let config = CaptureConfig {
+        labels: label_config(args.prior.as_deref())?,
+        without_skips: args.no_skip,
+        minimal,
+        ..CaptureConfig::default()
+    };
     let mut job = CaptureJob::new(config, archive, header, &mut scans)?;
     let bar = input::progress(Some(names.len() as u64), "capturing");
     let mut rows = Vec::new();
@@ -87,8 +93,10 @@ struct CaptureJob {
     header: Option<CaptureHeader>,
     /// Absent until the first scan that is not done.
     capture: Option<OutfitCapture>,
-    /// Last scan that was done before.
+    /// Result of the scan before.
     last: Option<FrameRecord>,
+    /// Scan before, if it was read.
+    read: Option<BodyScan>,
     start: Option<tryon::clothcap::align::Start>,
 }
 
@@ -105,6 +113,7 @@ impl CaptureJob {
             header,
             capture: None,
             last: None,
+            read: None,
             start: scans.start.take(),
         })
     }
@@ -123,10 +132,15 @@ impl CaptureJob {
             .filter(|_| self.header.is_some())
         {
             let report = serde_json::to_value(&record.report)?;
-            self.last = Some(record);
+            (self.last, self.read) = (Some(record), None);
             return Ok(report);
         }
         let scan = scans.read(file)?;
+        if let Some(record) = self.repeated(scans, &scan, (name, names), out)? {
+            let report = serde_json::to_value(&record.report)?;
+            (self.last, self.read) = (Some(record), Some(scan));
+            return Ok(report);
+        }
         if self.capture.is_none() {
             self.capture = Some(self.begin(scans)?);
         }
@@ -145,8 +159,37 @@ impl CaptureJob {
             self.archive.write_header(&header)?;
             self.header = Some(header);
         }
-        self.write(scans, &scan, (name, &frame), out)?;
+        let record = self.write(scans, &scan, (name, &frame), out)?;
+        (self.last, self.read) = (Some(record), Some(scan));
         Ok(serde_json::to_value(&frame.report)?)
+    }
+
+    /// Result of the scan before, for a scan that is unchanged. The first scan makes the outfit and is fitted in another way
+    /// than those after it, so that the second one never repeats it.
+    fn repeated(
+        &mut self,
+        scans: &Scans,
+        scan: &BodyScan,
+        (name, names): (&str, &[String]),
+        out: &Path,
+    ) -> Result<Option<FrameRecord>> {
+        let at = names.iter().position(|n| n == name).unwrap_or_default();
+        let (Some(header), Some(before)) = (&self.header, &self.last) else {
+            return Ok(None);
+        };
+        if at < 2 || self.config.without_skips {
+            return Ok(None);
+        }
+        if self.read.is_none() {
+            self.read = Some(scans.read(&scans.files[at - 1])?);
+        }
+        if !self.read.as_ref().is_some_and(|b| b.is_unchanged(scan)) {
+            return Ok(None);
+        }
+        let picture = |name: &str| out.join(PICTURES).join(format!("{name}.png"));
+        let from = picture(&before.scan);
+        std::fs::copy(&from, picture(name)).with_context(|| format!("{}", from.display()))?;
+        Ok(Some(self.archive.repeat(before, name, header)?))
     }
 
     fn begin(&mut self, scans: &Scans) -> Result<OutfitCapture> {
@@ -156,6 +199,11 @@ impl CaptureJob {
             let mut capture = OutfitCapture::new(template, config)?;
             if let Some(start) = self.start.take() {
                 capture.start_at(start);
+            }
+            if self.config.minimal.is_none() {
+                for file in shape_files(&scans.files) {
+                    capture.add_shape_scan(scans.read(file)?);
+                }
             }
             return Ok(capture);
         };
@@ -176,7 +224,7 @@ impl CaptureJob {
         scan: &BodyScan,
         (name, frame): (&str, &FrameCapture),
         out: &Path,
-    ) -> Result<()> {
+    ) -> Result<FrameRecord> {
         let header = self.header.as_ref().context("no header")?;
         let capture = self.capture.as_ref().context("no capture")?;
         let picture = stages(capture.cloth(), scan, frame, &header.outfit);
@@ -187,6 +235,15 @@ impl CaptureJob {
             report: frame.report.clone(),
         };
         let displacements = FrameDisplacements::of(&scans.template, frame);
-        Ok(self.archive.write_frame(&record, &displacements)?)
+        self.archive.write_frame(&record, &displacements)?;
+        Ok(record)
     }
+}
+
+/// Scans beside the first one that give the body under the clothes, evenly over the sequence.
+fn shape_files(files: &[PathBuf]) -> impl Iterator<Item = &PathBuf> {
+    /// Most of them; each costs about a second.
+    const MOST: usize = 3;
+    let count = MOST.min(files.len().saturating_sub(1));
+    (1..=count).map(move |k| &files[k * (files.len() - 1) / count])
 }

@@ -7,12 +7,12 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tryon::body::Template;
-use tryon::clothcap::CaptureError;
+use tryon::body::{BodyShape, Template};
 use tryon::clothcap::align::{Start, find_frame, find_person};
 use tryon::clothcap::scan::{BodyScan, ScanFrame};
 use tryon::clothcap::segment::{LabelConfig, Slot};
 use tryon::clothcap::turn::TurnReport;
+use tryon::clothcap::{CaptureError, minimal_shape};
 use tryon::formats::scan::{ScanMesh, read_scan, scan_files};
 
 /// Scans of one subject and the frame they share.
@@ -62,6 +62,15 @@ impl Scans {
     pub(super) fn read(&self, file: &Path) -> Result<BodyScan> {
         let mesh = read_scan(file)?;
         BodyScan::new(&mesh, &self.frame).with_context(|| format!("{}", file.display()))
+    }
+
+    /// Shape of the subject from a scan in minimal clothing, of any unit and axes.
+    pub(super) fn minimal_shape(&self, file: &Path) -> Result<BodyShape> {
+        let context = || format!("{}", file.display());
+        let mesh = read_scan(file)?;
+        let (frame, start) = find_frame(&self.template, &mesh).with_context(context)?;
+        let scan = BodyScan::new(&mesh, &frame).with_context(context)?;
+        minimal_shape(&self.template, &scan, &start.body).with_context(context)
     }
 
     /// Writes report.json with a row a scan.
