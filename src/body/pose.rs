@@ -198,6 +198,7 @@ mod tests {
                     faces: self.faces,
                     uv: &[],
                     color: [200, 150, 120],
+                    texture: &[],
                 },
                 colors: &[],
                 joints: &self.weights.joints,

@@ -1,6 +1,7 @@
 //! A garment before it moves: panels, seams, materials, rest shape, sizes, anchors.
 
 mod error;
+mod fabric_image;
 mod flat_triangle;
 pub mod import;
 pub mod library;
@@ -14,6 +15,7 @@ mod triangulate;
 mod union_find;
 
 pub use error::GarmentError;
+pub use fabric_image::FabricImage;
 pub use flat_triangle::rest_area;
 pub use material::{IsotropicSolid, Material};
 pub use mesh::{AnchorKind, AnchorSet, GarmentMesh, Region, RenderMesh, Triangulation};

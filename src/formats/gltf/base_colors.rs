@@ -4,7 +4,11 @@ use super::accessors::Accessors;
 use super::srgb::{encoded, linear};
 use super::uri::external;
 use crate::camera::ColorImage;
+use crate::formats::TexturePoint;
 use crate::formats::image::{decode_color, sample_texture};
+use crate::formats::texture_points::TexturePoints;
+use crate::math::P3;
+use crate::mesh::Face;
 use ::gltf::{Document, Primitive, Semantic};
 use std::borrow::Cow;
 use std::path::Path;
@@ -61,6 +65,40 @@ impl<'a> BaseColors<'a> {
             .iter()
             .map(|c| c.map(|l| 255.0 * encoded(l)))
             .collect())
+    }
+
+    /// Colours of a primitive's texture between its vertices; none without a texture, and where COLOR_0 multiplies it.
+    pub(super) fn points_of_primitive(
+        &mut self,
+        p: &Primitive<'_>,
+        (vertices, faces, first): (&[P3], &[Face], usize),
+        out: &mut Vec<TexturePoint>,
+    ) -> Result<(), String> {
+        let material = p.material();
+        let pbr = material.pbr_metallic_roughness();
+        let Some(info) = pbr.base_color_texture() else {
+            return Ok(());
+        };
+        let uv = p.get(&Semantic::TexCoords(info.tex_coord()));
+        let (Some(uv), None) = (uv, p.get(&Semantic::Colors(0))) else {
+            return Ok(());
+        };
+        let uv = self.accessors.normalized::<2>(&uv)?;
+        let [r, g, b, _] = pbr.base_color_factor();
+        let meshes = self.document.meshes();
+        let parts = meshes.map(|m| m.primitives().count()).sum();
+        let image = self.image(info.texture().source().index())?;
+        let places = TexturePoints::over(vertices, faces, parts);
+        let color = |c: [f32; 3]| {
+            let light = c.map(|s| linear(s / 255.0));
+            [light[0] * r, light[1] * g, light[2] * b].map(|l| 255.0 * encoded(l))
+        };
+        for (f, face) in (first as u32..).zip(faces) {
+            let at = face.map(|v| uv.get(v as usize).copied().unwrap_or([f32::NAN; 2]));
+            let corners = face.map(|v| vertices[v as usize]);
+            places.add((f, corners), (image, at), color, out);
+        }
+        Ok(())
     }
 
     /// Pixels of an image.

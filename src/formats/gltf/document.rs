@@ -22,6 +22,8 @@ pub(super) struct GlbDocument {
     views: Vec<Value>,
     accessors: Vec<Value>,
     materials: Vec<Value>,
+    images: Vec<Value>,
+    textures: Vec<Value>,
     roots: Vec<usize>,
     /// Nodes; [`GlbDocument::root`] also places a node in the scene.
     pub(super) nodes: Vec<Value>,
@@ -34,16 +36,22 @@ pub(super) struct GlbDocument {
 }
 
 impl GlbDocument {
-    /// Adds an accessor with a buffer view of its own. Every element is a multiple of 4 bytes, so offsets stay aligned.
-    fn accessor(&mut self, data: &[u8], target: Option<u32>, mut accessor: Value) -> usize {
+    /// Adds a buffer view, padded to 4 bytes, so that the next one is aligned for any element.
+    fn view(&mut self, data: &[u8], target: Option<u32>) -> usize {
         let mut view =
             json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": data.len()});
         if let Some(t) = target {
             view["target"] = json!(t);
         }
         self.bytes.extend_from_slice(data);
-        accessor["bufferView"] = json!(self.views.len());
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         self.views.push(view);
+        self.views.len() - 1
+    }
+
+    /// Adds an accessor with a buffer view of its own.
+    fn accessor(&mut self, data: &[u8], target: Option<u32>, mut accessor: Value) -> usize {
+        accessor["bufferView"] = json!(self.view(data, target));
         self.accessors.push(accessor);
         self.accessors.len() - 1
     }
@@ -94,14 +102,26 @@ impl GlbDocument {
         self.accessor(&data, Some(INDEX_BUFFER), accessor)
     }
 
-    /// Adds a rough, double-sided material; base colour in sRGB.
-    pub(super) fn material(&mut self, name: &str, color: [u8; 3]) -> usize {
+    /// Adds a texture of an image file, with bilinear samples and repetition.
+    pub(super) fn texture(&mut self, file: &[u8], mime: &str) -> usize {
+        let view = self.view(file, None);
+        self.textures.push(json!({"source": self.images.len()}));
+        self.images
+            .push(json!({"bufferView": view, "mimeType": mime}));
+        self.textures.len() - 1
+    }
+
+    /// Adds a rough, double-sided material; base colour in sRGB, times a texture.
+    pub(super) fn material(&mut self, name: &str, color: [u8; 3], texture: Option<usize>) -> usize {
         let [r, g, b] = color.map(|c| linear(f32::from(c) / 255.0));
-        self.materials.push(json!({
-            "name": name,
-            "doubleSided": true,
-            "pbrMetallicRoughness": {"baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.9},
-        }));
+        let mut surface = json!({
+            "baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.9,
+        });
+        if let Some(index) = texture {
+            surface["baseColorTexture"] = json!({"index": index});
+        }
+        self.materials
+            .push(json!({"name": name, "doubleSided": true, "pbrMetallicRoughness": surface}));
         self.materials.len() - 1
     }
 
@@ -126,7 +146,13 @@ impl GlbDocument {
             "buffers": [{"byteLength": self.bytes.len()}],
         });
         // Empty lists are invalid.
-        for (key, list) in [("skins", self.skins), ("animations", self.animations)] {
+        let lists = [
+            ("skins", self.skins),
+            ("animations", self.animations),
+            ("images", self.images),
+            ("textures", self.textures),
+        ];
+        for (key, list) in lists {
             if !list.is_empty() {
                 root[key] = json!(list);
             }

@@ -4,6 +4,7 @@ use super::accessors::Accessors;
 use super::base_colors::BaseColors;
 use super::uri::MAX_BYTES;
 use crate::formats::FormatError;
+use crate::formats::TexturePoint;
 use crate::formats::image::read_limited;
 use crate::math::P3;
 use crate::mesh::{Face, MeshError, TriMesh};
@@ -53,6 +54,8 @@ pub(in crate::formats) struct GltfScan {
     pub(in crate::formats) faces: Vec<Face>,
     /// Base colours, sRGB, 0 to 255, shape `[points]`; NaN where a primitive has none.
     pub(in crate::formats) colors: Vec<[f32; 3]>,
+    /// Colours of the textures between the vertices.
+    pub(in crate::formats) texture: Vec<TexturePoint>,
 }
 
 /// Triangles read so far, and the buffers they come from.
@@ -65,6 +68,7 @@ struct SceneReader<'a> {
     faces: Vec<Face>,
     uv: Vec<[f32; 2]>,
     colors: Vec<[f32; 3]>,
+    texture: Vec<TexturePoint>,
     parts: Vec<GltfPart>,
     nodes: usize,
 }
@@ -113,6 +117,7 @@ pub(in crate::formats) fn read_gltf_scan(path: &Path) -> Result<GltfScan, Format
         points: file.vertices,
         faces: file.faces,
         colors: file.colors,
+        texture: file.texture,
     })
 }
 
@@ -222,6 +227,7 @@ impl<'a> SceneReader<'a> {
             faces: Vec::new(),
             uv: Vec::new(),
             colors: Vec::new(),
+            texture: Vec::new(),
             parts: Vec::new(),
             nodes: 0,
         }
@@ -343,6 +349,10 @@ impl<'a> SceneReader<'a> {
             let colors = base_colors.of_primitive(p, vertices.len());
             self.colors
                 .extend(colors.map_err(|why| fault("base colour", why))?);
+            let surface = (&vertices[..], &faces[..], first);
+            base_colors
+                .points_of_primitive(p, surface, &mut self.texture)
+                .map_err(|why| fault("base colour", why))?;
             self.append(&vertices, &faces);
         } else {
             // Checked alone first, so that an error names the primitive's own face and vertex.

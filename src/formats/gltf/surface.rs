@@ -5,6 +5,7 @@ use crate::formats::FormatError;
 use crate::math::{P3, V3};
 use crate::mesh::{Face, face_normal};
 use serde_json::{Value, json};
+use std::collections::HashMap;
 use std::path::Path;
 
 /// Mesh to write: corners share position and texture coordinate. Metres, y up.
@@ -18,8 +19,10 @@ pub struct GlbMesh<'a> {
     pub faces: &'a [Face],
     /// Texture coordinates (v down, as in glTF), shape `[vertices]`; empty for none.
     pub uv: &'a [[f32; 2]],
-    /// Base colour, sRGB, of both sides.
+    /// Base colour, sRGB, of both sides; multiplies the texture.
     pub color: [u8; 3],
+    /// PNG or JPEG file with the base colours at [`GlbMesh::uv`]; empty for none.
+    pub texture: &'a [u8],
 }
 
 impl GlbMesh<'_> {
@@ -45,6 +48,14 @@ impl GlbMesh<'_> {
         if !self.uv.is_empty() && self.uv.len() != n {
             return fault("uv", format!("{} for {n} vertices", self.uv.len()));
         }
+        if !self.texture.is_empty() {
+            if self.uv.is_empty() {
+                return fault("texture", "without texture coordinates".into());
+            }
+            if mime_type(self.texture).is_none() {
+                return fault("texture", "neither PNG nor JPEG".into());
+            }
+        }
         Ok(())
     }
 
@@ -60,8 +71,18 @@ impl GlbMesh<'_> {
             attributes["TEXCOORD_0"] = json!(document.vectors("VEC2", uv, true));
         }
         let indices = document.triangles(self.faces);
-        let material = document.material(self.name, self.color);
+        let texture = mime_type(self.texture).map(|mime| document.texture(self.texture, mime));
+        let material = document.material(self.name, self.color, texture);
         json!({"attributes": attributes, "indices": indices, "material": material})
+    }
+}
+
+/// Kind of an image file by its first bytes.
+fn mime_type(image: &[u8]) -> Option<&'static str> {
+    match image {
+        [0x89, b'P', b'N', b'G', ..] => Some("image/png"),
+        [0xff, 0xd8, ..] => Some("image/jpeg"),
+        _ => None,
     }
 }
 
@@ -70,14 +91,21 @@ pub(super) fn is_finite(points: &[P3]) -> bool {
     points.iter().all(|p| p.iter().all(|c| c.is_finite()))
 }
 
-/// Area-weighted vertex normals; +y for a vertex without a face.
+/// Area-weighted vertex normals, shared by vertices at one position; +y for a vertex without a face.
 pub(super) fn normals(vertices: &[P3], faces: &[Face]) -> Vec<V3> {
-    let mut out = vec![V3::zeros(); vertices.len()];
+    let mut first = HashMap::new();
+    let place = |(i, p): (usize, &P3)| {
+        let key = [p.x, p.y, p.z].map(f32::to_bits);
+        *first.entry(key).or_insert(i)
+    };
+    let places: Vec<usize> = vertices.iter().enumerate().map(place).collect();
+    let mut sums = vec![V3::zeros(); vertices.len()];
     for f in faces {
         let n = face_normal(vertices, f);
-        f.iter().for_each(|&i| out[i as usize] += n);
+        f.iter().for_each(|&i| sums[places[i as usize]] += n);
     }
-    out.iter()
-        .map(|n| n.try_normalize(0.0).unwrap_or(V3::y()))
+    places
+        .iter()
+        .map(|i| sums[*i].try_normalize(0.0).unwrap_or(V3::y()))
         .collect()
 }

@@ -1,4 +1,6 @@
 use super::*;
+use crate::camera::ColorImage;
+use crate::formats::image::encode_png_rgb;
 use crate::math::P3;
 use crate::mesh::Face;
 use std::path::Path;
@@ -26,6 +28,7 @@ fn encoded(frames: &[Vec<Vec<P3>>]) -> Result<Vec<u8>, crate::formats::FormatErr
         faces: &FACES,
         uv: &UV,
         color: [200, 10, 0],
+        texture: &[],
     };
     let skirt = GlbMesh {
         name: "skirt",
@@ -130,6 +133,7 @@ fn faults_name_mesh_and_index() {
         faces: &[[0, 1, 9]],
         uv: &[],
         color: [0; 3],
+        texture: &[],
     };
     let e = encode_glb(&[hole], &[], 1.0, Path::new(AT))
         .expect_err("hole")
@@ -138,6 +142,65 @@ fn faults_name_mesh_and_index() {
         e.contains("hole") && e.contains("face 0") && e.contains('9'),
         "{e}"
     );
+}
+
+/// A square whose texture has the colours of its corners in four pixels.
+fn textured(png: &[u8]) -> Result<Vec<u8>, crate::formats::FormatError> {
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let vertices = corners.map(|[x, y]| P3::new(x, 1.0 - y, 0.0));
+    let square = GlbMesh {
+        name: "square",
+        vertices: &vertices,
+        faces: &[[0, 2, 1], [0, 3, 2]],
+        uv: &corners,
+        color: [255; 3],
+        texture: png,
+    };
+    encode_glb(&[square], &[], 1.0, Path::new(AT))
+}
+
+#[test]
+fn textures_are_written_and_read_back() {
+    let colors = [[250, 10, 0], [0, 200, 30], [40, 0, 220], [128, 129, 130]];
+    let [a, b, c, d] = colors;
+    let pixels = ColorImage::new(2, 2, [a, b, d, c].concat()).expect("sizes");
+    let png = encode_png_rgb(&pixels, Path::new(AT)).expect("encoded");
+    let bytes = textured(&png).expect("encodes");
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("square.glb");
+    std::fs::write(&path, bytes).expect("written");
+    let scan = read_gltf_scan(&path).expect("reads");
+    for (got, wanted) in scan.colors.iter().zip(colors) {
+        for (g, w) in got.iter().zip(wanted) {
+            assert!((g - f32::from(w)).abs() < 0.5, "{got:?} for {wanted:?}");
+        }
+    }
+    let middle = scan
+        .texture
+        .iter()
+        .find(|t| t.face == 0 && t.weights[2] > 0.5);
+    assert!(middle.is_some(), "{:?}", scan.texture);
+    let e = textured(b"BM").expect_err("a bitmap").to_string();
+    assert!(e.contains("`square`.texture"), "{e}");
+}
+
+#[test]
+fn normals_are_shared_by_vertices_at_one_position() {
+    // Two triangles at a right angle whose common edge has vertices of its own in each.
+    let p = [
+        [0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0],
+    ]
+    .map(P3::from);
+    let [a, b, c, d] = p;
+    let vertices = [a, b, c, a, b, d];
+    let normals = super::surface::normals(&vertices, &[[0, 2, 1], [3, 4, 5]]);
+    assert_eq!(normals[0], normals[3]);
+    assert_eq!(normals[1], normals[4]);
+    assert!(normals[2] != normals[0] && normals[5] != normals[0]);
 }
 
 #[test]

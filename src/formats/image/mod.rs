@@ -15,4 +15,4 @@ pub use jpeg::{decode_jpeg, encode_jpeg};
 pub use limits::{MAX_PIXELS, MAX_SIDE};
 pub(super) use limits::{check_size, read_limited};
 pub use png_file::{decode_png_color, decode_png_depth, encode_png_depth, encode_png_rgb};
-pub(super) use sample::sample_texture;
+pub use sample::sample_texture;

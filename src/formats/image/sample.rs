@@ -5,7 +5,7 @@ use crate::camera::ColorImage;
 /// Colour at texture coordinates with v down, 0 to 255; `None` for coordinates that are not finite.
 ///
 /// The image repeats outside \[0, 1\]. Within half a texel of a border the border texel alone counts.
-pub(in crate::formats) fn sample_texture(image: &ColorImage, uv: [f32; 2]) -> Option<[f32; 3]> {
+pub fn sample_texture(image: &ColorImage, uv: [f32; 2]) -> Option<[f32; 3]> {
     let [width, height] = [image.width(), image.height()];
     if width == 0 || height == 0 || !uv.iter().all(|t| t.is_finite()) {
         return None;

@@ -17,5 +17,6 @@ pub(super) fn read_scene(path: &Path) -> Result<ScanMesh, FormatError> {
         faces: scan.faces,
         normals: Vec::new(),
         colors: quantized(&scan.colors, 255.0),
+        texture: scan.texture,
     })
 }

@@ -1,5 +1,6 @@
 //! Triangle mesh of a coloured scan, as its file stores it.
 
+use crate::formats::TexturePoint;
 use crate::math::{P3, V3};
 use crate::mesh::Face;
 
@@ -18,4 +19,6 @@ pub struct ScanMesh {
     ///
     /// A point without a finite colour has the mean colour of the scan.
     pub colors: Vec<[u8; 3]>,
+    /// Colours of the texture between the vertices; empty without a texture, and where vertices have colours of their own.
+    pub texture: Vec<TexturePoint>,
 }

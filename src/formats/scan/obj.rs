@@ -18,15 +18,18 @@ const MAX_BYTES: u64 = 2 << 30;
 pub(super) fn read_obj_scan(path: &Path) -> Result<ScanMesh, FormatError> {
     let bytes = read_limited(path, MAX_BYTES)?;
     let records = parse_records(&String::from_utf8_lossy(&bytes), path, ObjFaults::Kept)?;
-    let colors = if records.colors.iter().any(is_finite) {
-        quantized(&records.colors, white(&records.colors))
+    let (colors, texture) = if records.colors.iter().any(is_finite) {
+        let own = quantized(&records.colors, white(&records.colors));
+        (own, Vec::new())
     } else {
-        quantized(&corner_colors(&records, path)?, 255.0)
+        let (corners, points) = corner_colors(&records, path)?;
+        (quantized(&corners, 255.0), points)
     };
     Ok(ScanMesh {
         points: records.vertices,
         faces: records.faces,
         normals: Vec::new(),
         colors,
+        texture,
     })
 }

@@ -2,8 +2,10 @@
 
 use super::mtl::{MtlMaterial, read_libraries};
 use crate::formats::FormatError;
+use crate::formats::TexturePoint;
 use crate::formats::image::{read_color, sample_texture};
 use crate::formats::obj_records::ObjRecords;
+use crate::formats::texture_points::TexturePoints;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -39,7 +41,8 @@ impl CornerSums {
     }
 }
 
-/// Mean colour of the corners of each vertex, sRGB, 0 to 255, shape `[vertices]`; NaN for a vertex without one.
+/// Mean colour of the corners of each vertex, sRGB, 0 to 255, shape `[vertices]`, NaN for a vertex without one; and colours
+/// of the textures between the vertices.
 ///
 /// The colour of a corner is `map_Kd` at its texture coordinate, or `Kd` of a material without texture.
 /// A material that no library has leaves its corners without colour.
@@ -49,10 +52,11 @@ impl CornerSums {
 pub(super) fn corner_colors(
     records: &ObjRecords,
     origin: &Path,
-) -> Result<Vec<[f32; 3]>, FormatError> {
+) -> Result<(Vec<[f32; 3]>, Vec<TexturePoint>), FormatError> {
     let mut corners = CornerSums::new(records.vertices.len());
+    let mut points = Vec::new();
     if records.materials.is_empty() {
-        return Ok(corners.means());
+        return Ok((corners.means(), points));
     }
     let library = read_libraries(origin, &records.libraries)?;
     let materials: Vec<Option<&MtlMaterial>> =
@@ -61,10 +65,10 @@ pub(super) fn corner_colors(
     let maps = materials.iter().flatten().filter_map(|m| m.map.as_deref());
     // One texture at a time in memory.
     for map in maps.collect::<BTreeSet<_>>() {
-        add_textured(records, &materials, map, &mut corners)
+        add_textured(records, &materials, map, (&mut corners, &mut points))
             .map_err(|e| FormatError::field(origin, "map_Kd", e.to_string()))?;
     }
-    Ok(corners.means())
+    Ok((corners.means(), points))
 }
 
 /// Material of a face.
@@ -88,23 +92,28 @@ fn add_plain(records: &ObjRecords, materials: &[Option<&MtlMaterial>], corners: 
     }
 }
 
-/// Adds the corners whose material has the texture `map`.
+/// Adds the corners whose material has the texture `map`, and points between them.
 fn add_textured(
     records: &ObjRecords,
     materials: &[Option<&MtlMaterial>],
     map: &Path,
-    corners: &mut CornerSums,
+    (corners, points): (&mut CornerSums, &mut Vec<TexturePoint>),
 ) -> Result<(), FormatError> {
     let image = read_color(map)?;
+    let places = TexturePoints::over(&records.vertices, &records.faces, 1);
     for (f, (face, uv)) in records.faces.iter().zip(&records.face_uv).enumerate() {
         let has_map =
             material_of(records, materials, f).is_some_and(|m| m.map.as_deref() == Some(map));
         let Some(uv) = uv.filter(|_| has_map) else {
             continue;
         };
-        for (vertex, t) in face.iter().zip(uv) {
-            // OBJ counts v upwards from the lower border.
-            let at = records.uv.get(t as usize).map(|t| [t[0], 1.0 - t[1]]);
+        // OBJ counts v upwards from the lower border.
+        let at = uv.map(|t| records.uv.get(t as usize).map(|t| [t[0], 1.0 - t[1]]));
+        if let [Some(a), Some(b), Some(c)] = at {
+            let ends = face.map(|v| records.vertices[v as usize]);
+            places.add((f as u32, ends), (&image, [a, b, c]), |c| c, points);
+        }
+        for (vertex, at) in face.iter().zip(at) {
             if let Some(color) = at.and_then(|at| sample_texture(&image, at)) {
                 corners.add(*vertex, color);
             }

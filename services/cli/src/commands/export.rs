@@ -35,6 +35,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<ExitCode> {
             faces: t.mesh().faces(),
             uv: &[],
             color: SKIN,
+            texture: &[],
         };
         write_mesh(out, body)?;
     } else {
@@ -53,6 +54,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<ExitCode> {
                 faces: &g.render.faces,
                 uv: &g.render.uv,
                 color: library::dye(what),
+                texture: &[],
             };
             write_mesh(out, cut)?;
         }
@@ -111,6 +113,7 @@ fn worn(out: &Path, pattern: &Pattern, seconds: f64) -> Result<()> {
         faces: &garment.render.faces,
         uv: &garment.render.uv,
         color: library::dye(&garment.name),
+        texture: &[],
     };
     let count = (seconds.clamp(0.0, LONGEST) * FRAMES) as u64;
     if count == 0 || out.extension().is_none_or(|e| e != "glb") {

@@ -62,6 +62,7 @@ fn write(
         faces,
         uv,
         color: GREY,
+        texture: &[],
     };
     args.out.as_ref().map_or(Ok(()), |out| write_mesh(out, m))
 }

@@ -37,6 +37,7 @@ const SHIRT: SkinnedMesh<'_> = SkinnedMesh {
         faces: &FACES,
         uv: &[],
         color: [255; 3],
+        texture: &[],
     },
     colors: &[],
     joints: &[[1, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0]],

@@ -40,6 +40,34 @@ fn an_obj_takes_its_colours_from_the_texture() {
 }
 
 #[test]
+fn textures_are_sampled_between_vertices() {
+    let dir = folder();
+    let at = |name: &str| dir.path().join(name);
+    std::fs::write(at("s.mtl"), "newmtl cloth\nmap_Kd t.png\n").expect("written");
+    // A column of light in the middle, which no corner shows.
+    let pixel = |i: usize| if i % 30 / 10 == 1 { 250 } else { 20 };
+    let pixels = (0..30 * 30).flat_map(|i| [pixel(i); 3]).collect();
+    write_png_rgb(
+        &at("t.png"),
+        &ColorImage::new(30, 30, pixels).expect("sizes"),
+    )
+    .expect("written");
+    let text = "mtllib s.mtl\nv 0 0 0\nv 3 0 0\nv 3 3 0\nv 0 3 0\n\
+        vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl cloth\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n";
+    let scan = read_bytes(dir.path(), "a.obj", text.as_bytes()).expect("valid");
+    assert_eq!(scan.colors, [[20; 3]; 4]);
+    assert!(scan.texture.len() > 1800, "{}", scan.texture.len());
+    for t in &scan.texture {
+        let corners = scan.faces[t.face as usize].map(|v| scan.points[v as usize]);
+        let x: f32 = (0..3).map(|k| t.weights[k] * corners[k].x).sum();
+        if (x - 1.0).abs() > 0.06 && (x - 2.0).abs() > 0.06 {
+            let wanted = if (1.0..2.0).contains(&x) { 250 } else { 20 };
+            assert_eq!(t.color, [wanted; 3], "{x}");
+        }
+    }
+}
+
+#[test]
 fn plain_materials_and_vertices_without_one_are_coloured() {
     let dir = folder();
     let at = |name: &str| dir.path().join(name);
