@@ -4,9 +4,11 @@ use super::align::AlignedBody;
 use super::capture::{FrameCapture, FrameReport};
 pub use super::capture_header::CaptureHeader;
 use super::capture_header::{check_body, check_header};
+use super::texture::GarmentTexture;
 use super::unpose::unpose_shaped;
 use crate::body::Template;
 use crate::formats::FormatError;
+use crate::formats::image::{read_color, write_png_rgb};
 use crate::formats::npy::{read_npy, write_npy};
 use crate::math::V3;
 use serde::de::DeserializeOwned;
@@ -20,6 +22,9 @@ const VERSION: u32 = 2;
 const HEADER: &str = "capture.json";
 /// Folder of the scans' results.
 const FRAMES: &str = "frames";
+
+/// Folder of the garments' textures.
+const TEXTURES: &str = "textures";
 
 /// Result of one scan.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -198,6 +203,43 @@ impl CaptureArchive {
         Ok(record)
     }
 
+    /// Image of a garment's texture, and white where a scan saw it.
+    fn texture_paths(&self, garment: usize) -> [PathBuf; 2] {
+        let name = |end: &str| format!("garment{garment}{end}.png");
+        ["", ".seen"].map(|end| self.folder.join(TEXTURES).join(name(end)))
+    }
+
+    /// Writes the garments' textures.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_textures(&self, textures: &[GarmentTexture]) -> Result<(), FormatError> {
+        let folder = self.folder.join(TEXTURES);
+        std::fs::create_dir_all(&folder).map_err(|e| FormatError::io(&folder, e))?;
+        for (k, texture) in textures.iter().enumerate() {
+            let [image, seen] = self.texture_paths(k);
+            write_beside(&image, |part| write_png_rgb(part, texture.image()))?;
+            write_beside(&seen, |part| write_png_rgb(part, &texture.seen_image()))?;
+        }
+        Ok(())
+    }
+
+    /// Textures of the garments; none for scans without colours, and for captures of programs that made none.
+    ///
+    /// # Errors
+    /// A missing or damaged image, or one of another size than its atlas.
+    pub fn textures(&self, header: &CaptureHeader) -> Result<Vec<GarmentTexture>, FormatError> {
+        let atlases = header.outfit.atlases.iter().enumerate();
+        let read = atlases.map(|(k, atlas)| {
+            let [image, seen] = self.texture_paths(k);
+            let texture =
+                GarmentTexture::from_images(atlas, read_color(&image)?, &read_color(&seen)?);
+            let size = [atlas.size.width, atlas.size.height];
+            texture.ok_or_else(|| FormatError::field(&image, "size", format!("not {size:?}")))
+        });
+        read.collect()
+    }
+
     /// Displacements of a scan.
     ///
     /// # Errors
@@ -247,11 +289,22 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, FormatError> {
     serde_json::from_str(&text).map_err(|e| FormatError::field(path, "json", e.to_string()))
 }
 
-/// Writes beside the file and renames, so that a kill leaves the old one or the new one.
 fn write_json(path: &Path, value: &impl Serialize) -> Result<(), FormatError> {
     let text = serde_json::to_string(value)
         .map_err(|e| FormatError::field(path, "json", e.to_string()))?;
-    let beside = path.with_extension("json.part");
-    std::fs::write(&beside, text).map_err(|e| FormatError::io(&beside, e))?;
+    write_beside(path, |part| {
+        std::fs::write(part, text).map_err(|e| FormatError::io(part, e))
+    })
+}
+
+/// Writes beside the file and renames, so that a kill leaves the old one or the new one.
+fn write_beside(
+    path: &Path,
+    write: impl FnOnce(&Path) -> Result<(), FormatError>,
+) -> Result<(), FormatError> {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".part");
+    let beside = PathBuf::from(name);
+    write(&beside)?;
     std::fs::rename(&beside, path).map_err(|e| FormatError::io(path, e))
 }

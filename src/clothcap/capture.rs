@@ -11,6 +11,7 @@ use super::retarget::{PenetrationSolver, SolidBody, pose_part};
 use super::scan::{BodyScan, LeftOut};
 use super::segment::{LabelConfig, Labelling};
 use super::segmenter::{ScanSegmenter, SegmentedScan};
+use super::texture::{GarmentTexture, ScanPaint, TextureAtlas};
 use super::topology::ClothTemplate;
 use super::undress::{
     ShapeScan, Undressed, Undresser, WornGarments, minimally_clothed, posed_under_cloth,
@@ -23,6 +24,10 @@ use std::sync::Arc;
 
 /// Mean robust distance of a scan from the body model above which it says nothing of the subject's shape, metres.
 const MISALIGNED: f64 = 0.03;
+/// Side of a texel over the distance between the scan's colours, and its limits, metres.
+const TEXEL: f32 = 0.5;
+/// See [`TEXEL`].
+const TEXELS: [f32; 2] = [0.001, 0.004];
 
 /// Capture of one scan.
 #[derive(Clone, Debug)]
@@ -72,6 +77,9 @@ pub struct CapturedOutfit {
     pub rest: Vec<Vec<P3>>,
     /// Colours of each garment's vertices, sRGB.
     pub colors: Vec<Vec<[u8; 3]>>,
+    /// Texture coordinates of each garment; empty for scans without colours.
+    #[serde(default)]
+    pub atlases: Vec<TextureAtlas>,
     /// Minimally clothed shape with the first pose.
     pub body: AlignedBody,
 }
@@ -103,6 +111,8 @@ pub struct OutfitCapture {
     /// Systems of the outfit's garments, kept from scan to scan.
     fits: Vec<PartFit>,
     solvers: Vec<PenetrationSolver>,
+    /// Image of each atlas, from the scans so far.
+    textures: Vec<GarmentTexture>,
 }
 
 impl OutfitCapture {
@@ -133,6 +143,7 @@ impl OutfitCapture {
             shape_scans: Vec::new(),
             fits: Vec::new(),
             solvers: Vec::new(),
+            textures: Vec::new(),
         })
     }
 
@@ -167,6 +178,17 @@ impl OutfitCapture {
     /// Outfit, once a scan is captured.
     pub fn outfit(&self) -> Option<&CapturedOutfit> {
         self.outfit.as_ref()
+    }
+
+    /// Image of each garment's texture; empty for scans without colours.
+    pub fn textures(&self) -> &[GarmentTexture] {
+        &self.textures
+    }
+
+    /// The same with the images of the scans before.
+    #[must_use]
+    pub fn with_textures(self, textures: Vec<GarmentTexture>) -> Self {
+        Self { textures, ..self }
     }
 
     /// Starts the first scan at a person found before.
@@ -236,6 +258,7 @@ impl OutfitCapture {
         let undressed = self.undresser.run((scan, &covered), worn, body)?;
         self.segmenter.follow(&undressed.body);
         let garments = self.freed(&outfit, &fitted.vertices, &undressed)?;
+        self.paint((scan, &segmented.labels), &outfit, &fitted.vertices);
         let out = FrameCapture {
             labels: segmented.parts(),
             displacements: displacements(
@@ -290,6 +313,29 @@ impl OutfitCapture {
             })
             .collect();
         minimally_clothed(&self.template, &shape_scans)
+    }
+
+    /// Paints what no scan before showed of the garments with the points of their labels.
+    fn paint(
+        &mut self,
+        (scan, labels): (&BodyScan, &[u8]),
+        outfit: &CapturedOutfit,
+        fitted: &[Vec<P3>],
+    ) {
+        if scan.colors.is_empty() {
+            return;
+        }
+        for (k, atlas) in outfit.atlases.iter().enumerate() {
+            let (part, vertices) = (&outfit.cloth.parts[k], &fitted[k]);
+            let colors = &outfit.colors[k];
+            if k == self.textures.len() {
+                self.textures
+                    .push(GarmentTexture::of_vertices(atlas, colors));
+            }
+            let own = |i: usize| labels[i] == part.label;
+            let paint = ScanPaint::new(scan, own, (&part.faces, vertices));
+            paint.apply(&mut self.textures[k], atlas, vertices, colors);
+        }
     }
 
     /// Garments moved out of the undressed body where the fit left them inside, so that retargeting onto it moves nothing.
@@ -356,9 +402,17 @@ impl PartFitter<'_> {
             .parts
             .iter()
             .map(|part| part_colors(part, &segmented.nodes, self.scan));
+        let rest: Vec<Vec<P3>> = rest.collect();
+        let texel = TEXEL * self.scan.color_spacing();
+        let atlases = cloth.parts.iter().zip(&rest);
+        let atlases = atlases.map(|(part, rest)| {
+            TextureAtlas::new(rest, &part.faces, texel.clamp(TEXELS[0], TEXELS[1]))
+        });
+        let is_colored = !self.scan.colors.is_empty();
         let outfit = CapturedOutfit {
-            rest: rest.collect(),
+            atlases: atlases.filter(|_| is_colored).collect(),
             colors: colors.collect(),
+            rest,
             labelling: segmented.labelling.clone(),
             body,
             cloth,

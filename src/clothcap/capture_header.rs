@@ -112,6 +112,9 @@ pub(super) fn check_header(header: &CaptureHeader, template: &Arc<Template>) -> 
     let parts = outfit.cloth.parts.len();
     check_count(outfit.rest.len(), parts, "outfit.rest")?;
     check_count(outfit.colors.len(), parts, "outfit.colors")?;
+    if !outfit.atlases.is_empty() {
+        check_count(outfit.atlases.len(), parts, "outfit.atlases")?;
+    }
     for (k, part) in outfit.cloth.parts.iter().enumerate() {
         check_part(
             part,
@@ -130,6 +133,11 @@ pub(super) fn check_header(header: &CaptureHeader, template: &Arc<Template>) -> 
             &format!("outfit.colors[{k}]"),
         )?;
         check_finite(&outfit.rest[k], &format!("outfit.rest[{k}]"))?;
+        if let Some(atlas) = outfit.atlases.get(k) {
+            let at = |(field, why)| (format!("outfit.atlases[{k}].{field}"), why);
+            let checked = atlas.check(part.nodes.len(), part.faces.len());
+            checked.map_err(at)?;
+        }
     }
     Ok(())
 }

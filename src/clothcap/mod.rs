@@ -22,6 +22,7 @@ mod segmenter;
 mod test_scans;
 #[cfg(test)]
 mod tests;
+pub mod texture;
 pub mod topology;
 pub mod turn;
 mod undress;

@@ -2,6 +2,7 @@
 
 use super::capture::{CapturedOutfit, FrameCapture};
 use super::scan::BodyScan;
+use super::texture::{GarmentTexture, TextureAtlas};
 use super::topology::ClothTemplate;
 use crate::body::Pose;
 use crate::camera::ColorImage;
@@ -35,6 +36,36 @@ pub struct Painted<'a> {
     pub faces: &'a [Face],
     /// Colours, sRGB, shape `[points]`.
     pub colors: &'a [[u8; 3]],
+    /// Texture in place of the colours.
+    pub texture: Option<(&'a TextureAtlas, &'a GarmentTexture)>,
+}
+
+impl<'a> Painted<'a> {
+    /// Garment `k` of an outfit at posed points, with its texture if it has one.
+    pub fn garment(
+        outfit: &'a CapturedOutfit,
+        textures: &'a [GarmentTexture],
+        k: usize,
+        points: &'a [P3],
+    ) -> Self {
+        Self {
+            points,
+            faces: &outfit.cloth.parts[k].faces,
+            colors: &outfit.colors[k],
+            texture: outfit.atlases.get(k).zip(textures.get(k)),
+        }
+    }
+
+    /// Colour at a point of a face, sRGB, 0 to 255.
+    fn color(&self, face: usize, weights: [f32; 3]) -> V3 {
+        match self.texture {
+            Some((atlas, texture)) => texture.sample(atlas, face, weights).into(),
+            None => {
+                let corners = self.faces[face].map(|v| self.colors[v as usize].map(f32::from));
+                (0..3).map(|k| V3::from(corners[k]) * weights[k]).sum()
+            }
+        }
+    }
 }
 
 /// One panel: meshes seen from a direction.
@@ -71,6 +102,7 @@ pub fn stages(
     scan: &BodyScan,
     frame: &FrameCapture,
     outfit: &CapturedOutfit,
+    textures: &[GarmentTexture],
 ) -> ColorImage {
     let (skin_mesh, surface) = (cloth.body().mesh(), cloth.template().mesh());
     let front = heading(&frame.alignment.body.pose);
@@ -82,6 +114,7 @@ pub fn stages(
         points: &scan.points,
         faces: &scan.faces,
         colors,
+        texture: None,
     };
     let captured = if scan.colors.is_empty() {
         &plain
@@ -92,20 +125,17 @@ pub fn stages(
         points: &frame.undressed.vertices,
         faces: skin_mesh.faces(),
         colors: &skin,
+        texture: None,
     };
-    let parts = outfit.cloth.parts.iter().zip(&frame.garments);
-    let garments: Vec<Painted<'_>> = parts
-        .zip(&outfit.colors)
-        .map(|((part, points), colors)| Painted {
-            points,
-            faces: &part.faces,
-            colors,
-        })
+    let garments = frame.garments.iter().enumerate();
+    let garments: Vec<Painted<'_>> = garments
+        .map(|(k, points)| Painted::garment(outfit, textures, k, points))
         .collect();
     let aligned = Painted {
         points: &frame.alignment.surface,
         faces: surface.faces(),
         colors: &grey,
+        texture: None,
     };
     let dressed = [&[body][..], &garments].concat();
     let columns = [
@@ -243,7 +273,7 @@ impl Target<'_> {
                 // Both sides of cloth are lit.
                 let n = if n.z > 0.0 { -n } else { n };
                 let lit = AMBIENT + (1.0 - AMBIENT) * n.dot(&light).max(0.0);
-                let color = sum(&|i| V3::from(mesh.colors[i].map(f32::from)));
+                let color = mesh.color(id as usize, b);
                 let at = (v * w + u) as usize;
                 self.put(at, buffer.depth[at], (color * lit).into());
             }

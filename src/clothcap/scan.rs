@@ -2,6 +2,7 @@
 
 use super::CaptureError;
 use super::floor::{Floor, inner_range};
+use crate::formats::TexturePoint;
 use crate::formats::scan::ScanMesh;
 use crate::math::{P3, V3};
 use crate::mesh::Face;
@@ -150,6 +151,17 @@ pub(super) fn axis_range(points: &[P3], axis: usize, strays: f64) -> [f32; 2] {
     inner_range(finite, strays)
 }
 
+/// Colour of a scan's texture between its points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureColor {
+    /// Place, metres.
+    pub at: P3,
+    /// Nearest corner of its triangle.
+    pub point: u32,
+    /// sRGB.
+    pub color: [u8; 3],
+}
+
 /// A scan: finite points, metres, y up.
 #[derive(Clone, Debug, Default)]
 pub struct BodyScan {
@@ -159,6 +171,8 @@ pub struct BodyScan {
     pub normals: Vec<V3>,
     /// Colours, sRGB, shape `[points]`; empty if absent.
     pub colors: Vec<[u8; 3]>,
+    /// Colours of its texture between the points; empty without one.
+    pub texture: Vec<TextureColor>,
     /// Triangles between kept points.
     pub faces: Vec<Face>,
     /// Point of each row of the file; `u32::MAX` for a row left out. Equal positions share a point.
@@ -245,8 +259,42 @@ impl BodyScan {
             .filter(|f| f.iter().all(|v| *v != u32::MAX))
             .filter(|f| f[0] != f[1] && f[1] != f[2] && f[0] != f[2])
             .collect();
+        scan.texture = scan.texture_of(file);
         scan.find_normals();
         Ok(scan)
+    }
+
+    /// Texture of a file whose points are known.
+    fn texture_of(&self, file: &ScanMesh) -> Vec<TextureColor> {
+        let color = |t: &TexturePoint| {
+            let face = file.faces.get(t.face as usize)?;
+            let corners = face.map(|v| self.point_of_row.get(v as usize).copied());
+            let [a, b, c] = [corners[0]?, corners[1]?, corners[2]?];
+            let place = |p: u32| self.points.get(p as usize).map(|p| p.coords);
+            let [x, y, z] = [place(a)?, place(b)?, place(c)?];
+            let w = t.weights;
+            let corner = if w[0] >= w[1] && w[0] >= w[2] {
+                a
+            } else if w[1] >= w[2] {
+                b
+            } else {
+                c
+            };
+            Some(TextureColor {
+                at: P3::from(x * w[0] + y * w[1] + z * w[2]),
+                point: corner,
+                color: t.color,
+            })
+        };
+        file.texture.iter().filter_map(color).collect()
+    }
+
+    /// Typical distance between its colours, metres: those of the texture, or of the points.
+    pub(super) fn color_spacing(&self) -> f32 {
+        if self.texture.is_empty() {
+            return mean_spacing(&self.points);
+        }
+        mean_spacing(&self.texture.iter().map(|t| t.at).collect::<Vec<_>>())
     }
 
     /// The scan, if it has the points of a person.

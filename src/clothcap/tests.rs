@@ -59,6 +59,24 @@ fn an_outfit_is_captured_and_fits_its_own_body_exactly() {
         assert!(worst < 1e-4, "{worst}");
     }
 
+    // Its textures show the colours of the scan, but for its shades of 15 %.
+    for (texture, wanted) in capture.textures().iter().zip([BLUE, GREY]) {
+        let seen = (0..).zip(texture.image().data().chunks(3));
+        let seen = seen.filter(|(i, _)| texture.is_seen(*i));
+        let (mut sum, mut count) = ([0.0; 3], 0.0);
+        for (_, c) in seen {
+            count += 1.0;
+            (0..3).for_each(|k| sum[k] += f64::from(c[k]));
+        }
+        for (sum, wanted) in sum.iter().zip(wanted) {
+            let mean = sum / count;
+            assert!(
+                (mean - f64::from(wanted)).abs() < 12.0,
+                "{mean} for {wanted}"
+            );
+        }
+    }
+
     // No vertex is inside any of some other bodies.
     for shape in population(&template, 4, 3) {
         let body = template.personalise(&shape);
@@ -82,6 +100,7 @@ fn a_stopped_capture_continues_where_it_ended() {
     let mut whole =
         OutfitCapture::new(template.clone(), CaptureConfig::default()).expect("a capture");
     let first = whole.frame(&scans[0]).expect("captured");
+    let textures = whole.textures().to_vec();
     let second = whole.frame(&scans[1]).expect("captured");
 
     let folder = tempfile::tempdir().expect("a folder");
@@ -95,6 +114,7 @@ fn a_stopped_capture_continues_where_it_ended() {
         clothed: whole.clothed().expect("aligned").clone(),
         scans: vec!["a".into(), "b".into()],
     };
+    archive.write_textures(&textures).expect("written");
     archive.write_header(&header).expect("written");
     let record = FrameRecord {
         scan: "a".into(),
@@ -123,10 +143,17 @@ fn a_stopped_capture_continues_where_it_ended() {
         .header(&template)
         .expect_err("a vertex out of range");
     assert!(refused.to_string().contains("parts[0].nodes"), "{refused}");
+    let mut damaged = header.clone();
+    damaged.outfit.atlases[0].uv[0] = [0.5, 1.5];
+    archive.write_header(&damaged).expect("written");
+    let refused = archive.header(&template).expect_err("beside the image");
+    assert!(refused.to_string().contains("atlases[0].uv"), "{refused}");
+    let textures = archive.textures(&header).expect("readable");
     let state = (header.clothed, record.body);
     let mut resumed =
         OutfitCapture::resume(template, CaptureConfig::default(), header.outfit, state)
-            .expect("a capture");
+            .expect("a capture")
+            .with_textures(textures);
     let again = resumed.frame(&scans[1]).expect("captured");
     assert_eq!(again.labels, second.labels);
     for (a, b) in again.garments.iter().zip(&second.garments) {
@@ -137,6 +164,7 @@ fn a_stopped_capture_continues_where_it_ended() {
             .fold(0.0, f32::max);
         assert!(worst < 1e-5, "{worst}");
     }
+    assert_eq!(resumed.textures(), whole.textures());
 }
 
 #[test]

@@ -115,6 +115,7 @@ fn mesh_of(scan: &TrueScan) -> ScanMesh {
         faces: Vec::new(),
         normals: scan.normals.clone(),
         colors: scan.colors.clone(),
+        texture: Vec::new(),
     }
 }
 
@@ -126,6 +127,7 @@ fn keep(file: &ScanMesh, labels: &[u8], wanted: impl Fn(usize) -> bool) -> (Scan
         normals: rows.iter().map(|i| file.normals[*i]).collect(),
         colors: rows.iter().map(|i| file.colors[*i]).collect(),
         faces: Vec::new(),
+        texture: Vec::new(),
     };
     (mesh, rows.iter().map(|i| labels[*i]).collect())
 }
@@ -414,6 +416,7 @@ fn a_dress_is_one_garment_around_both_legs() {
         faces,
         normals,
         colors,
+        texture: Vec::new(),
     };
     let template = embedded::template();
     let (frame, start) = find_frame(&template, &file).expect("a person");

@@ -536,7 +536,7 @@ pub(crate) struct ClothcapCaptureArgs {
     /// Skips nothing: no point keeps its place from iteration to iteration, no unchanged scan the result of the one before.
     #[arg(long)]
     pub(crate) no_skip: bool,
-    /// Folder for results: capture.json, frames/, pictures/, report.json; of a recording also turn.ply and turn.json.
+    /// Folder for results: capture.json, frames/, textures/, pictures/, report.json; of a recording also turn.ply and turn.json.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
 }

@@ -215,6 +215,7 @@ fn mesh_of(scan: &TrueScan) -> ScanMesh {
         faces: scan.faces.clone(),
         normals: scan.normals.clone(),
         colors: scan.colors.clone(),
+        texture: Vec::new(),
     }
 }
 

@@ -146,6 +146,8 @@ impl CaptureJob {
         }
         let capture = self.capture.as_mut().context("no capture")?;
         let frame = capture.frame(&scan)?;
+        // Before the header, which names them.
+        self.archive.write_textures(capture.textures())?;
         if self.header.is_none() {
             let (outfit, clothed) = (capture.outfit(), capture.clothed());
             let header = CaptureHeader {
@@ -210,12 +212,10 @@ impl CaptureJob {
         let last = self.last.as_ref().map(|r| r.body.clone());
         let clothed = header.clothed.clone();
         let last = last.unwrap_or_else(|| clothed.body.clone());
-        Ok(OutfitCapture::resume(
-            template,
-            config,
-            header.outfit.clone(),
-            (clothed, last),
-        )?)
+        let textures = self.archive.textures(header)?;
+        let capture =
+            OutfitCapture::resume(template, config, header.outfit.clone(), (clothed, last))?;
+        Ok(capture.with_textures(textures))
     }
 
     fn write(
@@ -227,7 +227,8 @@ impl CaptureJob {
     ) -> Result<FrameRecord> {
         let header = self.header.as_ref().context("no header")?;
         let capture = self.capture.as_ref().context("no capture")?;
-        let picture = stages(capture.cloth(), scan, frame, &header.outfit);
+        let textures = capture.textures();
+        let picture = stages(capture.cloth(), scan, frame, &header.outfit, textures);
         write_png_rgb(&out.join(PICTURES).join(format!("{name}.png")), &picture)?;
         let record = FrameRecord {
             scan: name.to_owned(),

@@ -5,6 +5,7 @@ use std::path::Path;
 use tryon::body::{RestBody, SkinWeights};
 use tryon::clothcap::archive::CaptureHeader;
 use tryon::clothcap::picture::part_color;
+use tryon::clothcap::texture::TextureAtlas;
 use tryon::clothcap::topology::ClothTemplate;
 use tryon::clothcap::{DressedPose, unpose};
 use tryon::formats::gltf::{
@@ -17,6 +18,8 @@ use tryon::math::{P3, P3d, V3};
 pub(super) struct DressedMotion<'a> {
     pub(super) surface: &'a ClothTemplate,
     pub(super) header: &'a CaptureHeader,
+    /// PNG file of each garment's texture; empty for captures without.
+    pub(super) textures: &'a [Vec<u8>],
     pub(super) body: &'a RestBody,
     pub(super) frames: &'a [DressedPose],
     /// Time of each frame, seconds.
@@ -32,14 +35,35 @@ struct RestMesh {
     vertices: Vec<P3>,
     /// Displacements of each later frame from the first.
     targets: Vec<Vec<V3>>,
+    /// Colours of the vertices; empty with a texture.
     colors: Vec<[u8; 3]>,
     faces: Vec<[u32; 3]>,
+    uv: Vec<[f32; 2]>,
+    /// PNG file; empty for none.
+    texture: Vec<u8>,
 }
 
 /// Joints and weights of each vertex.
 type SkinRows = (Vec<[u8; 4]>, Vec<[f32; 4]>);
 
 impl RestMesh {
+    /// The mesh over the vertices of an atlas, with its texture in place of colours.
+    fn textured(self, atlas: &TextureAtlas, png: &[u8]) -> Self {
+        fn taken<T: Copy>(all: &[T], atlas: &TextureAtlas) -> Vec<T> {
+            atlas.vertex.iter().map(|v| all[*v as usize]).collect()
+        }
+        Self {
+            nodes: taken(&self.nodes, atlas),
+            vertices: taken(&self.vertices, atlas),
+            targets: self.targets.iter().map(|t| taken(t, atlas)).collect(),
+            colors: Vec::new(),
+            faces: atlas.faces.clone(),
+            uv: atlas.uv.clone(),
+            texture: png.to_vec(),
+            name: self.name,
+        }
+    }
+
     /// Morph targets, named after the scans; the first scan is the mesh itself.
     fn morph_targets<'a>(&'a self, scans: &'a [String]) -> Vec<GlbMorphTarget<'a>> {
         let named = self.targets.iter().enumerate();
@@ -95,8 +119,9 @@ impl DressedMotion<'_> {
                     name: &m.name,
                     vertices: &m.vertices,
                     faces: &m.faces,
-                    uv: &[],
+                    uv: &m.uv,
                     color: [255; 3],
+                    texture: &m.texture,
                 },
                 colors: &m.colors,
                 joints,
@@ -145,7 +170,10 @@ impl DressedMotion<'_> {
             let mut mesh = self.rest_mesh(part.slot.name().into(), nodes, |f| &f.garments[k]);
             mesh.faces.clone_from(&part.faces);
             mesh.colors.clone_from(&outfit.colors[k]);
-            out.push(mesh);
+            out.push(match outfit.atlases.get(k).zip(self.textures.get(k)) {
+                Some((atlas, png)) => mesh.textured(atlas, png),
+                None => mesh,
+            });
         }
         out
     }
@@ -173,6 +201,8 @@ impl DressedMotion<'_> {
             nodes,
             colors: Vec::new(),
             faces: Vec::new(),
+            uv: Vec::new(),
+            texture: Vec::new(),
         }
     }
 }

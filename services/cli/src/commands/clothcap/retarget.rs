@@ -13,8 +13,9 @@ use tryon::clothcap::align::Aligner;
 use tryon::clothcap::archive::{CaptureArchive, CaptureHeader, FrameDisplacements};
 use tryon::clothcap::picture::{Painted, PicturePanel, heading, part_color, sheet};
 use tryon::clothcap::scan::{BodyScan, ScanFrame};
-use tryon::clothcap::{BodyDresser, DressedPose, population};
-use tryon::formats::image::write_png_rgb;
+use tryon::clothcap::texture::GarmentTexture;
+use tryon::clothcap::{BodyDresser, CapturedOutfit, DressedPose, population};
+use tryon::formats::image::{encode_png_rgb, write_png_rgb};
 use tryon::formats::npz::read_smpl;
 use tryon::formats::read_motion;
 use tryon::formats::scan::ScanMesh;
@@ -57,10 +58,15 @@ fn retarget_all(args: &ClothcapRetargetArgs) -> Result<()> {
         !bodies.is_empty(),
         "--shard {index}/{count}: no body is left for this job"
     );
+    let textures = archive.textures(&header)?;
+    let encoded = textures
+        .iter()
+        .map(|t| encode_png_rgb(t.image(), &args.capture));
     let bar = input::progress(Some(bodies.len() as u64), "dressing");
     let mut batch = Batch {
         args,
         header: &header,
+        textures: encoded.collect::<Result<_, _>>()?,
         frames: &frames,
         dresser: BodyDresser::new(template.clone(), &header.outfit.cloth)?,
         bodies: bodies.len(),
@@ -79,7 +85,7 @@ fn retarget_all(args: &ClothcapRetargetArgs) -> Result<()> {
     };
     if !batch.shown.is_empty() {
         let sheet = args.out.join(format!("sheet{suffix}.png"));
-        contact_sheet(&template, &header, &batch.shown, &sheet)?;
+        contact_sheet(&template, &header.outfit, &textures, &batch.shown, &sheet)?;
     }
     let report = json!({
         "capture": args.capture,
@@ -95,6 +101,8 @@ fn retarget_all(args: &ClothcapRetargetArgs) -> Result<()> {
 struct Batch<'a> {
     args: &'a ClothcapRetargetArgs,
     header: &'a CaptureHeader,
+    /// PNG files.
+    textures: Vec<Vec<u8>>,
     frames: &'a CapturedFrames,
     dresser: BodyDresser<'a>,
     bodies: usize,
@@ -126,6 +134,7 @@ impl Batch<'_> {
         let motion = DressedMotion {
             surface: self.dresser.surface(),
             header: self.header,
+            textures: &self.textures,
             body,
             frames: &dressed,
             seconds: &frames.seconds,
@@ -265,29 +274,25 @@ fn other_body(path: &Path, template: &Arc<Template>) -> Result<RestBody> {
 
 fn contact_sheet(
     template: &Template,
-    header: &CaptureHeader,
+    outfit: &CapturedOutfit,
+    textures: &[GarmentTexture],
     shown: &[DressedPose],
     out: &Path,
 ) -> Result<()> {
     let skin = vec![part_color(0); template.mesh().vertices().len()];
+    let body = |points| Painted {
+        points,
+        faces: template.mesh().faces(),
+        colors: &skin,
+        texture: None,
+    };
     let panels: Vec<PicturePanel<'_>> = shown
         .iter()
         .map(|d| {
-            let mut meshes = vec![Painted {
-                points: &d.body,
-                faces: template.mesh().faces(),
-                colors: &skin,
-            }];
-            let parts = header.outfit.cloth.parts.iter().zip(&header.outfit.colors);
-            for ((part, colors), points) in parts.zip(&d.garments) {
-                meshes.push(Painted {
-                    points,
-                    faces: &part.faces,
-                    colors,
-                });
-            }
+            let garments = d.garments.iter().enumerate();
+            let worn = garments.map(|(k, points)| Painted::garment(outfit, textures, k, points));
             PicturePanel {
-                meshes,
+                meshes: std::iter::once(body(&d.body)).chain(worn).collect(),
                 yaw: heading(&d.pose),
             }
         })

@@ -1,0 +1,253 @@
+//! Charts of a surface: connected faces that look along one axis, projected along it without overlap.
+
+use crate::clothcap::face_edges::sides;
+use crate::math::{P3, V3};
+use crate::mesh::{Csr, Face, face_normal};
+use std::collections::BTreeMap;
+
+/// Axes of projection: garments at rest face +z and stand along +y.
+const AXES: [[f32; 3]; 6] = [
+    [0.0, 0.0, 1.0],
+    [0.0, 0.0, -1.0],
+    [1.0, 0.0, 0.0],
+    [-1.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0],
+    [0.0, -1.0, 0.0],
+];
+/// Gain of an axis for each neighbour that has it, beside the cosine to the face's normal: larger values give fewer
+/// charts, with more distortion.
+const NEIGHBOUR: f32 = 0.3;
+/// Least cosine between a face and the axis that it takes from its neighbours: stretches by 3 at most.
+const STEEPEST: f32 = 0.33;
+/// Rounds over all faces.
+const ROUNDS: usize = 8;
+/// Number of faces below which a chart is given to its neighbours where their axes allow it.
+const LEAST_FACES: usize = 24;
+/// Side of a cell of the search for overlaps, metres.
+const CELL: f32 = 0.002;
+
+/// Faces that are projected along one axis.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Chart {
+    /// Faces, ascending.
+    pub(super) faces: Vec<u32>,
+    axis: usize,
+}
+
+impl Chart {
+    /// Coordinates of a point in the chart's plane as seen from outside, metres: rightwards and downwards.
+    pub(super) fn project(&self, p: &P3) -> [f32; 2] {
+        project(self.axis, p)
+    }
+}
+
+fn project(axis: usize, p: &P3) -> [f32; 2] {
+    let out = V3::from(AXES[axis]);
+    let up = match axis {
+        4 => -V3::z(),
+        5 => V3::z(),
+        _ => V3::y(),
+    };
+    [up.cross(&out).dot(&p.coords), -up.dot(&p.coords)]
+}
+
+/// Cuts a surface into charts; every face is in one. Their order depends on nothing but the arguments.
+pub(super) fn charts(vertices: &[P3], faces: &[Face]) -> Vec<Chart> {
+    let around = face_neighbours(faces);
+    let normals: Vec<V3> = faces
+        .iter()
+        .map(|f| face_normal(vertices, f).try_normalize(0.0))
+        .map(|n| n.unwrap_or(V3::z()))
+        .collect();
+    let mut axes = smoothed_axes(&normals, &around);
+    absorb_small(&mut axes, &normals, &around);
+    let mut out = Vec::new();
+    for (axis, faces_of) in components(&axes, &around) {
+        separate(vertices, faces, &around, (axis, faces_of), &mut out);
+    }
+    out
+}
+
+/// Neighbours of each face across its sides.
+fn face_neighbours(faces: &[Face]) -> Csr {
+    let mut of_edge: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
+    for (f, face) in (0..).zip(faces) {
+        for [a, b] in sides(face) {
+            of_edge.entry([a.min(b), a.max(b)]).or_default().push(f);
+        }
+    }
+    let mut pairs = Vec::new();
+    for beside in of_edge.values() {
+        for (i, a) in beside.iter().enumerate() {
+            for b in &beside[i + 1..] {
+                pairs.extend([(*a, *b), (*b, *a)]);
+            }
+        }
+    }
+    Csr::from_pairs(faces.len(), &pairs)
+}
+
+fn cosine(axis: usize, normal: &V3) -> f32 {
+    V3::from(AXES[axis]).dot(normal)
+}
+
+/// Axis of each face: near its normal, and that of its neighbours where it can be (iterated conditional modes).
+fn smoothed_axes(normals: &[V3], around: &Csr) -> Vec<usize> {
+    let best = |score: &dyn Fn(usize) -> f32| {
+        let axes = (0..AXES.len()).map(|a| (score(a), a));
+        let best = axes.reduce(|best, next| if next.0 > best.0 { next } else { best });
+        best.map_or(0, |b| b.1)
+    };
+    let mut axes: Vec<usize> = normals.iter().map(|n| best(&|a| cosine(a, n))).collect();
+    for _ in 0..ROUNDS {
+        for (f, n) in normals.iter().enumerate() {
+            let row = around.row(f);
+            axes[f] = best(&|a| {
+                let cos = cosine(a, n);
+                let alike = row.iter().filter(|g| axes[**g as usize] == a).count();
+                // An axis at a right angle would flatten the face.
+                if cos < STEEPEST {
+                    cos - 2.0
+                } else {
+                    cos + NEIGHBOUR * alike as f32
+                }
+            });
+        }
+    }
+    axes
+}
+
+/// Connected faces of each axis, in the order of their first faces.
+fn components(axes: &[usize], around: &Csr) -> Vec<(usize, Vec<u32>)> {
+    let mut is_taken = vec![false; axes.len()];
+    let mut out = Vec::new();
+    for first in 0..axes.len() {
+        if is_taken[first] {
+            continue;
+        }
+        is_taken[first] = true;
+        let mut own = vec![first as u32];
+        let mut next = 0;
+        while let Some(f) = own.get(next).copied() {
+            next += 1;
+            for g in around.row(f as usize) {
+                let g = *g as usize;
+                if !is_taken[g] && axes[g] == axes[first] {
+                    is_taken[g] = true;
+                    own.push(g as u32);
+                }
+            }
+        }
+        own.sort_unstable();
+        out.push((axes[first], own));
+    }
+    out
+}
+
+/// Gives the faces of small charts to their neighbours.
+fn absorb_small(axes: &mut [usize], normals: &[V3], around: &Csr) {
+    for (own_axis, own) in components(axes, around) {
+        if own.len() >= LEAST_FACES {
+            continue;
+        }
+        for f in own {
+            let f = f as usize;
+            let beside = around.row(f).iter().map(|g| axes[*g as usize]);
+            let other = beside.filter(|a| *a != own_axis && cosine(*a, &normals[f]) > STEEPEST);
+            let best = other.max_by(|a, b| {
+                cosine(*a, &normals[f])
+                    .total_cmp(&cosine(*b, &normals[f]))
+                    .then(b.cmp(a))
+            });
+            axes[f] = best.unwrap_or(own_axis);
+        }
+    }
+}
+
+/// Adds connected faces as a chart; faces that lie over others of it in its plane become charts of their own.
+fn separate(
+    vertices: &[P3],
+    faces: &[Face],
+    around: &Csr,
+    (axis, own): (usize, Vec<u32>),
+    out: &mut Vec<Chart>,
+) {
+    let mut left = own;
+    while !left.is_empty() {
+        let mut cells: BTreeMap<[i32; 2], Vec<[[f32; 2]; 3]>> = BTreeMap::new();
+        let (mut kept, mut over) = (Vec::new(), Vec::new());
+        for f in breadth_first(&left, around) {
+            let t = faces[f as usize].map(|v| project(axis, &vertices[v as usize]));
+            let [low, high] = [f32::min, f32::max].map(|pick: fn(f32, f32) -> f32| {
+                [0, 1]
+                    .map(|k| (pick(pick(t[0][k], t[1][k]), t[2][k]) / (8.0 * CELL)).floor() as i32)
+            });
+            let reached =
+                || (low[0]..=high[0]).flat_map(|x| (low[1]..=high[1]).map(move |y| [x, y]));
+            let is_over = reached().any(|c| {
+                let there = cells.get(&c).into_iter().flatten();
+                there.into_iter().any(|other| overlap(&t, other))
+            });
+            if is_over {
+                over.push(f);
+                continue;
+            }
+            kept.push(f);
+            for c in reached() {
+                cells.entry(c).or_default().push(t);
+            }
+        }
+        kept.sort_unstable();
+        over.sort_unstable();
+        out.push(Chart { faces: kept, axis });
+        left = over;
+    }
+}
+
+/// Faces of a set, neighbours after each other as far as they are connected within it.
+fn breadth_first(set: &[u32], around: &Csr) -> Vec<u32> {
+    let mut order: Vec<u32> = Vec::with_capacity(set.len());
+    let mut is_taken = vec![false; set.len()];
+    for (k, first) in set.iter().enumerate() {
+        if is_taken[k] {
+            continue;
+        }
+        is_taken[k] = true;
+        let mut next = order.len();
+        order.push(*first);
+        while let Some(f) = order.get(next).copied() {
+            next += 1;
+            for g in around.row(f as usize) {
+                if let Ok(at) = set.binary_search(g)
+                    && !is_taken[at]
+                {
+                    is_taken[at] = true;
+                    order.push(*g);
+                }
+            }
+        }
+    }
+    order
+}
+
+/// True if two triangles of one orientation overlap by more than rounding (separating axes).
+fn overlap(a: &[[f32; 2]; 3], b: &[[f32; 2]; 3]) -> bool {
+    /// Depth of an overlap that rounding can make, metres.
+    const ROUNDING: f32 = 1e-5;
+    let separates = |t: &[[f32; 2]; 3], o: &[[f32; 2]; 3]| {
+        (0..3).any(|k| {
+            let (p, q) = (t[k], t[(k + 1) % 3]);
+            let across = [q[1] - p[1], p[0] - q[0]];
+            let length = across[0].hypot(across[1]);
+            if length < ROUNDING {
+                return false;
+            }
+            let side =
+                |r: &[f32; 2]| ((r[0] - p[0]) * across[0] + (r[1] - p[1]) * across[1]) / length;
+            let inner = side(&t[(k + 2) % 3]);
+            // A triangle without an area covers nothing.
+            inner.abs() < ROUNDING || o.iter().all(|r| side(r) * inner.signum() < ROUNDING)
+        })
+    };
+    !separates(a, b) && !separates(b, a)
+}
