@@ -1,6 +1,9 @@
 //! Colour and pattern of fabrics, in sRGB and linear light.
 
+use super::image_pyramid::ImagePyramid;
+use super::srgb::linear;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Colour and surface of a garment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -16,7 +19,7 @@ pub struct Appearance {
 }
 
 /// A fabric's pattern over its texture coordinates.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Print {
     /// One colour.
     Solid,
@@ -46,6 +49,9 @@ pub enum Print {
         /// Colour at 1, sRGB.
         high: [u8; 3],
     },
+    /// An image in place of the base colour. Texture coordinates are metres from its upper left corner, v down.
+    #[serde(skip)]
+    Image(Arc<ImagePyramid>),
 }
 
 impl Default for Appearance {
@@ -59,50 +65,8 @@ impl Default for Appearance {
     }
 }
 
-/// sRGB byte to linear light (IEC 61966-2-1).
-pub(crate) fn linear(c: u8) -> f32 {
-    let c = f32::from(c) / 255.0;
-    if c <= 0.040_45 {
-        c / 12.92
-    } else {
-        ((c + 0.055) / 1.055).powf(2.4)
-    }
-}
-
-/// Steps of the sRGB table: leave less than half a byte of error above black.
-const SRGB_STEPS: usize = 4096;
-
-/// Linear light to sRGB, 0 to 255, by table.
-#[derive(Clone, Debug)]
-pub(crate) struct ToSrgb(Vec<f32>);
-
-impl Default for ToSrgb {
-    fn default() -> Self {
-        let encode = |l: f32| {
-            255.0
-                * if l <= 0.003_130_8 {
-                    12.92 * l
-                } else {
-                    1.055 * l.powf(1.0 / 2.4) - 0.055
-                }
-        };
-        // Indexed by the square root of the light, so that dark tones get as many steps as bright ones.
-        Self(
-            (0..=SRGB_STEPS)
-                .map(|i| encode((i as f32 / SRGB_STEPS as f32).powi(2)))
-                .collect(),
-        )
-    }
-}
-
-impl ToSrgb {
-    pub(crate) fn get(&self, light: f32) -> f32 {
-        self.0[(light.clamp(0.0, 1.0).sqrt() * SRGB_STEPS as f32 + 0.5) as usize]
-    }
-}
-
 /// An appearance in linear light, for the inner loop.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Fabric {
     pub(crate) base: [f32; 3],
     pub(crate) other: [f32; 3],
@@ -140,13 +104,15 @@ impl Fabric {
         let (other, low) = match appearance.pattern {
             Print::Stripes { color, .. } | Print::Check { color, .. } => (color, appearance.base),
             Print::Scale { low, high } => (high, low),
-            Print::Solid | Print::Knit { .. } => (appearance.base, appearance.base),
+            Print::Solid | Print::Knit { .. } | Print::Image(_) => {
+                (appearance.base, appearance.base)
+            }
         };
         Self {
             base: appearance.base.map(linear),
             other: other.map(linear),
             low: low.map(linear),
-            print: appearance.pattern,
+            print: appearance.pattern.clone(),
             gloss: (1.0 - appearance.roughness).clamp(0.0, 1.0),
             metres_per_uv: appearance.metres_per_uv,
         }
@@ -159,14 +125,14 @@ impl Fabric {
             std::array::from_fn(|k| self.base[k] + (self.other[k] - self.base[k]) * t)
         };
         let at = |k: usize, period: f32| uv[k] * self.metres_per_uv / period;
-        match self.print {
+        match &self.print {
             Print::Solid => self.base,
-            Print::Stripes { period, .. } => mix(square_wave(at(1, period), footprint / period)),
-            Print::Check { period, .. } => {
+            &Print::Stripes { period, .. } => mix(square_wave(at(1, period), footprint / period)),
+            &Print::Check { period, .. } => {
                 let w = footprint / period;
                 mix(0.5 * (square_wave(at(0, period), w) + square_wave(at(1, period), w)))
             }
-            Print::Knit { period } => {
+            &Print::Knit { period } => {
                 let groove = knit_groove(
                     at(0, period),
                     at(1, STITCH_HEIGHT * period),
@@ -182,6 +148,7 @@ impl Fabric {
                 };
                 std::array::from_fn(|k| self.base[k] + (to[k] - self.base[k]) * t.min(1.0))
             }
+            Print::Image(image) => image.sample(uv.map(|t| t * self.metres_per_uv), footprint),
         }
     }
 }
@@ -189,14 +156,6 @@ impl Fabric {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn srgb_table_inverts_linear() {
-        let table = ToSrgb::default();
-        for c in 0..=255u8 {
-            assert!((table.get(linear(c)) - f32::from(c)).abs() < 0.5, "{c}");
-        }
-    }
 
     #[test]
     fn scale_interpolates_low_base_high_and_clamps() {

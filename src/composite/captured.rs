@@ -1,7 +1,7 @@
 //! Pass one: the captured picture at the output's size, and the brightness of the room.
 
-use super::appearance::linear;
 use super::input::Input;
+use super::srgb::linear;
 use super::viewport::Viewport;
 use crate::camera::{ColorImage, DepthImage};
 use crate::par::{self, Par};

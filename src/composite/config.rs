@@ -1,6 +1,6 @@
 //! Settings of the compositor; immutable while a session runs.
 
-use super::appearance::ToSrgb;
+use super::srgb::ToSrgb;
 use crate::par::Par;
 use serde::{Deserialize, Serialize};
 

@@ -54,6 +54,7 @@ pub(crate) mod contact_shadow;
 pub(crate) mod coverage;
 mod evidence;
 mod hand;
+mod image_pyramid;
 mod input;
 mod limbs;
 mod matte;
@@ -62,6 +63,7 @@ mod render;
 mod report;
 pub(crate) mod shading;
 mod skin;
+pub(crate) mod srgb;
 mod state;
 pub(crate) mod surface;
 #[cfg(test)]
@@ -72,6 +74,7 @@ mod workspace;
 
 pub use appearance::{Appearance, Print};
 pub use config::{Config, Framing, Lights, Margins, Model};
+pub use image_pyramid::ImagePyramid;
 pub use input::{BodyView, GarmentView, Input, RenderError};
 pub use limbs::Limbs;
 pub use render::render;

@@ -1,7 +1,7 @@
 //! Light on cloth: hemisphere light, one key lamp, openness of folds, the inner side.
 
-use super::appearance::ToSrgb;
 use super::config::Lights;
+use super::srgb::ToSrgb;
 use super::surface::Surface;
 use crate::camera::Intrinsics;
 use crate::math::V3;

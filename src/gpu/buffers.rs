@@ -1,5 +1,6 @@
 //! Data uploaded for each picture. Layouts are those of `garments.wgsl`; padding has a name.
 
+use crate::composite::ImagePyramid;
 use crate::composite::appearance::{Fabric, Print};
 use crate::composite::area::{Area, NEAR};
 use crate::composite::contact_shadow::{ContactShadows, NO_SHADOW, SHADOW_DEPTH};
@@ -8,6 +9,7 @@ use crate::composite::shading::Shader;
 use crate::composite::surface::Surface;
 use crate::composite::viewport::Viewport;
 use bytemuck::{Pod, Zeroable};
+use std::sync::Arc;
 
 /// `Scene` of the shader.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -65,29 +67,47 @@ pub(super) struct FabricData {
     base: [f32; 4],
     other: [f32; 4],
     pattern: [f32; 4],
+    /// First texel, columns, rows and levels of an image.
+    image: [u32; 4],
 }
 
-impl From<&Fabric> for FabricData {
-    fn from(f: &Fabric) -> Self {
-        let pattern = match f.print {
+impl FabricData {
+    /// A fabric whose image, if it has one, starts at texel `first`.
+    fn new(f: &Fabric, first: u32) -> Self {
+        let mut image = [0; 4];
+        let pattern = match &f.print {
             Print::Solid => [0.0, 1.0, 0.0, 0.0],
-            Print::Stripes { period, .. } => [1.0, period, 0.0, 0.0],
-            Print::Check { period, .. } => [2.0, period, 0.0, 0.0],
-            Print::Knit { period } => [3.0, period, 0.0, 0.0],
+            &Print::Stripes { period, .. } => [1.0, period, 0.0, 0.0],
+            &Print::Check { period, .. } => [2.0, period, 0.0, 0.0],
+            &Print::Knit { period } => [3.0, period, 0.0, 0.0],
             Print::Scale { .. } => [4.0, f.low[0], f.low[1], f.low[2]],
+            Print::Image(pyramid) => {
+                let [width, height, levels] = pyramid.shape();
+                image = [first, width, height, levels];
+                [5.0, pyramid.metres_per_texel(), 0.0, 0.0]
+            }
         };
         Self {
             base: [f.base[0], f.base[1], f.base[2], f.gloss],
             other: [f.other[0], f.other[1], f.other[2], f.metres_per_uv],
             pattern,
+            image,
         }
     }
+}
+
+/// Images of the fabrics of a surface.
+pub(super) fn images(surface: &Surface) -> impl Iterator<Item = &Arc<ImagePyramid>> {
+    surface.fabrics.iter().filter_map(|f| match &f.print {
+        Print::Image(pyramid) => Some(pyramid),
+        _ => None,
+    })
 }
 
 /// Flag of an owner seen from inside, above the garment's number.
 const INNER: u32 = 256;
 
-/// Bytes of the five storage buffers, in the order of their bindings.
+/// Bytes of the storage buffers of the geometry, in the order of their bindings.
 pub(super) fn geometry(surface: &Surface) -> [Vec<u8>; 5] {
     let points: Vec<[f32; 4]> = surface
         .vertices
@@ -100,7 +120,18 @@ pub(super) fn geometry(surface: &Surface) -> [Vec<u8>; 5] {
         .zip(&surface.inner)
         .map(|(g, i)| u32::from(*g) + u32::from(*i) * INNER)
         .collect();
-    let fabrics: Vec<FabricData> = surface.fabrics.iter().map(FabricData::from).collect();
+    let mut first = 0;
+    let fabrics: Vec<FabricData> = surface
+        .fabrics
+        .iter()
+        .map(|f| {
+            let data = FabricData::new(f, first);
+            if let Print::Image(pyramid) = &f.print {
+                first += pyramid.texels().len() as u32;
+            }
+            data
+        })
+        .collect();
     [
         bytemuck::cast_slice(&points).to_vec(),
         bytemuck::cast_slice(&surface.faces).to_vec(),

@@ -25,8 +25,11 @@ struct Fabric {
     base: vec4f,
     // Second colour; metres per unit of texture coordinate.
     other: vec4f,
-    // Kind (0 solid, 1 stripes, 2 check, 3 knit), period (metres), unused. Kind 4, a scale: third colour.
+    // Kind (0 solid, 1 stripes, 2 check, 3 knit), period (metres), unused. Kind 4, a scale: third colour. Kind 5, an
+    // image: metres per texel.
     pattern: vec4f,
+    // First texel, columns, rows and levels of an image.
+    image: vec4u,
 }
 
 struct Attribute {
@@ -43,6 +46,8 @@ struct Attribute {
 @group(0) @binding(3) var<storage, read> owners: array<u32>;
 @group(0) @binding(4) var<storage, read> attributes: array<Attribute>;
 @group(0) @binding(5) var<storage, read> fabrics: array<Fabric>;
+// sRGB, 0xBBGGRR, level by level, row by row.
+@group(0) @binding(6) var<storage, read> texels: array<u32>;
 @group(1) @binding(0) var faces: texture_2d<u32>;
 @group(1) @binding(1) var depths: texture_depth_2d;
 @group(2) @binding(0) var pixels: texture_2d<u32>;
@@ -128,12 +133,39 @@ fn square_wave(x: f32, width: f32) -> f32 {
     return (wave_integral(x + 0.5 * w) - wave_integral(x - 0.5 * w)) / w;
 }
 
+fn linear_texel(index: u32) -> vec3f {
+    let c = unpack4x8unorm(texels[index]).xyz;
+    return select(pow((c + 0.055) / 1.055, vec3f(2.4)), c / 12.92, c <= vec3f(0.04045));
+}
+
+fn image_at(f: Fabric, at: vec2f, footprint: f32) -> vec3f {
+    let octave = log2(max(footprint / f.pattern.y, 1.0));
+    let level = min(u32(octave + 0.5), f.image.w - 1u);
+    var first = f.image.x;
+    var size = f.image.yz;
+    for (var k = 0u; k < level; k++) {
+        first += size.x * size.y;
+        size = (size + 1u) / 2u;
+    }
+    let metres = f.pattern.y * f32(1u << level);
+    let p = clamp(at / metres - 0.5, vec2f(0.0), vec2f(size - 1u));
+    let low = vec2u(p);
+    let high = min(low + 1u, size - 1u);
+    let w = p - floor(p);
+    let top = mix(linear_texel(first + low.y * size.x + low.x), linear_texel(first + low.y * size.x + high.x), w.x);
+    let bottom = mix(linear_texel(first + high.y * size.x + low.x), linear_texel(first + high.y * size.x + high.x), w.x);
+    return mix(top, bottom, w.y);
+}
+
 fn albedo(f: Fabric, uv: vec2f, footprint: f32) -> vec3f {
     if f.pattern.x == 4.0 {
         if uv.x < 0.0 {
             return mix(f.base.xyz, f.pattern.yzw, min(-uv.x, 1.0));
         }
         return mix(f.base.xyz, f.other.xyz, min(uv.x, 1.0));
+    }
+    if f.pattern.x == 5.0 {
+        return image_at(f, uv * f.other.w, footprint);
     }
     let period = f.pattern.y;
     let m = uv * f.other.w / period;

@@ -5,8 +5,8 @@ use wgpu::{BindingType, BufferBindingType, ShaderStages, TextureSampleType};
 
 /// Source of the shaders.
 pub(super) const SHADERS: &str = include_str!("garments.wgsl");
-/// Storage buffers of the geometry group: vertices, faces, owners, attributes, fabrics.
-pub(super) const STORAGE_BUFFERS: u32 = 5;
+/// Storage buffers of the geometry group: vertices, faces, owners, attributes, fabrics, texels.
+pub(super) const STORAGE_BUFFERS: u32 = 6;
 
 /// Compiled passes and the layouts of their bind groups.
 #[derive(Debug)]

@@ -1,7 +1,7 @@
 //! [`crate::composite::render`] on a graphics card.
 
 use super::adapter::{AdapterReport, GpuError, found, report};
-use super::buffers::{SceneData, geometry, shadow_texels};
+use super::buffers::{SceneData, geometry, images, shadow_texels};
 use super::passes::Passes;
 use super::pipelines::{Pipelines, STORAGE_BUFFERS};
 use super::readback::{COVERAGE_BYTES, fetch, unpack};
@@ -11,8 +11,10 @@ use crate::composite::area::Area;
 use crate::composite::captured_depth::AreaDepth;
 use crate::composite::composition::Composition;
 use crate::composite::shading::Shader;
+use crate::composite::surface::Surface;
 use crate::composite::{
-    Appearance, GarmentView, Input, Model, RenderError, RenderReport, State, Workspace,
+    Appearance, GarmentView, ImagePyramid, Input, Model, RenderError, RenderReport, State,
+    Workspace,
 };
 use crate::math::P3;
 use std::sync::{Arc, Mutex};
@@ -30,6 +32,8 @@ pub struct Renderer {
     scene: wgpu::Buffer,
     storage: Vec<wgpu::Buffer>,
     targets: Option<Targets>,
+    /// Images in the last storage buffer.
+    images: Vec<Arc<ImagePyramid>>,
     failure: Failure,
 }
 
@@ -80,6 +84,7 @@ impl Renderer {
             device,
             queue,
             targets: None,
+            images: Vec::new(),
             failure,
         };
         renderer.warm_up().map_err(|e| refused(e.to_string()))?;
@@ -169,12 +174,36 @@ impl Renderer {
         let data = SceneData::new(viewport, area, samples, config.inner_bias, &shader);
         self.queue
             .write_buffer(&self.scene, 0, bytemuck::bytes_of(&data));
-        for (slot, bytes) in self.storage.iter_mut().zip(geometry(&work.surface)) {
-            if slot.size() < bytes.len() as u64 {
-                *slot = storage_buffer(&self.device, bytes.len().next_power_of_two() as u64);
-            }
-            self.queue.write_buffer(slot, 0, &bytes);
+        for (slot, bytes) in geometry(&work.surface).iter().enumerate() {
+            self.store(slot, bytes);
         }
+        self.upload_images(&work.surface);
+    }
+
+    /// Uploads the images of the fabrics unless they are those of the last picture.
+    fn upload_images(&mut self, surface: &Surface) {
+        let is_same = |(a, b): (&Arc<ImagePyramid>, &Arc<ImagePyramid>)| Arc::ptr_eq(a, b);
+        let count = images(surface).count();
+        if count == self.images.len() && images(surface).zip(&self.images).all(is_same) {
+            return;
+        }
+        self.images = images(surface).cloned().collect();
+        let texels: Vec<u32> = self
+            .images
+            .iter()
+            .flat_map(|i| i.texels())
+            .copied()
+            .collect();
+        self.store(self.storage.len() - 1, bytemuck::cast_slice(&texels));
+    }
+
+    /// Writes a storage buffer, a larger one where it has to be.
+    fn store(&mut self, slot: usize, bytes: &[u8]) {
+        let buffer = &mut self.storage[slot];
+        if buffer.size() < bytes.len() as u64 {
+            *buffer = storage_buffer(&self.device, bytes.len().next_power_of_two() as u64);
+        }
+        self.queue.write_buffer(buffer, 0, bytes);
     }
 
     /// The targets of the last picture if they fit, else new ones.
@@ -283,6 +312,7 @@ mod tests {
     use super::*;
     use crate::composite::tests::fixture::{RED, SKIN, Scenery, draw};
     use crate::composite::{Config, Print};
+    use crate::garment::FabricImage;
 
     /// An adapter, or a loud skip; an error when everything is required.
     fn renderer() -> Option<Renderer> {
@@ -297,6 +327,12 @@ mod tests {
                 None
             }
         }
+    }
+
+    /// Image of 256 × 128 pixels that changes smoothly.
+    fn gradient() -> ColorImage {
+        let pixel = |i: u32| [(i % 256) as u8, (i / 128) as u8, 128];
+        ColorImage::new(256, 128, (0..256 * 128).flat_map(pixel).collect()).expect("sizes")
     }
 
     fn draw_on(
@@ -331,9 +367,13 @@ mod tests {
                 low: [58, 104, 190],
                 high: [206, 58, 48],
             },
+            Print::Image(Arc::new(ImagePyramid::new(&FabricImage {
+                pixels: gradient(),
+                metres_per_pixel: 0.02,
+            }))),
         ];
         for (k, print) in prints.into_iter().enumerate() {
-            scenery.appearance.pattern = print;
+            scenery.appearance.pattern = print.clone();
             scenery.appearance.roughness = 0.3 * k as f32;
             for output in [None, Some([500, 300])] {
                 let model = Model::new(Config {

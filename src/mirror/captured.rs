@@ -5,11 +5,13 @@ use crate::clothcap::archive::{CaptureArchive, CaptureHeader, FrameDisplacements
 use crate::clothcap::multi::ClothPart;
 use crate::clothcap::retarget::on_body;
 use crate::clothcap::segment::Slot;
+use crate::clothcap::texture::{GarmentTexture, Texel, TextureAtlas};
 use crate::clothcap::topology::ClothTemplate;
 use crate::dressing::{MeshGarment, MeshGarmentError, SourceBody};
 use crate::formats::FormatError;
-use crate::garment::Material;
-use crate::math::P3;
+use crate::garment::{FabricImage, Material, RenderMesh};
+use crate::math::{P3, V3};
+use crate::spatial::{Bvh, SurfacePoint};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -19,6 +21,8 @@ use std::sync::Arc;
 pub struct CapturedWardrobe {
     header: CaptureHeader,
     displacements: FrameDisplacements,
+    /// Textures of the parts; empty for captures without.
+    textures: Vec<GarmentTexture>,
     body: SourceBody,
     /// Vertices of the clothed template on the body, metres, shape `[vertices]`.
     surface: Vec<P3>,
@@ -60,6 +64,7 @@ impl CapturedWardrobe {
         Ok(Self {
             names: names(&header.outfit.cloth.parts),
             body: SourceBody::of_template(Arc::new(body)),
+            textures: archive.textures(&header)?,
             header,
             displacements,
             surface,
@@ -96,7 +101,66 @@ impl CapturedWardrobe {
         let made = MeshGarment::on_body(name, mesh, self.body.clone(), material, edge)?;
         let mut garment = made.in_layer(layer(part.slot));
         garment.color = color(part, &outfit.colors[k]);
-        Ok(garment)
+        let texture = outfit.atlases.get(k).zip(self.textures.get(k));
+        Ok(match texture {
+            Some((atlas, texture)) => {
+                let captured = CapturedSurface {
+                    bvh: Bvh::new(&part.faces, &vertices),
+                    vertices: &vertices,
+                    atlas,
+                    texture,
+                };
+                captured.paint(garment)
+            }
+            None => garment,
+        })
+    }
+}
+
+/// Textured surface of a captured part on its subject's body.
+struct CapturedSurface<'a> {
+    bvh: Bvh,
+    /// Metres, shape `[vertices]`.
+    vertices: &'a [P3],
+    atlas: &'a TextureAtlas,
+    texture: &'a GarmentTexture,
+}
+
+impl CapturedSurface<'_> {
+    /// Paints a garment made from this surface, whose triangles are others, with the colours at its nearest points.
+    fn paint(&self, garment: MeshGarment) -> MeshGarment {
+        let (x, faces) = garment.surface();
+        let texel = self.atlas.size.texel;
+        let atlas = TextureAtlas::new(&x, &faces, texel);
+        let painted = GarmentTexture::filled(&atlas, |f, texels| {
+            let corners = faces[f].map(|v| x[v as usize].coords);
+            let mut near = None;
+            let color = |t: &Texel| {
+                let at: V3 = (0..3).map(|k| corners[k] * t.weights[k]).sum();
+                let found = self.bvh.closest_near(self.vertices, &P3::from(at), near);
+                near = found.map(|f| f.face);
+                let color = |f: SurfacePoint| {
+                    let face = f.face as usize;
+                    self.texture.sample(self.atlas, face, f.weights)
+                };
+                found.map_or([0.0; 3], color)
+            };
+            texels.iter().map(color).collect()
+        });
+        let size = atlas.size;
+        let metres = [size.width, size.height].map(|n| n as f32 * size.texel);
+        let drawn = RenderMesh {
+            uv: (atlas.uv.iter())
+                .map(|t| [t[0] * metres[0], t[1] * metres[1]])
+                .collect(),
+            vertex: atlas.vertex,
+            faces: atlas.faces,
+        };
+        let image = FabricImage {
+            pixels: painted.image().clone(),
+            metres_per_pixel: size.texel,
+        };
+        garment.with_image(image, &drawn)
     }
 }
 

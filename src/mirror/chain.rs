@@ -11,7 +11,7 @@ use crate::body::measure::measure;
 use crate::body::{BodyShape, Pose, Template};
 use crate::camera::{Calibration, ColorImage, RgbdFrame};
 use crate::cloth;
-use crate::composite::{self, Appearance, RenderReport};
+use crate::composite::{self, Appearance, ImagePyramid, Print, RenderReport};
 use crate::math::P3;
 use crate::tracking::{self, Status, TrackerConfig, TrackerModel, TrackerState};
 use std::sync::Arc;
@@ -157,6 +157,9 @@ impl Mirror {
             let source = outfit.source(k).map(|s| &outfit.worn()[s]);
             source.map_or_else(Appearance::default, |garment| Appearance {
                 base: garment.color(),
+                pattern: garment.image().map_or(Print::Solid, |image| {
+                    Print::Image(Arc::new(ImagePyramid::new(image)))
+                }),
                 ..Appearance::default()
             })
         };
@@ -199,6 +202,7 @@ impl Mirror {
                 .map(|(mesh, appearance)| DrawnSurface {
                     faces: &mesh.render.faces,
                     uv: &mesh.render.uv,
+                    vertex: &mesh.render.vertex,
                     appearance,
                 })
         });

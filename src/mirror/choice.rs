@@ -2,7 +2,7 @@
 
 use crate::body::measure::Measurements;
 use crate::dressing::{FinishedGarment, GarmentSource, MeshGarment, suggest};
-use crate::garment::{GarmentError, Pattern, Size, library};
+use crate::garment::{FabricImage, GarmentError, Pattern, Size, library};
 use std::sync::Arc;
 
 /// One garment chosen for a person.
@@ -138,6 +138,14 @@ impl SizedGarment {
             WornItem::Mesh(m) => m.color,
         };
         own.unwrap_or_else(|| library::dye(self.name()))
+    }
+
+    /// Image that it shows unless another colour is chosen.
+    pub fn image(&self) -> Option<&Arc<FabricImage>> {
+        match &self.item {
+            WornItem::Pattern(_) => None,
+            WornItem::Mesh(m) => m.image.as_ref(),
+        }
     }
 
     pub(super) fn wear(&self) -> GarmentSource<'_> {

@@ -2,11 +2,11 @@
 
 use crate::body::Template;
 use crate::cloth::{Config, collision_model};
-use crate::composite::{Appearance, BodyView, GarmentView, Limbs};
+use crate::composite::{Appearance, BodyView, GarmentView, Limbs, Print};
 use crate::contact::{CollisionBody, CollisionModel, CollisionWorkspace};
 use crate::garment::library;
-use crate::math::{Camera, P3, Rigid, World};
-use crate::mesh::Face;
+use crate::math::{Camera, P3, Rigid, V3, World};
+use crate::mesh::{Face, face_normal};
 use std::sync::Arc;
 
 /// Appearance of a garment of the library; of other names that of its first garment.
@@ -24,14 +24,39 @@ pub struct DrawnSurface<'a> {
     pub faces: &'a [Face],
     /// Texture coordinates, shape `[n]`.
     pub uv: &'a [[f32; 2]],
+    /// Simulated vertex under each drawn one, shape `[n]`.
+    pub vertex: &'a [u32],
     /// Colour and surface of the fabric.
     pub appearance: &'a Appearance,
+}
+
+impl DrawnSurface<'_> {
+    /// Unit normals that drawn vertices over one simulated vertex share, so that charts of an image show no seams. None for
+    /// other patterns: panels do have seams.
+    fn shared_normals(&self, positions: &[P3], sums: &mut Vec<V3>, out: &mut Vec<V3>) {
+        out.clear();
+        if !matches!(self.appearance.pattern, Print::Image(_)) {
+            return;
+        }
+        let count = self.vertex.iter().max().map_or(0, |v| *v as usize + 1);
+        sums.clear();
+        sums.resize(count, V3::zeros());
+        for f in self.faces {
+            let n = face_normal(positions, f);
+            let corners = f.map(|v| self.vertex[v as usize] as usize);
+            corners.into_iter().for_each(|v| sums[v] += n);
+        }
+        let unit = |v: &u32| sums[*v as usize].try_normalize(0.0);
+        out.extend(self.vertex.iter().map(|v| unit(v).unwrap_or_default()));
+    }
 }
 
 /// Garment vertices in the camera frame, in buffers that are kept from frame to frame.
 #[derive(Debug, Default)]
 pub struct CameraGarments {
     vertices: Vec<Vec<P3>>,
+    normals: Vec<Vec<V3>>,
+    sums: Vec<V3>,
 }
 
 impl CameraGarments {
@@ -42,6 +67,7 @@ impl CameraGarments {
         world: impl ExactSizeIterator<Item = &'a [P3]>,
     ) {
         self.vertices.resize_with(world.len(), Vec::new);
+        self.normals.resize_with(world.len(), Vec::new);
         for (positions, out) in world.zip(&mut self.vertices) {
             camera_from_world.points_f32(positions, out);
         }
@@ -49,15 +75,21 @@ impl CameraGarments {
 
     /// Views of the placed garments, each with its surface.
     pub fn views<'a>(
-        &'a self,
+        &'a mut self,
         surfaces: impl IntoIterator<Item = DrawnSurface<'a>>,
     ) -> Vec<GarmentView<'a>> {
-        (self.vertices.iter().zip(surfaces))
-            .map(|(vertices, surface)| GarmentView {
+        let surfaces: Vec<DrawnSurface<'_>> = surfaces.into_iter().collect();
+        for ((positions, normals), surface) in
+            self.vertices.iter().zip(&mut self.normals).zip(&surfaces)
+        {
+            surface.shared_normals(positions, &mut self.sums, normals);
+        }
+        (self.vertices.iter().zip(&self.normals).zip(surfaces))
+            .map(|((vertices, normals), surface)| GarmentView {
                 vertices,
                 faces: surface.faces,
                 uv: surface.uv,
-                normals: &[],
+                normals,
                 appearance: surface.appearance,
             })
             .collect()

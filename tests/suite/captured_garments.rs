@@ -28,6 +28,7 @@ fn capture(folder: &Path) {
         faces: Vec::new(),
         normals: scan.normals,
         colors: scan.colors,
+        texture: Vec::new(),
     };
     let (frame, start) = find_frame(&template, &file).expect("a person");
     let labels = LabelConfig {
@@ -51,6 +52,7 @@ fn capture(folder: &Path) {
         clothed: job.clothed().expect("a template").clone(),
         scans: vec!["first".into()],
     };
+    archive.write_textures(job.textures()).expect("written");
     archive.write_header(&header).expect("written");
     let record = FrameRecord {
         scan: "first".into(),
@@ -87,6 +89,21 @@ fn worn_on(coefficients: &[f64], captured: &CapturedWardrobe) -> Vec<Size> {
     assert_eq!(d.report.crossings, 0);
     assert!(d.report.p99_strain < 0.15, "{}", d.report.p99_strain);
     assert!(d.report.penetration < 0.005, "{}", d.report.penetration);
+
+    // Each is drawn with an image that holds all of its texture coordinates.
+    for worn in &d.model.outfit.garments {
+        let garment = garments.iter().find(|g| g.name == worn.name);
+        let garment = garment.expect("known by its name");
+        let image = garment.image.as_ref().expect("an image");
+        let size = [image.pixels.width(), image.pixels.height()];
+        let size = size.map(|n| n as f32 * image.metres_per_pixel);
+        let inside = |t: &[f32; 2]| (0..2).all(|k| (0.0..=size[k]).contains(&t[k]));
+        assert!(worn.render.uv.iter().all(inside));
+        assert_eq!(worn.render.faces.len(), worn.faces.len());
+        for (drawn, own) in worn.render.faces.iter().zip(&worn.faces) {
+            assert_eq!(drawn.map(|v| worn.render.vertex[v as usize]), *own);
+        }
+    }
 
     let mut probe = FitProbe::new(&template, &d.model).expect("a probe");
     let body = d.state.collision_body().vertices().to_vec();

@@ -4,6 +4,7 @@ mod anchors;
 mod classifier;
 mod grading;
 mod layers;
+mod painting;
 mod piece;
 mod read;
 mod sizing;

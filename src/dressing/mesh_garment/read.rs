@@ -16,7 +16,7 @@ use crate::dressing::suggest::Suggestion;
 use crate::formats::obj::ObjMesh;
 use crate::formats::sewn_obj::SewnObj;
 use crate::garment::import::{read_mesh, split};
-use crate::garment::{GarmentError, GarmentKind, GarmentMesh, Material, Size};
+use crate::garment::{FabricImage, GarmentError, GarmentKind, GarmentMesh, Material, Size};
 use crate::math::P3;
 use crate::mesh::TriMesh;
 use std::path::Path;
@@ -31,9 +31,11 @@ pub struct MeshGarment {
     pub notes: Vec<String>,
     /// Colour, sRGB; `None` where nobody said.
     pub color: Option<[u8; 3]>,
+    /// Image in place of the colour, for texture coordinates of its drawn meshes; see [`MeshGarment::with_image`].
+    pub image: Option<Arc<FabricImage>>,
     source: Arc<Template>,
     /// Innermost first.
-    pieces: Vec<GarmentPiece>,
+    pub(super) pieces: Vec<GarmentPiece>,
     /// Order on the body; `None` for that of its kind.
     layer: Option<u8>,
     /// Absent for a garment on a guessed body, and for one without cloth.
@@ -139,6 +141,7 @@ impl MeshGarment {
             name: name.to_owned(),
             notes,
             color: None,
+            image: None,
             source: source.template.clone(),
             pieces,
             layer: None,
