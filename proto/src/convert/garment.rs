@@ -2,14 +2,23 @@
 
 use super::{WireError, bulk, required};
 use crate::v1;
+use std::path::Path;
 use std::sync::Arc;
+use tryon::formats::image::{decode_color, encode_jpeg, encode_png_rgb};
 use tryon::formats::{FormatError, PositionCoder};
+use tryon::garment::FabricImage;
 use tryon::math::P3;
 use tryon::mesh::Face;
 
 const MAX_VERTICES: u32 = 262_144;
 const MAX_FACES: u32 = 524_288;
 const MAX_DRAWN: u32 = 524_288;
+/// Largest image of a texture, bytes: eight of them fit a message of 16 MiB only as JPEG.
+const MAX_TEXTURE_BYTES: usize = 4 << 20;
+/// Longest side of an image, pixels.
+const MAX_TEXTURE_SIDE: u32 = 2048;
+/// Quality of an image that is too large without loss.
+const JPEG_QUALITY: u8 = 90;
 /// Most garments worn at once.
 pub const MAX_GARMENTS: usize = 8;
 
@@ -30,6 +39,15 @@ pub struct WornGarment {
     pub uvs: Vec<[f32; 2]>,
     /// Colours and pattern.
     pub look: v1::GarmentLook,
+    /// Image in place of the colours.
+    pub image: Option<Arc<WornImage>>,
+}
+
+/// Image of a worn garment, encoded once for all readers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WornImage {
+    image: FabricImage,
+    wire: v1::GarmentTexture,
 }
 
 impl WornGarment {
@@ -41,6 +59,65 @@ impl WornGarment {
             .map(|f| f.map(|i| self.drawn[i as usize]))
             .collect();
         PositionCoder::new(self.vertices, &faces)
+    }
+}
+
+impl WornImage {
+    /// Encodes an image: PNG, without loss, or JPEG where that is too large.
+    ///
+    /// # Errors
+    /// An image that is too large for both, or has no size.
+    pub fn new(image: FabricImage) -> Result<Self, WireError> {
+        let field = "garment_topology.texture.image";
+        let encoded = encode_png_rgb(&image.pixels, Path::new(field));
+        let fits = |bytes: &Vec<u8>| bytes.len() <= MAX_TEXTURE_BYTES;
+        let bytes = match encoded {
+            Ok(bytes) if fits(&bytes) => Ok(bytes),
+            _ => encode_jpeg(&image.pixels, JPEG_QUALITY),
+        };
+        let bytes = bytes.map_err(|e| WireError::new(field, e.to_string()))?;
+        if !fits(&bytes) {
+            return Err(WireError::new(field, too_large(bytes.len())));
+        }
+        let wire = v1::GarmentTexture {
+            image: bytes.into(),
+            metres_per_pixel: image.metres_per_pixel,
+        };
+        Ok(Self { image, wire })
+    }
+
+    /// Pixels and their size.
+    pub fn image(&self) -> &FabricImage {
+        &self.image
+    }
+
+    fn from_wire(t: &v1::GarmentTexture) -> Result<Self, WireError> {
+        let fault = |field: &str, why: String| {
+            let field = format!("garment_topology.texture.{field}");
+            Err(WireError::new(field, why))
+        };
+        if t.image.len() > MAX_TEXTURE_BYTES {
+            return fault("image", too_large(t.image.len()));
+        }
+        if !(t.metres_per_pixel.is_finite() && t.metres_per_pixel > 0.0) {
+            return fault("metres_per_pixel", "must be positive".into());
+        }
+        let pixels = match decode_color(&t.image, Path::new("texture")) {
+            Ok(pixels) => pixels,
+            Err(e) => return fault("image", e.to_string()),
+        };
+        let (w, h) = (pixels.width(), pixels.height());
+        if w.max(h) > MAX_TEXTURE_SIDE {
+            return fault("image", format!("{w}×{h}, at most {MAX_TEXTURE_SIDE}"));
+        }
+        let image = FabricImage {
+            pixels,
+            metres_per_pixel: t.metres_per_pixel,
+        };
+        Ok(Self {
+            image,
+            wire: t.clone(),
+        })
     }
 }
 
@@ -56,7 +133,12 @@ pub fn topology_to_wire(g: &WornGarment) -> v1::GarmentTopology {
         look: Some(g.look),
         drawn_count: g.drawn.len() as u32,
         drawn: bulk::write_flat(&g.drawn),
+        texture: g.image.as_ref().map(|i| i.wire.clone()),
     }
+}
+
+fn too_large(bytes: usize) -> String {
+    format!("{bytes} bytes, at most {MAX_TEXTURE_BYTES}")
 }
 
 /// Topology with consistent sizes.
@@ -86,12 +168,14 @@ pub fn topology_from_wire(t: &v1::GarmentTopology) -> Result<WornGarment, WireEr
         let why = format!("{}, but there are {vertices} vertices", drawn[i]);
         return Err(WireError::new(format!("garment_topology.drawn[{i}]"), why));
     }
+    let image = t.texture.as_ref().map(WornImage::from_wire);
     Ok(WornGarment {
         garment: t.garment.clone(),
         size: t.size.clone(),
         vertices,
         faces: bulk::faces("garment_topology.faces", m, k, &t.faces)?,
         uvs: bulk::read("garment_topology.uvs", k, &t.uvs)?,
+        image: image.transpose()?.map(Arc::new),
         drawn,
         look,
     })
@@ -203,6 +287,7 @@ impl GarmentReader {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tryon::camera::ColorImage;
 
     /// Two triangles of two panels that share a seam: four simulated vertices, six drawn ones.
     fn flag() -> WornGarment {
@@ -226,6 +311,7 @@ mod tests {
                 [5.0, 1.0],
             ],
             look,
+            image: None,
         }
     }
 
@@ -277,6 +363,32 @@ mod tests {
                 .expect("nothing worn")
                 .is_empty()
         );
+    }
+
+    #[test]
+    fn images_arrive_without_loss_and_faults_name_the_field() {
+        let pixels = (0..64 * 32u32 * 3).map(|i| (i * 7 % 251) as u8).collect();
+        let image = FabricImage {
+            pixels: ColorImage::new(64, 32, pixels).expect("sizes"),
+            metres_per_pixel: 0.002,
+        };
+        let sent = WornGarment {
+            image: Some(Arc::new(WornImage::new(image).expect("small"))),
+            ..flag()
+        };
+        let wire = topology_to_wire(&sent);
+        assert_eq!(topology_from_wire(&wire).expect("read"), sent);
+        let with = |change: &dyn Fn(&mut v1::GarmentTexture)| {
+            let mut t = wire.clone();
+            t.texture.iter_mut().for_each(change);
+            topology_from_wire(&t).expect_err("refused").to_string()
+        };
+        let size = with(&|t| t.metres_per_pixel = f32::NAN);
+        let cut = with(&|t| t.image = t.image.slice(..40));
+        let huge = with(&|t| t.image = vec![0; MAX_TEXTURE_BYTES + 1].into());
+        assert!(size.contains("texture.metres_per_pixel"), "{size}");
+        assert!(cut.contains("texture.image"), "{cut}");
+        assert!(huge.contains("texture.image"), "{huge}");
     }
 
     #[test]

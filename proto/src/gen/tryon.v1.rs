@@ -2117,7 +2117,7 @@ pub struct GarmentTopology {
     /// u32[m][3], indices of drawn vertices, counter-clockwise seen from outside.
     #[prost(bytes = "bytes", tag = "5")]
     pub faces: ::prost::bytes::Bytes,
-    /// f32[k][2], flat panel coordinates of the drawn vertices, metres.
+    /// f32[k][2], flat panel coordinates of the drawn vertices, metres; with a texture from its upper left corner, v down.
     #[prost(bytes = "bytes", tag = "6")]
     pub uvs: ::prost::bytes::Bytes,
     #[prost(message, optional, tag = "7")]
@@ -2128,6 +2128,20 @@ pub struct GarmentTopology {
     /// u32\[k\], the simulated vertex under each drawn one.
     #[prost(bytes = "bytes", tag = "9")]
     pub drawn: ::prost::bytes::Bytes,
+    /// Shown in place of look's colours; absent for a garment in plain colours. Drawn vertices over one simulated vertex share
+    /// their normals then. A reader that doesn't know it shows look.
+    #[prost(message, optional, tag = "10")]
+    pub texture: ::core::option::Option<GarmentTexture>,
+}
+/// Image on a garment.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct GarmentTexture {
+    /// PNG or JPEG, sRGB, at most 2048 pixels along each side and 4 MiB.
+    #[prost(bytes = "bytes", tag = "1")]
+    pub image: ::prost::bytes::Bytes,
+    /// Side of a pixel on the cloth, metres, positive.
+    #[prost(float, tag = "2")]
+    pub metres_per_pixel: f32,
 }
 /// Appearance of a garment.
 #[derive(Clone, Copy, PartialEq, ::prost::Message)]

@@ -14,7 +14,7 @@ use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::body::pose_from_wire;
 use tryon_proto::convert::fit::fit_to_wire;
 use tryon_proto::convert::frame::stages_from_wire;
-use tryon_proto::convert::garment::{Positions, WornGarment};
+use tryon_proto::convert::garment::{Positions, WornGarment, WornImage};
 use tryon_proto::convert::geometry::rigid_from_wire;
 use tryon_proto::convert::required;
 use tryon_proto::v1::{self, BodyState, GarmentChoice};
@@ -153,6 +153,10 @@ fn worn_garment(
     let choice = &choices[source];
     let worn = &outfit.worn()[source];
     let color = choice.color_rgb.unwrap_or_else(|| rgb(worn.color()));
+    // A colour that somebody chose replaces it.
+    let image = worn.image().filter(|_| choice.color_rgb.is_none());
+    let image = image.map(|image| WornImage::new((**image).clone()));
+    let image = image.transpose().map_err(|e| e.to_string())?;
     Ok(Arc::new(WornGarment {
         garment: choice.garment.clone(),
         size: worn
@@ -167,6 +171,7 @@ fn worn_garment(
             accent_rgb: color,
             stripe_width: 0.0,
         },
+        image: image.map(Arc::new),
     }))
 }
 

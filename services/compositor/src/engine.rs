@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use tryon::camera::ColorImage;
 use tryon::composite::{
-    Appearance, Config, Framing, Input, Model, Print, RenderReport, State, Workspace,
+    Appearance, Config, Framing, ImagePyramid, Input, Model, Print, RenderReport, State, Workspace,
 };
 use tryon::dressing::FIT_COLORS;
 use tryon::formats::image::{encode_jpeg, encode_png_rgb};
@@ -19,9 +19,9 @@ use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::body::pose_from_wire;
 use tryon_proto::convert::fit::tightness;
-use tryon_proto::convert::garment::{PlacedGarments, WornGarment};
+use tryon_proto::convert::garment::{PlacedGarments, WornGarment, WornImage};
 use tryon_proto::convert::request::PictureFormat;
-use tryon_proto::v1::{GarmentLook, StageTime};
+use tryon_proto::v1::StageTime;
 
 /// Garments that belong to one exposure.
 pub(crate) struct Placed {
@@ -85,6 +85,7 @@ pub(crate) struct Engine {
     /// Capture times of the posed bodies.
     clock: FrameClock,
     garments: CameraGarments,
+    pyramids: Pyramids,
 }
 
 /// Pictures by their size.
@@ -122,7 +123,7 @@ impl Engine {
     fn render(&mut self, job: &Job) -> Result<Sizes, String> {
         let reported = job.body.as_ref().filter(|_| job.placed.is_some());
         let has_body = reported.is_some_and(|b| self.pose(b));
-        let worn = worn_garments(job);
+        let worn = worn_garments(job, &mut self.pyramids);
         if let Some(p) = &job.placed {
             let world = p.garments.iter().map(|(_, world)| world.as_slice());
             self.garments.place(&p.world_from_camera.inverse(), world);
@@ -193,13 +194,15 @@ impl Worn<'_> {
         DrawnSurface {
             faces: &self.garment.faces,
             uv: self.fit.as_ref().unwrap_or(&self.garment.uvs),
+            vertex: &self.garment.drawn,
             appearance: &self.appearance,
         }
     }
 }
 
 /// Garments of `job`, innermost first.
-fn worn_garments(job: &Job) -> Vec<Worn<'_>> {
+fn worn_garments<'a>(job: &'a Job, pyramids: &mut Pyramids) -> Vec<Worn<'a>> {
+    pyramids.keep(job);
     let placed = job.placed.iter().flat_map(|p| &p.garments);
     let fits = |k: usize| job.fit.as_ref()?.get(k);
     placed
@@ -208,7 +211,7 @@ fn worn_garments(job: &Job) -> Vec<Worn<'_>> {
             let fit = fits(k).and_then(|bytes| fit_scale(garment, bytes));
             let appearance = match fit {
                 Some(_) => fit_appearance(),
-                None => appearance(&garment.look),
+                None => appearance(garment, pyramids),
             };
             Worn {
                 garment,
@@ -278,7 +281,39 @@ fn rgb(c: u32) -> [u8; 3] {
     [r, g, b]
 }
 
-fn appearance(l: &GarmentLook) -> Appearance {
+/// Images of the garments that are worn, with their smaller copies, kept from picture to picture.
+#[derive(Default)]
+struct Pyramids(Vec<(Arc<WornImage>, Arc<ImagePyramid>)>);
+
+impl Pyramids {
+    /// Drops the images of garments that `job` lacks.
+    fn keep(&mut self, job: &Job) {
+        let worn = job.placed.iter().flat_map(|p| &p.garments);
+        let worn: Vec<_> = worn.filter_map(|(g, _)| g.image.as_ref()).collect();
+        let is_worn = |image: &Arc<WornImage>| worn.iter().any(|own| Arc::ptr_eq(own, image));
+        self.0.retain(|(image, _)| is_worn(image));
+    }
+
+    fn of(&mut self, image: &Arc<WornImage>) -> Arc<ImagePyramid> {
+        let known = self.0.iter().find(|(own, _)| Arc::ptr_eq(own, image));
+        if let Some((_, pyramid)) = known {
+            return Arc::clone(pyramid);
+        }
+        let pyramid = Arc::new(ImagePyramid::new(image.image()));
+        self.0.push((Arc::clone(image), Arc::clone(&pyramid)));
+        pyramid
+    }
+}
+
+fn appearance(garment: &WornGarment, pyramids: &mut Pyramids) -> Appearance {
+    let l = &garment.look;
+    if let Some(image) = &garment.image {
+        return Appearance {
+            base: rgb(l.color_rgb),
+            pattern: Print::Image(pyramids.of(image)),
+            ..Appearance::default()
+        };
+    }
     let stripes = l.stripe_width > 0.0 && l.accent_rgb != l.color_rgb;
     let pattern = if stripes {
         Print::Stripes {
