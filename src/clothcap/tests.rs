@@ -224,7 +224,6 @@ fn skipping_is_counted_and_changes_garments_by_less_than_a_tenth_of_a_millimetre
     assert_eq!(whole[1].report.alignment.queries.skipped, 0);
     let report = &some[1].report;
     let (parts, single) = (report.queries, report.alignment.queries);
-    println!("{change} m, {parts:?} {single:?}");
     assert!(parts.skipped > 0 && single.skipped > 0, "{report:?}");
 }
 
@@ -275,6 +274,5 @@ fn several_scans_give_one_shape_and_a_minimal_scan_overrides_them() {
     let known = capture.frame(&scans[0]).expect("captured");
     assert_eq!(known.undressed.body.shape, shape);
     let less = mean_distance(&known.undressed.vertices, &truths[0].body);
-    println!("body {off:.4} m from three scans, {less:.4} m with the minimal shape");
     assert!(less < off, "{less} {off}");
 }

@@ -36,6 +36,6 @@ pub use position_codec::{PositionCoder, STEP as POSITION_STEP};
 pub use recording::open_recording;
 pub use rgbd_folder::{RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};
 pub use rgbd_source::RgbdSource;
-pub use texture_points::TexturePoint;
 #[cfg(test)]
 pub(crate) use shared_data::shared_data;
+pub use texture_points::TexturePoint;

@@ -19,6 +19,8 @@ const PULL: f32 = 0.7;
 const SMOOTHNESS: [f32; 2] = [2.0, 0.2];
 /// Difference of colours that halves the rest.
 const CONTRAST: f32 = 0.08;
+/// Point whose label is not open.
+const NO_ROW: u32 = u32::MAX;
 /// Neighbours of a point of a cloud.
 const NEIGHBOURS: usize = 6;
 
@@ -41,17 +43,22 @@ pub fn label_scan(
         return Ok(labels.iter().map(|l| *l as u8).collect());
     }
     let depth = label_depths(neighbours, labelling);
-    let colors: Vec<_> = scan.colors.iter().map(|c| hsv_cone(*c)).collect();
     let count = labelling.slots.len();
-    let mut unary = Vec::with_capacity(labels.len() * count);
-    for (i, m) in matches.iter().enumerate() {
-        let node = node_of(m);
-        for (l, appearance) in labelling.appearances.iter().enumerate() {
+    let of_node = |i: usize| {
+        let node = node_of(&matches[i]);
+        &depth[node * count..(node + 1) * count]
+    };
+    let is_open = |i: &usize| of_node(*i).iter().filter(|d| **d <= BAND).count() > 1;
+    let open: Vec<usize> = (0..matches.len()).filter(is_open).collect();
+    let colors: Vec<_> = scan.colors.iter().map(|c| hsv_cone(*c)).collect();
+    let mut unary = Vec::with_capacity(open.len() * count);
+    for &i in &open {
+        for (appearance, rings) in labelling.appearances.iter().zip(of_node(i)) {
             let color = appearance
                 .as_ref()
                 .map_or(0.0, |a| a.cost(&colors[i]) as f32);
             // Rings from the node to the nearest one of this label.
-            let pull = match depth[node * count + l] {
+            let pull = match *rings {
                 0 => 0.0,
                 d if d <= BAND => PULL * d as f32,
                 _ => IMPOSSIBLE,
@@ -59,26 +66,64 @@ pub fn label_scan(
             unary.push(color + pull);
         }
     }
-    let edges = scan_edges(scan);
-    let weights: Vec<f32> = edges
-        .iter()
-        .map(|e| {
-            let d = (colors[e[0] as usize] - colors[e[1] as usize]).norm() as f32 / CONTRAST;
-            let [full, rest] = SMOOTHNESS;
-            full * (rest + (1.0 - rest) / (1.0 + d * d))
-        })
-        .collect();
+    let weight = |[a, b]: [u32; 2]| {
+        let d = (colors[a as usize] - colors[b as usize]).norm() as f32 / CONTRAST;
+        let [full, rest] = SMOOTHNESS;
+        full * (rest + (1.0 - rest) / (1.0 + d * d))
+    };
+    let mut row_of = vec![NO_ROW; labels.len()];
+    for (row, i) in open.iter().enumerate() {
+        row_of[*i] = row as u32;
+    }
+    let (mut edges, mut weights) = (Vec::new(), Vec::new());
+    for edge in scan_edges(scan) {
+        let [a, b] = edge.map(|v| row_of[v as usize]);
+        match (a != NO_ROW, b != NO_ROW) {
+            (true, true) => {
+                edges.push([a, b]);
+                weights.push(weight(edge));
+            }
+            // Points of one possible label are theirs whatever their neighbours are.
+            (true, false) => hold(
+                &mut unary,
+                (a, count),
+                labels[edge[1] as usize],
+                weight(edge),
+            ),
+            (false, true) => hold(
+                &mut unary,
+                (b, count),
+                labels[edge[0] as usize],
+                weight(edge),
+            ),
+            (false, false) => (),
+        }
+    }
     let model = MrfModel {
         edges: &edges,
         weights: &weights,
     };
+    let mut found: Vec<u32> = open.iter().map(|i| labels[*i]).collect();
     model
-        .expand(&unary, &mut labels, &ExpansionConfig::default())
+        .expand(&unary, &mut found, &ExpansionConfig::default())
         .map_err(|e| CaptureError::Solve {
             stage: "labels of the scan",
             why: e.to_string(),
         })?;
+    for (i, label) in open.iter().zip(found) {
+        labels[*i] = label;
+    }
     Ok(labels.iter().map(|l| *l as u8).collect())
+}
+
+/// Adds the cost of other labels than that of a fixed neighbour.
+fn hold(unary: &mut [f32], (row, count): (u32, usize), label: u32, weight: f32) {
+    let row = row as usize * count;
+    for (l, cost) in unary[row..row + count].iter_mut().enumerate() {
+        if l != label as usize {
+            *cost += weight;
+        }
+    }
 }
 
 /// Rings from each node to the nearest one of each label, at most one beyond [`BAND`]; shape `[nodes, labels]`.
