@@ -3,13 +3,15 @@
 use crate::body::Template;
 use crate::body::parts::BodyPart;
 
-/// Parts of the body that move as one: trunk, head, arms, legs.
+/// Parts of the body that move as one: pelvis, chest, head, arms, legs.
 #[derive(Debug)]
 pub(super) struct MovingParts {
     /// Part of each bone.
     of_bone: Vec<usize>,
-    /// Joint that ties each part to the trunk; the trunk's own is unused.
+    /// Joint that ties each part to its parent; the pelvis' own is unused.
     pub(super) joints: Vec<usize>,
+    /// Part that each part hangs on; the pelvis' own is unused.
+    pub(super) parents: Vec<usize>,
 }
 
 impl MovingParts {
@@ -22,7 +24,7 @@ impl MovingParts {
             BodyPart::RightLeg,
         ];
         let mut joints = vec![0];
-        joints.extend(skeleton.index("head"));
+        joints.extend(["spine2", "head"].iter().filter_map(|j| skeleton.index(j)));
         joints.extend(
             limbs
                 .iter()
@@ -38,7 +40,13 @@ impl MovingParts {
                 (None, None) => 0,
             };
         }
-        Self { of_bone, joints }
+        let parent = |j: &usize| skeleton.joints()[*j].parent.map_or(0, |p| of_bone[p]);
+        let parents = joints.iter().map(parent).collect();
+        Self {
+            of_bone,
+            joints,
+            parents,
+        }
     }
 
     /// Number of parts.

@@ -31,7 +31,7 @@ const DEVIATION: f64 = 0.01;
 const INDEPENDENT: f64 = 300.0;
 /// Distance that parts may move apart at their joint, metres.
 const JOINT: f64 = 0.03;
-/// Turn of a part against the trunk, beyond that of the tracked pose, radians. Legs and head are nearly round: without a
+/// Turn of a part against its parent, beyond that of the tracked pose, radians. Legs and head are nearly round: without a
 /// bound they spin.
 const BEND: f64 = 0.5;
 /// Motion of a frame in one iteration, metres and radians.
@@ -47,7 +47,7 @@ pub(super) struct RegisteredFrame {
     pub(super) points: Vec<FusedPoint>,
     /// Yaw at which they were seen, radians.
     pub(super) yaw: f64,
-    /// Joints as each part moves them: trunk's and own position, metres.
+    /// Joints as each part moves them: the parent's and own position, metres.
     joints: Vec<[P3d; 2]>,
     /// Turn of each part so far, radians.
     turns: Vec<Vector3<f64>>,
@@ -223,19 +223,20 @@ fn add_priors(
             h[(i, i)] += 1.0 / (step * step);
         }
         for part in 1..parts.len() {
-            let [of_trunk, own] = frame.joints[part];
-            // Joint stays one: trunk's motion of it less the part's.
+            let [of_parent, own] = frame.joints[part];
+            let parent = parts.parents[part];
+            // Joint stays one: the parent's motion of it less the part's.
             for axis in 0..3 {
                 let e = Vector3::from_fn(|i, _| f64::from(u8::from(i == axis)));
                 let mut row = Vec::with_capacity(12);
-                for (first, joint, sign) in [(at(0), of_trunk, 1.0), (at(part), own, -1.0)] {
+                for (first, joint, sign) in [(at(parent), of_parent, 1.0), (at(part), own, -1.0)] {
                     let moment = joint.coords.cross(&e);
                     row.push((first + axis, sign));
                     row.extend((0..3).map(|c| (first + 3 + c, sign * moment[c])));
                 }
-                add_row((h, g), &row, of_trunk[axis] - own[axis], JOINT);
-                let turn = [(at(0) + 3 + axis, 1.0), (at(part) + 3 + axis, -1.0)];
-                let bend = frame.turns[0][axis] - frame.turns[part][axis];
+                add_row((h, g), &row, of_parent[axis] - own[axis], JOINT);
+                let turn = [(at(parent) + 3 + axis, 1.0), (at(part) + 3 + axis, -1.0)];
+                let bend = frame.turns[parent][axis] - frame.turns[part][axis];
                 add_row((h, g), &turn, bend, BEND);
             }
         }
@@ -268,7 +269,10 @@ fn apply(frames: &mut [RegisteredFrame], parts: &MovingParts, update: &DVector<f
         let motions: Vec<_> = (0..parts.len()).map(motion).collect();
         frame.points.iter_mut().for_each(|p| p.blend(&motions));
         for (part, joint) in frame.joints.iter_mut().enumerate() {
-            *joint = [motions[0] * joint[0], motions[part] * joint[1]];
+            *joint = [
+                motions[parts.parents[part]] * joint[0],
+                motions[part] * joint[1],
+            ];
             frame.turns[part] += motions[part].rotation.scaled_axis();
         }
     }
