@@ -17,9 +17,10 @@ use tryon::clothcap::{
 use tryon::evaluate::garment_capture::{
     CaptureVariant, capture_scenes, measure, measure_turn_scene, turn_scenes,
 };
-use tryon::evaluate::scans::{SKIN_LABEL, ScanScene, TrueScan};
+use tryon::evaluate::scans::{SKIN_LABEL, ScanMotion, ScanScene, TrueScan};
 use tryon::formats::scan::{ScanMesh, read_scan};
 use tryon::math::{P3, V3};
+use tryon::synth::{Posture, Routine};
 
 /// Unsigned bytes of an npy file.
 fn bytes_of_npy(path: &Path) -> Vec<u8> {
@@ -388,6 +389,32 @@ fn scans_without_a_dressed_person_are_refused_or_reported() {
     match segmented(&plain, LabelConfig::default()) {
         Ok((found, _)) => println!("one colour: {:?}", found.labelling.slots),
         Err(e) => assert_eq!(e, CaptureError::NoGarment),
+    }
+}
+
+/// Arms against the torso: hanging beside a wide one, and with sleeves crossed before it.
+#[test]
+fn arms_against_the_torso_keep_labels_and_garments_apart() {
+    let cases = [
+        ("heavy", Posture::Standing),
+        ("long sleeves tucked", Posture::ArmsCrossed),
+    ];
+    for (name, posture) in cases {
+        let scenes = capture_scenes().expect("scenes");
+        let mut scene = scenes.into_iter().find(|s| s.name == name).expect(name);
+        scene.scene.motion = ScanMotion::Play {
+            routine: Routine::Hold(posture),
+            start: 0.0,
+        };
+        (scene.scene.scans, scene.scene.scanner.points) = (1, 30_000);
+        let row = measure(&scene, &CaptureVariant::all()[0], 3).expect("measured");
+        let error = |name| row.get(name).unwrap_or(f64::NAN);
+        println!("{posture:?}: {row:?}");
+        assert!(error("F1") > 0.95, "{posture:?}");
+        assert!(error("garment_mm") < 4.0, "{posture:?}");
+        assert!(error("body_mm") < 6.0, "{posture:?}");
+        assert!(error("own_body_max_mm") < 0.1, "{posture:?}");
+        assert_eq!(error("inside"), 0.0, "{posture:?}");
     }
 }
 
