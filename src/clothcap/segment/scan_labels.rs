@@ -10,6 +10,7 @@ use crate::clothcap::mrf::{ExpansionConfig, MrfModel};
 use crate::clothcap::scan::{BodyScan, mean_spacing};
 use crate::mesh::{Csr, Face};
 use crate::spatial::HashGrid;
+use nalgebra::Vector3;
 
 /// Width of the band about the template's boundaries in which the scan decides, rings of nodes.
 const BAND: u32 = 3;
@@ -51,78 +52,106 @@ pub fn label_scan(
     let is_open = |i: &usize| of_node(*i).iter().filter(|d| **d <= BAND).count() > 1;
     let open: Vec<usize> = (0..matches.len()).filter(is_open).collect();
     let colors: Vec<_> = scan.colors.iter().map(|c| hsv_cone(*c)).collect();
-    let mut unary = Vec::with_capacity(open.len() * count);
-    for &i in &open {
-        for (appearance, rings) in labelling.appearances.iter().zip(of_node(i)) {
-            let color = appearance
-                .as_ref()
-                .map_or(0.0, |a| a.cost(&colors[i]) as f32);
-            // Rings from the node to the nearest one of this label.
+    let unary: Vec<f32> = open
+        .iter()
+        .flat_map(|i| costs(labelling, of_node(*i), &colors[*i]))
+        .collect();
+    let mut energy = OpenPoints::new(labels.len(), &open, unary);
+    for edge in scan_edges(scan) {
+        let d = (colors[edge[0] as usize] - colors[edge[1] as usize]).norm() as f32 / CONTRAST;
+        let [full, rest] = SMOOTHNESS;
+        energy.join(edge, full * (rest + (1.0 - rest) / (1.0 + d * d)), &labels);
+    }
+    energy.solve(&open, &mut labels)?;
+    Ok(labels.iter().map(|l| *l as u8).collect())
+}
+
+/// Costs of all labels at a point: its colour, and rings from its node to the nearest one of each label.
+fn costs<'a>(
+    labelling: &'a Labelling,
+    rings: &'a [u32],
+    color: &'a Vector3<f64>,
+) -> impl Iterator<Item = f32> + 'a {
+    labelling
+        .appearances
+        .iter()
+        .zip(rings)
+        .map(|(look, rings)| {
             let pull = match *rings {
                 0 => 0.0,
                 d if d <= BAND => PULL * d as f32,
                 _ => IMPOSSIBLE,
             };
-            unary.push(color + pull);
-        }
-    }
-    let weight = |[a, b]: [u32; 2]| {
-        let d = (colors[a as usize] - colors[b as usize]).norm() as f32 / CONTRAST;
-        let [full, rest] = SMOOTHNESS;
-        full * (rest + (1.0 - rest) / (1.0 + d * d))
-    };
-    let mut row_of = vec![NO_ROW; labels.len()];
-    for (row, i) in open.iter().enumerate() {
-        row_of[*i] = row as u32;
-    }
-    let (mut edges, mut weights) = (Vec::new(), Vec::new());
-    for edge in scan_edges(scan) {
-        let [a, b] = edge.map(|v| row_of[v as usize]);
-        match (a != NO_ROW, b != NO_ROW) {
-            (true, true) => {
-                edges.push([a, b]);
-                weights.push(weight(edge));
-            }
-            // Points of one possible label are theirs whatever their neighbours are.
-            (true, false) => hold(
-                &mut unary,
-                (a, count),
-                labels[edge[1] as usize],
-                weight(edge),
-            ),
-            (false, true) => hold(
-                &mut unary,
-                (b, count),
-                labels[edge[0] as usize],
-                weight(edge),
-            ),
-            (false, false) => (),
-        }
-    }
-    let model = MrfModel {
-        edges: &edges,
-        weights: &weights,
-    };
-    let mut found: Vec<u32> = open.iter().map(|i| labels[*i]).collect();
-    model
-        .expand(&unary, &mut found, &ExpansionConfig::default())
-        .map_err(|e| CaptureError::Solve {
-            stage: "labels of the scan",
-            why: e.to_string(),
-        })?;
-    for (i, label) in open.iter().zip(found) {
-        labels[*i] = label;
-    }
-    Ok(labels.iter().map(|l| *l as u8).collect())
+            look.as_ref().map_or(0.0, |a| a.cost(color) as f32) + pull
+        })
 }
 
-/// Adds the cost of other labels than that of a fixed neighbour.
-fn hold(unary: &mut [f32], (row, count): (u32, usize), label: u32, weight: f32) {
-    let row = row as usize * count;
-    for (l, cost) in unary[row..row + count].iter_mut().enumerate() {
-        if l != label as usize {
-            *cost += weight;
+/// Energy of the points that may have more than one label; the others hold their neighbours.
+struct OpenPoints {
+    /// Row of each point of the scan, [`NO_ROW`] for one that is not open.
+    row_of: Vec<u32>,
+    /// Shape `[rows, labels]`.
+    unary: Vec<f32>,
+    labels: usize,
+    edges: Vec<[u32; 2]>,
+    weights: Vec<f32>,
+}
+
+impl OpenPoints {
+    fn new(points: usize, open: &[usize], unary: Vec<f32>) -> Self {
+        let mut row_of = vec![NO_ROW; points];
+        for (row, i) in open.iter().enumerate() {
+            row_of[*i] = row as u32;
         }
+        Self {
+            row_of,
+            labels: unary.len() / open.len().max(1),
+            unary,
+            edges: Vec::new(),
+            weights: Vec::new(),
+        }
+    }
+
+    /// Adds an edge of the scan; `labels` are those of points that are not open.
+    fn join(&mut self, edge: [u32; 2], weight: f32, labels: &[u32]) {
+        let [p, q] = edge.map(|v| v as usize);
+        match [self.row_of[p], self.row_of[q]] {
+            [NO_ROW, NO_ROW] => (),
+            [row, NO_ROW] => self.hold(row, labels[q], weight),
+            [NO_ROW, row] => self.hold(row, labels[p], weight),
+            rows => {
+                self.edges.push(rows);
+                self.weights.push(weight);
+            }
+        }
+    }
+
+    /// Adds the cost of other labels than that of a neighbour that is not open.
+    fn hold(&mut self, row: u32, label: u32, weight: f32) {
+        let row = row as usize * self.labels;
+        for (l, cost) in self.unary[row..row + self.labels].iter_mut().enumerate() {
+            if l != label as usize {
+                *cost += weight;
+            }
+        }
+    }
+
+    fn solve(&self, open: &[usize], labels: &mut [u32]) -> Result<(), CaptureError> {
+        let model = MrfModel {
+            edges: &self.edges,
+            weights: &self.weights,
+        };
+        let mut found: Vec<u32> = open.iter().map(|i| labels[*i]).collect();
+        model
+            .expand(&self.unary, &mut found, &ExpansionConfig::default())
+            .map_err(|e| CaptureError::Solve {
+                stage: "labels of the scan",
+                why: e.to_string(),
+            })?;
+        for (i, label) in open.iter().zip(found) {
+            labels[*i] = label;
+        }
+        Ok(())
     }
 }
 
