@@ -84,6 +84,7 @@ fn main() {
     let surfaces = (meshes.iter().zip(&appearances)).map(|(mesh, appearance)| DrawnSurface {
         faces: &mesh.render.faces,
         uv: &mesh.render.uv,
+        vertex: &mesh.render.vertex,
         appearance,
     });
     let garments = camera.views(surfaces);

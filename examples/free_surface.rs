@@ -150,6 +150,7 @@ fn run(folder: &Path) -> Result<(), Fault> {
         faces: truth.faces,
         normals: truth.normals,
         colors: truth.colors,
+        ..ScanMesh::default()
     };
     let (frame, start) = find_frame(&template, &file)?;
     let scan = BodyScan::new(&file, &frame)?;

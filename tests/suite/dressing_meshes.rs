@@ -246,6 +246,7 @@ fn our_own_gltf_is_retargeted_from_any_place_in_a_room() {
             faces: &g.render.faces,
             uv: &g.render.uv,
             color,
+            texture: &[],
         };
         write_glb(&file, &[mesh]).expect("written");
         MeshGarment::read_on(
