@@ -119,9 +119,12 @@ pub(super) fn posed_under_cloth(
     start: AlignedBody,
 ) -> Result<AlignedBody, CaptureError> {
     let mut fit = ModelFit::new(template, scan, LATER_SAMPLES).with_covered(covered);
-    let mut body = start;
+    let mut body = start.clone();
     fit.run(&mut body, &LATER)?;
-    Ok(body)
+    Ok(AlignedBody {
+        pose: body.pose,
+        ..start
+    })
 }
 
 /// Garments of one scan, posed.

@@ -1,9 +1,13 @@
 //! Colours of the scan gathered at the nodes of the template (B of eq. 12).
 
 use super::color_mixture::{ColorMixture, hsv_cone};
+#[cfg(test)]
+use super::prior::BodyRegion;
 use crate::body::Template;
 use crate::clothcap::align::Alignment;
 use crate::clothcap::scan::BodyScan;
+#[cfg(test)]
+use crate::math::P3;
 use crate::math::V3;
 use crate::mesh::{Csr, vertex_normals};
 use crate::par::Par;
@@ -82,6 +86,45 @@ impl NodeColors {
             .map(|p| appearance.cost(&self.colors[*p as usize]))
             .sum();
         sum / row.len() as f64 * (row.len() as f64).min(INDEPENDENT)
+    }
+}
+
+#[cfg(test)]
+impl NodeColors {
+    /// One point a node, painted by place and region, in light from above and in front, at heights over the body (m).
+    pub(super) fn painted(
+        template: &Template,
+        color: impl Fn(&P3, BodyRegion) -> [f32; 3],
+        height: impl Fn(&P3) -> f32,
+    ) -> Self {
+        let (mesh, regions) = (template.mesh(), BodyRegion::of_vertices(template));
+        let around = template.topology().vertex_faces();
+        let mut normals = Vec::new();
+        vertex_normals(
+            Par::Rayon,
+            mesh.vertices(),
+            mesh.faces(),
+            around,
+            &mut normals,
+        );
+        let places = mesh.vertices().iter().zip(&regions).zip(&normals);
+        let colors: Vec<_> = places
+            .enumerate()
+            .map(|(v, ((p, region), n))| {
+                let light = 0.6 + 0.25 * n.y.max(0.0) + 0.15 * n.z.max(0.0);
+                let grain = 1.0 + 0.02 * ((v * 7919) % 13) as f32 / 13.0;
+                hsv_cone(color(p, *region).map(|c| (c * light * grain) as u8))
+            })
+            .collect();
+        let pairs: Vec<_> = (0..regions.len() as u32).map(|v| (v, v)).collect();
+        let heights: Vec<f32> = mesh.vertices().iter().map(height).collect();
+        Self {
+            points: Csr::from_pairs(regions.len(), &pairs),
+            means: colors.iter().copied().map(Some).collect(),
+            colors,
+            steps: steps(&heights, template.topology().vertex_neighbours()),
+            heights,
+        }
     }
 }
 

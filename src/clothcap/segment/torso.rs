@@ -193,54 +193,23 @@ fn separation([a, b]: &[Vec<Vector3<f64>>; 2]) -> Option<(Vector3<f64>, f64)> {
 mod tests {
     use super::*;
     use crate::body::embedded;
-    use crate::clothcap::segment::{BodyRegion, LabelConfig, NodeColors, hsv_cone};
+    use crate::clothcap::segment::{BodyRegion, LabelConfig, NodeColors};
     use crate::clothcap::topology::{ClothTemplate, LegTopology};
     use crate::math::P3;
-    use crate::mesh::{Csr, vertex_normals};
-    use crate::par::Par;
 
     const SKIN: [f32; 3] = [205.0, 150.0, 120.0];
     const NAVY: [f32; 3] = [44.0, 52.0, 86.0];
     const WHITE: [f32; 3] = [228.0, 228.0, 224.0];
 
-    /// Looks for a second garment where each node of torso and arms has a colour of its place, the rest that of skin; light comes
-    /// from above and in front.
+    /// Looks for a second garment where torso and arms have a colour of their place, the rest that of skin.
     fn finds_two(color: impl Fn(&P3, BodyRegion) -> [f32; 3]) -> bool {
         let cloth = ClothTemplate::new(&embedded::template(), LegTopology::Apart).expect("small");
-        let mesh = cloth.template().mesh();
-        let regions = BodyRegion::of_vertices(cloth.template());
-        let around = cloth.template().topology().vertex_faces();
-        let mut normals = Vec::new();
-        vertex_normals(
-            Par::Rayon,
-            mesh.vertices(),
-            mesh.faces(),
-            around,
-            &mut normals,
-        );
-        let colors: Vec<_> = (0..regions.len())
-            .map(|v| {
-                let is_dressed = regions[v].is_torso() || regions[v].is_arm();
-                let base = if is_dressed {
-                    color(&mesh.vertices()[v], regions[v])
-                } else {
-                    SKIN
-                };
-                let light = 0.6 + 0.25 * normals[v].y.max(0.0) + 0.15 * normals[v].z.max(0.0);
-                let grain = 1.0 + 0.02 * ((v * 7919) % 13) as f32 / 13.0;
-                hsv_cone(base.map(|c| (c * light * grain) as u8))
-            })
-            .collect();
-        let pairs: Vec<_> = (0..regions.len() as u32).map(|v| (v, v)).collect();
-        let nodes = NodeColors {
-            points: Csr::from_pairs(regions.len(), &pairs),
-            means: colors.iter().copied().map(Some).collect(),
-            colors,
-            heights: vec![0.0; regions.len()],
-            steps: vec![0.0; regions.len()],
+        let dressed = |p: &P3, r: BodyRegion| match r.is_torso() || r.is_arm() {
+            true => color(p, r),
+            false => SKIN,
         };
-        let config = LabelConfig::default();
-        Labeller::new(&cloth, &nodes, &config).find_second_top()
+        let nodes = NodeColors::painted(cloth.template(), dressed, |_| 0.0);
+        Labeller::new(&cloth, &nodes, &LabelConfig::default()).find_second_top()
     }
 
     #[test]
