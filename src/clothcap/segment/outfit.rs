@@ -157,3 +157,42 @@ fn ends(found: &Labelling) -> Option<[usize; 2]> {
     let at = |slot: Slot| found.slots.iter().position(|s| *s == slot);
     Some([at(Slot::Top)?, at(Slot::Bottom)?])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::embedded;
+    use crate::math::P3;
+
+    /// Labels of a top and bottom of one colour, the top `thick` metres over the bottom, and nodes of the top below the pelvis.
+    fn label(thick: f32) -> (Labelling, usize) {
+        let cloth = ClothTemplate::new(&embedded::template(), LegTopology::Apart).expect("small");
+        let regions = BodyRegion::of_vertices(cloth.template());
+        let vertices = cloth.template().mesh().vertices();
+        let thighs = vertices.iter().zip(&regions);
+        let thighs = thighs.filter(|(_, r)| **r == BodyRegion::Thigh);
+        let hem = thighs.map(|(p, _)| p.y).fold(f32::MIN, f32::max) - 0.08;
+        let color = |_: &P3, r: BodyRegion| match r {
+            BodyRegion::Head | BodyRegion::Neck | BodyRegion::Hand => [205.0, 150.0, 120.0],
+            _ => [44.0, 52.0, 86.0],
+        };
+        let height = |p: &P3| if p.y > hem { thick } else { 0.0 };
+        let nodes = NodeColors::painted(cloth.template(), color, height);
+        let found = label_nodes(&cloth, &nodes, &LabelConfig::default()).expect("finite");
+        let [top, _] = ends(&found).expect("top and bottom");
+        let low = regions
+            .iter()
+            .zip(&found.labels)
+            .filter(|(r, l)| **r == BodyRegion::Thigh && usize::from(**l) == top);
+        let low = low.count();
+        (found, low)
+    }
+
+    #[test]
+    fn a_long_top_ends_at_its_step_and_one_without_a_step_high() {
+        let (long, below) = label(0.012);
+        assert!(long.is_top_long && below > 50, "{below} nodes");
+        let (high, below) = label(0.0);
+        assert!(!high.is_top_long && below < 10, "{below} nodes");
+    }
+}
