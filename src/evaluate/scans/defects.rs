@@ -1,7 +1,7 @@
 //! Defects of scans: holes, stray points, damaged rows.
 
 use super::points::{STRAY_LABEL, ScanPoints};
-use super::scanner::{ScanSeed, gauss};
+use super::random::{ScanSeed, gauss};
 use crate::math::{P3, V3};
 use rand::Rng;
 use rand::seq::index::sample;

@@ -51,6 +51,26 @@ impl Default for DepthCamera {
     }
 }
 
+/// Room around the subject.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Backdrop {
+    /// A floor, and a wall behind the subject.
+    Wall,
+    /// A floor only.
+    Floor,
+}
+
+/// Images without noise. Shapes: `[pixels]`.
+#[derive(Clone, Debug)]
+pub(super) struct CleanView {
+    /// Depth (m); infinite where nothing is seen.
+    pub(super) depth: Vec<f32>,
+    /// Colours, sRGB.
+    pub(super) color: Vec<[u8; 3]>,
+    /// Garment from 1, skin, or [`STRAY_LABEL`] beside the subject.
+    pub(super) labels: Vec<u8>,
+}
+
 impl DepthCamera {
     /// Calibration of the frames.
     pub fn calibration(&self) -> Calibration {
@@ -60,17 +80,37 @@ impl DepthCamera {
     /// Frame number `index` of a painted surface, `rate` a second, and the label of each pixel.
     pub(super) fn shoot(
         &self,
-        (surface, paint): (&SceneSurface, &ScenePaint),
+        painted: (&SceneSurface, &ScenePaint),
         index: usize,
         (seed, rate): (u64, f64),
     ) -> (RgbdFrame, Vec<u8>) {
+        let clean = self.view(painted, Backdrop::Wall);
+        let depth: DepthImage =
+            (self.noise).apply(&self.intrinsics, &clean.depth, seed, index as u64);
+        let Intrinsics { width, height, .. } = self.intrinsics;
+        let color = ColorImage::new(width, height, clean.color.concat());
+        let frame = RgbdFrame {
+            sequence: index as u64,
+            time_ns: (index as f64 / rate * 1e9) as u64,
+            depth,
+            color: color.ok(),
+        };
+        (frame, clean.labels)
+    }
+
+    /// A painted surface in a room as a camera without noise sees it.
+    pub(super) fn view(
+        &self,
+        (surface, paint): (&SceneSurface, &ScenePaint),
+        backdrop: Backdrop,
+    ) -> CleanView {
         let view = View::Perspective {
             camera: self.intrinsics,
             near: NEAR,
         };
         let mut drawn = surface.drawn.clone();
         let mut faces = surface.faces.clone();
-        add_room(&mut drawn, &mut faces);
+        add_room(&mut drawn, &mut faces, backdrop);
         let mut local = Vec::new();
         (self.world_from_camera.inverse()).points_f32(&drawn, &mut local);
         let mut buffer = VisibilityBuffer::default();
@@ -82,12 +122,10 @@ impl DepthCamera {
 
         let eye = self.world_from_camera.point(&P3d::origin()).cast::<f32>();
         let width = self.intrinsics.width;
-        let mut labels = Vec::with_capacity(buffer.face.len());
-        let mut color = Vec::with_capacity(3 * buffer.face.len());
-        for (i, &face) in buffer.face.iter().enumerate() {
+        let seen = |(i, face): (usize, &u32)| {
             let pixel = [i as u32 % width, i as u32 / width].map(|c| c as f32);
-            let (label, rgb) = match faces.get(face as usize) {
-                Some(corners) if (face as usize) < surface.faces.len() => {
+            match faces.get(*face as usize) {
+                Some(corners) if (*face as usize) < surface.faces.len() => {
                     let at = corners.map(|v| local[v as usize]);
                     let weights = barycentrics(&view, at, pixel[0], pixel[1]);
                     let label = surface.labels[corners[0] as usize];
@@ -95,24 +133,18 @@ impl DepthCamera {
                     (label, lit((surface, paint), corners, weights, &eye))
                 }
                 Some(_) => {
-                    let wall = face as usize >= surface.faces.len() + 2;
+                    let wall = *face as usize >= surface.faces.len() + 2;
                     (STRAY_LABEL, ROOM_COLORS[usize::from(wall)])
                 }
                 None => (STRAY_LABEL, [0; 3]),
-            };
-            labels.push(label);
-            color.extend(rgb);
-        }
-        let depth: DepthImage =
-            (self.noise).apply(&self.intrinsics, &buffer.depth, seed, index as u64);
-        let color = ColorImage::new(width, self.intrinsics.height, color);
-        let frame = RgbdFrame {
-            sequence: index as u64,
-            time_ns: (index as f64 / rate * 1e9) as u64,
-            depth,
-            color: color.ok(),
+            }
         };
-        (frame, labels)
+        let (labels, color) = buffer.face.iter().enumerate().map(seen).unzip();
+        CleanView {
+            depth: buffer.depth,
+            color,
+            labels,
+        }
     }
 }
 
@@ -137,23 +169,27 @@ fn lit(
     color.map(|c| (c * light).clamp(0.0, 255.0) as u8)
 }
 
-/// Adds two triangles of floor, then two of wall.
-fn add_room(vertices: &mut Vec<P3>, faces: &mut Vec<Face>) {
+/// Adds two triangles of floor, then two of wall if there is one.
+fn add_room(vertices: &mut Vec<P3>, faces: &mut Vec<Face>, backdrop: Backdrop) {
+    let (back, count) = match backdrop {
+        Backdrop::Wall => (WALL, 2),
+        Backdrop::Floor => (-ROOM, 1),
+    };
     let quads = [
         [
-            [-ROOM, 0.0, WALL],
-            [ROOM, 0.0, WALL],
+            [-ROOM, 0.0, back],
+            [ROOM, 0.0, back],
             [ROOM, 0.0, ROOM],
             [-ROOM, 0.0, ROOM],
         ],
         [
-            [-ROOM, 0.0, WALL],
-            [ROOM, 0.0, WALL],
-            [ROOM, ROOM, WALL],
-            [-ROOM, ROOM, WALL],
+            [-ROOM, 0.0, back],
+            [ROOM, 0.0, back],
+            [ROOM, ROOM, back],
+            [-ROOM, ROOM, back],
         ],
     ];
-    for quad in quads {
+    for quad in &quads[..count] {
         let first = vertices.len() as u32;
         vertices.extend(quad.map(P3::from));
         faces.push([first, first + 1, first + 2]);

@@ -2,7 +2,7 @@
 
 use super::depth_camera::DepthCamera;
 use super::points::ScanPoints;
-use super::scanner::ScanSeed;
+use super::random::ScanSeed;
 use super::scene::{ScanScene, TrueScan};
 use crate::camera::RgbdFrame;
 use crate::evaluate::EvaluateError;

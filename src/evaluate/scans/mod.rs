@@ -19,6 +19,7 @@
 //! # }
 //! ```
 
+mod camera_rig;
 mod cloth_run;
 mod defects;
 mod depth_camera;
@@ -26,6 +27,7 @@ mod film;
 mod motion;
 mod paint;
 mod points;
+mod random;
 mod sampling;
 mod scanner;
 mod scene;
@@ -36,6 +38,7 @@ mod tests;
 mod view;
 mod write;
 
+pub use camera_rig::CameraRig;
 pub use cloth_run::ScanGarment;
 pub use defects::ScanDefects;
 pub use depth_camera::DepthCamera;

@@ -1,14 +1,13 @@
 //! Virtual body scanner: visible points or triangles of a surface, with noise.
 
+use super::camera_rig::CameraRig;
 use super::paint::{ScenePaint, tinted_shade};
 use super::points::ScanPoints;
+use super::random::{ScanSeed, gauss};
 use super::sampling::{SurfaceSample, sample, visible_mesh};
 use super::surface::SceneSurface;
 use super::view::ViewRing;
 use crate::math::V3;
-use rand::{Rng, SeedableRng};
-use rand_distr::{Distribution, StandardNormal};
-use rand_pcg::Pcg64;
 
 /// Settings of the scanner.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +24,8 @@ pub struct ScannerSetting {
     pub light_tint: f32,
     /// Output of the visible triangles in place of a cloud.
     pub is_meshed: bool,
+    /// Depth cameras in place of the scanner; of the settings above only `points` matters to them.
+    pub rig: Option<CameraRig>,
 }
 
 impl Default for ScannerSetting {
@@ -37,24 +38,8 @@ impl Default for ScannerSetting {
             color_noise: 3.0,
             light_tint: 0.0,
             is_meshed: false,
+            rig: None,
         }
-    }
-}
-
-/// Random numbers of one stage of one scan.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct ScanSeed {
-    /// Seed of the scene.
-    pub(super) scene: u64,
-    /// Number of the scan.
-    pub(super) scan: u64,
-}
-
-impl ScanSeed {
-    /// Generator of a stage: each stage has its own, so that settings of one leave the others alone.
-    pub(super) fn stage(self, stage: u64) -> Pcg64 {
-        let mixed = self.scene.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        Pcg64::seed_from_u64(mixed ^ (self.scan << 8) ^ stage)
     }
 }
 
@@ -72,6 +57,9 @@ impl ScannerSetting {
         paint: &ScenePaint,
         seed: ScanSeed,
     ) -> ScanPoints {
+        if let Some(rig) = &self.rig {
+            return rig.scan((surface, paint), self.points, seed);
+        }
         let ring = ViewRing::draw(surface, surface.center());
         let openness = ring.openness(surface);
         let candidates = ring.candidates(surface, &openness);
@@ -115,10 +103,4 @@ fn lit_color(
     let light = SceneSurface::blend(brightness, face, s.weights);
     let color = paint.color(s.label, &material);
     std::array::from_fn(|k| color[k] * light[k])
-}
-
-/// Normally distributed number.
-pub(super) fn gauss(rng: &mut impl Rng, deviation: f64) -> f32 {
-    let x: f64 = StandardNormal.sample(rng);
-    (x * deviation) as f32
 }

@@ -5,7 +5,8 @@ use super::defects::ScanDefects;
 use super::motion::{PoseTrack, ScanMotion};
 use super::paint::{ScanPalette, ScenePaint};
 use super::points::ScanPoints;
-use super::scanner::{ScanSeed, ScannerSetting};
+use super::random::ScanSeed;
+use super::scanner::ScannerSetting;
 use super::skinned::SkinnedGarment;
 use super::surface::SceneSurface;
 use super::view::MAX_GARMENT;
@@ -102,7 +103,7 @@ pub struct TrueScan {
     pub time: f64,
     /// Positions, world (m); y up, floor at y = 0.
     pub points: Vec<P3>,
-    /// Unit normals on the side of the cameras.
+    /// Unit normals on the side of the cameras; empty in clouds of a [`CameraRig`](super::CameraRig).
     pub normals: Vec<V3>,
     /// Triangles; empty for a cloud.
     pub faces: Vec<Face>,
@@ -178,6 +179,9 @@ impl ScanScene {
             };
             let mut points = self.scanner.scan(moment.surface, moment.paint, seed);
             (self.defects).apply(&mut points, moment.surface.center(), seed);
+            if self.scanner.rig.is_some() {
+                points.normals.clear();
+            }
             each(self.truth(&moment, points))
         })
     }

@@ -61,19 +61,24 @@ fn float_colors(scan: &TrueScan) -> String {
         "ply\nformat ascii 1.0\nelement vertex {}\n",
         scan.points.len()
     );
-    for property in ["x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"] {
+    let normal: &[&str] = match scan.normals.is_empty() {
+        true => &[],
+        false => &["nx", "ny", "nz"],
+    };
+    for property in [&["x", "y", "z"], normal, &["red", "green", "blue"]].concat() {
         let _ = writeln!(text, "property float {property}");
     }
     let _ = writeln!(text, "element face {}", scan.faces.len());
     text.push_str("property list uchar int vertex_indices\nend_header\n");
     let mut lost = scan.uncolored.iter().peekable();
-    let rows = scan.points.iter().zip(&scan.normals).zip(&scan.colors);
-    for (row, ((p, n), color)) in (0u32..).zip(rows) {
-        let color = match lost.next_if(|l| **l == row) {
+    let rows = scan.points.iter().zip(&scan.colors).enumerate();
+    for (i, (p, color)) in rows {
+        let color = match lost.next_if(|l| **l as usize == i) {
             Some(_) => [f32::NAN; 3],
             None => color.map(f32::from),
         };
-        let words = p.iter().chain(n.iter()).chain(&color);
+        let normal = scan.normals.get(i).into_iter().flat_map(|n| n.iter());
+        let words = p.iter().chain(normal).chain(&color);
         let words: Vec<String> = words.map(f32::to_string).collect();
         let _ = writeln!(text, "{}", words.join(" "));
     }
