@@ -233,6 +233,7 @@ impl OutfitCapture {
             scan,
             segmented: &segmented,
             near: nearest_nodes(&segmented, self.segmenter.cloth()),
+            edges: scan.edges(),
             config: &parts,
         };
         let alignment = &segmented.alignment;
@@ -373,6 +374,8 @@ struct PartFitter<'a> {
     segmented: &'a SegmentedScan,
     /// Vertex of the clothed template that each scan point lies near, shape `[points]`.
     near: Vec<u32>,
+    /// Edges of the scan.
+    edges: Vec<[u32; 2]>,
     config: &'a PartFitConfig,
 }
 
@@ -439,7 +442,11 @@ impl PartFitter<'_> {
         out: &mut FittedParts,
     ) -> Result<(), CaptureError> {
         let segmented = self.segmented;
-        let points = PartScan::new(self.scan, (&segmented.labels, &self.near), part.label);
+        let points = PartScan::new(
+            (self.scan, &self.edges),
+            (&segmented.labels, &self.near),
+            part.label,
+        );
         let mut vertices = start;
         let k = out.vertices.len();
         if k == self.fits.len() {

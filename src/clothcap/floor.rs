@@ -1,6 +1,6 @@
 //! Floor below a person in a scan: a plane that the rest stands on.
 
-use crate::math::{P3, V3};
+use crate::math::{P3, V3, principal_axes};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -21,6 +21,9 @@ const LEAST_WIDTH: f32 = 0.25;
 /// Share of points left out at each end of an extent: strays.
 const STRAYS: f64 = 0.01;
 
+/// Largest distance of a floor's points from its plane beside [`THICKNESS`]: those of several cameras disagree.
+const MOST_SPREAD: f32 = 2.5;
+
 /// Plane with everything else on one side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Floor {
@@ -40,7 +43,7 @@ impl Floor {
             .copied()
             .collect();
         let stride = finite.len().div_ceil(SAMPLES).max(1);
-        let some: Vec<P3> = finite.into_iter().step_by(stride).collect();
+        let some: Vec<P3> = finite.iter().step_by(stride).copied().collect();
         if some.len() < 100 {
             return None;
         }
@@ -64,7 +67,33 @@ impl Floor {
         }
         let (on, floor) = best?;
         let is_large = on as f64 >= LEAST_SHARE * some.len() as f64;
-        (is_large && floor.carries(&some)).then_some(floor)
+        (is_large && floor.carries(&some)).then(|| floor.thickened(&finite))
+    }
+
+    /// The plane through the middle of its points, as thick as they spread: only noise lies below a floor, and as much of
+    /// it above.
+    fn thickened(self, points: &[P3]) -> Self {
+        let near = |p: &&P3| self.over(p).abs() < MOST_SPREAD * self.thickness;
+        let near: Vec<P3> = points.iter().filter(near).copied().collect();
+        let Some((middle, axes, _)) = principal_axes(&near) else {
+            return self;
+        };
+        let normal: V3 = axes.column(2).into_owned().cast();
+        let up = normal * normal.dot(&self.up).signum();
+        let height = up.dot(&middle.coords.cast());
+        let level = Self { up, height, ..self };
+        let over = near.iter().map(|p| level.over(p));
+        let [middle, _] = inner_range(over.clone(), 0.5);
+        let below = over.filter(|d| *d < middle);
+        let [_, spread] = inner_range(below.map(|d| middle - d), STRAYS);
+        if spread < self.thickness {
+            return self;
+        }
+        Self {
+            height: height + middle,
+            thickness: spread,
+            ..level
+        }
     }
 
     fn through([a, b, c]: [P3; 3], thickness: f32) -> Option<Self> {

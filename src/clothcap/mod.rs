@@ -4,6 +4,7 @@ pub mod align;
 pub mod archive;
 mod capture;
 mod capture_header;
+mod cloud;
 mod dress_body;
 mod error;
 mod face_edges;

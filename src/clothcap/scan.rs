@@ -1,13 +1,15 @@
 //! A scan made ready: finite points in metres, y up, with normals and colours.
 
 use super::CaptureError;
+pub(super) use super::cloud::mean_spacing;
+use super::cloud::{are_strays, neighbour_edges, plane_normals, turn_outwards};
+use super::face_edges::edges;
 use super::floor::{Floor, inner_range};
 use crate::formats::TexturePoint;
 use crate::formats::scan::ScanMesh;
 use crate::math::{P3, V3};
 use crate::mesh::Face;
-use crate::spatial::HashGrid;
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Least number of points of a person. Fewer leave whole limbs without one.
@@ -26,11 +28,6 @@ const UPRIGHT: f64 = 0.7;
 const FARTHEST: f64 = 8e3;
 /// Largest distance between the points of two scans that are the same but for noise, metres.
 const UNCHANGED: f32 = 1e-4;
-/// Neighbours of a point in the plane of its normal.
-const NEIGHBOURS: usize = 12;
-/// Radius of that search as a multiple of the mean distance between points.
-const REACH: f32 = 3.0;
-
 /// Units and axes of a scan file.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ScanFrame {
@@ -192,6 +189,9 @@ pub struct LeftOut {
     pub floor: usize,
     /// Positions that another row has.
     pub repeated: usize,
+    /// Apart from the rest of a cloud.
+    #[serde(default)]
+    pub strays: usize,
 }
 
 impl BodyScan {
@@ -241,6 +241,9 @@ impl BodyScan {
             scan.point_of_row.push(point);
         }
         let mut scan = scan.checked()?;
+        if file.faces.is_empty() {
+            scan.leave_out_strays();
+        }
         let largest = extent(&scan.points).into_iter().fold(0.0, f32::max);
         if !(USABLE[0]..=USABLE[1]).contains(&f64::from(largest)) {
             return Err(CaptureError::NoPersonSize {
@@ -262,6 +265,24 @@ impl BodyScan {
         scan.texture = scan.texture_of(file);
         scan.find_normals();
         Ok(scan)
+    }
+
+    /// Leaves out the points of a cloud without faces that lie apart from the rest.
+    fn leave_out_strays(&mut self) {
+        let strays = are_strays(&self.points);
+        let mut next = 0;
+        let number = |is_stray: &bool| {
+            next += u32::from(!is_stray);
+            if *is_stray { u32::MAX } else { next - 1 }
+        };
+        let numbers: Vec<u32> = strays.iter().map(number).collect();
+        for point in self.point_of_row.iter_mut().filter(|p| **p != u32::MAX) {
+            *point = numbers[*point as usize];
+            self.left_out.strays += usize::from(*point == u32::MAX);
+        }
+        retain(&mut self.points, &strays);
+        retain(&mut self.normals, &strays);
+        retain(&mut self.colors, &strays);
     }
 
     /// Texture of a file whose points are known.
@@ -311,7 +332,7 @@ impl BodyScan {
         Ok(self)
     }
 
-    /// Normals from faces, else from the file, else from neighbours.
+    /// Normals from faces, else from the file, else from neighbours, outwards where they are seen from.
     fn find_normals(&mut self) {
         if !self.faces.is_empty() {
             self.normals = face_normals(&self.points, &self.faces);
@@ -320,7 +341,7 @@ impl BodyScan {
             self.oriented = true;
         } else {
             self.normals = plane_normals(&self.points);
-            self.oriented = false;
+            self.oriented = turn_outwards(&self.points, &mut self.normals);
         }
         if self.oriented && is_inside_out(&self.points, &self.normals) {
             self.normals.iter_mut().for_each(|n| *n = -*n);
@@ -337,10 +358,26 @@ impl BodyScan {
             && self.points.iter().zip(&other.points).all(near)
     }
 
+    /// Edges of the faces, or between near points of a cloud, the lower index first; each once.
+    pub fn edges(&self) -> Vec<[u32; 2]> {
+        if !self.faces.is_empty() {
+            return edges(&self.faces);
+        }
+        neighbour_edges(&self.points)
+    }
+
     /// Label of each row of the file from one a point; `absent` for rows left out.
     pub fn rows<T: Copy>(&self, of_points: &[T], absent: T) -> Vec<T> {
         let label = |p: &u32| of_points.get(*p as usize).copied().unwrap_or(absent);
         self.point_of_row.iter().map(label).collect()
+    }
+}
+
+/// Leaves out values of points; arrays of another length are those of no or some points only.
+fn retain<T>(values: &mut Vec<T>, left_out: &[bool]) {
+    if values.len() == left_out.len() {
+        let mut left_out = left_out.iter();
+        values.retain(|_| left_out.next() == Some(&false));
     }
 }
 
@@ -366,49 +403,6 @@ fn face_normals(points: &[P3], faces: &[Face]) -> Vec<V3> {
     sums.iter()
         .map(|n| n.try_normalize(f32::MIN_POSITIVE).unwrap_or_default())
         .collect()
-}
-
-/// Normal of the plane through each point and its neighbours, of either sign; zero with fewer than three.
-fn plane_normals(points: &[P3]) -> Vec<V3> {
-    let spacing = mean_spacing(points);
-    let mut grid = HashGrid::default();
-    // Searches reach half a cell, and may find a point twice.
-    grid.fill(points, 2.0 * REACH * spacing);
-    points
-        .iter()
-        .map(|p| {
-            let mut near = Vec::new();
-            grid.within(p, REACH * spacing, |i, d| near.push((d, i)));
-            near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            near.dedup();
-            near.truncate(NEIGHBOURS);
-            if near.len() < 3 {
-                return V3::zeros();
-            }
-            let at = |i: u32| points[i as usize].coords.cast::<f64>();
-            let mean = near.iter().map(|n| at(n.1)).sum::<Vector3<f64>>() / near.len() as f64;
-            let scatter: Matrix3<f64> = near
-                .iter()
-                .map(|n| at(n.1) - mean)
-                .map(|d| d * d.transpose())
-                .sum();
-            let eigen = scatter.symmetric_eigen();
-            let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin());
-            normal.into_owned().cast()
-        })
-        .collect()
-}
-
-/// Typical distance between neighbouring points of a surface, metres: by the number of occupied cells of 3 cm.
-pub(super) fn mean_spacing(points: &[P3]) -> f32 {
-    const CELL: f32 = 0.03;
-    let cells: std::collections::HashSet<[i32; 3]> = points
-        .iter()
-        .map(|p| [p.x, p.y, p.z].map(|v| (v / CELL).floor() as i32))
-        .collect();
-    // A surface crosses about 1.5 cells for each square of a cell's side.
-    let area = cells.len() as f32 * CELL * CELL / 1.5;
-    (area / points.len().max(1) as f32).sqrt()
 }
 
 #[cfg(test)]
@@ -469,6 +463,7 @@ mod tests {
             not_finite: 1,
             floor: 0,
             repeated: 1,
+            strays: 0,
         };
         assert_eq!(scan.left_out, left_out);
         assert_eq!(scan.point_of_row[9], scan.point_of_row[8]);
@@ -481,17 +476,17 @@ mod tests {
     }
 
     #[test]
-    fn clouds_get_normals_of_either_sign() {
+    fn clouds_get_normals_outwards() {
         let points = cylinder(1, 1.0);
         let file = ScanMesh {
             points,
             ..ScanMesh::default()
         };
         let scan = BodyScan::new(&file, &ScanFrame::default()).expect("enough points");
-        assert!(!scan.oriented);
+        assert!(scan.oriented);
         let radial = scan.points.iter().zip(&scan.normals).filter(|(p, n)| {
             let out = V3::new(p.x / 0.0225, 0.0, p.z / 0.04).normalize();
-            n.dot(&out).abs() > 0.9
+            n.dot(&out) > 0.9
         });
         assert!(radial.count() > 3500);
     }

@@ -1,6 +1,7 @@
 //! Depth images of a scan from virtual cameras around it, so that the tracker can find the person in it.
 
-use super::scan::{BodyScan, axis_range, mean_spacing};
+use super::cloud::mean_spacing;
+use super::scan::{BodyScan, axis_range};
 use crate::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
 use crate::math::{Camera, P3, Rigid, World};
 use crate::par::Par;

@@ -5,7 +5,7 @@ use crate::clothcap::CaptureError;
 use crate::clothcap::align::{
     EVEN_EDGE, FaceCache, Found, QuadraticEnergy, QueryCounts, ScanNormal, Stencil,
 };
-use crate::clothcap::face_edges::{edges, neighbours, sides};
+use crate::clothcap::face_edges::{edges, neighbours};
 use crate::clothcap::scan::BodyScan;
 use crate::math::{P3, V3};
 use crate::mesh::face_normal;
@@ -88,18 +88,22 @@ pub struct PartScan {
 impl PartScan {
     /// Points with a label, and the middles of the scan's edges to other labels. `near` gives the vertex of the clothed
     /// template that each point of the scan may lie near: searches start there.
-    pub fn new(scan: &BodyScan, (labels, near): (&[u8], &[u32]), label: u8) -> Self {
+    pub fn new(
+        (scan, edges): (&BodyScan, &[[u32; 2]]),
+        (labels, near): (&[u8], &[u32]),
+        label: u8,
+    ) -> Self {
         let own = |i: &usize| labels[*i] == label;
         let some: Vec<usize> = (0..scan.points.len()).filter(own).collect();
-        let crosses = |e: &[u32; 2]| {
-            let [a, b] = e.map(|v| labels[v as usize]);
-            a == label && b != label
+        let crosses = |e: &&[u32; 2]| {
+            let [a, b] = e.map(|v| labels[v as usize] == label);
+            a != b
         };
-        let middle = |e: [u32; 2]| {
+        let middle = |e: &[u32; 2]| {
             let [a, b] = e.map(|v| scan.points[v as usize]);
             nalgebra::center(&a, &b)
         };
-        let edges = scan.faces.iter().flat_map(sides).filter(crosses);
+        let edges = edges.iter().filter(crosses);
         Self {
             points: some.iter().map(|i| scan.points[*i]).collect(),
             normals: some.iter().map(|i| scan.normals[*i]).collect(),

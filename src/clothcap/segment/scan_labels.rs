@@ -5,11 +5,9 @@ use super::labelling::Labelling;
 use super::prior::IMPOSSIBLE;
 use crate::clothcap::CaptureError;
 use crate::clothcap::align::SurfaceMatch;
-use crate::clothcap::face_edges::edges;
 use crate::clothcap::mrf::{ExpansionConfig, MrfModel};
-use crate::clothcap::scan::{BodyScan, mean_spacing};
+use crate::clothcap::scan::BodyScan;
 use crate::mesh::{Csr, Face};
-use crate::spatial::HashGrid;
 use nalgebra::Vector3;
 
 /// Width of the band about the template's boundaries in which the scan decides, rings of nodes.
@@ -22,8 +20,6 @@ const SMOOTHNESS: [f32; 2] = [2.0, 0.2];
 const CONTRAST: f32 = 0.08;
 /// Point whose label is not open.
 const NO_ROW: u32 = u32::MAX;
-/// Neighbours of a point of a cloud.
-const NEIGHBOURS: usize = 6;
 
 /// Labels the points of a scan; `topology` gives the nodes' neighbours. Shape `[points]`.
 ///
@@ -57,7 +53,7 @@ pub fn label_scan(
         .flat_map(|i| costs(labelling, of_node(*i), &colors[*i]))
         .collect();
     let mut energy = OpenPoints::new(labels.len(), &open, unary);
-    for edge in scan_edges(scan) {
+    for edge in scan.edges() {
         let d = (colors[edge[0] as usize] - colors[edge[1] as usize]).norm() as f32 / CONTRAST;
         let [full, rest] = SMOOTHNESS;
         energy.join(edge, full * (rest + (1.0 - rest) / (1.0 + d * d)), &labels);
@@ -174,32 +170,4 @@ fn label_depths(neighbours: &Csr, labelling: &Labelling) -> Vec<u32> {
         }
     }
     depth
-}
-
-/// Edges of the faces, or between near points of a cloud; each once.
-fn scan_edges(scan: &BodyScan) -> Vec<[u32; 2]> {
-    if !scan.faces.is_empty() {
-        return edges(&scan.faces);
-    }
-    let reach = 2.0 * mean_spacing(&scan.points);
-    let mut grid = HashGrid::default();
-    // Searches reach half a cell, and may find a point twice.
-    grid.fill(&scan.points, 2.0 * reach);
-    let mut out = Vec::new();
-    for (i, p) in scan.points.iter().enumerate() {
-        let i = i as u32;
-        let mut near = Vec::new();
-        grid.within(p, reach, |j, d| {
-            if j != i {
-                near.push((d, j));
-            }
-        });
-        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        near.dedup();
-        let some = near.iter().take(NEIGHBOURS);
-        out.extend(some.map(|(_, j)| [*j.min(&i), *j.max(&i)]));
-    }
-    out.sort_unstable();
-    out.dedup();
-    out
 }

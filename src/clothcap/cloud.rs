@@ -1,0 +1,238 @@
+//! Neighbours in a cloud without faces: normals, edges and strays.
+
+use crate::math::{P3, V3};
+use crate::par::{self, Par};
+use crate::spatial::HashGrid;
+use nalgebra::{Matrix3, Vector3};
+
+/// Neighbours of a point in the plane of its normal: the fewest that make a plane.
+const NEIGHBOURS: [usize; 5] = [12, 24, 48, 96, 192];
+/// Radius of the search of the fewest as a multiple of the mean distance between points.
+const REACH: f32 = 3.0;
+/// Variance across a plane beside the smaller one along it, up to which points make one.
+const FLAT: f64 = 0.1;
+/// Neighbours of a point that share an edge with it in a cloud, and their largest distance as a multiple of the mean one.
+const BESIDE: (usize, f32) = (6, 2.0);
+/// Distance across which points are of one piece, as a multiple of the mean one.
+const LINK: f32 = 3.0;
+/// Largest share of the points of a piece that is a stray.
+const STRAY: f64 = 1e-3;
+/// Directions from which points are looked at, and the angle about the vertical from one to the next, radians.
+const DIRECTIONS: usize = 40;
+const GOLDEN: f32 = 2.399_963;
+/// Side of a cell of the pictures of these as a multiple of the mean distance between points: closes gaps.
+const SEEN_CELL: f32 = 2.5;
+/// Depth in a cell up to which points are seen, metres: cloth against the light, and noise.
+const SEEN_DEPTH: f32 = 0.03;
+/// Least sum of the cosines to the directions from which a point is seen: one, straight.
+const LEAST_FACING: f32 = 1.0;
+/// Share of the points from which signs are told.
+const MOST_KNOWN: f64 = 0.8;
+
+/// Edges between near points of a cloud, the lower index first; each once.
+pub(super) fn neighbour_edges(points: &[P3]) -> Vec<[u32; 2]> {
+    let (most, multiple) = BESIDE;
+    let reach = multiple * mean_spacing(points);
+    let near = Neighbours::new(points, reach);
+    let mut out = Vec::new();
+    for i in 0..points.len() as u32 {
+        let others = near.of(i, reach).into_iter().filter(|j| *j != i);
+        out.extend(others.take(most).map(|j| [j.min(i), j.max(i)]));
+    }
+    out.sort_unstable();
+    out.dedup();
+    out
+}
+
+/// Points of small pieces apart from the rest: pixels between surfaces, remains of a floor. Shape `[points]`.
+pub(super) fn are_strays(points: &[P3]) -> Vec<bool> {
+    let reach = LINK * mean_spacing(points);
+    let most = (STRAY * points.len() as f64) as usize;
+    let near = Neighbours::new(points, reach);
+    let mut seen = vec![false; points.len()];
+    let mut strays = seen.clone();
+    for first in 0..points.len() {
+        if std::mem::replace(&mut seen[first], true) {
+            continue;
+        }
+        let mut piece = vec![first as u32];
+        let mut next = 0;
+        while let Some(i) = piece.get(next).copied() {
+            near.each(i, reach, |j, _| {
+                if !std::mem::replace(&mut seen[j as usize], true) {
+                    piece.push(j);
+                }
+            });
+            next += 1;
+        }
+        if piece.len() <= most {
+            piece.iter().for_each(|i| strays[*i as usize] = true);
+        }
+    }
+    strays
+}
+
+/// Normal of the plane through each point and its neighbours, of either sign; zero with fewer than three.
+///
+/// Few neighbours follow the surface, but noise as large as their distances leaves no plane through them: then more.
+pub(super) fn plane_normals(points: &[P3]) -> Vec<V3> {
+    let reach = REACH * mean_spacing(points);
+    let widest = |k: usize| (k as f32 / NEIGHBOURS[0] as f32).sqrt() * reach;
+    let grids = NEIGHBOURS.map(|k| (k, widest(k), Neighbours::new(points, widest(k))));
+    let normal = |i: usize| {
+        let mut best = (f64::INFINITY, V3::zeros());
+        for (k, reach, grid) in &grids {
+            let mut near = grid.of(i as u32, *reach);
+            near.truncate(*k);
+            if let Some(found) = plane(points, &near).filter(|f| f.0 < best.0) {
+                best = found;
+            }
+            if best.0 < FLAT {
+                break;
+            }
+        }
+        best.1
+    };
+    let mut out = Vec::new();
+    par::map_into(Par::Rayon, points.len(), 256, &mut out, normal);
+    out
+}
+
+/// Turns normals towards the directions from which the points are seen; false if too many are seen from all sides or none,
+/// then of either sign as before. Shapes `[points]`.
+///
+/// A point that is not seen, or as well from behind, gets no normal.
+pub(super) fn turn_outwards(points: &[P3], normals: &mut [V3]) -> bool {
+    let side = SEEN_CELL * mean_spacing(points);
+    let mut toward = vec![V3::zeros(); points.len()];
+    for k in 0..DIRECTIONS {
+        // Evenly over the sphere, along a spiral.
+        let up = (2 * k + 1) as f32 / DIRECTIONS as f32 - 1.0;
+        let (sin, cos) = (k as f32 * GOLDEN).sin_cos();
+        let flat = (1.0 - up * up).sqrt();
+        let direction = V3::new(flat * cos, up, flat * sin);
+        let x = V3::new(-sin, 0.0, cos);
+        let y = direction.cross(&x);
+        let cell = |p: &P3| [x, y].map(|axis| (axis.dot(&p.coords) / side).floor() as i32);
+        let mut nearest = std::collections::HashMap::new();
+        for p in points {
+            let height = direction.dot(&p.coords);
+            let top = nearest.entry(cell(p)).or_insert(height);
+            *top = top.max(height);
+        }
+        for (toward, p) in toward.iter_mut().zip(points) {
+            if direction.dot(&p.coords) > nearest[&cell(p)] - SEEN_DEPTH {
+                *toward += direction;
+            }
+        }
+    }
+    let facing = |(n, t): (&V3, &V3)| n.dot(t);
+    let is_known = |n: &f32| n.abs() > LEAST_FACING;
+    let along: Vec<f32> = normals.iter().zip(&toward).map(facing).collect();
+    let known = along.iter().filter(|n| is_known(n)).count();
+    if (known as f64) < MOST_KNOWN * points.len() as f64 {
+        return false;
+    }
+    for (n, along) in normals.iter_mut().zip(&along) {
+        *n *= if is_known(along) { along.signum() } else { 0.0 };
+    }
+    true
+}
+
+/// Flatness of some points, 0 to 1, and the normal of their plane; `None` with fewer than three.
+fn plane(points: &[P3], some: &[u32]) -> Option<(f64, V3)> {
+    if some.len() < 3 {
+        return None;
+    }
+    let at = |i: &u32| points[*i as usize].coords.cast::<f64>();
+    let mean = some.iter().map(at).sum::<Vector3<f64>>() / some.len() as f64;
+    let scatter: Matrix3<f64> = (some.iter())
+        .map(|i| at(i) - mean)
+        .map(|d| d * d.transpose())
+        .sum();
+    let eigen = scatter.symmetric_eigen();
+    let across = eigen.eigenvalues.imin();
+    let normal = eigen.eigenvectors.column(across).into_owned().cast();
+    let mut spread: [f64; 3] = eigen.eigenvalues.into();
+    spread.sort_by(f64::total_cmp);
+    Some((spread[0] / spread[1].max(f64::MIN_POSITIVE), normal))
+}
+
+/// Search of the neighbours of a cloud's points.
+struct Neighbours<'a> {
+    points: &'a [P3],
+    grid: HashGrid,
+}
+
+impl<'a> Neighbours<'a> {
+    /// Searches within `reach` at most, metres.
+    fn new(points: &'a [P3], reach: f32) -> Self {
+        let mut grid = HashGrid::default();
+        // Searches reach half a cell.
+        grid.fill(points, 2.0 * reach);
+        Self { points, grid }
+    }
+
+    /// Calls `f` with index and squared distance of the points within `reach` of a point, possibly more than once.
+    fn each(&self, point: u32, reach: f32, f: impl FnMut(u32, f32)) {
+        let at = &self.points[point as usize];
+        self.grid.within(at, reach, f);
+    }
+
+    /// Points within `reach` of a point, itself included, nearest first.
+    fn of(&self, point: u32, reach: f32) -> Vec<u32> {
+        let mut near = Vec::new();
+        self.each(point, reach, |i, d| near.push((d, i)));
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        // Searches may find a point twice.
+        near.dedup();
+        near.into_iter().map(|(_, i)| i).collect()
+    }
+}
+
+/// Typical distance between neighbouring points of a surface, metres: by the number of occupied cells of 3 cm.
+pub(super) fn mean_spacing(points: &[P3]) -> f32 {
+    const CELL: f32 = 0.03;
+    let cells: std::collections::HashSet<[i32; 3]> = points
+        .iter()
+        .map(|p| [p.x, p.y, p.z].map(|v| (v / CELL).floor() as i32))
+        .collect();
+    // A surface crosses about 1.5 cells for each square of a cell's side.
+    let area = cells.len() as f32 * CELL * CELL / 1.5;
+    (area / points.len().max(1) as f32).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two parallel sheets of 1 m, 4 mm apart, whose points lie 6 mm apart.
+    fn sheets() -> Vec<P3> {
+        let place = |i: usize| [i / 170, i % 170].map(|c| 0.006 * c as f32);
+        let point = |i| {
+            let [x, z] = place(i);
+            P3::new(x, 0.004 * (i % 2) as f32, z)
+        };
+        (0..170 * 170).map(point).collect()
+    }
+
+    #[test]
+    fn normals_pass_over_the_distance_of_two_sheets() {
+        let points = sheets();
+        let normals = plane_normals(&points);
+        let across = normals.iter().filter(|n| n.y.abs() > 0.9).count();
+        assert!(across * 100 > points.len() * 98, "{across}");
+    }
+
+    #[test]
+    fn small_pieces_apart_are_strays() {
+        let mut points = sheets();
+        let count = points.len();
+        points.push(P3::new(0.5, 0.3, 0.5));
+        points.push(P3::new(0.5, 0.301, 0.5));
+        let strays = are_strays(&points);
+        assert_eq!(strays.iter().filter(|s| **s).count(), 2);
+        assert!(strays[count] && strays[count + 1]);
+        assert!(!are_strays(&sheets()).contains(&true));
+    }
+}
