@@ -15,7 +15,7 @@ use tryon::clothcap::{
     population,
 };
 use tryon::evaluate::garment_capture::{
-    CaptureVariant, capture_scenes, measure, measure_turn_scene, turn_scenes,
+    CaptureScene, CaptureVariant, capture_scenes, measure, measure_turn_scene, turn_scenes,
 };
 use tryon::evaluate::scans::{SKIN_LABEL, ScanMotion, ScanScene, TrueScan};
 use tryon::formats::scan::{ScanMesh, read_scan};
@@ -416,6 +416,23 @@ fn arms_against_the_torso_keep_labels_and_garments_apart() {
         assert!(error("own_body_max_mm") < 0.1, "{posture:?}");
         assert_eq!(error("inside"), 0.0, "{posture:?}");
     }
+}
+
+#[test]
+fn a_noisy_fused_cloud_without_normals_is_captured() {
+    let scenes = capture_scenes().expect("scenes");
+    let fused = |s: &CaptureScene| s.name == "noisy fused cloud";
+    let mut scene = scenes.into_iter().find(fused).expect("the scene");
+    scene.scene.scans = 1;
+    let row = measure(&scene, &CaptureVariant::whole(), 3).expect("measured");
+    println!("{row:?}");
+    let error = |name| row.get(name).unwrap_or(f64::NAN);
+    assert!(error("F1") > 0.95);
+    // The cameras disagree by 8 mm and half a degree.
+    assert!(error("garment_mm") < 8.0);
+    assert!(error("body_mm") < 12.0);
+    assert!(error("own_body_max_mm") < 0.1);
+    assert_eq!(error("inside"), 0.0);
 }
 
 #[test]

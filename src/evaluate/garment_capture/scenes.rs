@@ -3,7 +3,7 @@
 use crate::body::BodyShape;
 use crate::evaluate::EvaluateError;
 use crate::evaluate::scans::{
-    ScanDefects, ScanGarment, ScanMotion, ScanPalette, ScanScene, ScannerSetting,
+    CameraRig, ScanDefects, ScanGarment, ScanMotion, ScanPalette, ScanScene, ScannerSetting,
 };
 use crate::mirror::Choice;
 use crate::synth::{Actor, Routine};
@@ -110,6 +110,14 @@ const SCENES: [SceneSpec; 12] = [
     ),
 ];
 
+/// Scene whose scans are clouds of several depth cameras, fused; the other scenes keep their seeds.
+const FUSED: SceneSpec = (
+    "noisy fused cloud",
+    &[("trousers", 0), ("tshirt", 1)],
+    &[0.4, 0.3, 0.2],
+    ScanPalette::Distinct,
+);
+
 /// Garments of the library with their layers.
 ///
 /// # Errors
@@ -172,5 +180,10 @@ pub fn capture_scenes() -> Result<Vec<CaptureScene>, EvaluateError> {
             is_unseen: k % 3 == 2,
         })
     };
-    SCENES.iter().enumerate().map(scene).collect()
+    let all = SCENES.iter().chain([&FUSED]).enumerate();
+    let mut all: Vec<CaptureScene> = all.map(scene).collect::<Result<_, _>>()?;
+    if let Some(fused) = all.last_mut() {
+        fused.scene.scanner.rig = Some(CameraRig::default());
+    }
+    Ok(all)
 }
