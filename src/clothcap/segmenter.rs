@@ -117,6 +117,7 @@ impl ScanSegmenter {
             template.mesh().faces(),
             template.topology().vertex_neighbours(),
         );
+        labelling.join_islands(around.1);
         let labels = label_scan(scan, &alignment.matches, around, &labelling)?;
         labelling.adopt(&nodes, &labels);
         labelling.leave_unseen(&seen_slices(template, &nodes));

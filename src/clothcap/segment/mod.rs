@@ -1,6 +1,7 @@
 //! Body-model aided segmentation (section 5.2): labels of the template, then of the scan, and the rings between them.
 
 mod color_mixture;
+mod islands;
 mod labelling;
 mod node_colors;
 mod outfit;

@@ -1,0 +1,92 @@
+//! Islands of a garment in another one: stripes and prints in its colour.
+
+use super::labelling::Labelling;
+use super::prior::Slot;
+use crate::mesh::Csr;
+
+/// Share of the nodes of a garment's largest piece up to which another one, inside one other label, is an island.
+const ISLAND: f64 = 0.3;
+/// Share of an island's neighbours that have one label.
+const INSIDE: f64 = 0.9;
+
+impl Labelling {
+    /// Gives islands of tops, bottoms and one-piece garments to the garment that they lie in; `around` gives the neighbours
+    /// of each node.
+    pub fn join_islands(&mut self, around: &Csr) {
+        let is_one =
+            |l: &usize| matches!(self.slots[*l], Slot::Top | Slot::Bottom | Slot::OnePiece);
+        let whole: Vec<usize> = (0..self.slots.len()).filter(is_one).collect();
+        for l in whole {
+            let pieces = self.pieces(l as u8, around);
+            let largest = pieces.iter().map(Vec::len).max().unwrap_or(0);
+            let is_small = |p: &&Vec<u32>| p.len() as f64 <= ISLAND * largest as f64;
+            for piece in pieces.iter().filter(is_small) {
+                if let Some(label) = self.label_around(piece, around) {
+                    piece.iter().for_each(|v| self.labels[*v as usize] = label);
+                }
+            }
+        }
+    }
+
+    /// Connected nodes of a label.
+    fn pieces(&self, label: u8, around: &Csr) -> Vec<Vec<u32>> {
+        let mut is_open: Vec<bool> = self.labels.iter().map(|l| *l == label).collect();
+        let mut out = Vec::new();
+        for first in 0..is_open.len() {
+            if !std::mem::take(&mut is_open[first]) {
+                continue;
+            }
+            let mut piece = vec![first as u32];
+            let mut next = 0;
+            while let Some(v) = piece.get(next) {
+                let more = around.row(*v as usize).iter();
+                let more = more.filter(|w| std::mem::take(&mut is_open[**w as usize]));
+                let more: Vec<u32> = more.copied().collect();
+                piece.extend(more);
+                next += 1;
+            }
+            out.push(piece);
+        }
+        out
+    }
+
+    /// Garment that most neighbours of a piece have.
+    fn label_around(&self, piece: &[u32], around: &Csr) -> Option<u8> {
+        let own = self.labels[*piece.first()? as usize];
+        let mut counts = vec![0usize; self.slots.len()];
+        for w in piece.iter().flat_map(|v| around.row(*v as usize)) {
+            let label = self.labels[*w as usize];
+            counts[usize::from(label)] += usize::from(label != own);
+        }
+        let all: usize = counts.iter().sum();
+        let most = (0..counts.len()).max_by_key(|l| counts[*l])?;
+        let is_inside = counts[most] as f64 >= INSIDE * all as f64;
+        (all > 0 && is_inside && self.slots[most].is_garment()).then_some(most as u8)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stripes_in_the_colour_of_trousers_stay_with_the_top() {
+        // A line of nodes: trousers, a top with two stripes, skin.
+        let slots = vec![Slot::Skin, Slot::Hair, Slot::Top, Slot::Bottom];
+        let mut labels = [vec![3; 40], vec![2; 40], vec![0; 20]].concat();
+        for v in [50, 51, 60, 61, 99] {
+            labels[v] = 3;
+        }
+        let mut labelling = Labelling {
+            appearances: vec![None; slots.len()],
+            slots,
+            labels,
+            energy: 0.0,
+            is_top_long: false,
+        };
+        let pairs = (1..100u32).flat_map(|v| [(v - 1, v), (v, v - 1)]);
+        labelling.join_islands(&Csr::from_pairs(100, &pairs.collect::<Vec<_>>()));
+        let expected = [vec![3; 40], vec![2; 40], vec![0; 19], vec![3]].concat();
+        assert_eq!(labelling.labels, expected, "what lies in skin stays");
+    }
+}
