@@ -189,7 +189,7 @@ pub struct LeftOut {
     pub floor: usize,
     /// Positions that another row has.
     pub repeated: usize,
-    /// Apart from the rest of a cloud.
+    /// Apart from the rest of a cloud without normals.
     #[serde(default)]
     pub strays: usize,
 }
@@ -241,7 +241,8 @@ impl BodyScan {
             scan.point_of_row.push(point);
         }
         let mut scan = scan.checked()?;
-        if file.faces.is_empty() {
+        // What has normals is a surface that was cleaned before.
+        if file.faces.is_empty() && file.normals.is_empty() {
             scan.leave_out_strays();
         }
         let largest = extent(&scan.points).into_iter().fold(0.0, f32::max);
