@@ -15,6 +15,8 @@ use crate::spatial::{Bvh, PointTree};
 
 /// Smallest cosine between normals of a pair.
 const NORMALS: f32 = 0.2;
+/// Smallest cosine between normals of neighbours across a boundary.
+const BESIDE: f32 = 0.7;
 /// Pull to the start beside the data's: settles what no term determines.
 const ANCHOR: f64 = 1e-4;
 /// Mean motion of the vertices below which the fit ends, metres.
@@ -97,7 +99,13 @@ impl PartScan {
         let some: Vec<usize> = (0..scan.points.len()).filter(own).collect();
         let crosses = |e: &&[u32; 2]| {
             let [a, b] = e.map(|v| labels[v as usize] == label);
-            a != b
+            let [n, m] = e.map(|v| &scan.normals[v as usize]);
+            let of_scan = ScanNormal {
+                normal: *m,
+                oriented: scan.oriented,
+            };
+            // Edges of a cloud also join an arm and the torso behind it.
+            a != b && (!scan.faces.is_empty() || of_scan.agrees(n, BESIDE))
         };
         let middle = |e: &[u32; 2]| {
             let [a, b] = e.map(|v| scan.points[v as usize]);
