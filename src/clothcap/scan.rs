@@ -241,7 +241,7 @@ impl BodyScan {
             scan.point_of_row.push(point);
         }
         let mut scan = scan.checked()?;
-        // What has normals is a surface that was cleaned before.
+        // Files with normals are surfaces that were cleaned before.
         if file.faces.is_empty() && file.normals.is_empty() {
             scan.leave_out_strays();
         }
