@@ -209,16 +209,9 @@ impl OutfitCapture {
     pub fn frame(&mut self, scan: &BodyScan) -> Result<FrameCapture, CaptureError> {
         let segmented = self.segmenter.step(scan)?;
         let covered = segmented.covered();
-        let subject = match (&self.outfit, &self.config.minimal) {
-            (Some(outfit), _) => outfit.body.clone(),
-            (None, Some(shape)) => {
-                let start = AlignedBody {
-                    shape: shape.clone(),
-                    ..segmented.alignment.body.clone()
-                };
-                posed_under_cloth(&self.template, scan, &covered, start)?
-            }
-            (None, None) => self.subject(scan, &segmented)?,
+        let subject = match &self.outfit {
+            Some(outfit) => outfit.body.clone(),
+            None => self.subject((scan, &covered), &segmented)?,
         };
 
         // The first scan makes the outfit; nothing is skipped in it.
@@ -233,7 +226,6 @@ impl OutfitCapture {
             scan,
             segmented: &segmented,
             near: nearest_nodes(&segmented, self.segmenter.cloth()),
-            edges: scan.edges(),
             config: &parts,
         };
         let alignment = &segmented.alignment;
@@ -242,7 +234,7 @@ impl OutfitCapture {
                 let fitted = fitter.later(&outfit)?;
                 let start = AlignedBody {
                     pose: alignment.body.pose.clone(),
-                    shape: outfit.body.shape.clone(),
+                    shape: subject.shape,
                 };
                 let body = posed_under_cloth(&self.template, scan, &covered, start)?;
                 (outfit, fitted, body)
@@ -284,12 +276,19 @@ impl OutfitCapture {
         Ok(out)
     }
 
-    /// Minimally clothed shape from the first scan and those beside it in which the subject is found.
+    /// Minimally clothed body in the first scan: of the given shape, or of that which it and the scans beside it show.
     fn subject(
         &mut self,
-        scan: &BodyScan,
+        (scan, covered): (&BodyScan, &[bool]),
         first: &SegmentedScan,
     ) -> Result<AlignedBody, CaptureError> {
+        if let Some(shape) = &self.config.minimal {
+            let start = AlignedBody {
+                shape: shape.clone(),
+                ..first.alignment.body.clone()
+            };
+            return posed_under_cloth(&self.template, scan, covered, start);
+        }
         let scans = std::mem::take(&mut self.shape_scans);
         let mut others: Vec<(SegmentedScan, &BodyScan)> = Vec::new();
         if let Some(clothed) = self.segmenter.clothed().filter(|_| !scans.is_empty()) {
@@ -374,8 +373,6 @@ struct PartFitter<'a> {
     segmented: &'a SegmentedScan,
     /// Vertex of the clothed template that each scan point lies near, shape `[points]`.
     near: Vec<u32>,
-    /// Edges of the scan.
-    edges: Vec<[u32; 2]>,
     config: &'a PartFitConfig,
 }
 
@@ -443,7 +440,7 @@ impl PartFitter<'_> {
     ) -> Result<(), CaptureError> {
         let segmented = self.segmented;
         let points = PartScan::new(
-            (self.scan, &self.edges),
+            (self.scan, &segmented.edges),
             (&segmented.labels, &self.near),
             part.label,
         );

@@ -21,6 +21,8 @@ pub struct SegmentedScan {
     pub labelling: Labelling,
     /// Label of each scan point, shape `[points]`.
     pub labels: Vec<u8>,
+    /// Edges of the scan, see [`BodyScan::edges`].
+    pub edges: Vec<[u32; 2]>,
 }
 
 impl SegmentedScan {
@@ -118,7 +120,8 @@ impl ScanSegmenter {
             template.topology().vertex_neighbours(),
         );
         labelling.join_islands(around.1);
-        let labels = label_scan(scan, &alignment.matches, around, &labelling)?;
+        let edges = scan.edges();
+        let labels = label_scan((scan, &edges), &alignment.matches, around, &labelling)?;
         labelling.adopt(&nodes, &labels);
         labelling.leave_unseen(&seen_slices(template, &nodes));
         if !labelling
@@ -134,6 +137,7 @@ impl ScanSegmenter {
             nodes,
             labelling,
             labels,
+            edges,
         })
     }
 }

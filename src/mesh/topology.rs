@@ -28,6 +28,32 @@ impl Csr {
         }
         Self { offsets, items }
     }
+    /// Connected rows whose neighbours are `alike`, each ascending, in the order of their first rows.
+    pub fn components(&self, alike: impl Fn(usize, usize) -> bool) -> Vec<Vec<u32>> {
+        let mut is_taken = vec![false; self.rows()];
+        let mut out = Vec::new();
+        for first in 0..self.rows() {
+            if std::mem::replace(&mut is_taken[first], true) {
+                continue;
+            }
+            let mut own = vec![first as u32];
+            let mut next = 0;
+            while let Some(v) = own.get(next).map(|v| *v as usize) {
+                next += 1;
+                for w in self.row(v) {
+                    let taken = &mut is_taken[*w as usize];
+                    if !*taken && alike(v, *w as usize) {
+                        *taken = true;
+                        own.push(*w);
+                    }
+                }
+            }
+            own.sort_unstable();
+            out.push(own);
+        }
+        out
+    }
+
     /// Items of one row.
     pub fn row(&self, i: usize) -> &[u32] {
         &self.items[self.offsets[i] as usize..self.offsets[i + 1] as usize]
@@ -181,6 +207,15 @@ impl Topology {
 mod tests {
     use super::*;
     use crate::math::P3;
+
+    #[test]
+    fn components_are_connected_rows_that_are_alike() {
+        let pairs = [(0, 1), (1, 0), (1, 2), (2, 1), (3, 4), (4, 3)];
+        let csr = Csr::from_pairs(5, &pairs);
+        assert_eq!(csr.components(|_, _| true), [vec![0, 1, 2], vec![3, 4]]);
+        let split = csr.components(|a, b| (a < 2) == (b < 2));
+        assert_eq!(split, [vec![0, 1], vec![2], vec![3, 4]]);
+    }
 
     #[test]
     fn hinge_orientation_and_faults() {

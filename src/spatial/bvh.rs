@@ -328,7 +328,8 @@ impl Bvh {
         best
     }
 
-    fn point_of_face(&self, x: &[P3], p: &P3, face: u32) -> SurfacePoint {
+    /// Point of one triangle closest to `p`; `x` are the vertices.
+    pub fn point_of_face(&self, x: &[P3], p: &P3, face: u32) -> SurfacePoint {
         let corners = self.corners(face, x);
         let weights = closest_on_triangle(p, corners);
         let sum = |k: usize| corners[k].coords * weights[k];

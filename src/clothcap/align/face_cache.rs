@@ -2,7 +2,7 @@
 
 use crate::math::P3;
 use crate::mesh::Face;
-use crate::spatial::{Bvh, SurfacePoint, closest_on_triangle};
+use crate::spatial::{Bvh, SurfacePoint};
 use serde::{Deserialize, Serialize};
 
 /// Counts of nearest-point queries of a fit.
@@ -113,7 +113,7 @@ impl FaceCache {
         if let Some(k) = kept
             && self.travel[k.face as usize] - k.travel < self.settled
         {
-            let point = on_face((bvh.faces(), surface), k.face, p);
+            let point = bvh.point_of_face(surface, p, k.face);
             return Some(Found { point, kept });
         }
         let beside = self.kept[i - i % self.stride];
@@ -147,18 +147,4 @@ impl FaceCache {
 pub(in crate::clothcap) struct Found {
     pub(in crate::clothcap) point: SurfacePoint,
     kept: Option<KeptFace>,
-}
-
-/// Point of a face closest to `p`.
-fn on_face((faces, surface): (&[Face], &[P3]), face: u32, p: &P3) -> SurfacePoint {
-    let corners = faces[face as usize].map(|v| surface[v as usize]);
-    let weights = closest_on_triangle(p, corners);
-    let at = |k: usize| corners[k].coords * weights[k];
-    let point = P3::from(at(0) + at(1) + at(2));
-    SurfacePoint {
-        face,
-        weights,
-        point,
-        distance: (point - p).norm(),
-    }
 }

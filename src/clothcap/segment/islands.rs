@@ -30,24 +30,9 @@ impl Labelling {
 
     /// Connected nodes of a label.
     fn pieces(&self, label: u8, around: &Csr) -> Vec<Vec<u32>> {
-        let mut is_open: Vec<bool> = self.labels.iter().map(|l| *l == label).collect();
-        let mut out = Vec::new();
-        for first in 0..is_open.len() {
-            if !std::mem::take(&mut is_open[first]) {
-                continue;
-            }
-            let mut piece = vec![first as u32];
-            let mut next = 0;
-            while let Some(v) = piece.get(next) {
-                let more = around.row(*v as usize).iter();
-                let more = more.filter(|w| std::mem::take(&mut is_open[**w as usize]));
-                let more: Vec<u32> = more.copied().collect();
-                piece.extend(more);
-                next += 1;
-            }
-            out.push(piece);
-        }
-        out
+        let mut all = around.components(|v, w| self.labels[v] == self.labels[w]);
+        all.retain(|piece| self.labels[piece[0] as usize] == label);
+        all
     }
 
     /// Garment that most neighbours of a piece have.

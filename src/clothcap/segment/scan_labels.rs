@@ -26,7 +26,7 @@ const NO_ROW: u32 = u32::MAX;
 /// # Errors
 /// [`CaptureError::Solve`] for an energy that is not finite.
 pub fn label_scan(
-    scan: &BodyScan,
+    (scan, edges): (&BodyScan, &[[u32; 2]]),
     matches: &[SurfaceMatch],
     (faces, neighbours): (&[Face], &Csr),
     labelling: &Labelling,
@@ -53,7 +53,7 @@ pub fn label_scan(
         .flat_map(|i| costs(labelling, of_node(*i), &colors[*i]))
         .collect();
     let mut energy = OpenPoints::new(labels.len(), &open, unary);
-    for edge in scan.edges() {
+    for &edge in edges {
         let d = (colors[edge[0] as usize] - colors[edge[1] as usize]).norm() as f32 / CONTRAST;
         let [full, rest] = SMOOTHNESS;
         energy.join(edge, full * (rest + (1.0 - rest) / (1.0 + d * d)), &labels);

@@ -119,29 +119,8 @@ fn smoothed_axes(normals: &[V3], around: &Csr) -> Vec<usize> {
 
 /// Connected faces of each axis, in the order of their first faces.
 fn components(axes: &[usize], around: &Csr) -> Vec<(usize, Vec<u32>)> {
-    let mut is_taken = vec![false; axes.len()];
-    let mut out = Vec::new();
-    for first in 0..axes.len() {
-        if is_taken[first] {
-            continue;
-        }
-        is_taken[first] = true;
-        let mut own = vec![first as u32];
-        let mut next = 0;
-        while let Some(f) = own.get(next).copied() {
-            next += 1;
-            for g in around.row(f as usize) {
-                let g = *g as usize;
-                if !is_taken[g] && axes[g] == axes[first] {
-                    is_taken[g] = true;
-                    own.push(g as u32);
-                }
-            }
-        }
-        own.sort_unstable();
-        out.push((axes[first], own));
-    }
-    out
+    let all = around.components(|f, g| axes[f] == axes[g]).into_iter();
+    all.map(|own| (axes[own[0] as usize], own)).collect()
 }
 
 /// Gives the faces of small charts to their neighbours.
