@@ -4,14 +4,14 @@ use super::labelling::Labelling;
 use super::prior::Slot;
 use crate::mesh::Csr;
 
-/// Share of the nodes of a garment's largest piece up to which another one, inside one other label, is an island.
+/// Share of the nodes of a garment's largest piece up to which another one, beside another garment, is an island.
 const ISLAND: f64 = 0.3;
-/// Share of an island's neighbours that have one label.
-const INSIDE: f64 = 0.9;
+/// Least share of an island's neighbours that belong to one other garment.
+const BESIDE: f64 = 0.4;
 
 impl Labelling {
-    /// Gives islands of tops, bottoms and one-piece garments to the garment that they lie in; `around` gives the neighbours
-    /// of each node.
+    /// Gives islands of tops, bottoms and one-piece garments to the garment beside them; `around` gives the neighbours of
+    /// each node.
     pub fn join_islands(&mut self, around: &Csr) {
         let is_one =
             |l: &usize| matches!(self.slots[*l], Slot::Top | Slot::Bottom | Slot::OnePiece);
@@ -45,8 +45,8 @@ impl Labelling {
         }
         let all: usize = counts.iter().sum();
         let most = (0..counts.len()).max_by_key(|l| counts[*l])?;
-        let is_inside = counts[most] as f64 >= INSIDE * all as f64;
-        (all > 0 && is_inside && self.slots[most].is_garment()).then_some(most as u8)
+        let is_beside = counts[most] as f64 >= BESIDE * all as f64;
+        (all > 0 && is_beside && self.slots[most].is_garment()).then_some(most as u8)
     }
 }
 

@@ -19,6 +19,11 @@ const CONTRAST: [f32; 2] = [0.1, 0.10];
 const CHANGE: f32 = 1.0;
 /// Step down from the upper to the lower node that halves it, metres: hems lie on what is below.
 const STEP: f32 = 0.003;
+/// Mean cost above that of their own appearance from which colours are no skin, nats: bare arms have up to 2.0, shirts in an
+/// open jacket from 7.7.
+pub(super) const LEAST_UNLIKE_SKIN: f64 = 4.0;
+/// Least share of a garment's first nodes that it covers.
+const LEAST_CLOTH: f64 = 0.2;
 /// Turns of appearances and labels.
 const TURNS: usize = 5;
 /// Modes of skin, hair and what hands hold.
@@ -272,7 +277,7 @@ impl<'a> Labeller<'a> {
                 if slots[l] == Slot::Skin {
                     return self.skin_appearance();
                 }
-                ColorMixture::fit(&self.nodes.of(own(l)))
+                self.appearance(&own(l).collect::<Vec<_>>(), slots[l])
             })
             .collect();
         // Garments of one colour share an appearance: else each keeps the shades of the nodes that it began with.
@@ -291,6 +296,24 @@ impl<'a> Labeller<'a> {
             }
         }
         out
+    }
+
+    /// Appearance of a label's nodes. That of a garment leaves out bare skin among them, where the rest is clearly none: a
+    /// region starts whole, and shorts would keep the colour of the thighs below them.
+    fn appearance(&self, own: &[usize], slot: Slot) -> Option<ColorMixture> {
+        let all = ColorMixture::fit(&self.nodes.of(own.iter().copied()))?;
+        let Some(skin) = self.skin_appearance().filter(|_| slot.is_garment()) else {
+            return Some(all);
+        };
+        let is_cloth =
+            |v: &usize| self.nodes.cost(*v, &skin) - self.nodes.cost(*v, &all) > DISTINCT;
+        let cloth: Vec<usize> = own.iter().copied().filter(is_cloth).collect();
+        let is_enough = cloth.len() as f64 >= LEAST_CLOTH * own.len() as f64;
+        let excess = self.excess(cloth.iter().copied(), (&all, &skin));
+        if !is_enough || excess < LEAST_UNLIKE_SKIN {
+            return Some(all);
+        }
+        ColorMixture::fit(&self.nodes.of(cloth.into_iter()))
     }
 
     /// Mean cost of another appearance above that of their own at some nodes, nats.

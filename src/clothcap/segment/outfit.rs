@@ -195,4 +195,30 @@ mod tests {
         let (high, below) = label(0.0);
         assert!(!high.is_top_long && below < 10, "{below} nodes");
     }
+
+    #[test]
+    fn a_bare_belly_and_bare_thighs_are_skin() {
+        let cloth = ClothTemplate::new(&embedded::template(), LegTopology::Apart).expect("small");
+        let regions = BodyRegion::of_vertices(cloth.template());
+        let is_bare = |p: &P3, r: BodyRegion| match r {
+            BodyRegion::Chest => p.y < 1.25,
+            BodyRegion::Abdomen => true,
+            BodyRegion::Pelvis => p.y > 1.0,
+            BodyRegion::Thigh => p.y < 0.75,
+            _ => true,
+        };
+        let color = |p: &P3, r: BodyRegion| match is_bare(p, r) {
+            true => [205.0, 150.0, 120.0],
+            false if p.y > 1.1 => [40.0, 110.0, 60.0],
+            false => [44.0, 52.0, 86.0],
+        };
+        let nodes = NodeColors::painted(cloth.template(), color, |_| 0.0);
+        let found = label_nodes(&cloth, &nodes, &LabelConfig::default()).expect("finite");
+        let vertices = cloth.template().mesh().vertices();
+        let wrong = vertices.iter().zip(&regions).zip(&found.labels);
+        let wrong = wrong
+            .filter(|((p, r), l)| is_bare(p, **r) == found.slots[usize::from(**l)].is_garment());
+        let wrong = wrong.count();
+        assert!(wrong * 100 < regions.len(), "{wrong} nodes");
+    }
 }

@@ -142,7 +142,7 @@ impl Slot {
             (Self::Skin, Forearm) => 0.3,
             (Self::Skin, UpperArm | Shin | Foot) => 0.6,
             (Self::Skin, Thigh) => 1.0,
-            (Self::Skin, Chest | Abdomen | Pelvis) => 2.5,
+            (Self::Skin, Chest | Abdomen | Pelvis) => 1.5,
 
             (Self::Hair, Head) => 0.0,
             (Self::Hair, Neck) => 0.3,

@@ -1,7 +1,7 @@
 //! Garments of the torso: the two colours of torso and arms that are least like shades or prints of each other.
 
 use super::color_mixture::{ColorMixture, k_means};
-use super::labelling::Labeller;
+use super::labelling::{LEAST_UNLIKE_SKIN, Labeller};
 use nalgebra::Vector3;
 
 /// Clusters in which the colours of torso and arms start; each way to join them to two is tried.
@@ -15,9 +15,6 @@ const LEAST_STEP: f64 = 1.1;
 const MOST_MIXED: f64 = 0.5;
 /// Least share of its border at which a garment meets skin or the garment of the legs: prints meet their own garment only.
 const LEAST_FREE: f64 = 0.05;
-/// Mean cost above that of their own appearance from which colours are no skin, nats: bare arms have up to 2.0, shirts in an
-/// open jacket from 7.7.
-const LEAST_UNLIKE_SKIN: f64 = 4.0;
 /// Brightness added before colours are divided by it: hues of dark colours are noise.
 const DARK: f64 = 0.1;
 /// Weight of the logarithm of brightness beside hue and saturation: light changes it, dyes do too.

@@ -50,6 +50,8 @@ struct MadeSpec {
     palette: ScanPalette,
     /// See [`ScannerSetting::light_tint`].
     light_tint: f32,
+    /// See [`CaptureScene::is_unseen`].
+    is_unseen: bool,
 }
 
 /// Shoes and hats.
@@ -57,8 +59,8 @@ const ALL: GarmentParts = GarmentParts::All;
 /// Suits.
 const EACH: GarmentParts = GarmentParts::Each;
 
-/// The scenes; every third is unseen.
-const SPECS: [MadeSpec; 9] = [
+/// The scenes, a third of them unseen.
+const SPECS: [MadeSpec; 13] = [
     MadeSpec {
         name: "made: shirt, trousers, shoes",
         body: "subject_m_tall",
@@ -70,6 +72,7 @@ const SPECS: [MadeSpec; 9] = [
         clip: ("cmu_bvh/02_02_makehuman.bvh", 0.6),
         palette: ScanPalette::Distinct,
         light_tint: 0.0,
+        is_unseen: false,
     },
     MadeSpec {
         name: "made: open jacket over shirt",
@@ -82,6 +85,7 @@ const SPECS: [MadeSpec; 9] = [
         clip: ("cmu_asf_amc/13_29.amc", 2.0),
         palette: ScanPalette::Distinct,
         light_tint: 0.5,
+        is_unseen: false,
     },
     MadeSpec {
         name: "made: elegant suit",
@@ -94,6 +98,7 @@ const SPECS: [MadeSpec; 9] = [
         clip: ("cmu_asf_amc/93_04.amc", 1.0),
         palette: ScanPalette::Distinct,
         light_tint: 0.5,
+        is_unseen: true,
     },
     MadeSpec {
         name: "made: top and short skirt",
@@ -106,6 +111,7 @@ const SPECS: [MadeSpec; 9] = [
         clip: ("cmu_asf_amc/13_31.amc", 2.0),
         palette: ScanPalette::Distinct,
         light_tint: 0.5,
+        is_unseen: false,
     },
     MadeSpec {
         name: "made: low contrast",
@@ -118,6 +124,7 @@ const SPECS: [MadeSpec; 9] = [
         clip: ("cmu_asf_amc/02_07.amc", 2.0),
         palette: ScanPalette::LowContrast,
         light_tint: 0.0,
+        is_unseen: false,
     },
     MadeSpec {
         name: "made: shorts, shirt, hat",
@@ -131,6 +138,7 @@ const SPECS: [MadeSpec; 9] = [
         clip: ("cmu_asf_amc/13_29.amc", 10.0),
         palette: ScanPalette::Distinct,
         light_tint: 0.0,
+        is_unseen: false,
     },
     MadeSpec {
         name: "made: overalls and hat",
@@ -144,6 +152,7 @@ const SPECS: [MadeSpec; 9] = [
         clip: ("cmu_asf_amc/93_04.amc", 1.0),
         palette: ScanPalette::Distinct,
         light_tint: 0.0,
+        is_unseen: false,
     },
     MadeSpec {
         name: "made: woman, low contrast, tinted",
@@ -156,6 +165,7 @@ const SPECS: [MadeSpec; 9] = [
         clip: ("cmu_bvh/02_03.bvh", 0.2),
         palette: ScanPalette::LowContrast,
         light_tint: 0.5,
+        is_unseen: false,
     },
     MadeSpec {
         name: "made: sportswear",
@@ -168,6 +178,56 @@ const SPECS: [MadeSpec; 9] = [
         clip: ("cmu_asf_amc/13_31.amc", 8.0),
         palette: ScanPalette::LowContrast,
         light_tint: 0.0,
+        is_unseen: false,
+    },
+    MadeSpec {
+        name: "made: suit without shoes",
+        body: "subject_m_heavy",
+        clothes: &[("male_casualsuit06/male_casualsuit06", EACH)],
+        is_skinned: true,
+        clip: ("cmu_asf_amc/93_04.amc", 2.5),
+        palette: ScanPalette::Distinct,
+        light_tint: 0.5,
+        is_unseen: true,
+    },
+    MadeSpec {
+        name: "made: woman in sports clothes, tinted",
+        body: "subject_f_short_heavy",
+        clothes: &[
+            ("shoes02/shoes02", ALL),
+            ("female_sportsuit01/female_sportsuit01", EACH),
+        ],
+        is_skinned: true,
+        clip: ("cmu_bvh/02_03.bvh", 0.6),
+        palette: ScanPalette::Distinct,
+        light_tint: 0.5,
+        is_unseen: true,
+    },
+    MadeSpec {
+        name: "made: man, low contrast",
+        body: "subject_m_tall",
+        clothes: &[
+            ("shoes03/shoes03", ALL),
+            ("male_casualsuit01/male_casualsuit01", EACH),
+        ],
+        is_skinned: true,
+        clip: ("cmu_asf_amc/02_07.amc", 1.0),
+        palette: ScanPalette::LowContrast,
+        light_tint: 0.0,
+        is_unseen: true,
+    },
+    MadeSpec {
+        name: "made: woman, shorts and shirt",
+        body: "subject_f_avg",
+        clothes: &[
+            ("shoes04/shoes04", ALL),
+            ("female_casualsuit02/female_casualsuit02", EACH),
+        ],
+        is_skinned: true,
+        clip: ("cmu_asf_amc/13_31.amc", 5.0),
+        palette: ScanPalette::LowContrast,
+        light_tint: 0.5,
+        is_unseen: true,
     },
 ];
 
@@ -191,7 +251,7 @@ pub fn made_scenes(data: Option<&Path>) -> Result<MadeScenes, EvaluateError> {
         out.scenes.push(CaptureScene {
             name: spec.name.into(),
             scene: scene.map_err(|why| fault(spec.name, why))?,
-            is_unseen: k % 3 == 2,
+            is_unseen: spec.is_unseen,
         });
     }
     Ok(out)
