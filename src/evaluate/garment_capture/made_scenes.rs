@@ -208,7 +208,7 @@ const SPECS: [MadeSpec; 13] = [
         body: "subject_m_tall",
         clothes: &[
             ("shoes03/shoes03", ALL),
-            ("male_casualsuit01/male_casualsuit01", EACH),
+            ("male_casualsuit03/male_casualsuit03", EACH),
         ],
         is_skinned: true,
         clip: ("cmu_asf_amc/02_07.amc", 1.0),
