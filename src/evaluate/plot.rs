@@ -12,7 +12,7 @@ const MARGIN: f64 = 1.25;
 const LEAST: f64 = 1e-3;
 
 /// Draws run time (milliseconds, logarithmic) against one error (logarithmic); rows of one scene and method are joined
-/// in their order. `None` when there are fewer than two finite values.
+/// in their order. `None` without a finite value.
 ///
 /// # Errors
 /// [`EvaluateError::Plot`] when the drawing library refuses.
@@ -36,7 +36,7 @@ pub fn run_time_against_error(table: &Table, error: &str) -> Result<Option<Strin
         series[at].1.push((row.run_ms.max(LEAST), value.max(LEAST)));
     }
     let all: Vec<(f64, f64)> = series.iter().flat_map(|(_, p)| p.iter().copied()).collect();
-    if all.len() < 2 {
+    if all.is_empty() {
         return Ok(None);
     }
     let span = |f: fn(&(f64, f64)) -> f64| {

@@ -5,8 +5,7 @@ use super::{EvaluateError, Table};
 use std::path::{Path, PathBuf};
 
 impl Table {
-    /// Writes `NAME.csv`, `NAME.json` and, for each error that has two finite values at least, `NAME-ERROR.svg` into
-    /// `dir`, which is made when missing. Returns the files.
+    /// Writes `NAME.csv`, `NAME.json` and, for each error with a finite value, `NAME-ERROR.svg` into `dir`, which is made when missing. Returns the files.
     ///
     /// # Errors
     /// Names the file that cannot be written or the plot that cannot be drawn.
@@ -49,7 +48,8 @@ mod tests {
         t.rows.push(
             Row::new("walk", "plane", 3.0)
                 .error("joints_mm", 5.0)
-                .error("lost", 2.0),
+                .error("lost", 2.0)
+                .error("absent", f64::NAN),
         );
         t
     }
@@ -60,8 +60,8 @@ mod tests {
         let files = table().write(&dir.path().join("new")).expect("written");
         assert_eq!(
             files.len(),
-            3,
-            "{files:?}: `lost` has a single value and no plot"
+            4,
+            "{files:?}: `lost` has one value, `absent` none"
         );
         let blocked = dir.path().join("file");
         std::fs::write(&blocked, "x").expect("file");
