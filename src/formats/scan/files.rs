@@ -39,7 +39,12 @@ fn unknown_extension(path: &Path) -> FormatError {
 /// # Errors
 /// Names the extension that is unknown, or the part of the file at fault; a scan without points is an error.
 pub fn read_scan(path: &Path) -> Result<ScanMesh, FormatError> {
-    let scan = match format_of(path).ok_or_else(|| unknown_extension(path))? {
+    let format = format_of(path).ok_or_else(|| unknown_extension(path))?;
+    let size = std::fs::metadata(path).map_err(|e| FormatError::io(path, e))?;
+    if size.len() == 0 {
+        return Err(FormatError::field(path, "size", "the file is empty"));
+    }
+    let scan = match format {
         ScanFormat::Ply => read_ply(path)?,
         ScanFormat::Obj => read_obj_scan(path)?,
         ScanFormat::Gltf => read_scene(path)?,
