@@ -15,6 +15,8 @@ const FOCAL: f32 = 525.0;
 const FILL: f32 = 0.72;
 /// Nearest surface drawn, metres.
 const NEAR: f32 = 0.1;
+/// Faces a point, two on a whole surface, below which a scan is drawn as a cloud.
+const TORN: f64 = 1.4;
 /// Side of a point of a cloud as a multiple of the distance between points: closes the gaps.
 const SPLAT: f32 = 2.5;
 
@@ -65,7 +67,7 @@ impl VirtualCamera {
         let camera_from_world = self.world_from_camera.inverse();
         camera_from_world.points_f32(&scan.points, &mut points);
         let mut depth = DepthImage::empty(camera.width, camera.height);
-        if scan.faces.is_empty() {
+        if is_torn(scan) {
             splat(&camera, &points, depth.data_mut());
         } else {
             let view = View::Perspective { camera, near: NEAR };
@@ -86,6 +88,11 @@ impl VirtualCamera {
             color: None,
         }
     }
+}
+
+/// A cloud, or a mesh whose faces leave much of the surface between its points open.
+fn is_torn(scan: &BodyScan) -> bool {
+    (scan.faces.len() as f64) < TORN * scan.points.len() as f64
 }
 
 /// Draws each point of a cloud as a square that faces the camera.
