@@ -187,9 +187,9 @@ impl CaptureArchive {
         &self,
         before: &FrameRecord,
         scan: &str,
-        header: &CaptureHeader,
+        (header, template): (&CaptureHeader, &Template),
     ) -> Result<FrameRecord, FormatError> {
-        let displacements = self.displacements(&before.scan, header)?;
+        let displacements = self.displacements(&before.scan, header, template)?;
         let report = FrameReport {
             repeated: true,
             ..before.report.clone()
@@ -240,20 +240,22 @@ impl CaptureArchive {
         read.collect()
     }
 
-    /// Displacements of a scan.
+    /// Displacements of a scan of a capture on bodies of `template`.
     ///
     /// # Errors
-    /// A missing or damaged array, or one with other vertices than the outfit.
+    /// A missing or damaged array, or one with other vertices than the template or the outfit.
     pub fn displacements(
         &self,
         scan: &str,
         header: &CaptureHeader,
+        template: &Template,
     ) -> Result<FrameDisplacements, FormatError> {
         let read = |name: &str, count| read_vectors(&self.array_path(scan, name), count);
         let parts = header.outfit.cloth.parts.iter().enumerate();
         let garments = parts.map(|(k, part)| read(&format!("garment{k}"), part.nodes.len()));
         Ok(FrameDisplacements {
-            body: read("body", header.clothed.rest.len())?,
+            // The clothed template has further vertices where a skirt joins its legs.
+            body: read("body", template.mesh().vertices().len())?,
             garments: garments.collect::<Result<_, _>>()?,
         })
     }

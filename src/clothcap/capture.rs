@@ -9,7 +9,7 @@ use super::multi::{ClothPart, MultiCloth, PartFit, PartFitConfig, PartScan};
 use super::part_colors::part_colors;
 use super::retarget::{PenetrationSolver, SolidBody, pose_part};
 use super::scan::{BodyScan, LeftOut};
-use super::segment::{LabelConfig, Labelling};
+use super::segment::{BodyRegion, LabelConfig, Labelling, unseen_regions};
 use super::segmenter::{ScanSegmenter, SegmentedScan};
 use super::texture::{GarmentTexture, ScanPaint, TextureAtlas};
 use super::topology::ClothTemplate;
@@ -61,6 +61,9 @@ pub struct FrameReport {
     /// Rows of the scan's file that are no point.
     #[serde(default)]
     pub left_out: LeftOut,
+    /// Regions of the body that hardly any point shows; they get no garment.
+    #[serde(default)]
+    pub unseen: Vec<BodyRegion>,
     /// The scan is the one before, but for its noise: the capture is a copy of that one's.
     #[serde(default)]
     pub repeated: bool,
@@ -266,6 +269,10 @@ impl OutfitCapture {
                 boundary_errors: fitted.boundary_errors,
                 queries: fitted.queries,
                 left_out: scan.left_out,
+                unseen: unseen_regions(
+                    self.segmenter.cloth().template(),
+                    &segmented.alignment.matches,
+                ),
                 repeated: false,
             },
             alignment: segmented.alignment,

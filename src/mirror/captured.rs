@@ -49,7 +49,7 @@ impl CapturedWardrobe {
         let first = records.find_map(Result::transpose).ok_or_else(|| {
             FormatError::field(folder, "scans", "the capture has no finished scan")
         })??;
-        let displacements = archive.displacements(&first.scan, &header)?;
+        let displacements = archive.displacements(&first.scan, &header, template)?;
 
         let rest = template.personalise(&first.body.shape);
         let moved = rest.vertices.iter().zip(&displacements.body);

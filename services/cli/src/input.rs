@@ -5,6 +5,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Deserialize;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 use tryon::body::{Template, embedded, import::template_from_smpl};
 use tryon::dressing::{MeshGarment, SourceBody};
 use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
@@ -189,7 +190,10 @@ pub(crate) fn progress(frames: Option<u64>, what: &'static str) -> ProgressBar {
     };
     let style =
         ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    bar.with_style(style).with_prefix(what)
+    let bar = bar.with_style(style).with_prefix(what);
+    // Shown before the first one is done, which takes longest.
+    bar.enable_steady_tick(Duration::from_secs(1));
+    bar
 }
 
 /// Creates a folder for results.

@@ -99,6 +99,37 @@ fn jobs_of_a_batch_share_the_bodies_and_leave_what_is_done() {
 }
 
 #[test]
+fn a_skirt_is_put_on_other_bodies_with_its_texture() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = ScanScene::library(&["skirt", "tshirt"]).unwrap();
+    (scene.scans, scene.scanner.points) = (1, 20_000);
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (scans, outfit, bodies) = (at("scans"), at("outfit"), at("bodies"));
+    write_scan_folder(Path::new(&scans), &scene).unwrap();
+    succeeds(&["capture", "--scans", &scans, "--out", &outfit]);
+    let retarget = ["retarget", "--capture", &outfit, "--out", &bodies];
+    succeeds(&[&retarget[..], &["--population", "2", "--obj"]].concat());
+
+    let report = json_of(&folder.path().join("bodies/report.json"));
+    let rows = report["bodies"].as_array().unwrap();
+    for frame in rows.iter().flat_map(|b| b["frames"].as_array().unwrap()) {
+        for garment in frame.as_array().unwrap() {
+            assert_eq!(garment["inside"], 0, "{garment}");
+        }
+    }
+    let at_body = |name: &str| folder.path().join("bodies").join(name);
+    let materials = std::fs::read_to_string(at_body("0001.mtl")).unwrap();
+    assert!(materials.contains("map_Kd 0001_bottom.png"), "{materials}");
+    assert!(at_body("0001_bottom.png").exists() && at_body("0001.obj").exists());
+
+    // The sheet of a batch that continues shows the bodies that were done before, too.
+    let sheet = std::fs::read(at_body("sheet.png")).unwrap();
+    std::fs::remove_file(at_body("0001.json")).unwrap();
+    succeeds(&[&retarget[..], &["--population", "2", "--obj"]].concat());
+    assert_eq!(std::fs::read(at_body("sheet.png")).unwrap(), sheet);
+}
+
+#[test]
 fn scans_that_show_nobody_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
@@ -118,6 +149,14 @@ fn scans_that_show_nobody_are_refused_by_name() {
     let header = "ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\n";
     std::fs::write(&cut, header).unwrap();
     assert!(refused(&cut).contains("cut.ply"));
+
+    let nothing = folder.path().join("nothing.glb");
+    std::fs::write(&nothing, "").unwrap();
+    let err = refused(&nothing);
+    assert!(
+        err.contains("nothing.glb") && err.contains("empty"),
+        "{err}"
+    );
 
     let mut post = String::from(
         "ply\nformat ascii 1.0\nelement vertex 2000\nproperty float x\nproperty float y\nproperty float z\nend_header\n",

@@ -16,4 +16,4 @@ pub use node_colors::NodeColors;
 pub use outfit::label_nodes;
 pub use prior::{BodyRegion, IMPOSSIBLE, Slot};
 pub use scan_labels::label_scan;
-pub use unseen::seen_slices;
+pub use unseen::{seen_slices, unseen_regions};

@@ -1,8 +1,10 @@
-//! Slices of limbs and trunk that a scan shows: garments end where nothing of the body is seen.
+//! Parts of the body that a scan shows: garments end where nothing of the body is seen.
 
 use super::labelling::Labelling;
 use super::node_colors::NodeColors;
+use super::prior::BodyRegion;
 use crate::body::Template;
+use crate::clothcap::align::SurfaceMatch;
 use crate::math::V3;
 use std::collections::BTreeMap;
 
@@ -10,6 +12,10 @@ use std::collections::BTreeMap;
 const SLICE: f32 = 0.02;
 /// Share of a slice's nodes with a scan point from which it is seen: one side of a limb has a third.
 const SEEN: f64 = 0.1;
+/// Share of a region's vertices with a point below which the region is unseen.
+const SEEN_OF_REGION: f64 = 0.2;
+/// Distance up to which a point shows the surface below it, metres.
+const NEAR: f32 = 0.03;
 
 /// Nodes in slices of their bone that the scan shows, or next to one that it shows; shape `[nodes]`.
 pub fn seen_slices(template: &Template, nodes: &NodeColors) -> Vec<bool> {
@@ -26,6 +32,25 @@ pub fn seen_slices(template: &Template, nodes: &NodeColors) -> Vec<bool> {
     };
     let near = |(bone, k): &(usize, i32)| (k - 1..=k + 1).any(|k| is_seen(&(*bone, k)));
     slices.iter().map(near).collect()
+}
+
+/// Regions of the body of which hardly a vertex has a point; `template` is that of the matches' faces.
+pub fn unseen_regions(template: &Template, matches: &[SurfaceMatch]) -> Vec<BodyRegion> {
+    let faces = template.mesh().faces();
+    let regions = BodyRegion::of_vertices(template);
+    let mut seen = vec![false; regions.len()];
+    let shows = |m: &&SurfaceMatch| m.weight > 0.0 && m.distance < NEAR;
+    for m in matches.iter().filter(shows) {
+        for v in faces[m.face as usize] {
+            seen[v as usize] = true;
+        }
+    }
+    let share = |region: BodyRegion| {
+        let own = || regions.iter().zip(&seen).filter(|(r, _)| **r == region);
+        own().filter(|(_, s)| **s).count() as f64 / own().count().max(1) as f64
+    };
+    let all = BodyRegion::ALL.into_iter();
+    all.filter(|r| share(*r) < SEEN_OF_REGION).collect()
 }
 
 /// Bone of each node, and slice across it; shape `[nodes]`.

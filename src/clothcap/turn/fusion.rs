@@ -6,21 +6,15 @@ use super::moving_parts::MovingParts;
 use super::multi_view::{self, RegisteredFrame, measure, register};
 use super::{KeyFrameReport, TurnError, TurnReport};
 use crate::body::{BodyShape, BoneTransforms, Pose, Template, skin};
-use crate::clothcap::align::{
-    AlignedBody, FreeSurface, ModelFit, Start, SurfaceFitConfig, SurfaceMatch,
-};
+use crate::clothcap::align::{AlignedBody, FreeSurface, ModelFit, Start, SurfaceFitConfig};
 use crate::clothcap::scan::BodyScan;
-use crate::clothcap::segment::BodyRegion;
+use crate::clothcap::segment::{BodyRegion, unseen_regions};
 use crate::math::{Camera, P3, P3d, Rigid, World};
 use crate::par::Par;
 use std::sync::Arc;
 
 /// Points in the comparison of scan and body.
 const SAMPLES: usize = 1500;
-/// Share of a region's vertices with a point below which the region is unseen.
-const SEEN: f64 = 0.2;
-/// Distance up to which a point shows the surface below it, metres.
-const NEAR: f32 = 0.03;
 
 /// Settings of a fusion.
 #[derive(Clone, Debug, PartialEq)]
@@ -181,26 +175,5 @@ fn unseen(
     let mut free = FreeSurface::new(template)?;
     let mut surface = model.clone();
     free.run(scan, &model, &mut surface, &SurfaceFitConfig::later())?;
-    Ok(unmatched(template, free.matches()))
-}
-
-/// Regions of which hardly a vertex has a point.
-fn unmatched(template: &Template, matches: &[SurfaceMatch]) -> Vec<BodyRegion> {
-    let faces = template.mesh().faces();
-    let regions = BodyRegion::of_vertices(template);
-    let mut seen = vec![false; regions.len()];
-    for m in matches
-        .iter()
-        .filter(|m| m.weight > 0.0 && m.distance < NEAR)
-    {
-        for v in faces[m.face as usize] {
-            seen[v as usize] = true;
-        }
-    }
-    let share = |region: BodyRegion| {
-        let own = || regions.iter().zip(&seen).filter(|(r, _)| **r == region);
-        own().filter(|(_, s)| **s).count() as f64 / own().count().max(1) as f64
-    };
-    let all = BodyRegion::ALL.into_iter();
-    all.filter(|r| share(*r) < SEEN).collect()
+    Ok(unseen_regions(template, free.matches()))
 }

@@ -11,7 +11,8 @@ use std::time::Instant;
 use tryon::clothcap::archive::{CaptureArchive, CaptureHeader, FrameDisplacements, FrameRecord};
 use tryon::clothcap::picture::stages;
 use tryon::clothcap::scan::BodyScan;
-use tryon::clothcap::{CaptureConfig, FrameCapture, OutfitCapture};
+use tryon::clothcap::segment::BodyRegion;
+use tryon::clothcap::{CaptureConfig, FrameCapture, FrameReport, OutfitCapture};
 use tryon::formats::image::write_png_rgb;
 use tryon::par::with_threads;
 
@@ -49,25 +50,43 @@ fn capture_all(args: &ClothcapCaptureArgs) -> Result<()> {
     let mut job = CaptureJob::new(config, archive, header, &mut scans)?;
     let bar = input::progress(Some(names.len() as u64), "capturing");
     let mut rows = Vec::new();
+    let mut unseen = Vec::new();
     for (file, name) in scans.files.iter().zip(&names) {
         let started = Instant::now();
-        let report = job
+        let done = job
             .scan(&scans, file, (name, &names), &args.out)
             .with_context(|| format!("{}", file.display()))?;
         rows.push(json!({
             "scan": name,
-            "report": report,
+            "report": done.report,
             "ms": started.elapsed().as_secs_f64() * 1e3,
         }));
-        bar.inc(1);
+        if done.was_done {
+            // It says nothing of the time that the others take.
+            bar.dec_length(1);
+        } else {
+            bar.inc(1);
+        }
+        unseen.extend(done.report.unseen);
     }
     bar.finish_and_clear();
     scans.write_report(&rows, &args.out)?;
-    if let Some(report) = &scans.turn {
-        turn::print_unseen(report);
+    match &scans.turn {
+        Some(report) => turn::print_unseen(report),
+        None => print_unseen(&unseen, names.len()),
     }
     println!("{} scans captured, in {}", names.len(), args.out.display());
     Ok(())
+}
+
+/// Prints the regions that no scan shows, from those that each of so many scans does not show.
+fn print_unseen(regions: &[BodyRegion], scans: usize) {
+    let is_in_none = |r: &BodyRegion| regions.iter().filter(|u| *u == r).count() == scans;
+    let names = BodyRegion::ALL.into_iter().filter(is_in_none);
+    let names: Vec<String> = names.map(|r| r.to_string()).collect();
+    if !names.is_empty() {
+        println!("not seen, without garments: {}", names.join(", "));
+    }
 }
 
 /// Scans of the command, or the one that is fused from its recording.
@@ -84,6 +103,13 @@ fn opened(args: &ClothcapCaptureArgs, header: Option<&CaptureHeader>) -> Result<
         Some(h) => Scans::reopen(&scans, h.frame),
         None => Scans::open(&scans),
     }
+}
+
+/// Result of one scan.
+struct ScanDone {
+    report: FrameReport,
+    /// By a run before.
+    was_done: bool,
 }
 
 /// Capture that continues where a stopped one ended.
@@ -118,28 +144,21 @@ impl CaptureJob {
         })
     }
 
-    /// Captures one scan unless it is done; its report.
+    /// Captures one scan unless it is done.
     fn scan(
         &mut self,
         scans: &Scans,
         file: &Path,
         (name, names): (&str, &[String]),
         out: &Path,
-    ) -> Result<serde_json::Value> {
-        if let Some(record) = self
-            .archive
-            .record(name, &scans.template)?
-            .filter(|_| self.header.is_some())
-        {
-            let report = serde_json::to_value(&record.report)?;
-            (self.last, self.read) = (Some(record), None);
-            return Ok(report);
+    ) -> Result<ScanDone> {
+        let before = self.archive.record(name, &scans.template)?;
+        if let Some(record) = before.filter(|_| self.header.is_some()) {
+            return Ok(self.done(record, None, true));
         }
         let scan = scans.read(file)?;
         if let Some(record) = self.repeated(scans, &scan, (name, names), out)? {
-            let report = serde_json::to_value(&record.report)?;
-            (self.last, self.read) = (Some(record), Some(scan));
-            return Ok(report);
+            return Ok(self.done(record, Some(scan), false));
         }
         if self.capture.is_none() {
             self.capture = Some(self.begin(scans)?);
@@ -148,22 +167,24 @@ impl CaptureJob {
         let frame = capture.frame(&scan)?;
         // Before the header, which names them.
         self.archive.write_textures(capture.textures())?;
+        let header = match &self.header {
+            Some(header) => header.clone(),
+            None => header_of(capture, scans, names)?,
+        };
+        let record = self.write(scans, &scan, (name, &frame), &header, out)?;
         if self.header.is_none() {
-            let (outfit, clothed) = (capture.outfit(), capture.clothed());
-            let header = CaptureHeader {
-                version: 0,
-                template: scans.template.name().to_owned(),
-                frame: scans.frame,
-                outfit: outfit.context("no outfit")?.clone(),
-                clothed: clothed.context("no clothed template")?.clone(),
-                scans: names.to_vec(),
-            };
+            // After the first scan: a capture stopped before begins anew, since later scans are fitted in another way.
             self.archive.write_header(&header)?;
             self.header = Some(header);
         }
-        let record = self.write(scans, &scan, (name, &frame), out)?;
-        (self.last, self.read) = (Some(record), Some(scan));
-        Ok(serde_json::to_value(&frame.report)?)
+        Ok(self.done(record, Some(scan), false))
+    }
+
+    /// Keeps the result of a scan for the next one.
+    fn done(&mut self, record: FrameRecord, read: Option<BodyScan>, was_done: bool) -> ScanDone {
+        let report = record.report.clone();
+        (self.last, self.read) = (Some(record), read);
+        ScanDone { report, was_done }
     }
 
     /// Result of the scan before, for a scan that is unchanged. The first scan makes the outfit and is fitted in another way
@@ -191,7 +212,11 @@ impl CaptureJob {
         let picture = |name: &str| out.join(PICTURES).join(format!("{name}.png"));
         let from = picture(&before.scan);
         std::fs::copy(&from, picture(name)).with_context(|| format!("{}", from.display()))?;
-        Ok(Some(self.archive.repeat(before, name, header)?))
+        Ok(Some(self.archive.repeat(
+            before,
+            name,
+            (header, &scans.template),
+        )?))
     }
 
     fn begin(&mut self, scans: &Scans) -> Result<OutfitCapture> {
@@ -223,9 +248,9 @@ impl CaptureJob {
         scans: &Scans,
         scan: &BodyScan,
         (name, frame): (&str, &FrameCapture),
+        header: &CaptureHeader,
         out: &Path,
     ) -> Result<FrameRecord> {
-        let header = self.header.as_ref().context("no header")?;
         let capture = self.capture.as_ref().context("no capture")?;
         let textures = capture.textures();
         let picture = stages(capture.cloth(), scan, frame, &header.outfit, textures);
@@ -239,6 +264,19 @@ impl CaptureJob {
         self.archive.write_frame(&record, &displacements)?;
         Ok(record)
     }
+}
+
+/// Header of a capture whose first scan is done.
+fn header_of(capture: &OutfitCapture, scans: &Scans, names: &[String]) -> Result<CaptureHeader> {
+    let (outfit, clothed) = (capture.outfit(), capture.clothed());
+    Ok(CaptureHeader {
+        version: 0,
+        template: scans.template.name().to_owned(),
+        frame: scans.frame,
+        outfit: outfit.context("no outfit")?.clone(),
+        clothed: clothed.context("no clothed template")?.clone(),
+        scans: names.to_vec(),
+    })
 }
 
 /// Scans beside the first one that give the body under the clothes, evenly over the sequence.

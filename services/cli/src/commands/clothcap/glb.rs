@@ -12,6 +12,7 @@ use tryon::formats::gltf::{
     GlbInterpolation, GlbJoint, GlbJointMotion, GlbMesh, GlbMorphMotion, GlbMorphTarget,
     SkinnedGlb, SkinnedMesh, write_skinned_glb,
 };
+use tryon::formats::write_obj_scene;
 use tryon::math::{P3, P3d, V3};
 
 /// Dressed body in each frame of a motion.
@@ -64,6 +65,24 @@ impl RestMesh {
         }
     }
 
+    fn surface(&self) -> GlbMesh<'_> {
+        GlbMesh {
+            name: &self.name,
+            vertices: &self.vertices,
+            faces: &self.faces,
+            uv: &self.uv,
+            color: [255; 3],
+            texture: &self.texture,
+        }
+    }
+
+    /// Mean of the vertices' colours; white without.
+    fn mean_color(&self) -> [u8; 3] {
+        let n = self.colors.len() as u32;
+        let sum = |k: usize| self.colors.iter().map(|c| u32::from(c[k])).sum::<u32>();
+        [0, 1, 2].map(|k| sum(k).checked_div(n).map_or(u8::MAX, |mean| mean as u8))
+    }
+
     /// Morph targets, named after the scans; the first scan is the mesh itself.
     fn morph_targets<'a>(&'a self, scans: &'a [String]) -> Vec<GlbMorphTarget<'a>> {
         let named = self.targets.iter().enumerate();
@@ -77,6 +96,28 @@ impl RestMesh {
 }
 
 impl DressedMotion<'_> {
+    /// Writes body and garments of the first frame as OBJ, with materials and textures beside it.
+    pub(super) fn write_obj(&self, path: &Path) -> Result<()> {
+        let Some(frame) = self.frames.first() else {
+            return Ok(());
+        };
+        let mut meshes = self.rest_meshes();
+        let posed = std::iter::once(&frame.body).chain(&frame.garments);
+        for (mesh, vertices) in meshes.iter_mut().zip(posed) {
+            (mesh.vertices, mesh.targets) = (vertices.clone(), Vec::new());
+        }
+        let meshes = self.textured(meshes);
+        let surfaces: Vec<GlbMesh<'_>> = meshes
+            .iter()
+            .map(|m| GlbMesh {
+                color: m.mean_color(),
+                ..m.surface()
+            })
+            .collect();
+        write_obj_scene(path, &surfaces).with_context(|| format!("{}", path.display()))?;
+        Ok(())
+    }
+
     /// Writes body and garments to one file.
     pub(super) fn write(&self, path: &Path) -> Result<()> {
         let skeleton = self.surface.body().skeleton();
@@ -100,7 +141,7 @@ impl DressedMotion<'_> {
             .iter()
             .map(|f| f.pose.root.point(&self.body.joints[0]))
             .collect();
-        let meshes = self.rest_meshes();
+        let meshes = self.textured(self.rest_meshes());
         // Frame k shows target k − 1 alone; the first one none.
         let count = self.frames.len();
         let shown = |k: usize| (1..count).map(|t| f32::from(u8::from(t == k))).collect();
@@ -115,14 +156,7 @@ impl DressedMotion<'_> {
             .zip(&rows)
             .zip(&targets)
             .map(|((m, (joints, weights)), targets)| SkinnedMesh {
-                surface: GlbMesh {
-                    name: &m.name,
-                    vertices: &m.vertices,
-                    faces: &m.faces,
-                    uv: &m.uv,
-                    color: [255; 3],
-                    texture: &m.texture,
-                },
+                surface: m.surface(),
                 colors: &m.colors,
                 joints,
                 weights,
@@ -158,6 +192,7 @@ impl DressedMotion<'_> {
         (joints, nodes.iter().map(|v| weights.weights[*v]).collect())
     }
 
+    /// Body, then garments.
     fn rest_meshes(&self) -> Vec<RestMesh> {
         let body = self.surface.body().mesh();
         let all: Vec<usize> = (0..body.vertices().len()).collect();
@@ -170,12 +205,20 @@ impl DressedMotion<'_> {
             let mut mesh = self.rest_mesh(part.slot.name().into(), nodes, |f| &f.garments[k]);
             mesh.faces.clone_from(&part.faces);
             mesh.colors.clone_from(&outfit.colors[k]);
-            out.push(match outfit.atlases.get(k).zip(self.textures.get(k)) {
-                Some((atlas, png)) => mesh.textured(atlas, png),
-                None => mesh,
-            });
+            out.push(mesh);
         }
         out
+    }
+
+    /// Body and garments, those with a texture over the vertices of its atlas.
+    fn textured(&self, meshes: Vec<RestMesh>) -> Vec<RestMesh> {
+        let atlases = self.header.outfit.atlases.iter().zip(self.textures);
+        let mut atlases = std::iter::once(None).chain(atlases.map(Some));
+        let textured = |mesh: RestMesh| match atlases.next().flatten() {
+            Some((atlas, png)) => mesh.textured(atlas, png),
+            None => mesh,
+        };
+        meshes.into_iter().map(textured).collect()
     }
 
     fn rest_mesh(

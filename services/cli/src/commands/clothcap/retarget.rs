@@ -5,7 +5,7 @@ use crate::args::{ClothcapRetargetArgs, Shard};
 use crate::{input, report};
 use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 use tryon::body::{BodyShape, Pose, RestBody, Template};
@@ -74,8 +74,18 @@ fn retarget_all(args: &ClothcapRetargetArgs) -> Result<()> {
     };
     let mut rows = Vec::new();
     for (name, body) in &bodies {
-        rows.push(batch.dress(name, body)?);
-        bar.inc(1);
+        match batch.done(name)? {
+            Some(row) => {
+                batch.show_done(name, body)?;
+                rows.push(row);
+                // It says nothing of the time that the others take.
+                bar.dec_length(1);
+            }
+            None => {
+                rows.push(batch.dress(name, body)?);
+                bar.inc(1);
+            }
+        }
     }
     bar.finish_and_clear();
     let suffix = if count > 1 {
@@ -111,26 +121,42 @@ struct Batch<'a> {
 }
 
 impl Batch<'_> {
-    /// Dresses one body in all frames and writes it, unless that is done; its row of the report.
-    fn dress(&mut self, name: &str, body: &RestBody) -> Result<Value> {
-        let (args, frames) = (self.args, self.frames);
-        let path = args.out.join(format!("{name}.json"));
-        let job = json!({
+    /// The job of every body, as its row of the report names it.
+    fn job(&self) -> Value {
+        let args = self.args;
+        json!({
             "capture": args.capture,
             "body": args.body,
             "seed": args.seed,
             "motion": args.motion,
+            "obj": args.obj,
             "scans": self.header.scans,
-        });
-        if let Some(row) = done(&path, &job)? {
-            return Ok(row);
+        })
+    }
+
+    fn row_path(&self, name: &str) -> PathBuf {
+        self.args.out.join(format!("{name}.json"))
+    }
+
+    /// Row of a body that was dressed before by the same job.
+    fn done(&self, name: &str) -> Result<Option<Value>> {
+        let path = self.row_path(name);
+        if !path.exists() {
+            return Ok(None);
         }
+        let row = input::json(&path)?;
+        Ok((row["job"] == self.job()).then_some(row))
+    }
+
+    /// Dresses one body in all frames and writes it; its row of the report.
+    fn dress(&mut self, name: &str, body: &RestBody) -> Result<Value> {
+        let frames = self.frames;
         let started = Instant::now();
         let mut dressed = Vec::new();
-        for (pose, d) in frames.poses.iter().zip(&frames.displacements) {
-            let frame = self.dresser.dress(body, d, pose);
-            dressed.push(frame.with_context(|| name.to_owned())?);
+        for frame in 0..frames.poses.len() {
+            dressed.push(self.dress_frame((name, body), frame)?);
         }
+        let dressing = started.elapsed();
         let motion = DressedMotion {
             surface: self.dresser.surface(),
             header: self.header,
@@ -138,35 +164,60 @@ impl Batch<'_> {
             body,
             frames: &dressed,
             seconds: &frames.seconds,
-            has_targets: args.motion.is_none(),
+            has_targets: self.args.motion.is_none(),
         };
-        motion.write(&args.out.join(format!("{name}.glb")))?;
+        motion.write(&self.args.out.join(format!("{name}.glb")))?;
+        if self.args.obj {
+            motion.write_obj(&self.args.out.join(format!("{name}.obj")))?;
+        }
         let row = json!({
             "body": name,
-            "job": job,
+            "job": self.job(),
             "frames": dressed.iter().map(|f| &f.reports).collect::<Vec<_>>(),
+            "dressing_ms": dressing.as_secs_f64() * 1e3,
             "ms": started.elapsed().as_secs_f64() * 1e3,
         });
         // Last of the body's files: it stands for a whole result.
-        report::write(&path, &row)?;
-
-        // Many bodies show their first pose, one or two some poses of their motion.
-        let each = (MOST_ON_SHEET / self.bodies).clamp(1, dressed.len());
-        let every = dressed.len().div_ceil(each);
-        let room = MOST_ON_SHEET.saturating_sub(self.shown.len());
+        report::write(&self.row_path(name), &row)?;
+        let room = self.room();
+        let every = self.every();
         self.shown
             .extend(dressed.into_iter().step_by(every).take(room));
         Ok(row)
     }
-}
 
-/// Result of a body that was dressed before by the same job.
-fn done(path: &Path, job: &Value) -> Result<Option<Value>> {
-    if !path.exists() {
-        return Ok(None);
+    fn dress_frame(
+        &mut self,
+        (name, body): (&str, &RestBody),
+        frame: usize,
+    ) -> Result<DressedPose> {
+        let (pose, d) = (&self.frames.poses[frame], &self.frames.displacements[frame]);
+        let dressed = self.dresser.dress(body, d, pose);
+        dressed.with_context(|| name.to_owned())
     }
-    let row = input::json(path)?;
-    Ok((row["job"] == *job).then_some(row))
+
+    /// Dresses a body that is done once more, for the contact sheet, as far as that has room for it.
+    fn show_done(&mut self, name: &str, body: &RestBody) -> Result<()> {
+        let frames = (0..self.frames.poses.len()).step_by(self.every());
+        for frame in frames.take(self.room()) {
+            let dressed = self.dress_frame((name, body), frame)?;
+            self.shown.push(dressed);
+        }
+        Ok(())
+    }
+
+    /// Frames between those of one body on the contact sheet: many bodies show their first pose, one or two some of their
+    /// motion.
+    fn every(&self) -> usize {
+        let frames = self.frames.poses.len();
+        let each = (MOST_ON_SHEET / self.bodies).clamp(1, frames);
+        frames.div_ceil(each)
+    }
+
+    /// Room on the contact sheet.
+    fn room(&self) -> usize {
+        MOST_ON_SHEET.saturating_sub(self.shown.len())
+    }
 }
 
 fn read_frames(
@@ -185,7 +236,8 @@ fn read_frames(
         };
         out.seconds.push(out.poses.len() as f64 / RATE);
         out.poses.push(record.body.pose);
-        out.displacements.push(archive.displacements(scan, header)?);
+        out.displacements
+            .push(archive.displacements(scan, header, template)?);
     }
     ensure!(!out.poses.is_empty(), "the capture has no finished scan");
     Ok(out)
