@@ -7,7 +7,7 @@ import { css } from './outfit.js';
 /** Colours offered beside a garment's own, sRGB. */
 const COLORS = [['Ivory', 0xf1ece0], ['Charcoal', 0x33363b], ['Clay', 0xb2553a], ['Sage', 0x74876a], ['Denim', 0x46689a]];
 
-const DRAWINGS = [[/dress/, 'g-dress'], [/skirt/, 'g-skirt'], [/trouser|pant|jean|short|bottom/, 'g-trousers'], [/long|sweater|hoodie|jacket|under/, 'g-longsleeve']];
+const DRAWINGS = [[/dress|one_piece/, 'g-dress'], [/shoes/, 'g-shoes'], [/skirt/, 'g-skirt'], [/trouser|pant|jean|short|bottom/, 'g-trousers'], [/long|sweater|hoodie|jacket|under/, 'g-longsleeve']];
 
 function drawingOf(info) {
   const found = DRAWINGS.find(([pattern]) => pattern.test(info.name));
