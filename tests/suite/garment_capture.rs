@@ -15,7 +15,8 @@ use tryon::clothcap::{
     population,
 };
 use tryon::evaluate::garment_capture::{
-    CaptureScene, CaptureVariant, capture_scenes, measure, measure_turn_scene, turn_scenes,
+    CaptureScene, CaptureVariant, CloudCell, capture_scenes, film_clouds, measure, measure_cloud,
+    measure_turn_scene, turn_scenes,
 };
 use tryon::evaluate::scans::{SKIN_LABEL, ScanMotion, ScanScene, TrueScan};
 use tryon::formats::scan::{ScanMesh, read_scan};
@@ -433,6 +434,24 @@ fn a_noisy_fused_cloud_without_normals_is_captured() {
     assert!(error("body_mm") < 12.0);
     assert!(error("own_body_max_mm") < 0.1);
     assert_eq!(error("inside"), 0.0);
+}
+
+/// Two cameras 10 mm apart whose exposures differ by a tenth: without their gains, the back of the trousers is one garment
+/// with their front.
+#[test]
+fn cameras_of_other_exposure_change_no_labels() {
+    let scenes = capture_scenes().expect("scenes");
+    let heavy = scenes
+        .iter()
+        .find(|s| s.name == "heavy")
+        .expect("the scene");
+    let cells = &CloudCell::of_scene(2, 0)[..1];
+    let scan = film_clouds(heavy, cells).expect("filmed").remove(0);
+    let row = measure_cloud(heavy, &cells[0], scan);
+    println!("{row:?}");
+    let error = |name| row.get(name).unwrap_or(f64::NAN);
+    assert!(error("F1") > 0.98);
+    assert!(error("boundary_mm") < 10.0);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Garment capture against truth: labels, boundaries, surfaces, the body below, other bodies; run time against error.
 
+mod clouds;
 mod hems;
 mod made_scenes;
 mod scenes;
@@ -7,6 +8,7 @@ mod score;
 mod turn;
 mod variant;
 
+pub use clouds::{CloudCell, film_clouds, measure_cloud};
 pub use made_scenes::{MadeScenes, made_scenes};
 pub use scenes::{CaptureScene, capture_scenes};
 pub use turn::{TurnFilm, TurnScene, measure_turn, measure_turn_scene, turn_scenes};

@@ -11,6 +11,7 @@ use nalgebra::{Translation3, UnitQuaternion};
 use rand::Rng;
 use rand::seq::index::sample;
 use rand_pcg::Pcg64;
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// Difference of depths between neighbouring pixels from which they lie at a silhouette (m).
@@ -25,6 +26,7 @@ const FLYING: f32 = 0.02;
 const POSES: u64 = 21;
 const SILHOUETTES: u64 = 22;
 const CHOICE: u64 = 23;
+const EXPOSURES: u64 = 24;
 
 /// Consumer depth cameras around the subject. Their fused cloud has no normals and no faces.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,10 +45,14 @@ pub struct CameraRig {
     pub turn: f64,
     /// Largest gain of a colour channel of a camera beside 1: white balance.
     pub white_balance: f32,
+    /// Largest gain of all channels of a camera beside 1: exposure.
+    pub exposure: f32,
     /// Share of the pixels at silhouettes between near and far.
     pub flying: f64,
     /// Radius around the subject within which points are kept, floor included (m).
     pub radius: f32,
+    /// Side of the cells whose points are one, their mean (m); 0 keeps all.
+    pub cell: f32,
 }
 
 impl Default for CameraRig {
@@ -60,8 +66,10 @@ impl Default for CameraRig {
             shift: 0.008,
             turn: 0.5f64.to_radians(),
             white_balance: 0.12,
+            exposure: 0.0,
             flying: 0.3,
             radius: 0.8,
+            cell: 0.0,
         }
     }
 }
@@ -77,11 +85,14 @@ impl CameraRig {
         let center = painted.0.center();
         let mut poses = seed.stage(POSES);
         let mut flights = seed.stage(SILHOUETTES);
+        let mut exposures = seed.stage(EXPOSURES);
         let mut all = ScanPoints::default();
         for k in 0..self.cameras {
             let camera = self.camera(k, center, &mut poses);
             let gains =
                 [(); 3].map(|()| 1.0 + self.white_balance * (2.0 * poses.random::<f32>() - 1.0));
+            let exposure = 1.0 + self.exposure * (2.0 * exposures.random::<f32>() - 1.0);
+            let gains = gains.map(|g| g * exposure);
             let error = self.error(center, &mut poses);
             let mut clean = camera.view(painted, Backdrop::Floor);
             self.fly(&mut clean, camera.intrinsics.width as usize, &mut flights);
@@ -99,10 +110,36 @@ impl CameraRig {
                 }
             }
         }
+        if self.cell > 0.0 {
+            all = self.thinned(&all);
+        }
         let mut keep = vec![false; all.len()];
         let some = sample(&mut seed.stage(CHOICE), all.len(), count.min(all.len()));
         some.into_iter().for_each(|i| keep[i] = true);
         all.filtered(&keep)
+    }
+
+    /// Mean place and colour of the points in each cell, with the label of the first.
+    fn thinned(&self, all: &ScanPoints) -> ScanPoints {
+        let mut cells: BTreeMap<[i32; 3], (V3, [f32; 3], f32, u8)> = BTreeMap::new();
+        for ((p, color), label) in all.points.iter().zip(&all.colors).zip(&all.labels) {
+            let cell = [p.x, p.y, p.z].map(|c| (c / self.cell).floor() as i32);
+            let empty = (V3::zeros(), [0.0; 3], 0.0, *label);
+            let (place, sum, count, _) = cells.entry(cell).or_insert(empty);
+            *place += p.coords;
+            (0..3).for_each(|c| sum[c] += color[c]);
+            *count += 1.0;
+        }
+        let mut out = ScanPoints::default();
+        for (place, color, count, label) in cells.into_values() {
+            out.push(
+                P3::from(place / count),
+                V3::zeros(),
+                color.map(|c| c / count),
+                label,
+            );
+        }
+        out
     }
 
     /// Camera `k` where it is.

@@ -10,7 +10,7 @@ use super::scanner::ScannerSetting;
 use super::skinned::SkinnedGarment;
 use super::surface::SceneSurface;
 use super::view::MAX_GARMENT;
-use crate::body::{BodyShape, Pose};
+use crate::body::{BodyShape, Pose, RestBody};
 use crate::evaluate::EvaluateError;
 use crate::garment::{AnchorKind, GarmentError, GarmentKind, GarmentMesh};
 use crate::math::{P3, V3, World};
@@ -86,11 +86,13 @@ pub struct TrueGarment {
 }
 
 /// Subject at the time of one scan.
+#[derive(Clone, Copy)]
 pub(super) struct SceneMoment<'a> {
     pub(super) index: usize,
     pub(super) surface: &'a SceneSurface,
     pub(super) paint: &'a ScenePaint,
     run: &'a ClothRun<'a>,
+    rest: &'a RestBody,
     pose: &'a Pose<World>,
 }
 
@@ -164,6 +166,42 @@ impl ScanScene {
         Ok(all)
     }
 
+    /// Makes the first scan once with each scanner and its seed of colours, points, noise and defects; the clothes are put on
+    /// once.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn first_scans(
+        &self,
+        scanners: &[(ScannerSetting, u64)],
+    ) -> Result<Vec<TrueScan>, EvaluateError> {
+        let first = Self {
+            scans: 1,
+            ..self.clone()
+        };
+        let mut all = Vec::new();
+        first.play(|moment| {
+            for (scanner, seed) in scanners {
+                let one = Self {
+                    scanner: scanner.clone(),
+                    seed: *seed,
+                    ..first.clone()
+                };
+                let body = (&*self.actor.template, moment.rest);
+                let paint =
+                    ScenePaint::new(body, moment.run.garments().count(), self.palette, *seed);
+                let painted = SceneMoment {
+                    paint: &paint,
+                    ..moment
+                };
+                let points = one.scanned(&painted);
+                all.push(one.truth(&painted, points));
+            }
+            Ok(())
+        })?;
+        Ok(all)
+    }
+
     /// Makes the scans one after the other; `each` receives them.
     ///
     /// # Errors
@@ -173,17 +211,23 @@ impl ScanScene {
         mut each: impl FnMut(TrueScan) -> Result<(), EvaluateError>,
     ) -> Result<(), EvaluateError> {
         self.play(|moment| {
-            let seed = ScanSeed {
-                scene: self.seed,
-                scan: moment.index as u64,
-            };
-            let mut points = self.scanner.scan(moment.surface, moment.paint, seed);
-            (self.defects).apply(&mut points, moment.surface.center(), seed);
-            if self.scanner.rig.is_some() {
-                points.normals.clear();
-            }
+            let points = self.scanned(&moment);
             each(self.truth(&moment, points))
         })
+    }
+
+    /// Scan points of the subject, with their defects.
+    fn scanned(&self, moment: &SceneMoment<'_>) -> ScanPoints {
+        let seed = ScanSeed {
+            scene: self.seed,
+            scan: moment.index as u64,
+        };
+        let mut points = self.scanner.scan(moment.surface, moment.paint, seed);
+        (self.defects).apply(&mut points, moment.surface.center(), seed);
+        if self.scanner.rig.is_some() {
+            points.normals.clear();
+        }
+        points
     }
 
     /// Dresses the subject and simulates its motion; `each` receives the subject at the time of each scan.
@@ -221,6 +265,7 @@ impl ScanScene {
                 surface: &surface,
                 paint: &paint,
                 run: &run,
+                rest: &rest,
                 pose: &pose,
             })?;
         }
