@@ -254,7 +254,11 @@ impl OutfitCapture {
         let undressed = self.undresser.run((scan, &covered), worn, body)?;
         self.segmenter.follow(&undressed.body);
         let garments = self.freed(&outfit, &fitted.vertices, &undressed)?;
-        self.paint((scan, &segmented.labels), &outfit, &fitted.vertices);
+        self.paint(
+            (segmented.evened(scan), &segmented.labels),
+            &outfit,
+            &fitted.vertices,
+        );
         let out = FrameCapture {
             labels: segmented.parts(),
             displacements: displacements(
@@ -408,7 +412,7 @@ impl PartFitter<'_> {
         let colors = cloth
             .parts
             .iter()
-            .map(|part| part_colors(part, &segmented.nodes, self.scan));
+            .map(|part| part_colors(part, segmented, segmented.evened(self.scan)));
         let rest: Vec<Vec<P3>> = rest.collect();
         let texel = TEXEL * self.scan.color_spacing();
         let atlases = cloth.parts.iter().zip(&rest);

@@ -3,6 +3,7 @@
 use crate::math::{P3, V3, principal_axes};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
+use std::collections::HashSet;
 
 /// Points that planes are searched among.
 const SAMPLES: usize = 2000;
@@ -23,6 +24,13 @@ const STRAYS: f64 = 0.01;
 
 /// Largest distance of a floor's points from its plane beside [`THICKNESS`]: those of several cameras disagree.
 const MOST_SPREAD: f32 = 2.5;
+
+/// Height of feet and of the rests of floors, and of legs, metres.
+const LOW: f32 = 0.05;
+const LEGS: f32 = 0.30;
+/// Farthest that feet and heels reach from legs, and the side of a cell in which that is looked up, metres.
+const FOOT: f32 = 0.22;
+const FOOT_CELL: f32 = 0.02;
 
 /// Plane with everything else on one side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,6 +169,27 @@ impl Floor {
     }
 }
 
+/// Points less than [`LOW`] over a floor, and farther from all legs than feet reach; y up, metres. Shape `[points]`.
+pub(super) fn are_floor_rests(points: &[P3], top: f32) -> Vec<bool> {
+    let over = |p: &P3| p.y - top;
+    let cell = |p: &P3| [p.x, p.z].map(|c| (c / FOOT_CELL).floor() as i32);
+    let is_leg = |p: &&P3| (LOW..LEGS).contains(&over(p));
+    let legs: HashSet<[i32; 2]> = points.iter().filter(is_leg).map(cell).collect();
+    if legs.is_empty() {
+        return vec![false; points.len()];
+    }
+    let reach = (FOOT / FOOT_CELL) as i32;
+    let around = (-reach..=reach).flat_map(|a| (-reach..=reach).map(move |b| [a, b]));
+    let around = around.filter(|[a, b]| a * a + b * b <= reach * reach);
+    let around: Vec<[i32; 2]> = around.collect();
+    let near = legs
+        .iter()
+        .flat_map(|[x, z]| around.iter().map(move |[a, b]| [x + a, z + b]));
+    let near: HashSet<[i32; 2]> = near.collect();
+    let is_rest = |p: &P3| over(p) < LOW && !near.contains(&cell(p));
+    points.iter().map(is_rest).collect()
+}
+
 /// Length of the range of some values without strays.
 fn spread(values: impl Iterator<Item = f32>) -> f32 {
     let [low, high] = inner_range(values, STRAYS);
@@ -199,6 +228,22 @@ mod tests {
         }
         let turn = nalgebra::Rotation3::from_axis_angle(&V3::x_axis(), tilt);
         points.iter().map(|p| turn * p).collect()
+    }
+
+    #[test]
+    fn what_lies_low_and_apart_from_legs_is_floor() {
+        let template = embedded::template();
+        let mut points = template.mesh().vertices().to_vec();
+        let lowest = points.iter().map(|p| p.y).fold(f32::MAX, f32::min);
+        let person = points.len();
+        points.extend([
+            P3::new(0.7, lowest + 0.02, 0.0),
+            P3::new(-0.1, lowest + 0.03, -0.6),
+        ]);
+        points.push(P3::new(0.9, lowest + 0.7, 0.0));
+        let rests = are_floor_rests(&points, lowest);
+        assert_eq!(rests[person..], [true, true, false]);
+        assert!(!rests[..person].contains(&true));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 pub mod align;
 pub mod archive;
+mod camera_gains;
 mod capture;
 mod capture_header;
 mod cloud;
@@ -16,6 +17,7 @@ mod part_colors;
 pub mod picture;
 mod population;
 pub mod retarget;
+mod scalp;
 pub mod scan;
 pub mod segment;
 mod segmenter;

@@ -3,17 +3,24 @@
 use super::face_edges::{edges, neighbours};
 use super::multi::ClothPart;
 use super::scan::BodyScan;
-use super::segment::NodeColors;
+use super::segmenter::SegmentedScan;
 
 /// Colour of a garment without a coloured point, sRGB.
 const GREY: f32 = 160.0;
 
 /// Colours of a part's vertices, sRGB, shape `[vertices]`.
-pub(super) fn part_colors(part: &ClothPart, nodes: &NodeColors, scan: &BodyScan) -> Vec<[u8; 3]> {
+pub(super) fn part_colors(
+    part: &ClothPart,
+    segmented: &SegmentedScan,
+    scan: &BodyScan,
+) -> Vec<[u8; 3]> {
     let around = neighbours(part.nodes.len(), &edges(&part.faces));
     let own = |(v, hidden): (&u32, &bool)| {
-        let row = nodes.points.row(*v as usize);
-        let colors = row.iter().filter_map(|p| scan.colors.get(*p as usize));
+        let row = segmented.nodes.points.row(*v as usize);
+        // Hair and arms lie over garments.
+        let row = row.iter().map(|p| *p as usize);
+        let row = row.filter(|p| segmented.labels[*p] == part.label);
+        let colors = row.filter_map(|p| scan.colors.get(p));
         let all: Vec<[f32; 3]> = colors.map(|c| c.map(f32::from)).collect();
         // Points over a hidden vertex belong to the garment above.
         (!hidden).then(|| mean(&all)).flatten()

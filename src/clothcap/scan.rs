@@ -4,7 +4,7 @@ use super::CaptureError;
 pub(super) use super::cloud::mean_spacing;
 use super::cloud::{are_strays, neighbour_edges, plane_normals, turn_outwards};
 use super::face_edges::edges;
-use super::floor::{Floor, inner_range};
+use super::floor::{Floor, are_floor_rests, inner_range};
 use crate::formats::TexturePoint;
 use crate::formats::scan::ScanMesh;
 use crate::math::{P3, V3};
@@ -176,6 +176,8 @@ pub struct BodyScan {
     pub point_of_row: Vec<u32>,
     /// Normals point outwards.
     pub oriented: bool,
+    /// Its file has neither faces nor normals: depth images of several cameras.
+    pub is_cloud: bool,
     /// Rows of the file that are no point.
     pub left_out: LeftOut,
 }
@@ -242,8 +244,12 @@ impl BodyScan {
         }
         let mut scan = scan.checked()?;
         // Files with normals are surfaces that were cleaned before.
-        if file.faces.is_empty() && file.normals.is_empty() {
+        scan.is_cloud = file.faces.is_empty() && file.normals.is_empty();
+        if scan.is_cloud {
             scan.leave_out_strays();
+            if let Some(top) = frame.floor {
+                scan.leave_out_floor_rests((top * frame.metres_per_unit) as f32);
+            }
         }
         let largest = extent(&scan.points).into_iter().fold(0.0, f32::max);
         if !(USABLE[0]..=USABLE[1]).contains(&f64::from(largest)) {
@@ -271,6 +277,19 @@ impl BodyScan {
     /// Leaves out the points of a cloud without faces that lie apart from the rest.
     fn leave_out_strays(&mut self) {
         let strays = are_strays(&self.points);
+        self.left_out.strays += self.leave_out(&strays);
+    }
+
+    /// Leaves out what lies low and apart from the legs: floors of several cameras are tilted against each other. `top` is
+    /// the height of the floor, metres.
+    fn leave_out_floor_rests(&mut self, top: f32) {
+        let rests = are_floor_rests(&self.points, top);
+        self.left_out.floor += self.leave_out(&rests);
+    }
+
+    /// Leaves out some points; the number of rows that had one of them.
+    fn leave_out(&mut self, strays: &[bool]) -> usize {
+        let mut rows = 0;
         let mut next = 0;
         let number = |is_stray: &bool| {
             next += u32::from(!is_stray);
@@ -279,11 +298,12 @@ impl BodyScan {
         let numbers: Vec<u32> = strays.iter().map(number).collect();
         for point in self.point_of_row.iter_mut().filter(|p| **p != u32::MAX) {
             *point = numbers[*point as usize];
-            self.left_out.strays += usize::from(*point == u32::MAX);
+            rows += usize::from(*point == u32::MAX);
         }
-        retain(&mut self.points, &strays);
-        retain(&mut self.normals, &strays);
-        retain(&mut self.colors, &strays);
+        retain(&mut self.points, strays);
+        retain(&mut self.normals, strays);
+        retain(&mut self.colors, strays);
+        rows
     }
 
     /// Texture of a file whose points are known.

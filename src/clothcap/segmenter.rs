@@ -2,6 +2,7 @@
 
 use super::CaptureError;
 use super::align::{AlignedBody, Aligner, Alignment, ClothedTemplate, Start};
+use super::camera_gains::without_gains;
 use super::scan::BodyScan;
 use super::segment::{
     LabelConfig, Labelling, NodeColors, label_nodes, label_scan, relabel_nodes, seen_slices,
@@ -23,9 +24,16 @@ pub struct SegmentedScan {
     pub labels: Vec<u8>,
     /// Edges of the scan, see [`BodyScan::edges`].
     pub edges: Vec<[u32; 2]>,
+    /// Cloud of several cameras without their gains.
+    evened: Option<BodyScan>,
 }
 
 impl SegmentedScan {
+    /// The scan, if it is a cloud of several cameras without their gains.
+    pub(super) fn evened<'a>(&'a self, scan: &'a BodyScan) -> &'a BodyScan {
+        self.evened.as_ref().unwrap_or(scan)
+    }
+
     /// Part of each scan point, shape `[points]`: 0 for skin and hair, then one a garment.
     pub fn parts(&self) -> Vec<u8> {
         let parts = self.labelling.parts();
@@ -110,6 +118,8 @@ impl ScanSegmenter {
         let alignment = self.aligner.align(scan)?;
         let cloth = self.aligner.cloth();
         let template = cloth.template();
+        let evened = without_gains(scan, &alignment, template);
+        let scan = evened.as_ref().unwrap_or(scan);
         let nodes = NodeColors::new(scan, &alignment, template);
         let mut labelling = match &self.first {
             None => label_nodes(cloth, &nodes, &self.config)?,
@@ -138,6 +148,7 @@ impl ScanSegmenter {
             labelling,
             labels,
             edges,
+            evened,
         })
     }
 }

@@ -16,4 +16,5 @@ pub use node_colors::NodeColors;
 pub use outfit::label_nodes;
 pub use prior::{BodyRegion, IMPOSSIBLE, Slot};
 pub use scan_labels::label_scan;
+pub(super) use unseen::bone_slices;
 pub use unseen::{seen_slices, unseen_regions};

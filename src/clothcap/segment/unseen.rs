@@ -19,7 +19,7 @@ const NEAR: f32 = 0.03;
 
 /// Nodes in slices of their bone that the scan shows, or next to one that it shows; shape `[nodes]`.
 pub fn seen_slices(template: &Template, nodes: &NodeColors) -> Vec<bool> {
-    let slices = slices(template);
+    let slices = bone_slices(template, SLICE);
     let mut counts: BTreeMap<(usize, i32), (usize, usize)> = BTreeMap::new();
     for (v, slice) in slices.iter().enumerate() {
         let count = counts.entry(*slice).or_default();
@@ -53,8 +53,8 @@ pub fn unseen_regions(template: &Template, matches: &[SurfaceMatch]) -> Vec<Body
     all.filter(|r| share(*r) < SEEN_OF_REGION).collect()
 }
 
-/// Bone of each node, and slice across it; shape `[nodes]`.
-fn slices(template: &Template) -> Vec<(usize, i32)> {
+/// Bone of each node, and slice across it, `height` metres thick; shape `[nodes]`.
+pub(in crate::clothcap) fn bone_slices(template: &Template, height: f32) -> Vec<(usize, i32)> {
     let joints = template.skeleton().joints();
     let at = |j: usize| joints[j].rest.coords.cast::<f32>();
     let axis = |j: usize| -> V3 {
@@ -72,7 +72,7 @@ fn slices(template: &Template) -> Vec<(usize, i32)> {
         .map(|(v, p)| {
             let bone = template.weights().dominant(v);
             let along = axes[bone].dot(&(p.coords - at(bone)));
-            (bone, (along / SLICE).floor() as i32)
+            (bone, (along / height).floor() as i32)
         })
         .collect()
 }
