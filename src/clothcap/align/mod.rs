@@ -1,6 +1,7 @@
 //! Single-mesh alignment (section 5.1): body model, then free surface, first of one scan, then of a sequence.
 
 mod aligner;
+mod angle_priors;
 mod arms;
 mod body_equations;
 mod face_cache;

@@ -1,11 +1,13 @@
 //! Pose, bone lengths and shape coefficients that explain a scan: eq. 3 with infinite coupling, and the poses of eq. 9.
 
+use super::angle_priors::{angle_deviations, straight_precisions};
 use super::body_equations::BodyEquations;
 use super::pairing::{ScanNormal, closest_facing_near};
 use super::shape_unknowns::ShapeUnknowns;
 use crate::body::parts::BodySegment;
 use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin_moved};
 use crate::clothcap::CaptureError;
+use crate::clothcap::scalp::scalp;
 use crate::clothcap::scan::BodyScan;
 use crate::math::{P3, V3, World};
 use crate::mesh::Face;
@@ -22,9 +24,6 @@ use std::sync::Arc;
 const DEVIATION: f64 = 0.012;
 /// See [`DEVIATION`].
 const INDEPENDENT: f64 = 800.0;
-/// Standard deviations of joint angles from those of the start, radians: of joints of the spine, collars, hands and feet,
-/// and of the others.
-const ANGLES: [f64; 2] = [0.35, 1.2];
 /// Step of the difference quotient of a shape coefficient and of a bone's scale.
 const STEP: f64 = 0.02;
 /// Smallest cosine between normals of a pair, for oriented scans.
@@ -144,10 +143,13 @@ pub struct ModelFit<'a> {
     starts_near: bool,
     /// Vertices of head, hands and feet.
     bare: Vec<bool>,
+    /// Vertices below hair.
+    scalp: Vec<bool>,
     bvh: Bvh,
     posed: Vec<P3>,
     bones: BoneTransforms,
     deviations: Vec<f64>,
+    straight: Vec<f64>,
 }
 
 impl<'a> ModelFit<'a> {
@@ -171,10 +173,12 @@ impl<'a> ModelFit<'a> {
                 .map(|v| template.parts().segment(template.weights().dominant(v)))
                 .map(is_bare)
                 .collect(),
+            scalp: scalp(template),
             bvh: Bvh::new(mesh.faces(), mesh.vertices()),
             posed: Vec::new(),
             bones: BoneTransforms::default(),
             deviations: angle_deviations(template),
+            straight: straight_precisions(template),
         }
     }
 
@@ -291,6 +295,9 @@ impl<'a> ModelFit<'a> {
         if self.covered.get(i).copied().unwrap_or(false) {
             residual -= normal.cast() * THICKNESS;
             weight *= if is_outside { LOOSE } else { 1.0 };
+        } else if is_outside && self.scalp[face[0] as usize] && self.clothed.is_none() {
+            // Hair stands off the skin as cloth does.
+            weight *= UNKNOWN;
         } else if self.bare[face[0] as usize] {
             weight *= BARE;
         } else if is_outside && self.covered.is_empty() && self.clothed.is_none() {
@@ -370,6 +377,8 @@ impl<'a> ModelFit<'a> {
             let (i, w) = (6 + k, (deviation * prior.freedom).powi(-2));
             h[(i, i)] += w;
             g[i] += w * (prior.start.angles[k] - body.pose.angles[k]);
+            h[(i, i)] += self.straight[k];
+            g[i] -= self.straight[k] * body.pose.angles[k];
         }
         BodyEquations { h, g }
     }
@@ -523,24 +532,6 @@ fn robust_mean(matches: &[Match], kernel: &GemanMcClure) -> f64 {
         (s + kernel.value(m.residual.norm_squared()), n + 1)
     });
     (sum / n.max(1) as f64).sqrt()
-}
-
-fn angle_deviations(template: &Template) -> Vec<f64> {
-    use BodySegment::*;
-    let skeleton = template.skeleton();
-    let mut out = vec![ANGLES[1]; skeleton.dofs()];
-    for (j, joint) in skeleton.joints().iter().enumerate() {
-        let segment = template.parts().segment(j);
-        let is_stiff = matches!(
-            segment,
-            Abdomen | Chest | Neck | Head | Collar | Hand | Fingers | Foot | Toes
-        );
-        let at = skeleton.dof_offset(j);
-        for slot in &mut out[at..at + joint.motion.dofs()] {
-            *slot = ANGLES[usize::from(!is_stiff)];
-        }
-    }
-    out
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@ use super::prior::{BodyRegion, LONG_TOP, Slot};
 use crate::body::Template;
 use crate::clothcap::CaptureError;
 use crate::clothcap::mrf::{ExpansionConfig, MrfModel};
+use crate::clothcap::scalp::scalp;
 use crate::clothcap::topology::ClothTemplate;
-use crate::math::P3;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -162,7 +162,7 @@ impl<'a> Labeller<'a> {
         Self {
             nodes,
             config,
-            hair: scalp(template, &regions),
+            hair: scalp(template),
             bottom: vec![false; regions.len()],
             second_top: vec![None; regions.len()],
             is_top_long: false,
@@ -365,27 +365,4 @@ pub(super) fn step_down(template: &Template, nodes: &NodeColors, edge: [u32; 2])
     let [a, b] = edge.map(|v| template.mesh().vertices()[v as usize].y);
     let [p, q] = edge.map(|v| nodes.steps[v as usize]);
     if a > b { p - q } else { q - p }
-}
-
-/// Back and top of the head, where hair grows; shape `[vertices]`.
-fn scalp(template: &Template, regions: &[BodyRegion]) -> Vec<bool> {
-    /// Height of the hairline between chin and crown.
-    const HAIRLINE: f32 = 0.78;
-    let vertices = template.mesh().vertices();
-    let head = || {
-        vertices
-            .iter()
-            .zip(regions)
-            .filter(|(_, r)| **r == BodyRegion::Head)
-    };
-    let (low, high) = head().fold((f32::MAX, f32::MIN), |(l, h), (p, _)| {
-        (l.min(p.y), h.max(p.y))
-    });
-    let middle = head().map(|(p, _)| p.z).sum::<f32>() / head().count().max(1) as f32;
-    let is_scalp = |p: &P3| p.z < middle || p.y > low + HAIRLINE * (high - low);
-    vertices
-        .iter()
-        .zip(regions)
-        .map(|(p, r)| *r == BodyRegion::Head && is_scalp(p))
-        .collect()
 }
