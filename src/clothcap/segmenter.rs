@@ -11,6 +11,9 @@ use super::topology::ClothTemplate;
 use crate::body::Template;
 use std::sync::Arc;
 
+/// Farthest that a point of a garment lies off the surface, metres: the surface follows cloth to a few millimetres.
+const FARTHEST: f32 = 0.10;
+
 /// Aligned and labelled scan.
 #[derive(Clone, Debug)]
 pub struct SegmentedScan {
@@ -131,7 +134,11 @@ impl ScanSegmenter {
         );
         labelling.join_islands(around.1);
         let edges = scan.edges();
-        let labels = label_scan((scan, &edges), &alignment.matches, around, &labelling)?;
+        let mut labels = label_scan((scan, &edges), &alignment.matches, around, &labelling)?;
+        // Walls and things beside are no garments.
+        let far = alignment.matches.iter().map(|m| m.distance > FARTHEST);
+        let far = labels.iter_mut().zip(far).filter(|(_, far)| *far);
+        far.for_each(|(label, _)| *label = 0);
         labelling.adopt(&nodes, &labels);
         labelling.leave_unseen(&seen_slices(template, &nodes));
         if !labelling
