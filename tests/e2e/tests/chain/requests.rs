@@ -85,7 +85,7 @@ async fn huge_length_prefix(address: std::net::SocketAddr) {
     use std::io::{Read, Write};
     let mut s = std::net::TcpStream::connect(address).expect("connects");
     let body = [0u8, 0xff, 0xff, 0xff, 0xff, 1, 2, 3];
-    let head = "POST /tryon.v1.CompositorService/OpenTryOn HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\
+    let head = "POST /tryon.v1.CompositorService/OpenTryOn HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\
                 Content-Type: application/grpc-web+proto\r\nContent-Length: 8\r\n\r\n";
     s.write_all(head.as_bytes())
         .and_then(|()| s.write_all(&body))

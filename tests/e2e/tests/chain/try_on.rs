@@ -243,7 +243,7 @@ fn http(address: std::net::SocketAddr, path: &str) -> String {
     let mut s = std::net::TcpStream::connect(address).expect("connects");
     write!(
         s,
-        "GET {path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
+        "GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
     )
     .expect("sends");
     let mut out = String::new();

@@ -1,0 +1,151 @@
+"""Strangers: clients without credentials, other hosts' names, other people's sessions, the bus."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import pathlib
+import re
+import subprocess
+import time
+
+import grpc
+import zenoh
+
+from .box import Box
+from .range import ROOT, Range
+from .report import Figure, attack
+from .viewer import Client, Viewer
+
+REFUSED = (grpc.StatusCode.UNAUTHENTICATED, grpc.StatusCode.PERMISSION_DENIED)
+
+
+@attack("stranger", "a client without credentials opens a try-on and sees the person: pictures")
+def stranger(ground: Range) -> list[Figure]:
+    """Opens, streams and takes a snapshot on loopback, where `demo` and `up` put a token into the printed address."""
+    seen = 0
+    with ground.box() as box:
+        client = Client(ground, box, metadata=())
+        with contextlib.suppress(grpc.RpcError):
+            client.open("stranger")
+            viewer = Viewer(ground, box, "stranger", metadata=())
+            viewer.wait(lambda s: s.is_picture, 5.0)
+            seen = len(viewer.pictures())
+            viewer.close()
+        client.close()
+    return [Figure("pictures", min(seen, 1), 0, 0)]
+
+
+@attack("bus-tap", "a stranger's zenoh session reads RGBD off the bus: frames in 2 s")
+def bus_tap(ground: Range) -> list[Figure]:
+    """The Python client of zenoh, with nothing but the endpoint."""
+    with ground.box() as box:
+        frames = tap(box, 2.0)
+    return [Figure("frames", len(frames), 0, 0)]
+
+
+def tap(box: Box, seconds: float) -> list[float]:
+    """Times (monotonic) of all frames on the bus during `seconds`."""
+    config = zenoh.Config()
+    config.insert_json5("mode", '"peer"')
+    config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{box.bus}"]))
+    config.insert_json5("listen/endpoints", "[]")
+    config.insert_json5("scouting/multicast/enabled", "false")
+    times: list[float] = []
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError:
+        return times
+    subscriber = session.declare_subscriber("tryon/**", lambda _: times.append(time.monotonic()))
+    time.sleep(seconds)
+    subscriber.undeclare()
+    session.close()
+    return times
+
+
+@attack("close-others", "session ids whole in the log, and sessions that a stranger closes with them")
+def close_others(ground: Range) -> list[Figure]:
+    """An id drawn by the service is looked up in its log, and closed from another connection."""
+    closed = 0
+    with ground.box() as box:
+        owner, thief = Client(ground, box), Client(ground, box, metadata=())
+        opened = owner.rpc.OpenTryOn(owner.pb.OpenTryOnRequest(), timeout=5, metadata=owner.metadata)
+        call = owner.stream(opened.try_on_id)
+        next(call)
+        time.sleep(0.5)
+        whole = len(re.findall(re.escape(opened.try_on_id), box.log()))
+        with contextlib.suppress(grpc.RpcError):
+            thief.end(opened.try_on_id)
+            time.sleep(0.5)
+            closed = int(is_gone(owner, opened.try_on_id))
+        owner.close(), thief.close()
+    return [Figure("ids in the log", whole, 0, 0), Figure("closed", closed, 0, 0)]
+
+
+def is_gone(client: Client, name: str) -> bool:
+    """The try-on is not open any more."""
+    try:
+        next(client.stream(name, 5.0))
+        return False
+    except grpc.RpcError as e:
+        return e.code() == grpc.StatusCode.NOT_FOUND
+
+
+def curl(*arguments: str) -> int:
+    """HTTP status of a request by curl; 0 when there is none."""
+    run = subprocess.run(["curl", "-s", "-m", "5", "-o", "/dev/null", "-w", "%{http_code}", *arguments],
+                         capture_output=True, text=True, check=False)
+    return int(run.stdout or 0)
+
+
+@attack("host-header", "foreign Host and Origin that are served (DNS rebinding): requests of 5")
+def host_header(ground: Range) -> list[Figure]:
+    """curl over HTTP/1.1 and HTTP/2, for the page and for gRPC-web."""
+    with ground.box() as box:
+        page, rpc = f"http://{box.address}/", f"http://{box.address}/tryon.v1.CompositorService/ListGarmentChoices"
+        body = pathlib.Path(box.folder / "empty.bin")
+        body.write_bytes(b"\0\0\0\0\0")
+        web = ("-H", "Content-Type: application/grpc-web+proto", "--data-binary", f"@{body}")
+        served = [
+            curl("-H", "Host: evil.example", page),
+            curl("-H", "Host: evil.example:8080", "-X", "POST", *web, rpc),
+            curl("-H", "Origin: http://evil.example", "-X", "POST", *web, rpc),
+            curl("-H", "Origin: null", "-X", "POST", *web, rpc),
+            curl("--http2-prior-knowledge", "-H", "Host: evil.example", page),
+        ]
+    return [Figure("served", sum(200 <= s < 300 for s in served), 0, 0)]
+
+
+@attack("beyond-loopback", "addresses beyond loopback that are bound without TLS, tokens and --insecure: of 4")
+def beyond_loopback(ground: Range) -> list[Figure]:
+    """Each port in turn on 0.0.0.0: the program must end with status 64."""
+    bound = 0
+    for section in ("capture", "tracking", "cloth", "compositor"):
+        with ground.box() as box:
+            port = box.ports[section]
+            bound += not refuses(box, section, f"0.0.0.0:{port}")
+    return [Figure("bound", bound, 0, 0)]
+
+
+def refuses(box: Box, section: str, address: str) -> bool:
+    """`tryon up --check` ends with 64 for this address; services check alike."""
+    text = box.config.read_text()
+    changed = re.sub(rf'(\[{section}\]\naddress = )"[^"]*"', rf'\1"{address}"', text)
+    config = box.folder / f"{section}.toml"
+    config.write_text(changed)
+    run = subprocess.run([str(box.binaries / "tryon"), "up", "--check", "--config", str(config)],
+                         capture_output=True, check=False, timeout=10)
+    return run.returncode == 64
+
+
+@attack("node-port", "ports of shipped overlays that a whole LAN reaches without TLS")
+def node_port(ground: Range) -> list[Figure]:
+    """Services of type NodePort or LoadBalancer whose pods have no TLS, by `kubectl kustomize`."""
+    open_ports = 0
+    for overlay in sorted((ROOT / "deploy/kustomize/overlays").iterdir()):
+        run = subprocess.run(["kubectl", "kustomize", str(overlay)], capture_output=True, text=True, check=True)
+        documents = run.stdout.split("\n---\n")
+        exposed = [d for d in documents if re.search(r"^  type: (NodePort|LoadBalancer)$", d, re.M)]
+        if not re.search(r"TRYON_TLS__CERTIFICATE|^\s*\[tls\]", run.stdout, re.M):
+            open_ports += len(exposed)
+    return [Figure("ports", open_ports, 0, 0)]
