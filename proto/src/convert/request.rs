@@ -4,6 +4,7 @@ use super::WireError;
 use super::garment::MAX_GARMENTS;
 use crate::keys::{CameraKey, is_name, is_session_id};
 use crate::v1;
+use std::time::Duration;
 
 /// Session id.
 ///
@@ -66,9 +67,12 @@ pub struct PictureFormat {
     pub size: Option<(u32, u32)>,
     /// JPEG quality, 1 to 100.
     pub quality: u8,
-    /// Most pictures a second; `None` means no limit.
-    pub max_rate: Option<f32>,
+    /// Time between two pictures; zero means no limit.
+    pub interval: Duration,
 }
+
+/// Lowest and highest rate of a viewer (Hz). Lower is a snapshot now and then, higher is more than any camera gives.
+const RATES: std::ops::RangeInclusive<f32> = 0.01..=1000.0;
 
 /// Size, codec, quality and rate of a picture stream.
 ///
@@ -90,13 +94,20 @@ pub fn picture_format(r: &v1::StreamFramesRequest) -> Result<PictureFormat, Wire
     if r.quality > 100 {
         return fault("quality", "1 to 100, or 0 for the default");
     }
-    if !(r.max_rate.is_finite() && r.max_rate >= 0.0) {
-        return fault("max_rate", "zero or a positive number");
-    }
+    let interval = match r.max_rate {
+        0.0 => Duration::ZERO,
+        rate if RATES.contains(&rate) => Duration::from_secs_f32(1.0 / rate),
+        _ => {
+            return fault(
+                "max_rate",
+                "0.01 to 1000 pictures a second, or 0 for no limit",
+            );
+        }
+    };
     Ok(PictureFormat {
         size,
         quality: if r.quality == 0 { 80 } else { r.quality as u8 },
-        max_rate: (r.max_rate > 0.0).then_some(r.max_rate),
+        interval,
     })
 }
 
@@ -136,16 +147,6 @@ mod tests {
         );
         let r = v1::StreamFramesRequest {
             width: 640,
-            height: 480,
-            max_rate: f32::NAN,
-            ..Default::default()
-        };
-        assert_eq!(
-            picture_format(&r).expect_err("NaN").field,
-            "stream_frames_request.max_rate"
-        );
-        let r = v1::StreamFramesRequest {
-            width: 640,
             ..Default::default()
         };
         assert_eq!(
@@ -161,5 +162,31 @@ mod tests {
             picture_format(&r).expect_err("4 G").field,
             "stream_frames_request.width"
         );
+    }
+
+    #[test]
+    fn odd_rates_are_refused_and_intervals_are_finite() {
+        let format = |max_rate| {
+            picture_format(&v1::StreamFramesRequest {
+                max_rate,
+                ..Default::default()
+            })
+        };
+        let odd = [1e-30, f32::MIN_POSITIVE, 1e-45, 0.009, 1001.0, f32::MAX];
+        let none = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0];
+        for rate in odd.into_iter().chain(none) {
+            let fault = format(rate).expect_err("odd");
+            assert_eq!(fault.field, "stream_frames_request.max_rate", "{rate}");
+        }
+        for (rate, ms) in [
+            (0.0, 0),
+            (-0.0, 0),
+            (0.01, 100_000),
+            (10.0, 100),
+            (1000.0, 1),
+        ] {
+            let interval = format(rate).expect("fine").interval;
+            assert_eq!(interval.as_millis(), ms, "{rate}");
+        }
     }
 }

@@ -3073,7 +3073,7 @@ pub struct StreamFramesRequest {
     /// JPEG quality 1 to 100; 0 means 80.
     #[prost(uint32, tag = "5")]
     pub quality: u32,
-    /// Most pictures a second; 0 means no limit.
+    /// Most pictures a second, 0.01 to 1000; 0 means no limit.
     #[prost(float, tag = "6")]
     pub max_rate: f32,
 }
@@ -3473,7 +3473,9 @@ pub mod compositor_service_client {
         /// reason changes and at least twice a second while there are no pictures, so silence of a second means that the
         /// compositor is gone. Each reader has its own queue: a slow one does not delay the others. Use one HTTP/2 connection
         /// per stream: a slow reader stalls the other streams of its own connection.
-        /// The last message before a regular end is a status with CLOSED or DRAINING.
+        /// The last message before a regular end is a status with CLOSED or DRAINING. A try-on that fails ends its streams
+        /// with INTERNAL, and opening it again is safe; a reader that lets 64 statuses wait is cut off with
+        /// RESOURCE_EXHAUSTED.
         pub async fn stream_frames(
             &mut self,
             request: impl tonic::IntoRequest<super::StreamFramesRequest>,
@@ -3499,7 +3501,8 @@ pub mod compositor_service_client {
             self.inner.server_streaming(req, path, codec).await
         }
         /// Returns the newest picture, PNG or JPEG, at the camera's size. UNAVAILABLE with RetryInfo when the newest is older
-        /// than a second.
+        /// than a second, RESOURCE_EXHAUSTED with RetryInfo when four callers wait already. Pictures of streams and snapshots
+        /// take turns.
         pub async fn take_snapshot(
             &mut self,
             request: impl tonic::IntoRequest<super::TakeSnapshotRequest>,
@@ -3593,7 +3596,9 @@ pub mod compositor_service_server {
         /// reason changes and at least twice a second while there are no pictures, so silence of a second means that the
         /// compositor is gone. Each reader has its own queue: a slow one does not delay the others. Use one HTTP/2 connection
         /// per stream: a slow reader stalls the other streams of its own connection.
-        /// The last message before a regular end is a status with CLOSED or DRAINING.
+        /// The last message before a regular end is a status with CLOSED or DRAINING. A try-on that fails ends its streams
+        /// with INTERNAL, and opening it again is safe; a reader that lets 64 statuses wait is cut off with
+        /// RESOURCE_EXHAUSTED.
         async fn stream_frames(
             &self,
             request: tonic::Request<super::StreamFramesRequest>,
@@ -3602,7 +3607,8 @@ pub mod compositor_service_server {
             tonic::Status,
         >;
         /// Returns the newest picture, PNG or JPEG, at the camera's size. UNAVAILABLE with RetryInfo when the newest is older
-        /// than a second.
+        /// than a second, RESOURCE_EXHAUSTED with RetryInfo when four callers wait already. Pictures of streams and snapshots
+        /// take turns.
         async fn take_snapshot(
             &self,
             request: tonic::Request<super::TakeSnapshotRequest>,

@@ -27,7 +27,7 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
     for camera in c.cameras.iter().filter(|camera| camera.autostart) {
         service.autostart(&camera.name).await;
     }
-    let (mut routes, health) = server::routes()?;
+    let (mut routes, health) = server::routes(SERVICE_NAME)?;
     routes.add_service(
         CaptureServiceServer::new(service).max_decoding_message_size(server::MAX_REQUEST_BYTES),
     );

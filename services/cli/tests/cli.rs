@@ -364,7 +364,7 @@ fn a_box_starts_from_its_file_and_drains_at_a_signal() {
     let mut page = std::net::TcpStream::connect(mirror.expect("an address")).unwrap();
     write!(
         page,
-        "GET / HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
+        "GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
     )
     .unwrap();
     let mut html = String::new();

@@ -13,6 +13,7 @@ mod simulation;
 use tryon_kit::config::Config;
 use tryon_kit::server::{self, Context, Running, Service, StartError};
 use tryon_proto::v1::cloth_service_server::{ClothServiceServer, SERVICE_NAME};
+use tryon_proto::v1::tracking_service_server::SERVICE_NAME as TRACKING;
 
 /// Largest request, bytes: a scene of a simulation and its message.
 const MAX_REQUEST_BYTES: usize = 1024 * 1024 + 4096;
@@ -33,8 +34,10 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         key: "cloth.garments".into(),
         why: e.to_string(),
     })??;
+    let (mut routes, health) = server::routes(SERVICE_NAME)?;
+    let behind = vec![(TRACKING, tracking.clone())];
+    tryon_kit::behind::follow(health.clone(), &ctx, behind);
     let service = service::Cloth::new(c, &ctx, tracking, offered);
-    let (mut routes, health) = server::routes()?;
     routes
         .add_service(ClothServiceServer::new(service).max_decoding_message_size(MAX_REQUEST_BYTES));
     let service = Service {

@@ -12,7 +12,7 @@ use tonic::transport::Channel;
 use tonic::{Request, Response, Status};
 use tryon_kit::config::ClothConfig;
 use tryon_kit::server::Context;
-use tryon_kit::sessions::{Opened, Sessions};
+use tryon_kit::sessions::{Opened, Sessions, brief};
 use tryon_kit::status::{exhausted, not_found};
 use tryon_proto::convert::garment::GarmentWriter;
 use tryon_proto::convert::request;
@@ -81,7 +81,7 @@ impl ClothService for Cloth {
         let handle = match self.sessions.open(&id, || session::spawn(setup())) {
             Opened::Found(h) => h,
             Opened::Created(h) => {
-                tracing::info!(session = id, "opened");
+                tracing::info!(session = brief(&id), "opened");
                 metrics::gauge!("tryon_cloth_sessions").set(self.sessions.len() as f64);
                 h
             }

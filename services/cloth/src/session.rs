@@ -10,7 +10,8 @@ use tonic::transport::Channel;
 use tryon_kit::bodies::{News, follow};
 use tryon_kit::queue::{latest, ordered};
 use tryon_kit::server::Context;
-use tryon_kit::sessions::Sessions;
+use tryon_kit::session_task::{self, Place};
+use tryon_kit::sessions::{Sessions, brief};
 use tryon_kit::telemetry::record_stages;
 use tryon_proto::convert::garment::{Positions, WornGarment};
 use tryon_proto::v1::{
@@ -21,9 +22,6 @@ use tryon_proto::v1::{
 const HEARTBEAT: Duration = Duration::from_millis(450);
 /// Position updates that wait for a slow reader; a further one replaces the oldest.
 const WAITING: usize = 2;
-/// Reason of an end on request.
-const ASKED: &str = "asked to";
-
 /// Outfit that the client asked for; the revision grows with each change.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct WantedOutfit {
@@ -65,7 +63,14 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
     let (outfit, wanted) = watch::channel(WantedOutfit::default());
     let (commands, inbox) = mpsc::channel(8);
     tokio::spawn(async move {
-        let (id, directory) = (setup.id.clone(), setup.directory.clone());
+        let id = setup.id.clone();
+        let is_over = |h: &Handle| h.commands.is_closed();
+        let _place = Place::new(
+            setup.directory.clone(),
+            &id,
+            "tryon_cloth_sessions",
+            is_over,
+        );
         let (tx, news) = latest::channel();
         let following = follow(
             setup.tracking.clone(),
@@ -87,13 +92,9 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
             readers: Vec::new(),
             skipped: 0,
         };
-        let why = task.run(inbox, news, ready).await;
+        let why = session_task::run("cloth", &id, task.run(inbox, news, ready)).await;
         following.abort();
-        if why != ASKED {
-            directory.remove(&id);
-        }
-        metrics::gauge!("tryon_cloth_sessions").set(directory.len() as f64);
-        tracing::info!(session = id, why, "closed");
+        tracing::info!(session = brief(&id), why, "closed");
     });
     Handle { outfit, commands }
 }
@@ -158,7 +159,7 @@ impl Task {
                         self.readers.push(Reader { queue, has: None });
                         self.publish(status.clone());
                     }
-                    Some(Command::Close) | None => return ASKED,
+                    Some(Command::Close) | None => return "asked to",
                 },
                 Some(d) = ready.recv() => self.on_dressed(d),
                 n = news.recv() => {
@@ -282,7 +283,7 @@ impl Task {
         match d.outcome {
             Ok(worn) => (self.worn, self.on) = (Some(worn), d.revision),
             Err(why) => {
-                tracing::warn!(session = self.setup.id, %why, "cannot be dressed");
+                tracing::warn!(session = brief(&self.setup.id), %why, "cannot be dressed");
                 self.failed = d.revision;
                 self.publish(failed(d.revision, why).into());
             }
@@ -343,7 +344,7 @@ impl Task {
                 update
             }
             Err(why) => {
-                tracing::error!(session = self.setup.id, %why, "a step was lost");
+                tracing::error!(session = brief(&self.setup.id), %why, "a step was lost");
                 self.undress();
                 waiting(DegradedReason::StepFailed, why.to_string()).into()
             }

@@ -1,10 +1,11 @@
 //! Rendering and encoding of one try-on's pictures.
 
 use crate::card::Card;
+use crate::formats::Format;
 use crate::join_buffer::ReportedBody;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use tryon::camera::ColorImage;
 use tryon::composite::{
     Appearance, Config, Framing, ImagePyramid, Input, Model, Print, RenderReport, State, Workspace,
@@ -33,7 +34,7 @@ pub(crate) struct Placed {
 }
 
 /// Encoding of a picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Encoding {
     Jpeg(u8),
     Png,
@@ -46,7 +47,7 @@ pub(crate) struct Job {
     /// Absent for the plain camera picture.
     pub(crate) placed: Option<Arc<Placed>>,
     pub(crate) body: Option<ReportedBody>,
-    pub(crate) formats: Vec<(Option<(u32, u32)>, Encoding)>,
+    pub(crate) formats: Vec<Format>,
     /// Tightness byte of each simulated vertex by garment: draws garments in the colours of their fit.
     pub(crate) fit: Option<Arc<[bytes::Bytes]>>,
 }
@@ -58,6 +59,8 @@ pub(crate) struct Encoded {
     pub(crate) width: u32,
     pub(crate) height: u32,
     pub(crate) bytes: bytes::Bytes,
+    /// Time to draw and encode it.
+    pub(crate) cost: Duration,
 }
 
 /// Result of a job.
@@ -68,7 +71,7 @@ pub(crate) struct Drawn {
 
 impl Job {
     /// The format of a viewer, as jobs count them.
-    pub(crate) fn wants(f: &PictureFormat) -> (Option<(u32, u32)>, Encoding) {
+    pub(crate) fn wants(f: &PictureFormat) -> Format {
         (f.size, Encoding::Jpeg(f.quality))
     }
 }
@@ -88,8 +91,8 @@ pub(crate) struct Engine {
     pyramids: Pyramids,
 }
 
-/// Pictures by their size.
-type Sizes = Vec<(Option<(u32, u32)>, ColorImage)>;
+/// Pictures by their size, with the time to draw each.
+type Sizes = Vec<(Option<(u32, u32)>, ColorImage, Duration)>;
 
 impl Engine {
     pub(crate) fn new(card: Card) -> Self {
@@ -142,9 +145,10 @@ impl Engine {
         });
         let mut images = Sizes::new();
         for &(size, _) in &job.formats {
-            if images.iter().any(|(s, _)| *s == size) {
+            if images.iter().any(|(s, _, _)| *s == size) {
                 continue;
             }
+            let begun = Instant::now();
             let input = Input {
                 frame: &job.exposure.rgbd,
                 calibration: &job.exposure.calibration,
@@ -157,7 +161,7 @@ impl Engine {
                 .draw(&self.model, &mut self.state, &input, &mut self.work)
                 .map_err(|e| e.to_string())?;
             record(&report);
-            images.push((size, image));
+            images.push((size, image, begun.elapsed()));
         }
         Ok(images)
     }
@@ -239,9 +243,10 @@ fn record(report: &RenderReport) {
 fn encode(job: &Job, images: &Sizes) -> Result<Vec<Encoded>, String> {
     let mut pictures = Vec::new();
     for &(size, encoding) in &job.formats {
-        let Some((_, image)) = images.iter().find(|(s, _)| *s == size) else {
+        let Some((_, image, drawn)) = images.iter().find(|(s, _, _)| *s == size) else {
             continue;
         };
+        let begun = Instant::now();
         let bytes = match encoding {
             Encoding::Jpeg(quality) => encode_jpeg(image, quality),
             Encoding::Png => encode_png_rgb(image, Path::new("snapshot.png")),
@@ -252,6 +257,7 @@ fn encode(job: &Job, images: &Sizes) -> Result<Vec<Encoded>, String> {
             width: image.width(),
             height: image.height(),
             bytes: bytes.map_err(|e| e.to_string())?.into(),
+            cost: *drawn + begun.elapsed(),
         });
     }
     Ok(pictures)

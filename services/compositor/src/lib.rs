@@ -7,6 +7,7 @@
 
 mod card;
 mod engine;
+mod formats;
 mod join_buffer;
 mod life;
 pub mod page;
@@ -15,11 +16,25 @@ mod try_on;
 mod upstream;
 mod viewer;
 
+use axum::body::Body;
+use axum::middleware::{Next, from_fn};
+use http::{Request, Response};
 use tonic::service::Routes;
 use tonic_web::GrpcWebLayer;
 use tryon_kit::config::Config;
+use tryon_kit::hosts::Hosts;
 use tryon_kit::server::{self, Context, Running, Service, StartError};
 use tryon_proto::v1::compositor_service_server::{CompositorServiceServer, SERVICE_NAME};
+
+/// Refuses requests to foreign hosts and from foreign pages.
+async fn own_pages_only(hosts: Hosts, request: Request<Body>, next: Next) -> Response<Body> {
+    let Some(status) = hosts.refusal(&request) else {
+        return next.run(request).await;
+    };
+    let mut answer = Response::new(Body::empty());
+    *answer.status_mut() = status;
+    answer
+}
 
 /// Starts the service. The services behind it need not run yet.
 ///
@@ -28,7 +43,8 @@ use tryon_proto::v1::compositor_service_server::{CompositorServiceServer, SERVIC
 pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError> {
     let c = &config.compositor;
     let service = service::Compositor::new(c, &ctx)?;
-    let (mut routes, health) = server::routes()?;
+    let (mut routes, health) = server::routes(SERVICE_NAME)?;
+    tryon_kit::behind::follow(health.clone(), &ctx, service.behind());
     routes.add_service(
         CompositorServiceServer::new(service).max_decoding_message_size(server::MAX_REQUEST_BYTES),
     );
@@ -36,7 +52,11 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         .routes()
         .into_axum_router()
         .layer(GrpcWebLayer::new());
-    let routes = Routes::from(grpc.reset_fallback().merge(page::router()));
+    let app = grpc.reset_fallback().merge(page::router());
+    let hosts = Hosts::new(&c.hosts, &c.origins);
+    let routes = Routes::from(app.layer(from_fn(move |r, next| {
+        own_pages_only(hosts.clone(), r, next)
+    })));
     let service = Service {
         name: "compositor",
         grpc_name: SERVICE_NAME,

@@ -15,10 +15,12 @@ use tonic::{Code, Request, Response, Status};
 use tryon_kit::client::{channel, request as call};
 use tryon_kit::config::CompositorConfig;
 use tryon_kit::server::{Context, StartError};
-use tryon_kit::sessions::{Opened, Sessions, random_id};
+use tryon_kit::sessions::{Opened, Sessions, brief, random_id};
 use tryon_kit::status::{exhausted, from_upstream, not_found, unavailable};
 use tryon_proto::convert::{WireError, request};
+use tryon_proto::v1::cloth_service_server::SERVICE_NAME as CLOTH;
 use tryon_proto::v1::compositor_service_server::CompositorService;
+use tryon_proto::v1::tracking_service_server::SERVICE_NAME as TRACKING;
 use tryon_proto::v1::*;
 
 /// JPEG quality of snapshots.
@@ -35,6 +37,7 @@ pub(crate) struct Compositor {
     config: CompositorConfig,
     ctx: Context,
     cloth: Channel,
+    tracking: Channel,
     card: Card,
 }
 
@@ -44,7 +47,7 @@ impl Compositor {
             let key = format!("compositor.{key}");
             move |why| StartError::Config { key, why }
         };
-        channel(&config.tracking).map_err(fault("tracking"))?;
+        let tracking = channel(&config.tracking).map_err(fault("tracking"))?;
         let cloth = channel(&config.cloth).map_err(fault("cloth"))?;
         let card = Card::open(config.renderer).map_err(|e| StartError::Config {
             key: "compositor.renderer".into(),
@@ -55,8 +58,17 @@ impl Compositor {
             config: config.clone(),
             ctx: ctx.clone(),
             cloth,
+            tracking,
             card,
         })
+    }
+
+    /// Services behind this one, by gRPC name.
+    pub(crate) fn behind(&self) -> Vec<(&'static str, Channel)> {
+        vec![
+            (TRACKING, self.tracking.clone()),
+            (CLOTH, self.cloth.clone()),
+        ]
     }
 
     fn find(&self, id: &str) -> Result<Arc<Handle>, Status> {
@@ -144,7 +156,7 @@ impl CompositorService for Compositor {
         let created = match self.try_ons.open(&id, || try_on::spawn(setup())) {
             Opened::Found(_) => false,
             Opened::Created(_) => {
-                tracing::info!(try_on = id, camera = %key, "opened");
+                tracing::info!(try_on = brief(&id), camera = %key, "opened");
                 metrics::gauge!("tryon_try_ons").set(self.try_ons.len() as f64);
                 true
             }
@@ -233,7 +245,7 @@ impl CompositorService for Compositor {
         let r = r.get_ref();
         let format = request::picture_format(r)?;
         let handle = self.find(&r.try_on_id)?;
-        let (viewer, reader) = viewer(format);
+        let (viewer, reader) = viewer(&r.try_on_id, format);
         handle
             .commands
             .send(Command::View(viewer))

@@ -115,6 +115,11 @@ impl Config {
                 return fault(key, "a URL such as http://127.0.0.1:50052 is needed");
             }
         }
+        if let Some(key) = self.exposed().filter(|_| !self.process.insecure) {
+            let why = "is reached from beyond this machine, and there is neither TLS nor a token; \
+                       process.insecure = true (or --insecure) allows it";
+            return fault(key, why);
+        }
         for (key, n) in [
             ("tracking.max_sessions", self.tracking.max_sessions),
             ("cloth.max_sessions", self.cloth.max_sessions),
@@ -126,11 +131,63 @@ impl Config {
         }
         Ok(())
     }
+
+    /// Key of the first address that other machines reach.
+    fn exposed(&self) -> Option<&'static str> {
+        let addresses = [
+            ("capture.address", self.capture.address),
+            ("capture.admin", self.capture.admin),
+            ("tracking.address", self.tracking.address),
+            ("tracking.admin", self.tracking.admin),
+            ("cloth.address", self.cloth.address),
+            ("cloth.admin", self.cloth.admin),
+            ("compositor.address", self.compositor.address),
+            ("compositor.admin", self.compositor.admin),
+        ];
+        let exposed = addresses.iter().find(|(_, a)| !a.ip().is_loopback());
+        let is_bus = || self.bus.listen.iter().any(|e| !is_local_endpoint(e));
+        exposed
+            .map(|(key, _)| *key)
+            .or_else(|| is_bus().then_some("bus.listen"))
+    }
+}
+
+/// A zenoh endpoint of this machine: a socket of the file system, or a loopback address.
+fn is_local_endpoint(endpoint: &str) -> bool {
+    let (protocol, address) = endpoint.split_once('/').unwrap_or(("", endpoint));
+    let is_loopback = |a: std::net::SocketAddr| a.ip().is_loopback();
+    protocol == "unixsock-stream"
+        || address.starts_with("localhost:")
+        || address.parse().is_ok_and(is_loopback)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nothing_is_bound_beyond_loopback_without_being_told() {
+        let load = |set: &[&str]| {
+            let flags: Vec<String> = set.iter().map(|s| (*s).into()).collect();
+            Config::load(None, &flags).map_err(|e| e.to_string())
+        };
+        for (key, value) in [
+            ("compositor.address", "0.0.0.0:8080"),
+            ("tracking.admin", "\"[::]:9102\""),
+            ("bus.listen", "[\"tcp/10.0.0.1:7447\"]"),
+        ] {
+            let set = format!("{key}={value}");
+            let fault = load(&[&set]).expect_err("exposed");
+            assert!(fault.starts_with(key), "{fault}");
+            assert!(load(&[&set, "process.insecure=true"]).is_ok(), "{key}");
+        }
+        let local = [
+            "unixsock-stream//run/bus",
+            "tcp/[::1]:7447",
+            "tcp/localhost:7447",
+        ];
+        assert!(local.into_iter().all(is_local_endpoint));
+    }
 
     #[test]
     fn the_commented_default_file_is_the_default() {

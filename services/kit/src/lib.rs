@@ -2,19 +2,24 @@
 //! servers, reconnecting clients, and a shutdown with a deadline.
 
 pub mod admin;
+pub mod behind;
 pub mod bodies;
 pub mod bus;
 pub mod client;
 pub mod compute;
 pub mod config;
+mod connections;
 pub mod drain;
 pub mod frames;
+pub mod hosts;
 pub mod process;
 pub mod queue;
 pub mod server;
+pub mod session_task;
 pub mod sessions;
 pub mod status;
 pub mod telemetry;
+mod undecodable;
 
 pub use compute::Pool;
 pub use config::Config;

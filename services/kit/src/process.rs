@@ -15,6 +15,8 @@ use tokio_util::sync::CancellationToken;
 
 /// Exit status of a command line or configuration that cannot be used (sysexits.h, EX_USAGE).
 pub const EXIT_USAGE: u8 = 64;
+/// `--insecure` as a key.
+pub const INSECURE: &str = "process.insecure=true";
 /// Exit status of a service that could not start or broke (EX_SOFTWARE).
 pub const EXIT_BROKEN: u8 = 70;
 
@@ -28,6 +30,9 @@ pub struct Args {
     /// Sets one key, such as `--set tracking.address=127.0.0.1:0`; wins over file and environment.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
+    /// Lets addresses beyond loopback be bound, where anybody who reaches them sees the person.
+    #[arg(long)]
+    pub insecure: bool,
     /// Checks the configuration and ends.
     #[arg(long)]
     pub check: bool,
@@ -57,7 +62,9 @@ where
     F: FnOnce(Config, Context) -> Fut,
     Fut: Future<Output = Result<Running, StartError>>,
 {
-    let config = Config::load(args.config.as_deref(), &args.set).map_err(|e| e.to_string());
+    let mut set = args.set;
+    set.extend(args.insecure.then(|| INSECURE.to_owned()));
+    let config = Config::load(args.config.as_deref(), &set).map_err(|e| e.to_string());
     let config = match config.and_then(|c| crate::telemetry::init_logs(&c.log).map(|()| c)) {
         Ok(c) => c,
         Err(why) => {

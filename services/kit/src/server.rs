@@ -1,20 +1,22 @@
 //! gRPC servers: health and reflection beside the service, limits and keepalive, an end with a deadline.
 
 use crate::compute::Pool;
+use crate::connections::{self, Limits};
 use crate::drain::{Drained, until_deadline};
 use crate::frames::FrameBus;
+use crate::undecodable::blame_caller;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
-use tokio_stream::wrappers::TcpListenerStream;
 use tokio_util::sync::CancellationToken;
 use tonic::service::{Routes, RoutesBuilder};
 use tonic::transport::Server;
 use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
+use tower::util::MapResponseLayer;
 
 /// Longest time of a call until its headers or answer; streams run on.
 const CALL_TIMEOUT: Duration = Duration::from_secs(10);
@@ -28,6 +30,8 @@ const MAX_STREAMS: u32 = 64;
 const MAX_HEADER_BYTES: u32 = 16 * 1024;
 /// Largest request, bytes: requests are names and numbers. A service with larger ones sets its own limit.
 pub const MAX_REQUEST_BYTES: usize = 64 * 1024;
+/// gRPC name of health.
+const HEALTH: &str = "grpc.health.v1.Health";
 /// Time beyond `grace` for handlers to see the signal and end their streams.
 const CUT: Duration = Duration::from_millis(250);
 
@@ -109,22 +113,32 @@ impl Running {
     }
 }
 
-/// Routes with health and reflection in place.
-pub fn routes() -> Result<(RoutesBuilder, HealthReporter), StartError> {
+/// Routes of the service of that gRPC name, with health and reflection in place.
+///
+/// # Errors
+/// When the name is none of the contracts.
+pub fn routes(grpc_name: &str) -> Result<(RoutesBuilder, HealthReporter), StartError> {
     let reporter = HealthReporter::new();
     let health = tonic_health::pb::health_server::HealthServer::new(
         tonic_health::server::HealthService::from_health_reporter(reporter.clone()),
     );
-    let reflection = tonic_reflection::server::Builder::configure()
-        .register_encoded_file_descriptor_set(tryon_proto::DESCRIPTOR)
-        .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
-        .build_v1()
-        .map_err(|e| StartError::Config {
-            key: "reflection".into(),
-            why: e.to_string(),
-        })?;
+    // Only what this port answers is listed. Many tools still ask in v1alpha alone.
+    let listed = || {
+        tonic_reflection::server::Builder::configure()
+            .register_encoded_file_descriptor_set(tryon_proto::DESCRIPTOR)
+            .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+            .with_service_name(grpc_name)
+            .with_service_name(HEALTH)
+    };
+    let fault = |e: tonic_reflection::server::Error| StartError::Config {
+        key: "reflection".into(),
+        why: e.to_string(),
+    };
     let mut builder = Routes::builder();
-    builder.add_service(health).add_service(reflection);
+    builder
+        .add_service(health)
+        .add_service(listed().build_v1().map_err(fault)?)
+        .add_service(listed().build_v1alpha().map_err(fault)?);
     Ok((builder, reporter))
 }
 
@@ -181,14 +195,15 @@ pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartErro
         .set_service_status(grpc_name, ServingStatus::Serving)
         .await;
     let server = Server::builder()
+        .layer(MapResponseLayer::new(blame_caller))
         .accept_http1(http1)
         .timeout(CALL_TIMEOUT)
-        .tcp_nodelay(true)
         .http2_keepalive_interval(Some(PING_EVERY))
         .http2_keepalive_timeout(Some(PING_TIMEOUT))
         .http2_max_header_list_size(MAX_HEADER_BYTES)
         .max_concurrent_streams(MAX_STREAMS)
         .add_routes(routes);
+    let incoming = connections::accept(listener, Limits::default());
     let (shutdown, grace) = (ctx.shutdown.clone(), ctx.grace);
     let task = tokio::spawn(async move {
         let signalled = shutdown.clone();
@@ -199,7 +214,7 @@ pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartErro
                 .set_service_status(grpc_name, ServingStatus::NotServing)
                 .await;
         };
-        let work = server.serve_with_incoming_shutdown(TcpListenerStream::new(listener), stop);
+        let work = server.serve_with_incoming_shutdown(incoming, stop);
         let end = until_deadline(work, shutdown, grace + CUT).await;
         ended.cancel();
         end.map_err(|e| StartError::Broken {

@@ -61,6 +61,14 @@ impl<H> Sessions<H> {
     pub fn remove(&self, id: &str) -> Option<Arc<H>> {
         self.with(|m| m.remove(id))
     }
+    /// Takes a session out of the directory if `is_it` holds.
+    pub fn remove_if(&self, id: &str, is_it: impl FnOnce(&H) -> bool) {
+        self.with(|m| {
+            if m.get(id).is_some_and(|h| is_it(h)) {
+                m.remove(id);
+            }
+        });
+    }
     /// Most sessions at a time.
     pub fn limit(&self) -> usize {
         self.limit
@@ -78,6 +86,12 @@ impl<H> Sessions<H> {
 /// A random id: 128 bits, hexadecimal. `RandomState` draws from the system's generator.
 pub fn random_id() -> String {
     format!("{:016x}{:016x}", random_u64(), random_u64())
+}
+
+/// Beginning of an id for logs: whoever knows a whole id can watch and close its session.
+pub fn brief(id: &str) -> String {
+    let shown = (id.chars().count() / 2).min(8);
+    id.chars().take(shown).chain(['…']).collect()
 }
 
 /// A random number, never 0: the epoch of a camera's run.
@@ -115,5 +129,14 @@ mod tests {
         s.remove("a");
         assert!(matches!(s.open("c", || 3), Opened::Created(_)));
         assert_ne!(random_id(), random_id());
+        s.remove_if("c", |_| false);
+        assert!(matches!(s.open("c", || 4), Opened::Found(h) if *h == 3));
+    }
+
+    #[test]
+    fn no_log_shows_more_than_half_an_id() {
+        assert_eq!(brief("web-0123456789abcdef"), "web-0123…");
+        assert_eq!(brief("me"), "m…");
+        assert_eq!(brief(""), "…");
     }
 }

@@ -28,7 +28,7 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         why,
     })?;
     let service = service::Tracking::new(c, &ctx, template);
-    let (mut routes, health) = server::routes()?;
+    let (mut routes, health) = server::routes(SERVICE_NAME)?;
     routes.add_service(
         TrackingServiceServer::new(service).max_decoding_message_size(server::MAX_REQUEST_BYTES),
     );

@@ -11,7 +11,7 @@ use tonic::{Request, Response, Status};
 use tryon::body::Template;
 use tryon_kit::config::TrackingConfig;
 use tryon_kit::server::Context;
-use tryon_kit::sessions::{Opened, Sessions, random_id};
+use tryon_kit::sessions::{Opened, Sessions, brief, random_id};
 use tryon_kit::status::{exhausted, not_found};
 use tryon_proto::convert::{body, request};
 use tryon_proto::v1::tracking_service_server::TrackingService;
@@ -73,7 +73,7 @@ impl TrackingService for Tracking {
         }
         let created = match self.sessions.open(&id, || session::spawn(setup())) {
             Opened::Created(_) => {
-                tracing::info!(session = id, camera = %key, "opened");
+                tracing::info!(session = brief(&id), camera = %key, "opened");
                 metrics::gauge!("tryon_tracking_sessions").set(self.sessions.len() as f64);
                 true
             }

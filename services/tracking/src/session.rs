@@ -8,15 +8,13 @@ use tokio::time::Instant;
 use tryon::body::Template;
 use tryon_kit::frames::{CameraKey, Exposure, FrameSubscription};
 use tryon_kit::server::Context;
-use tryon_kit::sessions::Sessions;
+use tryon_kit::session_task::{self, Place};
+use tryon_kit::sessions::{Sessions, brief};
 use tryon_kit::telemetry::record_stages;
 use tryon_proto::v1::{self, DegradedReason, TrackingStatus};
 
 /// Time without a frame after which the camera counts as silent: half of the time in which clients must know.
 const SILENCE: Duration = Duration::from_millis(500);
-
-/// Reason of an end on request.
-const ASKED: &str = "asked to";
 
 /// Access to a session from the rpcs.
 pub(crate) struct Handle {
@@ -57,21 +55,23 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
     let (commands, inbox) = mpsc::channel(8);
     let key = setup.key.clone();
     tokio::spawn(async move {
-        let (id, directory) = (setup.id.clone(), setup.directory.clone());
-        let why = Task {
+        let id = setup.id.clone();
+        let is_over = |h: &Handle| h.commands.is_closed();
+        let _place = Place::new(
+            setup.directory.clone(),
+            &id,
+            "tryon_tracking_sessions",
+            is_over,
+        );
+        let task = Task {
             setup,
             states: sender,
             engine: None,
             shape_version: 0,
         }
-        .run(inbox)
-        .await;
-        // After an end on request the id is removed, and may name another session.
-        if why != ASKED {
-            directory.remove(&id);
-        }
-        metrics::gauge!("tryon_tracking_sessions").set(directory.len() as f64);
-        tracing::info!(session = id, why, "closed");
+        .run(inbox);
+        let why = session_task::run("tracking", &id, task).await;
+        tracing::info!(session = brief(&id), why, "closed");
     });
     Handle {
         key,
@@ -93,7 +93,7 @@ impl Task {
         let mut frames = match self.setup.ctx.bus.subscribe(&self.setup.key).await {
             Ok(f) => f,
             Err(e) => {
-                tracing::error!(session = self.setup.id, error = %e, "cannot subscribe");
+                tracing::error!(session = brief(&self.setup.id), error = %e, "cannot subscribe");
                 return "the bus refused";
             }
         };
@@ -109,7 +109,7 @@ impl Task {
                 c = inbox.recv() => match c {
                     Some(Command::Reset) => if let Some(e) = &mut self.engine { e.reset() },
                     Some(Command::Touch) => wanted = Instant::now(),
-                    Some(Command::Close) | None => return ASKED,
+                    Some(Command::Close) | None => return "asked to",
                 },
                 frame = frames.next() => match frame {
                     Some(f) => {
@@ -162,7 +162,7 @@ impl Task {
             }
             Err(why) => {
                 // The tracker is lost to its panic: the next frame starts a new one.
-                tracing::error!(session = self.setup.id, %why, "a step was lost");
+                tracing::error!(session = brief(&self.setup.id), %why, "a step was lost");
                 self.fault(DegradedReason::StepFailed, why.to_string());
             }
         }

@@ -84,6 +84,7 @@ fn configuration(args: &DemoArgs) -> Result<Config> {
         },
         ..Config::default()
     };
+    c.process.insecure = args.insecure;
     (c.capture.address, c.capture.admin) = (any_port, any_port);
     (c.tracking.address, c.tracking.admin) = (any_port, any_port);
     (c.cloth.address, c.cloth.admin) = (any_port, any_port);

@@ -10,14 +10,19 @@ use tryon_kit::compute::Pool;
 use tryon_kit::config::Config;
 use tryon_kit::drain;
 use tryon_kit::frames::FrameBus;
-use tryon_kit::process::EXIT_USAGE;
+use tryon_kit::process::{EXIT_USAGE, INSECURE};
 
 /// Runs the command.
 ///
 /// # Errors
 /// When a service cannot start.
 pub(crate) fn run(args: &UpArgs) -> Result<ExitCode> {
-    let config = match Config::load(args.config.as_deref(), &[]) {
+    let set: Vec<String> = args
+        .insecure
+        .then(|| INSECURE.to_owned())
+        .into_iter()
+        .collect();
+    let config = match Config::load(args.config.as_deref(), &set) {
         Ok(c) => c,
         Err(e) => {
             eprintln!("tryon up: {e}");

@@ -1,11 +1,17 @@
-//! Renderer of one try-on: one job at a time on the compute pool, the newest one waits.
+//! Renderer of one try-on: one job at a time on the compute pool. Of pictures the newest waits, snapshots wait in
+//! order, and the two take turns: neither starves the other.
 
 use super::handle::Answer;
 use crate::card::Card;
 use crate::engine::{Drawn, Engine, Job};
+use std::collections::VecDeque;
 use std::sync::Arc;
 use tokio::sync::mpsc;
 use tryon_kit::compute::Pool;
+use tryon_kit::status::exhausted;
+
+/// Snapshots that wait. A judgement, not a measurement: more would outlive their callers (two seconds).
+const SNAPSHOTS: usize = 4;
 
 /// Job that came back from the pool.
 pub(super) struct Done {
@@ -17,19 +23,56 @@ pub(super) struct Done {
     pub(super) answer: Option<Answer>,
 }
 
-struct Pending {
-    job: Job,
-    answer: Option<Answer>,
+/// Job with the receiver of its picture, if it is a snapshot.
+type Pending = (Job, Option<Answer>);
+
+/// Jobs that wait.
+#[derive(Default)]
+struct Queue {
+    picture: Option<Job>,
+    snapshots: VecDeque<(Job, Answer)>,
+    /// The last job was a snapshot.
+    is_pictures_turn: bool,
 }
 
-/// Engine and queue of one job.
+impl Queue {
+    /// Queues a snapshot; gives it back when too many wait.
+    fn push_snapshot(&mut self, job: Job, answer: Answer) -> Result<(), Answer> {
+        // Callers that left leave their place.
+        self.snapshots.retain(|(_, a)| !a.is_closed());
+        if self.snapshots.len() >= SNAPSHOTS {
+            return Err(answer);
+        }
+        self.snapshots.push_back((job, answer));
+        Ok(())
+    }
+
+    /// The next job: pictures and snapshots in turn.
+    fn pop(&mut self) -> Option<Pending> {
+        self.snapshots.retain(|(_, a)| !a.is_closed());
+        let is_picture = self.snapshots.is_empty() || self.is_pictures_turn;
+        let picture = if is_picture {
+            self.picture.take()
+        } else {
+            None
+        };
+        let next = match picture {
+            Some(job) => Some((job, None)),
+            None => (self.snapshots.pop_front()).map(|(job, answer)| (job, Some(answer))),
+        };
+        self.is_pictures_turn = next.as_ref().is_some_and(|(_, answer)| answer.is_some());
+        next
+    }
+}
+
+/// Engine and queue of a try-on.
 pub(super) struct Drawing {
     card: Card,
     pool: Arc<Pool>,
     done: mpsc::Sender<Done>,
     /// `None` while the pool draws.
     engine: Option<Engine>,
-    pending: Option<Pending>,
+    queue: Queue,
 }
 
 impl Drawing {
@@ -40,24 +83,22 @@ impl Drawing {
             card,
             pool,
             done,
-            pending: None,
+            queue: Queue::default(),
         }
     }
 
-    /// Queues a picture of the stream. It replaces one that waits, but not a snapshot.
+    /// Queues a picture of the stream in place of one that waits.
     pub(super) fn queue(&mut self, job: Job) {
-        if self.pending.as_ref().is_none_or(|p| p.answer.is_none()) {
-            self.pending = Some(Pending { job, answer: None });
-            self.start();
-        }
+        self.queue.picture = Some(job);
+        self.start();
     }
 
-    /// Queues a snapshot, which replaces whatever waits.
+    /// Queues a snapshot; RESOURCE_EXHAUSTED when too many wait.
     pub(super) fn queue_snapshot(&mut self, job: Job, answer: Answer) {
-        self.pending = Some(Pending {
-            job,
-            answer: Some(answer),
-        });
+        if let Err(answer) = self.queue.push_snapshot(job, answer) {
+            // The receiver may be gone.
+            let _ = answer.send(Err(exhausted("waiting snapshots", SNAPSHOTS)));
+        }
         self.start();
     }
 
@@ -71,7 +112,7 @@ impl Drawing {
         if self.engine.is_none() {
             return;
         }
-        let Some(p) = self.pending.take() else {
+        let Some((job, answer)) = self.queue.pop() else {
             return;
         };
         let Some(mut engine) = self.engine.take() else {
@@ -79,9 +120,9 @@ impl Drawing {
         };
         let (pool, done) = (self.pool.clone(), self.done.clone());
         tokio::spawn(async move {
-            let job = p.job.clone();
+            let drawn = job.clone();
             let work = move || {
-                let outcome = engine.draw(&job);
+                let outcome = engine.draw(&drawn);
                 (engine, outcome)
             };
             let (engine, outcome) = match pool.run(work).await {
@@ -92,11 +133,94 @@ impl Drawing {
             let _ = done
                 .send(Done {
                     engine,
-                    job: p.job,
+                    job,
                     outcome,
-                    answer: p.answer,
+                    answer,
                 })
                 .await;
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tokio::sync::oneshot;
+    use tryon::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+    use tryon_kit::frames::Exposure;
+    use tryon_proto::v1::{FrameId, Picture};
+
+    fn job(sequence: u64) -> Job {
+        let k = Intrinsics::KINECT_V1.resized(16, 16);
+        let exposure = Exposure {
+            id: FrameId {
+                sequence,
+                ..FrameId::default()
+            },
+            calibration: Arc::new(Calibration::registered(k)),
+            rgbd: RgbdFrame {
+                sequence,
+                time_ns: sequence,
+                depth: DepthImage::empty(16, 16),
+                color: None,
+            },
+            stages: vec![],
+        };
+        Job {
+            exposure: Arc::new(exposure),
+            placed: None,
+            body: None,
+            formats: vec![],
+            fit: None,
+        }
+    }
+
+    /// Sequence of the next job, and whether it is a snapshot.
+    fn pop(q: &mut Queue) -> Option<(u64, bool)> {
+        let (job, answer) = q.pop()?;
+        Some((job.exposure.id.sequence, answer.is_some()))
+    }
+
+    #[test]
+    fn snapshots_and_pictures_take_turns() {
+        let mut q = Queue::default();
+        let mut callers = Vec::<oneshot::Receiver<Result<Picture, tonic::Status>>>::new();
+        for i in 0..3 {
+            let (answer, caller) = oneshot::channel();
+            callers.push(caller);
+            assert!(q.push_snapshot(job(100 + i), answer).is_ok());
+        }
+        let mut order = Vec::new();
+        for i in 0..6 {
+            // A newer picture comes before each job is done; the older one is dropped.
+            q.picture = Some(job(i));
+            order.extend(pop(&mut q));
+        }
+        let wanted = [
+            (100, true),
+            (1, false),
+            (101, true),
+            (3, false),
+            (102, true),
+            (5, false),
+        ];
+        assert_eq!(order, wanted);
+    }
+
+    #[test]
+    fn a_full_queue_refuses_and_callers_that_left_free_it() {
+        let mut q = Queue::default();
+        let mut callers = Vec::new();
+        for _ in 0..SNAPSHOTS {
+            let (answer, caller) = oneshot::channel();
+            callers.push(caller);
+            assert!(q.push_snapshot(job(1), answer).is_ok());
+        }
+        let (answer, _late) = oneshot::channel();
+        assert!(q.push_snapshot(job(2), answer).is_err());
+        callers.clear();
+        let (answer, _caller) = oneshot::channel();
+        assert!(q.push_snapshot(job(3), answer).is_ok());
+        assert_eq!(q.snapshots.len(), 1);
     }
 }

@@ -3,6 +3,7 @@
 use crate::life;
 use tokio::time::Instant;
 use tryon::session::{Ages, Event, Fault, SilenceLimits, State, transition};
+use tryon_kit::sessions::brief;
 use tryon_proto::v1::TryOnStatus;
 
 /// Answers of a service behind the try-on.
@@ -95,7 +96,7 @@ impl Lifecycle {
         if next == self.state {
             return;
         }
-        tracing::info!(try_on = self.id, from = ?self.state, to = ?next, detail = self.detail, "state");
+        tracing::info!(try_on = brief(&self.id), from = ?self.state, to = ?next, detail = self.detail, "state");
         if self.state == State::Live {
             self.last_live = Some(Instant::now());
         }

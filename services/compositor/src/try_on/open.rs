@@ -2,7 +2,7 @@
 
 use super::handle::{Handle, Setup};
 use super::lifecycle::Lifecycle;
-use super::task::{ASKED, Inputs, Task};
+use super::task::{Inputs, Task};
 use crate::upstream::{self, Wanted};
 use std::time::Duration;
 use tokio::sync::{mpsc, watch};
@@ -12,6 +12,8 @@ use tryon_kit::bodies;
 use tryon_kit::client::{CALL_DEADLINE, channel, request};
 use tryon_kit::config::CompositorConfig;
 use tryon_kit::queue::latest;
+use tryon_kit::session_task::{self, Place};
+use tryon_kit::sessions::brief;
 use tryon_proto::v1::tracking_service_client::TrackingServiceClient;
 use tryon_proto::v1::{CloseSessionRequest, UndressRequest};
 
@@ -28,13 +30,11 @@ pub(crate) fn spawn(mut setup: Setup) -> Handle {
     });
     let key = setup.key.clone();
     tokio::spawn(async move {
-        let (id, directory) = (setup.id.clone(), setup.directory.clone());
+        let id = setup.id.clone();
+        let is_over = |h: &Handle| h.commands.is_closed();
+        let _place = Place::new(setup.directory.clone(), &id, "tryon_try_ons", is_over);
         let why = run(setup, inbox, outfit).await;
-        if why != ASKED {
-            directory.remove(&id);
-        }
-        metrics::gauge!("tryon_try_ons").set(directory.len() as f64);
-        tracing::info!(try_on = id, why, "closed");
+        tracing::info!(try_on = brief(&id), why, "closed");
     });
     Handle {
         key,
@@ -52,7 +52,7 @@ async fn run(
     let frames = match setup.ctx.bus.subscribe(&setup.key).await {
         Ok(f) => f,
         Err(e) => {
-            tracing::error!(try_on = setup.id, error = %e, "cannot subscribe");
+            tracing::error!(try_on = brief(&setup.id), error = %e, "cannot subscribe");
             return "the bus refused";
         }
     };
@@ -85,7 +85,8 @@ async fn run(
         garments,
         drawn,
     };
-    let why = Task::new(setup, life, done).run(inputs).await;
+    let task = Task::new(setup, life, done).run(inputs);
+    let why = session_task::run("compositor", &id, task).await;
 
     follow_bodies.abort();
     follow_garments.abort();

@@ -4,10 +4,12 @@ use super::drawing::{Done, Drawing};
 use super::handle::{Answer, Command, Setup};
 use super::lifecycle::Lifecycle;
 use crate::engine::{Drawn, Encoded, Encoding, Job, Placed};
+use crate::formats::Formats;
 use crate::join_buffer::{JoinBuffer, ReportedBody, not_after};
 use crate::life;
 use crate::upstream;
 use crate::viewer::Viewer;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::mpsc;
@@ -16,7 +18,7 @@ use tryon::session::{Event, Fault};
 use tryon_kit::bodies;
 use tryon_kit::frames::{Exposure, FrameSubscription};
 use tryon_kit::queue::latest;
-use tryon_kit::sessions::unix_ns;
+use tryon_kit::sessions::{brief, unix_ns};
 use tryon_kit::status::unavailable;
 use tryon_kit::telemetry::record_stages;
 use tryon_proto::v1::{
@@ -30,9 +32,6 @@ const TICK: Duration = Duration::from_millis(100);
 const HEARTBEAT: Duration = Duration::from_millis(450);
 /// Age above which a picture is no snapshot.
 const SNAPSHOT_AGE: Duration = Duration::from_secs(1);
-/// Reason of an end on request.
-pub(super) const ASKED: &str = "asked to";
-
 /// Streams into a try-on.
 pub(super) struct Inputs {
     pub(super) inbox: mpsc::Receiver<Command>,
@@ -63,6 +62,7 @@ pub(super) struct Task {
     join: JoinBuffer,
     fit: OutfitFit,
     viewers: Vec<Viewer>,
+    formats: Formats,
     /// Last message to the viewers.
     said: Instant,
     /// Last sign of interest in this try-on.
@@ -86,6 +86,7 @@ impl Task {
             join: JoinBuffer::default(),
             fit: OutfitFit::default(),
             viewers: Vec::new(),
+            formats: Formats::default(),
             said: now,
             wanted: now,
             lost_at: None,
@@ -157,7 +158,7 @@ impl Task {
             Some(Command::ShowFit(show)) => self.fit.is_shown = show,
             Some(Command::Close) | None => {
                 self.life.apply(Event::Close);
-                return Some(ASKED);
+                return Some("asked to");
             }
         }
         None
@@ -276,17 +277,20 @@ impl Task {
         }
     }
 
-    /// Draws for every viewer whose rate allows a picture now; the newest job wins.
+    /// Draws for the viewers whose rate allows a picture now, in the formats that fit; the newest job wins.
     fn draw(&mut self, mut job: Job) {
         if self.is_shown(&job.exposure.id) {
             return;
         }
+        let mut wanted = BTreeMap::<_, usize>::new();
         for v in self.viewers.iter().filter(|v| v.wants()) {
-            let f = Job::wants(&v.format);
-            if !job.formats.contains(&f) {
-                job.formats.push(f);
-            }
+            *wanted.entry(Job::wants(&v.format)).or_default() += 1;
         }
+        let depth = &job.exposure.rgbd.depth;
+        let pixels = f64::from(depth.width()) * f64::from(depth.height());
+        job.formats = self.formats.choose(&wanted, pixels, Instant::now());
+        let skipped = wanted.len() - job.formats.len();
+        metrics::counter!("tryon_compositor_formats_skipped").increment(skipped as u64);
         self.last = Some((Instant::now(), job.clone()));
         if job.formats.is_empty() {
             // Without a viewer nothing is drawn; a snapshot can still be drawn from `last`.
@@ -304,6 +308,9 @@ impl Task {
         match d.outcome {
             Ok(drawn) => {
                 record_stages("compositor", &drawn.stages);
+                for p in &drawn.pictures {
+                    self.formats.record((p.size, p.encoding), p.cost);
+                }
                 if let Some(answer) = d.answer {
                     let picture = drawn
                         .pictures
@@ -316,7 +323,7 @@ impl Task {
                 }
             }
             Err(why) => {
-                tracing::warn!(try_on = self.setup.id, %why, "a picture could not be drawn");
+                tracing::warn!(try_on = brief(&self.setup.id), %why, "a picture could not be drawn");
                 if let Some(answer) = d.answer {
                     let _ = answer.send(Err(unavailable("compositor", &why)));
                 }

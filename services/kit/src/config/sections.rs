@@ -47,6 +47,8 @@ pub struct ProcessConfig {
     pub compute_threads: usize,
     /// Time that open streams have to finish after a signal (ms); then they are cut.
     pub grace_ms: u64,
+    /// Lets addresses beyond loopback be bound, where anybody who reaches them sees the person.
+    pub insecure: bool,
 }
 
 impl Default for ProcessConfig {
@@ -54,6 +56,7 @@ impl Default for ProcessConfig {
         Self {
             compute_threads: 0,
             grace_ms: 3000,
+            insecure: false,
         }
     }
 }
@@ -237,6 +240,10 @@ pub struct CompositorConfig {
     pub camera_silence_ms: u64,
     /// Milliseconds after which garments are too old to be shown.
     pub garments_late_ms: u64,
+    /// Names of this port beside its IP addresses and localhost; requests to others are refused.
+    pub hosts: Vec<String>,
+    /// Origins of foreign pages that may call it, such as `https://kiosk.example`.
+    pub origins: Vec<String>,
     /// auto, cpu or gpu.
     pub renderer: RendererChoice,
 }
@@ -267,6 +274,8 @@ impl Default for CompositorConfig {
             idle_s: 30,
             camera_silence_ms: 700,
             garments_late_ms: 700,
+            hosts: Vec::new(),
+            origins: Vec::new(),
             renderer: RendererChoice::Auto,
         }
     }
