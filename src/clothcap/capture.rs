@@ -2,32 +2,29 @@
 
 use super::CaptureError;
 use super::align::{
-    AlignedBody, Alignment, AlignmentReport, ClothedTemplate, QueryCounts, SETTLED, Start,
+    AlignedBody, Alignment, AlignmentReport, ClothedTemplate, QueryCounts, Start, VertexCounts,
 };
+use super::captured_outfit::CapturedOutfit;
 use super::layers::clear_body;
-use super::multi::{ClothPart, MultiCloth, PartFit, PartFitConfig, PartScan};
-use super::part_colors::part_colors;
-use super::retarget::{PenetrationSolver, SolidBody, pose_part};
+use super::multi::{MultiCloth, PartFit, PartFitConfig};
+use super::part_fitter::{PartFitter, rest};
+use super::retarget::{PenetrationSolver, SolidBody};
 use super::scan::{BodyScan, LeftOut};
-use super::segment::{BodyRegion, LabelConfig, Labelling, unseen_regions};
+use super::segment::{BodyRegion, LabelConfig, unseen_regions};
 use super::segmenter::{ScanSegmenter, SegmentedScan};
-use super::texture::{GarmentTexture, ScanPaint, TextureAtlas};
+use super::texture::{GarmentTexture, ScanPaint};
 use super::topology::ClothTemplate;
 use super::undress::{
     ShapeScan, Undressed, Undresser, WornGarments, minimally_clothed, posed_under_cloth,
 };
 use super::unpose::unpose_shaped;
-use crate::body::{BodyShape, BoneTransforms, Template};
+use crate::body::{BodyShape, Template};
 use crate::math::{P3, V3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Mean robust distance of a scan from the body model above which it says nothing of the subject's shape, metres.
 const MISALIGNED: f64 = 0.03;
-/// Side of a texel over the distance between the scan's colours, and its limits, metres.
-const TEXEL: f32 = 0.5;
-/// See [`TEXEL`].
-const TEXELS: [f32; 2] = [0.001, 0.004];
 
 /// Capture of one scan.
 #[derive(Clone, Debug)]
@@ -58,6 +55,9 @@ pub struct FrameReport {
     /// Nearest-point queries of the garments' fits.
     #[serde(default)]
     pub queries: QueryCounts,
+    /// Vertices of the garments' fits.
+    #[serde(default)]
+    pub vertices: VertexCounts,
     /// Rows of the scan's file that are no point.
     #[serde(default)]
     pub left_out: LeftOut,
@@ -67,24 +67,6 @@ pub struct FrameReport {
     /// The scan is the one before, but for its noise: the capture is a copy of that one's.
     #[serde(default)]
     pub repeated: bool,
-}
-
-/// Outfit found in the first scan.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct CapturedOutfit {
-    /// Labels, slots and appearances.
-    pub labelling: Labelling,
-    /// Garments.
-    pub cloth: MultiCloth,
-    /// Rest vertices of each garment (L of eq. 15), metres.
-    pub rest: Vec<Vec<P3>>,
-    /// Colours of each garment's vertices, sRGB.
-    pub colors: Vec<Vec<[u8; 3]>>,
-    /// Texture coordinates of each garment; empty for scans without colours.
-    #[serde(default)]
-    pub atlases: Vec<TextureAtlas>,
-    /// Minimally clothed shape with the first pose.
-    pub body: AlignedBody,
 }
 
 /// Settings of a capture.
@@ -108,7 +90,7 @@ pub struct OutfitCapture {
     segmenter: ScanSegmenter,
     undresser: Undresser,
     solid: SolidBody,
-    outfit: Option<CapturedOutfit>,
+    outfit: Option<Arc<CapturedOutfit>>,
     /// Further scans that the minimally clothed shape is fitted to.
     shape_scans: Vec<BodyScan>,
     /// Systems of the outfit's garments, kept from scan to scan.
@@ -163,7 +145,7 @@ impl OutfitCapture {
         let (labels, first) = (config.labels.clone(), outfit.labelling.clone());
         let segmenter = ScanSegmenter::resume(template.clone(), labels, first, state)?;
         Ok(Self {
-            outfit: Some(outfit),
+            outfit: Some(Arc::new(outfit)),
             ..Self::with_segmenter(template, config, segmenter)?
         })
     }
@@ -180,7 +162,7 @@ impl OutfitCapture {
 
     /// Outfit, once a scan is captured.
     pub fn outfit(&self) -> Option<&CapturedOutfit> {
-        self.outfit.as_ref()
+        self.outfit.as_deref()
     }
 
     /// Image of each garment's texture; empty for scans without colours.
@@ -205,7 +187,8 @@ impl OutfitCapture {
         self.shape_scans.push(scan);
     }
 
-    /// Captures the next scan: segment → fit the parts → undress → displacements.
+    /// Captures the next scan: segment → fit the parts → undress → displacements. A scan that fails leaves the outfit as it
+    /// was.
     ///
     /// # Errors
     /// [`CaptureError::NoPerson`], or [`CaptureError::NoGarment`] if the first scan shows none.
@@ -217,41 +200,41 @@ impl OutfitCapture {
             None => self.subject((scan, &covered), &segmented)?,
         };
 
+        let known = self.outfit.clone();
+        if known.is_none() {
+            self.fits.clear();
+            self.solvers.clear();
+        }
         // The first scan makes the outfit; nothing is skipped in it.
-        let skips = self.outfit.is_some() && !self.config.without_skips;
-        let parts = PartFitConfig {
-            settled: if skips { SETTLED } else { 0.0 },
-            ..self.config.parts
-        };
-        let mut fitter = PartFitter {
-            fits: &mut self.fits,
-            cloth: self.segmenter.cloth(),
-            scan,
-            segmented: &segmented,
-            near: nearest_nodes(&segmented, self.segmenter.cloth()),
-            config: &parts,
-        };
+        let skips = known.is_some() && !self.config.without_skips;
+        let cloth = self.segmenter.cloth();
+        let mut fitter = PartFitter::new(
+            &mut self.fits,
+            cloth,
+            (scan, &segmented),
+            (&self.config.parts, skips),
+        );
         let alignment = &segmented.alignment;
-        let (outfit, fitted, body) = match self.outfit.take() {
+        let (outfit, fitted, body) = match known {
             Some(outfit) => {
                 let fitted = fitter.later(&outfit)?;
                 let start = AlignedBody {
                     pose: alignment.body.pose.clone(),
                     shape: subject.shape,
                 };
-                let body = posed_under_cloth(&self.template, scan, &covered, start)?;
+                let body = posed_under_cloth(&self.template, scan, &covered, start, skips)?;
                 (outfit, fitted, body)
             }
             None => {
                 let (outfit, fitted) = fitter.first(subject.clone())?;
-                (outfit, fitted, subject)
+                (Arc::new(outfit), fitted, subject)
             }
         };
         let worn = WornGarments {
             cloth: &outfit.cloth,
             vertices: &fitted.vertices,
         };
-        let undressed = self.undresser.run((scan, &covered), worn, body)?;
+        let undressed = self.undresser.run((scan, &covered), worn, body, skips)?;
         self.segmenter.follow(&undressed.body);
         let garments = self.freed(&outfit, &fitted.vertices, &undressed)?;
         self.paint(
@@ -272,6 +255,7 @@ impl OutfitCapture {
                 part_errors: fitted.errors,
                 boundary_errors: fitted.boundary_errors,
                 queries: fitted.queries,
+                vertices: fitted.vertex_counts,
                 left_out: scan.left_out,
                 unseen: unseen_regions(
                     self.segmenter.cloth().template(),
@@ -298,7 +282,7 @@ impl OutfitCapture {
                 shape: shape.clone(),
                 ..first.alignment.body.clone()
             };
-            return posed_under_cloth(&self.template, scan, covered, start);
+            return posed_under_cloth(&self.template, scan, covered, start, false);
         }
         let scans = std::mem::take(&mut self.shape_scans);
         let mut others: Vec<(SegmentedScan, &BodyScan)> = Vec::new();
@@ -366,126 +350,6 @@ impl OutfitCapture {
     }
 }
 
-/// Garments on one scan.
-#[derive(Debug, Default)]
-struct FittedParts {
-    vertices: Vec<Vec<P3>>,
-    errors: Vec<f64>,
-    boundary_errors: Vec<f64>,
-    queries: QueryCounts,
-}
-
-/// Fit of all parts to one segmented scan.
-struct PartFitter<'a> {
-    /// Systems of the garments so far.
-    fits: &'a mut Vec<PartFit>,
-    cloth: &'a ClothTemplate,
-    scan: &'a BodyScan,
-    segmented: &'a SegmentedScan,
-    /// Vertex of the clothed template that each scan point lies near, shape `[points]`.
-    near: Vec<u32>,
-    config: &'a PartFitConfig,
-}
-
-impl PartFitter<'_> {
-    /// Parts of the first scan, coupled to the body model (eq. 18), and the outfit that they make.
-    fn first(&mut self, body: AlignedBody) -> Result<(CapturedOutfit, FittedParts), CaptureError> {
-        let segmented = self.segmented;
-        let cloth = MultiCloth::new(self.cloth, &segmented.labelling);
-        if cloth.parts.is_empty() {
-            return Err(CaptureError::NoGarment);
-        }
-        let alignment = &segmented.alignment;
-        let mut fitted = FittedParts::default();
-        for part in &cloth.parts {
-            let pick = |v: &[P3]| {
-                part.nodes
-                    .iter()
-                    .map(|i| v[*i as usize])
-                    .collect::<Vec<_>>()
-            };
-            let model = pick(&alignment.model);
-            self.fit(part, &model, pick(&alignment.surface), &mut fitted)?;
-        }
-        let parts = cloth.parts.iter().zip(&fitted.vertices);
-        let rest = parts.map(|(part, v)| rest(self.cloth, &alignment.bones, part, v));
-        let colors = cloth
-            .parts
-            .iter()
-            .map(|part| part_colors(part, segmented, segmented.evened(self.scan)));
-        let rest: Vec<Vec<P3>> = rest.collect();
-        let texel = TEXEL * self.scan.color_spacing();
-        let atlases = cloth.parts.iter().zip(&rest);
-        let atlases = atlases.map(|(part, rest)| {
-            TextureAtlas::new(rest, &part.faces, texel.clamp(TEXELS[0], TEXELS[1]))
-        });
-        let is_colored = !self.scan.colors.is_empty();
-        let outfit = CapturedOutfit {
-            atlases: atlases.filter(|_| is_colored).collect(),
-            colors: colors.collect(),
-            rest,
-            labelling: segmented.labelling.clone(),
-            body,
-            cloth,
-        };
-        Ok((outfit, fitted))
-    }
-
-    /// Parts of a later scan, coupled to the posed multi-cloth template (eq. 21).
-    fn later(&mut self, outfit: &CapturedOutfit) -> Result<FittedParts, CaptureError> {
-        let mut fitted = FittedParts::default();
-        let bones = &self.segmented.alignment.bones;
-        for (part, rest) in outfit.cloth.parts.iter().zip(&outfit.rest) {
-            let model = pose_part(part, self.cloth.template(), bones, rest);
-            self.fit(part, &model, model.clone(), &mut fitted)?;
-        }
-        Ok(fitted)
-    }
-
-    fn fit(
-        &mut self,
-        part: &ClothPart,
-        model: &[P3],
-        start: Vec<P3>,
-        out: &mut FittedParts,
-    ) -> Result<(), CaptureError> {
-        let segmented = self.segmented;
-        let points = PartScan::new(
-            (self.scan, &segmented.edges),
-            (&segmented.labels, &self.near),
-            part.label,
-        );
-        let mut vertices = start;
-        let k = out.vertices.len();
-        if k == self.fits.len() {
-            // The order of its faces must not depend on the scan at which a capture was continued.
-            let template = self.cloth.template().mesh().vertices();
-            let rest: Vec<P3> = part.nodes.iter().map(|v| template[*v as usize]).collect();
-            self.fits.push(PartFit::new(part, &rest)?);
-        }
-        let report = self.fits[k].run(&points, model, &mut vertices, self.config)?;
-        out.vertices.push(vertices);
-        out.errors.push(report.error);
-        out.boundary_errors.push(report.boundary_error);
-        out.queries += report.queries;
-        Ok(())
-    }
-}
-
-/// Vertex of the clothed template nearest to each scan point on the single mesh, shape `[points]`.
-fn nearest_nodes(segmented: &SegmentedScan, cloth: &ClothTemplate) -> Vec<u32> {
-    let faces = cloth.template().mesh().faces();
-    let matches = segmented.alignment.matches.iter();
-    matches
-        .map(|m| faces[m.face as usize][m.nearest_corner()])
-        .collect()
-}
-
-fn rest(cloth: &ClothTemplate, bones: &BoneTransforms, part: &ClothPart, posed: &[P3]) -> Vec<P3> {
-    let nodes = part.nodes.iter().map(|v| *v as usize);
-    unpose_shaped(cloth.template(), bones, nodes, posed)
-}
-
 /// Rest displacements of each garment from the undressed body (eq. 23).
 fn displacements(
     surface: &ClothTemplate,
@@ -508,4 +372,34 @@ fn displacements(
             above.iter().zip(below).map(|(a, b)| a - b).collect()
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::embedded;
+    use crate::clothcap::test_scans::TestScan;
+
+    /// A weight that is not a number fails the fit of the parts after the scan is segmented.
+    #[test]
+    fn a_scan_that_fails_leaves_the_outfit_to_the_next() {
+        let scans = [0.6, 0.7].map(|yaw| TestScan::new(yaw, [40, 70, 160], [90, 90, 95]).scan());
+        let template = embedded::template();
+        let mut capture =
+            OutfitCapture::new(template, CaptureConfig::default()).expect("a capture");
+        capture.frame(&scans[0]).expect("captured");
+        let outfit = capture.outfit.clone().expect("an outfit");
+        let coupling = std::mem::replace(&mut capture.config.parts.coupling, f64::NAN);
+        let fault = capture.frame(&scans[1]);
+        assert!(
+            matches!(fault, Err(CaptureError::Solve { .. })),
+            "{fault:?}"
+        );
+        assert!(Arc::ptr_eq(&outfit, capture.outfit.as_ref().expect("kept")));
+        capture.config.parts.coupling = coupling;
+        let next = capture.frame(&scans[1]).expect("captured");
+        assert_eq!(next.garments.len(), outfit.cloth.parts.len());
+        let nodes = |k: usize| outfit.cloth.parts[k].nodes.len();
+        assert!((0..next.garments.len()).all(|k| next.garments[k].len() == nodes(k)));
+    }
 }

@@ -2,7 +2,7 @@
 //! indexes by it.
 
 use super::align::{AlignedBody, ClothedTemplate};
-use super::capture::CapturedOutfit;
+use super::captured_outfit::CapturedOutfit;
 use super::multi::ClothPart;
 use super::scan::ScanFrame;
 use super::topology::ClothTemplate;

@@ -29,19 +29,54 @@ const LEAST_FACING: f32 = 1.0;
 /// Share of the points from which signs are told.
 const MOST_KNOWN: f64 = 0.8;
 
-/// Edges between near points of a cloud, the lower index first; each once.
-pub(super) fn neighbour_edges(points: &[P3]) -> Vec<[u32; 2]> {
+/// Edges between near points of a cloud, the lower index first, each once: those of the wanted points.
+pub(super) fn neighbour_edges(points: &[P3], is_wanted: impl Fn(usize) -> bool) -> Vec<[u32; 2]> {
     let (most, multiple) = BESIDE;
     let reach = multiple * mean_spacing(points);
     let near = Neighbours::new(points, reach);
     let mut out = Vec::new();
-    for i in 0..points.len() as u32 {
-        let others = near.of(i, reach).into_iter().filter(|j| *j != i);
-        out.extend(others.take(most).map(|j| [j.min(i), j.max(i)]));
+    for i in (0..points.len() as u32).filter(|i| is_wanted(*i as usize)) {
+        let mut nearest = [(f32::INFINITY, u32::MAX); BESIDE.0];
+        near.each(i, reach, |j, square| {
+            let is_known = j == i || nearest.iter().any(|n| n.1 == j);
+            if !is_known && (square, j) < nearest[most - 1] {
+                let at = nearest.partition_point(|n| *n < (square, j));
+                nearest[at..].rotate_right(1);
+                nearest[at] = (square, j);
+            }
+        });
+        let found = nearest.iter().filter(|n| n.1 != u32::MAX);
+        out.extend(found.map(|n| [n.1.min(i), n.1.max(i)]));
     }
     out.sort_unstable();
     out.dedup();
     out
+}
+
+/// Order of points along a Morton curve: points near in it are near in space. Shape `[points]`.
+pub(super) fn spatial_order(points: &[P3]) -> Vec<u32> {
+    /// Side of a cell, metres; 1024 of them cover a person.
+    const CELL: f32 = 0.002;
+    let spread = |v: f32| {
+        let mut bits = ((v / CELL).floor() as i32 & 1023) as u32;
+        for (shift, mask) in [
+            (16, 0x0300_00FF),
+            (8, 0x0300_F00F),
+            (4, 0x030C_30C3),
+            (2, 0x0924_9249),
+        ] {
+            bits = (bits | (bits << shift)) & mask;
+        }
+        u64::from(bits)
+    };
+    let code = |p: &P3| spread(p.x) | (spread(p.y) << 1) | (spread(p.z) << 2);
+    let coded = points
+        .iter()
+        .enumerate()
+        .map(|(i, p)| (code(p) << 32) | i as u64);
+    let mut coded: Vec<u64> = coded.collect();
+    coded.sort_unstable();
+    coded.iter().map(|c| *c as u32).collect()
 }
 
 /// Points of small pieces apart from the rest: pixels between surfaces, remains of a floor. Shape `[points]`.
@@ -222,6 +257,34 @@ mod tests {
         let normals = plane_normals(&points);
         let across = normals.iter().filter(|n| n.y.abs() > 0.9).count();
         assert!(across * 100 > points.len() * 98, "{across}");
+    }
+
+    #[test]
+    fn neighbours_in_the_order_are_near() {
+        let mut points = sheets();
+        points.push(P3::new(f32::NAN, 0.0, 5e3));
+        let order = spatial_order(&points);
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        assert!(sorted.iter().enumerate().all(|(i, v)| i as u32 == *v));
+        let near = |w: &&[u32]| {
+            let [a, b] = [w[0], w[1]].map(|i| points[i as usize]);
+            (a - b).norm() < 0.02
+        };
+        assert!(order.windows(2).filter(near).count() * 10 > 9 * points.len());
+    }
+
+    #[test]
+    fn edges_of_wanted_points_are_those_of_all_that_touch_them() {
+        let points = sheets();
+        let all = neighbour_edges(&points, |_| true);
+        let some = neighbour_edges(&points, |i| i < 5000);
+        assert!(some.iter().all(|e| all.binary_search(e).is_ok()));
+        let inner = |e: &&[u32; 2]| e.iter().all(|v| *v < 5000);
+        assert_eq!(
+            all.iter().filter(inner).count(),
+            some.iter().filter(inner).count()
+        );
     }
 
     #[test]

@@ -9,11 +9,20 @@ pub(super) fn sides(f: &Face) -> [[u32; 2]; 3] {
 
 /// Edges of some faces, each once, smaller vertex first, sorted.
 pub(super) fn edges(faces: &[Face]) -> Vec<[u32; 2]> {
-    let mut edges: Vec<[u32; 2]> = faces.iter().flat_map(sides).collect();
-    edges.iter_mut().for_each(|e| e.sort_unstable());
-    edges.sort_unstable();
-    edges.dedup();
-    edges
+    let rows = faces.iter().flatten().max().map_or(0, |v| *v as usize + 1);
+    let ascending = |[a, b]: [u32; 2]| (a.min(b), a.max(b));
+    let pairs: Vec<(u32, u32)> = faces.iter().flat_map(sides).map(ascending).collect();
+    let by_first = Csr::from_pairs(rows, &pairs);
+    let mut out = Vec::with_capacity(pairs.len() / 2);
+    let mut row = Vec::new();
+    for a in 0..rows as u32 {
+        row.clear();
+        row.extend_from_slice(by_first.row(a as usize));
+        row.sort_unstable();
+        row.dedup();
+        out.extend(row.iter().map(|b| [a, *b]));
+    }
+    out
 }
 
 /// Neighbours of each of `vertices` vertices by some edges.

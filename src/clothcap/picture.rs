@@ -1,6 +1,7 @@
 //! Pictures of the stages: coloured meshes from the front, side and back, in rows.
 
-use super::capture::{CapturedOutfit, FrameCapture};
+use super::capture::FrameCapture;
+use super::captured_outfit::CapturedOutfit;
 use super::scan::BodyScan;
 use super::texture::{GarmentTexture, TextureAtlas};
 use super::topology::ClothTemplate;

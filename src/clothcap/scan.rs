@@ -2,7 +2,7 @@
 
 use super::CaptureError;
 pub(super) use super::cloud::mean_spacing;
-use super::cloud::{are_strays, neighbour_edges, plane_normals, turn_outwards};
+use super::cloud::{are_strays, neighbour_edges, plane_normals, spatial_order, turn_outwards};
 use super::face_edges::edges;
 use super::floor::{Floor, are_floor_rests, inner_range};
 use crate::formats::TexturePoint;
@@ -379,12 +379,18 @@ impl BodyScan {
             && self.points.iter().zip(&other.points).all(near)
     }
 
-    /// Edges of the faces, or between near points of a cloud, the lower index first; each once.
-    pub fn edges(&self) -> Vec<[u32; 2]> {
+    /// Order of the points in which neighbours are near in space, shape `[points]`.
+    pub(super) fn order(&self) -> Vec<u32> {
+        spatial_order(&self.points)
+    }
+
+    /// Edges of the faces, or between near points of a cloud, the lower index first, each once; of a cloud those of the
+    /// wanted points.
+    pub fn edges(&self, is_wanted: impl Fn(usize) -> bool) -> Vec<[u32; 2]> {
         if !self.faces.is_empty() {
             return edges(&self.faces);
         }
-        neighbour_edges(&self.points)
+        neighbour_edges(&self.points, is_wanted)
     }
 
     /// Label of each row of the file from one a point; `absent` for rows left out.

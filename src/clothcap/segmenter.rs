@@ -9,6 +9,7 @@ use super::segment::{
 };
 use super::topology::ClothTemplate;
 use crate::body::Template;
+use crate::mesh::Csr;
 use std::sync::Arc;
 
 /// Farthest that a point of a garment lies off the surface, metres: the surface follows cloth to a few millimetres.
@@ -25,7 +26,7 @@ pub struct SegmentedScan {
     pub labelling: Labelling,
     /// Label of each scan point, shape `[points]`.
     pub labels: Vec<u8>,
-    /// Edges of the scan, see [`BodyScan::edges`].
+    /// Edges of the scan, see [`BodyScan::edges`]; of a cloud those near boundaries of labels.
     pub edges: Vec<[u32; 2]>,
     /// Cloud of several cameras without their gains.
     evened: Option<BodyScan>,
@@ -49,6 +50,9 @@ impl SegmentedScan {
         self.labels.iter().map(is_garment).collect()
     }
 }
+
+/// Rings of nodes about a boundary of labels within which points may change theirs, their neighbours included.
+const NEAR: usize = 5;
 
 /// Aligns and segments scans; the first one gives the clothed template and the appearances of the garments.
 #[derive(Debug)]
@@ -133,7 +137,12 @@ impl ScanSegmenter {
             template.topology().vertex_neighbours(),
         );
         labelling.join_islands(around.1);
-        let edges = scan.edges();
+        let is_near = near_boundaries(&labelling, around.1);
+        let node_of = |i: usize| {
+            let m = &alignment.matches[i];
+            around.0[m.face as usize][m.nearest_corner()]
+        };
+        let edges = scan.edges(|i| is_near[node_of(i) as usize]);
         let mut labels = label_scan((scan, &edges), &alignment.matches, around, &labelling)?;
         // Walls and things beside are no garments.
         let far = alignment.matches.iter().map(|m| m.distance > FARTHEST);
@@ -158,4 +167,18 @@ impl ScanSegmenter {
             evened,
         })
     }
+}
+
+/// Nodes within [`NEAR`] rings of one with another label, shape `[nodes]`.
+fn near_boundaries(labelling: &Labelling, around: &Csr) -> Vec<bool> {
+    let other = |v: usize, w: usize| labelling.labels[v] != labelling.labels[w];
+    let beside = |v: usize| around.row(v).iter().any(|w| other(v, *w as usize));
+    let mut near: Vec<bool> = (0..labelling.labels.len()).map(beside).collect();
+    for _ in 1..NEAR {
+        let before = near.clone();
+        for (v, near) in near.iter_mut().enumerate() {
+            *near = *near || around.row(v).iter().any(|w| before[*w as usize]);
+        }
+    }
+    near
 }

@@ -2,14 +2,15 @@
 
 use super::CaptureError;
 use super::align::{
-    AlignedBody, EVEN_EDGE, FitStage, ModelFit, QuadraticEnergy, ScanNormal, Stencil,
-    closest_facing, fit_shared_shape,
+    AlignedBody, EVEN_EDGE, FaceCache, FitStage, Found, ModelFit, QuadraticEnergy, QuerySurface,
+    SETTLED, ScanNormal, Stencil, fit_shared_shape,
 };
 use super::multi::MultiCloth;
 use super::retarget::SolidBody;
 use super::scan::BodyScan;
 use crate::body::{BodyShape, BoneTransforms, Template};
 use crate::math::P3;
+use crate::mesh::face_normal;
 use crate::par::{self, Par};
 use crate::registration::GemanMcClure;
 use crate::spatial::Bvh;
@@ -108,7 +109,7 @@ pub fn minimal_shape(
 }
 
 /// Minimally clothed body in a later scan, from the aligned pose: that one belongs to the clothed template, whose joints
-/// lie elsewhere. The shape stays.
+/// lie elsewhere. The shape stays. With skips, searches start where the last ones ended.
 ///
 /// # Errors
 /// [`CaptureError::Solve`].
@@ -117,8 +118,10 @@ pub(super) fn posed_under_cloth(
     scan: &BodyScan,
     covered: &[bool],
     start: AlignedBody,
+    skips: bool,
 ) -> Result<AlignedBody, CaptureError> {
-    let mut fit = ModelFit::new(template, scan, LATER_SAMPLES).with_covered(covered);
+    let fit = ModelFit::new(template, scan, LATER_SAMPLES).with_covered(covered);
+    let mut fit = fit.with_starts(skips);
     let mut body = start.clone();
     fit.run(&mut body, &LATER)?;
     Ok(AlignedBody {
@@ -164,7 +167,8 @@ impl Undresser {
         })
     }
 
-    /// Body under the cloth of one scan, near the minimally clothed shape `body` in its pose.
+    /// Body under the cloth of one scan, near the minimally clothed shape `body` in its pose. With skips, settled points
+    /// keep their faces.
     ///
     /// # Errors
     /// [`CaptureError::Solve`].
@@ -173,13 +177,16 @@ impl Undresser {
         (scan, covered): (&BodyScan, &[bool]),
         garments: WornGarments<'_>,
         body: AlignedBody,
+        skips: bool,
     ) -> Result<Undressed, CaptureError> {
         let template = self.template.clone();
         let (model, bones) = ModelFit::new(&template, scan, 1).posed(&body);
         let mut vertices = model.clone();
+        let settled = if skips { SETTLED } else { 0.0 };
+        let mut cache = FaceCache::new(scan.points.len(), settled);
         for _ in 0..ITERATIONS {
             self.begin(&model);
-            self.add_skin(scan, covered, &vertices);
+            self.add_skin((scan, covered), &vertices, &mut cache);
             self.add_garments(garments, &vertices)?;
             vertices = self.energy.minimise("body under cloth")?;
         }
@@ -208,30 +215,47 @@ impl Undresser {
     }
 
     /// Pulls the body to the visible skin.
-    fn add_skin(&mut self, scan: &BodyScan, covered: &[bool], vertices: &[P3]) {
+    fn add_skin(
+        &mut self,
+        (scan, covered): (&BodyScan, &[bool]),
+        vertices: &[P3],
+        cache: &mut FaceCache,
+    ) {
         self.bvh.refit(vertices);
-        let kernel = GemanMcClure { sigma: SIGMA };
-        let mut matches = Vec::new();
+        cache.advance(self.bvh.faces(), vertices);
+        let query = QuerySurface {
+            tree: &self.bvh,
+            vertices,
+            around: self.template.topology().vertex_faces(),
+        };
+        let normal_of = |i: usize| ScanNormal {
+            normal: scan.normals[i],
+            oriented: scan.oriented,
+        };
+        let mut found: Vec<Option<Found>> = Vec::new();
         let stride = scan.points.len().div_ceil(POINTS).max(1);
         let count = scan.points.len().div_ceil(stride);
-        par::map_into(Par::Rayon, count, 256, &mut matches, |k| {
+        par::map_into(Par::Rayon, count, 256, &mut found, |k| {
             let i = k * stride;
-            let p = scan.points[i];
-            let normal = ScanNormal {
-                normal: scan.normals[i],
-                oriented: scan.oriented,
-            };
-            if covered[i] {
-                return None;
-            }
-            let (found, _) = closest_facing((&self.bvh, vertices), &p, normal, NORMALS)?;
-            let weight = kernel.weight(f64::from(found.distance * found.distance));
-            Some((found.face, found.weights, weight, p))
+            let point = (&scan.points[i], normal_of(i));
+            let is_skin = !covered[i];
+            is_skin.then(|| cache.closest(i, &query, point, NORMALS))?
         });
+        let kernel = GemanMcClure { sigma: SIGMA };
         let point = self.template.mesh().area() / count.max(1) as f64;
-        for (face, corners, weight, p) in matches.into_iter().flatten() {
-            self.energy
-                .add_face_point(face, corners, point * weight, &p);
+        for (k, found) in found.iter().enumerate() {
+            let (i, Some(found)) = (k * stride, found) else {
+                continue;
+            };
+            cache.keep(i, found);
+            let at = &found.point;
+            let own = face_normal(vertices, &self.bvh.faces()[at.face as usize]);
+            let unit = own.try_normalize(f32::MIN_POSITIVE);
+            if unit.is_some_and(|own| normal_of(i).agrees(&own, NORMALS)) {
+                let weight = point * kernel.weight(f64::from(at.distance * at.distance));
+                self.energy
+                    .add_face_point(at.face, at.weights, weight, &scan.points[i]);
+            }
         }
     }
 

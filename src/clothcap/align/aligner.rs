@@ -1,5 +1,6 @@
 //! Single-mesh alignment of a sequence: the first scan gives the clothed template, later ones are coupled to it.
 
+use super::active_vertices::VertexCounts;
 use super::arms::search_lost_arms;
 use super::face_cache::QueryCounts;
 use super::free_surface::{FreeSurface, SurfaceFitConfig, SurfaceMatch};
@@ -26,6 +27,8 @@ const LATER: [FitStage; 2] = [FitStage::posed(0.08, 8), FitStage::posed(0.03, 6)
 const TURNS: [f64; 3] = [FRAC_PI_2, PI, -FRAC_PI_2];
 /// Mean robust distance in the last pose below which no turn is tried, metres: a back is farther from a front.
 const FACING: f64 = 0.02;
+/// Change of the mean robust distance in the last aligned pose up to which a scan may show that pose again, metres.
+const SAME: f64 = 1e-4;
 /// Mean robust distance above which a later pose is lost and the person is searched anew, metres.
 const LOST: f64 = 0.03;
 
@@ -60,6 +63,9 @@ pub struct AlignmentReport {
     /// Nearest-point queries of the free surface.
     #[serde(default)]
     pub queries: QueryCounts,
+    /// Vertices of the free surface.
+    #[serde(default)]
+    pub vertices: VertexCounts,
     /// Turns about the vertical that were not tried, since the last pose fits.
     #[serde(default)]
     pub turns_skipped: usize,
@@ -77,6 +83,15 @@ pub struct ClothedTemplate {
     pub legs: LegTopology,
 }
 
+/// Body in a later scan.
+struct LaterPose {
+    body: AlignedBody,
+    /// The person was searched from nothing.
+    searched: bool,
+    /// Turns about the vertical that were not tried.
+    turns_skipped: usize,
+}
+
 /// Aligns the scans of one subject in order.
 #[derive(Debug)]
 pub struct Aligner {
@@ -88,6 +103,8 @@ pub struct Aligner {
     start: Option<Start>,
     /// Pose of the last scan.
     last: Option<AlignedBody>,
+    /// Aligned body of the last scan with its mean robust distance, metres.
+    aligned: Option<(AlignedBody, f64)>,
     /// Settled points keep their faces, and turns are tried only where they may help.
     skips: bool,
 }
@@ -105,6 +122,7 @@ impl Aligner {
             clothed: None,
             start: None,
             last: None,
+            aligned: None,
             skips: true,
         })
     }
@@ -175,6 +193,7 @@ impl Aligner {
             }
         };
         self.last = Some(out.body.clone());
+        self.aligned = Some((out.body.clone(), out.report.model_error));
         Ok(out)
     }
 
@@ -222,12 +241,47 @@ impl Aligner {
         let template = self.cloth.template().clone();
         let fit = ModelFit::new(&template, scan, LATER_SAMPLES).with_clothed(&clothed.rest);
         let mut fit = fit.with_starts(self.skips);
+        let found = match self.unmoved(&mut fit)? {
+            Some(body) => LaterPose {
+                body,
+                searched: false,
+                turns_skipped: TURNS.len(),
+            },
+            None => self.later_pose(scan, clothed, &mut fit)?,
+        };
+        let out = self.released(scan, &mut fit, found.body, &SurfaceFitConfig::later())?;
+        Ok(Alignment {
+            report: AlignmentReport {
+                searched: found.searched,
+                turns_skipped: found.turns_skipped,
+                ..out.report
+            },
+            ..out
+        })
+    }
+
+    /// Body of the last scan, if this one shows its pose: a fit would end there.
+    fn unmoved(&self, fit: &mut ModelFit<'_>) -> Result<Option<AlignedBody>, CaptureError> {
+        let Some((body, error)) = self.aligned.as_ref().filter(|_| self.skips) else {
+            return Ok(None);
+        };
+        let is_near = (fit.error(body) - error).abs() < SAME;
+        let is_same = is_near && fit.is_settled(body, &LATER[1])?;
+        Ok(is_same.then(|| body.clone()))
+    }
+
+    /// Pose by the clothed template, from that of the last scan.
+    fn later_pose(
+        &self,
+        scan: &BodyScan,
+        clothed: &ClothedTemplate,
+        fit: &mut ModelFit<'_>,
+    ) -> Result<LaterPose, CaptureError> {
         let last = &self.last.as_ref().unwrap_or(&clothed.body).pose;
-        let (mut body, turns_skipped) = self.turned(last, clothed, &mut fit);
-        for stage in &LATER {
-            fit.run(&mut body, stage)?;
-        }
-        if search_lost_arms(&self.template, scan, &mut fit, &mut body)? {
+        let (mut body, turns_skipped) = self.turned(last, clothed, fit);
+        fit.run(&mut body, &LATER[0])?;
+        fit.run(&mut body, &FitStage::posed(0.03, 10))?;
+        if search_lost_arms(&self.template, scan, fit, &mut body)? {
             fit.run(&mut body, &LATER[1])?;
         }
         let searched = !(fit.error(&body) < LOST);
@@ -244,14 +298,10 @@ impl Aligner {
                 body = other;
             }
         }
-        let out = self.released(scan, &mut fit, body, &SurfaceFitConfig::later())?;
-        Ok(Alignment {
-            report: AlignmentReport {
-                searched,
-                turns_skipped,
-                ..out.report
-            },
-            ..out
+        Ok(LaterPose {
+            body,
+            searched,
+            turns_skipped,
         })
     }
 
@@ -301,11 +351,10 @@ impl Aligner {
         let model_error = fit.error(&body);
         let (model, bones) = fit.posed(&body);
         let mut surface = model.clone();
-        let settled = if self.skips { config.settled } else { 0.0 };
-        let config = SurfaceFitConfig {
-            settled,
-            ..config.clone()
-        };
+        let mut config = config.clone();
+        if !self.skips {
+            (config.settled, config.still) = (0.0, 0.0);
+        }
         let report = self.free.run(scan, &model, &mut surface, &config)?;
         let points = scan.points.len().max(1) as f64;
         Ok(Alignment {
@@ -320,6 +369,7 @@ impl Aligner {
                 explained: report.paired as f64 / points,
                 searched: false,
                 queries: report.queries,
+                vertices: report.vertices,
                 turns_skipped: 0,
             },
         })

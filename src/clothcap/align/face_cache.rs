@@ -1,8 +1,10 @@
 //! Nearest faces of scan points, kept from iteration to iteration while the surface around them hardly moves.
 
+use super::face_walk::QuerySurface;
+use super::pairing::ScanNormal;
 use crate::math::P3;
 use crate::mesh::Face;
-use crate::spatial::{Bvh, SurfacePoint};
+use crate::spatial::SurfacePoint;
 use serde::{Deserialize, Serialize};
 
 /// Counts of nearest-point queries of a fit.
@@ -10,6 +12,9 @@ use serde::{Deserialize, Serialize};
 pub struct QueryCounts {
     /// Searches of the whole surface.
     pub made: usize,
+    /// Searches of the faces around the last one.
+    #[serde(default)]
+    pub near: usize,
     /// Searches left out: the face of the last one was kept.
     pub skipped: usize,
 }
@@ -17,6 +22,7 @@ pub struct QueryCounts {
 impl std::ops::AddAssign for QueryCounts {
     fn add_assign(&mut self, other: Self) {
         self.made += other.made;
+        self.near += other.near;
         self.skipped += other.skipped;
     }
 }
@@ -36,8 +42,6 @@ pub(in crate::clothcap) struct FaceCache {
     /// Searches start at the last face: of two faces equally near, another one may be found.
     starts: bool,
     kept: Vec<Option<KeptFace>>,
-    /// Every so many points are searched in each iteration; scans of meshes have those between beside them.
-    stride: usize,
     /// Way of each face so far: the sum of the largest motions of its corners, metres.
     travel: Vec<f32>,
     /// Surface of the last iteration.
@@ -46,14 +50,13 @@ pub(in crate::clothcap) struct FaceCache {
 }
 
 impl FaceCache {
-    /// Cache of a fit to so many points, each `stride`-th in its iterations; `settled` is the motion up to which a face is
-    /// kept, metres; at 0 each search is made from nothing.
-    pub(in crate::clothcap) fn new(points: usize, stride: usize, settled: f32) -> Self {
+    /// Cache of a fit to so many points; `settled` is the motion up to which a face is kept, metres; at 0 each search is
+    /// made from nothing.
+    pub(in crate::clothcap) fn new(points: usize, settled: f32) -> Self {
         Self {
             settled,
             starts: settled > 0.0,
             kept: vec![None; points],
-            stride: stride.max(1),
             travel: Vec::new(),
             last: Vec::new(),
             counts: QueryCounts::default(),
@@ -72,15 +75,16 @@ impl FaceCache {
         self.kept[i] = Some(KeptFace { face, travel });
     }
 
-    /// Starts the first searches of points without a face at those of their neighbours by triangles of the scan.
-    pub(in crate::clothcap) fn spread(&mut self, faces: &[Face]) {
-        let given = self.kept.clone();
-        for f in faces {
-            let Some(known) = f.iter().find_map(|v| given[*v as usize]) else {
-                continue;
-            };
-            let open = f.iter().filter(|v| given[**v as usize].is_none());
-            open.for_each(|v| self.start_at(*v as usize, known.face));
+    /// Starts the first searches of points at the face of the last point before them that was searched, in an order in which
+    /// neighbours are near.
+    pub(in crate::clothcap) fn spread(&mut self, order: &[u32]) {
+        let mut last = None;
+        for i in order.iter().map(|i| *i as usize) {
+            match (self.kept[i].filter(|k| k.travel.is_finite()), last) {
+                (Some(found), _) => last = Some(found.face),
+                (None, Some(face)) => self.start_at(i, face),
+                (None, None) => (),
+            }
         }
     }
 
@@ -102,24 +106,31 @@ impl FaceCache {
         self.last.extend_from_slice(surface);
     }
 
-    /// Point of the surface closest to point `i`, on its kept face or searched.
+    /// Point of the surface closest to point `i`, on its kept face, near it or searched; `least` is the smallest cosine
+    /// between normals of a pair.
     pub(in crate::clothcap) fn closest(
         &self,
         i: usize,
-        (bvh, surface): (&Bvh, &[P3]),
-        p: &P3,
+        surface: &QuerySurface<'_>,
+        (p, normal): (&P3, ScanNormal),
+        least: f32,
     ) -> Option<Found> {
         let kept = self.kept[i];
         if let Some(k) = kept
             && self.travel[k.face as usize] - k.travel < self.settled
         {
-            let point = bvh.point_of_face(surface, p, k.face);
-            return Some(Found { point, kept });
+            let point = surface.tree.point_of_face(surface.vertices, p, k.face);
+            let search = Search::Skipped(k);
+            return Some(Found { point, search });
         }
-        let beside = self.kept[i - i % self.stride];
-        let near = kept.or(beside).filter(|_| self.starts).map(|k| k.face);
-        let point = bvh.closest_near(surface, p, near)?;
-        Some(Found { point, kept: None })
+        let near = kept.filter(|_| self.starts).map(|k| k.face);
+        if let Some(point) = near.and_then(|f| surface.descend((p, normal), f, least)) {
+            let search = Search::Near;
+            return Some(Found { point, search });
+        }
+        let point = surface.tree.closest_near(surface.vertices, p, near)?;
+        let search = Search::Whole;
+        Some(Found { point, search })
     }
 
     /// Keeps what was found for point `i`.
@@ -129,11 +140,20 @@ impl FaceCache {
             face,
             travel: self.travel[face as usize],
         };
-        match found.kept {
-            Some(_) => self.counts.skipped += 1,
-            None => self.counts.made += 1,
-        }
-        self.kept[i] = Some(found.kept.unwrap_or(fresh));
+        self.kept[i] = Some(match found.search {
+            Search::Skipped(kept) => {
+                self.counts.skipped += 1;
+                kept
+            }
+            Search::Near => {
+                self.counts.near += 1;
+                fresh
+            }
+            Search::Whole => {
+                self.counts.made += 1;
+                fresh
+            }
+        });
     }
 
     /// Queries so far.
@@ -142,9 +162,20 @@ impl FaceCache {
     }
 }
 
-/// Closest point, and its face in the cache if that was kept.
+/// Extent of a search.
+#[derive(Clone, Copy, Debug)]
+enum Search {
+    /// None: the face in the cache.
+    Skipped(KeptFace),
+    /// Faces around the last one.
+    Near,
+    /// All faces.
+    Whole,
+}
+
+/// Closest point and the search that found it.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::clothcap) struct Found {
     pub(in crate::clothcap) point: SurfacePoint,
-    kept: Option<KeptFace>,
+    search: Search,
 }

@@ -1,6 +1,8 @@
 //! Free surface of a single-mesh alignment (eq. 3 to 5): vertices follow the scan, edges stay near those of the body model.
 
+use super::active_vertices::{ActiveVertices, VertexCounts};
 use super::face_cache::{FaceCache, Found, QueryCounts};
+use super::face_walk::QuerySurface;
 use super::model_fit::is_bare;
 use super::pairing::ScanNormal;
 use super::quadratic::{EVEN_EDGE, QuadraticEnergy, Stencil};
@@ -8,10 +10,11 @@ use crate::body::Template;
 use crate::clothcap::CaptureError;
 use crate::clothcap::scan::BodyScan;
 use crate::math::{P3, V3};
-use crate::mesh::{Face, vertex_normals};
+use crate::mesh::{Csr, Face, vertex_normals};
 use crate::par::{self, Par};
 use crate::registration::GemanMcClure;
 use crate::spatial::Bvh;
+use std::sync::Arc;
 
 /// Coupling of hands, feet and head beside 1 elsewhere (w of eq. 5): scans are noisy there and no cloth covers them.
 const FIRM: f64 = 8.0;
@@ -26,6 +29,13 @@ const CONVERGED: f32 = 5e-5;
 /// low contrast are 1 mm worse.
 pub(in crate::clothcap) const SETTLED: f32 = 5e-4;
 
+/// Motion of a vertex in an iteration up to which it is held in the next, metres: what it would still move is a
+/// fraction of that.
+pub(in crate::clothcap) const STILL: f32 = 1e-4;
+
+/// Name of the solve in faults.
+const STAGE: &str = "free surface";
+
 /// Kernel and coupling of one stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceStage {
@@ -36,6 +46,8 @@ pub struct SurfaceStage {
     pub sigma: f64,
     /// Most iterations.
     pub iterations: usize,
+    /// Most scan points in an iteration; the others are matched in the end.
+    pub points: usize,
 }
 
 /// Stages of a free-surface fit, coarse to fine.
@@ -43,24 +55,25 @@ pub struct SurfaceStage {
 pub struct SurfaceFitConfig {
     /// Stages.
     pub stages: Vec<SurfaceStage>,
-    /// Most scan points in an iteration; the others are matched in the end.
-    pub points: usize,
     /// Motion of a face up to which the points on it keep it without a search, metres; 0 searches always.
     pub settled: f32,
+    /// Motion of a vertex in an iteration up to which it is held in the next, metres; 0 solves all in each.
+    pub still: f32,
 }
 
 impl SurfaceFitConfig {
     /// Stages of a later frame, which starts at the clothed template in its pose (eq. 9).
     pub fn later() -> Self {
-        let stage = |coupling, sigma, iterations| SurfaceStage {
+        let stage = |coupling, sigma, iterations, points| SurfaceStage {
             coupling,
             sigma,
             iterations,
+            points,
         };
         Self {
-            stages: vec![stage(0.04, 0.05, 3), stage(0.012, 0.03, 3)],
+            stages: vec![stage(0.04, 0.05, 2, 7_500), stage(0.012, 0.03, 3, 30_000)],
             settled: SETTLED,
-            ..Self::default()
+            still: STILL,
         }
     }
 }
@@ -71,6 +84,7 @@ impl Default for SurfaceFitConfig {
             coupling,
             sigma,
             iterations,
+            points: 30_000,
         };
         Self {
             stages: vec![
@@ -79,8 +93,8 @@ impl Default for SurfaceFitConfig {
                 stage(0.025, 0.04, 4),
                 stage(0.012, 0.03, 4),
             ],
-            points: 30_000,
             settled: 0.0,
+            still: 0.0,
         }
     }
 }
@@ -96,6 +110,8 @@ pub struct SurfaceFitReport {
     pub paired: usize,
     /// Nearest-point queries.
     pub queries: QueryCounts,
+    /// Vertices.
+    pub vertices: VertexCounts,
 }
 
 /// Free surface over the mesh of a template.
@@ -104,7 +120,8 @@ pub struct FreeSurface {
     energy: QuadraticEnergy,
     edges: Vec<[u32; 2]>,
     faces: Vec<Face>,
-    around: crate::mesh::Csr,
+    around: Csr,
+    neighbours: Arc<Csr>,
     bvh: Bvh,
     area: f64,
     matches: Vec<SurfaceMatch>,
@@ -129,6 +146,7 @@ impl FreeSurface {
             edges,
             faces: mesh.faces().to_vec(),
             around: template.topology().vertex_faces().clone(),
+            neighbours: Arc::new(template.topology().vertex_neighbours().clone()),
             bvh: Bvh::new(mesh.faces(), mesh.vertices()),
             area: mesh.area(),
             matches: Vec::new(),
@@ -147,58 +165,74 @@ impl FreeSurface {
         config: &SurfaceFitConfig,
     ) -> Result<SurfaceFitReport, CaptureError> {
         let mut report = SurfaceFitReport::default();
-        let stride = (scan.points.len() / config.points.max(1)).max(1);
-        let mut cache = FaceCache::new(scan.points.len(), stride, config.settled);
-        // Each point stands for its share of the area, each vertex for its own.
-        let per_point = self.area / scan.points.len().div_ceil(stride).max(1) as f64;
-        let per_vertex = ANCHOR * self.area / model.len().max(1) as f64;
+        let mut cache = FaceCache::new(scan.points.len(), config.settled);
+        let order = if config.settled > 0.0 {
+            scan.order()
+        } else {
+            Vec::new()
+        };
+        let spread = |cache: &mut FaceCache| cache.spread(&order);
+        let neighbours = self.neighbours.clone();
+        let mut active = ActiveVertices::new(&neighbours, config.still);
         for stage in &config.stages {
+            let stride = (scan.points.len() / stage.points.max(1)).max(1);
             let kernel = GemanMcClure { sigma: stage.sigma };
+            active.begin();
+            spread(&mut cache);
             for _ in 0..stage.iterations {
                 let matches = self.pair((scan, stride), surface, &kernel, &mut cache);
-                report = SurfaceFitReport {
-                    iterations: report.iterations + 1,
-                    ..measure(&matches)
-                };
-                self.energy.reset();
-                for (k, e) in self.edges.iter().enumerate() {
-                    let d = (model[e[0] as usize] - model[e[1] as usize]).cast::<f64>();
-                    let scale = stage.coupling * stage.coupling;
-                    self.energy.add_stencil(k, scale, d.into());
-                }
-                for (v, p) in model.iter().enumerate() {
-                    self.energy.add_vertex(v as u32, per_vertex, p);
-                }
-                for (m, p) in matches.iter().zip(scan.points.iter().step_by(stride)) {
-                    if m.weight > 0.0 {
-                        let weight = per_point * m.weight;
-                        self.energy.add_face_point(m.face, m.corners, weight, p);
-                    }
-                }
-
-                let moved = self.energy.minimise("free surface")?;
-                let sum: f32 = moved
-                    .iter()
-                    .zip(&*surface)
-                    .map(|(a, b)| (a - b).norm())
-                    .sum();
-                *surface = moved;
-                if sum < CONVERGED * model.len() as f32 {
+                self.assemble((scan, stride), model, &matches, stage.coupling);
+                let good = matches.iter().filter(|m| m.weight > 0.0);
+                active.see(
+                    good.map(|m| self.faces[m.face as usize]),
+                    std::iter::empty(),
+                );
+                let motion = active.solve(&mut self.energy, surface, STAGE)?;
+                report.iterations += 1;
+                if motion < CONVERGED {
                     break;
                 }
             }
+            active.finish(&mut self.energy, surface, STAGE)?;
         }
+        report.vertices = active.counts();
         let last = config.stages.last().map_or(0.03, |s| s.sigma);
         let kernel = GemanMcClure { sigma: last };
         // Labels are read off these matches: each is searched.
         cache.search_all();
-        cache.spread(&scan.faces);
+        spread(&mut cache);
         self.matches = self.pair((scan, 1), surface, &kernel, &mut cache);
         Ok(SurfaceFitReport {
-            iterations: report.iterations,
             queries: cache.counts(),
-            ..measure(&self.matches)
+            ..measure(&self.matches, report)
         })
+    }
+
+    /// Fills the system with coupling, anchor and the matches of every `stride`-th scan point.
+    fn assemble(
+        &mut self,
+        (scan, stride): (&BodyScan, usize),
+        model: &[P3],
+        matches: &[SurfaceMatch],
+        coupling: f64,
+    ) {
+        // Each point stands for its share of the area, each vertex for its own.
+        let per_point = self.area / matches.len().max(1) as f64;
+        let per_vertex = ANCHOR * self.area / model.len().max(1) as f64;
+        self.energy.reset();
+        for (k, e) in self.edges.iter().enumerate() {
+            let d = (model[e[0] as usize] - model[e[1] as usize]).cast::<f64>();
+            self.energy.add_stencil(k, coupling * coupling, d.into());
+        }
+        for (v, p) in model.iter().enumerate() {
+            self.energy.add_vertex(v as u32, per_vertex, p);
+        }
+        for (m, p) in matches.iter().zip(scan.points.iter().step_by(stride)) {
+            if m.weight > 0.0 {
+                let weight = per_point * m.weight;
+                self.energy.add_face_point(m.face, m.corners, weight, p);
+            }
+        }
     }
 
     /// Place of each scan point on the surface of the last run, shape `[points]`.
@@ -218,11 +252,20 @@ impl FreeSurface {
         cache.advance(&self.faces, surface);
         let mut normals = Vec::new();
         vertex_normals(Par::Rayon, surface, &self.faces, &self.around, &mut normals);
+        let query = QuerySurface {
+            tree: &self.bvh,
+            vertices: surface,
+            around: &self.around,
+        };
+        let normal_of = |i: usize| ScanNormal {
+            normal: scan.normals[i],
+            oriented: scan.oriented,
+        };
         let mut found = Vec::new();
         let count = scan.points.len().div_ceil(stride);
         par::map_into(Par::Rayon, count, 256, &mut found, |k| {
             let i = k * stride;
-            cache.closest(i, (&self.bvh, surface), &scan.points[i])
+            cache.closest(i, &query, (&scan.points[i], normal_of(i)), NORMALS)
         });
         let matched = |(k, found): (usize, &Option<Found>)| {
             let Some(found) = found else {
@@ -234,12 +277,8 @@ impl FreeSurface {
             let face = &self.faces[found.face as usize];
             let corners = found.weights;
             let normal: V3 = (0..3).map(|k| normals[face[k] as usize] * corners[k]).sum();
-            let of_scan = ScanNormal {
-                normal: scan.normals[i],
-                oriented: scan.oriented,
-            };
             let e2 = f64::from(found.distance * found.distance);
-            let agrees = of_scan.agrees(&normal, NORMALS);
+            let agrees = normal_of(i).agrees(&normal, NORMALS);
             SurfaceMatch {
                 face: found.face,
                 corners,
@@ -278,14 +317,14 @@ impl SurfaceMatch {
     }
 }
 
-fn measure(matches: &[SurfaceMatch]) -> SurfaceFitReport {
+/// The report with the distances of the last matches.
+fn measure(matches: &[SurfaceMatch], report: SurfaceFitReport) -> SurfaceFitReport {
     let good = matches.iter().filter(|m| m.weight > 0.0);
     let (sum, n) = good.fold((0.0, 0), |(s, n), m| (s + f64::from(m.distance), n + 1));
     SurfaceFitReport {
-        iterations: 0,
-        queries: QueryCounts::default(),
         error: sum / f64::from(n.max(1)),
         paired: n as usize,
+        ..report
     }
 }
 

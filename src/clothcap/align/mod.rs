@@ -1,11 +1,14 @@
 //! Single-mesh alignment (section 5.1): body model, then free surface, first of one scan, then of a sequence.
 
+mod active_vertices;
 mod aligner;
 mod angle_priors;
 mod arms;
 mod body_equations;
 mod face_cache;
+mod face_walk;
 mod free_surface;
+mod jacobian;
 mod legs;
 mod model_fit;
 mod pairing;
@@ -14,13 +17,16 @@ mod shape_unknowns;
 mod shared_shape;
 mod start;
 
+pub(super) use active_vertices::ActiveVertices;
+pub use active_vertices::VertexCounts;
 pub use aligner::{Aligner, Alignment, AlignmentReport, ClothedTemplate};
 pub use face_cache::QueryCounts;
 pub(super) use face_cache::{FaceCache, Found};
-pub(super) use free_surface::SETTLED;
+pub(super) use face_walk::QuerySurface;
 pub use free_surface::{
     FreeSurface, SurfaceFitConfig, SurfaceFitReport, SurfaceMatch, SurfaceStage,
 };
+pub(super) use free_surface::{SETTLED, STILL};
 pub use model_fit::{AlignedBody, FitStage, ModelFit, ModelFitReport};
 pub(super) use pairing::{ScanNormal, closest_facing};
 pub(super) use quadratic::EVEN_EDGE;

@@ -2,6 +2,8 @@
 
 use super::angle_priors::{angle_deviations, straight_precisions};
 use super::body_equations::BodyEquations;
+use super::face_walk::QuerySurface;
+use super::jacobian::JacobianRows;
 use super::pairing::{ScanNormal, closest_facing_near};
 use super::shape_unknowns::ShapeUnknowns;
 use crate::body::parts::BodySegment;
@@ -10,12 +12,11 @@ use crate::clothcap::CaptureError;
 use crate::clothcap::scalp::scalp;
 use crate::clothcap::scan::BodyScan;
 use crate::math::{P3, V3, World};
-use crate::mesh::Face;
 use crate::par::{self, Par};
-use crate::registration::{Dof, GemanMcClure};
+use crate::registration::GemanMcClure;
 use crate::spatial::Bvh;
 use crate::tracking::{apply, linearise};
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DVector, Vector3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -28,8 +29,6 @@ const INDEPENDENT: f64 = 800.0;
 const STEP: f64 = 0.02;
 /// Smallest cosine between normals of a pair, for oriented scans.
 const NORMALS: f32 = 0.3;
-/// Weight of tangential beside normal distances: limbs move along themselves only by it.
-const TANGENTIAL: f64 = 0.05;
 /// Thickness of a fabric with the air below it where it lies on the body, metres.
 const THICKNESS: f64 = 0.003;
 /// Weight of cloth outside the body beside cloth inside of it: garments hang away from the body, never into it.
@@ -42,8 +41,6 @@ const BARE: f64 = 2.0;
 pub(super) const CONVERGED: f64 = 5e-4;
 /// See [`CONVERGED`].
 const LEVER: f64 = 0.25;
-/// Rows of the Jacobian in one product.
-const CHUNK: usize = 256;
 
 /// Posed and shaped body in the frame of the scan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -118,7 +115,7 @@ pub struct ModelFitReport {
 pub(super) struct Match {
     pub(super) face: u32,
     pub(super) corners: [f32; 3],
-    point: Vector3<f64>,
+    pub(super) point: Vector3<f64>,
     pub(super) normal: Vector3<f64>,
     /// BodyScan point minus surface point.
     pub(super) residual: Vector3<f64>,
@@ -146,6 +143,8 @@ pub struct ModelFit<'a> {
     /// Vertices below hair.
     scalp: Vec<bool>,
     bvh: Bvh,
+    /// Shape of the last pose and its rest body.
+    rest: Option<(BodyShape, RestBody)>,
     posed: Vec<P3>,
     bones: BoneTransforms,
     deviations: Vec<f64>,
@@ -175,6 +174,7 @@ impl<'a> ModelFit<'a> {
                 .collect(),
             scalp: scalp(template),
             bvh: Bvh::new(mesh.faces(), mesh.vertices()),
+            rest: None,
             posed: Vec::new(),
             bones: BoneTransforms::default(),
             deviations: angle_deviations(template),
@@ -189,7 +189,7 @@ impl<'a> ModelFit<'a> {
     }
 
     /// The same with searches that start where the last one ended.
-    pub(super) fn with_starts(mut self, starts_near: bool) -> Self {
+    pub(in crate::clothcap) fn with_starts(mut self, starts_near: bool) -> Self {
         self.starts_near = starts_near;
         self
     }
@@ -221,8 +221,17 @@ impl<'a> ModelFit<'a> {
         offsets: Option<&[V3]>,
         (out, bones): (&mut Vec<P3>, &mut BoneTransforms),
     ) {
-        let rest = self.rest(&body.shape);
-        body.pose.bones(self.template.skeleton(), &rest, bones);
+        let rest = &self.rest(&body.shape);
+        self.pose_rest((body, rest), offsets, (out, bones));
+    }
+
+    fn pose_rest(
+        &self,
+        (body, rest): (&AlignedBody, &RestBody),
+        offsets: Option<&[V3]>,
+        (out, bones): (&mut Vec<P3>, &mut BoneTransforms),
+    ) {
+        body.pose.bones(self.template.skeleton(), rest, bones);
         match offsets {
             Some(offsets) => {
                 let moved = (rest.vertices.as_slice(), offsets);
@@ -261,7 +270,11 @@ impl<'a> ModelFit<'a> {
     pub(super) fn place(&mut self, body: &AlignedBody) {
         let mut posed = std::mem::take(&mut self.posed);
         let mut bones = std::mem::take(&mut self.bones);
-        self.pose_vertices(body, None, (&mut posed, &mut bones));
+        // Only few updates change the shape.
+        let kept = self.rest.take().filter(|(shape, _)| *shape == body.shape);
+        let (shape, rest) = kept.unwrap_or_else(|| (body.shape.clone(), self.rest(&body.shape)));
+        self.pose_rest((body, &rest), None, (&mut posed, &mut bones));
+        self.rest = Some((shape, rest));
         self.bvh.refit(&posed);
         (self.posed, self.bones) = (posed, bones);
     }
@@ -286,8 +299,12 @@ impl<'a> ModelFit<'a> {
             normal: self.normals[i],
             oriented: self.oriented,
         };
-        let surface = (&self.bvh, self.posed.as_slice());
-        let (found, normal) = closest_facing_near(surface, (&p, self.near[i]), normal, NORMALS)?;
+        let surface = QuerySurface {
+            tree: &self.bvh,
+            vertices: &self.posed,
+            around: self.template.topology().vertex_faces(),
+        };
+        let (found, normal) = closest_facing_near(&surface, (&p, self.near[i]), normal, NORMALS)?;
         let face = self.bvh.faces()[found.face as usize];
         let mut residual = (p - found.point).cast::<f64>();
         let mut weight = kernel.weight(residual.norm_squared());
@@ -323,24 +340,16 @@ impl<'a> ModelFit<'a> {
         stage: &FitStage,
     ) -> Result<ModelFitReport, CaptureError> {
         let start = body.clone();
-        let kernel = GemanMcClure { sigma: stage.sigma };
         let mut report = ModelFitReport::default();
         let shaped = stage.shape && self.clothed.is_none();
         let unknowns = ShapeUnknowns::new(self.template, &mut body.shape, shaped);
+        let prior = Prior {
+            start: &start.pose,
+            unknowns: &unknowns,
+            freedom: stage.freedom,
+        };
         for _ in 0..stage.iterations {
-            self.place(body);
-            let matches = self.matches(&kernel);
-            report.iterations += 1;
-            report.paired = matches.iter().filter(|m| m.weight > 0.0).count();
-            report.error = robust_mean(&matches, &kernel);
-            let prior = Prior {
-                start: &start.pose,
-                unknowns: &unknowns,
-                freedom: stage.freedom,
-            };
-            let mut system = self.system(body, &prior, &matches);
-            system.add_shape_prior(&body.shape, &unknowns);
-            let update = system.solve()?;
+            let update = self.newton_update(body, &prior, stage.sigma, &mut report)?;
             let moved = self.update(body, &unknowns, &update);
             if moved < CONVERGED {
                 report.converged = true;
@@ -348,6 +357,46 @@ impl<'a> ModelFit<'a> {
             }
         }
         Ok(report)
+    }
+
+    /// The pose is one that a stage would end at: its next update is below the bound.
+    ///
+    /// # Errors
+    /// As [`ModelFit::run`].
+    pub(super) fn is_settled(
+        &mut self,
+        body: &AlignedBody,
+        stage: &FitStage,
+    ) -> Result<bool, CaptureError> {
+        let mut moved = body.clone();
+        let unknowns = ShapeUnknowns::new(self.template, &mut moved.shape, false);
+        let prior = Prior {
+            start: &body.pose,
+            unknowns: &unknowns,
+            freedom: stage.freedom,
+        };
+        let mut report = ModelFitReport::default();
+        let update = self.newton_update(body, &prior, stage.sigma, &mut report)?;
+        Ok(self.update(&mut moved, &unknowns, &update) < CONVERGED)
+    }
+
+    /// Gauss–Newton update of one iteration, which is counted in the report.
+    fn newton_update(
+        &mut self,
+        body: &AlignedBody,
+        prior: &Prior<'_>,
+        sigma: f64,
+        report: &mut ModelFitReport,
+    ) -> Result<DVector<f64>, CaptureError> {
+        let kernel = GemanMcClure { sigma };
+        self.place(body);
+        let matches = self.matches(&kernel);
+        report.iterations += 1;
+        report.paired = matches.iter().filter(|m| m.weight > 0.0).count();
+        report.error = robust_mean(&matches, &kernel);
+        let mut system = self.system(body, prior, &matches);
+        system.add_shape_prior(&body.shape, prior.unknowns);
+        system.solve()
     }
 
     /// Normal equations of the matches with the prior of the pose.
@@ -363,7 +412,7 @@ impl<'a> ModelFit<'a> {
         linearise(skeleton, &self.bones, &body.pose, &centre, &mut dofs);
         let fields = self.shape_fields(body, prior.unknowns);
         let rows = JacobianRows {
-            fit: self,
+            template: self.template,
             dofs: &dofs,
             fields: &fields,
             centre,
@@ -433,91 +482,6 @@ pub(super) struct Prior<'a> {
     pub(super) start: &'a Pose<World>,
     pub(super) unknowns: &'a ShapeUnknowns,
     pub(super) freedom: f64,
-}
-
-/// Jacobian of the matches. Pose blend shapes are in the residuals and left out here: muscles and folds of skin move by a
-/// centimetre while a joint turns by a radian, limbs by 25 cm.
-struct JacobianRows<'a> {
-    fit: &'a ModelFit<'a>,
-    dofs: &'a [Dof],
-    fields: &'a [Vec<V3>],
-    centre: Vector3<f64>,
-}
-
-impl JacobianRows<'_> {
-    /// Jᵀ W J and Jᵀ W r over all matches, summed in a fixed order.
-    fn normal_equations(&self, matches: &[Match], n: usize) -> (DMatrix<f64>, DVector<f64>) {
-        let good: Vec<&Match> = matches.iter().filter(|m| m.weight > 0.0).collect();
-        let mut sums = Vec::new();
-        let chunks = good.len().div_ceil(CHUNK);
-        par::map_into(Par::Rayon, chunks, 1, &mut sums, |c| {
-            let some = &good[c * CHUNK..((c + 1) * CHUNK).min(good.len())];
-            // Rows along the normal and two tangents, scaled by the roots of their weights.
-            let mut j = DMatrix::<f64>::zeros(3 * some.len(), n);
-            let mut r = DVector::<f64>::zeros(3 * some.len());
-            for (k, m) in some.iter().enumerate() {
-                self.fill(m, 3 * k, (&mut j, &mut r));
-            }
-            Some((j.tr_mul(&j), j.tr_mul(&r)))
-        });
-        let mut total = (DMatrix::zeros(n, n), DVector::zeros(n));
-        for (h, g) in sums.into_iter().flatten() {
-            total.0 += h;
-            total.1 += g;
-        }
-        total
-    }
-
-    fn fill(&self, m: &Match, row: usize, (j, r): (&mut DMatrix<f64>, &mut DVector<f64>)) {
-        let face = self.fit.template.mesh().faces()[m.face as usize];
-        let influence = self.influence(&face, m.corners);
-        let across = if m.normal.x.abs() < 0.8 {
-            Vector3::x()
-        } else {
-            Vector3::y()
-        };
-        let t = m.normal.cross(&across).normalize();
-        let axes = [
-            (m.normal, (m.weight * (1.0 + TANGENTIAL)).sqrt()),
-            (t, (m.weight * TANGENTIAL).sqrt()),
-            (m.normal.cross(&t), (m.weight * TANGENTIAL).sqrt()),
-        ];
-        let lever = m.point - self.centre;
-        for (k, (axis, weight)) in axes.into_iter().enumerate() {
-            r[row + k] = weight * axis.dot(&m.residual);
-            let moment = lever.cross(&axis);
-            for (c, dof) in self.dofs.iter().enumerate() {
-                let share = influence[dof.bone];
-                if share > 0.0 {
-                    let motion = axis.dot(&dof.twist.linear) + moment.dot(&dof.twist.angular);
-                    j[(row + k, c)] = weight * share * motion;
-                }
-            }
-            for (c, field) in self.fields.iter().enumerate() {
-                let moved: V3 = (0..3).map(|i| field[face[i] as usize] * m.corners[i]).sum();
-                j[(row + k, self.dofs.len() + c)] = weight * axis.dot(&moved.cast());
-            }
-        }
-    }
-
-    /// Share of a surface point that moves with each bone or one below it.
-    fn influence(&self, face: &Face, corners: [f32; 3]) -> Vec<f64> {
-        let weights = self.fit.template.weights();
-        let joints = self.fit.template.skeleton().joints();
-        let mut share = vec![0.0; joints.len()];
-        for (v, c) in face.iter().zip(corners) {
-            let v = *v as usize;
-            for k in 0..4 {
-                share[usize::from(weights.joints[v][k])] += f64::from(weights.weights[v][k] * c);
-            }
-        }
-        for j in (0..joints.len()).rev() {
-            if let Some(p) = joints[j].parent {
-                share[p] += share[j];
-            }
-        }
-        share
-    }
 }
 
 /// Mostly bare: head, hands and feet.

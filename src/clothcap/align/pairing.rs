@@ -1,5 +1,6 @@
 //! Pairs of scan points and surface points, by distance and direction of their normals.
 
+use super::face_walk::QuerySurface;
 use crate::math::{P3, V3};
 use crate::mesh::face_normal;
 use crate::spatial::{Bvh, SurfacePoint};
@@ -24,22 +25,34 @@ impl ScanNormal {
 
 /// Surface point closest to a scan point, and the unit normal of its face; `None` if the normals differ.
 pub(in crate::clothcap) fn closest_facing(
-    surface: (&Bvh, &[P3]),
+    (bvh, surface): (&Bvh, &[P3]),
     point: &P3,
     normal: ScanNormal,
     least: f32,
 ) -> Option<(SurfacePoint, V3)> {
-    closest_facing_near(surface, (point, None), normal, least)
+    let found = bvh.closest(surface, point)?;
+    facing((bvh, surface), found, normal, least)
 }
 
-/// The same, faster from a face that may lie near the point.
+/// The same, faster from a face that may lie near the point: it and its neighbours are searched first.
 pub(in crate::clothcap) fn closest_facing_near(
-    (bvh, surface): (&Bvh, &[P3]),
+    surface: &QuerySurface<'_>,
     (point, near): (&P3, Option<u32>),
     normal: ScanNormal,
     least: f32,
 ) -> Option<(SurfacePoint, V3)> {
-    let found = bvh.closest_near(surface, point, near)?;
+    let found = near.and_then(|f| surface.descend((point, normal), f, least));
+    let whole = || surface.tree.closest_near(surface.vertices, point, near);
+    let found = found.or_else(whole)?;
+    facing((surface.tree, surface.vertices), found, normal, least)
+}
+
+fn facing(
+    (bvh, surface): (&Bvh, &[P3]),
+    found: SurfacePoint,
+    normal: ScanNormal,
+    least: f32,
+) -> Option<(SurfacePoint, V3)> {
     let face = &bvh.faces()[found.face as usize];
     let own = face_normal(surface, face).try_normalize(f32::MIN_POSITIVE)?;
     normal.agrees(&own, least).then_some((found, own))

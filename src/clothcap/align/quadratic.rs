@@ -3,13 +3,22 @@
 //! x, y and z share one matrix, since every term measures a distance and no direction.
 
 use crate::clothcap::CaptureError;
-use crate::linear::{Factor, LinearError, SymbolicFactor, SymmetricPattern};
+use crate::linear::{
+    Factor, LinearError, StopCriterion, SymbolicFactor, SymmetricPattern, conjugate_gradient,
+};
 use crate::math::P3;
-use crate::mesh::Face;
+use crate::mesh::{Csr, Face};
+use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
 
 /// Weight of an edge of an even mesh in the Dirichlet energy of a displacement: the cotangent of 60°.
 pub(in crate::clothcap) const EVEN_EDGE: f64 = 0.577;
+
+/// End of an iteration on some vertices: the residual beside that before, and the most products.
+const STOP: StopCriterion = StopCriterion {
+    residual: 0.01,
+    iterations: 100,
+};
 
 /// Weighted sum of a few vertices.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +62,8 @@ pub struct QuadraticEnergy {
     faces: Vec<[u32; 6]>,
     corners: Vec<Face>,
     pattern: Arc<SymmetricPattern>,
+    /// Columns of each row beside its diagonal, and where their values are stored.
+    rows: [Csr; 2],
     factor: Factor,
     values: Vec<f64>,
     rhs: Vec<[f64; 3]>,
@@ -75,7 +86,13 @@ impl QuadraticEnergy {
                 pairs.extend(all[..k].iter().map(|&b| (a, b)));
             }
         }
-        let pattern = Arc::new(SymmetricPattern::new(vertices, pairs).map_err(fault)?);
+        pairs
+            .iter_mut()
+            .for_each(|p| *p = (p.0.min(p.1), p.0.max(p.1)));
+        pairs.sort_unstable();
+        pairs.dedup();
+        let entries = pairs.iter().copied();
+        let pattern = Arc::new(SymmetricPattern::new(vertices, entries).map_err(fault)?);
         let slots = |all: &[u32]| -> Slots {
             let mut out = Vec::new();
             for (k, &a) in all.iter().enumerate() {
@@ -98,6 +115,7 @@ impl QuadraticEnergy {
                     (s, at)
                 })
                 .collect(),
+            rows: rows(&pattern, &pairs),
             values: vec![0.0; pattern.entries()],
             rhs: vec![[0.0; 3]; vertices],
             factor: Factor::new(SymbolicFactor::new(pattern.clone()).map_err(fault)?),
@@ -171,6 +189,96 @@ impl QuadraticEnergy {
             None => Ok(out),
         }
     }
+
+    /// Moves some vertices of `x` to the positions of least energy, metres, all others held: to a hundredth of the residual,
+    /// from where they are.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] if the numbers are not finite.
+    pub fn minimise_some(
+        &self,
+        x: &mut [P3],
+        some: &[u32],
+        stage: &'static str,
+    ) -> Result<(), CaptureError> {
+        let system = self.restricted(x, some);
+        let mut moves = vec![Vector3::zeros(); some.len()];
+        let apply = |from: &[Vector3<f64>], to: &mut [Vector3<f64>]| system.multiply(from, to);
+        conjugate_gradient(apply, &system.inverse, &system.rhs, &mut moves, STOP);
+        for (v, by) in some.iter().zip(&moves) {
+            let moved = x[*v as usize].cast::<f64>() + by;
+            if !moved.iter().all(|c| c.is_finite()) {
+                let why = format!("vertex {v} is not finite");
+                return Err(CaptureError::Solve { stage, why });
+            }
+            x[*v as usize] = moved.cast();
+        }
+        Ok(())
+    }
+
+    /// Equations of the motion of some vertices from `x`, all others held.
+    fn restricted(&self, x: &[P3], some: &[u32]) -> RestrictedSystem {
+        const HELD: u32 = u32::MAX;
+        let mut local = vec![HELD; x.len()];
+        for (k, v) in some.iter().enumerate() {
+            local[*v as usize] = k as u32;
+        }
+        let mut out = RestrictedSystem::default();
+        for &v in some {
+            let v = v as usize;
+            let diagonal = self.values[self.pattern.diagonal_slot(v)];
+            let mut left = Vector3::from(self.rhs[v]) - x[v].coords.cast() * diagonal;
+            let [columns, slots] = self.rows.each_ref().map(|r| r.row(v));
+            for (column, slot) in columns.iter().zip(slots) {
+                let value = self.values[*slot as usize];
+                left -= x[*column as usize].coords.cast() * value;
+                if local[*column as usize] != HELD {
+                    out.entries.push((local[*column as usize], value));
+                }
+            }
+            out.ends.push(out.entries.len());
+            out.diagonal.push(diagonal);
+            out.inverse
+                .push(Matrix3::from_diagonal_element(1.0 / diagonal));
+            out.rhs.push(left);
+        }
+        out
+    }
+}
+
+/// Rows and columns of some vertices.
+#[derive(Debug, Default)]
+struct RestrictedSystem {
+    diagonal: Vec<f64>,
+    /// Preconditioner.
+    inverse: Vec<Matrix3<f64>>,
+    /// Column and value beside the diagonal, row after row.
+    entries: Vec<(u32, f64)>,
+    /// End of each row in them.
+    ends: Vec<usize>,
+    rhs: Vec<Vector3<f64>>,
+}
+
+impl RestrictedSystem {
+    fn multiply(&self, from: &[Vector3<f64>], to: &mut [Vector3<f64>]) {
+        let mut first = 0;
+        for (row, out) in to.iter_mut().enumerate() {
+            let mut sum = from[row] * self.diagonal[row];
+            for (column, value) in &self.entries[first..self.ends[row]] {
+                sum += from[*column as usize] * *value;
+            }
+            (*out, first) = (sum, self.ends[row]);
+        }
+    }
+}
+
+/// Columns of each row of a pattern beside its diagonal, and the slots of their values; `pairs` are the entries.
+fn rows(pattern: &SymmetricPattern, pairs: &[(u32, u32)]) -> [Csr; 2] {
+    let both = pairs.iter().flat_map(|&(a, b)| [(a, b), (b, a)]);
+    let columns: Vec<(u32, u32)> = both.filter(|(a, b)| a != b).collect();
+    let slot = |&(a, b): &(u32, u32)| (a, pattern.slot(a, b).unwrap_or_default() as u32);
+    let slots: Vec<(u32, u32)> = columns.iter().map(slot).collect();
+    [columns, slots].map(|all| Csr::from_pairs(pattern.size(), &all))
 }
 
 fn fault(e: LinearError) -> CaptureError {
@@ -242,6 +350,29 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// Some vertices solved with the others held at the minimum arrive there too.
+    #[test]
+    fn some_vertices_alone_arrive_at_the_minimum_of_all() {
+        let n = 12;
+        let edges = (1..n).map(|i| Stencil::edge([i - 1, i], 0.5 + 0.1 * f64::from(i)));
+        let mut energy = QuadraticEnergy::new(n as usize, edges.collect(), &[]).expect("in range");
+        (0..n as usize - 1).for_each(|k| energy.add_stencil(k, 1.0, [0.01, 0.0, 0.02]));
+        for v in [0, 5, 11] {
+            energy.add_vertex(v, 0.3, &P3::new(v as f32, 1.0, -1.0));
+        }
+        let least = energy.minimise("test").expect("definite");
+        let some = [2, 3, 4, 8, 9];
+        let mut x = least.clone();
+        some.iter().for_each(|v| x[*v as usize].y += 0.5);
+        for _ in 0..4 {
+            energy.minimise_some(&mut x, &some, "test").expect("solved");
+        }
+        let off = x.iter().zip(&least).map(|(a, b)| (a - b).norm());
+        assert!(off.fold(0.0, f32::max) < 1e-5);
+        x[2].y = f32::NAN;
+        assert!(energy.minimise_some(&mut x, &some, "test").is_err());
     }
 
     #[test]

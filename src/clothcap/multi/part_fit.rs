@@ -3,15 +3,17 @@
 use super::part::ClothPart;
 use crate::clothcap::CaptureError;
 use crate::clothcap::align::{
-    EVEN_EDGE, FaceCache, Found, QuadraticEnergy, QueryCounts, ScanNormal, Stencil,
+    ActiveVertices, EVEN_EDGE, FaceCache, Found, QuadraticEnergy, QueryCounts, QuerySurface,
+    ScanNormal, Stencil, VertexCounts,
 };
 use crate::clothcap::face_edges::{edges, neighbours};
 use crate::clothcap::scan::BodyScan;
 use crate::math::{P3, V3};
-use crate::mesh::face_normal;
+use crate::mesh::{Csr, face_normal};
 use crate::par::{self, Par};
 use crate::registration::GemanMcClure;
 use crate::spatial::{Bvh, PointTree};
+use std::sync::Arc;
 
 /// Smallest cosine between normals of a pair.
 const NORMALS: f32 = 0.2;
@@ -21,6 +23,8 @@ const BESIDE: f32 = 0.7;
 const ANCHOR: f64 = 1e-4;
 /// Mean motion of the vertices below which the fit ends, metres.
 const CONVERGED: f32 = 5e-5;
+/// Name of the solve in faults.
+const STAGE: &str = "garment part";
 /// Distance up to which a boundary point of the scan belongs to a ring, metres.
 const RING_REACH: f32 = 0.06;
 
@@ -43,6 +47,8 @@ pub struct PartFitConfig {
     pub points: usize,
     /// Motion of a face up to which the points on it keep it without a search, metres; 0 searches always.
     pub settled: f32,
+    /// Motion of a vertex in an iteration up to which it is held in the next, metres; 0 solves all in each.
+    pub still: f32,
 }
 
 impl Default for PartFitConfig {
@@ -56,6 +62,7 @@ impl Default for PartFitConfig {
             iterations: 8,
             points: 15_000,
             settled: 0.0,
+            still: 0.0,
         }
     }
 }
@@ -73,6 +80,8 @@ pub struct PartFitReport {
     pub iterations: usize,
     /// Nearest-point queries.
     pub queries: QueryCounts,
+    /// Vertices.
+    pub vertices: VertexCounts,
 }
 
 /// BodyScan points of one part.
@@ -131,8 +140,9 @@ pub struct PartFit {
     /// Stencils: edges, then Laplacians, then rings.
     ranges: [usize; 3],
     bvh: Bvh,
-    /// A face at each vertex.
-    face_at: Vec<u32>,
+    /// Faces around each vertex.
+    around: Csr,
+    neighbours: Arc<Csr>,
 }
 
 impl PartFit {
@@ -143,7 +153,7 @@ impl PartFit {
     pub fn new(part: &ClothPart, rest: &[P3]) -> Result<Self, CaptureError> {
         let n = part.nodes.len();
         let edges = edges(&part.faces);
-        let around = neighbours(n, &edges);
+        let neighbours = neighbours(n, &edges);
         let mut on_ring = vec![false; n];
         part.rings
             .iter()
@@ -152,7 +162,7 @@ impl PartFit {
         let mut stencils: Vec<Stencil> =
             edges.iter().map(|e| Stencil::edge(*e, EVEN_EDGE)).collect();
         let laplacian = |v: u32| {
-            let row = around.row(v as usize);
+            let row = neighbours.row(v as usize);
             let mut vertices = vec![v];
             vertices.extend(row);
             let mut factors = vec![1.0];
@@ -174,17 +184,16 @@ impl PartFit {
                 weight: 1.0,
             }));
         }
-        let mut face_at = vec![0; n];
-        for (k, f) in part.faces.iter().enumerate() {
-            f.iter().for_each(|v| face_at[*v as usize] = k as u32);
-        }
+        let corners = part.faces.iter().enumerate();
+        let corners = corners.flat_map(|(k, f)| f.map(|v| (v, k as u32)));
         Ok(Self {
-            face_at,
+            around: Csr::from_pairs(n, &corners.collect::<Vec<_>>()),
             ranges: [edges.len(), second, stencils.len()],
             energy: QuadraticEnergy::new(n, stencils, &part.faces)?,
             bvh: Bvh::new(&part.faces, rest),
             part: part.clone(),
             edges,
+            neighbours: Arc::new(neighbours),
         })
     }
 
@@ -204,53 +213,66 @@ impl PartFit {
         let stride = scan.points.len().div_ceil(config.points.max(1)).max(1);
         let point = area / scan.points.len().div_ceil(stride).max(1) as f64;
         let mut report = PartFitReport::default();
-        let mut cache = self.cache(scan, stride, config);
+        let mut cache = self.cache((scan, stride), config);
+        let neighbours = self.neighbours.clone();
+        let mut active = ActiveVertices::new(&neighbours, config.still);
         while report.iterations < config.iterations {
             let matches = self.pair((scan, stride), surface, config, &mut cache);
-            self.energy.reset();
-            for (i, e) in self.edges.iter().enumerate() {
-                let d = (model[e[0] as usize] - model[e[1] as usize]).cast::<f64>();
-                self.energy
-                    .add_stencil(i, config.coupling * config.coupling, d.into());
-            }
-            // A Laplacian of size δ on an even mesh bends like δ / h², so its weight is length⁴ / h⁴ by area.
-            let bend = (config.laplacian * config.laplacian / vertex).powi(2) * vertex;
-            (self.ranges[0]..self.ranges[1])
-                .for_each(|i| self.energy.add_stencil(i, bend, [0.0; 3]));
-            let smooth = config.smoothness * vertex;
-            (self.ranges[1]..self.ranges[2])
-                .for_each(|i| self.energy.add_stencil(i, smooth, [0.0; 3]));
-            for (v, p) in model.iter().enumerate() {
-                self.energy.add_vertex(v as u32, ANCHOR * vertex, p);
-            }
-            for m in &matches {
-                self.energy
-                    .add_face_point(m.face, m.corners, point * m.weight, &m.target);
-            }
+            self.assemble(model, (&matches, point), vertex, config);
             report.boundary_error = self.add_boundary(scan, surface, config.boundary * vertex);
 
-            let moved = self.energy.minimise("garment part")?;
+            let faces = matches.iter().map(|m| self.part.faces[m.face as usize]);
+            active.see(faces, ring_vertices(&self.part));
             report.iterations += 1;
-            let settled = mean_motion(&moved, surface) < CONVERGED;
-            *surface = moved;
-            if settled {
+            if active.solve(&mut self.energy, surface, STAGE)? < CONVERGED {
                 break;
             }
         }
-        cache.search_all();
-        let matches = self.pair((scan, 1), surface, config, &mut cache);
+        active.finish(&mut self.energy, surface, STAGE)?;
+        let matches = self.pair((scan, stride), surface, config, &mut cache);
         report.queries = cache.counts();
+        report.vertices = active.counts();
         report.error = mean_distance(&matches);
         report.paired = matches.len();
         Ok(report)
     }
 
-    /// Cache whose searches start at the faces near which the single mesh had the points.
-    fn cache(&self, scan: &PartScan, stride: usize, config: &PartFitConfig) -> FaceCache {
-        let mut cache = FaceCache::new(scan.points.len(), stride, config.settled);
-        for (i, node) in scan.near.iter().enumerate() {
+    /// Fills the system with all terms but those of the boundary; `point` and `vertex` are the areas of a scan point and of
+    /// a vertex, m².
+    fn assemble(
+        &mut self,
+        model: &[P3],
+        (matches, point): (&[PartMatch], f64),
+        vertex: f64,
+        config: &PartFitConfig,
+    ) {
+        self.energy.reset();
+        for (i, e) in self.edges.iter().enumerate() {
+            let d = (model[e[0] as usize] - model[e[1] as usize]).cast::<f64>();
+            self.energy
+                .add_stencil(i, config.coupling * config.coupling, d.into());
+        }
+        // A Laplacian of size δ on an even mesh bends like δ / h², so its weight is length⁴ / h⁴ by area.
+        let bend = (config.laplacian * config.laplacian / vertex).powi(2) * vertex;
+        (self.ranges[0]..self.ranges[1]).for_each(|i| self.energy.add_stencil(i, bend, [0.0; 3]));
+        let smooth = config.smoothness * vertex;
+        (self.ranges[1]..self.ranges[2]).for_each(|i| self.energy.add_stencil(i, smooth, [0.0; 3]));
+        for (v, p) in model.iter().enumerate() {
+            self.energy.add_vertex(v as u32, ANCHOR * vertex, p);
+        }
+        for m in matches {
+            self.energy
+                .add_face_point(m.face, m.corners, point * m.weight, &m.target);
+        }
+    }
+
+    /// Cache whose searches start at the faces near which the single mesh had the points, every `stride`-th of them.
+    fn cache(&self, (scan, stride): (&PartScan, usize), config: &PartFitConfig) -> FaceCache {
+        let mut cache = FaceCache::new(scan.points.len(), config.settled);
+        for (i, node) in scan.near.iter().enumerate().step_by(stride) {
             if let Ok(v) = self.part.nodes.binary_search(node) {
-                cache.start_at(i, self.face_at[v]);
+                let last = self.around.row(v).last();
+                last.into_iter().for_each(|f| cache.start_at(i, *f));
             }
         }
         cache
@@ -269,23 +291,28 @@ impl PartFit {
         let kernel = GemanMcClure {
             sigma: config.sigma,
         };
+        let query = QuerySurface {
+            tree: &self.bvh,
+            vertices: surface,
+            around: &self.around,
+        };
+        let normal_of = |i: usize| ScanNormal {
+            normal: scan.normals[i],
+            oriented: scan.oriented,
+        };
         let mut found = Vec::new();
         let count = scan.points.len().div_ceil(stride);
         par::map_into(Par::Rayon, count, 256, &mut found, |k| {
             let i = k * stride;
-            cache.closest(i, (&self.bvh, surface), &scan.points[i])
+            cache.closest(i, &query, (&scan.points[i], normal_of(i)), NORMALS)
         });
         let matched = |(k, found): (usize, Option<Found>)| {
             let (i, found) = (k * stride, found?);
             cache.keep(i, &found);
             let found = found.point;
-            let of_scan = ScanNormal {
-                normal: scan.normals[i],
-                oriented: scan.oriented,
-            };
             let face = &self.part.faces[found.face as usize];
             let own = face_normal(surface, face).try_normalize(f32::MIN_POSITIVE)?;
-            of_scan.agrees(&own, NORMALS).then(|| PartMatch {
+            normal_of(i).agrees(&own, NORMALS).then(|| PartMatch {
                 face: found.face,
                 corners: found.weights,
                 target: scan.points[i],
@@ -298,12 +325,7 @@ impl PartFit {
 
     /// Pulls each ring vertex to the mean of the scan's boundary points nearest to it; their mean distance, metres.
     fn add_boundary(&mut self, scan: &PartScan, surface: &[P3], weight: f64) -> f64 {
-        let ring: Vec<u32> = self
-            .part
-            .rings
-            .iter()
-            .flat_map(|r| r.vertices.clone())
-            .collect();
+        let ring: Vec<u32> = ring_vertices(&self.part).collect();
         let places: Vec<P3> = ring.iter().map(|v| surface[*v as usize]).collect();
         let tree = PointTree::new(&places);
         let mut sums = vec![(V3::zeros(), 0.0f32); ring.len()];
@@ -332,10 +354,8 @@ struct PartMatch {
     weight: f64,
 }
 
-/// Mean way of the vertices between two iterations, metres.
-fn mean_motion(moved: &[P3], before: &[P3]) -> f32 {
-    let way = moved.iter().zip(before).map(|(a, b)| (a - b).norm());
-    way.sum::<f32>() / moved.len().max(1) as f32
+fn ring_vertices(part: &ClothPart) -> impl Iterator<Item = u32> + '_ {
+    part.rings.iter().flat_map(|r| &r.vertices).copied()
 }
 
 fn mean_distance(matches: &[PartMatch]) -> f64 {

@@ -1,0 +1,176 @@
+//! Fit of all garments of an outfit to one segmented scan.
+
+use super::CaptureError;
+use super::align::{AlignedBody, QueryCounts, SETTLED, STILL, VertexCounts};
+use super::captured_outfit::CapturedOutfit;
+use super::multi::{ClothPart, MultiCloth, PartFit, PartFitConfig, PartScan};
+use super::part_colors::part_colors;
+use super::retarget::pose_part;
+use super::scan::BodyScan;
+use super::segmenter::SegmentedScan;
+use super::texture::TextureAtlas;
+use super::topology::ClothTemplate;
+use super::unpose::unpose_shaped;
+use crate::body::BoneTransforms;
+use crate::math::P3;
+
+/// Side of a texel over the distance between the scan's colours, and its limits, metres.
+const TEXEL: f32 = 0.5;
+/// See [`TEXEL`].
+const TEXELS: [f32; 2] = [0.001, 0.004];
+
+/// Garments on one scan.
+#[derive(Debug, Default)]
+pub(super) struct FittedParts {
+    /// Posed vertices of each, world, metres.
+    pub(super) vertices: Vec<Vec<P3>>,
+    /// Mean distance of each one's scan points from it, metres.
+    pub(super) errors: Vec<f64>,
+    /// Mean distance of the scan's boundary points from each one's rings, metres.
+    pub(super) boundary_errors: Vec<f64>,
+    pub(super) queries: QueryCounts,
+    pub(super) vertex_counts: VertexCounts,
+}
+
+/// Fit of all parts to one segmented scan.
+pub(super) struct PartFitter<'a> {
+    /// Systems of the garments so far.
+    fits: &'a mut Vec<PartFit>,
+    cloth: &'a ClothTemplate,
+    scan: &'a BodyScan,
+    segmented: &'a SegmentedScan,
+    /// Vertex of the clothed template that each scan point lies near, shape `[points]`.
+    near: Vec<u32>,
+    config: PartFitConfig,
+}
+
+impl<'a> PartFitter<'a> {
+    /// Fitter of one scan; `fits` are the systems of the garments so far. With skips, settled points and vertices are held.
+    pub(super) fn new(
+        fits: &'a mut Vec<PartFit>,
+        cloth: &'a ClothTemplate,
+        (scan, segmented): (&'a BodyScan, &'a SegmentedScan),
+        (config, skips): (&PartFitConfig, bool),
+    ) -> Self {
+        let [settled, still] = if skips { [SETTLED, STILL] } else { [0.0; 2] };
+        Self {
+            fits,
+            cloth,
+            scan,
+            segmented,
+            near: nearest_nodes(segmented, cloth),
+            config: PartFitConfig {
+                settled,
+                still,
+                ..*config
+            },
+        }
+    }
+
+    /// Parts of the first scan, coupled to the body model (eq. 18), and the outfit that they make.
+    pub(super) fn first(
+        &mut self,
+        body: AlignedBody,
+    ) -> Result<(CapturedOutfit, FittedParts), CaptureError> {
+        let segmented = self.segmented;
+        let cloth = MultiCloth::new(self.cloth, &segmented.labelling);
+        if cloth.parts.is_empty() {
+            return Err(CaptureError::NoGarment);
+        }
+        let alignment = &segmented.alignment;
+        let mut fitted = FittedParts::default();
+        for part in &cloth.parts {
+            let pick = |v: &[P3]| {
+                part.nodes
+                    .iter()
+                    .map(|i| v[*i as usize])
+                    .collect::<Vec<_>>()
+            };
+            let model = pick(&alignment.model);
+            self.fit(part, &model, pick(&alignment.surface), &mut fitted)?;
+        }
+        let parts = cloth.parts.iter().zip(&fitted.vertices);
+        let rest = parts.map(|(part, v)| rest(self.cloth, &alignment.bones, part, v));
+        let colors = cloth
+            .parts
+            .iter()
+            .map(|part| part_colors(part, segmented, segmented.evened(self.scan)));
+        let rest: Vec<Vec<P3>> = rest.collect();
+        let texel = TEXEL * self.scan.color_spacing();
+        let atlases = cloth.parts.iter().zip(&rest);
+        let atlases = atlases.map(|(part, rest)| {
+            TextureAtlas::new(rest, &part.faces, texel.clamp(TEXELS[0], TEXELS[1]))
+        });
+        let is_colored = !self.scan.colors.is_empty();
+        let outfit = CapturedOutfit {
+            atlases: atlases.filter(|_| is_colored).collect(),
+            colors: colors.collect(),
+            rest,
+            labelling: segmented.labelling.clone(),
+            body,
+            cloth,
+        };
+        Ok((outfit, fitted))
+    }
+
+    /// Parts of a later scan, coupled to the posed multi-cloth template (eq. 21).
+    pub(super) fn later(&mut self, outfit: &CapturedOutfit) -> Result<FittedParts, CaptureError> {
+        let mut fitted = FittedParts::default();
+        let bones = &self.segmented.alignment.bones;
+        for (part, rest) in outfit.cloth.parts.iter().zip(&outfit.rest) {
+            let model = pose_part(part, self.cloth.template(), bones, rest);
+            self.fit(part, &model, model.clone(), &mut fitted)?;
+        }
+        Ok(fitted)
+    }
+
+    fn fit(
+        &mut self,
+        part: &ClothPart,
+        model: &[P3],
+        start: Vec<P3>,
+        out: &mut FittedParts,
+    ) -> Result<(), CaptureError> {
+        let segmented = self.segmented;
+        let points = PartScan::new(
+            (self.scan, &segmented.edges),
+            (&segmented.labels, &self.near),
+            part.label,
+        );
+        let mut vertices = start;
+        let k = out.vertices.len();
+        if k == self.fits.len() {
+            // The order of its faces must not depend on the scan at which a capture was continued.
+            let template = self.cloth.template().mesh().vertices();
+            let rest: Vec<P3> = part.nodes.iter().map(|v| template[*v as usize]).collect();
+            self.fits.push(PartFit::new(part, &rest)?);
+        }
+        let report = self.fits[k].run(&points, model, &mut vertices, &self.config)?;
+        out.vertices.push(vertices);
+        out.errors.push(report.error);
+        out.boundary_errors.push(report.boundary_error);
+        out.queries += report.queries;
+        out.vertex_counts += report.vertices;
+        Ok(())
+    }
+}
+
+/// Vertex of the clothed template nearest to each scan point on the single mesh, shape `[points]`.
+fn nearest_nodes(segmented: &SegmentedScan, cloth: &ClothTemplate) -> Vec<u32> {
+    let faces = cloth.template().mesh().faces();
+    let matches = segmented.alignment.matches.iter();
+    matches
+        .map(|m| faces[m.face as usize][m.nearest_corner()])
+        .collect()
+}
+
+/// Rest vertices of a part from posed ones (eq. 15), metres.
+pub(super) fn rest(
+    cloth: &ClothTemplate,
+    bones: &BoneTransforms,
+    part: &ClothPart,
+    posed: &[P3],
+) -> Vec<P3> {
+    let nodes = part.nodes.iter().map(|v| *v as usize);
+    unpose_shaped(cloth.template(), bones, nodes, posed)
+}
