@@ -22,13 +22,14 @@ const SAMPLES: usize = 6000;
 /// BodyScan points in a fit of a later pose.
 const LATER_SAMPLES: usize = 3000;
 /// Stages of a later pose.
-const LATER: [FitStage; 2] = [FitStage::posed(0.08, 8), FitStage::posed(0.03, 6)];
+const LATER: [FitStage; 2] = [FitStage::posed(0.08, 8), FitStage::posed(0.03, 10)];
 /// Turns about the vertical between two scans that are tried, radians.
 const TURNS: [f64; 3] = [FRAC_PI_2, PI, -FRAC_PI_2];
 /// Mean robust distance in the last pose below which no turn is tried, metres: a back is farther from a front.
 const FACING: f64 = 0.02;
-/// Change of the mean robust distance in the last aligned pose up to which a scan may show that pose again, metres.
-const SAME: f64 = 1e-4;
+/// Change of the mean robust distance in the last aligned pose up to which a scan shows that pose again, metres: sensor
+/// noise of 0.05 mm averages to less, any motion changes it by more.
+const SAME: f64 = 2e-6;
 /// Mean robust distance above which a later pose is lost and the person is searched anew, metres.
 const LOST: f64 = 0.03;
 
@@ -241,7 +242,7 @@ impl Aligner {
         let template = self.cloth.template().clone();
         let fit = ModelFit::new(&template, scan, LATER_SAMPLES).with_clothed(&clothed.rest);
         let mut fit = fit.with_starts(self.skips);
-        let found = match self.unmoved(&mut fit)? {
+        let found = match self.unmoved(&mut fit) {
             Some(body) => LaterPose {
                 body,
                 searched: false,
@@ -260,14 +261,10 @@ impl Aligner {
         })
     }
 
-    /// Body of the last scan, if this one shows its pose: a fit would end there.
-    fn unmoved(&self, fit: &mut ModelFit<'_>) -> Result<Option<AlignedBody>, CaptureError> {
-        let Some((body, error)) = self.aligned.as_ref().filter(|_| self.skips) else {
-            return Ok(None);
-        };
-        let is_near = (fit.error(body) - error).abs() < SAME;
-        let is_same = is_near && fit.is_settled(body, &LATER[1])?;
-        Ok(is_same.then(|| body.clone()))
+    /// Body of the last scan, if this one shows its pose.
+    fn unmoved(&self, fit: &mut ModelFit<'_>) -> Option<AlignedBody> {
+        let (body, error) = self.aligned.as_ref().filter(|_| self.skips)?;
+        ((fit.error(body) - error).abs() < SAME).then(|| body.clone())
     }
 
     /// Pose by the clothed template, from that of the last scan.
@@ -279,8 +276,9 @@ impl Aligner {
     ) -> Result<LaterPose, CaptureError> {
         let last = &self.last.as_ref().unwrap_or(&clothed.body).pose;
         let (mut body, turns_skipped) = self.turned(last, clothed, fit);
-        fit.run(&mut body, &LATER[0])?;
-        fit.run(&mut body, &FitStage::posed(0.03, 10))?;
+        for stage in &LATER {
+            fit.run(&mut body, stage)?;
+        }
         if search_lost_arms(&self.template, scan, fit, &mut body)? {
             fit.run(&mut body, &LATER[1])?;
         }

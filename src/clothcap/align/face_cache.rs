@@ -120,16 +120,16 @@ impl FaceCache {
             && self.travel[k.face as usize] - k.travel < self.settled
         {
             let point = surface.tree.point_of_face(surface.vertices, p, k.face);
-            let search = Search::Skipped(k);
+            let search = FaceSearch::Skipped(k);
             return Some(Found { point, search });
         }
         let near = kept.filter(|_| self.starts).map(|k| k.face);
         if let Some(point) = near.and_then(|f| surface.descend((p, normal), f, least)) {
-            let search = Search::Near;
+            let search = FaceSearch::Near;
             return Some(Found { point, search });
         }
         let point = surface.tree.closest_near(surface.vertices, p, near)?;
-        let search = Search::Whole;
+        let search = FaceSearch::Whole;
         Some(Found { point, search })
     }
 
@@ -141,15 +141,15 @@ impl FaceCache {
             travel: self.travel[face as usize],
         };
         self.kept[i] = Some(match found.search {
-            Search::Skipped(kept) => {
+            FaceSearch::Skipped(kept) => {
                 self.counts.skipped += 1;
                 kept
             }
-            Search::Near => {
+            FaceSearch::Near => {
                 self.counts.near += 1;
                 fresh
             }
-            Search::Whole => {
+            FaceSearch::Whole => {
                 self.counts.made += 1;
                 fresh
             }
@@ -164,7 +164,7 @@ impl FaceCache {
 
 /// Extent of a search.
 #[derive(Clone, Copy, Debug)]
-enum Search {
+enum FaceSearch {
     /// None: the face in the cache.
     Skipped(KeptFace),
     /// Faces around the last one.
@@ -177,5 +177,5 @@ enum Search {
 #[derive(Clone, Copy, Debug)]
 pub(in crate::clothcap) struct Found {
     pub(in crate::clothcap) point: SurfacePoint,
-    search: Search,
+    search: FaceSearch,
 }

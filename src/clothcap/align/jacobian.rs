@@ -1,6 +1,5 @@
 //! Normal equations of matched scan points in pose and shape, from the few unknowns that move each point.
 
-use super::model_fit::Match;
 use crate::body::Template;
 use crate::math::V3;
 use crate::mesh::Face;
@@ -12,6 +11,18 @@ use nalgebra::{DMatrix, DVector, Vector3};
 const TANGENTIAL: f64 = 0.05;
 /// Matches in one partial sum.
 const CHUNK: usize = 256;
+
+/// A scan point on the surface.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Match {
+    pub(super) face: u32,
+    pub(super) corners: [f32; 3],
+    pub(super) point: Vector3<f64>,
+    pub(super) normal: Vector3<f64>,
+    /// BodyScan point minus surface point.
+    pub(super) residual: Vector3<f64>,
+    pub(super) weight: f64,
+}
 
 /// Jacobian of the matches. Pose blend shapes are in the residuals and left out here: muscles and folds of skin move by a
 /// centimetre while a joint turns by a radian, limbs by 25 cm.

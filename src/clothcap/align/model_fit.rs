@@ -3,8 +3,8 @@
 use super::angle_priors::{angle_deviations, straight_precisions};
 use super::body_equations::BodyEquations;
 use super::face_walk::QuerySurface;
-use super::jacobian::JacobianRows;
-use super::pairing::{ScanNormal, closest_facing_near};
+use super::jacobian::{JacobianRows, Match};
+use super::pairing::ScanNormal;
 use super::shape_unknowns::ShapeUnknowns;
 use crate::body::parts::BodySegment;
 use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin_moved};
@@ -16,7 +16,7 @@ use crate::par::{self, Par};
 use crate::registration::GemanMcClure;
 use crate::spatial::Bvh;
 use crate::tracking::{apply, linearise};
-use nalgebra::{DVector, Vector3};
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -108,18 +108,6 @@ pub struct ModelFitReport {
     pub error: f64,
     /// Points with a partner.
     pub paired: usize,
-}
-
-/// A scan point on the surface.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Match {
-    pub(super) face: u32,
-    pub(super) corners: [f32; 3],
-    pub(super) point: Vector3<f64>,
-    pub(super) normal: Vector3<f64>,
-    /// BodyScan point minus surface point.
-    pub(super) residual: Vector3<f64>,
-    pub(super) weight: f64,
 }
 
 /// Fit of the body model to some points of a scan.
@@ -304,7 +292,7 @@ impl<'a> ModelFit<'a> {
             vertices: &self.posed,
             around: self.template.topology().vertex_faces(),
         };
-        let (found, normal) = closest_facing_near(&surface, (&p, self.near[i]), normal, NORMALS)?;
+        let (found, normal) = surface.closest_facing((&p, normal), self.near[i], NORMALS)?;
         let face = self.bvh.faces()[found.face as usize];
         let mut residual = (p - found.point).cast::<f64>();
         let mut weight = kernel.weight(residual.norm_squared());
@@ -357,27 +345,6 @@ impl<'a> ModelFit<'a> {
             }
         }
         Ok(report)
-    }
-
-    /// The pose is one that a stage would end at: its next update is below the bound.
-    ///
-    /// # Errors
-    /// As [`ModelFit::run`].
-    pub(super) fn is_settled(
-        &mut self,
-        body: &AlignedBody,
-        stage: &FitStage,
-    ) -> Result<bool, CaptureError> {
-        let mut moved = body.clone();
-        let unknowns = ShapeUnknowns::new(self.template, &mut moved.shape, false);
-        let prior = Prior {
-            start: &body.pose,
-            unknowns: &unknowns,
-            freedom: stage.freedom,
-        };
-        let mut report = ModelFitReport::default();
-        let update = self.newton_update(body, &prior, stage.sigma, &mut report)?;
-        Ok(self.update(&mut moved, &unknowns, &update) < CONVERGED)
     }
 
     /// Gauss–Newton update of one iteration, which is counted in the report.

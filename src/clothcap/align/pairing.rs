@@ -1,6 +1,5 @@
 //! Pairs of scan points and surface points, by distance and direction of their normals.
 
-use super::face_walk::QuerySurface;
 use crate::math::{P3, V3};
 use crate::mesh::face_normal;
 use crate::spatial::{Bvh, SurfacePoint};
@@ -34,20 +33,8 @@ pub(in crate::clothcap) fn closest_facing(
     facing((bvh, surface), found, normal, least)
 }
 
-/// The same, faster from a face that may lie near the point: it and its neighbours are searched first.
-pub(in crate::clothcap) fn closest_facing_near(
-    surface: &QuerySurface<'_>,
-    (point, near): (&P3, Option<u32>),
-    normal: ScanNormal,
-    least: f32,
-) -> Option<(SurfacePoint, V3)> {
-    let found = near.and_then(|f| surface.descend((point, normal), f, least));
-    let whole = || surface.tree.closest_near(surface.vertices, point, near);
-    let found = found.or_else(whole)?;
-    facing((surface.tree, surface.vertices), found, normal, least)
-}
-
-fn facing(
+/// A point of the surface and the unit normal of its face; `None` if it differs.
+pub(super) fn facing(
     (bvh, surface): (&Bvh, &[P3]),
     found: SurfacePoint,
     normal: ScanNormal,

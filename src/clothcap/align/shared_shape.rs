@@ -2,7 +2,8 @@
 //! normal equations of each scan, and what is left is summed.
 
 use super::body_equations::BodyEquations;
-use super::model_fit::{AlignedBody, CONVERGED, FitStage, Match, ModelFit, Prior};
+use super::jacobian::Match;
+use super::model_fit::{AlignedBody, CONVERGED, FitStage, ModelFit, Prior};
 use super::shape_unknowns::ShapeUnknowns;
 use crate::body::{Pose, Template};
 use crate::clothcap::CaptureError;
