@@ -27,9 +27,6 @@ const LATER: [FitStage; 2] = [FitStage::posed(0.08, 8), FitStage::posed(0.03, 10
 const TURNS: [f64; 3] = [FRAC_PI_2, PI, -FRAC_PI_2];
 /// Mean robust distance in the last pose below which no turn is tried, metres: a back is farther from a front.
 const FACING: f64 = 0.02;
-/// Change of the mean robust distance in the last aligned pose up to which a scan shows that pose again, metres: sensor
-/// noise of 0.05 mm averages to less, any motion changes it by more.
-const SAME: f64 = 2e-6;
 /// Mean robust distance above which a later pose is lost and the person is searched anew, metres.
 const LOST: f64 = 0.03;
 
@@ -104,8 +101,6 @@ pub struct Aligner {
     start: Option<Start>,
     /// Pose of the last scan.
     last: Option<AlignedBody>,
-    /// Aligned body of the last scan with its mean robust distance, metres.
-    aligned: Option<(AlignedBody, f64)>,
     /// Settled points keep their faces, and turns are tried only where they may help.
     skips: bool,
 }
@@ -123,7 +118,6 @@ impl Aligner {
             clothed: None,
             start: None,
             last: None,
-            aligned: None,
             skips: true,
         })
     }
@@ -194,7 +188,6 @@ impl Aligner {
             }
         };
         self.last = Some(out.body.clone());
-        self.aligned = Some((out.body.clone(), out.report.model_error));
         Ok(out)
     }
 
@@ -242,14 +235,7 @@ impl Aligner {
         let template = self.cloth.template().clone();
         let fit = ModelFit::new(&template, scan, LATER_SAMPLES).with_clothed(&clothed.rest);
         let mut fit = fit.with_starts(self.skips);
-        let found = match self.unmoved(&mut fit) {
-            Some(body) => LaterPose {
-                body,
-                searched: false,
-                turns_skipped: TURNS.len(),
-            },
-            None => self.later_pose(scan, clothed, &mut fit)?,
-        };
+        let found = self.later_pose(scan, clothed, &mut fit)?;
         let out = self.released(scan, &mut fit, found.body, &SurfaceFitConfig::later())?;
         Ok(Alignment {
             report: AlignmentReport {
@@ -259,12 +245,6 @@ impl Aligner {
             },
             ..out
         })
-    }
-
-    /// Body of the last scan, if this one shows its pose.
-    fn unmoved(&self, fit: &mut ModelFit<'_>) -> Option<AlignedBody> {
-        let (body, error) = self.aligned.as_ref().filter(|_| self.skips)?;
-        ((fit.error(body) - error).abs() < SAME).then(|| body.clone())
     }
 
     /// Pose by the clothed template, from that of the last scan.
