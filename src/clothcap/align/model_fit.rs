@@ -38,7 +38,7 @@ const UNKNOWN: f64 = 0.3;
 /// Weight of heads, hands and feet, which mostly are bare, beside the rest (w of eq. 5).
 const BARE: f64 = 2.0;
 /// Update below which a stage ends, metres at a lever of 25 cm.
-pub(super) const CONVERGED: f64 = 5e-4;
+pub(super) const CONVERGED: f64 = 1e-4;
 /// See [`CONVERGED`].
 const LEVER: f64 = 0.25;
 
