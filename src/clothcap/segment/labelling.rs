@@ -277,7 +277,7 @@ impl<'a> Labeller<'a> {
                 if slots[l] == Slot::Skin {
                     return self.skin_appearance();
                 }
-                self.appearance(&own(l).collect::<Vec<_>>(), slots[l])
+                self.appearance(own(l).collect(), slots[l])
             })
             .collect();
         // Garments of one colour share an appearance: else each keeps the shades of the nodes that it began with.
@@ -298,22 +298,33 @@ impl<'a> Labeller<'a> {
         out
     }
 
-    /// Appearance of a label's nodes. That of a garment leaves out bare skin among them, where the rest is clearly none: a
-    /// region starts whole, and shorts would keep the colour of the thighs below them.
-    fn appearance(&self, own: &[usize], slot: Slot) -> Option<ColorMixture> {
-        let all = ColorMixture::fit(&self.nodes.of(own.iter().copied()))?;
-        let Some(skin) = self.skin_appearance().filter(|_| slot.is_garment()) else {
-            return Some(all);
+    /// Appearance of a label's nodes; that of a garment leaves out bare skin among them.
+    fn appearance(&self, own: Vec<usize>, slot: Slot) -> Option<ColorMixture> {
+        let own = if slot.is_garment() {
+            self.without_skin(own)
+        } else {
+            own
+        };
+        ColorMixture::fit(&self.nodes.of(own.into_iter()))
+    }
+
+    /// Nodes of a garment's start without those that look like skin, if the rest clearly does not: regions start whole, and
+    /// shorts would keep the colour of the thighs below them.
+    pub(super) fn without_skin(&self, own: Vec<usize>) -> Vec<usize> {
+        let all = ColorMixture::fit(&self.nodes.of(own.iter().copied()));
+        let Some((all, skin)) = all.zip(self.skin_appearance()) else {
+            return own;
         };
         let is_cloth =
             |v: &usize| self.nodes.cost(*v, &skin) - self.nodes.cost(*v, &all) > DISTINCT;
         let cloth: Vec<usize> = own.iter().copied().filter(is_cloth).collect();
         let is_enough = cloth.len() as f64 >= LEAST_CLOTH * own.len() as f64;
         let excess = self.excess(cloth.iter().copied(), (&all, &skin));
-        if !is_enough || excess < LEAST_UNLIKE_SKIN {
-            return Some(all);
+        if is_enough && excess >= LEAST_UNLIKE_SKIN {
+            cloth
+        } else {
+            own
         }
-        ColorMixture::fit(&self.nodes.of(cloth.into_iter()))
     }
 
     /// Mean cost of another appearance above that of their own at some nodes, nats.

@@ -118,9 +118,8 @@ impl Labeller<'_> {
         };
         let start = self.first_labels(&found.slots);
         let own = |l: usize| {
-            (0..self.count())
-                .filter(|v| usize::from(start[*v]) == l)
-                .collect()
+            let all = (0..self.count()).filter(|v| usize::from(start[*v]) == l);
+            self.without_skin(all.collect())
         };
         let [upper, lower]: [Vec<usize>; 2] = [top, bottom].map(own);
         let look = |nodes: &[usize]| ColorMixture::fit(&self.nodes.of(nodes.iter().copied()));
@@ -220,5 +219,22 @@ mod tests {
             .filter(|((p, r), l)| is_bare(p, **r) == found.slots[usize::from(**l)].is_garment());
         let wrong = wrong.count();
         assert!(wrong * 100 < regions.len(), "{wrong} nodes");
+    }
+
+    #[test]
+    fn a_dress_over_bare_thighs_is_one_piece() {
+        let cloth = ClothTemplate::new(&embedded::template(), LegTopology::Joined).expect("small");
+        let is_dress = |p: &P3, r: BodyRegion| {
+            use BodyRegion::*;
+            matches!(r, Chest | Abdomen | Pelvis) || r == Thigh && p.y > 0.65
+        };
+        let color = |p: &P3, r: BodyRegion| match is_dress(p, r) {
+            true => [120.0, 66.0, 92.0],
+            false => [96.0, 62.0, 44.0],
+        };
+        let nodes = NodeColors::painted(cloth.template(), color, |_| 0.0);
+        let found = label_nodes(&cloth, &nodes, &LabelConfig::default()).expect("finite");
+        let expected = [Slot::Skin, Slot::Hair, Slot::OnePiece];
+        assert_eq!(found.slots, expected);
     }
 }
