@@ -451,7 +451,8 @@ fn cameras_of_other_exposure_change_no_labels() {
     println!("{row:?}");
     let error = |name| row.get(name).unwrap_or(f64::NAN);
     assert!(error("F1") > 0.98);
-    assert!(error("boundary_mm") < 10.0);
+    // 33 mm without their gains.
+    assert!(error("boundary_mm") < 20.0);
 }
 
 #[test]
