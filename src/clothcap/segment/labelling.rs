@@ -27,7 +27,7 @@ const LEAST_CLOTH: f64 = 0.2;
 /// Turns of appearances and labels.
 const TURNS: usize = 5;
 /// Modes of skin, hair and what hands hold.
-pub(super) const SKIN_MODES: usize = 6;
+const SKIN_MODES: usize = 6;
 /// Mean cost above that of its own appearance from which a region is no skin, nats.
 pub(super) const DISTINCT: f64 = 0.8;
 /// Cost of a garment at a node of the tube between the legs that no scan point is near, nats: below a hem there is nothing.
@@ -260,12 +260,17 @@ impl<'a> Labeller<'a> {
         labels
     }
 
-    pub(super) fn skin_appearance(&self) -> Option<ColorMixture> {
-        let bare = |v: &usize| {
+    /// Face and hands.
+    pub(super) fn bare_nodes(&self) -> Vec<usize> {
+        let is_bare = |v: &usize| {
             let face = self.regions[*v] == BodyRegion::Head && !self.hair[*v];
             face || self.regions[*v] == BodyRegion::Hand
         };
-        let colors = self.nodes.of((0..self.count()).filter(bare));
+        (0..self.count()).filter(is_bare).collect()
+    }
+
+    pub(super) fn skin_appearance(&self) -> Option<ColorMixture> {
+        let colors = self.nodes.of(self.bare_nodes().into_iter());
         ColorMixture::fit_modes(&colors, SKIN_MODES)
     }
 

@@ -1,14 +1,17 @@
 //! Number and kinds of the garments of an outfit, found by the labels that each choice leads to.
 
 use super::color_mixture::ColorMixture;
-use super::labelling::{DISTINCT, LabelConfig, Labeller, Labelling, SKIN_MODES};
+use super::labelling::{DISTINCT, LabelConfig, Labeller, Labelling};
 use super::node_colors::NodeColors;
 use super::prior::{BodyRegion, Slot};
 use crate::clothcap::CaptureError;
 use crate::clothcap::topology::{ClothTemplate, LegTopology};
+use nalgebra::Vector3;
 
-/// The same for feet beside shins: they lie in another light. Bare ones have up to 3.1, shoes of `scans/liam` 7.6.
-const DISTINCT_SHOES: f64 = 5.0;
+/// Least difference between the dyes of shoes and skin, light left out: bare feet have up to 0.11, shoes from 0.37.
+const LEAST_DYE: f64 = 0.2;
+/// Least share of the feet that shoes cover: hems of trousers lie there, too.
+const LEAST_FEET: f64 = 0.3;
 /// Mean step at a hem from which one garment lies over the other, metres. A dress has 0.0009 along its deepest folds, tops over
 /// bottoms have 0.0012 to 0.008.
 const LEAST_OVERLAP: f64 = 0.0012;
@@ -79,36 +82,48 @@ impl Labeller<'_> {
     /// Slots of a labelling that are worn: those whose nodes do not look like skin.
     fn worn(&self, all: &Labelling) -> Vec<Slot> {
         let skin = self.skin_appearance();
-        // Feet lie in another light than faces; bare shins tell how skin looks there.
-        let is_shin = |v: &usize| all.labels[*v] == 0 && self.regions[*v] == BodyRegion::Shin;
-        let shins = self.nodes.of((0..self.count()).filter(is_shin));
-        let shins = ColorMixture::fit_modes(&shins, SKIN_MODES);
         let is_worn = |l: usize| {
-            let skin = match all.slots[l] {
-                Slot::Shoes => shins.as_ref().or(skin.as_ref()),
-                _ => skin.as_ref(),
-            };
             let own: Vec<usize> = (0..self.count())
                 .filter(|v| usize::from(all.labels[*v]) == l)
                 .filter(|v| !self.nodes.points.row(*v).is_empty())
                 .collect();
-            let (Some(skin), Some(look)) = (skin, &all.appearances[l]) else {
+            let (Some(skin), Some(look)) = (&skin, &all.appearances[l]) else {
                 return !own.is_empty();
             };
-            let excess = own
-                .iter()
-                .map(|v| self.nodes.cost(*v, skin) - self.nodes.cost(*v, look));
-            let least = if all.slots[l] == Slot::Shoes {
-                DISTINCT_SHOES
-            } else {
-                DISTINCT
-            };
-            excess.sum::<f64>() > least * own.len().max(1) as f64
+            if all.slots[l] == Slot::Shoes && !self.are_shoes(&own) {
+                return false;
+            }
+            self.excess(own.into_iter(), (look, skin)) > DISTINCT
         };
         (0..all.slots.len())
             .filter(|l| !all.slots[*l].is_garment() || is_worn(*l))
             .map(|l| all.slots[l])
             .collect()
+    }
+
+    /// Nodes cover the feet, and are dyed. Costs of colours do not tell: feet lie in another light than faces and hands.
+    fn are_shoes(&self, own: &[usize]) -> bool {
+        let seen = |v: &usize| self.nodes.means[*v].is_some();
+        let feet = (0..self.count()).filter(|v| self.regions[*v] == BodyRegion::Foot);
+        let feet = feet.filter(seen).count();
+        let covered = own.iter().filter(|v| self.regions[**v] == BodyRegion::Foot);
+        let dyes = self.dye(own).zip(self.dye(&self.bare_nodes()));
+        covered.count() as f64 >= LEAST_FEET * feet as f64
+            && dyes.is_none_or(|(shoes, skin)| (shoes - skin).norm() > LEAST_DYE)
+    }
+
+    /// Median colour of nodes without light.
+    fn dye(&self, nodes: &[usize]) -> Option<Vector3<f64>> {
+        let colors: Vec<_> = nodes
+            .iter()
+            .filter_map(|v| self.without_light(*v))
+            .collect();
+        let median = |axis: usize| {
+            let mut all: Vec<f64> = colors.iter().map(|c| c[axis]).collect();
+            all.sort_unstable_by(f64::total_cmp);
+            all.get(all.len() / 2).copied()
+        };
+        Some(Vector3::new(median(0)?, median(1)?, median(2)?))
     }
 
     /// Top and bottom of a labelling look alike.
@@ -236,5 +251,25 @@ mod tests {
         let found = label_nodes(&cloth, &nodes, &LabelConfig::default()).expect("finite");
         let expected = [Slot::Skin, Slot::Hair, Slot::OnePiece];
         assert_eq!(found.slots, expected);
+    }
+
+    #[test]
+    fn feet_in_another_light_are_bare_and_leather_is_worn() {
+        let finds_shoes = |feet: [f32; 3]| {
+            let cloth =
+                ClothTemplate::new(&embedded::template(), LegTopology::Apart).expect("small");
+            let color = |_: &P3, r: BodyRegion| match r {
+                BodyRegion::Foot => feet,
+                BodyRegion::Thigh | BodyRegion::Shin | BodyRegion::Pelvis => [44.0, 52.0, 86.0],
+                BodyRegion::Chest | BodyRegion::Abdomen => [40.0, 110.0, 60.0],
+                _ => [205.0, 150.0, 120.0],
+            };
+            let nodes = NodeColors::painted(cloth.template(), color, |_| 0.0);
+            let found = label_nodes(&cloth, &nodes, &LabelConfig::default()).expect("finite");
+            found.slots.contains(&Slot::Shoes)
+        };
+        assert!(!finds_shoes([205.0, 150.0, 120.0]));
+        assert!(!finds_shoes([160.0, 117.0, 94.0]), "shaded");
+        assert!(finds_shoes([92.0, 52.0, 30.0]), "brown leather");
     }
 }

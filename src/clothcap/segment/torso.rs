@@ -153,7 +153,7 @@ impl Labeller<'_> {
     }
 
     /// Mean colour of a node with little of its light left: hue and saturation, and the logarithm of brightness.
-    fn without_light(&self, node: usize) -> Option<Vector3<f64>> {
+    pub(super) fn without_light(&self, node: usize) -> Option<Vector3<f64>> {
         self.nodes.means[node].map(|c| {
             let bright = c.z + DARK;
             Vector3::new(c.x / bright, c.y / bright, BRIGHTNESS * bright.ln())
