@@ -62,7 +62,9 @@ impl Labeller<'_> {
         self.is_top_long = true;
         let low = self.run(high.slots.clone())?;
         let [up, down] = [&high, &low].map(|found| self.overlap(found));
-        let best = if down > up { low } else { high };
+        // A long hem lies over what is below it.
+        let is_low = down > up && down >= LEAST_OVERLAP;
+        let best = if is_low { low } else { high };
         self.is_top_long = best.is_top_long;
         // Overalls are rarer than trousers and a top of one colour, skirts and tops of one colour rarer than dresses.
         if legs == LegTopology::Joined && up.max(down) < LEAST_OVERLAP {
