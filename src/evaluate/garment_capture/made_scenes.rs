@@ -227,7 +227,7 @@ const SPECS: [MadeSpec; 13] = [
         clip: ("cmu_asf_amc/13_31.amc", 5.0),
         palette: ScanPalette::LowContrast,
         light_tint: 0.5,
-        is_unseen: true,
+        is_unseen: false,
     },
 ];
 
