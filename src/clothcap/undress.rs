@@ -2,8 +2,8 @@
 
 use super::CaptureError;
 use super::align::{
-    AlignedBody, EVEN_EDGE, FaceCache, FitStage, Found, ModelFit, QuadraticEnergy, QuerySurface,
-    SETTLED, ScanNormal, Stencil, fit_shared_shape,
+    AlignedBody, EVEN_EDGE, FaceCache, FitStage, ModelFit, QuadraticEnergy, QueryPoints,
+    QuerySurface, SETTLED, Stencil, fit_shared_shape,
 };
 use super::multi::MultiCloth;
 use super::retarget::SolidBody;
@@ -228,30 +228,24 @@ impl Undresser {
             vertices,
             around: self.template.topology().vertex_faces(),
         };
-        let normal_of = |i: usize| ScanNormal {
-            normal: scan.normals[i],
-            oriented: scan.oriented,
-        };
-        let mut found: Vec<Option<Found>> = Vec::new();
         let stride = scan.points.len().div_ceil(POINTS).max(1);
         let count = scan.points.len().div_ceil(stride);
-        par::map_into(Par::Rayon, count, 256, &mut found, |k| {
-            let i = k * stride;
-            let point = (&scan.points[i], normal_of(i));
-            let is_skin = !covered[i];
-            is_skin.then(|| cache.closest(i, &query, point, NORMALS))?
-        });
+        let points = QueryPoints {
+            points: &scan.points,
+            normals: &scan.normals,
+            oriented: scan.oriented,
+            stride,
+            left_out: covered,
+        };
         let kernel = GemanMcClure { sigma: SIGMA };
         let point = self.template.mesh().area() / count.max(1) as f64;
-        for (k, found) in found.iter().enumerate() {
-            let (i, Some(found)) = (k * stride, found) else {
+        for (i, of_scan, found) in cache.closest_each(&query, &points, NORMALS) {
+            let Some(at) = found else {
                 continue;
             };
-            cache.keep(i, found);
-            let at = &found.point;
             let own = face_normal(vertices, &self.bvh.faces()[at.face as usize]);
             let unit = own.try_normalize(f32::MIN_POSITIVE);
-            if unit.is_some_and(|own| normal_of(i).agrees(&own, NORMALS)) {
+            if unit.is_some_and(|own| of_scan.agrees(&own, NORMALS)) {
                 let weight = point * kernel.weight(f64::from(at.distance * at.distance));
                 self.energy
                     .add_face_point(at.face, at.weights, weight, &scan.points[i]);

@@ -2,8 +2,9 @@
 
 use super::face_walk::QuerySurface;
 use super::pairing::ScanNormal;
-use crate::math::P3;
+use crate::math::{P3, V3};
 use crate::mesh::Face;
+use crate::par::{self, Par};
 use crate::spatial::SurfacePoint;
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +33,30 @@ impl std::ops::AddAssign for QueryCounts {
 struct KeptFace {
     face: u32,
     travel: f32,
+}
+
+/// Points of a scan that look for a surface.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::clothcap) struct QueryPoints<'a> {
+    /// All of them, metres.
+    pub(in crate::clothcap) points: &'a [P3],
+    /// Their normals, see [`ScanNormal::normal`].
+    pub(in crate::clothcap) normals: &'a [V3],
+    /// See [`ScanNormal::oriented`].
+    pub(in crate::clothcap) oriented: bool,
+    /// Every so manieth takes part; at least 1.
+    pub(in crate::clothcap) stride: usize,
+    /// Points that take no part, shape `[points]`, or empty.
+    pub(in crate::clothcap) left_out: &'a [bool],
+}
+
+impl QueryPoints<'_> {
+    fn normal(&self, i: usize) -> ScanNormal {
+        ScanNormal {
+            normal: self.normals[i],
+            oriented: self.oriented,
+        }
+    }
 }
 
 /// Faces of the points of one fit.
@@ -106,9 +131,34 @@ impl FaceCache {
         self.last.extend_from_slice(surface);
     }
 
+    /// Points of the surface closest to every `stride`-th point, with the point's index and normal; each is kept.
+    pub(in crate::clothcap) fn closest_each(
+        &mut self,
+        surface: &QuerySurface<'_>,
+        points: &QueryPoints<'_>,
+        least: f32,
+    ) -> Vec<(usize, ScanNormal, Option<SurfacePoint>)> {
+        let count = points.points.len().div_ceil(points.stride);
+        let mut found = Vec::new();
+        par::map_into(Par::Rayon, count, 256, &mut found, |k| {
+            let i = k * points.stride;
+            let takes_part = !points.left_out.get(i).is_some_and(|out| *out);
+            let point = (&points.points[i], points.normal(i));
+            takes_part.then(|| self.closest(i, surface, point, least))?
+        });
+        let kept = |(k, found): (usize, Option<Found>)| {
+            let i = k * points.stride;
+            if let Some(found) = &found {
+                self.keep(i, found);
+            }
+            (i, points.normal(i), found.map(|f| f.point))
+        };
+        found.into_iter().enumerate().map(kept).collect()
+    }
+
     /// Point of the surface closest to point `i`, on its kept face, near it or searched; `least` is the smallest cosine
     /// between normals of a pair.
-    pub(in crate::clothcap) fn closest(
+    fn closest(
         &self,
         i: usize,
         surface: &QuerySurface<'_>,
@@ -134,7 +184,7 @@ impl FaceCache {
     }
 
     /// Keeps what was found for point `i`.
-    pub(in crate::clothcap) fn keep(&mut self, i: usize, found: &Found) {
+    fn keep(&mut self, i: usize, found: &Found) {
         let face = found.point.face;
         let fresh = KeptFace {
             face,
@@ -175,7 +225,7 @@ enum FaceSearch {
 
 /// Closest point and the search that found it.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::clothcap) struct Found {
-    pub(in crate::clothcap) point: SurfacePoint,
+struct Found {
+    point: SurfacePoint,
     search: FaceSearch,
 }

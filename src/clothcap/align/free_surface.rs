@@ -1,7 +1,7 @@
 //! Free surface of a single-mesh alignment (eq. 3 to 5): vertices follow the scan, edges stay near those of the body model.
 
 use super::active_vertices::{ActiveVertices, VertexCounts};
-use super::face_cache::{FaceCache, Found, QueryCounts};
+use super::face_cache::{FaceCache, QueryCounts, QueryPoints};
 use super::face_walk::QuerySurface;
 use super::model_fit::is_bare;
 use super::pairing::ScanNormal;
@@ -11,9 +11,9 @@ use crate::clothcap::CaptureError;
 use crate::clothcap::scan::BodyScan;
 use crate::math::{P3, V3};
 use crate::mesh::{Csr, Face, vertex_normals};
-use crate::par::{self, Par};
+use crate::par::Par;
 use crate::registration::GemanMcClure;
-use crate::spatial::Bvh;
+use crate::spatial::{Bvh, SurfacePoint};
 use std::sync::Arc;
 
 /// Coupling of hands, feet and head beside 1 elsewhere (w of eq. 5): scans are noisy there and no cloth covers them.
@@ -257,28 +257,22 @@ impl FreeSurface {
             vertices: surface,
             around: &self.around,
         };
-        let normal_of = |i: usize| ScanNormal {
-            normal: scan.normals[i],
+        let points = QueryPoints {
+            points: &scan.points,
+            normals: &scan.normals,
             oriented: scan.oriented,
+            stride,
+            left_out: &[],
         };
-        let mut found = Vec::new();
-        let count = scan.points.len().div_ceil(stride);
-        par::map_into(Par::Rayon, count, 256, &mut found, |k| {
-            let i = k * stride;
-            cache.closest(i, &query, (&scan.points[i], normal_of(i)), NORMALS)
-        });
-        let matched = |(k, found): (usize, &Option<Found>)| {
+        let matched = |(_, of_scan, found): (usize, ScanNormal, Option<SurfacePoint>)| {
             let Some(found) = found else {
                 return SurfaceMatch::default();
             };
-            let i = k * stride;
-            cache.keep(i, found);
-            let found = &found.point;
             let face = &self.faces[found.face as usize];
             let corners = found.weights;
             let normal: V3 = (0..3).map(|k| normals[face[k] as usize] * corners[k]).sum();
             let e2 = f64::from(found.distance * found.distance);
-            let agrees = normal_of(i).agrees(&normal, NORMALS);
+            let agrees = of_scan.agrees(&normal, NORMALS);
             SurfaceMatch {
                 face: found.face,
                 corners,
@@ -286,7 +280,8 @@ impl FreeSurface {
                 weight: if agrees { kernel.weight(e2) } else { 0.0 },
             }
         };
-        found.iter().enumerate().map(matched).collect()
+        let found = cache.closest_each(&query, &points, NORMALS);
+        found.into_iter().map(matched).collect()
     }
 }
 

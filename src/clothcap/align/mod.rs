@@ -21,7 +21,7 @@ pub(super) use active_vertices::ActiveVertices;
 pub use active_vertices::VertexCounts;
 pub use aligner::{Aligner, Alignment, AlignmentReport, ClothedTemplate};
 pub use face_cache::QueryCounts;
-pub(super) use face_cache::{FaceCache, Found};
+pub(super) use face_cache::{FaceCache, QueryPoints};
 pub(super) use face_walk::QuerySurface;
 pub use free_surface::{
     FreeSurface, SurfaceFitConfig, SurfaceFitReport, SurfaceMatch, SurfaceStage,

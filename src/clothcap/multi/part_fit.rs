@@ -3,16 +3,15 @@
 use super::part::ClothPart;
 use crate::clothcap::CaptureError;
 use crate::clothcap::align::{
-    ActiveVertices, EVEN_EDGE, FaceCache, Found, QuadraticEnergy, QueryCounts, QuerySurface,
+    ActiveVertices, EVEN_EDGE, FaceCache, QuadraticEnergy, QueryCounts, QueryPoints, QuerySurface,
     ScanNormal, Stencil, VertexCounts,
 };
 use crate::clothcap::face_edges::{edges, neighbours};
 use crate::clothcap::scan::BodyScan;
 use crate::math::{P3, V3};
 use crate::mesh::{Csr, face_normal};
-use crate::par::{self, Par};
 use crate::registration::GemanMcClure;
-use crate::spatial::{Bvh, PointTree};
+use crate::spatial::{Bvh, PointTree, SurfacePoint};
 use std::sync::Arc;
 
 /// Smallest cosine between normals of a pair.
@@ -296,23 +295,18 @@ impl PartFit {
             vertices: surface,
             around: &self.around,
         };
-        let normal_of = |i: usize| ScanNormal {
-            normal: scan.normals[i],
+        let points = QueryPoints {
+            points: &scan.points,
+            normals: &scan.normals,
             oriented: scan.oriented,
+            stride,
+            left_out: &[],
         };
-        let mut found = Vec::new();
-        let count = scan.points.len().div_ceil(stride);
-        par::map_into(Par::Rayon, count, 256, &mut found, |k| {
-            let i = k * stride;
-            cache.closest(i, &query, (&scan.points[i], normal_of(i)), NORMALS)
-        });
-        let matched = |(k, found): (usize, Option<Found>)| {
-            let (i, found) = (k * stride, found?);
-            cache.keep(i, &found);
-            let found = found.point;
+        let matched = |(i, of_scan, found): (usize, ScanNormal, Option<SurfacePoint>)| {
+            let found = found?;
             let face = &self.part.faces[found.face as usize];
             let own = face_normal(surface, face).try_normalize(f32::MIN_POSITIVE)?;
-            normal_of(i).agrees(&own, NORMALS).then(|| PartMatch {
+            of_scan.agrees(&own, NORMALS).then(|| PartMatch {
                 face: found.face,
                 corners: found.weights,
                 target: scan.points[i],
@@ -320,7 +314,8 @@ impl PartFit {
                 weight: kernel.weight(f64::from(found.distance * found.distance)),
             })
         };
-        found.into_iter().enumerate().filter_map(matched).collect()
+        let found = cache.closest_each(&query, &points, NORMALS);
+        found.into_iter().filter_map(matched).collect()
     }
 
     /// Pulls each ring vertex to the mean of the scan's boundary points nearest to it; their mean distance, metres.

@@ -16,6 +16,7 @@ import urllib.request
 from collections.abc import Iterator
 
 import psutil
+from separate_processes import free_ports
 
 from .credentials import Authority, Metadata, bearer
 from .report import NotBuilt
@@ -50,17 +51,6 @@ class Setup:
     authority: Authority | None = None
     # Processors that the program may use; 0 means all.
     cores: int = 0
-
-
-def free_ports(n: int) -> list[int]:
-    """Ports of the loopback interface that nobody uses now."""
-    sockets = [socket.socket() for _ in range(n)]
-    for s in sockets:
-        s.bind(("127.0.0.1", 0))
-    ports = [s.getsockname()[1] for s in sockets]
-    for s in sockets:
-        s.close()
-    return ports
 
 
 def toml(value: object) -> str:
