@@ -4,7 +4,7 @@ use super::body::PosedBody;
 use super::choice::Choice;
 use super::clock::{FrameClock, LongGap};
 use super::error::MirrorError;
-use super::outfit::{DressedOutfit, Subject};
+use super::outfit::{DressedOutfit, PutOn, Subject};
 use super::picture::{CameraGarments, DrawnBody, DrawnSurface};
 use super::report::{MirrorFrame, StageTimer};
 use crate::body::measure::measure;
@@ -152,7 +152,8 @@ impl Mirror {
             pose: &pose,
             world_from_camera,
         };
-        let outfit = DressedOutfit::put_on(&subject, sized, false).map_err(MirrorError::Dress)?;
+        let outfit =
+            DressedOutfit::put_on(&subject, sized, PutOn::default()).map_err(MirrorError::Dress)?;
         let appearance = |k: usize| {
             let source = outfit.source(k).map(|s| &outfit.worn()[s]);
             source.map_or_else(Appearance::default, |garment| Appearance {

@@ -40,6 +40,6 @@ pub use chain::Mirror;
 pub use choice::{Choice, SizedGarment};
 pub use clock::{FrameClock, LongGap};
 pub use error::MirrorError;
-pub use outfit::{DressedOutfit, Subject};
+pub use outfit::{DressedOutfit, PutOn, Subject};
 pub use picture::{CameraGarments, DrawnBody, DrawnSurface, FollowedBody, library_appearance};
 pub use report::MirrorFrame;

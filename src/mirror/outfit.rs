@@ -23,6 +23,18 @@ pub struct Subject<'a> {
     pub world_from_camera: Rigid<World, Camera>,
 }
 
+/// Longer edges of coarse garments: 2.4 times fewer vertices. Longer ones don't resolve sleeves.
+const COARSER: f64 = 1.55;
+
+/// Settings of putting on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PutOn {
+    /// Puts on garments that do not fit too.
+    pub any_size: bool,
+    /// Sews garments from coarser cloth, which costs less to simulate. Imported meshes keep theirs.
+    pub is_coarse: bool,
+}
+
 /// Garments on a body.
 #[derive(Debug)]
 pub struct DressedOutfit {
@@ -36,21 +48,25 @@ pub struct DressedOutfit {
 }
 
 impl DressedOutfit {
-    /// Puts garments on, on arms beside the trunk as [`PosedBody`](super::PosedBody) has them; takes about a second. With `any_size` also those that do not fit.
+    /// Puts garments on, on arms beside the trunk as [`PosedBody`](super::PosedBody) has them; takes about a second.
     ///
     /// # Errors
     /// Faults of the garments or the pose; without `any_size` a garment that does not fit.
     pub fn put_on(
         subject: &Subject<'_>,
         worn: Vec<SizedGarment>,
-        any_size: bool,
+        how: PutOn,
     ) -> Result<Self, DressError> {
         let wear: Vec<GarmentSource<'_>> = worn.iter().map(SizedGarment::wear).collect();
-        let options = DressOptions {
+        let mut options = DressOptions {
             config: Config::tracked().seen_from(&subject.world_from_camera),
-            any_size,
+            any_size: how.any_size,
             ..DressOptions::default()
         };
+        if how.is_coarse {
+            options.triangulation.edge_length *= COARSER;
+            options.triangulation.hood_length *= COARSER;
+        }
         let Subject { template, rest, .. } = subject;
         let arms = ArmClearance::new(template, rest);
         let mut bones = BoneTransforms::default();
@@ -84,6 +100,15 @@ impl DressedOutfit {
         let (model, state) = (&self.model, &mut self.state);
         self.wear.judge(model, state, &report, jumped);
         Ok(report)
+    }
+
+    /// Positions of each garment as skin carries it to a posed body (world, metres), without a step: for outfits that there
+    /// is no time to simulate. The state stays behind, and the next step puts the outfit on again if it must.
+    ///
+    /// # Errors
+    /// A body of another size or with a vertex that is not finite.
+    pub fn skinned(&self, body: &[P3]) -> Result<Vec<Vec<P3>>, ClothError> {
+        self.wear.skinned(&self.model, body)
     }
 
     /// False while the outfit is put on again after a jump of the body; it isn't shown then.

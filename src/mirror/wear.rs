@@ -1,7 +1,7 @@
 //! Fit of a worn outfit from step to step, and its return to how it was put on.
 
 use crate::body::parts::BodyPart;
-use crate::cloth::{Model, State, StepReport, WornReference};
+use crate::cloth::{ClothError, Model, State, StepReport, WornReference};
 use crate::math::P3;
 
 /// Stretch that one edge in a hundred exceeds in a garment that is caught or torn: dances reach 0.25 for a frame.
@@ -83,6 +83,14 @@ impl WearWatch {
             masks,
             state: WearState::default(),
         }
+    }
+
+    /// Positions of each garment as skin carries it from where it was put on to `body` (world, metres).
+    ///
+    /// # Errors
+    /// A body of another size or with a vertex that is not finite.
+    pub(super) fn skinned(&self, model: &Model, body: &[P3]) -> Result<Vec<Vec<P3>>, ClothError> {
+        self.reference.skinned(model, body)
     }
 
     /// True while the outfit sits as it was put on.

@@ -6,7 +6,7 @@ use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
 use tryon::cloth::WornReference;
 use tryon::evaluate::rest::lower_arms;
 use tryon::math::{Rigid, V3, World};
-use tryon::mirror::{Choice, DressedOutfit, Subject};
+use tryon::mirror::{Choice, DressedOutfit, PutOn, Subject};
 
 /// Steps within which an outfit is shown again: half a second.
 const HALF_A_SECOND: usize = 15;
@@ -19,6 +19,10 @@ struct Fitting {
 
 /// A pullover on the mean body with its arms down.
 fn fitting() -> Fitting {
+    fitting_of(PutOn::default())
+}
+
+fn fitting_of(how: PutOn) -> Fitting {
     let template = embedded::template();
     let rest = template.personalise(&BodyShape::default());
     let measures = measure(&template, &rest).expect("measures");
@@ -30,7 +34,7 @@ fn fitting() -> Fitting {
         world_from_camera: Rigid::identity(),
     };
     let worn = vec![choice.sized(&measures).expect("a size")];
-    let outfit = DressedOutfit::put_on(&subject, worn, false).expect("dressed");
+    let outfit = DressedOutfit::put_on(&subject, worn, how).expect("dressed");
     Fitting {
         template: (*template).clone(),
         rest,
@@ -48,6 +52,35 @@ impl Fitting {
         });
         shown.expect("shown again")
     }
+}
+
+#[test]
+fn coarse_garments_have_fewer_vertices_and_skin_carries_them_along() {
+    let fine = fitting();
+    let coarse = fitting_of(PutOn {
+        is_coarse: true,
+        ..PutOn::default()
+    });
+    let count = |f: &Fitting| f.outfit.state.garments[0].positions.len() as f64;
+    let ratio = count(&fine) / count(&coarse);
+    assert!((1.8..3.5).contains(&ratio), "{ratio}");
+
+    let mut raised = arms_down(&fine.template, &fine.rest);
+    lower_arms(&fine.template, &fine.rest, -0.2, &mut raised);
+    let body = posed(&fine.template, &fine.rest, &raised);
+    let skinned = coarse.outfit.skinned(&body).expect("a body");
+    let mut stepped = coarse;
+    for _ in 0..30 {
+        stepped.outfit.step(&body, DT).expect("a step");
+    }
+    let simulated = &stepped.outfit.state.garments[0].positions;
+    let mut offsets: Vec<f32> = (skinned[0].iter().zip(simulated))
+        .map(|(a, b)| (a - b).norm())
+        .collect();
+    offsets.sort_by(f32::total_cmp);
+    let (median, largest) = (offsets[offsets.len() / 2], offsets[offsets.len() - 1]);
+    assert!(median < 0.01 && largest < 0.1, "{median} m, {largest} m");
+    assert!(stepped.outfit.skinned(&body[1..]).is_err(), "another body");
 }
 
 #[test]

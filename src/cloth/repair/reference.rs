@@ -6,6 +6,7 @@
 use super::sleeve_rings::Sleeve;
 use super::teleport::{Teleport, blend};
 use crate::cloth::commit::percentile;
+use crate::cloth::error::ClothError;
 use crate::cloth::outfit_model::Model;
 use crate::cloth::state::State;
 use crate::garment::Region;
@@ -84,6 +85,21 @@ impl WornReference {
         state.sleep.wake_all();
     }
 
+    /// Positions of each garment where skin carries it from the reference to `body` (world, metres): cloth that is not
+    /// simulated.
+    ///
+    /// # Errors
+    /// A body of another size or with a vertex that is not finite.
+    pub fn skinned(&self, model: &Model, body: &[P3]) -> Result<Vec<Vec<P3>>, ClothError> {
+        model.collision.check(body)?;
+        let motions = teleport(model, self.state.body.vertices(), body).motions();
+        let garments = self.state.garments.iter().enumerate().map(|(k, g)| {
+            let all = 0..g.positions.len();
+            all.map(|v| self.place(model, &motions, k, v)).collect()
+        });
+        Ok(garments.collect())
+    }
+
     /// Motion of each joint from the reference to the body of `state`.
     fn motions(&self, model: &Model, state: &State) -> Vec<Matrix3x4<f64>> {
         teleport(model, self.state.body.vertices(), state.body.vertices()).motions()
@@ -133,6 +149,10 @@ mod tests {
             assert!((p - motion * q).norm() < 1e-4, "{p} {}", motion * q);
         }
         assert!(put_on.velocities.iter().all(|v| *v == V3::zeros()));
+        let skinned = reference.skinned(&model, &moved).expect("a body");
+        assert_eq!(skinned, [put_on.positions.clone()]);
+        let fault = reference.skinned(&model, &moved[1..]);
+        assert!(fault.is_err(), "another body");
         assert_eq!(
             reference.limb_offset(&model, &state),
             0.0,
