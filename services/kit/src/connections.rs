@@ -5,7 +5,7 @@ use futures::task::AtomicWaker;
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::io;
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::pin::Pin;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -16,12 +16,19 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::time::{Instant, Sleep};
 use tonic::transport::server::{Connected, TcpConnectInfo};
 
+/// Bytes that may wait unsent in a socket; Linux keeps up to 4 MB otherwise. Less costs more wakeups.
+#[cfg(target_os = "linux")]
+const UNSENT_BYTES: u32 = 16 * 1024;
+
 /// Limits of one port.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
     /// Most connections: a soft limit of 1024 descriptors leaves as many again for everything else. When all are taken,
     /// the oldest that never sent a byte makes place; if there is none, the new one is closed.
     pub(crate) connections: usize,
+    /// Most connections of one address; further ones are closed. The machine's own clients share its loopback address and
+    /// have no such limit.
+    pub(crate) per_peer: usize,
     /// Time without a byte in either direction after which a connection is closed. HTTP/2 is pinged twice in it, and
     /// every stream of HTTP/1.1 sends twice a second, so only stuck peers and unused connections reach it.
     pub(crate) idle: Duration,
@@ -31,6 +38,7 @@ impl Default for Limits {
     fn default() -> Self {
         Self {
             connections: 512,
+            per_peer: 64,
             idle: Duration::from_secs(10),
         }
     }
@@ -49,6 +57,8 @@ struct Seats {
     next: u64,
     silent: BTreeMap<u64, Arc<Seat>>,
     taken: usize,
+    /// Taken seats by address, of other machines.
+    peers: BTreeMap<IpAddr, usize>,
 }
 
 type Directory = Arc<Mutex<Seats>>;
@@ -57,10 +67,19 @@ fn with<R>(seats: &Directory, f: impl FnOnce(&mut Seats) -> R) -> R {
     f(&mut seats.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// Takes a seat; `None` when all are taken by connections that have spoken.
-fn take_seat(seats: &Directory, limit: usize) -> Option<(u64, Arc<Seat>)> {
+/// Address whose connections are counted; `None` for this machine's own.
+fn counted(peer: SocketAddr) -> Option<IpAddr> {
+    Some(peer.ip().to_canonical()).filter(|ip| !ip.is_loopback())
+}
+
+/// Takes a seat; `None` when its address has too many, or all are taken by connections that have spoken.
+fn take_seat(seats: &Directory, limits: &Limits, peer: Option<IpAddr>) -> Option<(u64, Arc<Seat>)> {
     with(seats, |s| {
-        if s.taken >= limit {
+        let of_peer = peer.map_or(0, |ip| s.peers.get(&ip).copied().unwrap_or(0));
+        if of_peer >= limits.per_peer {
+            return None;
+        }
+        if s.taken >= limits.connections {
             let (_, oldest) = s.silent.pop_first()?;
             oldest.is_evicted.store(true, Ordering::Release);
             oldest.waker.wake();
@@ -69,6 +88,9 @@ fn take_seat(seats: &Directory, limit: usize) -> Option<(u64, Arc<Seat>)> {
         let (number, seat) = (s.next, Arc::<Seat>::default());
         s.next += 1;
         s.taken += 1;
+        if let Some(ip) = peer {
+            *s.peers.entry(ip).or_default() += 1;
+        }
         s.silent.insert(number, seat.clone());
         Some((number, seat))
     })
@@ -83,20 +105,35 @@ pub(crate) fn accept(
     let start = (listener, Directory::default());
     futures::stream::unfold(start, move |(listener, seats)| async move {
         loop {
-            let stream = match listener.accept().await {
-                Ok((stream, _)) => stream,
+            let (stream, peer) = match listener.accept().await {
+                Ok(accepted) => accepted,
                 Err(e) => {
                     tracing::warn!(error = %e, "a connection could not be accepted");
                     tokio::time::sleep(Duration::from_millis(50)).await;
                     continue;
                 }
             };
+            // Small messages wait for nothing, and large ones not in the socket. Neither is a condition for service.
             let _ = stream.set_nodelay(true);
-            let Some((number, seat)) = take_seat(&seats, limits.connections) else {
+            #[cfg(target_os = "linux")]
+            let _ = socket2::SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT_BYTES);
+            let peer = counted(peer);
+            let Some((number, seat)) = take_seat(&seats, &limits, peer) else {
                 metrics::counter!("tryon_connections_refused").increment(1);
                 continue;
             };
-            let connection = Connection::new(stream, limits.idle, number, seat, seats.clone());
+            let now = Instant::now();
+            let connection = Connection {
+                stream,
+                idle: limits.idle,
+                moved: now,
+                timer: Box::pin(tokio::time::sleep_until(now + limits.idle)),
+                number,
+                has_spoken: false,
+                peer,
+                seat,
+                seats: seats.clone(),
+            };
             return Some((Ok(connection), (listener, seats)));
         }
     })
@@ -111,31 +148,13 @@ pub(crate) struct Connection {
     timer: Pin<Box<Sleep>>,
     number: u64,
     has_spoken: bool,
+    /// Address under which it is counted.
+    peer: Option<IpAddr>,
     seat: Arc<Seat>,
     seats: Directory,
 }
 
 impl Connection {
-    fn new(
-        stream: TcpStream,
-        idle: Duration,
-        number: u64,
-        seat: Arc<Seat>,
-        seats: Directory,
-    ) -> Self {
-        let now = Instant::now();
-        Self {
-            stream,
-            idle,
-            moved: now,
-            timer: Box::pin(tokio::time::sleep_until(now + idle)),
-            number,
-            has_spoken: false,
-            seat,
-            seats,
-        }
-    }
-
     /// Error of a connection that waits for too long or is evicted; else the task is woken when it will be.
     fn poll_end(&mut self, cx: &mut Context<'_>) -> Poll<io::Error> {
         self.seat.waker.register(cx.waker());
@@ -179,6 +198,14 @@ impl Drop for Connection {
         with(&self.seats, |s| {
             s.silent.remove(&self.number);
             s.taken -= 1;
+            if let Some(ip) = self.peer
+                && let Some(count) = s.peers.get_mut(&ip)
+            {
+                *count -= 1;
+                if *count == 0 {
+                    s.peers.remove(&ip);
+                }
+            }
         });
     }
 }
@@ -330,5 +357,20 @@ mod tests {
         let refused = tokio::time::timeout(Duration::from_millis(100), accepted.next()).await;
         assert!(refused.is_err(), "two speakers have both seats");
         assert_eq!(fourth.read(&mut [0]).await.unwrap_or(0), 0, "closed");
+    }
+
+    #[test]
+    fn another_machine_has_its_share_of_the_seats_and_this_one_all() {
+        let limits = Limits {
+            per_peer: 2,
+            ..Limits::default()
+        };
+        let seats = Directory::default();
+        let far: SocketAddr = "192.0.2.1:9".parse().expect("an address");
+        let near: SocketAddr = "[::ffff:127.0.0.1]:9".parse().expect("an address");
+        let take = |peer| take_seat(&seats, &limits, counted(peer)).is_some();
+        assert_eq!([far, far, far].map(take), [true, true, false]);
+        assert_eq!([near, near, near].map(take), [true; 3]);
+        assert_eq!(with(&seats, |s| (s.taken, s.peers.len())), (5, 1));
     }
 }

@@ -2,9 +2,12 @@
 
 use crate::compute::Pool;
 use crate::connections::{self, Limits};
+use crate::deadline::within_deadline;
 use crate::drain::{Drained, until_deadline};
 use crate::frames::FrameBus;
+use crate::transport;
 use crate::undecodable::blame_caller;
+use axum::middleware::from_fn;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,21 +16,10 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 use tonic::service::{Routes, RoutesBuilder};
-use tonic::transport::Server;
 use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
 use tower::util::MapResponseLayer;
 
-/// Longest time of a call until its headers or answer; streams run on.
-const CALL_TIMEOUT: Duration = Duration::from_secs(10);
-/// Interval of pings, which detect clients that vanished.
-const PING_EVERY: Duration = Duration::from_secs(5);
-/// Time without an answer to a ping after which the client counts as gone.
-const PING_TIMEOUT: Duration = Duration::from_secs(5);
-/// Most streams on one connection: a kiosk opens three, a page six.
-const MAX_STREAMS: u32 = 64;
-/// Largest headers, bytes: those of our clients take 1 kB.
-const MAX_HEADER_BYTES: u32 = 16 * 1024;
 /// Largest request, bytes: requests are names and numbers. A service with larger ones sets its own limit.
 pub const MAX_REQUEST_BYTES: usize = 64 * 1024;
 /// gRPC name of health.
@@ -194,15 +186,9 @@ pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartErro
     health
         .set_service_status(grpc_name, ServingStatus::Serving)
         .await;
-    let server = Server::builder()
+    let router = (routes.prepare().into_axum_router())
         .layer(MapResponseLayer::new(blame_caller))
-        .accept_http1(http1)
-        .timeout(CALL_TIMEOUT)
-        .http2_keepalive_interval(Some(PING_EVERY))
-        .http2_keepalive_timeout(Some(PING_TIMEOUT))
-        .http2_max_header_list_size(MAX_HEADER_BYTES)
-        .max_concurrent_streams(MAX_STREAMS)
-        .add_routes(routes);
+        .layer(from_fn(within_deadline));
     let incoming = connections::accept(listener, Limits::default());
     let (shutdown, grace) = (ctx.shutdown.clone(), ctx.grace);
     let task = tokio::spawn(async move {
@@ -214,13 +200,13 @@ pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartErro
                 .set_service_status(grpc_name, ServingStatus::NotServing)
                 .await;
         };
-        let work = server.serve_with_incoming_shutdown(incoming, stop);
+        let work = async {
+            transport::serve(incoming, router, http1, stop).await;
+            Ok(())
+        };
         let end = until_deadline(work, shutdown, grace + CUT).await;
         ended.cancel();
-        end.map_err(|e| StartError::Broken {
-            service: name,
-            why: format!("{e}: {:?}", std::error::Error::source(&e)),
-        })
+        end
     });
     tracing::info!(service = name, address = %bound, %admin, "serving");
     Ok(Running {
