@@ -138,7 +138,7 @@ const status = (state) => ({ picture: null, status: { state, reason: 0 } });
 const forever = (signal) => new Promise((_, fail) => signal.addEventListener('abort', () => fail(new RpcError(Code.CANCELLED, 'cancelled'))));
 
 function scripted({ streams, opens = [] }) {
-  const calls = { open: 0, choose: 0, close: 0 };
+  const calls = { open: 0, choose: 0, close: 0, acknowledged: [] };
   const client = {
     openTryOn: async () => {
       calls.open += 1;
@@ -148,6 +148,7 @@ function scripted({ streams, opens = [] }) {
     },
     chooseGarments: async () => ({ outfit_revision: BigInt(++calls.choose) }),
     closeTryOn: async () => { calls.close += 1; },
+    acknowledgePicture: async ({ stream, number }) => { calls.acknowledged.push([stream, number]); },
     streamFrames: (request, { signal }) => streams.shift()(signal),
   };
   return { client, calls };
@@ -175,11 +176,28 @@ test('a stream that breaks is opened again under the same id and says again what
   const { tryOn, events, until } = follow(script);
   await until((e) => e.filter((x) => x.kind === 'status').length === 2);
   assert.deepEqual(links(events), ['opening', 'waiting', 'opening']);
-  assert.deepEqual(script.calls, { open: 2, choose: 1, close: 0 });
+  assert.deepEqual(script.calls, { open: 2, choose: 1, close: 0, acknowledged: [] });
   await tryOn.close();
   await tryOn.finished;
   assert.equal(script.calls.close, 1);
   assert.equal(links(events).at(-1), 'closed');
+});
+
+test('every picture is acknowledged, and a lost acknowledgement ends nothing', async () => {
+  const shown = (number) => ({ picture: { stream: 7n, number }, status: null });
+  const script = scripted({
+    streams: [async function* (signal) { yield shown(1n); yield shown(2n); await forever(signal); }],
+  });
+  const keep = script.client.acknowledgePicture;
+  script.client.acknowledgePicture = async (request) => {
+    await keep(request);
+    throw new RpcError(Code.UNAVAILABLE, 'lost');
+  };
+  const { tryOn, events, until } = follow(script);
+  await until((e) => e.filter((x) => x.kind === 'picture').length === 2);
+  assert.deepEqual(script.calls.acknowledged, [[7n, 1n], [7n, 2n]]);
+  assert.deepEqual(links(events), ['opening']);
+  await tryOn.close();
 });
 
 test('silence is a broken line', async () => {

@@ -69,12 +69,17 @@ pub struct PictureFormat {
     pub quality: u8,
     /// Time between two pictures; zero means no limit.
     pub interval: Duration,
+    /// Most pictures on the way to a reader that acknowledges them.
+    pub window: Option<u32>,
 }
+
+/// Largest [`PictureFormat::window`]: half a second at 30 Hz.
+const MAX_WINDOW: u32 = 16;
 
 /// Lowest and highest rate of a viewer (Hz). Lower is a snapshot now and then, higher is more than any camera gives.
 const RATES: std::ops::RangeInclusive<f32> = 0.01..=1000.0;
 
-/// Size, codec, quality and rate of a picture stream.
+/// Size, codec, quality, rate and window of a picture stream.
 ///
 /// # Errors
 /// Names the field out of range.
@@ -104,7 +109,13 @@ pub fn picture_format(r: &v1::StreamFramesRequest) -> Result<PictureFormat, Wire
             );
         }
     };
+    let window = match r.max_unacknowledged {
+        0 => None,
+        n if n <= MAX_WINDOW => Some(n),
+        _ => return fault("max_unacknowledged", "1 to 16 pictures, or 0 for none"),
+    };
     Ok(PictureFormat {
+        window,
         size,
         quality: if r.quality == 0 { 80 } else { r.quality as u8 },
         interval,

@@ -228,6 +228,46 @@ impl DegradedReason {
         }
     }
 }
+/// Detail of cloth, in the order in which a machine that cannot keep up gives it up. It is taken back when it can.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum ClothDetail {
+    Unspecified = 0,
+    /// Simulated at full resolution.
+    Full = 1,
+    /// Simulated from coarser cloth, with fewer vertices.
+    Coarse = 2,
+    /// Carried by the skin, not simulated.
+    Skinned = 3,
+    /// No garments: the plain mirror.
+    None = 4,
+}
+impl ClothDetail {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "CLOTH_DETAIL_UNSPECIFIED",
+            Self::Full => "CLOTH_DETAIL_FULL",
+            Self::Coarse => "CLOTH_DETAIL_COARSE",
+            Self::Skinned => "CLOTH_DETAIL_SKINNED",
+            Self::None => "CLOTH_DETAIL_NONE",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "CLOTH_DETAIL_UNSPECIFIED" => Some(Self::Unspecified),
+            "CLOTH_DETAIL_FULL" => Some(Self::Full),
+            "CLOTH_DETAIL_COARSE" => Some(Self::Coarse),
+            "CLOTH_DETAIL_SKINNED" => Some(Self::Skinned),
+            "CLOTH_DETAIL_NONE" => Some(Self::None),
+            _ => None,
+        }
+    }
+}
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
 pub enum FitClass {
@@ -2087,6 +2127,9 @@ pub struct GarmentFrame {
     /// Fit of each garment in the order of `garments`, measured about once a second and absent in between.
     #[prost(message, repeated, tag = "11")]
     pub fit: ::prost::alloc::vec::Vec<GarmentFit>,
+    /// Detail of `garments`, or for which the outfit is being put on.
+    #[prost(enumeration = "ClothDetail", tag = "12")]
+    pub cloth_detail: i32,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct GarmentMesh {
@@ -3076,6 +3119,10 @@ pub struct StreamFramesRequest {
     /// Most pictures a second, 0.01 to 1000; 0 means no limit.
     #[prost(float, tag = "6")]
     pub max_rate: f32,
+    /// Most pictures on the way that this reader has not acknowledged, 1 to 16; 0 means that it acknowledges none.
+    /// 1 is newest for a slow reader; a fast one needs its round trip times the rate, and one more.
+    #[prost(uint32, tag = "7")]
+    pub max_unacknowledged: u32,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct StreamFramesResponse {
@@ -3123,13 +3170,33 @@ pub struct Picture {
     pub latency_ms: f32,
     #[prost(message, repeated, tag = "11")]
     pub stages: ::prost::alloc::vec::Vec<StageTime>,
-    /// Pictures dropped for this reader since its stream began.
+    /// Pictures that this reader did not get since its stream began, because it had not taken older ones.
     #[prost(uint64, tag = "12")]
     pub dropped: u64,
     /// Fit of each garment drawn, inner layer first, as last measured (about once a second); empty until then.
     #[prost(message, repeated, tag = "13")]
     pub fit: ::prost::alloc::vec::Vec<GarmentFit>,
+    /// Stream and place in it, from 1, for AcknowledgePicture; 0 in a snapshot.
+    #[prost(uint64, tag = "14")]
+    pub stream: u64,
+    #[prost(uint64, tag = "15")]
+    pub number: u64,
+    /// Detail of the garments drawn; UNSPECIFIED without any.
+    #[prost(enumeration = "ClothDetail", tag = "16")]
+    pub cloth_detail: i32,
 }
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct AcknowledgePictureRequest {
+    #[prost(string, tag = "1")]
+    pub try_on_id: ::prost::alloc::string::String,
+    /// Of the picture.
+    #[prost(uint64, tag = "2")]
+    pub stream: u64,
+    #[prost(uint64, tag = "3")]
+    pub number: u64,
+}
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct AcknowledgePictureResponse {}
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct TryOnStatus {
     #[prost(enumeration = "TryOnState", tag = "1")]
@@ -3473,9 +3540,12 @@ pub mod compositor_service_client {
         /// reason changes and at least twice a second while there are no pictures, so silence of a second means that the
         /// compositor is gone. Each reader has its own queue: a slow one does not delay the others. Use one HTTP/2 connection
         /// per stream: a slow reader stalls the other streams of its own connection.
+        /// What a reader's own windows and sockets hold is beyond the service's reach: a reader that wants new pictures however
+        /// slow it is acknowledges them (`max_unacknowledged`), and the next one is made when it has room.
         /// The last message before a regular end is a status with CLOSED or DRAINING. A try-on that fails ends its streams
-        /// with INTERNAL, and opening it again is safe; a reader that lets 64 statuses wait is cut off with
-        /// RESOURCE_EXHAUSTED.
+        /// with INTERNAL, and opening it again is safe; a reader that lets 64 statuses wait or acknowledges nothing for 10 s is
+        /// cut off with RESOURCE_EXHAUSTED. So is one too many, or one with a size or quality too many: readers of one size and
+        /// quality share their pictures.
         pub async fn stream_frames(
             &mut self,
             request: impl tonic::IntoRequest<super::StreamFramesRequest>,
@@ -3499,6 +3569,33 @@ pub mod compositor_service_client {
             req.extensions_mut()
                 .insert(GrpcMethod::new("tryon.v1.CompositorService", "StreamFrames"));
             self.inner.server_streaming(req, path, codec).await
+        }
+        /// Acknowledges a picture of a stream and those before it. Safe to call again; a stream that has ended is no error.
+        pub async fn acknowledge_picture(
+            &mut self,
+            request: impl tonic::IntoRequest<super::AcknowledgePictureRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::AcknowledgePictureResponse>,
+            tonic::Status,
+        > {
+            self.inner
+                .ready()
+                .await
+                .map_err(|e| {
+                    tonic::Status::unknown(
+                        format!("Service was not ready: {}", e.into()),
+                    )
+                })?;
+            let codec = tonic_prost::ProstCodec::default();
+            let path = http::uri::PathAndQuery::from_static(
+                "/tryon.v1.CompositorService/AcknowledgePicture",
+            );
+            let mut req = request.into_request();
+            req.extensions_mut()
+                .insert(
+                    GrpcMethod::new("tryon.v1.CompositorService", "AcknowledgePicture"),
+                );
+            self.inner.unary(req, path, codec).await
         }
         /// Returns the newest picture, PNG or JPEG, at the camera's size. UNAVAILABLE with RetryInfo when the newest is older
         /// than a second, RESOURCE_EXHAUSTED with RetryInfo when four callers wait already. Pictures of streams and snapshots
@@ -3596,14 +3693,25 @@ pub mod compositor_service_server {
         /// reason changes and at least twice a second while there are no pictures, so silence of a second means that the
         /// compositor is gone. Each reader has its own queue: a slow one does not delay the others. Use one HTTP/2 connection
         /// per stream: a slow reader stalls the other streams of its own connection.
+        /// What a reader's own windows and sockets hold is beyond the service's reach: a reader that wants new pictures however
+        /// slow it is acknowledges them (`max_unacknowledged`), and the next one is made when it has room.
         /// The last message before a regular end is a status with CLOSED or DRAINING. A try-on that fails ends its streams
-        /// with INTERNAL, and opening it again is safe; a reader that lets 64 statuses wait is cut off with
-        /// RESOURCE_EXHAUSTED.
+        /// with INTERNAL, and opening it again is safe; a reader that lets 64 statuses wait or acknowledges nothing for 10 s is
+        /// cut off with RESOURCE_EXHAUSTED. So is one too many, or one with a size or quality too many: readers of one size and
+        /// quality share their pictures.
         async fn stream_frames(
             &self,
             request: tonic::Request<super::StreamFramesRequest>,
         ) -> std::result::Result<
             tonic::Response<Self::StreamFramesStream>,
+            tonic::Status,
+        >;
+        /// Acknowledges a picture of a stream and those before it. Safe to call again; a stream that has ended is no error.
+        async fn acknowledge_picture(
+            &self,
+            request: tonic::Request<super::AcknowledgePictureRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::AcknowledgePictureResponse>,
             tonic::Status,
         >;
         /// Returns the newest picture, PNG or JPEG, at the camera's size. UNAVAILABLE with RetryInfo when the newest is older
@@ -3970,6 +4078,55 @@ pub mod compositor_service_server {
                                 max_encoding_message_size,
                             );
                         let res = grpc.server_streaming(method, req).await;
+                        Ok(res)
+                    };
+                    Box::pin(fut)
+                }
+                "/tryon.v1.CompositorService/AcknowledgePicture" => {
+                    #[allow(non_camel_case_types)]
+                    struct AcknowledgePictureSvc<T: CompositorService>(pub Arc<T>);
+                    impl<
+                        T: CompositorService,
+                    > tonic::server::UnaryService<super::AcknowledgePictureRequest>
+                    for AcknowledgePictureSvc<T> {
+                        type Response = super::AcknowledgePictureResponse;
+                        type Future = BoxFuture<
+                            tonic::Response<Self::Response>,
+                            tonic::Status,
+                        >;
+                        fn call(
+                            &mut self,
+                            request: tonic::Request<super::AcknowledgePictureRequest>,
+                        ) -> Self::Future {
+                            let inner = Arc::clone(&self.0);
+                            let fut = async move {
+                                <T as CompositorService>::acknowledge_picture(
+                                        &inner,
+                                        request,
+                                    )
+                                    .await
+                            };
+                            Box::pin(fut)
+                        }
+                    }
+                    let accept_compression_encodings = self.accept_compression_encodings;
+                    let send_compression_encodings = self.send_compression_encodings;
+                    let max_decoding_message_size = self.max_decoding_message_size;
+                    let max_encoding_message_size = self.max_encoding_message_size;
+                    let inner = self.inner.clone();
+                    let fut = async move {
+                        let method = AcknowledgePictureSvc(inner);
+                        let codec = tonic_prost::ProstCodec::default();
+                        let mut grpc = tonic::server::Grpc::new(codec)
+                            .apply_compression_config(
+                                accept_compression_encodings,
+                                send_compression_encodings,
+                            )
+                            .apply_max_message_size_config(
+                                max_decoding_message_size,
+                                max_encoding_message_size,
+                            );
+                        let res = grpc.unary(method, req).await;
                         Ok(res)
                     };
                     Box::pin(fut)

@@ -8,7 +8,7 @@ use tryon::body::{BodyShape, Pose, Template};
 use tryon::cloth::StepReport;
 use tryon::dressing::{self, FitProbe, Suggestion};
 use tryon::math::{Camera, Rigid, World};
-use tryon::mirror::{DressedOutfit, FrameClock, LongGap, PosedBody, Subject};
+use tryon::mirror::{DressedOutfit, FrameClock, LongGap, PosedBody, PutOn, Subject};
 use tryon_kit::frames::stage;
 use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::body::pose_from_wire;
@@ -17,7 +17,7 @@ use tryon_proto::convert::frame::stages_from_wire;
 use tryon_proto::convert::garment::{Positions, WornGarment, WornImage};
 use tryon_proto::convert::geometry::rigid_from_wire;
 use tryon_proto::convert::required;
-use tryon_proto::v1::{self, BodyState, GarmentChoice};
+use tryon_proto::v1::{self, BodyState, ClothDetail, GarmentChoice};
 
 /// Interval between fit measurements [s of the stream].
 const FIT_INTERVAL: f64 = 1.0;
@@ -71,6 +71,8 @@ pub(crate) struct Worn {
     outfit: DressedOutfit,
     body: PosedBody,
     clock: FrameClock,
+    /// Garments are sewn from coarser cloth.
+    is_coarse: bool,
     garments: Arc<[Arc<WornGarment>]>,
     fit: FitProbe,
     /// Room of each garment on the body; `None` for those made to measure.
@@ -107,11 +109,22 @@ fn ease(outfit: &DressedOutfit, measures: &Measurements) -> Vec<Option<Suggestio
         .collect()
 }
 
+/// Message of the exposure of a body, without garments.
+pub(crate) fn frame_of(body: &Body) -> v1::GarmentFrame {
+    v1::GarmentFrame {
+        frame: body.state.frame,
+        world_from_camera: body.state.world_from_camera,
+        stages: body.state.stages.clone(),
+        ..Default::default()
+    }
+}
+
 /// Puts garments on, in sizes that do not fit too: the fit says so. Takes about a second.
 pub(crate) fn dress(
     body: &Body,
     choices: &[GarmentChoice],
     library: &Library,
+    is_coarse: bool,
 ) -> Result<Worn, String> {
     let start = Instant::now();
     let rest = body.template.personalise(&body.shape);
@@ -125,7 +138,11 @@ pub(crate) fn dress(
         world_from_camera: body.world_from_camera,
     };
     let sized = sized.map_err(|e| e.to_string())?;
-    let outfit = DressedOutfit::put_on(&subject, sized, true).map_err(|e| e.to_string())?;
+    let how = PutOn {
+        any_size: true,
+        is_coarse,
+    };
+    let outfit = DressedOutfit::put_on(&subject, sized, how).map_err(|e| e.to_string())?;
     let garments = (0..outfit.model.outfit.garments.len())
         .map(|k| worn_garment(&outfit, k, choices))
         .collect::<Result<Vec<_>, _>>()?;
@@ -136,6 +153,7 @@ pub(crate) fn dress(
         ease: ease(&outfit, &measures),
         fit: FitProbe::new(&body.template, &outfit.model).map_err(|e| e.to_string())?,
         fit_age: FIT_INTERVAL,
+        is_coarse,
         outfit,
         body: PosedBody::new(body.shape.clone(), rest),
         clock: FrameClock::at(body.time_ns()),
@@ -176,15 +194,43 @@ fn worn_garment(
 }
 
 impl Worn {
-    /// Steps the garments to the pose of `body`.
-    pub(crate) fn step(&mut self, body: &Body) -> Result<Update, String> {
+    /// Moves the garments to the pose of `body`: in a step of the simulation, or as skin carries them.
+    pub(crate) fn follow(&mut self, body: &Body, is_simulated: bool) -> Result<Update, String> {
         let start = Instant::now();
         if self.body.pose(&body.template, &body.shape, &body.pose) {
             let measures = measure(&body.template, self.body.rest()).map_err(|e| e.to_string())?;
             self.ease = ease(&self.outfit, &measures);
         }
         let posed = stage("cloth.body", start);
+        let mut update = if is_simulated {
+            self.step(body)?
+        } else {
+            self.skin(body)?
+        };
+        update.frame.stages.push(posed);
+        update
+            .frame
+            .set_cloth_detail(match (is_simulated, self.is_coarse) {
+                (false, _) => ClothDetail::Skinned,
+                (true, true) => ClothDetail::Coarse,
+                (true, false) => ClothDetail::Full,
+            });
+        Ok(update)
+    }
 
+    /// Garments as skin carries them; their fit is kept.
+    fn skin(&mut self, body: &Body) -> Result<Update, String> {
+        let begun = Instant::now();
+        let positions = self.outfit.skinned(self.body.vertices());
+        let mut frame = frame_of(body);
+        frame.stages.push(stage("cloth.skin", begun));
+        Ok(Update {
+            frame,
+            positions: Arc::new(positions.map_err(|e| e.to_string())?),
+        })
+    }
+
+    fn step(&mut self, body: &Body) -> Result<Update, String> {
         let begun = Instant::now();
         let gap = self.clock.gap(body.time_ns());
         let dt = LongGap::Clamped.time_step(gap);
@@ -193,7 +239,7 @@ impl Worn {
             .step(self.body.vertices(), dt)
             .map_err(|e| e.to_string())?;
         let mut update = self.update(body, report);
-        (update.frame.stages).extend([posed, stage("cloth.step", begun)]);
+        update.frame.stages.push(stage("cloth.step", begun));
 
         self.fit_age += gap;
         if self.fit_age >= FIT_INTERVAL {
@@ -201,6 +247,11 @@ impl Worn {
             self.measure_fit(&mut update.frame)?;
         }
         Ok(update)
+    }
+
+    /// Sewn from coarser cloth.
+    pub(crate) fn is_coarse(&self) -> bool {
+        self.is_coarse
     }
 
     /// False while the outfit is put on again after a jump of the body.
@@ -240,13 +291,8 @@ impl Worn {
                 ("contact searches", report.searches_skipped),
             ],
         );
-        let frame = v1::GarmentFrame {
-            frame: body.state.frame,
-            world_from_camera: body.state.world_from_camera,
-            stages: body.state.stages.clone(),
-            detail: report.kept_last_good.unwrap_or_default(),
-            ..Default::default()
-        };
+        let mut frame = frame_of(body);
+        frame.detail = report.kept_last_good.unwrap_or_default();
         let garments = self.outfit.state.garments.iter();
         Update {
             frame,

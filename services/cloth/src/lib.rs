@@ -3,6 +3,7 @@
 //! One task owns one session (`session`): it follows the body states, dresses the body when it is calibrated, steps the
 //! garments on the compute pool and sends each reader a keyframe and then positions.
 
+mod detail_ladder;
 mod engine;
 mod folder;
 mod library;

@@ -26,6 +26,7 @@ pub(crate) struct Cloth {
     ctx: Context,
     tracking: Channel,
     idle: Duration,
+    adapts_detail: bool,
     library: Arc<Library>,
 }
 
@@ -42,6 +43,7 @@ impl Cloth {
             ctx: ctx.clone(),
             tracking,
             idle: Duration::from_secs(config.idle_s),
+            adapts_detail: config.adapts_detail,
             library: Arc::new(library),
         }
     }
@@ -75,6 +77,7 @@ impl ClothService for Cloth {
             ctx: self.ctx.clone(),
             tracking: self.tracking.clone(),
             idle: self.idle,
+            adapts_detail: self.adapts_detail,
             library: self.library.clone(),
             directory: self.sessions.clone(),
         };

@@ -1,6 +1,7 @@
 //! One session: its task, its outfit, its readers.
 
-use crate::engine::{Body, Update, Worn, dress};
+use crate::detail_ladder::DetailLadder;
+use crate::engine::{Body, Update, Worn, dress, frame_of};
 use crate::library::Library;
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,7 +16,7 @@ use tryon_kit::sessions::{Sessions, brief};
 use tryon_kit::telemetry::record_stages;
 use tryon_proto::convert::garment::{Positions, WornGarment};
 use tryon_proto::v1::{
-    self, ClothStatus, DegradedReason, GarmentChoice, GarmentFrame, TrackingStatus,
+    self, ClothDetail, ClothStatus, DegradedReason, GarmentChoice, GarmentFrame, TrackingStatus,
 };
 
 /// Longest interval between messages to a reader; a silent stream repeats its last status.
@@ -49,6 +50,7 @@ pub(crate) struct Setup {
     pub(crate) ctx: Context,
     pub(crate) tracking: Channel,
     pub(crate) idle: Duration,
+    pub(crate) adapts_detail: bool,
     pub(crate) library: Arc<Library>,
     pub(crate) directory: Sessions<Handle>,
 }
@@ -91,6 +93,9 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
             dressed,
             readers: Vec::new(),
             skipped: 0,
+            ladder: DetailLadder::new(std::time::Instant::now()),
+            missed: 0,
+            refused: None,
         };
         let why = session_task::run("cloth", &id, task.run(inbox, news, ready)).await;
         following.abort();
@@ -102,6 +107,7 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
 /// Result of dressing one revision.
 struct Dressed {
     revision: u64,
+    is_coarse: bool,
     outcome: Result<Worn, String>,
 }
 
@@ -135,7 +141,13 @@ struct Task {
     dressing: Option<u64>,
     dressed: mpsc::Sender<Dressed>,
     readers: Vec<Reader>,
+    /// Body states that were replaced by newer ones.
     skipped: u64,
+    ladder: DetailLadder,
+    /// Exposures without garments so far, on their way from the camera to here.
+    missed: u64,
+    /// Revision that could not be put on from such cloth, coarse or not: it is worn as it is.
+    refused: Option<(u64, bool)>,
 }
 
 impl Task {
@@ -163,11 +175,11 @@ impl Task {
                 },
                 Some(d) = ready.recv() => self.on_dressed(d),
                 n = news.recv() => {
+                    self.skipped = news.dropped();
                     status = match n {
                         Some(n) => self.on_tracking(n).await,
                         None => return "tracking cannot be followed",
                     };
-                    self.skipped = news.dropped();
                     self.publish(status.clone());
                     published = Instant::now();
                     // A repetition of the status must not present old positions as new.
@@ -282,6 +294,10 @@ impl Task {
         self.dressing = None;
         match d.outcome {
             Ok(worn) => (self.worn, self.on) = (Some(worn), d.revision),
+            Err(why) if self.on == d.revision => {
+                tracing::info!(session = brief(&self.setup.id), %why, "keeps its cloth");
+                self.refused = Some((d.revision, d.is_coarse));
+            }
             Err(why) => {
                 tracing::warn!(session = brief(&self.setup.id), %why, "cannot be dressed");
                 self.failed = d.revision;
@@ -295,21 +311,22 @@ impl Task {
         if wanted.choices.is_empty() {
             self.undress();
             self.on = wanted.revision;
-            let s = &body.state;
-            let bare = GarmentFrame {
-                frame: s.frame,
-                world_from_camera: s.world_from_camera,
-                stages: s.stages.clone(),
-                ..Default::default()
-            };
-            return live(bare.into(), wanted.revision);
+            return live(frame_of(&body).into(), wanted.revision);
+        }
+        let missed = self.skipped + body.state.frames_dropped;
+        let newly_missed = missed.saturating_sub(std::mem::replace(&mut self.missed, missed));
+        let (begun, detail) = (std::time::Instant::now(), self.ladder.detail());
+        if self.dressing.is_some() {
+            self.ladder.restart(begun);
+        }
+        if detail == ClothDetail::None {
+            self.ladder.count(begun, newly_missed, Duration::ZERO);
+            self.report_detail(detail);
+            return plain_mirror(&body).into();
         }
         let body = Arc::new(body);
-        if self.on != wanted.revision
-            && self.failed != wanted.revision
-            && self.dressing != Some(wanted.revision)
-        {
-            self.start_dressing(body.clone(), wanted.clone());
+        if self.needs_dressing(wanted.revision, detail) {
+            self.start_dressing(body.clone(), wanted.clone(), detail != ClothDetail::Full);
         }
         let Some(mut worn) = self.worn.take() else {
             return match self.dressing {
@@ -318,11 +335,17 @@ impl Task {
             };
         };
         let stepped = body.clone();
-        let step = move || {
-            let placed = worn.step(&stepped);
+        let follow = move || {
+            let placed = worn.follow(&stepped, detail != ClothDetail::Skinned);
             (worn, placed)
         };
-        match self.setup.ctx.pool.run(step).await {
+        let followed = self.setup.ctx.pool.run(follow).await;
+        if self.setup.adapts_detail {
+            self.ladder
+                .count(std::time::Instant::now(), newly_missed, begun.elapsed());
+            self.report_detail(detail);
+        }
+        match followed {
             Ok((worn, placed)) => {
                 let update = match placed {
                     Ok(p) => {
@@ -351,20 +374,44 @@ impl Task {
         }
     }
 
+    /// The wanted outfit is not on and not on its way, or is of other cloth than the detail asks for.
+    fn needs_dressing(&self, revision: u64, detail: ClothDetail) -> bool {
+        if self.on != revision {
+            return self.failed != revision && self.dressing != Some(revision);
+        }
+        let is_coarse = detail != ClothDetail::Full;
+        let is_other = |w: &Worn| w.is_coarse() != is_coarse;
+        self.dressing.is_none()
+            && detail != ClothDetail::Skinned
+            && self.refused != Some((revision, is_coarse))
+            && self.worn.as_ref().is_some_and(is_other)
+    }
+
+    /// Logs and counts a change of the detail from `before`.
+    fn report_detail(&self, before: ClothDetail) {
+        let now = self.ladder.detail();
+        if now != before {
+            let (from, to) = (before.as_str_name(), now.as_str_name());
+            tracing::info!(session = brief(&self.setup.id), from, to, "detail of cloth");
+            metrics::counter!("tryon_cloth_detail_changes", "to" => to).increment(1);
+        }
+    }
+
     /// Dresses on the pool; the worn outfit is stepped meanwhile.
-    fn start_dressing(&mut self, body: Arc<Body>, wanted: WantedOutfit) {
+    fn start_dressing(&mut self, body: Arc<Body>, wanted: WantedOutfit, is_coarse: bool) {
         self.dressing = Some(wanted.revision);
         let (pool, done) = (self.setup.ctx.pool.clone(), self.dressed.clone());
         let library = self.setup.library.clone();
         tokio::spawn(async move {
             let outcome = pool
-                .run(move || dress(&body, &wanted.choices, &library))
+                .run(move || dress(&body, &wanted.choices, &library, is_coarse))
                 .await;
             let outcome = outcome.map_err(|e| e.to_string()).and_then(|r| r);
             // The session may be gone by now.
             let _ = done
                 .send(Dressed {
                     revision: wanted.revision,
+                    is_coarse,
                     outcome,
                 })
                 .await;
@@ -376,6 +423,17 @@ fn dressing(body: &Body, detail: &str) -> GarmentFrame {
     let mut f = waiting(DegradedReason::Unspecified, detail.into());
     f.set_status(ClothStatus::Dressing);
     (f.frame, f.world_from_camera) = (body.state.frame, body.state.world_from_camera);
+    f
+}
+
+/// Message of a machine that has no time for garments.
+fn plain_mirror(body: &Body) -> GarmentFrame {
+    let mut f = waiting(
+        DegradedReason::GarmentsLate,
+        "this machine has no time for garments now".into(),
+    );
+    (f.frame, f.world_from_camera) = (body.state.frame, body.state.world_from_camera);
+    f.set_cloth_detail(ClothDetail::None);
     f
 }
 

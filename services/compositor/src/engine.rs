@@ -22,7 +22,7 @@ use tryon_proto::convert::body::pose_from_wire;
 use tryon_proto::convert::fit::tightness;
 use tryon_proto::convert::garment::{PlacedGarments, WornGarment, WornImage};
 use tryon_proto::convert::request::PictureFormat;
-use tryon_proto::v1::StageTime;
+use tryon_proto::v1::{ClothDetail, StageTime};
 
 /// Garments that belong to one exposure.
 pub(crate) struct Placed {
@@ -31,6 +31,7 @@ pub(crate) struct Placed {
     pub(crate) stages: Vec<StageTime>,
     /// Revision as this service counts.
     pub(crate) revision: u64,
+    pub(crate) detail: ClothDetail,
 }
 
 /// Encoding of a picture.
@@ -47,6 +48,7 @@ pub(crate) struct Job {
     /// Absent for the plain camera picture.
     pub(crate) placed: Option<Arc<Placed>>,
     pub(crate) body: Option<ReportedBody>,
+    /// Most wanted first.
     pub(crate) formats: Vec<Format>,
     /// Tightness byte of each simulated vertex by garment: draws garments in the colours of their fit.
     pub(crate) fit: Option<Arc<[bytes::Bytes]>>,
@@ -61,11 +63,7 @@ pub(crate) struct Encoded {
     pub(crate) bytes: bytes::Bytes,
     /// Time to draw and encode it.
     pub(crate) cost: Duration,
-}
-
-/// Result of a job.
-pub(crate) struct Drawn {
-    pub(crate) pictures: Vec<Encoded>,
+    /// Stages up to it.
     pub(crate) stages: Vec<StageTime>,
 }
 
@@ -91,9 +89,6 @@ pub(crate) struct Engine {
     pyramids: Pyramids,
 }
 
-/// Pictures by their size, with the time to draw each.
-type Sizes = Vec<(Option<(u32, u32)>, ColorImage, Duration)>;
-
 impl Engine {
     pub(crate) fn new(card: Card) -> Self {
         // The contract says letterboxed.
@@ -108,22 +103,13 @@ impl Engine {
         }
     }
 
-    /// Renders each size once and encodes each format once.
-    pub(crate) fn draw(&mut self, job: &Job) -> Result<Drawn, String> {
-        let start = Instant::now();
-        let mut stages = match &job.placed {
-            Some(placed) => placed.stages.clone(),
-            None => job.exposure.stages.clone(),
-        };
-        let images = self.render(job)?;
-        stages.push(stage("compositor.render", start));
-        let begun = Instant::now();
-        let pictures = encode(job, &images)?;
-        stages.push(stage("compositor.encode", begun));
-        Ok(Drawn { pictures, stages })
-    }
-
-    fn render(&mut self, job: &Job) -> Result<Sizes, String> {
+    /// Renders each size once, in the order of the formats, and delivers each picture as soon as it is encoded.
+    pub(crate) fn draw(
+        &mut self,
+        job: &Job,
+        mut deliver: impl FnMut(Encoded),
+    ) -> Result<(), String> {
+        let mut begun = Instant::now();
         let reported = job.body.as_ref().filter(|_| job.placed.is_some());
         let has_body = reported.is_some_and(|b| self.pose(b));
         let worn = worn_garments(job, &mut self.pyramids);
@@ -143,12 +129,7 @@ impl Engine {
                 posed
             })
         });
-        let mut images = Sizes::new();
-        for &(size, _) in &job.formats {
-            if images.iter().any(|(s, _, _)| *s == size) {
-                continue;
-            }
-            let begun = Instant::now();
+        for size in distinct(job.formats.iter().map(|(size, _)| *size)) {
             let input = Input {
                 frame: &job.exposure.rgbd,
                 calibration: &job.exposure.calibration,
@@ -161,9 +142,17 @@ impl Engine {
                 .draw(&self.model, &mut self.state, &input, &mut self.work)
                 .map_err(|e| e.to_string())?;
             record(&report);
-            images.push((size, image, begun.elapsed()));
+            let rendered = Rendered {
+                image,
+                cost: begun.elapsed(),
+                stage: stage("compositor.render", begun),
+            };
+            for format in job.formats.iter().filter(|f| f.0 == size) {
+                deliver(rendered.encode(job, *format)?);
+            }
+            begun = Instant::now();
         }
-        Ok(images)
+        Ok(())
     }
 
     /// Poses the body; `false` when its numbers do not fit, which costs only the finer occlusion.
@@ -239,28 +228,43 @@ fn record(report: &RenderReport) {
     );
 }
 
-/// Encodes every format of `job` from the image of its size.
-fn encode(job: &Job, images: &Sizes) -> Result<Vec<Encoded>, String> {
-    let mut pictures = Vec::new();
-    for &(size, encoding) in &job.formats {
-        let Some((_, image, drawn)) = images.iter().find(|(s, _, _)| *s == size) else {
-            continue;
-        };
+/// Elements without repetitions, in order.
+fn distinct<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
+    all.fold(Vec::new(), |mut known, x| {
+        if !known.contains(&x) {
+            known.push(x);
+        }
+        known
+    })
+}
+
+/// Picture of one size.
+struct Rendered {
+    image: ColorImage,
+    cost: Duration,
+    stage: StageTime,
+}
+
+impl Rendered {
+    fn encode(&self, job: &Job, (size, encoding): Format) -> Result<Encoded, String> {
         let begun = Instant::now();
         let bytes = match encoding {
-            Encoding::Jpeg(quality) => encode_jpeg(image, quality),
-            Encoding::Png => encode_png_rgb(image, Path::new("snapshot.png")),
+            Encoding::Jpeg(quality) => encode_jpeg(&self.image, quality),
+            Encoding::Png => encode_png_rgb(&self.image, Path::new("snapshot.png")),
         };
-        pictures.push(Encoded {
+        let before = job.placed.as_ref().map(|p| &p.stages);
+        let mut stages = before.unwrap_or(&job.exposure.stages).clone();
+        stages.extend([self.stage.clone(), stage("compositor.encode", begun)]);
+        Ok(Encoded {
             size,
             encoding,
-            width: image.width(),
-            height: image.height(),
+            width: self.image.width(),
+            height: self.image.height(),
             bytes: bytes.map_err(|e| e.to_string())?.into(),
-            cost: *drawn + begun.elapsed(),
-        });
+            cost: self.cost + begun.elapsed(),
+            stages,
+        })
     }
-    Ok(pictures)
 }
 
 /// Tightness of each drawn vertex as a texture coordinate; `None` when the bytes are those of another garment.

@@ -1,6 +1,6 @@
 //! Choice of the formats that are drawn of an exposure, so that no viewer's format costs the others their rate.
 //!
-//! The most wanted format is always drawn. Of the others, those that fit before the next exposure cost nobody anything;
+//! The most wanted format is always drawn, the older of equals. Of the others, those that fit before the next exposure cost nobody anything;
 //! one that does not is paid from a small share of the time, longest unserved first.
 
 use crate::engine::Encoding;
@@ -23,6 +23,15 @@ const WEIGHT: f64 = 0.2;
 const FIRST_INTERVAL_S: f64 = 0.033;
 /// Cost of a pixel before anything was measured (s): 640×480 in 6 ms.
 const FIRST_PIXEL_S: f64 = 2e-8;
+
+/// Viewers of a format.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wanted {
+    /// Voices of their connections.
+    pub(crate) voices: f64,
+    /// Place of the oldest among all viewers.
+    pub(crate) rank: usize,
+}
 
 /// Measurements of one format.
 #[derive(Clone, Copy, Debug)]
@@ -54,10 +63,10 @@ impl Default for Formats {
 }
 
 impl Formats {
-    /// Formats to draw of an exposure of `pixels` that came at `now`, of those wanted with their number of viewers.
+    /// Formats to draw of an exposure of `pixels` that came at `now`, of those wanted by viewers; the first comes first.
     pub(crate) fn choose(
         &mut self,
-        wanted: &BTreeMap<Format, usize>,
+        wanted: &BTreeMap<Format, Wanted>,
         pixels: f64,
         now: Instant,
     ) -> Vec<Format> {
@@ -73,9 +82,11 @@ impl Formats {
         let mut waiting: Vec<(Format, Known)> = (wanted.keys())
             .map(|f| (*f, *self.known.entry(*f).or_insert(fresh)))
             .collect();
-        // Most viewers first; of as many the smallest, which costs least.
-        let by_rank = |(f, _): &&(Format, Known)| (wanted[f], std::cmp::Reverse(area(f) as u64));
-        let Some(&(first, _)) = waiting.iter().max_by_key(by_rank) else {
+        let by_voices = |(a, _): &&(Format, Known), (b, _): &&(Format, Known)| {
+            let (a, b) = (wanted[a], wanted[b]);
+            (a.voices.total_cmp(&b.voices)).then(b.rank.cmp(&a.rank))
+        };
+        let Some(&(first, _)) = waiting.iter().max_by(by_voices) else {
             return Vec::new();
         };
         waiting.sort_by_key(|(_, k)| k.served);
@@ -138,9 +149,11 @@ mod tests {
     }
 
     /// Runs a minute of exposures at 30 Hz whose pictures cost 30 ns a pixel; while one is drawn, the newest waits. Times
-    /// that each format was drawn.
-    fn run(wanted: &[(Format, usize)]) -> BTreeMap<Format, usize> {
-        let wanted: BTreeMap<_, _> = wanted.iter().copied().collect();
+    /// that each format was drawn. Formats in order of arrival, with their voices.
+    fn run(wanted: &[(Format, f64)]) -> BTreeMap<Format, usize> {
+        let wanted: BTreeMap<_, _> = (wanted.iter().enumerate())
+            .map(|(rank, &(f, voices))| (f, Wanted { voices, rank }))
+            .collect();
         let (mut formats, mut drawn) = (Formats::default(), BTreeMap::new());
         let start = Instant::now();
         let mut free = start;
@@ -166,7 +179,7 @@ mod tests {
     #[test]
     fn a_huge_format_costs_its_own_rate() {
         let (small, huge) = (format(640, 480), format(4096, 4096));
-        let drawn = run(&[(small, 1), (huge, 1)]);
+        let drawn = run(&[(small, 1.0), (huge, 1.0)]);
         assert!(drawn[&small] > LEAST, "{drawn:?}");
         assert!(drawn[&huge] >= 3, "it is served too: {drawn:?}");
     }
@@ -174,9 +187,9 @@ mod tests {
     #[test]
     fn many_formats_share_what_is_left_and_none_starves() {
         let mut wanted: Vec<_> = (0..50)
-            .map(|i| (format(320 + 16 * i, 240 + 8 * i), 1))
+            .map(|i| (format(320 + 16 * i, 240 + 8 * i), 0.02))
             .collect();
-        wanted.push((format(640, 480), 2));
+        wanted.push((format(640, 480), 1.0));
         let drawn = run(&wanted);
         assert!(drawn[&format(640, 480)] > LEAST, "{drawn:?}");
         assert_eq!(drawn.len(), 51);
@@ -186,7 +199,7 @@ mod tests {
     #[test]
     fn formats_that_fit_are_all_drawn() {
         let (a, b) = (format(640, 480), format(320, 240));
-        let drawn = run(&[(a, 1), (b, 1)]);
+        let drawn = run(&[(a, 1.0), (b, 1.0)]);
         assert_eq!(
             (drawn[&a], drawn[&b]),
             (EXPOSURES as usize, EXPOSURES as usize)

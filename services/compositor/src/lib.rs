@@ -5,7 +5,9 @@
 //! for every viewer (`viewer`). The states of a try-on are the table of `tryon::session`. gRPC, gRPC-web and the page
 //! share one port.
 
+mod admission;
 mod card;
+mod empty_scene;
 mod engine;
 mod formats;
 mod join_buffer;

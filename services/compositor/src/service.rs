@@ -1,5 +1,6 @@
 //! Remote procedures of the compositor: check the request, find the try-on, answer.
 
+use crate::admission::Admission;
 use crate::card::Card;
 use crate::engine::Encoding;
 use crate::try_on::{self, Command, Handle, Setup};
@@ -34,6 +35,7 @@ type Pictures = Pin<Box<dyn Stream<Item = Result<StreamFramesResponse, Status>> 
 /// Directory of try-ons and the dependencies of new ones.
 pub(crate) struct Compositor {
     try_ons: Sessions<Handle>,
+    admission: Admission,
     config: CompositorConfig,
     ctx: Context,
     cloth: Channel,
@@ -53,8 +55,11 @@ impl Compositor {
             key: "compositor.renderer".into(),
             why: e.to_string(),
         })?;
+        let try_ons = Sessions::new(config.max_try_ons);
+        let open = try_ons.clone();
         Ok(Self {
-            try_ons: Sessions::new(config.max_try_ons),
+            admission: Admission::start(move || open.len(), ctx.shutdown.clone()),
+            try_ons,
             config: config.clone(),
             ctx: ctx.clone(),
             cloth,
@@ -138,6 +143,11 @@ impl CompositorService for Compositor {
                 created: false,
             }));
         }
+        let open = self.try_ons.len();
+        if self.config.by_capacity && !self.admission.has_room(open) {
+            metrics::counter!("tryon_try_ons_refused").increment(1);
+            return Err(exhausted("try-ons that this machine can run", open));
+        }
         if !choices.is_empty()
             && let Err(s) = self.dress(&id, &choices, "open_try_on_request").await
             && s.code() == Code::InvalidArgument
@@ -158,6 +168,7 @@ impl CompositorService for Compositor {
             Opened::Created(_) => {
                 tracing::info!(try_on = brief(&id), camera = %key, "opened");
                 metrics::gauge!("tryon_try_ons").set(self.try_ons.len() as f64);
+                self.admission.on_opened();
                 true
             }
             Opened::Full => return Err(exhausted("try-ons", self.try_ons.limit())),
@@ -242,16 +253,29 @@ impl CompositorService for Compositor {
         &self,
         r: Request<StreamFramesRequest>,
     ) -> Result<Response<Pictures>, Status> {
+        let peer = r.remote_addr();
         let r = r.get_ref();
         let format = request::picture_format(r)?;
         let handle = self.find(&r.try_on_id)?;
-        let (viewer, reader) = viewer(&r.try_on_id, format);
-        handle
-            .commands
-            .send(Command::View(viewer))
-            .await
-            .map_err(|_| not_found("try-on", &r.try_on_id))?;
+        let gone = || not_found("try-on", &r.try_on_id);
+        let (viewer, reader) = viewer(&r.try_on_id, format, peer);
+        let (answer, is_admitted) = oneshot::channel();
+        let view = Command::View(viewer, answer);
+        handle.commands.send(view).await.map_err(|_| gone())?;
+        is_admitted.await.map_err(|_| gone())??;
         Ok(Response::new(Box::pin(reader.stream())))
+    }
+
+    async fn acknowledge_picture(
+        &self,
+        r: Request<AcknowledgePictureRequest>,
+    ) -> Result<Response<AcknowledgePictureResponse>, Status> {
+        let r = r.get_ref();
+        let handle = self.find(&r.try_on_id)?;
+        let command = Command::Acknowledge(r.stream, r.number);
+        let gone = |_| not_found("try-on", &r.try_on_id);
+        handle.commands.send(command).await.map_err(gone)?;
+        Ok(Response::new(AcknowledgePictureResponse {}))
     }
 
     async fn take_snapshot(

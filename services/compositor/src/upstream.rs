@@ -177,6 +177,7 @@ fn read(
         world_from_camera: rigid_from_wire(world, "garment_frame.world_from_camera")?,
         stages: stages_from_wire(&frame.stages, "garment_frame.stages")?,
         revision,
+        detail: frame.cloth_detail(),
     };
     Ok(News::Placed(Box::new(frame), Arc::new(placed)))
 }

@@ -1,24 +1,40 @@
-//! One viewer: its format, its rate, its queue.
+//! One viewer: its format, its rate, its queue, and what it has acknowledged.
 
 use futures::Stream;
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::sync::mpsc::error::TrySendError;
 use tokio::time::Instant;
 use tonic::Status;
 use tryon_kit::queue::latest;
+use tryon_kit::sessions::random_u64;
 use tryon_proto::convert::request::PictureFormat;
 use tryon_proto::v1::stream_frames_response::Event;
 use tryon_proto::v1::{Picture, StreamFramesResponse, TryOnState, TryOnStatus};
 
 /// Statuses that wait for a slow reader. They are never dropped: a reader that fills the queue is cut off.
 const STATUSES: usize = 64;
+/// Time without an acknowledgement, while pictures are on the way, after which a reader is cut off.
+const UNACKNOWLEDGED: Duration = Duration::from_secs(10);
+/// Age in the queue above which a picture is not sent any more: the next one is made within an exposure.
+const FRESH: Duration = Duration::from_millis(100);
 
 /// The writing end.
 pub(crate) struct Viewer {
     pub(crate) format: PictureFormat,
-    pictures: latest::Sender<Picture>,
+    /// Peer of its connection, which viewers on one connection have in common.
+    pub(crate) connection: Option<SocketAddr>,
+    /// Random name of its stream.
+    stream: u64,
+    /// Number of the newest picture, and of the newest one acknowledged.
+    sent: u64,
+    acknowledged: u64,
+    /// Last acknowledgement, or first picture after one.
+    moved: Instant,
+    pictures: latest::Sender<(Instant, Picture)>,
     statuses: mpsc::Sender<TryOnStatus>,
     next: Instant,
     /// Set when the reader is cut off for its slowness.
@@ -28,7 +44,7 @@ pub(crate) struct Viewer {
 /// The reading end.
 pub(crate) struct Reader {
     try_on: String,
-    pictures: latest::Receiver<Picture>,
+    pictures: latest::Receiver<(Instant, Picture)>,
     statuses: mpsc::Receiver<TryOnStatus>,
     is_cut_off: Arc<AtomicBool>,
     end: End,
@@ -45,14 +61,23 @@ enum End {
     Told,
 }
 
-/// A viewer of a try-on and its reader.
-pub(crate) fn viewer(try_on: &str, format: PictureFormat) -> (Viewer, Reader) {
+/// A viewer of a try-on, on that connection, and its reader.
+pub(crate) fn viewer(
+    try_on: &str,
+    format: PictureFormat,
+    connection: Option<SocketAddr>,
+) -> (Viewer, Reader) {
     let (pictures, p) = latest::channel();
     let (statuses, s) = mpsc::channel(STATUSES);
     let is_cut_off = Arc::<AtomicBool>::default();
     (
         Viewer {
             format,
+            connection,
+            stream: random_u64(),
+            sent: 0,
+            acknowledged: 0,
+            moved: Instant::now(),
             pictures,
             statuses,
             next: Instant::now(),
@@ -73,12 +98,53 @@ impl Viewer {
     pub(crate) fn wants(&self) -> bool {
         self.next <= Instant::now()
     }
+    /// It has not taken what was made for it: another picture would only wait.
+    pub(crate) fn is_behind(&self) -> bool {
+        let on_the_way = self.sent - self.acknowledged;
+        let is_full = (self.format.window).is_some_and(|w| on_the_way >= u64::from(w));
+        is_full || self.pictures.is_waiting()
+    }
     /// Queues a picture in place of one that still waits.
     pub(crate) fn picture(&mut self, p: Picture) {
-        // Counted from the time it was due: the rate is met on average, without bursts after a gap.
+        self.wait_a_turn();
+        if self.sent == self.acknowledged {
+            self.moved = Instant::now();
+        }
+        self.sent += 1;
+        let (stream, number) = (self.stream, self.sent);
+        let p = Picture {
+            stream,
+            number,
+            ..p
+        };
+        self.pictures.send((Instant::now(), p));
+    }
+    /// Counts a picture that was not made because the reader is behind.
+    pub(crate) fn skip(&mut self) {
+        self.wait_a_turn();
+        self.pictures.skip();
+    }
+    /// Counted from the time it was due: the rate is met on average, without bursts after a gap.
+    fn wait_a_turn(&mut self) {
         let (step, now) = (self.format.interval, Instant::now());
         self.next = (self.next + step).max(now.checked_sub(step).unwrap_or(now));
-        self.pictures.send(p);
+    }
+    /// Takes an acknowledgement, if it is of this stream and new.
+    pub(crate) fn acknowledge(&mut self, stream: u64, number: u64) {
+        if stream == self.stream && number > self.acknowledged {
+            self.acknowledged = number.min(self.sent);
+            self.moved = Instant::now();
+        }
+    }
+    /// The reader has gone, or acknowledges nothing: then it is cut off.
+    pub(crate) fn is_over(&self) -> bool {
+        let is_stuck = self.format.window.is_some()
+            && self.sent > self.acknowledged
+            && self.moved.elapsed() > UNACKNOWLEDGED;
+        if is_stuck {
+            self.is_cut_off.store(true, Ordering::Release);
+        }
+        is_stuck || self.statuses.is_closed()
     }
     /// Queues a status; `false` when the reader is gone or its queue is full.
     pub(crate) fn status(&self, s: TryOnStatus) -> bool {
@@ -87,9 +153,6 @@ impl Viewer {
             self.is_cut_off.store(true, Ordering::Release);
         }
         sent.is_ok()
-    }
-    pub(crate) fn is_gone(&self) -> bool {
-        self.statuses.is_closed()
     }
 }
 
@@ -106,7 +169,7 @@ impl Reader {
                     }
                     Event::Status(s)
                 }
-                Some(p) = r.pictures.recv() => Event::Picture(Picture { dropped: r.pictures.dropped(), ..p }),
+                Some(p) = fresh_picture(&mut r.pictures) => Event::Picture(p),
                 else => return r.fault().map(|s| (Err(s), Self { end: End::Told, ..r })),
             };
             Some((Ok(StreamFramesResponse { event: Some(event) }), r))
@@ -129,10 +192,21 @@ impl Reader {
     }
 }
 
+/// The next picture; those that waited for too long are dropped. Cancel safe.
+async fn fresh_picture(pictures: &mut latest::Receiver<(Instant, Picture)>) -> Option<Picture> {
+    loop {
+        let (queued, p) = pictures.recv().await?;
+        if queued.elapsed() <= FRESH {
+            let dropped = pictures.dropped();
+            return Some(Picture { dropped, ..p });
+        }
+        pictures.discard();
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tokio::time::Duration;
     use tokio_stream::StreamExt;
     use tonic::Code;
 
@@ -140,6 +214,7 @@ mod tests {
         size: None,
         quality: 80,
         interval: Duration::ZERO,
+        window: None,
     };
 
     fn status(state: TryOnState) -> TryOnStatus {
@@ -151,7 +226,7 @@ mod tests {
 
     #[tokio::test]
     async fn an_end_that_nobody_announced_is_internal_and_names_the_try_on() {
-        let (v, r) = viewer("shopper", FORMAT);
+        let (v, r) = viewer("shopper", FORMAT, None);
         v.status(status(TryOnState::Live));
         drop(v);
         let all: Vec<_> = r.stream().collect().await;
@@ -162,7 +237,7 @@ mod tests {
 
     #[tokio::test]
     async fn an_announced_end_is_ok_and_a_full_queue_is_told() {
-        let (v, r) = viewer("shopper", FORMAT);
+        let (v, r) = viewer("shopper", FORMAT, None);
         v.status(status(TryOnState::Closed));
         drop(v);
         assert_eq!(
@@ -174,7 +249,7 @@ mod tests {
             0
         );
 
-        let (v, r) = viewer("shopper", FORMAT);
+        let (v, r) = viewer("shopper", FORMAT, None);
         while v.status(status(TryOnState::Live)) {}
         drop(v);
         let last = r.stream().collect::<Vec<_>>().await.pop().expect("an end");
@@ -183,7 +258,7 @@ mod tests {
 
     #[tokio::test]
     async fn slow_reader_receives_every_status_and_the_newest_picture() {
-        let (mut v, r) = viewer("shopper", FORMAT);
+        let (mut v, r) = viewer("shopper", FORMAT, None);
         for i in 0..5 {
             v.picture(Picture {
                 width: i,
@@ -220,5 +295,68 @@ mod tests {
             }
         });
         assert_eq!(last, Some((4, 4)));
+    }
+
+    #[tokio::test]
+    async fn a_full_window_waits_for_acknowledgements_and_skips_count() {
+        let format = PictureFormat {
+            window: Some(2),
+            ..FORMAT
+        };
+        let (mut v, mut r) = viewer("shopper", format, None);
+        for number in 1..=2 {
+            assert!(!v.is_behind());
+            v.picture(Picture::default());
+            let p = fresh_picture(&mut r.pictures).await.expect("queued");
+            assert_eq!((p.stream, p.number, p.dropped), (v.stream, number, 0));
+        }
+        assert!(v.is_behind(), "two are on the way");
+        v.skip();
+        v.acknowledge(v.stream.wrapping_add(1), 2);
+        assert!(v.is_behind(), "another stream's");
+        v.acknowledge(v.stream, 1_000_000);
+        v.acknowledge(v.stream, 1);
+        assert_eq!((v.is_behind(), v.acknowledged), (false, 2));
+        v.picture(Picture::default());
+        assert_eq!(
+            fresh_picture(&mut r.pictures)
+                .await
+                .expect("queued")
+                .dropped,
+            1
+        );
+    }
+
+    #[tokio::test]
+    async fn a_reader_that_acknowledges_nothing_is_cut_off() {
+        let format = PictureFormat {
+            window: Some(1),
+            ..FORMAT
+        };
+        let (mut v, r) = viewer("shopper", format, None);
+        let long_ago = Instant::now().checked_sub(2 * UNACKNOWLEDGED);
+        v.moved = long_ago.expect("the machine has run for a while");
+        assert!(!v.is_over(), "there was no picture");
+        v.picture(Picture::default());
+        assert!(!v.is_over());
+        v.moved = long_ago.expect("as above");
+        assert!(v.is_over());
+        drop(v);
+        let last = r.stream().collect::<Vec<_>>().await.pop().expect("an end");
+        assert_eq!(last.expect_err("cut off").code(), Code::ResourceExhausted);
+    }
+
+    #[tokio::test]
+    async fn pictures_that_waited_for_too_long_are_not_sent() {
+        let (mut v, mut r) = viewer("shopper", FORMAT, None);
+        v.picture(Picture::default());
+        assert!(v.is_behind());
+        tokio::time::sleep(2 * FRESH).await;
+        let next = tokio::spawn(async move { fresh_picture(&mut r.pictures).await });
+        tokio::task::yield_now().await;
+        assert!(!v.is_behind());
+        v.picture(Picture::default());
+        let p = next.await.expect("ends").expect("a picture");
+        assert_eq!((p.number, p.dropped), (2, 1));
     }
 }

@@ -124,6 +124,8 @@ impl Config {
             ("tracking.max_sessions", self.tracking.max_sessions),
             ("cloth.max_sessions", self.cloth.max_sessions),
             ("compositor.max_try_ons", self.compositor.max_try_ons),
+            ("compositor.max_viewers", self.compositor.max_viewers),
+            ("compositor.max_formats", self.compositor.max_formats),
         ] {
             if n == 0 {
                 return fault(key, "at least 1");

@@ -9,6 +9,7 @@ use std::future::Future;
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
 use tokio::sync::watch;
+use tokio::time::Instant;
 use tryon::camera::Calibration;
 use tryon_proto::Message;
 pub use tryon_proto::convert::frame::{Exposure, exposure_from_wire, exposure_to_wire, stage};
@@ -117,6 +118,16 @@ impl FrameSubscription {
             self.last = Some((epoch, sequence));
             return Some(exposure);
         }
+    }
+    /// The newest exposure from `due` on: those before it are left out, neither unpacked nor counted as missed.
+    ///
+    /// Cancel safe.
+    pub async fn next_from(&mut self, due: Instant) -> Option<Arc<Exposure>> {
+        if self.unpacking.is_none() && due > Instant::now() {
+            self.last = None;
+            tokio::time::sleep_until(due).await;
+        }
+        self.next().await
     }
     /// Number of missed exposures of the current epoch.
     pub fn skipped(&self) -> u64 {
@@ -285,6 +296,26 @@ pub(crate) mod tests {
             tokio::time::sleep(Duration::from_millis(50)).await;
         }
         panic!("the camera still counts as alive");
+    }
+
+    #[tokio::test]
+    async fn exposures_before_a_time_are_left_out() {
+        let bus = LocalBus::new(Pool::new(1).expect("a thread"));
+        let key = CameraKey::new("store", "front").expect("names");
+        let mut s = bus.subscribe(&key).await.expect("subscribed");
+        let mut p = (bus.publish(&key, &exposure(0).calibration).await).expect("published");
+        p.send(exposure(1)).await.expect("sent");
+        assert_eq!(s.next().await.expect("lives").id.sequence, 1);
+        let due = Instant::now() + Duration::from_millis(50);
+        let sending = async {
+            for sequence in 2..5 {
+                p.send(exposure(sequence)).await.expect("sent");
+            }
+        };
+        let (next, ()) = tokio::join!(s.next_from(due), sending);
+        assert_eq!(next.expect("lives").id.sequence, 4);
+        assert!(Instant::now() >= due);
+        assert_eq!(s.skipped(), 0, "left out on purpose");
     }
 
     #[tokio::test]

@@ -16,6 +16,9 @@ use tryon_proto::v1::{self, DegradedReason, TrackingStatus};
 /// Time without a frame after which the camera counts as silent: half of the time in which clients must know.
 const SILENCE: Duration = Duration::from_millis(500);
 
+/// Interval of searches while nobody is in view: a person who comes is found within it. More is noticed, less costs more.
+const SEARCH_EVERY: Duration = Duration::from_millis(100);
+
 /// Access to a session from the rpcs.
 pub(crate) struct Handle {
     pub(crate) key: CameraKey,
@@ -100,8 +103,8 @@ impl Task {
         let shutdown = self.setup.ctx.shutdown.clone();
         let mut tick = tokio::time::interval(SILENCE / 2);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-        let (mut received, mut published, mut wanted) =
-            (Instant::now(), Instant::now(), Instant::now());
+        let now = Instant::now();
+        let (mut received, mut published, mut wanted, mut due) = (now, now, now, now);
         loop {
             tokio::select! {
                 biased;
@@ -111,9 +114,11 @@ impl Task {
                     Some(Command::Touch) => wanted = Instant::now(),
                     Some(Command::Close) | None => return "asked to",
                 },
-                frame = frames.next() => match frame {
+                frame = frames.next_from(due) => match frame {
                     Some(f) => {
+                        let taken = Instant::now();
                         self.step(f, frames.skipped()).await;
+                        due = if self.is_nobody() { taken + SEARCH_EVERY } else { taken };
                         (received, published) = (Instant::now(), Instant::now());
                     }
                     None => return "the bus is gone",
@@ -132,6 +137,15 @@ impl Task {
                 }
             }
         }
+    }
+
+    /// Nobody is in view.
+    fn is_nobody(&self) -> bool {
+        let reason = self.states.borrow().reason();
+        matches!(
+            reason,
+            DegradedReason::NoPerson | DegradedReason::PersonLeft
+        )
     }
 
     async fn step(&mut self, exposure: Arc<Exposure>, skipped: u64) {

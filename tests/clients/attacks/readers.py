@@ -32,11 +32,13 @@ def noise_setup(ground: Range, **compositor: object) -> Setup:
 
 
 class Slow:
-    """Reads one message a second for `seconds`, then the rest as fast as it can."""
+    """Reads one message a second for `seconds`, then the rest as fast as it can. One that acknowledges says so when it
+    has room for the next picture."""
 
-    def __init__(self, name: str, client: Client, next_message: Callable[[float], object | None]):
-        self.name, self.client, self.next_message = name, client, next_message
+    def __init__(self, name: str, client: Client, next_message: Callable[[float], object | None], acknowledges: bool):
+        self.name, self.client, self.next_message, self.acknowledges = name, client, next_message, acknowledges
         self.read: list[tuple[float, Seen]] = []
+        self.last: object | None = None
 
     def run(self, seconds: float) -> None:
         """Collects pictures with the Unix time at which each was taken."""
@@ -55,9 +57,13 @@ class Slow:
 
     def take(self, limit: float) -> Seen | None:
         """The next message."""
+        if self.last and self.acknowledges:
+            self.client.acknowledge(SHARED, self.last)
         message = self.next_message(limit)
         if message is None:
             return None
+        if message.WhichOneof("event") == "picture":
+            self.last = message.picture
         seen = self.client.seen(message)
         if seen.is_picture:
             self.read.append((time.time(), seen))
@@ -74,28 +80,40 @@ class Slow:
         return max(counts, default=0)
 
 
-def slow_readers(ground: Range, box: Box) -> tuple[list[Slow], list[Callable[[], None]]]:
+def slow_readers(ground: Range, box: Box, acknowledges: bool) -> tuple[list[Slow], list[Callable[[], None]]]:
     """One over grpcio, one over h2, one over HTTP/1.1 as browsers have it; and what closes them."""
     client = Client(ground, box)
     client.open_patiently(SHARED)
-    request = client.pb.StreamFramesRequest(try_on_id=SHARED).SerializeToString()
-    call = client.stream(SHARED)
+    window = {"max_unacknowledged": 1} if acknowledges else {}
+    request = client.pb.StreamFramesRequest(try_on_id=SHARED, **window).SerializeToString()
+    call = client.stream(SHARED, **window)
     http2 = Http2Call(box.address, COMPOSITOR + "StreamFrames", framed(request), box.metadata)
     http1 = Http1Call(box.address, "StreamFrames", request, box.metadata)
     parse = lambda data: data and client.pb.StreamFramesResponse.FromString(data)
     readers = [
-        Slow("grpcio", client, lambda _: next(call, None)),
-        Slow("h2", client, lambda limit: parse(http2.message(limit))),
-        Slow("HTTP/1.1", client, lambda limit: parse(http1.message(limit))),
+        Slow("grpcio", client, lambda _: next(call, None), acknowledges),
+        Slow("h2", client, lambda limit: parse(http2.message(limit)), acknowledges),
+        Slow("HTTP/1.1", client, lambda limit: parse(http1.message(limit)), acknowledges),
     ]
     return readers, [call.cancel, http2.close, http1.close, client.close]
 
 
 @attack("slow-reader", "slow reader (one a second): age of its pictures p99; pictures waiting for it anywhere")
 def slow_reader(ground: Range) -> list[Figure]:
-    """The worst of three transports."""
+    """Readers that acknowledge, over each of three transports."""
+    return slow_figures(ground, acknowledges=True)
+
+
+@attack("slow-plain", "slow reader that acknowledges nothing: age of its pictures p99; pictures waiting for it anywhere")
+def slow_plain(ground: Range) -> list[Figure]:
+    """What the transports' own windows and sockets hold."""
+    return slow_figures(ground, acknowledges=False)
+
+
+def slow_figures(ground: Range, acknowledges: bool) -> list[Figure]:
+    """Age and waiting pictures of each reader."""
     with ground.box(noise_setup(ground)) as box:
-        readers, closes = slow_readers(ground, box)
+        readers, closes = slow_readers(ground, box, acknowledges)
         run_all([lambda r=r: r.run(ground.pick(15, 40)) for r in readers])
         for close in closes:
             close()
@@ -199,7 +217,7 @@ def neighbours(ground: Range) -> list[Figure]:
 
 def start_slow(ground: Range, box: Box) -> list[Callable[[], None]]:
     """Slow readers that run on while the neighbours are timed."""
-    readers, closes = slow_readers(ground, box)
+    readers, closes = slow_readers(ground, box, acknowledges=False)
     for r in readers:
         threading.Thread(target=quietly, args=(lambda r=r: r.run(20.0),), daemon=True).start()
     return closes

@@ -3,7 +3,7 @@
 
 use super::handle::Answer;
 use crate::card::Card;
-use crate::engine::{Drawn, Engine, Job};
+use crate::engine::{Encoded, Engine, Job};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use tokio::sync::mpsc;
@@ -13,12 +13,21 @@ use tryon_kit::status::exhausted;
 /// Snapshots that wait. A judgement, not a measurement: more would outlive their callers (two seconds).
 const SNAPSHOTS: usize = 4;
 
-/// Job that came back from the pool.
-pub(super) struct Done {
+/// Message of the pool.
+pub(super) enum Done {
+    /// One format of a picture of the stream.
+    Picture(Arc<Job>, Encoded),
+    /// The job has ended.
+    End(End),
+}
+
+/// End of a job.
+pub(super) struct End {
     /// `None` after a panic.
     pub(super) engine: Option<Engine>,
-    pub(super) job: Job,
-    pub(super) outcome: Result<Drawn, String>,
+    pub(super) job: Arc<Job>,
+    /// The picture, if the job is a snapshot.
+    pub(super) outcome: Result<Option<Encoded>, String>,
     /// Receiver of a snapshot; `None` for a picture of the stream.
     pub(super) answer: Option<Answer>,
 }
@@ -118,26 +127,33 @@ impl Drawing {
         let Some(mut engine) = self.engine.take() else {
             return;
         };
-        let (pool, done) = (self.pool.clone(), self.done.clone());
+        let (pool, done, job) = (self.pool.clone(), self.done.clone(), Arc::new(job));
+        let is_snapshot = answer.is_some();
         tokio::spawn(async move {
-            let drawn = job.clone();
+            let (drawn, stream) = (job.clone(), done.clone());
             let work = move || {
-                let outcome = engine.draw(&drawn);
-                (engine, outcome)
+                let mut snapshot = None;
+                let outcome = engine.draw(&drawn, |picture| {
+                    if is_snapshot {
+                        snapshot = Some(picture);
+                    } else {
+                        // The send fails only after the try-on has ended.
+                        let _ = stream.blocking_send(Done::Picture(drawn.clone(), picture));
+                    }
+                });
+                (engine, outcome.map(|()| snapshot))
             };
             let (engine, outcome) = match pool.run(work).await {
                 Ok((e, o)) => (Some(e), o),
                 Err(why) => (None, Err(why.to_string())),
             };
-            // The send fails only after the try-on has ended.
-            let _ = done
-                .send(Done {
-                    engine,
-                    job,
-                    outcome,
-                    answer,
-                })
-                .await;
+            let end = End {
+                engine,
+                job,
+                outcome,
+                answer,
+            };
+            let _ = done.send(Done::End(end)).await;
         });
     }
 }

@@ -24,8 +24,10 @@ pub(crate) type Answer = oneshot::Sender<Result<Picture, Status>>;
 
 /// Command to a try-on.
 pub(crate) enum Command {
-    /// Adds a viewer.
-    View(Viewer),
+    /// Adds a viewer, unless there are too many or too many formats.
+    View(Viewer, oneshot::Sender<Result<(), Status>>),
+    /// Acknowledges a picture of that stream and number.
+    Acknowledge(u64, u64),
     /// Draws the newest picture once.
     Snapshot(Encoding, Answer),
     /// Keeps the try-on open.

@@ -131,6 +131,14 @@ impl Lifecycle {
         self.tracking.fault = None;
     }
 
+    /// Tracking sees nobody.
+    pub(super) fn is_nobody_in_view(&self) -> bool {
+        matches!(
+            self.state,
+            State::Degraded(Fault::NoPerson | Fault::PersonLeft)
+        )
+    }
+
     /// Tracking answered that it follows nobody.
     pub(super) fn on_nobody(&mut self, reason: Fault, detail: &str) {
         self.fail(reason, detail);

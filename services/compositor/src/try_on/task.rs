@@ -1,25 +1,27 @@
 //! Task of one try-on: joins frames, bodies and garments, and hands pictures to viewers.
 
-use super::drawing::{Done, Drawing};
+use super::drawing::{Done, Drawing, End};
 use super::handle::{Answer, Command, Setup};
 use super::lifecycle::Lifecycle;
-use crate::engine::{Drawn, Encoded, Encoding, Job, Placed};
-use crate::formats::Formats;
+use crate::empty_scene::EmptyScene;
+use crate::engine::{Encoded, Encoding, Job, Placed};
+use crate::formats::{Format, Formats, Wanted};
 use crate::join_buffer::{JoinBuffer, ReportedBody, not_after};
 use crate::life;
 use crate::upstream;
 use crate::viewer::Viewer;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::time::Instant;
+use tonic::Status;
 use tryon::session::{Event, Fault};
 use tryon_kit::bodies;
 use tryon_kit::frames::{Exposure, FrameSubscription};
 use tryon_kit::queue::latest;
 use tryon_kit::sessions::{brief, unix_ns};
-use tryon_kit::status::unavailable;
+use tryon_kit::status::{exhausted, unavailable};
 use tryon_kit::telemetry::record_stages;
 use tryon_proto::v1::{
     BodyState, ClothStatus, FrameId, GarmentFit, GarmentFrame, Picture, PictureCodec,
@@ -69,8 +71,13 @@ pub(super) struct Task {
     wanted: Instant,
     /// Newest exposure in which nobody was followed; garments up to it are not shown.
     lost_at: Option<FrameId>,
-    /// Newest exposure shown.
+    /// Newest exposure shown, and the job that shows it.
     shown: Option<FrameId>,
+    showing: Option<Arc<Job>>,
+    /// The picture while nobody is in view.
+    scene: EmptyScene,
+    /// Time from which exposures are taken.
+    due: Instant,
     /// Last job, for snapshots.
     last: Option<(Instant, Job)>,
 }
@@ -91,6 +98,9 @@ impl Task {
             wanted: now,
             lost_at: None,
             shown: None,
+            showing: None,
+            scene: EmptyScene::default(),
+            due: now,
             last: None,
         }
     }
@@ -123,7 +133,7 @@ impl Task {
                 return Some("shutting down");
             }
             c = i.inbox.recv() => return self.on_command(c),
-            Some(d) = i.drawn.recv() => self.on_drawn(d),
+            Some(d) = i.drawn.recv() => self.on_done(d),
             g = i.garments.recv() => match g {
                 Some(g) => self.on_garments(g),
                 None => return Some("cloth cannot be followed"),
@@ -132,7 +142,7 @@ impl Task {
                 Some(b) => self.on_body(b),
                 None => return Some("tracking cannot be followed"),
             },
-            f = i.frames.next() => match f {
+            f = i.frames.next_from(self.due) => match f {
                 Some(f) => self.on_frame(f),
                 None => return Some("the bus is gone"),
             },
@@ -149,9 +159,12 @@ impl Task {
 
     fn on_command(&mut self, command: Option<Command>) -> Option<&'static str> {
         match command {
-            Some(Command::View(v)) => {
-                v.status(self.life.status());
-                self.viewers.push(v);
+            Some(Command::View(v, answer)) => {
+                // The receiver may be gone, and then its viewer leaves with the next tick.
+                let _ = answer.send(self.admit(v));
+            }
+            Some(Command::Acknowledge(stream, number)) => {
+                (self.viewers.iter_mut()).for_each(|v| v.acknowledge(stream, number));
             }
             Some(Command::Snapshot(encoding, answer)) => self.snapshot(encoding, answer),
             Some(Command::Touch) => self.wanted = Instant::now(),
@@ -164,6 +177,27 @@ impl Task {
         None
     }
 
+    /// Adds a viewer; RESOURCE_EXHAUSTED when it is one too many, or its format is.
+    fn admit(&mut self, v: Viewer) -> Result<(), Status> {
+        let (max_viewers, max_formats) =
+            (self.setup.config.max_viewers, self.setup.config.max_formats);
+        if self.viewers.len() >= max_viewers {
+            return Err(exhausted("viewers of a try-on", max_viewers));
+        }
+        let formats: BTreeSet<_> = (self.viewers.iter().chain([&v]))
+            .map(|v| Job::wants(&v.format))
+            .collect();
+        if formats.len() > max_formats {
+            let what = "sizes and qualities of a try-on's pictures";
+            return Err(exhausted(what, max_formats));
+        }
+        v.status(self.life.status());
+        self.viewers.push(v);
+        // Its first picture does not wait for a change of the scene.
+        (self.scene, self.due) = (EmptyScene::default(), Instant::now());
+        Ok(())
+    }
+
     fn say(&mut self, status: &TryOnStatus) {
         self.viewers.retain(|v| v.status(status.clone()));
         self.said = Instant::now();
@@ -171,13 +205,15 @@ impl Task {
 
     fn on_tick(&mut self) {
         self.life.check();
-        self.viewers.retain(|v| !v.is_gone());
+        self.viewers.retain(|v| !v.is_over());
         if !self.viewers.is_empty() {
             self.wanted = Instant::now();
         }
         if self.said.elapsed() >= HEARTBEAT {
+            // A reader that is behind has something to read: repetitions would wait before the next picture.
             let status = self.life.status();
-            self.say(&status);
+            (self.viewers).retain(|v| v.is_behind() || v.status(status.clone()));
+            self.said = Instant::now();
         }
     }
 
@@ -185,7 +221,7 @@ impl Task {
         self.life.on_frame();
         self.join.push_frame(e.clone());
         // While live, pictures wait for their garments; otherwise the plain picture is shown at once.
-        if !self.life.state().shows_garments() {
+        if !self.life.state().shows_garments() && self.is_worth_a_picture(&e) {
             self.draw(Job {
                 exposure: e,
                 placed: None,
@@ -194,6 +230,21 @@ impl Task {
                 fit: None,
             });
         }
+    }
+
+    /// False for an empty scene that stands still: its exposures are taken and drawn now and then.
+    fn is_worth_a_picture(&mut self, e: &Exposure) -> bool {
+        let now = Instant::now();
+        self.due = now;
+        if !self.life.is_nobody_in_view() {
+            return true;
+        }
+        let look = self.scene.look(e.rgbd.color.as_ref(), now);
+        self.due = look.next;
+        if !look.is_due {
+            metrics::counter!("tryon_compositor_still").increment(1);
+        }
+        look.is_due
     }
 
     fn on_body(&mut self, news: bodies::News) {
@@ -282,10 +333,7 @@ impl Task {
         if self.is_shown(&job.exposure.id) {
             return;
         }
-        let mut wanted = BTreeMap::<_, usize>::new();
-        for v in self.viewers.iter().filter(|v| v.wants()) {
-            *wanted.entry(Job::wants(&v.format)).or_default() += 1;
-        }
+        let wanted = self.wanted_formats();
         let depth = &job.exposure.rgbd.depth;
         let pixels = f64::from(depth.width()) * f64::from(depth.height());
         job.formats = self.formats.choose(&wanted, pixels, Instant::now());
@@ -300,62 +348,98 @@ impl Task {
         self.drawing.queue(job);
     }
 
+    /// Formats that viewers want now. A connection has one voice, however many streams it opens.
+    fn wanted_formats(&mut self) -> BTreeMap<Format, Wanted> {
+        let mut streams = BTreeMap::<_, usize>::new();
+        for v in &self.viewers {
+            *streams.entry(v.connection).or_default() += 1;
+        }
+        let mut wanted = BTreeMap::<_, Wanted>::new();
+        for (rank, v) in self
+            .viewers
+            .iter_mut()
+            .enumerate()
+            .filter(|(_, v)| v.wants())
+        {
+            if v.is_behind() {
+                v.skip();
+                continue;
+            }
+            let fresh = Wanted { voices: 0.0, rank };
+            let w = wanted.entry(Job::wants(&v.format)).or_insert(fresh);
+            w.voices += 1.0 / streams[&v.connection] as f64;
+        }
+        wanted
+    }
+
     fn is_shown(&self, id: &FrameId) -> bool {
         self.shown.as_ref().is_some_and(|s| not_after(id, s))
     }
 
-    fn on_drawn(&mut self, d: Done) {
-        match d.outcome {
+    fn on_done(&mut self, d: Done) {
+        match d {
+            Done::Picture(job, picture) => {
+                self.formats
+                    .record((picture.size, picture.encoding), picture.cost);
+                if job.placed.is_some() == self.life.state().shows_garments() {
+                    self.deliver(&job, &picture);
+                }
+            }
+            Done::End(end) => self.on_end(end),
+        }
+    }
+
+    fn on_end(&mut self, end: End) {
+        let answer = match &end.outcome {
             Ok(drawn) => {
-                record_stages("compositor", &drawn.stages);
-                for p in &drawn.pictures {
-                    self.formats.record((p.size, p.encoding), p.cost);
-                }
-                if let Some(answer) = d.answer {
-                    let picture = drawn
-                        .pictures
-                        .first()
-                        .map(|p| self.picture(&d.job, &drawn, p));
-                    let _ =
-                        answer.send(picture.ok_or_else(|| unavailable("compositor", "no picture")));
-                } else if d.job.placed.is_some() == self.life.state().shows_garments() {
-                    self.deliver(&d.job, &drawn);
-                }
+                let picture = drawn.as_ref().map(|p| self.picture(&end.job, p));
+                picture.ok_or_else(|| unavailable("compositor", "no picture"))
             }
             Err(why) => {
                 tracing::warn!(try_on = brief(&self.setup.id), %why, "a picture could not be drawn");
-                if let Some(answer) = d.answer {
-                    let _ = answer.send(Err(unavailable("compositor", &why)));
-                }
-                self.life.fail(Fault::StepFailed, &why);
+                self.life.fail(Fault::StepFailed, why);
+                Err(unavailable("compositor", why))
             }
+        };
+        if let Some(caller) = end.answer {
+            // The caller may be gone.
+            let _ = caller.send(answer);
         }
-        self.drawing.resume(d.engine);
+        self.drawing.resume(end.engine);
     }
 
-    fn deliver(&mut self, job: &Job, drawn: &Drawn) {
-        let id = job.exposure.id;
-        if self.is_shown(&id) {
+    /// Hands a picture to the viewers that want its format. One exposure is shown by one job only.
+    fn deliver(&mut self, job: &Arc<Job>, drawn: &Encoded) {
+        let is_next = self.showing.as_ref().is_some_and(|s| Arc::ptr_eq(s, job));
+        if !is_next && self.is_shown(&job.exposure.id) {
             return;
         }
-        self.shown = Some(id);
+        let wanted = (drawn.size, drawn.encoding);
         let mut viewers = std::mem::take(&mut self.viewers);
-        for v in viewers.iter_mut().filter(|v| v.wants()) {
-            let wanted = Job::wants(&v.format);
-            let made = |p: &&Encoded| (p.size, p.encoding) == wanted;
-            if let Some(p) = drawn.pictures.iter().find(made) {
-                v.picture(self.picture(job, drawn, p));
+        for v in viewers.iter_mut().filter(|v| v.wants() && !v.is_behind()) {
+            if Job::wants(&v.format) == wanted {
+                v.picture(self.picture(job, drawn));
             }
         }
         self.viewers = viewers;
         self.said = Instant::now();
+        if !is_next {
+            self.on_shown(job, drawn);
+        }
+    }
+
+    /// Counts a new exposure on show.
+    fn on_shown(&mut self, job: &Arc<Job>, drawn: &Encoded) {
+        let id = job.exposure.id;
+        (self.shown, self.showing) = (Some(id), Some(job.clone()));
+        record_stages("compositor", &drawn.stages);
         let state = life::state(self.life.state()).as_str_name();
         metrics::counter!("tryon_pictures", "state" => state).increment(1);
         let latency = unix_ns().saturating_sub(id.received_unix_ns) as f64 * 1e-6;
         metrics::histogram!("tryon_stage_ms", "stage" => "latency").record(latency);
     }
 
-    fn picture(&self, job: &Job, drawn: &Drawn, p: &Encoded) -> Picture {
+    fn picture(&self, job: &Job, p: &Encoded) -> Picture {
         let id = job.exposure.id;
         // The state of the picture's content, which may differ from the state by now.
         let state = if job.placed.is_some() {
@@ -375,7 +459,7 @@ impl Task {
             height: p.height,
             image: p.bytes.clone(),
             latency_ms: unix_ns().saturating_sub(id.received_unix_ns) as f32 * 1e-6,
-            stages: drawn.stages.clone(),
+            stages: p.stages.clone(),
             ..Picture::default()
         };
         if is_degraded {
@@ -384,6 +468,7 @@ impl Task {
         }
         if let Some(placed) = &job.placed {
             picture.outfit_revision = placed.revision;
+            picture.set_cloth_detail(placed.detail);
             if placed.revision == self.fit.revision {
                 picture.fit.clone_from(&self.fit.garments);
             }

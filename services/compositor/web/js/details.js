@@ -5,6 +5,9 @@ import { fitRows } from './fit.js';
 
 const whole = (x) => (Number.isFinite(x) ? String(Math.round(x)) : '–');
 
+/** `CLOTH_DETAIL_*` in words; full detail goes without. */
+const DETAIL = ['', '', ', coarser cloth', ', cloth not simulated', ', no garments'];
+
 /** "tracking.solve" → service "tracking", and words for people. */
 function stageName(stage) {
   const dot = stage.indexOf('.');
@@ -40,7 +43,8 @@ export class Details {
     this.#line(summary.recent);
     this.#fits(picture?.fit ?? []);
     const size = picture ? `${picture.width} × ${picture.height}` : '';
-    setText(byId('d-frame'), picture ? `Exposure ${picture.frame?.sequence ?? '?'}, ${size}, outfit ${picture.outfit_revision}` : '');
+    const cloth = DETAIL[picture?.cloth_detail] ?? '';
+    setText(byId('d-frame'), picture ? `Exposure ${picture.frame?.sequence ?? '?'}, ${size}, outfit ${picture.outfit_revision}${cloth}` : '');
   }
 
   #bars(stages) {

@@ -81,7 +81,8 @@ export const StreamFramesRequest = schema('StreamFramesRequest',
   [3, 'height', 'uint32'],
   [4, 'codec', 'enum'],
   [5, 'quality', 'uint32'],
-  [6, 'max_rate', 'float']);
+  [6, 'max_rate', 'float'],
+  [7, 'max_unacknowledged', 'uint32']);
 
 export const Picture = schema('Picture',
   [1, 'frame', 'message', FrameId],
@@ -96,7 +97,17 @@ export const Picture = schema('Picture',
   [10, 'latency_ms', 'float'],
   [11, 'stages', 'message[]', StageTime],
   [12, 'dropped', 'uint64'],
-  [13, 'fit', 'message[]', GarmentFit]);
+  [13, 'fit', 'message[]', GarmentFit],
+  [14, 'stream', 'uint64'],
+  [15, 'number', 'uint64'],
+  [16, 'cloth_detail', 'enum']);
+
+export const AcknowledgePictureRequest = schema('AcknowledgePictureRequest',
+  [1, 'try_on_id', 'string'],
+  [2, 'stream', 'uint64'],
+  [3, 'number', 'uint64']);
+
+export const AcknowledgePictureResponse = schema('AcknowledgePictureResponse');
 
 export const TryOnStatus = schema('TryOnStatus',
   [1, 'state', 'enum'],
@@ -136,6 +147,9 @@ export const Reason = Object.freeze({
   STEP_FAILED: 8,
   PERSON_SITS: 9,
 });
+
+/** `CLOTH_DETAIL_*` */
+export const ClothDetail = Object.freeze({ FULL: 1, COARSE: 2, SKINNED: 3, NONE: 4 });
 
 // google.rpc, for the details of an error.
 export const Any = schema('Any', [1, 'type_url', 'string'], [2, 'value', 'bytes']);

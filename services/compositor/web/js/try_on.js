@@ -7,6 +7,9 @@ import { Backoff } from './backoff.js';
 /** The contract: no message for a second means that the compositor is gone. One more for a busy network, ms. */
 export const SILENCE_MS = 2000;
 
+/** Pictures on the way before the first acknowledgement is back: a network of 100 ms at 30 a second. */
+const MAX_UNACKNOWLEDGED = 4;
+
 /** Answers that another try cannot change. */
 const HOPELESS = new Set([Code.INVALID_ARGUMENT, Code.FAILED_PRECONDITION]);
 
@@ -90,11 +93,15 @@ export class TryOn {
     };
     heard();
     try {
-      for await (const event of this.client.streamFrames({ try_on_id: this.id }, { signal })) {
+      const wanted = { try_on_id: this.id, max_unacknowledged: MAX_UNACKNOWLEDGED };
+      for await (const event of this.client.streamFrames(wanted, { signal })) {
         heard();
         this.backoff.reset();
-        if (event.picture) this.on({ kind: 'picture', picture: event.picture });
-        else if (event.status) this.on({ kind: 'status', status: event.status });
+        if (event.picture) {
+          this.on({ kind: 'picture', picture: event.picture });
+          this.#acknowledge(event.picture, signal);
+        }
+        if (event.status) this.on({ kind: 'status', status: event.status });
         if (event.status?.state === State.DRAINING || event.status?.state === State.CLOSED) break;
       }
     } catch (error) {
@@ -103,6 +110,11 @@ export class TryOn {
     } finally {
       clearTimeout(watchdog);
     }
+  }
+
+  /** The next acknowledgement covers one that is lost. */
+  #acknowledge({ stream, number }, signal) {
+    this.client.acknowledgePicture({ try_on_id: this.id, stream, number }, { signal }).catch(() => {});
   }
 
   /** Sends the wanted garments; of several quick choices only the last one's answer counts (null for the others). */

@@ -183,6 +183,8 @@ pub struct ClothConfig {
     pub max_sessions: usize,
     /// Seconds after which a session that nobody streams is closed.
     pub idle_s: u64,
+    /// Gives up detail of cloth while exposures go without garments.
+    pub adapts_detail: bool,
     /// Most simulations at a time.
     pub max_simulations: usize,
     /// Folder of mesh garments (`.obj`, `.glb`, `.gltf`, `.mhclo`) and captures (folders that `tryon clothcap capture`
@@ -207,6 +209,7 @@ impl Default for ClothConfig {
             tracking: "http://127.0.0.1:50052".into(),
             max_sessions: 4,
             idle_s: 30,
+            adapts_detail: true,
             max_simulations: 1,
             garments: PathBuf::new(),
             garments_body: PathBuf::new(),
@@ -234,6 +237,12 @@ pub struct CompositorConfig {
     pub camera: String,
     /// Most try-ons at a time.
     pub max_try_ons: usize,
+    /// Refuses try-ons beside others that this machine has no processors for.
+    pub by_capacity: bool,
+    /// Most viewers of a try-on.
+    pub max_viewers: usize,
+    /// Most sizes and qualities of a try-on's pictures; viewers of one share its pictures.
+    pub max_formats: usize,
     /// Seconds after which a try-on that nobody streams is closed.
     pub idle_s: u64,
     /// Milliseconds without a frame after which the camera counts as silent.
@@ -271,6 +280,9 @@ impl Default for CompositorConfig {
             store: "store".into(),
             camera: "front".into(),
             max_try_ons: 4,
+            by_capacity: true,
+            max_viewers: 64,
+            max_formats: 8,
             idle_s: 30,
             camera_silence_ms: 700,
             garments_late_ms: 700,

@@ -43,6 +43,16 @@ impl<T> Sender<T> {
         self.0.arrived.notify_one();
         !self.is_closed()
     }
+    /// Counts a value that was not even made.
+    pub fn skip(&self) {
+        self.0.dropped.fetch_add(1, Ordering::Relaxed);
+    }
+    /// A value waits to be taken.
+    pub fn is_waiting(&self) -> bool {
+        (self.0.slot.lock())
+            .unwrap_or_else(PoisonError::into_inner)
+            .is_some()
+    }
     /// The receiver is gone.
     pub fn is_closed(&self) -> bool {
         self.0.closed.load(Ordering::Acquire)
@@ -87,7 +97,11 @@ impl<T> Receiver<T> {
             .unwrap_or_else(PoisonError::into_inner)
             .take()
     }
-    /// Values replaced before they were taken.
+    /// Counts a value that was taken and not used.
+    pub fn discard(&self) {
+        self.0.dropped.fetch_add(1, Ordering::Relaxed);
+    }
+    /// Values replaced, skipped or discarded.
     pub fn dropped(&self) -> u64 {
         self.0.dropped.load(Ordering::Relaxed)
     }

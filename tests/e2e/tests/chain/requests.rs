@@ -67,6 +67,74 @@ async fn bad_compositor_requests(kiosk: &Kiosk) {
     assert_eq!(unknown.code(), Code::NotFound);
 }
 
+#[test]
+fn a_reader_that_acknowledges_gets_the_next_picture_when_it_has_room() {
+    let kiosk = Kiosk::start("pattern", 10.0);
+    client(async {
+        let mut other = Watcher::open(&kiosk, "good", "front", &[]).await;
+        let mut c = kiosk.compositor();
+        let wide = StreamFramesRequest {
+            try_on_id: "good".into(),
+            max_unacknowledged: 17,
+            ..Default::default()
+        };
+        let named = field(c.stream_frames(wide).await.expect_err("too many"));
+        assert_eq!(named, "stream_frames_request.max_unacknowledged");
+        let one = StreamFramesRequest {
+            try_on_id: "good".into(),
+            max_unacknowledged: 1,
+            ..Default::default()
+        };
+        let events = c.stream_frames(one).await.expect("streams").into_inner();
+        let mut slow = Watcher { events };
+        let first = slow.picture(TryOnState::Degraded).await;
+        for _ in 0..5 {
+            other.picture(TryOnState::Degraded).await;
+        }
+        let acknowledgement = AcknowledgePictureRequest {
+            try_on_id: "good".into(),
+            stream: first.stream,
+            number: first.number,
+        };
+        let stray = AcknowledgePictureRequest {
+            stream: first.stream ^ 1,
+            ..acknowledgement.clone()
+        };
+        c.acknowledge_picture(stray).await.expect("no error");
+        c.acknowledge_picture(acknowledgement).await.expect("taken");
+        let second = slow.picture(TryOnState::Degraded).await;
+        let sequence = |p: &Picture| p.frame.expect("an exposure").sequence;
+        assert_eq!((first.number, second.number), (1, 2));
+        assert!(second.dropped >= 4, "{} were not made", second.dropped);
+        assert!(sequence(&second) > sequence(&first) + 4, "it is a new one");
+    });
+}
+
+#[test]
+fn one_format_too_many_is_refused_and_the_others_go_on() {
+    let kiosk = Kiosk::start("pattern", 10.0);
+    client(async {
+        let mut w = Watcher::open(&kiosk, "good", "front", &[]).await;
+        let mut c = kiosk.compositor();
+        let most = kiosk.config.compositor.max_formats as u32;
+        let mut open = Vec::new();
+        for i in 1..=most {
+            let sized = StreamFramesRequest {
+                try_on_id: "good".into(),
+                width: 320 + 16 * i,
+                height: 240,
+                ..Default::default()
+            };
+            open.push(c.stream_frames(sized).await);
+        }
+        let last = open.pop().expect("several").expect_err("too many");
+        assert_eq!(last.code(), Code::ResourceExhausted);
+        assert!(last.get_error_details().retry_info().is_some());
+        assert!(open.iter().all(Result::is_ok));
+        w.picture(TryOnState::Degraded).await;
+    });
+}
+
 async fn bad_capture_requests(kiosk: &Kiosk) {
     let mut capture = CaptureServiceClient::new(kiosk.channel(Part::Capture));
     let camera = "front".to_owned();
