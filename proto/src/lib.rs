@@ -21,5 +21,11 @@ pub mod v1 {
     include!("gen/tryon.v1.rs");
 }
 
+impl std::fmt::Debug for v1::FrameKey {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("FrameKey").finish_non_exhaustive()
+    }
+}
+
 /// The descriptor set of the package, for gRPC reflection.
 pub const DESCRIPTOR: &[u8] = include_bytes!("gen/descriptor.bin");

@@ -55,13 +55,13 @@ def main():
     assert args.first in known and args.second in known, known
     try:
         bad = [common.GarmentChoice(garment="cape")]
-        compositor.OpenTryOn(pb.OpenTryOnRequest(garments=bad), timeout=5)
+        compositor.OpenTryOn(pb.OpenTryOnRequest(garments=bad, consent=pb.Consent(given=True)), timeout=5)
         raise SystemExit("an unknown garment was accepted")
     except grpc.RpcError as e:
         assert e.code() == grpc.StatusCode.INVALID_ARGUMENT and "garments[0].garment" in e.details(), e
 
     first = [common.GarmentChoice(garment=args.first, size="M")]
-    try_on = compositor.OpenTryOn(pb.OpenTryOnRequest(garments=first), timeout=5).try_on_id
+    try_on = compositor.OpenTryOn(pb.OpenTryOnRequest(garments=first, consent=pb.Consent(given=True)), timeout=5).try_on_id
     stream = compositor.StreamFrames(pb.StreamFramesRequest(try_on_id=try_on, width=640, height=480))
     begun = time.monotonic()
     frames, latencies, last, states = 0, [], None, []

@@ -31,6 +31,10 @@ def field(number, value):
     return varint(number << 3 | 2) + varint(len(value)) + value
 
 
+# OpenTryOnRequest.consent.given
+CONSENT = field(5, field(1, 1))
+
+
 def decode(data):
     """A message as {number: [values]}; nested messages stay bytes."""
     out, at = {}, 0
@@ -120,11 +124,11 @@ def main():
     args.add_argument("--live", type=float, default=60, help="seconds to wait for the first LIVE picture; 0: take any")
     args = args.parse_args()
 
-    bad = Call(args.address, "OpenTryOn", field(4, choice("cape")))
+    bad = Call(args.address, "OpenTryOn", field(4, choice("cape")) + CONSENT)
     list(bad.messages())
     assert bad.status()[0] == 3, f"an unknown garment must be INVALID_ARGUMENT, not {bad.status()}"
 
-    try_on = unary(args.address, "OpenTryOn", field(4, choice(args.first)))[1][0].decode()
+    try_on = unary(args.address, "OpenTryOn", field(4, choice(args.first)) + CONSENT)[1][0].decode()
     stream = Call(args.address, "StreamFrames", field(1, try_on) + field(2, 640) + field(3, 480))
     begun, frames, states, revision, chosen, changed = time.monotonic(), 0, [], None, None, None
     for data in stream.messages():

@@ -53,6 +53,7 @@ class Box:
                 lines.append(f'tracking = "http://{address["tracking"]}"')
             if name == "compositor":
                 lines.append(f'cloth = "http://{address["cloth"]}"')
+                lines.append(f'capture = "http://{address["capture"]}"')
         # A plain picture on the second camera: a try-on that no failure of tracking or cloth may touch.
         for camera, source, fps in (("front", "synth:still", rate), ("side", "pattern", 10.0)):
             lines += ["[[capture.cameras]]", f'name = "{camera}"', f'source = "{source}"', f"rate = {fps}"]
@@ -88,7 +89,8 @@ class Viewer:
         self.channel = grpc.insecure_channel(box.address)
         compositor = rpc.CompositorServiceStub(self.channel)
         choices = [common.GarmentChoice(garment=g, size="M") for g in garments]
-        request = self.pb.OpenTryOnRequest(try_on_id=name, camera=camera, garments=choices)
+        request = self.pb.OpenTryOnRequest(try_on_id=name, camera=camera, garments=choices,
+                                           consent=self.pb.Consent(given=True))
         deadline = time.monotonic() + 30
         while True:
             try:

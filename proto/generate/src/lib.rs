@@ -26,6 +26,8 @@ pub fn generate(root: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
     tonic_prost_build::configure()
         .emit_rerun_if_changed(false)
         .bytes(".tryon.v1")
+        // Its secret must not reach a log.
+        .skip_debug([".tryon.v1.FrameKey"])
         .out_dir(out)
         .compile_fds(set.clone())?;
     // Reflection needs no comments: without them the binary is a third of the size.

@@ -78,6 +78,18 @@ pub struct FrameId {
     #[prost(uint64, tag = "4")]
     pub received_unix_ns: u64,
 }
+/// Key of the sealed frames of one camera (frame.proto), drawn when the first lease of consent begins and forgotten when
+/// the last one ends. Never logged, never stored.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+#[prost(skip_debug)]
+pub struct FrameKey {
+    /// Random; sealed frames name it.
+    #[prost(fixed64, tag = "1")]
+    pub id: u64,
+    /// 32 bytes.
+    #[prost(bytes = "bytes", tag = "2")]
+    pub secret: ::prost::bytes::Bytes,
+}
 /// Time of one stage of a frame. Stages are in the order in which they ran. Each message repeats the stages before its
 /// own, so the last receiver has the whole chain.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -364,6 +376,26 @@ pub struct GetCalibrationResponse {
     #[prost(message, optional, tag = "1")]
     pub calibration: ::core::option::Option<Calibration>,
 }
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct HoldConsentRequest {
+    #[prost(string, tag = "1")]
+    pub camera: ::prost::alloc::string::String,
+    /// Holder: 1 to 64 characters of \[A-Za-z0-9_-\].
+    #[prost(string, tag = "2")]
+    pub try_on_id: ::prost::alloc::string::String,
+    /// Length from now on, at most 5; 0 ends the lease.
+    #[prost(float, tag = "3")]
+    pub seconds: f32,
+    /// Store of the camera; empty means that of this process.
+    #[prost(string, tag = "4")]
+    pub store: ::prost::alloc::string::String,
+}
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct HoldConsentResponse {
+    /// Key of the frames from now on, the same for all leases that overlap; absent when the lease was ended.
+    #[prost(message, optional, tag = "1")]
+    pub key: ::core::option::Option<FrameKey>,
+}
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StartCameraRequest {
     #[prost(string, tag = "1")]
@@ -419,6 +451,7 @@ pub struct StopRecordingResponse {
 pub enum CameraState {
     Unspecified = 0,
     Stopped = 1,
+    /// Publishes while a lease of consent runs.
     Running = 2,
     /// A recording that plays once is at its end.
     Ended = 3,
@@ -593,7 +626,35 @@ pub mod capture_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CaptureService", "GetCalibration"));
             self.inner.unary(req, path, codec).await
         }
-        /// Starts publishing under a new epoch. FAILED_PRECONDITION when it already runs, UNAVAILABLE when the device or
+        /// Holds or renews a lease: the person before the camera agrees to be seen in this try-on. Frames are published only
+        /// while a lease runs, so a holder that is lost stops the camera by itself. Renew well before the end, and only while
+        /// somebody watches. Answers with the key of the frames (frame.proto). NOT_FOUND for an unknown camera,
+        /// INVALID_ARGUMENT for a length out of range, RESOURCE_EXHAUSTED with RetryInfo at 64 leases.
+        pub async fn hold_consent(
+            &mut self,
+            request: impl tonic::IntoRequest<super::HoldConsentRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::HoldConsentResponse>,
+            tonic::Status,
+        > {
+            self.inner
+                .ready()
+                .await
+                .map_err(|e| {
+                    tonic::Status::unknown(
+                        format!("Service was not ready: {}", e.into()),
+                    )
+                })?;
+            let codec = tonic_prost::ProstCodec::default();
+            let path = http::uri::PathAndQuery::from_static(
+                "/tryon.v1.CaptureService/HoldConsent",
+            );
+            let mut req = request.into_request();
+            req.extensions_mut()
+                .insert(GrpcMethod::new("tryon.v1.CaptureService", "HoldConsent"));
+            self.inner.unary(req, path, codec).await
+        }
+        /// Runs the camera under a new epoch; frames are published while a lease of consent runs. FAILED_PRECONDITION when it already runs, UNAVAILABLE when the device or
         /// file cannot be opened.
         pub async fn start_camera(
             &mut self,
@@ -644,7 +705,8 @@ pub mod capture_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CaptureService", "StopCamera"));
             self.inner.unary(req, path, codec).await
         }
-        /// Starts writing every published frame of a camera to an MCAP file in the configured folder.
+        /// Starts writing every frame of a camera to an MCAP file in the configured folder, published or not: the consent of
+        /// this call covers the file, a lease covers the bus.
         /// FAILED_PRECONDITION without consent, when no folder is configured or a recording is already under way.
         /// Recording never slows publishing: when the disk is too slow, frames are dropped from the file and counted.
         pub async fn start_recording(
@@ -727,7 +789,18 @@ pub mod capture_service_server {
             tonic::Response<super::GetCalibrationResponse>,
             tonic::Status,
         >;
-        /// Starts publishing under a new epoch. FAILED_PRECONDITION when it already runs, UNAVAILABLE when the device or
+        /// Holds or renews a lease: the person before the camera agrees to be seen in this try-on. Frames are published only
+        /// while a lease runs, so a holder that is lost stops the camera by itself. Renew well before the end, and only while
+        /// somebody watches. Answers with the key of the frames (frame.proto). NOT_FOUND for an unknown camera,
+        /// INVALID_ARGUMENT for a length out of range, RESOURCE_EXHAUSTED with RetryInfo at 64 leases.
+        async fn hold_consent(
+            &self,
+            request: tonic::Request<super::HoldConsentRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::HoldConsentResponse>,
+            tonic::Status,
+        >;
+        /// Runs the camera under a new epoch; frames are published while a lease of consent runs. FAILED_PRECONDITION when it already runs, UNAVAILABLE when the device or
         /// file cannot be opened.
         async fn start_camera(
             &self,
@@ -744,7 +817,8 @@ pub mod capture_service_server {
             tonic::Response<super::StopCameraResponse>,
             tonic::Status,
         >;
-        /// Starts writing every published frame of a camera to an MCAP file in the configured folder.
+        /// Starts writing every frame of a camera to an MCAP file in the configured folder, published or not: the consent of
+        /// this call covers the file, a lease covers the bus.
         /// FAILED_PRECONDITION without consent, when no folder is configured or a recording is already under way.
         /// Recording never slows publishing: when the disk is too slow, frames are dropped from the file and counted.
         async fn start_recording(
@@ -916,6 +990,51 @@ pub mod capture_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = GetCalibrationSvc(inner);
+                        let codec = tonic_prost::ProstCodec::default();
+                        let mut grpc = tonic::server::Grpc::new(codec)
+                            .apply_compression_config(
+                                accept_compression_encodings,
+                                send_compression_encodings,
+                            )
+                            .apply_max_message_size_config(
+                                max_decoding_message_size,
+                                max_encoding_message_size,
+                            );
+                        let res = grpc.unary(method, req).await;
+                        Ok(res)
+                    };
+                    Box::pin(fut)
+                }
+                "/tryon.v1.CaptureService/HoldConsent" => {
+                    #[allow(non_camel_case_types)]
+                    struct HoldConsentSvc<T: CaptureService>(pub Arc<T>);
+                    impl<
+                        T: CaptureService,
+                    > tonic::server::UnaryService<super::HoldConsentRequest>
+                    for HoldConsentSvc<T> {
+                        type Response = super::HoldConsentResponse;
+                        type Future = BoxFuture<
+                            tonic::Response<Self::Response>,
+                            tonic::Status,
+                        >;
+                        fn call(
+                            &mut self,
+                            request: tonic::Request<super::HoldConsentRequest>,
+                        ) -> Self::Future {
+                            let inner = Arc::clone(&self.0);
+                            let fut = async move {
+                                <T as CaptureService>::hold_consent(&inner, request).await
+                            };
+                            Box::pin(fut)
+                        }
+                    }
+                    let accept_compression_encodings = self.accept_compression_encodings;
+                    let send_compression_encodings = self.send_compression_encodings;
+                    let max_decoding_message_size = self.max_decoding_message_size;
+                    let max_encoding_message_size = self.max_encoding_message_size;
+                    let inner = self.inner.clone();
+                    let fut = async move {
+                        let method = HoldConsentSvc(inner);
                         let codec = tonic_prost::ProstCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
@@ -1162,6 +1281,9 @@ pub struct OpenSessionRequest {
     pub store: ::prost::alloc::string::String,
     #[prost(string, tag = "3")]
     pub camera: ::prost::alloc::string::String,
+    /// Key of the camera's frames, as HoldConsent answered it; opening again hands over the next one.
+    #[prost(message, optional, tag = "4")]
+    pub frame_key: ::core::option::Option<FrameKey>,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct OpenSessionResponse {
@@ -1509,7 +1631,8 @@ pub mod tracking_service_client {
         }
         /// Opens a session, or answers with the open one of that id: callers choose ids, so opening again after a lost
         /// connection or a restart of this service is safe. RESOURCE_EXHAUSTED at the configured number of sessions,
-        /// FAILED_PRECONDITION when the id is open with another camera. A session that nobody reads and nobody opens again
+        /// FAILED_PRECONDITION when the id is open with another camera. A session whose camera sends nothing for a second
+        /// forgets body and pose. A session that nobody reads and nobody opens again
         /// is closed after the configured idle time.
         pub async fn open_session(
             &mut self,
@@ -1656,7 +1779,8 @@ pub mod tracking_service_server {
     pub trait TrackingService: std::marker::Send + std::marker::Sync + 'static {
         /// Opens a session, or answers with the open one of that id: callers choose ids, so opening again after a lost
         /// connection or a restart of this service is safe. RESOURCE_EXHAUSTED at the configured number of sessions,
-        /// FAILED_PRECONDITION when the id is open with another camera. A session that nobody reads and nobody opens again
+        /// FAILED_PRECONDITION when the id is open with another camera. A session whose camera sends nothing for a second
+        /// forgets body and pose. A session that nobody reads and nobody opens again
         /// is closed after the configured idle time.
         async fn open_session(
             &self,
@@ -3040,6 +3164,13 @@ pub mod cloth_service_server {
         const NAME: &'static str = SERVICE_NAME;
     }
 }
+/// Consent of the person before the camera.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct Consent {
+    /// The person was told what is seen and agreed. Body images are biometric: nothing is shown without it.
+    #[prost(bool, tag = "1")]
+    pub given: bool,
+}
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct OpenTryOnRequest {
     /// 1 to 64 characters of \[A-Za-z0-9_-\], chosen by the caller; empty lets the service draw a random one.
@@ -3053,6 +3184,9 @@ pub struct OpenTryOnRequest {
     /// First outfit, inner layer first, at most 8; may be empty.
     #[prost(message, repeated, tag = "4")]
     pub garments: ::prost::alloc::vec::Vec<GarmentChoice>,
+    /// Required, also to open again.
+    #[prost(message, optional, tag = "5")]
+    pub consent: ::core::option::Option<Consent>,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct OpenTryOnResponse {
@@ -3069,6 +3203,13 @@ pub struct CloseTryOnRequest {
 }
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct CloseTryOnResponse {}
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct WithdrawConsentRequest {
+    #[prost(string, tag = "1")]
+    pub try_on_id: ::prost::alloc::string::String,
+}
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct WithdrawConsentResponse {}
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct ChooseGarmentsRequest {
     #[prost(string, tag = "1")]
@@ -3216,6 +3357,9 @@ pub struct TryOnStatus {
     /// Delay before a retry, seconds; 0 means that the compositor retries by itself.
     #[prost(float, tag = "6")]
     pub retry_after: f32,
+    /// Set when the state is CLOSED.
+    #[prost(enumeration = "TryOnEnd", tag = "7")]
+    pub end: i32,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct TakeSnapshotRequest {
@@ -3229,6 +3373,62 @@ pub struct TakeSnapshotRequest {
 pub struct TakeSnapshotResponse {
     #[prost(message, optional, tag = "1")]
     pub picture: ::core::option::Option<Picture>,
+}
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct OfferPhotoRequest {
+    #[prost(string, tag = "1")]
+    pub try_on_id: ::prost::alloc::string::String,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct OfferPhotoResponse {
+    /// Absolute link to a JPEG, answered to one GET.
+    #[prost(string, tag = "1")]
+    pub url: ::prost::alloc::string::String,
+    /// The link as a QR code: an SVG document without scripts or external references, dark on light.
+    #[prost(string, tag = "2")]
+    pub qr_svg: ::prost::alloc::string::String,
+    /// Life of the link from now, seconds.
+    #[prost(float, tag = "3")]
+    pub seconds: f32,
+    /// The picture behind it, to show on the page.
+    #[prost(message, optional, tag = "4")]
+    pub picture: ::core::option::Option<Picture>,
+}
+/// Reason of a CLOSED state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum TryOnEnd {
+    Unspecified = 0,
+    /// CloseTryOn.
+    Requested = 1,
+    /// WithdrawConsent.
+    Withdrawn = 2,
+    /// Nobody streamed it for the configured idle time.
+    Idle = 3,
+}
+impl TryOnEnd {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "TRY_ON_END_UNSPECIFIED",
+            Self::Requested => "TRY_ON_END_REQUESTED",
+            Self::Withdrawn => "TRY_ON_END_WITHDRAWN",
+            Self::Idle => "TRY_ON_END_IDLE",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "TRY_ON_END_UNSPECIFIED" => Some(Self::Unspecified),
+            "TRY_ON_END_REQUESTED" => Some(Self::Requested),
+            "TRY_ON_END_WITHDRAWN" => Some(Self::Withdrawn),
+            "TRY_ON_END_IDLE" => Some(Self::Idle),
+            _ => None,
+        }
+    }
 }
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
@@ -3402,8 +3602,10 @@ pub mod compositor_service_client {
             self.inner = self.inner.max_encoding_message_size(limit);
             self
         }
-        /// Opens a try-on, or answers with the open one of that id: safe to call again after a lost connection or a restart.
-        /// Does not wait for camera or person; the stream reports the progress. RESOURCE_EXHAUSTED with RetryInfo at the
+        /// Opens a try-on with the consent of the person before the camera, or answers with the open one of that id: safe to call again after a lost connection or a restart.
+        /// Does not wait for camera or person; the stream reports the progress. The camera publishes while somebody streams the
+        /// try-on, and no longer. FAILED_PRECONDITION without consent, NOT_FOUND for a camera that the capture service does not
+        /// have (UNAVAILABLE capture services are asked again while the try-on is open), RESOURCE_EXHAUSTED with RetryInfo at the
         /// configured number of try-ons, FAILED_PRECONDITION when the id is open with another camera. A try-on that nobody
         /// streams is closed after the configured idle time.
         pub async fn open_try_on(
@@ -3453,6 +3655,36 @@ pub mod compositor_service_client {
             let mut req = request.into_request();
             req.extensions_mut()
                 .insert(GrpcMethod::new("tryon.v1.CompositorService", "CloseTryOn"));
+            self.inner.unary(req, path, codec).await
+        }
+        /// Withdraws the consent: closes the try-on, and answers once the camera has stopped for it and the sessions behind it
+        /// have been told to forget. Its streams end with a CLOSED status whose `end` is WITHDRAWN, and its photos are gone.
+        /// An unknown id is no error. UNAVAILABLE with RetryInfo when the capture service did not answer: its lease ends by
+        /// itself within a second.
+        pub async fn withdraw_consent(
+            &mut self,
+            request: impl tonic::IntoRequest<super::WithdrawConsentRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::WithdrawConsentResponse>,
+            tonic::Status,
+        > {
+            self.inner
+                .ready()
+                .await
+                .map_err(|e| {
+                    tonic::Status::unknown(
+                        format!("Service was not ready: {}", e.into()),
+                    )
+                })?;
+            let codec = tonic_prost::ProstCodec::default();
+            let path = http::uri::PathAndQuery::from_static(
+                "/tryon.v1.CompositorService/WithdrawConsent",
+            );
+            let mut req = request.into_request();
+            req.extensions_mut()
+                .insert(
+                    GrpcMethod::new("tryon.v1.CompositorService", "WithdrawConsent"),
+                );
             self.inner.unary(req, path, codec).await
         }
         /// Replaces the garments. Answers at once; pictures show the old garments until the new ones are worn, then the new
@@ -3624,6 +3856,32 @@ pub mod compositor_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CompositorService", "TakeSnapshot"));
             self.inner.unary(req, path, codec).await
         }
+        /// Keeps the newest picture in memory behind a link for a phone: once, for five minutes at most, and not beyond the end
+        /// of the try-on. UNAVAILABLE and RESOURCE_EXHAUSTED as TakeSnapshot; a fifth photo of a try-on replaces its oldest.
+        pub async fn offer_photo(
+            &mut self,
+            request: impl tonic::IntoRequest<super::OfferPhotoRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::OfferPhotoResponse>,
+            tonic::Status,
+        > {
+            self.inner
+                .ready()
+                .await
+                .map_err(|e| {
+                    tonic::Status::unknown(
+                        format!("Service was not ready: {}", e.into()),
+                    )
+                })?;
+            let codec = tonic_prost::ProstCodec::default();
+            let path = http::uri::PathAndQuery::from_static(
+                "/tryon.v1.CompositorService/OfferPhoto",
+            );
+            let mut req = request.into_request();
+            req.extensions_mut()
+                .insert(GrpcMethod::new("tryon.v1.CompositorService", "OfferPhoto"));
+            self.inner.unary(req, path, codec).await
+        }
     }
 }
 /// Generated server implementations.
@@ -3639,8 +3897,10 @@ pub mod compositor_service_server {
     /// Generated trait containing gRPC methods that should be implemented for use with CompositorServiceServer.
     #[async_trait]
     pub trait CompositorService: std::marker::Send + std::marker::Sync + 'static {
-        /// Opens a try-on, or answers with the open one of that id: safe to call again after a lost connection or a restart.
-        /// Does not wait for camera or person; the stream reports the progress. RESOURCE_EXHAUSTED with RetryInfo at the
+        /// Opens a try-on with the consent of the person before the camera, or answers with the open one of that id: safe to call again after a lost connection or a restart.
+        /// Does not wait for camera or person; the stream reports the progress. The camera publishes while somebody streams the
+        /// try-on, and no longer. FAILED_PRECONDITION without consent, NOT_FOUND for a camera that the capture service does not
+        /// have (UNAVAILABLE capture services are asked again while the try-on is open), RESOURCE_EXHAUSTED with RetryInfo at the
         /// configured number of try-ons, FAILED_PRECONDITION when the id is open with another camera. A try-on that nobody
         /// streams is closed after the configured idle time.
         async fn open_try_on(
@@ -3656,6 +3916,17 @@ pub mod compositor_service_server {
             request: tonic::Request<super::CloseTryOnRequest>,
         ) -> std::result::Result<
             tonic::Response<super::CloseTryOnResponse>,
+            tonic::Status,
+        >;
+        /// Withdraws the consent: closes the try-on, and answers once the camera has stopped for it and the sessions behind it
+        /// have been told to forget. Its streams end with a CLOSED status whose `end` is WITHDRAWN, and its photos are gone.
+        /// An unknown id is no error. UNAVAILABLE with RetryInfo when the capture service did not answer: its lease ends by
+        /// itself within a second.
+        async fn withdraw_consent(
+            &self,
+            request: tonic::Request<super::WithdrawConsentRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::WithdrawConsentResponse>,
             tonic::Status,
         >;
         /// Replaces the garments. Answers at once; pictures show the old garments until the new ones are worn, then the new
@@ -3722,6 +3993,15 @@ pub mod compositor_service_server {
             request: tonic::Request<super::TakeSnapshotRequest>,
         ) -> std::result::Result<
             tonic::Response<super::TakeSnapshotResponse>,
+            tonic::Status,
+        >;
+        /// Keeps the newest picture in memory behind a link for a phone: once, for five minutes at most, and not beyond the end
+        /// of the try-on. UNAVAILABLE and RESOURCE_EXHAUSTED as TakeSnapshot; a fifth photo of a try-on replaces its oldest.
+        async fn offer_photo(
+            &self,
+            request: tonic::Request<super::OfferPhotoRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::OfferPhotoResponse>,
             tonic::Status,
         >;
     }
@@ -3880,6 +4160,52 @@ pub mod compositor_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = CloseTryOnSvc(inner);
+                        let codec = tonic_prost::ProstCodec::default();
+                        let mut grpc = tonic::server::Grpc::new(codec)
+                            .apply_compression_config(
+                                accept_compression_encodings,
+                                send_compression_encodings,
+                            )
+                            .apply_max_message_size_config(
+                                max_decoding_message_size,
+                                max_encoding_message_size,
+                            );
+                        let res = grpc.unary(method, req).await;
+                        Ok(res)
+                    };
+                    Box::pin(fut)
+                }
+                "/tryon.v1.CompositorService/WithdrawConsent" => {
+                    #[allow(non_camel_case_types)]
+                    struct WithdrawConsentSvc<T: CompositorService>(pub Arc<T>);
+                    impl<
+                        T: CompositorService,
+                    > tonic::server::UnaryService<super::WithdrawConsentRequest>
+                    for WithdrawConsentSvc<T> {
+                        type Response = super::WithdrawConsentResponse;
+                        type Future = BoxFuture<
+                            tonic::Response<Self::Response>,
+                            tonic::Status,
+                        >;
+                        fn call(
+                            &mut self,
+                            request: tonic::Request<super::WithdrawConsentRequest>,
+                        ) -> Self::Future {
+                            let inner = Arc::clone(&self.0);
+                            let fut = async move {
+                                <T as CompositorService>::withdraw_consent(&inner, request)
+                                    .await
+                            };
+                            Box::pin(fut)
+                        }
+                    }
+                    let accept_compression_encodings = self.accept_compression_encodings;
+                    let send_compression_encodings = self.send_compression_encodings;
+                    let max_decoding_message_size = self.max_decoding_message_size;
+                    let max_encoding_message_size = self.max_encoding_message_size;
+                    let inner = self.inner.clone();
+                    let fut = async move {
+                        let method = WithdrawConsentSvc(inner);
                         let codec = tonic_prost::ProstCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
@@ -4162,6 +4488,51 @@ pub mod compositor_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = TakeSnapshotSvc(inner);
+                        let codec = tonic_prost::ProstCodec::default();
+                        let mut grpc = tonic::server::Grpc::new(codec)
+                            .apply_compression_config(
+                                accept_compression_encodings,
+                                send_compression_encodings,
+                            )
+                            .apply_max_message_size_config(
+                                max_decoding_message_size,
+                                max_encoding_message_size,
+                            );
+                        let res = grpc.unary(method, req).await;
+                        Ok(res)
+                    };
+                    Box::pin(fut)
+                }
+                "/tryon.v1.CompositorService/OfferPhoto" => {
+                    #[allow(non_camel_case_types)]
+                    struct OfferPhotoSvc<T: CompositorService>(pub Arc<T>);
+                    impl<
+                        T: CompositorService,
+                    > tonic::server::UnaryService<super::OfferPhotoRequest>
+                    for OfferPhotoSvc<T> {
+                        type Response = super::OfferPhotoResponse;
+                        type Future = BoxFuture<
+                            tonic::Response<Self::Response>,
+                            tonic::Status,
+                        >;
+                        fn call(
+                            &mut self,
+                            request: tonic::Request<super::OfferPhotoRequest>,
+                        ) -> Self::Future {
+                            let inner = Arc::clone(&self.0);
+                            let fut = async move {
+                                <T as CompositorService>::offer_photo(&inner, request).await
+                            };
+                            Box::pin(fut)
+                        }
+                    }
+                    let accept_compression_encodings = self.accept_compression_encodings;
+                    let send_compression_encodings = self.send_compression_encodings;
+                    let max_decoding_message_size = self.max_decoding_message_size;
+                    let max_encoding_message_size = self.max_encoding_message_size;
+                    let inner = self.inner.clone();
+                    let fut = async move {
+                        let method = OfferPhotoSvc(inner);
                         let codec = tonic_prost::ProstCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(

@@ -1,5 +1,6 @@
 //! Task of one camera: commands, state, epochs.
 
+use crate::consent::Leases;
 use crate::reader::Reader;
 use crate::recorder::{Recorder, Recording};
 use crate::source::{OpenSource, open};
@@ -34,6 +35,7 @@ pub(crate) enum Command {
 pub(crate) struct Handle {
     pub(crate) commands: mpsc::Sender<Command>,
     pub(crate) info: watch::Receiver<v1::CameraInfo>,
+    pub(crate) leases: Leases,
 }
 
 /// Starts the task of a camera; it ends with `ctx.shutdown`.
@@ -47,7 +49,7 @@ pub(crate) fn spawn(config: CameraConfig, key: CameraKey, ctx: Context) -> Handl
     };
     let (sender, info) = watch::channel(info);
     let (commands, inbox) = mpsc::channel(8);
-    let recorder = Recorder::default();
+    let (recorder, leases) = (Recorder::default(), Leases::default());
     tokio::spawn(
         Task {
             config,
@@ -55,11 +57,16 @@ pub(crate) fn spawn(config: CameraConfig, key: CameraKey, ctx: Context) -> Handl
             ctx,
             info: Arc::new(sender),
             recorder,
+            leases: leases.clone(),
             run: None,
         }
         .serve(inbox),
     );
-    Handle { commands, info }
+    Handle {
+        commands,
+        info,
+        leases,
+    }
 }
 
 /// Name of a source outside the box: of a recording the file name only.
@@ -82,6 +89,7 @@ struct Task {
     ctx: Context,
     info: Arc<watch::Sender<v1::CameraInfo>>,
     recorder: Recorder,
+    leases: Leases,
     run: Option<Run>,
 }
 
@@ -153,6 +161,7 @@ impl Task {
             ctx: self.ctx.clone(),
             info: self.info.clone(),
             recorder: self.recorder.clone(),
+            leases: self.leases.clone(),
         };
         let stopped = stop.clone();
         let task = tokio::spawn(async move {
@@ -166,7 +175,7 @@ impl Task {
             task,
             calibration,
         });
-        tracing::info!(camera = %self.key, epoch, "publishing");
+        tracing::info!(camera = %self.key, epoch, "running");
         Ok(self.info.borrow().clone())
     }
 

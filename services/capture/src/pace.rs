@@ -14,8 +14,10 @@ pub(crate) struct Pace {
     begun: Instant,
     /// Time of the source at the start of this round.
     first_ns: Option<u64>,
-    /// Length of the rounds before it.
+    /// Length of the rounds before it, and of pauses.
     added_ns: u64,
+    /// Length of all pauses.
+    paused: Duration,
     last_ns: u64,
     step_ns: u64,
     frames: u64,
@@ -29,10 +31,17 @@ impl Pace {
             begun,
             first_ns: None,
             added_ns: 0,
+            paused: Duration::ZERO,
             last_ns: 0,
             step_ns: NOMINAL_STEP_NS,
             frames: 0,
         }
+    }
+
+    /// Nothing was read for that long: the clock goes on, the frames do not.
+    pub(crate) fn pause(&mut self, length: Duration) {
+        self.paused += length;
+        self.added_ns += u64::try_from(length.as_nanos()).unwrap_or(u64::MAX);
     }
 
     /// Time of a frame on a clock that never runs back, and the moment to publish it; `None` for at once.
@@ -50,7 +59,8 @@ impl Pace {
         let due = if config.fast {
             None
         } else if config.rate > 0.0 {
-            Some(self.begun + Duration::from_secs_f64(self.frames as f64 / config.rate))
+            let step = Duration::from_secs_f64(self.frames as f64 / config.rate);
+            Some(self.begun + self.paused + step)
         } else {
             Some(self.begun + Duration::from_nanos(at))
         };

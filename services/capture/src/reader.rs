@@ -1,5 +1,6 @@
-//! Reader of a source: frames at their pace, onto the bus and into a recording.
+//! Reader of a source: frames at their pace, onto the bus under a lease of consent, and into a recording.
 
+use crate::consent::Leases;
 use crate::pace::Pace;
 use crate::recorder::Recorder;
 use crate::source::OpenSource;
@@ -28,6 +29,24 @@ pub(crate) struct Reader {
     pub(crate) ctx: Context,
     pub(crate) info: Arc<watch::Sender<v1::CameraInfo>>,
     pub(crate) recorder: Recorder,
+    pub(crate) leases: Leases,
+}
+
+/// Waits until somebody may see the frames; none is read before. The length of the wait.
+async fn wanted(leases: &Leases, mut info: watch::Receiver<v1::CameraInfo>) -> Duration {
+    if leases.sealer().is_some() {
+        return Duration::ZERO;
+    }
+    let (begun, camera) = (Instant::now(), info.borrow().camera.clone());
+    let is_watched = metrics::gauge!("tryon_capture_watched", "camera" => camera);
+    is_watched.set(0.0);
+    let recording = async { info.wait_for(|i| i.recording).await.is_ok() };
+    tokio::select! {
+        () = leases.begun() => {}
+        _ = recording => {}
+    }
+    is_watched.set(1.0);
+    begun.elapsed()
 }
 
 impl Reader {
@@ -63,6 +82,7 @@ impl Reader {
     pub(crate) async fn run(mut self, mut publisher: Box<dyn FramePublisher>) {
         let (mut pace, mut faults, mut sequence) = (Pace::new(), 0, 0);
         loop {
+            pace.pause(wanted(&self.leases, self.info.subscribe()).await);
             let start = Instant::now();
             let frame = match self.read().await {
                 Ok(Some(f)) => f,
@@ -103,7 +123,11 @@ impl Reader {
                 stages: vec![read],
             });
             self.recorder.offer(&exposure);
-            if let Err(e) = publisher.send(exposure).await {
+            // The consent may have ended since the frame was read.
+            let Some(sealer) = self.leases.sealer() else {
+                continue;
+            };
+            if let Err(e) = publisher.send(exposure, sealer).await {
                 tracing::warn!(camera = self.config.name, error = %e, "a frame did not get out");
             }
             metrics::counter!("tryon_capture_frames").increment(1);

@@ -3,6 +3,7 @@
 use crate::camera::{self, Command, Handle};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::time::Duration;
 use tokio::sync::oneshot;
 use tonic::{Request, Response, Status};
 use tryon_kit::config::CaptureConfig;
@@ -10,8 +11,12 @@ use tryon_kit::frames::CameraKey;
 use tryon_kit::server::Context;
 use tryon_kit::status::{not_found, unavailable};
 use tryon_proto::convert::geometry::calibration_to_wire;
+use tryon_proto::convert::{WireError, request};
 use tryon_proto::v1::capture_service_server::CaptureService;
 use tryon_proto::v1::*;
+
+/// Longest lease of consent (s): a lost holder must not keep a camera on.
+const MAX_LEASE_S: f32 = 5.0;
 
 /// All cameras of the process.
 pub(crate) struct Capture {
@@ -81,6 +86,30 @@ impl CaptureService for Capture {
         Ok(Response::new(GetCalibrationResponse {
             calibration: Some(calibration_to_wire(&c)),
         }))
+    }
+
+    async fn hold_consent(
+        &self,
+        r: Request<HoldConsentRequest>,
+    ) -> Result<Response<HoldConsentResponse>, Status> {
+        let r = r.get_ref();
+        let holder = request::session_id("hold_consent_request.try_on_id", &r.try_on_id)?;
+        let camera = self.find(&r.camera)?;
+        if !r.store.is_empty() && r.store != camera.info.borrow().store {
+            return Err(not_found("store", &r.store));
+        }
+        if !(0.0..=MAX_LEASE_S).contains(&r.seconds) {
+            let why = format!("0 to {MAX_LEASE_S} s");
+            return Err(WireError::new("hold_consent_request.seconds", why).into());
+        }
+        let key = if r.seconds > 0.0 {
+            let length = Duration::from_secs_f32(r.seconds);
+            Some(camera.leases.hold(&holder, length)?)
+        } else {
+            camera.leases.end(&holder);
+            None
+        };
+        Ok(Response::new(HoldConsentResponse { key }))
     }
 
     async fn start_camera(

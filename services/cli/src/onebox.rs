@@ -97,7 +97,8 @@ fn pin_addresses(config: &mut Config, name: &str, running: &Running) {
     let url = format!("http://{}", running.address);
     match name {
         "capture" => {
-            (config.capture.address, config.capture.admin) = (running.address, running.admin)
+            (config.capture.address, config.capture.admin) = (running.address, running.admin);
+            config.compositor.capture = url;
         }
         "tracking" => {
             (config.tracking.address, config.tracking.admin) = (running.address, running.admin);

@@ -2,7 +2,7 @@
 //!
 //! One task owns one try-on (`try_on`): it opens the sessions behind it and joins frames, bodies and garments by epoch
 //! and sequence (`join_buffer`). It renders on the compute pool (`engine`, on a `card` where there is one) and queues pictures
-//! for every viewer (`viewer`). The states of a try-on are the table of `tryon::session`. gRPC, gRPC-web and the page
+//! for every viewer (`viewer`), and keeps photos for their phones (`photos`). The states of a try-on are the table of `tryon::session`. gRPC, gRPC-web and the page
 //! share one port.
 
 mod admission;
@@ -13,6 +13,7 @@ mod formats;
 mod join_buffer;
 mod life;
 pub mod page;
+mod photos;
 mod service;
 mod try_on;
 mod upstream;
@@ -44,7 +45,8 @@ async fn own_pages_only(hosts: Hosts, request: Request<Body>, next: Next) -> Res
 /// When an address cannot be bound or a URL is none.
 pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError> {
     let c = &config.compositor;
-    let service = service::Compositor::new(c, &ctx)?;
+    let photos = photos::Photos::default();
+    let service = service::Compositor::new(c, &ctx, photos.clone())?;
     let (mut routes, health) = server::routes(SERVICE_NAME)?;
     tryon_kit::behind::follow(health.clone(), &ctx, service.behind());
     routes.add_service(
@@ -54,8 +56,14 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         .routes()
         .into_axum_router()
         .layer(GrpcWebLayer::new());
-    let app = grpc.reset_fallback().merge(page::router());
-    let hosts = Hosts::new(&c.hosts, &c.origins);
+    let app = grpc
+        .reset_fallback()
+        .merge(page::router())
+        .merge(photos::router(photos));
+    let mut names = c.hosts.clone();
+    let public = c.public.parse::<http::Uri>().ok();
+    names.extend(public.and_then(|u| u.host().map(str::to_owned)));
+    let hosts = Hosts::new(&names, &c.origins);
     let routes = Routes::from(app.layer(from_fn(move |r, next| {
         own_pages_only(hosts.clone(), r, next)
     })));

@@ -4,6 +4,9 @@ use clap::Parser;
 use std::process::ExitCode;
 use tryon_kit::process::{self, Args, BusRole};
 
+#[global_allocator]
+static ALLOCATOR: tryon_kit::forget::Zeroing = tryon_kit::forget::ZEROING;
+
 fn main() -> ExitCode {
     process::run(
         "compositor",

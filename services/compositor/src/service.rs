@@ -3,6 +3,7 @@
 use crate::admission::Admission;
 use crate::card::Card;
 use crate::engine::Encoding;
+use crate::photos::{self, Photos};
 use crate::try_on::{self, Command, Handle, Setup};
 use crate::upstream::{self, renamed};
 use crate::viewer::viewer;
@@ -15,10 +16,12 @@ use tonic::transport::Channel;
 use tonic::{Code, Request, Response, Status};
 use tryon_kit::client::{channel, request as call};
 use tryon_kit::config::CompositorConfig;
+use tryon_kit::consent::Cameras;
 use tryon_kit::server::{Context, StartError};
 use tryon_kit::sessions::{Opened, Sessions, brief, random_id};
 use tryon_kit::status::{exhausted, from_upstream, not_found, unavailable};
 use tryon_proto::convert::{WireError, request};
+use tryon_proto::v1::capture_service_server::SERVICE_NAME as CAPTURE;
 use tryon_proto::v1::cloth_service_server::SERVICE_NAME as CLOTH;
 use tryon_proto::v1::compositor_service_server::CompositorService;
 use tryon_proto::v1::tracking_service_server::SERVICE_NAME as TRACKING;
@@ -28,6 +31,9 @@ use tryon_proto::v1::*;
 const SNAPSHOT_QUALITY: u8 = 95;
 /// Longest wait for a snapshot.
 const SNAPSHOT_DEADLINE: Duration = Duration::from_secs(2);
+
+/// Longest wait until everything behind a try-on was told of its end.
+const WITHDRAWAL_DEADLINE: Duration = Duration::from_secs(5);
 
 /// Picture stream of a viewer.
 type Pictures = Pin<Box<dyn Stream<Item = Result<StreamFramesResponse, Status>> + Send>>;
@@ -40,17 +46,25 @@ pub(crate) struct Compositor {
     ctx: Context,
     cloth: Channel,
     tracking: Channel,
+    capture: Channel,
+    cameras: Cameras,
+    photos: Photos,
     card: Card,
 }
 
 impl Compositor {
-    pub(crate) fn new(config: &CompositorConfig, ctx: &Context) -> Result<Self, StartError> {
+    pub(crate) fn new(
+        config: &CompositorConfig,
+        ctx: &Context,
+        photos: Photos,
+    ) -> Result<Self, StartError> {
         let fault = |key: &str| {
             let key = format!("compositor.{key}");
             move |why| StartError::Config { key, why }
         };
         let tracking = channel(&config.tracking).map_err(fault("tracking"))?;
         let cloth = channel(&config.cloth).map_err(fault("cloth"))?;
+        let capture = channel(&config.capture).map_err(fault("capture"))?;
         let card = Card::open(config.renderer).map_err(|e| StartError::Config {
             key: "compositor.renderer".into(),
             why: e.to_string(),
@@ -64,6 +78,9 @@ impl Compositor {
             ctx: ctx.clone(),
             cloth,
             tracking,
+            cameras: Cameras::new(capture.clone()),
+            capture,
+            photos,
             card,
         })
     }
@@ -71,6 +88,7 @@ impl Compositor {
     /// Services behind this one, by gRPC name.
     pub(crate) fn behind(&self) -> Vec<(&'static str, Channel)> {
         vec![
+            (CAPTURE, self.capture.clone()),
             (TRACKING, self.tracking.clone()),
             (CLOTH, self.cloth.clone()),
         ]
@@ -81,6 +99,23 @@ impl Compositor {
             .get(id)
             .filter(|h| !h.commands.is_closed())
             .ok_or_else(|| not_found("try-on", id))
+    }
+
+    /// Newest picture of a try-on, at the camera's size.
+    async fn snapshot(&self, id: &str, encoding: Encoding) -> Result<Picture, Status> {
+        let handle = self.find(id)?;
+        let (answer, drawn) = oneshot::channel();
+        let gone = || not_found("try-on", id);
+        handle
+            .commands
+            .send(Command::Snapshot(encoding, answer))
+            .await
+            .map_err(|_| gone())?;
+        let late = |_| unavailable("compositor", "the picture took too long");
+        tokio::time::timeout(SNAPSHOT_DEADLINE, drawn)
+            .await
+            .map_err(late)?
+            .map_err(|_| gone())?
     }
 
     /// Dresses the session in cloth. A silent cloth service is UNAVAILABLE, no fault of the outfit.
@@ -123,6 +158,11 @@ impl CompositorService for Compositor {
         );
         let key = request::camera_key("open_try_on_request", &store, &camera)?;
         let choices = request::choices("open_try_on_request", &r.garments)?;
+        if !r.consent.is_some_and(|c| c.given) {
+            return Err(Status::failed_precondition(
+                "open_try_on_request.consent: nobody is shown without it",
+            ));
+        }
         if self
             .try_ons
             .get(&id)
@@ -148,6 +188,10 @@ impl CompositorService for Compositor {
             metrics::counter!("tryon_try_ons_refused").increment(1);
             return Err(exhausted("try-ons that this machine can run", open));
         }
+        // Without an answer it may come up later: the try-on says so, and asks again.
+        if let Ok(false) = self.cameras.has(&key).await {
+            return Err(not_found("camera", &key.to_string()));
+        }
         if !choices.is_empty()
             && let Err(s) = self.dress(&id, &choices, "open_try_on_request").await
             && s.code() == Code::InvalidArgument
@@ -161,6 +205,8 @@ impl CompositorService for Compositor {
             ctx: self.ctx.clone(),
             config: self.config.clone(),
             card: self.card.clone(),
+            cameras: self.cameras.clone(),
+            photos: self.photos.clone(),
             directory: self.try_ons.clone(),
         };
         let created = match self.try_ons.open(&id, || try_on::spawn(setup())) {
@@ -184,9 +230,22 @@ impl CompositorService for Compositor {
         r: Request<CloseTryOnRequest>,
     ) -> Result<Response<CloseTryOnResponse>, Status> {
         if let Some(h) = self.try_ons.remove(&r.get_ref().try_on_id) {
-            let _ = h.commands.send(Command::Close).await;
+            let _ = h.commands.send(Command::Close(TryOnEnd::Requested)).await;
         }
         Ok(Response::new(CloseTryOnResponse {}))
+    }
+
+    async fn withdraw_consent(
+        &self,
+        r: Request<WithdrawConsentRequest>,
+    ) -> Result<Response<WithdrawConsentResponse>, Status> {
+        if let Some(h) = self.try_ons.remove(&r.get_ref().try_on_id) {
+            let _ = h.commands.send(Command::Close(TryOnEnd::Withdrawn)).await;
+            tokio::time::timeout(WITHDRAWAL_DEADLINE, h.over.cancelled())
+                .await
+                .map_err(|_| unavailable("capture", "its lease ends by itself"))?;
+        }
+        Ok(Response::new(WithdrawConsentResponse {}))
     }
 
     async fn choose_garments(
@@ -290,20 +349,29 @@ impl CompositorService for Compositor {
                 return Err(WireError::new("take_snapshot_request.codec", "JPEG or PNG").into());
             }
         };
-        let handle = self.find(&r.try_on_id)?;
-        let (answer, drawn) = oneshot::channel();
-        let gone = || not_found("try-on", &r.try_on_id);
-        handle
-            .commands
-            .send(Command::Snapshot(encoding, answer))
-            .await
-            .map_err(|_| gone())?;
-        let late = |_| unavailable("compositor", "the picture took too long");
-        let picture = tokio::time::timeout(SNAPSHOT_DEADLINE, drawn)
-            .await
-            .map_err(late)?
-            .map_err(|_| gone())??;
+        let picture = self.snapshot(&r.try_on_id, encoding).await?;
         Ok(Response::new(TakeSnapshotResponse {
+            picture: Some(picture),
+        }))
+    }
+
+    async fn offer_photo(
+        &self,
+        r: Request<OfferPhotoRequest>,
+    ) -> Result<Response<OfferPhotoResponse>, Status> {
+        let origin = photos::origin(&self.config.public, r.metadata())?;
+        let id = &r.get_ref().try_on_id;
+        let picture = self.snapshot(id, Encoding::Jpeg(SNAPSHOT_QUALITY)).await?;
+        let url = origin + &self.photos.offer(id, picture.image.clone())?;
+        if let Err(gone) = self.find(id) {
+            // Its end came before the offer and found nothing to drop.
+            self.photos.forget(id);
+            return Err(gone);
+        }
+        Ok(Response::new(OfferPhotoResponse {
+            qr_svg: photos::qr_svg(&url)?,
+            url,
+            seconds: photos::LIFE.as_secs_f32(),
             picture: Some(picture),
         }))
     }

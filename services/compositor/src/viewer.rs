@@ -19,6 +19,8 @@ use tryon_proto::v1::{Picture, StreamFramesResponse, TryOnState, TryOnStatus};
 const STATUSES: usize = 64;
 /// Time without an acknowledgement, while pictures are on the way, after which a reader is cut off.
 const UNACKNOWLEDGED: Duration = Duration::from_secs(10);
+/// Time without an acknowledgement after which a reader may be a lost kiosk, which must not keep the camera on.
+const LOST: Duration = Duration::from_secs(2);
 /// Age in the queue above which a picture is not sent any more: the next one is made within an exposure.
 const FRESH: Duration = Duration::from_millis(100);
 
@@ -136,11 +138,18 @@ impl Viewer {
             self.moved = Instant::now();
         }
     }
+    /// Pictures are on the way to it, and it has acknowledged none for that long.
+    fn is_silent_for(&self, time: Duration) -> bool {
+        let is_awaited = self.format.window.is_some() && self.sent > self.acknowledged;
+        is_awaited && self.moved.elapsed() > time
+    }
+    /// It takes its pictures, as far as it tells.
+    pub(crate) fn is_watching(&self) -> bool {
+        !self.is_silent_for(LOST)
+    }
     /// The reader has gone, or acknowledges nothing: then it is cut off.
     pub(crate) fn is_over(&self) -> bool {
-        let is_stuck = self.format.window.is_some()
-            && self.sent > self.acknowledged
-            && self.moved.elapsed() > UNACKNOWLEDGED;
+        let is_stuck = self.is_silent_for(UNACKNOWLEDGED);
         if is_stuck {
             self.is_cut_off.store(true, Ordering::Release);
         }

@@ -2,6 +2,7 @@
 
 use crate::client::{pauses, request};
 use crate::compute::Pool;
+use crate::consent::Keys;
 use crate::frames::CameraKey;
 use crate::queue::latest;
 use std::sync::Arc;
@@ -32,48 +33,70 @@ pub enum News {
     Gone(String),
 }
 
+/// Camera to open a session with.
+pub struct Opening {
+    /// Bus keys of the camera.
+    pub camera: CameraKey,
+    /// Key of its frames, handed over whenever it changes.
+    pub keys: Keys,
+}
+
 /// Session of the subscription.
 struct FollowedSession {
     id: String,
-    /// Camera to open the session with, before each stream.
-    camera: Option<CameraKey>,
+    /// Given by those who open the session, before each stream.
+    opening: Option<Opening>,
 }
 
 impl FollowedSession {
     /// Opens the session if it has a camera.
-    async fn open(&self, client: &mut TrackingServiceClient<Channel>) -> Result<(), tonic::Status> {
-        if let Some(key) = &self.camera {
+    async fn open(
+        &mut self,
+        client: &mut TrackingServiceClient<Channel>,
+    ) -> Result<(), tonic::Status> {
+        if let Some(Opening { camera, keys }) = &mut self.opening {
             let message = OpenSessionRequest {
                 session_id: self.id.clone(),
-                store: key.store().into(),
-                camera: key.camera().into(),
+                store: camera.store().into(),
+                camera: camera.camera().into(),
+                frame_key: keys.borrow_and_update().clone(),
             };
             client.open_session(request(message)).await?;
         }
         Ok(())
     }
+
+    /// Waits for a key that the session was not opened with.
+    async fn key_changed(&mut self) {
+        if let Some(Opening { keys, .. }) = &mut self.opening
+            && keys.changed().await.is_ok()
+        {
+            return;
+        }
+        std::future::pending().await
+    }
 }
 
-/// Follows `session` until the receiver of `news` is gone. With `open`, each stream opens the session first.
+/// Follows `session` until the receiver of `news` is gone. With `opening`, each stream opens the session first.
 ///
 /// The newest state wins. Shapes are never lost: they are joined to states before the queue drops any.
 pub async fn follow(
     channel: Channel,
     session: String,
-    open: Option<CameraKey>,
+    opening: Option<Opening>,
     pool: Arc<Pool>,
     news: latest::Sender<News>,
 ) {
     let mut client =
         TrackingServiceClient::new(channel).max_decoding_message_size(MAX_TEMPLATE_BYTES);
-    let session = FollowedSession {
+    let mut session = FollowedSession {
         id: session,
-        camera: open,
+        opening,
     };
     let mut wait = pauses();
     while !news.is_closed() {
         let mut any = false;
-        let why = match one_stream(&mut client, &session, &pool, &news, &mut any).await {
+        let why = match one_stream(&mut client, &mut session, &pool, &news, &mut any).await {
             Ok(()) => "the session was closed".into(),
             Err(why) => why,
         };
@@ -89,7 +112,7 @@ pub async fn follow(
 
 async fn one_stream(
     client: &mut TrackingServiceClient<Channel>,
-    session: &FollowedSession,
+    session: &mut FollowedSession,
     pool: &Pool,
     news: &latest::Sender<News>,
     any: &mut bool,
@@ -117,7 +140,17 @@ async fn one_stream(
         .await;
     let mut states = call.map_err(said)?.into_inner();
     let (mut shape, mut version) = (None, 0);
-    while let Some(message) = states.next().await {
+    loop {
+        let message = tokio::select! {
+            message = states.next() => message,
+            () = session.key_changed() => {
+                session.open(client).await.map_err(said)?;
+                continue;
+            }
+        };
+        let Some(message) = message else {
+            return Ok(());
+        };
         let state = required(
             message.map_err(said)?.state,
             "stream_body_states_response.state",
@@ -136,8 +169,7 @@ async fn one_stream(
             shape,
             template: template.clone(),
         }) {
-            break;
+            return Ok(());
         }
     }
-    Ok(())
 }

@@ -11,11 +11,11 @@ use crate::frames::{
     BoxFuture, BusError, CameraKey, Exposure, FrameBus, FramePublisher, FrameSubscription, Packet,
 };
 use crate::queue::latest;
-use bytes::Bytes;
+use crate::seal::{KeyRing, Sealer, Unsealing};
 use std::sync::Arc;
 use tokio::sync::watch;
 use tryon::camera::Calibration;
-use tryon_proto::Message;
+use tryon_proto::v1::FrameKey;
 use zenoh::Wait;
 use zenoh::handlers::RingChannel;
 use zenoh::qos::CongestionControl;
@@ -37,6 +37,7 @@ fn fault(e: impl std::fmt::Display) -> BusError {
 pub struct ZenohBus {
     session: zenoh::Session,
     pool: Arc<Pool>,
+    keys: Arc<KeyRing>,
 }
 
 impl ZenohBus {
@@ -75,7 +76,11 @@ impl ZenohBus {
                 .map_err(|e| BusError(format!("{key} = {value}: {e}")))?;
         }
         let session = zenoh::open(c).await.map_err(fault)?;
-        Ok(Arc::new(Self { session, pool }))
+        Ok(Arc::new(Self {
+            session,
+            pool,
+            keys: Arc::default(),
+        }))
     }
     /// Leaves the bus.
     pub async fn close(&self) {
@@ -97,6 +102,7 @@ pub fn free_tcp_endpoint() -> std::io::Result<String> {
 }
 
 struct ZenohPublisher {
+    key: CameraKey,
     frames: Arc<zenoh::pubsub::Publisher<'static>>,
     pool: Arc<Pool>,
     _calibration: zenoh::query::Queryable<()>,
@@ -104,9 +110,17 @@ struct ZenohPublisher {
 }
 
 impl FramePublisher for ZenohPublisher {
-    fn send(&mut self, exposure: Arc<Exposure>) -> BoxFuture<'_, Result<(), BusError>> {
+    fn send(
+        &mut self,
+        exposure: Arc<Exposure>,
+        sealer: Arc<Sealer>,
+    ) -> BoxFuture<'_, Result<(), BusError>> {
         Box::pin(async move {
-            let pack = move || exposure_to_wire(&exposure).map(|m| m.encode_to_vec());
+            let key = self.key.clone();
+            let pack = move || {
+                let message = exposure_to_wire(&exposure).map_err(|e| e.to_string())?;
+                sealer.seal(&key, &message).map_err(|e| e.to_string())
+            };
             let bytes = self.pool.run(pack).await.map_err(fault)?.map_err(fault)?;
             let frames = self.frames.clone();
             // `put` may block on a stalled peer: not on an async worker.
@@ -125,8 +139,8 @@ impl FrameBus for ZenohBus {
         calibration: &Calibration,
     ) -> BoxFuture<'_, Result<Box<dyn FramePublisher>, BusError>> {
         let key = key.clone();
-        let answer =
-            tryon_proto::convert::geometry::calibration_to_wire(calibration).encode_to_vec();
+        let answer = tryon_proto::convert::geometry::calibration_to_wire(calibration);
+        let answer = tryon_proto::Message::encode_to_vec(&answer);
         Box::pin(async move {
             let frames = self
                 .session
@@ -152,6 +166,7 @@ impl FrameBus for ZenohBus {
                 .await
                 .map_err(fault)?;
             let p = ZenohPublisher {
+                key,
                 frames,
                 pool: self.pool.clone(),
                 _calibration: calibration,
@@ -173,8 +188,8 @@ impl FrameBus for ZenohBus {
             let (tx, packets) = latest::channel();
             let pump = tokio::spawn(async move {
                 while let Ok(sample) = ring.recv_async().await {
-                    let payload = Bytes::from(sample.payload().to_bytes().into_owned());
-                    if !tx.send(Packet::Packed(payload)) {
+                    let payload = sample.payload().to_bytes().into_owned();
+                    if !tx.send(Packet::Sealed(payload)) {
                         return;
                     }
                 }
@@ -195,9 +210,14 @@ impl FrameBus for ZenohBus {
                 packets,
                 alive,
                 self.pool.clone(),
+                Unsealing::new(self.keys.clone(), key),
                 guard,
             ))
         })
+    }
+
+    fn learn(&self, camera: &CameraKey, key: &FrameKey) {
+        self.keys.learn(camera, key);
     }
 }
 

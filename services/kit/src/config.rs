@@ -110,10 +110,16 @@ impl Config {
             ("cloth.tracking", &self.cloth.tracking),
             ("compositor.tracking", &self.compositor.tracking),
             ("compositor.cloth", &self.compositor.cloth),
+            ("compositor.capture", &self.compositor.capture),
         ] {
             if !url.starts_with("http://") {
                 return fault(key, "a URL such as http://127.0.0.1:50052 is needed");
             }
+        }
+        let public = &self.compositor.public;
+        if !(public.is_empty() || public.starts_with("http://") || public.starts_with("https://")) {
+            let why = "an origin such as https://mirror.example is needed";
+            return fault("compositor.public", why);
         }
         if let Some(key) = self.exposed().filter(|_| !self.process.insecure) {
             let why = "is reached from beyond this machine, and there is neither TLS nor a token; \

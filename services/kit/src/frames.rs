@@ -2,6 +2,7 @@
 
 use crate::compute::{ComputeError, Pool};
 use crate::queue::latest;
+use crate::seal::{KeyRing, Sealer, Unsealing};
 use bytes::Bytes;
 use std::any::Any;
 use std::collections::BTreeMap;
@@ -14,6 +15,7 @@ use tryon::camera::Calibration;
 use tryon_proto::Message;
 pub use tryon_proto::convert::frame::{Exposure, exposure_from_wire, exposure_to_wire, stage};
 pub use tryon_proto::keys::CameraKey;
+use tryon_proto::v1::{FrameKey, RgbdFrame};
 
 /// Future of an object-safe async method.
 pub type BoxFuture<'a, T> = Pin<Box<dyn Future<Output = T> + Send + 'a>>;
@@ -33,18 +35,24 @@ pub trait FrameBus: Send + Sync {
     ) -> BoxFuture<'_, Result<Box<dyn FramePublisher>, BusError>>;
     /// Follows a camera, which need not exist yet.
     fn subscribe(&self, key: &CameraKey) -> BoxFuture<'_, Result<FrameSubscription, BusError>>;
+    /// Takes a key that frames of a camera are sealed with, for all subscriptions of this process.
+    fn learn(&self, camera: &CameraKey, key: &FrameKey);
 }
 
 /// Publishing end of one camera.
 pub trait FramePublisher: Send {
-    /// Publishes one exposure.
-    fn send(&mut self, exposure: Arc<Exposure>) -> BoxFuture<'_, Result<(), BusError>>;
+    /// Publishes one exposure, sealed wherever it leaves the process.
+    fn send(
+        &mut self,
+        exposure: Arc<Exposure>,
+        sealer: Arc<Sealer>,
+    ) -> BoxFuture<'_, Result<(), BusError>>;
 }
 
-/// Exposure in a subscriber's queue: unpacked inside one process, packed between processes.
+/// Exposure in a subscriber's queue: unpacked inside one process, sealed between processes.
 pub(crate) enum Packet {
     Ready(Arc<Exposure>),
-    Packed(Bytes),
+    Sealed(Vec<u8>),
 }
 
 /// Receiving end of one camera: the newest exposure, with missed ones counted.
@@ -52,6 +60,7 @@ pub struct FrameSubscription {
     pub(crate) packets: latest::Receiver<Packet>,
     pub(crate) alive: watch::Receiver<bool>,
     pub(crate) pool: Arc<Pool>,
+    unsealing: Unsealing,
     /// Frame that the pool unpacks; kept here, so that dropping the future of [`Self::next`] loses nothing.
     unpacking: Option<BoxFuture<'static, Result<Result<Exposure, String>, ComputeError>>>,
     last: Option<(u64, u64)>,
@@ -65,12 +74,14 @@ impl FrameSubscription {
         packets: latest::Receiver<Packet>,
         alive: watch::Receiver<bool>,
         pool: Arc<Pool>,
+        unsealing: Unsealing,
         guard: Box<dyn Any + Send>,
     ) -> Self {
         Self {
             packets,
             alive,
             pool,
+            unsealing,
             unpacking: None,
             last: None,
             skipped: 0,
@@ -101,10 +112,10 @@ impl FrameSubscription {
             } else {
                 match self.packets.recv().await? {
                     Packet::Ready(e) => e,
-                    Packet::Packed(b) => {
-                        let pool = self.pool.clone();
-                        self.unpacking =
-                            Some(Box::pin(async move { pool.run(move || unpack(b)).await }));
+                    Packet::Sealed(b) => {
+                        let (pool, unsealing) = (self.pool.clone(), self.unsealing.clone());
+                        let work = move || unpack(&unsealing, b);
+                        self.unpacking = Some(Box::pin(async move { pool.run(work).await }));
                         continue;
                     }
                 }
@@ -139,8 +150,10 @@ impl FrameSubscription {
     }
 }
 
-fn unpack(b: Bytes) -> Result<Exposure, String> {
-    let message = tryon_proto::v1::RgbdFrame::decode(b).map_err(|e| format!("rgbd_frame: {e}"))?;
+fn unpack(unsealing: &Unsealing, mut payload: Vec<u8>) -> Result<Exposure, String> {
+    let start = unsealing.open(&mut payload).map_err(|e| e.to_string())?;
+    let message = Bytes::from(payload).slice(start..);
+    let message = RgbdFrame::decode(message).map_err(|e| format!("rgbd_frame: {e}"))?;
     exposure_from_wire(&message).map_err(|e| e.to_string())
 }
 
@@ -189,7 +202,11 @@ impl Drop for LocalPublisher {
 }
 
 impl FramePublisher for LocalPublisher {
-    fn send(&mut self, exposure: Arc<Exposure>) -> BoxFuture<'_, Result<(), BusError>> {
+    fn send(
+        &mut self,
+        exposure: Arc<Exposure>,
+        _: Arc<Sealer>,
+    ) -> BoxFuture<'_, Result<(), BusError>> {
         let mut list = self
             .0
             .subscribers
@@ -221,9 +238,12 @@ impl FrameBus for LocalBus {
             .unwrap_or_else(PoisonError::into_inner)
             .push(tx);
         let alive = topic.alive.subscribe();
-        let s = FrameSubscription::new(packets, alive, self.pool.clone(), Box::new(topic));
+        let unsealing = Unsealing::new(Arc::new(KeyRing::default()), key.clone());
+        let pool = self.pool.clone();
+        let s = FrameSubscription::new(packets, alive, pool, unsealing, Box::new(topic));
         Box::pin(std::future::ready(Ok(s)))
     }
+    fn learn(&self, _: &CameraKey, _: &FrameKey) {}
 }
 
 #[cfg(test)]
@@ -261,7 +281,9 @@ pub(crate) mod tests {
         subscribing: &dyn FrameBus,
     ) {
         let key = CameraKey::new("store", "front").expect("names");
+        let sealer = Arc::new(Sealer::draw().expect("random"));
         let mut s = subscribing.subscribe(&key).await.expect("subscribed");
+        subscribing.learn(&key, sealer.key());
         assert!(!s.alive());
         let mut p = publishing
             .publish(&key, &exposure(0).calibration)
@@ -271,7 +293,9 @@ pub(crate) mod tests {
         let mut sequence = 0;
         let first = loop {
             sequence += 1;
-            p.send(exposure(sequence)).await.expect("sent");
+            p.send(exposure(sequence), sealer.clone())
+                .await
+                .expect("sent");
             if let Ok(f) = tokio::time::timeout(Duration::from_millis(50), s.next()).await {
                 break f.expect("the bus lives");
             }
@@ -279,7 +303,9 @@ pub(crate) mod tests {
         };
         for _ in 0..10 {
             sequence += 1;
-            p.send(exposure(sequence)).await.expect("sent");
+            p.send(exposure(sequence), sealer.clone())
+                .await
+                .expect("sent");
         }
         let mut last = first.id.sequence;
         while last < sequence {
@@ -304,12 +330,15 @@ pub(crate) mod tests {
         let key = CameraKey::new("store", "front").expect("names");
         let mut s = bus.subscribe(&key).await.expect("subscribed");
         let mut p = (bus.publish(&key, &exposure(0).calibration).await).expect("published");
-        p.send(exposure(1)).await.expect("sent");
+        let sealer = Arc::new(Sealer::draw().expect("random"));
+        p.send(exposure(1), sealer.clone()).await.expect("sent");
         assert_eq!(s.next().await.expect("lives").id.sequence, 1);
         let due = Instant::now() + Duration::from_millis(50);
         let sending = async {
             for sequence in 2..5 {
-                p.send(exposure(sequence)).await.expect("sent");
+                p.send(exposure(sequence), sealer.clone())
+                    .await
+                    .expect("sent");
             }
         };
         let (next, ()) = tokio::join!(s.next_from(due), sending);

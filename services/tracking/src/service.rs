@@ -56,6 +56,9 @@ impl TrackingService for Tracking {
             request::session_id("open_session_request.session_id", &r.session_id)?
         };
         let key = request::camera_key("open_session_request", &r.store, &r.camera)?;
+        if let Some(frame_key) = &r.frame_key {
+            self.ctx.bus.learn(&key, frame_key);
+        }
         let setup = || Setup {
             id: id.clone(),
             key: key.clone(),

@@ -6,6 +6,7 @@ use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tokio::time::Instant;
 use tryon::body::Template;
+use tryon_kit::consent::FORGET_AFTER;
 use tryon_kit::frames::{CameraKey, Exposure, FrameSubscription};
 use tryon_kit::server::Context;
 use tryon_kit::session_task::{self, Place};
@@ -46,15 +47,19 @@ pub(crate) struct Setup {
     pub(crate) directory: Sessions<Handle>,
 }
 
-/// Starts the task of a session.
-pub(crate) fn spawn(setup: Setup) -> Handle {
-    let first = v1::BodyState {
-        session_id: setup.id.clone(),
+/// State of a session that knows of nobody.
+fn searching(id: &str) -> v1::BodyState {
+    v1::BodyState {
+        session_id: id.into(),
         status: TrackingStatus::Searching.into(),
         reason: DegradedReason::NoPerson.into(),
         ..Default::default()
-    };
-    let (sender, states) = watch::channel(Arc::new(first));
+    }
+}
+
+/// Starts the task of a session.
+pub(crate) fn spawn(setup: Setup) -> Handle {
+    let (sender, states) = watch::channel(Arc::new(searching(&setup.id)));
     let (commands, inbox) = mpsc::channel(8);
     let key = setup.key.clone();
     tokio::spawn(async move {
@@ -124,6 +129,9 @@ impl Task {
                     None => return "the bus is gone",
                 },
                 _ = tick.tick() => {
+                    if received.elapsed() >= FORGET_AFTER {
+                        self.forget();
+                    }
                     if received.elapsed() >= SILENCE && published.elapsed() >= SILENCE {
                         self.silent(&frames);
                         published = Instant::now();
@@ -179,6 +187,14 @@ impl Task {
                 tracing::error!(session = brief(&self.setup.id), %why, "a step was lost");
                 self.fault(DegradedReason::StepFailed, why.to_string());
             }
+        }
+    }
+
+    /// Drops body and pose: nobody knows who stands before the camera now.
+    fn forget(&mut self) {
+        if self.engine.take().is_some() {
+            self.states
+                .send_replace(Arc::new(searching(&self.setup.id)));
         }
     }
 

@@ -132,7 +132,10 @@ impl Chain {
         })?;
         let (at, url) = (running.address, format!("http://{}", running.address));
         match name {
-            "capture" => self.config.capture.address = at,
+            "capture" => {
+                self.config.capture.address = at;
+                self.config.compositor.capture = url;
+            }
             "tracking" => {
                 self.config.tracking.address = at;
                 self.config.cloth.tracking.clone_from(&url);

@@ -7,12 +7,16 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
+use tokio::sync::watch;
 use tryon::camera::{Calibration, RgbdFrame};
 use tryon::formats::{McapWriter, RgbdFolderWriter};
 use tryon_kit::bus::ZenohBus;
+use tryon_kit::client::channel;
 use tryon_kit::compute::Pool;
 use tryon_kit::config::Config;
+use tryon_kit::consent::{self, Cameras, Lease};
 use tryon_kit::frames::{CameraKey, FrameBus};
+use tryon_kit::sessions::random_id;
 
 /// Silence of a camera on the bus after which the recording fails.
 const SILENCE: Duration = Duration::from_secs(5);
@@ -115,6 +119,15 @@ fn from_bus(args: &RecordArgs, camera: &str) -> Result<u64> {
             ZenohBus::open(&[], &config.bus.connect, Pool::new(1).context("threads")?).await?;
         let bus: Arc<dyn FrameBus> = bus;
         let mut frames = bus.subscribe(&key).await?;
+        let channel = channel(&config.compositor.capture).map_err(anyhow::Error::msg)?;
+        let lease = Lease {
+            camera: key.clone(),
+            holder: random_id(),
+        };
+        let ((recording, is_recording), (keys, _)) = (watch::channel(true), watch::channel(None));
+        let cameras = Cameras::new(channel);
+        let consent = consent::keep(cameras, lease, bus.clone(), is_recording, keys);
+        let consent = tokio::spawn(consent);
         let bar = input::progress(None, "recording");
         let end = tokio::time::Instant::now() + Duration::from_secs_f64(args.seconds);
         let mut sink: Option<Sink> = None;
@@ -132,6 +145,8 @@ fn from_bus(args: &RecordArgs, camera: &str) -> Result<u64> {
             })?;
             bar.inc(1);
         }
+        drop(recording);
+        consent.await.context("the lease of consent")??;
         bar.finish_and_clear();
         if let Some(sink) = sink {
             sink.finish()?;

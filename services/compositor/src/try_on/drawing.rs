@@ -81,6 +81,10 @@ pub(super) struct Drawing {
     done: mpsc::Sender<Done>,
     /// `None` while the pool draws.
     engine: Option<Engine>,
+    /// The engine that the pool has is dropped when it comes back.
+    is_stale: bool,
+    /// Nothing was drawn since the engine is new.
+    is_fresh: bool,
     queue: Queue,
 }
 
@@ -92,7 +96,20 @@ impl Drawing {
             card,
             pool,
             done,
+            is_stale: false,
+            is_fresh: true,
             queue: Queue::default(),
+        }
+    }
+
+    /// Drops all jobs and what the renderer knows of the last pictures.
+    pub(super) fn forget(&mut self) {
+        self.queue = Queue::default();
+        if self.engine.is_none() {
+            self.is_stale = true;
+        } else if !self.is_fresh {
+            self.engine = Some(Engine::new(self.card.clone()));
+            self.is_fresh = true;
         }
     }
 
@@ -113,7 +130,10 @@ impl Drawing {
 
     /// Takes the engine back from a finished job and starts the next one.
     pub(super) fn resume(&mut self, engine: Option<Engine>) {
+        let engine = engine.filter(|_| !self.is_stale);
+        self.is_fresh = engine.is_none();
         self.engine = engine.or_else(|| Some(Engine::new(self.card.clone())));
+        self.is_stale = false;
         self.start();
     }
 

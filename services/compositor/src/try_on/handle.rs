@@ -2,21 +2,26 @@
 
 use crate::card::Card;
 use crate::engine::Encoding;
+use crate::photos::Photos;
 use crate::upstream::Wanted;
 use crate::viewer::Viewer;
 use tokio::sync::{mpsc, oneshot, watch};
+use tokio_util::sync::CancellationToken;
 use tonic::Status;
 use tryon_kit::config::CompositorConfig;
+use tryon_kit::consent::Cameras;
 use tryon_kit::frames::CameraKey;
 use tryon_kit::server::Context;
 use tryon_kit::sessions::Sessions;
-use tryon_proto::v1::{GarmentChoice, Picture};
+use tryon_proto::v1::{GarmentChoice, Picture, TryOnEnd};
 
 /// Access to a try-on from the rpcs.
 pub(crate) struct Handle {
     pub(crate) key: CameraKey,
     pub(crate) commands: mpsc::Sender<Command>,
     pub(crate) wanted: watch::Sender<Wanted>,
+    /// Cancelled once the try-on has ended and everything behind it was told.
+    pub(crate) over: CancellationToken,
 }
 
 /// Receiver of a snapshot.
@@ -34,8 +39,8 @@ pub(crate) enum Command {
     Touch,
     /// Draws garments in the colours of their fit, or in their own.
     ShowFit(bool),
-    /// Ends the try-on.
-    Close,
+    /// Ends the try-on for that reason.
+    Close(TryOnEnd),
 }
 
 /// Dependencies of a try-on's task.
@@ -46,5 +51,7 @@ pub(crate) struct Setup {
     pub(crate) ctx: Context,
     pub(crate) config: CompositorConfig,
     pub(crate) card: Card,
+    pub(crate) cameras: Cameras,
+    pub(crate) photos: Photos,
     pub(crate) directory: Sessions<Handle>,
 }

@@ -1,10 +1,11 @@
 //! State of one try-on: the transition table of `tryon::session`, fed with events, faults and silences.
 
 use crate::life;
+use std::time::Duration;
 use tokio::time::Instant;
 use tryon::session::{Ages, Event, Fault, SilenceLimits, State, transition};
 use tryon_kit::sessions::brief;
-use tryon_proto::v1::TryOnStatus;
+use tryon_proto::v1::{TryOnEnd, TryOnStatus};
 
 /// Answers of a service behind the try-on.
 #[derive(Default)]
@@ -28,6 +29,8 @@ pub(super) struct Lifecycle {
     tracking: Upstream,
     cloth: Upstream,
     announced: Vec<TryOnStatus>,
+    /// Reason of the end.
+    end: TryOnEnd,
 }
 
 impl Lifecycle {
@@ -46,6 +49,7 @@ impl Lifecycle {
             tracking: Upstream::default(),
             cloth: Upstream::default(),
             announced: Vec::new(),
+            end: TryOnEnd::Unspecified,
         }
     }
 
@@ -62,6 +66,13 @@ impl Lifecycle {
     /// Tracking answered last time.
     pub(super) fn is_tracking_up(&self) -> bool {
         self.tracking.is_up
+    }
+
+    /// Time since the last frame; `None` before the first.
+    pub(super) fn silence(&self) -> Option<Duration> {
+        let now = self.since_birth_ns(Instant::now());
+        let at = self.ages.frame_ns?;
+        Some(Duration::from_nanos(now.saturating_sub(at)))
     }
 
     /// Garments of a frame that arrived at `arrived` are too old to be shown.
@@ -82,6 +93,7 @@ impl Lifecycle {
                 None => String::new(),
             },
             retry_after: 0.0,
+            end: self.end.into(),
         }
     }
 
@@ -105,6 +117,12 @@ impl Lifecycle {
         if next.invalidates_garments() {
             self.ages.garments_ns = None;
         }
+    }
+
+    /// Closes it for that reason.
+    pub(super) fn close(&mut self, end: TryOnEnd) {
+        self.end = end;
+        self.apply(Event::Close);
     }
 
     /// Applies a fault of this moment.

@@ -2,15 +2,17 @@
 
 use super::handle::{Handle, Setup};
 use super::lifecycle::Lifecycle;
-use super::task::{Inputs, Task};
+use super::task::{Inputs, Outputs, Task};
 use crate::upstream::{self, Wanted};
 use std::time::Duration;
 use tokio::sync::{mpsc, watch};
+use tokio_util::sync::CancellationToken;
 use tonic::transport::Channel;
 use tryon::session::SilenceLimits;
-use tryon_kit::bodies;
+use tryon_kit::bodies::{self, Opening};
 use tryon_kit::client::{CALL_DEADLINE, channel, request};
 use tryon_kit::config::CompositorConfig;
+use tryon_kit::consent::{self, Lease};
 use tryon_kit::queue::latest;
 use tryon_kit::session_task::{self, Place};
 use tryon_kit::sessions::brief;
@@ -29,17 +31,23 @@ pub(crate) fn spawn(mut setup: Setup) -> Handle {
         choices,
     });
     let key = setup.key.clone();
+    let over = CancellationToken::new();
+    let done = over.clone().drop_guard();
     tokio::spawn(async move {
+        let _done = done;
         let id = setup.id.clone();
         let is_over = |h: &Handle| h.commands.is_closed();
         let _place = Place::new(setup.directory.clone(), &id, "tryon_try_ons", is_over);
+        let photos = setup.photos.clone();
         let why = run(setup, inbox, outfit).await;
+        photos.forget(&id);
         tracing::info!(try_on = brief(&id), why, "closed");
     });
     Handle {
         key,
         commands,
         wanted,
+        over,
     }
 }
 
@@ -65,11 +73,25 @@ async fn run(
     };
     let id = setup.id.clone();
 
+    let (is_watched, watched) = watch::channel(false);
+    let (key_sender, keys) = watch::channel(None);
+    let lease = Lease {
+        camera: setup.key.clone(),
+        holder: id.clone(),
+    };
+    let bus = setup.ctx.bus.clone();
+    let cameras = setup.cameras.clone();
+    let consent = tokio::spawn(consent::keep(cameras, lease, bus, watched, key_sender));
+
     let (tx, bodies) = latest::channel();
+    let opening = Opening {
+        camera: setup.key.clone(),
+        keys,
+    };
     let follow_bodies = tokio::spawn(bodies::follow(
         tracking.clone(),
         id.clone(),
-        Some(setup.key.clone()),
+        Some(opening),
         setup.ctx.pool.clone(),
         tx,
     ));
@@ -85,9 +107,12 @@ async fn run(
         garments,
         drawn,
     };
-    let task = Task::new(setup, life, done).run(inputs);
+    let outputs = Outputs { done, is_watched };
+    let task = Task::new(setup, life, outputs).run(inputs);
     let why = session_task::run("compositor", &id, task).await;
 
+    // The sender that it watches is gone with the task: the camera stops first.
+    let _ = tokio::time::timeout(CALL_DEADLINE, consent).await;
     follow_bodies.abort();
     follow_garments.abort();
     close_sessions(id, tracking, cloth).await;

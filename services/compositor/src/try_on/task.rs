@@ -13,11 +13,12 @@ use crate::viewer::Viewer;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 use tokio::time::Instant;
 use tonic::Status;
 use tryon::session::{Event, Fault};
 use tryon_kit::bodies;
+use tryon_kit::consent::FORGET_AFTER;
 use tryon_kit::frames::{Exposure, FrameSubscription};
 use tryon_kit::queue::latest;
 use tryon_kit::sessions::{brief, unix_ns};
@@ -25,7 +26,7 @@ use tryon_kit::status::{exhausted, unavailable};
 use tryon_kit::telemetry::record_stages;
 use tryon_proto::v1::{
     BodyState, ClothStatus, FrameId, GarmentFit, GarmentFrame, Picture, PictureCodec,
-    TrackingStatus, TryOnState, TryOnStatus,
+    TrackingStatus, TryOnEnd, TryOnState, TryOnStatus,
 };
 
 /// Interval of the checks for silence.
@@ -41,6 +42,14 @@ pub(super) struct Inputs {
     pub(super) bodies: latest::Receiver<bodies::News>,
     pub(super) garments: latest::Receiver<upstream::News>,
     pub(super) drawn: mpsc::Receiver<Done>,
+}
+
+/// Ends of a task's channels that others read.
+pub(super) struct Outputs {
+    /// Finished jobs.
+    pub(super) done: mpsc::Sender<Done>,
+    /// Somebody watches: the consent is renewed while this is true.
+    pub(super) is_watched: watch::Sender<bool>,
 }
 
 /// Fit of the worn outfit as cloth last reported it.
@@ -64,6 +73,7 @@ pub(super) struct Task {
     join: JoinBuffer,
     fit: OutfitFit,
     viewers: Vec<Viewer>,
+    is_watched: watch::Sender<bool>,
     formats: Formats,
     /// Last message to the viewers.
     said: Instant,
@@ -83,16 +93,17 @@ pub(super) struct Task {
 }
 
 impl Task {
-    /// A try-on without viewers that sends finished jobs to `done`.
-    pub(super) fn new(setup: Setup, life: Lifecycle, done: mpsc::Sender<Done>) -> Self {
+    /// A try-on without viewers.
+    pub(super) fn new(setup: Setup, life: Lifecycle, outputs: Outputs) -> Self {
         let now = Instant::now();
         Self {
-            drawing: Drawing::new(setup.card.clone(), setup.ctx.pool.clone(), done),
+            drawing: Drawing::new(setup.card.clone(), setup.ctx.pool.clone(), outputs.done),
             setup,
             life,
             join: JoinBuffer::default(),
             fit: OutfitFit::default(),
             viewers: Vec::new(),
+            is_watched: outputs.is_watched,
             formats: Formats::default(),
             said: now,
             wanted: now,
@@ -149,7 +160,7 @@ impl Task {
             _ = tick.tick() => {
                 self.on_tick();
                 if self.wanted.elapsed() > Duration::from_secs(self.setup.config.idle_s) {
-                    self.life.apply(Event::Close);
+                    self.life.close(TryOnEnd::Idle);
                     return Some("nobody watches");
                 }
             }
@@ -169,10 +180,14 @@ impl Task {
             Some(Command::Snapshot(encoding, answer)) => self.snapshot(encoding, answer),
             Some(Command::Touch) => self.wanted = Instant::now(),
             Some(Command::ShowFit(show)) => self.fit.is_shown = show,
-            Some(Command::Close) | None => {
-                self.life.apply(Event::Close);
-                return Some("asked to");
+            Some(Command::Close(end)) => {
+                self.life.close(end);
+                return Some(match end {
+                    TryOnEnd::Withdrawn => "consent was withdrawn",
+                    _ => "asked to",
+                });
             }
+            None => return Some("nobody can reach it"),
         }
         None
     }
@@ -193,6 +208,7 @@ impl Task {
         }
         v.status(self.life.status());
         self.viewers.push(v);
+        self.is_watched.send_replace(true);
         // Its first picture does not wait for a change of the scene.
         (self.scene, self.due) = (EmptyScene::default(), Instant::now());
         Ok(())
@@ -209,12 +225,28 @@ impl Task {
         if !self.viewers.is_empty() {
             self.wanted = Instant::now();
         }
+        let is_watched = self.viewers.iter().any(Viewer::is_watching);
+        self.is_watched
+            .send_if_modified(|w| std::mem::replace(w, is_watched) != is_watched);
+        if self.life.silence().is_some_and(|s| s >= FORGET_AFTER) {
+            self.forget();
+        }
         if self.said.elapsed() >= HEARTBEAT {
             // A reader that is behind has something to read: repetitions would wait before the next picture.
             let status = self.life.status();
             (self.viewers).retain(|v| v.is_behind() || v.status(status.clone()));
             self.said = Instant::now();
         }
+    }
+
+    /// Drops all pictures and bodies: nobody knows who stands before the camera now.
+    fn forget(&mut self) {
+        self.join = JoinBuffer::default();
+        (self.last, self.showing) = (None, None);
+        self.scene = EmptyScene::default();
+        self.fit.garments.clear();
+        self.fit.tightness = Arc::default();
+        self.drawing.forget();
     }
 
     fn on_frame(&mut self, e: Arc<Exposure>) {

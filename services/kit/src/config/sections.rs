@@ -231,6 +231,8 @@ pub struct CompositorConfig {
     pub tracking: String,
     /// The cloth service.
     pub cloth: String,
+    /// The capture service, which asks for consent.
+    pub capture: String,
     /// Camera of a try-on that names none.
     pub store: String,
     /// Camera of a try-on that names none.
@@ -253,6 +255,9 @@ pub struct CompositorConfig {
     pub hosts: Vec<String>,
     /// Origins of foreign pages that may call it, such as `https://kiosk.example`.
     pub origins: Vec<String>,
+    /// Origin under which a shopper's phone reaches this port, such as `https://mirror.example`: the beginning of photo
+    /// links. Empty: the host that the page was asked for by.
+    pub public: String,
     /// auto, cpu or gpu.
     pub renderer: RendererChoice,
 }
@@ -277,6 +282,7 @@ impl Default for CompositorConfig {
             admin: local(9104),
             tracking: "http://127.0.0.1:50052".into(),
             cloth: "http://127.0.0.1:50053".into(),
+            capture: "http://127.0.0.1:50051".into(),
             store: "store".into(),
             camera: "front".into(),
             max_try_ons: 4,
@@ -288,6 +294,7 @@ impl Default for CompositorConfig {
             garments_late_ms: 700,
             hosts: Vec::new(),
             origins: Vec::new(),
+            public: String::new(),
             renderer: RendererChoice::Auto,
         }
     }

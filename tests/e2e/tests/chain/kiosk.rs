@@ -109,7 +109,10 @@ impl Kiosk {
         let (runtime, running) = std::thread::scope(|s| s.spawn(begin).join()).expect("starts");
         let url = format!("http://{}", running.address);
         match part {
-            Part::Capture => self.config.capture.address = running.address,
+            Part::Capture => {
+                self.config.capture.address = running.address;
+                self.config.compositor.capture = url;
+            }
             Part::Tracking => {
                 self.config.tracking.address = running.address;
                 (self.config.cloth.tracking, self.config.compositor.tracking) = (url.clone(), url);
@@ -270,6 +273,7 @@ impl Watcher {
             store: String::new(),
             camera: camera.into(),
             garments: wear(garments),
+            consent: Some(Consent { given: true }),
         };
         c.open_try_on(r).await?;
         let r = StreamFramesRequest {

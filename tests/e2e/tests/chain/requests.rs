@@ -35,6 +35,7 @@ async fn bad_compositor_requests(kiosk: &Kiosk) {
         store: String::new(),
         camera: camera.into(),
         garments,
+        consent: Some(Consent { given: true }),
     };
     let wildcard = c.open_try_on(open("*", vec![])).await;
     let named = field(wildcard.expect_err("a wildcard"));
