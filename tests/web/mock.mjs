@@ -117,6 +117,9 @@ function picture(index, outfit, person) {
   return painted.get(key);
 }
 
+/** Stands for a QR code. */
+const QR = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 3 3"><path d="M0 0h1v1H0zM2 0h1v1H2zM0 2h1v1H0zM1 1h1v1H1z"/></svg>';
+
 // ── the service ──────────────────────────────────────────────────────────────────────────────────────────────────
 
 export function startMock({ port = 0, rate = 20 } = {}) {
@@ -155,12 +158,13 @@ export function startMock({ port = 0, rate = 20 } = {}) {
   const nextStatus = (tryOn) => ({ state: stateOf(tryOn), reason: world.reason, age: (Date.now() - world.since) / 1000, service: '', detail: '', retry_after: 0 });
 
   const unary = {
-    OpenTryOn: [m.OpenTryOnRequest, m.OpenTryOnResponse, ({ try_on_id: id, garments }) => {
+    OpenTryOn: [m.OpenTryOnRequest, m.OpenTryOnResponse, ({ try_on_id: id, garments, consent }) => {
+      if (!consent?.given) throw 9;
       const created = !tryOns.has(id);
       if (created) tryOns.set(id, { garments, revision: 1n, opened: Date.now(), chosen: Date.now() });
       return { try_on_id: id, created };
     }],
-    CloseTryOn: [m.CloseTryOnRequest, m.CloseTryOnResponse, ({ try_on_id: id }) => { tryOns.delete(id); return {}; }],
+    WithdrawConsent: [m.WithdrawConsentRequest, m.WithdrawConsentResponse, ({ try_on_id: id }) => { tryOns.delete(id); return {}; }],
     ListGarmentChoices: [m.ListGarmentChoicesRequest, m.ListGarmentChoicesResponse, () => ({ garments: LIBRARY })],
     ChooseGarments: [m.ChooseGarmentsRequest, m.ChooseGarmentsResponse, ({ try_on_id: id, garments }) => {
       const tryOn = tryOns.get(id);
@@ -173,9 +177,9 @@ export function startMock({ port = 0, rate = 20 } = {}) {
       tryOns.get(id).fit = show;
       return {};
     }],
-    TakeSnapshot: [m.TakeSnapshotRequest, m.TakeSnapshotResponse, ({ try_on_id: id }) => {
+    OfferPhoto: [m.OfferPhotoRequest, m.OfferPhotoResponse, ({ try_on_id: id }) => {
       if (!tryOns.has(id)) throw 5;
-      return { picture: nextPicture(tryOns.get(id)) };
+      return { picture: nextPicture(tryOns.get(id)), url: 'http://127.0.0.1/photo/0', qr_svg: QR, seconds: 300 };
     }],
   };
 

@@ -6,7 +6,7 @@ import test from 'node:test';
 import { Backoff, FIRST_DELAY, LONGEST_DELAY } from '../../services/compositor/web/js/backoff.js';
 import { fitRows, fitWords } from '../../services/compositor/web/js/fit.js';
 import { Code, RpcError } from '../../services/compositor/web/js/grpc_web.js';
-import { Reason, State } from '../../services/compositor/web/js/messages.js';
+import { Reason, End, State } from '../../services/compositor/web/js/messages.js';
 import { Outfit } from '../../services/compositor/web/js/outfit.js';
 import { BLANK_MS, STALE_MS, ageWords, present } from '../../services/compositor/web/js/presentation.js';
 import { Stats, percentile } from '../../services/compositor/web/js/stats.js';
@@ -147,7 +147,7 @@ function scripted({ streams, opens = [] }) {
       return { try_on_id: 'x', created: answer ?? calls.open === 1 };
     },
     chooseGarments: async () => ({ outfit_revision: BigInt(++calls.choose) }),
-    closeTryOn: async () => { calls.close += 1; },
+    withdrawConsent: async () => { calls.close += 1; },
     acknowledgePicture: async ({ stream, number }) => { calls.acknowledged.push([stream, number]); },
     streamFrames: (request, { signal }) => streams.shift()(signal),
   };
@@ -206,6 +206,16 @@ test('silence is a broken line', async () => {
   await until((e) => links(e).includes('waiting'));
   assert.equal(events.find((e) => e.link === 'waiting').error.code, Code.UNAVAILABLE);
   await tryOn.close();
+});
+
+test('a withdrawn consent is not given again by the page', async () => {
+  const script = scripted({
+    streams: [async function* () { yield { picture: null, status: { state: State.CLOSED, reason: 0, end: End.WITHDRAWN } }; }],
+  });
+  const { tryOn, events } = follow(script);
+  await tryOn.finished;
+  assert.deepEqual(links(events), ['opening', 'withdrawn']);
+  assert.equal(script.calls.open, 1);
 });
 
 test('the compositor may refuse or ask for patience', async () => {

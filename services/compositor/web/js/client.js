@@ -13,6 +13,8 @@ export function compositor(origin = '') {
       unary(url('OpenTryOn'), m.OpenTryOnRequest, m.OpenTryOnResponse, request, options),
     closeTryOn: (request, options) =>
       unary(url('CloseTryOn'), m.CloseTryOnRequest, m.CloseTryOnResponse, request, options),
+    withdrawConsent: (request, options) =>
+      unary(url('WithdrawConsent'), m.WithdrawConsentRequest, m.WithdrawConsentResponse, request, options),
     chooseGarments: (request, options) =>
       unary(url('ChooseGarments'), m.ChooseGarmentsRequest, m.ChooseGarmentsResponse, request, options),
     showFit: (request, options) => unary(url('ShowFit'), m.ShowFitRequest, m.ShowFitResponse, request, options),
@@ -22,6 +24,8 @@ export function compositor(origin = '') {
       unary(url('AcknowledgePicture'), m.AcknowledgePictureRequest, m.AcknowledgePictureResponse, request, options),
     takeSnapshot: (request, options) =>
       unary(url('TakeSnapshot'), m.TakeSnapshotRequest, m.TakeSnapshotResponse, request, { timeoutMs: 10_000, ...options }),
+    offerPhoto: (request, options) =>
+      unary(url('OfferPhoto'), m.OfferPhotoRequest, m.OfferPhotoResponse, request, { timeoutMs: 10_000, ...options }),
     streamFrames: (request, options) =>
       serverStream(url('StreamFrames'), m.StreamFramesRequest, m.StreamFramesResponse, request, options),
   };

@@ -7,7 +7,7 @@ import { Backoff } from './backoff.js';
 import { Details } from './details.js';
 import { byId, setData, setText } from './elements.js';
 import { Code } from './grpc_web.js';
-import { Codec, State } from './messages.js';
+import { State } from './messages.js';
 import { Mirror } from './mirror.js';
 import { Outfit } from './outfit.js';
 import { AWAY, present } from './presentation.js';
@@ -25,6 +25,8 @@ const ABANDONED_S = 180;
 const TICK_MS = 200;
 /** Several touches in a row become one request, ms. */
 const CHOICE_MS = 180;
+/** Hosts that only this machine reaches. */
+const LOOPBACK = /^(localhost|127\..*|\[::1\])$/;
 
 const client = compositor();
 const outfit = new Outfit();
@@ -91,6 +93,7 @@ function finish() {
 
 function heard(event) {
   const { known } = session;
+  if (event.link === 'withdrawn') return finish();
   if (event.kind === 'link') {
     known.link = event.link;
     known.error = event.error ?? null;
@@ -258,31 +261,34 @@ function toast(text) {
 
 // ── the photo ────────────────────────────────────────────────────────────────────────────────────────────────────
 
+/** Offers the newest picture to a phone: the link is in a QR code, works once, and nothing is saved on this machine. */
 async function takePhoto() {
   const mine = session;
   if (!mine || byId('shutter').disabled || byId('photo').open) return;
   try {
-    const { picture } = await mine.tryOn.snapshot(Codec.PNG);
+    const { picture, url, qr_svg: qr, seconds } = await mine.tryOn.offerPhoto();
     if (session !== mine || !picture) return;
-    const png = picture.codec !== Codec.JPEG;
-    const url = URL.createObjectURL(new Blob([picture.image], { type: png ? 'image/png' : 'image/jpeg' }));
-    const save = byId('photo-save');
-    byId('photo-image').src = url;
-    save.href = url;
-    const stamp = new Date().toISOString().slice(0, 19).replace(/[:T]/g, '-');
-    save.download = `fitting-${stamp}.${png ? 'png' : 'jpg'}`;
+    byId('photo-image').src = URL.createObjectURL(new Blob([picture.image], { type: 'image/jpeg' }));
+    byId('photo-code').src = URL.createObjectURL(new Blob([qr], { type: 'image/svg+xml' }));
+    setText(byId('photo-minutes'), String(Math.round(seconds / 60)));
+    // A phone does not reach the loopback address of another machine.
+    const isLocal = LOOPBACK.test(new URL(url).hostname);
+    byId('photo-local').hidden = !isLocal;
+    if (isLocal) byId('photo-link').href = url;
     byId('photo').showModal();
   } catch (error) {
     if (session === mine && error.code !== Code.CANCELLED) toast('There is no fresh picture to keep. Try again in a moment.');
   }
 }
 
-/** The photo exists nowhere else: closing forgets it. */
+/** This page's copy is forgotten at once; the one behind the link with its time, its use or the session. */
 function closePhoto() {
-  const url = byId('photo-image').getAttribute('src');
-  byId('photo-image').removeAttribute('src');
-  byId('photo-save').removeAttribute('href');
-  if (url) URL.revokeObjectURL(url);
+  for (const image of [byId('photo-image'), byId('photo-code')]) {
+    const url = image.getAttribute('src');
+    image.removeAttribute('src');
+    if (url) URL.revokeObjectURL(url);
+  }
+  byId('photo-link').removeAttribute('href');
   if (byId('photo').open) byId('photo').close();
 }
 

@@ -42,11 +42,14 @@ export const GarmentInfo = schema('GarmentInfo',
   [4, 'sizes', 'string[]'],
   [5, 'color_rgb', 'uint32']);
 
+export const Consent = schema('Consent', [1, 'given', 'bool']);
+
 export const OpenTryOnRequest = schema('OpenTryOnRequest',
   [1, 'try_on_id', 'string'],
   [2, 'store', 'string'],
   [3, 'camera', 'string'],
-  [4, 'garments', 'message[]', GarmentChoice]);
+  [4, 'garments', 'message[]', GarmentChoice],
+  [5, 'consent', 'message', Consent]);
 
 export const OpenTryOnResponse = schema('OpenTryOnResponse',
   [1, 'try_on_id', 'string'],
@@ -56,6 +59,11 @@ export const CloseTryOnRequest = schema('CloseTryOnRequest',
   [1, 'try_on_id', 'string']);
 
 export const CloseTryOnResponse = schema('CloseTryOnResponse');
+
+export const WithdrawConsentRequest = schema('WithdrawConsentRequest',
+  [1, 'try_on_id', 'string']);
+
+export const WithdrawConsentResponse = schema('WithdrawConsentResponse');
 
 export const ChooseGarmentsRequest = schema('ChooseGarmentsRequest',
   [1, 'try_on_id', 'string'],
@@ -115,7 +123,8 @@ export const TryOnStatus = schema('TryOnStatus',
   [3, 'age', 'float'],
   [4, 'service', 'string'],
   [5, 'detail', 'string'],
-  [6, 'retry_after', 'float']);
+  [6, 'retry_after', 'float'],
+  [7, 'end', 'enum']);
 
 /** One of the two is set. */
 export const StreamFramesResponse = schema('StreamFramesResponse',
@@ -129,11 +138,23 @@ export const TakeSnapshotRequest = schema('TakeSnapshotRequest',
 export const TakeSnapshotResponse = schema('TakeSnapshotResponse',
   [1, 'picture', 'message', Picture]);
 
+export const OfferPhotoRequest = schema('OfferPhotoRequest',
+  [1, 'try_on_id', 'string']);
+
+export const OfferPhotoResponse = schema('OfferPhotoResponse',
+  [1, 'url', 'string'],
+  [2, 'qr_svg', 'string'],
+  [3, 'seconds', 'float'],
+  [4, 'picture', 'message', Picture]);
+
 /** `PICTURE_CODEC_*` */
 export const Codec = Object.freeze({ JPEG: 1, PNG: 2 });
 
 /** `TRY_ON_STATE_*` */
 export const State = Object.freeze({ OPENING: 1, CALIBRATING: 2, LIVE: 3, DEGRADED: 4, DRAINING: 5, CLOSED: 6 });
+
+/** `TRY_ON_END_*` */
+export const End = Object.freeze({ REQUESTED: 1, WITHDRAWN: 2, IDLE: 3 });
 
 /** `DEGRADED_REASON_*` */
 export const Reason = Object.freeze({

@@ -1,7 +1,7 @@
 // One try-on as the page sees it: open, stream, and when the line breaks, wait and open again. Draws nothing.
 
 import { Code, RpcError } from './grpc_web.js';
-import { State } from './messages.js';
+import { End, State } from './messages.js';
 import { Backoff } from './backoff.js';
 
 /** The contract: no message for a second means that the compositor is gone. One more for a busy network, ms. */
@@ -33,7 +33,7 @@ export function drawId() {
 
 /**
  * Calls `on(event)` with
- *   { kind: 'link', link: 'opening' | 'streaming' | 'waiting' | 'refused' | 'closed', retryIn?, error?, tries? }
+ *   { kind: 'link', link: 'opening' | 'streaming' | 'waiting' | 'refused' | 'withdrawn' | 'closed', retryIn?, error?, tries? }
  *   { kind: 'picture', picture } and { kind: 'status', status }, in the stream's order.
  */
 export class TryOn {
@@ -41,6 +41,7 @@ export class TryOn {
   #wake = new AbortController();
   #choice = 0;
   #fit = false;
+  #withdrawn = false;
 
   constructor({ client, on, garments, camera = {}, backoff = new Backoff(), silenceMs = SILENCE_MS }) {
     this.client = client;
@@ -64,6 +65,11 @@ export class TryOn {
         error = caught;
       }
       if (stop.aborted) break;
+      if (this.#withdrawn) {
+        // Somebody else withdrew the consent that this page was given: it must ask anew.
+        this.on({ kind: 'link', link: 'withdrawn' });
+        return;
+      }
       if (error instanceof RpcError && HOPELESS.has(error.code)) {
         this.on({ kind: 'link', link: 'refused', error });
         return;
@@ -78,7 +84,8 @@ export class TryOn {
 
   async #openAndStream(stop) {
     const { store = '', camera = '' } = this.camera;
-    const request = { try_on_id: this.id, store, camera, garments: this.garments() };
+    // A TryOn exists only after somebody has touched Start, below the words that say what that means.
+    const request = { try_on_id: this.id, store, camera, garments: this.garments(), consent: { given: true } };
     const opened = await this.client.openTryOn(request, { signal: stop });
     // A try-on that outlived our connection still wears what it wore: say again what is wanted.
     if (!opened.created) await this.#choose();
@@ -102,6 +109,7 @@ export class TryOn {
           this.#acknowledge(event.picture, signal);
         }
         if (event.status) this.on({ kind: 'status', status: event.status });
+        if (event.status?.state === State.CLOSED) this.#withdrawn = event.status.end === End.WITHDRAWN;
         if (event.status?.state === State.DRAINING || event.status?.state === State.CLOSED) break;
       }
     } catch (error) {
@@ -137,8 +145,9 @@ export class TryOn {
     await this.client.showFit({ try_on_id: this.id, show }, { signal: this.#stop.signal });
   }
 
-  snapshot(codec) {
-    return this.client.takeSnapshot({ try_on_id: this.id, codec }, { signal: this.#stop.signal });
+  /** The newest picture, and a link to it that a phone may follow once. */
+  offerPhoto() {
+    return this.client.offerPhoto({ try_on_id: this.id }, { signal: this.#stop.signal });
   }
 
   /** Tries at once instead of at the end of the wait. */
@@ -147,10 +156,13 @@ export class TryOn {
     this.#wake.abort();
   }
 
-  /** Ends it here and at the compositor. Never throws: a compositor that can't be told closes idle try-ons itself. */
+  /**
+   * Withdraws the consent: ends it here and in every service. Never throws: a compositor that can't be told stops the
+   * camera by itself once nobody streams.
+   */
   async close({ keepalive = false } = {}) {
     if (this.#stop.signal.aborted) return;
     this.#stop.abort();
-    await this.client.closeTryOn({ try_on_id: this.id }, { keepalive }).catch(() => {});
+    await this.client.withdrawConsent({ try_on_id: this.id }, { keepalive }).catch(() => {});
   }
 }
