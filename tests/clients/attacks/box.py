@@ -98,6 +98,7 @@ class Box:
         }
         sections["cloth"]["tracking"] = sections["compositor"]["tracking"] = url["tracking"]
         sections["compositor"]["cloth"] = url["cloth"]
+        sections["compositor"]["capture"] = url["capture"]
         if self.setup.authority:
             sections["auth"] = self.setup.authority.settings()
         for name, values in self.setup.settings.items():

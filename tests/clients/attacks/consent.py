@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import contextlib
 import math
+import pathlib
 import re
 import subprocess
 import time
@@ -24,6 +25,8 @@ WRITES = re.compile(r'(?:openat?\([^"]*"(?P<opened>[^"]+)"[^)]*O_(?:WRONLY|RDWR|
 NO_STORAGE = re.compile(r"^/(?:proc|sys|dev/(?!shm))|^$")
 # Bytes of a picture by which it is found elsewhere, and how many such pieces of each are searched.
 PIECE, PIECES = 24, 40
+# Bytes of memory read at a time.
+CHUNK = 16 << 20
 
 
 @attack("withdrawal", "frames without consent; last picture after withdrawal; files, logs and metrics with image data")
@@ -37,10 +40,12 @@ def withdrawal(ground: Range) -> list[Figure]:
         viewer = Viewer(ground, box, "person", keep=True)
         viewer.wait_picture()
         time.sleep(2.0)
+        seen = in_memory(box)
         is_built, withdrawn = withdraw(viewer)
         time.sleep(2.0)
         last = max((s.at - withdrawn for s in viewer.pictures(withdrawn)), default=0.0)
         after = frames_in(ground, box, 2.0)
+        remembered = in_memory(box)
         kiosk = Viewer(ground, box, "kiosk")
         kiosk.wait_picture()
         kiosk.close()
@@ -52,6 +57,8 @@ def withdrawal(ground: Range) -> list[Figure]:
         Figure("frames before consent", before, 0, 0),
         Figure("after withdrawal", after, 0, 0),
         Figure("after a lost kiosk", lost, 0, 0),
+        # What is never found while it is shown proves nothing when it is not found later.
+        Figure("pieces of images in memory", remembered if seen else math.nan, 0, 0),
         Figure("files written", files_written(trace.read_text(errors="replace")), 0, 0),
         Figure("pieces of images in logs and metrics", leaks, 0, 0),
     ]
@@ -81,6 +88,29 @@ def frames_in(ground: Range, box: Box, seconds: float) -> int:
     frames = count() - begun
     channel.close()
     return frames
+
+
+def in_memory(box: Box) -> int:
+    """Pieces of depth images in the memory of the program: rows of the wall that the camera sees."""
+    row = scenes.WALL_MM.to_bytes(2, "little") * (scenes.WIDTH // 2)
+    found = 0
+    for process in box.tree():
+        with contextlib.suppress(OSError):
+            found += pieces_of(process.pid, row)
+    return found
+
+
+def pieces_of(pid: int, piece: bytes) -> int:
+    """Occurrences of a piece in the writable memory of a process."""
+    ranges = re.findall(r"^([0-9a-f]+)-([0-9a-f]+) rw.. .*$", pathlib.Path(f"/proc/{pid}/maps").read_text(), re.M)
+    found = 0
+    with open(f"/proc/{pid}/mem", "rb", buffering=0) as memory:
+        for begin, end in ((int(b, 16), int(e, 16)) for b, e in ranges):
+            for at in range(begin, end, CHUNK):
+                with contextlib.suppress(OSError, ValueError):
+                    memory.seek(at)
+                    found += memory.read(min(CHUNK, end - at)).count(piece)
+    return found
 
 
 def files_written(trace: str) -> float:

@@ -103,7 +103,7 @@ def served(ground: Range, box: Box, name: str, begun: float) -> float:
     """Seconds since `begun` to the first message, or to a refusal with a type; infinite for anything else."""
     pb = ground.api.compositor
     try:
-        request = pb.OpenTryOnRequest(try_on_id=name).SerializeToString()
+        request = pb.OpenTryOnRequest(try_on_id=name, consent=pb.Consent(given=True)).SerializeToString()
         opening = Http2Call(box.address, COMPOSITOR + "OpenTryOn", framed(request), box.metadata)
         code = opening.status(20.0)
         opening.close()

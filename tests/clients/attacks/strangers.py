@@ -11,6 +11,7 @@ import time
 
 import grpc
 import zenoh
+from google.protobuf.message import DecodeError
 
 from .box import Box
 from .range import ROOT, Range
@@ -36,31 +37,45 @@ def stranger(ground: Range) -> list[Figure]:
     return [Figure("pictures", min(seen, 1), 0, 0)]
 
 
-@attack("bus-tap", "a stranger's zenoh session reads RGBD off the bus: frames in 2 s")
+@attack("bus-tap", "a stranger's zenoh session reads RGBD off the bus: frames without a viewer, and readable ones with one")
 def bus_tap(ground: Range) -> list[Figure]:
     """The Python client of zenoh, with nothing but the endpoint."""
     with ground.box() as box:
         frames = tap(box, 2.0)
-    return [Figure("frames", len(frames), 0, 0)]
+        viewer = Viewer(ground, box, "watched")
+        viewer.wait_picture()
+        watched = tap(box, 2.0)
+        viewer.close()
+    return [Figure("frames", len(frames), 0, 0),
+            Figure("readable beside a viewer", sum(is_readable(ground, f) for f in watched), 0, 0)]
 
 
-def tap(box: Box, seconds: float) -> list[float]:
-    """Times (monotonic) of all frames on the bus during `seconds`."""
+def is_readable(ground: Range, payload: bytes) -> bool:
+    """A frame in the clear, or pieces of one: a JPEG's or a depth image's beginning."""
+    with contextlib.suppress(DecodeError):
+        frame = ground.api.frame.RgbdFrame.FromString(payload)
+        if frame.depth or frame.color_jpeg:
+            return True
+    return b"\xff\xd8\xff" in payload or b"TRD1" in payload
+
+
+def tap(box: Box, seconds: float) -> list[bytes]:
+    """Payloads of all frames on the bus during `seconds`."""
     config = zenoh.Config()
     config.insert_json5("mode", '"peer"')
     config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{box.bus}"]))
     config.insert_json5("listen/endpoints", "[]")
     config.insert_json5("scouting/multicast/enabled", "false")
-    times: list[float] = []
+    frames: list[bytes] = []
     try:
         session = zenoh.open(config)
     except zenoh.ZError:
-        return times
-    subscriber = session.declare_subscriber("tryon/**", lambda _: times.append(time.monotonic()))
+        return frames
+    subscriber = session.declare_subscriber("tryon/**", lambda sample: frames.append(sample.payload.to_bytes()))
     time.sleep(seconds)
     subscriber.undeclare()
     session.close()
-    return times
+    return frames
 
 
 @attack("close-others", "session ids whole in the log, and sessions that a stranger closes with them")
@@ -69,7 +84,7 @@ def close_others(ground: Range) -> list[Figure]:
     closed = 0
     with ground.box() as box:
         owner, thief = Client(ground, box), Client(ground, box, metadata=())
-        opened = owner.rpc.OpenTryOn(owner.pb.OpenTryOnRequest(), timeout=5, metadata=owner.metadata)
+        opened = owner.rpc.OpenTryOn(owner.pb.OpenTryOnRequest(consent=owner.pb.Consent(given=True)), timeout=5, metadata=owner.metadata)
         call = owner.stream(opened.try_on_id)
         next(call)
         time.sleep(0.5)

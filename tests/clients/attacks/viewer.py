@@ -49,9 +49,8 @@ class Client:
     def open(self, name: str, camera: str = "front", garments: tuple[str, ...] = (), timeout: float = 5) -> None:
         """Opens a try-on; raises `grpc.RpcError`."""
         choices = [self.api.common.GarmentChoice(garment=g, size="M") for g in garments]
-        request = self.pb.OpenTryOnRequest(try_on_id=name, camera=camera, garments=choices)
-        if hasattr(request, "consent"):
-            request.consent.given = True
+        request = self.pb.OpenTryOnRequest(try_on_id=name, camera=camera, garments=choices,
+                                           consent=self.pb.Consent(given=True))
         self.rpc.OpenTryOn(request, timeout=timeout, metadata=self.metadata)
 
     def end(self, name: str) -> None:
