@@ -42,6 +42,11 @@ pub fn write_npy(
 pub fn read_npy(path: &Path) -> Result<(Vec<u64>, Vec<f32>), FormatError> {
     let io = |e| FormatError::io(path, e);
     let bytes = std::fs::read(path).map_err(io)?;
+    let start = data_start(&bytes).filter(|s| *s <= bytes.len());
+    let Some(start) = start else {
+        let why = "it is longer than the file";
+        return Err(FormatError::field(path, "header length", why));
+    };
     let header = npyz::NpyFile::new(&bytes[..]).map_err(io)?;
     let shape = header.shape().to_vec();
     let descr = header.dtype().descr();
@@ -68,18 +73,6 @@ pub fn read_npy(path: &Path) -> Result<(Vec<u64>, Vec<f32>), FormatError> {
         .iter()
         .try_fold(width as u64, |n, s| n.checked_mul(*s))
         .and_then(|n| usize::try_from(n).ok());
-    // NPY: magic (6), version (2), length of the header (2 bytes in version 1, 4 later), header, values.
-    let length = |at: usize, n: usize| {
-        bytes[at..at + n]
-            .iter()
-            .rev()
-            .fold(0usize, |s, b| s << 8 | usize::from(*b))
-    };
-    let start = if bytes[6] == 1 {
-        10 + length(8, 2)
-    } else {
-        12 + length(8, 4)
-    };
     let Some(data) = wanted.and_then(|n| bytes.get(start..start.checked_add(n)?)) else {
         return Err(FormatError::field(
             path,
@@ -102,6 +95,17 @@ pub fn read_npy(path: &Path) -> Result<(Vec<u64>, Vec<f32>), FormatError> {
             .collect(),
     };
     Ok((shape, values))
+}
+
+/// Offset of the values as the file states it; npyz allocates the stated header, so it is checked first.
+///
+/// Magic (6 bytes), version (2), length of the header (2 bytes in version 1, 4 later), header, values.
+pub(super) fn data_start(bytes: &[u8]) -> Option<usize> {
+    match bytes.get(6..12)? {
+        [1, _, a, b, ..] => Some(10 + usize::from(u16::from_le_bytes([*a, *b]))),
+        [_, _, a, b, c, d] => 12usize.checked_add(u32::from_le_bytes([*a, *b, *c, *d]) as usize),
+        _ => None,
+    }
 }
 
 /// Value of an IEEE 754 binary16 number.

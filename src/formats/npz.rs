@@ -119,13 +119,9 @@ impl Archive<'_> {
         if read as u64 != size {
             return Err(fault(format!("{read} bytes found, {size} announced")));
         }
-        // npyz allocates the stated length of the header, so it is checked first.
-        let header_end = match bytes.get(6..12) {
-            Some([1, _, a, b, ..]) => 10 + u64::from(u16::from_le_bytes([*a, *b])),
-            Some([_, _, a, b, c, d]) => 12 + u64::from(u32::from_le_bytes([*a, *b, *c, *d])),
-            _ => return Err(fault("too short for a numpy array".into())),
-        };
-        if header_end > size {
+        let header_end = super::npy::data_start(&bytes)
+            .ok_or_else(|| fault("too short for a numpy array".into()))?;
+        if header_end > bytes.len() {
             return Err(fault("its header is longer than the array".into()));
         }
         let header = NpyHeader::from_reader(&bytes[..])

@@ -38,8 +38,10 @@ fn open<'a>(
     decoder.set_transformations(t);
     decoder.set_ignore_text_chunk(true);
     let info = decoder.read_header_info().map_err(|e| fault(origin, &e))?;
-    let (width, height, raw) = (info.width, info.height, info.raw_bytes() as u64);
+    let (width, height) = (info.width, info.height);
+    // First, since the product of larger sides overflows.
     check_size(origin, width, height)?;
+    let raw = info.raw_bytes() as u64;
     if raw > DEFLATE_LIMIT * bytes.len() as u64 {
         let why = format!(
             "{width}×{height} pixels cannot come from {} bytes; the file is cut short",

@@ -6,6 +6,7 @@
 
 mod message;
 mod reader;
+mod record;
 mod writer;
 
 pub use reader::McapReader;

@@ -1,13 +1,13 @@
 //! Reads RGBD frames from an MCAP file as a stream, with memory for one frame.
 
 use super::message::{MessageContext, MessageItem};
+use super::record::McapRecord;
 use crate::camera::{Calibration, ColorImage, Intrinsics, RgbdFrame};
 use crate::formats::FormatError;
 use crate::formats::foxglove::{CameraCalibration, FrameTransform};
 use crate::formats::rgbd_source::RgbdSource;
 use crate::math::{Camera, ColorCamera, Rigid};
 use mcap::McapError;
-use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
@@ -199,38 +199,36 @@ impl McapReader {
                     self.records.notify_read(got);
                 }
                 Ok(LinearReadEvent::Record { opcode, data }) => {
-                    let record = mcap::parse_record(opcode, data).map_err(|e| {
-                        FormatError::field(
-                            &self.path,
-                            format!("record 0x{opcode:02x}"),
-                            e.to_string(),
-                        )
+                    let record = McapRecord::parse(opcode, data).map_err(|part| {
+                        let field = format!("record 0x{opcode:02x}.{part}");
+                        FormatError::field(&self.path, field, "cut short, or no text")
                     })?;
                     match record {
-                        Record::Schema { header, .. } => {
-                            self.schemas.insert(header.id, header.name);
+                        Some(McapRecord::Schema { id, name }) => {
+                            self.schemas.insert(id, name.to_owned());
                         }
-                        Record::Channel(c) => {
-                            let schema =
-                                self.schemas.get(&c.schema_id).cloned().unwrap_or_default();
-                            self.channels.insert(c.id, schema);
+                        Some(McapRecord::Channel { id, schema }) => {
+                            let name = self.schemas.get(&schema).cloned().unwrap_or_default();
+                            self.channels.insert(id, name);
                         }
-                        Record::Message { header, data } => {
+                        Some(McapRecord::Message {
+                            channel,
+                            sequence,
+                            log_time,
+                            data,
+                        }) => {
                             self.messages += 1;
-                            let schema = self
-                                .channels
-                                .get(&header.channel_id)
-                                .map_or("", String::as_str);
+                            let schema = self.channels.get(&channel).map_or("", String::as_str);
                             let at = MessageContext {
                                 path: &self.path,
                                 schema,
                                 message: self.messages,
                             };
-                            if let Some(item) = at.item(header.sequence, header.log_time, &data)? {
+                            if let Some(item) = at.item(sequence, log_time, data)? {
                                 return Ok(Some(item));
                             }
                         }
-                        _ => {}
+                        None => {}
                     }
                 }
                 Err(McapError::UnexpectedEof | McapError::UnexpectedEoc) if self.messages > 0 => {

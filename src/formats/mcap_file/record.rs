@@ -1,0 +1,87 @@
+//! Records of an MCAP file that lead to messages, <https://mcap.dev/spec>.
+//!
+//! Read here rather than by the `mcap` crate: its parser allocates the length that a string states before it looks
+//! whether the record has that many bytes, and slices short attachments out of range.
+
+use mcap::records::op;
+
+/// Record on the way to a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum McapRecord<'a> {
+    /// Schema and its name.
+    Schema { id: u16, name: &'a str },
+    /// Channel and its schema.
+    Channel { id: u16, schema: u16 },
+    /// Message of a channel.
+    Message {
+        channel: u16,
+        sequence: u32,
+        /// Nanoseconds.
+        log_time: u64,
+        data: &'a [u8],
+    },
+}
+
+impl<'a> McapRecord<'a> {
+    /// Parses the content of a record; `None` for the kinds that matter to no message.
+    ///
+    /// # Errors
+    /// The field that is cut short, or no UTF-8.
+    pub(super) fn parse(opcode: u8, content: &'a [u8]) -> Result<Option<Self>, &'static str> {
+        let mut rest = content;
+        Ok(Some(match opcode {
+            op::SCHEMA => {
+                let id = u16::from_le_bytes(take(&mut rest).ok_or("id")?);
+                let length = u32::from_le_bytes(take(&mut rest).ok_or("name")?);
+                let name = rest.get(..length as usize).ok_or("name")?;
+                let name = std::str::from_utf8(name).map_err(|_| "name")?;
+                Self::Schema { id, name }
+            }
+            op::CHANNEL => Self::Channel {
+                id: u16::from_le_bytes(take(&mut rest).ok_or("id")?),
+                schema: u16::from_le_bytes(take(&mut rest).ok_or("schema_id")?),
+            },
+            op::MESSAGE => {
+                let channel = u16::from_le_bytes(take(&mut rest).ok_or("channel_id")?);
+                let sequence = u32::from_le_bytes(take(&mut rest).ok_or("sequence")?);
+                let log_time = u64::from_le_bytes(take(&mut rest).ok_or("log_time")?);
+                let _publish_time: [u8; 8] = take(&mut rest).ok_or("publish_time")?;
+                Self::Message {
+                    channel,
+                    sequence,
+                    log_time,
+                    data: rest,
+                }
+            }
+            _ => return Ok(None),
+        }))
+    }
+}
+
+/// Takes `N` bytes off the front.
+fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
+    let (head, tail) = rest.split_first_chunk()?;
+    *rest = tail;
+    Some(*head)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_beyond_the_record_are_refused() {
+        let schema = |length: u32| {
+            let mut content = vec![7, 0];
+            content.extend(length.to_le_bytes());
+            content.extend(b"abc");
+            content
+        };
+        let (fine, long) = (schema(3), schema(u32::MAX));
+        let named = McapRecord::Schema { id: 7, name: "abc" };
+        assert_eq!(McapRecord::parse(op::SCHEMA, &fine), Ok(Some(named)));
+        assert_eq!(McapRecord::parse(op::SCHEMA, &long), Err("name"));
+        assert_eq!(McapRecord::parse(op::ATTACHMENT, &[]), Ok(None));
+        assert_eq!(McapRecord::parse(op::MESSAGE, &[0; 7]), Err("log_time"));
+    }
+}
