@@ -55,7 +55,7 @@ impl Config {
         for flag in flags {
             let fault = || {
                 ConfigError(format!(
-                    "--set {flag}: `key=value` is needed, such as capture.cameras.0.loop=true"
+                    "--set {flag}: `key=value` is needed, such as compositor.address=127.0.0.1:0"
                 ))
             };
             let (key, value) = flag.split_once('=').ok_or_else(fault)?;

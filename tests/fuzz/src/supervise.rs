@@ -1,0 +1,139 @@
+//! Supervisor: one process for each campaign, so that aborts, exhausted stacks and endless inputs are findings too.
+
+use crate::bundle::Bundle;
+use crate::campaign::{EXIT_ENDLESS, Tally};
+use crate::corpus;
+use crate::targets::Target;
+use anyhow::{Context, Result};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+/// Address space of a campaign (KiB): a decoder that wants more aborts, and is found.
+const ADDRESS_SPACE_KIB: u64 = 8 << 20;
+
+/// Writes a line to standard output.
+#[expect(clippy::print_stdout)]
+pub fn say(line: &str) {
+    println!("{line}");
+}
+
+/// Plan of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan {
+    /// Time of each target.
+    pub time: Duration,
+    /// Campaigns at a time.
+    pub jobs: usize,
+    /// Start of the random numbers.
+    pub seed: u64,
+}
+
+/// Runs campaigns against all `targets` and returns the number of findings.
+///
+/// # Errors
+/// A process that cannot be started.
+pub fn run(targets: &[&'static Target], plan: Plan) -> Result<usize> {
+    let (next, findings) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let fault = Mutex::new(None);
+    std::thread::scope(|scope| {
+        for _ in 0..plan.jobs.max(1) {
+            scope.spawn(|| {
+                while let Some(target) = targets.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    match supervise(target, plan) {
+                        Ok(n) => drop(findings.fetch_add(n, Ordering::Relaxed)),
+                        Err(e) => drop(fault.lock().map(|mut f| f.replace(e))),
+                    }
+                }
+            });
+        }
+    });
+    match fault.into_inner() {
+        Ok(Some(e)) => Err(e),
+        _ => Ok(findings.into_inner()),
+    }
+}
+
+/// Campaigns against one target until its time is over; a crash ends one of them.
+fn supervise(target: &'static Target, plan: Plan) -> Result<usize> {
+    let folder = tempfile::tempdir()?;
+    let current = folder.path().join("current");
+    let start = Instant::now();
+    let mut crashes = 0;
+    loop {
+        let left = plan.time.saturating_sub(start.elapsed());
+        let seed = plan.seed + crashes as u64;
+        let output = campaign(target, left, seed, &current)?;
+        let text = String::from_utf8_lossy(&output.stdout);
+        for line in text.lines().filter(|l| l.starts_with("finding ")) {
+            say(&format!("{}: {line}", target.name));
+        }
+        if let Some(tally) = text.lines().find_map(Tally::parse) {
+            let findings = tally.findings + crashes;
+            say(&summary(target, tally, findings));
+            return Ok(findings);
+        }
+        crashes += 1;
+        report_crash(target, &output, &current)?;
+        if crashes >= 3 || left.is_zero() {
+            return Ok(crashes);
+        }
+    }
+}
+
+fn campaign(target: &Target, time: Duration, seed: u64, current: &Path) -> Result<Output> {
+    let program = std::env::current_exe().context("the path of this program")?;
+    let limited = format!("ulimit -v {ADDRESS_SPACE_KIB}; exec \"$0\" \"$@\"");
+    Command::new("sh")
+        .args(["-c", &limited])
+        .arg(program)
+        .args(["--campaign", target.name])
+        .args(["--seconds", &time.as_secs_f64().to_string()])
+        .args(["--seed", &seed.to_string()])
+        .arg("--current")
+        .arg(current)
+        .stdin(Stdio::null())
+        .output()
+        .context("a campaign's process")
+}
+
+/// Saves the input that ended the process.
+fn report_crash(target: &Target, output: &Output, current: &Path) -> Result<()> {
+    let kind = match output.status.code() {
+        Some(EXIT_ENDLESS) => "endless",
+        _ => "crash",
+    };
+    let errors = String::from_utf8_lossy(&output.stderr);
+    let tail: Vec<&str> = errors.lines().rev().take(3).collect();
+    let bytes = std::fs::read(current).unwrap_or_default();
+    let saved = match Bundle::decode(&bytes) {
+        Some(input) => corpus::save(target.name, kind, &input)?
+            .display()
+            .to_string(),
+        None => "(its input is unknown)".into(),
+    };
+    let status = output.status;
+    say(&format!(
+        "{}: finding {kind} ({status}) in {saved}: {}",
+        target.name,
+        tail.join(" | ")
+    ));
+    Ok(())
+}
+
+fn summary(target: &Target, tally: Tally, findings: usize) -> String {
+    let Tally {
+        inputs,
+        outcomes,
+        held,
+        slowest_ms,
+        ..
+    } = tally;
+    format!(
+        "{:<16} {inputs:>9} inputs {outcomes:>5} outcomes {:>8} KiB held {slowest_ms:>5} ms slowest {findings:>3} findings",
+        target.name,
+        held >> 10
+    )
+}

@@ -1,0 +1,114 @@
+//! Recordings: MCAP files and RGBD folders.
+
+use super::{Target, text};
+use crate::bundle::Bundle;
+use crate::pack;
+use std::path::Path;
+use tryon::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
+use tryon::formats::{McapWriter, RgbdFolderWriter, open_recording};
+
+/// Most frames read from an input.
+const MOST_FRAMES: usize = 50;
+
+/// MCAP: messages packed anew, or a raw file.
+pub(super) const MCAP: Target = Target::new(
+    "mcap",
+    "src/formats/mcap_file",
+    |b, scratch| {
+        let raw = b.get("a.mcap");
+        let file = if raw.is_empty() {
+            pack::mcap(&b.0)?
+        } else {
+            raw.to_vec()
+        };
+        frames(&scratch.file("a.mcap", &file)?)
+    },
+    || {
+        let file = recorded(|path, calibration, frames| {
+            let mut writer = McapWriter::create(path, calibration).map_err(text)?;
+            for f in frames {
+                writer.write(f).map_err(text)?;
+            }
+            writer.finish().map(drop).map_err(text)
+        });
+        let raw = file.0.first().map_or_else(Vec::new, |m| m.bytes.clone());
+        let messages = pack::unpack_mcap(&raw).unwrap_or_default();
+        vec![Bundle::of("a.mcap", raw), messages]
+    },
+)
+.words(&[
+    "16UC1",
+    "mono16",
+    "rgb8",
+    "jpeg",
+    "png",
+    "depth_camera",
+    "color_camera",
+])
+.allow(2 << 20, 60_000);
+
+/// RGBD folders.
+pub(super) const FOLDER: Target = Target::new(
+    "rgbd-folder",
+    "src/formats/rgbd_folder",
+    |b, scratch| frames(scratch.fill(b)?),
+    || {
+        let folder = recorded(|path, calibration, frames| {
+            let mut writer = RgbdFolderWriter::create(path, calibration).map_err(text)?;
+            for f in frames {
+                writer.write(f).map_err(text)?;
+            }
+            Ok(())
+        });
+        vec![folder]
+    },
+)
+.words(&[
+    "width",
+    "height",
+    "fx",
+    "cx",
+    "depth_scale",
+    "color",
+    "color_from_depth",
+    "translation",
+    "rotation",
+    "..",
+])
+.allow(1 << 20, 60_000);
+
+fn frames(path: &Path) -> Result<usize, String> {
+    let mut source = open_recording(path).map_err(text)?;
+    let mut pixels = 0;
+    for _ in 0..MOST_FRAMES {
+        match source.next_frame().map_err(text)? {
+            Some(f) => pixels += f.depth.data().len(),
+            None => break,
+        }
+    }
+    source.rewind().map_err(text)?;
+    Ok(pixels)
+}
+
+/// Files that `write` makes of three frames of 8 × 6 pixels with a colour camera of its own.
+fn recorded(write: impl Fn(&Path, &Calibration, &[RgbdFrame]) -> Result<(), String>) -> Bundle {
+    let depth_camera = Intrinsics::KINECT_V1.resized(8, 6);
+    let calibration = Calibration {
+        color: Some(Intrinsics::KINECT_V1.resized(16, 12)),
+        ..Calibration::registered(depth_camera)
+    };
+    let frame = |i: u64| RgbdFrame {
+        sequence: i,
+        time_ns: i * 33_000_000,
+        depth: DepthImage::new(8, 6, vec![1000 + i as u16; 48]).unwrap_or(DepthImage::empty(8, 6)),
+        color: Some(ColorImage::filled(16, 12, [i as u8; 3])),
+    };
+    let frames: Vec<RgbdFrame> = (0..3).map(frame).collect();
+    let read = || {
+        let folder = tempfile::tempdir().ok()?;
+        let path = folder.path().join("recording.mcap");
+        write(&path, &calibration, &frames).ok()?;
+        Bundle::read(&path).ok()
+    };
+    read().unwrap_or_default()
+}
