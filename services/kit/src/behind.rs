@@ -28,6 +28,8 @@ pub fn follow(reporter: HealthReporter, ctx: &Context, services: Vec<(&'static s
                 .iter()
                 .map(|(name, channel)| ask(name, channel.clone()));
             for ((name, _), status) in services.iter().zip(join_all(questions).await) {
+                let serves = f64::from(matches!(status, ServingStatus::Serving));
+                metrics::gauge!("tryon_behind_serving", "service" => *name).set(serves);
                 reporter.set_service_status(name, status).await;
             }
         }

@@ -23,6 +23,7 @@ pub mod server;
 pub mod session_task;
 pub mod sessions;
 pub mod status;
+pub mod supervisor;
 pub mod telemetry;
 mod transport;
 mod undecodable;

@@ -5,6 +5,7 @@ use crate::compute::Pool;
 use crate::config::Config;
 use crate::drain::{self, Drained};
 use crate::server::{Context, Running, StartError};
+use crate::supervisor;
 use clap::Parser;
 use std::future::Future;
 use std::io::Write;
@@ -136,23 +137,29 @@ where
     let shutdown = CancellationToken::new();
     let ctx = Context {
         bus: bus.clone(),
-        pool,
+        pool: pool.clone(),
         shutdown: shutdown.clone(),
         grace,
     };
+    crate::telemetry::show_zeros(name);
     let running = start(config, ctx).await?;
     say(&format!(
         "{name}: grpc {} admin {}",
         running.address, running.admin
     ));
+    let watchdog = supervisor::ready(&pool, running.admin);
     let watch = tokio::spawn(async move {
         if let Ok(which) = drain::signal().await {
             tracing::info!(signal = which, "draining");
+            supervisor::stopping();
         }
         shutdown.cancel();
     });
     let end = running.ended().await;
     watch.abort();
+    if let Some(watchdog) = watchdog {
+        watchdog.abort();
+    }
     // The bus closes within a deadline of its own.
     let _ = tokio::time::timeout(Duration::from_millis(500), bus.close()).await;
     end

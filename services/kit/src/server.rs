@@ -180,7 +180,7 @@ pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartErro
     let (ready, is_ready) = watch::channel(true);
     // The admin port outlives the drain, so that probes can observe it.
     let ended = CancellationToken::new();
-    let admin = crate::admin::serve(admin, is_ready, ended.clone())
+    let admin = crate::admin::serve(admin, is_ready, health.clone(), ended.clone())
         .await
         .map_err(bind("admin", admin))?;
     health

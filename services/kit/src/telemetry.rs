@@ -40,6 +40,18 @@ pub fn metrics() -> Option<&'static PrometheusHandle> {
     HANDLE.get_or_init(install).as_ref()
 }
 
+/// Shows the counters of rare faults of `service` as zero from its start: a counter that first appears as one has not
+/// increased for Prometheus, and its alert would miss the first fault.
+pub fn show_zeros(service: &'static str) {
+    let _ = metrics();
+    metrics::counter!("tryon_session_panics", "service" => service).increment(0);
+    metrics::counter!("tryon_frames_broken").increment(0);
+    if service == "capture" {
+        metrics::counter!("tryon_capture_faults").increment(0);
+        metrics::counter!("tryon_recordings_failed").increment(0);
+    }
+}
+
 /// Counts skipped work as `tryon_skipped{service="…", what="…"}`.
 pub fn record_skipped<const N: usize>(service: &'static str, skipped: [(&'static str, usize); N]) {
     for (what, n) in skipped {
