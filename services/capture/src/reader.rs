@@ -58,6 +58,17 @@ impl Reader {
         });
     }
 
+    /// Shows, once, that the recording has ended by a fault; StopRecording tells its kind. Publishing goes on.
+    fn recording_failed(&self) {
+        let is_first = self
+            .info
+            .send_if_modified(|i| std::mem::replace(&mut i.recording, false));
+        if is_first {
+            metrics::counter!("tryon_recordings_failed").increment(1);
+            tracing::error!(camera = self.config.name, "the recording cannot be written");
+        }
+    }
+
     /// The next frame; a looped source rewinds at its end.
     async fn read(&mut self) -> Result<Option<RgbdFrame>, String> {
         let Some(mut source) = self.source.take() else {
@@ -122,7 +133,9 @@ impl Reader {
                 rgbd,
                 stages: vec![read],
             });
-            self.recorder.offer(&exposure);
+            if !self.recorder.offer(&exposure) {
+                self.recording_failed();
+            }
             // The consent may have ended since the frame was read.
             let Some(sealer) = self.leases.sealer() else {
                 continue;

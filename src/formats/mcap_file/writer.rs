@@ -7,7 +7,7 @@ use crate::formats::foxglove::{
 };
 use crate::formats::{FormatError, image};
 use mcap::records::MessageHeader;
-use mcap::{Compression, WriteOptions, Writer};
+use mcap::{Compression, McapError, WriteOptions, Writer};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
@@ -40,6 +40,14 @@ pub struct McapWriter {
     frames: u32,
 }
 
+/// Error of the system, such as a full disk, or of the format.
+fn fault(path: &Path, field: &str, e: McapError) -> FormatError {
+    match e {
+        McapError::Io(e) => FormatError::io(path, e),
+        other => FormatError::field(path, field, other.to_string()),
+    }
+}
+
 impl std::fmt::Debug for McapWriter {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("McapWriter")
@@ -55,7 +63,7 @@ impl McapWriter {
     /// # Errors
     /// When it exists or cannot be created.
     pub fn create(path: &Path, calibration: &Calibration) -> Result<Self, FormatError> {
-        let fault = |e: mcap::McapError| FormatError::field(path, "mcap", e.to_string());
+        let fault = |e| fault(path, "mcap", e);
         let file = File::create_new(path).map_err(|e| FormatError::io(path, e))?;
         // lz4 compresses raw depth to a third in about 1 ms; JPEG costs next to nothing.
         let options = WriteOptions::new()
@@ -103,7 +111,7 @@ impl McapWriter {
         };
         self.writer
             .write_to_known_channel(&header, data)
-            .map_err(|e| FormatError::field(&self.path, format!("frame {sequence}"), e.to_string()))
+            .map_err(|e| fault(&self.path, &format!("frame {sequence}"), e))
     }
 
     fn put_calibration(&mut self, time_ns: u64) -> Result<(), FormatError> {
@@ -200,7 +208,7 @@ impl McapWriter {
         self.frames += 1;
         self.writer
             .flush()
-            .map_err(|e| FormatError::field(&self.path, "mcap", e.to_string()))
+            .map_err(|e| fault(&self.path, "mcap", e))
     }
     /// Writes the index and closes the file.
     ///
@@ -210,6 +218,6 @@ impl McapWriter {
         self.writer
             .finish()
             .map(|_| ())
-            .map_err(|e| FormatError::field(&self.path, "mcap", e.to_string()))
+            .map_err(|e| fault(&self.path, "mcap", e))
     }
 }
