@@ -134,7 +134,7 @@ test('percentiles, rate, and stages that vanish', () => {
 
 // ── the try-on's life, against a client made of functions ────────────────────────────────────────────────────────
 
-const status = (state) => ({ picture: null, status: { state, reason: 0 } });
+const status = (state) => ({ picture: null, status: { state, reason: 0 }, stream: 7n, number: 1n });
 const forever = (signal) => new Promise((_, fail) => signal.addEventListener('abort', () => fail(new RpcError(Code.CANCELLED, 'cancelled'))));
 
 function scripted({ streams, opens = [] }) {
@@ -148,7 +148,7 @@ function scripted({ streams, opens = [] }) {
     },
     chooseGarments: async () => ({ outfit_revision: BigInt(++calls.choose) }),
     withdrawConsent: async () => { calls.close += 1; },
-    acknowledgePicture: async ({ stream, number }) => { calls.acknowledged.push([stream, number]); },
+    acknowledgeFrames: async ({ stream, number }) => { calls.acknowledged.push([stream, number]); },
     streamFrames: (request, { signal }) => streams.shift()(signal),
   };
   return { client, calls };
@@ -176,20 +176,20 @@ test('a stream that breaks is opened again under the same id and says again what
   const { tryOn, events, until } = follow(script);
   await until((e) => e.filter((x) => x.kind === 'status').length === 2);
   assert.deepEqual(links(events), ['opening', 'waiting', 'opening']);
-  assert.deepEqual(script.calls, { open: 2, choose: 1, close: 0, acknowledged: [] });
+  assert.deepEqual(script.calls, { open: 2, choose: 1, close: 0, acknowledged: [[7n, 1n], [7n, 1n]] });
   await tryOn.close();
   await tryOn.finished;
   assert.equal(script.calls.close, 1);
   assert.equal(links(events).at(-1), 'closed');
 });
 
-test('every picture is acknowledged, and a lost acknowledgement ends nothing', async () => {
-  const shown = (number) => ({ picture: { stream: 7n, number }, status: null });
+test('every message is acknowledged, and a lost acknowledgement ends nothing', async () => {
+  const shown = (number) => ({ picture: {}, status: null, stream: 7n, number });
   const script = scripted({
     streams: [async function* (signal) { yield shown(1n); yield shown(2n); await forever(signal); }],
   });
-  const keep = script.client.acknowledgePicture;
-  script.client.acknowledgePicture = async (request) => {
+  const keep = script.client.acknowledgeFrames;
+  script.client.acknowledgeFrames = async (request) => {
     await keep(request);
     throw new RpcError(Code.UNAVAILABLE, 'lost');
   };

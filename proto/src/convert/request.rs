@@ -69,7 +69,7 @@ pub struct PictureFormat {
     pub quality: u8,
     /// Time between two pictures; zero means no limit.
     pub interval: Duration,
-    /// Most pictures on the way to a reader that acknowledges them.
+    /// Most messages on the way to a reader that acknowledges them.
     pub window: Option<u32>,
 }
 
@@ -112,7 +112,7 @@ pub fn picture_format(r: &v1::StreamFramesRequest) -> Result<PictureFormat, Wire
     let window = match r.max_unacknowledged {
         0 => None,
         n if n <= MAX_WINDOW => Some(n),
-        _ => return fault("max_unacknowledged", "1 to 16 pictures, or 0 for none"),
+        _ => return fault("max_unacknowledged", "1 to 16 messages, or 0 for none"),
     };
     Ok(PictureFormat {
         window,

@@ -709,6 +709,7 @@ pub mod capture_service_client {
         /// this call covers the file, a lease covers the bus.
         /// FAILED_PRECONDITION without consent, when no folder is configured or a recording is already under way.
         /// Recording never slows publishing: when the disk is too slow, frames are dropped from the file and counted.
+        /// RESOURCE_EXHAUSTED when the disk is full, DATA_LOSS when the file cannot be made for another reason.
         pub async fn start_recording(
             &mut self,
             request: impl tonic::IntoRequest<super::StartRecordingRequest>,
@@ -733,7 +734,9 @@ pub mod capture_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CaptureService", "StartRecording"));
             self.inner.unary(req, path, codec).await
         }
-        /// Finishes the file. FAILED_PRECONDITION when nothing is being recorded.
+        /// Finishes the file. FAILED_PRECONDITION when nothing is being recorded. When the disk became full on the way
+        /// RESOURCE_EXHAUSTED, when writing failed otherwise DATA_LOSS: publishing went on, CameraInfo.recording became false, and
+        /// the file stays, readable up to its last whole frame.
         pub async fn stop_recording(
             &mut self,
             request: impl tonic::IntoRequest<super::StopRecordingRequest>,
@@ -821,6 +824,7 @@ pub mod capture_service_server {
         /// this call covers the file, a lease covers the bus.
         /// FAILED_PRECONDITION without consent, when no folder is configured or a recording is already under way.
         /// Recording never slows publishing: when the disk is too slow, frames are dropped from the file and counted.
+        /// RESOURCE_EXHAUSTED when the disk is full, DATA_LOSS when the file cannot be made for another reason.
         async fn start_recording(
             &self,
             request: tonic::Request<super::StartRecordingRequest>,
@@ -828,7 +832,9 @@ pub mod capture_service_server {
             tonic::Response<super::StartRecordingResponse>,
             tonic::Status,
         >;
-        /// Finishes the file. FAILED_PRECONDITION when nothing is being recorded.
+        /// Finishes the file. FAILED_PRECONDITION when nothing is being recorded. When the disk became full on the way
+        /// RESOURCE_EXHAUSTED, when writing failed otherwise DATA_LOSS: publishing went on, CameraInfo.recording became false, and
+        /// the file stays, readable up to its last whole frame.
         async fn stop_recording(
             &self,
             request: tonic::Request<super::StopRecordingRequest>,
@@ -3260,13 +3266,18 @@ pub struct StreamFramesRequest {
     /// Most pictures a second, 0.01 to 1000; 0 means no limit.
     #[prost(float, tag = "6")]
     pub max_rate: f32,
-    /// Most pictures on the way that this reader has not acknowledged, 1 to 16; 0 means that it acknowledges none.
+    /// Most messages on the way that this reader has not acknowledged, 1 to 16; 0 means that it acknowledges none.
     /// 1 is newest for a slow reader; a fast one needs its round trip times the rate, and one more.
     #[prost(uint32, tag = "7")]
     pub max_unacknowledged: u32,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct StreamFramesResponse {
+    /// Name of this stream, and place of this message in it, from 1, for AcknowledgeFrames.
+    #[prost(uint64, tag = "3")]
+    pub stream: u64,
+    #[prost(uint64, tag = "4")]
+    pub number: u64,
     #[prost(oneof = "stream_frames_response::Event", tags = "1, 2")]
     pub event: ::core::option::Option<stream_frames_response::Event>,
 }
@@ -3317,27 +3328,22 @@ pub struct Picture {
     /// Fit of each garment drawn, inner layer first, as last measured (about once a second); empty until then.
     #[prost(message, repeated, tag = "13")]
     pub fit: ::prost::alloc::vec::Vec<GarmentFit>,
-    /// Stream and place in it, from 1, for AcknowledgePicture; 0 in a snapshot.
-    #[prost(uint64, tag = "14")]
-    pub stream: u64,
-    #[prost(uint64, tag = "15")]
-    pub number: u64,
     /// Detail of the garments drawn; UNSPECIFIED without any.
-    #[prost(enumeration = "ClothDetail", tag = "16")]
+    #[prost(enumeration = "ClothDetail", tag = "14")]
     pub cloth_detail: i32,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
-pub struct AcknowledgePictureRequest {
+pub struct AcknowledgeFramesRequest {
     #[prost(string, tag = "1")]
     pub try_on_id: ::prost::alloc::string::String,
-    /// Of the picture.
+    /// Of the message.
     #[prost(uint64, tag = "2")]
     pub stream: u64,
     #[prost(uint64, tag = "3")]
     pub number: u64,
 }
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
-pub struct AcknowledgePictureResponse {}
+pub struct AcknowledgeFramesResponse {}
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct TryOnStatus {
     #[prost(enumeration = "TryOnState", tag = "1")]
@@ -3768,12 +3774,13 @@ pub mod compositor_service_client {
             self.inner.unary(req, path, codec).await
         }
         /// Streams pictures and statuses, in order. The first message is a status. At most one picture waits for a slow
-        /// reader; newer ones replace it (`dropped` counts them). Statuses are never dropped. A status is sent when state or
-        /// reason changes and at least twice a second while there are no pictures, so silence of a second means that the
-        /// compositor is gone. Each reader has its own queue: a slow one does not delay the others. Use one HTTP/2 connection
-        /// per stream: a slow reader stalls the other streams of its own connection.
-        /// What a reader's own windows and sockets hold is beyond the service's reach: a reader that wants new pictures however
-        /// slow it is acknowledges them (`max_unacknowledged`), and the next one is made when it has room.
+        /// reader; newer ones replace it (`dropped` counts them). A status is sent when state or reason changes, and at least
+        /// twice a second while there are no pictures and the reader has taken all before, so silence of a second means that
+        /// the compositor is gone. Each reader has its own queue: a slow one does not delay the others. Use one HTTP/2
+        /// connection per stream: a slow reader stalls the other streams of its own connection.
+        /// What a reader's own windows and sockets hold is beyond the service's reach. A reader that wants new pictures however
+        /// slow it is acknowledges messages (`max_unacknowledged`): the next picture is made when it has room, and statuses
+        /// other than the end are left out until then, since pictures have the state too. Others get every status.
         /// The last message before a regular end is a status with CLOSED or DRAINING. A try-on that fails ends its streams
         /// with INTERNAL, and opening it again is safe; a reader that lets 64 statuses wait or acknowledges nothing for 10 s is
         /// cut off with RESOURCE_EXHAUSTED. So is one too many, or one with a size or quality too many: readers of one size and
@@ -3802,12 +3809,12 @@ pub mod compositor_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CompositorService", "StreamFrames"));
             self.inner.server_streaming(req, path, codec).await
         }
-        /// Acknowledges a picture of a stream and those before it. Safe to call again; a stream that has ended is no error.
-        pub async fn acknowledge_picture(
+        /// Acknowledges a message of a stream and those before it. Safe to call again; a stream that has ended is no error.
+        pub async fn acknowledge_frames(
             &mut self,
-            request: impl tonic::IntoRequest<super::AcknowledgePictureRequest>,
+            request: impl tonic::IntoRequest<super::AcknowledgeFramesRequest>,
         ) -> std::result::Result<
-            tonic::Response<super::AcknowledgePictureResponse>,
+            tonic::Response<super::AcknowledgeFramesResponse>,
             tonic::Status,
         > {
             self.inner
@@ -3820,12 +3827,12 @@ pub mod compositor_service_client {
                 })?;
             let codec = tonic_prost::ProstCodec::default();
             let path = http::uri::PathAndQuery::from_static(
-                "/tryon.v1.CompositorService/AcknowledgePicture",
+                "/tryon.v1.CompositorService/AcknowledgeFrames",
             );
             let mut req = request.into_request();
             req.extensions_mut()
                 .insert(
-                    GrpcMethod::new("tryon.v1.CompositorService", "AcknowledgePicture"),
+                    GrpcMethod::new("tryon.v1.CompositorService", "AcknowledgeFrames"),
                 );
             self.inner.unary(req, path, codec).await
         }
@@ -3960,12 +3967,13 @@ pub mod compositor_service_server {
             + std::marker::Send
             + 'static;
         /// Streams pictures and statuses, in order. The first message is a status. At most one picture waits for a slow
-        /// reader; newer ones replace it (`dropped` counts them). Statuses are never dropped. A status is sent when state or
-        /// reason changes and at least twice a second while there are no pictures, so silence of a second means that the
-        /// compositor is gone. Each reader has its own queue: a slow one does not delay the others. Use one HTTP/2 connection
-        /// per stream: a slow reader stalls the other streams of its own connection.
-        /// What a reader's own windows and sockets hold is beyond the service's reach: a reader that wants new pictures however
-        /// slow it is acknowledges them (`max_unacknowledged`), and the next one is made when it has room.
+        /// reader; newer ones replace it (`dropped` counts them). A status is sent when state or reason changes, and at least
+        /// twice a second while there are no pictures and the reader has taken all before, so silence of a second means that
+        /// the compositor is gone. Each reader has its own queue: a slow one does not delay the others. Use one HTTP/2
+        /// connection per stream: a slow reader stalls the other streams of its own connection.
+        /// What a reader's own windows and sockets hold is beyond the service's reach. A reader that wants new pictures however
+        /// slow it is acknowledges messages (`max_unacknowledged`): the next picture is made when it has room, and statuses
+        /// other than the end are left out until then, since pictures have the state too. Others get every status.
         /// The last message before a regular end is a status with CLOSED or DRAINING. A try-on that fails ends its streams
         /// with INTERNAL, and opening it again is safe; a reader that lets 64 statuses wait or acknowledges nothing for 10 s is
         /// cut off with RESOURCE_EXHAUSTED. So is one too many, or one with a size or quality too many: readers of one size and
@@ -3977,12 +3985,12 @@ pub mod compositor_service_server {
             tonic::Response<Self::StreamFramesStream>,
             tonic::Status,
         >;
-        /// Acknowledges a picture of a stream and those before it. Safe to call again; a stream that has ended is no error.
-        async fn acknowledge_picture(
+        /// Acknowledges a message of a stream and those before it. Safe to call again; a stream that has ended is no error.
+        async fn acknowledge_frames(
             &self,
-            request: tonic::Request<super::AcknowledgePictureRequest>,
+            request: tonic::Request<super::AcknowledgeFramesRequest>,
         ) -> std::result::Result<
-            tonic::Response<super::AcknowledgePictureResponse>,
+            tonic::Response<super::AcknowledgeFramesResponse>,
             tonic::Status,
         >;
         /// Returns the newest picture, PNG or JPEG, at the camera's size. UNAVAILABLE with RetryInfo when the newest is older
@@ -4408,25 +4416,25 @@ pub mod compositor_service_server {
                     };
                     Box::pin(fut)
                 }
-                "/tryon.v1.CompositorService/AcknowledgePicture" => {
+                "/tryon.v1.CompositorService/AcknowledgeFrames" => {
                     #[allow(non_camel_case_types)]
-                    struct AcknowledgePictureSvc<T: CompositorService>(pub Arc<T>);
+                    struct AcknowledgeFramesSvc<T: CompositorService>(pub Arc<T>);
                     impl<
                         T: CompositorService,
-                    > tonic::server::UnaryService<super::AcknowledgePictureRequest>
-                    for AcknowledgePictureSvc<T> {
-                        type Response = super::AcknowledgePictureResponse;
+                    > tonic::server::UnaryService<super::AcknowledgeFramesRequest>
+                    for AcknowledgeFramesSvc<T> {
+                        type Response = super::AcknowledgeFramesResponse;
                         type Future = BoxFuture<
                             tonic::Response<Self::Response>,
                             tonic::Status,
                         >;
                         fn call(
                             &mut self,
-                            request: tonic::Request<super::AcknowledgePictureRequest>,
+                            request: tonic::Request<super::AcknowledgeFramesRequest>,
                         ) -> Self::Future {
                             let inner = Arc::clone(&self.0);
                             let fut = async move {
-                                <T as CompositorService>::acknowledge_picture(
+                                <T as CompositorService>::acknowledge_frames(
                                         &inner,
                                         request,
                                     )
@@ -4441,7 +4449,7 @@ pub mod compositor_service_server {
                     let max_encoding_message_size = self.max_encoding_message_size;
                     let inner = self.inner.clone();
                     let fut = async move {
-                        let method = AcknowledgePictureSvc(inner);
+                        let method = AcknowledgeFramesSvc(inner);
                         let codec = tonic_prost::ProstCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(

@@ -325,16 +325,16 @@ impl CompositorService for Compositor {
         Ok(Response::new(Box::pin(reader.stream())))
     }
 
-    async fn acknowledge_picture(
+    async fn acknowledge_frames(
         &self,
-        r: Request<AcknowledgePictureRequest>,
-    ) -> Result<Response<AcknowledgePictureResponse>, Status> {
+        r: Request<AcknowledgeFramesRequest>,
+    ) -> Result<Response<AcknowledgeFramesResponse>, Status> {
         let r = r.get_ref();
         let handle = self.find(&r.try_on_id)?;
         let command = Command::Acknowledge(r.stream, r.number);
         let gone = |_| not_found("try-on", &r.try_on_id);
         handle.commands.send(command).await.map_err(gone)?;
-        Ok(Response::new(AcknowledgePictureResponse {}))
+        Ok(Response::new(AcknowledgeFramesResponse {}))
     }
 
     async fn take_snapshot(

@@ -31,23 +31,35 @@ pub(crate) struct Viewer {
     pub(crate) connection: Option<SocketAddr>,
     /// Random name of its stream.
     stream: u64,
-    /// Number of the newest picture, and of the newest one acknowledged.
+    /// Number of the newest message, and of the newest one acknowledged.
     sent: u64,
     acknowledged: u64,
-    /// Last acknowledgement, or first picture after one.
+    /// Last acknowledgement, or first message after one.
     moved: Instant,
-    pictures: latest::Sender<(Instant, Picture)>,
-    statuses: mpsc::Sender<TryOnStatus>,
+    /// Last message.
+    told: Instant,
+    pictures: latest::Sender<QueuedPicture>,
+    statuses: mpsc::Sender<(u64, TryOnStatus)>,
     next: Instant,
     /// Set when the reader is cut off for its slowness.
     is_cut_off: Arc<AtomicBool>,
 }
 
+/// Picture with its number and the time since which it waits.
+struct QueuedPicture {
+    queued: Instant,
+    number: u64,
+    picture: Picture,
+}
+
 /// The reading end.
 pub(crate) struct Reader {
     try_on: String,
-    pictures: latest::Receiver<(Instant, Picture)>,
-    statuses: mpsc::Receiver<TryOnStatus>,
+    stream: u64,
+    /// The viewer waits for acknowledgements.
+    is_acknowledged: bool,
+    pictures: latest::Receiver<QueuedPicture>,
+    statuses: mpsc::Receiver<(u64, TryOnStatus)>,
     is_cut_off: Arc<AtomicBool>,
     end: End,
 }
@@ -71,15 +83,16 @@ pub(crate) fn viewer(
 ) -> (Viewer, Reader) {
     let (pictures, p) = latest::channel();
     let (statuses, s) = mpsc::channel(STATUSES);
-    let is_cut_off = Arc::<AtomicBool>::default();
+    let (is_cut_off, stream) = (Arc::<AtomicBool>::default(), random_u64());
     (
         Viewer {
             format,
             connection,
-            stream: random_u64(),
+            stream,
             sent: 0,
             acknowledged: 0,
             moved: Instant::now(),
+            told: Instant::now(),
             pictures,
             statuses,
             next: Instant::now(),
@@ -87,6 +100,8 @@ pub(crate) fn viewer(
         },
         Reader {
             try_on: try_on.into(),
+            stream,
+            is_acknowledged: format.window.is_some(),
             pictures: p,
             statuses: s,
             is_cut_off,
@@ -100,7 +115,7 @@ impl Viewer {
     pub(crate) fn wants(&self) -> bool {
         self.next <= Instant::now()
     }
-    /// It has not taken what was made for it: another picture would only wait.
+    /// It has not taken what was made for it: more would only wait.
     pub(crate) fn is_behind(&self) -> bool {
         let on_the_way = self.sent - self.acknowledged;
         let is_full = (self.format.window).is_some_and(|w| on_the_way >= u64::from(w));
@@ -109,17 +124,20 @@ impl Viewer {
     /// Queues a picture in place of one that still waits.
     pub(crate) fn picture(&mut self, p: Picture) {
         self.wait_a_turn();
+        let queued = QueuedPicture {
+            queued: Instant::now(),
+            number: self.next_number(),
+            picture: p,
+        };
+        self.pictures.send(queued);
+    }
+    fn next_number(&mut self) -> u64 {
+        self.told = Instant::now();
         if self.sent == self.acknowledged {
-            self.moved = Instant::now();
+            self.moved = self.told;
         }
         self.sent += 1;
-        let (stream, number) = (self.stream, self.sent);
-        let p = Picture {
-            stream,
-            number,
-            ..p
-        };
-        self.pictures.send((Instant::now(), p));
+        self.sent
     }
     /// Counts a picture that was not made because the reader is behind.
     pub(crate) fn skip(&mut self) {
@@ -138,7 +156,7 @@ impl Viewer {
             self.moved = Instant::now();
         }
     }
-    /// Pictures are on the way to it, and it has acknowledged none for that long.
+    /// Messages are on the way to it, and it has acknowledged none for that long.
     fn is_silent_for(&self, time: Duration) -> bool {
         let is_awaited = self.format.window.is_some() && self.sent > self.acknowledged;
         is_awaited && self.moved.elapsed() > time
@@ -155,14 +173,28 @@ impl Viewer {
         }
         is_stuck || self.statuses.is_closed()
     }
-    /// Queues a status; `false` when the reader is gone or its queue is full.
-    pub(crate) fn status(&self, s: TryOnStatus) -> bool {
-        let sent = self.statuses.try_send(s);
+    /// Queues a status; `false` when the reader is gone or its queue is full. One that acknowledges and is behind gets only
+    /// the end: the next picture or [`Self::repeat`] has the state of then.
+    pub(crate) fn status(&mut self, s: TryOnStatus) -> bool {
+        if self.format.window.is_some() && self.is_behind() && !is_end(&s) {
+            return !self.statuses.is_closed();
+        }
+        let number = self.next_number();
+        let sent = self.statuses.try_send((number, s));
         if matches!(sent, Err(TrySendError::Full(_))) {
             self.is_cut_off.store(true, Ordering::Release);
         }
         sent.is_ok()
     }
+    /// Repeats the status when nothing was sent for `interval`. A reader that is behind has something to read.
+    pub(crate) fn repeat(&mut self, s: &TryOnStatus, interval: Duration) -> bool {
+        let is_due = self.told.elapsed() >= interval && !self.is_behind();
+        !is_due || self.status(s.clone())
+    }
+}
+
+fn is_end(s: &TryOnStatus) -> bool {
+    matches!(s.state(), TryOnState::Closed | TryOnState::Draining)
 }
 
 impl Reader {
@@ -170,18 +202,23 @@ impl Reader {
     /// with the error that names the try-on.
     pub(crate) fn stream(self) -> impl Stream<Item = Result<StreamFramesResponse, Status>> {
         futures::stream::unfold(self, |mut r| async move {
-            let event = tokio::select! {
+            let (number, event) = tokio::select! {
                 biased;
-                Some(s) = r.statuses.recv() => {
-                    if matches!(s.state(), TryOnState::Closed | TryOnState::Draining) {
+                Some((number, s)) = r.statuses.recv() => {
+                    if is_end(&s) {
                         r.end = End::Announced;
                     }
-                    Event::Status(s)
+                    (number, Event::Status(s))
                 }
-                Some(p) = fresh_picture(&mut r.pictures) => Event::Picture(p),
+                Some((number, p)) = next_picture(&mut r.pictures, r.is_acknowledged) => (number, Event::Picture(p)),
                 else => return r.fault().map(|s| (Err(s), Self { end: End::Told, ..r })),
             };
-            Some((Ok(StreamFramesResponse { event: Some(event) }), r))
+            let message = StreamFramesResponse {
+                event: Some(event),
+                stream: r.stream,
+                number,
+            };
+            Some((Ok(message), r))
         })
     }
 
@@ -201,13 +238,21 @@ impl Reader {
     }
 }
 
-/// The next picture; those that waited for too long are dropped. Cancel safe.
-async fn fresh_picture(pictures: &mut latest::Receiver<(Instant, Picture)>) -> Option<Picture> {
+/// The next picture and its number; one that waited for too long is dropped unless its acknowledgement is awaited. Cancel
+/// safe.
+async fn next_picture(
+    pictures: &mut latest::Receiver<QueuedPicture>,
+    is_awaited: bool,
+) -> Option<(u64, Picture)> {
     loop {
-        let (queued, p) = pictures.recv().await?;
-        if queued.elapsed() <= FRESH {
+        let next = pictures.recv().await?;
+        if is_awaited || next.queued.elapsed() <= FRESH {
             let dropped = pictures.dropped();
-            return Some(Picture { dropped, ..p });
+            let picture = Picture {
+                dropped,
+                ..next.picture
+            };
+            return Some((next.number, picture));
         }
         pictures.discard();
     }
@@ -235,7 +280,7 @@ mod tests {
 
     #[tokio::test]
     async fn an_end_that_nobody_announced_is_internal_and_names_the_try_on() {
-        let (v, r) = viewer("shopper", FORMAT, None);
+        let (mut v, r) = viewer("shopper", FORMAT, None);
         v.status(status(TryOnState::Live));
         drop(v);
         let all: Vec<_> = r.stream().collect().await;
@@ -246,7 +291,7 @@ mod tests {
 
     #[tokio::test]
     async fn an_announced_end_is_ok_and_a_full_queue_is_told() {
-        let (v, r) = viewer("shopper", FORMAT, None);
+        let (mut v, r) = viewer("shopper", FORMAT, None);
         v.status(status(TryOnState::Closed));
         drop(v);
         assert_eq!(
@@ -258,7 +303,7 @@ mod tests {
             0
         );
 
-        let (v, r) = viewer("shopper", FORMAT, None);
+        let (mut v, r) = viewer("shopper", FORMAT, None);
         while v.status(status(TryOnState::Live)) {}
         drop(v);
         let last = r.stream().collect::<Vec<_>>().await.pop().expect("an end");
@@ -316,8 +361,8 @@ mod tests {
         for number in 1..=2 {
             assert!(!v.is_behind());
             v.picture(Picture::default());
-            let p = fresh_picture(&mut r.pictures).await.expect("queued");
-            assert_eq!((p.stream, p.number, p.dropped), (v.stream, number, 0));
+            let (n, p) = next_picture(&mut r.pictures, true).await.expect("queued");
+            assert_eq!((n, p.dropped), (number, 0));
         }
         assert!(v.is_behind(), "two are on the way");
         v.skip();
@@ -327,13 +372,37 @@ mod tests {
         v.acknowledge(v.stream, 1);
         assert_eq!((v.is_behind(), v.acknowledged), (false, 2));
         v.picture(Picture::default());
-        assert_eq!(
-            fresh_picture(&mut r.pictures)
-                .await
-                .expect("queued")
-                .dropped,
-            1
+        let (_, p) = next_picture(&mut r.pictures, true).await.expect("queued");
+        assert_eq!(p.dropped, 1);
+    }
+
+    #[tokio::test]
+    async fn a_reader_that_is_behind_gets_no_status_but_the_end() {
+        let format = PictureFormat {
+            window: Some(1),
+            ..FORMAT
+        };
+        let (mut v, r) = viewer("shopper", format, None);
+        assert!(v.status(status(TryOnState::Opening)));
+        assert!(
+            v.status(status(TryOnState::Live))
+                && v.repeat(&status(TryOnState::Live), Duration::ZERO)
         );
+        v.acknowledge(v.stream, 1);
+        assert!(v.repeat(&status(TryOnState::Degraded), Duration::ZERO));
+        assert!(v.status(status(TryOnState::Closed)));
+        drop(v);
+        let all: Vec<_> = r.stream().filter_map(Result::ok).collect().await;
+        let states = all.iter().map(|m| match &m.event {
+            Some(Event::Status(s)) => (m.number, s.state()),
+            _ => panic!("a picture"),
+        });
+        let wanted = [
+            (1, TryOnState::Opening),
+            (2, TryOnState::Degraded),
+            (3, TryOnState::Closed),
+        ];
+        assert_eq!(states.collect::<Vec<_>>(), wanted);
     }
 
     #[tokio::test]
@@ -361,11 +430,11 @@ mod tests {
         v.picture(Picture::default());
         assert!(v.is_behind());
         tokio::time::sleep(2 * FRESH).await;
-        let next = tokio::spawn(async move { fresh_picture(&mut r.pictures).await });
+        let next = tokio::spawn(async move { next_picture(&mut r.pictures, false).await });
         tokio::task::yield_now().await;
         assert!(!v.is_behind());
         v.picture(Picture::default());
-        let p = next.await.expect("ends").expect("a picture");
-        assert_eq!((p.number, p.dropped), (2, 1));
+        let (number, p) = next.await.expect("ends").expect("a picture");
+        assert_eq!((number, p.dropped), (2, 1));
     }
 }

@@ -62,8 +62,7 @@ class Slow:
         message = self.next_message(limit)
         if message is None:
             return None
-        if message.WhichOneof("event") == "picture":
-            self.last = message.picture
+        self.last = message
         seen = self.client.seen(message)
         if seen.is_picture:
             self.read.append((time.time(), seen))

@@ -74,10 +74,10 @@ class Client:
         request = self.pb.StreamFramesRequest(try_on_id=name, **format)
         return self.rpc.StreamFrames(request, timeout=deadline, metadata=self.metadata)
 
-    def acknowledge(self, name: str, picture: object) -> None:
-        """Makes room for the next picture of a stream."""
-        request = self.pb.AcknowledgePictureRequest(try_on_id=name, stream=picture.stream, number=picture.number)
-        self.rpc.AcknowledgePicture(request, timeout=5, metadata=self.metadata)
+    def acknowledge(self, name: str, message: object) -> None:
+        """Makes room for the next message of a stream."""
+        request = self.pb.AcknowledgeFramesRequest(try_on_id=name, stream=message.stream, number=message.number)
+        self.rpc.AcknowledgeFrames(request, timeout=5, metadata=self.metadata)
 
     def list(self, timeout: float = 10) -> None:
         """The control call that attacks time."""

@@ -75,8 +75,6 @@ pub(super) struct Task {
     viewers: Vec<Viewer>,
     is_watched: watch::Sender<bool>,
     formats: Formats,
-    /// Last message to the viewers.
-    said: Instant,
     /// Last sign of interest in this try-on.
     wanted: Instant,
     /// Newest exposure in which nobody was followed; garments up to it are not shown.
@@ -105,7 +103,6 @@ impl Task {
             viewers: Vec::new(),
             is_watched: outputs.is_watched,
             formats: Formats::default(),
-            said: now,
             wanted: now,
             lost_at: None,
             shown: None,
@@ -193,7 +190,7 @@ impl Task {
     }
 
     /// Adds a viewer; RESOURCE_EXHAUSTED when it is one too many, or its format is.
-    fn admit(&mut self, v: Viewer) -> Result<(), Status> {
+    fn admit(&mut self, mut v: Viewer) -> Result<(), Status> {
         let (max_viewers, max_formats) =
             (self.setup.config.max_viewers, self.setup.config.max_formats);
         if self.viewers.len() >= max_viewers {
@@ -215,8 +212,7 @@ impl Task {
     }
 
     fn say(&mut self, status: &TryOnStatus) {
-        self.viewers.retain(|v| v.status(status.clone()));
-        self.said = Instant::now();
+        self.viewers.retain_mut(|v| v.status(status.clone()));
     }
 
     fn on_tick(&mut self) {
@@ -231,12 +227,8 @@ impl Task {
         if self.life.silence().is_some_and(|s| s >= FORGET_AFTER) {
             self.forget();
         }
-        if self.said.elapsed() >= HEARTBEAT {
-            // A reader that is behind has something to read: repetitions would wait before the next picture.
-            let status = self.life.status();
-            (self.viewers).retain(|v| v.is_behind() || v.status(status.clone()));
-            self.said = Instant::now();
-        }
+        let status = self.life.status();
+        (self.viewers).retain_mut(|v| v.repeat(&status, HEARTBEAT));
     }
 
     /// Drops all pictures and bodies: nobody knows who stands before the camera now.
@@ -454,7 +446,6 @@ impl Task {
             }
         }
         self.viewers = viewers;
-        self.said = Instant::now();
         if !is_next {
             self.on_shown(job, drawn);
         }

@@ -20,8 +20,8 @@ export function compositor(origin = '') {
     showFit: (request, options) => unary(url('ShowFit'), m.ShowFitRequest, m.ShowFitResponse, request, options),
     listGarmentChoices: (options) =>
       unary(url('ListGarmentChoices'), m.ListGarmentChoicesRequest, m.ListGarmentChoicesResponse, {}, options),
-    acknowledgePicture: (request, options) =>
-      unary(url('AcknowledgePicture'), m.AcknowledgePictureRequest, m.AcknowledgePictureResponse, request, options),
+    acknowledgeFrames: (request, options) =>
+      unary(url('AcknowledgeFrames'), m.AcknowledgeFramesRequest, m.AcknowledgeFramesResponse, request, options),
     takeSnapshot: (request, options) =>
       unary(url('TakeSnapshot'), m.TakeSnapshotRequest, m.TakeSnapshotResponse, request, { timeoutMs: 10_000, ...options }),
     offerPhoto: (request, options) =>

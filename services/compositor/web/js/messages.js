@@ -106,16 +106,14 @@ export const Picture = schema('Picture',
   [11, 'stages', 'message[]', StageTime],
   [12, 'dropped', 'uint64'],
   [13, 'fit', 'message[]', GarmentFit],
-  [14, 'stream', 'uint64'],
-  [15, 'number', 'uint64'],
-  [16, 'cloth_detail', 'enum']);
+  [14, 'cloth_detail', 'enum']);
 
-export const AcknowledgePictureRequest = schema('AcknowledgePictureRequest',
+export const AcknowledgeFramesRequest = schema('AcknowledgeFramesRequest',
   [1, 'try_on_id', 'string'],
   [2, 'stream', 'uint64'],
   [3, 'number', 'uint64']);
 
-export const AcknowledgePictureResponse = schema('AcknowledgePictureResponse');
+export const AcknowledgeFramesResponse = schema('AcknowledgeFramesResponse');
 
 export const TryOnStatus = schema('TryOnStatus',
   [1, 'state', 'enum'],
@@ -129,7 +127,9 @@ export const TryOnStatus = schema('TryOnStatus',
 /** One of the two is set. */
 export const StreamFramesResponse = schema('StreamFramesResponse',
   [1, 'picture', 'message', Picture],
-  [2, 'status', 'message', TryOnStatus]);
+  [2, 'status', 'message', TryOnStatus],
+  [3, 'stream', 'uint64'],
+  [4, 'number', 'uint64']);
 
 export const TakeSnapshotRequest = schema('TakeSnapshotRequest',
   [1, 'try_on_id', 'string'],

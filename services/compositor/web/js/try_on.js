@@ -7,7 +7,7 @@ import { Backoff } from './backoff.js';
 /** The contract: no message for a second means that the compositor is gone. One more for a busy network, ms. */
 export const SILENCE_MS = 2000;
 
-/** Pictures on the way before the first acknowledgement is back: a network of 100 ms at 30 a second. */
+/** Messages on the way before the first acknowledgement is back: a network of 100 ms at 30 a second. */
 const MAX_UNACKNOWLEDGED = 4;
 
 /** Answers that another try cannot change. */
@@ -104,10 +104,8 @@ export class TryOn {
       for await (const event of this.client.streamFrames(wanted, { signal })) {
         heard();
         this.backoff.reset();
-        if (event.picture) {
-          this.on({ kind: 'picture', picture: event.picture });
-          this.#acknowledge(event.picture, signal);
-        }
+        this.#acknowledge(event, signal);
+        if (event.picture) this.on({ kind: 'picture', picture: event.picture });
         if (event.status) this.on({ kind: 'status', status: event.status });
         if (event.status?.state === State.CLOSED) this.#withdrawn = event.status.end === End.WITHDRAWN;
         if (event.status?.state === State.DRAINING || event.status?.state === State.CLOSED) break;
@@ -122,7 +120,7 @@ export class TryOn {
 
   /** The next acknowledgement covers one that is lost. */
   #acknowledge({ stream, number }, signal) {
-    this.client.acknowledgePicture({ try_on_id: this.id, stream, number }, { signal }).catch(() => {});
+    this.client.acknowledgeFrames({ try_on_id: this.id, stream, number }, { signal }).catch(() => {});
   }
 
   /** Sends the wanted garments; of several quick choices only the last one's answer counts (null for the others). */
