@@ -20,6 +20,8 @@ pub struct Config {
     pub process: ProcessConfig,
     /// Frames between processes.
     pub bus: BusConfig,
+    /// Tokens.
+    pub auth: AuthConfig,
     /// The capture service.
     pub capture: CaptureConfig,
     /// The tracking service.
@@ -36,8 +38,8 @@ pub struct Config {
 pub struct ConfigError(pub String);
 
 /// Environment variables with the prefix that are no keys: test switches, the path of the file, and the log filter of
-/// the command line (services have `TRYON_LOG__LEVEL`).
-const NOT_KEYS: [&str; 4] = ["SHARED", "REQUIRE_ALL", "CONFIG", "LOG"];
+/// the command line (services have `TRYON_LOG__LEVEL`); the token of a client.
+const NOT_KEYS: [&str; 5] = ["SHARED", "REQUIRE_ALL", "CONFIG", "LOG", "TOKEN"];
 
 impl Config {
     /// Reads all layers. `flags` are `key=value` pairs such as `capture.address=127.0.0.1:0`.
@@ -121,10 +123,17 @@ impl Config {
             let why = "an origin such as https://mirror.example is needed";
             return fault("compositor.public", why);
         }
-        if let Some(key) = self.exposed().filter(|_| !self.process.insecure) {
-            let why = "is reached from beyond this machine, and there is neither TLS nor a token; \
-                       process.insecure = true (or --insecure) allows it";
+        let is_open = !(self.has_tls() && self.has_tokens());
+        if let Some(key) = self.exposed().filter(|_| is_open && !self.process.insecure) {
+            let why = "is reached from beyond this machine, which needs both TLS and tokens ([auth] keys); \
+                       process.insecure = true (or --insecure) allows it without";
             return fault(key, why);
+        }
+        if !self.auth.store.is_empty() && !is_name(&self.auth.store) {
+            return fault("auth.store", name);
+        }
+        if !self.has_tokens() && !self.auth.revoked.as_os_str().is_empty() {
+            return fault("auth.revoked", "revokes nothing without auth.keys");
         }
         for (key, n) in [
             ("tracking.max_sessions", self.tracking.max_sessions),
@@ -138,6 +147,25 @@ impl Config {
             }
         }
         Ok(())
+    }
+
+    /// Store of this box, to which tokens are bound.
+    pub fn store(&self) -> &str {
+        if self.auth.store.is_empty() {
+            &self.capture.store
+        } else {
+            &self.auth.store
+        }
+    }
+
+    /// The services ask for tokens.
+    fn has_tokens(&self) -> bool {
+        !self.auth.keys.is_empty()
+    }
+
+    /// The services are reached through TLS only.
+    fn has_tls(&self) -> bool {
+        false
     }
 
     /// Key of the first address that other machines reach.

@@ -2,6 +2,7 @@
 //! servers, reconnecting clients, and a shutdown with a deadline.
 
 pub mod admin;
+pub mod auth;
 pub mod behind;
 pub mod bodies;
 pub mod bus;

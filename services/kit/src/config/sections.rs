@@ -81,6 +81,22 @@ impl Default for BusConfig {
     }
 }
 
+/// Tokens: who may call the services (docs/decisions/062).
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct AuthConfig {
+    /// Files of public keys (PEM, Ed25519) whose tokens are taken; none means that no tokens are asked for.
+    pub keys: Vec<PathBuf>,
+    /// File of revoked tokens, a `jti` a line, read again within a second; empty for none.
+    pub revoked: PathBuf,
+    /// File of the token that the services present to each other, read again when it changes; empty for none.
+    pub token: PathBuf,
+    /// Store whose tokens are taken; empty means `capture.store`.
+    pub store: String,
+    /// Folder of enrolment codes that the compositor trades for tokens; empty means that it trades none.
+    pub enrolments: PathBuf,
+}
+
 /// The capture service.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

@@ -1,0 +1,116 @@
+//! Failed attempts of each peer: a token bucket by address.
+
+use std::collections::HashMap;
+use std::net::{IpAddr, Ipv6Addr};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+/// Most peers that are remembered; those without recent failures make place.
+const MAX_PEERS: usize = 4096;
+
+/// Attempts that a peer may fail.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Allowance {
+    /// At once.
+    pub(super) burst: f64,
+    /// Again, each second.
+    pub(super) per_second: f64,
+}
+
+#[derive(Clone, Copy)]
+struct Bucket {
+    /// Attempts that were left at `at`.
+    left: f64,
+    at: Instant,
+}
+
+/// Buckets of all peers.
+pub(super) struct Failures {
+    allowance: Allowance,
+    peers: Mutex<HashMap<IpAddr, Bucket>>,
+}
+
+impl Failures {
+    pub(super) fn new(allowance: Allowance) -> Self {
+        Self {
+            allowance,
+            peers: Mutex::default(),
+        }
+    }
+
+    /// The peer has no attempt left.
+    pub(super) fn is_spent(&self, peer: IpAddr, now: Instant) -> bool {
+        let peers = self.peers.lock().unwrap_or_else(PoisonError::into_inner);
+        (peers.get(&group(peer))).is_some_and(|b| self.left(b, now) < 1.0)
+    }
+
+    /// Takes one attempt from the peer.
+    pub(super) fn record(&self, peer: IpAddr, now: Instant) {
+        let mut peers = self.peers.lock().unwrap_or_else(PoisonError::into_inner);
+        if peers.len() >= MAX_PEERS {
+            peers.retain(|_, b| self.left(b, now) < self.allowance.burst);
+        }
+        if peers.len() >= MAX_PEERS {
+            // A flood from thousands of addresses: forgetting it keeps memory bounded, and costs it one burst each.
+            peers.clear();
+        }
+        let full = Bucket {
+            left: self.allowance.burst,
+            at: now,
+        };
+        let bucket = peers.entry(group(peer)).or_insert(full);
+        let left = (self.left(bucket, now) - 1.0).max(0.0);
+        *bucket = Bucket { left, at: now };
+    }
+
+    fn left(&self, bucket: &Bucket, now: Instant) -> f64 {
+        let gained = now.saturating_duration_since(bucket.at).as_secs_f64();
+        (bucket.left + gained * self.allowance.per_second).min(self.allowance.burst)
+    }
+}
+
+/// One customer of a network holds a whole /64 of IPv6.
+fn group(peer: IpAddr) -> IpAddr {
+    match peer.to_canonical() {
+        IpAddr::V6(a) => Ipv6Addr::from(u128::from(a) & (u128::MAX << 64)).into(),
+        v4 => v4,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn a_peer_spends_its_own_attempts_and_gets_them_back() {
+        let failures = Failures::new(Allowance {
+            burst: 3.0,
+            per_second: 0.5,
+        });
+        let (now, a) = (Instant::now(), IpAddr::from([10, 0, 0, 1]));
+        (0..3).for_each(|_| failures.record(a, now));
+        assert!(failures.is_spent(a, now));
+        assert!(failures.is_spent("::ffff:10.0.0.1".parse().expect("an address"), now));
+        assert!(!failures.is_spent(IpAddr::from([10, 0, 0, 2]), now));
+        assert!(failures.is_spent(a, now + Duration::from_secs(1)));
+        assert!(!failures.is_spent(a, now + Duration::from_secs(2)));
+        let neighbours = ["2001:db8::1", "2001:db8::2"].map(|a| a.parse().expect("an address"));
+        (0..3).for_each(|_| failures.record(neighbours[0], now));
+        assert!(failures.is_spent(neighbours[1], now));
+    }
+
+    #[test]
+    fn memory_is_bounded() {
+        let failures = Failures::new(Allowance {
+            burst: 3.0,
+            per_second: 0.5,
+        });
+        let now = Instant::now();
+        for i in 0..3 * MAX_PEERS as u32 {
+            failures.record(IpAddr::from(i.to_be_bytes()), now);
+        }
+        let peers = failures.peers.lock().expect("not poisoned");
+        assert!(peers.len() <= MAX_PEERS);
+    }
+}

@@ -1,0 +1,130 @@
+//! Layer in front of every service: asks for a token before anything of a message is decoded.
+
+use super::authority::Authority;
+use super::claims::Claims;
+use super::ending::Ending;
+use super::grant::{Grant, denied};
+use super::revocation::Revocations;
+use super::{Fault, unix_s};
+use axum::Router;
+use axum::body::Body;
+use axum::extract::State;
+use axum::middleware::{Next, from_fn_with_state};
+use http::{HeaderMap, Request, Response, header};
+use std::net::{IpAddr, Ipv4Addr};
+use std::sync::Arc;
+use std::time::Duration;
+use tonic::Status;
+use tonic::transport::server::TcpConnectInfo;
+
+/// Probes carry no token.
+const HEALTH: &str = "/grpc.health.v1.Health/";
+/// The one call that is made before a caller has a token; its handler asks for a code.
+const REDEEM: &str = "/tryon.v1.CompositorService/RedeemCode";
+/// Longest sleep until a token's end: a later one is slept for again (timers of hundreds of years overflow).
+const LONGEST_SLEEP: Duration = Duration::from_secs(24 * 3600);
+
+#[derive(Clone)]
+struct Gate {
+    authority: Option<Arc<Authority>>,
+    service: &'static str,
+}
+
+/// Puts the gate of a service in front of its routes.
+pub(super) fn guard(
+    authority: Option<Arc<Authority>>,
+    service: &'static str,
+    routes: Router,
+) -> Router {
+    routes.layer(from_fn_with_state(Gate { authority, service }, pass))
+}
+
+/// Passes a request on with its [`Grant`], or answers with UNAUTHENTICATED or PERMISSION_DENIED.
+async fn pass(State(gate): State<Gate>, mut request: Request<Body>, next: Next) -> Response<Body> {
+    let Some(authority) = gate.authority else {
+        request.extensions_mut().insert(Grant::everything());
+        return next.run(request).await;
+    };
+    if is_open(&request) {
+        request.extensions_mut().insert(Grant::nothing());
+        return next.run(request).await;
+    }
+    match judge(&authority, gate.service, &request) {
+        Ok(claims) => {
+            let end = end(claims.clone(), authority.revoked());
+            request.extensions_mut().insert(Grant::of_token(claims));
+            let answer = next.run(request).await;
+            answer.map(|body| Body::new(Ending::new(body, end)))
+        }
+        Err(status) => {
+            let code = format!("{:?}", status.code());
+            metrics::counter!("tryon_refused_calls", "service" => gate.service, "code" => code)
+                .increment(1);
+            status.into_http()
+        }
+    }
+}
+
+/// Claims of a request that cover it.
+fn judge<B>(
+    authority: &Authority,
+    service: &str,
+    request: &Request<B>,
+) -> Result<Arc<Claims>, Status> {
+    let unauthenticated = |f: Fault| Status::unauthenticated(f.to_string());
+    let token = bearer(request.headers()).map_err(unauthenticated)?;
+    let claims = authority
+        .authenticate(token, peer(request))
+        .map_err(unauthenticated)?;
+    let method = request.uri().path().rsplit('/').next().unwrap_or_default();
+    match authority.refusal(&claims, service, method) {
+        Some(claim) => Err(denied(claim)),
+        None => Ok(claims),
+    }
+}
+
+/// A call that needs no token.
+fn is_open<B>(request: &Request<B>) -> bool {
+    let has_credentials = request.headers().contains_key(header::AUTHORIZATION);
+    let path = request.uri().path();
+    path.starts_with(HEALTH) || (path == REDEEM && !has_credentials)
+}
+
+/// Token of the one `authorization: Bearer TOKEN` (RFC 6750, 2.1).
+fn bearer(headers: &HeaderMap) -> Result<&str, Fault> {
+    let mut values = headers.get_all(header::AUTHORIZATION).iter();
+    let (Some(value), None) = (values.next(), values.next()) else {
+        return Err(Fault::Missing);
+    };
+    let value = value.to_str().map_err(|_| Fault::Malformed)?;
+    let (scheme, token) = value.split_once(' ').ok_or(Fault::Missing)?;
+    if scheme.eq_ignore_ascii_case("bearer") {
+        Ok(token.trim())
+    } else {
+        Err(Fault::Missing)
+    }
+}
+
+/// Address of the caller; one for all callers of a transport that has none.
+fn peer<B>(request: &Request<B>) -> IpAddr {
+    let info = request.extensions().get::<TcpConnectInfo>();
+    let address = info.and_then(TcpConnectInfo::remote_addr);
+    address.map_or(Ipv4Addr::UNSPECIFIED.into(), |a| a.ip())
+}
+
+/// Waits for the end of a token; its reason.
+async fn end(claims: Arc<Claims>, mut revoked: Revocations) -> &'static str {
+    let expiry = async {
+        loop {
+            let left = Duration::from_secs(claims.exp.saturating_sub(unix_s()));
+            if left.is_zero() {
+                return;
+            }
+            tokio::time::sleep(left.min(LONGEST_SLEEP)).await;
+        }
+    };
+    tokio::select! {
+        () = expiry => "the token has expired",
+        () = revoked.of(&claims.jti) => "the token was revoked",
+    }
+}
