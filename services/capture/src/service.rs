@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 use tokio::sync::oneshot;
 use tonic::{Request, Response, Status};
+use tryon_kit::auth::Grant;
 use tryon_kit::config::CaptureConfig;
 use tryon_kit::frames::CameraKey;
 use tryon_kit::server::Context;
@@ -20,7 +21,7 @@ const MAX_LEASE_S: f32 = 5.0;
 
 /// All cameras of the process.
 pub(crate) struct Capture {
-    cameras: BTreeMap<String, Handle>,
+    cameras: BTreeMap<String, (CameraKey, Handle)>,
     recordings: PathBuf,
 }
 
@@ -29,7 +30,8 @@ impl Capture {
         let spawn = |c: &tryon_kit::config::CameraConfig| {
             // Names were checked with the configuration.
             let key = CameraKey::new(&config.store, &c.name)?;
-            Some((c.name.clone(), camera::spawn(c.clone(), key, ctx.clone())))
+            let handle = camera::spawn(c.clone(), key.clone(), ctx.clone());
+            Some((c.name.clone(), (key, handle)))
         };
         Self {
             cameras: config.cameras.iter().filter_map(spawn).collect(),
@@ -38,25 +40,34 @@ impl Capture {
     }
 
     pub(crate) async fn autostart(&self, name: &str) {
-        // A camera that cannot be opened is listed as failed, and its task has logged why.
-        let _ = self.send(name, Command::Start).await;
+        if let Some((_, handle)) = self.cameras.get(name) {
+            // A camera that cannot be opened is listed as failed, and its task has logged why.
+            let _ = handle.send(Command::Start).await;
+        }
     }
 
-    fn find(&self, name: &str) -> Result<&Handle, Status> {
-        self.cameras
-            .get(name)
-            .ok_or_else(|| not_found("camera", name))
+    /// Camera of that name, if the request's token reaches it. A token for one camera does not learn of others.
+    fn find<T>(&self, r: &Request<T>, name: &str) -> Result<&Handle, Status> {
+        let grant = Grant::of(r)?;
+        let Some((key, handle)) = self.cameras.get(name) else {
+            return Err(match grant.camera() {
+                Some(own) if own != name => Status::permission_denied("another camera's token"),
+                _ => not_found("camera", name),
+            });
+        };
+        grant.check_camera(key)?;
+        Ok(handle)
     }
+}
 
+impl Handle {
     async fn send<T>(
         &self,
-        name: &str,
         command: impl FnOnce(oneshot::Sender<Result<T, Status>>) -> Command,
     ) -> Result<T, Status> {
         let (answer, reply) = oneshot::channel();
         let gone = |_| unavailable("capture", "shutting down");
-        self.find(name)?
-            .commands
+        self.commands
             .send(command(answer))
             .await
             .map_err(|_| unavailable("capture", "shutting down"))?;
@@ -68,12 +79,12 @@ impl Capture {
 impl CaptureService for Capture {
     async fn list_cameras(
         &self,
-        _: Request<ListCamerasRequest>,
+        r: Request<ListCamerasRequest>,
     ) -> Result<Response<ListCamerasResponse>, Status> {
-        let cameras = self
-            .cameras
-            .values()
-            .map(|h| h.info.borrow().clone())
+        let grant = Grant::of(&r)?;
+        let cameras = (self.cameras.values())
+            .filter(|(key, _)| grant.check_camera(key).is_ok())
+            .map(|(_, h)| h.info.borrow().clone())
             .collect();
         Ok(Response::new(ListCamerasResponse { cameras }))
     }
@@ -82,7 +93,10 @@ impl CaptureService for Capture {
         &self,
         r: Request<GetCalibrationRequest>,
     ) -> Result<Response<GetCalibrationResponse>, Status> {
-        let c = self.send(&r.get_ref().camera, Command::Calibration).await?;
+        let c = self
+            .find(&r, &r.get_ref().camera)?
+            .send(Command::Calibration)
+            .await?;
         Ok(Response::new(GetCalibrationResponse {
             calibration: Some(calibration_to_wire(&c)),
         }))
@@ -116,7 +130,10 @@ impl CaptureService for Capture {
         &self,
         r: Request<StartCameraRequest>,
     ) -> Result<Response<StartCameraResponse>, Status> {
-        let info = self.send(&r.get_ref().camera, Command::Start).await?;
+        let info = self
+            .find(&r, &r.get_ref().camera)?
+            .send(Command::Start)
+            .await?;
         Ok(Response::new(StartCameraResponse { info: Some(info) }))
     }
 
@@ -124,7 +141,10 @@ impl CaptureService for Capture {
         &self,
         r: Request<StopCameraRequest>,
     ) -> Result<Response<StopCameraResponse>, Status> {
-        let info = self.send(&r.get_ref().camera, Command::Stop).await?;
+        let info = self
+            .find(&r, &r.get_ref().camera)?
+            .send(Command::Stop)
+            .await?;
         Ok(Response::new(StopCameraResponse { info: Some(info) }))
     }
 
@@ -132,8 +152,8 @@ impl CaptureService for Capture {
         &self,
         r: Request<StartRecordingRequest>,
     ) -> Result<Response<StartRecordingResponse>, Status> {
+        let camera = self.find(&r, &r.get_ref().camera)?;
         let r = r.get_ref();
-        self.find(&r.camera)?;
         if !r.consent {
             return Err(Status::failed_precondition(
                 "start_recording_request.consent: nobody is recorded without it",
@@ -145,8 +165,8 @@ impl CaptureService for Capture {
             ));
         }
         let folder = self.recordings.clone();
-        let file = self
-            .send(&r.camera, |answer| Command::Record { folder, answer })
+        let file = camera
+            .send(|answer| Command::Record { folder, answer })
             .await?;
         Ok(Response::new(StartRecordingResponse { file }))
     }
@@ -156,7 +176,8 @@ impl CaptureService for Capture {
         r: Request<StopRecordingRequest>,
     ) -> Result<Response<StopRecordingResponse>, Status> {
         let done = self
-            .send(&r.get_ref().camera, Command::EndRecording)
+            .find(&r, &r.get_ref().camera)?
+            .send(Command::EndRecording)
             .await?;
         Ok(Response::new(StopRecordingResponse {
             file: done.file,

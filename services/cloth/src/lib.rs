@@ -29,6 +29,7 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         key: "cloth.tracking".into(),
         why,
     })?;
+    let tracking = ctx.auth.credentials().present(tracking);
     let settings = c.clone();
     let offered = tokio::task::spawn_blocking(move || library::Library::read(&settings)).await;
     let offered = offered.map_err(|e| StartError::Config {
@@ -47,6 +48,7 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         address: c.address,
         admin: c.admin,
         routes: routes.routes(),
+        around: None,
         http1: false,
         health,
     };

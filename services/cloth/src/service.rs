@@ -8,8 +8,8 @@ use futures::Stream;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
-use tonic::transport::Channel;
 use tonic::{Request, Response, Status};
+use tryon_kit::auth::{Connection, Grant};
 use tryon_kit::config::ClothConfig;
 use tryon_kit::server::Context;
 use tryon_kit::sessions::{Opened, Sessions, brief};
@@ -24,7 +24,7 @@ pub(crate) struct Cloth {
     sessions: Sessions<Handle>,
     simulations: Simulations,
     ctx: Context,
-    tracking: Channel,
+    tracking: Connection,
     idle: Duration,
     adapts_detail: bool,
     library: Arc<Library>,
@@ -34,7 +34,7 @@ impl Cloth {
     pub(crate) fn new(
         config: &ClothConfig,
         ctx: &Context,
-        tracking: Channel,
+        tracking: Connection,
         library: Library,
     ) -> Self {
         Self {
@@ -49,6 +49,11 @@ impl Cloth {
     }
 }
 
+/// Refuses a request whose token does not reach the session it names, whose camera this service does not know.
+fn permit<T>(r: &Request<T>, session: &str) -> Result<(), Status> {
+    Grant::of(r)?.check_session_of_any_camera(session)
+}
+
 #[tonic::async_trait]
 impl ClothService for Cloth {
     async fn list_garments(
@@ -61,6 +66,7 @@ impl ClothService for Cloth {
     }
 
     async fn dress(&self, r: Request<DressRequest>) -> Result<Response<DressResponse>, Status> {
+        permit(&r, &r.get_ref().session_id)?;
         let r = r.get_ref();
         let id = request::session_id("dress_request.session_id", &r.session_id)?;
         let choices = request::choices("dress_request", &r.garments)?;
@@ -106,6 +112,7 @@ impl ClothService for Cloth {
         &self,
         r: Request<UndressRequest>,
     ) -> Result<Response<UndressResponse>, Status> {
+        permit(&r, &r.get_ref().session_id)?;
         if let Some(h) = self.sessions.remove(&r.get_ref().session_id) {
             let _ = h.commands.send(Command::Close).await;
         }
@@ -120,6 +127,7 @@ impl ClothService for Cloth {
         r: Request<StreamGarmentsRequest>,
     ) -> Result<Response<Self::StreamGarmentsStream>, Status> {
         let id = &r.get_ref().session_id;
+        permit(&r, id)?;
         let handle: Arc<Handle> = self
             .sessions
             .get(id)
@@ -159,6 +167,7 @@ impl ClothService for Cloth {
         &self,
         r: Request<StartSimulationRequest>,
     ) -> Result<Response<StartSimulationResponse>, Status> {
+        Grant::of(&r)?.check_whole_store()?;
         self.simulations.start(r.get_ref()).await.map(Response::new)
     }
 
@@ -168,6 +177,7 @@ impl ClothService for Cloth {
         &self,
         r: Request<FollowSimulationRequest>,
     ) -> Result<Response<Self::FollowSimulationStream>, Status> {
+        Grant::of(&r)?.check_whole_store()?;
         let r = r.get_ref();
         self.simulations
             .follow(&r.simulation_id, r.first_frame)

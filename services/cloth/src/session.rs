@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tokio::time::Instant;
-use tonic::transport::Channel;
+use tryon_kit::auth::Connection;
 use tryon_kit::bodies::{News, follow};
 use tryon_kit::queue::{latest, ordered};
 use tryon_kit::server::Context;
@@ -48,7 +48,7 @@ pub(crate) enum Command {
 pub(crate) struct Setup {
     pub(crate) id: String,
     pub(crate) ctx: Context,
-    pub(crate) tracking: Channel,
+    pub(crate) tracking: Connection,
     pub(crate) idle: Duration,
     pub(crate) adapts_detail: bool,
     pub(crate) library: Arc<Library>,

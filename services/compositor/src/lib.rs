@@ -19,10 +19,10 @@ mod try_on;
 mod upstream;
 mod viewer;
 
+use axum::Router;
 use axum::body::Body;
 use axum::middleware::{Next, from_fn};
 use http::{Request, Response};
-use tonic::service::Routes;
 use tonic_web::GrpcWebLayer;
 use tryon_kit::config::Config;
 use tryon_kit::hosts::Hosts;
@@ -52,27 +52,23 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
     routes.add_service(
         CompositorServiceServer::new(service).max_decoding_message_size(server::MAX_REQUEST_BYTES),
     );
-    let grpc = routes
-        .routes()
-        .into_axum_router()
-        .layer(GrpcWebLayer::new());
-    let app = grpc
-        .reset_fallback()
-        .merge(page::router())
-        .merge(photos::router(photos));
     let mut names = c.hosts.clone();
     let public = c.public.parse::<http::Uri>().ok();
     names.extend(public.and_then(|u| u.host().map(str::to_owned)));
     let hosts = Hosts::new(&names, &c.origins);
-    let routes = Routes::from(app.layer(from_fn(move |r, next| {
-        own_pages_only(hosts.clone(), r, next)
-    })));
+    let around = move |grpc: Router| {
+        let grpc = grpc.layer(GrpcWebLayer::new()).reset_fallback();
+        let own = from_fn(move |r, next| own_pages_only(hosts.clone(), r, next));
+        let open = page::router().merge(photos::router(photos));
+        grpc.merge(open).layer(own)
+    };
     let service = Service {
         name: "compositor",
         grpc_name: SERVICE_NAME,
         address: c.address,
         admin: c.admin,
-        routes,
+        routes: routes.routes(),
+        around: Some(Box::new(around)),
         http1: true,
         health,
     };

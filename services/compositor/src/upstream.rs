@@ -5,8 +5,8 @@ use std::sync::Arc;
 use tokio::sync::watch;
 use tokio_stream::StreamExt;
 use tonic::Status;
-use tonic::transport::Channel;
 use tonic_types::{ErrorDetails, FieldViolation, StatusExt};
+use tryon_kit::auth::Connection;
 use tryon_kit::client::{pauses, request};
 use tryon_kit::queue::latest;
 use tryon_proto::convert::frame::stages_from_wire;
@@ -38,13 +38,13 @@ pub(crate) enum News {
     Gone(String),
 }
 
-pub(crate) fn client(channel: Channel) -> ClothServiceClient<Channel> {
+pub(crate) fn client(channel: Connection) -> ClothServiceClient<Connection> {
     ClothServiceClient::new(channel).max_decoding_message_size(MAX_GARMENT_BYTES)
 }
 
 /// Requests an outfit from cloth; cloth's own revision of it.
 pub(crate) async fn dress(
-    client: &mut ClothServiceClient<Channel>,
+    client: &mut ClothServiceClient<Connection>,
     session: &str,
     choices: &[GarmentChoice],
 ) -> Result<u64, Status> {
@@ -80,7 +80,7 @@ pub(crate) fn renamed(s: &Status, message: &str) -> Status {
 
 /// Follows the garments of `session` until the receiver of `news` is gone, and dresses it as wanted.
 pub(crate) async fn follow(
-    channel: Channel,
+    channel: Connection,
     session: String,
     mut wanted: watch::Receiver<Wanted>,
     news: latest::Sender<News>,
@@ -104,7 +104,7 @@ pub(crate) async fn follow(
 }
 
 async fn one_stream(
-    client: &mut ClothServiceClient<Channel>,
+    client: &mut ClothServiceClient<Connection>,
     session: &str,
     wanted: &mut watch::Receiver<Wanted>,
     news: &latest::Sender<News>,

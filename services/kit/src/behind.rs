@@ -1,9 +1,9 @@
 //! Health of the services behind a port, told at that port under their own gRPC names.
 
+use crate::auth::Connection;
 use crate::server::Context;
 use futures::future::join_all;
 use std::time::Duration;
-use tonic::transport::Channel;
 use tonic_health::ServingStatus;
 use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_check_response::ServingStatus as Answer;
@@ -14,7 +14,7 @@ use tonic_health::server::HealthReporter;
 const EVERY: Duration = Duration::from_millis(500);
 
 /// Asks each service (gRPC name, connection) until shutdown, and reports what it answers.
-pub fn follow(reporter: HealthReporter, ctx: &Context, services: Vec<(&'static str, Channel)>) {
+pub fn follow(reporter: HealthReporter, ctx: &Context, services: Vec<(&'static str, Connection)>) {
     let shutdown = ctx.shutdown.clone();
     tokio::spawn(async move {
         let mut tick = tokio::time::interval(EVERY);
@@ -37,7 +37,7 @@ pub fn follow(reporter: HealthReporter, ctx: &Context, services: Vec<(&'static s
 }
 
 /// Status of one service; a silent one does not serve.
-async fn ask(name: &str, channel: Channel) -> ServingStatus {
+async fn ask(name: &str, channel: Connection) -> ServingStatus {
     let question = HealthCheckRequest {
         service: name.into(),
     };
@@ -51,9 +51,14 @@ async fn ask(name: &str, channel: Channel) -> ServingStatus {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::auth::Credentials;
     use crate::client::channel;
     use crate::connections;
     use tokio::net::TcpListener;
+
+    fn connect(url: &str) -> Connection {
+        Credentials::none().present(channel(url).expect("a URL"))
+    }
 
     #[tokio::test]
     async fn a_service_that_serves_is_told_from_one_that_is_dead() {
@@ -72,7 +77,7 @@ mod tests {
             ));
         tokio::spawn(server);
 
-        let living = channel(&url).expect("a URL");
+        let living = connect(&url);
         assert!(matches!(
             ask("up", living.clone()).await,
             ServingStatus::Serving
@@ -81,7 +86,7 @@ mod tests {
             ask("other", living).await,
             ServingStatus::NotServing
         ));
-        let dead = channel("http://127.0.0.1:1").expect("a URL");
+        let dead = connect("http://127.0.0.1:1");
         assert!(matches!(ask("up", dead).await, ServingStatus::NotServing));
     }
 }

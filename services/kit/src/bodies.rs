@@ -1,5 +1,6 @@
 //! Subscription to the body states of a tracking session, through losses and restarts; for cloth and compositor.
 
+use crate::auth::Connection;
 use crate::client::{pauses, request};
 use crate::compute::Pool;
 use crate::consent::Keys;
@@ -7,7 +8,6 @@ use crate::frames::CameraKey;
 use crate::queue::latest;
 use std::sync::Arc;
 use tokio_stream::StreamExt;
-use tonic::transport::Channel;
 use tryon::body::{BodyShape, Template};
 use tryon_proto::convert::{body, required};
 use tryon_proto::v1::tracking_service_client::TrackingServiceClient;
@@ -52,7 +52,7 @@ impl FollowedSession {
     /// Opens the session if it has a camera.
     async fn open(
         &mut self,
-        client: &mut TrackingServiceClient<Channel>,
+        client: &mut TrackingServiceClient<Connection>,
     ) -> Result<(), tonic::Status> {
         if let Some(Opening { camera, keys }) = &mut self.opening {
             let message = OpenSessionRequest {
@@ -81,7 +81,7 @@ impl FollowedSession {
 ///
 /// The newest state wins. Shapes are never lost: they are joined to states before the queue drops any.
 pub async fn follow(
-    channel: Channel,
+    channel: Connection,
     session: String,
     opening: Option<Opening>,
     pool: Arc<Pool>,
@@ -111,7 +111,7 @@ pub async fn follow(
 }
 
 async fn one_stream(
-    client: &mut TrackingServiceClient<Channel>,
+    client: &mut TrackingServiceClient<Connection>,
     session: &mut FollowedSession,
     pool: &Pool,
     news: &latest::Sender<News>,

@@ -1,10 +1,10 @@
 //! Lease of consent at the capture service: a camera publishes only while somebody who watches renews it.
 
+use crate::auth::Connection;
 use crate::frames::{CameraKey, FrameBus};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::watch;
-use tonic::transport::Channel;
 use tonic::{Code, Status};
 use tryon_proto::v1::capture_service_client::CaptureServiceClient;
 use tryon_proto::v1::{FrameKey, HoldConsentRequest, ListCamerasRequest};
@@ -22,11 +22,11 @@ const DEADLINE: Duration = Duration::from_millis(500);
 
 /// Cameras of the capture service.
 #[derive(Clone)]
-pub struct Cameras(CaptureServiceClient<Channel>);
+pub struct Cameras(CaptureServiceClient<Connection>);
 
 impl Cameras {
     /// Cameras of the capture service behind `channel`.
-    pub fn new(channel: Channel) -> Self {
+    pub fn new(channel: Connection) -> Self {
         Self(CaptureServiceClient::new(channel))
     }
 

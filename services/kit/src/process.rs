@@ -1,5 +1,6 @@
 //! A service as a process: parse, validate (exit 64), build, announce addresses, serve, drain, report the end.
 
+use crate::auth::Auth;
 use crate::bus::ZenohBus;
 use crate::compute::Pool;
 use crate::config::Config;
@@ -31,7 +32,7 @@ pub struct Args {
     /// Sets one key, such as `--set tracking.address=127.0.0.1:0`; wins over file and environment.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// Lets addresses beyond loopback be bound, where anybody who reaches them sees the person.
+    /// Lets addresses beyond loopback be bound without TLS and tokens: anybody who reaches them sees the person.
     #[arg(long)]
     pub insecure: bool,
     /// Checks the configuration and ends.
@@ -104,11 +105,13 @@ where
         }
         Err(e) => {
             complain(name, &e.to_string());
-            ExitCode::from(if matches!(e, StartError::Config { .. }) {
-                EXIT_USAGE
-            } else {
-                EXIT_BROKEN
-            })
+            ExitCode::from(
+                if matches!(e, StartError::Config { .. } | StartError::Auth(_)) {
+                    EXIT_USAGE
+                } else {
+                    EXIT_BROKEN
+                },
+            )
         }
     }
 }
@@ -128,6 +131,7 @@ where
         service: name,
         why: e.to_string(),
     };
+    let auth = Auth::open(&config, None)?;
     let pool = Pool::new(config.process.compute_threads).map_err(broken)?;
     let (listen, connect) = match role {
         BusRole::Listen => (&config.bus.listen[..], &[][..]),
@@ -140,6 +144,7 @@ where
         pool: pool.clone(),
         shutdown: shutdown.clone(),
         grace,
+        auth,
     };
     crate::telemetry::show_zeros(name);
     let running = start(config, ctx).await?;

@@ -1,5 +1,6 @@
 //! gRPC servers: health and reflection beside the service, limits and keepalive, an end with a deadline.
 
+use crate::auth::{Auth, AuthError};
 use crate::compute::Pool;
 use crate::connections::{self, Limits};
 use crate::deadline::within_deadline;
@@ -7,6 +8,7 @@ use crate::drain::{Drained, until_deadline};
 use crate::frames::FrameBus;
 use crate::transport;
 use crate::undecodable::blame_caller;
+use axum::Router;
 use axum::middleware::from_fn;
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -38,6 +40,8 @@ pub struct Context {
     pub shutdown: CancellationToken,
     /// Time that open streams have to finish.
     pub grace: Duration,
+    /// Who may call, and the process's own token.
+    pub auth: Auth,
 }
 
 /// A service that could not start, or broke.
@@ -61,6 +65,9 @@ pub enum StartError {
         /// Fault.
         why: String,
     },
+    /// A file of `[auth]` turned out unusable.
+    #[error(transparent)]
+    Auth(#[from] AuthError),
     /// The bus could not be joined.
     #[error(transparent)]
     Bus(#[from] crate::frames::BusError),
@@ -134,6 +141,9 @@ pub fn routes(grpc_name: &str) -> Result<(RoutesBuilder, HealthReporter), StartE
     Ok((builder, reporter))
 }
 
+/// Layers and routes around guarded ones.
+pub type Around = Box<dyn FnOnce(Router) -> Router + Send>;
+
 /// Arguments of [`start`].
 pub struct Service {
     /// Its name, as in the configuration: `tracking`.
@@ -144,8 +154,10 @@ pub struct Service {
     pub address: SocketAddr,
     /// Admin address to bind.
     pub admin: SocketAddr,
-    /// Its routes.
+    /// Its routes; they are put behind the gate of `auth`.
     pub routes: Routes,
+    /// Layers and routes around the gate, which see requests without a token.
+    pub around: Option<Around>,
     /// Speaks HTTP/1.1 too, for browsers.
     pub http1: bool,
     /// Reports its health.
@@ -163,9 +175,15 @@ pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartErro
         address,
         admin,
         routes,
+        around,
         http1,
         health,
     } = service;
+    let guarded = ctx.auth.guard(name, routes.into_axum_router());
+    let routes = Routes::from(match around {
+        Some(around) => around(guarded),
+        None => guarded,
+    });
     let bind = |key: &'static str, address| {
         move |source| StartError::Bind {
             key: format!("{name}.{key}"),

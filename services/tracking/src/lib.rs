@@ -38,6 +38,7 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         address: c.address,
         admin: c.admin,
         routes: routes.routes(),
+        around: None,
         http1: false,
         health,
     };

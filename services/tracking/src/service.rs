@@ -7,8 +7,9 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio_stream::StreamExt;
 use tokio_stream::wrappers::WatchStream;
-use tonic::{Request, Response, Status};
+use tonic::{Code, Request, Response, Status};
 use tryon::body::Template;
+use tryon_kit::auth::Grant;
 use tryon_kit::config::TrackingConfig;
 use tryon_kit::server::Context;
 use tryon_kit::sessions::{Opened, Sessions, brief, random_id};
@@ -36,10 +37,14 @@ impl Tracking {
             idle: Duration::from_secs(config.idle_s),
         }
     }
-    fn find(&self, id: &str) -> Result<Arc<Handle>, Status> {
-        self.sessions
-            .get(id)
-            .ok_or_else(|| not_found("session", id))
+    /// Session of that id, if the request's token reaches it.
+    fn find<T>(&self, r: &Request<T>, id: &str) -> Result<Arc<Handle>, Status> {
+        let grant = Grant::of(r)?;
+        grant.check_session(id)?;
+        let found = self.sessions.get(id);
+        let handle = found.ok_or_else(|| not_found("session", id))?;
+        grant.check_camera(&handle.key)?;
+        Ok(handle)
     }
 }
 
@@ -49,13 +54,16 @@ impl TrackingService for Tracking {
         &self,
         r: Request<OpenSessionRequest>,
     ) -> Result<Response<OpenSessionResponse>, Status> {
+        let grant = Grant::of(&r)?;
         let r = r.get_ref();
         let id = if r.session_id.is_empty() {
             random_id()
         } else {
             request::session_id("open_session_request.session_id", &r.session_id)?
         };
+        grant.check_session(&id)?;
         let key = request::camera_key("open_session_request", &r.store, &r.camera)?;
+        grant.check_camera(&key)?;
         if let Some(frame_key) = &r.frame_key {
             self.ctx.bus.learn(&key, frame_key);
         }
@@ -103,8 +111,15 @@ impl TrackingService for Tracking {
         &self,
         r: Request<CloseSessionRequest>,
     ) -> Result<Response<CloseSessionResponse>, Status> {
-        if let Some(h) = self.sessions.remove(&r.get_ref().session_id) {
-            let _ = h.commands.send(Command::Close).await;
+        let id = &r.get_ref().session_id;
+        match self.find(&r, id) {
+            Ok(h) => {
+                self.sessions.remove_if(id, |open| std::ptr::eq(open, &*h));
+                let _ = h.commands.send(Command::Close).await;
+            }
+            // An unknown id is no error.
+            Err(s) if s.code() == Code::NotFound => {}
+            Err(s) => return Err(s),
         }
         Ok(Response::new(CloseSessionResponse {}))
     }
@@ -114,7 +129,7 @@ impl TrackingService for Tracking {
         r: Request<ResetSessionRequest>,
     ) -> Result<Response<ResetSessionResponse>, Status> {
         let id = &r.get_ref().session_id;
-        self.find(id)?
+        self.find(&r, id)?
             .commands
             .send(Command::Reset)
             .await
@@ -142,7 +157,7 @@ impl TrackingService for Tracking {
         &self,
         r: Request<StreamBodyStatesRequest>,
     ) -> Result<Response<Self::StreamBodyStatesStream>, Status> {
-        let handle = self.find(&r.get_ref().session_id)?;
+        let handle = self.find(&r, &r.get_ref().session_id)?;
         let mut sent = 0;
         // The stream ends when the session's task, which holds the sender, ends.
         let states = WatchStream::new(handle.states.clone()).map(move |state| {

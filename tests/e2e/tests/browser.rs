@@ -14,6 +14,7 @@ use std::time::Duration;
 use anyhow::{Result, anyhow, bail, ensure};
 use tokio::runtime::Runtime;
 use tokio_util::sync::CancellationToken;
+use tryon_kit::auth::Auth;
 use tryon_kit::compute::Pool;
 use tryon_kit::config::Config;
 use tryon_kit::frames::LocalBus;
@@ -120,6 +121,7 @@ impl Chain {
             pool: self.pool.clone(),
             shutdown: shutdown.clone(),
             grace: Duration::from_millis(200),
+            auth: Auth::off(),
         };
         let config = &self.config;
         let running = self.runtime.block_on(async {

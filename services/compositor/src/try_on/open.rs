@@ -7,8 +7,8 @@ use crate::upstream::{self, Wanted};
 use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tokio_util::sync::CancellationToken;
-use tonic::transport::Channel;
 use tryon::session::SilenceLimits;
+use tryon_kit::auth::Connection;
 use tryon_kit::bodies::{self, Opening};
 use tryon_kit::client::{CALL_DEADLINE, channel, request};
 use tryon_kit::config::CompositorConfig;
@@ -71,6 +71,8 @@ async fn run(
     ) else {
         return "a URL is none";
     };
+    let credentials = setup.ctx.auth.credentials();
+    let (tracking, cloth) = (credentials.present(tracking), credentials.present(cloth));
     let id = setup.id.clone();
 
     let (is_watched, watched) = watch::channel(false);
@@ -128,7 +130,7 @@ fn limits(config: &CompositorConfig) -> SilenceLimits {
 }
 
 /// Closes the sessions behind a try-on, within a deadline: idle ones end by themselves.
-async fn close_sessions(id: String, tracking: Channel, cloth: Channel) {
+async fn close_sessions(id: String, tracking: Connection, cloth: Connection) {
     let close = async {
         let session_id = id.clone();
         let _ = TrackingServiceClient::new(tracking)

@@ -6,6 +6,7 @@ use tokio::runtime::Runtime;
 use tokio_util::sync::CancellationToken;
 use tonic::Streaming;
 use tonic::transport::Channel;
+use tryon_kit::auth::Auth;
 use tryon_kit::bus::{ZenohBus, free_tcp_endpoint};
 use tryon_kit::config::CameraConfig;
 use tryon_kit::server::{Context, Outcome, Running, StartError};
@@ -154,6 +155,7 @@ impl Kiosk {
                 pool,
                 shutdown: token,
                 grace: Duration::from_millis(config.process.grace_ms),
+                auth: Auth::open(&config, None)?,
             };
             match part {
                 Part::Capture => tryon_capture::start(&config, ctx).await,
