@@ -3170,6 +3170,18 @@ pub mod cloth_service_server {
         const NAME: &'static str = SERVICE_NAME;
     }
 }
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct RedeemCodeRequest {
+    /// Twelve letters and digits; case, dashes and spaces do not matter.
+    #[prost(string, tag = "1")]
+    pub code: ::prost::alloc::string::String,
+}
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct RedeemCodeResponse {
+    /// To be sent with every call from now on, as `authorization: Bearer TOKEN`.
+    #[prost(string, tag = "1")]
+    pub token: ::prost::alloc::string::String,
+}
 /// Consent of the person before the camera.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct Consent {
@@ -3889,6 +3901,33 @@ pub mod compositor_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CompositorService", "OfferPhoto"));
             self.inner.unary(req, path, codec).await
         }
+        /// Trades an enrolment code (`tryon token enrol`) for a kiosk's token: once, within ten minutes. Beside health the one
+        /// call that is made without a token. UNAUTHENTICATED when the code is unknown, used or too old, and after ten wrong
+        /// ones from an address, which gets another try every ten seconds; FAILED_PRECONDITION for callers with a token.
+        pub async fn redeem_code(
+            &mut self,
+            request: impl tonic::IntoRequest<super::RedeemCodeRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::RedeemCodeResponse>,
+            tonic::Status,
+        > {
+            self.inner
+                .ready()
+                .await
+                .map_err(|e| {
+                    tonic::Status::unknown(
+                        format!("Service was not ready: {}", e.into()),
+                    )
+                })?;
+            let codec = tonic_prost::ProstCodec::default();
+            let path = http::uri::PathAndQuery::from_static(
+                "/tryon.v1.CompositorService/RedeemCode",
+            );
+            let mut req = request.into_request();
+            req.extensions_mut()
+                .insert(GrpcMethod::new("tryon.v1.CompositorService", "RedeemCode"));
+            self.inner.unary(req, path, codec).await
+        }
     }
 }
 /// Generated server implementations.
@@ -4010,6 +4049,16 @@ pub mod compositor_service_server {
             request: tonic::Request<super::OfferPhotoRequest>,
         ) -> std::result::Result<
             tonic::Response<super::OfferPhotoResponse>,
+            tonic::Status,
+        >;
+        /// Trades an enrolment code (`tryon token enrol`) for a kiosk's token: once, within ten minutes. Beside health the one
+        /// call that is made without a token. UNAUTHENTICATED when the code is unknown, used or too old, and after ten wrong
+        /// ones from an address, which gets another try every ten seconds; FAILED_PRECONDITION for callers with a token.
+        async fn redeem_code(
+            &self,
+            request: tonic::Request<super::RedeemCodeRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::RedeemCodeResponse>,
             tonic::Status,
         >;
     }
@@ -4541,6 +4590,51 @@ pub mod compositor_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = OfferPhotoSvc(inner);
+                        let codec = tonic_prost::ProstCodec::default();
+                        let mut grpc = tonic::server::Grpc::new(codec)
+                            .apply_compression_config(
+                                accept_compression_encodings,
+                                send_compression_encodings,
+                            )
+                            .apply_max_message_size_config(
+                                max_decoding_message_size,
+                                max_encoding_message_size,
+                            );
+                        let res = grpc.unary(method, req).await;
+                        Ok(res)
+                    };
+                    Box::pin(fut)
+                }
+                "/tryon.v1.CompositorService/RedeemCode" => {
+                    #[allow(non_camel_case_types)]
+                    struct RedeemCodeSvc<T: CompositorService>(pub Arc<T>);
+                    impl<
+                        T: CompositorService,
+                    > tonic::server::UnaryService<super::RedeemCodeRequest>
+                    for RedeemCodeSvc<T> {
+                        type Response = super::RedeemCodeResponse;
+                        type Future = BoxFuture<
+                            tonic::Response<Self::Response>,
+                            tonic::Status,
+                        >;
+                        fn call(
+                            &mut self,
+                            request: tonic::Request<super::RedeemCodeRequest>,
+                        ) -> Self::Future {
+                            let inner = Arc::clone(&self.0);
+                            let fut = async move {
+                                <T as CompositorService>::redeem_code(&inner, request).await
+                            };
+                            Box::pin(fut)
+                        }
+                    }
+                    let accept_compression_encodings = self.accept_compression_encodings;
+                    let send_compression_encodings = self.send_compression_encodings;
+                    let max_decoding_message_size = self.max_decoding_message_size;
+                    let max_encoding_message_size = self.max_encoding_message_size;
+                    let inner = self.inner.clone();
+                    let fut = async move {
+                        let method = RedeemCodeSvc(inner);
                         let codec = tonic_prost::ProstCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(

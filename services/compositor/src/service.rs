@@ -8,12 +8,13 @@ use crate::try_on::{self, Command, Handle, Setup};
 use crate::upstream::{self, renamed};
 use crate::viewer::viewer;
 use futures::Stream;
+use std::net::Ipv4Addr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::oneshot;
-use tonic::transport::Channel;
 use tonic::{Code, Request, Response, Status};
+use tryon_kit::auth::{Connection, EnrolFault, Grant};
 use tryon_kit::client::{channel, request as call};
 use tryon_kit::config::CompositorConfig;
 use tryon_kit::consent::Cameras;
@@ -44,9 +45,9 @@ pub(crate) struct Compositor {
     admission: Admission,
     config: CompositorConfig,
     ctx: Context,
-    cloth: Channel,
-    tracking: Channel,
-    capture: Channel,
+    cloth: Connection,
+    tracking: Connection,
+    capture: Connection,
     cameras: Cameras,
     photos: Photos,
     card: Card,
@@ -62,9 +63,10 @@ impl Compositor {
             let key = format!("compositor.{key}");
             move |why| StartError::Config { key, why }
         };
-        let tracking = channel(&config.tracking).map_err(fault("tracking"))?;
-        let cloth = channel(&config.cloth).map_err(fault("cloth"))?;
-        let capture = channel(&config.capture).map_err(fault("capture"))?;
+        let present = |channel| ctx.auth.credentials().present(channel);
+        let tracking = present(channel(&config.tracking).map_err(fault("tracking"))?);
+        let cloth = present(channel(&config.cloth).map_err(fault("cloth"))?);
+        let capture = present(channel(&config.capture).map_err(fault("capture"))?);
         let card = Card::open(config.renderer).map_err(|e| StartError::Config {
             key: "compositor.renderer".into(),
             why: e.to_string(),
@@ -86,7 +88,7 @@ impl Compositor {
     }
 
     /// Services behind this one, by gRPC name.
-    pub(crate) fn behind(&self) -> Vec<(&'static str, Channel)> {
+    pub(crate) fn behind(&self) -> Vec<(&'static str, Connection)> {
         vec![
             (CAPTURE, self.capture.clone()),
             (TRACKING, self.tracking.clone()),
@@ -94,28 +96,32 @@ impl Compositor {
         ]
     }
 
-    fn find(&self, id: &str) -> Result<Arc<Handle>, Status> {
-        self.try_ons
-            .get(id)
-            .filter(|h| !h.commands.is_closed())
-            .ok_or_else(|| not_found("try-on", id))
+    /// Try-on of that id, open or ending, if the request's token reaches it.
+    fn reach<T>(&self, r: &Request<T>, id: &str) -> Result<Option<Arc<Handle>>, Status> {
+        let grant = Grant::of(r)?;
+        grant.check_session(id)?;
+        let found = self.try_ons.get(id);
+        if let Some(handle) = &found {
+            grant.check_camera(&handle.key)?;
+        }
+        Ok(found)
     }
 
-    /// Newest picture of a try-on, at the camera's size.
-    async fn snapshot(&self, id: &str, encoding: Encoding) -> Result<Picture, Status> {
-        let handle = self.find(id)?;
-        let (answer, drawn) = oneshot::channel();
-        let gone = || not_found("try-on", id);
-        handle
-            .commands
-            .send(Command::Snapshot(encoding, answer))
-            .await
-            .map_err(|_| gone())?;
-        let late = |_| unavailable("compositor", "the picture took too long");
-        tokio::time::timeout(SNAPSHOT_DEADLINE, drawn)
-            .await
-            .map_err(late)?
-            .map_err(|_| gone())?
+    /// The open try-on of that id.
+    fn find<T>(&self, r: &Request<T>, id: &str) -> Result<Arc<Handle>, Status> {
+        let open = |h: &Arc<Handle>| !h.commands.is_closed();
+        let found = self.reach(r, id)?.filter(open);
+        found.ok_or_else(|| not_found("try-on", id))
+    }
+
+    /// Takes a try-on out of the directory to end it; `None` when there is none.
+    fn take<T>(&self, r: &Request<T>, id: &str) -> Result<Option<Arc<Handle>>, Status> {
+        let found = self.reach(r, id)?;
+        if let Some(handle) = &found {
+            self.try_ons
+                .remove_if(id, |open| std::ptr::eq(open, &**handle));
+        }
+        Ok(found)
     }
 
     /// Dresses the session in cloth. A silent cloth service is UNAVAILABLE, no fault of the outfit.
@@ -133,15 +139,33 @@ impl Compositor {
     }
 }
 
+/// Newest picture of try-on `id`, at the camera's size.
+async fn snapshot(handle: &Handle, id: &str, encoding: Encoding) -> Result<Picture, Status> {
+    let (answer, drawn) = oneshot::channel();
+    let gone = || not_found("try-on", id);
+    handle
+        .commands
+        .send(Command::Snapshot(encoding, answer))
+        .await
+        .map_err(|_| gone())?;
+    let late = |_| unavailable("compositor", "the picture took too long");
+    tokio::time::timeout(SNAPSHOT_DEADLINE, drawn)
+        .await
+        .map_err(late)?
+        .map_err(|_| gone())?
+}
+
 #[tonic::async_trait]
 impl CompositorService for Compositor {
     async fn open_try_on(
         &self,
         r: Request<OpenTryOnRequest>,
     ) -> Result<Response<OpenTryOnResponse>, Status> {
+        let grant = Grant::of(&r)?;
         let r = r.get_ref();
         let id = if r.try_on_id.is_empty() {
-            random_id()
+            // A token for one try-on names it.
+            grant.session().map_or_else(random_id, Into::into)
         } else {
             request::session_id("open_try_on_request.try_on_id", &r.try_on_id)?
         };
@@ -152,11 +176,11 @@ impl CompositorService for Compositor {
                 given.to_owned()
             }
         };
-        let (store, camera) = (
-            or(&r.store, &self.config.store),
-            or(&r.camera, &self.config.camera),
-        );
+        let camera = grant.camera().unwrap_or(&self.config.camera);
+        let (store, camera) = (or(&r.store, &self.config.store), or(&r.camera, camera));
+        grant.check_session(&id)?;
         let key = request::camera_key("open_try_on_request", &store, &camera)?;
+        grant.check_camera(&key)?;
         let choices = request::choices("open_try_on_request", &r.garments)?;
         if !r.consent.is_some_and(|c| c.given) {
             return Err(Status::failed_precondition(
@@ -229,7 +253,7 @@ impl CompositorService for Compositor {
         &self,
         r: Request<CloseTryOnRequest>,
     ) -> Result<Response<CloseTryOnResponse>, Status> {
-        if let Some(h) = self.try_ons.remove(&r.get_ref().try_on_id) {
+        if let Some(h) = self.take(&r, &r.get_ref().try_on_id)? {
             let _ = h.commands.send(Command::Close(TryOnEnd::Requested)).await;
         }
         Ok(Response::new(CloseTryOnResponse {}))
@@ -239,7 +263,7 @@ impl CompositorService for Compositor {
         &self,
         r: Request<WithdrawConsentRequest>,
     ) -> Result<Response<WithdrawConsentResponse>, Status> {
-        if let Some(h) = self.try_ons.remove(&r.get_ref().try_on_id) {
+        if let Some(h) = self.take(&r, &r.get_ref().try_on_id)? {
             let _ = h.commands.send(Command::Close(TryOnEnd::Withdrawn)).await;
             tokio::time::timeout(WITHDRAWAL_DEADLINE, h.over.cancelled())
                 .await
@@ -252,8 +276,8 @@ impl CompositorService for Compositor {
         &self,
         r: Request<ChooseGarmentsRequest>,
     ) -> Result<Response<ChooseGarmentsResponse>, Status> {
+        let handle = self.find(&r, &r.get_ref().try_on_id)?;
         let r = r.get_ref();
-        let handle = self.find(&r.try_on_id)?;
         let choices = request::choices("choose_garments_request", &r.garments)?;
         let accepted = self
             .dress(&r.try_on_id, &choices, "choose_garments_request")
@@ -282,8 +306,8 @@ impl CompositorService for Compositor {
         &self,
         r: Request<ShowFitRequest>,
     ) -> Result<Response<ShowFitResponse>, Status> {
+        let handle = self.find(&r, &r.get_ref().try_on_id)?;
         let r = r.get_ref();
-        let handle = self.find(&r.try_on_id)?;
         let gone = |_| not_found("try-on", &r.try_on_id);
         handle
             .commands
@@ -306,6 +330,33 @@ impl CompositorService for Compositor {
         Ok(Response::new(ListGarmentChoicesResponse { garments }))
     }
 
+    async fn redeem_code(
+        &self,
+        r: Request<RedeemCodeRequest>,
+    ) -> Result<Response<RedeemCodeResponse>, Status> {
+        if !Grant::of(&r)?.is_nothing() {
+            let why = "a code is for callers without a token, where tokens are asked for";
+            return Err(Status::failed_precondition(why));
+        }
+        let Some(codes) = self.ctx.auth.enrolments() else {
+            return Err(Status::unauthenticated("no codes are traded here"));
+        };
+        let peer = r
+            .remote_addr()
+            .map_or(Ipv4Addr::UNSPECIFIED.into(), |a| a.ip());
+        let code = r.into_inner().code;
+        let trade = tokio::task::spawn_blocking(move || codes.redeem(&code, peer));
+        let traded = trade.await.map_err(|e| Status::internal(e.to_string()))?;
+        match traded {
+            Ok(token) => Ok(Response::new(RedeemCodeResponse { token })),
+            Err(EnrolFault::Folder(e)) => {
+                tracing::error!(error = %e, "auth.enrolments cannot be read");
+                Err(Status::unavailable("codes cannot be traded now"))
+            }
+            Err(e) => Err(Status::unauthenticated(e.to_string())),
+        }
+    }
+
     type StreamFramesStream = Pictures;
 
     async fn stream_frames(
@@ -313,9 +364,9 @@ impl CompositorService for Compositor {
         r: Request<StreamFramesRequest>,
     ) -> Result<Response<Pictures>, Status> {
         let peer = r.remote_addr();
+        let format = request::picture_format(r.get_ref())?;
+        let handle = self.find(&r, &r.get_ref().try_on_id)?;
         let r = r.get_ref();
-        let format = request::picture_format(r)?;
-        let handle = self.find(&r.try_on_id)?;
         let gone = || not_found("try-on", &r.try_on_id);
         let (viewer, reader) = viewer(&r.try_on_id, format, peer);
         let (answer, is_admitted) = oneshot::channel();
@@ -329,8 +380,8 @@ impl CompositorService for Compositor {
         &self,
         r: Request<AcknowledgeFramesRequest>,
     ) -> Result<Response<AcknowledgeFramesResponse>, Status> {
+        let handle = self.find(&r, &r.get_ref().try_on_id)?;
         let r = r.get_ref();
-        let handle = self.find(&r.try_on_id)?;
         let command = Command::Acknowledge(r.stream, r.number);
         let gone = |_| not_found("try-on", &r.try_on_id);
         handle.commands.send(command).await.map_err(gone)?;
@@ -341,15 +392,15 @@ impl CompositorService for Compositor {
         &self,
         r: Request<TakeSnapshotRequest>,
     ) -> Result<Response<TakeSnapshotResponse>, Status> {
-        let r = r.get_ref();
-        let encoding = match PictureCodec::try_from(r.codec) {
+        let encoding = match PictureCodec::try_from(r.get_ref().codec) {
             Ok(PictureCodec::Unspecified | PictureCodec::Png) => Encoding::Png,
             Ok(PictureCodec::Jpeg) => Encoding::Jpeg(SNAPSHOT_QUALITY),
             Err(_) => {
                 return Err(WireError::new("take_snapshot_request.codec", "JPEG or PNG").into());
             }
         };
-        let picture = self.snapshot(&r.try_on_id, encoding).await?;
+        let handle = self.find(&r, &r.get_ref().try_on_id)?;
+        let picture = snapshot(&handle, &r.get_ref().try_on_id, encoding).await?;
         Ok(Response::new(TakeSnapshotResponse {
             picture: Some(picture),
         }))
@@ -361,9 +412,10 @@ impl CompositorService for Compositor {
     ) -> Result<Response<OfferPhotoResponse>, Status> {
         let origin = photos::origin(&self.config.public, r.metadata())?;
         let id = &r.get_ref().try_on_id;
-        let picture = self.snapshot(id, Encoding::Jpeg(SNAPSHOT_QUALITY)).await?;
+        let handle = self.find(&r, id)?;
+        let picture = snapshot(&handle, id, Encoding::Jpeg(SNAPSHOT_QUALITY)).await?;
         let url = origin + &self.photos.offer(id, picture.image.clone())?;
-        if let Err(gone) = self.find(id) {
+        if let Err(gone) = self.find(&r, id) {
             // Its end came before the offer and found nothing to drop.
             self.photos.forget(id);
             return Err(gone);
