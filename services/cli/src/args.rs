@@ -2,12 +2,17 @@
 
 mod clothcap;
 mod serve;
+mod token;
 
 pub(crate) use clothcap::{
     ClothcapAlignArgs, ClothcapArgs, ClothcapCaptureArgs, ClothcapRetargetArgs,
     ClothcapSegmentArgs, ClothcapWhat, ScanArgs, ScanFrameArgs, Shard,
 };
 pub(crate) use serve::{DemoArgs, UpArgs};
+pub(crate) use token::{
+    AudienceArg, ClaimArgs, TokenArgs, TokenEnrolArgs, TokenIssueArgs, TokenKeyArgs,
+    TokenRedeemArgs, TokenRevokeArgs, TokenWhat,
+};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -60,6 +65,8 @@ pub(crate) enum Command {
     TrainParts(TrainPartsArgs),
     /// Run time against error, methods side by side: tables as CSV and JSON, plots as SVG.
     Bench(BenchArgs),
+    /// Keys, tokens and enrolment codes: who may call the services.
+    Token(TokenArgs),
     /// Check this machine: cores, memory, graphics adapter, ports, shared data; report expected faults.
     Doctor(DoctorArgs),
 }

@@ -38,6 +38,7 @@ fn main() -> ExitCode {
         Command::Replay(a) => commands::replay::run(&a),
         Command::TrainParts(a) => commands::train_parts::run(&a),
         Command::Bench(a) => commands::bench::run(&a),
+        Command::Token(a) => commands::token::run(&a),
         Command::Doctor(a) => commands::doctor::run(&a),
     };
     match outcome {

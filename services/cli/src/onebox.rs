@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
+use tryon_kit::auth::{Auth, Issuer};
 use tryon_kit::client::pauses;
 use tryon_kit::compute::Pool;
 use tryon_kit::config::Config;
@@ -37,6 +38,9 @@ const SERVICES: [(&str, Start); 4] = [
 pub(crate) struct OneBox {
     /// Addresses by service name.
     pub(crate) addresses: Vec<(&'static str, SocketAddr, SocketAddr)>,
+    /// Token of the mirror's page. It and its key are drawn at each start; where `[auth] keys` are given, their holder
+    /// issues the page's token.
+    pub(crate) token: Option<String>,
     shutdown: CancellationToken,
     tasks: JoinSet<()>,
 }
@@ -48,6 +52,13 @@ impl OneBox {
     /// # Errors
     /// Names the service and the address or key at fault.
     pub(crate) async fn start(mut config: Config, bus: Option<Arc<dyn FrameBus>>) -> Result<Self> {
+        let issuer = Issuer::generate()?;
+        let auth = Auth::open(&config, Some(&issuer))?;
+        let token = if config.auth.keys.is_empty() {
+            Some(issuer.issue_for_process(config.store(), &["compositor"])?)
+        } else {
+            None
+        };
         let pool = Pool::new(config.process.compute_threads)
             .context("the compute threads cannot be started")?;
         let bus = bus.unwrap_or_else(|| LocalBus::new(Arc::clone(&pool)));
@@ -58,6 +69,7 @@ impl OneBox {
             pool,
             shutdown: shutdown.clone(),
             grace,
+            auth,
         };
         let mut addresses = Vec::new();
         let mut tasks = JoinSet::new();
@@ -77,6 +89,7 @@ impl OneBox {
         }
         Ok(Self {
             addresses,
+            token,
             shutdown,
             tasks,
         })
@@ -84,6 +97,13 @@ impl OneBox {
     /// gRPC address of a service.
     pub(crate) fn address(&self, name: &str) -> Option<SocketAddr> {
         self.addresses.iter().find(|a| a.0 == name).map(|a| a.1)
+    }
+    /// Address of the mirror's page. The token is behind `#`, where no log and no referrer sees it.
+    pub(crate) fn page(&self) -> Option<String> {
+        let address = self.address("compositor")?;
+        let token = self.token.as_ref();
+        let fragment = token.map_or(String::new(), |t| format!("#token={t}"));
+        Some(format!("http://{address}/{fragment}"))
     }
     /// Drains all services; each has its own hard deadline.
     pub(crate) async fn stop(mut self) {

@@ -2,11 +2,11 @@
 
 use anyhow::{Context, Result};
 use std::collections::BTreeMap;
-use std::net::SocketAddr;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use tryon::formats::image::{decode_jpeg, write_png_rgb};
-use tryon_kit::client::{channel, request};
+use tryon_kit::auth::Connection;
+use tryon_kit::client::request;
 use tryon_kit::telemetry;
 use tryon_proto::v1;
 use tryon_proto::v1::compositor_service_client::CompositorServiceClient;
@@ -52,14 +52,13 @@ pub(crate) struct Received {
 /// # Errors
 /// When the compositor refuses or falls silent, or a picture cannot be read or written.
 pub(crate) async fn watch(
-    address: SocketAddr,
+    compositor: Connection,
     garments: &[String],
     time: Duration,
     out: &Path,
 ) -> Result<Received> {
-    let channel = channel(&format!("http://{address}")).map_err(anyhow::Error::msg)?;
     let mut client =
-        CompositorServiceClient::new(channel).max_decoding_message_size(MAX_PICTURE_BYTES);
+        CompositorServiceClient::new(compositor).max_decoding_message_size(MAX_PICTURE_BYTES);
     let opened = client.open_try_on(request(open_request(garments))).await;
     let id = opened.context("opening a try-on")?.into_inner().try_on_id;
     let stream = v1::StreamFramesRequest {

@@ -30,7 +30,7 @@ pub(crate) struct DemoArgs {
     /// A recording instead of the synthetic person (looped).
     #[arg(long, value_name = "REC")]
     pub(crate) input: Option<PathBuf>,
-    /// Lets addresses beyond loopback be bound, where anybody who reaches them sees the person.
+    /// Lets addresses beyond loopback be bound without TLS and tokens: anybody who reaches them sees the person.
     #[arg(long)]
     pub(crate) insecure: bool,
 }
@@ -43,7 +43,7 @@ pub(crate) struct UpArgs {
     /// Check the configuration, print the result of all its layers, and stop.
     #[arg(long)]
     pub(crate) check: bool,
-    /// Lets addresses beyond loopback be bound, where anybody who reaches them sees the person.
+    /// Lets addresses beyond loopback be bound without TLS and tokens: anybody who reaches them sees the person.
     #[arg(long)]
     pub(crate) insecure: bool,
 }

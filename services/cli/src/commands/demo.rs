@@ -11,6 +11,8 @@ use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use tryon::garment::{Size, library};
+use tryon_kit::auth::Credentials;
+use tryon_kit::client::channel;
 use tryon_kit::config::{Config, LogConfig};
 use tryon_kit::drain;
 use tryon_kit::telemetry;
@@ -118,7 +120,8 @@ async fn demo(args: &DemoArgs) -> Result<ExitCode> {
             args.out.display()
         );
         let received = viewer::watch(
-            address,
+            Credentials::fixed(services.token.as_deref().unwrap_or_default())
+                .present(channel(&format!("http://{address}")).map_err(anyhow::Error::msg)?),
             &args.garments,
             Duration::from_secs_f64(seconds),
             &args.out,
@@ -127,7 +130,8 @@ async fn demo(args: &DemoArgs) -> Result<ExitCode> {
         services.stop().await;
         return summarise(args, &received?);
     }
-    println!("The mirror is open at http://{address} (Ctrl-C ends it)");
+    let page = services.page().unwrap_or_default();
+    println!("The mirror is open at {page} (Ctrl-C ends it)");
     let started = Instant::now();
     let limit = args.seconds.map_or(Duration::MAX, Duration::from_secs_f64);
     tokio::select! {

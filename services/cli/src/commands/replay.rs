@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 use tryon::formats::open_recording;
+use tryon_kit::auth::Auth;
 use tryon_kit::bus::ZenohBus;
 use tryon_kit::compute::Pool;
 use tryon_kit::config::{CameraConfig, Config};
@@ -52,6 +53,7 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<ExitCode> {
             pool,
             shutdown: shutdown.clone(),
             grace,
+            auth: Auth::off(),
         };
         let key = format!("tryon/{}/{name}/rgbd", config.capture.store);
         let service = tryon_capture::start(&config, ctx).await?;

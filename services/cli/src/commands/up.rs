@@ -45,8 +45,8 @@ pub(crate) fn run(args: &UpArgs) -> Result<ExitCode> {
         for (name, grpc, admin) in &services.addresses {
             println!("{name}: grpc {grpc} admin {admin}");
         }
-        if let Some(address) = services.address("compositor") {
-            println!("mirror: http://{address}");
+        if let Some(page) = services.page() {
+            println!("mirror: {page}");
         }
         let signal = drain::signal().await.context("signals")?;
         println!("{signal}: draining");
