@@ -12,6 +12,7 @@ from grpc_reflection.v1alpha import reflection_pb2, reflection_pb2_grpc
 from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
 
 from .box import SERVICES, Box, Setup
+from .credentials import Metadata
 from .range import Range
 from .raw import COMPOSITOR, Http2Call, framed
 from .report import Figure, attack
@@ -73,7 +74,7 @@ def reflection(ground: Range) -> list[Figure]:
     blind = dead = 0
     with ground.box() as box:
         for service in SERVICES:
-            channel = grpc.insecure_channel(box.of(service))
+            channel = grpc.intercept_channel(grpc.insecure_channel(box.of(service)), Presenting(box.metadata))
             try:
                 # `ProtoReflectionDescriptorDatabase.get_services` would do, but hides the status.
                 listed = v1alpha_services(channel)
@@ -84,6 +85,17 @@ def reflection(ground: Range) -> list[Figure]:
             dead += sum(not answers(box, service, name) for name in listed if name.startswith("tryon."))
             channel.close()
     return [Figure("ports without v1alpha", blind, 0, 0), Figure("listed and unanswered", dead, 0, 0)]
+
+
+class Presenting(grpc.StreamStreamClientInterceptor):
+    """Adds credentials to calls of tools that have no argument for them."""
+
+    def __init__(self, metadata: Metadata):
+        self.metadata = metadata
+
+    def intercept_stream_stream(self, call, details, requests):
+        """Passes a call on with the credentials."""
+        return call(details._replace(metadata=[*(details.metadata or ()), *self.metadata]), requests)
 
 
 def v1alpha_services(channel: grpc.Channel) -> list[str]:

@@ -29,12 +29,14 @@ class Authority:
             serialization.Encoding.PEM, serialization.PublicFormat.SubjectPublicKeyInfo
         )
         self.public_file, self.revoked_file = folder / "issuer.pub.pem", folder / "revoked.txt"
+        self.service_file = folder / "service.token"
         self.public_file.write_bytes(self.public)
         self.revoked_file.write_text("")
+        self.service_file.write_text(self.token())
 
     def settings(self) -> dict[str, object]:
-        """Section `[auth]` of the configuration."""
-        return {"keys": [str(self.public_file)], "revoked": str(self.revoked_file)}
+        """Section `[auth]` of the configuration; services in processes of their own present `token` to each other."""
+        return {"keys": [str(self.public_file)], "revoked": str(self.revoked_file), "token": str(self.service_file)}
 
     def claims(self, **changed: object) -> dict[str, object]:
         """Claims that allow everything in the store for an hour, with changes."""
