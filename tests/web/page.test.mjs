@@ -4,6 +4,7 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 
 import { Backoff, FIRST_DELAY, LONGEST_DELAY } from '../../services/compositor/web/js/backoff.js';
+import { takeToken } from '../../services/compositor/web/js/credentials.js';
 import { fitRows, fitWords } from '../../services/compositor/web/js/fit.js';
 import { Code, RpcError } from '../../services/compositor/web/js/grpc_web.js';
 import { Reason, End, State } from '../../services/compositor/web/js/messages.js';
@@ -53,6 +54,26 @@ test('every reason has words, and an unknown one too', () => {
 test('a broken line says when it tries again', () => {
   assert.match(present(known({ link: 'waiting', retryAt: 12_400 }), 10_000).hint, /again in 3 s/);
   assert.match(present(known({ link: 'opening', retryAt: 9_000 }), 10_000).title, /does not answer/);
+});
+
+test('a page that may not watch keeps no picture', () => {
+  for (const code of [Code.UNAUTHENTICATED, Code.PERMISSION_DENIED]) {
+    const said = present(known({ link: 'refused', error: new RpcError(code, 'no') }), 10_000);
+    assert.deepEqual([said.tone, said.blank], ['down', true]);
+  }
+});
+
+test('the token leaves the address and stays with the tab', () => {
+  const kept = new Map();
+  const store = { getItem: (k) => kept.get(k) ?? null, setItem: (k, v) => kept.set(k, v) };
+  const shown = [];
+  const history = { replaceState: (_state, _title, url) => shown.push(url) };
+  const at = (hash) => takeToken({ location: { hash, pathname: '/', search: '?idle=9' }, history, store });
+  assert.equal(at(''), '');
+  assert.equal(at('#token=a.b-c_d'), 'a.b-c_d');
+  assert.equal(at(''), 'a.b-c_d');
+  assert.equal(at('#x=1&token=e'), 'e');
+  assert.deepEqual(shown, ['/?idle=9', '/?idle=9#x=1']);
 });
 
 test('ages in words', () => {

@@ -44,6 +44,7 @@ const FILES: &[File] = files! {
     "css/welcome.css": CSS,
     "js/backoff.js": JS,
     "js/client.js": JS,
+    "js/credentials.js": JS,
     "js/details.js": JS,
     "js/elements.js": JS,
     "js/fit.js": JS,

@@ -1,12 +1,19 @@
 // CompositorService as functions. The page talks to the origin that served it and to nobody else.
 
 import * as m from './messages.js';
-import { serverStream, unary } from './grpc_web.js';
+import { serverStream as callStream, unary as callUnary } from './grpc_web.js';
 
 const method = (name) => `/tryon.v1.CompositorService/${name}`;
 
-/** @param {string} origin empty for the page's own origin; tests give another. */
-export function compositor(origin = '') {
+/**
+ * @param {string} origin empty for the page's own origin; tests give another.
+ * @param {string} token sent with every call; empty for none.
+ */
+export function compositor(origin = '', token = '') {
+  const unary = (to, request, response, message, options) =>
+    callUnary(to, request, response, message, { token, ...options });
+  const serverStream = (to, request, response, message, options) =>
+    callStream(to, request, response, message, { token, ...options });
   const url = (name) => origin + method(name);
   return {
     openTryOn: (request, options) =>

@@ -15,8 +15,8 @@ const COMPRESSED = 0x01;
 
 /** Status codes the page acts on. */
 export const Code = Object.freeze({
-  OK: 0, CANCELLED: 1, UNKNOWN: 2, INVALID_ARGUMENT: 3, DEADLINE_EXCEEDED: 4, NOT_FOUND: 5, RESOURCE_EXHAUSTED: 8,
-  FAILED_PRECONDITION: 9, INTERNAL: 13, UNAVAILABLE: 14,
+  OK: 0, CANCELLED: 1, UNKNOWN: 2, INVALID_ARGUMENT: 3, DEADLINE_EXCEEDED: 4, NOT_FOUND: 5, PERMISSION_DENIED: 7,
+  RESOURCE_EXHAUSTED: 8, FAILED_PRECONDITION: 9, INTERNAL: 13, UNAVAILABLE: 14, UNAUTHENTICATED: 16,
 });
 
 /** A call that did not end with OK. `retryAfter` is the server's RetryInfo in seconds or null. */
@@ -134,8 +134,9 @@ function httpError(status) {
   return new RpcError(code, `HTTP ${status}`);
 }
 
-async function post(url, body, { signal, timeoutMs, keepalive }) {
+async function post(url, body, { signal, timeoutMs, keepalive, token }) {
   const headers = { 'content-type': 'application/grpc-web+proto', accept: 'application/grpc-web+proto', 'x-grpc-web': '1' };
+  if (token) headers.authorization = `Bearer ${token}`;
   if (timeoutMs) headers['grpc-timeout'] = `${Math.round(timeoutMs)}m`;
   try {
     return await fetch(url, { method: 'POST', headers, body, signal, keepalive, cache: 'no-store', credentials: 'omit' });
@@ -190,11 +191,11 @@ export async function* serverStream(url, request, response, message, options = {
 }
 
 /** Calls a unary method; `timeoutMs` is also told to the server, `keepalive` lets the call outlive the page. */
-export async function unary(url, request, response, message, { signal, timeoutMs = 5000, keepalive = false } = {}) {
+export async function unary(url, request, response, message, { signal, timeoutMs = 5000, keepalive = false, token } = {}) {
   const timeout = AbortSignal.timeout(timeoutMs);
   const both = signal ? AbortSignal.any([signal, timeout]) : timeout;
   let result = null;
-  const options = { signal: both, timeoutMs, keepalive };
+  const options = { signal: both, timeoutMs, keepalive, token };
   for await (const one of serverStream(url, request, response, message, options)) result ??= one;
   if (result === null) throw new RpcError(Code.INTERNAL, 'the answer holds no message');
   return result;

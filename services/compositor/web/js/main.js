@@ -1,8 +1,10 @@
 // The page's story: wait for somebody, open a try-on with consent, show it, and leave nothing behind.
 //
-// Address: ?store=… &camera=… choose the camera; &idle=SECONDS ends a session that nobody stands before (0: never).
+// Address: ?store=… &camera=… choose the camera; &idle=SECONDS ends a session that nobody stands before (0: never);
+// #token=… lets it call the compositor.
 
 import { compositor } from './client.js';
+import { takeToken } from './credentials.js';
 import { Backoff } from './backoff.js';
 import { Details } from './details.js';
 import { byId, setData, setText } from './elements.js';
@@ -28,7 +30,7 @@ const CHOICE_MS = 180;
 /** Hosts that only this machine reaches. */
 const LOOPBACK = /^(localhost|127\..*|\[::1\])$/;
 
-const client = compositor();
+const client = compositor('', takeToken({ location, history, store: sessionStorage }));
 const outfit = new Outfit();
 const details = new Details();
 const wardrobe = new Wardrobe(outfit, choiceChanged);
@@ -162,8 +164,9 @@ async function loadWardrobe() {
       return;
     } catch (error) {
       if (error.code === Code.CANCELLED) return;
-      wardrobe.say('The wardrobe does not answer yet. It opens by itself.');
-      setText(byId('readiness'), 'The mirror is getting ready…');
+      const refused = [Code.UNAUTHENTICATED, Code.PERMISSION_DENIED].includes(error.code);
+      wardrobe.say(refused ? 'This mirror has no valid token.' : 'The wardrobe does not answer yet. It opens by itself.');
+      setText(byId('readiness'), refused ? 'This mirror has no valid token: open the whole address, with what follows #.' : 'The mirror is getting ready…');
       byId('readiness').hidden = false;
       await new Promise((next) => setTimeout(next, backoff.next(error.retryAfter) * 1000));
     }
@@ -342,6 +345,9 @@ document.addEventListener('contextmenu', (event) => event.preventDefault());
 // Told at once, a compositor frees the camera's session at once; it would notice by itself later.
 addEventListener('pagehide', () => session?.tryOn.close({ keepalive: true }));
 addEventListener('pageshow', (event) => event.persisted && finish());
+
+// A new token typed into the address bar loads no page by itself.
+addEventListener('hashchange', () => location.reload());
 
 setInterval(refresh, TICK_MS);
 loadWardrobe();

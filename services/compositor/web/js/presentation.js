@@ -1,5 +1,6 @@
 // Messages to the user, as a pure function of state. A picture that isn't fresh is never called live.
 
+import { Code } from './grpc_web.js';
 import { Reason, State } from './messages.js';
 
 /** A picture older than this is shown dimmed with its age, ms. Half the slowest rate worth calling live (2 Hz). */
@@ -50,6 +51,10 @@ export function present(known, now) {
   const age = stale && sincePicture !== null ? `Last picture ${ageWords(sincePicture)} ago` : '';
   const say = (tone, title, hint, more = {}) => ({ tone, title, hint, age, dim: stale ? 'hard' : '', blank, guide: false, ...more });
 
+  if (known.link === 'refused' && [Code.UNAUTHENTICATED, Code.PERMISSION_DENIED].includes(known.error?.code)) {
+    // Whoever may not watch any more may not keep the last picture either.
+    return say('down', 'Degraded: this mirror may not be watched', 'Its token is missing, has ended or is for another mirror.', { blank: true });
+  }
   if (known.link === 'refused') {
     return say('down', 'Degraded: this mirror cannot start', known.error?.message ?? '');
   }

@@ -11,7 +11,7 @@ export const SILENCE_MS = 2000;
 const MAX_UNACKNOWLEDGED = 4;
 
 /** Answers that another try cannot change. */
-const HOPELESS = new Set([Code.INVALID_ARGUMENT, Code.FAILED_PRECONDITION]);
+const HOPELESS = new Set([Code.INVALID_ARGUMENT, Code.FAILED_PRECONDITION, Code.UNAUTHENTICATED, Code.PERMISSION_DENIED]);
 
 const sleep = (ms, signal) =>
   new Promise((resolve) => {
