@@ -361,7 +361,10 @@ fn a_box_starts_from_its_file_and_drains_at_a_signal() {
         .by_ref()
         .map(Result::unwrap)
         .find_map(|l| l.strip_prefix("mirror: http://").map(str::to_owned));
-    let mut page = std::net::TcpStream::connect(mirror.expect("an address")).unwrap();
+    let mirror = mirror.expect("an address");
+    let (address, token) = mirror.split_once("/#token=").expect("a token");
+    assert_eq!(token.split('.').count(), 3);
+    let mut page = std::net::TcpStream::connect(address).unwrap();
     write!(
         page,
         "GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
@@ -383,6 +386,69 @@ fn a_box_starts_from_its_file_and_drains_at_a_signal() {
     std::fs::write(&file, config.replace("[cloth]", "[cloth]\nmax_session = 3")).unwrap();
     let refused = tryon(&["up", "--config", &file_text]);
     assert!(refused.status.code() == Some(64) && text(&refused.stderr).contains("max_session"));
+}
+
+#[test]
+fn tokens_are_made_and_revoked() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).display().to_string();
+    let run = |args: &[&str]| tryon(&[&["token"], args].concat());
+    let keys = path("keys");
+    assert!(run(&["key", "--out", &keys]).status.success());
+    assert!(
+        !run(&["key", "--out", &keys]).status.success(),
+        "never over another key"
+    );
+    let key = path("keys/issuer.pem");
+    let shared = ["--key", &key, "--store", "store"];
+    let issue = |more: &[&str]| run(&[&["issue"], &shared[..], more].concat());
+    let issued = issue(&["--audience", "compositor", "cloth", "--ttl", "60"]);
+    assert_eq!(text(&issued.stdout).trim().split('.').count(), 3);
+    let jti = text(&issued.stderr)
+        .trim()
+        .strip_prefix("jti ")
+        .unwrap()
+        .to_owned();
+    for (wrong, said) in [
+        (vec!["--audience", "elsewhere", "--ttl", "60"], "elsewhere"),
+        (vec!["--audience", "cloth", "--ttl", "0"], "ttl"),
+        (
+            vec!["--audience", "cloth", "--ttl", "60", "--camera", "a/b"],
+            "--camera a/b",
+        ),
+        (
+            vec!["--audience", "cloth", "--ttl", "60", "--method", "a/b"],
+            "--method a/b",
+        ),
+    ] {
+        let refused = issue(&wrong);
+        assert!(
+            !refused.status.success() && text(&refused.stderr).contains(said),
+            "{said}"
+        );
+    }
+    let list = path("revoked");
+    std::fs::write(&list, "older").unwrap();
+    assert!(run(&["revoke", "--list", &list, &jti]).status.success());
+    assert_eq!(
+        std::fs::read_to_string(&list).unwrap(),
+        format!("older\n{jti}\n")
+    );
+    let token = text(&issued.stdout).trim().to_owned();
+    assert!(
+        !run(&["revoke", "--list", &list, &token]).status.success(),
+        "a token is no identity"
+    );
+    let codes = path("codes");
+    let enrol = [
+        &["enrol"],
+        &shared[..],
+        &["--camera", "front", "--folder", &codes],
+    ]
+    .concat();
+    let code = text(&run(&enrol).stdout).trim().to_owned();
+    assert_eq!(code.len(), "XXXX-XXXX-XXXX".len());
+    assert_eq!(std::fs::read_dir(&codes).unwrap().count(), 1);
 }
 
 #[test]

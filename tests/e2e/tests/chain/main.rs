@@ -10,6 +10,7 @@ mod faults;
 mod kiosk;
 mod requests;
 mod simulation;
+mod tokens;
 mod try_on;
 
 /// Runs a client on a runtime of its own.
