@@ -9,6 +9,7 @@ Exit status 0 when everything went as promised; the figures are printed as JSON.
 import argparse
 import importlib
 import json
+import os
 import pathlib
 import statistics
 import sys
@@ -34,6 +35,18 @@ def stubs():
     return modules
 
 
+class Presenting(grpc.UnaryUnaryClientInterceptor, grpc.UnaryStreamClientInterceptor):
+    """Lets every call carry a token."""
+
+    def __init__(self, token):
+        self.metadata = [("authorization", f"Bearer {token}")]
+
+    def intercept_unary_unary(self, call, details, request):
+        return call(details._replace(metadata=self.metadata), request)
+
+    intercept_unary_stream = intercept_unary_unary
+
+
 def percentile(values, share):
     return sorted(values)[min(len(values) - 1, int(share * len(values)))]
 
@@ -46,9 +59,13 @@ def main():
     args.add_argument("--second", default="longsleeve")
     args.add_argument("--live", type=float, default=60, help="seconds to wait for the first LIVE picture; 0: take any")
     args.add_argument("--out", type=pathlib.Path, help="folder for the last picture with each outfit")
+    args.add_argument("--token", type=pathlib.Path, default=os.environ.get("TRYON_TOKEN"), metavar="FILE",
+                      help="token of a box that asks for one (TRYON_TOKEN)")
     args = args.parse_args()
     pb, rpc, common = stubs()
     channel = grpc.insecure_channel(args.address, options=[("grpc.max_receive_message_length", 16 << 20)])
+    if args.token:
+        channel = grpc.intercept_channel(channel, Presenting(pathlib.Path(args.token).read_text().strip()))
     compositor = rpc.CompositorServiceStub(channel)
 
     known = [g.name for g in compositor.ListGarmentChoices(pb.ListGarmentChoicesRequest(), timeout=5).garments]

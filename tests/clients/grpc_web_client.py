@@ -8,6 +8,8 @@ Exit status 0 when everything went as promised; the figures are printed as JSON.
 import argparse
 import http.client
 import json
+import os
+import pathlib
 import struct
 import time
 
@@ -71,11 +73,12 @@ def decode(data):
 class Call:
     """One rpc: an HTTP/1.1 POST, answered by frames of a flag, a length and a body; flag 0x80 carries the trailers."""
 
+    headers = {"Content-Type": "application/grpc-web+proto", "X-Grpc-Web": "1"}
+
     def __init__(self, address, method, message):
         self.http = http.client.HTTPConnection(address, timeout=30)
         body = struct.pack(">BI", 0, len(message)) + message
-        headers = {"Content-Type": "application/grpc-web+proto", "X-Grpc-Web": "1"}
-        self.http.request("POST", f"/tryon.v1.CompositorService/{method}", body, headers)
+        self.http.request("POST", f"/tryon.v1.CompositorService/{method}", body, self.headers)
         self.response = self.http.getresponse()
         assert self.response.status == 200, self.response.status
         self.trailers = {k.lower(): v for k, v in self.response.getheaders() if k.lower().startswith("grpc-")}
@@ -122,7 +125,11 @@ def main():
     args.add_argument("--first", default="tshirt")
     args.add_argument("--second", default="longsleeve")
     args.add_argument("--live", type=float, default=60, help="seconds to wait for the first LIVE picture; 0: take any")
+    args.add_argument("--token", type=pathlib.Path, default=os.environ.get("TRYON_TOKEN"), metavar="FILE",
+                      help="token of a box that asks for one (TRYON_TOKEN)")
     args = args.parse_args()
+    if args.token:
+        Call.headers["Authorization"] = f"Bearer {pathlib.Path(args.token).read_text().strip()}"
 
     bad = Call(args.address, "OpenTryOn", field(4, choice("cape")) + CONSENT)
     list(bad.messages())
