@@ -13,8 +13,8 @@ use std::time::Instant;
 
 /// Bad tokens that a peer may send. A signature cannot be guessed: this bounds the work (60 µs a check) and the log.
 const ALLOWANCE: Allowance = Allowance {
-    burst: 100.0,
-    per_second: 50.0,
+    burst: 500.0,
+    per_second: 200.0,
 };
 /// Most signatures that are remembered as good.
 const MAX_KNOWN: usize = 1024;

@@ -128,3 +128,101 @@ async fn end(claims: Arc<Claims>, mut revoked: Revocations) -> &'static str {
         () = revoked.of(&claims.jti) => "the token was revoked",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::auth::Issuer;
+    use axum::routing::any;
+    use tower::ServiceExt;
+
+    const CALL: &str = "/tryon.v1.ClothService/Dress";
+
+    /// Guarded routes that answer with the reach of the request, and the issuer of their tokens.
+    fn guarded() -> (Router, Issuer) {
+        let issuer = Issuer::generate().expect("random");
+        let keys = vec![issuer.public()];
+        let authority = Authority::new(keys, "store".into(), Revocations::none());
+        let answer = any(|request: Request<Body>| async move {
+            let grant = request.extensions().get::<Grant>().cloned();
+            format!("{}", grant.expect("passed the gate").is_nothing())
+        });
+        let routes = Router::new().fallback(answer);
+        (guard(authority.map(Arc::new), "cloth", routes), issuer)
+    }
+
+    /// `grpc-status` of a refusal, or the answer of the routes.
+    async fn answer(routes: &Router, path: &str, authorizations: &[&str]) -> String {
+        let mut request = Request::post(path);
+        for value in authorizations {
+            request = request.header("authorization", *value);
+        }
+        let request = request.body(Body::empty()).expect("a request");
+        let answer = routes.clone().oneshot(request).await.expect("infallible");
+        if let Some(status) = answer.headers().get("grpc-status") {
+            return status.to_str().expect("a number").to_owned();
+        }
+        let body = axum::body::to_bytes(answer.into_body(), 64).await;
+        String::from_utf8_lossy(&body.expect("short")).into_owned()
+    }
+
+    #[tokio::test]
+    async fn one_bearer_token_that_covers_the_call_passes() {
+        let (routes, issuer) = guarded();
+        let token = |service: &str| {
+            let token = issuer.issue_for_process("store", &[service]);
+            format!("Bearer {}", token.expect("random"))
+        };
+        let good = token("cloth");
+        let lower = good.replace("Bearer", "bearer ");
+        assert_eq!(answer(&routes, CALL, &[&good]).await, "false");
+        assert_eq!(answer(&routes, CALL, &[&lower]).await, "false");
+        assert_eq!(answer(&routes, CALL, &[&token("capture")]).await, "7");
+        let basic = good.replace("Bearer", "Basic");
+        let long = format!("Bearer {}", "a".repeat(10_000));
+        let refused: [&[&str]; 7] = [
+            &[],
+            &[""],
+            &["Bearer"],
+            &["Bearer "],
+            &[&basic],
+            &[&long],
+            &[&good, &good],
+        ];
+        for headers in refused {
+            assert_eq!(answer(&routes, CALL, headers).await, "16", "{headers:?}");
+        }
+    }
+
+    #[tokio::test]
+    async fn health_and_the_trade_of_codes_need_no_token() {
+        let (routes, _) = guarded();
+        let health = "/grpc.health.v1.Health/Check";
+        for (path, headers, expected) in [
+            (health, &[][..], "true"),
+            (health, &["Bearer x"], "true"),
+            (REDEEM, &[], "true"),
+            (REDEEM, &["Bearer x"], "16"),
+            ("/grpc.health.v1.Healthy/Check", &[], "16"),
+            (
+                "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo",
+                &[],
+                "16",
+            ),
+            ("/", &[], "16"),
+            ("//grpc.health.v1.Health/Check", &[], "16"),
+        ] {
+            assert_eq!(answer(&routes, path, headers).await, expected, "{path}");
+        }
+    }
+
+    #[tokio::test]
+    async fn without_keys_everything_passes() {
+        let open = guard(
+            None,
+            "cloth",
+            Router::new().fallback(any(|| async { "open" })),
+        );
+        assert_eq!(answer(&open, CALL, &[]).await, "open");
+    }
+}
