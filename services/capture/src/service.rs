@@ -106,9 +106,10 @@ impl CaptureService for Capture {
         &self,
         r: Request<HoldConsentRequest>,
     ) -> Result<Response<HoldConsentResponse>, Status> {
+        Grant::of(&r)?.check_session(&r.get_ref().try_on_id)?;
+        let camera = self.find(&r, &r.get_ref().camera)?;
         let r = r.get_ref();
         let holder = request::session_id("hold_consent_request.try_on_id", &r.try_on_id)?;
-        let camera = self.find(&r.camera)?;
         if !r.store.is_empty() && r.store != camera.info.borrow().store {
             return Err(not_found("store", &r.store));
         }

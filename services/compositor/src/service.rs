@@ -18,6 +18,7 @@ use tryon_kit::auth::{Connection, EnrolFault, Grant};
 use tryon_kit::client::{channel, request as call};
 use tryon_kit::config::CompositorConfig;
 use tryon_kit::consent::Cameras;
+use tryon_kit::frames::CameraKey;
 use tryon_kit::server::{Context, StartError};
 use tryon_kit::sessions::{Opened, Sessions, brief, random_id};
 use tryon_kit::status::{exhausted, from_upstream, not_found, unavailable};
@@ -124,6 +125,29 @@ impl Compositor {
         Ok(found)
     }
 
+    /// Id and camera of a try-on to be opened, if the request's token reaches both. Names that are left out are those of
+    /// the token, then those of the configuration.
+    fn opening(&self, r: &Request<OpenTryOnRequest>) -> Result<(String, CameraKey), Status> {
+        let grant = Grant::of(r)?;
+        let r = r.get_ref();
+        let id = if r.try_on_id.is_empty() {
+            grant.session().map_or_else(random_id, Into::into)
+        } else {
+            request::session_id("open_try_on_request.try_on_id", &r.try_on_id)?
+        };
+        grant.check_session(&id)?;
+        let or = |given: &str, default: &str| {
+            let name = if given.is_empty() { default } else { given };
+            name.to_owned()
+        };
+        let store = or(&r.store, &self.config.store);
+        let camera = grant.camera().unwrap_or(&self.config.camera);
+        let camera = or(&r.camera, camera);
+        let key = request::camera_key("open_try_on_request", &store, &camera)?;
+        grant.check_camera(&key)?;
+        Ok((id, key))
+    }
+
     /// Dresses the session in cloth. A silent cloth service is UNAVAILABLE, no fault of the outfit.
     async fn dress(
         &self,
@@ -161,26 +185,8 @@ impl CompositorService for Compositor {
         &self,
         r: Request<OpenTryOnRequest>,
     ) -> Result<Response<OpenTryOnResponse>, Status> {
-        let grant = Grant::of(&r)?;
+        let (id, key) = self.opening(&r)?;
         let r = r.get_ref();
-        let id = if r.try_on_id.is_empty() {
-            // A token for one try-on names it.
-            grant.session().map_or_else(random_id, Into::into)
-        } else {
-            request::session_id("open_try_on_request.try_on_id", &r.try_on_id)?
-        };
-        let or = |given: &str, configured: &str| {
-            if given.is_empty() {
-                configured.to_owned()
-            } else {
-                given.to_owned()
-            }
-        };
-        let camera = grant.camera().unwrap_or(&self.config.camera);
-        let (store, camera) = (or(&r.store, &self.config.store), or(&r.camera, camera));
-        grant.check_session(&id)?;
-        let key = request::camera_key("open_try_on_request", &store, &camera)?;
-        grant.check_camera(&key)?;
         let choices = request::choices("open_try_on_request", &r.garments)?;
         if !r.consent.is_some_and(|c| c.given) {
             return Err(Status::failed_precondition(

@@ -258,6 +258,7 @@ async fn watch(
 ) -> Streaming<StreamFramesResponse> {
     let open = OpenTryOnRequest {
         try_on_id: id.into(),
+        consent: Some(Consent { given: true }),
         ..OpenTryOnRequest::default()
     };
     compositor.open_try_on(open).await.expect("opened");
@@ -335,6 +336,7 @@ fn a_code_is_traded_once_for_a_token_of_one_camera() {
         let side = |id: &str| OpenTryOnRequest {
             try_on_id: id.into(),
             camera: "side".into(),
+            consent: Some(Consent { given: true }),
             ..OpenTryOnRequest::default()
         };
         let denied = kiosk.open_try_on(side("other")).await;
