@@ -8,12 +8,13 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
-use tryon_kit::auth::{Auth, Issuer};
-use tryon_kit::client::pauses;
+use tryon_kit::auth::{Auth, Connection, Credentials, Issuer};
+use tryon_kit::client::{channel, pauses};
 use tryon_kit::compute::Pool;
 use tryon_kit::config::Config;
 use tryon_kit::frames::{FrameBus, LocalBus};
 use tryon_kit::server::{Context, Running, StartError};
+use tryon_kit::tls::Tls;
 
 type Starting = Pin<Box<dyn Future<Output = Result<Running, StartError>> + Send>>;
 type Start = fn(Arc<Config>, Context) -> Starting;
@@ -41,6 +42,9 @@ pub(crate) struct OneBox {
     /// Token of the mirror's page. It and its key are drawn at each start; where `[auth] keys` are given, their holder
     /// issues the page's token.
     pub(crate) token: Option<String>,
+    /// `http` or `https`.
+    scheme: &'static str,
+    tls: Tls,
     shutdown: CancellationToken,
     tasks: JoinSet<()>,
 }
@@ -59,6 +63,7 @@ impl OneBox {
         } else {
             None
         };
+        let tls = Tls::open(&config.tls)?;
         let pool = Pool::new(config.process.compute_threads)
             .context("the compute threads cannot be started")?;
         let bus = bus.unwrap_or_else(|| LocalBus::new(Arc::clone(&pool)));
@@ -70,6 +75,7 @@ impl OneBox {
             shutdown: shutdown.clone(),
             grace,
             auth,
+            tls: tls.clone(),
         };
         let mut addresses = Vec::new();
         let mut tasks = JoinSet::new();
@@ -88,6 +94,8 @@ impl OneBox {
             ));
         }
         Ok(Self {
+            scheme: scheme(&config),
+            tls,
             addresses,
             token,
             shutdown,
@@ -103,7 +111,17 @@ impl OneBox {
         let address = self.address("compositor")?;
         let token = self.token.as_ref();
         let fragment = token.map_or(String::new(), |t| format!("#token={t}"));
-        Some(format!("http://{address}/{fragment}"))
+        Some(format!("{}://{address}/{fragment}", self.scheme))
+    }
+    /// Connection to the compositor, with the page's token.
+    ///
+    /// # Errors
+    /// When it has no address.
+    pub(crate) fn compositor(&self) -> Result<Connection> {
+        let address = (self.address("compositor")).context("the compositor has no address")?;
+        let url = format!("{}://{address}", self.scheme);
+        let channel = channel(&url, &self.tls).map_err(anyhow::Error::msg)?;
+        Ok(Credentials::fixed(self.token.as_deref().unwrap_or_default()).present(channel))
     }
     /// Drains all services; each has its own hard deadline.
     pub(crate) async fn stop(mut self) {
@@ -112,9 +130,18 @@ impl OneBox {
     }
 }
 
+/// Scheme of the services' URLs.
+fn scheme(config: &Config) -> &'static str {
+    if config.tls.is_server() {
+        "https"
+    } else {
+        "http"
+    }
+}
+
 /// Replaces port 0 by the bound port, for the services that follow and for restarts.
 fn pin_addresses(config: &mut Config, name: &str, running: &Running) {
-    let url = format!("http://{}", running.address);
+    let url = format!("{}://{}", scheme(config), running.address);
     match name {
         "capture" => {
             (config.capture.address, config.capture.admin) = (running.address, running.admin);

@@ -15,6 +15,7 @@ use tryon::camera::{ColorImage, DepthImage};
 use tryon::formats::image::{decode_jpeg, write_png_depth, write_png_rgb};
 use tryon_kit::bus::free_tcp_endpoint;
 use tryon_kit::client::channel;
+use tryon_kit::tls::Tls;
 use tryon_proto::v1::capture_service_client::CaptureServiceClient;
 use tryon_proto::v1::compositor_service_client::CompositorServiceClient;
 use tryon_proto::v1::stream_frames_response::Event;
@@ -189,14 +190,14 @@ impl Drop for Program {
 
 /// Exposures published so far.
 async fn published(url: &str) -> u64 {
-    let mut capture = CaptureServiceClient::new(channel(url).unwrap());
+    let mut capture = CaptureServiceClient::new(channel(url, &Tls::off()).unwrap());
     let cameras = capture.list_cameras(ListCamerasRequest {}).await.unwrap();
     cameras.into_inner().cameras.iter().map(|c| c.frames).sum()
 }
 
 /// Opens the session and checks every picture of it until its stream ends; their number and that of foreign ones.
 async fn watch(session: &'static Painted, url: String) -> (u64, u64) {
-    let mut c = CompositorServiceClient::new(channel(&url).unwrap());
+    let mut c = CompositorServiceClient::new(channel(&url, &Tls::off()).unwrap());
     let open = OpenTryOnRequest {
         try_on_id: session.name.into(),
         camera: session.name.into(),
@@ -256,7 +257,7 @@ fn no_picture_is_foreign_and_nothing_remains_in_memory_logs_and_metrics() {
             eventually("a frame in memory", is_found).await;
         }
 
-        let mut c = CompositorServiceClient::new(channel(&compositor).unwrap());
+        let mut c = CompositorServiceClient::new(channel(&compositor, &Tls::off()).unwrap());
         for s in &SESSIONS {
             let try_on_id = s.name.into();
             c.withdraw_consent(WithdrawConsentRequest { try_on_id })

@@ -25,7 +25,8 @@ const MAX_REQUEST_BYTES: usize = 1024 * 1024 + 4096;
 /// When an address cannot be bound or the tracking URL is none.
 pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError> {
     let c = &config.cloth;
-    let tracking = tryon_kit::client::channel(&c.tracking).map_err(|why| StartError::Config {
+    let tracking = tryon_kit::client::channel(&c.tracking, &ctx.tls);
+    let tracking = tracking.map_err(|why| StartError::Config {
         key: "cloth.tracking".into(),
         why,
     })?;

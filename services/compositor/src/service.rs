@@ -65,9 +65,9 @@ impl Compositor {
             move |why| StartError::Config { key, why }
         };
         let present = |channel| ctx.auth.credentials().present(channel);
-        let tracking = present(channel(&config.tracking).map_err(fault("tracking"))?);
-        let cloth = present(channel(&config.cloth).map_err(fault("cloth"))?);
-        let capture = present(channel(&config.capture).map_err(fault("capture"))?);
+        let tracking = present(channel(&config.tracking, &ctx.tls).map_err(fault("tracking"))?);
+        let cloth = present(channel(&config.cloth, &ctx.tls).map_err(fault("cloth"))?);
+        let capture = present(channel(&config.capture, &ctx.tls).map_err(fault("capture"))?);
         let card = Card::open(config.renderer).map_err(|e| StartError::Config {
             key: "compositor.renderer".into(),
             why: e.to_string(),

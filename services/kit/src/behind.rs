@@ -54,10 +54,11 @@ mod tests {
     use crate::auth::Credentials;
     use crate::client::channel;
     use crate::connections;
+    use crate::tls::Tls;
     use tokio::net::TcpListener;
 
     fn connect(url: &str) -> Connection {
-        Credentials::none().present(channel(url).expect("a URL"))
+        Credentials::none().present(channel(url, &Tls::off()).expect("a URL"))
     }
 
     #[tokio::test]

@@ -22,6 +22,8 @@ pub struct Config {
     pub bus: BusConfig,
     /// Tokens.
     pub auth: AuthConfig,
+    /// Encryption of connections.
+    pub tls: TlsConfig,
     /// The capture service.
     pub capture: CaptureConfig,
     /// The tracking service.
@@ -114,9 +116,15 @@ impl Config {
             ("compositor.cloth", &self.compositor.cloth),
             ("compositor.capture", &self.compositor.capture),
         ] {
-            if !url.starts_with("http://") {
+            if !(url.starts_with("http://") || url.starts_with("https://")) {
                 return fault(key, "a URL such as http://127.0.0.1:50052 is needed");
             }
+            if url.starts_with("https://") && !self.tls.is_client() {
+                return fault(key, "https needs tls.ca, the authority of that service");
+            }
+        }
+        if self.tls.is_server() == self.tls.key.as_os_str().is_empty() {
+            return fault("tls.key", "certificate and key are given together");
         }
         let public = &self.compositor.public;
         if !(public.is_empty() || public.starts_with("http://") || public.starts_with("https://")) {
@@ -165,7 +173,7 @@ impl Config {
 
     /// The services are reached through TLS only.
     fn has_tls(&self) -> bool {
-        false
+        self.tls.is_server()
     }
 
     /// Key of the first address that other machines reach.

@@ -13,6 +13,7 @@ mod connections;
 pub mod consent;
 mod deadline;
 pub mod drain;
+mod followed;
 pub mod forget;
 pub mod frames;
 pub mod hosts;
@@ -26,6 +27,7 @@ pub mod sessions;
 pub mod status;
 pub mod supervisor;
 pub mod telemetry;
+pub mod tls;
 mod transport;
 mod undecodable;
 

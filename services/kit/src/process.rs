@@ -7,6 +7,7 @@ use crate::config::Config;
 use crate::drain::{self, Drained};
 use crate::server::{Context, Running, StartError};
 use crate::supervisor;
+use crate::tls::Tls;
 use clap::Parser;
 use std::future::Future;
 use std::io::Write;
@@ -106,7 +107,10 @@ where
         Err(e) => {
             complain(name, &e.to_string());
             ExitCode::from(
-                if matches!(e, StartError::Config { .. } | StartError::Auth(_)) {
+                if matches!(
+                    e,
+                    StartError::Config { .. } | StartError::Auth(_) | StartError::Tls(_)
+                ) {
                     EXIT_USAGE
                 } else {
                     EXIT_BROKEN
@@ -145,6 +149,7 @@ where
         shutdown: shutdown.clone(),
         grace,
         auth,
+        tls: Tls::open(&config.tls)?,
     };
     crate::telemetry::show_zeros(name);
     let running = start(config, ctx).await?;

@@ -6,6 +6,7 @@ use crate::connections::{self, Limits};
 use crate::deadline::within_deadline;
 use crate::drain::{Drained, until_deadline};
 use crate::frames::FrameBus;
+use crate::tls::{Tls, TlsError};
 use crate::transport;
 use crate::undecodable::blame_caller;
 use axum::Router;
@@ -42,6 +43,8 @@ pub struct Context {
     pub grace: Duration,
     /// Who may call, and the process's own token.
     pub auth: Auth,
+    /// Encryption of connections, made and accepted.
+    pub tls: Tls,
 }
 
 /// A service that could not start, or broke.
@@ -68,6 +71,9 @@ pub enum StartError {
     /// A file of `[auth]` turned out unusable.
     #[error(transparent)]
     Auth(#[from] AuthError),
+    /// A file of `[tls]` turned out unusable.
+    #[error(transparent)]
+    Tls(#[from] TlsError),
     /// The bus could not be joined.
     #[error(transparent)]
     Bus(#[from] crate::frames::BusError),
@@ -208,6 +214,10 @@ pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartErro
         .layer(MapResponseLayer::new(blame_caller))
         .layer(from_fn(within_deadline));
     let incoming = connections::accept(listener, Limits::default());
+    let protocols = transport::Protocols {
+        has_http1: http1,
+        tls: ctx.tls.clone(),
+    };
     let (shutdown, grace) = (ctx.shutdown.clone(), ctx.grace);
     let task = tokio::spawn(async move {
         let signalled = shutdown.clone();
@@ -219,7 +229,7 @@ pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartErro
                 .await;
         };
         let work = async {
-            transport::serve(incoming, router, http1, stop).await;
+            transport::serve(incoming, router, &protocols, stop).await;
             Ok(())
         };
         let end = until_deadline(work, shutdown, grace + CUT).await;

@@ -2,7 +2,7 @@
 //! connection on.
 
 use crate::config::TlsConfig;
-use rustls::client::WebPkiServerVerifier;
+use crate::followed::follow_all;
 use rustls::crypto::{CryptoProvider, ring};
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
@@ -10,13 +10,11 @@ use rustls::server::WebPkiClientVerifier;
 use rustls::{ClientConfig, RootCertStore, ServerConfig};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant, SystemTime};
+use std::sync::Arc;
 use tokio::net::TcpStream;
+use tokio::sync::watch;
 use tokio_rustls::{TlsAcceptor, TlsConnector};
 
-/// Interval of looks at the files.
-const LOOK_EVERY: Duration = Duration::from_secs(1);
 /// Protocols of a port, preferred first.
 const PROTOCOLS: [&[u8]; 2] = [b"h2", b"http/1.1"];
 
@@ -35,27 +33,43 @@ pub struct TlsError {
 /// Certificates of a process. Clones share what was read.
 #[derive(Clone, Debug)]
 pub struct Tls {
-    server: Option<Arc<Reloaded<ServerConfig>>>,
-    client: Arc<Reloaded<ClientConfig>>,
+    server: Option<watch::Receiver<Arc<ServerConfig>>>,
+    client: Option<watch::Receiver<Arc<ClientConfig>>>,
 }
 
 impl Tls {
-    /// Reads the files.
+    /// No certificates: connections are plain, and `https` URLs are trusted to nobody.
+    pub fn off() -> Self {
+        Self {
+            server: None,
+            client: None,
+        }
+    }
+
+    /// Reads the files, and follows them on a task of the runtime.
     ///
     /// # Errors
     /// Names the key of a file that cannot be read or used.
     pub fn open(config: &TlsConfig) -> Result<Self, TlsError> {
-        let is_server = config.is_server();
-        let server = is_server.then(|| Reloaded::open(config.clone(), server_config));
+        fn follow<T: Send + Sync + 'static>(
+            config: &TlsConfig,
+            make: fn(&TlsConfig) -> Result<T, TlsError>,
+        ) -> Result<watch::Receiver<Arc<T>>, TlsError> {
+            let files = config.clone();
+            follow_all(config.files(), move || make(&files).map(Arc::new))
+        }
+        let server = config.is_server().then(|| follow(config, server_config));
+        let client = config.is_client().then(|| follow(config, client_config));
         Ok(Self {
-            server: server.transpose()?.map(Arc::new),
-            client: Arc::new(Reloaded::open(config.clone(), client_config)?),
+            server: server.transpose()?,
+            client: client.transpose()?,
         })
     }
 
     /// Acceptor of new connections; `None` without a certificate.
     pub(crate) fn acceptor(&self) -> Option<TlsAcceptor> {
-        Some(TlsAcceptor::from(self.server.as_ref()?.current()))
+        let config = self.server.as_ref()?.borrow().clone();
+        Some(TlsAcceptor::from(config))
     }
 
     /// Encrypts a connection to `host`, whose certificate must be for that name or address.
@@ -67,68 +81,20 @@ impl Tls {
         host: &str,
         stream: TcpStream,
     ) -> io::Result<tokio_rustls::client::TlsStream<TcpStream>> {
-        let host = host.trim_start_matches('[').trim_end_matches(']').to_owned();
+        let host = host
+            .trim_start_matches('[')
+            .trim_end_matches(']')
+            .to_owned();
         let name = ServerName::try_from(host).map_err(io::Error::other)?;
-        let connector = TlsConnector::from(self.client.current());
-        connector.connect(name, stream).await
+        let untrusting = || io::Error::other("tls.ca: no authority is trusted");
+        let config = self
+            .client
+            .as_ref()
+            .ok_or_else(untrusting)?
+            .borrow()
+            .clone();
+        TlsConnector::from(config).connect(name, stream).await
     }
-}
-
-/// Value made of files, made anew when one of them changes.
-#[derive(Debug)]
-struct Reloaded<T> {
-    files: TlsConfig,
-    make: fn(&TlsConfig) -> Result<T, TlsError>,
-    state: Mutex<State<T>>,
-}
-
-#[derive(Debug)]
-struct State<T> {
-    value: Arc<T>,
-    looked: Instant,
-    changed: Vec<Option<SystemTime>>,
-}
-
-impl<T> Reloaded<T> {
-    fn open(files: TlsConfig, make: fn(&TlsConfig) -> Result<T, TlsError>) -> Result<Self, TlsError> {
-        let state = State {
-            changed: changed(&files),
-            value: Arc::new(make(&files)?),
-            looked: Instant::now(),
-        };
-        Ok(Self {
-            files,
-            make,
-            state: Mutex::new(state),
-        })
-    }
-
-    /// The value of the files as they are now; of faulty files the last good one.
-    fn current(&self) -> Arc<T> {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        if state.looked.elapsed() < LOOK_EVERY {
-            return state.value.clone();
-        }
-        state.looked = Instant::now();
-        let changed = changed(&self.files);
-        if changed != state.changed {
-            // Files are replaced one by one: a pair that does not fit is looked at again.
-            match (self.make)(&self.files) {
-                Ok(value) => {
-                    tracing::info!("the certificates were read again");
-                    (state.value, state.changed) = (Arc::new(value), changed);
-                }
-                Err(e) => tracing::warn!(error = %e, "the last certificates stay in use"),
-            }
-        }
-        state.value.clone()
-    }
-}
-
-fn changed(files: &TlsConfig) -> Vec<Option<SystemTime>> {
-    let paths = [&files.certificate, &files.key, &files.client_ca, &files.ca];
-    let time = |p: &&PathBuf| std::fs::metadata(p).and_then(|m| m.modified()).ok();
-    paths.iter().map(time).collect()
 }
 
 fn provider() -> Arc<CryptoProvider> {
@@ -184,7 +150,9 @@ fn server_config(files: &TlsConfig) -> Result<ServerConfig, TlsError> {
         builder.with_client_cert_verifier(verifier)
     };
     let (chain, key) = identity(files)?;
-    let mut config = builder.with_single_cert(chain, key).map_err(|e| wrong(&e))?;
+    let mut config = builder
+        .with_single_cert(chain, key)
+        .map_err(|e| wrong(&e))?;
     config.alpn_protocols = PROTOCOLS.map(<[u8]>::to_vec).to_vec();
     Ok(config)
 }
@@ -193,18 +161,7 @@ fn client_config(files: &TlsConfig) -> Result<ClientConfig, TlsError> {
     let wrong = fault("ca", &files.ca);
     let builder = ClientConfig::builder_with_provider(provider());
     let builder = (builder.with_safe_default_protocol_versions()).map_err(|e| wrong(&e))?;
-    let trusted = if files.ca.as_os_str().is_empty() {
-        Arc::new(RootCertStore::empty())
-    } else {
-        roots("ca", &files.ca)?
-    };
-    let builder = if trusted.is_empty() {
-        // Nobody is trusted: every connection fails, and says so.
-        builder.with_root_certificates(trusted)
-    } else {
-        let verifier = WebPkiServerVerifier::builder_with_provider(trusted, provider()).build();
-        builder.with_webpki_verifier(verifier.map_err(|e| wrong(&e))?)
-    };
+    let builder = builder.with_root_certificates(roots("ca", &files.ca)?);
     let mut config = if files.is_server() {
         let (chain, key) = identity(files)?;
         let own = builder.with_client_auth_cert(chain, key);
@@ -214,4 +171,130 @@ fn client_config(files: &TlsConfig) -> Result<ClientConfig, TlsError> {
     };
     config.alpn_protocols = vec![PROTOCOLS[0].to_vec()];
     Ok(config)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::client::channel;
+    use crate::connections::{self, Limits};
+    use crate::transport::{self, Protocols};
+    use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
+    use std::time::Duration;
+    use tokio::net::TcpListener;
+    use tonic::Code;
+    use tonic_health::pb::HealthCheckRequest;
+    use tonic_health::pb::health_client::HealthClient;
+
+    type Authority = CertifiedIssuer<'static, KeyPair>;
+
+    fn authority() -> Authority {
+        let mut params = CertificateParams::new(Vec::new()).expect("no names");
+        params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+        CertifiedIssuer::self_signed(params, KeyPair::generate().expect("a key")).expect("signed")
+    }
+
+    /// Writes a certificate for 127.0.0.1, its key, and the authority.
+    fn issue(dir: &Path, by: &Authority) -> TlsConfig {
+        let key = KeyPair::generate().expect("a key");
+        let params = CertificateParams::new(vec!["127.0.0.1".to_owned()]).expect("an address");
+        let certificate = params.signed_by(&key, by).expect("signed");
+        let write = |name: &str, text: String| {
+            let path = dir.join(name);
+            std::fs::write(&path, text).expect("written");
+            path
+        };
+        TlsConfig {
+            certificate: write("certificate.pem", certificate.pem()),
+            key: write("key.pem", key.serialize_pem()),
+            client_ca: PathBuf::new(),
+            ca: write("ca.pem", by.pem()),
+        }
+    }
+
+    async fn serve(config: &TlsConfig) -> String {
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+        let port = listener.local_addr().expect("bound").port();
+        let (routes, _) = crate::server::routes("tryon.v1.CaptureService").expect("known");
+        let protocols = Protocols {
+            has_http1: true,
+            tls: Tls::open(config).expect("certificates"),
+        };
+        tokio::spawn(async move {
+            let incoming = connections::accept(listener, Limits::default());
+            let router = routes.routes().prepare().into_axum_router();
+            transport::serve(incoming, router, &protocols, std::future::pending()).await;
+        });
+        format!("https://127.0.0.1:{port}")
+    }
+
+    async fn call(url: &str, config: &TlsConfig) -> Result<(), Code> {
+        let tls = Tls::open(config).expect("certificates");
+        let mut health = HealthClient::new(channel(url, &tls).expect("a URL"));
+        let asked = health.check(HealthCheckRequest::default()).await;
+        asked.map(drop).map_err(|s| s.code())
+    }
+
+    #[tokio::test]
+    async fn only_trusted_ends_talk_and_new_certificates_are_served() {
+        let [server, client, other] = [0; 3].map(|_| tempfile::tempdir().expect("a folder"));
+        let (ours, theirs) = (authority(), authority());
+        let mut served = issue(server.path(), &ours);
+        let known = issue(client.path(), &ours);
+        let stranger = issue(other.path(), &theirs);
+        let anonymous = TlsConfig {
+            ca: known.ca.clone(),
+            ..TlsConfig::default()
+        };
+        let url = serve(&served).await;
+        assert_eq!(call(&url, &anonymous).await, Ok(()));
+        assert_eq!(call(&url, &stranger).await, Err(Code::Unavailable));
+        let plain = url.replace("https", "http");
+        assert_eq!(call(&plain, &anonymous).await, Err(Code::Unavailable));
+
+        served.client_ca = known.ca.clone();
+        let mutual = serve(&served).await;
+        assert_eq!(call(&mutual, &known).await, Ok(()));
+        assert!(call(&mutual, &anonymous).await.is_err());
+        let intruder = TlsConfig {
+            ca: known.ca.clone(),
+            ..stranger.clone()
+        };
+        assert!(call(&mutual, &intruder).await.is_err());
+
+        issue(server.path(), &theirs);
+        let mut renewed = Err(Code::Unavailable);
+        for _ in 0..100 {
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            renewed = call(&url, &stranger).await;
+            if renewed.is_ok() {
+                break;
+            }
+        }
+        assert_eq!(renewed, Ok(()));
+        assert_eq!(call(&url, &anonymous).await, Err(Code::Unavailable));
+    }
+
+    #[tokio::test]
+    async fn faults_name_their_key() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let good = issue(dir.path(), &authority());
+        let key_of = |config: &TlsConfig| Tls::open(config).expect_err("unusable").key;
+        let missing = TlsConfig {
+            key: dir.path().join("none"),
+            ..good.clone()
+        };
+        assert_eq!(key_of(&missing), "key");
+        let empty = TlsConfig {
+            certificate: good.key.clone(),
+            ..good.clone()
+        };
+        assert_eq!(key_of(&empty), "certificate");
+        let unlike = TlsConfig {
+            client_ca: good.key.clone(),
+            ..good
+        };
+        assert_eq!(key_of(&unlike), "client_ca");
+        assert!(Tls::off().acceptor().is_none());
+    }
 }

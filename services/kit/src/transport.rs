@@ -2,6 +2,7 @@
 //! this process; the rest waits in the reader's own windows.
 
 use crate::connections::Connection;
+use crate::tls::Tls;
 use axum::Router;
 use axum::body::Body;
 use futures::{Stream, StreamExt};
@@ -14,6 +15,8 @@ use std::future::Future;
 use std::io;
 use std::pin::pin;
 use std::time::Duration;
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio_rustls::TlsAcceptor;
 use tonic::transport::server::{Connected, TcpConnectInfo};
 use tower::ServiceExt;
 
@@ -27,20 +30,29 @@ const MAX_STREAMS: u32 = 64;
 const MAX_HEADER_BYTES: usize = 16 * 1024;
 /// Time of the headers of an HTTP/1.1 request.
 const HEADERS: Duration = Duration::from_secs(10);
+/// Time of a TLS handshake.
+const HANDSHAKE: Duration = Duration::from_secs(10);
 /// Bytes of a stream that may wait here beside the message that is being written. Less costs more wakeups.
 const SEND_BUFFER: usize = 16 * 1024;
 /// Bytes that a caller may send ahead of a stream's handler, and of all handlers of a connection.
 const RECEIVE_WINDOWS: (u32, u32) = (64 * 1024, 256 * 1024);
 
+/// Protocols of a port.
+pub(crate) struct Protocols {
+    /// HTTP/1.1 beside HTTP/2, for browsers.
+    pub(crate) has_http1: bool,
+    pub(crate) tls: Tls,
+}
+
 /// Serves `router` until `stop`, then until the last request is answered.
 pub(crate) async fn serve(
     incoming: impl Stream<Item = io::Result<Connection>>,
     router: Router,
-    has_http1: bool,
+    protocols: &Protocols,
     stop: impl Future<Output = ()>,
 ) {
     let graceful = GracefulShutdown::new();
-    let builder = builder(has_http1);
+    let builder = builder(protocols.has_http1);
     let mut incoming = Box::pin(incoming);
     let mut stop = pin!(stop);
     loop {
@@ -51,13 +63,13 @@ pub(crate) async fn serve(
         };
         match accepted {
             Some(Ok(connection)) => {
-                let serving = answer(
-                    connection,
-                    router.clone(),
-                    builder.clone(),
-                    graceful.watcher(),
-                );
-                tokio::spawn(serving);
+                let serving = Serving {
+                    peer: connection.connect_info(),
+                    router: router.clone(),
+                    builder: builder.clone(),
+                    watcher: graceful.watcher(),
+                };
+                tokio::spawn(serving.accept(connection, protocols.tls.acceptor()));
             }
             Some(Err(_)) => (),
             None => break,
@@ -93,20 +105,41 @@ fn builder(has_http1: bool) -> Builder<TokioExecutor> {
     }
 }
 
-/// Answers the requests of one connection to its end.
-async fn answer(
-    connection: Connection,
+/// Service of one connection.
+struct Serving {
+    peer: TcpConnectInfo,
     router: Router,
     builder: Builder<TokioExecutor>,
     watcher: Watcher,
-) {
-    let peer: TcpConnectInfo = connection.connect_info();
-    let service = hyper::service::service_fn(move |mut request: Request<Incoming>| {
-        request.extensions_mut().insert(peer.clone());
-        router.clone().oneshot(request.map(Body::new))
-    });
-    let work = builder.serve_connection(TokioIo::new(connection), service);
-    if let Err(e) = watcher.watch(work.into_owned()).await {
-        tracing::debug!(error = %e, "a connection broke");
+}
+
+impl Serving {
+    /// Encrypts the connection where there is a certificate, and answers its requests to its end.
+    async fn accept(self, connection: Connection, tls: Option<TlsAcceptor>) {
+        let Some(tls) = tls else {
+            return self.answer(connection).await;
+        };
+        match tokio::time::timeout(HANDSHAKE, tls.accept(connection)).await {
+            Ok(Ok(encrypted)) => self.answer(encrypted).await,
+            Ok(Err(e)) => tracing::debug!(error = %e, "a connection could not be encrypted"),
+            Err(_) => tracing::debug!("a connection was not encrypted in time"),
+        }
+    }
+
+    async fn answer(self, io: impl AsyncRead + AsyncWrite + Send + Unpin + 'static) {
+        let Self {
+            peer,
+            router,
+            builder,
+            watcher,
+        } = self;
+        let service = hyper::service::service_fn(move |mut request: Request<Incoming>| {
+            request.extensions_mut().insert(peer.clone());
+            router.clone().oneshot(request.map(Body::new))
+        });
+        let work = builder.serve_connection(TokioIo::new(io), service);
+        if let Err(e) = watcher.watch(work.into_owned()).await {
+            tracing::debug!(error = %e, "a connection broke");
+        }
     }
 }

@@ -19,6 +19,7 @@ use tryon_kit::compute::Pool;
 use tryon_kit::config::Config;
 use tryon_kit::frames::LocalBus;
 use tryon_kit::server::{Context, Running};
+use tryon_kit::tls::Tls;
 
 /// Longest run of the browser: all steps with two restarts take a minute on two idle cores; a hung browser is ended
 /// here.
@@ -122,6 +123,7 @@ impl Chain {
             shutdown: shutdown.clone(),
             grace: Duration::from_millis(200),
             auth: Auth::off(),
+            tls: Tls::off(),
         };
         let config = &self.config;
         let running = self.runtime.block_on(async {

@@ -108,6 +108,14 @@ pub(crate) struct TokenRedeemArgs {
     /// URL of the compositor.
     #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:8080")]
     pub(crate) at: String,
+    /// Authorities of its certificate (PEM), for an `https` URL.
+    #[arg(
+        long,
+        value_name = "FILE",
+        default_value = "",
+        hide_default_value = true
+    )]
+    pub(crate) ca: PathBuf,
     /// The code; case, dashes and spaces do not matter.
     #[arg(value_name = "CODE")]
     pub(crate) code: String,

@@ -11,8 +11,6 @@ use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use tryon::garment::{Size, library};
-use tryon_kit::auth::Credentials;
-use tryon_kit::client::channel;
 use tryon_kit::config::{Config, LogConfig};
 use tryon_kit::drain;
 use tryon_kit::telemetry;
@@ -108,9 +106,6 @@ fn configuration(args: &DemoArgs) -> Result<Config> {
 
 async fn demo(args: &DemoArgs) -> Result<ExitCode> {
     let services = OneBox::start(configuration(args)?, None).await?;
-    let address = services
-        .address("compositor")
-        .context("the compositor has no address")?;
     if args.headless {
         let seconds = args.seconds.unwrap_or(HEADLESS_SECONDS);
         input::create_dir(&args.out)?;
@@ -120,8 +115,7 @@ async fn demo(args: &DemoArgs) -> Result<ExitCode> {
             args.out.display()
         );
         let received = viewer::watch(
-            Credentials::fixed(services.token.as_deref().unwrap_or_default())
-                .present(channel(&format!("http://{address}")).map_err(anyhow::Error::msg)?),
+            services.compositor()?,
             &args.garments,
             Duration::from_secs_f64(seconds),
             &args.out,

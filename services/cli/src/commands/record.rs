@@ -10,6 +10,7 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tryon::camera::{Calibration, RgbdFrame};
 use tryon::formats::{McapWriter, RgbdFolderWriter};
+use tryon_kit::auth::Auth;
 use tryon_kit::bus::ZenohBus;
 use tryon_kit::client::channel;
 use tryon_kit::compute::Pool;
@@ -17,6 +18,7 @@ use tryon_kit::config::Config;
 use tryon_kit::consent::{self, Cameras, Lease};
 use tryon_kit::frames::{CameraKey, FrameBus};
 use tryon_kit::sessions::random_id;
+use tryon_kit::tls::Tls;
 
 /// Silence of a camera on the bus after which the recording fails.
 const SILENCE: Duration = Duration::from_secs(5);
@@ -119,13 +121,15 @@ fn from_bus(args: &RecordArgs, camera: &str) -> Result<u64> {
             ZenohBus::open(&[], &config.bus.connect, Pool::new(1).context("threads")?).await?;
         let bus: Arc<dyn FrameBus> = bus;
         let mut frames = bus.subscribe(&key).await?;
-        let channel = channel(&config.compositor.capture).map_err(anyhow::Error::msg)?;
+        let channel = channel(&config.compositor.capture, &Tls::open(&config.tls)?)
+            .map_err(anyhow::Error::msg)?;
         let lease = Lease {
             camera: key.clone(),
             holder: random_id(),
         };
         let ((recording, is_recording), (keys, _)) = (watch::channel(true), watch::channel(None));
-        let cameras = Cameras::new(channel);
+        let auth = Auth::open(&config, None)?;
+        let cameras = Cameras::new(auth.credentials().present(channel));
         let consent = consent::keep(cameras, lease, bus.clone(), is_recording, keys);
         let consent = tokio::spawn(consent);
         let bar = input::progress(None, "recording");

@@ -12,6 +12,7 @@ use tryon_kit::compute::Pool;
 use tryon_kit::config::{CameraConfig, Config};
 use tryon_kit::drain;
 use tryon_kit::server::Context as ServiceContext;
+use tryon_kit::tls::Tls;
 
 /// Runs the command: the capture service with this recording as its only camera.
 ///
@@ -54,6 +55,7 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<ExitCode> {
             shutdown: shutdown.clone(),
             grace,
             auth: Auth::off(),
+            tls: Tls::off(),
         };
         let key = format!("tryon/{}/{name}/rgbd", config.capture.store);
         let service = tryon_capture::start(&config, ctx).await?;

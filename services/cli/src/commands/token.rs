@@ -12,6 +12,8 @@ use std::process::ExitCode;
 use std::time::{SystemTime, UNIX_EPOCH};
 use tryon_kit::auth::{CODE_LIFE, Claims, Enrolments, Issuer, create_secret, random_jti};
 use tryon_kit::client::{channel, request};
+use tryon_kit::config::TlsConfig;
+use tryon_kit::tls::Tls;
 use tryon_proto::keys::is_name;
 use tryon_proto::v1::RedeemCodeRequest;
 use tryon_proto::v1::compositor_service_client::CompositorServiceClient;
@@ -121,7 +123,12 @@ fn redeem(args: &TokenRedeemArgs) -> Result<()> {
         .build()
         .context("the runtime")?;
     let answer = runtime.block_on(async {
-        let channel = channel(&args.at).map_err(|e| anyhow::anyhow!("--at {e}"))?;
+        let trusted = TlsConfig {
+            ca: args.ca.clone(),
+            ..TlsConfig::default()
+        };
+        let tls = Tls::open(&trusted)?;
+        let channel = channel(&args.at, &tls).map_err(|e| anyhow::anyhow!("--at {e}"))?;
         let mut compositor = CompositorServiceClient::new(channel);
         match compositor
             .redeem_code(request(RedeemCodeRequest { code }))

@@ -66,8 +66,8 @@ async fn run(
     };
     // One connection for each stream; both URLs were checked at the start.
     let (Ok(tracking), Ok(cloth)) = (
-        channel(&setup.config.tracking),
-        channel(&setup.config.cloth),
+        channel(&setup.config.tracking, &setup.ctx.tls),
+        channel(&setup.config.cloth, &setup.ctx.tls),
     ) else {
         return "a URL is none";
     };

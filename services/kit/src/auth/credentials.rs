@@ -1,6 +1,5 @@
 //! Token that a process presents to its neighbours.
 
-use super::followed;
 use std::path::Path;
 use tokio::sync::watch;
 use tonic::metadata::{Ascii, MetadataValue};
@@ -34,7 +33,7 @@ impl Credentials {
     /// # Errors
     /// When it cannot be read now.
     pub fn follow(file: &Path) -> Result<Self, String> {
-        followed::follow(file, |text| header(text).map(Some)).map(Self)
+        crate::followed::follow(file, |text| header(text).map(Some)).map(Self)
     }
 
     /// Lets the calls of a channel carry the token.

@@ -11,7 +11,6 @@ mod credentials;
 mod ending;
 mod enrolment;
 mod failures;
-mod followed;
 mod gate;
 mod grant;
 mod issuer;

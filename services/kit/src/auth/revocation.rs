@@ -1,6 +1,5 @@
 //! List of revoked tokens: a file with a `jti` a line.
 
-use super::followed;
 use std::collections::HashSet;
 use std::path::Path;
 use tokio::sync::watch;
@@ -15,7 +14,7 @@ impl Revocations {
     /// # Errors
     /// When it cannot be read now: what is revoked must be known.
     pub(super) fn follow(file: &Path) -> Result<Self, String> {
-        followed::follow(file, |text| Ok(read(text))).map(Self)
+        crate::followed::follow(file, |text| Ok(read(text))).map(Self)
     }
 
     /// Without a list nothing is ever revoked.

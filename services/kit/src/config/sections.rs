@@ -97,6 +97,40 @@ pub struct AuthConfig {
     pub enrolments: PathBuf,
 }
 
+/// TLS of all connections of the process; the files are read again when they change.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TlsConfig {
+    /// Certificate chain of this process (PEM), valid for the names and addresses under which it is called; empty serves
+    /// plain connections. As a client it shows the same.
+    pub certificate: PathBuf,
+    /// Its key (PEM).
+    pub key: PathBuf,
+    /// Authorities of clients (PEM): only those with a certificate of theirs are served. Empty serves all.
+    pub client_ca: PathBuf,
+    /// Authorities of the services that this process calls by `https` (PEM).
+    pub ca: PathBuf,
+}
+
+impl TlsConfig {
+    /// Ports of this process speak TLS.
+    pub fn is_server(&self) -> bool {
+        !self.certificate.as_os_str().is_empty()
+    }
+
+    /// This process can call others by TLS.
+    pub(crate) fn is_client(&self) -> bool {
+        !self.ca.as_os_str().is_empty()
+    }
+
+    /// Files that are given.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        let all = [&self.certificate, &self.key, &self.client_ca, &self.ca];
+        let given = all.into_iter().filter(|p| !p.as_os_str().is_empty());
+        given.cloned().collect()
+    }
+}
+
 /// The capture service.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

@@ -10,6 +10,7 @@ use tryon_kit::auth::Auth;
 use tryon_kit::bus::{ZenohBus, free_tcp_endpoint};
 use tryon_kit::config::CameraConfig;
 use tryon_kit::server::{Context, Outcome, Running, StartError};
+use tryon_kit::tls::Tls;
 use tryon_kit::{Config, Pool};
 use tryon_proto::v1::compositor_service_client::CompositorServiceClient;
 use tryon_proto::v1::stream_frames_response::Event;
@@ -156,6 +157,7 @@ impl Kiosk {
                 shutdown: token,
                 grace: Duration::from_millis(config.process.grace_ms),
                 auth: Auth::open(&config, None)?,
+                tls: Tls::open(&config.tls)?,
             };
             match part {
                 Part::Capture => tryon_capture::start(&config, ctx).await,

@@ -1,4 +1,4 @@
-//! Contents of a file, read again when it changes.
+//! Contents of files, read again when they change.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -28,41 +28,53 @@ fn mark(file: &Path) -> std::io::Result<Mark> {
     })
 }
 
-/// Reads a file now, and again on a task of the runtime until no receiver is left. While it is away or unreadable, the
-/// last content holds and the fault is logged once.
+/// Reads a file now, and again whenever it changes; see [`follow_all`].
 ///
 /// # Errors
 /// When it cannot be read now.
-pub(super) fn follow<T, F>(file: &Path, read: F) -> Result<watch::Receiver<T>, String>
+pub(crate) fn follow<T, F>(file: &Path, read: F) -> Result<watch::Receiver<T>, String>
 where
     T: Send + Sync + 'static,
     F: Fn(&str) -> Result<T, String> + Send + 'static,
 {
-    let load = move |file: &Path| {
-        let text = std::fs::read_to_string(file).map_err(|e| e.to_string())?;
-        read(&text)
-    };
-    let at_start = |e: &dyn std::fmt::Display| format!("{}: {e}", file.display());
-    // The mark is taken first: a change between the two is read again.
-    let mut seen = Some(mark(file).map_err(|e| at_start(&e))?);
-    let (content, following) = watch::channel(load(file).map_err(|e| at_start(&e))?);
-    let file: PathBuf = file.into();
+    let file = file.to_owned();
+    follow_all(vec![file.clone()], move || {
+        let text = std::fs::read_to_string(&file).map_err(|e| e.to_string());
+        (text.and_then(|t| read(&t))).map_err(|why| format!("{}: {why}", file.display()))
+    })
+}
+
+/// Loads from files now, and again on a task of the runtime whenever one of them changes, until no receiver is left. While
+/// they cannot be used, the last content holds and the fault is logged once.
+///
+/// # Errors
+/// When they cannot be used now.
+pub(crate) fn follow_all<T, E, F>(files: Vec<PathBuf>, load: F) -> Result<watch::Receiver<T>, E>
+where
+    T: Send + Sync + 'static,
+    E: std::fmt::Display + Send,
+    F: Fn() -> Result<T, E> + Send + 'static,
+{
+    let marks = move || -> Vec<Option<Mark>> { files.iter().map(|f| mark(f).ok()).collect() };
+    // The marks are taken first: a change between the two is read again.
+    let mut seen = marks();
+    let (content, following) = watch::channel(load()?);
     tokio::spawn(async move {
         let mut is_faulty = false;
         while !content.is_closed() {
             tokio::time::sleep(EVERY).await;
-            let now = mark(&file).ok();
+            let now = marks();
             if now == seen && !is_faulty {
                 continue;
             }
-            match load(&file) {
+            match load() {
                 Ok(new) => {
                     content.send_replace(new);
                     (seen, is_faulty) = (now, false);
                 }
                 Err(why) => {
                     if !is_faulty {
-                        tracing::error!(file = %file.display(), why, "unreadable: the last content holds");
+                        tracing::error!(%why, "unusable: the last content holds");
                     }
                     is_faulty = true;
                 }
