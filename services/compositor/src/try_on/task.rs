@@ -33,6 +33,8 @@ use tryon_proto::v1::{
 const TICK: Duration = Duration::from_millis(100);
 /// Longest interval between messages to a viewer.
 const HEARTBEAT: Duration = Duration::from_millis(450);
+/// Time that the consent is held on for who has just opened the try-on, or lost its stream and streams again.
+const LINGER: Duration = Duration::from_millis(500);
 /// Age above which a picture is no snapshot.
 const SNAPSHOT_AGE: Duration = Duration::from_secs(1);
 /// Streams into a try-on.
@@ -74,6 +76,8 @@ pub(super) struct Task {
     fit: OutfitFit,
     viewers: Vec<Viewer>,
     is_watched: watch::Sender<bool>,
+    /// Last time that somebody watched, or was about to.
+    watched: Instant,
     formats: Formats,
     /// Last sign of interest in this try-on.
     wanted: Instant,
@@ -102,6 +106,7 @@ impl Task {
             fit: OutfitFit::default(),
             viewers: Vec::new(),
             is_watched: outputs.is_watched,
+            watched: now,
             formats: Formats::default(),
             wanted: now,
             lost_at: None,
@@ -175,7 +180,7 @@ impl Task {
                 (self.viewers.iter_mut()).for_each(|v| v.acknowledge(stream, number));
             }
             Some(Command::Snapshot(encoding, answer)) => self.snapshot(encoding, answer),
-            Some(Command::Touch) => self.wanted = Instant::now(),
+            Some(Command::Touch) => (self.wanted, self.watched) = (Instant::now(), Instant::now()),
             Some(Command::ShowFit(show)) => self.fit.is_shown = show,
             Some(Command::Close(end)) => {
                 self.life.close(end);
@@ -205,6 +210,7 @@ impl Task {
         }
         v.status(self.life.status());
         self.viewers.push(v);
+        self.watched = Instant::now();
         self.is_watched.send_replace(true);
         // Its first picture does not wait for a change of the scene.
         (self.scene, self.due) = (EmptyScene::default(), Instant::now());
@@ -221,7 +227,10 @@ impl Task {
         if !self.viewers.is_empty() {
             self.wanted = Instant::now();
         }
-        let is_watched = self.viewers.iter().any(Viewer::is_watching);
+        if self.viewers.iter().any(Viewer::is_watching) {
+            self.watched = Instant::now();
+        }
+        let is_watched = self.watched.elapsed() < LINGER;
         self.is_watched
             .send_if_modified(|w| std::mem::replace(w, is_watched) != is_watched);
         if self.life.silence().is_some_and(|s| s >= FORGET_AFTER) {
