@@ -13,6 +13,8 @@ mod formats;
 mod join_buffer;
 mod life;
 pub mod page;
+#[cfg(test)]
+mod painted;
 mod photos;
 mod service;
 mod try_on;
