@@ -12,6 +12,7 @@ use crate::frames::{
 };
 use crate::queue::latest;
 use crate::seal::{KeyRing, Sealer, Unsealing};
+use std::path::Path;
 use std::sync::Arc;
 use tokio::sync::watch;
 use tryon::camera::Calibration;
@@ -41,17 +42,36 @@ pub struct ZenohBus {
 }
 
 impl ZenohBus {
-    /// Opens the peer. Endpoints are `tcp/ADDRESS:PORT` or `unixsock-stream/PATH`; those to connect to may come up
-    /// later. Requires a multi-threaded runtime.
+    /// Opens the peer without TLS and access control.
     ///
     /// # Errors
-    /// Names the endpoint that is malformed or cannot be listened on.
+    /// As [`Self::open_with`].
     pub async fn open(
         listen: &[String],
         connect: &[String],
         pool: Arc<Pool>,
     ) -> Result<Arc<Self>, BusError> {
-        let mut c = zenoh::Config::default();
+        Self::open_with(Path::new(""), listen, connect, pool).await
+    }
+
+    /// Opens the peer with the certificates and access control of a file of zenoh (JSON5); an empty path for none.
+    /// Endpoints are `tcp/ADDRESS:PORT`, `tls/HOST:PORT` or `unixsock-stream/PATH`; those to connect to may come up later.
+    /// Requires a multi-threaded runtime.
+    ///
+    /// # Errors
+    /// Names the file that is unusable, or the endpoint that is malformed or cannot be listened on.
+    pub async fn open_with(
+        file: &Path,
+        listen: &[String],
+        connect: &[String],
+        pool: Arc<Pool>,
+    ) -> Result<Arc<Self>, BusError> {
+        let mut c = if file.as_os_str().is_empty() {
+            zenoh::Config::default()
+        } else {
+            zenoh::Config::from_file(file)
+                .map_err(|e| BusError(format!("{}: {e}", file.display())))?
+        };
         let list = |l: &[String]| format!("{l:?}");
         let (init, max) = RETRY_MS;
         let retry =

@@ -189,7 +189,10 @@ impl Config {
             ("compositor.admin", self.compositor.admin),
         ];
         let exposed = addresses.iter().find(|(_, a)| !a.ip().is_loopback());
-        let is_bus = || self.bus.listen.iter().any(|e| !is_local_endpoint(e));
+        let is_guarded =
+            |e: &String| e.starts_with("tls/") && !self.bus.config.as_os_str().is_empty();
+        let is_open = |e: &String| !is_local_endpoint(e) && !is_guarded(e);
+        let is_bus = || self.bus.listen.iter().any(is_open);
         exposed
             .map(|(key, _)| *key)
             .or_else(|| is_bus().then_some("bus.listen"))
@@ -225,6 +228,11 @@ mod tests {
             assert!(fault.starts_with(key), "{fault}");
             assert!(load(&[&set, "process.insecure=true"]).is_ok(), "{key}");
         }
+        let guarded = [
+            "bus.config=\"bus.json5\"",
+            "bus.listen=[\"tls/0.0.0.0:7447\"]",
+        ];
+        assert!(load(&guarded).is_ok() && load(&guarded[1..]).is_err());
         let local = [
             "unixsock-stream//run/bus",
             "tcp/[::1]:7447",

@@ -141,7 +141,7 @@ where
         BusRole::Listen => (&config.bus.listen[..], &[][..]),
         BusRole::Connect => (&[][..], &config.bus.connect[..]),
     };
-    let bus = ZenohBus::open(listen, connect, pool.clone()).await?;
+    let bus = ZenohBus::open_with(&config.bus.config, listen, connect, pool.clone()).await?;
     let shutdown = CancellationToken::new();
     let ctx = Context {
         bus: bus.clone(),

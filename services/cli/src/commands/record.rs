@@ -117,8 +117,8 @@ fn from_bus(args: &RecordArgs, camera: &str) -> Result<u64> {
         .build()
         .context("the runtime")?;
     runtime.block_on(async {
-        let bus =
-            ZenohBus::open(&[], &config.bus.connect, Pool::new(1).context("threads")?).await?;
+        let pool = Pool::new(1).context("threads")?;
+        let bus = ZenohBus::open_with(&config.bus.config, &[], &config.bus.connect, pool).await?;
         let bus: Arc<dyn FrameBus> = bus;
         let mut frames = bus.subscribe(&key).await?;
         let channel = channel(&config.compositor.capture, &Tls::open(&config.tls)?)

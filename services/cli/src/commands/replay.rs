@@ -46,7 +46,8 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<ExitCode> {
         .context("the runtime")?;
     runtime.block_on(async {
         let pool = Pool::new(config.process.compute_threads).context("threads")?;
-        let bus = ZenohBus::open(&config.bus.listen, &[], pool.clone()).await?;
+        let bus =
+            ZenohBus::open_with(&config.bus.config, &config.bus.listen, &[], pool.clone()).await?;
         let shutdown = CancellationToken::new();
         let grace = Duration::from_millis(config.process.grace_ms);
         let ctx = ServiceContext {

@@ -40,7 +40,8 @@ pub(crate) fn run(args: &UpArgs) -> Result<ExitCode> {
     runtime.block_on(async {
         // The bus listens for camera nodes and `tryon replay` in other processes.
         let pool = Pool::new(1).context("the bus's threads")?;
-        let bus: Arc<dyn FrameBus> = ZenohBus::open(&config.bus.listen, &[], pool).await?;
+        let bus = ZenohBus::open_with(&config.bus.config, &config.bus.listen, &[], pool);
+        let bus: Arc<dyn FrameBus> = bus.await?;
         let services = OneBox::start(config, Some(bus)).await?;
         for (name, grpc, admin) in &services.addresses {
             println!("{name}: grpc {grpc} admin {admin}");

@@ -65,7 +65,9 @@ impl Default for ProcessConfig {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BusConfig {
-    /// Endpoints on which the capture process listens: `tcp/ADDRESS:PORT` or `unixsock-stream/PATH`.
+    /// File of zenoh (JSON5) with certificates and access control, as `deploy/zenoh/secure/service.json5`; empty for none.
+    pub config: PathBuf,
+    /// Endpoints on which the capture process listens: `tcp/ADDRESS:PORT`, `tls/HOST:PORT` or `unixsock-stream/PATH`.
     pub listen: Vec<String>,
     /// Endpoints to which the other processes connect.
     pub connect: Vec<String>,
@@ -75,6 +77,7 @@ impl Default for BusConfig {
     fn default() -> Self {
         let endpoint = vec!["tcp/127.0.0.1:7447".to_owned()];
         Self {
+            config: PathBuf::new(),
             listen: endpoint.clone(),
             connect: endpoint,
         }
