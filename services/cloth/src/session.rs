@@ -9,6 +9,7 @@ use tokio::sync::{mpsc, watch};
 use tokio::time::Instant;
 use tryon_kit::auth::Connection;
 use tryon_kit::bodies::{News, follow};
+use tryon_kit::consent::FORGET_AFTER;
 use tryon_kit::queue::{latest, ordered};
 use tryon_kit::server::Context;
 use tryon_kit::session_task::{self, Place};
@@ -160,7 +161,8 @@ impl Task {
         let shutdown = self.setup.ctx.shutdown.clone();
         let mut tick = tokio::time::interval(HEARTBEAT / 3);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-        let (mut published, mut read) = (Instant::now(), Instant::now());
+        let now = Instant::now();
+        let (mut published, mut read, mut followed) = (now, now, now);
         let mut status = Update::from(waiting(DegradedReason::NoPerson, String::new()));
         loop {
             tokio::select! {
@@ -176,6 +178,9 @@ impl Task {
                 Some(d) = ready.recv() => self.on_dressed(d),
                 n = news.recv() => {
                     self.skipped = news.dropped();
+                    if matches!(&n, Some(News::Body { state, .. }) if state.pose.is_some()) {
+                        followed = Instant::now();
+                    }
                     status = match n {
                         Some(n) => self.on_tracking(n).await,
                         None => return "tracking cannot be followed",
@@ -186,6 +191,10 @@ impl Task {
                     status.positions = Positions::default();
                 }
                 _ = tick.tick() => {
+                    if followed.elapsed() >= FORGET_AFTER {
+                        // Nobody knows whom the worn outfit fits.
+                        self.undress();
+                    }
                     if published.elapsed() >= HEARTBEAT {
                         if status.frame.status() == ClothStatus::Live {
                             status = waiting(DegradedReason::CameraSilent, "no body state".into()).into();

@@ -156,6 +156,10 @@ async fn one_stream(
             "stream_body_states_response.state",
         );
         let mut state = state.map_err(|e| e.to_string())?;
+        if state.shape_version == 0 {
+            // Tracking has forgotten the body.
+            shape = None;
+        }
         if let Some(s) = state.shape.take() {
             shape = Some(Arc::new(
                 body::shape_from_wire(&s, &template).map_err(|e| e.to_string())?,
