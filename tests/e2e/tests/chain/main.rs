@@ -6,6 +6,7 @@
     clippy::print_stdout
 )]
 
+mod consent;
 mod faults;
 mod kiosk;
 mod requests;
