@@ -1,6 +1,7 @@
 //! Frame bus: the trait, and its implementation inside one process.
 
 use crate::compute::{ComputeError, Pool};
+use crate::frame_order::FrameOrder;
 use crate::queue::latest;
 use crate::seal::{KeyRing, Sealer, Unsealing};
 use bytes::Bytes;
@@ -63,8 +64,7 @@ pub struct FrameSubscription {
     unsealing: Unsealing,
     /// Frame that the pool unpacks; kept here, so that dropping the future of [`Self::next`] loses nothing.
     unpacking: Option<BoxFuture<'static, Result<Result<Exposure, String>, ComputeError>>>,
-    last: Option<(u64, u64)>,
-    skipped: u64,
+    order: FrameOrder,
     /// Keeps the transport's own subscription open.
     _guard: Box<dyn Any + Send>,
 }
@@ -83,13 +83,13 @@ impl FrameSubscription {
             pool,
             unsealing,
             unpacking: None,
-            last: None,
-            skipped: 0,
+            order: FrameOrder::default(),
             _guard: guard,
         }
     }
 
-    /// The newest exposure, waiting for one; `None` when the bus is gone. Broken ones are logged and left out.
+    /// The newest exposure, waiting for one; `None` when the bus is gone. Broken ones, and those that are not after all
+    /// before, are counted and left out.
     ///
     /// Cancel safe.
     pub async fn next(&mut self) -> Option<Arc<Exposure>> {
@@ -120,14 +120,10 @@ impl FrameSubscription {
                     }
                 }
             };
-            let (epoch, sequence) = (exposure.id.epoch, exposure.id.sequence);
-            if let Some((e, s)) = self.last
-                && e == epoch
-            {
-                self.skipped += sequence.saturating_sub(s + 1);
+            if self.order.admit(exposure.id.epoch, exposure.id.sequence) {
+                return Some(exposure);
             }
-            self.last = Some((epoch, sequence));
-            return Some(exposure);
+            metrics::counter!("tryon_frames_out_of_order").increment(1);
         }
     }
     /// The newest exposure from `due` on: those before it are left out, neither unpacked nor counted as missed.
@@ -135,14 +131,14 @@ impl FrameSubscription {
     /// Cancel safe.
     pub async fn next_from(&mut self, due: Instant) -> Option<Arc<Exposure>> {
         if self.unpacking.is_none() && due > Instant::now() {
-            self.last = None;
+            self.order.pause();
             tokio::time::sleep_until(due).await;
         }
         self.next().await
     }
-    /// Number of missed exposures of the current epoch.
+    /// Number of missed exposures.
     pub fn skipped(&self) -> u64 {
-        self.skipped
+        self.order.missed()
     }
     /// The camera is on the bus.
     pub fn alive(&self) -> bool {
@@ -313,6 +309,7 @@ pub(crate) mod tests {
             assert!(f.id.sequence > last, "in order, none twice");
             last = f.id.sequence;
         }
+        leaves_out_disorder(p.as_mut(), &mut s, &sealer, last).await;
         assert!(s.alive());
         drop(p);
         for _ in 0..100 {
@@ -322,6 +319,33 @@ pub(crate) mod tests {
             tokio::time::sleep(Duration::from_millis(50)).await;
         }
         panic!("the camera still counts as alive");
+    }
+
+    /// Sends doubles, late frames and gaps after frame `last`, each sealed anew: what is not after all before stays out.
+    async fn leaves_out_disorder(
+        p: &mut dyn FramePublisher,
+        s: &mut FrameSubscription,
+        sealer: &Arc<Sealer>,
+        last: u64,
+    ) {
+        let missed = s.skipped();
+        let brought = [
+            (2, true),
+            (2, false),
+            (1, false),
+            (3, true),
+            (0, false),
+            (9, true),
+        ];
+        for (step, is_new) in brought {
+            let sent = exposure(last + step);
+            p.send(sent, sealer.clone()).await.expect("sent");
+            let patience = Duration::from_millis(if is_new { 5000 } else { 200 });
+            let next = tokio::time::timeout(patience, s.next()).await.ok();
+            let next = next.map(|f| f.expect("the bus lives").id.sequence);
+            assert_eq!(next, is_new.then_some(last + step));
+        }
+        assert_eq!(s.skipped() - missed, 1 + 5, "what was lost is counted");
     }
 
     #[tokio::test]

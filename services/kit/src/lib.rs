@@ -15,6 +15,7 @@ mod deadline;
 pub mod drain;
 mod followed;
 pub mod forget;
+mod frame_order;
 pub mod frames;
 pub mod hosts;
 pub mod load;
