@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import pathlib
 import select
 import socket
 import threading
@@ -15,7 +16,7 @@ from . import scenes
 from .box import SERVICES, Box, Camera, Setup, free_ports
 from .range import Range
 from .readers import SHARED, noise_setup, stuck_readers
-from .report import Figure, attack
+from .report import Figure, NotBuilt, attack
 from .viewer import Client, Seen, Viewer
 
 # Two viewers for each of four try-ons: a person in garments and three walls of one colour each.
@@ -192,6 +193,43 @@ def camera_gone(ground: Range) -> list[Figure]:
         viewer.close()
         channel.close()
     return [Figure("told", told, 1, 0.3, " s"), Figure("pictures", back, 3, 1, " s")]
+
+
+def faketime() -> str:
+    """Library that gives programs another clock."""
+    found = sorted(pathlib.Path("/usr/lib").glob("*/faketime/libfaketime.so.1"))
+    if not found:
+        raise NotBuilt("libfaketime is not installed (apt-get install libfaketime)")
+    return str(found[-1])
+
+
+@attack("clock-steps", "wall clock stepped by +5, -10, +5 s under four processes: longest time without a picture, those not live")
+def clock_steps(ground: Range) -> list[Figure]:
+    """The clock that only moves forwards is left alone, as it is when somebody sets the time."""
+    clock = ground.folder / "clock"
+    clock.write_text("+0s\n")
+    variables = {"LD_PRELOAD": faketime(), "FAKETIME_TIMESTAMP_FILE": clock, "FAKETIME_CACHE_DURATION": 1,
+                 "FAKETIME_DONT_FAKE_MONOTONIC": 1, "DONT_FAKE_MONOTONIC": 1}
+    prefix = ("env", *(f"{k}={v}" for k, v in variables.items()))
+    gap, other, step = 0.0, 0, 0.0
+    with ground.box(Setup([Camera("front", "synth:still", 15.0)], is_apart=True, prefix=prefix)) as box:
+        viewer = Viewer(ground, box, "person", garments=("tshirt",))
+        viewer.wait_live()
+        for offset in ("+5s", "-5s", "+0s"):
+            stepped = time.monotonic()
+            clock.write_text(f"{offset}\n")
+            time.sleep(ground.pick(4, 20))
+            with viewer.arrived:
+                since = [s for s in viewer.seen if s.at >= stepped]
+            times = [stepped, *(s.at for s in since if s.is_picture), time.monotonic()]
+            gap = max(gap, *(b - a for a, b in zip(times, times[1:])))
+            other += sum(s.is_picture and s.state != "LIVE" for s in since)
+            # Proof that the clock was stepped: the capture process stamps what it receives.
+            step = max(step, *(abs(s.age) for s in since if s.is_picture))
+        viewer.close()
+    if step < 4.0:
+        raise NotBuilt(f"the clock was stepped by {step:.1f} s only")
+    return [Figure("gap", gap, 1, 0.3, " s"), Figure("not live", other, 0, 0)]
 
 
 @attack("sigterm", "SIGTERM with stuck readers: ended within")
