@@ -25,7 +25,7 @@ test('the examples of the encoding guide', () => {
 });
 
 test('64-bit numbers keep all their bits', () => {
-  const id = { epoch: 0xffff_ffff_ffff_ffffn, sequence: 1n << 63n, capture_time_ns: 9007199254740993n, received_unix_ns: 0n };
+  const id = { epoch: 0xffff_ffff_ffff_ffffn, sequence: 1n << 63n, capture_time_ns: 9007199254740993n, received_unix_ns: 0n, trace: 9n };
   assert.deepEqual(decode(messages.FrameId, encode(messages.FrameId, id)), id);
   assert.equal(hex(encode(messages.FrameId, { epoch: (1n << 64n) - 1n })), '08ffffffffffffffffff01');
 });
@@ -36,7 +36,7 @@ test('a negative enum from a newer contract is read as its low bits, not refused
 
 test('every kind survives a round trip', () => {
   const picture = {
-    frame: { epoch: 7n, sequence: 42n, capture_time_ns: 1n, received_unix_ns: 1_700_000_000_000_000_001n },
+    frame: { epoch: 7n, sequence: 42n, capture_time_ns: 1n, received_unix_ns: 1_700_000_000_000_000_001n, trace: 0n },
     state: messages.State.DEGRADED, reason: messages.Reason.PERSON_LEFT, degraded_age: 1.5, codec: 1, width: 640, height: 480,
     image: Uint8Array.of(0xff, 0xd8, 0, 1), outfit_revision: 3n, latency_ms: 87.25,
     stages: [{ stage: 'tracking.solve', ms: 12.5 }, { stage: 'cloth.step', ms: 9 }], dropped: 0n, cloth_detail: 2,

@@ -124,6 +124,7 @@ mod tests {
             sequence: 3,
             capture_time_ns: 5,
             received_unix_ns: 9,
+            trace: 11,
         };
         let color = Some(ColorImage::filled(64, 48, [10, 200, 90]));
         Exposure {

@@ -77,6 +77,10 @@ pub struct FrameId {
     /// Wall clock of the capture process on reception of the exposure, Unix nanoseconds: the start of all latencies.
     #[prost(uint64, tag = "4")]
     pub received_unix_ns: u64,
+    /// Random number of an exposure that is traced, 0 for others. The W3C trace id is epoch, then this (16 hexadecimal digits
+    /// each), the id of the root span, capture's, is this.
+    #[prost(uint64, tag = "5")]
+    pub trace: u64,
 }
 /// Key of the sealed frames of one camera (frame.proto), drawn when the first lease of consent begins and forgotten when
 /// the last one ends. Never logged, never stored.

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use tokio::sync::watch;
 use tryon::camera::{Calibration, RgbdFrame};
 use tryon_kit::config::CameraConfig;
+use tryon_kit::frame_trace::{self, Sampler};
 use tryon_kit::frames::{Exposure, FramePublisher, stage};
 use tryon_kit::server::Context;
 use tryon_kit::sessions::unix_ns;
@@ -92,6 +93,7 @@ impl Reader {
     /// Publishes frames until the source ends or fails.
     pub(crate) async fn run(mut self, mut publisher: Box<dyn FramePublisher>) {
         let (mut pace, mut faults, mut sequence) = (Pace::new(), 0, 0);
+        let mut sampler = Sampler::default();
         loop {
             pace.pause(wanted(&self.leases, self.info.subscribe()).await);
             let start = Instant::now();
@@ -115,11 +117,13 @@ impl Reader {
             if let Some(due) = due {
                 tokio::time::sleep_until(due).await;
             }
+            let received_unix_ns = unix_ns();
             let id = v1::FrameId {
                 epoch: self.epoch,
                 sequence,
                 capture_time_ns: time_ns,
-                received_unix_ns: unix_ns(),
+                received_unix_ns,
+                trace: sampler.trace(received_unix_ns),
             };
             sequence += 1;
             let rgbd = RgbdFrame {
@@ -131,7 +135,7 @@ impl Reader {
                 id,
                 calibration: self.calibration.clone(),
                 rgbd,
-                stages: vec![read],
+                stages: vec![read.clone()],
             });
             if !self.recorder.offer(&exposure) {
                 self.recording_failed();
@@ -140,9 +144,11 @@ impl Reader {
             let Some(sealer) = self.leases.sealer() else {
                 continue;
             };
+            let sending = Instant::now();
             if let Err(e) = publisher.send(exposure, sealer).await {
                 tracing::warn!(camera = self.config.name, error = %e, "a frame did not get out");
             }
+            frame_trace::record("capture", &id, &[read, stage("capture.publish", sending)]);
             metrics::counter!("tryon_capture_frames").increment(1);
             self.info.send_if_modified(|i| {
                 i.frames += 1;

@@ -12,6 +12,7 @@ use tryon_kit::auth::{Auth, Connection, Credentials, Issuer};
 use tryon_kit::client::{channel, pauses};
 use tryon_kit::compute::Pool;
 use tryon_kit::config::Config;
+use tryon_kit::frame_trace;
 use tryon_kit::frames::{FrameBus, LocalBus};
 use tryon_kit::server::{Context, Running, StartError};
 use tryon_kit::tls::Tls;
@@ -47,6 +48,7 @@ pub(crate) struct OneBox {
     tls: Tls,
     shutdown: CancellationToken,
     tasks: JoinSet<()>,
+    traces: Option<frame_trace::Exporter>,
 }
 
 impl OneBox {
@@ -77,6 +79,8 @@ impl OneBox {
             auth,
             tls: tls.clone(),
         };
+        let traces = frame_trace::start("box", &config.telemetry);
+        let traces = traces.map_err(|why| anyhow::anyhow!("telemetry.otlp: {why}"))?;
         let mut addresses = Vec::new();
         let mut tasks = JoinSet::new();
         for (name, start) in SERVICES {
@@ -100,6 +104,7 @@ impl OneBox {
             token,
             shutdown,
             tasks,
+            traces,
         })
     }
     /// gRPC address of a service.
@@ -127,6 +132,9 @@ impl OneBox {
     pub(crate) async fn stop(mut self) {
         self.shutdown.cancel();
         while self.tasks.join_next().await.is_some() {}
+        if let Some(traces) = self.traces {
+            traces.end().await;
+        }
     }
 }
 

@@ -358,7 +358,7 @@ impl Task {
             Ok((worn, placed)) => {
                 let update = match placed {
                     Ok(p) => {
-                        record_stages("cloth", &p.frame.stages);
+                        record_stages("cloth", p.frame.frame.as_ref(), &p.frame.stages);
                         metrics::counter!("tryon_cloth_steps").increment(1);
                         if worn.is_worn() {
                             live(p, self.on)

@@ -16,6 +16,8 @@ use std::path::Path;
 pub struct Config {
     /// Logs.
     pub log: LogConfig,
+    /// Traces.
+    pub telemetry: TelemetryConfig,
     /// Threads and shutdown.
     pub process: ProcessConfig,
     /// Frames between processes.
@@ -130,6 +132,9 @@ impl Config {
         if !(public.is_empty() || public.starts_with("http://") || public.starts_with("https://")) {
             let why = "an origin such as https://mirror.example is needed";
             return fault("compositor.public", why);
+        }
+        if let Some((key, why)) = self.telemetry.fault() {
+            return fault(key, why);
         }
         let is_open = !(self.has_tls() && self.has_tokens());
         if let Some(key) = self.exposed().filter(|_| is_open && !self.process.insecure) {

@@ -256,6 +256,7 @@ pub(crate) mod tests {
             sequence,
             capture_time_ns: sequence,
             received_unix_ns: 1,
+            trace: 0,
         };
         let rgbd = RgbdFrame {
             sequence,

@@ -16,6 +16,7 @@ pub mod drain;
 mod followed;
 pub mod forget;
 mod frame_order;
+pub mod frame_trace;
 pub mod frames;
 pub mod hosts;
 pub mod load;

@@ -5,6 +5,7 @@ use crate::bus::ZenohBus;
 use crate::compute::Pool;
 use crate::config::Config;
 use crate::drain::{self, Drained};
+use crate::frame_trace;
 use crate::server::{Context, Running, StartError};
 use crate::supervisor;
 use crate::tls::Tls;
@@ -152,6 +153,11 @@ where
         tls: Tls::open(&config.tls)?,
     };
     crate::telemetry::show_zeros(name);
+    let unusable = |why| StartError::Config {
+        key: "telemetry.otlp".into(),
+        why,
+    };
+    let traces = frame_trace::start(name, &config.telemetry).map_err(unusable)?;
     let running = start(config, ctx).await?;
     say(&format!(
         "{name}: grpc {} admin {}",
@@ -169,6 +175,9 @@ where
     watch.abort();
     if let Some(watchdog) = watchdog {
         watchdog.abort();
+    }
+    if let Some(traces) = traces {
+        traces.end().await;
     }
     // The bus closes within a deadline of its own.
     let _ = tokio::time::timeout(Duration::from_millis(500), bus.close()).await;

@@ -1,9 +1,11 @@
 //! Logs and metrics. Neither ever carries pixels or poses.
 
 use crate::config::{LogConfig, LogFormat};
+use crate::frame_trace;
 use metrics_exporter_prometheus::{PrometheusBuilder, PrometheusHandle};
 use std::sync::OnceLock;
 use tracing_subscriber::EnvFilter;
+use tryon_proto::v1::{FrameId, StageTime};
 
 /// Starts logging to standard error; later calls in the same process change nothing.
 ///
@@ -60,8 +62,12 @@ pub fn record_skipped<const N: usize>(service: &'static str, skipped: [(&'static
     }
 }
 
-/// Records stage times as `tryon_stage_ms{stage="…"}`, those whose name starts with `service.`.
-pub fn record_stages(service: &str, stages: &[tryon_proto::v1::StageTime]) {
+/// Records stage times of an exposure as `tryon_stage_ms{stage="…"}`, those whose name starts with `service.`, and as
+/// spans if it is traced.
+pub fn record_stages(service: &'static str, frame: Option<&FrameId>, stages: &[StageTime]) {
+    if let Some(id) = frame {
+        frame_trace::record(service, id, stages);
+    }
     for s in stages
         .iter()
         .filter(|s| s.stage.split('.').next() == Some(service))

@@ -178,7 +178,7 @@ impl Task {
                 self.engine = Some(engine);
                 state.session_id = self.setup.id.clone();
                 state.frames_dropped = skipped;
-                record_stages("tracking", &state.stages);
+                record_stages("tracking", state.frame.as_ref(), &state.stages);
                 metrics::counter!("tryon_tracking_steps").increment(1);
                 self.states.send_replace(Arc::new(state));
             }

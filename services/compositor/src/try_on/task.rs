@@ -464,7 +464,7 @@ impl Task {
     fn on_shown(&mut self, job: &Arc<Job>, drawn: &Encoded) {
         let id = job.exposure.id;
         (self.shown, self.showing) = (Some(id), Some(job.clone()));
-        record_stages("compositor", &drawn.stages);
+        record_stages("compositor", Some(&id), &drawn.stages);
         let state = life::state(self.life.state()).as_str_name();
         metrics::counter!("tryon_pictures", "state" => state).increment(1);
         let latency = unix_ns().saturating_sub(id.received_unix_ns) as f64 * 1e-6;

@@ -6,7 +6,8 @@ export const FrameId = schema('FrameId',
   [1, 'epoch', 'uint64'],
   [2, 'sequence', 'uint64'],
   [3, 'capture_time_ns', 'uint64'],
-  [4, 'received_unix_ns', 'uint64']);
+  [4, 'received_unix_ns', 'uint64'],
+  [5, 'trace', 'uint64']);
 
 export const StageTime = schema('StageTime',
   [1, 'stage', 'string'],

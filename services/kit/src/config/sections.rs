@@ -39,6 +39,37 @@ impl Default for LogConfig {
     }
 }
 
+/// Traces.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TelemetryConfig {
+    /// OTLP/gRPC endpoint of a collector, such as `http://127.0.0.1:4317`; empty: no traces.
+    pub otlp: String,
+    /// Exposures of each camera that are traced a second.
+    pub traces_per_second: f64,
+}
+
+impl TelemetryConfig {
+    /// First key at fault, and the fault.
+    pub(super) fn fault(&self) -> Option<(&'static str, &'static str)> {
+        if !(self.otlp.is_empty() || self.otlp.starts_with("http://")) {
+            let why = "a URL such as http://127.0.0.1:4317 is needed, or nothing";
+            return Some(("telemetry.otlp", why));
+        }
+        let is_rate = (0.0..=1000.0).contains(&self.traces_per_second);
+        (!is_rate).then_some(("telemetry.traces_per_second", "0 to 1000"))
+    }
+}
+
+impl Default for TelemetryConfig {
+    fn default() -> Self {
+        Self {
+            otlp: String::new(),
+            traces_per_second: 1.0,
+        }
+    }
+}
+
 /// Threads and shutdown.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

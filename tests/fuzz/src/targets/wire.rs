@@ -234,6 +234,7 @@ fn frame() -> v1::RgbdFrame {
             sequence: 3,
             capture_time_ns: 5,
             received_unix_ns: 9,
+            trace: 11,
         },
         calibration: Calibration::registered(Intrinsics::KINECT_V1.resized(16, 12)).into(),
         rgbd: RgbdFrame {
