@@ -114,6 +114,10 @@ requests!(
     StreamGarmentsRequest,
     StartSimulationRequest,
     FollowSimulationRequest,
+    HoldConsentRequest,
+    WithdrawConsentRequest,
+    AcknowledgePictureRequest,
+    OfferPhotoRequest,
     OpenTryOnRequest,
     CloseTryOnRequest,
     ChooseGarmentsRequest,
@@ -135,6 +139,11 @@ fn run_request(b: &Bundle, _: &Scratch) -> Result<usize, String> {
             request::camera_key("open_try_on_request", &r.store, &r.camera).map_err(text)?;
             let chosen = request::choices("open_try_on_request", &r.garments);
             chosen.map(|c| c.len()).map_err(text)
+        }
+        "HoldConsentRequest" => {
+            let r = v1::HoldConsentRequest::decode(bytes).map_err(text)?;
+            request::session_id("hold_consent_request.try_on_id", &r.try_on_id).map_err(text)?;
+            Ok(r.encoded_len())
         }
         "OpenSessionRequest" => {
             let r = v1::OpenSessionRequest::decode(bytes).map_err(text)?;
@@ -179,7 +188,7 @@ fn request_seeds() -> Vec<Bundle> {
         store: "store".into(),
         camera: "front".into(),
         garments: vec![shirt.clone()],
-        ..Default::default()
+        consent: Some(v1::Consent { given: true }),
     };
     let session = v1::OpenSessionRequest {
         session_id: "abc-1".into(),
@@ -209,6 +218,12 @@ fn request_seeds() -> Vec<Bundle> {
         scene_json: super::garments::scene_json(),
         ..Default::default()
     };
+    let hold = v1::HoldConsentRequest {
+        store: "store".into(),
+        camera: "front".into(),
+        try_on_id: "abc-1".into(),
+        seconds: 1.5,
+    };
     let record = v1::StartRecordingRequest {
         camera: "front".into(),
         consent: true,
@@ -216,6 +231,7 @@ fn request_seeds() -> Vec<Bundle> {
     };
     vec![
         Bundle::of("OpenTryOnRequest.pb", open.encode_to_vec()),
+        Bundle::of("HoldConsentRequest.pb", hold.encode_to_vec()),
         Bundle::of("OpenSessionRequest.pb", session.encode_to_vec()),
         Bundle::of("DressRequest.pb", dress.encode_to_vec()),
         Bundle::of("ChooseGarmentsRequest.pb", choose.encode_to_vec()),
