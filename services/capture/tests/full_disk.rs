@@ -7,7 +7,7 @@ use tonic::Code;
 use tryon::formats::open_recording;
 use tryon_proto::v1::capture_service_client::CaptureServiceClient;
 use tryon_proto::v1::{
-    CameraInfo, ListCamerasRequest, StartRecordingRequest, StopRecordingRequest,
+    CameraInfo, HoldConsentRequest, ListCamerasRequest, StartRecordingRequest, StopRecordingRequest,
 };
 
 /// Ends the process whatever the test does.
@@ -26,6 +26,17 @@ async fn camera(client: &mut Client) -> CameraInfo {
     let list = client.list_cameras(ListCamerasRequest::default()).await;
     let cameras = list.expect("listed").into_inner().cameras;
     cameras.into_iter().next().expect("one camera")
+}
+
+/// Lets the camera publish for the next seconds.
+async fn hold(client: &mut Client) {
+    let request = HoldConsentRequest {
+        camera: "front".into(),
+        try_on_id: "somebody".into(),
+        seconds: 2.0,
+        ..Default::default()
+    };
+    client.hold_consent(request).await.expect("held");
 }
 
 /// The service with files of at most `kib` KiB (RLIMIT_FSIZE, EFBIG like a full disk's ENOSPC), and its gRPC URL.
@@ -67,6 +78,7 @@ async fn a_full_disk_ends_the_recording_and_nothing_else() {
         camera: "front".into(),
         consent: true,
     };
+    hold(&mut client).await;
     let begun = client.start_recording(request).await.expect("begun");
     let file = begun.into_inner().file;
 
@@ -75,6 +87,7 @@ async fn a_full_disk_ends_the_recording_and_nothing_else() {
     }
     let before = camera(&mut client).await.frames;
     while camera(&mut client).await.frames < before + 10 {
+        hold(&mut client).await;
         tokio::time::sleep(Duration::from_millis(50)).await;
     }
 
