@@ -72,7 +72,7 @@ fn start(folder: &std::path::Path, kib: usize) -> (Process, String) {
 #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
 async fn a_full_disk_ends_the_recording_and_nothing_else() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (_process, url) = start(folder.path(), 1500);
+    let (_process, url) = start(folder.path(), 300);
     let mut client = Client::connect(url).await.expect("connected");
     let request = StartRecordingRequest {
         camera: "front".into(),

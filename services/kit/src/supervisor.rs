@@ -91,9 +91,11 @@ mod tests {
         assert!(is_live(&pool, admin, limit).await);
 
         let (release, stuck) = std::sync::mpsc::channel::<()>();
+        let (begun, has_begun) = tokio::sync::oneshot::channel();
         let busy = pool.clone();
-        let job = tokio::spawn(async move { busy.run(move || stuck.recv().is_err()).await });
-        tokio::task::yield_now().await;
+        let work = move || begun.send(()).is_ok() && stuck.recv().is_err();
+        let job = tokio::spawn(async move { busy.run(work).await });
+        assert_eq!(has_begun.await, Ok(()));
         assert!(!is_live(&pool, admin, Duration::from_millis(300)).await);
         drop(release);
         assert!(job.await.expect("joined").is_ok());
