@@ -139,7 +139,7 @@ impl Archive<'_> {
             .shape()
             .iter()
             .try_fold(1u64, |n, d| n.checked_mul(*d));
-        let payload = bytes.split_off(header_end as usize);
+        let payload = bytes.split_off(header_end);
         if count.and_then(|n| n.checked_mul(item as u64)) != Some(payload.len() as u64) {
             return Err(fault(format!(
                 "shape {:?} of {item} bytes each does not match its {} bytes",
