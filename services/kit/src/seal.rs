@@ -250,7 +250,7 @@ mod tests {
         let at = front.open(&mut opened).expect("opens");
         assert_eq!(RgbdFrame::decode(&opened[at..]), Ok(frame()));
         assert_eq!(front.open(&mut sealed.clone()), Err(SealError::Repeated));
-        assert_eq!(front.open(&mut vec![0; 10]), Err(SealError::NoHeader));
+        assert_eq!(front.open(&mut [0; 10]), Err(SealError::NoHeader));
     }
 
     #[test]

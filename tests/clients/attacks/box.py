@@ -99,6 +99,8 @@ class Box:
         sections["cloth"]["tracking"] = sections["compositor"]["tracking"] = url["tracking"]
         sections["compositor"]["cloth"] = url["cloth"]
         sections["compositor"]["capture"] = url["capture"]
+        # Whatever else runs on the machine of the attack must neither refuse its try-ons nor thin their cloth.
+        sections["compositor"]["by_capacity"] = sections["cloth"]["adapts_detail"] = False
         if self.setup.authority:
             sections["auth"] = self.setup.authority.settings()
         for name, values in self.setup.settings.items():

@@ -38,6 +38,7 @@ def overload(ground: Range) -> list[Figure]:
     cameras = [Camera(f"c{i}", "synth:still", 15.0) for i in range(2 * CAPACITY)]
     places = {name: {key: 6} for name, key in
               (("compositor", "max_try_ons"), ("tracking", "max_sessions"), ("cloth", "max_sessions"))}
+    places["compositor"]["by_capacity"] = True
     with ground.box(Setup(cameras, places, cores=2)) as box:
         running = [Viewer(ground, box, f"r{i}", f"c{i}", GARMENTS) for i in range(CAPACITY)]
         for v in running:

@@ -18,7 +18,7 @@ pub(super) enum Done {
     /// One format of a picture of the stream.
     Picture(Arc<Job>, Encoded),
     /// The job has ended.
-    End(End),
+    End(Box<End>),
 }
 
 /// End of a job.
@@ -173,7 +173,7 @@ impl Drawing {
                 outcome,
                 answer,
             };
-            let _ = done.send(Done::End(end)).await;
+            let _ = done.send(Done::End(Box::new(end))).await;
         });
     }
 }

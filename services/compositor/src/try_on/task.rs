@@ -418,7 +418,7 @@ impl Task {
                     self.deliver(&job, &picture);
                 }
             }
-            Done::End(end) => self.on_end(end),
+            Done::End(end) => self.on_end(*end),
         }
     }
 

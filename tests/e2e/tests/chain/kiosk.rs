@@ -55,6 +55,8 @@ impl Kiosk {
         (config.bus.listen, config.bus.connect) = (endpoint.clone(), endpoint);
         config.process.grace_ms = 1000;
         config.process.compute_threads = 2;
+        // Tests share their machine: whatever else runs on it must not thin cloth or refuse try-ons.
+        (config.cloth.adapts_detail, config.compositor.by_capacity) = (false, false);
         let camera = |name: &str, source: &str, rate| CameraConfig {
             name: name.into(),
             source: source.into(),

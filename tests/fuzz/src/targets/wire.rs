@@ -116,7 +116,7 @@ requests!(
     FollowSimulationRequest,
     HoldConsentRequest,
     WithdrawConsentRequest,
-    AcknowledgePictureRequest,
+    AcknowledgeFramesRequest,
     OfferPhotoRequest,
     OpenTryOnRequest,
     CloseTryOnRequest,
