@@ -138,7 +138,7 @@ const DOORS: &[(&str, &[&str])] = &[
     ("kiddo", &["src/spatial/kdtree.rs"]),
     ("wgpu", &["src/gpu/"]),
     ("faer", &["src/linear/"]),
-    ("mcap", &["src/formats/"]),
+    ("mcap", &["src/formats/", "tests/fuzz/src/pack.rs"]),
     ("gltf", &["src/formats/"]),
     ("png", &["src/formats/"]),
     ("zune_jpeg", &["src/formats/"]),

@@ -1,4 +1,4 @@
-//! What a box shows, remembers and tells of the people before it: two sessions whose cameras paint their ids into colour
+//! All that a box shows, remembers and tells of the people before it: two sessions whose cameras paint their ids into colour
 //! and depth, watched from outside the process.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, missing_docs, clippy::print_stdout)]
@@ -252,7 +252,7 @@ fn no_picture_is_foreign_and_nothing_remains_in_memory_logs_and_metrics() {
             .map(|s| tokio::spawn(watch(s, compositor.clone())));
         eventually("1e5 frames", async || published(&capture).await >= FRAMES).await;
         for s in &SESSIONS {
-            // What cannot be found while it is there proves nothing later.
+            // A search that does not find them while they are there proves nothing later.
             let is_found = async || tryon.remembers(&s.piece()) > 0;
             eventually("a frame in memory", is_found).await;
         }

@@ -16,7 +16,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// Interval of pictures of a still scene, which show changes too slow to be detected.
 const DRAW_EVERY: Duration = Duration::from_millis(500);
 
-/// What to do about an exposure of an empty scene.
+/// Treatment of one exposure of an empty scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Look {
     /// It shows something new, or the last picture is old.

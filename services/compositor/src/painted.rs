@@ -57,7 +57,7 @@ struct Session {
     engine: Engine,
 }
 
-/// What its pictures showed.
+/// All that its pictures showed.
 #[derive(Default)]
 struct Seen {
     pictures: u64,
@@ -102,6 +102,7 @@ impl Session {
             sequence,
             capture_time_ns: sequence * 33_000_000,
             received_unix_ns: 1,
+            trace: 0,
         }
     }
 

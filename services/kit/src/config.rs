@@ -45,6 +45,9 @@ pub struct ConfigError(pub String);
 /// the command line (services have `TRYON_LOG__LEVEL`); the token of a client.
 const NOT_KEYS: [&str; 5] = ["SHARED", "REQUIRE_ALL", "CONFIG", "LOG", "TOKEN"];
 
+/// Fault of a name.
+const NAME: &str = "1 to 64 characters of [a-z0-9_-] are needed";
+
 impl Config {
     /// Reads all layers. `flags` are `key=value` pairs such as `capture.address=127.0.0.1:0`.
     ///
@@ -80,24 +83,10 @@ impl Config {
     pub fn validate(&self) -> Result<(), ConfigError> {
         use tryon_proto::keys::is_name;
         let fault = |key: &str, why: &str| Err(ConfigError(format!("{key}: {why}")));
-        let name = "1 to 64 characters of [a-z0-9_-] are needed";
         if !is_name(&self.capture.store) {
-            return fault("capture.store", name);
+            return fault("capture.store", NAME);
         }
-        for (i, c) in self.capture.cameras.iter().enumerate() {
-            if !is_name(&c.name) {
-                return fault(&format!("capture.cameras.{i}.name"), name);
-            }
-            if self.capture.cameras[..i].iter().any(|o| o.name == c.name) {
-                return fault(&format!("capture.cameras.{i}.name"), "is used twice");
-            }
-            if !(c.rate.is_finite() && (0.0..=1000.0).contains(&c.rate)) {
-                return fault(
-                    &format!("capture.cameras.{i}.rate"),
-                    "0 to 1000 frames a second",
-                );
-            }
-        }
+        self.validate_cameras()?;
         for (key, ms) in [
             (
                 "compositor.camera_silence_ms",
@@ -112,22 +101,7 @@ impl Config {
                 return fault(key, "at least 50 ms, or every hiccup is a fault");
             }
         }
-        for (key, url) in [
-            ("cloth.tracking", &self.cloth.tracking),
-            ("compositor.tracking", &self.compositor.tracking),
-            ("compositor.cloth", &self.compositor.cloth),
-            ("compositor.capture", &self.compositor.capture),
-        ] {
-            if !(url.starts_with("http://") || url.starts_with("https://")) {
-                return fault(key, "a URL such as http://127.0.0.1:50052 is needed");
-            }
-            if url.starts_with("https://") && !self.tls.is_client() {
-                return fault(key, "https needs tls.ca, the authority of that service");
-            }
-        }
-        if self.tls.is_server() == self.tls.key.as_os_str().is_empty() {
-            return fault("tls.key", "certificate and key are given together");
-        }
+        self.validate_connections()?;
         let public = &self.compositor.public;
         if !(public.is_empty() || public.starts_with("http://") || public.starts_with("https://")) {
             let why = "an origin such as https://mirror.example is needed";
@@ -143,7 +117,7 @@ impl Config {
             return fault(key, why);
         }
         if !self.auth.store.is_empty() && !is_name(&self.auth.store) {
-            return fault("auth.store", name);
+            return fault("auth.store", NAME);
         }
         if !self.has_tokens() && !self.auth.revoked.as_os_str().is_empty() {
             return fault("auth.revoked", "revokes nothing without auth.keys");
@@ -158,6 +132,46 @@ impl Config {
             if n == 0 {
                 return fault(key, "at least 1");
             }
+        }
+        Ok(())
+    }
+
+    fn validate_cameras(&self) -> Result<(), ConfigError> {
+        let fault = |key: &str, why: &str| Err(ConfigError(format!("{key}: {why}")));
+        for (i, c) in self.capture.cameras.iter().enumerate() {
+            if !tryon_proto::keys::is_name(&c.name) {
+                return fault(&format!("capture.cameras.{i}.name"), NAME);
+            }
+            if self.capture.cameras[..i].iter().any(|o| o.name == c.name) {
+                return fault(&format!("capture.cameras.{i}.name"), "is used twice");
+            }
+            if !(c.rate.is_finite() && (0.0..=1000.0).contains(&c.rate)) {
+                return fault(
+                    &format!("capture.cameras.{i}.rate"),
+                    "0 to 1000 frames a second",
+                );
+            }
+        }
+        Ok(())
+    }
+
+    fn validate_connections(&self) -> Result<(), ConfigError> {
+        let fault = |key: &str, why: &str| Err(ConfigError(format!("{key}: {why}")));
+        for (key, url) in [
+            ("cloth.tracking", &self.cloth.tracking),
+            ("compositor.tracking", &self.compositor.tracking),
+            ("compositor.cloth", &self.compositor.cloth),
+            ("compositor.capture", &self.compositor.capture),
+        ] {
+            if !(url.starts_with("http://") || url.starts_with("https://")) {
+                return fault(key, "a URL such as http://127.0.0.1:50052 is needed");
+            }
+            if url.starts_with("https://") && !self.tls.is_client() {
+                return fault(key, "https needs tls.ca, the authority of that service");
+            }
+        }
+        if self.tls.is_server() == self.tls.key.as_os_str().is_empty() {
+            return fault("tls.key", "certificate and key are given together");
         }
         Ok(())
     }

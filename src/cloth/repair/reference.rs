@@ -150,7 +150,7 @@ mod tests {
         }
         assert!(put_on.velocities.iter().all(|v| *v == V3::zeros()));
         let skinned = reference.skinned(&model, &moved).expect("a body");
-        assert_eq!(skinned, [put_on.positions.clone()]);
+        assert_eq!(skinned, std::slice::from_ref(&put_on.positions));
         let fault = reference.skinned(&model, &moved[1..]);
         assert!(fault.is_err(), "another body");
         assert_eq!(

@@ -215,7 +215,7 @@ impl Kiosk {
             Part::Cloth => self.config.cloth.address,
             Part::Compositor => self.config.compositor.address,
         };
-        tryon_kit::client::channel(&format!("http://{address}")).expect("a URL")
+        tryon_kit::client::channel(&format!("http://{address}"), &Tls::off()).expect("a URL")
     }
 
     /// Client of the compositor.

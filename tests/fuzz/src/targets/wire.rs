@@ -118,6 +118,7 @@ requests!(
     WithdrawConsentRequest,
     AcknowledgeFramesRequest,
     OfferPhotoRequest,
+    RedeemCodeRequest,
     OpenTryOnRequest,
     CloseTryOnRequest,
     ChooseGarmentsRequest,
@@ -199,12 +200,10 @@ fn request_seeds() -> Vec<Bundle> {
     let dress = v1::DressRequest {
         session_id: "abc-1".into(),
         garments: vec![shirt.clone(), shirt.clone()],
-        ..Default::default()
     };
     let choose = v1::ChooseGarmentsRequest {
         try_on_id: "abc-1".into(),
         garments: vec![shirt],
-        ..Default::default()
     };
     let stream = v1::StreamFramesRequest {
         try_on_id: "abc-1".into(),
@@ -227,7 +226,6 @@ fn request_seeds() -> Vec<Bundle> {
     let record = v1::StartRecordingRequest {
         camera: "front".into(),
         consent: true,
-        ..Default::default()
     };
     vec![
         Bundle::of("OpenTryOnRequest.pb", open.encode_to_vec()),
@@ -336,7 +334,7 @@ fn body_seeds() -> Vec<Bundle> {
             joint("left_hip", Some(0), v1::JointKind::Hinge, 1),
             joint("left_knee", Some(1), v1::JointKind::Fixed, 0),
         ],
-        skin_joints: vec![0, 1, 2, 0].repeat(4).into(),
+        skin_joints: [0, 1, 2, 0].repeat(4).into(),
         skin_weights: f32s(&[0.5, 0.3, 0.2, 0.0].repeat(4)),
         shape_directions: vec![v1::ShapeDirection {
             name: "tall".into(),
@@ -357,7 +355,7 @@ fn body_seeds() -> Vec<Bundle> {
     let shape = v1::BodyShape {
         coefficients: f64s(&[0.5]),
         bone_scales: f64s(&[1.0, 1.1, 0.9]),
-        displacements: vec![1, 0].repeat(4).into(),
+        displacements: [1, 0].repeat(4).into(),
         displacement_unit: 1e-4,
     };
     let bundle = Bundle::of("template.pb", template.encode_to_vec());
