@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use tryon::camera::{ColorImage, DepthImage};
 use tryon::formats::image::{decode_jpeg, write_png_depth, write_png_rgb};
+use tryon_kit::auth::{Connection, Credentials};
 use tryon_kit::bus::free_tcp_endpoint;
 use tryon_kit::client::channel;
 use tryon_kit::tls::Tls;
@@ -89,9 +90,32 @@ impl Painted {
     }
 }
 
+/// Makes keys in a folder, and a token for capture and compositor.
+fn issue(keys: &Path) -> String {
+    let run = |args: &[&str]| {
+        let token = Command::new(env!("CARGO_BIN_EXE_tryon"))
+            .arg("token")
+            .args(args)
+            .output();
+        let token = token.unwrap();
+        assert!(token.status.success(), "{token:?}");
+        String::from_utf8(token.stdout).unwrap()
+    };
+    run(&["key", "--out", keys.to_str().unwrap()]);
+    let key = keys.join("issuer.pem");
+    let of = ["issue", "--key", key.to_str().unwrap(), "--store", "store"];
+    run(&[
+        &of[..],
+        &["--audience", "capture", "compositor", "--ttl", "3600"],
+    ]
+    .concat())
+}
+
 /// `tryon up` with the two cameras.
 struct Program {
     child: Child,
+    /// Presents a token for all of it.
+    credentials: Credentials,
     log: Arc<Mutex<String>>,
     addresses: Vec<(String, SocketAddr, SocketAddr)>,
 }
@@ -100,6 +124,12 @@ impl Program {
     fn start(folder: &Path) -> Self {
         let bus = free_tcp_endpoint().unwrap();
         let mut config = format!("[bus]\nlisten = [\"{bus}\"]\nconnect = [\"{bus}\"]\n");
+        let keys = folder.join("keys");
+        let token = issue(&keys);
+        config += &format!(
+            "[auth]\nkeys = [\"{}\"]\n",
+            keys.join("issuer.pub.pem").display()
+        );
         for service in ["capture", "tracking", "cloth", "compositor"] {
             config += &format!("[{service}]\naddress = \"127.0.0.1:0\"\nadmin = \"127.0.0.1:0\"\n");
         }
@@ -138,13 +168,17 @@ impl Program {
         Self {
             addresses: addresses.collect(),
             child,
+            credentials: Credentials::fixed(token.trim()),
             log,
         }
     }
 
-    fn url(&self, service: &str) -> String {
+    fn connect(&self, service: &str) -> Connection {
         let found = self.addresses.iter().find(|a| a.0 == service);
-        format!("http://{}", found.unwrap().1)
+        let url = format!("http://{}", found.unwrap().1);
+        self.credentials
+            .clone()
+            .present(channel(&url, &Tls::off()).unwrap())
     }
 
     /// Occurrences of a piece in the writable memory of the process.
@@ -189,15 +223,15 @@ impl Drop for Program {
 }
 
 /// Exposures published so far.
-async fn published(url: &str) -> u64 {
-    let mut capture = CaptureServiceClient::new(channel(url, &Tls::off()).unwrap());
+async fn published(capture: &Connection) -> u64 {
+    let mut capture = CaptureServiceClient::new(capture.clone());
     let cameras = capture.list_cameras(ListCamerasRequest {}).await.unwrap();
     cameras.into_inner().cameras.iter().map(|c| c.frames).sum()
 }
 
 /// Opens the session and checks every picture of it until its stream ends; their number and that of foreign ones.
-async fn watch(session: &'static Painted, url: String) -> (u64, u64) {
-    let mut c = CompositorServiceClient::new(channel(&url, &Tls::off()).unwrap());
+async fn watch(session: &'static Painted, compositor: Connection) -> (u64, u64) {
+    let mut c = CompositorServiceClient::new(compositor);
     let open = OpenTryOnRequest {
         try_on_id: session.name.into(),
         camera: session.name.into(),
@@ -243,7 +277,7 @@ fn no_picture_is_foreign_and_nothing_remains_in_memory_logs_and_metrics() {
         .build()
         .unwrap();
     runtime.block_on(async {
-        let (capture, compositor) = (tryon.url("capture"), tryon.url("compositor"));
+        let (capture, compositor) = (tryon.connect("capture"), tryon.connect("compositor"));
         tokio::time::sleep(Duration::from_millis(500)).await;
         assert_eq!(published(&capture).await, 0, "before anybody agreed");
 
@@ -257,7 +291,7 @@ fn no_picture_is_foreign_and_nothing_remains_in_memory_logs_and_metrics() {
             eventually("a frame in memory", is_found).await;
         }
 
-        let mut c = CompositorServiceClient::new(channel(&compositor, &Tls::off()).unwrap());
+        let mut c = CompositorServiceClient::new(compositor);
         for s in &SESSIONS {
             let try_on_id = s.name.into();
             c.withdraw_consent(WithdrawConsentRequest { try_on_id })

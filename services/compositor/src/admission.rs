@@ -17,6 +17,8 @@ const FIRST_COST: f64 = 0.8;
 const SETTLED: Duration = Duration::from_secs(6);
 /// Weight of a reading.
 const WEIGHT: f64 = 0.2;
+/// Weight of a reading above what others took so far: the start of the services themselves is no load that stays.
+const RISE: f64 = 0.02;
 /// Fall of the cost a reading: try-ons cost little while nobody is in view, and people come back. Half in six minutes.
 const FORGETTING: f64 = 0.001;
 
@@ -89,7 +91,8 @@ impl Capacity {
     fn learn(&mut self, load: Load, open: usize, now: Instant) {
         self.processors = Some(load.processors);
         if open == 0 {
-            self.others += WEIGHT * (load.busy - self.others);
+            let weight = if load.busy > self.others { RISE } else { WEIGHT };
+            self.others += weight * (load.busy - self.others);
             return;
         }
         let is_settled = self.opened.is_none_or(|t| now - t >= SETTLED);
@@ -160,6 +163,14 @@ mod tests {
     #[test]
     fn work_of_others_takes_places() {
         let (mut c, start) = (Capacity::default(), Instant::now());
+        let busy = |busy| Load {
+            busy,
+            processors: 2.0,
+        };
+        for _ in 0..6 {
+            c.learn(busy(1.8), 0, start);
+        }
+        assert!(c.has_room(1), "the services have just started: {c:?}");
         run(&mut c, 1.2, 0, start);
         assert!(c.has_room(0) && !c.has_room(1), "{c:?}");
     }

