@@ -416,9 +416,9 @@ impl CompositorService for Compositor {
         &self,
         r: Request<OfferPhotoRequest>,
     ) -> Result<Response<OfferPhotoResponse>, Status> {
-        let origin = photos::origin(&self.config.public, r.metadata())?;
         let id = &r.get_ref().try_on_id;
         let handle = self.find(&r, id)?;
+        let origin = photos::origin(&self.config.public, r.metadata())?;
         let picture = snapshot(&handle, id, Encoding::Jpeg(SNAPSHOT_QUALITY)).await?;
         let url = origin + &self.photos.offer(id, picture.image.clone())?;
         if let Err(gone) = self.find(&r, id) {
