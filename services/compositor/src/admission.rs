@@ -91,7 +91,11 @@ impl Capacity {
     fn learn(&mut self, load: Load, open: usize, now: Instant) {
         self.processors = Some(load.processors);
         if open == 0 {
-            let weight = if load.busy > self.others { RISE } else { WEIGHT };
+            let weight = if load.busy > self.others {
+                RISE
+            } else {
+                WEIGHT
+            };
             self.others += weight * (load.busy - self.others);
             return;
         }
