@@ -72,12 +72,15 @@ impl ZenohBus {
             zenoh::Config::from_file(file)
                 .map_err(|e| BusError(format!("{}: {e}", file.display())))?
         };
+        // A router hands frames on to clients; between peers it needs the gossip that is off here.
+        let is_behind_router = !file.as_os_str().is_empty() && listen.is_empty();
+        let mode = if is_behind_router { "client" } else { "peer" };
         let list = |l: &[String]| format!("{l:?}");
         let (init, max) = RETRY_MS;
         let retry =
             format!("{{period_init_ms: {init}, period_max_ms: {max}, period_increase_factor: 2}}");
         let settings = [
-            ("mode", "\"peer\"".to_owned()),
+            ("mode", format!("\"{mode}\"")),
             ("listen/endpoints", list(listen)),
             ("connect/endpoints", list(connect)),
             ("connect/timeout_ms", "-1".into()),
