@@ -100,7 +100,7 @@ impl Session {
         FrameId {
             epoch: 1,
             sequence,
-            capture_time_ns: sequence * 33_000_000,
+            capture_time_ns: sequence.wrapping_mul(33_000_000),
             received_unix_ns: 1,
             trace: 0,
         }

@@ -95,7 +95,12 @@ impl Enrolments {
 
     fn take(&self, digest: &str) -> Result<String, EnrolFault> {
         let mut found = None;
-        for entry in std::fs::read_dir(&self.folder)? {
+        let waiting = match std::fs::read_dir(&self.folder) {
+            // The first code makes the folder.
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Err(EnrolFault::Code),
+            waiting => waiting?,
+        };
+        for entry in waiting {
             let entry = entry?;
             // Every name is compared, each in constant time.
             let name = entry.file_name();
