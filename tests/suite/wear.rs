@@ -79,7 +79,7 @@ fn coarse_garments_have_fewer_vertices_and_skin_carries_them_along() {
         .collect();
     offsets.sort_by(f32::total_cmp);
     let (median, largest) = (offsets[offsets.len() / 2], offsets[offsets.len() - 1]);
-    // Where the cloth hangs freely it swings on; 24 and 63 mm here.
+    // 24 and 63 mm: cloth that hangs freely swings on.
     assert!(median < 0.035 && largest < 0.1, "{median} m, {largest} m");
     assert!(stepped.outfit.skinned(&body[1..]).is_err(), "another body");
 }
