@@ -54,6 +54,10 @@ class Box:
             if name == "compositor":
                 lines.append(f'cloth = "http://{address["cloth"]}"')
                 lines.append(f'capture = "http://{address["capture"]}"')
+                # Whatever else runs on the machine must not refuse the second try-on.
+                lines.append("by_capacity = false")
+            if name == "cloth":
+                lines.append("adapts_detail = false")
         # A plain picture on the second camera: a try-on that no failure of tracking or cloth may touch.
         for camera, source, fps in (("front", "synth:still", rate), ("side", "pattern", 10.0)):
             lines += ["[[capture.cameras]]", f'name = "{camera}"', f'source = "{source}"', f"rate = {fps}"]
