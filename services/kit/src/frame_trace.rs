@@ -132,7 +132,7 @@ pub fn start(name: &'static str, config: &TelemetryConfig) -> Result<Option<Expo
 }
 
 impl Exporter {
-    /// Sends what waits, within [`PATIENCE`].
+    /// Sends what waits, within two seconds.
     pub async fn end(self) {
         self.end.cancel();
         let _ = tokio::time::timeout(PATIENCE, self.task).await;
