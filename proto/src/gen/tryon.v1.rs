@@ -3794,7 +3794,7 @@ pub mod compositor_service_client {
         /// twice a second while there are no pictures and the reader has taken all before, so silence of a second means that
         /// the compositor is gone. Each reader has its own queue: a slow one does not delay the others. Use one HTTP/2
         /// connection per stream: a slow reader stalls the other streams of its own connection.
-        /// What a reader's own windows and sockets hold is beyond the service's reach. A reader that wants new pictures however
+        /// A reader's own windows and sockets hold pictures beyond the service's reach. A reader that wants new pictures however
         /// slow it is acknowledges messages (`max_unacknowledged`): the next picture is made when it has room, and statuses
         /// other than the end are left out until then, since pictures have the state too. Others get every status.
         /// The last message before a regular end is a status with CLOSED or DRAINING. A try-on that fails ends its streams
@@ -4014,7 +4014,7 @@ pub mod compositor_service_server {
         /// twice a second while there are no pictures and the reader has taken all before, so silence of a second means that
         /// the compositor is gone. Each reader has its own queue: a slow one does not delay the others. Use one HTTP/2
         /// connection per stream: a slow reader stalls the other streams of its own connection.
-        /// What a reader's own windows and sockets hold is beyond the service's reach. A reader that wants new pictures however
+        /// A reader's own windows and sockets hold pictures beyond the service's reach. A reader that wants new pictures however
         /// slow it is acknowledges messages (`max_unacknowledged`): the next picture is made when it has room, and statuses
         /// other than the end are left out until then, since pictures have the state too. Others get every status.
         /// The last message before a regular end is a status with CLOSED or DRAINING. A try-on that fails ends its streams

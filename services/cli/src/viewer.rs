@@ -111,7 +111,7 @@ fn open_request(garments: &[String]) -> v1::OpenTryOnRequest {
     };
     v1::OpenTryOnRequest {
         garments: garments.iter().map(choice).collect(),
-        // Whoever runs the command watches a person of their own, synthetic or recorded.
+        // The command shows a subject of its caller's choice, synthetic or recorded: consent is given.
         consent: Some(v1::Consent { given: true }),
         ..Default::default()
     }

@@ -75,7 +75,7 @@ async fn run(
     let (tracking, cloth) = (credentials.present(tracking), credentials.present(cloth));
     let id = setup.id.clone();
 
-    // Whoever opened it is about to stream.
+    // The caller that opened it is about to stream.
     let (is_watched, watched) = watch::channel(true);
     let (key_sender, keys) = watch::channel(None);
     let lease = Lease {
