@@ -1,12 +1,14 @@
-//! Small fixed-size algebra that nalgebra lacks: so(3)/se(3) maps, twists, polar rotation, PSD projection, derivative check.
+//! Small fixed-size algebra that nalgebra lacks: so(3)/se(3) maps, twists, polar rotation, PSD projection, element energies, derivative check.
 
 #[cfg(test)]
 pub(crate) mod derivative_check;
+mod element_energy;
 mod frames;
 mod lie;
 mod polar;
 mod symmetric;
 
+pub use element_energy::ElementEnergy;
 pub use frames::{Body, Camera, ColorCamera, Rigid, World};
 pub use lie::{Twist, exp_se3, exp_so3, left_jacobian_so3, log_so3, skew};
 pub use polar::polar_rotation_3;
