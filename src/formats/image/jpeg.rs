@@ -14,6 +14,9 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 const BYTES: &str = "jpeg bytes";
 /// Largest distance of the end marker from the end of the bytes: some writers pad to a sector.
 const END_WINDOW: usize = 4096;
+/// Most pixels of a byte: Huffman codes take a bit or more for each block of 8×8 (ITU-T T.81, F.1.2), and arithmetic
+/// coding is not decoded.
+const MAX_PIXELS_PER_BYTE: u64 = 8 * 64;
 
 /// Encodes colour as baseline JPEG with chroma at half resolution, quality 1 (small) to 100 (good).
 /// Quality 80 takes about 3 ms and 35 kB for a VGA picture.
@@ -64,6 +67,11 @@ pub(super) fn decode_jpeg_from(bytes: &[u8], origin: &Path) -> Result<ColorImage
         .ok_or_else(|| fault("it has no header".into()))?;
     let (width, height) = (u32::from(info.width), u32::from(info.height));
     check_size(origin, width, height)?;
+    let held = bytes.len() as u64 * MAX_PIXELS_PER_BYTE;
+    if u64::from(width) * u64::from(height) > held {
+        let why = format!("{width}×{height} pixels, {} bytes hold {held}", bytes.len());
+        return Err(fault(why));
+    }
     // The decoder fills missing data with grey; an image without its end marker is truncated.
     if !bytes
         .windows(2)
@@ -129,6 +137,17 @@ mod tests {
                 .to_string()
                 .contains("pixels")
         );
+    }
+
+    #[test]
+    fn a_header_beyond_the_coded_bytes_is_refused() {
+        let flat = ColorImage::filled(2048, 2048, [7, 7, 7]);
+        let mut bytes = encode_jpeg(&flat, 1).expect("encodes");
+        assert!(decode_jpeg(&bytes).is_ok(), "the emptiest picture fits");
+        bytes.truncate(8_000);
+        bytes.extend([0xff, 0xd9]);
+        let why = decode_jpeg(&bytes).expect_err("cut").to_string();
+        assert!(why.contains("8002 bytes hold"), "{why}");
     }
 
     proptest! {

@@ -13,6 +13,9 @@ use tryon::math::P3;
 
 /// Deflate and zstd legitimately expand a byte by thousands; sizes are checked before, and the largest image is bounded.
 const PER_PACKED_BYTE: usize = 60_000;
+/// A byte of JPEG holds at most 512 pixels, of 3 bytes as colour and of 6 as coefficients of progressive scans, with the
+/// decoder's rows beside them.
+const PER_JPEG_BYTE: usize = 512 * 20;
 
 /// Depth of the wire.
 pub(super) const DEPTH: Target = Target::new(
@@ -95,7 +98,7 @@ pub(super) const JPEG: Target = Target::new(
     },
 )
 .words(&["\u{ff}\u{d8}", "JFIF", "Exif\0\0"])
-.allow(1 << 20, PER_PACKED_BYTE);
+.allow(1 << 20, PER_JPEG_BYTE);
 
 fn depth() -> DepthImage {
     let data = (0..16 * 12).map(|i| 900 + i % 50).collect();
