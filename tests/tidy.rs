@@ -18,7 +18,7 @@ const MODULES: &[(u8, &str, &str)] = &[
     (
         0,
         "math",
-        "Small fixed-size algebra that nalgebra lacks: so(3)/se(3) maps, twists, polar rotation, PSD projection, element energies, derivative check.",
+        "Small fixed-size algebra that nalgebra lacks: so(3)/se(3) maps, twists, polar rotation, PSD projection, element energy, derivative check.",
     ),
     (
         0,

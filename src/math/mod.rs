@@ -1,4 +1,4 @@
-//! Small fixed-size algebra that nalgebra lacks: so(3)/se(3) maps, twists, polar rotation, PSD projection, element energies, derivative check.
+//! Small fixed-size algebra that nalgebra lacks: so(3)/se(3) maps, twists, polar rotation, PSD projection, element energy, derivative check.
 
 #[cfg(test)]
 pub(crate) mod derivative_check;

@@ -25,6 +25,7 @@
 //! # Ok::<(), tryon::tracking::StepError>(())
 //! ```
 
+mod adaptation;
 mod agreement;
 mod arm_clearance;
 mod body_proposals;
@@ -67,6 +68,7 @@ mod trunk;
 mod workspace;
 
 pub use crate::registration::residual::SurfaceNormals;
+pub use adaptation::adapt_surface;
 pub use agreement::Agreement;
 pub use arm_clearance::ArmClearance;
 pub use confidence::{ConfidenceReason, JointConfidence};
@@ -80,6 +82,6 @@ pub use report::{Skipped, StepError, StepReport, TrackingStagesMs};
 pub use size::SizeEstimate;
 pub use state::TrackerState;
 pub use status::{LostReason, Status};
-pub use step::step;
+pub use step::{follow, step};
 pub use surface::SurfaceStatistics;
 pub use workspace::Workspace;

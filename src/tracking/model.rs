@@ -9,7 +9,9 @@ use crate::body::parts::{BodyPart, BodySegment, BodySide};
 use crate::body::{JointMotion, SkinWeights, Template};
 use crate::camera::Calibration;
 use crate::math::{P3, V3};
+use crate::registration::Association;
 use crate::segment::part_forest::PartForest;
+use crate::spatial::{OrganisedCloud, PointTree};
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -71,6 +73,13 @@ pub struct TrackerModel {
 }
 
 impl TrackerModel {
+    /// Tree of the subject's points, where the configured association queries one.
+    pub(super) fn point_tree(&self, grid: &OrganisedCloud, cells: &[u32]) -> Option<PointTree> {
+        let has_tree = self.config.association == Association::KdTree;
+        let points = cells.iter().map(|&c| grid.points[c as usize]);
+        has_tree.then(|| PointTree::new(&points.collect::<Vec<P3>>()))
+    }
+
     /// Prepares a template for tracking with one camera.
     pub fn new(template: Arc<Template>, calibration: Calibration, config: TrackerConfig) -> Self {
         let skeleton = template.skeleton();

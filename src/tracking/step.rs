@@ -1,5 +1,6 @@
-//! One frame (Algorithm 1): segment → track the subject → keep a reference for change detection.
+//! One frame (Algorithm 1): segment → track the subject → keep a reference for change detection → adapt the surface.
 
+use super::adaptation::adapt_surface;
 use super::change_detection::DepthReference;
 use super::extrapolation::motion;
 use super::gravity::rolled_camera;
@@ -10,10 +11,9 @@ use super::segmentation::{LEAST_CELLS, segment};
 use super::subject::{StepLog, SubjectFrame};
 use super::{LostReason, Status, StepError, StepReport, TrackerModel, TrackerState, Workspace};
 use crate::camera::{DepthImage, RgbdFrame};
-use crate::math::P3;
-use crate::registration::{Association, Observation};
+use crate::registration::Observation;
 use crate::segment::{CandidateBox, PersonSearch};
-use crate::spatial::{OrganisedCloud, PointTree};
+use crate::spatial::OrganisedCloud;
 use nalgebra::Vector3;
 
 /// Motion per frame below which a fit is at rest, metres, and such frames in a row before frames are compared. A fit creeps
@@ -36,7 +36,25 @@ pub fn step(
     frame: &RgbdFrame,
     workspace: &mut Workspace,
 ) -> Result<StepReport, StepError> {
+    let mut report = follow(model, state, frame, workspace)?;
+    let mut watch = Stopwatch::start();
+    report.skipped.displacements -= adapt_surface(model, state, workspace);
+    report.stages_ms.surface = watch.lap();
+    Ok(report)
+}
+
+/// First half of [`step`]: pose, status and size. [`adapt_surface`] is the second; without it displacements stay.
+///
+/// # Errors
+/// As [`step`].
+pub fn follow(
+    model: &TrackerModel,
+    state: &mut TrackerState,
+    frame: &RgbdFrame,
+    workspace: &mut Workspace,
+) -> Result<StepReport, StepError> {
     check(model, state, frame)?;
+    workspace.surface_cells = None;
     let mut watch = Stopwatch::start();
     if let Some(mut report) = reuse(state, frame) {
         report.stages_ms.segment = watch.lap();
@@ -54,9 +72,7 @@ pub fn step(
         lose(state, LostReason::NoPerson);
     } else {
         let contour = std::mem::take(&mut workspace.contour);
-        let has_tree = model.config.association == Association::KdTree;
-        let points = person.cells.iter().map(|&c| grid.points[c as usize]);
-        let tree = has_tree.then(|| PointTree::new(&points.collect::<Vec<P3>>()));
+        let tree = model.point_tree(&grid, &person.cells);
         let observation = Observation {
             grid: &grid,
             cells: &person.cells,

@@ -1,4 +1,4 @@
-//! One subject in view (Algorithm 1): find or predict → fit → recover → calibrate → filter → commit → displacements.
+//! One subject in view (Algorithm 1): find or predict → fit → recover → calibrate → filter → commit.
 
 use super::agreement::Agreement;
 use super::body_proposals::{BodyProposals, person_cells};
@@ -10,7 +10,7 @@ use super::person_evidence::{PersonBelief, PersonEvidence, Verdict};
 use super::personal_body::PersonalBody;
 use super::pose_filter::filter_pose;
 use super::pose_fit::{
-    ANNEAL, FitContext, FitReport, FitTerms, START, START_TERMS, Schedule, TRACK, fit_pose, pair,
+    ANNEAL, FitContext, FitReport, FitTerms, START, START_TERMS, Schedule, TRACK, fit_pose,
 };
 use super::prediction::{Prediction, predict};
 use super::repair::Repair;
@@ -20,7 +20,7 @@ use super::size::first_shapes;
 use super::standing::{FloorStance, FootMemory, HiddenKnees, floor_below, highest_hips};
 use super::{
     JointConfidence, LostReason, SizeEstimate, Skipped, Status, StepReport, TrackerModel,
-    TrackerState, TrackingStagesMs, Workspace, surface,
+    TrackerState, TrackingStagesMs, Workspace,
 };
 use crate::body::{BodyShape, BoneTransforms, Pose};
 use crate::camera::RgbdFrame;
@@ -48,12 +48,6 @@ const PATIENCE: u32 = 8;
 const FORGET: u32 = 150;
 /// Residual that halves the quality of a frame, metres.
 const POOR_RESIDUAL: f64 = 0.02;
-/// Longest pair when the body is drawn for displacements, metres (paper, section 3.3).
-const DISPLACEMENT_DISTANCE: f32 = 0.05;
-/// Root mean square change below which displacements have settled, metres.
-const SETTLED_DISPLACEMENT: f32 = 0.4e-3;
-/// Longest interval between updates of settled displacements, frames.
-const LONGEST_INTERVAL: u32 = 24;
 
 /// Report in progress, with the stopwatch of its stages.
 pub(super) struct StepLog {
@@ -130,7 +124,7 @@ impl SubjectFrame<'_> {
         }
     }
 
-    /// Finds or follows the pose, then adapts size and displacements.
+    /// Finds or follows the pose and adapts the size.
     pub(super) fn track(
         &self,
         state: &mut TrackerState,
@@ -207,7 +201,8 @@ impl SubjectFrame<'_> {
         if state.belief.verdict == Verdict::Unsure {
             state.status = status;
         }
-        self.update_displacements(good, state, workspace, log);
+        let is_due = self.is_surface_due(good, state);
+        workspace.surface_cells = is_due.then(|| self.person.cells.clone());
         Ok(())
     }
 
@@ -424,40 +419,14 @@ impl SubjectFrame<'_> {
         state.feet = Some(state.feet.map_or(feet, |kept| kept.updated(feet)));
     }
 
-    /// Updates displacements when they are due. The interval doubles while they hardly change.
-    fn update_displacements(
-        &self,
-        good: bool,
-        state: &mut TrackerState,
-        workspace: &mut Workspace,
-        log: &mut StepLog,
-    ) {
+    /// Counts down to the next adaptation of the surface; true when it is due.
+    fn is_surface_due(&self, good: bool, state: &mut TrackerState) -> bool {
         let config = &self.model.config;
-        let shortest = config.displacement_interval.max(1);
         let [wait, interval] = &mut state.surface_due;
         *wait = wait.saturating_sub(1);
-        *interval = (*interval).max(shortest);
-        let tracking = state.status == Status::Tracking;
-        if !(good && config.displacements && tracking && *wait == 0) {
-            return;
-        }
-        let (context, scratch) = (self.context(&workspace.body), &mut workspace.fit);
-        pair(&context, &state.pose, DISPLACEMENT_DISTANCE, 0.0, scratch);
-        let (updated, change) = surface::fit(
-            &context,
-            scratch,
-            &mut state.shape.displacements,
-            &mut state.surface,
-            &mut workspace.surface,
-        );
-        log.report.skipped.displacements = state.shape.displacements.len() - updated;
-        *interval = if config.skip_settled && change < SETTLED_DISPLACEMENT {
-            (*interval * 2).min(LONGEST_INTERVAL)
-        } else {
-            shortest
-        };
-        *wait = *interval;
-        log.report.stages_ms.surface = log.watch.lap();
+        *interval = (*interval).max(config.displacement_interval.max(1));
+        let is_tracking = state.status == Status::Tracking;
+        good && config.displacements && is_tracking && *wait == 0
     }
 }
 

@@ -23,6 +23,8 @@ pub struct Workspace {
     pub(super) agreement: AgreementScratch,
     pub(super) parts: PartScratch,
     pub(super) surface: SurfaceScratch,
+    /// Cells of the subject in the last frame, while an adaptation of the surface to them is due.
+    pub(super) surface_cells: Option<Vec<u32>>,
     posed: Vec<P3>,
 }
 

@@ -15,6 +15,7 @@ pub(crate) const NOUNS: &[(&str, &[Noun])] = &[
             ("twists", "Twist"),
             ("polar", "polar.rs"),
             ("PSD projection", "project_psd_2"),
+            ("element energy", "element_energy.rs"),
             ("derivative check", "derivative_check.rs"),
         ],
     ),

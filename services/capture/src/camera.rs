@@ -10,6 +10,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
 use tryon::camera::Calibration;
+use tryon_kit::compute::Pool;
 use tryon_kit::config::CameraConfig;
 use tryon_kit::frames::CameraKey;
 use tryon_kit::server::Context;
@@ -117,10 +118,12 @@ impl Task {
         self.stop().await;
     }
 
-    async fn open(&self) -> Result<OpenSource, String> {
+    /// Opens the source on a thread of its own.
+    async fn open(&self) -> Result<(Arc<Pool>, OpenSource), String> {
+        let thread = Pool::background("source").map_err(|e| e.to_string())?;
         let name = self.config.source.clone();
-        match self.ctx.pool.run(move || open(&name)).await {
-            Ok(opened) => opened.map_err(|e| e.to_string()),
+        match thread.run(move || open(&name)).await {
+            Ok(opened) => opened.map(|s| (thread, s)).map_err(|e| e.to_string()),
             Err(e) => Err(e.to_string()),
         }
     }
@@ -133,7 +136,7 @@ impl Task {
             )));
         }
         self.stop().await;
-        let source = match self.open().await {
+        let (thread, source) = match self.open().await {
             Ok(s) => s,
             Err(why) => {
                 tracing::warn!(camera = %self.key, %why, "cannot be opened");
@@ -155,10 +158,10 @@ impl Task {
         let stop = self.ctx.shutdown.child_token();
         let reader = Reader {
             source: Some(source),
+            thread,
             calibration: Arc::new(calibration.clone()),
             epoch,
             config: self.config.clone(),
-            ctx: self.ctx.clone(),
             info: self.info.clone(),
             recorder: self.recorder.clone(),
             leases: self.leases.clone(),
@@ -198,7 +201,7 @@ impl Task {
         }
         self.open()
             .await
-            .map(|s| s.calibration().clone())
+            .map(|(_, s)| s.calibration().clone())
             .map_err(|why| unavailable("capture", &why))
     }
 

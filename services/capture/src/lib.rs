@@ -1,6 +1,6 @@
 //! Capture service: cameras and recordings onto the bus.
 //!
-//! One task owns one camera (`camera`). Its frames are read on the compute pool (`reader`) while somebody holds a lease
+//! One task owns one camera (`camera`). Its frames are read on a thread of their own (`reader`) while somebody holds a lease
 //! of consent (`consent`), and published on the bus, which keeps only the newest. The rpcs (`service`) start, stop and report.
 
 mod camera;

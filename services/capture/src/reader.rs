@@ -8,10 +8,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
 use tryon::camera::{Calibration, RgbdFrame};
+use tryon_kit::compute::Pool;
 use tryon_kit::config::CameraConfig;
 use tryon_kit::frame_trace::{self, Sampler};
 use tryon_kit::frames::{Exposure, FramePublisher, stage};
-use tryon_kit::server::Context;
 use tryon_kit::sessions::unix_ns;
 use tryon_proto::v1::{self, CameraState};
 
@@ -22,12 +22,13 @@ const MAX_FAULTS: u32 = 30;
 
 /// Reader of one run of a source.
 pub(crate) struct Reader {
-    /// `None` while the pool reads it.
+    /// `None` while its thread reads it.
     pub(crate) source: Option<OpenSource>,
+    /// Thread of the source. It waits for a device, or makes frames ahead of their time.
+    pub(crate) thread: Arc<Pool>,
     pub(crate) calibration: Arc<Calibration>,
     pub(crate) epoch: u64,
     pub(crate) config: CameraConfig,
-    pub(crate) ctx: Context,
     pub(crate) info: Arc<watch::Sender<v1::CameraInfo>>,
     pub(crate) recorder: Recorder,
     pub(crate) leases: Leases,
@@ -85,7 +86,7 @@ impl Reader {
             };
             (source, frame)
         };
-        let (source, frame) = self.ctx.pool.run(read).await.map_err(|e| e.to_string())?;
+        let (source, frame) = self.thread.run(read).await.map_err(|e| e.to_string())?;
         self.source = Some(source);
         frame.map_err(|e| e.to_string())
     }

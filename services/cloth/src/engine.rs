@@ -69,6 +69,7 @@ impl Body {
 /// An outfit on a tracked body.
 pub(crate) struct Worn {
     outfit: DressedOutfit,
+    template: Arc<Template>,
     body: PosedBody,
     clock: FrameClock,
     /// Garments are sewn from coarser cloth.
@@ -79,6 +80,10 @@ pub(crate) struct Worn {
     ease: Vec<Option<Suggestion>>,
     /// Time of the stream since the fit was measured (s).
     fit_age: f64,
+    /// The body has changed since the room was measured.
+    is_resized: bool,
+    /// Measured fit that no message has yet.
+    measured: Vec<v1::GarmentFit>,
 }
 
 /// A message to all readers, before it is coded for each of them.
@@ -153,8 +158,11 @@ pub(crate) fn dress(
         ease: ease(&outfit, &measures),
         fit: FitProbe::new(&body.template, &outfit.model).map_err(|e| e.to_string())?,
         fit_age: FIT_INTERVAL,
+        is_resized: false,
+        measured: Vec::new(),
         is_coarse,
         outfit,
+        template: body.template.clone(),
         body: PosedBody::new(body.shape.clone(), rest),
         clock: FrameClock::at(body.time_ns()),
     })
@@ -197,10 +205,7 @@ impl Worn {
     /// Moves the garments to the pose of `body`: in a step of the simulation, or as skin carries them.
     pub(crate) fn follow(&mut self, body: &Body, is_simulated: bool) -> Result<Update, String> {
         let start = Instant::now();
-        if self.body.pose(&body.template, &body.shape, &body.pose) {
-            let measures = measure(&body.template, self.body.rest()).map_err(|e| e.to_string())?;
-            self.ease = ease(&self.outfit, &measures);
-        }
+        self.is_resized |= self.body.pose(&body.template, &body.shape, &body.pose);
         let posed = stage("cloth.body", start);
         let mut update = if is_simulated {
             self.step(body)?
@@ -242,10 +247,7 @@ impl Worn {
         update.frame.stages.push(stage("cloth.step", begun));
 
         self.fit_age += gap;
-        if self.fit_age >= FIT_INTERVAL {
-            self.fit_age = 0.0;
-            self.measure_fit(&mut update.frame)?;
-        }
+        update.frame.fit = std::mem::take(&mut self.measured);
         Ok(update)
     }
 
@@ -269,17 +271,29 @@ impl Worn {
         &self.garments
     }
 
-    fn measure_fit(&mut self, frame: &mut v1::GarmentFrame) -> Result<(), String> {
+    /// The fit is to be measured.
+    pub(crate) fn is_fit_due(&self) -> bool {
+        self.fit_age >= FIT_INTERVAL
+    }
+
+    /// Measures the fit to the body of the last message; the next one has it.
+    pub(crate) fn measure_fit(&mut self) -> Result<(), String> {
         let begun = Instant::now();
+        self.fit_age = 0.0;
+        if std::mem::take(&mut self.is_resized) {
+            let measures = measure(&self.template, self.body.rest()).map_err(|e| e.to_string())?;
+            self.ease = ease(&self.outfit, &measures);
+        }
         let outfit = &self.outfit;
         let maps = self
             .fit
             .measure(&outfit.model, &outfit.state, self.body.vertices())
             .map_err(|e| e.to_string())?;
-        frame.fit = (self.garments.iter().zip(&maps).zip(&self.ease))
+        self.measured = (self.garments.iter().zip(&maps).zip(&self.ease))
             .map(|((g, map), ease)| fit_to_wire(&g.garment, &g.size, map, ease.as_ref()))
             .collect();
-        frame.stages.push(stage("cloth.fit", begun));
+        metrics::histogram!("tryon_stage_ms", "stage" => "cloth.fit")
+            .record(begun.elapsed().as_secs_f64() * 1e3);
         Ok(())
     }
 

@@ -189,6 +189,7 @@ impl Task {
                     published = Instant::now();
                     // A repetition of the status must not present old positions as new.
                     status.positions = Positions::default();
+                    self.measure_fit().await;
                 }
                 _ = tick.tick() => {
                     if followed.elapsed() >= FORGET_AFTER {
@@ -379,6 +380,29 @@ impl Task {
                 tracing::error!(session = brief(&self.setup.id), %why, "a step was lost");
                 self.undress();
                 waiting(DegradedReason::StepFailed, why.to_string()).into()
+            }
+        }
+    }
+
+    /// Measures the fit when that is due, after the garments are on their way.
+    async fn measure_fit(&mut self) {
+        let Some(mut worn) = self.worn.take_if(|w| w.is_fit_due()) else {
+            return;
+        };
+        let work = move || {
+            let measured = worn.measure_fit();
+            (worn, measured)
+        };
+        match self.setup.ctx.pool.run(work).await {
+            Ok((worn, measured)) => {
+                self.worn = Some(worn);
+                if let Err(why) = measured {
+                    tracing::warn!(session = brief(&self.setup.id), %why, "the fit is not known");
+                }
+            }
+            Err(why) => {
+                tracing::error!(session = brief(&self.setup.id), %why, "an outfit was lost");
+                self.undress();
             }
         }
     }

@@ -6,6 +6,9 @@ use tokio::sync::oneshot;
 
 type Job = Box<dyn FnOnce() + Send>;
 
+/// Niceness of background threads: a tenth of another thread's share where both want a processor (Linux, CFS weights).
+const BACKGROUND_NICENESS: i32 = 10;
+
 /// Fixed number of threads that run jobs in order of arrival.
 ///
 /// The queue is unbounded: every session has at most one job under way, and sessions are bounded.
@@ -24,6 +27,18 @@ pub enum ComputeError {
     Gone,
 }
 
+/// Runs jobs until the pool is gone.
+fn serve(jobs: &Mutex<mpsc::Receiver<Job>>) {
+    loop {
+        // The lock is held while waiting: the other idle threads wait for it.
+        let job = jobs.lock().unwrap_or_else(PoisonError::into_inner).recv();
+        match job {
+            Ok(job) => job(),
+            Err(mpsc::RecvError) => return,
+        }
+    }
+}
+
 impl Pool {
     /// Starts `threads` threads; 0 means one for each core.
     ///
@@ -35,21 +50,31 @@ impl Pool {
         } else {
             threads
         };
+        Self::start(n, "compute", 0)
+    }
+
+    /// Starts one thread at low priority, for work that has time: it gets what the threads of [`Self::new`] leave. Its
+    /// jobs may wait for a device.
+    ///
+    /// # Errors
+    /// When the system refuses the thread.
+    pub fn background(name: &str) -> std::io::Result<Arc<Self>> {
+        Self::start(1, name, BACKGROUND_NICENESS)
+    }
+
+    fn start(threads: usize, name: &str, niceness: i32) -> std::io::Result<Arc<Self>> {
         let (tx, rx) = mpsc::channel::<Job>();
         let rx = Arc::new(Mutex::new(rx));
-        for i in 0..n {
+        for i in 0..threads {
             let rx = rx.clone();
             std::thread::Builder::new()
-                .name(format!("compute-{i}"))
+                .name(format!("{name}-{i}"))
                 .spawn(move || {
-                    loop {
-                        // The lock is held while waiting: the other idle threads wait for it.
-                        let job = rx.lock().unwrap_or_else(PoisonError::into_inner).recv();
-                        match job {
-                            Ok(job) => job(),
-                            Err(mpsc::RecvError) => return,
-                        }
+                    if niceness != 0 {
+                        // Of this thread alone on Linux; a refusal costs only the priority.
+                        let _ = rustix::process::nice(niceness);
                     }
+                    serve(&rx);
                 })?;
         }
         Ok(Arc::new(Self {
@@ -95,5 +120,17 @@ mod tests {
             Err(ComputeError::Panicked)
         );
         assert_eq!(pool.run(|| 1).await, Ok(1));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[tokio::test]
+    async fn only_background_threads_step_back() {
+        let niceness = || rustix::process::getpriority_process(None).expect("known");
+        let usual = Pool::new(1).expect("a thread");
+        let background = Pool::background("source").expect("a thread");
+        let low = background.run(niceness).await.expect("runs");
+        let own = usual.run(niceness).await.expect("runs");
+        assert_eq!(low, (own + BACKGROUND_NICENESS).min(19));
+        assert_eq!(own, niceness());
     }
 }

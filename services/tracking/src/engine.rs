@@ -7,7 +7,7 @@ use tryon::body::{BodyShape, Template, embedded, import};
 use tryon::camera::Calibration;
 use tryon::formats::npz;
 use tryon::tracking::{
-    LostReason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace, step,
+    LostReason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace, adapt_surface, follow,
 };
 use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;
@@ -83,10 +83,19 @@ impl Engine {
         self.state.reset(&self.model);
     }
 
-    /// Tracks one exposure; the wire form of the state.
+    /// Adapts the surface to the exposure of the last step, when that is due: the next step has it.
+    pub(crate) fn adapt(&mut self) {
+        let begun = Instant::now();
+        if adapt_surface(&self.model, &mut self.state, &mut self.work) > 0 {
+            metrics::histogram!("tryon_stage_ms", "stage" => "tracking.surface")
+                .record(begun.elapsed().as_secs_f64() * 1e3);
+        }
+    }
+
+    /// Tracks one exposure; the wire form of the state. [`Self::adapt`] is to follow.
     pub(crate) fn step(&mut self, e: &Exposure) -> v1::BodyState {
         let start = Instant::now();
-        let report = step(&self.model, &mut self.state, &e.rgbd, &mut self.work);
+        let report = follow(&self.model, &mut self.state, &e.rgbd, &mut self.work);
         let mut stages = e.stages.clone();
         let mut state = v1::BodyState {
             frame: Some(e.id),
@@ -103,7 +112,7 @@ impl Engine {
                 stages.extend([
                     of("segment", s.segment),
                     of("pose", s.place + s.pose),
-                    of("shape", s.size + s.surface),
+                    of("shape", s.size),
                 ]);
                 (state.residual_mm, state.visible_points) =
                     (r.residual_mm as f32, r.visible_points as u32);

@@ -6,6 +6,7 @@ use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tokio::time::Instant;
 use tryon::body::Template;
+use tryon_kit::compute::ComputeError;
 use tryon_kit::consent::FORGET_AFTER;
 use tryon_kit::frames::{CameraKey, Exposure, FrameSubscription};
 use tryon_kit::server::Context;
@@ -175,19 +176,33 @@ impl Task {
         match self.setup.ctx.pool.run(work).await {
             Ok((engine, mut state)) => {
                 self.shape_version = engine.shape_version();
-                self.engine = Some(engine);
                 state.session_id = self.setup.id.clone();
                 state.frames_dropped = skipped;
                 record_stages("tracking", state.frame.as_ref(), &state.stages);
                 metrics::counter!("tryon_tracking_steps").increment(1);
                 self.states.send_replace(Arc::new(state));
+                self.adapt(engine).await;
             }
-            Err(why) => {
-                // The tracker is lost to its panic: the next frame starts a new one.
-                tracing::error!(session = brief(&self.setup.id), %why, "a step was lost");
-                self.fault(DegradedReason::StepFailed, why.to_string());
-            }
+            Err(why) => self.lost(&why),
         }
+    }
+
+    /// Second half of a step, while others work on the pose.
+    async fn adapt(&mut self, mut engine: Engine) {
+        let work = move || {
+            engine.adapt();
+            engine
+        };
+        match self.setup.ctx.pool.run(work).await {
+            Ok(engine) => self.engine = Some(engine),
+            Err(why) => self.lost(&why),
+        }
+    }
+
+    /// The tracker is lost to its panic: the next frame starts a new one.
+    fn lost(&mut self, why: &ComputeError) {
+        tracing::error!(session = brief(&self.setup.id), %why, "a step was lost");
+        self.fault(DegradedReason::StepFailed, why.to_string());
     }
 
     /// Drops body and pose: nobody knows who stands before the camera now.
