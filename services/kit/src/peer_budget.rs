@@ -1,51 +1,51 @@
-//! Failed attempts of each peer: a token bucket by address.
+//! Budget of each peer: a token bucket by address. Calls, failed attempts.
 
 use std::collections::HashMap;
 use std::net::{IpAddr, Ipv6Addr};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-/// Most peers that are remembered; those without recent failures make place.
+/// Most peers that are remembered; those with a full budget make place.
 const MAX_PEERS: usize = 4096;
 
-/// Attempts that a peer may fail.
+/// Number of events that a peer may cause.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Allowance {
+pub(crate) struct Allowance {
     /// At once.
-    pub(super) burst: f64,
+    pub(crate) burst: f64,
     /// Again, each second.
-    pub(super) per_second: f64,
+    pub(crate) per_second: f64,
 }
 
 #[derive(Clone, Copy)]
 struct Bucket {
-    /// Attempts that were left at `at`.
+    /// Events that were left at `at`.
     left: f64,
     at: Instant,
 }
 
 /// Buckets of all peers.
-pub(super) struct Failures {
+pub(crate) struct PeerBudget {
     allowance: Allowance,
     peers: Mutex<HashMap<IpAddr, Bucket>>,
 }
 
-impl Failures {
-    pub(super) fn new(allowance: Allowance) -> Self {
+impl PeerBudget {
+    pub(crate) fn new(allowance: Allowance) -> Self {
         Self {
             allowance,
             peers: Mutex::default(),
         }
     }
 
-    /// The peer has no attempt left.
-    pub(super) fn is_spent(&self, peer: IpAddr, now: Instant) -> bool {
+    /// The peer has no event left.
+    pub(crate) fn is_spent(&self, peer: IpAddr, now: Instant) -> bool {
         let peers = self.peers.lock().unwrap_or_else(PoisonError::into_inner);
         (peers.get(&group(peer))).is_some_and(|b| self.left(b, now) < 1.0)
     }
 
-    /// Takes one attempt from the peer.
-    pub(super) fn record(&self, peer: IpAddr, now: Instant) {
+    /// Takes one event from the budget of the peer.
+    pub(crate) fn record(&self, peer: IpAddr, now: Instant) {
         let mut peers = self.peers.lock().unwrap_or_else(PoisonError::into_inner);
         if peers.len() >= MAX_PEERS {
             peers.retain(|_, b| self.left(b, now) < self.allowance.burst);
@@ -83,34 +83,34 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn a_peer_spends_its_own_attempts_and_gets_them_back() {
-        let failures = Failures::new(Allowance {
+    fn a_peer_spends_its_own_budget_and_gets_it_back() {
+        let budget = PeerBudget::new(Allowance {
             burst: 3.0,
             per_second: 0.5,
         });
         let (now, a) = (Instant::now(), IpAddr::from([10, 0, 0, 1]));
-        (0..3).for_each(|_| failures.record(a, now));
-        assert!(failures.is_spent(a, now));
-        assert!(failures.is_spent("::ffff:10.0.0.1".parse().expect("an address"), now));
-        assert!(!failures.is_spent(IpAddr::from([10, 0, 0, 2]), now));
-        assert!(failures.is_spent(a, now + Duration::from_secs(1)));
-        assert!(!failures.is_spent(a, now + Duration::from_secs(2)));
+        (0..3).for_each(|_| budget.record(a, now));
+        assert!(budget.is_spent(a, now));
+        assert!(budget.is_spent("::ffff:10.0.0.1".parse().expect("an address"), now));
+        assert!(!budget.is_spent(IpAddr::from([10, 0, 0, 2]), now));
+        assert!(budget.is_spent(a, now + Duration::from_secs(1)));
+        assert!(!budget.is_spent(a, now + Duration::from_secs(2)));
         let neighbours = ["2001:db8::1", "2001:db8::2"].map(|a| a.parse().expect("an address"));
-        (0..3).for_each(|_| failures.record(neighbours[0], now));
-        assert!(failures.is_spent(neighbours[1], now));
+        (0..3).for_each(|_| budget.record(neighbours[0], now));
+        assert!(budget.is_spent(neighbours[1], now));
     }
 
     #[test]
     fn memory_is_bounded() {
-        let failures = Failures::new(Allowance {
+        let budget = PeerBudget::new(Allowance {
             burst: 3.0,
             per_second: 0.5,
         });
         let now = Instant::now();
         for i in 0..3 * MAX_PEERS as u32 {
-            failures.record(IpAddr::from(i.to_be_bytes()), now);
+            budget.record(IpAddr::from(i.to_be_bytes()), now);
         }
-        let peers = failures.peers.lock().expect("not poisoned");
+        let peers = budget.peers.lock().expect("not poisoned");
         assert!(peers.len() <= MAX_PEERS);
     }
 }

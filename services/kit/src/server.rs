@@ -1,6 +1,7 @@
 //! gRPC servers: health and reflection beside the service, limits and keepalive, an end with a deadline.
 
 use crate::auth::{Auth, AuthError};
+use crate::call_rate::{self, within_rate};
 use crate::compute::Pool;
 use crate::connections::{self, Limits};
 use crate::deadline::within_deadline;
@@ -10,7 +11,7 @@ use crate::tls::{Tls, TlsError};
 use crate::transport;
 use crate::undecodable::blame_caller;
 use axum::Router;
-use axum::middleware::from_fn;
+use axum::middleware::{from_fn, from_fn_with_state};
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -212,7 +213,8 @@ pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartErro
         .await;
     let router = (routes.prepare().into_axum_router())
         .layer(MapResponseLayer::new(blame_caller))
-        .layer(from_fn(within_deadline));
+        .layer(from_fn(within_deadline))
+        .layer(from_fn_with_state(call_rate::budget(), within_rate));
     let incoming = connections::accept(listener, Limits::default());
     let protocols = transport::Protocols {
         has_http1: http1,

@@ -25,6 +25,13 @@ pub fn exhausted(what: &str, limit: usize) -> Status {
     )
 }
 
+/// RESOURCE_EXHAUSTED for a caller that calls too often, with its allowance.
+pub(crate) fn too_often(per_second: f64) -> Status {
+    let details = ErrorDetails::with_retry_info(Some(RETRY_LIMIT));
+    let why = format!("more than {per_second} calls a second from one address");
+    Status::with_error_details(Code::ResourceExhausted, why, details)
+}
+
 /// NOT_FOUND with kind and id.
 pub fn not_found(what: &str, id: &str) -> Status {
     Status::not_found(format!("no {what} `{id}`"))

@@ -1,9 +1,9 @@
 //! Judge of tokens of a box: keys, store, revocations, and the patience with peers that fail.
 
 use super::claims::{Call, Claims};
-use super::failures::{Allowance, Failures};
 use super::revocation::Revocations;
 use super::{Fault, jws, unix_s};
+use crate::peer_budget::{Allowance, PeerBudget};
 use ed25519_dalek::VerifyingKey;
 use sha2::{Digest, Sha256};
 use std::collections::HashMap;
@@ -26,7 +26,7 @@ pub(super) struct Authority {
     keys: Vec<VerifyingKey>,
     store: String,
     revoked: Revocations,
-    failures: Failures,
+    failures: PeerBudget,
     /// Claims by digest of tokens whose signature was good. They pass where a peer's attempts are spent, so that nobody
     /// behind the same address locks others out.
     known: Mutex<HashMap<Digest256, Arc<Claims>>>,
@@ -43,7 +43,7 @@ impl Authority {
             keys,
             store,
             revoked,
-            failures: Failures::new(ALLOWANCE),
+            failures: PeerBudget::new(ALLOWANCE),
             known: Mutex::default(),
         })
     }

@@ -4,10 +4,10 @@
 //! compositor reads, in a file of mode 0600 whose name is the code's digest. Removing the file is the trade: the system
 //! lets one caller remove it, and a restart forgets nothing.
 
-use super::failures::{Allowance, Failures};
 use super::issuer::create_secret;
 use super::keys::{self, KeyFault};
 use super::unix_s;
+use crate::peer_budget::{Allowance, PeerBudget};
 use sha2::{Digest, Sha256};
 use std::net::IpAddr;
 use std::path::{Path, PathBuf};
@@ -46,7 +46,7 @@ pub enum EnrolFault {
 /// Codes that wait in a folder.
 pub struct Enrolments {
     folder: PathBuf,
-    failures: Failures,
+    failures: PeerBudget,
 }
 
 impl Enrolments {
@@ -54,7 +54,7 @@ impl Enrolments {
     pub fn new(folder: &Path) -> Self {
         Self {
             folder: folder.into(),
-            failures: Failures::new(ALLOWANCE),
+            failures: PeerBudget::new(ALLOWANCE),
         }
     }
 

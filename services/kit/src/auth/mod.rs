@@ -10,7 +10,6 @@ mod claims;
 mod credentials;
 mod ending;
 mod enrolment;
-mod failures;
 mod gate;
 mod grant;
 mod issuer;
