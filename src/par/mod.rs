@@ -19,6 +19,14 @@ pub enum Par {
     Rayon,
 }
 
+/// Starts the global pool, unless it runs: its threads take over the calling thread's priority.
+pub fn start() {
+    // An error means that it runs.
+    let _ = rayon::ThreadPoolBuilder::new()
+        .thread_name(|i| format!("par-{i}"))
+        .build_global();
+}
+
 /// Runs `f` inside a pool of `threads` threads (0 = one per core).
 ///
 /// # Errors

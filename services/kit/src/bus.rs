@@ -10,6 +10,7 @@ use crate::frames::exposure_to_wire;
 use crate::frames::{
     BoxFuture, BusError, CameraKey, Exposure, FrameBus, FramePublisher, FrameSubscription, Packet,
 };
+use crate::neighbours::Neighbours;
 use crate::queue::latest;
 use crate::seal::{KeyRing, Sealer, Unsealing};
 use std::path::Path;
@@ -20,7 +21,7 @@ use tryon_proto::v1::FrameKey;
 use zenoh::Wait;
 use zenoh::handlers::RingChannel;
 use zenoh::qos::CongestionControl;
-use zenoh::sample::SampleKind;
+use zenoh::sample::{Locality, SampleKind};
 
 /// Time that a stalled peer may block the others [µs]; then its connection is closed and reopened. zenoh's default of
 /// 5 s freezes every screen.
@@ -39,6 +40,7 @@ pub struct ZenohBus {
     session: zenoh::Session,
     pool: Arc<Pool>,
     keys: Arc<KeyRing>,
+    neighbours: Arc<Neighbours>,
 }
 
 impl ZenohBus {
@@ -103,6 +105,7 @@ impl ZenohBus {
             session,
             pool,
             keys: Arc::default(),
+            neighbours: Arc::default(),
         }))
     }
     /// Leaves the bus.
@@ -128,6 +131,7 @@ struct ZenohPublisher {
     key: CameraKey,
     frames: Arc<zenoh::pubsub::Publisher<'static>>,
     pool: Arc<Pool>,
+    neighbours: Arc<Neighbours>,
     _calibration: zenoh::query::Queryable<()>,
     _alive: zenoh::liveliness::LivelinessToken,
 }
@@ -138,7 +142,12 @@ impl FramePublisher for ZenohPublisher {
         exposure: Arc<Exposure>,
         sealer: Arc<Sealer>,
     ) -> BoxFuture<'_, Result<(), BusError>> {
+        self.neighbours.send(&self.key, &exposure);
         Box::pin(async move {
+            let matching = self.frames.matching_status().await;
+            if matching.is_ok_and(|others| !others.matching()) {
+                return Ok(());
+            }
             let key = self.key.clone();
             let pack = move || {
                 let message = exposure_to_wire(&exposure).map_err(|e| e.to_string())?;
@@ -168,6 +177,7 @@ impl FrameBus for ZenohBus {
             let frames = self
                 .session
                 .declare_publisher(key.rgbd())
+                .allowed_destination(Locality::Remote)
                 .congestion_control(CongestionControl::Block);
             let frames = Arc::new(frames.await.map_err(fault)?);
             let name = key.calibration();
@@ -192,6 +202,7 @@ impl FrameBus for ZenohBus {
                 key,
                 frames,
                 pool: self.pool.clone(),
+                neighbours: self.neighbours.clone(),
                 _calibration: calibration,
                 _alive: alive,
             };
@@ -205,10 +216,13 @@ impl FrameBus for ZenohBus {
             let ring = self
                 .session
                 .declare_subscriber(key.rgbd())
+                .allowed_origin(Locality::Remote)
                 .with(RingChannel::new(1))
                 .await
                 .map_err(fault)?;
             let (tx, packets) = latest::channel();
+            let tx = Arc::new(tx);
+            self.neighbours.add(&key, &tx);
             let pump = tokio::spawn(async move {
                 while let Ok(sample) = ring.recv_async().await {
                     let payload = sample.payload().to_bytes().into_owned();
@@ -265,6 +279,8 @@ mod tests {
             .expect("opens before its peer");
         let camera = ZenohBus::open(&endpoint, &[], pool).await.expect("listens");
         crate::frames::tests::fulfils_the_contract(camera.as_ref(), late.as_ref()).await;
+        // Within one process too, beside subscribers in others.
+        crate::frames::tests::fulfils_the_contract(camera.as_ref(), camera.as_ref()).await;
         late.close().await;
         camera.close().await;
     }

@@ -63,6 +63,8 @@ impl Pool {
     }
 
     fn start(threads: usize, name: &str, niceness: i32) -> std::io::Result<Arc<Self>> {
+        // Here, lest a background thread be the first to need them: they would take over its priority.
+        tryon::par::start();
         let (tx, rx) = mpsc::channel::<Job>();
         let rx = Arc::new(Mutex::new(rx));
         for i in 0..threads {

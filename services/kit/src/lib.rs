@@ -21,6 +21,7 @@ pub mod frame_trace;
 pub mod frames;
 pub mod hosts;
 pub mod load;
+mod neighbours;
 mod peer_budget;
 pub mod process;
 pub mod queue;

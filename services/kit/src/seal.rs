@@ -169,7 +169,7 @@ impl KeyRing {
 
 /// Keys of one subscription, and the last frame that it opened.
 #[derive(Clone)]
-pub(crate) struct Unsealing {
+pub struct Unsealing {
     keys: Arc<KeyRing>,
     camera: CameraKey,
     /// Key and counter of the last frame.
@@ -178,7 +178,7 @@ pub(crate) struct Unsealing {
 
 impl Unsealing {
     /// Opens frames of `camera` with keys from `keys`.
-    pub(crate) fn new(keys: Arc<KeyRing>, camera: CameraKey) -> Self {
+    pub fn new(keys: Arc<KeyRing>, camera: CameraKey) -> Self {
         Self {
             keys,
             camera,
@@ -187,7 +187,10 @@ impl Unsealing {
     }
 
     /// Decrypts a payload in place; the encoded message is what follows the returned number of bytes.
-    pub(crate) fn open(&self, payload: &mut [u8]) -> Result<usize, SealError> {
+    ///
+    /// # Errors
+    /// A payload that is not a newer frame of this camera under a known key.
+    pub fn open(&self, payload: &mut [u8]) -> Result<usize, SealError> {
         let (id, counter) = header(payload)?;
         let key = self
             .keys

@@ -63,6 +63,17 @@ impl Issuer {
         Ok(token)
     }
 
+    /// Claims of a token of this issuer, past or present.
+    ///
+    /// # Errors
+    /// A token of another issuer or without the claims of one.
+    pub fn claims(&self, token: &str) -> Result<Claims, Fault> {
+        if token.len() > jws::MAX_BYTES {
+            return Err(Fault::TooLong);
+        }
+        Claims::read(&jws::verify(token, &[self.public()])?)
+    }
+
     /// A token for some services of a store, as long as the process lives; for keys that die with it.
     ///
     /// # Errors

@@ -5,6 +5,7 @@ mod garments;
 mod images;
 mod meshes;
 mod recordings;
+mod secrets;
 mod settings;
 mod wire;
 
@@ -98,6 +99,8 @@ pub const TARGETS: &[Target] = &[
     garments::SCENE,
     recordings::MCAP,
     recordings::FOLDER,
+    secrets::TOKEN,
+    secrets::SEALED,
     settings::CONFIG,
     settings::HOSTS,
 ];
