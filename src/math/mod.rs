@@ -12,7 +12,7 @@ pub use element_energy::ElementEnergy;
 pub use frames::{Body, Camera, ColorCamera, Rigid, World};
 pub use lie::{Twist, exp_se3, exp_so3, left_jacobian_so3, log_so3, skew};
 pub use polar::polar_rotation_3;
-pub use symmetric::{principal_axes, project_psd_2};
+pub use symmetric::{principal_axes, project_psd};
 
 /// A point in f32, metres: the storage type of surfaces.
 pub type P3 = nalgebra::Point3<f32>;

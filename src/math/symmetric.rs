@@ -1,12 +1,21 @@
 //! Symmetric matrices: nearest positive semi-definite matrix and principal axes.
 
-use nalgebra::{Matrix2, Matrix3, Point3, SymmetricEigen, Vector3};
+use nalgebra::allocator::Allocator;
+use nalgebra::{
+    DefaultAllocator, DimDiff, DimSub, Matrix3, OMatrix, Point3, SymmetricEigen, U1, Vector3,
+};
 
-/// Nearest positive semi-definite matrix (negative eigenvalues become zero).
-pub fn project_psd_2(m: &Matrix2<f64>) -> Matrix2<f64> {
-    let e = SymmetricEigen::new(*m);
-    let d = Matrix2::from_diagonal(&e.eigenvalues.map(|v| v.max(0.0)));
-    e.eigenvectors * d * e.eigenvectors.transpose()
+/// Nearest positive semi-definite matrix in the Frobenius norm (negative eigenvalues become zero).
+pub fn project_psd<D: DimSub<U1>>(m: &OMatrix<f64, D, D>) -> OMatrix<f64, D, D>
+where
+    DefaultAllocator: Allocator<D, D> + Allocator<D> + Allocator<DimDiff<D, U1>>,
+{
+    let e = SymmetricEigen::new(m.clone());
+    let mut scaled = e.eigenvectors.clone();
+    for (k, mut column) in scaled.column_iter_mut().enumerate() {
+        column *= e.eigenvalues[k].max(0.0);
+    }
+    scaled * e.eigenvectors.transpose()
 }
 
 /// Centroid, orthonormal axes (columns) and variances of a cloud, largest variance first.
@@ -38,17 +47,18 @@ pub fn principal_axes(points: &[Point3<f32>]) -> Option<(Point3<f64>, Matrix3<f6
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Matrix2;
 
     #[test]
     fn projection_clears_negative_directions_only() {
         let m = Matrix2::new(2.0, 1.5, 1.5, -1.0);
-        let p = project_psd_2(&m);
+        let p = project_psd(&m);
         assert!(p.symmetric_eigenvalues().iter().all(|v| *v > -1e-12));
         // The other part of m is negative and orthogonal to p.
         assert!((p * (m - p)).norm() < 1e-12 && (m - p).trace() < 0.0);
         let positive = Matrix2::new(2.0, 0.5, 0.5, 1.0);
-        assert!((project_psd_2(&positive) - positive).norm() < 1e-12);
-        assert!(project_psd_2(&Matrix2::new(-1.0, 0.0, 0.0, -2.0)).norm() < 1e-12);
+        assert!((project_psd(&positive) - positive).norm() < 1e-12);
+        assert!(project_psd(&Matrix2::new(-1.0, 0.0, 0.0, -2.0)).norm() < 1e-12);
     }
 
     #[test]

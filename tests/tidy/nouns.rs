@@ -14,7 +14,7 @@ pub(crate) const NOUNS: &[(&str, &[Noun])] = &[
             ("so(3)/se(3) maps", "exp_se3"),
             ("twists", "Twist"),
             ("polar", "polar.rs"),
-            ("PSD projection", "project_psd_2"),
+            ("PSD projection", "project_psd"),
             ("element energy", "element_energy.rs"),
             ("derivative check", "derivative_check.rs"),
         ],
