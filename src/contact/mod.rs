@@ -7,6 +7,7 @@ mod closest_multistart;
 mod closest_point;
 mod collision_body;
 mod depth_maps;
+mod distance;
 mod interior;
 mod joint_clearance;
 mod part_clearance;
@@ -23,6 +24,10 @@ pub use collision_body::{
     CollisionReport, CollisionWorkspace,
 };
 pub use depth_maps::{DepthMaps, MapDetail, MapView};
+pub use distance::{
+    ClosestFeatures, ParallelMollifier, Separation, Slide, edge_edge, mollifier_threshold,
+    point_edge, point_point, point_triangle,
+};
 pub use interior::Interior;
 pub use skin_grid::{SkinCandidates, SkinGrid};
 pub use surface::{Part, SurfaceFrame, SurfaceModel};
