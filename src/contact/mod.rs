@@ -10,7 +10,9 @@ mod depth_maps;
 mod distance;
 mod interior;
 mod joint_clearance;
+mod pair;
 mod part_clearance;
+mod potential;
 mod proximity_cache;
 mod skin_grid;
 mod surface;
@@ -29,5 +31,7 @@ pub use distance::{
     point_edge, point_point, point_triangle,
 };
 pub use interior::Interior;
+pub use pair::{ActivePair, ContactPair};
+pub use potential::{Barrier, BarrierSample, ContactAssembly, ContactElement, Curvature};
 pub use skin_grid::{SkinCandidates, SkinGrid};
 pub use surface::{Part, SurfaceFrame, SurfaceModel};

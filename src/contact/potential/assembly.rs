@@ -1,0 +1,173 @@
+//! Energies of all contact pairs in parallel, with the same bits at any thread count; buffers are reused.
+
+use super::barrier::Barrier;
+use super::composition::Curvature;
+use crate::contact::pair::ActivePair;
+use crate::math::{ElementEnergy, V3d};
+use crate::par::{Par, map_into};
+
+/// Pairs that one thread takes at a time.
+const CHUNK: usize = 256;
+
+/// Energy of one contact and the vertices that it acts on.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct ContactElement {
+    /// Vertices of the stencil; unknown `3 k + i` of the energy is axis `i` of vertex `k`.
+    pub vertices: [u32; 4],
+    /// Value, gradient and Hessian.
+    pub energy: ElementEnergy<12>,
+}
+
+/// Elements of the last call, and the buffers behind them.
+#[derive(Clone, Debug, Default)]
+pub struct ContactAssembly {
+    squared: Vec<f64>,
+    in_reach: Vec<u32>,
+    elements: Vec<ContactElement>,
+}
+
+impl ContactAssembly {
+    /// Elements of the pairs within reach of the barrier, in the order of `pairs`. `positions` (m) of all vertices.
+    ///
+    /// # Panics
+    /// With fewer positions than the pairs' indices need.
+    pub fn barrier(
+        &mut self,
+        par: Par,
+        barrier: &Barrier,
+        positions: &[V3d],
+        pairs: &[ActivePair],
+        curvature: Curvature,
+    ) -> &[ContactElement] {
+        map_into(par, pairs.len(), CHUNK, &mut self.squared, |i| {
+            let pair = pairs[i].pair;
+            pair.separation(&pair.corners(positions)).squared
+        });
+        let reach = barrier.reach() * barrier.reach();
+        self.in_reach.clear();
+        let indices = (0u32..).zip(&self.squared);
+        self.in_reach
+            .extend(indices.filter(|(_, s)| **s < reach).map(|(i, _)| i));
+
+        let in_reach = &self.in_reach;
+        map_into(par, in_reach.len(), CHUNK, &mut self.elements, |k| {
+            let active = &pairs[in_reach[k] as usize];
+            let corners = active.pair.corners(positions);
+            ContactElement {
+                vertices: active.pair.stencil(),
+                energy: barrier
+                    .energy(active, &corners, curvature)
+                    .unwrap_or_default(),
+            }
+        });
+        &self.elements
+    }
+    /// Energy of all pairs (J), without derivatives: infinite as soon as one pair is at or below the thickness.
+    ///
+    /// # Panics
+    /// With fewer positions than the pairs' indices need.
+    pub fn barrier_value(
+        &mut self,
+        par: Par,
+        barrier: &Barrier,
+        positions: &[V3d],
+        pairs: &[ActivePair],
+    ) -> f64 {
+        map_into(par, pairs.len(), CHUNK, &mut self.squared, |i| {
+            barrier.value(&pairs[i], &pairs[i].pair.corners(positions))
+        });
+        self.squared.iter().sum()
+    }
+    /// Elements of the last call.
+    pub fn elements(&self) -> &[ContactElement] {
+        &self.elements
+    }
+    /// Index in `pairs` of each of [`Self::elements`].
+    pub fn in_reach(&self) -> &[u32] {
+        &self.in_reach
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::pair::ContactPair;
+    use crate::par::with_threads;
+
+    /// Two triangulated strips, 5 mm apart.
+    fn scene() -> (Vec<V3d>, Vec<ActivePair>) {
+        let layer = |y: f64, shift: f64| {
+            (0..600).map(move |i| {
+                let along = f64::from(i / 2) * 0.01 + shift;
+                let wave = 1e-3 * (f64::from(i) * 0.7).sin();
+                V3d::new(along, y + wave, f64::from(i % 2) * 0.01)
+            })
+        };
+        let x: Vec<V3d> = layer(0.0, 0.0).chain(layer(0.005, 0.003)).collect();
+        let mut pairs = Vec::new();
+        for i in 0..590u32 {
+            for k in 0..4 {
+                let f = [i + k, i + k + 1, i + k + 2];
+                pairs.push(ContactPair::VertexFace { v: 600 + i, f });
+                let (a, b) = ([600 + i, 601 + i], [i + k, i + k + 1]);
+                pairs.push(ContactPair::EdgeEdge { a, b });
+            }
+        }
+        let active = pairs.iter().map(|p| ActivePair::new(*p, &x)).collect();
+        (x, active)
+    }
+
+    #[test]
+    fn elements_are_the_same_at_any_thread_count() {
+        let (x, pairs) = scene();
+        let barrier = Barrier {
+            stiffness: 1e-3,
+            activation: 6e-3,
+            thickness: 5e-4,
+        };
+        let run = |par| {
+            let mut assembly = ContactAssembly::default();
+            assembly.barrier(par, &barrier, &x, &pairs, Curvature::Projected);
+            let value = assembly.barrier_value(par, &barrier, &x, &pairs);
+            (
+                assembly.elements().to_vec(),
+                assembly.in_reach().to_vec(),
+                value,
+            )
+        };
+        let one = run(Par::Seq);
+        assert!(
+            one.0.len() > 1000 && one.0.len() < pairs.len(),
+            "{}",
+            one.0.len()
+        );
+        for threads in [1, 2, 5] {
+            let other = with_threads(threads, || run(Par::Rayon)).expect("threads");
+            assert!(other == one, "{threads} threads");
+        }
+        let sum: f64 = one.0.iter().map(|e| e.energy.value).sum();
+        assert!((sum - one.2).abs() < 1e-12 * sum);
+    }
+
+    #[test]
+    fn buffers_are_reused() {
+        let (x, pairs) = scene();
+        let barrier = Barrier {
+            stiffness: 1e-3,
+            activation: 6e-3,
+            thickness: 0.0,
+        };
+        let mut assembly = ContactAssembly::default();
+        let at = |a: &mut ContactAssembly| {
+            a.barrier(Par::Seq, &barrier, &x, &pairs, Curvature::GaussNewton)
+                .as_ptr()
+        };
+        let first = at(&mut assembly);
+        assert_eq!(first, at(&mut assembly));
+        assert!(
+            assembly
+                .barrier(Par::Seq, &barrier, &x, &[], Curvature::Exact)
+                .is_empty()
+        );
+    }
+}
