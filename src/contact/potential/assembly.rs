@@ -2,6 +2,7 @@
 
 use super::barrier::Barrier;
 use super::composition::Curvature;
+use super::friction::{Friction, FrictionPair};
 use crate::contact::pair::ActivePair;
 use crate::math::{ElementEnergy, V3d};
 use crate::par::{Par, map_into};
@@ -21,7 +22,7 @@ pub struct ContactElement {
 /// Elements of the last call, and the buffers behind them.
 #[derive(Clone, Debug, Default)]
 pub struct ContactAssembly {
-    squared: Vec<f64>,
+    scalars: Vec<f64>,
     in_reach: Vec<u32>,
     elements: Vec<ContactElement>,
 }
@@ -39,13 +40,13 @@ impl ContactAssembly {
         pairs: &[ActivePair],
         curvature: Curvature,
     ) -> &[ContactElement] {
-        map_into(par, pairs.len(), CHUNK, &mut self.squared, |i| {
+        map_into(par, pairs.len(), CHUNK, &mut self.scalars, |i| {
             let pair = pairs[i].pair;
             pair.separation(&pair.corners(positions)).squared
         });
         let reach = barrier.reach() * barrier.reach();
         self.in_reach.clear();
-        let indices = (0u32..).zip(&self.squared);
+        let indices = (0u32..).zip(&self.scalars);
         self.in_reach
             .extend(indices.filter(|(_, s)| **s < reach).map(|(i, _)| i));
 
@@ -73,16 +74,51 @@ impl ContactAssembly {
         positions: &[V3d],
         pairs: &[ActivePair],
     ) -> f64 {
-        map_into(par, pairs.len(), CHUNK, &mut self.squared, |i| {
+        map_into(par, pairs.len(), CHUNK, &mut self.scalars, |i| {
             barrier.value(&pairs[i], &pairs[i].pair.corners(positions))
         });
-        self.squared.iter().sum()
+        self.scalars.iter().sum()
+    }
+    /// Elements of lagged friction, in the order of `pairs`. `positions` (m) of all vertices.
+    ///
+    /// # Panics
+    /// With fewer positions than the pairs' indices need.
+    pub fn friction(
+        &mut self,
+        par: Par,
+        friction: &Friction,
+        positions: &[V3d],
+        pairs: &[FrictionPair],
+    ) -> &[ContactElement] {
+        map_into(par, pairs.len(), CHUNK, &mut self.elements, |k| {
+            ContactElement {
+                vertices: pairs[k].vertices,
+                energy: friction.energy(&pairs[k], &pairs[k].corners(positions)),
+            }
+        });
+        &self.elements
+    }
+    /// Energy of lagged friction of all pairs (J).
+    ///
+    /// # Panics
+    /// With fewer positions than the pairs' indices need.
+    pub fn friction_value(
+        &mut self,
+        par: Par,
+        friction: &Friction,
+        positions: &[V3d],
+        pairs: &[FrictionPair],
+    ) -> f64 {
+        map_into(par, pairs.len(), CHUNK, &mut self.scalars, |k| {
+            friction.value(&pairs[k], &pairs[k].corners(positions))
+        });
+        self.scalars.iter().sum()
     }
     /// Elements of the last call.
     pub fn elements(&self) -> &[ContactElement] {
         &self.elements
     }
-    /// Index in `pairs` of each of [`Self::elements`].
+    /// Index in `pairs` of each element of the last [`Self::barrier`].
     pub fn in_reach(&self) -> &[u32] {
         &self.in_reach
     }

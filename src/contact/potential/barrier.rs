@@ -55,6 +55,12 @@ impl Barrier {
             0.0
         }
     }
+    /// Force that pushes the two features of a pair apart (N): |dE/dd| without that of the mollifier.
+    pub fn load(&self, active: &ActivePair, corners: &[V3d; 4]) -> f64 {
+        let squared = active.pair.separation(corners).squared;
+        let mollifier = mollifier(active, corners).map_or(1.0, |m| m.value());
+        -2.0 * self.sample(squared).first * squared.sqrt() * mollifier * active.weight
+    }
     /// Energy of a pair with its derivatives at these corners; `None` out of reach.
     ///
     /// At and below the thickness the value is infinite and the derivatives are zero.

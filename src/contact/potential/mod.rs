@@ -3,9 +3,11 @@
 mod assembly;
 mod barrier;
 mod composition;
+mod friction;
 #[cfg(test)]
 mod tests;
 
 pub use assembly::{ContactAssembly, ContactElement};
 pub use barrier::Barrier;
 pub use composition::{BarrierSample, Curvature};
+pub use friction::{Friction, FrictionPair};
