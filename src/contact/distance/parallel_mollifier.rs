@@ -17,6 +17,7 @@ pub fn mollifier_threshold(a: &V3d, b: &V3d) -> f64 {
 pub struct ParallelMollifier {
     u: V3d,
     v: V3d,
+    /// u × v.
     n: V3d,
     threshold: f64,
 }
@@ -35,6 +36,20 @@ impl ParallelMollifier {
     pub fn value(&self) -> f64 {
         let y = self.ratio();
         y * (2.0 - y)
+    }
+    /// m with its first and second derivative by ν = |u × v| (1/m², 1/m⁴).
+    pub(in crate::contact) fn by_area(&self) -> [f64; 3] {
+        let second = 4.0 / self.threshold * (1.0 - 3.0 * self.ratio());
+        let first = self.slope_over_area() * self.n.norm();
+        [self.value(), first, second]
+    }
+    /// m_ν / ν (1/m⁴), finite for parallel edges.
+    pub(in crate::contact) fn slope_over_area(&self) -> f64 {
+        4.0 / self.threshold * (1.0 - self.ratio())
+    }
+    /// u and v (m).
+    pub(in crate::contact) fn edges(&self) -> [V3d; 2] {
+        [self.u, self.v]
     }
     /// m, ∇m (1/m) and the indefinite ∇²m (1/m²) by a₀, a₁, b₀, b₁ with u = a₁ − a₀, v = b₁ − b₀.
     pub fn expansion(&self) -> ElementEnergy<12> {

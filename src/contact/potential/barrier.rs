@@ -2,9 +2,10 @@
 //! IPC, eq. 6), of one contact pair.
 
 use super::composition::{BarrierSample, Curvature, compose};
+use super::mollified::compose_mollified;
 use crate::contact::distance::ParallelMollifier;
 use crate::contact::pair::{ActivePair, ContactPair};
-use crate::math::{ElementEnergy, V3d, project_psd};
+use crate::math::{ElementEnergy, V3d};
 
 /// Barrier κ b(y) = −κ (y − 1)² ln y of y = (d² − ξ²) / ((ξ + d̂)² − ξ²): zero from y = 1 on, infinite at y = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,10 +85,7 @@ impl Barrier {
         }
         Some(match mollifier(active, corners) {
             None => compose(&separation, &sample, curvature),
-            Some(m) => {
-                let b = compose(&separation, &sample, Curvature::Exact);
-                mollified(&b, &m.expansion(), curvature)
-            }
+            Some(m) => compose_mollified(&separation, &sample, &m, curvature),
         })
     }
 }
@@ -99,24 +97,5 @@ fn mollifier(active: &ActivePair, [a0, a1, b0, b1]: &[V3d; 4]) -> Option<Paralle
             ParallelMollifier::new(a1 - a0, b1 - b0, active.parallel_threshold)
         }
         _ => None,
-    }
-}
-
-/// Product of an energy and its mollifier.
-fn mollified(
-    b: &ElementEnergy<12>,
-    m: &ElementEnergy<12>,
-    curvature: Curvature,
-) -> ElementEnergy<12> {
-    let mut hessian = b.hessian * m.value + m.hessian * b.value;
-    hessian.ger(1.0, &m.gradient, &b.gradient, 1.0);
-    hessian.ger(1.0, &b.gradient, &m.gradient, 1.0);
-    ElementEnergy {
-        value: b.value * m.value,
-        gradient: b.gradient * m.value + m.gradient * b.value,
-        hessian: match curvature {
-            Curvature::Exact => hessian,
-            _ => project_psd(&hessian),
-        },
     }
 }

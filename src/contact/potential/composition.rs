@@ -1,17 +1,16 @@
 //! Function of a squared distance as an energy of the stencil, its Hessian made positive semi-definite.
 //!
-//! With w, c and slides (T, e) of a [`Separation`] and b(D): ∇²E = 4 b″ (c⊗w)(c⊗w)ᵀ + b′ ∇²D. Along ŵ it is d²b/dd², in
-//! the directions c⊗B across w and the slides 2 b′, and c⊗T couples with e⊗ŵ. So at most five directions have
-//! curvature of either sign where b falls (b′ < 0), and what is outside of them is negative.
+//! With w, c and slides (T, e) of a [`Separation`] and b(D): ∇²E = 4 b″ (c⊗w)(c⊗w)ᵀ + b′ ∇²D. Along c⊗ŵ the curvature is
+//! d²b/dd²; each slide couples c⊗T with e⊗ŵ; across w and the slides it is 2 b′ < 0. So a semi-definite bound has rank 3.
 
 use crate::contact::distance::Separation;
-use crate::math::{ElementEnergy, V3d, project_psd};
-use nalgebra::{Matrix5, SMatrix, Vector4};
+use crate::math::ElementEnergy;
+use nalgebra::{SMatrix, SVector};
 
 /// Second derivative that a potential returns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Curvature {
-    /// Nearest positive semi-definite matrix.
+    /// Sum of the semi-definite parts of its terms, which is not below the second derivative.
     #[default]
     Projected,
     /// Along the separation only: Gauss–Newton, of rank 1.
@@ -32,6 +31,10 @@ pub struct BarrierSample {
 }
 
 impl BarrierSample {
+    /// d²b/dd² (N/m), curvature along the distance d = √D.
+    pub(super) fn along(&self, squared: f64) -> f64 {
+        4.0 * self.second * squared + 2.0 * self.first
+    }
     /// The same of a pair of another weight.
     pub(super) fn scaled(self, weight: f64) -> Self {
         Self {
@@ -55,11 +58,11 @@ pub(super) fn compose(
             d.hessian * b.first + d.gradient * d.gradient.transpose() * b.second
         }
         Curvature::GaussNewton => {
-            let along = 2.0 * b.first / separation.squared + 4.0 * b.second;
+            let along = b.along(separation.squared) / separation.squared;
             let g = Separation::stack::<12>(&separation.weights, &separation.vector);
             g * g.transpose() * along.max(0.0)
         }
-        Curvature::Projected => projected(separation, b),
+        Curvature::Projected => by_slides(separation, b),
     };
     ElementEnergy {
         value: b.value,
@@ -68,54 +71,37 @@ pub(super) fn compose(
     }
 }
 
-/// Nearest positive semi-definite matrix to ∇²b(D), in an orthonormal basis of the (at most) five directions.
-fn projected(separation: &Separation<4>, b: &BarrierSample) -> SMatrix<f64, 12, 12> {
+/// Hessian as R Rᵀ, in the vectors that [`slide_roots`] names.
+fn by_slides(separation: &Separation<4>, b: &BarrierSample) -> SMatrix<f64, 12, 12> {
+    let [first, second] = slide_roots(separation, b);
+    let along = b.along(separation.squared).max(0.0).sqrt();
+    let normal = separation.vector * (along / separation.squared.sqrt());
+    let distance = Separation::stack(&separation.weights, &normal);
+    let roots = SMatrix::<f64, 12, 3>::from_columns(&[distance, first, second]);
+    roots * roots.transpose()
+}
+
+/// Roots of the semi-definite parts of the slides' terms in ∇²b(D): the sum of their squares exceeds those terms.
+///
+/// In the unit vectors e⊗ŵ / |e| and c⊗T / |c|, which are orthogonal, a slide's term is [[β, γ], [γ, 0]] with one positive
+/// eigenvalue.
+pub(super) fn slide_roots(separation: &Separation<4>, b: &BarrierSample) -> [SVector<f64, 12>; 2] {
     let distance = separation.squared.sqrt();
     let normal = separation.vector / distance;
-    let slides = separation.slides();
-
-    // Gram–Schmidt of c, e₁, e₂: columns of `triangle` are their coordinates in the axes.
-    let mut axes = [Vector4::zeros(); 3];
-    let mut triangle = SMatrix::<f64, 3, 3>::zeros();
-    let columns = std::iter::once(separation.weights).chain(slides.iter().map(|s| s.rate));
-    for (k, column) in columns.enumerate() {
-        let mut rest = column;
-        for j in 0..k {
-            triangle[(j, k)] = axes[j].dot(&column);
-            rest -= axes[j] * triangle[(j, k)];
-        }
-        triangle[(k, k)] = rest.norm();
-        if triangle[(k, k)] > f64::MIN_POSITIVE {
-            axes[k] = rest / triangle[(k, k)];
-        }
-    }
-
-    let mut small = Matrix5::zeros();
     let across = -2.0 * b.first;
-    let diagonal = [
-        4.0 * b.second * separation.squared - across,
-        across * separation.squared,
-        across * separation.squared,
-    ];
-    for (i, j, k) in (0..27).map(|n| (n / 9, n / 3 % 3, n % 3)) {
-        small[(i, j)] += diagonal[k] * triangle[(i, k)] * triangle[(j, k)];
-    }
-    for k in 0..slides.len() {
-        for i in 0..3 {
-            let coupling = across * distance * triangle[(i, k + 1)] * triangle[(0, 0)];
-            small[(i, 3 + k)] = coupling;
-            small[(3 + k, i)] = coupling;
+    let weight = separation.weights.norm();
+    let mut roots = [SVector::zeros(); 2];
+    for (root, slide) in roots.iter_mut().zip(separation.slides()) {
+        let rate = slide.rate.norm();
+        let beta = across * separation.squared * rate * rate;
+        let gamma = across * distance * rate * weight;
+        let eigenvalue = 0.5 * (beta + (beta * beta + 4.0 * gamma * gamma).sqrt());
+        let scale = (eigenvalue / (eigenvalue * eigenvalue + gamma * gamma)).sqrt();
+        if scale.is_finite() {
+            let [x, y] = [eigenvalue * scale / rate, gamma * scale / weight];
+            *root = Separation::stack::<12>(&slide.rate, &(normal * x))
+                + Separation::stack::<12>(&separation.weights, &(slide.tangent * y));
         }
     }
-
-    let stack = |c: &Vector4<f64>, a: &V3d| Separation::stack::<12>(c, a);
-    let tangent = |k: usize| slides.get(k).map_or_else(V3d::zeros, |s| s.tangent);
-    let basis = SMatrix::<f64, 12, 5>::from_columns(&[
-        stack(&axes[0], &normal),
-        stack(&axes[1], &normal),
-        stack(&axes[2], &normal),
-        stack(&axes[0], &tangent(0)),
-        stack(&axes[0], &tangent(1)),
-    ]);
-    basis * (project_psd(&small) * basis.transpose())
+    roots
 }

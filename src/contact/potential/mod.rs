@@ -4,6 +4,7 @@ mod assembly;
 mod barrier;
 mod composition;
 mod friction;
+mod mollified;
 #[cfg(test)]
 mod tests;
 

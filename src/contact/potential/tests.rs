@@ -85,20 +85,25 @@ fn barrier_derivatives_in_every_region() {
 }
 
 #[test]
-fn projection_is_the_nearest_semi_definite_matrix() {
+fn projected_hessians_are_semi_definite_and_not_below_the_exact() {
     for pair in PAIRS {
         for x in points(pair) {
-            let exact = energy(pair, &x, 1.0, Curvature::Exact).hessian;
-            let ours = energy(pair, &x, 1.0, Curvature::Projected).hessian;
-            let error = (ours - project_psd(&exact)).norm();
-            assert!(
-                error < 1e-9 * exact.norm(),
-                "{pair:?} {error:e} of {:e}",
-                exact.norm()
-            );
-            let rough = energy(pair, &x, 1.0, Curvature::GaussNewton).hessian;
-            let lowest = rough.symmetric_eigenvalues().min();
-            assert!(lowest > -1e-10 * rough.norm());
+            let exact = energy(pair, &x, 1.0, Curvature::Exact);
+            let size = exact.hessian.norm();
+            for curvature in [Curvature::Projected, Curvature::GaussNewton] {
+                let e = energy(pair, &x, 1.0, curvature);
+                assert!((e.value - exact.value).abs() < 1e-12 * exact.value);
+                let error = (e.gradient - exact.gradient).norm();
+                assert!(error < 1e-10 * exact.gradient.norm(), "{error:e}");
+                assert!(e.hessian.symmetric_eigenvalues().min() > -1e-10 * size);
+            }
+            let projected = energy(pair, &x, 1.0, Curvature::Projected).hessian;
+            let lowest = (projected - exact.hessian).symmetric_eigenvalues().min();
+            assert!(lowest > -1e-9 * size, "{pair:?} {lowest:e} of {size:e}");
+            // The nearest semi-definite matrix, for the size of the excess.
+            let nearest = project_psd(&exact.hessian);
+            let excess = (projected - nearest).norm() / nearest.norm();
+            assert!(excess < 1.0, "{pair:?} {excess}");
         }
     }
 }
