@@ -33,7 +33,8 @@ pub use distance::{
 pub use interior::Interior;
 pub use pair::{ActivePair, ContactPair};
 pub use potential::{
-    Barrier, BarrierSample, ContactAssembly, ContactElement, Curvature, Friction, FrictionPair,
+    Barrier, BarrierSample, BarrierScale, ContactAssembly, ContactElement, Curvature, Friction,
+    FrictionPair,
 };
 pub use skin_grid::{SkinCandidates, SkinGrid};
 pub use surface::{Part, SurfaceFrame, SurfaceModel};
