@@ -27,8 +27,8 @@ pub struct FrictionPair {
     pub load: f64,
     weights: Vector4<f64>,
     normal: V3d,
-    /// Σ cₖ xₖ⁰ (m).
-    start: V3d,
+    /// x⁰ (m).
+    start: [V3d; 4],
 }
 
 impl FrictionPair {
@@ -48,12 +48,13 @@ impl FrictionPair {
             load,
             weights,
             normal,
-            start: (0..4).map(|k| start[k] * weights[k]).sum(),
+            start: *start,
         })
     }
     /// Relative tangential displacement since the start of the step (m).
     pub fn displacement(&self, corners: &[V3d; 4]) -> V3d {
-        let u = (0..4).map(|k| corners[k] * self.weights[k]).sum::<V3d>() - self.start;
+        let moved = |k: usize| (corners[k] - self.start[k]) * self.weights[k];
+        let u: V3d = (0..4).map(moved).sum();
         u - self.normal * self.normal.dot(&u)
     }
     /// Positions of the stencil (m) out of those of all vertices.
