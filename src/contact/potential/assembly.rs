@@ -9,6 +9,10 @@ use crate::par::{Par, map_into};
 
 /// Pairs that one thread takes at a time.
 const CHUNK: usize = 256;
+/// Elements that are made before they are consumed: 1.3 MB. Fewer wake the threads too often, more leave the cache.
+const BLOCK: usize = 1024;
+/// Elements of a block that one thread takes at a time.
+const BLOCK_CHUNK: usize = 64;
 
 /// Energy of one contact and the vertices that it acts on.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -40,6 +44,44 @@ impl ContactAssembly {
         pairs: &[ActivePair],
         curvature: Curvature,
     ) -> &[ContactElement] {
+        self.find_in_reach(par, barrier, positions, pairs);
+        let in_reach = &self.in_reach;
+        map_into(par, in_reach.len(), CHUNK, &mut self.elements, |k| {
+            element(barrier, positions, &pairs[in_reach[k] as usize], curvature)
+        });
+        &self.elements
+    }
+    /// Calls `add` on each of these elements in turn, with the projected curvature.
+    ///
+    /// Elements are 1.3 kB each; a block of them stays in the cache, which [`Self::barrier`] leaves.
+    ///
+    /// # Panics
+    /// With fewer positions than the pairs' indices need.
+    pub fn for_each_barrier(
+        &mut self,
+        par: Par,
+        barrier: &Barrier,
+        positions: &[V3d],
+        pairs: &[ActivePair],
+        mut add: impl FnMut(&ContactElement),
+    ) {
+        self.find_in_reach(par, barrier, positions, pairs);
+        for block in self.in_reach.chunks(BLOCK) {
+            map_into(par, block.len(), BLOCK_CHUNK, &mut self.elements, |k| {
+                let active = &pairs[block[k] as usize];
+                element(barrier, positions, active, Curvature::Projected)
+            });
+            self.elements.iter().for_each(&mut add);
+        }
+    }
+    /// Lists the pairs within reach in ascending order.
+    fn find_in_reach(
+        &mut self,
+        par: Par,
+        barrier: &Barrier,
+        positions: &[V3d],
+        pairs: &[ActivePair],
+    ) {
         map_into(par, pairs.len(), CHUNK, &mut self.scalars, |i| {
             let pair = pairs[i].pair;
             pair.separation(&pair.corners(positions)).squared
@@ -49,19 +91,6 @@ impl ContactAssembly {
         let indices = (0u32..).zip(&self.scalars);
         self.in_reach
             .extend(indices.filter(|(_, s)| **s < reach).map(|(i, _)| i));
-
-        let in_reach = &self.in_reach;
-        map_into(par, in_reach.len(), CHUNK, &mut self.elements, |k| {
-            let active = &pairs[in_reach[k] as usize];
-            let corners = active.pair.corners(positions);
-            ContactElement {
-                vertices: active.pair.stencil(),
-                energy: barrier
-                    .energy(active, &corners, curvature)
-                    .unwrap_or_default(),
-            }
-        });
-        &self.elements
     }
     /// Energy of all pairs (J), without derivatives: infinite as soon as one pair is at or below the thickness.
     ///
@@ -90,13 +119,40 @@ impl ContactAssembly {
         positions: &[V3d],
         pairs: &[FrictionPair],
     ) -> &[ContactElement] {
-        map_into(par, pairs.len(), CHUNK, &mut self.elements, |k| {
+        self.friction_block(par, friction, positions, pairs, CHUNK);
+        &self.elements
+    }
+    /// Calls `add` on each of these elements in turn; see [`Self::for_each_barrier`].
+    ///
+    /// # Panics
+    /// With fewer positions than the pairs' indices need.
+    pub fn for_each_friction(
+        &mut self,
+        par: Par,
+        friction: &Friction,
+        positions: &[V3d],
+        pairs: &[FrictionPair],
+        mut add: impl FnMut(&ContactElement),
+    ) {
+        for block in pairs.chunks(BLOCK) {
+            self.friction_block(par, friction, positions, block, BLOCK_CHUNK);
+            self.elements.iter().for_each(&mut add);
+        }
+    }
+    fn friction_block(
+        &mut self,
+        par: Par,
+        friction: &Friction,
+        positions: &[V3d],
+        pairs: &[FrictionPair],
+        chunk: usize,
+    ) {
+        map_into(par, pairs.len(), chunk, &mut self.elements, |k| {
             ContactElement {
                 vertices: pairs[k].vertices,
                 energy: friction.energy(&pairs[k], &pairs[k].corners(positions)),
             }
         });
-        &self.elements
     }
     /// Energy of lagged friction of all pairs (J).
     ///
@@ -121,6 +177,22 @@ impl ContactAssembly {
     /// Index in `pairs` of each element of the last [`Self::barrier`].
     pub fn in_reach(&self) -> &[u32] {
         &self.in_reach
+    }
+}
+
+/// Element of one pair.
+fn element(
+    barrier: &Barrier,
+    positions: &[V3d],
+    active: &ActivePair,
+    curvature: Curvature,
+) -> ContactElement {
+    let corners = active.pair.corners(positions);
+    ContactElement {
+        vertices: active.pair.stencil(),
+        energy: barrier
+            .energy(active, &corners, curvature)
+            .unwrap_or_default(),
     }
 }
 
@@ -181,6 +253,11 @@ mod tests {
             let other = with_threads(threads, || run(Par::Rayon)).expect("threads");
             assert!(other == one, "{threads} threads");
         }
+        let mut streamed = Vec::new();
+        let mut assembly = ContactAssembly::default();
+        let add = |e: &ContactElement| streamed.push(*e);
+        assembly.for_each_barrier(Par::Rayon, &barrier, &x, &pairs, add);
+        assert!(streamed == one.0);
         let sum: f64 = one.0.iter().map(|e| e.energy.value).sum();
         assert!((sum - one.2).abs() < 1e-12 * sum);
     }
