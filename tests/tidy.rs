@@ -145,6 +145,7 @@ const DOORS: &[(&str, &[&str])] = &[
     ("jpeg_encoder", &["src/formats/"]),
     ("npyz", &["src/formats/"]),
     ("plotters", &["src/evaluate/"]),
+    ("robust", &["src/contact/edge_triangle.rs"]),
     ("zstd", &["src/formats/"]),
     // docs/decisions/050-recordings.md: MCAP channels carry foxglove protobuf messages, so formats encodes those few itself.
     ("prost", &["proto/", "src/formats/foxglove.rs"]),

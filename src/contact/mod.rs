@@ -3,11 +3,15 @@
 //! Built once a pose: cloth collides with it, dressing drapes on it, the compositor draws it. Nothing here steps time.
 
 mod body_filter;
+pub mod broad_phase;
+pub mod ccd;
 mod closest_multistart;
 mod closest_point;
 mod collision_body;
+mod contact_mesh;
 mod depth_maps;
 mod distance;
+mod edge_triangle;
 mod interior;
 mod joint_clearance;
 mod pair;
@@ -25,6 +29,7 @@ pub use collision_body::{
     CollisionBody, CollisionConfig, CollisionError, CollisionModel, CollisionParts,
     CollisionReport, CollisionWorkspace,
 };
+pub use contact_mesh::{ContactMesh, ContactMeshError, ContactSurface};
 pub use depth_maps::{DepthMaps, MapDetail, MapView};
 pub use distance::{
     ClosestFeatures, ParallelMollifier, Separation, Slide, edge_edge, mollifier_threshold,

@@ -271,6 +271,38 @@ impl Bvh {
         });
     }
 
+    /// Number of leaves: groups of eight triangles at most that lay together when the tree was built.
+    pub fn leaf_count(&self) -> usize {
+        self.leaves.len()
+    }
+
+    /// Triangles of one leaf.
+    pub fn leaf(&self, leaf: usize) -> impl Iterator<Item = u32> + '_ {
+        let all = self.leaves[leaf].faces.iter().copied();
+        all.take_while(|f| *f != NONE)
+    }
+
+    /// Calls `visit` with the index of a box (low, high; metres) and each triangle whose box overlaps it, in no
+    /// particular order: one traversal for boxes that lie together.
+    pub fn overlapping_group(&self, boxes: &[[[f32; 3]; 2]], mut visit: impl FnMut(usize, u32)) {
+        let wide = |p: [f32; 3]| [p[0], p[1], p[2], 0.0];
+        let bounds = |[low, high]: &[[f32; 3]; 2]| Bounds {
+            low: wide(*low),
+            high: wide(*high),
+        };
+        let mut all = Bounds::EMPTY;
+        boxes.iter().for_each(|b| all.include(&bounds(b)));
+        self.overlapping_leaves(&all, |node, leaf| {
+            for (k, b) in boxes.iter().enumerate() {
+                let b = bounds(b);
+                if !node.is_apart(&b) {
+                    let found = self.leaves[leaf as usize].overlapping(&b);
+                    found.for_each(|face| visit(k, face));
+                }
+            }
+        });
+    }
+
     fn corners(&self, face: u32, x: &[P3]) -> [P3; 3] {
         self.faces[face as usize].map(|v| x[v as usize])
     }
