@@ -2,6 +2,7 @@
 
 mod asf_amc;
 mod bvh;
+pub mod ccd_queries;
 mod error;
 pub mod fabric_json;
 mod foxglove;
