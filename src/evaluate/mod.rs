@@ -3,6 +3,7 @@
 //! A benchmark fills a [`Table`]; [`Table::write`] leaves it as CSV, JSON and one SVG plot per measure of error.
 
 pub mod ablation;
+pub mod ccd;
 pub mod cloth;
 mod corruptions;
 pub mod dance;

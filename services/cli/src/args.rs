@@ -51,6 +51,8 @@ pub(crate) enum Command {
     Simulate(SimulateArgs),
     /// Draw garment meshes (in the camera's frame) into one captured picture.
     Composite(CompositeArgs),
+    /// Ask query sets of continuous collision detection with truth: missed impacts, false alarms, time a query.
+    Ccd(CcdArgs),
     /// Garments from 3D scans of a person: align, segment, capture, and dress other bodies.
     Clothcap(ClothcapArgs),
     /// Check a body, garment or recording made elsewhere and convert it to this product's own form.
@@ -386,6 +388,16 @@ pub(crate) struct TrainPartsArgs {
     /// Worker threads; 0 means one per core.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub(crate) threads: usize,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CcdArgs {
+    /// Folder tree with CSV files of rational numbers in folders named vertex-face and edge-edge (Wang et al. 2021).
+    #[arg(long, value_name = "DIR")]
+    pub(crate) queries: PathBuf,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -31,6 +31,7 @@ fn main() -> ExitCode {
         Command::Track(a) => commands::track::run(&a),
         Command::Simulate(a) => commands::simulate::run(&a),
         Command::Composite(a) => commands::composite::run(&a),
+        Command::Ccd(a) => commands::ccd::run(&a),
         Command::Clothcap(a) => commands::clothcap::run(&a),
         Command::Import(a) => commands::import::run(&a),
         Command::Export(a) => commands::export::run(&a),

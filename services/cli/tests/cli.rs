@@ -69,6 +69,7 @@ fn each_command_explains_itself() {
         "track",
         "simulate",
         "composite",
+        "ccd",
         "import",
         "export",
         "record",
@@ -449,6 +450,29 @@ fn tokens_are_made_and_revoked() {
     let code = text(&run(&enrol).stdout).trim().to_owned();
     assert_eq!(code.len(), "XXXX-XXXX-XXXX".len());
     assert_eq!(std::fs::read_dir(&codes).unwrap().count(), 1);
+}
+
+#[test]
+fn ccd_counts_against_the_truth() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path().display().to_string();
+    assert!(refused(&["ccd", "--queries", &root]).contains("vertex-face"));
+    let kind = dir.path().join("drop").join("vertex-face");
+    std::fs::create_dir_all(&kind).unwrap();
+    let face = "0,1,0,1,0,1,1\n1,1,0,1,0,1,1\n0,1,0,1,1,1,1\n";
+    let query = format!("1,4,1,1,1,4,1\n{face}1,4,-1,1,1,4,1\n{face}");
+    std::fs::write(kind.join("a.csv"), &query).unwrap();
+    let out = tryon(&["ccd", "--queries", &root, "--json"]);
+    let report: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(report["total"]["impacts"], 1);
+    assert_eq!(report["total"]["missed"], 0);
+    assert_eq!(report["sets"][0]["group"], "drop");
+    std::fs::write(kind.join("b.csv"), query.replace("-1,1", "-1,0")).unwrap();
+    let fault = refused(&["ccd", "--queries", &root]);
+    assert!(
+        fault.contains("b.csv") && fault.contains("line 5, y numerator"),
+        "{fault}"
+    );
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Commands of the command line, one file each.
 
 pub(crate) mod bench;
+pub(crate) mod ccd;
 pub(crate) mod clothcap;
 pub(crate) mod composite;
 pub(crate) mod demo;
