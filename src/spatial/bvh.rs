@@ -146,6 +146,8 @@ pub struct Bvh {
     faces: Vec<Face>,
     nodes: Vec<Node>,
     pub(super) leaves: Vec<Leaf>,
+    /// Node of each leaf.
+    leaf_nodes: Vec<u32>,
 }
 
 impl Bvh {
@@ -184,6 +186,7 @@ impl Bvh {
         if is_leaf {
             // NaN bounds of absent triangles overlap nothing, not even an infinite box.
             let nowhere = [[f32::NAN; LEAF]; 3];
+            self.leaf_nodes.push(at as u32);
             self.leaves.push(Leaf {
                 faces: std::array::from_fn(|l| some.get(l).copied().unwrap_or(NONE)),
                 low: nowhere,
@@ -233,13 +236,13 @@ impl Bvh {
         }
     }
 
-    /// Calls `visit` with the leaves whose boxes `enters` accepts.
-    fn traverse(
+    /// Calls `visit` with the leaves at and after node `k` whose boxes `enters` accepts.
+    fn traverse_from(
         &self,
+        mut k: usize,
         mut enters: impl FnMut(&Bounds) -> bool,
         mut visit: impl FnMut(&Bounds, u32),
     ) {
-        let mut k = 0;
         while let Some(n) = self.nodes.get(k) {
             if !enters(&n.bounds) {
                 k = n.skip as usize;
@@ -254,7 +257,7 @@ impl Bvh {
 
     /// Calls `visit` with the box and the index of every leaf that overlaps `b`.
     pub(super) fn overlapping_leaves(&self, b: &Bounds, visit: impl FnMut(&Bounds, u32)) {
-        self.traverse(|n| !n.is_apart(b), visit);
+        self.traverse_from(0, |n| !n.is_apart(b), visit);
     }
 
     /// Triangles whose boxes overlap the box from `low` to `high`, metres; in no particular order.
@@ -282,9 +285,14 @@ impl Bvh {
         all.take_while(|f| *f != NONE)
     }
 
-    /// Calls `visit` with the index of a box (low, high; metres) and each triangle whose box overlaps it, in no
-    /// particular order: one traversal for boxes that lie together.
-    pub fn overlapping_group(&self, boxes: &[[[f32; 3]; 2]], mut visit: impl FnMut(usize, u32)) {
+    /// Calls `visit` with the index of a box (low, high; metres) and each triangle of the leaves from `first` on whose
+    /// box overlaps it, in no particular order: one traversal for boxes that lie together.
+    pub fn overlapping_group(
+        &self,
+        boxes: &[[[f32; 3]; 2]],
+        first: usize,
+        mut visit: impl FnMut(usize, u32),
+    ) {
         let wide = |p: [f32; 3]| [p[0], p[1], p[2], 0.0];
         let bounds = |[low, high]: &[[f32; 3]; 2]| Bounds {
             low: wide(*low),
@@ -292,7 +300,16 @@ impl Bvh {
         };
         let mut all = Bounds::EMPTY;
         boxes.iter().for_each(|b| all.include(&bounds(b)));
-        self.overlapping_leaves(&all, |node, leaf| {
+        // Leaves ascend along the nodes, so a traversal may begin at any of them.
+        let from = match first {
+            0 => 0,
+            _ => self
+                .leaf_nodes
+                .get(first)
+                .map_or(self.nodes.len(), |n| *n as usize),
+        };
+        let enters = |n: &Bounds| !n.is_apart(&all);
+        self.traverse_from(from, enters, |node, leaf| {
             for (k, b) in boxes.iter().enumerate() {
                 let b = bounds(b);
                 if !node.is_apart(&b) {

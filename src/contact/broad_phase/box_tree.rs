@@ -47,6 +47,35 @@ impl BoxTree {
         other: &Self,
         keep: impl Fn(u32, u32) -> bool + Sync,
     ) -> Vec<[u32; 2]> {
+        self.join_leaves(par, other, |_, here, there| {
+            keep(here, there).then_some([here, there])
+        })
+    }
+
+    /// Pairs of own boxes that overlap and that `keep` accepts, each once, the smaller first, ascending.
+    pub(super) fn self_join(
+        &self,
+        par: Par,
+        keep: impl Fn(u32, u32) -> bool + Sync,
+    ) -> Vec<[u32; 2]> {
+        let own = |leaf: usize, item: u32| self.tree.leaf(leaf).any(|i| i == item);
+        self.join_leaves(par, self, |leaf, here, there| {
+            // Pairs within a leaf are met in both orders, those of two leaves from the first of them.
+            let is_new = here < there || (here != there && !own(leaf, there));
+            let pair = [here.min(there), here.max(there)];
+            (is_new && keep(pair[0], pair[1])).then_some(pair)
+        })
+    }
+
+    /// Pairs that `pair` makes of (own leaf, own box, box of `other`), sorted; of leaves after the own one if `other`
+    /// is this tree.
+    fn join_leaves(
+        &self,
+        par: Par,
+        other: &Self,
+        pair: impl Fn(usize, u32, u32) -> Option<[u32; 2]> + Sync,
+    ) -> Vec<[u32; 2]> {
+        let is_self = std::ptr::eq(self, other);
         let mut chunks: Vec<Vec<[u32; 2]>> = Vec::new();
         let leaves = self.tree.leaf_count();
         par::map_into(par, leaves.div_ceil(CHUNK), 1, &mut chunks, |chunk| {
@@ -57,11 +86,12 @@ impl BoxTree {
                 group.clear();
                 let own = |item: &u32| &self.boxes[*item as usize];
                 group.extend(items.iter().map(own).map(|b| [b.low, b.high]));
-                other.tree.overlapping_group(&group, |k, there| {
+                let first = if is_self { leaf } else { 0 };
+                other.tree.overlapping_group(&group, first, |k, there| {
                     let here = items[k];
                     // The tree's boxes are a rounding wider.
-                    if own(&here).overlaps(&other.boxes[there as usize]) && keep(here, there) {
-                        found.push([here, there]);
+                    if own(&here).overlaps(&other.boxes[there as usize]) {
+                        found.extend(pair(leaf, here, there));
                     }
                 });
             }

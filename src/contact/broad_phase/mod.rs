@@ -109,19 +109,21 @@ impl BroadPhase {
 
     fn edge_edge(&self, mesh: &ContactMesh, par: Par) -> Vec<ContactPair> {
         let (own, other) = mesh.edges().split_at(mesh.cloth_edges());
-        let join = |tree: &BoxTree, edges: &[[u32; 2]], is_self: bool| -> Vec<ContactPair> {
-            let keep = |a: u32, b: u32| {
-                (!is_self || a < b) && !mesh.are_incident(&own[a as usize], &edges[b as usize])
-            };
-            let found = self.cloth_edges.join(par, tree, keep);
+        let apart = |a: u32, b: &[u32; 2]| !mesh.are_incident(&own[a as usize], b);
+        let pairs = |found: Vec<[u32; 2]>, edges: &[[u32; 2]]| -> Vec<ContactPair> {
             let pair = |[a, b]: [u32; 2]| ContactPair::EdgeEdge {
                 a: own[a as usize],
                 b: edges[b as usize],
             };
             found.into_iter().map(pair).collect()
         };
-        let mut all = join(&self.cloth_edges, own, true);
-        all.extend(join(&self.obstacle_edges, other, false));
+        let cloth = &self.cloth_edges;
+        let on_cloth = cloth.self_join(par, |a, b| apart(a, &own[b as usize]));
+        let on_obstacle = cloth.join(par, &self.obstacle_edges, |a, b| {
+            apart(a, &other[b as usize])
+        });
+        let mut all = pairs(on_cloth, own);
+        all.extend(pairs(on_obstacle, other));
         all
     }
 }
