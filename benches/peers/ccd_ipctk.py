@@ -19,6 +19,8 @@ from fractions import Fraction
 import ipctk
 import numpy as np
 
+ipctk.set_logger_level(ipctk.LoggerLevel.error)
+
 REPEATS = 5
 LONG = 1e-3  # seconds after which a call isn't repeated
 
