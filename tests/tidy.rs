@@ -68,7 +68,7 @@ const MODULES: &[(u8, &str, &str)] = &[
     (
         3,
         "contact",
-        "The collision body of a pose: filtered, parts and joints separated; its closest points, inside tests and virtual depth maps.",
+        "The collision body of a pose: filtered, parts and joints separated; its closest points, inside tests and virtual depth maps. Contact pairs: broad phase, continuous collision detection, distances, barrier, friction.",
     ),
     (
         3,

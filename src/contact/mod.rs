@@ -1,6 +1,6 @@
-//! The collision body of a pose: filtered, parts and joints separated; its closest points, inside tests and virtual depth maps.
+//! The collision body of a pose: filtered, parts and joints separated; its closest points, inside tests and virtual depth maps. Contact pairs: broad phase, continuous collision detection, distances, barrier, friction.
 //!
-//! Built once a pose: cloth collides with it, dressing drapes on it, the compositor draws it. Nothing here steps time.
+//! The body is built once a pose: cloth collides with it, dressing drapes on it, the compositor draws it. Nothing here steps time.
 
 mod body_filter;
 pub mod broad_phase;

@@ -241,6 +241,12 @@ pub(crate) const NOUNS: &[(&str, &[Noun])] = &[
             ("closest points", "closest_point.rs"),
             ("inside tests", "interior.rs"),
             ("virtual depth maps", "depth_maps.rs"),
+            ("Contact pairs", "ContactPair"),
+            ("broad phase", "broad_phase/mod.rs"),
+            ("continuous collision detection", "ccd/mod.rs"),
+            ("distances", "distance/mod.rs"),
+            ("barrier", "Barrier"),
+            ("friction", "Friction"),
         ],
     ),
     (
