@@ -19,6 +19,7 @@ pub mod spatial;
 // Layer 3
 pub mod body;
 pub mod contact;
+pub mod elastic;
 pub mod garment;
 pub mod registration;
 pub mod segment;

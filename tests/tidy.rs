@@ -72,6 +72,11 @@ const MODULES: &[(u8, &str, &str)] = &[
     ),
     (
         3,
+        "elastic",
+        "Elasticity of a thin sheet in f64: stretch and bend laws, membranes, hinges, dihedral angles, the cloth model with its masses, assembly.",
+    ),
+    (
+        3,
         "segment",
         "The pixels of the person: floor, background, nearest body, edges, body parts.",
     ),

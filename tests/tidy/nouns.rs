@@ -250,6 +250,19 @@ pub(crate) const NOUNS: &[(&str, &[Noun])] = &[
         ],
     ),
     (
+        "elastic",
+        &[
+            ("stretch", "stretch_law.rs"),
+            ("bend laws", "bend_law.rs"),
+            ("membranes", "membrane.rs"),
+            ("hinges", "hinge.rs"),
+            ("dihedral angles", "dihedral.rs"),
+            ("cloth model", "ClothModel"),
+            ("masses", "model.rs"),
+            ("assembly", "assembly.rs"),
+        ],
+    ),
+    (
         "cloth",
         &[
             ("step", "step.rs"),

@@ -1,0 +1,47 @@
+//! Bending laws: energy per rest area of a curvature.
+
+use super::{ElasticError, Jet};
+use nalgebra::{Matrix3, Vector3};
+
+/// Energy density of bending by the curvature (κᵤᵤ, κᵥᵥ, 2 κᵤᵥ) (1/m).
+#[derive(Clone, Debug, PartialEq)]
+pub enum BendLaw {
+    /// ½ κᵀ D κ with a symmetric positive D (N·m).
+    Linear(Matrix3<f64>),
+}
+
+impl BendLaw {
+    /// Isotropic plate: rigidity B (N·m) and Poisson ratio.
+    pub fn isotropic(rigidity: f64, poisson: f64) -> Self {
+        let (b, c) = (rigidity, rigidity * poisson);
+        let twist = 0.5 * rigidity * (1.0 - poisson);
+        Self::Linear(Matrix3::new(b, c, 0.0, c, b, 0.0, 0.0, 0.0, twist))
+    }
+    /// Energy per rest area (N/m), moment (N) and tangent (N·m).
+    pub fn expand(&self, curvature: &Vector3<f64>) -> Jet {
+        match self {
+            Self::Linear(d) => Jet::quadratic(d, curvature),
+        }
+    }
+    /// Stiffness of a flat sheet (N·m).
+    pub fn at_rest(&self) -> Matrix3<f64> {
+        match self {
+            Self::Linear(d) => *d,
+        }
+    }
+    /// Checks that no curvature yields energy.
+    ///
+    /// # Errors
+    /// [`ElasticError::Fabric`] with the least eigenvalue.
+    pub(super) fn check(&self) -> Result<(), ElasticError> {
+        let d = self.at_rest();
+        let value = d.symmetric_eigenvalues().min();
+        if d.iter().all(|v| v.is_finite()) && value >= 0.0 {
+            return Ok(());
+        }
+        Err(ElasticError::Fabric {
+            field: "bending stiffness",
+            value,
+        })
+    }
+}

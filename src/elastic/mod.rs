@@ -1,0 +1,28 @@
+//! Elasticity of a thin sheet in f64: stretch and bend laws, membranes, hinges, dihedral angles, the cloth model with its masses, assembly.
+
+mod assembly;
+mod bend_law;
+mod dihedral;
+mod edges;
+mod element_set;
+mod error;
+mod fabric;
+mod hinge;
+mod jet;
+mod membrane;
+mod model;
+mod packed;
+mod rest_sheet;
+mod stretch_law;
+
+pub use assembly::ElasticExpansion;
+pub use bend_law::BendLaw;
+pub use dihedral::Dihedral;
+pub use error::ElasticError;
+pub use fabric::ElasticFabric;
+pub use hinge::{AngleHessian, HingeElement};
+pub use jet::Jet;
+pub use membrane::MembraneElement;
+pub use model::{BendingModel, ClothModel};
+pub use rest_sheet::{RestSheet, RestTriangle};
+pub use stretch_law::{StretchLaw, Stretching};

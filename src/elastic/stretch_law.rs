@@ -1,0 +1,76 @@
+//! Membrane laws: energy per rest area of a Green–Lagrange strain (Volino et al. 2009, section 3).
+
+use super::{ElasticError, Jet};
+use nalgebra::{Matrix3, Vector3};
+
+/// Orthotropic membrane stiffness (N/m): σᵤᵤ = c₁₁ εᵤᵤ + c₁₂ εᵥᵥ, σᵥᵥ = c₁₂ εᵤᵤ + c₂₂ εᵥᵥ, σᵤᵥ = c₃₃ γ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stretching {
+    /// Along u (weft).
+    pub weft: f64,
+    /// Coupling of both directions.
+    pub coupling: f64,
+    /// Along v (warp).
+    pub warp: f64,
+    /// Shear modulus: stress by the shear angle γ = 2 εᵤᵥ.
+    pub shear: f64,
+}
+
+impl Stretching {
+    /// Isotropic sheet: Young's modulus times thickness (N/m) and Poisson ratio.
+    pub fn isotropic(membrane: f64, poisson: f64) -> Self {
+        let plane = membrane / (1.0 - poisson * poisson);
+        Self {
+            weft: plane,
+            coupling: plane * poisson,
+            warp: plane,
+            shear: membrane / (2.0 * (1.0 + poisson)),
+        }
+    }
+    /// Stiffness matrix in the order (uu, vv, γ).
+    pub fn matrix(&self) -> Matrix3<f64> {
+        let c = self.coupling;
+        Matrix3::new(self.weft, c, 0.0, c, self.warp, 0.0, 0.0, 0.0, self.shear)
+    }
+    /// Checks that every strain costs energy.
+    ///
+    /// # Errors
+    /// [`ElasticError::Fabric`] names the modulus.
+    pub(super) fn check(&self) -> Result<(), ElasticError> {
+        let positive = [
+            ("weft stiffness", self.weft),
+            ("warp stiffness", self.warp),
+            ("shear stiffness", self.shear),
+            (
+                "determinant of the stretching stiffness",
+                self.weft * self.warp - self.coupling * self.coupling,
+            ),
+        ];
+        match positive.iter().find(|(_, v)| !(*v > 0.0 && v.is_finite())) {
+            None => Ok(()),
+            Some(&(field, value)) => Err(ElasticError::Fabric { field, value }),
+        }
+    }
+}
+
+/// Energy density of a membrane by its strain (εᵤᵤ, εᵥᵥ, γ = 2 εᵤᵥ).
+#[derive(Clone, Debug, PartialEq)]
+pub enum StretchLaw {
+    /// St. Venant–Kirchhoff with orthotropic moduli.
+    Linear(Stretching),
+}
+
+impl StretchLaw {
+    /// Energy per rest area (N/m), stress and tangent.
+    pub fn expand(&self, strain: &Vector3<f64>) -> Jet {
+        match self {
+            Self::Linear(s) => Jet::quadratic(&s.matrix(), strain),
+        }
+    }
+    /// Energy per rest area (N/m).
+    pub fn value(&self, strain: &Vector3<f64>) -> f64 {
+        match self {
+            Self::Linear(s) => 0.5 * strain.dot(&(s.matrix() * strain)),
+        }
+    }
+}
