@@ -1,5 +1,6 @@
 //! Bending laws: energy per rest area of a curvature.
 
+use super::measured_bend::MeasuredBend;
 use super::{ElasticError, Jet};
 use nalgebra::{Matrix3, Vector3};
 
@@ -8,6 +9,8 @@ use nalgebra::{Matrix3, Vector3};
 pub enum BendLaw {
     /// ½ κᵀ D κ with a symmetric positive D (N·m).
     Linear(Matrix3<f64>),
+    /// Measured, with a stiffness that depends on direction and curvature.
+    Measured(Box<MeasuredBend>),
 }
 
 impl BendLaw {
@@ -21,12 +24,14 @@ impl BendLaw {
     pub fn expand(&self, curvature: &Vector3<f64>) -> Jet {
         match self {
             Self::Linear(d) => Jet::quadratic(d, curvature),
+            Self::Measured(m) => m.expand(curvature),
         }
     }
     /// Stiffness of a flat sheet (N·m).
     pub fn at_rest(&self) -> Matrix3<f64> {
         match self {
             Self::Linear(d) => *d,
+            Self::Measured(m) => m.at_rest(),
         }
     }
     /// Checks that no curvature yields energy.

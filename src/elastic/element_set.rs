@@ -4,7 +4,6 @@ use super::ElasticExpansion;
 use super::packed::Packed;
 use crate::math::V3d;
 use crate::par::{Par, map_into};
-use nalgebra::Matrix3;
 
 /// Vertex index of a corner that an element lacks.
 pub(super) const ABSENT: u32 = u32::MAX;

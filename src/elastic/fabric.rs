@@ -1,6 +1,9 @@
 //! Fabric of an elastic sheet.
 
+use super::measured_bend::MeasuredBend;
+use super::measured_stretch::MeasuredStretch;
 use super::{BendLaw, ElasticError, StretchLaw};
+use crate::formats::fabric_json::MeasuredFabric;
 
 /// Constitutive laws and mass of a sheet, u along the weft and v along the warp.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +17,14 @@ pub struct ElasticFabric {
 }
 
 impl ElasticFabric {
+    /// Fabric measured as by Wang, O'Brien & Ramamoorthi 2011.
+    pub fn measured(fabric: &MeasuredFabric) -> Self {
+        Self {
+            area_density: fabric.density,
+            stretch: StretchLaw::Measured(Box::new(MeasuredStretch::new(fabric))),
+            bend: BendLaw::Measured(Box::new(MeasuredBend::new(fabric))),
+        }
+    }
     /// Checks that all numbers are possible for a sheet.
     ///
     /// # Errors
@@ -25,8 +36,7 @@ impl ElasticFabric {
                 value: self.area_density,
             });
         }
-        let StretchLaw::Linear(s) = &self.stretch;
-        s.check()?;
+        self.stretch.check()?;
         self.bend.check()
     }
 }

@@ -1,5 +1,6 @@
 //! Membrane laws: energy per rest area of a Green–Lagrange strain (Volino et al. 2009, section 3).
 
+use super::measured_stretch::MeasuredStretch;
 use super::{ElasticError, Jet};
 use nalgebra::{Matrix3, Vector3};
 
@@ -36,7 +37,7 @@ impl Stretching {
     ///
     /// # Errors
     /// [`ElasticError::Fabric`] names the modulus.
-    pub(super) fn check(&self) -> Result<(), ElasticError> {
+    fn check(&self) -> Result<(), ElasticError> {
         let positive = [
             ("weft stiffness", self.weft),
             ("warp stiffness", self.warp),
@@ -58,6 +59,8 @@ impl Stretching {
 pub enum StretchLaw {
     /// St. Venant–Kirchhoff with orthotropic moduli.
     Linear(Stretching),
+    /// Measured, nonlinear and anisotropic.
+    Measured(Box<MeasuredStretch>),
 }
 
 impl StretchLaw {
@@ -65,12 +68,25 @@ impl StretchLaw {
     pub fn expand(&self, strain: &Vector3<f64>) -> Jet {
         match self {
             Self::Linear(s) => Jet::quadratic(&s.matrix(), strain),
+            Self::Measured(m) => m.expand(strain),
         }
     }
     /// Energy per rest area (N/m).
     pub fn value(&self, strain: &Vector3<f64>) -> f64 {
         match self {
             Self::Linear(s) => 0.5 * strain.dot(&(s.matrix() * strain)),
+            Self::Measured(m) => m.expand(strain).value,
+        }
+    }
+    /// Checks that every strain costs energy.
+    ///
+    /// # Errors
+    /// [`ElasticError::Fabric`] names the modulus.
+    pub(super) fn check(&self) -> Result<(), ElasticError> {
+        match self {
+            Self::Linear(s) => s.check(),
+            // Positive by construction.
+            Self::Measured(_) => Ok(()),
         }
     }
 }
