@@ -1,5 +1,6 @@
 //! Second-order expansion of the elastic energy of a whole sheet, on a fixed sparsity.
 
+use super::fan_expansion::CurvatureBuffers;
 use super::packed::Packed;
 use crate::math::V3d;
 use nalgebra::Matrix3;
@@ -23,6 +24,7 @@ pub struct ElasticExpansion {
 pub(super) struct ElementBuffers {
     pub(super) membranes: Vec<Packed<3, 6>>,
     pub(super) hinges: Vec<Packed<4, 10>>,
+    pub(super) curvatures: CurvatureBuffers,
 }
 
 impl ElasticExpansion {

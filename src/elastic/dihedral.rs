@@ -166,10 +166,7 @@ mod tests {
                 .with_hessian(DMatrix::from_column_slice(12, 12, h.as_slice()))
         };
         let check = DerivativeCheck::default();
-        check.run(
-            &[-2.9, -1.0, -1e-3, 0.0, 0.4, 1.5707, 3.0].map(bent),
-            evaluate,
-        );
+        check.run(&[-2.9, -1.0, -1e-3, 0.0, 0.4, 1.5, 3.0].map(bent), evaluate);
         // Without area, without length, folded flat.
         let mut sliver = bent(0.3);
         sliver.copy_within(0..3, 6);

@@ -25,6 +25,8 @@ pub(super) struct RestWing {
     pub(super) area: f64,
     /// Unit normal of the edge in the material.
     pub(super) normal: Vector2<f64>,
+    /// Apex along the edge from its start, and away from it (m).
+    pub(super) apex: Vector2<f64>,
 }
 
 impl InteriorEdge {
@@ -33,12 +35,15 @@ impl InteriorEdge {
         [0, 1].map(|side| {
             let t = &triangles[self.faces[side] as usize];
             let k = self.opposite[side];
-            let edge = t.corners[(k + 2) % 3] - t.corners[(k + 1) % 3];
+            // The left face traverses the edge from its start, the right one from its end.
+            let [start, end] = [[1, 2], [2, 1]][side].map(|j| t.corners[(k + j) % 3]);
+            let (edge, arm) = (end - start, t.corners[k] - start);
             let length = edge.norm();
             RestWing {
                 length,
                 area: t.area,
                 normal: Vector2::new(edge.y, -edge.x) / length,
+                apex: Vector2::new(edge.dot(&arm), edge.perp(&arm).abs()) / length,
             }
         })
     }
@@ -50,13 +55,15 @@ impl InteriorEdge {
     }
 }
 
+/// Face and its corner opposite an edge, of the face that traverses it from its smaller vertex and of the other.
+type Sides = [Option<(u32, usize)>; 2];
+
 /// Edges with two faces, sorted by their vertices.
 ///
 /// # Errors
 /// [`ElasticError::Edge`] for an edge with more faces, or with faces oriented against each other.
 pub(super) fn interior_edges(faces: &[[u32; 3]]) -> Result<Vec<InteriorEdge>, ElasticError> {
-    // Per edge and direction (forward: smaller vertex first) the face and its corner opposite the edge.
-    let mut sides: BTreeMap<[u32; 2], [Option<(u32, usize)>; 2]> = BTreeMap::new();
+    let mut sides: BTreeMap<[u32; 2], Sides> = BTreeMap::new();
     for (face, f) in faces.iter().enumerate() {
         for k in 0..3 {
             let (a, b) = (f[(k + 1) % 3], f[(k + 2) % 3]);
@@ -66,7 +73,7 @@ pub(super) fn interior_edges(faces: &[[u32; 3]]) -> Result<Vec<InteriorEdge>, El
             }
         }
     }
-    let edge = |(v, side): (&[u32; 2], &[Option<(u32, usize)>; 2])| {
+    let edge = |(v, side): (&[u32; 2], &Sides)| {
         let [(left, k), (right, m)] = [side[0]?, side[1]?];
         let apex = |face: u32, k: usize| faces[face as usize][k];
         Some(InteriorEdge {

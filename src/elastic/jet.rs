@@ -59,13 +59,14 @@ impl Jet {
         let r = self.value.recip();
         self.chain([r, -r * r, 2.0 * r * r * r])
     }
-    /// Expansion by z of f(m z + offset), where `self` expands f at that point.
-    pub fn pull_back(self, m: &Matrix3<f64>) -> Self {
-        Self {
-            value: self.value,
-            gradient: m.tr_mul(&self.gradient),
-            hessian: m.tr_mul(&self.hessian) * m,
+    /// Nearest positive semi-definite matrix to the Hessian.
+    pub fn positive_hessian(&self) -> Matrix3<f64> {
+        if self.hessian.cholesky().is_some() {
+            return self.hessian;
         }
+        let e = self.hessian.symmetric_eigen();
+        let kept = Matrix3::from_diagonal(&e.eigenvalues.map(|v| v.max(0.0)));
+        e.eigenvectors * kept * e.eigenvectors.transpose()
     }
 }
 

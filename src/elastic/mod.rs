@@ -2,11 +2,15 @@
 
 mod assembly;
 mod bend_law;
+mod curvature_set;
+mod curvature_weights;
 mod dihedral;
 mod edges;
 mod element_set;
 mod error;
 mod fabric;
+mod fan_expansion;
+mod fans;
 mod hinge;
 mod jet;
 mod measured_bend;
@@ -16,6 +20,12 @@ mod model;
 mod packed;
 mod rest_sheet;
 mod stretch_law;
+#[cfg(test)]
+mod test_cantilever;
+#[cfg(test)]
+mod test_statics;
+#[cfg(test)]
+mod test_strips;
 
 pub use assembly::ElasticExpansion;
 pub use bend_law::BendLaw;

@@ -1,5 +1,6 @@
 //! Elastic model of a sheet: masses, elements, energy and its second-order expansion.
 
+use super::curvature_set::CurvatureSet;
 use super::edges::{InteriorEdge, interior_edges};
 use super::element_set::{CHUNK, ElementSet, pairs_of};
 use super::hinge::AngleHessian;
@@ -16,9 +17,11 @@ use crate::par::{Par, map_into};
 pub enum BendingModel {
     /// Membrane only.
     None,
-    /// One dihedral angle an edge (Bridson et al. 2003).
-    #[default]
+    /// One dihedral angle an edge (Bridson et al. 2003): depends on the directions of edges.
     Hinges,
+    /// One curvature tensor a vertex, from the dihedral angles around it.
+    #[default]
+    Curvature,
 }
 
 /// Elastic sheet on a fixed mesh. Positions are in metres, shape `[vertices]`, energies in joules.
@@ -31,6 +34,7 @@ pub struct ClothModel {
     membrane_set: ElementSet<3, 6>,
     hinges: Vec<HingeElement>,
     hinge_set: ElementSet<4, 10>,
+    curvatures: CurvatureSet,
 }
 
 impl ClothModel {
@@ -48,18 +52,28 @@ impl ClothModel {
         let triangles = rest.triangles(vertices)?;
         let edges = match bending {
             BendingModel::None => Vec::new(),
-            BendingModel::Hinges => interior_edges(&rest.faces)?,
+            BendingModel::Hinges | BendingModel::Curvature => interior_edges(&rest.faces)?,
         };
-        let hinges: Vec<_> = edges.iter().map(|e| hinge(e, &triangles, rest)).collect();
-        let corners: Vec<_> = edges.iter().map(|e| e.corners).collect();
+        let (mut hinges, mut hinge_corners) = (Vec::new(), Vec::new());
+        let mut curvatures = CurvatureSet::default();
+        if bending == BendingModel::Curvature {
+            let d = fabric.bend.at_rest();
+            curvatures = CurvatureSet::new(rest, &triangles, &edges, &d);
+        } else {
+            hinges = edges.iter().map(|e| hinge(e, &triangles, rest)).collect();
+            hinge_corners = edges.iter().map(|e| e.corners).collect();
+        }
         let mut pairs = pairs_of(&rest.faces);
-        pairs.extend(pairs_of(&corners));
+        pairs.extend(pairs_of(&hinge_corners));
+        pairs.extend(curvatures.pairs());
         pairs.sort_unstable();
         pairs.dedup();
+        curvatures.list(vertices, &pairs);
         Ok(Self {
             masses: lumped_masses(&rest.faces, &triangles, vertices, fabric.area_density),
             membrane_set: ElementSet::new(rest.faces.clone(), vertices, &pairs),
-            hinge_set: ElementSet::new(corners, vertices, &pairs),
+            hinge_set: ElementSet::new(hinge_corners, vertices, &pairs),
+            curvatures,
             membranes: triangles
                 .into_iter()
                 .map(|rest| MembraneElement { rest })
@@ -99,7 +113,8 @@ impl ClothModel {
         map_into(par, self.hinges.len(), CHUNK, &mut values, |k| {
             self.hinges[k].value(&self.fabric.bend, &self.hinge_set.corners(k, x))
         });
-        stretch + values.iter().sum::<f64>()
+        let folds = values.iter().sum::<f64>();
+        stretch + folds + self.curvatures.energy(&self.fabric.bend, par, x)
     }
     /// Energy, gradient and positive semi-definite Hessian at `x`, the same bits at any number of threads.
     pub fn expand(&self, par: Par, x: &[V3d], out: &mut ElasticExpansion) {
@@ -115,6 +130,8 @@ impl ClothModel {
             let second = AngleHessian::GaussNewton;
             Packed::new(&self.hinges[k].expand(&self.fabric.bend, &at, second))
         });
+        let (law, buffer) = (&self.fabric.bend, &mut buffers.curvatures);
+        self.curvatures.assemble(law, par, x, buffer, out);
         out.buffers = buffers;
     }
 }
@@ -203,59 +220,61 @@ mod tests {
         h
     }
 
+    fn expanded(model: &ClothModel, x: &[V3d]) -> ElasticExpansion {
+        let mut e = ElasticExpansion::default();
+        model.expand(Par::Seq, x, &mut e);
+        e
+    }
+
+    fn stacked(x: &[V3d]) -> Vec<f64> {
+        x.iter().flat_map(|p| [p.x, p.y, p.z]).collect()
+    }
+
     #[test]
     fn sums_are_the_derivatives_of_the_energy() {
-        let (rest, state) = sheet(2);
-        let model = ClothModel::new(&rest, state.len(), fabric(), BendingModel::Hinges);
-        let model = model.expect("valid");
-        let mut expansion = ElasticExpansion::default();
-        model.expand(Par::Seq, &state, &mut expansion);
-        let evaluate = |x: &[f64], weight: f64| {
-            let x: Vec<V3d> = x.chunks(3).map(V3d::from_column_slice).collect();
-            let mut e = ElasticExpansion::default();
-            model.expand(Par::Seq, &x, &mut e);
-            assert!((model.energy(Par::Seq, &x) - e.value).abs() <= 1e-14 * e.value);
-            let gradient = e.gradient.iter().flat_map(|g| [g.x, g.y, g.z]);
-            Derivatives::energy(weight * e.value, gradient.map(|g| weight * g).collect())
-        };
-        let x: Vec<f64> = state.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
-        let check = DerivativeCheck {
-            step: 1e-6,
-            ..DerivativeCheck::default()
-        };
-        check.run(&[x], evaluate);
-        // A flat sheet in tension has no stress to project: there the Hessian is the derivative of the gradient.
-        let flat: Vec<V3d> = state
-            .iter()
-            .map(|p| V3d::new(p.x, 0.0, 1.1 * p.z))
-            .collect();
-        let mut at_flat = ElasticExpansion::default();
-        model.expand(Par::Seq, &flat, &mut at_flat);
-        let h = dense(&model, &at_flat);
-        let mut product = vec![V3d::zeros(); flat.len()];
-        at_flat.multiply(model.pairs(), &state, &mut product);
-        let flattened = state.iter().flat_map(|p| [p.x, p.y, p.z]);
-        let expected = &h * DMatrix::from_iterator(3 * flat.len(), 1, flattened);
-        for (k, p) in product.iter().enumerate() {
-            assert!((p - expected.fixed_view::<3, 1>(3 * k, 0)).norm() < 1e-9 * h.norm());
+        for bending in [BendingModel::Hinges, BendingModel::Curvature] {
+            let (rest, state) = sheet(2);
+            let model = ClothModel::new(&rest, state.len(), fabric(), bending).expect("valid");
+            let evaluate = |x: &[f64], weight: f64| {
+                let x: Vec<V3d> = x.chunks(3).map(V3d::from_column_slice).collect();
+                let e = expanded(&model, &x);
+                assert!((model.energy(Par::Seq, &x) - e.value).abs() <= 1e-14 * e.value);
+                let gradient = stacked(&e.gradient)
+                    .into_iter()
+                    .map(|g| weight * g)
+                    .collect();
+                (
+                    Derivatives::energy(weight * e.value, gradient),
+                    dense(&model, &e) * weight,
+                )
+            };
+            let check = DerivativeCheck {
+                step: 1e-6,
+                ..DerivativeCheck::default()
+            };
+            check.run(&[stacked(&state)], |x, w| evaluate(x, w).0);
+            // In tension and flat nothing is projected: the Hessian is the derivative of the gradient.
+            let stretched = |p: &V3d| V3d::new(p.x, 0.0, 1.1 * p.z);
+            let flat: Vec<V3d> = state.iter().map(stretched).collect();
+            check.run(&[stacked(&flat)], |x, w| {
+                let (energy, hessian) = evaluate(x, w);
+                energy.with_hessian(hessian)
+            });
+            let e = expanded(&model, &flat);
+            let mut product = vec![V3d::zeros(); flat.len()];
+            e.multiply(model.pairs(), &state, &mut product);
+            let expected =
+                dense(&model, &e) * DMatrix::from_vec(stacked(&state).len(), 1, stacked(&state));
+            let error =
+                (DMatrix::from_vec(expected.len(), 1, stacked(&product)) - &expected).norm();
+            assert!(error < 1e-12 * expected.norm());
         }
-        let x: Vec<f64> = flat.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
-        check.run(&[x], |x, weight| {
-            evaluate(x, weight).with_hessian(
-                weight * {
-                    let x: Vec<V3d> = x.chunks(3).map(V3d::from_column_slice).collect();
-                    let mut e = ElasticExpansion::default();
-                    model.expand(Par::Seq, &x, &mut e);
-                    dense(&model, &e)
-                },
-            )
-        });
     }
 
     #[test]
     fn expansion_has_the_same_bits_at_any_thread_count() {
         let (rest, state) = sheet(30);
-        let model = ClothModel::new(&rest, state.len(), fabric(), BendingModel::Hinges);
+        let model = ClothModel::new(&rest, state.len(), fabric(), BendingModel::Curvature);
         let model = model.expect("valid");
         let run = |par| {
             let mut e = ElasticExpansion::default();

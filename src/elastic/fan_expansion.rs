@@ -1,0 +1,34 @@
+//! Expansion of the bending energy around one vertex.
+
+use super::Dihedral;
+use crate::math::V3d;
+use nalgebra::Matrix3;
+
+/// Second-order expansion of the energy of one fan: its Hessian's blocks are Jᵢᵀ C Jⱼ.
+#[derive(Clone, Debug, Default)]
+pub(super) struct FanExpansion {
+    pub(super) value: f64,
+    pub(super) gradient: Vec<V3d>,
+    /// Jᵢ, the curvature by the position of vertex i (1/m²).
+    pub(super) by_vertex: Vec<Matrix3<f64>>,
+    /// C, the tangent times the area (N·m³).
+    pub(super) tangent: Matrix3<f64>,
+}
+
+/// Buffers of an expansion.
+#[derive(Clone, Debug, Default)]
+pub(super) struct CurvatureBuffers {
+    pub(super) angles: Vec<Option<Dihedral>>,
+    pub(super) fans: Vec<FanExpansion>,
+}
+
+/// Fan and places of two of its vertices.
+pub(super) type Place = (u32, u16, u16);
+
+impl FanExpansion {
+    /// Block of the Hessian of two of the fan's vertices.
+    pub(super) fn block(&self, &(_, a, b): &Place) -> Matrix3<f64> {
+        let (a, b) = (&self.by_vertex[a as usize], &self.by_vertex[b as usize]);
+        a.tr_mul(&(self.tangent * b))
+    }
+}
