@@ -23,6 +23,8 @@ mod stretch_law;
 #[cfg(test)]
 mod test_cantilever;
 #[cfg(test)]
+mod test_curves;
+#[cfg(test)]
 mod test_statics;
 #[cfg(test)]
 mod test_strips;
