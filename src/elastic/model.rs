@@ -296,6 +296,51 @@ mod tests {
         }
     }
 
+    /// Closed surfaces whose vertices have three and four neighbours: angles of rest, also around a cone.
+    #[test]
+    fn folded_rest_shapes_are_at_rest() {
+        let tetrahedron = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+        let octahedron = vec![
+            [0, 1, 4],
+            [1, 2, 4],
+            [2, 3, 4],
+            [3, 0, 4],
+            [1, 0, 5],
+            [2, 1, 5],
+            [3, 2, 5],
+            [0, 3, 5],
+        ];
+        let (x, y, z) = (V3d::x(), V3d::y(), V3d::z());
+        for (faces, at) in [
+            (tetrahedron, vec![V3d::zeros(), x, y, z]),
+            (octahedron, vec![x, y, -x, -y, z, -z]),
+        ] {
+            let rest = RestSheet::surface(faces, &at, &V3d::new(0.3, 0.5, 0.9)).expect("faces");
+            for bending in [BendingModel::Hinges, BendingModel::Curvature] {
+                let model = ClothModel::new(&rest, at.len(), fabric(), bending).expect("valid");
+                let e = expanded(&model, &at);
+                assert!(e.value < 1e-25, "{}", e.value);
+                assert!(e.gradient.iter().all(|g| g.norm() < 1e-10));
+                // Squeezed, it resists with the derivative of its energy.
+                let squeezed: Vec<V3d> = at.iter().map(|p| V3d::new(p.x, p.y, 0.8 * p.z)).collect();
+                assert!(expanded(&model, &squeezed).value > 0.1);
+                let check = DerivativeCheck {
+                    step: 1e-6,
+                    ..DerivativeCheck::default()
+                };
+                check.run(&[stacked(&squeezed)], |x, weight| {
+                    let x: Vec<V3d> = x.chunks(3).map(V3d::from_column_slice).collect();
+                    let e = expanded(&model, &x);
+                    let gradient = stacked(&e.gradient)
+                        .into_iter()
+                        .map(|g| weight * g)
+                        .collect();
+                    Derivatives::energy(weight * e.value, gradient)
+                });
+            }
+        }
+    }
+
     #[test]
     fn masses_sum_to_that_of_the_sheet_and_faults_are_named() {
         let (rest, state) = sheet(4);

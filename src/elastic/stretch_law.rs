@@ -28,6 +28,17 @@ impl Stretching {
             shear: membrane / (2.0 * (1.0 + poisson)),
         }
     }
+    /// Orthotropic sheet: stiffness of a strip cut along the weft and along the warp, free to contract (Young's modulus times
+    /// thickness, N/m), the geometric mean of both Poisson ratios, and the shear modulus (N/m).
+    pub fn orthotropic(strips: [f64; 2], poisson: f64, shear: f64) -> Self {
+        let plane = 1.0 / (1.0 - poisson * poisson);
+        Self {
+            weft: strips[0] * plane,
+            coupling: poisson * plane * (strips[0] * strips[1]).sqrt(),
+            warp: strips[1] * plane,
+            shear,
+        }
+    }
     /// Stiffness matrix in the order (uu, vv, γ).
     pub fn matrix(&self) -> Matrix3<f64> {
         let c = self.coupling;
@@ -88,5 +99,31 @@ impl StretchLaw {
             // Positive by construction.
             Self::Measured(_) => Ok(()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strips_have_the_stiffness_asked_for() {
+        let s = Stretching::orthotropic([300.0, 800.0], 0.3, 50.0);
+        let compliance = s.matrix().try_inverse().expect("positive");
+        assert!((compliance[(0, 0)] - 1.0 / 300.0).abs() < 1e-12);
+        assert!((compliance[(1, 1)] - 1.0 / 800.0).abs() < 1e-12);
+        let same = Stretching::orthotropic([500.0; 2], 0.2, 500.0 / 2.4);
+        let isotropic = Stretching::isotropic(500.0, 0.2);
+        assert!((same.matrix() - isotropic.matrix()).norm() < 1e-9);
+        assert!(
+            Stretching::orthotropic([300.0, -1.0], 0.3, 50.0)
+                .check()
+                .is_err()
+        );
+        assert!(
+            Stretching::orthotropic([300.0, 800.0], 1.1, 50.0)
+                .check()
+                .is_err()
+        );
     }
 }
