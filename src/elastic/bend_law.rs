@@ -1,5 +1,6 @@
 //! Bending laws: energy per rest area of a curvature.
 
+use super::jet::Smooth;
 use super::measured_bend::MeasuredBend;
 use super::{ElasticError, Jet};
 use nalgebra::{Matrix3, Vector3};

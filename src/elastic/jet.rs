@@ -1,5 +1,6 @@
 //! Second-order jet in three variables: value, gradient and Hessian carried through arithmetic.
 
+use crate::math::project_psd;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::{Add, Mul, Sub};
 
@@ -18,22 +19,73 @@ pub struct Jet {
 }
 
 impl Jet {
+    /// Nearest positive semi-definite matrix to the Hessian.
+    pub fn positive_hessian(&self) -> Matrix3<f64> {
+        if self.hessian.cholesky().is_some() {
+            return self.hessian;
+        }
+        project_psd(&self.hessian)
+    }
+}
+
+/// Number of three variables: a [`Jet`], or its value alone.
+pub(super) trait Smooth:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Mul<f64, Output = Self>
+{
     /// Constant.
-    pub fn constant(value: f64) -> Self {
+    fn constant(value: f64) -> Self;
+    /// Variable number `axis`.
+    fn variable(axis: usize, value: f64) -> Self;
+    /// ½ zᵀ C z.
+    fn quadratic(c: &Matrix3<f64>, z: &Vector3<f64>) -> Self;
+    /// Value.
+    fn real(self) -> f64;
+    /// Function with these values of f, f′ and f″.
+    fn chain(self, derivatives: [f64; 3]) -> Self;
+    /// Square root of a positive number.
+    fn sqrt(self) -> Self {
+        let root = self.real().sqrt();
+        self.chain([root, 0.5 / root, -0.25 / (root * self.real())])
+    }
+    /// Reciprocal of a number other than zero.
+    fn recip(self) -> Self {
+        let r = self.real().recip();
+        self.chain([r, -r * r, 2.0 * r * r * r])
+    }
+}
+
+impl Smooth for f64 {
+    fn constant(value: f64) -> Self {
+        value
+    }
+    fn variable(_: usize, value: f64) -> Self {
+        value
+    }
+    fn quadratic(c: &Matrix3<f64>, z: &Vector3<f64>) -> Self {
+        0.5 * z.dot(&(c * z))
+    }
+    fn real(self) -> f64 {
+        self
+    }
+    fn chain(self, derivatives: [f64; 3]) -> Self {
+        derivatives[0]
+    }
+}
+
+impl Smooth for Jet {
+    fn constant(value: f64) -> Self {
         Self {
             value,
             gradient: Vector3::zeros(),
             hessian: Matrix3::zeros(),
         }
     }
-    /// Variable number `axis` with this value.
-    pub fn variable(axis: usize, value: f64) -> Self {
+    fn variable(axis: usize, value: f64) -> Self {
         let mut jet = Self::constant(value);
         jet.gradient[axis] = 1.0;
         jet
     }
-    /// Quadratic form ½ zᵀ C z at `z`, C symmetric.
-    pub fn quadratic(c: &Matrix3<f64>, z: &Vector3<f64>) -> Self {
+    fn quadratic(c: &Matrix3<f64>, z: &Vector3<f64>) -> Self {
         let gradient = c * z;
         Self {
             value: 0.5 * z.dot(&gradient),
@@ -41,32 +93,15 @@ impl Jet {
             hessian: *c,
         }
     }
-    /// f(self) of a scalar function with these values of f, f′ and f″.
-    pub fn chain(self, [f, f1, f2]: [f64; 3]) -> Self {
+    fn real(self) -> f64 {
+        self.value
+    }
+    fn chain(self, [f, f1, f2]: [f64; 3]) -> Self {
         Self {
             value: f,
             gradient: self.gradient * f1,
             hessian: self.hessian * f1 + self.gradient * self.gradient.transpose() * f2,
         }
-    }
-    /// Square root of a positive value.
-    pub fn sqrt(self) -> Self {
-        let root = self.value.sqrt();
-        self.chain([root, 0.5 / root, -0.25 / (root * self.value)])
-    }
-    /// Reciprocal of a value other than zero.
-    pub fn recip(self) -> Self {
-        let r = self.value.recip();
-        self.chain([r, -r * r, 2.0 * r * r * r])
-    }
-    /// Nearest positive semi-definite matrix to the Hessian.
-    pub fn positive_hessian(&self) -> Matrix3<f64> {
-        if self.hessian.cholesky().is_some() {
-            return self.hessian;
-        }
-        let e = self.hessian.symmetric_eigen();
-        let kept = Matrix3::from_diagonal(&e.eigenvalues.map(|v| v.max(0.0)));
-        e.eigenvectors * kept * e.eigenvectors.transpose()
     }
 }
 

@@ -6,6 +6,7 @@
 //! radial, W(κ) = κᵀ [∫₀ˢ t D(t) dt] κ / s² with s = |κ|: it does the measured work of bending along each direction.
 
 use super::Jet;
+use super::jet::Smooth;
 use crate::formats::fabric_json::MeasuredFabric;
 use nalgebra::{Matrix3, Vector3};
 

@@ -12,6 +12,7 @@
 //! - s fades to zero in compression, where nothing was measured and K₀ holds.
 
 use super::Jet;
+use super::jet::Smooth;
 use crate::formats::fabric_json::MeasuredFabric;
 use nalgebra::{Matrix3, Vector3};
 
@@ -71,13 +72,11 @@ impl MeasuredStretch {
             for j in 0..=SAMPLES / 8 {
                 let rho = j as f64 / (SAMPLES / 8) as f64;
                 let (b, a) = (i as f64 / SAMPLES as f64 * std::f64::consts::PI).sin_cos();
-                let h = Harmonics::new(&Jet::constant(rho * a), &Jet::constant(rho * b));
-                let k = (0..ANGLES).fold(self.at_rest, |k, m| {
-                    k + self.harmonics[m] * h.cosines[m].value
-                });
-                if h.between.value > MEASURED {
+                let h = Harmonics::new(rho * a, rho * b);
+                let k = (0..ANGLES).fold(self.at_rest, |k, m| k + self.harmonics[m] * h.cosines[m]);
+                if h.between > MEASURED {
                     let least = k.symmetric_eigenvalues().min();
-                    lacking = lacking.max((LEAST_ELSEWHERE - least) / h.between.value);
+                    lacking = lacking.max((LEAST_ELSEWHERE - least) / h.between);
                 }
             }
         }
@@ -85,37 +84,44 @@ impl MeasuredStretch {
     }
     /// Energy per rest area (N/m), stress and tangent of a strain (εᵤᵤ, εᵥᵥ, γ).
     pub fn expand(&self, strain: &Vector3<f64>) -> Jet {
-        let linear = Jet::quadratic(&self.at_rest, strain);
-        let Some(m) = Measures::new(strain) else {
+        self.evaluate(strain)
+    }
+    /// Energy per rest area (N/m) of a strain (εᵤᵤ, εᵥᵥ, γ).
+    pub fn value(&self, strain: &Vector3<f64>) -> f64 {
+        self.evaluate(strain)
+    }
+    fn evaluate<T: Smooth>(&self, strain: &Vector3<f64>) -> T {
+        let linear = T::quadratic(&self.at_rest, strain);
+        let Some(m) = Measures::<T>::new(strain) else {
             return linear;
         };
-        let h = Harmonics::new(&m.along, &m.across);
+        let h = Harmonics::<T>::new(m.along, m.across);
         let between = Matrix3::from_diagonal_element(self.between);
-        let change = (0..ANGLES).fold(h.between * Jet::quadratic(&between, strain), |sum, k| {
-            sum + h.cosines[k] * Jet::quadratic(&self.harmonics[k], strain)
+        let change = (0..ANGLES).fold(h.between * T::quadratic(&between, strain), |sum, k| {
+            sum + h.cosines[k] * T::quadratic(&self.harmonics[k], strain)
         });
         linear + saturation(m.tension * STRAIN.recip()) * change
     }
 }
 
 /// Smooth measures of a strain with tension: its magnitude s, and ρ (cos 2φ, sin 2φ).
-struct Measures {
-    tension: Jet,
-    along: Jet,
-    across: Jet,
+struct Measures<T> {
+    tension: T,
+    along: T,
+    across: T,
 }
 
-impl Measures {
+impl<T: Smooth> Measures<T> {
     /// `None` without tension.
     fn new(strain: &Vector3<f64>) -> Option<Self> {
-        let [u, v, g] = [0, 1, 2].map(|k| Jet::variable(k, strain[k]));
+        let [u, v, g] = [0, 1, 2].map(|k| T::variable(k, strain[k]));
         let (sum, difference) = (u + v, u - v);
         let radius = difference * difference + g * g;
         let squares = u * u + v * v + g * g * 0.5;
-        if squares.value < UNSTRAINED {
+        if squares.real() < UNSTRAINED {
             return None;
         }
-        let principal = [1.0, -1.0].map(|sign| 0.5 * (sum.value + sign * radius.value.sqrt()));
+        let principal = [1.0, -1.0].map(|sign| 0.5 * (sum.real() + sign * radius.real().sqrt()));
         if principal[0] <= 0.0 {
             return None;
         }
@@ -140,33 +146,33 @@ impl Measures {
 }
 
 /// Angular functions of a = ρ cos 2φ and b = ρ sin 2φ.
-struct Harmonics {
+struct Harmonics<T> {
     /// ρᵐ cos(2mφ) for m = 0..4.
-    cosines: [Jet; ANGLES],
+    cosines: [T; ANGLES],
     /// ½ (1 − ρ⁸ cos 16φ): zero at the measured angles.
-    between: Jet,
+    between: T,
 }
 
-impl Harmonics {
-    fn new(a: &Jet, b: &Jet) -> Self {
-        let (mut re, mut im) = (Jet::constant(1.0), Jet::constant(0.0));
+impl<T: Smooth> Harmonics<T> {
+    fn new(a: T, b: T) -> Self {
+        let (mut re, mut im) = (T::constant(1.0), T::constant(0.0));
         let mut last = (re, im);
         let cosines = std::array::from_fn(|_| {
             last = (re, im);
-            (re, im) = (re * *a - im * *b, re * *b + im * *a);
+            (re, im) = (re * a - im * b, re * b + im * a);
             last.0
         });
         let eighth = last.0 * last.0 - last.1 * last.1;
         Self {
             cosines,
-            between: (Jet::constant(1.0) - eighth) * 0.5,
+            between: (T::constant(1.0) - eighth) * 0.5,
         }
     }
 }
 
 /// Share of K₁ in the radial mean of the stiffness.
-fn saturation(tau: Jet) -> Jet {
-    let t = tau.value;
+fn saturation<T: Smooth>(tau: T) -> T {
+    let t = tau.real();
     if t <= 1.0 {
         tau * (2.0 / 3.0)
     } else {
@@ -274,7 +280,9 @@ mod tests {
     fn stress_and_tangent_are_derivatives_of_the_energy() {
         let law = MeasuredStretch::new(&fabric());
         let evaluate = |x: &[f64], weight: f64| {
-            let w = law.expand(&Vector3::from_column_slice(x)) * weight;
+            let strain = Vector3::from_column_slice(x);
+            let w = law.expand(&strain) * weight;
+            assert!((law.value(&strain) * weight - w.value).abs() <= 1e-14 * w.value);
             Derivatives::energy(w.value, w.gradient.as_slice().to_vec())
                 .with_hessian(DMatrix::from_column_slice(3, 3, w.hessian.as_slice()))
         };

@@ -1,5 +1,6 @@
 //! Membrane laws: energy per rest area of a Green–Lagrange strain (Volino et al. 2009, section 3).
 
+use super::jet::Smooth;
 use super::measured_stretch::MeasuredStretch;
 use super::{ElasticError, Jet};
 use nalgebra::{Matrix3, Vector3};
@@ -86,7 +87,7 @@ impl StretchLaw {
     pub fn value(&self, strain: &Vector3<f64>) -> f64 {
         match self {
             Self::Linear(s) => 0.5 * strain.dot(&(s.matrix() * strain)),
-            Self::Measured(m) => m.expand(strain).value,
+            Self::Measured(m) => m.value(strain),
         }
     }
     /// Checks that every strain costs energy.
