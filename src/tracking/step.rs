@@ -38,7 +38,10 @@ pub fn step(
 ) -> Result<StepReport, StepError> {
     let mut report = follow(model, state, frame, workspace)?;
     let mut watch = Stopwatch::start();
-    report.skipped.displacements -= adapt_surface(model, state, workspace);
+    let updated = adapt_surface(model, state, workspace);
+    if updated > 0 {
+        report.skipped.displacements = state.shape.displacements.len() - updated;
+    }
     report.stages_ms.surface = watch.lap();
     Ok(report)
 }
