@@ -1,10 +1,11 @@
-//! Meshes: OBJ with MTL, scans, PLY, glTF.
+//! Meshes: OBJ with MTL, scans, PLY, glTF; pairs of them: collision queries.
 
 use super::{Target, lossy, text};
 use crate::bundle::Bundle;
 use crate::execute::Scratch;
 use crate::pack;
 use std::path::Path;
+use tryon::formats::ccd_queries::read_ccd_queries;
 use tryon::formats::gltf::{GlbMesh, encode_glb, parse_gltf};
 use tryon::formats::obj::parse_obj;
 use tryon::formats::scan::{PlyMesh, read_scan, write_ply};
@@ -51,6 +52,31 @@ pub(super) const SCAN_OBJ: Target = Target::new(
 )
 .words(OBJ_WORDS)
 .allow(1 << 20, 60_000);
+
+/// Queries of continuous collision detection, rationals as CSV.
+pub(super) const CCD_QUERIES: Target = Target::new(
+    "ccd-queries",
+    "src/formats/ccd_queries",
+    |b, scratch| {
+        let path = scratch.file("queries.csv", b.first())?;
+        let queries = read_ccd_queries(&path).map_err(text)?;
+        Ok(queries.len())
+    },
+    || {
+        vec![Bundle::of(
+            "queries.csv",
+            "-3,4,36893488147419103233,36893488147419103232,0,1,1\n".repeat(8),
+        )]
+    },
+)
+.words(&[
+    "-",
+    ",",
+    "0,1",
+    "1\n",
+    "340282366920938463463374607431768211456",
+])
+.allow(512 << 10, 400);
 
 /// PLY, text and binary.
 pub(super) const PLY: Target = Target::new(

@@ -87,6 +87,7 @@ pub const TARGETS: &[Target] = &[
     images::JPEG,
     meshes::OBJ,
     meshes::SCAN_OBJ,
+    meshes::CCD_QUERIES,
     meshes::PLY,
     meshes::GLTF,
     bodies::NPZ,
