@@ -1,9 +1,9 @@
 //! Interior edges of a mesh with the rest geometry of both wings.
 
-use super::{Dihedral, ElasticError, RestTriangle};
+use super::{Dihedral, RestTriangle};
 use crate::math::V3d;
 use nalgebra::Vector2;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Edge with a face on each side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,18 +58,16 @@ impl InteriorEdge {
 /// Face and its corner opposite an edge, of the face that traverses it from its smaller vertex and of the other.
 type Sides = [Option<(u32, usize)>; 2];
 
-/// Edges with two faces, sorted by their vertices.
-///
-/// # Errors
-/// [`ElasticError::Edge`] for an edge with more faces, or with faces oriented against each other.
-pub(super) fn interior_edges(faces: &[[u32; 3]]) -> Result<Vec<InteriorEdge>, ElasticError> {
+/// Edges with two faces that are oriented alike, sorted by their vertices. A seam of three or more panels is no hinge.
+pub(super) fn interior_edges(faces: &[[u32; 3]]) -> Vec<InteriorEdge> {
     let mut sides: BTreeMap<[u32; 2], Sides> = BTreeMap::new();
+    let mut seams = BTreeSet::new();
     for (face, f) in faces.iter().enumerate() {
         for k in 0..3 {
             let (a, b) = (f[(k + 1) % 3], f[(k + 2) % 3]);
             let side = &mut sides.entry([a.min(b), a.max(b)]).or_default()[usize::from(a > b)];
             if side.replace((face as u32, k)).is_some() {
-                return Err(ElasticError::Edge(a.min(b), a.max(b)));
+                seams.insert([a.min(b), a.max(b)]);
             }
         }
     }
@@ -82,5 +80,6 @@ pub(super) fn interior_edges(faces: &[[u32; 3]]) -> Result<Vec<InteriorEdge>, El
             opposite: [k, m],
         })
     };
-    Ok(sides.iter().filter_map(edge).collect())
+    let others = sides.iter().filter(|(v, _)| !seams.contains(*v));
+    others.filter_map(edge).collect()
 }
