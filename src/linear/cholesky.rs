@@ -108,6 +108,16 @@ impl Factor {
                 LinearError::NotPositiveDefinite { pivot: index }
             })
     }
+    /// Replaces one right-hand side with the solution. Shape `[size]`.
+    pub fn solve_vector(&mut self, rhs: &mut [f64]) {
+        let n = self.symbolic.pattern.size();
+        LltRef::new(&*self.symbolic.symbolic, &self.values).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(rhs, n, 1),
+            Par::Seq,
+            MemStack::new(&mut self.scratch),
+        );
+    }
     /// Replaces `rhs` with the solution, three right-hand sides at once. Shape `[size]`.
     pub fn solve(&mut self, rhs: &mut [[f64; 3]]) {
         let n = self.symbolic.pattern.size();

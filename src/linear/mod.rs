@@ -1,9 +1,11 @@
 //! Sparse symmetric systems: assembly, factorisation, preconditioned iteration, with a report of how it went.
 
+mod block_matrix;
 mod cholesky;
 mod conjugate_gradient;
 mod pattern;
 
+pub use block_matrix::{BlockMatrix, BlockPattern};
 pub use cholesky::{Factor, SymbolicFactor};
 pub use conjugate_gradient::{CgReport, StopCriterion, conjugate_gradient};
 pub use pattern::SymmetricPattern;

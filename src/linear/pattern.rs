@@ -48,6 +48,14 @@ impl SymmetricPattern {
             size,
         })
     }
+    /// Pattern from compressed columns whose rows are sorted and begin with the diagonal.
+    pub(super) fn from_sorted(columns: Vec<u32>, rows: Vec<u32>, size: usize) -> Self {
+        Self {
+            columns,
+            rows,
+            size,
+        }
+    }
     /// Rows (and columns).
     pub fn size(&self) -> usize {
         self.size
