@@ -32,6 +32,7 @@ pub mod tracking;
 pub mod dressing;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+pub mod offline;
 pub mod session;
 pub mod synth;
 // Layer 6

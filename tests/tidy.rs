@@ -122,6 +122,11 @@ const MODULES: &[(u8, &str, &str)] = &[
     ),
     (
         5,
+        "offline",
+        "Offline cloth on contact that never fails: steps, static drape, animation, checkpoints, obstacle springs.",
+    ),
+    (
+        5,
         "session",
         "The life of one try-on as a pure transition table: Opening → Calibrating → Live ⇄ Degraded(why) → Draining → Closed.",
     ),

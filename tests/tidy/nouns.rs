@@ -199,6 +199,17 @@ pub(crate) const NOUNS: &[(&str, &[Noun])] = &[
         ],
     ),
     (
+        "offline",
+        &[
+            ("contact", "contacts.rs"),
+            ("steps", "step.rs"),
+            ("static drape", "drape.rs"),
+            ("animation", "animation.rs"),
+            ("checkpoints", "checkpoint.rs"),
+            ("obstacle springs", "ObstacleSpring"),
+        ],
+    ),
+    (
         "session",
         &[
             ("transition table", "table.rs"),

@@ -1,0 +1,128 @@
+//! Checkpoints: the state between two frames as bytes, exact to the bit.
+
+use super::error::OfflineError;
+use super::integrator::{MotionState, OfflineState};
+use super::step::OfflineSolver;
+use crate::math::V3d;
+
+/// First bytes of a checkpoint; the digit is the version.
+const MAGIC: &[u8; 8] = b"tryonoc1";
+
+impl OfflineSolver<'_> {
+    /// Bytes of the state after `frame`, little-endian.
+    pub fn checkpoint(&self, frame: u64) -> Vec<u8> {
+        let mut out = MAGIC.to_vec();
+        let state = &self.state;
+        let lengths = [state.now.x.len() as u64, state.obstacle[0].len() as u64];
+        let has_earlier = u64::from(state.earlier.is_some());
+        let steps = [u64::from(self.level), u64::from(self.calm_steps)];
+        for n in [
+            frame,
+            lengths[0],
+            lengths[1],
+            has_earlier,
+            steps[0],
+            steps[1],
+        ] {
+            out.extend(n.to_le_bytes());
+        }
+        let before = state.earlier.as_ref().map_or(0.0, |(_, h)| *h);
+        for x in [state.time, before] {
+            out.extend(x.to_le_bytes());
+        }
+        let earlier = state.earlier.iter().flat_map(|(s, _)| [&s.x, &s.v]);
+        let arrays = [&state.now.x, &state.now.v].into_iter().chain(earlier);
+        for array in arrays.chain(&state.obstacle) {
+            out.extend(
+                array
+                    .iter()
+                    .flat_map(|p| p.iter().flat_map(|c| c.to_le_bytes())),
+            );
+        }
+        out.extend(checksum(&out).to_le_bytes());
+        out
+    }
+
+    /// Takes over the state of a checkpoint of the same cloth and obstacle; returns its frame.
+    ///
+    /// # Errors
+    /// Bytes that are no checkpoint, are damaged, or belong to other meshes; the state is then as it was.
+    pub fn resume(&mut self, bytes: &[u8]) -> Result<u64, OfflineError> {
+        let fault = |why: &str| OfflineError::Checkpoint(why.to_owned());
+        let (body, sum) = bytes
+            .split_last_chunk::<8>()
+            .ok_or_else(|| fault("too short"))?;
+        if u64::from_le_bytes(*sum) != checksum(body) {
+            return Err(fault("damaged"));
+        }
+        let mut reader = Reader(
+            body.strip_prefix(MAGIC)
+                .ok_or_else(|| fault("another format"))?,
+        );
+        let mut head = [0; 6];
+        for n in &mut head {
+            *n = u64::from_le_bytes(reader.next().ok_or_else(|| fault("too short"))?);
+        }
+        let [frame, n, m, has_earlier, level, calm] = head;
+        if n != self.cloth.len() as u64 || m != self.state.obstacle[0].len() as u64 {
+            return Err(fault("another cloth or obstacle"));
+        }
+        let state = reader
+            .state((n as usize, m as usize), has_earlier == 1)
+            .filter(|_| reader.0.is_empty());
+        self.state = state.ok_or_else(|| fault("wrong length"))?;
+        self.level = level as u32;
+        self.calm_steps = calm as u32;
+        Ok(frame)
+    }
+}
+
+/// FNV-1a.
+fn checksum(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, b| {
+        (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
+/// Bytes that are left.
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn next(&mut self) -> Option<[u8; 8]> {
+        let (first, rest) = self.0.split_first_chunk::<8>()?;
+        self.0 = rest;
+        Some(*first)
+    }
+    fn number(&mut self) -> Option<f64> {
+        self.next().map(f64::from_le_bytes)
+    }
+    fn vectors(&mut self, count: usize) -> Option<Vec<V3d>> {
+        if self.0.len() < count.checked_mul(24)? {
+            return None;
+        }
+        (0..count)
+            .map(|_| Some(V3d::new(self.number()?, self.number()?, self.number()?)))
+            .collect()
+    }
+    fn motion(&mut self, count: usize) -> Option<MotionState> {
+        Some(MotionState {
+            x: self.vectors(count)?,
+            v: self.vectors(count)?,
+        })
+    }
+    fn state(&mut self, (n, m): (usize, usize), has_earlier: bool) -> Option<OfflineState> {
+        let (time, before) = (self.number()?, self.number()?);
+        let now = self.motion(n)?;
+        let earlier = if has_earlier {
+            Some((self.motion(n)?, before))
+        } else {
+            None
+        };
+        Some(OfflineState {
+            time,
+            now,
+            earlier,
+            obstacle: [self.vectors(m)?, self.vectors(m)?],
+        })
+    }
+}

@@ -1,0 +1,304 @@
+//! Contact of one step: candidates that cover the motion of the iteration, barrier, lagged friction, largest free step.
+
+use super::newton::NewtonSystem;
+use crate::contact::broad_phase::{BroadPhase, ContactSweep};
+use crate::contact::ccd::{StepMotion, first_impact};
+use crate::contact::{
+    ActivePair, Barrier, ContactAssembly, ContactElement, ContactMesh, ContactPair, Curvature,
+    Friction, FrictionPair,
+};
+use crate::linear::{BlockMatrix, BlockPattern, LinearError};
+use crate::math::V3d;
+use crate::par::Par;
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Share of the way to the first impact that a step takes, so that no distance becomes zero.
+const IMPACT_SHARE: f64 = 0.8;
+
+/// Contact of cloth with itself and with the obstacle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ContactSettings {
+    /// Distance beyond the thickness at which the barrier begins (m).
+    pub activation: f64,
+    /// Distance that nothing goes below (m).
+    pub thickness: f64,
+    /// Stiffness of the barrier (J).
+    pub stiffness: f64,
+    /// Coulomb coefficient.
+    pub friction: f64,
+    /// Speed from which friction is full (m/s); what sticks creeps slower than that.
+    pub creep: f64,
+    /// Motion of vertices that the candidates allow for beyond that of the query (m). Larger: fewer queries, more pairs.
+    pub margin: f64,
+}
+
+impl Default for ContactSettings {
+    fn default() -> Self {
+        Self {
+            activation: 1e-3,
+            thickness: 0.0,
+            stiffness: 2e-6,
+            friction: 0.3,
+            creep: 5e-3,
+            margin: 1e-3,
+        }
+    }
+}
+
+impl ContactSettings {
+    /// Barrier of these settings.
+    pub(super) fn barrier(&self) -> Barrier {
+        Barrier {
+            stiffness: self.stiffness,
+            activation: self.activation,
+            thickness: self.thickness,
+        }
+    }
+}
+
+/// Work of contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ContactReport {
+    /// Broad-phase queries.
+    pub queries: usize,
+    /// Queries that were skipped, because the candidates covered the motion.
+    pub reused: usize,
+    /// Candidates of the largest query.
+    pub candidates: usize,
+    /// Most pairs in reach of the barrier.
+    pub in_reach: usize,
+}
+
+/// Box of a vertex over a query, seen from the mean motion of all.
+#[derive(Clone, Copy, Debug, Default)]
+struct SweptBox {
+    low: V3d,
+    high: V3d,
+}
+
+/// Contact pairs around the present iterate.
+#[derive(Debug)]
+pub(super) struct Contacts {
+    mesh: ContactMesh,
+    settings: ContactSettings,
+    par: Par,
+    broad_phase: BroadPhase,
+    boxes: Vec<SweptBox>,
+    /// Mean position at the start of the query (m).
+    start_mean: V3d,
+    candidates: Vec<ContactPair>,
+    pairs: Vec<ActivePair>,
+    assembly: ContactAssembly,
+    friction: Friction,
+    friction_pairs: Vec<FrictionPair>,
+    pub(super) report: ContactReport,
+}
+
+impl Contacts {
+    pub(super) fn new(mesh: ContactMesh, settings: ContactSettings, par: Par) -> Self {
+        Self {
+            mesh,
+            settings,
+            par,
+            broad_phase: BroadPhase::default(),
+            boxes: Vec::new(),
+            start_mean: V3d::zeros(),
+            candidates: Vec::new(),
+            pairs: Vec::new(),
+            assembly: ContactAssembly::default(),
+            friction: Friction {
+                coefficient: settings.friction,
+                slip: 1.0,
+            },
+            friction_pairs: Vec::new(),
+            report: ContactReport::default(),
+        }
+    }
+
+    /// Forgets the candidates, so that a frame's bits do not depend on the frames before.
+    pub(super) fn forget(&mut self) {
+        self.boxes.clear();
+    }
+
+    /// Lags friction at the start `x` of a step of `h` (s).
+    pub(super) fn begin_step(&mut self, x: &[V3d], h: f64) {
+        self.cover(x, x);
+        self.friction.slip = self.settings.creep * h;
+        self.friction_pairs.clear();
+        if self.settings.friction > 0.0 {
+            let barrier = self.settings.barrier();
+            self.friction_pairs
+                .extend(self.pairs.iter().filter_map(|a| {
+                    let corners = a.pair.corners(x);
+                    FrictionPair::lagged(a, &barrier, &corners, &corners)
+                }));
+        }
+    }
+
+    /// Makes the candidates hold every pair that comes within reach while each vertex moves straight from `x` to `end`.
+    fn cover(&mut self, x: &[V3d], end: &[V3d]) {
+        let margin = self.settings.margin;
+        if self.covers(x) && self.covers(end) {
+            self.report.reused += 1;
+            return;
+        }
+        let sweep = ContactSweep {
+            start: x,
+            end,
+            distance: self.settings.barrier().reach() + 2.0 * margin,
+        };
+        self.candidates = self.broad_phase.candidates(&self.mesh, &sweep, self.par);
+        self.pairs.clear();
+        let active = self.candidates.iter().map(|p| ActivePair::new(*p, x));
+        self.pairs.extend(active);
+        self.start_mean = mean_of(x);
+        let shift = mean_of(end) - self.start_mean;
+        self.boxes.clear();
+        self.boxes.extend(x.iter().zip(end).map(|(a, b)| SweptBox {
+            low: a.inf(&(b - shift)),
+            high: a.sup(&(b - shift)),
+        }));
+        self.report.queries += 1;
+        self.report.candidates = self.report.candidates.max(self.candidates.len());
+    }
+
+    /// True if each vertex of `x`, less the mean motion since the query, is within the margin of its box: then every pair
+    /// in reach is a candidate, and so it is anywhere between two such points, for boxes are convex.
+    fn covers(&self, x: &[V3d]) -> bool {
+        let shift = mean_of(x) - self.start_mean;
+        let margin = self.settings.margin;
+        let inside = |(c, p): (&SweptBox, &V3d)| {
+            let p = p - shift;
+            (0..3).all(|d| p[d] >= c.low[d] - margin && p[d] <= c.high[d] + margin)
+        };
+        self.boxes.len() == x.len() && self.boxes.iter().zip(x).all(inside)
+    }
+
+    /// Energy of contact and friction (J) at a point that [`Self::free_share`] or [`Self::assemble`] has covered.
+    pub(super) fn value(&mut self, x: &[V3d]) -> f64 {
+        let barrier = self.settings.barrier();
+        let pressed = self
+            .assembly
+            .barrier_value(self.par, &barrier, x, &self.pairs);
+        let rubbed =
+            self.assembly
+                .friction_value(self.par, &self.friction, x, &self.friction_pairs);
+        pressed + rubbed
+    }
+
+    /// Springs that make cloth near the obstacle follow its motion, replacing the contact matrix of `out`: stiff where
+    /// they touch, none at `reach` (m). They shape the first guess of a step only.
+    pub(super) fn couple(
+        &mut self,
+        x: &[V3d],
+        (reach, stiffness): (f64, f64),
+        out: &mut NewtonSystem,
+    ) -> Result<(), LinearError> {
+        let sweep = ContactSweep {
+            start: x,
+            end: x,
+            distance: reach,
+        };
+        let near = self.broad_phase.candidates(&self.mesh, &sweep, self.par);
+        let cloth = self.mesh.cloth_vertices() as u32;
+        let mut springs = Vec::new();
+        for pair in near {
+            let ContactPair::VertexFace { v, f } = pair else {
+                break;
+            };
+            let separation = pair.separation(&pair.corners(x));
+            let distance = separation.squared.sqrt();
+            let own = v < cloth && f[0] < cloth;
+            let range = if own {
+                self.settings.barrier().reach()
+            } else {
+                reach
+            };
+            if distance < range {
+                springs.push((
+                    pair.stencil(),
+                    separation.weights,
+                    stiffness * (1.0 - distance / range),
+                ));
+            }
+        }
+        let pairs = springs
+            .iter()
+            .flat_map(|(v, ..)| (0..4).flat_map(move |i| (0..i).map(move |j| (v[i], v[j]))));
+        out.contact = BlockMatrix::zeros(Arc::new(BlockPattern::new(x.len(), pairs)?));
+        for (v, w, k) in &springs {
+            for i in 0..4 {
+                for j in 0..4 {
+                    if let Some(slot) = out.contact.pattern().slot(v[i], v[j]) {
+                        let block = Matrix3::from_diagonal_element(k * w[i] * w[j]);
+                        *out.contact.block_mut(slot) += block;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds contact and friction at `x` to `out`, whose contact matrix is replaced.
+    pub(super) fn assemble(
+        &mut self,
+        x: &[V3d],
+        out: &mut NewtonSystem,
+    ) -> Result<(), LinearError> {
+        self.cover(x, x);
+        let barrier = self.settings.barrier();
+        let mut elements = self
+            .assembly
+            .barrier(self.par, &barrier, x, &self.pairs, Curvature::Projected)
+            .to_vec();
+        self.report.in_reach = self.report.in_reach.max(elements.len());
+        elements.extend_from_slice(self.assembly.friction(
+            self.par,
+            &self.friction,
+            x,
+            &self.friction_pairs,
+        ));
+        let pairs = elements.iter().flat_map(|e| {
+            let v = e.vertices;
+            (0..4).flat_map(move |i| (0..i).map(move |j| (v[i], v[j])))
+        });
+        out.contact = BlockMatrix::zeros(Arc::new(BlockPattern::new(x.len(), pairs)?));
+        for e in &elements {
+            add_element(e, out);
+        }
+        Ok(())
+    }
+
+    /// Largest share of `direction` without impact, at most 1; covers the segment for [`Self::value`].
+    pub(super) fn free_share(&mut self, x: &[V3d], direction: &[V3d]) -> f64 {
+        let end: Vec<V3d> = x.iter().zip(direction).map(|(x, p)| x + p).collect();
+        self.cover(x, &end);
+        let motion = StepMotion {
+            start: x,
+            end: &end,
+            min_separation: self.settings.thickness,
+        };
+        let impact = first_impact(&self.candidates, &motion, self.par);
+        impact.map_or(1.0, |i| i.time * IMPACT_SHARE)
+    }
+}
+
+/// Mean position (m).
+fn mean_of(x: &[V3d]) -> V3d {
+    x.iter().sum::<V3d>() / x.len().max(1) as f64
+}
+
+fn add_element(element: &ContactElement, out: &mut NewtonSystem) {
+    let (v, energy) = (&element.vertices, &element.energy);
+    out.value += energy.value;
+    for i in 0..4 {
+        out.gradient[v[i] as usize] += energy.gradient.fixed_rows::<3>(3 * i);
+        for j in 0..4 {
+            if let Some(slot) = out.contact.pattern().slot(v[i], v[j]) {
+                *out.contact.block_mut(slot) += energy.hessian.fixed_view::<3, 3>(3 * i, 3 * j);
+            }
+        }
+    }
+}

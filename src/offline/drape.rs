@@ -1,0 +1,117 @@
+//! Static drape: pseudo-transient continuation, implicit Euler steps from rest that grow as the cloth settles.
+
+use super::error::{NewtonFault, OfflineError};
+use super::integrator::TimeScheme;
+use super::newton::{NewtonReport, largest};
+use super::step::OfflineSolver;
+use super::targets::{FrameScript, FrameTargets};
+use crate::math::V3d;
+use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
+
+/// End of a static drape.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DrapeSettings {
+    /// Largest motion of a vertex in a step of the longest length that counts as settled (m).
+    pub tolerance: f64,
+    /// First and longest step (s). A longer one nears the quasi-static limit, and its systems are harder to solve.
+    pub steps: [f64; 2],
+    /// Most steps.
+    pub most_steps: usize,
+}
+
+impl Default for DrapeSettings {
+    fn default() -> Self {
+        Self {
+            tolerance: 5e-4,
+            steps: [1.0 / 60.0, 0.25],
+            most_steps: 60,
+        }
+    }
+}
+
+/// Work and end of a static drape.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DrapeReport {
+    /// Steps taken.
+    pub steps: usize,
+    /// Steps repeated at half the length.
+    pub unsolved: usize,
+    /// Largest motion of a vertex in the last step (m).
+    pub motion: f64,
+    /// True if the last step was of the longest length and within the tolerance.
+    pub settled: bool,
+    /// Newton's work.
+    pub newton: NewtonReport,
+}
+
+impl OfflineSolver<'_> {
+    /// Moves the cloth to rest where obstacle and pins are. `progress` receives each step and may break off.
+    ///
+    /// # Errors
+    /// A step that is not solved at a thousandth of the first length.
+    pub fn drape(
+        &mut self,
+        drape: &DrapeSettings,
+        mut progress: impl FnMut(&DrapeReport) -> ControlFlow<()>,
+    ) -> Result<DrapeReport, OfflineError> {
+        let mut report = DrapeReport::default();
+        report.newton.smallest_share = 1.0;
+        let targets = FrameTargets::default();
+        let held = FrameScript {
+            targets: &targets,
+            pins: Vec::new(),
+            obstacle: self.state.obstacle[1].clone(),
+        };
+        let scheme = std::mem::replace(&mut self.settings.scheme, TimeScheme::ImplicitEuler);
+        let mut h = drape.steps[0];
+        let mut end = Ok(());
+        while report.steps < drape.most_steps && !report.settled {
+            self.rest();
+            match self.try_step(h, &held.at(1.0), &mut report.newton) {
+                Ok(Ok(solved)) => {
+                    let before = self.state.now.x.clone();
+                    self.accept(solved, h, self.state.time);
+                    report.steps += 1;
+                    report.motion = self.motion_since(&before);
+                    report.settled = report.motion <= drape.tolerance && h >= drape.steps[1];
+                    h = (2.0 * h).min(drape.steps[1]);
+                }
+                Ok(Err(why)) if h > drape.steps[0] * 1e-3 => {
+                    report.unsolved += 1;
+                    h *= 0.5;
+                    let _: NewtonFault = why;
+                }
+                Ok(Err(why)) => {
+                    let (time, step) = (self.state.time, h);
+                    end = Err(OfflineError::Unsolved { time, step, why });
+                }
+                Err(fault) => end = Err(fault),
+            }
+            if end.is_err() || progress(&report).is_break() {
+                break;
+            }
+        }
+        self.rest();
+        self.settings.scheme = scheme;
+        end.map(|()| report)
+    }
+
+    /// Forgets velocities.
+    fn rest(&mut self) {
+        self.state.now.v.fill(V3d::zeros());
+        self.state.earlier = None;
+    }
+
+    fn motion_since(&self, before: &[V3d]) -> f64 {
+        let moved: Vec<V3d> = self
+            .state
+            .now
+            .x
+            .iter()
+            .zip(before)
+            .map(|(a, b)| a - b)
+            .collect();
+        largest(&moved).1
+    }
+}

@@ -1,0 +1,36 @@
+//! Offline cloth on contact that never fails: steps, static drape, animation, checkpoints, obstacle springs.
+
+mod animation;
+mod checkpoint;
+mod contacts;
+mod drape;
+mod elastic_term;
+mod energy_term;
+mod error;
+mod integrator;
+mod linear_solver;
+mod model;
+mod newton;
+mod obstacle;
+mod potential;
+mod problem;
+mod start;
+mod step;
+mod targets;
+#[cfg(test)]
+mod tests;
+
+pub use animation::AnimationProgress;
+pub use contacts::{ContactReport, ContactSettings};
+pub use drape::{DrapeReport, DrapeSettings};
+pub use elastic_term::ElasticTerm;
+pub use energy_term::{ElementTerm, EnergyElements, EnergyTerm};
+pub use error::{NewtonFault, OfflineError};
+pub use integrator::{MotionState, OfflineState, TimeScheme};
+pub use linear_solver::LinearMethod;
+pub use model::{OfflineCloth, PinTarget};
+pub use newton::{NewtonReport, NewtonSettings};
+pub use obstacle::ObstacleSpring;
+pub use start::{JoinedSurfaces, StartReport};
+pub use step::{OfflineFrameReport, OfflineSettings, OfflineSolver};
+pub use targets::FrameTargets;

@@ -1,0 +1,108 @@
+//! The minimisation of one step: shape, inertia and pins of the cloth, springs of the obstacle, contact.
+
+use super::contacts::Contacts;
+use super::error::OfflineError;
+use super::newton::{
+    Minimised, NewtonReport, NewtonSettings, NewtonSystem, find_direction, largest,
+};
+use super::obstacle::ObstacleSpring;
+use super::potential::StepPotential;
+use crate::linear::LinearError;
+use crate::math::V3d;
+use crate::par::Par;
+use nalgebra::Matrix3;
+
+/// Unknowns are the cloth's vertices, then the obstacle's.
+pub(super) struct StepProblem<'a> {
+    pub(super) potential: StepPotential<'a>,
+    /// Targets of the obstacle's vertices (m).
+    pub(super) obstacle: &'a [V3d],
+    pub(super) spring: ObstacleSpring,
+    pub(super) contacts: Option<&'a mut Contacts>,
+    pub(super) par: Par,
+}
+
+/// Stiffness of the springs that couple cloth to the skin in a first guess, over mass per squared time.
+const COUPLING: f64 = 30.0;
+/// Longest reach of that coupling (m).
+const LONGEST_COUPLING: f64 = 0.01;
+
+impl StepProblem<'_> {
+    /// First guess of a step from `x`: one linear step of the cloth with all cloth near the obstacle tied to its scripted
+    /// motion, shortened to where nothing touches.
+    ///
+    /// # Errors
+    /// A linear system that cannot be solved.
+    pub(super) fn guess(
+        &mut self,
+        settings: &NewtonSettings,
+        x: &mut [V3d],
+        report: &mut NewtonReport,
+    ) -> Result<(), OfflineError> {
+        let n = self.potential.cloth.len();
+        let motion: Vec<V3d> = x[n..]
+            .iter()
+            .zip(self.obstacle)
+            .map(|(x, t)| t - x)
+            .collect();
+        let reach = 2.0 * largest(&motion).1;
+        let mut system = self.new_system();
+        self.potential.assemble(self.par, x, &mut system);
+        for (j, d) in motion.iter().enumerate() {
+            let k = self.spring.stiffness;
+            system.add_diagonal(n + j, d * -k, Matrix3::from_diagonal_element(k));
+        }
+        if let Some(contacts) = &mut self.contacts {
+            let mass = self.potential.cloth.mass.iter().sum::<f64>() / n.max(1) as f64;
+            let stiffness = COUPLING * mass * self.potential.rate_squared;
+            let reach = reach.clamp(1e-3, LONGEST_COUPLING);
+            contacts.couple(x, (reach, stiffness), &mut system)?;
+        }
+        let mut direction = vec![V3d::zeros(); x.len()];
+        report.products += find_direction(settings, self.par, &system, &mut direction)?;
+        let free = self.free_share(x, &direction);
+        for (x, d) in x.iter_mut().zip(&direction) {
+            *x += d * free;
+        }
+        Ok(())
+    }
+}
+
+impl Minimised for StepProblem<'_> {
+    fn new_system(&self) -> NewtonSystem {
+        NewtonSystem {
+            shape: self.potential.cloth.matrix(self.obstacle.len()),
+            ..NewtonSystem::default()
+        }
+    }
+
+    fn value(&mut self, x: &[V3d]) -> f64 {
+        let n = self.potential.cloth.len();
+        let mut value = self.potential.value(self.par, x);
+        let apart = x[n..].iter().zip(self.obstacle);
+        value += apart.map(|(x, t)| self.spring.value(&(x - t))).sum::<f64>();
+        match &mut self.contacts {
+            Some(contacts) => value + contacts.value(x),
+            None => value,
+        }
+    }
+
+    fn assemble(&mut self, x: &[V3d], out: &mut NewtonSystem) -> Result<(), LinearError> {
+        let n = self.potential.cloth.len();
+        self.potential.assemble(self.par, x, out);
+        for (j, target) in self.obstacle.iter().enumerate() {
+            self.spring.assemble(n + j, &(x[n + j] - target), out);
+        }
+        match &mut self.contacts {
+            Some(contacts) => contacts.assemble(x, out),
+            None => Ok(()),
+        }
+    }
+
+    fn free_share(&mut self, x: &[V3d], direction: &[V3d]) -> f64 {
+        match &mut self.contacts {
+            Some(contacts) => contacts.free_share(x, direction),
+            None => 1.0,
+        }
+    }
+}

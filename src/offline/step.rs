@@ -1,0 +1,294 @@
+//! One frame of cloth: implicit steps whose length follows the error and the solver.
+
+use super::contacts::{ContactReport, ContactSettings, Contacts};
+use super::error::{NewtonFault, OfflineError};
+use super::integrator::{MotionState, OfflineState, StepCoefficients, TimeScheme};
+use super::model::OfflineCloth;
+use super::newton::{NewtonReport, NewtonSettings, minimise};
+use super::obstacle::ObstacleSpring;
+use super::potential::StepPotential;
+use super::problem::StepProblem;
+use super::targets::{FrameScript, FrameTargets, StepTargets};
+use crate::contact::{ContactMesh, ContactSurface};
+use crate::math::V3d;
+use crate::mesh::Face;
+use crate::par::Par;
+use serde::{Deserialize, Serialize};
+
+/// Settings of the time integration.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OfflineSettings {
+    /// Order of the steps.
+    pub scheme: TimeScheme,
+    /// Longest step (s).
+    pub longest_step: f64,
+    /// Halvings of the longest step before a step that is not solved is an error.
+    pub halvings: u32,
+    /// Local error of a step that is accepted: root mean square over the vertices, per second (m/s). A smaller one follows
+    /// the exact motion longer, in more steps.
+    pub error_rate: f64,
+    /// Newton's method.
+    pub newton: NewtonSettings,
+    /// Contact; `None` lets surfaces pass through each other.
+    pub contact: Option<ContactSettings>,
+    /// Spring of the obstacle's vertices.
+    pub obstacle: ObstacleSpring,
+}
+
+impl Default for OfflineSettings {
+    fn default() -> Self {
+        Self {
+            scheme: TimeScheme::Bdf2,
+            longest_step: 1.0 / 60.0,
+            halvings: 10,
+            error_rate: 0.02,
+            newton: NewtonSettings::default(),
+            contact: Some(ContactSettings::default()),
+            obstacle: ObstacleSpring::default(),
+        }
+    }
+}
+
+/// Work and quality of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct OfflineFrameReport {
+    /// Accepted steps.
+    pub steps: usize,
+    /// Steps repeated at half the length because their error was too large.
+    pub inaccurate: usize,
+    /// Steps repeated at half the length because they were not solved.
+    pub unsolved: usize,
+    /// Newton's work, that of repeated steps included.
+    pub newton: NewtonReport,
+    /// Work of contact.
+    pub contact: ContactReport,
+    /// Largest distance of an obstacle vertex from its target at the end of the frame (m).
+    pub largest_give: f64,
+    /// Largest estimated local error of an accepted step (m, root mean square).
+    pub largest_error: f64,
+}
+
+/// Cloth in motion.
+#[derive(Debug)]
+pub struct OfflineSolver<'a> {
+    pub(super) cloth: &'a OfflineCloth,
+    pub(super) settings: OfflineSettings,
+    par: Par,
+    pub(super) state: OfflineState,
+    contacts: Option<Contacts>,
+    /// Number of halvings of the longest step in use.
+    pub(super) level: u32,
+    /// Accepted steps since the last change of length.
+    pub(super) calm_steps: u32,
+}
+
+/// Steps of one length before a longer one is tried: a two-step method needs two to settle.
+const STEPS_BEFORE_GROWTH: u32 = 4;
+/// Share of the allowed error below which the step doubles; a third-order local error grows eightfold.
+const GROWTH_SHARE: f64 = 0.1;
+
+impl<'a> OfflineSolver<'a> {
+    /// Cloth at rest or in motion; `obstacle` has the triangles of the state's obstacle vertices.
+    ///
+    /// # Errors
+    /// Positions or velocities that do not fit the cloth, or are not finite.
+    pub fn new(
+        cloth: &'a OfflineCloth,
+        obstacle: &[Face],
+        state: OfflineState,
+        settings: OfflineSettings,
+        par: Par,
+    ) -> Result<Self, OfflineError> {
+        let (n, m) = (cloth.len(), state.obstacle[0].len());
+        check("positions", &state.now.x, n)?;
+        check("velocities", &state.now.v, n)?;
+        check("obstacle", &state.obstacle[0], m)?;
+        check("obstacle targets", &state.obstacle[1], m)?;
+        let surface = |vertices, faces| ContactSurface { vertices, faces };
+        let mesh = ContactMesh::new(surface(n, &cloth.faces), surface(m, obstacle))?;
+        Ok(Self {
+            cloth,
+            settings,
+            par,
+            state,
+            contacts: settings
+                .contact
+                .map(|contact| Contacts::new(mesh, contact, par)),
+            level: 0,
+            calm_steps: 0,
+        })
+    }
+
+    /// Present state.
+    pub fn state(&self) -> &OfflineState {
+        &self.state
+    }
+
+    /// Advances by `duration` (s) while pins and obstacle move evenly to their targets.
+    ///
+    /// # Errors
+    /// A step that is not solved at the smallest length; the state is then that before the step.
+    pub fn advance(
+        &mut self,
+        duration: f64,
+        targets: &FrameTargets<'_>,
+    ) -> Result<OfflineFrameReport, OfflineError> {
+        let mut report = OfflineFrameReport::default();
+        report.newton.smallest_share = 1.0;
+        if let Some(contacts) = &mut self.contacts {
+            contacts.forget();
+        }
+        let start = self.state.time;
+        let script = FrameScript {
+            targets,
+            pins: targets
+                .pins
+                .iter()
+                .map(|p| self.state.now.x[p.vertex as usize])
+                .collect(),
+            obstacle: self.state.obstacle[1].clone(),
+        };
+        let coarsest = (duration / self.settings.longest_step)
+            .log2()
+            .ceil()
+            .max(0.0) as u32;
+        let finest = coarsest + self.settings.halvings;
+        let frame = 1u64 << finest;
+        self.level = self.level.clamp(coarsest, finest);
+        let mut at = 0;
+        while at < frame {
+            let length = 1u64 << (finest - self.level);
+            let h = duration * length as f64 / frame as f64;
+            let share = (at + length) as f64 / frame as f64;
+            let last = self.level == finest;
+            match self.try_step(h, &script.at(share), &mut report.newton)? {
+                Ok(solved) if last || solved.error <= self.settings.error_rate * h => {
+                    at += length;
+                    report.steps += 1;
+                    report.largest_error = report.largest_error.max(solved.error);
+                    let calm = solved.error <= GROWTH_SHARE * self.settings.error_rate * h;
+                    self.accept(solved, h, start + duration * share);
+                    self.grow(calm, (coarsest, finest), at);
+                    continue;
+                }
+                Ok(_) => report.inaccurate += 1,
+                Err(why) if last => {
+                    let (time, step) = (self.state.time, h);
+                    return Err(OfflineError::Unsolved { time, step, why });
+                }
+                Err(_) => {
+                    report.unsolved += 1;
+                    self.state.earlier = None;
+                }
+            }
+            self.level += 1;
+            self.calm_steps = 0;
+        }
+        let apart = self.state.obstacle[0].iter().zip(&self.state.obstacle[1]);
+        report.largest_give = apart.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        if let Some(contacts) = &mut self.contacts {
+            report.contact = std::mem::take(&mut contacts.report);
+        }
+        Ok(report)
+    }
+
+    /// Solves one step of `h` (s) without accepting it.
+    pub(super) fn try_step(
+        &mut self,
+        h: f64,
+        targets: &StepTargets,
+        report: &mut NewtonReport,
+    ) -> Result<Result<SolvedStep, NewtonFault>, OfflineError> {
+        let (n, state) = (self.cloth.len(), &self.state);
+        let coefficients = StepCoefficients::new(self.settings.scheme, state, h);
+        let each = |f: &dyn Fn(usize) -> V3d| (0..n).map(f).collect::<Vec<V3d>>();
+        let inertial = each(&|i| coefficients.inertial_position(state, i));
+        let predicted = each(&|i| coefficients.prediction(state, i, h));
+        let start: Vec<V3d> = (state.now.x.iter().chain(&state.obstacle[0]))
+            .copied()
+            .collect();
+        if let Some(contacts) = &mut self.contacts {
+            contacts.begin_step(&start, h);
+        }
+        let mut problem = StepProblem {
+            potential: StepPotential {
+                cloth: self.cloth,
+                inertial: &inertial,
+                rate_squared: coefficients.span.powi(-2),
+                pins: &targets.pins,
+            },
+            obstacle: &targets.obstacle,
+            spring: self.settings.obstacle,
+            contacts: self.contacts.as_mut(),
+            par: self.par,
+        };
+        let mut x = start;
+        if problem.contacts.is_some() {
+            problem.guess(&self.settings.newton, &mut x, report)?;
+        } else {
+            x[..n].copy_from_slice(&predicted);
+        }
+        let solved = minimise(
+            &mut problem,
+            &self.settings.newton,
+            self.par,
+            &mut x,
+            report,
+        )?;
+        Ok(solved.map(|()| {
+            let obstacle = x.split_off(n);
+            let error = coefficients.error_share() * mean_distance(&x, &predicted);
+            let v = (0..n).map(|i| coefficients.velocity(&self.state, i, &x[i]));
+            SolvedStep {
+                end: MotionState { v: v.collect(), x },
+                obstacle: [obstacle, targets.obstacle.clone()],
+                error,
+            }
+        }))
+    }
+
+    pub(super) fn accept(&mut self, solved: SolvedStep, h: f64, time: f64) {
+        let before = std::mem::replace(&mut self.state.now, solved.end);
+        self.state.earlier = Some((before, h));
+        self.state.obstacle = solved.obstacle;
+        self.state.time = time;
+    }
+
+    /// Doubles the step when it was accurate for a while and the frame's grid allows it.
+    fn grow(&mut self, calm: bool, (coarsest, finest): (u32, u32), at: u64) {
+        self.calm_steps = if calm { self.calm_steps + 1 } else { 0 };
+        if self.calm_steps < STEPS_BEFORE_GROWTH || self.level <= coarsest {
+            return;
+        }
+        if at.is_multiple_of(1 << (finest - self.level + 1)) {
+            self.level -= 1;
+            self.calm_steps = 0;
+        }
+    }
+}
+
+/// A solution that may still be refused for its error.
+pub(super) struct SolvedStep {
+    pub(super) end: MotionState,
+    /// Obstacle and its targets (m).
+    obstacle: [Vec<V3d>; 2],
+    /// Estimated local error (m, root mean square).
+    error: f64,
+}
+
+fn check(field: &'static str, values: &[V3d], expected: usize) -> Result<(), OfflineError> {
+    let why = if values.len() != expected {
+        format!("{} for {expected} vertices", values.len())
+    } else if let Some(v) = values.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+        format!("vertex {v} is not finite")
+    } else {
+        return Ok(());
+    };
+    Err(OfflineError::Input { field, why })
+}
+
+/// Root mean square distance (m).
+fn mean_distance(a: &[V3d], b: &[V3d]) -> f64 {
+    let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum();
+    (sum / a.len().max(1) as f64).sqrt()
+}
