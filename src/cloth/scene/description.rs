@@ -3,6 +3,7 @@
 use crate::cloth::solver::collider::Collider;
 use crate::cloth::{ClothError, Sheet};
 use crate::formats::FormatError;
+use crate::garment::Material;
 use crate::math::{P3, V3d};
 use crate::mesh::Face;
 
@@ -32,6 +33,8 @@ pub enum SceneError {
 pub struct Scene {
     /// The cloth.
     pub sheet: Sheet,
+    /// Its fabric.
+    pub material: Material,
     /// Its triangles.
     pub faces: Vec<Face>,
     /// Start positions in the world (y up), which are the rest shape (m).

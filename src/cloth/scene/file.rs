@@ -83,6 +83,7 @@ pub fn parse(text: &str, origin: &Path, folder: Option<&Path>) -> Result<Scene, 
     };
     file.check_pins(mesh.vertices().len())
         .map_err(|(field, why)| fault(field, why))?;
+    let material = file.material.fabric();
     let collider = |(i, c): (usize, &ColliderFile)| {
         c.read(folder)
             .map_err(|why| fault(&format!("colliders[{i}]"), why))
@@ -90,7 +91,8 @@ pub fn parse(text: &str, origin: &Path, folder: Option<&Path>) -> Result<Scene, 
     let colliders = file.colliders.iter().enumerate().map(collider);
     Ok(Scene {
         colliders: colliders.collect::<Result<_, _>>()?,
-        sheet: sheet(&mesh, &file.material)?,
+        sheet: sheet(&mesh, &material)?,
+        material,
         faces: mesh.faces().to_vec(),
         start: mesh.vertices().to_vec(),
         pinned_to: file.carrier().map_err(|(field, why)| fault(field, why))?,
@@ -145,16 +147,25 @@ impl SceneFile {
     }
 }
 
+impl MaterialFile {
+    /// Fabric without damping. The membrane is given as force per width, so any thickness makes the same sheet.
+    fn fabric(&self) -> Material {
+        let solid = IsotropicSolid {
+            young: self.young_membrane / self.thickness,
+            poisson: self.poisson,
+            density: self.area_density / self.thickness,
+        };
+        Material {
+            bending: self.bending_rigidity,
+            friction: self.friction,
+            damping: 0.0,
+            ..Material::isotropic(&self.name, solid, self.thickness, "scene file")
+        }
+    }
+}
+
 /// Sheet whose rest shape is the mesh.
-fn sheet(mesh: &TriMesh, m: &MaterialFile) -> Result<Sheet, SceneError> {
-    // The membrane is given as force per width, so any thickness makes the same sheet.
-    let solid = IsotropicSolid {
-        young: m.young_membrane / m.thickness,
-        poisson: m.poisson,
-        density: m.area_density / m.thickness,
-    };
-    let mut material = Material::isotropic(&m.name, solid, m.thickness, "scene file");
-    (material.bending, material.friction, material.damping) = (m.bending_rigidity, m.friction, 0.0);
+fn sheet(mesh: &TriMesh, material: &Material) -> Result<Sheet, SceneError> {
     let rest: Vec<[[f64; 2]; 3]> = (0..mesh.faces().len())
         .map(|f| flat(&mesh.corners(f)))
         .collect();
@@ -163,7 +174,7 @@ fn sheet(mesh: &TriMesh, m: &MaterialFile) -> Result<Sheet, SceneError> {
         vertices.len(),
         faces,
         &rest,
-        &material,
+        material,
         Some(vertices),
     )?)
 }
