@@ -2,6 +2,7 @@
 
 use crate::contact::ContactMeshError;
 use crate::contact::broad_phase::EdgeFace;
+use crate::elastic::ElasticError;
 use crate::linear::LinearError;
 
 /// Fault of an offline simulation.
@@ -34,6 +35,9 @@ pub enum OfflineError {
     /// The surfaces.
     #[error(transparent)]
     Mesh(#[from] ContactMeshError),
+    /// The rest shape or the fabric.
+    #[error(transparent)]
+    Elastic(#[from] ElasticError),
     /// The linear system.
     #[error(transparent)]
     Linear(#[from] LinearError),

@@ -1,0 +1,152 @@
+//! Scene files by the offline solver: scene in, positions of every frame out.
+
+use super::{
+    AnimationProgress, ElasticTerm, FrameTargets, MotionState, OfflineCloth, OfflineError,
+    OfflineSettings, OfflineSolver, OfflineState, PinTarget, solid_mesh::solid_mesh,
+};
+use crate::cloth::scene::Scene;
+use crate::elastic::{
+    BendLaw, BendingModel, ClothModel, ElasticFabric, RestSheet, StretchLaw, Stretching,
+};
+use crate::garment::Material;
+use crate::math::{P3, V3d};
+use crate::mesh::Face;
+use crate::par::Par;
+use nalgebra::{Point3, Vector2};
+use std::ops::ControlFlow;
+
+/// Scene as the offline solver needs it.
+#[derive(Debug)]
+pub struct OfflineScene<'a> {
+    scene: &'a Scene,
+    cloth: OfflineCloth,
+    /// Surface of all solids, each in its own frame (m), with the number of its collider.
+    solids: Vec<(V3d, usize)>,
+    faces: Vec<Face>,
+}
+
+/// Laws of an orthotropic sheet of these moduli; bending is isotropic.
+fn fabric_of(material: &Material) -> ElasticFabric {
+    let strips = [material.stretch_weft, material.stretch_warp];
+    // ν / (1 − ν²) = λ / √(E₁ E₂).
+    let ratio = material.coupling / (strips[0] * strips[1]).sqrt();
+    let poisson = 2.0 * ratio / (1.0 + (1.0 + 4.0 * ratio * ratio).sqrt());
+    let stretch = Stretching::orthotropic(strips, poisson, material.shear);
+    ElasticFabric {
+        area_density: material.area_density,
+        stretch: StretchLaw::Linear(stretch),
+        bend: BendLaw::isotropic(material.bending, poisson),
+    }
+}
+
+/// A triangle laid flat, its first edge along u.
+fn flat(corners: [V3d; 3]) -> [Vector2<f64>; 3] {
+    let (e, d) = (corners[1] - corners[0], corners[2] - corners[0]);
+    let length = e.norm().max(f64::MIN_POSITIVE);
+    [
+        Vector2::zeros(),
+        Vector2::new(length, 0.0),
+        Vector2::new(d.dot(&e), e.cross(&d).norm()) / length,
+    ]
+}
+
+impl<'a> OfflineScene<'a> {
+    /// Cloth and solids of a scene; the start is the rest shape.
+    ///
+    /// # Errors
+    /// Names the face or modulus at fault.
+    pub fn new(scene: &'a Scene) -> Result<Self, OfflineError> {
+        let x: Vec<V3d> = scene.start.iter().map(|p| p.coords.cast()).collect();
+        let corners = scene.faces.iter().map(|f| flat(f.map(|v| x[v as usize])));
+        let rest = RestSheet {
+            faces: scene.faces.clone(),
+            corners: corners.collect(),
+            folded: Some(x.clone()),
+        };
+        let fabric = fabric_of(&scene.material);
+        let model = ClothModel::new(&rest, x.len(), fabric, BendingModel::default())?;
+        let mass = model.masses().to_vec();
+        let terms = vec![Box::new(ElasticTerm::new(model)) as Box<_>];
+        let (mut solids, mut faces) = (Vec::new(), Vec::new());
+        for (number, collider) in scene.colliders.iter().enumerate() {
+            let (x, own) = solid_mesh(&collider.shape);
+            let first = solids.len() as u32;
+            faces.extend(own.iter().map(|f| f.map(|v| v + first)));
+            solids.extend(x.into_iter().map(|p| (p, number)));
+        }
+        Ok(Self {
+            cloth: OfflineCloth::new(mass, scene.faces.clone(), scene.gravity, terms)?,
+            scene,
+            solids,
+            faces,
+        })
+    }
+
+    /// Surface of the solids at a time (m).
+    fn obstacle(&self, time: f64) -> Vec<V3d> {
+        let placements: Vec<_> = (self.scene.colliders.iter())
+            .map(|c| c.placement(time))
+            .collect();
+        let place = |(p, n): &(V3d, usize)| (placements[*n] * Point3::from(*p)).coords;
+        self.solids.iter().map(place).collect()
+    }
+
+    fn pins(&self, time: f64) -> Vec<PinTarget> {
+        let carrier = self.scene.pinned_to.map(|c| &self.scene.colliders[c]);
+        let moved = carrier.map(|c| c.placement(time) * c.placement(0.0).inverse());
+        let target = |v: &u32| {
+            let p: Point3<f64> = self.scene.start[*v as usize].cast();
+            PinTarget {
+                vertex: *v,
+                target: moved.map_or(p, |m| m * p).coords,
+            }
+        };
+        self.scene.pins.iter().map(target).collect()
+    }
+
+    /// Simulates all frames. `frame` receives the progress and the positions of each (m), and may break off; returns the
+    /// last frame. Friction is that of the first solid, else of the material.
+    ///
+    /// # Errors
+    /// A step that is not solved.
+    pub fn run(
+        &self,
+        settings: &OfflineSettings,
+        par: Par,
+        mut frame: impl FnMut(&AnimationProgress, &[P3]) -> ControlFlow<()>,
+    ) -> Result<usize, OfflineError> {
+        let mut settings = *settings;
+        if let Some(contact) = &mut settings.contact {
+            let solid = self.scene.colliders.first();
+            contact.friction = solid.map_or(self.scene.material.friction, |c| c.friction);
+        }
+        let (start, interval) = (self.obstacle(0.0), 1.0 / self.scene.rate);
+        let state = OfflineState {
+            now: MotionState {
+                x: self.scene.start.iter().map(|p| p.coords.cast()).collect(),
+                v: vec![V3d::zeros(); self.cloth.len()],
+            },
+            obstacle: [start.clone(), start],
+            ..OfflineState::default()
+        };
+        let mut solver = OfflineSolver::new(&self.cloth, &self.faces, state, settings, par)?;
+        let frames = self.scene.frames().saturating_sub(1);
+        let script: Vec<_> = (0..=frames)
+            .map(|k| interval * k as f64)
+            .map(|t| (self.pins(t), self.obstacle(t)))
+            .collect();
+        solver.animate(
+            interval,
+            (0, frames),
+            |k| FrameTargets {
+                pins: &script[k].0,
+                obstacle: &script[k].1,
+            },
+            |done, solver| {
+                let x = solver.state().now.x.iter();
+                let shown: Vec<P3> = x.map(|p| P3::from(p.cast::<f32>())).collect();
+                frame(done, &shown)
+            },
+        )
+    }
+}
