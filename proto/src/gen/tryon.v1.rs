@@ -2425,7 +2425,8 @@ pub enum ClothSolver {
     Unspecified = 0,
     /// Many small explicit steps.
     Realtime = 1,
-    /// Finite elements, implicit steps iterated to convergence; hundreds of times slower. No contact of cloth with cloth.
+    /// Finite elements, implicit steps iterated to convergence, on contact that never ends in an intersection, of cloth with
+    /// cloth too; hundreds of times slower.
     Offline = 2,
 }
 impl ClothSolver {

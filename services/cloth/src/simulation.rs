@@ -14,6 +14,9 @@ use std::time::{Duration, Instant};
 use tokio::sync::watch;
 use tonic::Status;
 use tryon::cloth::scene::{self, RunConfig, Scene};
+use tryon::math::P3;
+use tryon::offline::{OfflineScene, OfflineSettings};
+use tryon::par::Par;
 use tryon_kit::status::{exhausted, not_found};
 use tryon_proto::convert::WireError;
 use tryon_proto::v1::{
@@ -74,10 +77,7 @@ impl Simulations {
         r: &StartSimulationRequest,
     ) -> Result<StartSimulationResponse, Status> {
         let scene = check(r)?;
-        let config = match r.solver() {
-            ClothSolver::Offline => RunConfig::offline(),
-            ClothSolver::Unspecified | ClothSolver::Realtime => RunConfig::default(),
-        };
+        let solver = r.solver();
         let (tx, rx) = watch::channel(Progress::default());
         let frame_count = scene.frames() as u32;
         let vertex_count = scene.start.len() as u32;
@@ -100,7 +100,7 @@ impl Simulations {
         }
         let spawned = std::thread::Builder::new()
             .name(id.clone())
-            .spawn(move || compute(&scene, &config, &tx));
+            .spawn(move || compute(&scene, solver, &tx));
         if let Err(e) = spawned {
             self.running
                 .lock()
@@ -190,9 +190,9 @@ fn check(r: &StartSimulationRequest) -> Result<Scene, Status> {
 }
 
 /// Runs a scene to its end, or until no reader can follow it.
-fn compute(scene: &Scene, config: &RunConfig, progress: &watch::Sender<Progress>) {
+fn compute(scene: &Scene, solver: ClothSolver, progress: &watch::Sender<Progress>) {
     let mut last = Instant::now();
-    let result = scene::run(scene, config, |_, positions| {
+    let mut publish = |positions: &[P3]| {
         let bytes: Vec<u8> = positions
             .iter()
             .flat_map(|p| [p.x, p.y, p.z])
@@ -206,10 +206,32 @@ fn compute(scene: &Scene, config: &RunConfig, progress: &watch::Sender<Progress>
         } else {
             ControlFlow::Continue(())
         }
-    });
-    let end = result.map(|_| ()).map_err(|e| e.to_string());
+    };
+    let end = match solver {
+        ClothSolver::Offline => offline(scene, &mut publish),
+        ClothSolver::Unspecified | ClothSolver::Realtime => {
+            scene::run(scene, &RunConfig::default(), |_, x| publish(x))
+                .map(drop)
+                .map_err(|e| e.to_string())
+        }
+    };
     if let Err(why) = &end {
         tracing::warn!(why, "simulation failed");
     }
     progress.send_modify(|p| p.end = Some((Instant::now(), end)));
+}
+
+/// All frames by the offline solver, the start first.
+fn offline(
+    scene: &Scene,
+    publish: &mut impl FnMut(&[P3]) -> ControlFlow<()>,
+) -> Result<(), String> {
+    let offline = OfflineScene::new(scene).map_err(|e| e.to_string())?;
+    if publish(&scene.start).is_break() {
+        return Ok(());
+    }
+    offline
+        .run(&OfflineSettings::default(), Par::Rayon, |_, x| publish(x))
+        .map(drop)
+        .map_err(|e| e.to_string())
 }
