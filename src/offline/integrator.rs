@@ -121,7 +121,7 @@ mod tests {
             now: one(1.0, 0.0),
             ..OfflineState::default()
         };
-        let mut lengths = vec![0.8 / steps as f64, 1.2 / steps as f64].repeat(steps / 2);
+        let mut lengths = [0.8 / steps as f64, 1.2 / steps as f64].repeat(steps / 2);
         lengths.truncate(steps);
         for h in lengths {
             let c = StepCoefficients::new(scheme, &state, h);
