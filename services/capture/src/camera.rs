@@ -118,12 +118,10 @@ impl Task {
         self.stop().await;
     }
 
-    /// Opens the source on a thread of its own.
-    async fn open(&self) -> Result<(Arc<Pool>, OpenSource), String> {
-        let thread = Pool::background("source").map_err(|e| e.to_string())?;
+    async fn open(&self) -> Result<OpenSource, String> {
         let name = self.config.source.clone();
-        match thread.run(move || open(&name)).await {
-            Ok(opened) => opened.map(|s| (thread, s)).map_err(|e| e.to_string()),
+        match self.ctx.pool.run(move || open(&name)).await {
+            Ok(opened) => opened.map_err(|e| e.to_string()),
             Err(e) => Err(e.to_string()),
         }
     }
@@ -136,7 +134,9 @@ impl Task {
             )));
         }
         self.stop().await;
-        let (thread, source) = match self.open().await {
+        let thread = Pool::background("source");
+        let thread = thread.map_err(|e| unavailable("capture", &e.to_string()))?;
+        let source = match self.open().await {
             Ok(s) => s,
             Err(why) => {
                 tracing::warn!(camera = %self.key, %why, "cannot be opened");
@@ -201,7 +201,7 @@ impl Task {
         }
         self.open()
             .await
-            .map(|(_, s)| s.calibration().clone())
+            .map(|s| s.calibration().clone())
             .map_err(|why| unavailable("capture", &why))
     }
 

@@ -18,7 +18,7 @@ pub struct SourceError {
     pub why: String,
 }
 
-/// Opens a source by its configured name. Reads files: call it on the source's thread.
+/// Opens a source by its configured name. Reads files: call it on the compute pool.
 ///
 /// # Errors
 /// Names the source, and the file and field at fault.

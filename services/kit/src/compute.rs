@@ -6,8 +6,9 @@ use tokio::sync::oneshot;
 
 type Job = Box<dyn FnOnce() + Send>;
 
-/// Niceness of background threads: a tenth of another thread's share where both want a processor (Linux, CFS weights).
-const BACKGROUND_NICENESS: i32 = 10;
+/// Niceness of background threads: a third of another thread's share where both want a processor (Linux, CFS weights). A
+/// larger one starves a camera on a machine without a free processor.
+const BACKGROUND_NICENESS: i32 = 5;
 
 /// Fixed number of threads that run jobs in order of arrival.
 ///
