@@ -436,9 +436,12 @@ impl Task {
         let (pool, done) = (self.setup.ctx.pool.clone(), self.dressed.clone());
         let library = self.setup.library.clone();
         tokio::spawn(async move {
-            let outcome = pool
-                .run(move || dress(&body, &wanted.choices, &library, is_coarse))
-                .await;
+            let work = move || dress(&body, &wanted.choices, &library, is_coarse);
+            let outcome = tokio::select! {
+                outcome = pool.run(work) => outcome,
+                // The session is gone: nobody waits for it.
+                () = done.closed() => return,
+            };
             let outcome = outcome.map_err(|e| e.to_string()).and_then(|r| r);
             // The session may be gone by now.
             let _ = done

@@ -12,7 +12,8 @@ const BACKGROUND_NICENESS: i32 = 5;
 
 /// Fixed number of threads that run jobs in order of arrival.
 ///
-/// The queue is unbounded: every session has at most one job under way, and sessions are bounded.
+/// The queue is unbounded: every session has at most one job under way, sessions are bounded, and jobs that nobody waits for
+/// any more are left out.
 pub struct Pool {
     jobs: Mutex<mpsc::Sender<Job>>,
 }
@@ -85,7 +86,8 @@ impl Pool {
         }))
     }
 
-    /// Runs `f` on the pool and waits for its result. Dropping the future lets the job finish and discards the result.
+    /// Runs `f` on the pool and waits for its result. Dropping the future discards the result of a job that has begun;
+    /// one that still waits is left out, so that callers who come and go faster than the pool works leave no backlog.
     ///
     /// # Errors
     /// [`ComputeError`] when the job panicked or the pool is gone.
@@ -95,6 +97,9 @@ impl Pool {
     ) -> Result<T, ComputeError> {
         let (tx, rx) = oneshot::channel();
         let job: Job = Box::new(move || {
+            if tx.is_closed() {
+                return;
+            }
             // A panic loses the state that moved into the job; nothing shared is left half changed.
             let answer = catch_unwind(AssertUnwindSafe(f));
             let _ = tx.send(answer);
@@ -113,6 +118,7 @@ impl Pool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     #[tokio::test]
     async fn jobs_answer_and_a_panic_costs_only_itself() {
@@ -123,6 +129,28 @@ mod tests {
             Err(ComputeError::Panicked)
         );
         assert_eq!(pool.run(|| 1).await, Ok(1));
+    }
+
+    #[tokio::test]
+    async fn jobs_that_nobody_waits_for_are_left_out() {
+        let pool = Pool::new(1).expect("a thread");
+        let (release, held) = mpsc::channel::<()>();
+        let first = pool.run(move || held.recv());
+        let ran = Arc::new(AtomicUsize::new(0));
+        let count = |ran: &Arc<AtomicUsize>| {
+            let ran = ran.clone();
+            move || ran.fetch_add(1, Ordering::Relaxed)
+        };
+        tokio::pin!(first);
+        assert!(futures::poll!(&mut first).is_pending());
+        for _ in 0..100 {
+            let mut left = Box::pin(pool.run(count(&ran)));
+            assert!(futures::poll!(&mut left).is_pending());
+        }
+        let mut last = Box::pin(pool.run(count(&ran)));
+        assert!(futures::poll!(&mut last).is_pending());
+        release.send(()).expect("held");
+        assert_eq!(last.await, Ok(0));
     }
 
     #[cfg(target_os = "linux")]

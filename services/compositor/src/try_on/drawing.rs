@@ -163,7 +163,12 @@ impl Drawing {
                 });
                 (engine, outcome.map(|()| snapshot))
             };
-            let (engine, outcome) = match pool.run(work).await {
+            let drawn = tokio::select! {
+                drawn = pool.run(work) => drawn,
+                // The try-on has ended: nobody waits for it.
+                () = done.closed() => return,
+            };
+            let (engine, outcome) = match drawn {
                 Ok((e, o)) => (Some(e), o),
                 Err(why) => (None, Err(why.to_string())),
             };
