@@ -46,21 +46,35 @@ pub struct DrapeReport {
 }
 
 impl OfflineSolver<'_> {
-    /// Moves the cloth to rest where obstacle and pins are. `progress` receives each step and may break off.
+    /// Moves cloth without pins to rest where the obstacle is, as [`Self::drape_to`].
     ///
     /// # Errors
     /// A step that is not solved at a thousandth of the first length.
     pub fn drape(
         &mut self,
         drape: &DrapeSettings,
+        progress: impl FnMut(&DrapeReport) -> ControlFlow<()>,
+    ) -> Result<DrapeReport, OfflineError> {
+        self.drape_to(drape, &FrameTargets::default(), progress)
+    }
+
+    /// Moves the cloth to rest with pins and obstacle at their targets from the first step on. `progress` receives each
+    /// step and may break off.
+    ///
+    /// # Errors
+    /// A step that is not solved at a thousandth of the first length.
+    pub fn drape_to(
+        &mut self,
+        drape: &DrapeSettings,
+        targets: &FrameTargets<'_>,
         mut progress: impl FnMut(&DrapeReport) -> ControlFlow<()>,
     ) -> Result<DrapeReport, OfflineError> {
         let mut report = DrapeReport::default();
         report.newton.smallest_share = 1.0;
-        let targets = FrameTargets::default();
+        let x = &self.state.now.x;
         let held = FrameScript {
-            targets: &targets,
-            pins: Vec::new(),
+            targets,
+            pins: targets.pins.iter().map(|p| x[p.vertex as usize]).collect(),
             obstacle: self.state.obstacle[1].clone(),
         };
         let scheme = std::mem::replace(&mut self.settings.scheme, TimeScheme::ImplicitEuler);
