@@ -5,7 +5,7 @@ use crate::math::V3d;
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
 /// True if the closed segment and the closed triangle have a point in common.
-pub(super) fn edge_meets_triangle([p, q]: &[V3d; 2], [a, b, c]: &[V3d; 3]) -> bool {
+pub(crate) fn edge_meets_triangle([p, q]: &[V3d; 2], [a, b, c]: &[V3d; 3]) -> bool {
     let [above, below] = [side(a, b, c, p), side(a, b, c, q)];
     if above * below > 0 {
         return false;

@@ -35,6 +35,8 @@ pub use distance::{
     ClosestFeatures, ParallelMollifier, Separation, Slide, edge_edge, mollifier_threshold,
     point_edge, point_point, point_triangle,
 };
+#[cfg(test)]
+pub(crate) use edge_triangle::edge_meets_triangle;
 pub use interior::Interior;
 pub use pair::{ActivePair, ContactPair};
 pub use potential::{

@@ -20,6 +20,14 @@ mod start;
 mod step;
 mod targets;
 #[cfg(test)]
+mod test_momentum;
+#[cfg(test)]
+mod test_sheets;
+#[cfg(test)]
+mod test_static_drape;
+#[cfg(test)]
+mod test_twist;
+#[cfg(test)]
 mod tests;
 
 pub use animation::AnimationProgress;
