@@ -20,6 +20,8 @@ mod start;
 mod step;
 mod targets;
 #[cfg(test)]
+mod test_incline;
+#[cfg(test)]
 mod test_momentum;
 #[cfg(test)]
 mod test_sheets;
