@@ -20,6 +20,8 @@ mod start;
 mod step;
 mod targets;
 #[cfg(test)]
+mod test_drape_coefficient;
+#[cfg(test)]
 mod test_incline;
 #[cfg(test)]
 mod test_momentum;
