@@ -28,6 +28,8 @@ mod test_momentum;
 #[cfg(test)]
 mod test_sheets;
 #[cfg(test)]
+mod test_skips;
+#[cfg(test)]
 mod test_static_drape;
 #[cfg(test)]
 mod test_twist;
