@@ -32,6 +32,8 @@ mod test_skips;
 #[cfg(test)]
 mod test_static_drape;
 #[cfg(test)]
+mod test_stress;
+#[cfg(test)]
 mod test_twist;
 #[cfg(test)]
 mod tests;
