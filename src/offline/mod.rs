@@ -22,6 +22,8 @@ mod targets;
 #[cfg(test)]
 mod test_drape_coefficient;
 #[cfg(test)]
+mod test_faults;
+#[cfg(test)]
 mod test_incline;
 #[cfg(test)]
 mod test_momentum;
