@@ -89,6 +89,12 @@ impl BlockPattern {
         self.diagonal[row] as usize
     }
 
+    /// Columns of the blocks of a row, ascending.
+    pub fn neighbours(&self, row: usize) -> &[u32] {
+        let range = self.rows[row] as usize..self.rows[row + 1] as usize;
+        &self.columns[range]
+    }
+
     /// Row, column and storage index of the blocks of a row.
     fn row(&self, row: usize) -> impl Iterator<Item = (u32, u32, usize)> {
         let range = self.rows[row] as usize..self.rows[row + 1] as usize;
@@ -158,6 +164,13 @@ impl BlockMatrix {
     /// Diagonal block of a row.
     pub fn diagonal(&self, row: usize) -> &Matrix3<f64> {
         &self.blocks[self.pattern.diagonal_slot(row)]
+    }
+
+    /// Column and block of each block of a row.
+    pub fn row_blocks(&self, row: usize) -> impl Iterator<Item = (u32, &Matrix3<f64>)> {
+        let range = self.pattern.rows[row] as usize..self.pattern.rows[row + 1] as usize;
+        let columns = &self.pattern.columns[range.clone()];
+        columns.iter().copied().zip(&self.blocks[range])
     }
 
     /// Product `y += A x`, shapes `[size]`; the bits do not depend on the threads.

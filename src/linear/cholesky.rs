@@ -118,6 +118,10 @@ impl Factor {
             MemStack::new(&mut self.scratch),
         );
     }
+    /// Pattern of the matrix.
+    pub fn pattern(&self) -> &SymmetricPattern {
+        &self.symbolic.pattern
+    }
     /// Replaces `rhs` with the solution, three right-hand sides at once. Shape `[size]`.
     pub fn solve(&mut self, rhs: &mut [[f64; 3]]) {
         let n = self.symbolic.pattern.size();

@@ -1,6 +1,7 @@
-//! Preconditioned conjugate gradients on three-vectors: matrix-free, block Jacobi.
+//! Preconditioned conjugate gradients on three-vectors: matrix-free.
 
-use nalgebra::{Matrix3, Vector3};
+use super::Preconditioner;
+use nalgebra::Vector3;
 
 /// Report of a solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -20,11 +21,11 @@ pub struct StopCriterion {
     pub iterations: usize,
 }
 
-/// Solves `A x = b` from the initial `x` with the inverse diagonal blocks as preconditioner.
+/// Solves `A x = b` from the initial `x` with a preconditioner.
 /// A search direction without positive curvature ends the iteration at the current `x`.
 pub fn conjugate_gradient(
     mut apply: impl FnMut(&[Vector3<f64>], &mut [Vector3<f64>]),
-    inverse_blocks: &[Matrix3<f64>],
+    preconditioner: &mut impl Preconditioner,
     b: &[Vector3<f64>],
     x: &mut [Vector3<f64>],
     stop: StopCriterion,
@@ -36,7 +37,8 @@ pub fn conjugate_gradient(
     let mut ap = vec![Vector3::zeros(); n];
     apply(x, &mut ap);
     let mut r: Vec<_> = b.iter().zip(&ap).map(|(b, a)| b - a).collect();
-    let mut z: Vec<_> = r.iter().zip(inverse_blocks).map(|(r, m)| m * r).collect();
+    let mut z = vec![Vector3::zeros(); n];
+    preconditioner.apply(&r, &mut z);
     let mut p = z.clone();
     let norm_b = dot(b, b).sqrt().max(f64::MIN_POSITIVE);
     let mut rz = dot(&r, &z);
@@ -52,8 +54,8 @@ pub fn conjugate_gradient(
         for i in 0..n {
             x[i] += p[i] * alpha;
             r[i] -= ap[i] * alpha;
-            z[i] = inverse_blocks[i] * r[i];
         }
+        preconditioner.apply(&r, &mut z);
         let next = dot(&r, &z);
         let beta = next / rz;
         rz = next;
@@ -70,6 +72,8 @@ pub fn conjugate_gradient(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::linear::BlockJacobi;
+    use nalgebra::Matrix3;
 
     #[test]
     fn finite_termination_on_a_path() {
@@ -91,8 +95,8 @@ mod tests {
             residual: 1e-12,
             iterations: 3 * n,
         };
-        let inverse = vec![Matrix3::identity() / 2.5; n];
-        let report = conjugate_gradient(apply, &inverse, &b, &mut x, stop);
+        let mut inverse = BlockJacobi::from_inverse(vec![Matrix3::identity() / 2.5; n]);
+        let report = conjugate_gradient(apply, &mut inverse, &b, &mut x, stop);
         assert!(
             report.relative_residual < 1e-11 && report.iterations <= 3 * n,
             "{report:?}"

@@ -2,13 +2,17 @@
 
 mod block_matrix;
 mod cholesky;
+mod coarse_space;
 mod conjugate_gradient;
 mod pattern;
+mod preconditioner;
 
 pub use block_matrix::{BlockMatrix, BlockPattern};
 pub use cholesky::{Factor, SymbolicFactor};
+pub use coarse_space::CoarseSpace;
 pub use conjugate_gradient::{CgReport, StopCriterion, conjugate_gradient};
 pub use pattern::SymmetricPattern;
+pub use preconditioner::{BlockJacobi, Preconditioner, TwoLevel};
 
 /// Error of a linear system.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -32,4 +36,14 @@ pub enum LinearError {
     /// Too large for 32-bit indices or for the memory.
     #[error("the system is too large: {0}")]
     TooLarge(String),
+}
+
+impl LinearError {
+    /// Nothing where a pivot was not positive, the error otherwise.
+    pub fn unless_indefinite(self) -> Result<(), Self> {
+        match self {
+            Self::NotPositiveDefinite { .. } => Ok(()),
+            other => Err(other),
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::newton::NewtonSystem;
 use crate::contact::broad_phase::{BroadPhase, ContactSweep};
-use crate::contact::ccd::{StepMotion, first_impact};
+use crate::contact::ccd::{MotionLimits, MotionRoom, free_motion};
 use crate::contact::{
     ActivePair, Barrier, ContactAssembly, ContactElement, ContactMesh, ContactPair, Curvature,
     Friction, FrictionPair,
@@ -13,9 +13,6 @@ use crate::par::Par;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-
-/// Share of the way to the first impact that a step takes, so that no distance becomes zero.
-const IMPACT_SHARE: f64 = 0.8;
 
 /// Contact of cloth with itself and with the obstacle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -39,7 +36,7 @@ impl Default for ContactSettings {
         Self {
             activation: 1e-3,
             thickness: 0.0,
-            stiffness: 2e-6,
+            stiffness: 2e-5,
             friction: 0.3,
             creep: 5e-3,
             margin: 1e-3,
@@ -176,7 +173,7 @@ impl Contacts {
         self.boxes.len() == x.len() && self.boxes.iter().zip(x).all(inside)
     }
 
-    /// Energy of contact and friction (J) at a point that [`Self::free_share`] or [`Self::assemble`] has covered.
+    /// Energy of contact and friction (J) at a point that [`Self::free_motion`] or [`Self::assemble`] has covered.
     pub(super) fn value(&mut self, x: &[V3d]) -> f64 {
         let barrier = self.settings.barrier();
         let pressed = self
@@ -271,17 +268,15 @@ impl Contacts {
         Ok(())
     }
 
-    /// Largest share of `direction` without impact, at most 1; covers the segment for [`Self::value`].
-    pub(super) fn free_share(&mut self, x: &[V3d], direction: &[V3d]) -> f64 {
-        let end: Vec<V3d> = x.iter().zip(direction).map(|(x, p)| x + p).collect();
+    /// Shortens `direction` of each vertex to where nothing meets; covers the segment for [`Self::value`].
+    pub(super) fn free_motion(&mut self, x: &[V3d], direction: &mut [V3d]) -> MotionLimits {
+        let end: Vec<V3d> = x.iter().zip(&*direction).map(|(x, p)| x + p).collect();
         self.cover(x, &end);
-        let motion = StepMotion {
-            start: x,
-            end: &end,
+        let room = MotionRoom {
             min_separation: self.settings.thickness,
+            reach: self.settings.activation,
         };
-        let impact = first_impact(&self.candidates, &motion, self.par);
-        impact.map_or(1.0, |i| i.time * IMPACT_SHARE)
+        free_motion(&self.candidates, x, direction, &room, self.par)
     }
 }
 

@@ -1,58 +1,103 @@
 //! Search direction of a Newton iteration: factorisation or preconditioned conjugate gradients.
 
 use super::error::OfflineError;
-use crate::linear::{BlockMatrix, Factor, StopCriterion, SymbolicFactor, conjugate_gradient};
+use super::newton::{NewtonSettings, NewtonSystem};
+use crate::linear::{
+    BlockJacobi, BlockMatrix, CoarseSpace, Factor, LinearError, StopCriterion, SymbolicFactor,
+    TwoLevel, conjugate_gradient,
+};
 use crate::math::V3d;
 use crate::par::Par;
-use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+
+/// Vertices of a patch of the coarse level.
+const PATCH: usize = 48;
 
 /// Solver of the Newton system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum LinearMethod {
-    /// Conjugate gradients with the inverse diagonal blocks as preconditioner.
+    /// Conjugate gradients with two levels: inverse diagonal blocks and patches of vertices.
     #[default]
+    TwoLevel,
+    /// Conjugate gradients with the inverse diagonal blocks as preconditioner.
     ConjugateGradient,
     /// Sparse Cholesky factorisation.
     Cholesky,
 }
 
-/// Replaces `direction` with the solution of `(Σ matrices) direction = right`; returns products with the matrix.
-pub(super) fn solve(
-    method: LinearMethod,
-    (par, stop): (Par, StopCriterion),
-    matrices: &[&BlockMatrix],
-    right: &[V3d],
-    direction: &mut [V3d],
-) -> Result<usize, OfflineError> {
-    match method {
-        LinearMethod::ConjugateGradient => Ok(iterate((par, stop), matrices, right, direction)),
-        LinearMethod::Cholesky => factorise(matrices, right, direction).map(|()| 0),
-    }
+/// Solver of Newton systems and what it keeps between them.
+#[derive(Debug)]
+pub(super) struct DirectionSolver {
+    pub(super) par: Par,
+    /// Patches of the shape's graph, grown at the first use.
+    coarse: Option<CoarseSpace>,
 }
 
-fn iterate(
-    (par, stop): (Par, StopCriterion),
-    matrices: &[&BlockMatrix],
-    right: &[V3d],
-    direction: &mut [V3d],
-) -> usize {
-    let inverse: Vec<Matrix3<f64>> = (0..right.len())
-        .map(|i| {
-            let block = matrices
-                .iter()
-                .fold(Matrix3::zeros(), |sum, m| sum + m.diagonal(i));
-            block.try_inverse().unwrap_or_else(Matrix3::identity)
-        })
-        .collect();
-    let apply = |x: &[V3d], y: &mut [V3d]| {
-        y.fill(V3d::zeros());
-        for m in matrices {
-            m.multiply_add(par, x, y);
-        }
-    };
-    conjugate_gradient(apply, &inverse, right, direction, stop).iterations
+impl DirectionSolver {
+    pub(super) fn new(par: Par) -> Self {
+        Self { par, coarse: None }
+    }
+
+    /// Replaces `direction` with the Newton direction at `x`; returns products with the matrix.
+    pub(super) fn solve(
+        &mut self,
+        settings: &NewtonSettings,
+        system: &NewtonSystem,
+        x: &[V3d],
+        direction: &mut [V3d],
+    ) -> Result<usize, OfflineError> {
+        direction.fill(V3d::zeros());
+        self.improve(settings, system, x, direction)
+    }
+
+    /// Goes on from a `direction`, until the residual is that of the settings.
+    pub(super) fn improve(
+        &mut self,
+        settings: &NewtonSettings,
+        system: &NewtonSystem,
+        x: &[V3d],
+        direction: &mut [V3d],
+    ) -> Result<usize, OfflineError> {
+        let right: Vec<V3d> = system.gradient.iter().map(|g| -g).collect();
+        let both = [&system.shape, &system.contact];
+        let matrices = if system.contact.pattern().size() == 0 {
+            &both[..1]
+        } else {
+            &both[..]
+        };
+        let par = self.par;
+        let apply = |x: &[V3d], y: &mut [V3d]| {
+            y.fill(V3d::zeros());
+            for m in matrices {
+                m.multiply_add(par, x, y);
+            }
+        };
+        let stop = StopCriterion {
+            residual: settings.linear_residual,
+            iterations: settings.linear_iterations,
+        };
+        let mut fine = BlockJacobi::new(matrices);
+        let report = match settings.linear {
+            LinearMethod::Cholesky => return factorise(matrices, &right, direction).map(|()| 0),
+            LinearMethod::ConjugateGradient => {
+                conjugate_gradient(apply, &mut fine, &right, direction, stop)
+            }
+            LinearMethod::TwoLevel => {
+                let pattern = system.shape.pattern();
+                let coarse = self
+                    .coarse
+                    .get_or_insert_with(|| CoarseSpace::new(pattern, PATCH));
+                // Where rounding leaves the coarse matrix indefinite, the fine level works alone.
+                coarse
+                    .update(x, matrices)
+                    .or_else(LinearError::unless_indefinite)?;
+                let mut both = TwoLevel::new(fine, coarse);
+                conjugate_gradient(apply, &mut both, &right, direction, stop)
+            }
+        };
+        Ok(report.iterations)
+    }
 }
 
 fn factorise(

@@ -2,6 +2,7 @@
 
 mod animation;
 mod checkpoint;
+mod checks;
 mod contacts;
 mod drape;
 mod elastic_term;
@@ -18,6 +19,7 @@ mod scene_run;
 mod solid_mesh;
 mod start;
 mod step;
+mod stitch;
 mod targets;
 #[cfg(test)]
 mod test_drape_coefficient;
@@ -54,4 +56,5 @@ pub use obstacle::ObstacleSpring;
 pub use scene_run::OfflineScene;
 pub use start::{JoinedSurfaces, StartReport};
 pub use step::{OfflineFrameReport, OfflineSettings, OfflineSolver};
+pub use stitch::{Stitch, StitchSprings};
 pub use targets::FrameTargets;

@@ -2,6 +2,7 @@
 
 use super::energy_term::EnergyTerm;
 use super::error::OfflineError;
+use crate::contact::{ContactMesh, ContactMeshError, ContactSurface};
 use crate::linear::{BlockMatrix, BlockPattern};
 use crate::math::V3d;
 use crate::mesh::Face;
@@ -28,6 +29,8 @@ pub struct OfflineCloth {
     pub faces: Vec<Face>,
     /// Acceleration of gravity (m/s²).
     pub gravity: V3d,
+    /// Pairs of vertices that are sewn to one another: elements that own one each never form contact.
+    pub sewn: Vec<[u32; 2]>,
     terms: Vec<Box<dyn EnergyTerm>>,
     pattern: Arc<BlockPattern>,
 }
@@ -71,6 +74,7 @@ impl OfflineCloth {
             mass,
             faces,
             gravity,
+            sewn: Vec::new(),
             terms,
             pattern,
         })
@@ -84,6 +88,23 @@ impl OfflineCloth {
     /// True for cloth without vertices.
     pub fn is_empty(&self) -> bool {
         self.mass.is_empty()
+    }
+
+    /// Surfaces that meet: the cloth, and an obstacle of `vertices` with these triangles.
+    ///
+    /// # Errors
+    /// A face with a vertex beyond its surface's.
+    pub fn contact_mesh(
+        &self,
+        obstacle: ContactSurface<'_>,
+    ) -> Result<ContactMesh, ContactMeshError> {
+        let own = ContactSurface {
+            vertices: self.len(),
+            faces: &self.faces,
+        };
+        let mut mesh = ContactMesh::new(own, obstacle)?;
+        mesh.exclude(&self.sewn);
+        Ok(mesh)
     }
 
     /// Energies of the shape.

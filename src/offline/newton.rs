@@ -1,16 +1,20 @@
 //! Newton's method with an inexact linear solve and a backtracking line search whose longest step contact limits.
 
 use super::error::{NewtonFault, OfflineError};
-use super::linear_solver::{LinearMethod, solve};
-use crate::linear::{BlockMatrix, LinearError, StopCriterion};
+use super::linear_solver::{DirectionSolver, LinearMethod};
+use crate::contact::ccd::MotionLimits;
+use crate::linear::{BlockMatrix, LinearError};
 use crate::math::V3d;
-use crate::par::Par;
 use serde::{Deserialize, Serialize};
 
 /// Share of the linear decrease that a step must reach (Armijo).
 const SUFFICIENT_DECREASE: f64 = 1e-4;
 /// Halvings of a step before the line search gives up.
 const MAX_HALVINGS: usize = 40;
+/// Residual, relative to that of other iterations, of one that would end the iteration.
+const TIGHTER: f64 = 0.1;
+/// Motion of all vertices below which nothing moves (m): rounding alone.
+const RESTING: f64 = 1e-12;
 /// Decrease relative to the energy below which rounding decides, so that a full step is taken.
 const ROUNDING: f64 = 1e-13;
 
@@ -44,6 +48,13 @@ impl Default for NewtonSettings {
     }
 }
 
+impl NewtonSettings {
+    /// True for a step so small that the iteration ends.
+    fn is_settled(&self, direction: &[V3d]) -> bool {
+        largest(direction).1 <= self.largest && mean(direction) <= self.tolerance
+    }
+}
+
 /// Work of one or several minimisations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NewtonReport {
@@ -53,9 +64,9 @@ pub struct NewtonReport {
     pub products: usize,
     /// Evaluations of the energy in line searches.
     pub evaluations: usize,
-    /// Iterations whose step contact shortened.
+    /// Iterations in which contact shortened the step of some vertex.
     pub limited: usize,
-    /// Smallest share of a step that contact left.
+    /// Smallest share of its step that contact left to a vertex.
     pub smallest_share: f64,
 }
 
@@ -83,6 +94,14 @@ pub(super) struct NewtonSystem {
     pub(super) contact: BlockMatrix,
 }
 
+impl NewtonSystem {
+    /// Derivative of the energy along a direction (J).
+    fn slope(&self, direction: &[V3d]) -> f64 {
+        let pairs = self.gradient.iter().zip(direction);
+        pairs.map(|(g, p)| g.dot(p)).sum()
+    }
+}
+
 /// Energy to minimise.
 pub(super) trait Minimised {
     /// Empty expansion with the pattern of its blocks.
@@ -91,8 +110,8 @@ pub(super) trait Minimised {
     fn value(&mut self, x: &[V3d]) -> f64;
     /// Expansion at `x`, replacing the one in `out`.
     fn assemble(&mut self, x: &[V3d], out: &mut NewtonSystem) -> Result<(), LinearError>;
-    /// Largest share of `direction`, at most 1, that passes through nothing; prepares contact for that segment.
-    fn free_share(&mut self, x: &[V3d], direction: &[V3d]) -> f64;
+    /// Shortens `direction` of each vertex to where nothing passes through anything; prepares contact for that segment.
+    fn free_motion(&mut self, x: &[V3d], direction: &mut [V3d]) -> MotionLimits;
 }
 
 /// Largest norm and its index.
@@ -121,7 +140,7 @@ fn mean(vectors: &[V3d]) -> f64 {
 pub(super) fn minimise(
     problem: &mut impl Minimised,
     settings: &NewtonSettings,
-    par: Par,
+    solver: &mut DirectionSolver,
     x: &mut [V3d],
     report: &mut NewtonReport,
 ) -> Result<Result<(), NewtonFault>, OfflineError> {
@@ -134,23 +153,34 @@ pub(super) fn minimise(
         if let Some(vertex) = first_not_finite(&system.gradient) {
             return Ok(Err(NewtonFault::NotFinite { vertex }));
         }
-        report.products += find_direction(settings, par, &system, &mut direction)?;
+        report.products += solver.solve(settings, &system, x, &mut direction)?;
         report.iterations += 1;
+        if settings.is_settled(&direction) {
+            // A small step may be one of which a loose residual has hidden the rest: rigid motion comes last.
+            let tight = NewtonSettings {
+                linear_residual: TIGHTER * settings.linear_residual,
+                ..*settings
+            };
+            report.products += solver.improve(&tight, &system, x, &mut direction)?;
+        }
         last_motion = largest(&direction);
         if !last_motion.1.is_finite() {
             let vertex = last_motion.0;
             return Ok(Err(NewtonFault::NotFinite { vertex }));
         }
-        let free = problem.free_share(x, &direction);
-        if free < 1.0 {
-            report.limited += 1;
-            report.smallest_share = report.smallest_share.min(free);
+        if last_motion.1 < RESTING {
+            return Ok(Ok(()));
         }
-        let (found, evaluations) = search_line(problem, &system, (x, &direction, free), &mut trial);
+        let free = shorten(problem, &system, x, &mut direction);
+        if free.vertices > 0 {
+            report.limited += 1;
+            report.smallest_share = report.smallest_share.min(free.smallest);
+        }
+        let (found, evaluations) = search_line(problem, &system, (x, &direction), &mut trial);
         report.evaluations += evaluations;
         if found.is_none() {
             let (vertex, motion) = last_motion;
-            let share = free;
+            let share = free.smallest;
             return Ok(Err(NewtonFault::Stuck {
                 vertex,
                 motion,
@@ -158,8 +188,7 @@ pub(super) fn minimise(
             }));
         }
         x.copy_from_slice(&trial);
-        let settled = last_motion.1 <= settings.largest && mean(&direction) <= settings.tolerance;
-        if settled && found == Some(1.0) {
+        if settings.is_settled(&direction) && found == Some(1.0) && free.vertices == 0 {
             return Ok(Ok(()));
         }
     }
@@ -177,40 +206,35 @@ fn first_not_finite(gradient: &[V3d]) -> Option<usize> {
         .position(|g| !g.iter().all(|c| c.is_finite()))
 }
 
-/// Solves for the Newton direction; returns products with the matrix.
-pub(super) fn find_direction(
-    settings: &NewtonSettings,
-    par: Par,
+/// Shortens each vertex' step as far as its contacts ask; all by one share where the shortened step would climb.
+fn shorten(
+    problem: &mut impl Minimised,
     system: &NewtonSystem,
+    x: &[V3d],
     direction: &mut [V3d],
-) -> Result<usize, OfflineError> {
-    let right: Vec<V3d> = system.gradient.iter().map(|g| -g).collect();
-    direction.fill(V3d::zeros());
-    let stop = StopCriterion {
-        residual: settings.linear_residual,
-        iterations: settings.linear_iterations,
-    };
-    let both = [&system.shape, &system.contact];
-    let used = if system.contact.pattern().size() == 0 {
-        &both[..1]
-    } else {
-        &both[..]
-    };
-    solve(settings.linear, (par, stop), used, &right, direction)
+) -> MotionLimits {
+    let whole = direction.to_vec();
+    let limits = problem.free_motion(x, direction);
+    if limits.vertices > 0 && system.slope(direction) >= 0.0 {
+        for (d, whole) in direction.iter_mut().zip(&whole) {
+            *d = whole * limits.smallest;
+        }
+        problem.free_motion(x, direction);
+    }
+    limits
 }
 
-/// Longest of the halved steps that lowers the energy enough, from the `free` share of the direction; fills `trial`.
+/// Longest of the halved steps that lowers the energy enough; fills `trial`.
 /// Returns its share of the direction and the evaluations of the energy.
 fn search_line(
     problem: &mut impl Minimised,
     system: &NewtonSystem,
-    (x, direction, free): (&[V3d], &[V3d], f64),
+    (x, direction): (&[V3d], &[V3d]),
     trial: &mut [V3d],
 ) -> (Option<f64>, usize) {
-    let pairs = system.gradient.iter().zip(direction);
-    let slope: f64 = pairs.map(|(g, p)| g.dot(p)).sum();
+    let slope = system.slope(direction);
     let noise = ROUNDING * system.value.abs();
-    let mut share = free;
+    let mut share = 1.0;
     for halvings in 0..MAX_HALVINGS {
         for (t, (x, p)) in trial.iter_mut().zip(x.iter().zip(direction)) {
             *t = x + p * share;

@@ -2,11 +2,11 @@
 
 use super::contacts::Contacts;
 use super::error::OfflineError;
-use super::newton::{
-    Minimised, NewtonReport, NewtonSettings, NewtonSystem, find_direction, largest,
-};
+use super::linear_solver::DirectionSolver;
+use super::newton::{Minimised, NewtonReport, NewtonSettings, NewtonSystem, largest};
 use super::obstacle::ObstacleSpring;
 use super::potential::StepPotential;
+use crate::contact::ccd::MotionLimits;
 use crate::linear::LinearError;
 use crate::math::V3d;
 use crate::par::Par;
@@ -29,13 +29,14 @@ const LONGEST_COUPLING: f64 = 0.01;
 
 impl StepProblem<'_> {
     /// First guess of a step from `x`: one linear step of the cloth with all cloth near the obstacle tied to its scripted
-    /// motion, shortened to where nothing touches.
+    /// motion, each vertex shortened to where nothing touches.
     ///
     /// # Errors
     /// A linear system that cannot be solved.
     pub(super) fn guess(
         &mut self,
         settings: &NewtonSettings,
+        solver: &mut DirectionSolver,
         x: &mut [V3d],
         report: &mut NewtonReport,
     ) -> Result<(), OfflineError> {
@@ -59,10 +60,10 @@ impl StepProblem<'_> {
             contacts.couple(x, (reach, stiffness), &mut system)?;
         }
         let mut direction = vec![V3d::zeros(); x.len()];
-        report.products += find_direction(settings, self.par, &system, &mut direction)?;
-        let free = self.free_share(x, &direction);
+        report.products += solver.solve(settings, &system, x, &mut direction)?;
+        self.free_motion(x, &mut direction);
         for (x, d) in x.iter_mut().zip(&direction) {
-            *x += d * free;
+            *x += d;
         }
         Ok(())
     }
@@ -99,10 +100,13 @@ impl Minimised for StepProblem<'_> {
         }
     }
 
-    fn free_share(&mut self, x: &[V3d], direction: &[V3d]) -> f64 {
+    fn free_motion(&mut self, x: &[V3d], direction: &mut [V3d]) -> MotionLimits {
         match &mut self.contacts {
-            Some(contacts) => contacts.free_share(x, direction),
-            None => 1.0,
+            Some(contacts) => contacts.free_motion(x, direction),
+            None => MotionLimits {
+                smallest: 1.0,
+                ..MotionLimits::default()
+            },
         }
     }
 }

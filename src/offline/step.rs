@@ -1,15 +1,18 @@
 //! One frame of cloth: implicit steps whose length follows the error and the solver.
 
+use super::checks::{check_frame, check_settings, check_vectors};
 use super::contacts::{ContactReport, ContactSettings, Contacts};
 use super::error::{NewtonFault, OfflineError};
 use super::integrator::{MotionState, OfflineState, StepCoefficients, TimeScheme};
+use super::linear_solver::DirectionSolver;
 use super::model::OfflineCloth;
 use super::newton::{NewtonReport, NewtonSettings, minimise};
 use super::obstacle::ObstacleSpring;
 use super::potential::StepPotential;
 use super::problem::StepProblem;
+use super::start::JoinedSurfaces;
 use super::targets::{FrameScript, FrameTargets, StepTargets};
-use crate::contact::{ContactMesh, ContactSurface};
+use crate::contact::ContactSurface;
 use crate::math::V3d;
 use crate::mesh::Face;
 use crate::par::Par;
@@ -76,6 +79,7 @@ pub struct OfflineSolver<'a> {
     par: Par,
     pub(super) state: OfflineState,
     contacts: Option<Contacts>,
+    directions: DirectionSolver,
     /// Number of halvings of the longest step in use.
     pub(super) level: u32,
     /// Accepted steps since the last change of length.
@@ -91,7 +95,8 @@ impl<'a> OfflineSolver<'a> {
     /// Cloth at rest or in motion; `obstacle` has the triangles of the state's obstacle vertices.
     ///
     /// # Errors
-    /// Positions or velocities that do not fit the cloth, or are not finite.
+    /// Positions or velocities that do not fit the cloth, or are not finite; steps that are no lengths; with contact, a
+    /// start that passes through itself or the obstacle.
     pub fn new(
         cloth: &'a OfflineCloth,
         obstacle: &[Face],
@@ -99,13 +104,29 @@ impl<'a> OfflineSolver<'a> {
         settings: OfflineSettings,
         par: Par,
     ) -> Result<Self, OfflineError> {
+        check_settings(&settings)?;
         let (n, m) = (cloth.len(), state.obstacle[0].len());
-        check("positions", &state.now.x, n)?;
-        check("velocities", &state.now.v, n)?;
-        check("obstacle", &state.obstacle[0], m)?;
-        check("obstacle targets", &state.obstacle[1], m)?;
-        let surface = |vertices, faces| ContactSurface { vertices, faces };
-        let mesh = ContactMesh::new(surface(n, &cloth.faces), surface(m, obstacle))?;
+        check_vectors("positions", &state.now.x, n)?;
+        check_vectors("velocities", &state.now.v, n)?;
+        check_vectors("obstacle", &state.obstacle[0], m)?;
+        check_vectors("obstacle targets", &state.obstacle[1], m)?;
+        let mesh = cloth.contact_mesh(ContactSurface {
+            vertices: m,
+            faces: obstacle,
+        })?;
+        if settings.contact.is_some() {
+            let start: Vec<V3d> = state
+                .now
+                .x
+                .iter()
+                .chain(&state.obstacle[0])
+                .copied()
+                .collect();
+            let crossings = JoinedSurfaces(&mesh).crossings(par, &start);
+            if !crossings.is_empty() {
+                return Err(OfflineError::IntersectingStart { crossings });
+            }
+        }
         Ok(Self {
             cloth,
             settings,
@@ -114,6 +135,7 @@ impl<'a> OfflineSolver<'a> {
             contacts: settings
                 .contact
                 .map(|contact| Contacts::new(mesh, contact, par)),
+            directions: DirectionSolver::new(par),
             level: 0,
             calm_steps: 0,
         })
@@ -127,12 +149,15 @@ impl<'a> OfflineSolver<'a> {
     /// Advances by `duration` (s) while pins and obstacle move evenly to their targets.
     ///
     /// # Errors
-    /// A step that is not solved at the smallest length; the state is then that before the step.
+    /// A step that is not solved at the smallest length; the state is then that before the step. A duration or targets that
+    /// are none.
     pub fn advance(
         &mut self,
         duration: f64,
         targets: &FrameTargets<'_>,
     ) -> Result<OfflineFrameReport, OfflineError> {
+        let vertices = [self.cloth.len(), self.state.obstacle[0].len()];
+        check_frame(duration, targets, vertices)?;
         let mut report = OfflineFrameReport::default();
         report.newton.smallest_share = 1.0;
         if let Some(contacts) = &mut self.contacts {
@@ -155,7 +180,7 @@ impl<'a> OfflineSolver<'a> {
         let finest = coarsest + self.settings.halvings;
         let frame = 1u64 << finest;
         self.level = self.level.clamp(coarsest, finest);
-        let mut at = 0;
+        let (mut at, mut aside) = (0, None);
         while at < frame {
             let length = 1u64 << (finest - self.level);
             let h = duration * length as f64 / frame as f64;
@@ -167,18 +192,22 @@ impl<'a> OfflineSolver<'a> {
                     report.steps += 1;
                     report.largest_error = report.largest_error.max(solved.error);
                     let calm = solved.error <= GROWTH_SHARE * self.settings.error_rate * h;
+                    aside = None;
                     self.accept(solved, h, start + duration * share);
                     self.grow(calm, (coarsest, finest), at);
                     continue;
                 }
                 Ok(_) => report.inaccurate += 1,
                 Err(why) if last => {
+                    if aside.is_some() {
+                        self.state.earlier = aside;
+                    }
                     let (time, step) = (self.state.time, h);
                     return Err(OfflineError::Unsolved { time, step, why });
                 }
                 Err(_) => {
                     report.unsolved += 1;
-                    self.state.earlier = None;
+                    aside = self.state.earlier.take().or(aside);
                 }
             }
             self.level += 1;
@@ -224,14 +253,14 @@ impl<'a> OfflineSolver<'a> {
         };
         let mut x = start;
         if problem.contacts.is_some() {
-            problem.guess(&self.settings.newton, &mut x, report)?;
+            problem.guess(&self.settings.newton, &mut self.directions, &mut x, report)?;
         } else {
             x[..n].copy_from_slice(&predicted);
         }
         let solved = minimise(
             &mut problem,
             &self.settings.newton,
-            self.par,
+            &mut self.directions,
             &mut x,
             report,
         )?;
@@ -274,17 +303,6 @@ pub(super) struct SolvedStep {
     obstacle: [Vec<V3d>; 2],
     /// Estimated local error (m, root mean square).
     error: f64,
-}
-
-fn check(field: &'static str, values: &[V3d], expected: usize) -> Result<(), OfflineError> {
-    let why = if values.len() != expected {
-        format!("{} for {expected} vertices", values.len())
-    } else if let Some(v) = values.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
-        format!("vertex {v} is not finite")
-    } else {
-        return Ok(());
-    };
-    Err(OfflineError::Input { field, why })
 }
 
 /// Root mean square distance (m).

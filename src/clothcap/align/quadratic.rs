@@ -204,7 +204,8 @@ impl QuadraticEnergy {
         let system = self.restricted(x, some);
         let mut moves = vec![Vector3::zeros(); some.len()];
         let apply = |from: &[Vector3<f64>], to: &mut [Vector3<f64>]| system.multiply(from, to);
-        conjugate_gradient(apply, &system.inverse, &system.rhs, &mut moves, STOP);
+        let mut inverse = BlockJacobi::from_inverse(system.inverse.clone());
+        conjugate_gradient(apply, &mut inverse, &system.rhs, &mut moves, STOP);
         for (v, by) in some.iter().zip(&moves) {
             let moved = x[*v as usize].cast::<f64>() + by;
             if !moved.iter().all(|c| c.is_finite()) {

@@ -8,7 +8,7 @@ use crate::cloth::solver::single_patch::{
     SinglePatchSolver, VelocityUpdate, local_numbers, whole_sheet,
 };
 use crate::cloth::solver::{Environment, RunConfig, SheetStart};
-use crate::linear::{StopCriterion, conjugate_gradient};
+use crate::linear::{BlockJacobi, StopCriterion, conjugate_gradient};
 use crate::math::V3d;
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
@@ -148,7 +148,7 @@ impl VelocityUpdate for Springs {
             system.right[pin.vertex as usize] = V3d::zeros();
         }
         let inverse = |b: &Matrix3<f64>| b.try_inverse().unwrap_or_else(Matrix3::identity);
-        let inverse: Vec<Matrix3<f64>> = system.diagonal.iter().map(inverse).collect();
+        let mut inverse = BlockJacobi::from_inverse(system.diagonal.iter().map(inverse).collect());
         let mut change = vec![V3d::zeros(); n];
         let product = |p: &[V3d], out: &mut [V3d]| {
             for i in 0..n {
@@ -163,7 +163,7 @@ impl VelocityUpdate for Springs {
                 out[i] = p[i] * self.mass[i];
             }
         };
-        conjugate_gradient(product, &inverse, &system.right, &mut change, STOP);
+        conjugate_gradient(product, &mut inverse, &system.right, &mut change, STOP);
         for i in 0..n {
             state.velocity[i] = (v[i] + change[i]).into();
         }

@@ -1,0 +1,239 @@
+//! Coarse space of a two-level preconditioner: patches of vertices that move by affine functions of two coordinates.
+//!
+//! Each patch has three shape functions (1 and its two principal coordinates) for each of x, y, z. A flat patch has all its
+//! rigid motions to first order among them, so what stays for the fine level lives within a patch.
+
+use super::{
+    BlockMatrix, BlockPattern, Factor, LinearError, SymbolicFactor, pattern::SymmetricPattern,
+};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Shape functions of a patch.
+const FUNCTIONS: usize = 3;
+/// Variance of a coordinate beside the first's below which it counts as constant.
+const FLAT: f64 = 1e-4;
+
+/// Patches, their shape functions and the factored coarse matrix.
+#[derive(Debug, Default)]
+pub struct CoarseSpace {
+    /// Patch of each vertex; `u32::MAX` for those of the fine level alone.
+    patch: Vec<u32>,
+    patches: usize,
+    /// Values of the shape functions at each vertex.
+    shapes: Vec<[f64; FUNCTIONS]>,
+    factor: Option<Factor>,
+    /// Right-hand side of the coarse system.
+    loads: Vec<f64>,
+}
+
+impl CoarseSpace {
+    /// Grows patches of `size` vertices over the graph of a pattern. Vertices without a neighbour belong to none.
+    pub fn new(pattern: &BlockPattern, size: usize) -> Self {
+        let n = pattern.size();
+        let mut space = Self {
+            patch: vec![u32::MAX; n],
+            shapes: vec![[0.0; FUNCTIONS]; n],
+            ..Self::default()
+        };
+        // Each patch begins beside the last ones, so that no small ones are left between.
+        let mut seeds: VecDeque<u32> = VecDeque::new();
+        let mut next = 0;
+        loop {
+            let beside = std::iter::from_fn(|| seeds.pop_front());
+            let seed = beside.into_iter().find(|s| space.is_free(*s));
+            let seed = match seed {
+                Some(seed) => seed,
+                None => {
+                    while next < n
+                        && !(space.is_free(next as u32) && pattern.neighbours(next).len() > 1)
+                    {
+                        next += 1;
+                    }
+                    if next == n {
+                        break;
+                    }
+                    next as u32
+                }
+            };
+            space.grow(pattern, (seed, size), &mut seeds);
+        }
+        space
+    }
+
+    fn is_free(&self, vertex: u32) -> bool {
+        self.patch[vertex as usize] == u32::MAX
+    }
+
+    fn grow(
+        &mut self,
+        pattern: &BlockPattern,
+        (seed, size): (u32, usize),
+        seeds: &mut VecDeque<u32>,
+    ) {
+        let number = self.patches as u32;
+        let mut queue = VecDeque::from([seed]);
+        let mut count = 0;
+        while count < size {
+            let Some(v) = queue.pop_front() else { break };
+            if !self.is_free(v) {
+                continue;
+            }
+            self.patch[v as usize] = number;
+            count += 1;
+            let beside = pattern.neighbours(v as usize).iter();
+            queue.extend(beside.filter(|w| self.patch[**w as usize] == u32::MAX));
+        }
+        seeds.extend(queue);
+        self.patches += 1;
+    }
+
+    /// Fits the shape functions to positions (m) and factors the coarse form of the sum of matrices.
+    ///
+    /// # Errors
+    /// A coarse matrix that is not positive definite.
+    pub fn update(
+        &mut self,
+        positions: &[Vector3<f64>],
+        matrices: &[&BlockMatrix],
+    ) -> Result<(), LinearError> {
+        self.fit(positions);
+        let mut sum = self.coarse_matrix(matrices)?;
+        for row in 0..sum.pattern().size() {
+            // A function that vanishes, as the slope of a patch of one vertex, stays without effect.
+            if sum.diagonal(row).trace() <= 0.0 {
+                let slot = sum.pattern().diagonal_slot(row);
+                *sum.block_mut(slot) = Matrix3::identity();
+            }
+        }
+        let (pattern, values): (SymmetricPattern, Vec<f64>) = sum.to_scalar()?;
+        let same = self.factor.take();
+        let mut factor = match same {
+            Some(factor) if *factor.pattern() == pattern => factor,
+            _ => Factor::new(SymbolicFactor::new(Arc::new(pattern))?),
+        };
+        factor.refactor(&values)?;
+        self.factor = Some(factor);
+        Ok(())
+    }
+
+    /// Adds the coarse solution for the residual `r` to `z`.
+    pub fn add(&mut self, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
+        let Some(factor) = &mut self.factor else {
+            return;
+        };
+        self.loads.clear();
+        self.loads.resize(3 * FUNCTIONS * self.patches, 0.0);
+        let vertices = self.patch.iter().zip(&self.shapes);
+        for ((patch, shapes), r) in vertices.clone().zip(r) {
+            let first = 3 * FUNCTIONS * *patch as usize;
+            let Some(loads) = self.loads.get_mut(first..first + 3 * FUNCTIONS) else {
+                continue;
+            };
+            for (loads, shape) in loads.chunks_exact_mut(3).zip(shapes) {
+                loads.iter_mut().zip(r).for_each(|(l, r)| *l += shape * r);
+            }
+        }
+        factor.solve_vector(&mut self.loads);
+        for ((patch, shapes), z) in vertices.zip(z) {
+            let first = 3 * FUNCTIONS * *patch as usize;
+            let Some(loads) = self.loads.get(first..first + 3 * FUNCTIONS) else {
+                continue;
+            };
+            for (loads, shape) in loads.chunks_exact(3).zip(shapes) {
+                *z += Vector3::from_column_slice(loads) * *shape;
+            }
+        }
+    }
+
+    /// Shape functions: 1, and the two principal coordinates of each patch in parts of their deviation.
+    fn fit(&mut self, positions: &[Vector3<f64>]) {
+        let mut means = vec![(Vector3::zeros(), 0.0); self.patches];
+        for (patch, x) in self.patch.iter().zip(positions) {
+            if let Some(mean) = means.get_mut(*patch as usize) {
+                mean.0 += x;
+                mean.1 += 1.0;
+            }
+        }
+        let means: Vec<Vector3<f64>> = means.iter().map(|(sum, n)| sum / *n).collect();
+        let mut spreads = vec![Matrix3::zeros(); self.patches];
+        for (patch, x) in self.patch.iter().zip(positions) {
+            if let Some(spread) = spreads.get_mut(*patch as usize) {
+                let apart = x - means[*patch as usize];
+                *spread += apart * apart.transpose();
+            }
+        }
+        let axes: Vec<[Vector3<f64>; 2]> = spreads.iter().map(principal_axes).collect();
+        for ((patch, x), shapes) in self.patch.iter().zip(positions).zip(&mut self.shapes) {
+            if let Some(axes) = axes.get(*patch as usize) {
+                let apart = x - means[*patch as usize];
+                *shapes = [1.0, apart.dot(&axes[0]), apart.dot(&axes[1])];
+            }
+        }
+    }
+
+    /// Pᵀ (Σ A) P, three rows of blocks a patch.
+    fn coarse_matrix(&self, matrices: &[&BlockMatrix]) -> Result<BlockMatrix, LinearError> {
+        let f = FUNCTIONS as u32;
+        let patch = |v: usize| self.patch.get(v).copied().filter(|p| *p != u32::MAX);
+        let mut beside: Vec<Vec<u32>> = (0..self.patches as u32).map(|p| vec![p]).collect();
+        for m in matrices {
+            for row in 0..m.pattern().size().min(self.patch.len()) {
+                let Some(own) = patch(row) else { continue };
+                let list = &mut beside[own as usize];
+                for w in m.pattern().neighbours(row) {
+                    if let Some(other) = patch(*w as usize).filter(|o| !list.contains(o)) {
+                        list.push(other);
+                    }
+                }
+            }
+        }
+        let pairs = beside.iter().enumerate().flat_map(|(a, list)| {
+            list.iter().flat_map(move |b| {
+                (0..f).flat_map(move |i| (0..f).map(move |j| (f * a as u32 + i, f * b + j)))
+            })
+        });
+        let size = FUNCTIONS * self.patches;
+        let mut coarse = BlockMatrix::zeros(Arc::new(BlockPattern::new(size, pairs)?));
+        for m in matrices {
+            for row in 0..m.pattern().size().min(self.patch.len()) {
+                let Some(own) = patch(row) else { continue };
+                for (column, block) in m.row_blocks(row) {
+                    let Some(other) = patch(column as usize) else {
+                        continue;
+                    };
+                    for i in 0..f {
+                        // The functions of a patch are neighbours in every row of the pattern.
+                        let Some(slot) = coarse.pattern().slot(f * own + i, f * other) else {
+                            continue;
+                        };
+                        let weight = self.shapes[row][i as usize];
+                        for j in 0..FUNCTIONS {
+                            let shape = weight * self.shapes[column as usize][j];
+                            *coarse.block_mut(slot + j) += block * shape;
+                        }
+                    }
+                }
+            }
+        }
+        Ok(coarse)
+    }
+}
+
+/// The two principal axes over their standard deviations; zero where a patch has no extent.
+fn principal_axes(spread: &Matrix3<f64>) -> [Vector3<f64>; 2] {
+    let eigen = spread.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+    let largest = eigen.eigenvalues[order[0]];
+    [order[0], order[1]].map(|k| {
+        let variance = eigen.eigenvalues[k];
+        let axis: Vector3<f64> = eigen.eigenvectors.column(k).into();
+        if variance > FLAT * largest && variance > 0.0 {
+            axis / variance.sqrt()
+        } else {
+            Vector3::zeros()
+        }
+    })
+}
