@@ -4,10 +4,14 @@ use anyhow::{Context, Result};
 use std::process::exit;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use tryon_kit::drain;
 
 /// Exit code after Ctrl-C, as shells report it.
 pub(crate) const INTERRUPTED: u8 = 130;
+
+/// Time after a signal in which another is the same request: `timeout` sends two.
+const REPEAT: Duration = Duration::from_millis(500);
 
 /// Request to end.
 #[derive(Clone, Debug, Default)]
@@ -31,6 +35,7 @@ impl Interrupt {
             }
             eprintln!("tryon: ending after this frame; once more to end now");
             asked.0.store(true, Ordering::Relaxed);
+            std::thread::sleep(REPEAT);
             if runtime.block_on(drain::signal()).is_ok() {
                 exit(i32::from(INTERRUPTED));
             }

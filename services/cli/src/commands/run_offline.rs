@@ -8,6 +8,7 @@ use crate::preview::{Preview, PreviewFrame};
 use crate::report::{peak_memory, write};
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -255,8 +256,11 @@ impl<'a> Animation<'a> {
         };
         report.start = start;
         let mut solver = outfit.solver(state, Par::Rayon)?;
-        if let Some(bytes) = &saved {
-            solver.resume(bytes)?;
+        match &saved {
+            Some(bytes) => {
+                solver.resume(bytes)?;
+            }
+            None => report.drape = Some(settle(outfit, &mut solver, worn)?),
         }
 
         let resumed = known.unwrap_or(0) as usize;
@@ -331,6 +335,7 @@ impl<'a> Animation<'a> {
         if std::mem::take(&mut self.is_lost) {
             let (state, _) = self.outfit.start(worn, Par::Rayon)?;
             self.solver = self.outfit.solver(state, Par::Rayon)?;
+            settle(self.outfit, &mut self.solver, worn)?;
         }
         let started = Instant::now();
         let work = advance(self.outfit, &mut self.solver, worn, dt)?;
@@ -339,6 +344,24 @@ impl<'a> Animation<'a> {
         let fine = fine_picture(preview, painter, frame, self.outfit, solver)?;
         picture(out, frame.index, "", &fine)
     }
+}
+
+/// Brings the start of an animation to rest, which the preview's fabric and contact left under stress; the report and the
+/// time (s).
+fn settle(
+    outfit: &OfflineOutfit,
+    solver: &mut OfflineSolver<'_>,
+    worn: &DressedOutfit,
+) -> Result<(DrapeReport, f64)> {
+    let pins = outfit.pins(worn.state.collision_body().vertices());
+    let bar = input::progress(None, "draping");
+    let started = Instant::now();
+    let done = solver.drape_pinned(&DrapeSettings::default(), &pins, |_| {
+        bar.inc(1);
+        ControlFlow::Continue(())
+    })?;
+    bar.finish_and_clear();
+    Ok((done, started.elapsed().as_secs_f64()))
 }
 
 /// One frame: the body moves evenly to where the preview has it.
