@@ -21,8 +21,10 @@ const TIED: f64 = 1.0;
 /// Garments of an outfit on finer meshes. Vertices and faces of all garments have one numbering, in the outfit's order.
 #[derive(Debug)]
 pub struct OfflineOutfit {
+    /// Subdivisions of each garment.
+    level: usize,
     coarse: Vec<GarmentMesh>,
-    /// Refinements of each garment, from coarse to fine; equally many.
+    /// Refinements of each garment, from coarse to fine.
     refinements: Vec<Vec<GarmentSubdivision>>,
     garments: Vec<GarmentMesh>,
     cloth: OfflineCloth,
@@ -47,9 +49,19 @@ impl OfflineOutfit {
         body_faces: &[Face],
         vertices: usize,
     ) -> Result<Self, MirrorError> {
+        let coarse = worn.model.outfit.garments.iter();
+        let levels = levels(coarse.map(|g| g.vertices).sum(), vertices);
+        Self::with_level(worn, body_faces, levels)
+    }
+
+    /// Garments of `worn` whose triangles were divided by four `levels` times.
+    pub(super) fn with_level(
+        worn: &DressedOutfit,
+        body_faces: &[Face],
+        levels: usize,
+    ) -> Result<Self, MirrorError> {
         let outfit = &worn.model.outfit;
         let coarse = outfit.garments.clone();
-        let levels = levels(coarse.iter().map(|g| g.vertices).sum(), vertices);
         let refine = |garment: &GarmentMesh| {
             let mut all: Vec<GarmentSubdivision> = Vec::new();
             for _ in 0..levels {
@@ -76,6 +88,7 @@ impl OfflineOutfit {
             first += garment.vertices as u32;
         }
         Ok(Self {
+            level: levels,
             coarse,
             refinements,
             garments,
@@ -93,6 +106,16 @@ impl OfflineOutfit {
     /// Cloth of all garments.
     pub fn cloth(&self) -> &OfflineCloth {
         &self.cloth
+    }
+
+    /// Number of subdivisions.
+    pub(super) fn level(&self) -> usize {
+        self.level
+    }
+
+    /// Triangles of the obstacle.
+    pub(super) fn body_faces(&self) -> &[Face] {
+        &self.body_faces
     }
 
     /// Solver of the cloth with the mean friction of the fabrics, weighted by vertices.
@@ -122,8 +145,8 @@ impl OfflineOutfit {
     ) -> Result<(OfflineState, StartReport), MirrorError> {
         let mut x = positions(worn);
         let mut report = self.repair(&self.coarse, par, &mut x)?;
-        let mut fine = self.refine(&x);
-        if !self.refinements.iter().all(Vec::is_empty) {
+        let mut fine = self.refine(0, &x);
+        if self.level > 0 {
             // Rounding of the middles.
             let again = self.repair(&self.garments, par, &mut fine)?;
             report.found += again.found;
@@ -134,7 +157,7 @@ impl OfflineOutfit {
 
     /// Start as the real-time result is, with its intersections: for a checkpoint to replace.
     pub fn unrepaired_start(&self, worn: &DressedOutfit) -> OfflineState {
-        self.state(self.refine(&positions(worn)), worn)
+        self.state(self.refine(0, &positions(worn)), worn)
     }
 
     /// State at rest at these vertices of the finer meshes and the body.
@@ -150,13 +173,29 @@ impl OfflineOutfit {
         }
     }
 
-    /// Vertices of the finer meshes from those of the coarse ones, each followed by the body's.
-    fn refine(&self, x: &[V3d]) -> Vec<V3d> {
+    /// State of a `coarse` outfit of the same preview, at rest, on these finer meshes.
+    pub(super) fn refined(&self, coarse: &Self, state: &OfflineState) -> OfflineState {
+        let x = self.refine(coarse.level, &state.now.x);
+        OfflineState {
+            time: state.time,
+            now: MotionState {
+                v: vec![V3d::zeros(); x.len()],
+                x,
+            },
+            earlier: None,
+            obstacle: state.obstacle.clone(),
+        }
+    }
+
+    /// Vertices of the finer meshes from those of a coarser level; further ones stay behind them.
+    fn refine(&self, level: usize, x: &[V3d]) -> Vec<V3d> {
         let (mut fine, mut first) = (Vec::new(), 0);
         for (garment, refinements) in self.coarse.iter().zip(&self.refinements) {
-            let mut own = x[first..first + garment.vertices].to_vec();
-            first += garment.vertices;
-            for finer in refinements {
+            let (known, further) = refinements.split_at(level);
+            let count = known.last().map_or(garment.vertices, |s| s.mesh.vertices);
+            let mut own = x[first..first + count].to_vec();
+            first += count;
+            for finer in further {
                 own = finer.refine(&own);
             }
             fine.extend(own);

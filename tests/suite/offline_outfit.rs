@@ -1,6 +1,7 @@
 //! The offline solver after the preview: an outfit at rest on a body, taken over on a finer mesh.
 
 use crate::common::{DT, arms_down, posed};
+use std::ops::ControlFlow;
 use tryon::body::measure::measure;
 use tryon::body::{BodyShape, Pose, embedded};
 use tryon::contact::{ContactMesh, ContactSurface};
@@ -62,13 +63,25 @@ fn a_preview_goes_on_offline_without_intersections() {
     );
     assert_eq!(outfit.drawn_positions(&vec![P3::origin(); count]).len(), 1);
 
-    let (state, _) = outfit.start(&worn, Par::Seq).expect("a start");
+    let mut steps = Vec::new();
+    let (state, report) = outfit
+        .drape(&worn, Par::Seq, |vertices, _| {
+            steps.push(vertices);
+            ControlFlow::Continue(())
+        })
+        .expect("at rest");
+    assert!(report.is_settled(), "{report:?}");
+    assert_eq!(report.levels.len(), 2);
+    assert!(
+        steps.contains(&coarse) && steps.contains(&count),
+        "{steps:?}"
+    );
     let before = state.now.x.clone();
     let mut solver = outfit.solver(state, Par::Seq).expect("a solver");
     assert_eq!(crossings(&outfit, &faces, &solver), 0);
 
-    // The body steps aside, and the waistband with it.
-    let aside = V3::new(0.02, 0.0, 0.0);
+    // The body moves aside, and the waistband with it; a sudden speed costs steps at any length.
+    let aside = V3::new(0.001, 0.0, 0.0);
     let moved: Vec<P3> = worn
         .state
         .collision_body()
@@ -94,7 +107,7 @@ fn a_preview_goes_on_offline_without_intersections() {
         );
     }
     let sums = [&before, x].map(|x| x.iter().sum::<V3d>() / count as f64);
-    assert!((sums[1] - sums[0]).x > 0.002, "the skirt follows: {sums:?}");
+    assert!((sums[1] - sums[0]).x > 1e-4, "the skirt follows: {sums:?}");
 
     let resumed = outfit.unrepaired_start(&worn);
     let mut resumed = outfit.solver(resumed, Par::Seq).expect("a solver");

@@ -16,15 +16,20 @@ use tryon::camera::ColorImage;
 use tryon::formats::gltf::{GlbMesh, write_glb_motion};
 use tryon::formats::image::write_png_rgb;
 use tryon::math::{P3, V3d};
-use tryon::mirror::{DressedOutfit, FrameClock, LongGap, OfflineOutfit, OutfitPainter};
+use tryon::mirror::{
+    DressedOutfit, FrameClock, LongGap, MirrorError, OfflineDrapeReport, OfflineOutfit,
+    OutfitPainter,
+};
 use tryon::offline::{
-    DrapeReport, DrapeSettings, FrameTargets, OfflineFrameReport, OfflineSolver, StartReport,
-    checkpoint_frame,
+    FrameTargets, OfflineFrameReport, OfflineSolver, OfflineState, checkpoint_frame,
 };
 use tryon::par::{Par, with_threads};
 
 /// Nominal time between frames of the animation (s).
 const INTERVAL: f32 = 1.0 / 30.0;
+
+/// Frames after the wanted one that are tried when its cloth intersects too much to start from: two seconds.
+const LATER_STARTS: usize = 60;
 
 /// report.json of an offline run.
 #[derive(Debug, Default, Serialize)]
@@ -34,9 +39,8 @@ struct Report {
     first_frame: usize,
     /// Frames of positions.npy, the start included.
     frames: usize,
-    start: StartReport,
-    /// Drape of a still pose, and its time (s).
-    drape: Option<(DrapeReport, f64)>,
+    /// Drape in the pose of the first frame, from coarse to fine.
+    drape: OfflineDrapeReport,
     /// Frames without a live body: cloth stays as it was, and starts again from the preview.
     waited: Vec<usize>,
     /// Work of each frame of this run, and its time (s).
@@ -66,9 +70,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
             eprintln!("tryon: nobody was dressed in {}", args.input.display());
             return Ok(ExitCode::FAILURE);
         };
-        let worn = worn(&preview)?;
-        let faces = preview.mirror.template().mesh().faces().to_vec();
-        let outfit = OfflineOutfit::new(worn, &faces, args.fine.vertices)?;
+        let (dressed, outfit) = free_start(args, &mut preview, dressed)?;
         let mut report = Report {
             garments: parts(&outfit),
             first_frame: dressed.index,
@@ -116,6 +118,44 @@ fn dress(args: &RunArgs, preview: &mut Preview) -> Result<Option<PreviewFrame>> 
     Ok(None)
 }
 
+/// The first frame from `dressed` on whose cloth is free of intersections, or can be freed; its outfit.
+fn free_start(
+    args: &RunArgs,
+    preview: &mut Preview,
+    mut dressed: PreviewFrame,
+) -> Result<(PreviewFrame, OfflineOutfit)> {
+    let faces = preview.mirror.template().mesh().faces().to_vec();
+    let mut left = LATER_STARTS;
+    loop {
+        let worn = worn(preview)?;
+        let outfit = OfflineOutfit::new(worn, &faces, args.fine.vertices)?;
+        let tangled = match outfit.start(worn, Par::Rayon) {
+            Ok(_) => return Ok((dressed, outfit)),
+            Err(e @ MirrorError::TangledStart { .. }) => e,
+            Err(e) => return Err(e.into()),
+        };
+        if left == LATER_STARTS {
+            eprintln!(
+                "tryon: frame {}: {tangled}; trying later ones",
+                dressed.index
+            );
+        }
+        loop {
+            if args.fine.still.is_none() && !preview.is_still() {
+                picture(&args.out, dressed.index, "", &dressed.seen.picture)?;
+            }
+            left -= 1;
+            match preview.next()?.filter(|_| left > 0) {
+                Some(next) => dressed = next,
+                None => return Err(tangled.into()),
+            }
+            if dressed.seen.is_dressed {
+                break;
+            }
+        }
+    }
+}
+
 fn worn(preview: &Preview) -> Result<&DressedOutfit> {
     preview.mirror.outfit().context("nobody is dressed")
 }
@@ -153,7 +193,7 @@ fn fine_picture(
     Ok((preview.mirror).picture_of(painter, &frame.frame, outfit, surfaces)?)
 }
 
-/// Drapes the outfit in the pose of one frame; true when it settled or the steps ran out.
+/// Drapes the outfit in the pose of one frame; false after Ctrl-C.
 fn drape(
     args: &RunArgs,
     preview: &Preview,
@@ -165,31 +205,16 @@ fn drape(
         bail!("a drape takes seconds and has no checkpoint");
     }
     picture(&args.out, frame.index, "_preview", &frame.seen.picture)?;
-    let (state, start) = outfit.start(worn(preview)?, Par::Rayon)?;
-    report.start = start;
-    let mut solver = outfit.solver(state, Par::Rayon)?;
     let mut files = OfflineFiles::open(&args.solver, &args.out, outfit.cloth().len(), 0)?;
-
-    let settings = DrapeSettings::default();
-    let bar = input::progress(Some(settings.most_steps as u64), "draping");
-    let started = Instant::now();
-    let pins = outfit.pins(worn(preview)?.state.collision_body().vertices());
-    let targets = FrameTargets {
-        pins: &pins,
-        ..FrameTargets::default()
-    };
-    let done = solver.drape_to(&settings, &targets, |_| {
-        bar.inc(1);
-        files.flow()
-    })?;
-    bar.finish_and_clear();
-    report.drape = Some((done, started.elapsed().as_secs_f64()));
+    let (state, done) = settle(outfit, worn(preview)?, || files.flow())?;
+    report.drape = done;
+    let solver = outfit.solver(state, Par::Rayon)?;
     files.start(&solver.state().positions())?;
     let mut painter = OutfitPainter::new(input::template(args.body.as_deref())?);
     let fine = fine_picture(preview, &mut painter, frame, outfit, &solver)?;
     picture(&args.out, frame.index, "", &fine)?;
     finish(args, preview, outfit, &mut files, report)?;
-    Ok(done.settled || done.steps >= settings.most_steps)
+    Ok(files.flow().is_continue())
 }
 
 /// Writes outfit.glb of all frames.
@@ -249,34 +274,36 @@ impl<'a> Animation<'a> {
     ) -> Result<Self> {
         let saved = saved_state(&args.solver)?;
         let known = saved.as_deref().map(checkpoint_frame).transpose()?;
+        let resumed = known.unwrap_or(0) as usize;
+        let frames = known.map_or(0, |_| resumed + 1);
+        let count = outfit.cloth().len();
+        let mut files = OfflineFiles::open(&args.solver, &args.out, count, frames)?;
         let worn = worn(preview)?;
-        let (state, start) = match saved {
-            Some(_) => (outfit.unrepaired_start(worn), StartReport::default()),
-            None => outfit.start(worn, Par::Rayon)?,
+        let state = match saved {
+            Some(_) => outfit.unrepaired_start(worn),
+            None => {
+                let (state, done) = settle(outfit, worn, || files.flow())?;
+                report.drape = done;
+                state
+            }
         };
-        report.start = start;
         let mut solver = outfit.solver(state, Par::Rayon)?;
         match &saved {
             Some(bytes) => {
                 solver.resume(bytes)?;
             }
-            None => report.drape = Some(settle(outfit, &mut solver, worn)?),
+            None => files.start(&solver.state().positions())?,
         }
-
-        let resumed = known.unwrap_or(0) as usize;
-        let frames = known.map_or(0, |_| resumed + 1);
-        let count = outfit.cloth().len();
         let mut out = Self {
             args,
             outfit,
             solver,
-            files: OfflineFiles::open(&args.solver, &args.out, count, frames)?,
+            files,
             painter: OutfitPainter::new(input::template(args.body.as_deref())?),
             resumed,
             is_lost: false,
         };
         if saved.is_none() {
-            out.files.start(&out.solver.state().positions())?;
             let (painter, solver) = (&mut out.painter, &out.solver);
             let fine = fine_picture(preview, painter, first, outfit, solver)?;
             picture(&args.out, first.index, "", &fine)?;
@@ -333,9 +360,8 @@ impl<'a> Animation<'a> {
         }
         let worn = worn(preview)?;
         if std::mem::take(&mut self.is_lost) {
-            let (state, _) = self.outfit.start(worn, Par::Rayon)?;
+            let (state, _) = settle(self.outfit, worn, || self.files.flow())?;
             self.solver = self.outfit.solver(state, Par::Rayon)?;
-            settle(self.outfit, &mut self.solver, worn)?;
         }
         let started = Instant::now();
         let work = advance(self.outfit, &mut self.solver, worn, dt)?;
@@ -346,22 +372,23 @@ impl<'a> Animation<'a> {
     }
 }
 
-/// Brings the start of an animation to rest, which the preview's fabric and contact left under stress; the report and the
-/// time (s).
+/// Static drape from the preview, which leaves the cloth under stress by the offline fabric and contact. `flow` breaks off.
 fn settle(
     outfit: &OfflineOutfit,
-    solver: &mut OfflineSolver<'_>,
     worn: &DressedOutfit,
-) -> Result<(DrapeReport, f64)> {
-    let pins = outfit.pins(worn.state.collision_body().vertices());
+    flow: impl Fn() -> ControlFlow<()>,
+) -> Result<(OfflineState, OfflineDrapeReport)> {
     let bar = input::progress(None, "draping");
-    let started = Instant::now();
-    let done = solver.drape_pinned(&DrapeSettings::default(), &pins, |_| {
+    let done = outfit.drape(worn, Par::Rayon, |vertices, step| {
+        bar.set_message(format!(
+            "{vertices} vertices, moved {:.1} mm",
+            step.motion * 1e3
+        ));
         bar.inc(1);
-        ControlFlow::Continue(())
+        flow()
     })?;
     bar.finish_and_clear();
-    Ok((done, started.elapsed().as_secs_f64()))
+    Ok(done)
 }
 
 /// One frame: the body moves evenly to where the preview has it.
