@@ -29,22 +29,29 @@ impl Interrupt {
             .enable_all()
             .build()
             .context("signals")?;
-        let wait = move || {
-            if runtime.block_on(drain::signal()).is_err() {
-                return;
-            }
-            eprintln!("tryon: ending after this frame; once more to end now");
-            asked.0.store(true, Ordering::Relaxed);
-            std::thread::sleep(REPEAT);
-            if runtime.block_on(drain::signal()).is_ok() {
-                exit(i32::from(INTERRUPTED));
-            }
-        };
+        let wait = move || runtime.block_on(asked.wait());
         std::thread::Builder::new()
             .name("signals".into())
             .spawn(wait)
             .context("signals")?;
         Ok(interrupt)
+    }
+
+    /// Marks the first signal, ends the process at the second.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "who asks twice does not wait for the frame in work"
+    )]
+    async fn wait(self) {
+        if drain::signal().await.is_err() {
+            return;
+        }
+        eprintln!("tryon: ending after this frame; once more to end now");
+        self.0.store(true, Ordering::Relaxed);
+        tokio::time::sleep(REPEAT).await;
+        if drain::signal().await.is_ok() {
+            exit(i32::from(INTERRUPTED));
+        }
     }
 
     /// True once asked for.

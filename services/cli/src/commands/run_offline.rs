@@ -28,8 +28,8 @@ use tryon::par::{Par, with_threads};
 /// Nominal time between frames of the animation (s).
 const INTERVAL: f32 = 1.0 / 30.0;
 
-/// Frames after the wanted one that are tried when its cloth intersects too much to start from: two seconds.
-const LATER_STARTS: usize = 60;
+/// Frames after the wanted one that are tried when its cloth intersects too much to start from: one second.
+const LATER_STARTS: usize = 30;
 
 /// report.json of an offline run.
 #[derive(Debug, Default, Serialize)]
