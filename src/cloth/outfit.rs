@@ -21,7 +21,7 @@ pub struct AnchorBinding {
 
 impl AnchorBinding {
     /// Position on a triangle with these corners, metres.
-    pub(super) fn position(&self, [p, q, r]: [P3; 3]) -> P3 {
+    pub fn position(&self, [p, q, r]: [P3; 3]) -> P3 {
         let w = self.weights;
         let on = p.coords * w[0] + q.coords * w[1] + r.coords * w[2];
         let normal = (q - p).cross(&(r - p)).try_normalize(0.0);

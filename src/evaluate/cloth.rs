@@ -136,24 +136,31 @@ fn measured(
     if config.method == Method::Explicit {
         row = row.with("stiffness_kept", format!("{:.2}", r.softened));
     }
-    if let Some(reference) = reference {
-        let n = reference.len().min(frames.len());
-        let sum: f64 = (0..n)
-            .map(|k| (centre(&frames[k]) - centre(&reference[k])).norm_squared())
-            .sum();
-        row = row.error("com_rms_mm", (sum / n.max(1) as f64).sqrt() * 1e3);
-        /// Half a second at 60 frames a second: later the swing is chaotic.
-        const HALF: usize = 30;
-        if n > HALF {
-            let apart = frames[HALF]
-                .iter()
-                .zip(&reference[HALF])
-                .map(|(a, b)| f64::from((a - b).norm_squared()));
-            let rms = (apart.sum::<f64>() / frames[HALF].len().max(1) as f64).sqrt();
-            row = row.error("vertices_rms_mm", rms * 1e3);
-        }
+    match reference {
+        Some(reference) => reference_errors(row, frames, reference),
+        None => row,
     }
-    row
+}
+
+/// Adds the distances from reference positions, shape `[frames][vertices]`: the centre of mass over all frames, the vertices at
+/// half a second.
+pub(super) fn reference_errors(row: Row, frames: &[Vec<P3>], reference: &[Vec<P3>]) -> Row {
+    /// Half a second at 60 frames a second: later the swing is chaotic.
+    const HALF: usize = 30;
+    let n = reference.len().min(frames.len());
+    let sum: f64 = (0..n)
+        .map(|k| (centre(&frames[k]) - centre(&reference[k])).norm_squared())
+        .sum();
+    let row = row.error("com_rms_mm", (sum / n.max(1) as f64).sqrt() * 1e3);
+    if n <= HALF {
+        return row;
+    }
+    let apart = frames[HALF]
+        .iter()
+        .zip(&reference[HALF])
+        .map(|(a, b)| f64::from((a - b).norm_squared()));
+    let rms = (apart.sum::<f64>() / frames[HALF].len().max(1) as f64).sqrt();
+    row.error("vertices_rms_mm", rms * 1e3)
 }
 
 fn centre(p: &[P3]) -> nalgebra::Vector3<f64> {
@@ -163,7 +170,8 @@ fn centre(p: &[P3]) -> nalgebra::Vector3<f64> {
         / p.len().max(1) as f64
 }
 
-fn reference(folder: &Path, name: &str, scene: &Scene) -> Option<Vec<Vec<P3>>> {
+/// Reference positions of a scene, shape `[frames][vertices]`, if there are any of its size.
+pub(super) fn reference(folder: &Path, name: &str, scene: &Scene) -> Option<Vec<Vec<P3>>> {
     let (shape, values) = read_npy(&folder.join(format!("{name}.reference.npy"))).ok()?;
     if shape.len() != 3 || shape[1] as usize != scene.start.len() || shape[2] != 3 {
         return None;

@@ -5,6 +5,7 @@
 pub mod ablation;
 pub mod ccd;
 pub mod cloth;
+pub mod cloth_offline;
 mod corruptions;
 pub mod dance;
 mod depth_scene;

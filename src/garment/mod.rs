@@ -11,6 +11,7 @@ mod outline;
 mod pattern;
 mod presets;
 mod size;
+mod subdivision;
 mod triangulate;
 mod union_find;
 
@@ -22,3 +23,4 @@ pub use mesh::{AnchorKind, AnchorSet, GarmentMesh, Region, RenderMesh, Triangula
 pub use outline::{Curve, PanelEdge};
 pub use pattern::{Anchor, Dart, GarmentKind, Panel, Pattern, Placement, Seam, Side};
 pub use size::{BodyMeasures, Size, SizeRow, size_table};
+pub use subdivision::GarmentSubdivision;

@@ -4,14 +4,15 @@ use super::body::PosedBody;
 use super::choice::Choice;
 use super::clock::{FrameClock, LongGap};
 use super::error::MirrorError;
+use super::offline_outfit::OfflineOutfit;
 use super::outfit::{DressedOutfit, PutOn, Subject};
-use super::picture::{CameraGarments, DrawnBody, DrawnSurface};
+use super::painter::{CapturedView, DrawnOutfit, OutfitPainter};
 use super::report::{MirrorFrame, StageTimer};
 use crate::body::measure::measure;
 use crate::body::{BodyShape, Pose, Template};
 use crate::camera::{Calibration, ColorImage, RgbdFrame};
 use crate::cloth;
-use crate::composite::{self, Appearance, ImagePyramid, Print, RenderReport};
+use crate::composite::{Appearance, ImagePyramid, Print, RenderReport};
 use crate::math::P3;
 use crate::tracking::{self, Status, TrackerConfig, TrackerModel, TrackerState};
 use std::sync::Arc;
@@ -26,11 +27,7 @@ pub struct Mirror {
     worn: Option<Worn>,
     shape: Arc<BodyShape>,
     posed: PosedBody,
-    body: DrawnBody,
-    garments: CameraGarments,
-    compositor: composite::Model,
-    composite_state: composite::State,
-    composite_work: composite::Workspace,
+    painter: OutfitPainter,
     notes: Vec<String>,
 }
 
@@ -44,7 +41,7 @@ struct Worn {
 impl Mirror {
     /// A chain in front of this camera. Nobody is tracked or dressed yet.
     pub fn new(template: Arc<Template>, calibration: &Calibration, choices: Vec<Choice>) -> Self {
-        let body = DrawnBody::new(Arc::clone(&template));
+        let painter = OutfitPainter::new(Arc::clone(&template));
         let tracker = TrackerModel::new(template, calibration.clone(), TrackerConfig::default());
         Self {
             choices,
@@ -55,11 +52,7 @@ impl Mirror {
             worn: None,
             shape: Arc::default(),
             posed: PosedBody::default(),
-            body,
-            garments: CameraGarments::default(),
-            compositor: composite::Model::default(),
-            composite_state: composite::State::default(),
-            composite_work: composite::Workspace::default(),
+            painter,
             notes: Vec::new(),
         }
     }
@@ -118,6 +111,42 @@ impl Mirror {
     /// Remarks about sizes and meshes; empty before the subject is dressed.
     pub fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    /// Outfit of the subject; `None` before the subject is dressed.
+    pub fn outfit(&self) -> Option<&DressedOutfit> {
+        self.worn.as_ref().map(|w| &w.outfit)
+    }
+
+    /// Colour and surface of each garment of the outfit; empty before the subject is dressed.
+    pub fn appearances(&self) -> &[Appearance] {
+        self.worn.as_ref().map_or(&[], |w| &w.appearances)
+    }
+
+    /// Picture of the last frame with the outfit as another solver moved it: vertices of the cloth and of the body that it
+    /// met (world, metres).
+    ///
+    /// # Errors
+    /// A vertex that is not finite.
+    pub fn picture_of(
+        &self,
+        painter: &mut OutfitPainter,
+        frame: &RgbdFrame,
+        outfit: &OfflineOutfit,
+        [cloth, body]: [&[P3]; 2],
+    ) -> Result<ColorImage, MirrorError> {
+        let drawn = DrawnOutfit {
+            garments: outfit.garments(),
+            appearances: self.appearances(),
+            positions: &outfit.drawn_positions(cloth),
+            body,
+        };
+        let view = CapturedView {
+            frame,
+            calibration: self.tracker.calibration(),
+            camera_from_world: self.tracked.world_from_camera.inverse(),
+        };
+        Ok(painter.paint(&view, Some(&drawn), None)?.0)
     }
 
     /// The body that cloth meets, camera frame, metres; `None` while nobody is live.
@@ -193,36 +222,18 @@ impl Mirror {
         body: Option<&[P3]>,
     ) -> Result<(ColorImage, RenderReport), MirrorError> {
         let worn = self.worn.as_ref().filter(|_| body.is_some());
-        let drawn = worn.map_or_else(Vec::new, |w| w.outfit.drawn_positions());
-        let camera_from_world = self.tracked.world_from_camera.inverse();
-        (self.garments).place(&camera_from_world, drawn.iter().map(Vec::as_slice));
-        let surfaces = worn.iter().flat_map(|worn| {
-            let meshes = worn.outfit.model.outfit.garments.iter();
-            meshes
-                .zip(&worn.appearances)
-                .map(|(mesh, appearance)| DrawnSurface {
-                    faces: &mesh.render.faces,
-                    uv: &mesh.render.uv,
-                    vertex: &mesh.render.vertex,
-                    appearance,
-                })
+        let positions = worn.map_or_else(Vec::new, |w| w.outfit.drawn_positions());
+        let outfit = worn.map(|worn| DrawnOutfit {
+            garments: &worn.outfit.model.outfit.garments,
+            appearances: &worn.appearances,
+            positions: &positions,
+            body: worn.outfit.state.collision_body().vertices(),
         });
-
-        // Under garments the collision body is drawn: cloth stays off its skin.
-        let mut collision_body = Vec::new();
-        if let Some(worn) = worn {
-            let world = worn.outfit.state.collision_body().vertices();
-            camera_from_world.points_f32(world, &mut collision_body);
-        }
-        let drawn = worn.map(|_| &collision_body[..]);
-        let input = composite::Input {
+        let view = CapturedView {
             frame,
             calibration: self.tracker.calibration(),
-            garments: &self.garments.views(surfaces),
-            body: body.map(|posed| self.body.view(drawn.unwrap_or(posed))),
-            output: None,
+            camera_from_world: self.tracked.world_from_camera.inverse(),
         };
-        let (state, work) = (&mut self.composite_state, &mut self.composite_work);
-        Ok(composite::render(&self.compositor, state, &input, work)?)
+        Ok(self.painter.paint(&view, outfit.as_ref(), body)?)
     }
 }

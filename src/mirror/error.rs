@@ -5,6 +5,7 @@ use crate::cloth::ClothError;
 use crate::composite::RenderError;
 use crate::dressing::DressError;
 use crate::garment::GarmentError;
+use crate::offline::OfflineError;
 use crate::tracking;
 
 /// Frame or garment that stops the chain.
@@ -28,4 +29,15 @@ pub enum MirrorError {
     /// The picture cannot be drawn.
     #[error(transparent)]
     Render(#[from] RenderError),
+    /// The offline solver.
+    #[error(transparent)]
+    Offline(#[from] OfflineError),
+    /// The real-time result passes through itself or the body too much for the offline solver to start from it.
+    #[error("{found} edges pass through faces at the start: {places}")]
+    TangledStart {
+        /// Crossings of an edge and a face.
+        found: usize,
+        /// Number between each pair of surfaces, with the place of the first (m).
+        places: String,
+    },
 }

@@ -48,17 +48,7 @@ impl OfflineSolver<'_> {
     /// # Errors
     /// Bytes that are no checkpoint, are damaged, or belong to other meshes; the state is then as it was.
     pub fn resume(&mut self, bytes: &[u8]) -> Result<u64, OfflineError> {
-        let fault = |why: &str| OfflineError::Checkpoint(why.to_owned());
-        let (body, sum) = bytes
-            .split_last_chunk::<8>()
-            .ok_or_else(|| fault("too short"))?;
-        if u64::from_le_bytes(*sum) != checksum(body) {
-            return Err(fault("damaged"));
-        }
-        let mut reader = Reader(
-            body.strip_prefix(MAGIC)
-                .ok_or_else(|| fault("another format"))?,
-        );
+        let mut reader = Reader(contents(bytes)?);
         let mut head = [0; 6];
         for n in &mut head {
             *n = u64::from_le_bytes(reader.next().ok_or_else(|| fault("too short"))?);
@@ -70,11 +60,38 @@ impl OfflineSolver<'_> {
         let state = reader
             .state((n as usize, m as usize), has_earlier == 1)
             .filter(|_| reader.0.is_empty());
-        self.state = state.ok_or_else(|| fault("wrong length"))?;
+        self.state = state.ok_or_else(|| fault("wrong length, or a number that is not finite"))?;
         self.level = level as u32;
         self.calm_steps = calm as u32;
         Ok(frame)
     }
+}
+
+/// Frame after which a checkpoint was taken.
+///
+/// # Errors
+/// Bytes that are no checkpoint or are damaged.
+pub fn checkpoint_frame(bytes: &[u8]) -> Result<u64, OfflineError> {
+    let frame = Reader(contents(bytes)?).next();
+    frame
+        .map(u64::from_le_bytes)
+        .ok_or_else(|| fault("too short"))
+}
+
+fn fault(why: &str) -> OfflineError {
+    OfflineError::Checkpoint(why.to_owned())
+}
+
+/// Bytes between the format's name and the checksum, which holds.
+fn contents(bytes: &[u8]) -> Result<&[u8], OfflineError> {
+    let (body, sum) = bytes
+        .split_last_chunk::<8>()
+        .ok_or_else(|| fault("too short"))?;
+    if u64::from_le_bytes(*sum) != checksum(body) {
+        return Err(fault("damaged"));
+    }
+    body.strip_prefix(MAGIC)
+        .ok_or_else(|| fault("another format"))
 }
 
 /// FNV-1a.
@@ -93,8 +110,10 @@ impl Reader<'_> {
         self.0 = rest;
         Some(*first)
     }
+    /// A finite number.
     fn number(&mut self) -> Option<f64> {
-        self.next().map(f64::from_le_bytes)
+        let value = self.next().map(f64::from_le_bytes);
+        value.filter(|x| x.is_finite())
     }
     fn vectors(&mut self, count: usize) -> Option<Vec<V3d>> {
         if self.0.len() < count.checked_mul(24)? {

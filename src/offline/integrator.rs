@@ -3,7 +3,7 @@
 //! With `a = (1+ω)²/(1+2ω)`, `b = ω²/(1+2ω)`, `γ = (1+ω)/(1+2ω)` and the ratio `ω` of this step to the last one, the
 //! second-order backward difference (BDF2) of a variable step reads `x − a xₙ + b xₙ₋₁ = γ h v`. `ω = 0` is implicit Euler.
 
-use crate::math::V3d;
+use crate::math::{P3, V3d};
 use serde::{Deserialize, Serialize};
 
 /// Order of a step.
@@ -36,6 +36,22 @@ pub struct OfflineState {
     pub earlier: Option<(MotionState, f64)>,
     /// Obstacle vertices where they are, and their scripted targets (m); empty without an obstacle.
     pub obstacle: [Vec<V3d>; 2],
+}
+
+impl OfflineState {
+    /// Positions in single precision (m).
+    pub fn positions(&self) -> Vec<P3> {
+        points(&self.now.x)
+    }
+
+    /// Obstacle vertices in single precision (m).
+    pub fn obstacle_positions(&self) -> Vec<P3> {
+        points(&self.obstacle[0])
+    }
+}
+
+fn points(x: &[V3d]) -> Vec<P3> {
+    x.iter().map(|p| P3::from(p.cast::<f32>())).collect()
 }
 
 /// Coefficients of one step.

@@ -8,6 +8,7 @@ mod drape;
 mod elastic_term;
 mod energy_term;
 mod error;
+mod garment_cloth;
 mod integrator;
 mod linear_solver;
 mod model;
@@ -43,6 +44,7 @@ mod test_twist;
 mod tests;
 
 pub use animation::AnimationProgress;
+pub use checkpoint::checkpoint_frame;
 pub use contacts::{ContactReport, ContactSettings};
 pub use drape::{DrapeReport, DrapeSettings};
 pub use elastic_term::ElasticTerm;

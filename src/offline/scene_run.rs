@@ -1,15 +1,13 @@
 //! Scene files by the offline solver: scene in, positions of every frame out.
 
+use super::garment_cloth::fabric_of;
 use super::{
     AnimationProgress, ElasticTerm, FrameTargets, MotionState, OfflineCloth, OfflineError,
     OfflineSettings, OfflineSolver, OfflineState, PinTarget, solid_mesh::solid_mesh,
 };
 use crate::cloth::scene::Scene;
-use crate::elastic::{
-    BendLaw, BendingModel, ClothModel, ElasticFabric, RestSheet, StretchLaw, Stretching,
-};
-use crate::garment::Material;
-use crate::math::{P3, V3d};
+use crate::elastic::{BendingModel, ClothModel, RestSheet};
+use crate::math::V3d;
 use crate::mesh::Face;
 use crate::par::Par;
 use nalgebra::{Point3, Vector2};
@@ -23,20 +21,6 @@ pub struct OfflineScene<'a> {
     /// Surface of all solids, each in its own frame (m), with the number of its collider.
     solids: Vec<(V3d, usize)>,
     faces: Vec<Face>,
-}
-
-/// Laws of an orthotropic sheet of these moduli; bending is isotropic.
-fn fabric_of(material: &Material) -> ElasticFabric {
-    let strips = [material.stretch_weft, material.stretch_warp];
-    // ν / (1 − ν²) = λ / √(E₁ E₂).
-    let ratio = material.coupling / (strips[0] * strips[1]).sqrt();
-    let poisson = 2.0 * ratio / (1.0 + (1.0 + 4.0 * ratio * ratio).sqrt());
-    let stretch = Stretching::orthotropic(strips, poisson, material.shear);
-    ElasticFabric {
-        area_density: material.area_density,
-        stretch: StretchLaw::Linear(stretch),
-        bend: BendLaw::isotropic(material.bending, poisson),
-    }
 }
 
 /// A triangle laid flat, its first edge along u.
@@ -104,16 +88,17 @@ impl<'a> OfflineScene<'a> {
         self.scene.pins.iter().map(target).collect()
     }
 
-    /// Simulates all frames. `frame` receives the progress and the positions of each (m), and may break off; returns the
-    /// last frame. Friction is that of the first solid, else of the material.
+    /// Simulates all frames, or those after `checkpoint`. `frame` receives the progress and the solver after each, and may
+    /// break off; returns the last frame. Friction is that of the first solid, else of the material.
     ///
     /// # Errors
-    /// A step that is not solved.
+    /// A step that is not solved; a checkpoint of another scene.
     pub fn run(
         &self,
         settings: &OfflineSettings,
         par: Par,
-        mut frame: impl FnMut(&AnimationProgress, &[P3]) -> ControlFlow<()>,
+        checkpoint: Option<&[u8]>,
+        frame: impl FnMut(&AnimationProgress, &OfflineSolver<'_>) -> ControlFlow<()>,
     ) -> Result<usize, OfflineError> {
         let mut settings = *settings;
         if let Some(contact) = &mut settings.contact {
@@ -131,22 +116,22 @@ impl<'a> OfflineScene<'a> {
         };
         let mut solver = OfflineSolver::new(&self.cloth, &self.faces, state, settings, par)?;
         let frames = self.scene.frames().saturating_sub(1);
+        let first = match checkpoint {
+            Some(bytes) => solver.resume(bytes)? as usize,
+            None => 0,
+        };
         let script: Vec<_> = (0..=frames)
             .map(|k| interval * k as f64)
             .map(|t| (self.pins(t), self.obstacle(t)))
             .collect();
         solver.animate(
             interval,
-            (0, frames),
+            (first, frames),
             |k| FrameTargets {
                 pins: &script[k].0,
                 obstacle: &script[k].1,
             },
-            |done, solver| {
-                let x = solver.state().now.x.iter();
-                let shown: Vec<P3> = x.map(|p| P3::from(p.cast::<f32>())).collect();
-                frame(done, &shown)
-            },
+            frame,
         )
     }
 }

@@ -13,6 +13,7 @@ mod drift;
 mod garment_capture;
 mod garment_stream;
 mod garments;
+mod offline_outfit;
 mod seat;
 mod sleep;
 mod starts;

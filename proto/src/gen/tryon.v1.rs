@@ -2342,6 +2342,10 @@ pub struct StartSimulationRequest {
     /// Unspecified is the real-time solver.
     #[prost(enumeration = "ClothSolver", tag = "2")]
     pub solver: i32,
+    /// State of the same scene to continue from, as `CancelSimulation` returned it; at most 4 MiB, offline solver only. The
+    /// frames are the same to the bit as those of an uninterrupted simulation.
+    #[prost(bytes = "bytes", tag = "3")]
+    pub checkpoint: ::prost::bytes::Bytes,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StartSimulationResponse {
@@ -2353,6 +2357,9 @@ pub struct StartSimulationResponse {
     /// Vertices of all garments together.
     #[prost(uint32, tag = "3")]
     pub vertex_count: u32,
+    /// First frame that is computed: 0, or the one after the checkpoint. Earlier ones are not streamed.
+    #[prost(uint32, tag = "4")]
+    pub first_frame: u32,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct FollowSimulationRequest {
@@ -2374,6 +2381,24 @@ pub struct FollowSimulationResponse {
     /// Milliseconds of computing for this frame.
     #[prost(float, tag = "4")]
     pub ms: f32,
+    /// Estimated seconds of computing for the frames after this one.
+    #[prost(float, tag = "5")]
+    pub seconds_left: f32,
+}
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct CancelSimulationRequest {
+    #[prost(string, tag = "1")]
+    pub simulation_id: ::prost::alloc::string::String,
+}
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct CancelSimulationResponse {
+    /// The frame after the last finished one.
+    #[prost(uint32, tag = "1")]
+    pub next_frame: u32,
+    /// State after the last finished frame, for `StartSimulationRequest.checkpoint`; empty for the real-time solver and when
+    /// the simulation had ended before.
+    #[prost(bytes = "bytes", tag = "2")]
+    pub checkpoint: ::prost::bytes::Bytes,
 }
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
@@ -2647,7 +2672,7 @@ pub mod cloth_service_client {
                 .insert(GrpcMethod::new("tryon.v1.ClothService", "StreamGarments"));
             self.inner.server_streaming(req, path, codec).await
         }
-        /// Starts a simulation of a scene that needs no camera; it runs until it is done or the service stops.
+        /// Starts a simulation of a scene that needs no camera; it runs until it is done, cancelled, or the service stops.
         /// INVALID_ARGUMENT names the field of the scene at fault, also when its frames would take more than 256 MiB.
         /// RESOURCE_EXHAUSTED with RetryInfo when too many run.
         pub async fn start_simulation(
@@ -2700,6 +2725,32 @@ pub mod cloth_service_client {
             req.extensions_mut()
                 .insert(GrpcMethod::new("tryon.v1.ClothService", "FollowSimulation"));
             self.inner.server_streaming(req, path, codec).await
+        }
+        /// Ends a simulation after the frame in work and answers then; one that has ended stays as it is. Finished frames are
+        /// kept as above. NOT_FOUND for an unknown id.
+        pub async fn cancel_simulation(
+            &mut self,
+            request: impl tonic::IntoRequest<super::CancelSimulationRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::CancelSimulationResponse>,
+            tonic::Status,
+        > {
+            self.inner
+                .ready()
+                .await
+                .map_err(|e| {
+                    tonic::Status::unknown(
+                        format!("Service was not ready: {}", e.into()),
+                    )
+                })?;
+            let codec = tonic_prost::ProstCodec::default();
+            let path = http::uri::PathAndQuery::from_static(
+                "/tryon.v1.ClothService/CancelSimulation",
+            );
+            let mut req = request.into_request();
+            req.extensions_mut()
+                .insert(GrpcMethod::new("tryon.v1.ClothService", "CancelSimulation"));
+            self.inner.unary(req, path, codec).await
         }
     }
 }
@@ -2755,7 +2806,7 @@ pub mod cloth_service_server {
             tonic::Response<Self::StreamGarmentsStream>,
             tonic::Status,
         >;
-        /// Starts a simulation of a scene that needs no camera; it runs until it is done or the service stops.
+        /// Starts a simulation of a scene that needs no camera; it runs until it is done, cancelled, or the service stops.
         /// INVALID_ARGUMENT names the field of the scene at fault, also when its frames would take more than 256 MiB.
         /// RESOURCE_EXHAUSTED with RetryInfo when too many run.
         async fn start_simulation(
@@ -2782,6 +2833,15 @@ pub mod cloth_service_server {
             request: tonic::Request<super::FollowSimulationRequest>,
         ) -> std::result::Result<
             tonic::Response<Self::FollowSimulationStream>,
+            tonic::Status,
+        >;
+        /// Ends a simulation after the frame in work and answers then; one that has ended stays as it is. Finished frames are
+        /// kept as above. NOT_FOUND for an unknown id.
+        async fn cancel_simulation(
+            &self,
+            request: tonic::Request<super::CancelSimulationRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::CancelSimulationResponse>,
             tonic::Status,
         >;
     }
@@ -3131,6 +3191,52 @@ pub mod cloth_service_server {
                                 max_encoding_message_size,
                             );
                         let res = grpc.server_streaming(method, req).await;
+                        Ok(res)
+                    };
+                    Box::pin(fut)
+                }
+                "/tryon.v1.ClothService/CancelSimulation" => {
+                    #[allow(non_camel_case_types)]
+                    struct CancelSimulationSvc<T: ClothService>(pub Arc<T>);
+                    impl<
+                        T: ClothService,
+                    > tonic::server::UnaryService<super::CancelSimulationRequest>
+                    for CancelSimulationSvc<T> {
+                        type Response = super::CancelSimulationResponse;
+                        type Future = BoxFuture<
+                            tonic::Response<Self::Response>,
+                            tonic::Status,
+                        >;
+                        fn call(
+                            &mut self,
+                            request: tonic::Request<super::CancelSimulationRequest>,
+                        ) -> Self::Future {
+                            let inner = Arc::clone(&self.0);
+                            let fut = async move {
+                                <T as ClothService>::cancel_simulation(&inner, request)
+                                    .await
+                            };
+                            Box::pin(fut)
+                        }
+                    }
+                    let accept_compression_encodings = self.accept_compression_encodings;
+                    let send_compression_encodings = self.send_compression_encodings;
+                    let max_decoding_message_size = self.max_decoding_message_size;
+                    let max_encoding_message_size = self.max_encoding_message_size;
+                    let inner = self.inner.clone();
+                    let fut = async move {
+                        let method = CancelSimulationSvc(inner);
+                        let codec = tonic_prost::ProstCodec::default();
+                        let mut grpc = tonic::server::Grpc::new(codec)
+                            .apply_compression_config(
+                                accept_compression_encodings,
+                                send_compression_encodings,
+                            )
+                            .apply_max_message_size_config(
+                                max_decoding_message_size,
+                                max_encoding_message_size,
+                            );
+                        let res = grpc.unary(method, req).await;
                         Ok(res)
                     };
                     Box::pin(fut)

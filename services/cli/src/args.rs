@@ -1,6 +1,7 @@
 //! Commands and flags of the command line.
 
 mod clothcap;
+mod offline;
 mod serve;
 mod token;
 
@@ -8,13 +9,14 @@ pub(crate) use clothcap::{
     ClothcapAlignArgs, ClothcapArgs, ClothcapCaptureArgs, ClothcapRetargetArgs,
     ClothcapSegmentArgs, ClothcapWhat, ScanArgs, ScanFrameArgs, Shard,
 };
+pub(crate) use offline::{FineArgs, SolverArgs};
 pub(crate) use serve::{DemoArgs, UpArgs};
 pub(crate) use token::{
     AudienceArg, ClaimArgs, TokenArgs, TokenEnrolArgs, TokenIssueArgs, TokenKeyArgs,
     TokenRedeemArgs, TokenRevokeArgs, TokenWhat,
 };
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
 /// Live virtual try-on: a depth camera records a person, the mirror shows the person in other garments.
@@ -103,6 +105,12 @@ pub(crate) struct RunArgs {
     /// Frames a still picture is repeated for, so that calibration and draping can settle.
     #[arg(long, value_name = "N", default_value_t = 45)]
     pub(crate) still_frames: usize,
+    /// Solver, checkpoint.
+    #[command(flatten)]
+    pub(crate) solver: SolverArgs,
+    /// Extent of the offline simulation.
+    #[command(flatten)]
+    pub(crate) fine: FineArgs,
     /// Also draw the tracked body over the picture (frame_*_body.png).
     #[arg(long)]
     pub(crate) overlay: bool,
@@ -137,27 +145,18 @@ pub(crate) struct TrackArgs {
     pub(crate) threads: usize,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum SolverArg {
-    /// Many small explicit steps: a millisecond a frame.
-    Realtime,
-    /// Finite elements, implicit steps of the length that accuracy allows, on contact that never ends in an
-    /// intersection, of cloth with cloth too.
-    Offline,
-}
-
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArgs {
     /// Scene file: mesh, pinned vertices, colliders, material, duration.
     #[arg(long, value_name = "SCENE.json")]
     pub(crate) scene: PathBuf,
-    /// Solver.
-    #[arg(long, value_enum, default_value = "realtime")]
-    pub(crate) solver: SolverArg,
+    /// Solver, checkpoint.
+    #[command(flatten)]
+    pub(crate) solver: SolverArgs,
     /// Lets cloth pass through itself and through solids (offline solver).
     #[arg(long)]
     pub(crate) no_contact: bool,
-    /// Folder for positions.npy (frames × vertices × 3, f32) and report.json.
+    /// Folder for positions.npy (frames × vertices × 3, f32), report.json and, by the offline solver, animation.glb.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
 }
@@ -335,6 +334,12 @@ pub(crate) struct BenchClothArgs {
     /// Slow methods on the large scenes too (many minutes).
     #[arg(long)]
     pub(crate) full: bool,
+    /// The offline solver instead: time schemes, linear solvers, steps, resolutions (cloth-offline.csv …).
+    #[arg(long)]
+    pub(crate) offline: bool,
+    /// Most frames of a scene (with --offline).
+    #[arg(long, value_name = "N", requires = "offline")]
+    pub(crate) frames: Option<usize>,
 }
 
 #[derive(Debug, Args)]

@@ -7,7 +7,10 @@
 mod args;
 mod commands;
 mod input;
+mod interrupt;
+mod offline_files;
 mod onebox;
+mod preview;
 mod report;
 mod viewer;
 

@@ -16,8 +16,8 @@ use tryon_kit::server::{self, Context, Running, Service, StartError};
 use tryon_proto::v1::cloth_service_server::{ClothServiceServer, SERVICE_NAME};
 use tryon_proto::v1::tracking_service_server::SERVICE_NAME as TRACKING;
 
-/// Largest request, bytes: a scene of a simulation and its message.
-const MAX_REQUEST_BYTES: usize = 1024 * 1024 + 4096;
+/// Largest request, bytes: a scene of a simulation, its checkpoint, and their message.
+const MAX_REQUEST_BYTES: usize = 5 * 1024 * 1024 + 4096;
 
 /// Starts the service. The tracking service need not run yet.
 ///

@@ -183,4 +183,13 @@ impl ClothService for Cloth {
             .follow(&r.simulation_id, r.first_frame)
             .map(Response::new)
     }
+
+    async fn cancel_simulation(
+        &self,
+        r: Request<CancelSimulationRequest>,
+    ) -> Result<Response<CancelSimulationResponse>, Status> {
+        Grant::of(&r)?.check_whole_store()?;
+        let id = &r.get_ref().simulation_id;
+        self.simulations.cancel(id).await.map(Response::new)
+    }
 }

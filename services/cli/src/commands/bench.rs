@@ -8,6 +8,7 @@ use anyhow::Result;
 use std::process::ExitCode;
 use tryon::evaluate::ablation::{self, Extent};
 use tryon::evaluate::cloth::ClothBench;
+use tryon::evaluate::cloth_offline::OfflineBench;
 use tryon::evaluate::garment_capture::{
     CaptureVariant, capture_scenes, made_scenes, measure_all, measure_turn_scene, turn_scenes,
 };
@@ -52,6 +53,9 @@ fn tracking(args: &BenchTrackingArgs) -> Result<ExitCode> {
 }
 
 fn cloth(args: &BenchClothArgs) -> Result<ExitCode> {
+    if args.offline {
+        return cloth_offline(args);
+    }
     let mut bench = ClothBench {
         full: args.full,
         ..ClothBench::default()
@@ -62,6 +66,25 @@ fn cloth(args: &BenchClothArgs) -> Result<ExitCode> {
     let bar = input::progress(None, "measuring");
     let table = evaluate::cloth::cloth(&args.scenes, &bench, |_| bar.inc(1))?;
     bar.finish_and_clear();
+    finish(&table, &args.out)
+}
+
+fn cloth_offline(args: &BenchClothArgs) -> Result<ExitCode> {
+    let mut bench = OfflineBench {
+        full: args.full,
+        ..OfflineBench::default()
+    };
+    bench.frames = args.frames.unwrap_or(bench.frames);
+    if !args.scene.is_empty() {
+        bench.scenes.clone_from(&args.scene);
+    }
+    let bar = input::progress(None, "measuring");
+    let mut table = evaluate::cloth_offline::cloth_offline(&args.scenes, &bench, |row| {
+        bar.set_message(format!("{}, {}", row.scene, row.method));
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    table.command = std::env::args().collect::<Vec<_>>().join(" ");
     finish(&table, &args.out)
 }
 

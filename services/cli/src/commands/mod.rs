@@ -11,6 +11,7 @@ pub(crate) mod import;
 pub(crate) mod record;
 pub(crate) mod replay;
 pub(crate) mod run;
+pub(crate) mod run_offline;
 pub(crate) mod simulate;
 pub(crate) mod token;
 pub(crate) mod track;

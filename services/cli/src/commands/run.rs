@@ -2,8 +2,9 @@
 
 use crate::args::RunArgs;
 use crate::input;
+use crate::preview::repetition;
 use crate::report::{Samples, Summary, peak_memory, write};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::process::ExitCode;
@@ -16,9 +17,6 @@ use tryon::mirror::{Mirror, MirrorFrame};
 use tryon::par::{Par, with_threads};
 use tryon::raster::{View, VisibilityBuffer, rasterise};
 use tryon::tracking::{LostReason, Status};
-
-/// Time between the repetitions of a still picture (ns): 30 a second.
-const STILL_INTERVAL_NS: u64 = 33_333_333;
 
 /// report.json of this command.
 #[derive(Debug, Default, Serialize)]
@@ -135,6 +133,10 @@ fn skipped(seen: &MirrorFrame) -> impl Iterator<Item = (&'static str, f64)> {
 /// # Errors
 /// Bad input, named; or pictures that cannot be written.
 pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
+    if args.solver.is_offline()? {
+        return super::run_offline::run(args);
+    }
+    ensure!(args.fine.still.is_none(), "--still needs --solver offline");
     let choices = input::choices(
         &args.garments,
         args.size.as_deref(),
@@ -225,15 +227,6 @@ fn dress_all(
     bar.finish_and_clear();
     report.sizes = mirror.notes().to_vec();
     Ok(measured.into_report(report))
-}
-
-/// The `k`-th repetition of a still picture.
-fn repetition(frame: &RgbdFrame, k: u64) -> RgbdFrame {
-    RgbdFrame {
-        time_ns: frame.time_ns + k * STILL_INTERVAL_NS,
-        sequence: frame.sequence + k,
-        ..frame.clone()
-    }
 }
 
 /// Nearest surface of the overlay (m): no body of a recording is nearer.

@@ -1,60 +1,58 @@
 //! `tryon simulate`: cloth in a scene file.
 
-use crate::args::{SimulateArgs, SolverArg};
+use crate::args::SimulateArgs;
 use crate::input;
+use crate::interrupt::INTERRUPTED;
+use crate::offline_files::{OfflineFiles, saved_state};
 use crate::report::write;
 use anyhow::Result;
-use indicatif::ProgressBar;
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::process::ExitCode;
-use tryon::cloth::scene::{self, RunConfig, RunReport, Scene};
+use tryon::cloth::scene::{self, RunConfig, Scene};
+use tryon::formats::gltf::{GlbMesh, write_glb_motion};
 use tryon::math::P3;
-use tryon::offline::{OfflineFrameReport, OfflineScene, OfflineSettings};
+use tryon::offline::{OfflineFrameReport, OfflineScene, OfflineSettings, checkpoint_frame};
 use tryon::par::Par;
+
+/// Base colour of the cloth in the animation, sRGB.
+const CLOTH: [u8; 3] = [190, 190, 200];
 
 /// Runs the command.
 ///
 /// # Errors
 /// A scene at fault, named by field, or results that cannot be written.
 pub(crate) fn run(args: &SimulateArgs) -> Result<ExitCode> {
+    let is_offline = args.solver.is_offline()?;
     let scene = scene::load(&args.scene)?;
     input::create_dir(&args.out)?;
-    let bar = input::progress(Some(scene.frames() as u64), "simulating");
-    let mut frames = Vec::with_capacity(scene.frames());
-    let report = args.out.join("report.json");
-    match args.solver {
-        SolverArg::Realtime => {
-            let done = realtime(&scene, &bar, &mut frames)?;
-            write(&report, &done)?;
-        }
-        SolverArg::Offline => {
-            let mut settings = OfflineSettings::default();
-            settings.contact = settings.contact.filter(|_| !args.no_contact);
-            let done = offline(&scene, &settings, &bar, &mut frames)?;
-            write(&report, &done)?;
-        }
+    if is_offline {
+        offline(args, &scene)
+    } else {
+        realtime(args, &scene)
     }
-    bar.finish_and_clear();
-    scene::write_positions(&args.out.join("positions.npy"), &frames)?;
-    println!("{} frames in {}", frames.len(), args.out.display());
-    Ok(ExitCode::SUCCESS)
 }
 
-/// Fills `frames` by the real-time solver.
-fn realtime(scene: &Scene, bar: &ProgressBar, frames: &mut Vec<Vec<P3>>) -> Result<RunReport> {
+/// Simulates by the real-time solver.
+fn realtime(args: &SimulateArgs, scene: &Scene) -> Result<ExitCode> {
+    let bar = input::progress(Some(scene.frames() as u64), "simulating");
+    let mut frames = Vec::with_capacity(scene.frames());
     let report = scene::run(scene, &RunConfig::default(), |_, positions| {
         frames.push(positions.to_vec());
         bar.inc(1);
         ControlFlow::Continue(())
     })?;
+    bar.finish_and_clear();
     if report.unconverged > 0 {
         eprintln!(
             "warning: {} steps did not converge; see report.json",
             report.unconverged
         );
     }
-    Ok(report)
+    write(&args.out.join("report.json"), &report)?;
+    scene::write_positions(&args.out.join("positions.npy"), &frames)?;
+    println!("{} frames in {}", frames.len(), args.out.display());
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Report of the offline solver.
@@ -62,35 +60,74 @@ fn realtime(scene: &Scene, bar: &ProgressBar, frames: &mut Vec<Vec<P3>>) -> Resu
 struct OfflineRun {
     /// Frames of the output, the start included.
     frames: usize,
+    /// Frames that an earlier run computed, the start included.
+    resumed: usize,
     vertices: usize,
-    /// Computing time of all frames (s).
+    /// Computing time of the frames of this run (s).
     seconds: f64,
-    /// Work of each frame but the start.
+    /// Work of each frame of this run.
     work: Vec<OfflineFrameReport>,
 }
 
-/// Fills `frames` by the offline solver.
-fn offline(
-    scene: &Scene,
-    settings: &OfflineSettings,
-    bar: &ProgressBar,
-    frames: &mut Vec<Vec<P3>>,
-) -> Result<OfflineRun> {
-    frames.push(scene.start.clone());
-    bar.inc(1);
-    let (mut work, mut seconds) = (Vec::new(), 0.0);
+/// Simulates by the offline solver.
+fn offline(args: &SimulateArgs, scene: &Scene) -> Result<ExitCode> {
+    let mut settings = OfflineSettings::default();
+    settings.contact = settings.contact.filter(|_| !args.no_contact);
+    let saved = saved_state(&args.solver)?;
     let offline = OfflineScene::new(scene)?;
-    offline.run(settings, Par::Rayon, |done, positions| {
-        frames.push(positions.to_vec());
+    let resumed = saved.as_deref().map_or(Ok(0), checkpoint_frame)? as usize;
+    let known = saved.as_ref().map_or(0, |_| resumed + 1);
+    let mut files = OfflineFiles::open(&args.solver, &args.out, scene.start.len(), known)?;
+    if saved.is_none() {
+        files.start(&scene.start)?;
+    }
+
+    let bar = input::progress(Some(scene.frames() as u64), "simulating");
+    bar.set_position(resumed as u64 + 1);
+    bar.reset_eta();
+    let (mut work, mut seconds, mut fault) = (Vec::new(), 0.0, None);
+    let simulated = offline.run(&settings, Par::Rayon, saved.as_deref(), |done, solver| {
         work.push(done.report);
         seconds = done.seconds[0];
         bar.inc(1);
-        ControlFlow::Continue(())
-    })?;
-    Ok(OfflineRun {
+        files.frame(solver).unwrap_or_else(|e| {
+            fault = Some(e);
+            ControlFlow::Break(())
+        })
+    });
+    bar.finish_and_clear();
+    fault.map_or(Ok(()), Err)?;
+    simulated?;
+
+    let frames = files.read()?;
+    let report = OfflineRun {
         frames: frames.len(),
+        resumed: known,
         vertices: scene.start.len(),
         seconds,
         work,
+    };
+    write(&args.out.join("report.json"), &report)?;
+    write_animation(args, scene, &frames)?;
+    println!("{} frames in {}", frames.len(), args.out.display());
+    Ok(if frames.len() < scene.frames() {
+        ExitCode::from(INTERRUPTED)
+    } else {
+        ExitCode::SUCCESS
     })
+}
+
+/// Writes animation.glb.
+fn write_animation(args: &SimulateArgs, scene: &Scene, frames: &[Vec<P3>]) -> Result<()> {
+    let cloth = GlbMesh {
+        name: "cloth",
+        vertices: &scene.start,
+        faces: &scene.faces,
+        uv: &[],
+        color: CLOTH,
+        texture: &[],
+    };
+    let (path, interval) = (args.out.join("animation.glb"), 1.0 / scene.rate);
+    write_glb_motion(&path, &[cloth], &[frames.to_vec()], interval as f32)?;
+    Ok(())
 }

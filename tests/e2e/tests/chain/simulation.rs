@@ -22,12 +22,16 @@ fn falling(change: impl Fn(&mut serde_json::Value)) -> StartSimulationRequest {
     change(&mut scene);
     StartSimulationRequest {
         scene_json: scene.to_string(),
-        solver: ClothSolver::Unspecified.into(),
+        ..Default::default()
     }
 }
 
-/// Mean height of each frame from `first` on.
-async fn heights(c: &mut ClothServiceClient<Channel>, id: &str, first: u32) -> Vec<f64> {
+/// Mean height of each frame from `first` on, of `count` frames in all.
+async fn heights(
+    c: &mut ClothServiceClient<Channel>,
+    id: &str,
+    (first, count): (u32, u32),
+) -> Vec<f64> {
     let r = FollowSimulationRequest {
         simulation_id: id.into(),
         first_frame: first,
@@ -37,7 +41,7 @@ async fn heights(c: &mut ClothServiceClient<Channel>, id: &str, first: u32) -> V
     while let Some(f) = frames.message().await.expect("a frame") {
         assert_eq!(
             (f.frame, f.frame_count, f.positions.len()),
-            (first + out.len() as u32, FRAMES, 4 * 12)
+            (first + out.len() as u32, count, 4 * 12)
         );
         let y = f
             .positions
@@ -63,7 +67,7 @@ fn a_simulation_on_request_falls_as_bodies_fall() {
                 .expect("started")
                 .into_inner();
             assert_eq!((started.frame_count, started.vertex_count), (FRAMES, 4));
-            let all = heights(&mut c, &started.simulation_id, 0).await;
+            let all = heights(&mut c, &started.simulation_id, (0, FRAMES)).await;
             assert_eq!(all.len(), FRAMES as usize);
             for (k, y) in all.iter().enumerate() {
                 let t = k as f64 / RATE;
@@ -75,7 +79,10 @@ fn a_simulation_on_request_falls_as_bodies_fall() {
                 );
             }
             // A second reader, later and from the middle, sees the same frames.
-            assert_eq!(heights(&mut c, &started.simulation_id, 10).await, all[10..]);
+            assert_eq!(
+                heights(&mut c, &started.simulation_id, (10, FRAMES)).await,
+                all[10..]
+            );
             let beyond = FollowSimulationRequest {
                 simulation_id: started.simulation_id,
                 first_frame: FRAMES,
@@ -122,5 +129,66 @@ fn a_simulation_on_request_falls_as_bodies_fall() {
             c.follow_simulation(gone).await.expect_err("unknown").code(),
             Code::NotFound
         );
+    });
+}
+
+#[test]
+fn a_cancelled_simulation_continues_to_the_same_bits() {
+    let kiosk = Kiosk::start("pattern", 10.0);
+    super::client(async {
+        let mut c = ClothServiceClient::new(kiosk.channel(Part::Cloth));
+        let offline = StartSimulationRequest {
+            solver: ClothSolver::Offline.into(),
+            ..falling(|s| s["duration_s"] = 200.0.into())
+        };
+        let started = c.start_simulation(offline.clone()).await.expect("started");
+        let id = started.into_inner().simulation_id;
+        let cancel = CancelSimulationRequest { simulation_id: id };
+        let first = c
+            .cancel_simulation(cancel.clone())
+            .await
+            .expect("cancelled");
+        let first = first.into_inner();
+        let again = c.cancel_simulation(cancel).await.expect("cancelled before");
+        assert_eq!(again.into_inner(), first);
+
+        // Half a second more than the first simulation came to.
+        let count = first.next_frame + FRAMES;
+        let whole = StartSimulationRequest {
+            scene_json: falling(|s| s["duration_s"] = (f64::from(count - 1) / RATE).into())
+                .scene_json,
+            ..offline
+        };
+        let rest = StartSimulationRequest {
+            checkpoint: first.checkpoint,
+            ..whole.clone()
+        };
+        let resumed = c.start_simulation(rest.clone()).await.expect("resumed");
+        let resumed = resumed.into_inner();
+        assert_eq!(resumed.first_frame, first.next_frame);
+        let range = (first.next_frame, count);
+        let resumed = heights(&mut c, &resumed.simulation_id, range).await;
+        let started = c.start_simulation(whole).await.expect("started");
+        let whole = heights(&mut c, &started.into_inner().simulation_id, range).await;
+        assert_eq!(resumed.len(), FRAMES as usize);
+        assert_eq!(resumed, whole);
+
+        let mut damaged = rest.checkpoint.to_vec();
+        damaged.truncate(damaged.len() / 2);
+        let mut refuse = async |request: StartSimulationRequest, part: &str| {
+            let e = c.start_simulation(request).await.expect_err("refused");
+            let is_named = e.message().contains("checkpoint") && e.message().contains(part);
+            assert!(e.code() == Code::InvalidArgument && is_named, "{part}: {e}");
+        };
+        let damaged = StartSimulationRequest {
+            checkpoint: damaged.into(),
+            ..rest.clone()
+        };
+        refuse(damaged, "damaged").await;
+        let realtime = StartSimulationRequest {
+            solver: ClothSolver::Realtime.into(),
+            ..rest
+        };
+        refuse(realtime, "only the offline solver").await;
     });
 }

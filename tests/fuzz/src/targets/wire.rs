@@ -114,6 +114,7 @@ requests!(
     StreamGarmentsRequest,
     StartSimulationRequest,
     FollowSimulationRequest,
+    CancelSimulationRequest,
     HoldConsentRequest,
     WithdrawConsentRequest,
     AcknowledgeFramesRequest,

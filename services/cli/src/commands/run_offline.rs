@@ -1,0 +1,408 @@
+//! `tryon run --solver offline`: the preview dresses the subject, the offline solver goes on from its result.
+
+use crate::args::RunArgs;
+use crate::input;
+use crate::interrupt::INTERRUPTED;
+use crate::offline_files::{OfflineFiles, saved_state};
+use crate::preview::{Preview, PreviewFrame};
+use crate::report::{peak_memory, write};
+use anyhow::{Context, Result, bail};
+use serde::Serialize;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+use tryon::camera::ColorImage;
+use tryon::formats::gltf::{GlbMesh, write_glb_motion};
+use tryon::formats::image::write_png_rgb;
+use tryon::math::{P3, V3d};
+use tryon::mirror::{
+    DressedOutfit, FrameClock, LongGap, MirrorError, OfflineDrapeReport, OfflineOutfit,
+    OutfitPainter,
+};
+use tryon::offline::{
+    FrameTargets, OfflineFrameReport, OfflineSolver, OfflineState, checkpoint_frame,
+};
+use tryon::par::{Par, with_threads};
+
+/// Nominal time between frames of the animation (s).
+const INTERVAL: f32 = 1.0 / 30.0;
+
+/// Frames after the wanted one that are tried when its cloth intersects too much to start from: one second.
+const LATER_STARTS: usize = 30;
+
+/// report.json of an offline run.
+#[derive(Debug, Default, Serialize)]
+struct Report {
+    garments: Vec<GarmentPart>,
+    /// Frame of the recording that the simulation starts from.
+    first_frame: usize,
+    /// Frames of positions.npy, the start included.
+    frames: usize,
+    /// Drape in the pose of the first frame, from coarse to fine.
+    drape: OfflineDrapeReport,
+    /// Frames without a live body: cloth stays as it was, and starts again from the preview.
+    waited: Vec<usize>,
+    /// Work of each frame of this run, and its time (s).
+    work: Vec<(OfflineFrameReport, f64)>,
+    sizes: Vec<String>,
+    peak_memory_bytes: Option<u64>,
+}
+
+/// Vertices of a garment in positions.npy.
+#[derive(Debug, Serialize)]
+struct GarmentPart {
+    name: String,
+    first_vertex: usize,
+    vertices: usize,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, named; a start with intersections that cannot be repaired; a step that is not solved; results that cannot
+/// be written.
+pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
+    input::create_dir(&args.out)?;
+    let mut preview = Preview::open(args)?;
+    with_threads(args.threads, || {
+        let Some(dressed) = dress(args, &mut preview)? else {
+            eprintln!("tryon: nobody was dressed in {}", args.input.display());
+            return Ok(ExitCode::FAILURE);
+        };
+        let (dressed, outfit) = free_start(args, &mut preview, dressed)?;
+        let mut report = Report {
+            garments: parts(&outfit),
+            first_frame: dressed.index,
+            sizes: preview.mirror.notes().to_vec(),
+            ..Report::default()
+        };
+        let is_whole = if preview.is_still() || args.fine.still.is_some() {
+            drape(args, &preview, &outfit, &dressed, &mut report)
+        } else {
+            Animation::start(args, &outfit, &preview, &dressed, &mut report)
+                .and_then(|mut animation| animation.run(&mut preview, &dressed, &mut report))
+        }?;
+        report.peak_memory_bytes = peak_memory();
+        write(&args.out.join("report.json"), &report)?;
+        report.sizes.iter().for_each(|note| println!("{note}"));
+        let (frames, out) = (report.frames, args.out.display());
+        println!(
+            "{frames} frames of {} vertices, pictures, positions.npy, outfit.glb and report.json in {out}",
+            outfit.cloth().len()
+        );
+        Ok(if is_whole {
+            ExitCode::SUCCESS
+        } else {
+            ExitCode::from(INTERRUPTED)
+        })
+    })?
+}
+
+/// Runs the preview up to the frame to start from; `None` when nobody is dressed.
+fn dress(args: &RunArgs, preview: &mut Preview) -> Result<Option<PreviewFrame>> {
+    let last = preview.total.filter(|_| preview.is_still());
+    let wanted = args.fine.still.or(last.map(|n| n.saturating_sub(1)));
+    let bar = input::progress(preview.total.map(|n| n as u64), "dressing");
+    while let Some(frame) = preview.next()? {
+        bar.inc(1);
+        if frame.seen.is_dressed && wanted.is_none_or(|w| frame.index >= w) {
+            bar.finish_and_clear();
+            return Ok(Some(frame));
+        }
+        if wanted.is_none() {
+            picture(&args.out, frame.index, "", &frame.seen.picture)?;
+        }
+    }
+    bar.finish_and_clear();
+    Ok(None)
+}
+
+/// The first frame from `dressed` on whose cloth is free of intersections, or can be freed; its outfit.
+fn free_start(
+    args: &RunArgs,
+    preview: &mut Preview,
+    mut dressed: PreviewFrame,
+) -> Result<(PreviewFrame, OfflineOutfit)> {
+    let faces = preview.mirror.template().mesh().faces().to_vec();
+    let mut left = LATER_STARTS;
+    loop {
+        let worn = worn(preview)?;
+        let outfit = OfflineOutfit::new(worn, &faces, args.fine.vertices)?;
+        let tangled = match outfit.start(worn, Par::Rayon) {
+            Ok(_) => return Ok((dressed, outfit)),
+            Err(e @ MirrorError::TangledStart { .. }) => e,
+            Err(e) => return Err(e.into()),
+        };
+        if left == LATER_STARTS {
+            eprintln!(
+                "tryon: frame {}: {tangled}; trying later ones",
+                dressed.index
+            );
+        }
+        loop {
+            if args.fine.still.is_none() && !preview.is_still() {
+                picture(&args.out, dressed.index, "", &dressed.seen.picture)?;
+            }
+            left -= 1;
+            match preview.next()?.filter(|_| left > 0) {
+                Some(next) => dressed = next,
+                None => return Err(tangled.into()),
+            }
+            if dressed.seen.is_dressed {
+                break;
+            }
+        }
+    }
+}
+
+fn worn(preview: &Preview) -> Result<&DressedOutfit> {
+    preview.mirror.outfit().context("nobody is dressed")
+}
+
+fn parts(outfit: &OfflineOutfit) -> Vec<GarmentPart> {
+    let mut first_vertex = 0;
+    let part = |g: &tryon::garment::GarmentMesh| {
+        let part = GarmentPart {
+            name: g.name.clone(),
+            first_vertex,
+            vertices: g.vertices,
+        };
+        first_vertex += g.vertices;
+        part
+    };
+    outfit.garments().iter().map(part).collect()
+}
+
+fn picture(out: &Path, index: usize, kind: &str, picture: &ColorImage) -> Result<()> {
+    let path = out.join(format!("frame_{index:06}{kind}.png"));
+    Ok(write_png_rgb(&path, picture)?)
+}
+
+/// Picture of a frame with the cloth of the solver.
+fn fine_picture(
+    preview: &Preview,
+    painter: &mut OutfitPainter,
+    frame: &PreviewFrame,
+    outfit: &OfflineOutfit,
+    solver: &OfflineSolver<'_>,
+) -> Result<ColorImage> {
+    let state = solver.state();
+    let surfaces = [state.positions(), state.obstacle_positions()];
+    let surfaces = [&surfaces[0][..], &surfaces[1]];
+    Ok((preview.mirror).picture_of(painter, &frame.frame, outfit, surfaces)?)
+}
+
+/// Drapes the outfit in the pose of one frame; false after Ctrl-C.
+fn drape(
+    args: &RunArgs,
+    preview: &Preview,
+    outfit: &OfflineOutfit,
+    frame: &PreviewFrame,
+    report: &mut Report,
+) -> Result<bool> {
+    if args.solver.checkpoint.is_some() {
+        bail!("a drape takes seconds and has no checkpoint");
+    }
+    picture(&args.out, frame.index, "_preview", &frame.seen.picture)?;
+    let mut files = OfflineFiles::open(&args.solver, &args.out, outfit.cloth().len(), 0)?;
+    let (state, done) = settle(outfit, worn(preview)?, || files.flow())?;
+    report.drape = done;
+    let solver = outfit.solver(state, Par::Rayon)?;
+    files.start(&solver.state().positions())?;
+    let mut painter = OutfitPainter::new(input::template(args.body.as_deref())?);
+    let fine = fine_picture(preview, &mut painter, frame, outfit, &solver)?;
+    picture(&args.out, frame.index, "", &fine)?;
+    finish(args, preview, outfit, &mut files, report)?;
+    Ok(files.flow().is_continue())
+}
+
+/// Writes outfit.glb of all frames.
+fn finish(
+    args: &RunArgs,
+    preview: &Preview,
+    outfit: &OfflineOutfit,
+    files: &mut OfflineFiles,
+    report: &mut Report,
+) -> Result<()> {
+    let frames = files.read()?;
+    report.frames = frames.len();
+    let mut motion: Vec<Vec<Vec<P3>>> = vec![Vec::new(); outfit.garments().len()];
+    for frame in &frames {
+        for (all, drawn) in motion.iter_mut().zip(outfit.drawn_positions(frame)) {
+            all.push(drawn);
+        }
+    }
+    let colors = preview.mirror.appearances().iter().map(|a| a.base);
+    let garments = outfit.garments().iter().zip(colors).zip(&motion);
+    let meshes: Vec<GlbMesh<'_>> = garments
+        .map(|((g, color), motion)| GlbMesh {
+            name: &g.name,
+            vertices: motion.first().map_or(&[][..], Vec::as_slice),
+            faces: &g.render.faces,
+            uv: &g.render.uv,
+            color,
+            texture: &[],
+        })
+        .collect();
+    let motion = if frames.len() > 1 { &motion[..] } else { &[] };
+    write_glb_motion(&args.out.join("outfit.glb"), &meshes, motion, INTERVAL)?;
+    Ok(())
+}
+
+/// Simulation of the frames after the first dressed one.
+struct Animation<'a> {
+    args: &'a RunArgs,
+    outfit: &'a OfflineOutfit,
+    solver: OfflineSolver<'a>,
+    files: OfflineFiles,
+    painter: OutfitPainter,
+    /// Frames after the first one that an earlier run computed.
+    resumed: usize,
+    /// True while nobody is dressed in the preview.
+    is_lost: bool,
+}
+
+impl<'a> Animation<'a> {
+    /// At the first frame, from the preview or at a checkpoint.
+    fn start(
+        args: &'a RunArgs,
+        outfit: &'a OfflineOutfit,
+        preview: &Preview,
+        first: &PreviewFrame,
+        report: &mut Report,
+    ) -> Result<Self> {
+        let saved = saved_state(&args.solver)?;
+        let known = saved.as_deref().map(checkpoint_frame).transpose()?;
+        let resumed = known.unwrap_or(0) as usize;
+        let frames = known.map_or(0, |_| resumed + 1);
+        let count = outfit.cloth().len();
+        let mut files = OfflineFiles::open(&args.solver, &args.out, count, frames)?;
+        let worn = worn(preview)?;
+        let state = match saved {
+            Some(_) => outfit.unrepaired_start(worn),
+            None => {
+                let (state, done) = settle(outfit, worn, || files.flow())?;
+                report.drape = done;
+                state
+            }
+        };
+        let mut solver = outfit.solver(state, Par::Rayon)?;
+        match &saved {
+            Some(bytes) => {
+                solver.resume(bytes)?;
+            }
+            None => files.start(&solver.state().positions())?,
+        }
+        let mut out = Self {
+            args,
+            outfit,
+            solver,
+            files,
+            painter: OutfitPainter::new(input::template(args.body.as_deref())?),
+            resumed,
+            is_lost: false,
+        };
+        if saved.is_none() {
+            let (painter, solver) = (&mut out.painter, &out.solver);
+            let fine = fine_picture(preview, painter, first, outfit, solver)?;
+            picture(&args.out, first.index, "", &fine)?;
+        }
+        Ok(out)
+    }
+
+    /// Simulates to the end of the recording, or to the end of the frame in work after Ctrl-C: false then.
+    fn run(
+        &mut self,
+        preview: &mut Preview,
+        first: &PreviewFrame,
+        report: &mut Report,
+    ) -> Result<bool> {
+        let left = preview.total.map(|n| (n - 1 - first.index) as u64);
+        let bar = input::progress(left, "simulating");
+        let mut clock = FrameClock::at(first.frame.time_ns);
+        let (mut done, mut is_whole) = (0, true);
+        while let Some(frame) = preview.next()? {
+            done += 1;
+            let dt = LongGap::Nominal.time_step(clock.gap(frame.frame.time_ns));
+            if done <= self.resumed {
+                self.is_lost = !frame.seen.is_dressed;
+                bar.inc(1);
+                bar.reset_eta();
+                continue;
+            }
+            self.frame(preview, &frame, dt, report)
+                .with_context(|| format!("frame {}", frame.index))?;
+            bar.inc(1);
+            if self.files.frame(&self.solver)?.is_break() {
+                is_whole = false;
+                break;
+            }
+        }
+        bar.finish_and_clear();
+        finish(self.args, preview, self.outfit, &mut self.files, report)?;
+        Ok(is_whole)
+    }
+
+    /// Simulates one frame and writes its picture.
+    fn frame(
+        &mut self,
+        preview: &Preview,
+        frame: &PreviewFrame,
+        dt: f64,
+        report: &mut Report,
+    ) -> Result<()> {
+        let out = &self.args.out;
+        if !frame.seen.is_dressed {
+            self.is_lost = true;
+            report.waited.push(frame.index);
+            return picture(out, frame.index, "", &frame.seen.picture);
+        }
+        let worn = worn(preview)?;
+        if std::mem::take(&mut self.is_lost) {
+            let (state, _) = settle(self.outfit, worn, || self.files.flow())?;
+            self.solver = self.outfit.solver(state, Par::Rayon)?;
+        }
+        let started = Instant::now();
+        let work = advance(self.outfit, &mut self.solver, worn, dt)?;
+        report.work.push((work, started.elapsed().as_secs_f64()));
+        let (painter, solver) = (&mut self.painter, &self.solver);
+        let fine = fine_picture(preview, painter, frame, self.outfit, solver)?;
+        picture(out, frame.index, "", &fine)
+    }
+}
+
+/// Static drape from the preview, which leaves the cloth under stress by the offline fabric and contact. `flow` breaks off.
+fn settle(
+    outfit: &OfflineOutfit,
+    worn: &DressedOutfit,
+    flow: impl Fn() -> ControlFlow<()>,
+) -> Result<(OfflineState, OfflineDrapeReport)> {
+    let bar = input::progress(None, "draping");
+    let done = outfit.drape(worn, Par::Rayon, |vertices, step| {
+        bar.set_message(format!(
+            "{vertices} vertices, moved {:.1} mm",
+            step.motion * 1e3
+        ));
+        bar.inc(1);
+        flow()
+    })?;
+    bar.finish_and_clear();
+    Ok(done)
+}
+
+/// One frame: the body moves evenly to where the preview has it.
+fn advance(
+    outfit: &OfflineOutfit,
+    solver: &mut OfflineSolver<'_>,
+    worn: &DressedOutfit,
+    dt: f64,
+) -> Result<OfflineFrameReport> {
+    let body = worn.state.collision_body().vertices();
+    let obstacle: Vec<V3d> = body.iter().map(|p| p.coords.cast()).collect();
+    let targets = FrameTargets {
+        pins: &outfit.pins(body),
+        obstacle: &obstacle,
+    };
+    Ok(solver.advance(dt, &targets)?)
+}

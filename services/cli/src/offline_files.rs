@@ -1,0 +1,104 @@
+//! Files of an offline simulation, valid after every frame: positions and checkpoint.
+
+use crate::args::SolverArgs;
+use crate::interrupt::Interrupt;
+use anyhow::{Context, Result};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use tryon::formats::NpyFrames;
+use tryon::math::P3;
+use tryon::offline::OfflineSolver;
+
+/// Positions of the frames so far, the checkpoint after the last, and the request to end.
+#[derive(Debug)]
+pub(crate) struct OfflineFiles {
+    positions: NpyFrames,
+    checkpoint: Option<PathBuf>,
+    interrupt: Interrupt,
+}
+
+/// State to continue from; `None` without `--resume` or before its first frame.
+///
+/// # Errors
+/// A file that cannot be read.
+pub(crate) fn saved_state(args: &SolverArgs) -> Result<Option<Vec<u8>>> {
+    let file = args.checkpoint.as_ref();
+    match file.filter(|f| args.resume && f.exists()) {
+        Some(file) => {
+            let bytes = std::fs::read(file);
+            bytes.with_context(|| file.display().to_string()).map(Some)
+        }
+        None => Ok(None),
+    }
+}
+
+impl OfflineFiles {
+    /// positions.npy in `out` and the checkpoint of `args`, after `frames` frames of an earlier run.
+    ///
+    /// # Errors
+    /// Files that cannot be written, or positions that do not belong to the checkpoint.
+    pub(crate) fn open(
+        args: &SolverArgs,
+        out: &Path,
+        vertices: usize,
+        frames: usize,
+    ) -> Result<Self> {
+        let path = out.join("positions.npy");
+        let positions = match frames {
+            0 => NpyFrames::create(&path, vertices),
+            n => NpyFrames::resume(&path, vertices, n),
+        };
+        Ok(Self {
+            positions: positions?,
+            checkpoint: args.checkpoint.clone(),
+            interrupt: Interrupt::watch()?,
+        })
+    }
+
+    /// Adds the start.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub(crate) fn start(&mut self, positions: &[P3]) -> Result<()> {
+        Ok(self.positions.push(positions)?)
+    }
+
+    /// Adds a frame and writes the checkpoint after it; breaks after Ctrl-C.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub(crate) fn frame(&mut self, solver: &OfflineSolver<'_>) -> Result<ControlFlow<()>> {
+        let number = self.positions.len() as u64;
+        self.positions.push(&solver.state().positions())?;
+        if let Some(file) = &self.checkpoint {
+            replace(file, &solver.checkpoint(number))
+                .with_context(|| format!("cannot write {}", file.display()))?;
+        }
+        Ok(self.flow())
+    }
+
+    /// Breaks after Ctrl-C.
+    pub(crate) fn flow(&self) -> ControlFlow<()> {
+        if self.interrupt.is_asked() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+
+    /// Positions of all frames (m), shape `[frames][vertices]`.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub(crate) fn read(&mut self) -> Result<Vec<Vec<P3>>> {
+        Ok(self.positions.read()?)
+    }
+}
+
+/// Writes a file beside `path` and renames it, so that there is a whole one at any time.
+fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".new");
+    std::fs::write(&beside, bytes)?;
+    std::fs::rename(&beside, path)
+}

@@ -1,0 +1,82 @@
+//! Static drape of an outfit from coarse to fine: each mesh starts from the rest of the coarser one (cascadic iteration,
+//! Bornemann & Deuflhard 1996), so that the fine systems only add what the coarse mesh cannot resolve.
+
+use super::error::MirrorError;
+use super::offline_outfit::OfflineOutfit;
+use super::outfit::DressedOutfit;
+use crate::offline::{DrapeReport, DrapeSettings, FrameTargets, OfflineState, StartReport};
+use crate::par::Par;
+use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+/// Work of a drape on one mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct OfflineDrapeLevel {
+    /// Vertices of the cloth.
+    pub vertices: usize,
+    /// Steps and end.
+    pub drape: DrapeReport,
+    /// Computing time (s). No result depends on it.
+    pub seconds: f64,
+}
+
+/// Work of a drape.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct OfflineDrapeReport {
+    /// Repair of the real-time result.
+    pub start: StartReport,
+    /// Meshes, from coarse to fine.
+    pub levels: Vec<OfflineDrapeLevel>,
+}
+
+impl OfflineDrapeReport {
+    /// True if the finest mesh came to rest.
+    pub fn is_settled(&self) -> bool {
+        self.levels.last().is_some_and(|l| l.drape.settled)
+    }
+}
+
+impl OfflineOutfit {
+    /// Brings the real-time result to rest on the body that it met. `progress` receives the vertices of the mesh in work and
+    /// each step; a break ends the drape of that mesh.
+    ///
+    /// # Errors
+    /// [`MirrorError::TangledStart`] when intersections stay; a step that is not solved.
+    pub fn drape(
+        &self,
+        worn: &DressedOutfit,
+        par: Par,
+        mut progress: impl FnMut(usize, &DrapeReport) -> ControlFlow<()>,
+    ) -> Result<(OfflineState, OfflineDrapeReport), MirrorError> {
+        let coarser = (0..self.level()).map(|l| Self::with_level(worn, self.body_faces(), l));
+        let coarser = coarser.collect::<Result<Vec<Self>, _>>()?;
+        let (mut state, start) = coarser.first().unwrap_or(self).start(worn, par)?;
+        let body = worn.state.collision_body().vertices();
+        let (mut settings, mut levels) = (DrapeSettings::default(), Vec::new());
+        let mut before: Option<&Self> = None;
+        for outfit in coarser.iter().chain([self]) {
+            if let Some(coarse) = before.replace(outfit) {
+                state = outfit.refined(coarse, &state);
+                // Near rest, the longest step is solved at once.
+                settings.steps[0] = settings.steps[1];
+            }
+            let started = Instant::now();
+            let vertices = outfit.cloth().len();
+            let mut solver = outfit.solver(state, par)?;
+            let pins = outfit.pins(body);
+            let targets = FrameTargets {
+                pins: &pins,
+                ..FrameTargets::default()
+            };
+            let drape = solver.drape_to(&settings, &targets, |step| progress(vertices, step))?;
+            levels.push(OfflineDrapeLevel {
+                vertices,
+                drape,
+                seconds: started.elapsed().as_secs_f64(),
+            });
+            state = solver.state().clone();
+        }
+        Ok((state, OfflineDrapeReport { start, levels }))
+    }
+}

@@ -1,0 +1,90 @@
+//! Compositing of garments over the captured frames of one camera.
+
+use super::picture::{CameraGarments, DrawnBody, DrawnSurface};
+use crate::body::Template;
+use crate::camera::{Calibration, ColorImage, RgbdFrame};
+use crate::composite::{self, Appearance, RenderError, RenderReport};
+use crate::garment::GarmentMesh;
+use crate::math::{Camera, P3, Rigid, World};
+use std::sync::Arc;
+
+/// Garments to draw and the body under them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DrawnOutfit<'a> {
+    /// Meshes, innermost first.
+    pub(super) garments: &'a [GarmentMesh],
+    /// Colour and surface of each.
+    pub(super) appearances: &'a [Appearance],
+    /// Vertices of each drawn mesh (world, metres).
+    pub(super) positions: &'a [Vec<P3>],
+    /// Body that the cloth met (world, metres), so that cloth stays off its skin.
+    pub(super) body: &'a [P3],
+}
+
+/// A captured frame and the place of its camera.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CapturedView<'a> {
+    pub(super) frame: &'a RgbdFrame,
+    pub(super) calibration: &'a Calibration,
+    pub(super) camera_from_world: Rigid<Camera, World>,
+}
+
+/// Compositor with its state from picture to picture.
+#[derive(Debug)]
+pub struct OutfitPainter {
+    body: DrawnBody,
+    garments: CameraGarments,
+    compositor: composite::Model,
+    state: composite::State,
+    work: composite::Workspace,
+}
+
+impl OutfitPainter {
+    /// Painter of people with bodies made from `template`.
+    pub fn new(template: Arc<Template>) -> Self {
+        Self {
+            body: DrawnBody::new(template),
+            garments: CameraGarments::default(),
+            compositor: composite::Model::default(),
+            state: composite::State::default(),
+            work: composite::Workspace::default(),
+        }
+    }
+
+    /// Picture of an outfit, or of a body without one (camera frame, metres); the captured one without both.
+    pub(super) fn paint(
+        &mut self,
+        view: &CapturedView<'_>,
+        outfit: Option<&DrawnOutfit<'_>>,
+        posed: Option<&[P3]>,
+    ) -> Result<(ColorImage, RenderReport), RenderError> {
+        let positions = outfit.map_or(&[][..], |o| o.positions);
+        let camera_from_world = &view.camera_from_world;
+        let world = positions.iter().map(Vec::as_slice);
+        self.garments.place(camera_from_world, world);
+        let surfaces = outfit.iter().flat_map(|outfit| {
+            (outfit.garments.iter().zip(outfit.appearances)).map(|(mesh, appearance)| {
+                DrawnSurface {
+                    faces: &mesh.render.faces,
+                    uv: &mesh.render.uv,
+                    vertex: &mesh.render.vertex,
+                    appearance,
+                }
+            })
+        });
+
+        let mut met = Vec::new();
+        if let Some(outfit) = outfit {
+            camera_from_world.points_f32(outfit.body, &mut met);
+        }
+        let drawn = outfit.map(|_| &met[..]).or(posed);
+        let input = composite::Input {
+            frame: view.frame,
+            calibration: view.calibration,
+            garments: &self.garments.views(surfaces),
+            body: drawn.map(|vertices| self.body.view(vertices)),
+            output: None,
+        };
+        composite::render(&self.compositor, &mut self.state, &input, &mut self.work)
+    }
+}
