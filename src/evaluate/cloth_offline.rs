@@ -35,18 +35,19 @@ impl Default for OfflineBench {
 type Variant = (TimeScheme, LinearMethod, Option<u32>);
 
 /// Variants measured, the defaults first.
-const VARIANTS: [Variant; 9] = {
-    use LinearMethod::{Cholesky, ConjugateGradient};
+const VARIANTS: [Variant; 10] = {
+    use LinearMethod::{Cholesky, ConjugateGradient, TwoLevel};
     use TimeScheme::{Bdf2, ImplicitEuler};
     [
-        (Bdf2, ConjugateGradient, None),
-        (Bdf2, ConjugateGradient, Some(120)),
+        (Bdf2, TwoLevel, None),
+        (Bdf2, TwoLevel, Some(120)),
+        (Bdf2, TwoLevel, Some(240)),
+        (Bdf2, TwoLevel, Some(480)),
         (Bdf2, ConjugateGradient, Some(240)),
-        (Bdf2, ConjugateGradient, Some(480)),
         (Bdf2, Cholesky, Some(240)),
-        (ImplicitEuler, ConjugateGradient, Some(120)),
-        (ImplicitEuler, ConjugateGradient, Some(240)),
-        (ImplicitEuler, ConjugateGradient, Some(480)),
+        (ImplicitEuler, TwoLevel, Some(120)),
+        (ImplicitEuler, TwoLevel, Some(240)),
+        (ImplicitEuler, TwoLevel, Some(480)),
         (ImplicitEuler, Cholesky, Some(240)),
     ]
 };
@@ -60,6 +61,7 @@ fn name((scheme, linear, steps): Variant) -> String {
         TimeScheme::ImplicitEuler => "implicit Euler",
     };
     let linear = match linear {
+        LinearMethod::TwoLevel => "two levels",
         LinearMethod::ConjugateGradient => "conjugate gradients",
         LinearMethod::Cholesky => "Cholesky",
     };

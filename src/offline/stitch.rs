@@ -84,7 +84,7 @@ impl EnergyElements<3, 9> for StitchSprings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{DerivativeCheck, Derivatives};
+    use crate::math::derivative_check::{DerivativeCheck, Derivatives};
     use nalgebra::DMatrix;
 
     #[test]

@@ -3,14 +3,11 @@
 //! One guard below all buffers instead of one in each: images, depth, poses, meshes, messages of the transports, and the
 //! copies that nobody thinks of. Not covered: buffers of the kernel and of a graphics card, and those that zstd takes
 //! from C.
-//!
-//! Below it is mimalloc, which gives freed memory back: on a starved machine where try-ons come and go, glibc's arenas grew
-//! by 3 MB a second around 100 MB in use.
 
-use mimalloc::MiMalloc;
+use std::alloc::System;
 
 /// Allocator of the programs that see people.
-pub type Zeroing = zeroizing_alloc::ZeroAlloc<MiMalloc>;
+pub type Zeroing = zeroizing_alloc::ZeroAlloc<System>;
 
 /// The allocator, for `#[global_allocator]`.
-pub const ZEROING: Zeroing = zeroizing_alloc::ZeroAlloc(MiMalloc);
+pub const ZEROING: Zeroing = zeroizing_alloc::ZeroAlloc(System);

@@ -115,7 +115,7 @@ impl TrackingService for Tracking {
         match self.find(&r, id) {
             Ok(h) => {
                 self.sessions.remove_if(id, |open| std::ptr::eq(open, &*h));
-                let _ = h.commands.send(Command::Close).await;
+                h.closing.cancel();
             }
             // An unknown id is no error.
             Err(s) if s.code() == Code::NotFound => {}

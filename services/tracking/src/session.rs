@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tokio::time::Instant;
+use tokio_util::sync::CancellationToken;
 use tryon::body::Template;
 use tryon_kit::compute::ComputeError;
 use tryon_kit::consent::FORGET_AFTER;
@@ -25,6 +26,8 @@ const SEARCH_EVERY: Duration = Duration::from_millis(100);
 pub(crate) struct Handle {
     pub(crate) key: CameraKey,
     pub(crate) commands: mpsc::Sender<Command>,
+    /// Ends the session, also in the middle of a step: on a busy machine that waits for seconds.
+    pub(crate) closing: CancellationToken,
     pub(crate) states: watch::Receiver<Arc<v1::BodyState>>,
 }
 
@@ -32,8 +35,6 @@ pub(crate) struct Handle {
 pub(crate) enum Command {
     /// Forgets body and pose.
     Reset,
-    /// Ends the session.
-    Close,
     /// Keeps the session open.
     Touch,
 }
@@ -63,6 +64,8 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
     let (sender, states) = watch::channel(Arc::new(searching(&setup.id)));
     let (commands, inbox) = mpsc::channel(8);
     let key = setup.key.clone();
+    let closing = CancellationToken::new();
+    let closed = closing.clone();
     tokio::spawn(async move {
         let id = setup.id.clone();
         let is_over = |h: &Handle| h.commands.is_closed();
@@ -79,12 +82,20 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
             shape_version: 0,
         }
         .run(inbox);
+        let task = async move {
+            tokio::select! {
+                biased;
+                () = closed.cancelled() => "asked to",
+                why = task => why,
+            }
+        };
         let why = session_task::run("tracking", &id, task).await;
         tracing::info!(session = brief(&id), why, "closed");
     });
     Handle {
         key,
         commands,
+        closing,
         states,
     }
 }
@@ -118,7 +129,7 @@ impl Task {
                 c = inbox.recv() => match c {
                     Some(Command::Reset) => if let Some(e) = &mut self.engine { e.reset() },
                     Some(Command::Touch) => wanted = Instant::now(),
-                    Some(Command::Close) | None => return "asked to",
+                    None => return "asked to",
                 },
                 frame = frames.next_from(due) => match frame {
                     Some(f) => {

@@ -4,7 +4,8 @@
 
 use crate::clothcap::CaptureError;
 use crate::linear::{
-    Factor, LinearError, StopCriterion, SymbolicFactor, SymmetricPattern, conjugate_gradient,
+    BlockJacobi, Factor, LinearError, StopCriterion, SymbolicFactor, SymmetricPattern,
+    conjugate_gradient,
 };
 use crate::math::P3;
 use crate::mesh::{Csr, Face};
