@@ -190,6 +190,6 @@ mod tests {
         assert!(fixed.error_rate.is_infinite());
         assert!((fixed.longest_step - 1.0 / 480.0).abs() < 1e-12);
         assert_eq!(settings(VARIANTS[0]), OfflineSettings::default());
-        assert_eq!(name(VARIANTS[0]), "BDF2, conjugate gradients, adaptive");
+        assert_eq!(name(VARIANTS[0]), "BDF2, two levels, adaptive");
     }
 }

@@ -11,6 +11,10 @@ use serde::{Deserialize, Serialize};
 const SUFFICIENT_DECREASE: f64 = 1e-4;
 /// Halvings of a step before the line search gives up.
 const MAX_HALVINGS: usize = 40;
+/// Iterations in which vertices may lag behind as far as contact asks: most of a step's way is gone by then.
+const HASTY: usize = 8;
+/// Share of its step that a vertex gets later, or all get the same: a direction bent more than that leads nowhere.
+const LEAST_SHARE: f64 = 0.01;
 /// Residual, relative to that of other iterations, of one that would end the iteration.
 const TIGHTER: f64 = 0.1;
 /// Motion of all vertices below which nothing moves (m): rounding alone.
@@ -148,7 +152,7 @@ pub(super) fn minimise(
     let mut direction = vec![V3d::zeros(); x.len()];
     let mut trial = x.to_vec();
     let mut last_motion = (0, f64::INFINITY);
-    for _ in 0..settings.iterations {
+    for iteration in 0..settings.iterations {
         problem.assemble(x, &mut system)?;
         if let Some(vertex) = first_not_finite(&system.gradient) {
             return Ok(Err(NewtonFault::NotFinite { vertex }));
@@ -171,7 +175,8 @@ pub(super) fn minimise(
         if last_motion.1 < RESTING {
             return Ok(Ok(()));
         }
-        let free = shorten(problem, &system, x, &mut direction);
+        let least = if iteration < HASTY { 0.0 } else { LEAST_SHARE };
+        let free = shorten(problem, (&system, x), least, &mut direction);
         if free.vertices > 0 {
             report.limited += 1;
             report.smallest_share = report.smallest_share.min(free.smallest);
@@ -206,16 +211,17 @@ fn first_not_finite(gradient: &[V3d]) -> Option<usize> {
         .position(|g| !g.iter().all(|c| c.is_finite()))
 }
 
-/// Shortens each vertex' step as far as its contacts ask; all by one share where the shortened step would climb.
+/// Shortens each vertex' step as far as its contacts ask; all by one share where the shortened step would climb, or leaves
+/// some vertex less than the `least` share.
 fn shorten(
     problem: &mut impl Minimised,
-    system: &NewtonSystem,
-    x: &[V3d],
+    (system, x): (&NewtonSystem, &[V3d]),
+    least: f64,
     direction: &mut [V3d],
 ) -> MotionLimits {
     let whole = direction.to_vec();
     let limits = problem.free_motion(x, direction);
-    if limits.vertices > 0 && system.slope(direction) >= 0.0 {
+    if limits.vertices > 0 && (limits.smallest < least || system.slope(direction) >= 0.0) {
         for (d, whole) in direction.iter_mut().zip(&whole) {
             *d = whole * limits.smallest;
         }
