@@ -1,7 +1,6 @@
 //! Input of the solver, checked before use: settings and targets come from files.
 
 use super::error::OfflineError;
-use super::step::OfflineSettings;
 use super::targets::FrameTargets;
 use crate::math::V3d;
 
@@ -36,10 +35,10 @@ fn check_positive(field: &'static str, value: f64) -> Result<(), OfflineError> {
 }
 
 /// Checks the lengths of steps.
-pub(super) fn check_settings(settings: &OfflineSettings) -> Result<(), OfflineError> {
-    check_positive("longest_step", settings.longest_step)?;
-    if settings.halvings > MOST_HALVINGS {
-        let why = format!("{} exceed {MOST_HALVINGS}", settings.halvings);
+pub(super) fn check_steps(longest_step: f64, halvings: u32) -> Result<(), OfflineError> {
+    check_positive("longest_step", longest_step)?;
+    if halvings > MOST_HALVINGS {
+        let why = format!("{halvings} exceed {MOST_HALVINGS}");
         return Err(fault("halvings", why));
     }
     Ok(())

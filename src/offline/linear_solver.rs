@@ -1,7 +1,6 @@
 //! Search direction of a Newton iteration: factorisation or preconditioned conjugate gradients.
 
 use super::error::OfflineError;
-use super::newton::{NewtonSettings, NewtonSystem};
 use crate::linear::{
     BlockJacobi, BlockMatrix, CoarseSpace, Factor, LinearError, StopCriterion, SymbolicFactor,
     TwoLevel, conjugate_gradient,
@@ -26,6 +25,17 @@ pub enum LinearMethod {
     Cholesky,
 }
 
+/// Linear system of a Newton iteration.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LinearSystem<'a> {
+    /// Gradient (N).
+    pub(super) gradient: &'a [V3d],
+    /// Hessian of shape, inertia, pins and obstacle (N/m).
+    pub(super) shape: &'a BlockMatrix,
+    /// Hessian of contact and friction (N/m); of size zero without contact.
+    pub(super) contact: &'a BlockMatrix,
+}
+
 /// Solver of Newton systems and what it keeps between them.
 #[derive(Debug)]
 pub(super) struct DirectionSolver {
@@ -42,25 +52,25 @@ impl DirectionSolver {
     /// Replaces `direction` with the Newton direction at `x`; returns products with the matrix.
     pub(super) fn solve(
         &mut self,
-        settings: &NewtonSettings,
-        system: &NewtonSystem,
+        how: (LinearMethod, StopCriterion),
+        system: &LinearSystem<'_>,
         x: &[V3d],
         direction: &mut [V3d],
     ) -> Result<usize, OfflineError> {
         direction.fill(V3d::zeros());
-        self.improve(settings, system, x, direction)
+        self.improve(how, system, x, direction)
     }
 
-    /// Goes on from a `direction`, until the residual is that of the settings.
+    /// Goes on from a `direction`, until the residual is that asked for.
     pub(super) fn improve(
         &mut self,
-        settings: &NewtonSettings,
-        system: &NewtonSystem,
+        (method, stop): (LinearMethod, StopCriterion),
+        system: &LinearSystem<'_>,
         x: &[V3d],
         direction: &mut [V3d],
     ) -> Result<usize, OfflineError> {
         let right: Vec<V3d> = system.gradient.iter().map(|g| -g).collect();
-        let both = [&system.shape, &system.contact];
+        let both = [system.shape, system.contact];
         let matrices = if system.contact.pattern().size() == 0 {
             &both[..1]
         } else {
@@ -73,12 +83,8 @@ impl DirectionSolver {
                 m.multiply_add(par, x, y);
             }
         };
-        let stop = StopCriterion {
-            residual: settings.linear_residual,
-            iterations: settings.linear_iterations,
-        };
         let mut fine = BlockJacobi::new(matrices);
-        let report = match settings.linear {
+        let report = match method {
             LinearMethod::Cholesky => return factorise(matrices, &right, direction).map(|()| 0),
             LinearMethod::ConjugateGradient => {
                 conjugate_gradient(apply, &mut fine, &right, direction, stop)
@@ -88,7 +94,7 @@ impl DirectionSolver {
                 let coarse = self
                     .coarse
                     .get_or_insert_with(|| CoarseSpace::new(pattern, PATCH));
-                // Where rounding leaves the coarse matrix indefinite, the fine level works alone.
+                // The fine level works alone when rounding leaves the coarse matrix indefinite.
                 coarse
                     .update(x, matrices)
                     .or_else(LinearError::unless_indefinite)?;

@@ -58,5 +58,5 @@ pub use obstacle::ObstacleSpring;
 pub use scene_run::OfflineScene;
 pub use start::{JoinedSurfaces, StartReport};
 pub use step::{OfflineFrameReport, OfflineSettings, OfflineSolver};
-pub use stitch::{Stitch, StitchSprings};
+pub use stitch::{StitchSprings, sewn_pairs};
 pub use targets::FrameTargets;

@@ -1,9 +1,9 @@
 //! Newton's method with an inexact linear solve and a backtracking line search whose longest step contact limits.
 
 use super::error::{NewtonFault, OfflineError};
-use super::linear_solver::{DirectionSolver, LinearMethod};
+use super::linear_solver::{DirectionSolver, LinearMethod, LinearSystem};
 use crate::contact::ccd::MotionLimits;
-use crate::linear::{BlockMatrix, LinearError};
+use crate::linear::{BlockMatrix, LinearError, StopCriterion};
 use crate::math::V3d;
 use serde::{Deserialize, Serialize};
 
@@ -53,6 +53,15 @@ impl Default for NewtonSettings {
 }
 
 impl NewtonSettings {
+    /// Method and end of a linear solve, to a share of the residual.
+    pub(super) fn linear(&self, share: f64) -> (LinearMethod, StopCriterion) {
+        let stop = StopCriterion {
+            residual: share * self.linear_residual,
+            iterations: self.linear_iterations,
+        };
+        (self.linear, stop)
+    }
+
     /// True for a step so small that the iteration ends.
     fn is_settled(&self, direction: &[V3d]) -> bool {
         largest(direction).1 <= self.largest && mean(direction) <= self.tolerance
@@ -99,6 +108,15 @@ pub(super) struct NewtonSystem {
 }
 
 impl NewtonSystem {
+    /// The linear system of its minimum.
+    pub(super) fn linear(&self) -> LinearSystem<'_> {
+        LinearSystem {
+            gradient: &self.gradient,
+            shape: &self.shape,
+            contact: &self.contact,
+        }
+    }
+
     /// Derivative of the energy along a direction (J).
     fn slope(&self, direction: &[V3d]) -> f64 {
         let pairs = self.gradient.iter().zip(direction);
@@ -157,15 +175,13 @@ pub(super) fn minimise(
         if let Some(vertex) = first_not_finite(&system.gradient) {
             return Ok(Err(NewtonFault::NotFinite { vertex }));
         }
-        report.products += solver.solve(settings, &system, x, &mut direction)?;
+        report.products +=
+            solver.solve(settings.linear(1.0), &system.linear(), x, &mut direction)?;
         report.iterations += 1;
         if settings.is_settled(&direction) {
             // A small step may be one of which a loose residual has hidden the rest: rigid motion comes last.
-            let tight = NewtonSettings {
-                linear_residual: TIGHTER * settings.linear_residual,
-                ..*settings
-            };
-            report.products += solver.improve(&tight, &system, x, &mut direction)?;
+            let tight = settings.linear(TIGHTER);
+            report.products += solver.improve(tight, &system.linear(), x, &mut direction)?;
         }
         last_motion = largest(&direction);
         if !last_motion.1.is_finite() {

@@ -60,7 +60,8 @@ impl StepProblem<'_> {
             contacts.couple(x, (reach, stiffness), &mut system)?;
         }
         let mut direction = vec![V3d::zeros(); x.len()];
-        report.products += solver.solve(settings, &system, x, &mut direction)?;
+        report.products +=
+            solver.solve(settings.linear(1.0), &system.linear(), x, &mut direction)?;
         self.free_motion(x, &mut direction);
         for (x, d) in x.iter_mut().zip(&direction) {
             *x += d;

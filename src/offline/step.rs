@@ -1,6 +1,6 @@
 //! One frame of cloth: implicit steps whose length follows the error and the solver.
 
-use super::checks::{check_frame, check_settings, check_vectors};
+use super::checks::{check_frame, check_steps, check_vectors};
 use super::contacts::{ContactReport, ContactSettings, Contacts};
 use super::error::{NewtonFault, OfflineError};
 use super::integrator::{MotionState, OfflineState, StepCoefficients, TimeScheme};
@@ -104,7 +104,7 @@ impl<'a> OfflineSolver<'a> {
         settings: OfflineSettings,
         par: Par,
     ) -> Result<Self, OfflineError> {
-        check_settings(&settings)?;
+        check_steps(settings.longest_step, settings.halvings)?;
         let (n, m) = (cloth.len(), state.obstacle[0].len());
         check_vectors("positions", &state.now.x, n)?;
         check_vectors("velocities", &state.now.v, n)?;

@@ -1,38 +1,28 @@
 //! Stitches: springs of no length between a vertex and a point of an edge.
 
 use super::energy_term::EnergyElements;
+use crate::formats::sewn_obj::Stitch;
 use crate::math::{ElementEnergy, V3d};
 use nalgebra::{Matrix3, SMatrix, SVector};
 
-/// A vertex sewn to the point `(1 − t) a + t b` of an edge.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stitch {
-    /// Sewn vertex.
-    pub vertex: u32,
-    /// Edge `[a, b]`.
-    pub edge: [u32; 2],
-    /// t, 0 to 1.
-    pub share: f64,
+/// Pairs of vertices that lie on one another, whose elements therefore never count as contact.
+pub fn sewn_pairs(stitches: &[Stitch]) -> Vec<[u32; 2]> {
+    let pairs = |s: &Stitch| s.edge.map(|v| [s.vertex, v]);
+    stitches.iter().flat_map(pairs).collect()
 }
 
-impl Stitch {
-    /// Pairs of vertices that lie on one another, whose elements therefore never count as contact.
-    pub fn sewn_pairs(&self) -> [[u32; 2]; 2] {
-        self.edge.map(|v| [self.vertex, v])
-    }
+fn weights(stitch: &Stitch) -> [f64; 3] {
+    let share = f64::from(stitch.at);
+    [1.0, share - 1.0, -share]
+}
 
-    fn weights(&self) -> [f64; 3] {
-        [1.0, self.share - 1.0, -self.share]
-    }
+fn vertices(stitch: &Stitch) -> [u32; 3] {
+    [stitch.vertex, stitch.edge[0], stitch.edge[1]]
+}
 
-    fn vertices(&self) -> [u32; 3] {
-        [self.vertex, self.edge[0], self.edge[1]]
-    }
-
-    fn gap(&self, x: &[V3d]) -> V3d {
-        let pairs = self.vertices().into_iter().zip(self.weights());
-        pairs.map(|(v, w)| x[v as usize] * w).sum()
-    }
+fn gap(stitch: &Stitch, x: &[V3d]) -> V3d {
+    let pairs = vertices(stitch).into_iter().zip(weights(stitch));
+    pairs.map(|(v, w)| x[v as usize] * w).sum()
 }
 
 /// Stitches of one thread: E = ½ k |gap|².
@@ -50,16 +40,16 @@ impl EnergyElements<3, 9> for StitchSprings {
     }
 
     fn vertices(&self, element: usize) -> [u32; 3] {
-        self.stitches[element].vertices()
+        vertices(&self.stitches[element])
     }
 
     fn value(&self, element: usize, x: &[V3d]) -> f64 {
-        0.5 * self.stiffness * self.stitches[element].gap(x).norm_squared()
+        0.5 * self.stiffness * gap(&self.stitches[element], x).norm_squared()
     }
 
     fn expand(&self, element: usize, x: &[V3d]) -> ElementEnergy<9> {
         let stitch = &self.stitches[element];
-        let (pull, w) = (stitch.gap(x) * self.stiffness, stitch.weights());
+        let (pull, w) = (gap(stitch, x) * self.stiffness, weights(stitch));
         let mut gradient = SVector::<f64, 9>::zeros();
         let mut hessian = SMatrix::<f64, 9, 9>::zeros();
         for i in 0..3 {
@@ -92,7 +82,7 @@ mod tests {
         let stitch = Stitch {
             vertex: 0,
             edge: [1, 2],
-            share: 0.25,
+            at: 0.25,
         };
         let springs = StitchSprings {
             stitches: vec![stitch],
