@@ -237,3 +237,80 @@ fn principal_axes(spread: &Matrix3<f64>) -> [Vector3<f64>; 2] {
         }
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear::{BlockJacobi, StopCriterion, TwoLevel, conjugate_gradient};
+    use crate::par::Par;
+
+    /// Springs along a grid of n × n vertices, held softly; positions of its vertices.
+    fn grid(n: usize) -> (BlockMatrix, Vec<Vector3<f64>>) {
+        let id = |i: usize, j: usize| (n * j + i) as u32;
+        let along = (0..n).flat_map(|j| (1..n).map(move |i| (id(i - 1, j), id(i, j))));
+        let across = (0..n).flat_map(|j| (1..n).map(move |i| (id(j, i - 1), id(j, i))));
+        let edges: Vec<_> = along.chain(across).collect();
+        let pattern = BlockPattern::new(n * n, edges.iter().copied()).expect("pattern");
+        let mut matrix = BlockMatrix::zeros(Arc::new(pattern));
+        let mut add = |a: u32, b: u32, k: f64| {
+            let slot = matrix.pattern().slot(a, b).expect("in pattern");
+            *matrix.block_mut(slot) += Matrix3::from_diagonal_element(k);
+        };
+        for (a, b) in edges {
+            add(a, a, 1.0);
+            add(b, b, 1.0);
+            add(a, b, -1.0);
+            add(b, a, -1.0);
+        }
+        (0..(n * n) as u32).for_each(|v| add(v, v, 1e-3));
+        let at = |k: usize| Vector3::new((k % n) as f64, (k / n) as f64, 0.0);
+        (matrix, (0..n * n).map(at).collect())
+    }
+
+    #[test]
+    fn two_levels_solve_the_same_system_in_fewer_iterations() {
+        let (matrix, x) = grid(40);
+        let right: Vec<_> = (0..x.len())
+            .map(|k| Vector3::new(1.0, (k as f64).sin(), k as f64 * 1e-3))
+            .collect();
+        let apply = |x: &[Vector3<f64>], y: &mut [Vector3<f64>]| {
+            y.fill(Vector3::zeros());
+            matrix.multiply_add(Par::Seq, x, y);
+        };
+        let stop = StopCriterion {
+            residual: 1e-9,
+            iterations: 1000,
+        };
+        let mut one = vec![Vector3::zeros(); x.len()];
+        let mut jacobi = BlockJacobi::new(&[&matrix]);
+        let alone = conjugate_gradient(apply, &mut jacobi, &right, &mut one, stop);
+        let mut coarse = CoarseSpace::new(matrix.pattern(), 48);
+        coarse.update(&x, &[&matrix]).expect("positive definite");
+        let mut two = vec![Vector3::zeros(); x.len()];
+        let mut levels = TwoLevel::new(BlockJacobi::new(&[&matrix]), &mut coarse);
+        let both = conjugate_gradient(apply, &mut levels, &right, &mut two, stop);
+        assert!(2 * both.iterations < alone.iterations, "{both:?} {alone:?}");
+        let apart = one.iter().zip(&two).map(|(a, b)| (a - b).norm());
+        let size = one.iter().map(|a| a.norm()).fold(0.0, f64::max);
+        assert!(apart.fold(0.0, f64::max) < 1e-6 * size);
+    }
+
+    #[test]
+    fn lone_vertices_belong_to_no_patch_and_add_nothing() {
+        let pattern = BlockPattern::new(3, [(0, 1)]).expect("pattern").extended(2);
+        let mut matrix = BlockMatrix::zeros(Arc::new(pattern));
+        for v in 0..5 {
+            let slot = matrix.pattern().diagonal_slot(v);
+            *matrix.block_mut(slot) = Matrix3::identity();
+        }
+        let mut coarse = CoarseSpace::new(matrix.pattern(), 48);
+        let x = vec![Vector3::zeros(); 5];
+        coarse
+            .update(&x, &[&matrix])
+            .expect("a patch without extent");
+        let mut z = vec![Vector3::zeros(); 5];
+        coarse.add(&[Vector3::new(1.0, 2.0, 3.0); 5], &mut z);
+        assert!((z[0] - Vector3::new(1.0, 2.0, 3.0)).norm() < 1e-12, "{z:?}");
+        assert!(z[2..].iter().all(|z| *z == Vector3::zeros()), "{z:?}");
+    }
+}

@@ -1,5 +1,6 @@
 //! The solver on small scenes: fall on an obstacle, squeeze, speed, same bits, resume.
 
+use super::test_sheets::{octahedron, resting};
 use super::*;
 use crate::contact::{ContactMesh, ContactSurface};
 use crate::elastic::{
@@ -44,17 +45,6 @@ fn cloth(x: &[V3d], faces: &[Face], young: f64) -> OfflineCloth {
     .expect("cloth")
 }
 
-fn at_rest(x: &[V3d], obstacle: &[V3d]) -> OfflineState {
-    OfflineState {
-        now: MotionState {
-            x: x.to_vec(),
-            v: vec![V3d::zeros(); x.len()],
-        },
-        obstacle: [obstacle.to_vec(), obstacle.to_vec()],
-        ..OfflineState::default()
-    }
-}
-
 fn settings() -> OfflineSettings {
     OfflineSettings {
         error_rate: f64::INFINITY,
@@ -73,36 +63,12 @@ fn crossings(solver: &OfflineSolver<'_>, cloth: &[Face], obstacle: &[Face]) -> u
     JoinedSurfaces(&mesh).crossings(Par::Seq, &x).len()
 }
 
-/// Corner-first box of half width `r` (m) around `centre`.
-fn ridge(centre: V3d, r: f64) -> (Vec<V3d>, Vec<Face>) {
-    let corners = [
-        [1, 0, 0],
-        [-1, 0, 0],
-        [0, 1, 0],
-        [0, -1, 0],
-        [0, 0, 1],
-        [0, 0, -1],
-    ];
-    let at = |c: &[i32; 3]| centre + V3d::from(c.map(f64::from)) * r;
-    let faces = vec![
-        [2, 4, 0],
-        [2, 0, 5],
-        [2, 5, 1],
-        [2, 1, 4],
-        [3, 0, 4],
-        [3, 5, 0],
-        [3, 1, 5],
-        [3, 4, 1],
-    ];
-    (corners.iter().map(at).collect(), faces)
-}
-
 #[test]
 fn cloth_falls_on_a_spike_without_a_crossing() {
     let (x, faces) = grid(8, 0.02, 0.0);
-    let (body, body_faces) = ridge(V3d::new(0.003, -0.065, 0.002), 0.06);
+    let (body, body_faces) = octahedron(V3d::new(0.003, -0.065, 0.002), 0.06);
     let cloth = cloth(&x, &faces, 500.0);
-    let state = at_rest(&x, &body);
+    let state = resting(&x, &body);
     let mut solver =
         OfflineSolver::new(&cloth, &body_faces, state, settings(), Par::Seq).expect("solver");
     for frame in 0..12 {
@@ -125,9 +91,9 @@ fn cloth_falls_on_a_spike_without_a_crossing() {
 #[test]
 fn a_fast_body_carries_cloth_along() {
     let (x, faces) = grid(6, 0.02, 0.0);
-    let (body, body_faces) = ridge(V3d::new(0.003, -0.065, 0.002), 0.06);
+    let (body, body_faces) = octahedron(V3d::new(0.003, -0.065, 0.002), 0.06);
     let cloth = cloth(&x, &faces, 500.0);
-    let state = at_rest(&x, &body);
+    let state = resting(&x, &body);
     let mut solver =
         OfflineSolver::new(&cloth, &body_faces, state, settings(), Par::Seq).expect("solver");
     let up: Vec<V3d> = body
@@ -152,7 +118,7 @@ fn cloth_between_obstacles_that_overlap_stays_whole() {
     body_faces.extend(more.iter().map(|f| f.map(|v| v + 9)));
     body.extend(upper);
     let cloth = cloth(&x, &faces, 500.0);
-    let state = at_rest(&x, &body);
+    let state = resting(&x, &body);
     let mut solver =
         OfflineSolver::new(&cloth, &body_faces, state, settings(), Par::Seq).expect("solver");
     // The plates pass each other by 8 mm.
@@ -172,10 +138,10 @@ fn cloth_between_obstacles_that_overlap_stays_whole() {
 #[test]
 fn frames_have_the_same_bits_at_any_thread_count_and_after_a_resume() {
     let (x, faces) = grid(8, 0.02, 0.0);
-    let (body, body_faces) = ridge(V3d::new(0.003, -0.065, 0.002), 0.06);
+    let (body, body_faces) = octahedron(V3d::new(0.003, -0.065, 0.002), 0.06);
     let cloth = cloth(&x, &faces, 500.0);
     let start = |par| {
-        let state = at_rest(&x, &body);
+        let state = resting(&x, &body);
         OfflineSolver::new(&cloth, &body_faces, state, settings(), par).expect("solver")
     };
     let run = |par| {
@@ -228,7 +194,7 @@ fn an_animation_breaks_off_where_it_is_told() {
     let (x, faces) = grid(3, 0.02, 0.0);
     let cloth = cloth(&x, &faces, 500.0);
     let mut solver =
-        OfflineSolver::new(&cloth, &[], at_rest(&x, &[]), settings(), Par::Seq).expect("solver");
+        OfflineSolver::new(&cloth, &[], resting(&x, &[]), settings(), Par::Seq).expect("solver");
     let last = solver.animate(
         0.01,
         (0, 9),
@@ -248,7 +214,7 @@ fn an_animation_breaks_off_where_it_is_told() {
 #[test]
 fn a_static_drape_comes_to_rest() {
     let (x, faces) = grid(6, 0.02, 0.0);
-    let (body, body_faces) = ridge(V3d::new(0.003, -0.065, 0.002), 0.06);
+    let (body, body_faces) = octahedron(V3d::new(0.003, -0.065, 0.002), 0.06);
     let cloth = cloth(&x, &faces, 500.0);
     let mut all = settings();
     all.contact = Some(ContactSettings {
@@ -256,7 +222,7 @@ fn a_static_drape_comes_to_rest() {
         ..ContactSettings::default()
     });
     let mut solver =
-        OfflineSolver::new(&cloth, &body_faces, at_rest(&x, &body), all, Par::Seq).expect("solver");
+        OfflineSolver::new(&cloth, &body_faces, resting(&x, &body), all, Par::Seq).expect("solver");
     let drape = DrapeSettings {
         most_steps: 12,
         ..DrapeSettings::default()
@@ -273,9 +239,9 @@ fn a_static_drape_comes_to_rest() {
 fn stiffness_over_six_decades_is_solved() {
     for young in [1.0, 1e2, 1e4, 1e6] {
         let (x, faces) = grid(5, 0.02, 0.0);
-        let (body, body_faces) = ridge(V3d::new(0.003, -0.065, 0.002), 0.06);
+        let (body, body_faces) = octahedron(V3d::new(0.003, -0.065, 0.002), 0.06);
         let cloth = cloth(&x, &faces, young);
-        let state = at_rest(&x, &body);
+        let state = resting(&x, &body);
         let mut solver =
             OfflineSolver::new(&cloth, &body_faces, state, settings(), Par::Seq).expect("solver");
         for _ in 0..4 {
@@ -291,7 +257,7 @@ fn faults_of_the_input_are_named() {
     let (x, faces) = grid(2, 0.02, 0.0);
     let cloth = cloth(&x, &faces, 500.0);
     let solver = |state| OfflineSolver::new(&cloth, &[], state, settings(), Par::Seq).map(|_| ());
-    let short = at_rest(&x[1..], &[]);
+    let short = resting(&x[1..], &[]);
     assert!(matches!(
         solver(short),
         Err(OfflineError::Input {
@@ -299,7 +265,7 @@ fn faults_of_the_input_are_named() {
             ..
         })
     ));
-    let mut wild = at_rest(&x, &[]);
+    let mut wild = resting(&x, &[]);
     wild.now.v[3].y = f64::NAN;
     let fault = solver(wild).expect_err("a fault").to_string();
     assert_eq!(fault, "velocities: vertex 3 is not finite");

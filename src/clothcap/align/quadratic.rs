@@ -202,10 +202,10 @@ impl QuadraticEnergy {
         some: &[u32],
         stage: &'static str,
     ) -> Result<(), CaptureError> {
-        let system = self.restricted(x, some);
+        let mut system = self.restricted(x, some);
+        let mut inverse = BlockJacobi::from_inverse(std::mem::take(&mut system.inverse));
         let mut moves = vec![Vector3::zeros(); some.len()];
         let apply = |from: &[Vector3<f64>], to: &mut [Vector3<f64>]| system.multiply(from, to);
-        let mut inverse = BlockJacobi::from_inverse(system.inverse.clone());
         conjugate_gradient(apply, &mut inverse, &system.rhs, &mut moves, STOP);
         for (v, by) in some.iter().zip(&moves) {
             let moved = x[*v as usize].cast::<f64>() + by;

@@ -127,3 +127,49 @@ fn shorten(pairs: &[ContactPair], impacts: &[(u32, f64)], shares: &mut [f64]) ->
     }
     factors.iter().map(|f| *f < 1.0).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROOMY: MotionRoom = MotionRoom {
+        min_separation: 0.0,
+        reach: 1e-3,
+    };
+
+    /// A triangle, a vertex 20 mm above it and one far away.
+    fn start() -> Vec<V3d> {
+        let corner = |x: f64, y: f64, z: f64| V3d::new(x, y, z);
+        vec![
+            corner(0.0, 0.0, 0.0),
+            corner(0.1, 0.0, 0.0),
+            corner(0.0, 0.0, 0.1),
+            corner(0.03, 0.02, 0.03),
+            corner(5.0, 0.0, 0.0),
+        ]
+    }
+
+    #[test]
+    fn only_vertices_that_would_meet_are_shortened_and_leave_room() {
+        let pairs = [ContactPair::VertexFace { v: 3, f: [0, 1, 2] }];
+        let x = start();
+        let mut motion = vec![V3d::zeros(); 5];
+        motion[3] = V3d::new(0.0, -0.05, 0.0);
+        motion[4] = V3d::new(0.0, -0.05, 0.0);
+        let limits = free_motion(&pairs, &x, &mut motion, &ROOMY, Par::Seq);
+        assert_eq!(motion[4], V3d::new(0.0, -0.05, 0.0));
+        let left = x[3].y + motion[3].y;
+        assert!((ROOM * ROOMY.reach..2e-3).contains(&left), "{left}");
+        assert!(limits.vertices == 4 && limits.smallest < 0.4, "{limits:?}");
+    }
+
+    #[test]
+    fn what_moves_along_is_not_shortened() {
+        let pairs = [ContactPair::VertexFace { v: 3, f: [0, 1, 2] }];
+        let mut motion = vec![V3d::new(0.3, -2.0, 1.0); 5];
+        let before = motion.clone();
+        let limits = free_motion(&pairs, &start(), &mut motion, &ROOMY, Par::Seq);
+        assert_eq!((limits.vertices, limits.smallest), (0, 1.0));
+        assert_eq!(motion, before);
+    }
+}
