@@ -2,7 +2,7 @@
 
 use super::newton::NewtonSystem;
 use crate::contact::broad_phase::{BroadPhase, ContactSweep};
-use crate::contact::ccd::{MotionLimits, MotionRoom, free_motion};
+use crate::contact::ccd::{StepMotion, first_impact};
 use crate::contact::{
     ActivePair, Barrier, ContactAssembly, ContactElement, ContactMesh, ContactPair, Curvature,
     Friction, FrictionPair,
@@ -13,6 +13,9 @@ use crate::par::Par;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+
+/// Share of the way to the first impact that a step takes, so that no distance becomes zero.
+const IMPACT_SHARE: f64 = 0.8;
 
 /// Contact of cloth with itself and with the obstacle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -173,7 +176,7 @@ impl Contacts {
         self.boxes.len() == x.len() && self.boxes.iter().zip(x).all(inside)
     }
 
-    /// Energy of contact and friction (J) at a point that [`Self::free_motion`] or [`Self::assemble`] has covered.
+    /// Energy of contact and friction (J) at a point that [`Self::free_share`] or [`Self::assemble`] has covered.
     pub(super) fn value(&mut self, x: &[V3d]) -> f64 {
         let barrier = self.settings.barrier();
         let pressed = self
@@ -268,15 +271,17 @@ impl Contacts {
         Ok(())
     }
 
-    /// Shortens `direction` of each vertex to where nothing meets; covers the segment for [`Self::value`].
-    pub(super) fn free_motion(&mut self, x: &[V3d], direction: &mut [V3d]) -> MotionLimits {
-        let end: Vec<V3d> = x.iter().zip(&*direction).map(|(x, p)| x + p).collect();
+    /// Largest share of `direction` without impact, at most 1; covers the segment for [`Self::value`].
+    pub(super) fn free_share(&mut self, x: &[V3d], direction: &[V3d]) -> f64 {
+        let end: Vec<V3d> = x.iter().zip(direction).map(|(x, p)| x + p).collect();
         self.cover(x, &end);
-        let room = MotionRoom {
+        let motion = StepMotion {
+            start: x,
+            end: &end,
             min_separation: self.settings.thickness,
-            reach: self.settings.activation,
         };
-        free_motion(&self.candidates, x, direction, &room, self.par)
+        let impact = first_impact(&self.candidates, &motion, self.par);
+        impact.map_or(1.0, |i| i.time * IMPACT_SHARE)
     }
 }
 

@@ -2,7 +2,6 @@
 
 use super::error::{NewtonFault, OfflineError};
 use super::linear_solver::{DirectionSolver, LinearMethod, LinearSystem};
-use crate::contact::ccd::MotionLimits;
 use crate::linear::{BlockMatrix, LinearError, StopCriterion};
 use crate::math::V3d;
 use serde::{Deserialize, Serialize};
@@ -11,10 +10,6 @@ use serde::{Deserialize, Serialize};
 const SUFFICIENT_DECREASE: f64 = 1e-4;
 /// Halvings of a step before the line search gives up.
 const MAX_HALVINGS: usize = 40;
-/// Iterations in which vertices may lag behind as far as contact asks: most of a step's way is gone by then.
-const HASTY: usize = 8;
-/// Share of its step that a vertex gets later, or all get the same: a direction bent more than that leads nowhere.
-const LEAST_SHARE: f64 = 0.01;
 /// Residual, relative to that of other iterations, of one that would end the iteration.
 const TIGHTER: f64 = 0.1;
 /// Motion of all vertices below which nothing moves (m): rounding alone.
@@ -77,9 +72,9 @@ pub struct NewtonReport {
     pub products: usize,
     /// Evaluations of the energy in line searches.
     pub evaluations: usize,
-    /// Iterations in which contact shortened the step of some vertex.
+    /// Iterations whose step contact shortened.
     pub limited: usize,
-    /// Smallest share of its step that contact left to a vertex.
+    /// Smallest share of a step that contact left.
     pub smallest_share: f64,
 }
 
@@ -132,8 +127,8 @@ pub(super) trait Minimised {
     fn value(&mut self, x: &[V3d]) -> f64;
     /// Expansion at `x`, replacing the one in `out`.
     fn assemble(&mut self, x: &[V3d], out: &mut NewtonSystem) -> Result<(), LinearError>;
-    /// Shortens `direction` of each vertex to where nothing passes through anything; prepares contact for that segment.
-    fn free_motion(&mut self, x: &[V3d], direction: &mut [V3d]) -> MotionLimits;
+    /// Largest share of `direction`, at most 1, that passes through nothing; prepares contact for that segment.
+    fn free_share(&mut self, x: &[V3d], direction: &[V3d]) -> f64;
 }
 
 /// Largest norm and its index.
@@ -170,7 +165,7 @@ pub(super) fn minimise(
     let mut direction = vec![V3d::zeros(); x.len()];
     let mut trial = x.to_vec();
     let mut last_motion = (0, f64::INFINITY);
-    for iteration in 0..settings.iterations {
+    for _ in 0..settings.iterations {
         problem.assemble(x, &mut system)?;
         if let Some(vertex) = first_not_finite(&system.gradient) {
             return Ok(Err(NewtonFault::NotFinite { vertex }));
@@ -191,17 +186,16 @@ pub(super) fn minimise(
         if last_motion.1 < RESTING {
             return Ok(Ok(()));
         }
-        let least = if iteration < HASTY { 0.0 } else { LEAST_SHARE };
-        let free = shorten(problem, (&system, x), least, &mut direction);
-        if free.vertices > 0 {
+        let free = problem.free_share(x, &direction);
+        if free < 1.0 {
             report.limited += 1;
-            report.smallest_share = report.smallest_share.min(free.smallest);
+            report.smallest_share = report.smallest_share.min(free);
         }
-        let (found, evaluations) = search_line(problem, &system, (x, &direction), &mut trial);
+        let (found, evaluations) = search_line(problem, &system, (x, &direction, free), &mut trial);
         report.evaluations += evaluations;
         if found.is_none() {
             let (vertex, motion) = last_motion;
-            let share = free.smallest;
+            let share = free;
             return Ok(Err(NewtonFault::Stuck {
                 vertex,
                 motion,
@@ -209,7 +203,7 @@ pub(super) fn minimise(
             }));
         }
         x.copy_from_slice(&trial);
-        if settings.is_settled(&direction) && found == Some(1.0) && free.vertices == 0 {
+        if settings.is_settled(&direction) && found == Some(1.0) {
             return Ok(Ok(()));
         }
     }
@@ -227,36 +221,17 @@ fn first_not_finite(gradient: &[V3d]) -> Option<usize> {
         .position(|g| !g.iter().all(|c| c.is_finite()))
 }
 
-/// Shortens each vertex' step as far as its contacts ask; all by one share where the shortened step would climb, or leaves
-/// some vertex less than the `least` share.
-fn shorten(
-    problem: &mut impl Minimised,
-    (system, x): (&NewtonSystem, &[V3d]),
-    least: f64,
-    direction: &mut [V3d],
-) -> MotionLimits {
-    let whole = direction.to_vec();
-    let limits = problem.free_motion(x, direction);
-    if limits.vertices > 0 && (limits.smallest < least || system.slope(direction) >= 0.0) {
-        for (d, whole) in direction.iter_mut().zip(&whole) {
-            *d = whole * limits.smallest;
-        }
-        problem.free_motion(x, direction);
-    }
-    limits
-}
-
-/// Longest of the halved steps that lowers the energy enough; fills `trial`.
+/// Longest of the halved steps that lowers the energy enough, from the `free` share of the direction; fills `trial`.
 /// Returns its share of the direction and the evaluations of the energy.
 fn search_line(
     problem: &mut impl Minimised,
     system: &NewtonSystem,
-    (x, direction): (&[V3d], &[V3d]),
+    (x, direction, free): (&[V3d], &[V3d], f64),
     trial: &mut [V3d],
 ) -> (Option<f64>, usize) {
     let slope = system.slope(direction);
     let noise = ROUNDING * system.value.abs();
-    let mut share = 1.0;
+    let mut share = free;
     for halvings in 0..MAX_HALVINGS {
         for (t, (x, p)) in trial.iter_mut().zip(x.iter().zip(direction)) {
             *t = x + p * share;

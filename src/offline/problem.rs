@@ -6,7 +6,6 @@ use super::linear_solver::DirectionSolver;
 use super::newton::{Minimised, NewtonReport, NewtonSettings, NewtonSystem, largest};
 use super::obstacle::ObstacleSpring;
 use super::potential::StepPotential;
-use crate::contact::ccd::MotionLimits;
 use crate::linear::LinearError;
 use crate::math::V3d;
 use crate::par::Par;
@@ -29,7 +28,7 @@ const LONGEST_COUPLING: f64 = 0.01;
 
 impl StepProblem<'_> {
     /// First guess of a step from `x`: one linear step of the cloth with all cloth near the obstacle tied to its scripted
-    /// motion, each vertex shortened to where nothing touches.
+    /// motion, shortened to where nothing touches.
     ///
     /// # Errors
     /// A linear system that cannot be solved.
@@ -62,9 +61,9 @@ impl StepProblem<'_> {
         let mut direction = vec![V3d::zeros(); x.len()];
         report.products +=
             solver.solve(settings.linear(1.0), &system.linear(), x, &mut direction)?;
-        self.free_motion(x, &mut direction);
+        let free = self.free_share(x, &direction);
         for (x, d) in x.iter_mut().zip(&direction) {
-            *x += d;
+            *x += d * free;
         }
         Ok(())
     }
@@ -101,13 +100,10 @@ impl Minimised for StepProblem<'_> {
         }
     }
 
-    fn free_motion(&mut self, x: &[V3d], direction: &mut [V3d]) -> MotionLimits {
+    fn free_share(&mut self, x: &[V3d], direction: &[V3d]) -> f64 {
         match &mut self.contacts {
-            Some(contacts) => contacts.free_motion(x, direction),
-            None => MotionLimits {
-                smallest: 1.0,
-                ..MotionLimits::default()
-            },
+            Some(contacts) => contacts.free_share(x, direction),
+            None => 1.0,
         }
     }
 }

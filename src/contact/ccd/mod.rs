@@ -1,8 +1,7 @@
 //! Continuous collision detection: first time of impact of vertex–face and edge–edge pairs, conservative in rounding.
 //!
 //! - [`time_of_impact`]`(&PairMotion, min_separation) -> Option<f64>` for one pair, [`has_impact`] for the yes or no;
-//! - [`first_impact`]`(&[ContactPair], &StepMotion, Par) -> Option<FirstImpact>` for the candidates of a step;
-//! - [`free_motion`]`(&[ContactPair], start, &mut motion, …) -> MotionLimits`: each vertex as far as it can go.
+//! - [`first_impact`]`(&[ContactPair], &StepMotion, Par) -> Option<FirstImpact>` for the candidates of a step.
 //!
 //! Method: time [0, 1] is covered from the left by certificates of separation. A fixed plane through the origin holds
 //! over the span in which all corners of the moving difference of the pair lie beyond it; the plane of the pair itself
@@ -14,13 +13,11 @@
 mod arithmetic;
 mod closest_direction;
 mod coplanarity;
-mod free_motion;
 mod pair_motion;
 mod separating_plane;
 mod step_bound;
 mod time_of_impact;
 
-pub use free_motion::{MotionLimits, MotionRoom, free_motion};
 pub use pair_motion::{PairKind, PairMotion};
 pub use step_bound::{FirstImpact, StepMotion, first_impact};
 pub use time_of_impact::{has_impact, time_of_impact};
