@@ -66,6 +66,16 @@ impl ContactPair {
             Self::VertexVertex { .. } => point_point(p, q).embed([0, 1]),
         }
     }
+    /// Lower bound of the squared distance (m²): that of the two features' boxes. Cheap, to leave far pairs out.
+    #[inline]
+    pub fn box_gap_squared(&self, [p, q, r, s]: &[V3d; 4]) -> f64 {
+        let [(low_a, high_a), (low_b, high_b)] = match self {
+            Self::EdgeEdge { .. } => [(p.inf(q), p.sup(q)), (r.inf(s), r.sup(s))],
+            _ => [(*p, *p), (q.inf(r).inf(s), q.sup(r).sup(s))],
+        };
+        let gap = (low_a - high_b).sup(&(low_b - high_a));
+        gap.map(|g| g.max(0.0)).norm_squared()
+    }
     /// Pair of the features that hold the closest points, its vertices in ascending order within a feature.
     pub fn reduced(&self, features: ClosestFeatures) -> Self {
         let stencil = self.stencil();

@@ -4,13 +4,12 @@ use super::newton::NewtonSystem;
 use crate::contact::broad_phase::{BroadPhase, ContactSweep};
 use crate::contact::ccd::{StepMotion, first_impact};
 use crate::contact::{
-    ActivePair, Barrier, ContactAssembly, ContactElement, ContactMesh, ContactPair, Curvature,
-    Friction, FrictionPair,
+    ActivePair, Barrier, ContactAssembly, ContactElement, ContactMesh, ContactPair, Friction,
+    FrictionPair,
 };
 use crate::linear::{BlockMatrix, BlockPattern, LinearError};
 use crate::math::V3d;
 use crate::par::Par;
-use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -188,9 +187,9 @@ impl Contacts {
         pressed + rubbed
     }
 
-    /// Springs that make cloth near the obstacle follow its motion, replacing the contact matrix of `out`: stiff where
-    /// they touch, none at `reach` (m). They shape the first guess of a step only.
-    pub(super) fn couple(
+    /// Springs across gaps, which keep their width, replacing the contact matrix of `out`: stiff where features touch, none
+    /// at `reach` (m) between cloth and obstacle, at the barrier's between cloth and cloth. They shape a first guess only.
+    pub(super) fn keep_gaps(
         &mut self,
         x: &[V3d],
         (reach, stiffness): (f64, f64),
@@ -203,37 +202,26 @@ impl Contacts {
         };
         let near = self.broad_phase.candidates(&self.mesh, &sweep, self.par);
         let cloth = self.mesh.cloth_vertices() as u32;
-        let mut springs = Vec::new();
-        for pair in near {
-            let ContactPair::VertexFace { v, f } = pair else {
-                break;
-            };
+        let own_reach = self.settings.barrier().reach();
+        let spring = |pair: &ContactPair| {
             let separation = pair.separation(&pair.corners(x));
             let distance = separation.squared.sqrt();
-            let own = v < cloth && f[0] < cloth;
-            let range = if own {
-                self.settings.barrier().reach()
-            } else {
-                reach
-            };
-            if distance < range {
-                springs.push((
-                    pair.stencil(),
-                    separation.weights,
-                    stiffness * (1.0 - distance / range),
-                ));
-            }
-        }
-        let pairs = springs
-            .iter()
-            .flat_map(|(v, ..)| (0..4).flat_map(move |i| (0..i).map(move |j| (v[i], v[j]))));
-        out.contact = BlockMatrix::zeros(Arc::new(BlockPattern::new(x.len(), pairs)?));
-        for (v, w, k) in &springs {
-            for i in 0..4 {
-                for j in 0..4 {
-                    if let Some(slot) = out.contact.pattern().slot(v[i], v[j]) {
-                        let block = Matrix3::from_diagonal_element(k * w[i] * w[j]);
-                        *out.contact.block_mut(slot) += block;
+            let vertices = pair.stencil();
+            let is_own = vertices.iter().all(|v| *v < cloth);
+            let range = if is_own { own_reach } else { reach };
+            // Weighted directions: the gap's change by the motion of each vertex.
+            let across = separation.vector / distance.max(f64::MIN_POSITIVE);
+            let strength = (stiffness * (1.0 - distance / range)).max(0.0).sqrt();
+            let rates = [0, 1, 2, 3].map(|k| across * (separation.weights[k] * strength));
+            (strength > 0.0).then_some((vertices, rates))
+        };
+        let springs: Vec<([u32; 4], [V3d; 4])> = near.iter().filter_map(spring).collect();
+        out.contact = zeros_on(x.len(), springs.iter().map(|(v, _)| *v))?;
+        for (v, rates) in &springs {
+            for (a, p) in v.iter().zip(rates) {
+                for (b, q) in v.iter().zip(rates) {
+                    if let Some(slot) = out.contact.pattern().slot(*a, *b) {
+                        *out.contact.block_mut(slot) += p * q.transpose();
                     }
                 }
             }
@@ -248,26 +236,18 @@ impl Contacts {
         out: &mut NewtonSystem,
     ) -> Result<(), LinearError> {
         self.cover(x, x);
-        let barrier = self.settings.barrier();
-        let mut elements = self
-            .assembly
-            .barrier(self.par, &barrier, x, &self.pairs, Curvature::Projected)
-            .to_vec();
-        self.report.in_reach = self.report.in_reach.max(elements.len());
-        elements.extend_from_slice(self.assembly.friction(
-            self.par,
-            &self.friction,
-            x,
-            &self.friction_pairs,
-        ));
-        let pairs = elements.iter().flat_map(|e| {
-            let v = e.vertices;
-            (0..4).flat_map(move |i| (0..i).map(move |j| (v[i], v[j])))
-        });
-        out.contact = BlockMatrix::zeros(Arc::new(BlockPattern::new(x.len(), pairs)?));
-        for e in &elements {
-            add_element(e, out);
-        }
+        let (par, barrier) = (self.par, self.settings.barrier());
+        let near = self.assembly.within_reach(par, &barrier, x, &self.pairs);
+        self.report.in_reach = self.report.in_reach.max(near.len());
+        let pressed = near.iter().map(|a| a.pair.stencil());
+        let rubbed = self.friction_pairs.iter().map(|p| p.vertices);
+        out.contact = zeros_on(x.len(), pressed.chain(rubbed))?;
+        let (friction, rubbing) = (&self.friction, &self.friction_pairs);
+        let mut add = |e: &ContactElement| add_element(e, out);
+        self.assembly
+            .for_each_barrier(par, &barrier, x, &near, &mut add);
+        self.assembly
+            .for_each_friction(par, friction, x, rubbing, add);
         Ok(())
     }
 
@@ -283,6 +263,16 @@ impl Contacts {
         let impact = first_impact(&self.candidates, &motion, self.par);
         impact.map_or(1.0, |i| i.time * IMPACT_SHARE)
     }
+}
+
+/// Zero matrix of `size` rows on the pairs of vertices that share a stencil.
+fn zeros_on(
+    size: usize,
+    stencils: impl Iterator<Item = [u32; 4]>,
+) -> Result<BlockMatrix, LinearError> {
+    let pairs = stencils.flat_map(|v| (0..4).flat_map(move |i| (0..i).map(move |j| (v[i], v[j]))));
+    let pattern = BlockPattern::new(size, pairs)?;
+    Ok(BlockMatrix::zeros(Arc::new(pattern)))
 }
 
 /// Mean position (m).

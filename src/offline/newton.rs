@@ -14,13 +14,15 @@ const MAX_HALVINGS: usize = 40;
 const TIGHTER: f64 = 0.1;
 /// Motion of all vertices below which nothing moves (m): rounding alone.
 const RESTING: f64 = 1e-12;
+/// Longest motion of a vertex in one iteration (m): longer ones make candidates of everything, which fills the memory.
+const LONGEST: f64 = 0.1;
 /// Decrease relative to the energy below which rounding decides, so that a full step is taken.
 const ROUNDING: f64 = 1e-13;
 
 /// End and means of the iteration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NewtonSettings {
-    /// Root mean square motion of the vertices in one iteration that counts as solved (m).
+    /// Root mean square motion of the vertices in one iteration that counts as solved (m), as the line search left it.
     pub tolerance: f64,
     /// Largest motion of one vertex then (m).
     pub largest: f64,
@@ -57,9 +59,10 @@ impl NewtonSettings {
         (self.linear, stop)
     }
 
-    /// True for a step so small that the iteration ends.
-    fn is_settled(&self, direction: &[V3d]) -> bool {
-        largest(direction).1 <= self.largest && mean(direction) <= self.tolerance
+    /// True for a share of a direction so small that the iteration ends.
+    fn is_settled(&self, direction: &[V3d], share: f64) -> bool {
+        let (longest, mean) = (largest(direction).1, mean(direction));
+        longest * share <= self.largest && mean * share <= self.tolerance
     }
 }
 
@@ -173,7 +176,7 @@ pub(super) fn minimise(
         report.products +=
             solver.solve(settings.linear(1.0), &system.linear(), x, &mut direction)?;
         report.iterations += 1;
-        if settings.is_settled(&direction) {
+        if settings.is_settled(&direction, 1.0) {
             // A small step may be one of which a loose residual has hidden the rest: rigid motion comes last.
             let tight = settings.linear(TIGHTER);
             report.products += solver.improve(tight, &system.linear(), x, &mut direction)?;
@@ -186,6 +189,7 @@ pub(super) fn minimise(
         if last_motion.1 < RESTING {
             return Ok(Ok(()));
         }
+        shorten(&mut direction, last_motion.1);
         let free = problem.free_share(x, &direction);
         if free < 1.0 {
             report.limited += 1;
@@ -203,7 +207,9 @@ pub(super) fn minimise(
             }));
         }
         x.copy_from_slice(&trial);
-        if settings.is_settled(&direction) && found == Some(1.0) {
+        // Halved once, it went too far at a few vertices, not astray; less than that says nothing about what is left.
+        let accepted = found.filter(|share| *share >= 0.5 && free >= 1.0);
+        if accepted.is_some_and(|share| settings.is_settled(&direction, share)) {
             return Ok(Ok(()));
         }
     }
@@ -213,6 +219,13 @@ pub(super) fn minimise(
         motion,
         iterations: settings.iterations,
     }))
+}
+
+/// Scales a direction down to [`LONGEST`].
+fn shorten(direction: &mut [V3d], longest: f64) {
+    if longest > LONGEST {
+        direction.iter_mut().for_each(|d| *d *= LONGEST / longest);
+    }
 }
 
 fn first_not_finite(gradient: &[V3d]) -> Option<usize> {

@@ -21,14 +21,16 @@ pub(super) struct StepProblem<'a> {
     pub(super) par: Par,
 }
 
-/// Stiffness of the springs that couple cloth to the skin in a first guess, over mass per squared time.
-const COUPLING: f64 = 30.0;
-/// Longest reach of that coupling (m).
+/// Stiffness that keeps the gaps of a first guess (N/m): above that of membranes, so that these yield.
+const GAP_STIFFNESS: f64 = 1e4;
+/// Longest reach of these springs (m).
 const LONGEST_COUPLING: f64 = 0.01;
+/// Residual of the guess relative to that of an iteration: the forces of the moving obstacle dwarf those of cloth.
+const GUESS_RESIDUAL: f64 = 1e-3;
 
 impl StepProblem<'_> {
-    /// First guess of a step from `x`: one linear step of the cloth with all cloth near the obstacle tied to its scripted
-    /// motion, shortened to where nothing touches.
+    /// First guess of a step from `x`: one linear step in which the obstacle follows its script and gaps keep their width,
+    /// shortened to where nothing touches.
     ///
     /// # Errors
     /// A linear system that cannot be solved.
@@ -53,14 +55,16 @@ impl StepProblem<'_> {
             system.add_diagonal(n + j, d * -k, Matrix3::from_diagonal_element(k));
         }
         if let Some(contacts) = &mut self.contacts {
-            let mass = self.potential.cloth.mass.iter().sum::<f64>() / n.max(1) as f64;
-            let stiffness = COUPLING * mass * self.potential.rate_squared;
             let reach = reach.clamp(1e-3, LONGEST_COUPLING);
-            contacts.couple(x, (reach, stiffness), &mut system)?;
+            contacts.keep_gaps(x, (reach, GAP_STIFFNESS), &mut system)?;
         }
         let mut direction = vec![V3d::zeros(); x.len()];
-        report.products +=
-            solver.solve(settings.linear(1.0), &system.linear(), x, &mut direction)?;
+        report.products += solver.solve(
+            settings.linear(GUESS_RESIDUAL),
+            &system.linear(),
+            x,
+            &mut direction,
+        )?;
         let free = self.free_share(x, &direction);
         for (x, d) in x.iter_mut().zip(&direction) {
             *x += d * free;

@@ -23,37 +23,44 @@ pub struct ContactElement {
     pub energy: ElementEnergy<12>,
 }
 
-/// Elements of the last call, and the buffers behind them.
+/// Buffers that are used again from call to call.
 #[derive(Clone, Debug, Default)]
 pub struct ContactAssembly {
     scalars: Vec<f64>,
-    in_reach: Vec<u32>,
     elements: Vec<ContactElement>,
 }
 
 impl ContactAssembly {
-    /// Elements of the pairs within reach of the barrier, in the order of `pairs`. `positions` (m) of all vertices.
+    /// Pairs within reach of the barrier, in the order of `pairs`. `positions` (m) of all vertices.
     ///
     /// # Panics
     /// With fewer positions than the pairs' indices need.
-    pub fn barrier(
+    pub fn within_reach(
         &mut self,
         par: Par,
         barrier: &Barrier,
         positions: &[V3d],
         pairs: &[ActivePair],
-        curvature: Curvature,
-    ) -> &[ContactElement] {
-        self.find_in_reach(par, barrier, positions, pairs);
-        let in_reach = &self.in_reach;
-        map_into(par, in_reach.len(), CHUNK, &mut self.elements, |k| {
-            element(barrier, positions, &pairs[in_reach[k] as usize], curvature)
+    ) -> Vec<ActivePair> {
+        let reach = barrier.reach() * barrier.reach();
+        map_into(par, pairs.len(), CHUNK, &mut self.scalars, |i| {
+            let pair = pairs[i].pair;
+            let corners = pair.corners(positions);
+            let gap = pair.box_gap_squared(&corners);
+            if gap >= reach {
+                gap
+            } else {
+                pair.separation(&corners).squared
+            }
         });
-        &self.elements
+        let squared = self.scalars.iter().zip(pairs);
+        squared
+            .filter_map(|(s, pair)| (*s < reach).then_some(*pair))
+            .collect()
     }
-    /// Calls `add` on each of these elements in turn, with the projected curvature.
+    /// Calls `add` on the element of each pair in turn; one out of reach is zero.
     ///
-    /// Elements are 1.3 kB each; a block of them stays in the cache, which [`Self::barrier`] leaves.
+    /// Elements are 1.3 kB each: a block of them stays in the cache.
     ///
     /// # Panics
     /// With fewer positions than the pairs' indices need.
@@ -65,32 +72,12 @@ impl ContactAssembly {
         pairs: &[ActivePair],
         mut add: impl FnMut(&ContactElement),
     ) {
-        self.find_in_reach(par, barrier, positions, pairs);
-        for block in self.in_reach.chunks(BLOCK) {
+        for block in pairs.chunks(BLOCK) {
             map_into(par, block.len(), BLOCK_CHUNK, &mut self.elements, |k| {
-                let active = &pairs[block[k] as usize];
-                element(barrier, positions, active, Curvature::Projected)
+                element(barrier, positions, &block[k])
             });
             self.elements.iter().for_each(&mut add);
         }
-    }
-    /// Lists the pairs within reach in ascending order.
-    fn find_in_reach(
-        &mut self,
-        par: Par,
-        barrier: &Barrier,
-        positions: &[V3d],
-        pairs: &[ActivePair],
-    ) {
-        map_into(par, pairs.len(), CHUNK, &mut self.scalars, |i| {
-            let pair = pairs[i].pair;
-            pair.separation(&pair.corners(positions)).squared
-        });
-        let reach = barrier.reach() * barrier.reach();
-        self.in_reach.clear();
-        let indices = (0u32..).zip(&self.scalars);
-        self.in_reach
-            .extend(indices.filter(|(_, s)| **s < reach).map(|(i, _)| i));
     }
     /// Energy of all pairs (J), without derivatives: infinite as soon as one pair is at or below the thickness.
     ///
@@ -108,21 +95,7 @@ impl ContactAssembly {
         });
         self.scalars.iter().sum()
     }
-    /// Elements of lagged friction, in the order of `pairs`. `positions` (m) of all vertices.
-    ///
-    /// # Panics
-    /// With fewer positions than the pairs' indices need.
-    pub fn friction(
-        &mut self,
-        par: Par,
-        friction: &Friction,
-        positions: &[V3d],
-        pairs: &[FrictionPair],
-    ) -> &[ContactElement] {
-        self.friction_block(par, friction, positions, pairs, CHUNK);
-        &self.elements
-    }
-    /// Calls `add` on each of these elements in turn; see [`Self::for_each_barrier`].
+    /// Calls `add` on the element of lagged friction of each pair in turn. `positions` (m) of all vertices.
     ///
     /// # Panics
     /// With fewer positions than the pairs' indices need.
@@ -135,24 +108,14 @@ impl ContactAssembly {
         mut add: impl FnMut(&ContactElement),
     ) {
         for block in pairs.chunks(BLOCK) {
-            self.friction_block(par, friction, positions, block, BLOCK_CHUNK);
+            map_into(par, block.len(), BLOCK_CHUNK, &mut self.elements, |k| {
+                ContactElement {
+                    vertices: block[k].vertices,
+                    energy: friction.energy(&block[k], &block[k].corners(positions)),
+                }
+            });
             self.elements.iter().for_each(&mut add);
         }
-    }
-    fn friction_block(
-        &mut self,
-        par: Par,
-        friction: &Friction,
-        positions: &[V3d],
-        pairs: &[FrictionPair],
-        chunk: usize,
-    ) {
-        map_into(par, pairs.len(), chunk, &mut self.elements, |k| {
-            ContactElement {
-                vertices: pairs[k].vertices,
-                energy: friction.energy(&pairs[k], &pairs[k].corners(positions)),
-            }
-        });
     }
     /// Energy of lagged friction of all pairs (J).
     ///
@@ -170,28 +133,15 @@ impl ContactAssembly {
         });
         self.scalars.iter().sum()
     }
-    /// Elements of the last call.
-    pub fn elements(&self) -> &[ContactElement] {
-        &self.elements
-    }
-    /// Index in `pairs` of each element of the last [`Self::barrier`].
-    pub fn in_reach(&self) -> &[u32] {
-        &self.in_reach
-    }
 }
 
-/// Element of one pair.
-fn element(
-    barrier: &Barrier,
-    positions: &[V3d],
-    active: &ActivePair,
-    curvature: Curvature,
-) -> ContactElement {
+/// Element of one pair, with the projected curvature.
+fn element(barrier: &Barrier, positions: &[V3d], active: &ActivePair) -> ContactElement {
     let corners = active.pair.corners(positions);
     ContactElement {
         vertices: active.pair.stencil(),
         energy: barrier
-            .energy(active, &corners, curvature)
+            .energy(active, &corners, Curvature::Projected)
             .unwrap_or_default(),
     }
 }
@@ -235,13 +185,12 @@ mod tests {
         };
         let run = |par| {
             let mut assembly = ContactAssembly::default();
-            assembly.barrier(par, &barrier, &x, &pairs, Curvature::Projected);
+            let near = assembly.within_reach(par, &barrier, &x, &pairs);
             let value = assembly.barrier_value(par, &barrier, &x, &pairs);
-            (
-                assembly.elements().to_vec(),
-                assembly.in_reach().to_vec(),
-                value,
-            )
+            let mut elements = Vec::new();
+            let add = |e: &ContactElement| elements.push(*e);
+            assembly.for_each_barrier(par, &barrier, &x, &near, add);
+            (elements, near, value)
         };
         let one = run(Par::Seq);
         assert!(
@@ -253,34 +202,18 @@ mod tests {
             let other = with_threads(threads, || run(Par::Rayon)).expect("threads");
             assert!(other == one, "{threads} threads");
         }
-        let mut streamed = Vec::new();
-        let mut assembly = ContactAssembly::default();
-        let add = |e: &ContactElement| streamed.push(*e);
-        assembly.for_each_barrier(Par::Rayon, &barrier, &x, &pairs, add);
-        assert!(streamed == one.0);
         let sum: f64 = one.0.iter().map(|e| e.energy.value).sum();
         assert!((sum - one.2).abs() < 1e-12 * sum);
     }
 
     #[test]
-    fn buffers_are_reused() {
+    fn a_box_gap_bounds_the_distance() {
         let (x, pairs) = scene();
-        let barrier = Barrier {
-            stiffness: 1e-3,
-            activation: 6e-3,
-            thickness: 0.0,
-        };
-        let mut assembly = ContactAssembly::default();
-        let at = |a: &mut ContactAssembly| {
-            a.barrier(Par::Seq, &barrier, &x, &pairs, Curvature::GaussNewton)
-                .as_ptr()
-        };
-        let first = at(&mut assembly);
-        assert_eq!(first, at(&mut assembly));
-        assert!(
-            assembly
-                .barrier(Par::Seq, &barrier, &x, &[], Curvature::Exact)
-                .is_empty()
-        );
+        for active in &pairs {
+            let corners = active.pair.corners(&x);
+            let squared = active.pair.separation(&corners).squared;
+            let gap = active.pair.box_gap_squared(&corners);
+            assert!(gap <= squared * (1.0 + 1e-12), "{gap} {squared}");
+        }
     }
 }

@@ -85,6 +85,9 @@ impl Barrier {
     }
     /// Energy of a pair at these [`ContactPair::corners`] (J); infinite at and below the thickness.
     pub fn value(&self, active: &ActivePair, corners: &[V3d; 4]) -> f64 {
+        if active.pair.box_gap_squared(corners) >= self.reach() * self.reach() {
+            return 0.0;
+        }
         let value = self.sample(active.pair.separation(corners).squared).value;
         let mollifier = mollifier(active, corners).map_or(1.0, |m| m.value());
         if value > 0.0 {
