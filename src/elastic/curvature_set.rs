@@ -5,8 +5,7 @@ use super::edges::InteriorEdge;
 use super::element_set::CHUNK;
 use super::fan_expansion::{CurvatureBuffers, FanExpansion, Place};
 use super::fans::RestMesh;
-use super::{BendLaw, Dihedral, ElasticExpansion, RestSheet, RestTriangle};
-use crate::math::V3d;
+use super::{BendLaw, Dihedral, ElasticExpansion, RestSheet, RestTriangle, SheetMotion};
 use crate::par::{Par, for_chunks, map_into};
 use nalgebra::{Matrix3, Vector3};
 
@@ -108,14 +107,12 @@ impl CurvatureSet {
             }
         }
     }
-    fn corners(&self, hinge: usize, x: &[V3d]) -> [V3d; 4] {
-        self.hinges[hinge].corners.map(|v| x[v as usize])
-    }
     /// Energy (J).
-    pub(super) fn energy(&self, law: &BendLaw, par: Par, x: &[V3d]) -> f64 {
+    pub(super) fn energy(&self, law: &BendLaw, par: Par, at: &SheetMotion<'_>) -> f64 {
         let (mut angles, mut values) = (Vec::new(), Vec::new());
         map_into(par, self.hinges.len(), CHUNK, &mut angles, |k| {
-            Dihedral::angle(&self.corners(k, x)) - self.hinges[k].angle
+            let hinge = &self.hinges[k];
+            Dihedral::continued_angle(&at.corners(&hinge.corners)) - hinge.angle
         });
         map_into(par, self.fans.len(), CHUNK, &mut values, |k| {
             let fan = &self.fans[k];
@@ -128,12 +125,12 @@ impl CurvatureSet {
         &self,
         law: &BendLaw,
         par: Par,
-        x: &[V3d],
+        at: &SheetMotion<'_>,
         buffers: &mut CurvatureBuffers,
         out: &mut ElasticExpansion,
     ) {
         map_into(par, self.hinges.len(), CHUNK, &mut buffers.angles, |k| {
-            Some(Dihedral::new(&self.corners(k, x)))
+            Some(Dihedral::continued(&at.corners(&self.hinges[k].corners)))
         });
         let angles = &buffers.angles;
         buffers
@@ -216,6 +213,7 @@ mod tests {
     use super::super::edges::interior_edges;
     use super::super::test_strips::{StripPattern, TestStrip, strip};
     use super::*;
+    use crate::math::V3d;
     use nalgebra::{DMatrix, Rotation2, Vector2};
 
     const PATTERNS: [StripPattern; 4] = [
@@ -258,7 +256,8 @@ mod tests {
             let area: f64 = set.fans.iter().map(|f| f.area).sum();
             for z in [[1.0, 0.0, 0.0], [0.3, -0.8, 0.5], [0.2, 0.1, -1.4]] {
                 let z = Vector3::from(z) * 1e-4;
-                let energy = set.energy(&law, Par::Seq, &curved(&s, &z));
+                let bent = curved(&s, &z);
+                let energy = set.energy(&law, Par::Seq, &SheetMotion::still(&bent));
                 let expected = area * law.expand(&z).value;
                 let error = energy / expected - 1.0;
                 // Corners, and boundary vertices whose neighbours lie on a conic, take the least curvature.
@@ -281,8 +280,11 @@ mod tests {
             }
         }
         let set = elements(&moved, s.at.len(), &law);
-        let expected = elements(&rest, s.at.len(), &law).energy(&law, Par::Seq, &x);
-        assert!((set.energy(&law, Par::Seq, &x) / expected - 1.0).abs() < 1e-9);
+        let expected =
+            elements(&rest, s.at.len(), &law).energy(&law, Par::Seq, &SheetMotion::still(&x));
+        assert!(
+            (set.energy(&law, Par::Seq, &SheetMotion::still(&x)) / expected - 1.0).abs() < 1e-9
+        );
         // The grain turned by 30°: the curvature is the same tensor in the turned frame.
         let turn = Rotation2::new(-std::f64::consts::FRAC_PI_6);
         let mut turned = rest.clone();
@@ -295,7 +297,9 @@ mod tests {
         let there = Vector3::new(t[(0, 0)], t[(1, 1)], 2.0 * t[(0, 1)]);
         let area: f64 = set.fans.iter().map(|f| f.area).sum();
         let expected = area * law.expand(&there).value;
-        assert!((set.energy(&law, Par::Seq, &x) / expected - 1.0).abs() < 0.005);
+        assert!(
+            (set.energy(&law, Par::Seq, &SheetMotion::still(&x)) / expected - 1.0).abs() < 0.005
+        );
     }
 
     /// Only affine heights are free: no hourglass mode on any mesh.
@@ -313,7 +317,13 @@ mod tests {
             out.reset(s.at.len(), pairs.len());
             let flat = curved(&s, &Vector3::zeros());
             let buffers = &mut CurvatureBuffers::default();
-            set.assemble(&law, Par::Seq, &flat, buffers, &mut out);
+            set.assemble(
+                &law,
+                Par::Seq,
+                &SheetMotion::still(&flat),
+                buffers,
+                &mut out,
+            );
             let mut h = DMatrix::zeros(s.at.len(), s.at.len());
             for (i, d) in out.diagonal.iter().enumerate() {
                 h[(i, i)] = d[(2, 2)];

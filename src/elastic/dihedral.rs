@@ -7,14 +7,47 @@
 
 use crate::math::{V3d, skew};
 use nalgebra::{Matrix3, SMatrix, SVector};
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Angle of a hinge with its derivatives by the stacked corners (edge start, edge end, left apex, right apex).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dihedral {
-    /// Angle (rad) in (−π, π].
+    /// Angle (rad) in (−π, π], beyond where it is a continued one.
     pub angle: f64,
     /// Derivative (rad/m).
     pub gradient: SVector<f64, 12>,
+}
+
+/// Positions of a sheet, and those from where it moved without passing through itself.
+#[derive(Clone, Copy, Debug)]
+pub struct SheetMotion<'a> {
+    /// Positions at the start (m): they tell a fold beyond π from one to the other side.
+    pub start: &'a [V3d],
+    /// Positions now (m).
+    pub now: &'a [V3d],
+}
+
+impl<'a> SheetMotion<'a> {
+    /// Sheet that has not moved: angles lie in (−π, π].
+    pub fn still(x: &'a [V3d]) -> Self {
+        Self { start: x, now: x }
+    }
+    /// Corners of a hinge at the start and now.
+    pub(super) fn corners(&self, vertices: &[u32; 4]) -> [[V3d; 4]; 2] {
+        [self.start, self.now].map(|x| vertices.map(|v| x[v as usize]))
+    }
+}
+
+/// `angle` (rad), or the turn beside it that is nearest to the angle at the start.
+///
+/// Folded flat, both sides of ±π are neighbours: without this the energy of a fan of hinges jumps there, and no step is
+/// short enough to lower it. Contact keeps most hinges from passing, but not those whose wings are sewn together.
+fn continued(angle: f64, start: &[V3d; 4]) -> f64 {
+    if angle.abs() < FRAC_PI_2 {
+        return angle;
+    }
+    let turns = (Wings::new(start).angle() - angle) / TAU;
+    angle + turns.round() * TAU
 }
 
 /// Least squared double area of a wing over the fourth power of the edge: below it the angle has no derivative, and the
@@ -64,6 +97,18 @@ impl Dihedral {
     /// Angle (rad) of the hinge.
     pub fn angle(x: &[V3d; 4]) -> f64 {
         Wings::new(x).angle()
+    }
+    /// Angle (rad) of a hinge that moved from `start` to `now`, beyond ±π where it passed that.
+    pub fn continued_angle([start, now]: &[[V3d; 4]; 2]) -> f64 {
+        continued(Wings::new(now).angle(), start)
+    }
+    /// [`Self::continued_angle`] and its gradient.
+    pub fn continued([start, now]: &[[V3d; 4]; 2]) -> Self {
+        let principal = Self::new(now);
+        Self {
+            angle: continued(principal.angle, start),
+            ..principal
+        }
     }
     /// Angle and gradient.
     pub fn new(x: &[V3d; 4]) -> Self {
@@ -132,6 +177,34 @@ mod tests {
     use super::*;
     use crate::math::derivative_check::{DerivativeCheck, Derivatives};
     use nalgebra::DMatrix;
+
+    /// Folded through itself, an angle goes on beyond π instead of turning into its opposite.
+    #[test]
+    fn angles_continue_through_a_flat_fold() {
+        let corners = |angle: f64| -> [V3d; 4] {
+            let x = bent(angle);
+            [0, 1, 2, 3].map(|k| V3d::from_column_slice(&x[3 * k..3 * k + 3]))
+        };
+        let base = Dihedral::angle(&corners(3.0));
+        for side in [1.0, -1.0] {
+            let start = corners(side * 3.0);
+            for step in 0..8 {
+                let turned = 0.05 * f64::from(step);
+                let motion = [start, corners(side * (3.0 + turned))];
+                let expected = side * (base.abs() + turned);
+                let angle = Dihedral::continued_angle(&motion);
+                assert!(
+                    (angle.abs() - expected.abs()).abs() < 1e-9,
+                    "{angle} {expected}"
+                );
+                assert_eq!(angle.signum(), Dihedral::angle(&start).signum());
+                assert_eq!(Dihedral::continued(&motion).angle, angle);
+            }
+        }
+        // Nothing is added where the hinge is open, whatever it was.
+        let open = [corners(-3.0), corners(0.4)];
+        assert_eq!(Dihedral::continued_angle(&open), Dihedral::angle(&open[1]));
+    }
 
     /// Irregular hinge whose right wing is lifted towards the normals by an angle.
     fn bent(angle: f64) -> Vec<f64> {

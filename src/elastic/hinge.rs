@@ -53,13 +53,26 @@ impl HingeElement {
             self.area * scale * scale * d.dot(&(w.hessian * d)),
         )
     }
+    /// Energy (J) after a motion of the corners.
+    pub(super) fn moved_value(&self, law: &BendLaw, motion: &[[V3d; 4]; 2]) -> f64 {
+        self.of_angle(law, Dihedral::continued_angle(motion)).0
+    }
     /// Energy (J).
     pub fn value(&self, law: &BendLaw, x: &[V3d; 4]) -> f64 {
         self.of_angle(law, Dihedral::angle(x)).0
     }
     /// Energy with its derivatives by (edge start, edge end, left apex, right apex).
     pub fn expand(&self, law: &BendLaw, x: &[V3d; 4], second: AngleHessian) -> ElementEnergy<12> {
-        let theta = Dihedral::new(x);
+        self.moved_expansion(law, &[*x, *x], second)
+    }
+    /// The same after a motion of the corners.
+    pub(super) fn moved_expansion(
+        &self,
+        law: &BendLaw,
+        motion: &[[V3d; 4]; 2],
+        second: AngleHessian,
+    ) -> ElementEnergy<12> {
+        let (theta, x) = (Dihedral::continued(motion), &motion[1]);
         let (value, moment, slope) = self.of_angle(law, theta.angle);
         let g = &theta.gradient;
         let mut hessian = g * g.transpose() * slope.max(0.0);

@@ -31,7 +31,7 @@ mod test_strips;
 
 pub use assembly::ElasticExpansion;
 pub use bend_law::BendLaw;
-pub use dihedral::Dihedral;
+pub use dihedral::{Dihedral, SheetMotion};
 pub use error::ElasticError;
 pub use fabric::ElasticFabric;
 pub use hinge::{AngleHessian, HingeElement};

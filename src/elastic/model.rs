@@ -7,7 +7,7 @@ use super::hinge::AngleHessian;
 use super::packed::Packed;
 use super::{
     ElasticError, ElasticExpansion, ElasticFabric, HingeElement, MembraneElement, RestSheet,
-    RestTriangle,
+    RestTriangle, SheetMotion,
 };
 use crate::math::V3d;
 use crate::par::{Par, map_into};
@@ -105,19 +105,32 @@ impl ClothModel {
     }
     /// Elastic energy (J) at `x`, the same bits at any number of threads.
     pub fn energy(&self, par: Par, x: &[V3d]) -> f64 {
+        self.moved_energy(par, &SheetMotion::still(x))
+    }
+    /// Energy (J) after a motion, in which no angle jumps by a turn.
+    pub fn moved_energy(&self, par: Par, at: &SheetMotion<'_>) -> f64 {
+        let x = at.now;
         let mut values = Vec::new();
         map_into(par, self.membranes.len(), CHUNK, &mut values, |k| {
             self.membranes[k].value(&self.fabric.stretch, &self.membrane_set.corners(k, x))
         });
         let stretch = values.iter().sum::<f64>();
         map_into(par, self.hinges.len(), CHUNK, &mut values, |k| {
-            self.hinges[k].value(&self.fabric.bend, &self.hinge_set.corners(k, x))
+            self.hinges[k].moved_value(&self.fabric.bend, &self.hinge_motion(k, at))
         });
         let folds = values.iter().sum::<f64>();
-        stretch + folds + self.curvatures.energy(&self.fabric.bend, par, x)
+        stretch + folds + self.curvatures.energy(&self.fabric.bend, par, at)
+    }
+    fn hinge_motion(&self, k: usize, at: &SheetMotion<'_>) -> [[V3d; 4]; 2] {
+        [at.start, at.now].map(|x| self.hinge_set.corners(k, x))
     }
     /// Energy, gradient and positive semi-definite Hessian at `x`, the same bits at any number of threads.
     pub fn expand(&self, par: Par, x: &[V3d], out: &mut ElasticExpansion) {
+        self.moved_expansion(par, &SheetMotion::still(x), out);
+    }
+    /// The same after a motion, in which no angle jumps by a turn.
+    pub fn moved_expansion(&self, par: Par, at: &SheetMotion<'_>, out: &mut ElasticExpansion) {
+        let x = at.now;
         out.reset(self.vertex_count(), self.pairs.len());
         let mut buffers = std::mem::take(&mut out.buffers);
         self.membrane_set
@@ -126,12 +139,12 @@ impl ClothModel {
                 Packed::new(&self.membranes[k].expand(&self.fabric.stretch, &at))
             });
         self.hinge_set.assemble(par, &mut buffers.hinges, out, |k| {
-            let at = self.hinge_set.corners(k, x);
+            let motion = self.hinge_motion(k, at);
             let second = AngleHessian::GaussNewton;
-            Packed::new(&self.hinges[k].expand(&self.fabric.bend, &at, second))
+            Packed::new(&self.hinges[k].moved_expansion(&self.fabric.bend, &motion, second))
         });
         let (law, buffer) = (&self.fabric.bend, &mut buffers.curvatures);
-        self.curvatures.assemble(law, par, x, buffer, out);
+        self.curvatures.assemble(law, par, at, buffer, out);
         out.buffers = buffers;
     }
 }

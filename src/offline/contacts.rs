@@ -87,6 +87,8 @@ pub(super) struct Contacts {
     boxes: Vec<SweptBox>,
     /// Mean position at the start of the query (m).
     start_mean: V3d,
+    /// Positions at the step's begin (m): their edge lengths decide how parallel edges are mollified throughout the step.
+    step_start: Vec<V3d>,
     candidates: Vec<ContactPair>,
     pairs: Vec<ActivePair>,
     assembly: ContactAssembly,
@@ -104,6 +106,7 @@ impl Contacts {
             broad_phase: BroadPhase::default(),
             boxes: Vec::new(),
             start_mean: V3d::zeros(),
+            step_start: Vec::new(),
             candidates: Vec::new(),
             pairs: Vec::new(),
             assembly: ContactAssembly::default(),
@@ -123,7 +126,9 @@ impl Contacts {
 
     /// Lags friction at the start `x` of a step of `h` (s).
     pub(super) fn begin_step(&mut self, x: &[V3d], h: f64) {
+        self.step_start = x.to_vec();
         self.cover(x, x);
+        self.list_pairs();
         self.friction.slip = self.settings.creep * h;
         self.friction_pairs.clear();
         if self.settings.friction > 0.0 {
@@ -149,9 +154,7 @@ impl Contacts {
             distance: self.settings.barrier().reach() + 2.0 * margin,
         };
         self.candidates = self.broad_phase.candidates(&self.mesh, &sweep, self.par);
-        self.pairs.clear();
-        let active = self.candidates.iter().map(|p| ActivePair::new(*p, x));
-        self.pairs.extend(active);
+        self.list_pairs();
         self.start_mean = mean_of(x);
         let shift = mean_of(end) - self.start_mean;
         self.boxes.clear();
@@ -161,6 +164,13 @@ impl Contacts {
         }));
         self.report.queries += 1;
         self.report.candidates = self.report.candidates.max(self.candidates.len());
+    }
+
+    /// Makes pairs of the candidates, the same at any point of a step.
+    fn list_pairs(&mut self) {
+        self.pairs.clear();
+        let active = |p: &ContactPair| ActivePair::new(*p, &self.step_start);
+        self.pairs.extend(self.candidates.iter().map(active));
     }
 
     /// True if each vertex of `x`, less the mean motion since the query, is within the margin of its box: then every pair

@@ -1,7 +1,7 @@
 //! The elastic sheet as an energy term.
 
 use super::energy_term::EnergyTerm;
-use crate::elastic::{ClothModel, ElasticExpansion};
+use crate::elastic::{ClothModel, ElasticExpansion, SheetMotion};
 use crate::linear::{BlockMatrix, BlockPattern};
 use crate::math::V3d;
 use crate::par::Par;
@@ -45,19 +45,19 @@ impl EnergyTerm for ElasticTerm {
         self.pairs = pairs.map(|[a, b]| [slot(*a, *b), slot(*b, *a)]).collect();
     }
 
-    fn value(&self, par: Par, x: &[V3d]) -> f64 {
-        self.model.energy(par, x)
+    fn value(&self, par: Par, at: &SheetMotion<'_>) -> f64 {
+        self.model.moved_energy(par, at)
     }
 
     fn assemble(
         &self,
         par: Par,
-        x: &[V3d],
+        at: &SheetMotion<'_>,
         gradient: &mut [V3d],
         hessian: &mut BlockMatrix,
     ) -> f64 {
         let mut scratch = self.scratch.lock().unwrap_or_else(PoisonError::into_inner);
-        self.model.expand(par, x, &mut scratch);
+        self.model.moved_expansion(par, at, &mut scratch);
         for (g, own) in gradient.iter_mut().zip(&scratch.gradient) {
             *g += own;
         }

@@ -1,5 +1,6 @@
 //! Sums of element energies over fixed stencils: elasticity, stitches, contact and friction alike.
 
+use crate::elastic::SheetMotion;
 use crate::linear::{BlockMatrix, BlockPattern};
 use crate::math::{ElementEnergy, V3d};
 use crate::par::{self, Par};
@@ -27,11 +28,16 @@ pub trait EnergyTerm: Send + Sync {
     fn visit_pairs(&self, visit: &mut dyn FnMut(u32, u32));
     /// Looks up where the blocks of each element go; call once a pattern.
     fn bind(&mut self, pattern: &BlockPattern);
-    /// Energy (J) at positions `x` (m); the bits do not depend on the threads.
-    fn value(&self, par: Par, x: &[V3d]) -> f64;
+    /// Energy (J) within a step; the bits do not depend on the threads.
+    fn value(&self, par: Par, at: &SheetMotion<'_>) -> f64;
     /// Adds gradient (N) and Hessian (N/m) and returns the energy (J).
-    fn assemble(&self, par: Par, x: &[V3d], gradient: &mut [V3d], hessian: &mut BlockMatrix)
-    -> f64;
+    fn assemble(
+        &self,
+        par: Par,
+        at: &SheetMotion<'_>,
+        gradient: &mut [V3d],
+        hessian: &mut BlockMatrix,
+    ) -> f64;
 }
 
 /// An [`EnergyElements`] as an [`EnergyTerm`].
@@ -89,14 +95,14 @@ impl<S: EnergyElements<V, N>, const V: usize, const N: usize> EnergyTerm for Ele
         }
     }
 
-    fn value(&self, par: Par, x: &[V3d]) -> f64 {
-        ordered_sum(par, self.set.count(), |element| self.set.value(element, x))
+    fn value(&self, par: Par, at: &SheetMotion<'_>) -> f64 {
+        ordered_sum(par, self.set.count(), |k| self.set.value(k, at.now))
     }
 
     fn assemble(
         &self,
         par: Par,
-        x: &[V3d],
+        at: &SheetMotion<'_>,
         gradient: &mut [V3d],
         hessian: &mut BlockMatrix,
     ) -> f64 {
@@ -105,7 +111,7 @@ impl<S: EnergyElements<V, N>, const V: usize, const N: usize> EnergyTerm for Ele
         for first in (0..self.set.count()).step_by(BATCH) {
             let count = BATCH.min(self.set.count() - first);
             par::map_into(par, count, CHUNK / 4, &mut batch, |k| {
-                self.set.expand(first + k, x)
+                self.set.expand(first + k, at.now)
             });
             for (k, energy) in batch.iter().enumerate() {
                 sum += energy.value;

@@ -3,6 +3,7 @@
 use super::energy_term::ordered_sum;
 use super::model::{OfflineCloth, PinTarget};
 use super::newton::NewtonSystem;
+use crate::elastic::SheetMotion;
 use crate::math::V3d;
 use crate::par::Par;
 use nalgebra::Matrix3;
@@ -11,6 +12,8 @@ use nalgebra::Matrix3;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StepPotential<'a> {
     pub(super) cloth: &'a OfflineCloth,
+    /// Positions of the cloth at the step's begin (m), from where angles are continued.
+    pub(super) start: &'a [V3d],
     /// Positions without forces (m).
     pub(super) inertial: &'a [V3d],
     /// 1/(γh)² (1/s²).
@@ -22,7 +25,14 @@ impl StepPotential<'_> {
     /// Energy at `x` (J).
     pub(super) fn value(&self, par: Par, x: &[V3d]) -> f64 {
         let shape = self.cloth.terms().iter();
-        self.pointwise(par, x) + shape.map(|t| t.value(par, x)).sum::<f64>()
+        self.pointwise(par, x) + shape.map(|t| t.value(par, &self.motion(x))).sum::<f64>()
+    }
+
+    fn motion<'b>(&'b self, x: &'b [V3d]) -> SheetMotion<'b> {
+        SheetMotion {
+            start: self.start,
+            now: x,
+        }
     }
 
     /// Energy of inertia, gravity and pins (J).
@@ -58,7 +68,7 @@ impl StepPotential<'_> {
             out.add_diagonal(pin.vertex as usize, gradient, block);
         }
         for term in cloth.terms() {
-            out.value += term.assemble(par, x, &mut out.gradient, &mut out.shape);
+            out.value += term.assemble(par, &self.motion(x), &mut out.gradient, &mut out.shape);
         }
     }
 }

@@ -242,6 +242,7 @@ impl<'a> OfflineSolver<'a> {
         let mut problem = StepProblem {
             potential: StepPotential {
                 cloth: self.cloth,
+                start: &state.now.x,
                 inertial: &inertial,
                 rate_squared: coefficients.span.powi(-2),
                 pins: &targets.pins,
