@@ -18,7 +18,7 @@ pub struct Dihedral {
     pub gradient: SVector<f64, 12>,
 }
 
-/// Positions of a sheet, and those from where it moved without passing through itself.
+/// Positions of a sheet, and those from where it moved there.
 #[derive(Clone, Copy, Debug)]
 pub struct SheetMotion<'a> {
     /// Positions at the start (m): they tell a fold beyond π from one to the other side.

@@ -59,7 +59,7 @@ impl HingeElement {
     }
     /// Energy (J).
     pub fn value(&self, law: &BendLaw, x: &[V3d; 4]) -> f64 {
-        self.of_angle(law, Dihedral::angle(x)).0
+        self.moved_value(law, &[*x, *x])
     }
     /// Energy with its derivatives by (edge start, edge end, left apex, right apex).
     pub fn expand(&self, law: &BendLaw, x: &[V3d; 4], second: AngleHessian) -> ElementEnergy<12> {

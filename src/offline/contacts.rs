@@ -127,8 +127,9 @@ impl Contacts {
     /// Lags friction at the start `x` of a step of `h` (s).
     pub(super) fn begin_step(&mut self, x: &[V3d], h: f64) {
         self.step_start = x.to_vec();
-        self.cover(x, x);
-        self.list_pairs();
+        if !self.cover(x, x) {
+            self.list_pairs();
+        }
         self.friction.slip = self.settings.creep * h;
         self.friction_pairs.clear();
         if self.settings.friction > 0.0 {
@@ -141,12 +142,13 @@ impl Contacts {
         }
     }
 
-    /// Makes the candidates hold every pair that comes within reach while each vertex moves straight from `x` to `end`.
-    fn cover(&mut self, x: &[V3d], end: &[V3d]) {
+    /// Makes the candidates hold every pair that comes within reach while each vertex moves straight from `x` to `end`;
+    /// true if that took a query.
+    fn cover(&mut self, x: &[V3d], end: &[V3d]) -> bool {
         let margin = self.settings.margin;
         if self.covers(x) && self.covers(end) {
             self.report.reused += 1;
-            return;
+            return false;
         }
         let sweep = ContactSweep {
             start: x,
@@ -164,6 +166,7 @@ impl Contacts {
         }));
         self.report.queries += 1;
         self.report.candidates = self.report.candidates.max(self.candidates.len());
+        true
     }
 
     /// Makes pairs of the candidates, the same at any point of a step.
