@@ -132,7 +132,7 @@ fn main() {
     println!(
         "{} vertices, {:.1} s, fitted template {:.1} mm off",
         dance.rest.vertices.len(),
-        dance.seconds(),
+        dance.bodies.seconds(),
         dance.fit * 1e3
     );
     let mut cells: Vec<[Vec<u8>; 2]> = Vec::new();

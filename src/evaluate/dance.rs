@@ -1,23 +1,17 @@
 //! Outfit on a dancing body without a known template: time, stretch and penetration over the whole dance.
 
+use super::dance_bodies::{DanceBodies, fault};
 use super::inside::Solid;
 use super::{EvaluateError, OutfitSpec, Row};
 use crate::body::{BodyShape, Pose, RestBody, Template, measure};
 use crate::cloth::{Input, State, Workspace, step};
 use crate::dressing::{Dressed, rig_standing, suggest};
-use crate::formats::obj::read_obj;
 use crate::math::{Body, P3, Rigid, World};
 use crate::mesh::Face;
-use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// The dance of `../shared/data/garments/cipc_apache2` (Apache-2.0): 121 bodies of 12,811 vertices.
-const BODIES: &str = "rumba_dancing_121x12811x3_f32le.bin.gz";
-const FACES: &str = "wm2_15k.obj";
-/// Time between two bodies (s).
-const INTERVAL: f64 = 0.04;
 /// Time of a step (s).
 const DT: f64 = 1.0 / 60.0;
 /// Steps between two measurements of penetration.
@@ -29,8 +23,8 @@ pub struct Dance {
     pub template: Arc<Template>,
     /// Its rest shape.
     pub rest: RestBody,
-    /// Vertices of each body, world, metres, shape `(bodies, vertices)`.
-    pub bodies: Vec<Vec<P3>>,
+    /// The moving body.
+    pub bodies: DanceBodies,
     /// Mean distance between the fitted template and the body's vertices (m).
     pub fit: f64,
 }
@@ -84,47 +78,13 @@ fn percentile(values: &mut [f64], share: f64) -> f64 {
         .unwrap_or(0.0)
 }
 
-fn fault(why: impl ToString) -> EvaluateError {
-    EvaluateError::Scene {
-        scene: "dance".into(),
-        why: why.to_string(),
-    }
-}
-
 /// Reads the dance and fits a skeleton to its body: the embedded template is tracked onto a rendering of it.
 ///
 /// # Errors
 /// A file that is missing or does not fit the others.
 pub fn load(folder: &Path) -> Result<Dance, EvaluateError> {
-    let faces = read_obj(&folder.join(FACES)).map_err(fault)?.mesh;
-    let mut bytes = Vec::new();
-    std::fs::File::open(folder.join(BODIES))
-        .and_then(|f| flate2::read::GzDecoder::new(f).read_to_end(&mut bytes))
-        .map_err(|e| fault(format!("{BODIES}: {e}")))?;
-    let n = faces.vertices().len();
-    let numbers: Vec<f32> = bytes
-        .chunks_exact(4)
-        .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-        .collect();
-    if n == 0 || !numbers.len().is_multiple_of(3 * n) || numbers.iter().any(|x| !x.is_finite()) {
-        return Err(fault(format!(
-            "{BODIES}: {} numbers are no bodies of {n} vertices",
-            numbers.len()
-        )));
-    }
-    let bodies: Vec<Vec<P3>> = numbers
-        .chunks_exact(3 * n)
-        .map(|b| {
-            b.chunks_exact(3)
-                .map(|p| P3::new(p[0], p[1], p[2]))
-                .collect()
-        })
-        .collect();
-    let first = bodies
-        .first()
-        .ok_or_else(|| fault(format!("{BODIES}: empty")))?;
-    let mesh = faces.with_vertices(first.clone()).map_err(fault)?;
-    let (template, fit) = rig_standing(mesh).map_err(fault)?;
+    let bodies = DanceBodies::read(folder)?;
+    let (template, fit) = rig_standing(bodies.mesh.clone()).map_err(fault)?;
     let rest = template.personalise(&BodyShape::default());
     Ok(Dance {
         template: Arc::new(template),
@@ -135,21 +95,6 @@ pub fn load(folder: &Path) -> Result<Dance, EvaluateError> {
 }
 
 impl Dance {
-    /// Body at a time, interpolated between its two neighbours (m).
-    pub fn body(&self, time: f64) -> Vec<P3> {
-        let at = (time / INTERVAL).clamp(0.0, (self.bodies.len() - 1) as f64);
-        let (i, share) = (at as usize, at.fract() as f32);
-        let next = &self.bodies[(i + 1).min(self.bodies.len() - 1)];
-        self.bodies[i]
-            .iter()
-            .zip(next)
-            .map(|(a, b)| a + (b - a) * share)
-            .collect()
-    }
-    /// Length of the dance (s).
-    pub fn seconds(&self) -> f64 {
-        (self.bodies.len() - 1) as f64 * INTERVAL
-    }
     /// Dresses the standing body in the suggested sizes.
     ///
     /// # Errors
@@ -190,10 +135,10 @@ impl Dance {
         };
         let (mut work, mut depths, mut single, mut strain) =
             (Workspace::default(), Vec::new(), Vec::new(), Vec::new());
-        let steps = (seconds.min(self.seconds()) / DT) as usize;
+        let steps = (seconds.min(self.bodies.seconds()) / DT) as usize;
         for index in 1..=steps {
             let time = index as f64 * DT;
-            let body = self.body(time);
+            let body = self.bodies.at(time);
             let started = Instant::now();
             let r = step(
                 &dressed.model,

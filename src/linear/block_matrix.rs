@@ -89,16 +89,25 @@ impl BlockPattern {
         self.diagonal[row] as usize
     }
 
+    /// Storage indices of the blocks of a row.
+    pub(super) fn slots(&self, row: usize) -> std::ops::Range<usize> {
+        self.rows[row] as usize..self.rows[row + 1] as usize
+    }
+
+    /// Column of a block.
+    pub(super) fn column(&self, slot: usize) -> u32 {
+        self.columns[slot]
+    }
+
     /// Columns of the blocks of a row, ascending.
     pub fn neighbours(&self, row: usize) -> &[u32] {
-        let range = self.rows[row] as usize..self.rows[row + 1] as usize;
-        &self.columns[range]
+        &self.columns[self.slots(row)]
     }
 
     /// Row, column and storage index of the blocks of a row.
     fn row(&self, row: usize) -> impl Iterator<Item = (u32, u32, usize)> {
-        let range = self.rows[row] as usize..self.rows[row + 1] as usize;
-        range.map(move |slot| (row as u32, self.columns[slot], slot))
+        self.slots(row)
+            .map(move |slot| (row as u32, self.columns[slot], slot))
     }
 
     fn row_range(&self, row: usize) -> Option<(usize, usize)> {
@@ -157,6 +166,11 @@ impl BlockMatrix {
     }
 
     /// Block at a storage index.
+    pub(super) fn block(&self, slot: usize) -> &Matrix3<f64> {
+        &self.blocks[slot]
+    }
+
+    /// Block at a storage index, to change.
     pub fn block_mut(&mut self, slot: usize) -> &mut Matrix3<f64> {
         &mut self.blocks[slot]
     }
@@ -168,7 +182,7 @@ impl BlockMatrix {
 
     /// Column and block of each block of a row.
     pub fn row_blocks(&self, row: usize) -> impl Iterator<Item = (u32, &Matrix3<f64>)> {
-        let range = self.pattern.rows[row] as usize..self.pattern.rows[row + 1] as usize;
+        let range = self.pattern.slots(row);
         let columns = &self.pattern.columns[range.clone()];
         columns.iter().copied().zip(&self.blocks[range])
     }
@@ -178,8 +192,7 @@ impl BlockMatrix {
         for_chunks(par, y, ROW_CHUNK, |start, rows| {
             for (k, sum) in rows.iter_mut().enumerate() {
                 let row = start + k;
-                let range = self.pattern.rows[row] as usize..self.pattern.rows[row + 1] as usize;
-                for slot in range {
+                for slot in self.pattern.slots(row) {
                     *sum += self.blocks[slot] * x[self.pattern.columns[slot] as usize];
                 }
             }

@@ -6,12 +6,17 @@
 use super::{
     BlockMatrix, BlockPattern, Factor, LinearError, SymbolicFactor, pattern::SymmetricPattern,
 };
+use crate::par::{Par, for_chunks, map_into};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Shape functions of a patch.
 const FUNCTIONS: usize = 3;
+/// Unknowns of a patch.
+const LOADS: usize = 3 * FUNCTIONS;
+/// Patches that one thread takes at a time.
+const PATCHES: usize = 32;
 /// Variance of a coordinate beside the first's below which it counts as constant.
 const FLAT: f64 = 1e-4;
 
@@ -23,6 +28,8 @@ pub struct CoarseSpace {
     patches: usize,
     /// Values of the shape functions at each vertex.
     shapes: Vec<[f64; FUNCTIONS]>,
+    /// Vertices of each patch.
+    members: Vec<Vec<u32>>,
     factor: Option<Factor>,
     /// Right-hand side of the coarse system.
     loads: Vec<f64>,
@@ -58,6 +65,12 @@ impl CoarseSpace {
                 }
             };
             space.grow(pattern, (seed, size), &mut seeds);
+        }
+        space.members.resize(space.patches, Vec::new());
+        for (patch, v) in space.patch.iter().zip(0..) {
+            if let Some(members) = space.members.get_mut(*patch as usize) {
+                members.push(v);
+            }
         }
         space
     }
@@ -95,11 +108,12 @@ impl CoarseSpace {
     /// A coarse matrix that is not positive definite.
     pub fn update(
         &mut self,
+        par: Par,
         positions: &[Vector3<f64>],
         matrices: &[&BlockMatrix],
     ) -> Result<(), LinearError> {
         self.fit(positions);
-        let mut sum = self.coarse_matrix(matrices)?;
+        let mut sum = self.coarse_matrix(par, matrices)?;
         for row in 0..sum.pattern().size() {
             // A function that vanishes, as the slope of a patch of one vertex, stays without effect.
             if sum.diagonal(row).trace() <= 0.0 {
@@ -118,33 +132,39 @@ impl CoarseSpace {
         Ok(())
     }
 
-    /// Adds the coarse solution for the residual `r` to `z`.
-    pub fn add(&mut self, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
+    /// Adds the coarse solution for the residual `r` to `z`; the bits do not depend on the threads.
+    pub fn add(&mut self, par: Par, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
         let Some(factor) = &mut self.factor else {
             return;
         };
-        self.loads.clear();
-        self.loads.resize(3 * FUNCTIONS * self.patches, 0.0);
-        let vertices = self.patch.iter().zip(&self.shapes);
-        for ((patch, shapes), r) in vertices.clone().zip(r) {
-            let first = 3 * FUNCTIONS * *patch as usize;
-            let Some(loads) = self.loads.get_mut(first..first + 3 * FUNCTIONS) else {
-                continue;
-            };
-            for (loads, shape) in loads.chunks_exact_mut(3).zip(shapes) {
-                loads.iter_mut().zip(r).for_each(|(l, r)| *l += shape * r);
+        let (members, shapes) = (&self.members, &self.shapes);
+        self.loads.resize(LOADS * self.patches, 0.0);
+        for_chunks(par, &mut self.loads, PATCHES * LOADS, |start, chunk| {
+            for (k, loads) in chunk.chunks_exact_mut(LOADS).enumerate() {
+                loads.fill(0.0);
+                for v in &members[start / LOADS + k] {
+                    let (r, shapes) = (&r[*v as usize], &shapes[*v as usize]);
+                    for (loads, shape) in loads.chunks_exact_mut(3).zip(shapes) {
+                        loads.iter_mut().zip(r).for_each(|(l, r)| *l += shape * r);
+                    }
+                }
             }
-        }
+        });
         factor.solve_vector(&mut self.loads);
-        for ((patch, shapes), z) in vertices.zip(z) {
-            let first = 3 * FUNCTIONS * *patch as usize;
-            let Some(loads) = self.loads.get(first..first + 3 * FUNCTIONS) else {
-                continue;
-            };
-            for (loads, shape) in loads.chunks_exact(3).zip(shapes) {
-                *z += Vector3::from_column_slice(loads) * *shape;
+        let (patch, loads) = (&self.patch, &self.loads);
+        for_chunks(par, z, PATCHES * LOADS, |start, chunk| {
+            for (k, z) in chunk.iter_mut().enumerate() {
+                // Vertices of the fine level alone have no patch, those beyond all patches no entry.
+                let first = patch.get(start + k).map(|p| LOADS * *p as usize);
+                let own = first.and_then(|f| loads.get(f..f + LOADS));
+                for (loads, shape) in own
+                    .into_iter()
+                    .flat_map(|l| l.chunks_exact(3).zip(&shapes[start + k]))
+                {
+                    *z += Vector3::from_column_slice(loads) * *shape;
+                }
             }
-        }
+        });
     }
 
     /// Shape functions: 1, and the two principal coordinates of each patch in parts of their deviation.
@@ -174,52 +194,71 @@ impl CoarseSpace {
     }
 
     /// Pᵀ (Σ A) P, three rows of blocks a patch.
-    fn coarse_matrix(&self, matrices: &[&BlockMatrix]) -> Result<BlockMatrix, LinearError> {
+    fn coarse_matrix(
+        &self,
+        par: Par,
+        matrices: &[&BlockMatrix],
+    ) -> Result<BlockMatrix, LinearError> {
         let f = FUNCTIONS as u32;
-        let patch = |v: usize| self.patch.get(v).copied().filter(|p| *p != u32::MAX);
-        let mut beside: Vec<Vec<u32>> = (0..self.patches as u32).map(|p| vec![p]).collect();
-        for m in matrices {
-            for row in 0..m.pattern().size().min(self.patch.len()) {
-                let Some(own) = patch(row) else { continue };
-                let list = &mut beside[own as usize];
-                for w in m.pattern().neighbours(row) {
-                    if let Some(other) = patch(*w as usize).filter(|o| !list.contains(o)) {
-                        list.push(other);
-                    }
-                }
+        let mut rows: Vec<PatchRow> = Vec::new();
+        map_into(par, self.patches, PATCHES, &mut rows, |p| {
+            let mut row = PatchRow::default();
+            for m in matrices {
+                self.add_row(m, p, &mut row);
             }
-        }
-        let pairs = beside.iter().enumerate().flat_map(|(a, list)| {
-            list.iter().flat_map(move |b| {
+            row
+        });
+        let pairs = rows.iter().enumerate().flat_map(|(a, row)| {
+            row.iter().flat_map(move |(b, _)| {
                 (0..f).flat_map(move |i| (0..f).map(move |j| (f * a as u32 + i, f * b + j)))
             })
         });
         let size = FUNCTIONS * self.patches;
         let mut coarse = BlockMatrix::zeros(Arc::new(BlockPattern::new(size, pairs)?));
-        for m in matrices {
-            for row in 0..m.pattern().size().min(self.patch.len()) {
-                let Some(own) = patch(row) else { continue };
-                for (column, block) in m.row_blocks(row) {
-                    let Some(other) = patch(column as usize) else {
+        for (own, row) in rows.iter().enumerate() {
+            for (other, blocks) in row {
+                for (i, blocks) in blocks.iter().enumerate() {
+                    // The functions of a patch are neighbours in every row of the pattern.
+                    let first = f * own as u32 + i as u32;
+                    let Some(slot) = coarse.pattern().slot(first, f * other) else {
                         continue;
                     };
-                    for i in 0..f {
-                        // The functions of a patch are neighbours in every row of the pattern.
-                        let Some(slot) = coarse.pattern().slot(f * own + i, f * other) else {
-                            continue;
-                        };
-                        let weight = self.shapes[row][i as usize];
-                        for j in 0..FUNCTIONS {
-                            let shape = weight * self.shapes[column as usize][j];
-                            *coarse.block_mut(slot + j) += block * shape;
-                        }
+                    for (j, block) in blocks.iter().enumerate() {
+                        *coarse.block_mut(slot + j) += block;
                     }
                 }
             }
         }
         Ok(coarse)
     }
+
+    /// Adds the rows of the members of a patch.
+    fn add_row(&self, m: &BlockMatrix, patch: usize, row: &mut PatchRow) {
+        let members = self.members[patch].iter().map(|v| *v as usize);
+        for vertex in members.filter(|v| *v < m.pattern().size()) {
+            let weights = &self.shapes[vertex];
+            for (column, block) in m.row_blocks(vertex) {
+                let Some(other) = self.patch.get(column as usize).filter(|o| **o != u32::MAX)
+                else {
+                    continue;
+                };
+                let at = row.iter().position(|(o, _)| o == other);
+                let at = at.unwrap_or_else(|| {
+                    row.push((*other, Default::default()));
+                    row.len() - 1
+                });
+                for (weight, sums) in weights.iter().zip(&mut row[at].1) {
+                    for (shape, sum) in self.shapes[column as usize].iter().zip(sums) {
+                        *sum += block * (weight * shape);
+                    }
+                }
+            }
+        }
+    }
 }
+
+/// Row of a patch in the coarse matrix: the patches that it meets, and a block for each pair of shape functions.
+type PatchRow = Vec<(u32, [[Matrix3<f64>; FUNCTIONS]; FUNCTIONS])>;
 
 /// The two principal axes over their standard deviations; zero where a patch has no extent.
 fn principal_axes(spread: &Matrix3<f64>) -> [Vector3<f64>; 2] {
@@ -242,7 +281,6 @@ fn principal_axes(spread: &Matrix3<f64>) -> [Vector3<f64>; 2] {
 mod tests {
     use super::*;
     use crate::linear::{BlockJacobi, StopCriterion, TwoLevel, conjugate_gradient};
-    use crate::par::Par;
 
     /// Springs along a grid of n × n vertices, held softly; positions of its vertices.
     fn grid(n: usize) -> (BlockMatrix, Vec<Vector3<f64>>) {
@@ -282,13 +320,15 @@ mod tests {
             iterations: 1000,
         };
         let mut one = vec![Vector3::zeros(); x.len()];
-        let mut jacobi = BlockJacobi::new(&[&matrix]);
-        let alone = conjugate_gradient(apply, &mut jacobi, &right, &mut one, stop);
+        let mut jacobi = BlockJacobi::new(Par::Seq, &[&matrix]);
+        let alone = conjugate_gradient(apply, &mut jacobi, &right, &mut one, (Par::Seq, stop));
         let mut coarse = CoarseSpace::new(matrix.pattern(), 48);
-        coarse.update(&x, &[&matrix]).expect("positive definite");
+        coarse
+            .update(Par::Seq, &x, &[&matrix])
+            .expect("positive definite");
         let mut two = vec![Vector3::zeros(); x.len()];
-        let mut levels = TwoLevel::new(BlockJacobi::new(&[&matrix]), &mut coarse);
-        let both = conjugate_gradient(apply, &mut levels, &right, &mut two, stop);
+        let mut levels = TwoLevel::new(BlockJacobi::new(Par::Seq, &[&matrix]), &mut coarse);
+        let both = conjugate_gradient(apply, &mut levels, &right, &mut two, (Par::Seq, stop));
         assert!(2 * both.iterations < alone.iterations, "{both:?} {alone:?}");
         let apart = one.iter().zip(&two).map(|(a, b)| (a - b).norm());
         let size = one.iter().map(|a| a.norm()).fold(0.0, f64::max);
@@ -306,10 +346,10 @@ mod tests {
         let mut coarse = CoarseSpace::new(matrix.pattern(), 48);
         let x = vec![Vector3::zeros(); 5];
         coarse
-            .update(&x, &[&matrix])
+            .update(Par::Seq, &x, &[&matrix])
             .expect("a patch without extent");
         let mut z = vec![Vector3::zeros(); 5];
-        coarse.add(&[Vector3::new(1.0, 2.0, 3.0); 5], &mut z);
+        coarse.add(Par::Seq, &[Vector3::new(1.0, 2.0, 3.0); 5], &mut z);
         assert!((z[0] - Vector3::new(1.0, 2.0, 3.0)).norm() < 1e-12, "{z:?}");
         assert!(z[2..].iter().all(|z| *z == Vector3::zeros()), "{z:?}");
     }

@@ -1,6 +1,7 @@
 //! Preconditioned conjugate gradients on three-vectors: matrix-free.
 
 use super::Preconditioner;
+use crate::par::{Par, for_chunks, map_into};
 use nalgebra::Vector3;
 
 /// Report of a solve.
@@ -21,52 +22,75 @@ pub struct StopCriterion {
     pub iterations: usize,
 }
 
-/// Solves `A x = b` from the initial `x` with a preconditioner.
+/// Solves `A x = b` from the initial `x` with a preconditioner; the bits do not depend on the threads.
 /// A search direction without positive curvature ends the iteration at the current `x`.
 pub fn conjugate_gradient(
     mut apply: impl FnMut(&[Vector3<f64>], &mut [Vector3<f64>]),
     preconditioner: &mut impl Preconditioner,
     b: &[Vector3<f64>],
     x: &mut [Vector3<f64>],
-    stop: StopCriterion,
+    (par, stop): (Par, StopCriterion),
 ) -> CgReport {
     let n = b.len();
-    let dot = |p: &[Vector3<f64>], q: &[Vector3<f64>]| {
-        p.iter().zip(q).map(|(a, b)| a.dot(b)).sum::<f64>()
-    };
     let mut ap = vec![Vector3::zeros(); n];
     apply(x, &mut ap);
     let mut r: Vec<_> = b.iter().zip(&ap).map(|(b, a)| b - a).collect();
     let mut z = vec![Vector3::zeros(); n];
-    preconditioner.apply(&r, &mut z);
+    preconditioner.apply(par, &r, &mut z);
     let mut p = z.clone();
-    let norm_b = dot(b, b).sqrt().max(f64::MIN_POSITIVE);
-    let mut rz = dot(&r, &z);
+    let norm_b = dot(par, b, b).sqrt().max(f64::MIN_POSITIVE);
+    let mut rz = dot(par, &r, &z);
+    let mut norm_r = dot(par, &r, &r).sqrt();
     let mut iterations = 0;
-    while iterations < stop.iterations && dot(&r, &r).sqrt() > stop.residual * norm_b {
+    while iterations < stop.iterations && norm_r > stop.residual * norm_b {
         apply(&p, &mut ap);
         iterations += 1;
-        let curvature = dot(&p, &ap);
+        let curvature = dot(par, &p, &ap);
         if !(curvature > 0.0) {
             break;
         }
         let alpha = rz / curvature;
-        for i in 0..n {
-            x[i] += p[i] * alpha;
-            r[i] -= ap[i] * alpha;
-        }
-        preconditioner.apply(&r, &mut z);
-        let next = dot(&r, &z);
+        combine(par, x, &p, |x, p| x + p * alpha);
+        combine(par, &mut r, &ap, |r, ap| r - ap * alpha);
+        preconditioner.apply(par, &r, &mut z);
+        let next = dot(par, &r, &z);
         let beta = next / rz;
         rz = next;
-        for i in 0..n {
-            p[i] = z[i] + p[i] * beta;
-        }
+        combine(par, &mut p, &z, |p, z| z + p * beta);
+        norm_r = dot(par, &r, &r).sqrt();
     }
     CgReport {
         iterations,
-        relative_residual: dot(&r, &r).sqrt() / norm_b,
+        relative_residual: norm_r / norm_b,
     }
+}
+
+/// Vectors that one thread takes at a time.
+const CHUNK: usize = 4096;
+
+/// Scalar product, summed chunk by chunk in a fixed order.
+fn dot(par: Par, a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
+    let mut sums = Vec::new();
+    map_into(par, a.len().div_ceil(CHUNK), 1, &mut sums, |k| {
+        let range = k * CHUNK..((k + 1) * CHUNK).min(a.len());
+        let pairs = a[range.clone()].iter().zip(&b[range]);
+        pairs.map(|(a, b)| a.dot(b)).sum::<f64>()
+    });
+    sums.iter().sum()
+}
+
+/// Replaces each `a` with `f(a, b)`.
+fn combine(
+    par: Par,
+    a: &mut [Vector3<f64>],
+    b: &[Vector3<f64>],
+    f: impl Fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64> + Sync,
+) {
+    for_chunks(par, a, CHUNK, |start, chunk| {
+        for (a, b) in chunk.iter_mut().zip(&b[start..]) {
+            *a = f(a, b);
+        }
+    });
 }
 
 #[cfg(test)]
@@ -96,7 +120,7 @@ mod tests {
             iterations: 3 * n,
         };
         let mut inverse = BlockJacobi::from_inverse(vec![Matrix3::identity() / 2.5; n]);
-        let report = conjugate_gradient(apply, &mut inverse, &b, &mut x, stop);
+        let report = conjugate_gradient(apply, &mut inverse, &b, &mut x, (Par::Seq, stop));
         assert!(
             report.relative_residual < 1e-11 && report.iterations <= 3 * n,
             "{report:?}"

@@ -6,6 +6,7 @@ mod coarse_space;
 mod conjugate_gradient;
 mod pattern;
 mod preconditioner;
+mod single_matrix;
 
 pub use block_matrix::{BlockMatrix, BlockPattern};
 pub use cholesky::{Factor, SymbolicFactor};
@@ -13,6 +14,7 @@ pub use coarse_space::CoarseSpace;
 pub use conjugate_gradient::{CgReport, StopCriterion, conjugate_gradient};
 pub use pattern::SymmetricPattern;
 pub use preconditioner::{BlockJacobi, Preconditioner, TwoLevel};
+pub use single_matrix::SingleMatrix;
 
 /// Error of a linear system.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

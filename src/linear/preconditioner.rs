@@ -1,12 +1,16 @@
 //! Preconditioners of conjugate gradients on blocks of three.
 
 use super::{BlockMatrix, CoarseSpace};
+use crate::par::{Par, for_chunks, map_into};
 use nalgebra::{Matrix3, Vector3};
+
+/// Blocks that one thread takes at a time.
+const CHUNK: usize = 1024;
 
 /// Approximate inverse of a matrix, symmetric and positive.
 pub trait Preconditioner {
     /// Replaces `z` with the approximate solution of `A z = r`.
-    fn apply(&mut self, r: &[Vector3<f64>], z: &mut [Vector3<f64>]);
+    fn apply(&mut self, par: Par, r: &[Vector3<f64>], z: &mut [Vector3<f64>]);
 }
 
 /// Inverse diagonal blocks.
@@ -22,7 +26,7 @@ impl BlockJacobi {
     }
 
     /// Of the sum of matrices of one size.
-    pub fn new(matrices: &[&BlockMatrix]) -> Self {
+    pub fn new(par: Par, matrices: &[&BlockMatrix]) -> Self {
         let size = matrices.first().map_or(0, |m| m.pattern().size());
         let block = |i: usize| {
             let sum = matrices
@@ -30,17 +34,20 @@ impl BlockJacobi {
                 .fold(Matrix3::zeros(), |sum, m| sum + m.diagonal(i));
             sum.try_inverse().unwrap_or_else(Matrix3::identity)
         };
-        Self {
-            inverse: (0..size).map(block).collect(),
-        }
+        let mut inverse = Vec::new();
+        map_into(par, size, CHUNK, &mut inverse, block);
+        Self { inverse }
     }
 }
 
 impl Preconditioner for BlockJacobi {
-    fn apply(&mut self, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
-        for ((z, r), m) in z.iter_mut().zip(r).zip(&self.inverse) {
-            *z = m * r;
-        }
+    fn apply(&mut self, par: Par, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
+        for_chunks(par, z, CHUNK, |start, chunk| {
+            let known = r[start..].iter().zip(&self.inverse[start..]);
+            for (z, (r, m)) in chunk.iter_mut().zip(known) {
+                *z = m * r;
+            }
+        });
     }
 }
 
@@ -59,8 +66,8 @@ impl<'a> TwoLevel<'a> {
 }
 
 impl Preconditioner for TwoLevel<'_> {
-    fn apply(&mut self, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
-        self.fine.apply(r, z);
-        self.coarse.add(r, z);
+    fn apply(&mut self, par: Par, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
+        self.fine.apply(par, r, z);
+        self.coarse.add(par, r, z);
     }
 }

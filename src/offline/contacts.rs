@@ -9,12 +9,15 @@ use crate::contact::{
 };
 use crate::linear::{BlockMatrix, BlockPattern, LinearError};
 use crate::math::V3d;
-use crate::par::Par;
+use crate::par::{Par, map_into};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Share of the way to the first impact that a step takes, so that no distance becomes zero.
 const IMPACT_SHARE: f64 = 0.8;
+
+/// Pairs that one thread takes at a time.
+const PAIRS: usize = 1024;
 
 /// Contact of cloth with itself and with the obstacle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,7 +44,7 @@ impl Default for ContactSettings {
             stiffness: 2e-5,
             friction: 0.3,
             creep: 5e-3,
-            margin: 1e-3,
+            margin: 1e-4,
         }
     }
 }
@@ -150,10 +153,12 @@ impl Contacts {
             self.report.reused += 1;
             return false;
         }
+        let reach = self.settings.barrier().reach() + 2.0 * margin;
         let sweep = ContactSweep {
             start: x,
             end,
-            distance: self.settings.barrier().reach() + 2.0 * margin,
+            distance: reach,
+            obstacle_distance: reach,
         };
         self.candidates = self.broad_phase.candidates(&self.mesh, &sweep, self.par);
         self.list_pairs();
@@ -208,27 +213,37 @@ impl Contacts {
         (reach, stiffness): (f64, f64),
         out: &mut NewtonSystem,
     ) -> Result<(), LinearError> {
+        let own_reach = self.settings.barrier().reach();
+        let reach = reach.max(own_reach);
         let sweep = ContactSweep {
             start: x,
             end: x,
-            distance: reach,
+            distance: own_reach,
+            obstacle_distance: reach,
         };
         let near = self.broad_phase.candidates(&self.mesh, &sweep, self.par);
         let cloth = self.mesh.cloth_vertices() as u32;
-        let own_reach = self.settings.barrier().reach();
         let spring = |pair: &ContactPair| {
-            let separation = pair.separation(&pair.corners(x));
-            let distance = separation.squared.sqrt();
             let vertices = pair.stencil();
             let is_own = vertices.iter().all(|v| *v < cloth);
             let range = if is_own { own_reach } else { reach };
+            let corners = pair.corners(x);
+            if pair.box_gap_squared(&corners) >= range * range {
+                return None;
+            }
+            let separation = pair.separation(&corners);
+            let distance = separation.squared.sqrt();
             // Weighted directions: the gap's change by the motion of each vertex.
             let across = separation.vector / distance.max(f64::MIN_POSITIVE);
             let strength = (stiffness * (1.0 - distance / range)).max(0.0).sqrt();
             let rates = [0, 1, 2, 3].map(|k| across * (separation.weights[k] * strength));
             (strength > 0.0).then_some((vertices, rates))
         };
-        let springs: Vec<([u32; 4], [V3d; 4])> = near.iter().filter_map(spring).collect();
+        let mut springs: Vec<Option<([u32; 4], [V3d; 4])>> = Vec::new();
+        map_into(self.par, near.len(), PAIRS, &mut springs, |k| {
+            spring(&near[k])
+        });
+        let springs: Vec<([u32; 4], [V3d; 4])> = springs.into_iter().flatten().collect();
         out.contact = zeros_on(x.len(), springs.iter().map(|(v, _)| *v))?;
         for (v, rates) in &springs {
             for (a, p) in v.iter().zip(rates) {

@@ -1,6 +1,8 @@
 //! Sewn garments as cloth of the offline solver: all in one index space, each of its own fabric.
 
-use super::{ElasticTerm, EnergyTerm, OfflineCloth, OfflineError};
+use super::{
+    ElasticTerm, ElementTerm, EnergyTerm, OfflineCloth, OfflineError, StitchSprings, sewn_pairs,
+};
 use crate::elastic::{
     BendLaw, BendingModel, ClothModel, ElasticFabric, RestSheet, StretchLaw, Stretching,
 };
@@ -53,6 +55,29 @@ impl OfflineCloth {
             first += garment.vertices;
         }
         Self::new(mass, faces, gravity, terms)
+    }
+
+    /// One sheet of `count` vertices whose panels hold together by `seams`, flat at rest as cut.
+    ///
+    /// # Errors
+    /// Names the face or modulus at fault; a vertex without a face has no mass.
+    pub fn of_sewn_sheet(
+        rest: &RestSheet,
+        count: usize,
+        material: &Material,
+        seams: StitchSprings,
+        gravity: V3d,
+    ) -> Result<Self, OfflineError> {
+        let fabric = fabric_of(material);
+        let model = ClothModel::new(rest, count, fabric, BendingModel::default())?;
+        let (mass, sewn) = (model.masses().to_vec(), sewn_pairs(&seams.stitches));
+        let terms: Vec<Box<dyn EnergyTerm>> = vec![
+            Box::new(ElasticTerm::new(model)),
+            Box::new(ElementTerm::new(seams)),
+        ];
+        let mut cloth = Self::new(mass, rest.faces.clone(), gravity, terms)?;
+        cloth.sewn = sewn;
+        Ok(cloth)
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::error::OfflineError;
 use crate::linear::{
-    BlockJacobi, BlockMatrix, CoarseSpace, Factor, LinearError, StopCriterion, SymbolicFactor,
-    TwoLevel, conjugate_gradient,
+    BlockJacobi, BlockMatrix, CoarseSpace, Factor, LinearError, SingleMatrix, StopCriterion,
+    SymbolicFactor, TwoLevel, conjugate_gradient,
 };
 use crate::math::V3d;
 use crate::par::Par;
@@ -42,11 +42,17 @@ pub(super) struct DirectionSolver {
     pub(super) par: Par,
     /// Patches of the shape's graph, grown at the first use.
     coarse: Option<CoarseSpace>,
+    /// Shape's matrix as the products read it.
+    single: SingleMatrix,
 }
 
 impl DirectionSolver {
     pub(super) fn new(par: Par) -> Self {
-        Self { par, coarse: None }
+        Self {
+            par,
+            coarse: None,
+            single: SingleMatrix::default(),
+        }
     }
 
     /// Replaces `direction` with the Newton direction at `x`; returns products with the matrix.
@@ -77,17 +83,20 @@ impl DirectionSolver {
             &both[..]
         };
         let par = self.par;
+        if method != LinearMethod::Cholesky {
+            self.single.copy(par, system.shape);
+        }
+        let single = &self.single;
         let apply = |x: &[V3d], y: &mut [V3d]| {
             y.fill(V3d::zeros());
-            for m in matrices {
-                m.multiply_add(par, x, y);
-            }
+            single.multiply_add(par, x, y);
+            matrices[1..].iter().for_each(|m| m.multiply_add(par, x, y));
         };
-        let mut fine = BlockJacobi::new(matrices);
+        let mut fine = BlockJacobi::new(par, matrices);
         let report = match method {
             LinearMethod::Cholesky => return factorise(matrices, &right, direction).map(|()| 0),
             LinearMethod::ConjugateGradient => {
-                conjugate_gradient(apply, &mut fine, &right, direction, stop)
+                conjugate_gradient(apply, &mut fine, &right, direction, (par, stop))
             }
             LinearMethod::TwoLevel => {
                 let pattern = system.shape.pattern();
@@ -96,10 +105,10 @@ impl DirectionSolver {
                     .get_or_insert_with(|| CoarseSpace::new(pattern, PATCH));
                 // The fine level works alone when rounding leaves the coarse matrix indefinite.
                 coarse
-                    .update(x, matrices)
+                    .update(par, x, matrices)
                     .or_else(LinearError::unless_indefinite)?;
                 let mut both = TwoLevel::new(fine, coarse);
-                conjugate_gradient(apply, &mut both, &right, direction, stop)
+                conjugate_gradient(apply, &mut both, &right, direction, (par, stop))
             }
         };
         Ok(report.iterations)

@@ -39,11 +39,11 @@ pub struct NewtonSettings {
 impl Default for NewtonSettings {
     fn default() -> Self {
         Self {
-            tolerance: 3e-5,
-            largest: 1e-3,
+            tolerance: 1e-4,
+            largest: 2e-3,
             iterations: 100,
             linear: LinearMethod::default(),
-            linear_residual: 0.1,
+            linear_residual: 0.2,
             linear_iterations: 2000,
         }
     }
@@ -147,12 +147,12 @@ pub(super) fn largest(vectors: &[V3d]) -> (usize, f64) {
 }
 
 /// Root mean square norm.
-fn mean(vectors: &[V3d]) -> f64 {
+pub(super) fn mean(vectors: &[V3d]) -> f64 {
     let sum: f64 = vectors.iter().map(V3d::norm_squared).sum();
     (sum / vectors.len().max(1) as f64).sqrt()
 }
 
-/// Moves `x` to the minimum.
+/// Moves `x` to the minimum; returns the expansion at the last iterate.
 ///
 /// # Errors
 /// The reason why it was not reached, and linear systems that cannot be solved; `x` is then the best point so far, which is
@@ -163,7 +163,7 @@ pub(super) fn minimise(
     solver: &mut DirectionSolver,
     x: &mut [V3d],
     report: &mut NewtonReport,
-) -> Result<Result<(), NewtonFault>, OfflineError> {
+) -> Result<Result<NewtonSystem, NewtonFault>, OfflineError> {
     let mut system = problem.new_system();
     let mut direction = vec![V3d::zeros(); x.len()];
     let mut trial = x.to_vec();
@@ -187,7 +187,7 @@ pub(super) fn minimise(
             return Ok(Err(NewtonFault::NotFinite { vertex }));
         }
         if last_motion.1 < RESTING {
-            return Ok(Ok(()));
+            return Ok(Ok(system));
         }
         shorten(&mut direction, last_motion.1);
         let free = problem.free_share(x, &direction);
@@ -210,7 +210,7 @@ pub(super) fn minimise(
         // Halved once, it went too far at a few vertices, not astray; less than that says nothing about what is left.
         let accepted = found.filter(|share| *share >= 0.5 && free >= 1.0);
         if accepted.is_some_and(|share| settings.is_settled(&direction, share)) {
-            return Ok(Ok(()));
+            return Ok(Ok(system));
         }
     }
     let (vertex, motion) = last_motion;

@@ -55,8 +55,7 @@ impl StepProblem<'_> {
             system.add_diagonal(n + j, d * -k, Matrix3::from_diagonal_element(k));
         }
         if let Some(contacts) = &mut self.contacts {
-            let reach = reach.clamp(1e-3, LONGEST_COUPLING);
-            contacts.keep_gaps(x, (reach, GAP_STIFFNESS), &mut system)?;
+            contacts.keep_gaps(x, (reach.min(LONGEST_COUPLING), GAP_STIFFNESS), &mut system)?;
         }
         let mut direction = vec![V3d::zeros(); x.len()];
         report.products += solver.solve(

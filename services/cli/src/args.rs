@@ -340,6 +340,15 @@ pub(crate) struct BenchClothArgs {
     /// Most frames of a scene (with --offline).
     #[arg(long, value_name = "N", requires = "offline")]
     pub(crate) frames: Option<usize>,
+    /// The sewn dress on the dancing body of this folder instead of scenes (dress-offline.csv …, with --offline).
+    #[arg(long, value_name = "DIR", requires = "offline", conflicts_with_all = ["scene", "full"])]
+    pub(crate) dress: Option<PathBuf>,
+    /// Vertices of the dress: its longest edges are halved.
+    #[arg(long, value_name = "N", default_value_t = 30_000, requires = "dress")]
+    pub(crate) vertices: usize,
+    /// Threads, 0 for all cores (with --offline).
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "offline")]
+    pub(crate) threads: usize,
 }
 
 #[derive(Debug, Args)]

@@ -9,6 +9,7 @@ use crate::linear::{
 };
 use crate::math::P3;
 use crate::mesh::{Csr, Face};
+use crate::par::Par;
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
 
@@ -206,7 +207,13 @@ impl QuadraticEnergy {
         let mut inverse = BlockJacobi::from_inverse(std::mem::take(&mut system.inverse));
         let mut moves = vec![Vector3::zeros(); some.len()];
         let apply = |from: &[Vector3<f64>], to: &mut [Vector3<f64>]| system.multiply(from, to);
-        conjugate_gradient(apply, &mut inverse, &system.rhs, &mut moves, STOP);
+        conjugate_gradient(
+            apply,
+            &mut inverse,
+            &system.rhs,
+            &mut moves,
+            (Par::Seq, STOP),
+        );
         for (v, by) in some.iter().zip(&moves) {
             let moved = x[*v as usize].cast::<f64>() + by;
             if !moved.iter().all(|c| c.is_finite()) {

@@ -1,5 +1,5 @@
-//! Boxes of elements along a step, inflated by half the contact distance: two elements may come that close only if
-//! their boxes overlap.
+//! Boxes of elements along a step, inflated so that two elements may come within the contact distance only if their boxes
+//! overlap.
 
 use super::ContactSweep;
 use crate::math::V3d;
@@ -25,6 +25,8 @@ impl Default for ElementBox {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SweepFrame<'a> {
     sweep: ContactSweep<'a>,
+    /// Distance by which boxes grow (m).
+    growth: f64,
     /// Mean displacement, metres; zero where it isn't finite.
     shift: V3d,
 }
@@ -36,14 +38,24 @@ impl<'a> SweepFrame<'a> {
         let is_finite = mean.iter().all(|c| c.is_finite());
         Self {
             sweep: *sweep,
+            growth: 0.5 * sweep.distance,
             shift: if is_finite { mean } else { V3d::zeros() },
+        }
+    }
+
+    /// The same for the boxes of the obstacle, which make up the rest of its distance.
+    pub(super) fn of_obstacle(&self) -> Self {
+        Self {
+            growth: self.sweep.obstacle_distance - self.growth,
+            ..*self
         }
     }
 }
 
 impl ElementBox {
     /// Box of the vertices of one element over the whole step. An element whose position isn't finite fills space.
-    pub(super) fn of(vertices: &[u32], SweepFrame { sweep, shift }: &SweepFrame<'_>) -> Self {
+    pub(super) fn of(vertices: &[u32], frame: &SweepFrame<'_>) -> Self {
+        let (sweep, shift, grown) = (&frame.sweep, &frame.shift, frame.growth);
         let (mut low, mut high) = (V3d::repeat(f64::INFINITY), V3d::repeat(f64::NEG_INFINITY));
         let mut is_finite = true;
         for v in vertices {
@@ -60,10 +72,10 @@ impl ElementBox {
                 high: [f32::INFINITY; 3],
             };
         }
-        let half = 0.5 * sweep.distance;
         // Bounds the rounding of the sums, also where they cancel.
-        let outwards =
-            |k: usize, c: f64| half + 4.0 * f64::EPSILON * (c.abs() + half + 2.0 * shift[k].abs());
+        let outwards = |k: usize, c: f64| {
+            grown + 4.0 * f64::EPSILON * (c.abs() + grown.abs() + 2.0 * shift[k].abs())
+        };
         Self {
             low: std::array::from_fn(|k| ((low[k] - outwards(k, low[k])) as f32).next_down()),
             high: std::array::from_fn(|k| ((high[k] + outwards(k, high[k])) as f32).next_up()),

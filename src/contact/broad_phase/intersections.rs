@@ -33,6 +33,7 @@ impl BroadPhase {
             start: positions,
             end: positions,
             distance: 0.0,
+            obstacle_distance: 0.0,
         };
         self.update_surfaces(mesh, &SweepFrame::new(&sweep), par);
         let (edges, faces) = (mesh.cloth_edges() as u32, mesh.cloth_faces() as u32);

@@ -26,8 +26,10 @@ pub struct ContactSweep<'a> {
     pub start: &'a [V3d],
     /// Positions at the end; the same slice for pairs at rest.
     pub end: &'a [V3d],
-    /// Pairs whose boxes come as near as this are candidates, metres.
+    /// Pairs of the cloth whose boxes come as near as this are candidates, metres.
     pub distance: f64,
+    /// The same for pairs of cloth and obstacle, metres; no less.
+    pub obstacle_distance: f64,
 }
 
 /// Trees of the broad phase, refit while the mesh keeps its size.
@@ -63,24 +65,24 @@ impl BroadPhase {
     fn update(&mut self, mesh: &ContactMesh, frame: &SweepFrame<'_>, par: Par) {
         self.update_surfaces(mesh, frame, par);
         let cloth = mesh.cloth_vertices();
-        let vertex = |v: usize| ElementBox::of(&[v as u32], frame);
-        let rest = mesh.vertices() - cloth;
-        self.cloth_vertices.update(par, cloth, vertex);
-        self.obstacle_vertices
-            .update(par, rest, |v| vertex(v + cloth));
+        let vertex = |v: usize, frame| ElementBox::of(&[v as u32], frame);
+        let (rest, outer) = (mesh.vertices() - cloth, frame.of_obstacle());
+        (self.cloth_vertices).update(par, cloth, |v| vertex(v, frame));
+        (self.obstacle_vertices).update(par, rest, |v| vertex(v + cloth, &outer));
     }
 
     fn update_surfaces(&mut self, mesh: &ContactMesh, frame: &SweepFrame<'_>, par: Par) {
-        let face = |f: usize| ElementBox::of(&mesh.faces()[f], frame);
-        let edge = |e: usize| ElementBox::of(&mesh.edges()[e], frame);
+        let face = |f: usize, frame| ElementBox::of(&mesh.faces()[f], frame);
+        let edge = |e: usize, frame| ElementBox::of(&mesh.edges()[e], frame);
+        let outer = frame.of_obstacle();
         let own = mesh.cloth_faces();
         let rest = mesh.faces().len() - own;
-        self.cloth_faces.update(par, own, face);
-        self.obstacle_faces.update(par, rest, |f| face(f + own));
+        (self.cloth_faces).update(par, own, |f| face(f, frame));
+        (self.obstacle_faces).update(par, rest, |f| face(f + own, &outer));
         let own = mesh.cloth_edges();
         let rest = mesh.edges().len() - own;
-        self.cloth_edges.update(par, own, edge);
-        self.obstacle_edges.update(par, rest, |e| edge(e + own));
+        (self.cloth_edges).update(par, own, |e| edge(e, frame));
+        (self.obstacle_edges).update(par, rest, |e| edge(e + own, &outer));
     }
 
     fn vertex_face(&self, mesh: &ContactMesh, par: Par) -> Vec<ContactPair> {
@@ -138,9 +140,12 @@ mod tests {
     /// Every pair, filtered by boxes and incidence.
     fn brute_force(mesh: &ContactMesh, sweep: &ContactSweep<'_>) -> Vec<ContactPair> {
         let frame = SweepFrame::new(sweep);
-        let boxed = |v: &[u32]| ElementBox::of(v, &frame);
+        let (cloth, outer) = (mesh.cloth_vertices() as u32, frame.of_obstacle());
+        let boxed = |v: &[u32]| {
+            let frame = if v[0] < cloth { &frame } else { &outer };
+            ElementBox::of(v, frame)
+        };
         let near = |a: &[u32], b: &[u32]| !mesh.are_incident(a, b) && boxed(a).overlaps(&boxed(b));
-        let cloth = mesh.cloth_vertices() as u32;
         let (own, other) = mesh.faces().split_at(mesh.cloth_faces());
         let mut pairs = Vec::new();
         let all = cloth..mesh.vertices() as u32;
@@ -197,6 +202,7 @@ mod tests {
                 start: &start,
                 end: &end,
                 distance,
+                obstacle_distance: 1.5 * distance,
             };
             let found = broad_phase.candidates(&mesh, &sweep, Par::Seq);
             assert_eq!(found, brute_force(&mesh, &sweep));
@@ -222,6 +228,7 @@ mod tests {
             start: &x,
             end: &x,
             distance: 0.0,
+            obstacle_distance: 0.0,
         };
         let found = BroadPhase::default().candidates(&mesh, &sweep, Par::Seq);
         assert_eq!(found, brute_force(&mesh, &sweep));

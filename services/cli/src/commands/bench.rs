@@ -5,16 +5,22 @@ use crate::args::{
 };
 use crate::input;
 use anyhow::Result;
+use std::path::Path;
 use std::process::ExitCode;
 use tryon::evaluate::ablation::{self, Extent};
 use tryon::evaluate::cloth::ClothBench;
 use tryon::evaluate::cloth_offline::OfflineBench;
+use tryon::evaluate::dress_offline::DressBench;
 use tryon::evaluate::garment_capture::{
     CaptureVariant, capture_scenes, made_scenes, measure_all, measure_turn_scene, turn_scenes,
 };
 use tryon::evaluate::people::{self, CaseSet, PeoplePlan};
 use tryon::evaluate::{self, Row, Table};
+use tryon::offline::OfflineSettings;
 use tryon::par::with_threads;
+
+/// Frames of the dress without --frames.
+const DRESS_FRAMES: usize = 4;
 
 /// Runs the command.
 ///
@@ -53,8 +59,11 @@ fn tracking(args: &BenchTrackingArgs) -> Result<ExitCode> {
 }
 
 fn cloth(args: &BenchClothArgs) -> Result<ExitCode> {
+    if let Some(folder) = &args.dress {
+        return with_threads(args.threads, || dress_offline(args, folder))?;
+    }
     if args.offline {
-        return cloth_offline(args);
+        return with_threads(args.threads, || cloth_offline(args))?;
     }
     let mut bench = ClothBench {
         full: args.full,
@@ -83,6 +92,19 @@ fn cloth_offline(args: &BenchClothArgs) -> Result<ExitCode> {
         bar.set_message(format!("{}, {}", row.scene, row.method));
         bar.inc(1);
     })?;
+    bar.finish_and_clear();
+    table.command = std::env::args().collect::<Vec<_>>().join(" ");
+    finish(&table, &args.out)
+}
+
+fn dress_offline(args: &BenchClothArgs, folder: &Path) -> Result<ExitCode> {
+    let bench = DressBench {
+        vertices: args.vertices,
+        frames: args.frames.unwrap_or(DRESS_FRAMES),
+        settings: OfflineSettings::default(),
+    };
+    let bar = input::progress(Some(bench.frames as u64), "measuring");
+    let mut table = evaluate::dress_offline::dress_offline(folder, bench, |_| bar.inc(1))?;
     bar.finish_and_clear();
     table.command = std::env::args().collect::<Vec<_>>().join(" ");
     finish(&table, &args.out)

@@ -10,6 +10,7 @@ use crate::cloth::solver::single_patch::{
 use crate::cloth::solver::{Environment, RunConfig, SheetStart};
 use crate::linear::{BlockJacobi, StopCriterion, conjugate_gradient};
 use crate::math::V3d;
+use crate::par::Par;
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
 
@@ -163,7 +164,13 @@ impl VelocityUpdate for Springs {
                 out[i] = p[i] * self.mass[i];
             }
         };
-        conjugate_gradient(product, &mut inverse, &system.right, &mut change, STOP);
+        conjugate_gradient(
+            product,
+            &mut inverse,
+            &system.right,
+            &mut change,
+            (Par::Seq, STOP),
+        );
         for i in 0..n {
             state.velocity[i] = (v[i] + change[i]).into();
         }
