@@ -30,6 +30,9 @@ impl Default for DrapeSettings {
     }
 }
 
+/// Largest motion of one vertex in the last iteration of a step by the motion that counts as settled.
+const LARGEST_SHARE: f64 = 10.0;
+
 /// Work and end of a static drape.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DrapeReport {
@@ -77,7 +80,13 @@ impl OfflineSolver<'_> {
             pins: targets.pins.iter().map(|p| x[p.vertex as usize]).collect(),
             obstacle: self.state.obstacle[1].clone(),
         };
-        let scheme = std::mem::replace(&mut self.settings.scheme, TimeScheme::ImplicitEuler);
+        let settings = self.settings;
+        self.settings.scheme = TimeScheme::ImplicitEuler;
+        self.settings.error_rate = f64::INFINITY;
+        // The way to rest is of no interest: a step need not be solved better than what counts as settled.
+        let newton = &mut self.settings.newton;
+        newton.tolerance = newton.tolerance.max(drape.tolerance);
+        newton.largest = newton.largest.max(drape.tolerance * LARGEST_SHARE);
         let mut h = drape.steps[0];
         let mut end = Ok(());
         while report.steps < drape.most_steps && !report.settled {
@@ -107,7 +116,7 @@ impl OfflineSolver<'_> {
             }
         }
         self.rest();
-        self.settings.scheme = scheme;
+        self.settings = settings;
         end.map(|()| report)
     }
 
