@@ -39,7 +39,7 @@ impl OfflineDrapeReport {
 
 impl OfflineOutfit {
     /// Brings the real-time result to rest on the body that it met. `progress` receives the vertices of the mesh in work and
-    /// each step; a break ends the drape of that mesh.
+    /// each step; a break ends the drape, and finer meshes stay as the coarser one is then.
     ///
     /// # Errors
     /// [`MirrorError::TangledStart`] when intersections stay; a step that is not solved.
@@ -54,7 +54,7 @@ impl OfflineOutfit {
         let (mut state, start) = coarser.first().unwrap_or(self).start(worn, par)?;
         let body = worn.state.collision_body().vertices();
         let (mut settings, mut levels) = (DrapeSettings::default(), Vec::new());
-        let mut before: Option<&Self> = None;
+        let (mut before, mut flow): (Option<&Self>, _) = (None, ControlFlow::Continue(()));
         for outfit in coarser.iter().chain([self]) {
             if let Some(coarse) = before.replace(outfit) {
                 state = outfit.refined(coarse, &state);
@@ -63,13 +63,23 @@ impl OfflineOutfit {
             }
             let started = Instant::now();
             let vertices = outfit.cloth().len();
+            if flow.is_break() {
+                levels.push(OfflineDrapeLevel {
+                    vertices,
+                    ..OfflineDrapeLevel::default()
+                });
+                continue;
+            }
             let mut solver = outfit.solver(state, par)?;
             let pins = outfit.pins(body);
             let targets = FrameTargets {
                 pins: &pins,
                 ..FrameTargets::default()
             };
-            let drape = solver.drape_to(&settings, &targets, |step| progress(vertices, step))?;
+            let drape = solver.drape_to(&settings, &targets, |step| {
+                flow = progress(vertices, step);
+                flow
+            })?;
             levels.push(OfflineDrapeLevel {
                 vertices,
                 drape,

@@ -116,3 +116,19 @@ fn a_preview_goes_on_offline_without_intersections() {
         .expect("its checkpoint");
     assert_eq!(resumed.state(), solver.state());
 }
+
+#[test]
+fn a_drape_that_breaks_off_leaves_finer_meshes_as_they_are() {
+    let (worn, faces, _) = worn();
+    let coarse = worn.model.outfit.garments[0].vertices;
+    let outfit = OfflineOutfit::new(&worn, &faces, 4 * coarse).expect("finer");
+    let (state, report) = outfit
+        .drape(&worn, Par::Seq, |_, _| ControlFlow::Break(()))
+        .expect("broken off");
+    assert_eq!(state.now.x.len(), outfit.cloth().len());
+    let steps: Vec<usize> = report.levels.iter().map(|l| l.drape.steps).collect();
+    assert_eq!(steps, [1, 0]);
+    assert!(!report.is_settled());
+    let solver = outfit.solver(state, Par::Seq).expect("a solver");
+    assert_eq!(crossings(&outfit, &faces, &solver), 0);
+}
