@@ -9,6 +9,7 @@ use crate::cloth::{Config, Input, Model, State, StepReport, Workspace, step};
 use crate::dressing::{DressError, DressOptions, GarmentSource, dress_all};
 use crate::math::{Camera, P3, Rigid, World};
 use crate::tracking::ArmClearance;
+use std::sync::Arc;
 
 /// Tracked body that is dressed.
 #[derive(Clone, Copy, Debug)]
@@ -39,12 +40,25 @@ pub struct PutOn {
 #[derive(Debug)]
 pub struct DressedOutfit {
     /// Immutable part of the simulation.
-    pub model: Model,
+    pub model: Arc<Model>,
     /// State after the last step.
     pub state: State,
     work: Workspace,
     wear: WearWatch,
     worn: Vec<SizedGarment>,
+}
+
+/// The same outfit from here on; its first step takes longer, as scratch is left behind.
+impl Clone for DressedOutfit {
+    fn clone(&self) -> Self {
+        Self {
+            model: Arc::clone(&self.model),
+            state: self.state.clone(),
+            work: Workspace::default(),
+            wear: self.wear.clone(),
+            worn: self.worn.clone(),
+        }
+    }
 }
 
 impl DressedOutfit {
@@ -81,7 +95,7 @@ impl DressedOutfit {
         let masks = vertex_masks(subject.template);
         Ok(Self {
             wear: WearWatch::new(&dressed.model, &dressed.state, masks),
-            model: dressed.model,
+            model: Arc::new(dressed.model),
             state: dressed.state,
             work: Workspace::default(),
             worn,

@@ -67,7 +67,7 @@ impl WearState {
 }
 
 /// Watch over an outfit from step to step.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct WearWatch {
     reference: WornReference,
     /// Mask of the part of each body vertex, shape `[body vertices]`.
