@@ -3,6 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use tokio::sync::oneshot;
+use tryon::par::{PoolError, with_threads};
 
 type Job = Box<dyn FnOnce() + Send>;
 
@@ -41,6 +42,22 @@ fn serve(jobs: &Mutex<mpsc::Receiver<Job>>) {
     }
 }
 
+/// Lowers the priority of the calling thread and of those that it starts.
+fn lower_priority(niceness: i32) {
+    // Of this thread alone on Linux; a refusal costs only the priority.
+    let _ = rustix::process::nice(niceness);
+}
+
+/// Runs `f` with parallel loops on threads of its own, one for each core, at low priority like [`Pool::background`]. The
+/// calling thread, which waits, keeps the low priority.
+///
+/// # Errors
+/// When the system refuses the threads.
+pub fn run_in_background<R: Send>(f: impl FnOnce() -> R + Send) -> Result<R, PoolError> {
+    lower_priority(BACKGROUND_NICENESS);
+    with_threads(0, f)
+}
+
 impl Pool {
     /// Starts `threads` threads; 0 means one for each core.
     ///
@@ -75,8 +92,7 @@ impl Pool {
                 .name(format!("{name}-{i}"))
                 .spawn(move || {
                     if niceness != 0 {
-                        // Of this thread alone on Linux; a refusal costs only the priority.
-                        let _ = rustix::process::nice(niceness);
+                        lower_priority(niceness);
                     }
                     serve(&rx);
                 })?;
@@ -163,5 +179,8 @@ mod tests {
         let own = usual.run(niceness).await.expect("runs");
         assert_eq!(low, (own + BACKGROUND_NICENESS).min(19));
         assert_eq!(own, niceness());
+        let parallel = std::thread::spawn(move || run_in_background(niceness));
+        let parallel = parallel.join().expect("no panic").expect("threads");
+        assert_eq!(parallel, low);
     }
 }
