@@ -2333,25 +2333,51 @@ pub struct GarmentLook {
     #[prost(float, tag = "3")]
     pub stripe_width: f32,
 }
-#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+#[derive(Clone, PartialEq, ::prost::Message)]
 pub struct StartSimulationRequest {
-    /// The scene, JSON as `tryon simulate --scene` reads it, UTF-8, at most 1 MiB, complete in itself: `mesh_obj` holds
-    /// the text of the OBJ file that `mesh` would name, and a collider's `motion` the rows of `motion_csv`.
-    #[prost(string, tag = "1")]
-    pub scene_json: ::prost::alloc::string::String,
-    /// Unspecified is the real-time solver.
+    /// Unspecified is the real-time solver for a scene and the offline solver for a session, which has no other.
     #[prost(enumeration = "ClothSolver", tag = "2")]
     pub solver: i32,
     /// State of the same scene to continue from, as `CancelSimulation` returned it; at most 4 MiB, offline solver only. The
     /// frames are the same to the bit as those of an uninterrupted simulation.
     #[prost(bytes = "bytes", tag = "3")]
     pub checkpoint: ::prost::bytes::Bytes,
+    #[prost(oneof = "start_simulation_request::Start", tags = "1, 4")]
+    pub start: ::core::option::Option<start_simulation_request::Start>,
 }
-#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+/// Nested message and enum types in `StartSimulationRequest`.
+pub mod start_simulation_request {
+    #[derive(Clone, PartialEq, ::prost::Oneof)]
+    pub enum Start {
+        /// The scene, JSON as `tryon simulate --scene` reads it, UTF-8, at most 1 MiB, complete in itself: `mesh_obj` holds
+        /// the text of the OBJ file that `mesh` would name, and a collider's `motion` the rows of `motion_csv`.
+        #[prost(string, tag = "1")]
+        SceneJson(::prost::alloc::string::String),
+        /// The garments that a session wears now.
+        #[prost(message, tag = "4")]
+        Session(super::SessionStart),
+    }
+}
+/// Start from the real-time garments of a session, which go on as they do. In the first frame they are draped to rest in
+/// the pose that the body has now.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct SessionStart {
+    /// A session whose garments are LIVE and simulated.
+    #[prost(string, tag = "1")]
+    pub session_id: ::prost::alloc::string::String,
+    /// Vertices of all garments, about, 1 to 50000: their triangles are divided by four until as near as can be.
+    #[prost(uint32, tag = "2")]
+    pub vertices: u32,
+    /// Seconds of the body's motion that are recorded from now on and simulated, a frame for each exposure; 0 to 10, 0 for
+    /// the first frame alone. A recording ends early when the body is lost, and after 60 exposures for each second.
+    #[prost(float, tag = "3")]
+    pub motion_seconds: f32,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
 pub struct StartSimulationResponse {
     #[prost(string, tag = "1")]
     pub simulation_id: ::prost::alloc::string::String,
-    /// Number of frames of the simulation.
+    /// Number of frames of the simulation; 0 when the body is still being recorded.
     #[prost(uint32, tag = "2")]
     pub frame_count: u32,
     /// Vertices of all garments together.
@@ -2360,6 +2386,16 @@ pub struct StartSimulationResponse {
     /// First frame that is computed: 0, or the one after the checkpoint. Earlier ones are not streamed.
     #[prost(uint32, tag = "4")]
     pub first_frame: u32,
+    /// Garments of a session on their finer meshes, inner layer first; empty for a scene. Positions of a frame are those of
+    /// their simulated vertices, one garment after the other.
+    #[prost(message, repeated, tag = "5")]
+    pub garments: ::prost::alloc::vec::Vec<GarmentTopology>,
+    /// The exposure whose body and garments a session's simulation starts from; absent for a scene.
+    #[prost(message, optional, tag = "6")]
+    pub exposure: ::core::option::Option<FrameId>,
+    /// Camera to world of `exposure`.
+    #[prost(message, optional, tag = "7")]
+    pub world_from_camera: ::core::option::Option<RigidTransform>,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct FollowSimulationRequest {
@@ -2371,19 +2407,43 @@ pub struct FollowSimulationRequest {
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct FollowSimulationResponse {
+    /// The frame, or the one in work.
     #[prost(uint32, tag = "1")]
     pub frame: u32,
+    /// Number of frames of the simulation; 0 while the body is being recorded.
     #[prost(uint32, tag = "2")]
     pub frame_count: u32,
-    /// f32[vertex_count][3], metres, world frame.
+    /// f32[vertex_count][3], metres, world frame; empty for a step of a drape.
     #[prost(bytes = "bytes", tag = "3")]
     pub positions: ::prost::bytes::Bytes,
     /// Milliseconds of computing for this frame.
     #[prost(float, tag = "4")]
     pub ms: f32,
-    /// Estimated seconds of computing for the frames after this one.
+    /// Estimated seconds of computing for the frames after this one; 0 while their number isn't known.
     #[prost(float, tag = "5")]
     pub seconds_left: f32,
+    /// Newest step of the drape in a session's simulation.
+    #[prost(message, optional, tag = "6")]
+    pub drape: ::core::option::Option<DrapeStep>,
+    /// The exposure whose body a frame of a session follows.
+    #[prost(message, optional, tag = "7")]
+    pub exposure: ::core::option::Option<FrameId>,
+}
+/// A step of a drape to rest, which goes from coarse to fine meshes.
+#[derive(Clone, Copy, PartialEq, ::prost::Message)]
+pub struct DrapeStep {
+    /// Vertices of the mesh in work, all garments together.
+    #[prost(uint32, tag = "1")]
+    pub vertex_count: u32,
+    /// Steps on this mesh so far.
+    #[prost(uint32, tag = "2")]
+    pub steps: u32,
+    /// Largest motion of a vertex in this step, metres.
+    #[prost(float, tag = "3")]
+    pub motion: f32,
+    /// The mesh is at rest. A mesh that doesn't come to rest is left after a limited number of steps.
+    #[prost(bool, tag = "4")]
+    pub settled: bool,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct CancelSimulationRequest {
@@ -2672,9 +2732,11 @@ pub mod cloth_service_client {
                 .insert(GrpcMethod::new("tryon.v1.ClothService", "StreamGarments"));
             self.inner.server_streaming(req, path, codec).await
         }
-        /// Starts a simulation of a scene that needs no camera; it runs until it is done, cancelled, or the service stops.
-        /// INVALID_ARGUMENT names the field of the scene at fault, also when its frames would take more than 256 MiB.
-        /// RESOURCE_EXHAUSTED with RetryInfo when too many run.
+        /// Starts a simulation of a scene, which needs no camera, or of the garments of a session on finer meshes. Callers who
+        /// may stream the garments of a session may start, follow and cancel its simulations. It runs beside the live sessions
+        /// until it is done, cancelled, or the service stops. INVALID_ARGUMENT names the field at fault, also when the frames
+        /// would take more than 256 MiB. NOT_FOUND for an unknown session; FAILED_PRECONDITION while it has no garments that are
+        /// simulated. RESOURCE_EXHAUSTED with RetryInfo when too many run.
         pub async fn start_simulation(
             &mut self,
             request: impl tonic::IntoRequest<super::StartSimulationRequest>,
@@ -2699,9 +2761,12 @@ pub mod cloth_service_client {
                 .insert(GrpcMethod::new("tryon.v1.ClothService", "StartSimulation"));
             self.inner.unary(req, path, codec).await
         }
-        /// Streams every frame of a simulation from `first_frame` on, in order; none is dropped. Finished frames are kept
-        /// until ten minutes after the end of the simulation, which does not wait for readers.
-        /// Ends with OK after the last frame, or with the simulation's error.
+        /// Streams every frame of a simulation from `first_frame` on, in order; none is dropped. Before a frame that is draped,
+        /// messages without positions show the newest step of the drape. Finished frames are kept until ten minutes after the
+        /// end of the simulation, which does not wait for readers; those of a session no longer than the body that it follows.
+        /// Ends with OK after the last frame, or with the simulation's error: ABORTED for a step that is not solved,
+        /// FAILED_PRECONDITION for garments of a session that pass through themselves or the body too much to start from, which
+        /// another pose may solve. NOT_FOUND for an unknown id, and at the end of a simulation whose body was forgotten.
         pub async fn follow_simulation(
             &mut self,
             request: impl tonic::IntoRequest<super::FollowSimulationRequest>,
@@ -2726,8 +2791,9 @@ pub mod cloth_service_client {
                 .insert(GrpcMethod::new("tryon.v1.ClothService", "FollowSimulation"));
             self.inner.server_streaming(req, path, codec).await
         }
-        /// Ends a simulation after the frame in work and answers then; one that has ended stays as it is. Finished frames are
-        /// kept as above. NOT_FOUND for an unknown id.
+        /// Ends a simulation after the frame in work, or after the step in work of a drape, and answers then; one that has ended
+        /// stays as it is. Finished frames are kept as above. NOT_FOUND for an unknown id. DEADLINE_EXCEEDED while the work takes
+        /// longer than the call may: the simulation ends all the same, and a repeated call has the answer.
         pub async fn cancel_simulation(
             &mut self,
             request: impl tonic::IntoRequest<super::CancelSimulationRequest>,
@@ -2806,9 +2872,11 @@ pub mod cloth_service_server {
             tonic::Response<Self::StreamGarmentsStream>,
             tonic::Status,
         >;
-        /// Starts a simulation of a scene that needs no camera; it runs until it is done, cancelled, or the service stops.
-        /// INVALID_ARGUMENT names the field of the scene at fault, also when its frames would take more than 256 MiB.
-        /// RESOURCE_EXHAUSTED with RetryInfo when too many run.
+        /// Starts a simulation of a scene, which needs no camera, or of the garments of a session on finer meshes. Callers who
+        /// may stream the garments of a session may start, follow and cancel its simulations. It runs beside the live sessions
+        /// until it is done, cancelled, or the service stops. INVALID_ARGUMENT names the field at fault, also when the frames
+        /// would take more than 256 MiB. NOT_FOUND for an unknown session; FAILED_PRECONDITION while it has no garments that are
+        /// simulated. RESOURCE_EXHAUSTED with RetryInfo when too many run.
         async fn start_simulation(
             &self,
             request: tonic::Request<super::StartSimulationRequest>,
@@ -2825,9 +2893,12 @@ pub mod cloth_service_server {
             >
             + std::marker::Send
             + 'static;
-        /// Streams every frame of a simulation from `first_frame` on, in order; none is dropped. Finished frames are kept
-        /// until ten minutes after the end of the simulation, which does not wait for readers.
-        /// Ends with OK after the last frame, or with the simulation's error.
+        /// Streams every frame of a simulation from `first_frame` on, in order; none is dropped. Before a frame that is draped,
+        /// messages without positions show the newest step of the drape. Finished frames are kept until ten minutes after the
+        /// end of the simulation, which does not wait for readers; those of a session no longer than the body that it follows.
+        /// Ends with OK after the last frame, or with the simulation's error: ABORTED for a step that is not solved,
+        /// FAILED_PRECONDITION for garments of a session that pass through themselves or the body too much to start from, which
+        /// another pose may solve. NOT_FOUND for an unknown id, and at the end of a simulation whose body was forgotten.
         async fn follow_simulation(
             &self,
             request: tonic::Request<super::FollowSimulationRequest>,
@@ -2835,8 +2906,9 @@ pub mod cloth_service_server {
             tonic::Response<Self::FollowSimulationStream>,
             tonic::Status,
         >;
-        /// Ends a simulation after the frame in work and answers then; one that has ended stays as it is. Finished frames are
-        /// kept as above. NOT_FOUND for an unknown id.
+        /// Ends a simulation after the frame in work, or after the step in work of a drape, and answers then; one that has ended
+        /// stays as it is. Finished frames are kept as above. NOT_FOUND for an unknown id. DEADLINE_EXCEEDED while the work takes
+        /// longer than the call may: the simulation ends all the same, and a repeated call has the answer.
         async fn cancel_simulation(
             &self,
             request: tonic::Request<super::CancelSimulationRequest>,

@@ -266,6 +266,11 @@ impl Worn {
         self.outfit.is_past_mending()
     }
 
+    /// The outfit after the last step, and the template of its body.
+    pub(crate) fn outfit(&self) -> (&DressedOutfit, &Arc<Template>) {
+        (&self.outfit, &self.template)
+    }
+
     /// Immutable part of every garment, for keyframes.
     pub(crate) fn garments(&self) -> &Arc<[Arc<WornGarment>]> {
         &self.garments

@@ -5,8 +5,12 @@
 
 mod detail_ladder;
 mod engine;
+mod fine_task;
 mod folder;
 mod library;
+mod progress;
+mod recording;
+mod scene_task;
 mod service;
 mod session;
 mod simulation;

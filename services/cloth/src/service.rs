@@ -1,13 +1,17 @@
 //! Remote procedures of the cloth service: check the request, find the session, answer.
 
 use crate::engine::Update;
+use crate::fine_task;
 use crate::library::Library;
+use crate::progress::Frames;
+use crate::scene_task::SceneTask;
 use crate::session::{self, Command, Handle, Message, Setup, reader};
-use crate::simulation::{Frames, Simulations};
+use crate::simulation::Simulations;
 use futures::Stream;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
+use tokio::sync::oneshot;
 use tonic::{Request, Response, Status};
 use tryon_kit::auth::{Connection, Grant};
 use tryon_kit::config::ClothConfig;
@@ -15,8 +19,9 @@ use tryon_kit::server::Context;
 use tryon_kit::sessions::{Opened, Sessions, brief};
 use tryon_kit::status::{exhausted, not_found};
 use tryon_proto::convert::garment::GarmentWriter;
-use tryon_proto::convert::request;
+use tryon_proto::convert::{WireError, request};
 use tryon_proto::v1::cloth_service_server::ClothService;
+use tryon_proto::v1::start_simulation_request::Start;
 use tryon_proto::v1::*;
 
 /// Directory of sessions and the dependencies of new ones.
@@ -45,6 +50,36 @@ impl Cloth {
             idle: Duration::from_secs(config.idle_s),
             adapts_detail: config.adapts_detail,
             library: Arc::new(library),
+        }
+    }
+
+    /// Sends a command to a session.
+    async fn command(&self, session: &str, command: Command) -> Result<(), Status> {
+        let handle = self.sessions.get(session);
+        let handle: Arc<Handle> = handle.ok_or_else(|| not_found("session", session))?;
+        let sent = handle.commands.send(command).await;
+        sent.map_err(|_| not_found("session", session))
+    }
+
+    /// Starts the simulation of the garments that a session wears now.
+    async fn start_fine(&self, start: &SessionStart) -> Result<StartSimulationResponse, Status> {
+        let place = self.simulations.place()?;
+        let id = &start.session_id;
+        let (answer, snapshot) = oneshot::channel();
+        let command = Command::Snapshot {
+            motion_seconds: start.motion_seconds,
+            answer,
+        };
+        self.command(id, command).await?;
+        let snapshot = snapshot.await.map_err(|_| not_found("session", id))??;
+        self.simulations.start_fine(place, start, snapshot).await
+    }
+
+    /// Refuses a request whose token does not reach a simulation: that of a session belongs to it, others to the store.
+    fn permit_simulation<T>(&self, r: &Request<T>, simulation: &str) -> Result<(), Status> {
+        match self.simulations.session(simulation)? {
+            Some(session) => permit(r, &session),
+            None => Grant::of(r)?.check_whole_store(),
         }
     }
 }
@@ -128,16 +163,8 @@ impl ClothService for Cloth {
     ) -> Result<Response<Self::StreamGarmentsStream>, Status> {
         let id = &r.get_ref().session_id;
         permit(&r, id)?;
-        let handle: Arc<Handle> = self
-            .sessions
-            .get(id)
-            .ok_or_else(|| not_found("session", id))?;
         let (tx, rx) = reader();
-        handle
-            .commands
-            .send(Command::Read(tx))
-            .await
-            .map_err(|_| not_found("session", id))?;
+        self.command(id, Command::Read(tx)).await?;
         // Encoded behind the queue: position deltas refer to the last message that this reader received.
         let start = Some((rx, GarmentWriter::default()));
         let frames = futures::stream::unfold(start, |at| async move {
@@ -167,8 +194,20 @@ impl ClothService for Cloth {
         &self,
         r: Request<StartSimulationRequest>,
     ) -> Result<Response<StartSimulationResponse>, Status> {
-        Grant::of(&r)?.check_whole_store()?;
-        self.simulations.start(r.get_ref()).await.map(Response::new)
+        let message = r.get_ref();
+        let started = match &message.start {
+            Some(Start::Session(start)) => {
+                permit(&r, &start.session_id)?;
+                fine_task::check(message, start)?;
+                self.start_fine(start).await
+            }
+            Some(Start::SceneJson(text)) => {
+                Grant::of(&r)?.check_whole_store()?;
+                self.simulations.start_scene(SceneTask::new(text, message)?)
+            }
+            None => Err(WireError::new("start_simulation_request.start", "is missing").into()),
+        };
+        started.map(Response::new)
     }
 
     type FollowSimulationStream = Frames;
@@ -177,7 +216,7 @@ impl ClothService for Cloth {
         &self,
         r: Request<FollowSimulationRequest>,
     ) -> Result<Response<Self::FollowSimulationStream>, Status> {
-        Grant::of(&r)?.check_whole_store()?;
+        self.permit_simulation(&r, &r.get_ref().simulation_id)?;
         let r = r.get_ref();
         self.simulations
             .follow(&r.simulation_id, r.first_frame)
@@ -188,8 +227,8 @@ impl ClothService for Cloth {
         &self,
         r: Request<CancelSimulationRequest>,
     ) -> Result<Response<CancelSimulationResponse>, Status> {
-        Grant::of(&r)?.check_whole_store()?;
         let id = &r.get_ref().simulation_id;
+        self.permit_simulation(&r, id)?;
         self.simulations.cancel(id).await.map(Response::new)
     }
 }

@@ -2,11 +2,14 @@
 
 use crate::detail_ladder::DetailLadder;
 use crate::engine::{Body, Update, Worn, dress, frame_of};
+use crate::fine_task::Snapshot;
 use crate::library::Library;
+use crate::recording::Recorder;
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::Instant;
+use tonic::Status;
 use tryon_kit::auth::Connection;
 use tryon_kit::bodies::{News, follow};
 use tryon_kit::consent::FORGET_AFTER;
@@ -17,7 +20,8 @@ use tryon_kit::sessions::{Sessions, brief};
 use tryon_kit::telemetry::record_stages;
 use tryon_proto::convert::garment::{Positions, WornGarment};
 use tryon_proto::v1::{
-    self, ClothDetail, ClothStatus, DegradedReason, GarmentChoice, GarmentFrame, TrackingStatus,
+    self, ClothDetail, ClothStatus, DegradedReason, FrameId, GarmentChoice, GarmentFrame,
+    TrackingStatus,
 };
 
 /// Longest interval between messages to a reader; a silent stream repeats its last status.
@@ -41,6 +45,12 @@ pub(crate) struct Handle {
 pub(crate) enum Command {
     /// Adds a reader.
     Read(ordered::Sender<Message>),
+    /// Answers with the outfit as it is worn now, and records the body from now on.
+    Snapshot {
+        /// Length of the recording (s); 0 for none.
+        motion_seconds: f32,
+        answer: oneshot::Sender<Result<Snapshot, Status>>,
+    },
     /// Ends the session.
     Close,
 }
@@ -88,6 +98,8 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
             setup,
             wanted,
             worn: None,
+            body: watch::Sender::new(()),
+            recorders: Vec::new(),
             on: 0,
             failed: 0,
             dressing: None,
@@ -134,6 +146,10 @@ struct Task {
     wanted: watch::Receiver<WantedOutfit>,
     /// Worn outfit; `None` while the pool steps it.
     worn: Option<Worn>,
+    /// Replaced when the body is forgotten: what is kept of it elsewhere goes then.
+    body: watch::Sender<()>,
+    /// Recordings of the body that go on.
+    recorders: Vec<Recorder>,
     /// Revision of the worn outfit; 0 for nothing.
     on: u64,
     /// Revision that failed to be put on.
@@ -173,6 +189,10 @@ impl Task {
                         self.readers.push(Reader { queue, has: None });
                         self.publish(status.clone());
                     }
+                    Some(Command::Snapshot { motion_seconds, answer }) => {
+                        // Its caller may have gone.
+                        let _ = answer.send(self.snapshot(&status.frame, motion_seconds));
+                    }
                     Some(Command::Close) | None => return "asked to",
                 },
                 Some(d) = ready.recv() => self.on_dressed(d),
@@ -185,6 +205,7 @@ impl Task {
                         Some(n) => self.on_tracking(n).await,
                         None => return "tracking cannot be followed",
                     };
+                    self.record(&status.frame);
                     self.publish(status.clone());
                     published = Instant::now();
                     // A repetition of the status must not present old positions as new.
@@ -194,7 +215,7 @@ impl Task {
                 _ = tick.tick() => {
                     if followed.elapsed() >= FORGET_AFTER {
                         // Nobody knows whom the worn outfit fits.
-                        self.undress();
+                        self.forget_body();
                     }
                     if published.elapsed() >= HEARTBEAT {
                         if status.frame.status() == ClothStatus::Live {
@@ -273,7 +294,7 @@ impl Task {
             }
             (TrackingStatus::Calibrating, _) => {
                 // A new measurement, perhaps of another subject: the worn outfit is for the old one.
-                self.undress();
+                self.forget_body();
                 for_frame(waiting(
                     DegradedReason::Unspecified,
                     "the body is being measured".into(),
@@ -285,10 +306,64 @@ impl Task {
                 for_frame(f)
             }
             _ => {
-                self.undress();
+                self.forget_body();
                 for_frame(waiting(state.reason(), state.detail.clone()))
             }
         }
+    }
+
+    /// Outfit and exposure of the message that is `shown`, if its garments are simulated.
+    fn simulated(&self, shown: &GarmentFrame) -> Option<(&Worn, FrameId)> {
+        let is_simulated = shown.status() == ClothStatus::Live
+            && shown.outfit_revision == self.on
+            && matches!(
+                shown.cloth_detail(),
+                ClothDetail::Full | ClothDetail::Coarse
+            );
+        let worn = self.worn.as_ref().filter(|_| is_simulated)?;
+        Some((worn, shown.frame?))
+    }
+
+    fn snapshot(&mut self, shown: &GarmentFrame, motion_seconds: f32) -> Result<Snapshot, Status> {
+        let (worn, exposure) = self.simulated(shown).ok_or_else(|| {
+            Status::failed_precondition("the session has no garments that are simulated now")
+        })?;
+        let (outfit, template) = worn.outfit();
+        let mut snapshot = Snapshot {
+            outfit: outfit.clone(),
+            template: template.clone(),
+            garments: worn.garments().clone(),
+            exposure,
+            world_from_camera: shown.world_from_camera,
+            recording: None,
+            body: self.body.subscribe(),
+        };
+        if motion_seconds > 0.0 {
+            let (recorder, recording) = Recorder::new(exposure, motion_seconds);
+            self.recorders.push(recorder);
+            snapshot.recording = Some(recording);
+        }
+        Ok(snapshot)
+    }
+
+    /// Adds the body of the message that is `shown` to the recordings. They end when garments are no longer live; cloth that
+    /// follows skin leaves a gap.
+    fn record(&mut self, shown: &GarmentFrame) {
+        let mut recorders = std::mem::take(&mut self.recorders);
+        if let Some((worn, exposure)) = self.simulated(shown) {
+            let body = worn.outfit().0.state.collision_body().vertices();
+            recorders.retain(|r| r.record(exposure, body));
+        } else if shown.status() != ClothStatus::Live {
+            recorders.clear();
+        }
+        self.recorders = recorders;
+    }
+
+    /// Forgets the body and everything that is kept of it.
+    fn forget_body(&mut self) {
+        self.undress();
+        self.recorders.clear();
+        self.body = watch::Sender::new(());
     }
 
     fn undress(&mut self) {

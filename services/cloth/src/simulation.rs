@@ -1,90 +1,96 @@
-//! Simulations of scenes without a camera.
+//! Simulations on request: their directory, their threads, and how long they are kept.
 //!
-//! Each runs on a thread of its own, apart from the compute pool of live sessions. Its finished frames stay in memory
-//! for any number of readers.
+//! Each runs on threads of its own, at low priority beside the compute pool of live sessions. Its finished frames stay in
+//! memory for any number of readers, those of a session no longer than the session knows the body.
 
-use bytes::Bytes;
+use crate::fine_task::{FineTask, Snapshot};
+use crate::progress::{self, Frames, Progress, Publisher, SharedProgress};
+use crate::scene_task::SceneTask;
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
-use std::path::Path;
-use std::pin::Pin;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
-use tokio::sync::watch;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use tonic::Status;
-use tryon::cloth::scene::{self, RunConfig, Scene};
-use tryon::math::P3;
-use tryon::offline::{OfflineScene, OfflineSettings, checkpoint_frame};
-use tryon::par::Par;
+use tryon_kit::compute::run_in_background;
+use tryon_kit::sessions::{brief, random_id};
 use tryon_kit::status::{exhausted, not_found};
 use tryon_proto::convert::WireError;
-use tryon_proto::v1::{
-    CancelSimulationResponse, ClothSolver, FollowSimulationResponse, StartSimulationRequest,
-    StartSimulationResponse,
-};
+use tryon_proto::v1::{CancelSimulationResponse, SessionStart, StartSimulationResponse};
 
-/// Frame stream of one reader.
-pub(crate) type Frames =
-    Pin<Box<dyn futures::Stream<Item = Result<FollowSimulationResponse, Status>> + Send>>;
-
-/// Largest scene text, bytes; as the contract says.
-const MAX_SCENE_BYTES: usize = 1024 * 1024;
-/// Most memory for the frames of one simulation, bytes: 10 s of 20,000 vertices at 60 frames/s take 144 MB.
-const MAX_RESULT_BYTES: usize = 256 << 20;
 /// Time that frames are kept after the end; as the contract says.
 const KEPT: Duration = Duration::from_secs(600);
 
-/// Largest checkpoint, bytes; as the contract says.
-const MAX_CHECKPOINT_BYTES: usize = 4 << 20;
-
-/// A finished frame.
-#[derive(Clone)]
-struct Finished {
-    positions: Bytes,
-    /// Computing time (ms).
-    ms: f32,
-    /// Estimated computing time of the frames after it (s).
-    seconds_left: f32,
-}
-
-/// Progress of a simulation. `frames` only grows.
-#[derive(Default)]
-struct Progress {
-    frames: Vec<Finished>,
-    /// State after the last frame of a cancelled simulation.
-    checkpoint: Bytes,
-    end: Option<(Instant, Result<(), String>)>,
-}
-
-/// A simulation as readers reach it.
+/// A simulation as the rpcs reach it.
 #[derive(Clone)]
 struct Entry {
-    /// First frame that it computes, and the frame after its last.
-    frames: [u32; 2],
-    progress: watch::Receiver<Progress>,
-    is_cancelled: Arc<AtomicBool>,
+    /// Session that it belongs to; `None` for a scene.
+    session: Option<String>,
+    progress: SharedProgress,
 }
 
-/// Simulations of the process; one without an entry breaks off.
+/// Simulations by their ids, which are secrets like those of sessions.
+#[derive(Clone, Default)]
+struct Directory(Arc<Mutex<BTreeMap<String, Entry>>>);
+
+impl Directory {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<String, Entry>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn entry(&self, id: &str) -> Result<Entry, Status> {
+        let entry = self.lock().get(id).cloned();
+        entry.ok_or_else(|| not_found("simulation", id))
+    }
+}
+
+/// Right to be kept. Dropping it forgets the simulation.
+struct Keep {
+    directory: Directory,
+    id: String,
+}
+
+impl Keep {
+    /// Ends with `origin`, or some time after the end of the simulation.
+    async fn run(self, mut origin: watch::Receiver<()>, mut progress: watch::Receiver<Progress>) {
+        let over = async {
+            // Its sender lives as long as the entry.
+            let _ = progress.wait_for(Progress::has_ended).await;
+            tokio::time::sleep(KEPT).await;
+        };
+        tokio::select! {
+            _ = origin.changed() => {}
+            () = over => {}
+        }
+    }
+}
+
+impl Drop for Keep {
+    fn drop(&mut self) {
+        let entry = self.directory.lock().remove(&self.id);
+        if let Some(entry) = entry {
+            entry.progress.send_modify(Progress::forget);
+        }
+    }
+}
+
+/// Place, owner and frames of a simulation that is about to run.
+struct Plan {
+    place: OwnedSemaphorePermit,
+    /// First frame that is computed, and the one after the last or 0 while it isn't known.
+    frames: [u32; 2],
+    session: Option<String>,
+    /// The simulation is forgotten once its sender is gone.
+    origin: watch::Receiver<()>,
+}
+
+/// Simulations of the process.
 pub(crate) struct Simulations {
     limit: usize,
-    started: AtomicU64,
-    running: Mutex<Directory>,
-}
-
-/// Simulations by their ids.
-type Directory = BTreeMap<String, Entry>;
-
-/// Removes simulations that ended more than [`KEPT`] ago.
-fn forget(all: &mut Directory) {
-    all.retain(|_, entry| {
-        let progress = entry.progress.borrow();
-        progress
-            .end
-            .as_ref()
-            .is_none_or(|(at, _)| at.elapsed() < KEPT)
-    });
+    places: Arc<Semaphore>,
+    directory: Directory,
+    /// Origin of scenes: gone with the service.
+    service: watch::Sender<()>,
 }
 
 impl Simulations {
@@ -92,282 +98,145 @@ impl Simulations {
     pub(crate) fn new(limit: usize) -> Self {
         Self {
             limit,
-            started: AtomicU64::new(0),
-            running: Mutex::new(BTreeMap::new()),
+            places: Arc::new(Semaphore::new(limit)),
+            directory: Directory::default(),
+            service: watch::Sender::new(()),
         }
     }
 
-    /// Checks the scene and starts its simulation.
-    pub(crate) async fn start(
-        &self,
-        r: &StartSimulationRequest,
-    ) -> Result<StartSimulationResponse, Status> {
-        let scene = check(r)?;
-        let checkpoint = check_checkpoint(r)?;
-        let solver = r.solver();
-        let (tx, rx) = watch::channel(Progress::default());
-        let frame_count = scene.frames() as u32;
-        let first_frame = checkpoint.as_ref().map_or(0, |(frame, _)| frame + 1);
-        let vertex_count = scene.start.len() as u32;
-        let id = format!(
-            "simulation-{}",
-            self.started.fetch_add(1, Ordering::Relaxed)
-        );
-        let is_cancelled = Arc::new(AtomicBool::new(false));
-        {
-            let mut all = self.running.lock().unwrap_or_else(PoisonError::into_inner);
-            forget(&mut all);
-            if all
-                .values()
-                .filter(|e| e.progress.borrow().end.is_none())
-                .count()
-                >= self.limit
-            {
-                return Err(exhausted("simulations", self.limit));
-            }
-            let entry = Entry {
-                frames: [first_frame, frame_count],
-                progress: rx,
-                is_cancelled: Arc::clone(&is_cancelled),
-            };
-            all.insert(id.clone(), entry);
-        }
-        let task = Task {
-            scene,
-            solver,
-            checkpoint: checkpoint.map(|(_, bytes)| bytes),
-            is_cancelled,
+    /// Place for one more simulation.
+    ///
+    /// # Errors
+    /// RESOURCE_EXHAUSTED when as many run as may.
+    pub(crate) fn place(&self) -> Result<OwnedSemaphorePermit, Status> {
+        let place = Arc::clone(&self.places).try_acquire_owned();
+        place.map_err(|_| exhausted("simulations", self.limit))
+    }
+
+    /// Starts the simulation of a scene.
+    pub(crate) fn start_scene(&self, task: SceneTask) -> Result<StartSimulationResponse, Status> {
+        let plan = Plan {
+            place: self.place()?,
+            frames: task.frames(),
+            session: None,
+            origin: self.service.subscribe(),
         };
-        let spawned = std::thread::Builder::new()
-            .name(id.clone())
-            .spawn(move || task.compute(&tx));
-        if let Err(e) = spawned {
-            self.running
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .remove(&id);
-            return Err(Status::internal(format!("no thread for a simulation: {e}")));
-        }
-        tracing::info!(simulation = id, frame_count, vertex_count, "started");
+        let ([first_frame, frame_count], vertex_count) = (plan.frames, task.vertices());
+        let simulation_id = self.launch(plan, move |publisher| task.compute(publisher))?;
         Ok(StartSimulationResponse {
-            simulation_id: id,
+            simulation_id,
             frame_count,
             vertex_count,
             first_frame,
+            ..Default::default()
         })
+    }
+
+    /// Starts the simulation of a session's garments, in a place taken before.
+    pub(crate) async fn start_fine(
+        &self,
+        place: OwnedSemaphorePermit,
+        start: &SessionStart,
+        snapshot: Snapshot,
+    ) -> Result<StartSimulationResponse, Status> {
+        let (exposure, world_from_camera) = (snapshot.exposure, snapshot.world_from_camera);
+        let (origin, wanted) = (snapshot.body.clone(), start.clone());
+        let task = tokio::task::spawn_blocking(move || FineTask::new(snapshot, &wanted)).await;
+        let task = task.map_err(|e| Status::internal(e.to_string()))??;
+        let frame_count = task.frame_count();
+        let plan = Plan {
+            place,
+            frames: [0, frame_count],
+            session: Some(start.session_id.clone()),
+            origin,
+        };
+        let mut response = StartSimulationResponse {
+            frame_count,
+            vertex_count: task.vertices(),
+            garments: task.topology(),
+            exposure: Some(exposure),
+            world_from_camera,
+            ..Default::default()
+        };
+        response.simulation_id = self.launch(plan, move |publisher| task.compute(publisher))?;
+        Ok(response)
+    }
+
+    /// Runs `work` on threads of its own; the id of the simulation.
+    fn launch(
+        &self,
+        plan: Plan,
+        work: impl FnOnce(&mut Publisher) -> Result<(), Status> + Send + 'static,
+    ) -> Result<String, Status> {
+        let Plan {
+            place,
+            frames,
+            session,
+            origin,
+        } = plan;
+        let id = random_id();
+        let progress = Progress::of(frames);
+        let mut publisher = Publisher::new(progress.clone());
+        let (shared, shown) = (progress.clone(), brief(&id));
+        let run = move || {
+            let work = || run_in_background(|| work(&mut publisher));
+            // A panic loses the state of this simulation only.
+            let end = match catch_unwind(AssertUnwindSafe(work)) {
+                Ok(Ok(end)) => end,
+                Ok(Err(e)) => Err(Status::internal(e.to_string())),
+                Err(_) => Err(Status::internal("the simulation panicked")),
+            };
+            if let Err(why) = &end {
+                tracing::warn!(simulation = shown, why = why.message(), "simulation failed");
+            }
+            drop(place);
+            shared.send_modify(|p| p.finish(end));
+        };
+        let thread = std::thread::Builder::new().name("simulation".into());
+        thread
+            .spawn(run)
+            .map_err(|e| Status::internal(format!("no thread for a simulation: {e}")))?;
+        tracing::info!(simulation = brief(&id), frame_count = frames[1], "started");
+        let ended = progress.subscribe();
+        let entry = Entry { session, progress };
+        self.directory.lock().insert(id.clone(), entry);
+        let keep = Keep {
+            directory: self.directory.clone(),
+            id: id.clone(),
+        };
+        tokio::spawn(keep.run(origin, ended));
+        Ok(id)
+    }
+
+    /// Session that a simulation belongs to; `None` for a scene.
+    pub(crate) fn session(&self, id: &str) -> Result<Option<String>, Status> {
+        Ok(self.directory.entry(id)?.session)
     }
 
     /// Ends a simulation after the frame in work.
     pub(crate) async fn cancel(&self, id: &str) -> Result<CancelSimulationResponse, Status> {
-        let Entry {
-            frames: [first, _],
-            mut progress,
-            is_cancelled,
-        } = self.entry(id)?;
-        is_cancelled.store(true, Ordering::Relaxed);
+        let progress = self.directory.entry(id)?.progress;
+        progress.send_modify(Progress::cancel);
+        let mut progress = progress.subscribe();
         let ended = progress
-            .wait_for(|p| p.end.is_some())
+            .wait_for(Progress::has_ended)
             .await
             .map_err(|_| Status::aborted("the simulation broke off"))?;
+        let (next_frame, checkpoint) = ended.outcome();
         Ok(CancelSimulationResponse {
-            next_frame: first + ended.frames.len() as u32,
-            checkpoint: ended.checkpoint.clone(),
+            next_frame,
+            checkpoint,
         })
-    }
-
-    fn entry(&self, id: &str) -> Result<Entry, Status> {
-        let mut all = self.running.lock().unwrap_or_else(PoisonError::into_inner);
-        forget(&mut all);
-        let entry = all.get(id).cloned();
-        entry.ok_or_else(|| not_found("simulation", id))
     }
 
     /// All frames from `first` on, then the end.
     pub(crate) fn follow(&self, id: &str, first: u32) -> Result<Frames, Status> {
-        let entry = self.entry(id)?;
-        let ([offset, frame_count], progress) = (entry.frames, entry.progress);
-        if first >= frame_count {
-            let why = format!("{first}: there are {frame_count} frames");
+        let progress = self.directory.entry(id)?.progress.subscribe();
+        let count = progress.borrow().frame_count();
+        if count > 0 && first >= count {
+            let why = format!("{first}: there are {count} frames");
             return Err(WireError::new("follow_simulation_request.first_frame", why).into());
         }
-        Ok(Box::pin(futures::stream::unfold(
-            Some((first.max(offset), progress)),
-            move |at| async move {
-                let (next, mut progress) = at?;
-                match wait(&mut progress, next - offset).await {
-                    Ok(Some(done)) => {
-                        let m = FollowSimulationResponse {
-                            frame: next,
-                            frame_count,
-                            positions: done.positions,
-                            ms: done.ms,
-                            seconds_left: done.seconds_left,
-                        };
-                        Some((Ok(m), Some((next + 1, progress))))
-                    }
-                    Ok(None) => None,
-                    Err(status) => Some((Err(status), None)),
-                }
-            },
-        )))
-    }
-}
-
-/// The frame `next` of those computed, or the end.
-async fn wait(
-    progress: &mut watch::Receiver<Progress>,
-    next: u32,
-) -> Result<Option<Finished>, Status> {
-    let known = progress
-        .wait_for(|p| p.frames.len() > next as usize || p.end.is_some())
-        .await
-        .map_err(|_| Status::aborted("the simulation broke off"))?;
-    match (known.frames.get(next as usize), &known.end) {
-        (Some(frame), _) => Ok(Some(frame.clone())),
-        (None, Some((_, Err(why)))) => Err(Status::aborted(why.clone())),
-        (None, _) => Ok(None),
-    }
-}
-
-/// The checkpoint of a request and its frame, or the fault of the field.
-fn check_checkpoint(r: &StartSimulationRequest) -> Result<Option<(u32, Bytes)>, Status> {
-    if r.checkpoint.is_empty() {
-        return Ok(None);
-    }
-    let fault = |why: String| WireError::new("start_simulation_request.checkpoint", why);
-    if r.checkpoint.len() > MAX_CHECKPOINT_BYTES {
-        return Err(fault("at most 4 MiB".into()).into());
-    }
-    if r.solver() != ClothSolver::Offline {
-        return Err(fault("only the offline solver has checkpoints".into()).into());
-    }
-    let frame = checkpoint_frame(&r.checkpoint).map_err(|e| fault(e.to_string()))?;
-    let frame = u32::try_from(frame).map_err(|e| fault(e.to_string()))?;
-    Ok(Some((frame, r.checkpoint.clone())))
-}
-
-/// The scene of a request, or the field at fault.
-fn check(r: &StartSimulationRequest) -> Result<Scene, Status> {
-    let fault = |field: &str, why: &str| {
-        Status::from(WireError::new(
-            format!("start_simulation_request.{field}"),
-            why,
-        ))
-    };
-    if r.scene_json.len() > MAX_SCENE_BYTES {
-        return Err(fault("scene_json", "at most 1 MiB"));
-    }
-    let scene = scene::parse(&r.scene_json, Path::new("scene_json"), None)
-        .map_err(|e| fault("scene_json", &e.to_string()))?;
-    let bytes = scene.frames() * scene.start.len() * size_of::<[f32; 3]>();
-    if bytes > MAX_RESULT_BYTES {
-        return Err(fault(
-            "scene_json",
-            &format!("duration_s: the frames take {bytes} bytes, at most {MAX_RESULT_BYTES}"),
-        ));
-    }
-    Ok(scene)
-}
-
-/// Work of one simulation.
-struct Task {
-    scene: Scene,
-    solver: ClothSolver,
-    checkpoint: Option<Bytes>,
-    is_cancelled: Arc<AtomicBool>,
-}
-
-/// Frames on their way to the readers.
-struct Publisher<'a> {
-    progress: &'a watch::Sender<Progress>,
-    is_cancelled: &'a AtomicBool,
-    started: Instant,
-    last: Instant,
-    /// Frames still to compute.
-    left: usize,
-    published: u32,
-}
-
-impl Publisher<'_> {
-    /// Adds a frame; breaks off when cancelled, or when no reader can follow any more.
-    fn publish(&mut self, positions: &[P3]) -> ControlFlow<()> {
-        let positions: Vec<u8> = positions
-            .iter()
-            .flat_map(|p| [p.x, p.y, p.z])
-            .flat_map(f32::to_le_bytes)
-            .collect();
-        self.published += 1;
-        self.left = self.left.saturating_sub(1);
-        let mean = self.started.elapsed().as_secs_f32() / self.published as f32;
-        let frame = Finished {
-            positions: positions.into(),
-            ms: self.last.elapsed().as_secs_f32() * 1e3,
-            seconds_left: mean * self.left as f32,
-        };
-        self.last = Instant::now();
-        self.progress.send_modify(|p| p.frames.push(frame));
-        if self.is_cancelled.load(Ordering::Relaxed) || self.progress.receiver_count() == 0 {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    }
-}
-
-impl Task {
-    /// Runs the scene to its end, until it is cancelled, or until no reader can follow it.
-    fn compute(&self, progress: &watch::Sender<Progress>) {
-        let now = Instant::now();
-        let mut publisher = Publisher {
-            progress,
-            is_cancelled: &self.is_cancelled,
-            started: now,
-            last: now,
-            left: self.scene.frames(),
-            published: 0,
-        };
-        let end = match self.solver {
-            ClothSolver::Offline => self.offline(&mut publisher),
-            ClothSolver::Unspecified | ClothSolver::Realtime => {
-                scene::run(&self.scene, &RunConfig::default(), |_, x| {
-                    publisher.publish(x)
-                })
-                .map(drop)
-                .map_err(|e| e.to_string())
-            }
-        };
-        if let Err(why) = &end {
-            tracing::warn!(why, "simulation failed");
-        }
-        progress.send_modify(|p| p.end = Some((Instant::now(), end)));
-    }
-
-    /// All frames by the offline solver, the start first, or those after the checkpoint.
-    fn offline(&self, publisher: &mut Publisher<'_>) -> Result<(), String> {
-        let offline = OfflineScene::new(&self.scene).map_err(|e| e.to_string())?;
-        let from = self.checkpoint.as_deref();
-        match from.map(checkpoint_frame) {
-            Some(frame) => {
-                let done = frame.map_err(|e| e.to_string())? as usize + 1;
-                publisher.left = publisher.left.saturating_sub(done);
-            }
-            None => {
-                // Cancelled or not: without a frame there is no state to continue from.
-                let _: ControlFlow<()> = publisher.publish(&self.scene.start);
-            }
-        }
-        let settings = OfflineSettings::default();
-        offline
-            .run(&settings, Par::Rayon, from, |done, solver| {
-                let flow = publisher.publish(&solver.state().positions());
-                if flow.is_break() {
-                    let state = solver.checkpoint(done.frame as u64);
-                    let progress = publisher.progress;
-                    progress.send_modify(|p| p.checkpoint = state.into());
-                }
-                flow
-            })
-            .map(drop)
-            .map_err(|e| e.to_string())
+        Ok(progress::follow(progress, first))
     }
 }

@@ -8,6 +8,7 @@
 
 mod consent;
 mod faults;
+mod fine;
 mod kiosk;
 mod requests;
 mod simulation;

@@ -8,7 +8,7 @@ use tryon_proto::v1::capture_service_client::CaptureServiceClient;
 use tryon_proto::v1::*;
 
 /// Path of the field at fault.
-fn field(s: Status) -> String {
+pub fn field(s: Status) -> String {
     assert_eq!(s.code(), Code::InvalidArgument, "{s}");
     let details = s.get_error_details();
     let bad = details.bad_request().expect("BadRequest");

@@ -4,6 +4,7 @@ use crate::kiosk::{Kiosk, Part};
 use tonic::Code;
 use tonic::transport::Channel;
 use tryon_proto::v1::cloth_service_client::ClothServiceClient;
+use tryon_proto::v1::start_simulation_request::Start;
 use tryon_proto::v1::*;
 
 const RATE: f64 = 30.0;
@@ -21,7 +22,7 @@ fn falling(change: impl Fn(&mut serde_json::Value)) -> StartSimulationRequest {
     });
     change(&mut scene);
     StartSimulationRequest {
-        scene_json: scene.to_string(),
+        start: Some(Start::SceneJson(scene.to_string())),
         ..Default::default()
     }
 }
@@ -155,8 +156,7 @@ fn a_cancelled_simulation_continues_to_the_same_bits() {
         // Half a second more than the first simulation came to.
         let count = first.next_frame + FRAMES;
         let whole = StartSimulationRequest {
-            scene_json: falling(|s| s["duration_s"] = (f64::from(count - 1) / RATE).into())
-                .scene_json,
+            start: falling(|s| s["duration_s"] = (f64::from(count - 1) / RATE).into()).start,
             ..offline
         };
         let rest = StartSimulationRequest {

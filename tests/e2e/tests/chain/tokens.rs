@@ -26,14 +26,15 @@ const SECOND: Duration = Duration::from_secs(1);
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A box that asks for tokens, and the issuer of them.
-struct Guarded {
-    kiosk: Kiosk,
+pub struct Guarded {
+    pub kiosk: Kiosk,
     issuer: Issuer,
     folder: TempDir,
 }
 
 impl Guarded {
-    fn start() -> Self {
+    /// Starts it with the front camera on `source`.
+    pub fn start(source: &str) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let issuer = Issuer::generate().expect("random");
         let [_, public] = issuer.write(folder.path()).expect("written");
@@ -42,7 +43,7 @@ impl Guarded {
         let all = ["capture", "tracking", "cloth", "compositor"];
         let own = issuer.issue_for_process("store", &all).expect("short");
         std::fs::write(at("token"), own).expect("written");
-        let kiosk = Kiosk::with("pattern", 10.0, |c| {
+        let kiosk = Kiosk::with(source, 10.0, |c| {
             c.auth.keys = vec![public];
             (c.auth.revoked, c.auth.token) = (at("revoked"), at("token"));
             c.auth.enrolments = at("codes");
@@ -59,7 +60,7 @@ impl Guarded {
     }
 
     /// Token of the whole store for an hour, with changes.
-    fn token(&self, change: impl FnOnce(&mut Claims)) -> String {
+    pub fn token(&self, change: impl FnOnce(&mut Claims)) -> String {
         let mut claims = Claims {
             aud: PARTS.map(|p| format!("{p:?}").to_lowercase()).to_vec(),
             exp: now() + 3600,
@@ -74,12 +75,12 @@ impl Guarded {
         self.issuer.issue(&claims).expect("short")
     }
 
-    fn connect(&self, part: Part, token: Option<&str>) -> Connection {
+    pub fn connect(&self, part: Part, token: Option<&str>) -> Connection {
         let credentials = token.map_or_else(Credentials::none, Credentials::fixed);
         credentials.present(self.kiosk.channel(part))
     }
 
-    fn compositor(&self, token: Option<&str>) -> CompositorServiceClient<Connection> {
+    pub fn compositor(&self, token: Option<&str>) -> CompositorServiceClient<Connection> {
         CompositorServiceClient::new(self.connect(Part::Compositor, token))
     }
 
@@ -216,7 +217,7 @@ fn is_refused(code: Code) -> bool {
 
 #[test]
 fn no_method_takes_a_bad_token_and_all_take_a_good_one() {
-    let guarded = Guarded::start();
+    let guarded = Guarded::start("pattern");
     let (good, bad) = (guarded.token(|_| {}), guarded.bad_tokens());
     let bound = guarded.token(|c| c.session = Some("mine".into()));
     client(async {
@@ -286,7 +287,7 @@ async fn end(stream: &mut Streaming<StreamFramesResponse>) -> Status {
 
 #[test]
 fn open_streams_end_with_their_tokens() {
-    let guarded = Guarded::start();
+    let guarded = Guarded::start("pattern");
     client(async {
         let lost = guarded.token(|c| c.jti = "lost".into());
         let kept = guarded.token(|_| {});
@@ -311,7 +312,7 @@ fn open_streams_end_with_their_tokens() {
 
 #[test]
 fn a_code_is_traded_once_for_a_token_of_one_camera() {
-    let guarded = Guarded::start();
+    let guarded = Guarded::start("pattern");
     let token = guarded.token(|c| c.camera = Some("front".into()));
     let codes = Enrolments::new(&guarded.file("codes"));
     let code = codes.offer(&token).expect("drawn");

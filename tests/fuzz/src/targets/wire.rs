@@ -171,8 +171,11 @@ fn run_request(b: &Bundle, _: &Scratch) -> Result<usize, String> {
         }
         "StartSimulationRequest" => {
             let r = v1::StartSimulationRequest::decode(bytes).map_err(text)?;
+            let Some(v1::start_simulation_request::Start::SceneJson(scene)) = r.start else {
+                return Ok(0);
+            };
             let at = Path::new("scene_json");
-            let scene = tryon::cloth::scene::parse(&r.scene_json, at, None).map_err(text)?;
+            let scene = tryon::cloth::scene::parse(&scene, at, None).map_err(text)?;
             Ok(scene.faces.len())
         }
         other => decode_other(other, bytes),
@@ -215,7 +218,9 @@ fn request_seeds() -> Vec<Bundle> {
         ..Default::default()
     };
     let simulate = v1::StartSimulationRequest {
-        scene_json: super::garments::scene_json(),
+        start: Some(v1::start_simulation_request::Start::SceneJson(
+            super::garments::scene_json(),
+        )),
         ..Default::default()
     };
     let hold = v1::HoldConsentRequest {

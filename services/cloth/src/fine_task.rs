@@ -1,0 +1,180 @@
+//! A session's garments on finer meshes, from the real-time result on: draped to rest in one pose, then through the
+//! recorded motion of the body.
+
+use crate::progress::{MAX_RESULT_BYTES, Publisher};
+use crate::recording::{MAX_SECONDS, Recording, most_bodies};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use tokio::sync::watch;
+use tonic::Status;
+use tryon::body::Template;
+use tryon::math::V3d;
+use tryon::mirror::{DressedOutfit, FrameClock, LongGap, MirrorError, OfflineOutfit};
+use tryon::offline::{DrapeReport, FrameTargets, OfflineState};
+use tryon::par::Par;
+use tryon_proto::convert::WireError;
+use tryon_proto::convert::garment::{WornGarment, topology_to_wire};
+use tryon_proto::v1::{
+    ClothSolver, DrapeStep, FrameId, GarmentTopology, RigidTransform, SessionStart,
+    StartSimulationRequest,
+};
+
+/// Most vertices that can be asked for, as the contract says: the finest garments of the paper.
+const MAX_VERTICES: u32 = 50_000;
+
+/// Outfit of a session at one exposure.
+pub(crate) struct Snapshot {
+    pub(crate) outfit: DressedOutfit,
+    pub(crate) template: Arc<Template>,
+    /// Garments of the outfit as keyframes describe them.
+    pub(crate) garments: Arc<[Arc<WornGarment>]>,
+    pub(crate) exposure: FrameId,
+    pub(crate) world_from_camera: Option<RigidTransform>,
+    /// The body after that exposure; `None` for the pose of that exposure alone.
+    pub(crate) recording: Option<Recording>,
+    /// Its sender is gone once the session has forgotten the body.
+    pub(crate) body: watch::Receiver<()>,
+}
+
+/// Checks a request that starts from a session.
+///
+/// # Errors
+/// INVALID_ARGUMENT names the field at fault.
+pub(crate) fn check(r: &StartSimulationRequest, start: &SessionStart) -> Result<(), Status> {
+    let fault = |field: &str, why: String| {
+        let field = format!("start_simulation_request.{field}");
+        Err(WireError::new(field, why).into())
+    };
+    if !(1..=MAX_VERTICES).contains(&start.vertices) {
+        let why = format!("{}, but 1 to {MAX_VERTICES} are needed", start.vertices);
+        return fault("session.vertices", why);
+    }
+    if !(0.0..=MAX_SECONDS).contains(&start.motion_seconds) {
+        let why = format!(
+            "{}, but 0 to {MAX_SECONDS} are needed",
+            start.motion_seconds
+        );
+        return fault("session.motion_seconds", why);
+    }
+    if !matches!(r.solver(), ClothSolver::Unspecified | ClothSolver::Offline) {
+        return fault("solver", "a session has the offline solver only".into());
+    }
+    if !r.checkpoint.is_empty() {
+        return fault("checkpoint", "only scenes have checkpoints".into());
+    }
+    Ok(())
+}
+
+/// Simulation from one snapshot on.
+pub(crate) struct FineTask {
+    snapshot: Snapshot,
+    outfit: OfflineOutfit,
+}
+
+impl FineTask {
+    /// Task of a request that was checked; divides the meshes, so it takes a while.
+    ///
+    /// # Errors
+    /// FAILED_PRECONDITION for a garment without area or mass; INVALID_ARGUMENT when the frames would take too much memory.
+    pub(crate) fn new(snapshot: Snapshot, start: &SessionStart) -> Result<Self, Status> {
+        let faces = snapshot.template.mesh().faces();
+        let outfit = OfflineOutfit::new(&snapshot.outfit, faces, start.vertices as usize);
+        let outfit = outfit.map_err(|e| Status::failed_precondition(e.to_string()))?;
+        let frames = 1 + most_bodies(start.motion_seconds);
+        let bytes = frames * outfit.cloth().len() * size_of::<[f32; 3]>();
+        if bytes > MAX_RESULT_BYTES {
+            let field = "start_simulation_request.session.motion_seconds";
+            let why = format!("the frames take {bytes} bytes, at most {MAX_RESULT_BYTES}");
+            return Err(WireError::new(field, why).into());
+        }
+        Ok(Self { snapshot, outfit })
+    }
+
+    /// Number of frames; 0 while the body is being recorded.
+    pub(crate) fn frame_count(&self) -> u32 {
+        u32::from(self.snapshot.recording.is_none())
+    }
+
+    /// Vertices of all garments.
+    pub(crate) fn vertices(&self) -> u32 {
+        self.outfit.cloth().len() as u32
+    }
+
+    /// Garments on their finer meshes.
+    pub(crate) fn topology(&self) -> Vec<GarmentTopology> {
+        let garments = self.outfit.garments().iter().zip(&*self.snapshot.garments);
+        let finer = garments.map(|(mesh, worn)| WornGarment {
+            vertices: mesh.vertices,
+            drawn: mesh.render.vertex.clone(),
+            faces: mesh.render.faces.clone(),
+            uvs: mesh.render.uv.clone(),
+            ..(**worn).clone()
+        });
+        finer.map(|g| topology_to_wire(&g)).collect()
+    }
+
+    /// Drapes and publishes the first frame, then those of the recording, until `publisher` breaks off.
+    ///
+    /// # Errors
+    /// FAILED_PRECONDITION for a start that cannot be freed of intersections, ABORTED for a step that is not solved.
+    pub(crate) fn compute(mut self, publisher: &mut Publisher) -> Result<(), Status> {
+        let show = |vertices, step: &DrapeReport| publisher.show(drape_step(vertices, step));
+        let draped = self.outfit.drape(&self.snapshot.outfit, Par::Rayon, show);
+        let (state, _) = draped.map_err(|e| match e {
+            MirrorError::TangledStart { .. } => Status::failed_precondition(e.to_string()),
+            e => Status::aborted(e.to_string()),
+        })?;
+        if publisher.is_cancelled() {
+            return Ok(());
+        }
+        let flow = publisher.publish(&state.positions(), Some(self.snapshot.exposure));
+        match (self.snapshot.recording.take(), flow) {
+            (Some(recording), ControlFlow::Continue(())) => {
+                self.animate(state, recording, publisher)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Frames of a recording that may still go on.
+    fn animate(
+        &self,
+        state: OfflineState,
+        mut recording: Recording,
+        publisher: &mut Publisher,
+    ) -> Result<(), Status> {
+        let aborted = |e: tryon::offline::OfflineError| Status::aborted(e.to_string());
+        let mut solver = self.outfit.solver(state, Par::Rayon).map_err(aborted)?;
+        let mut clock = FrameClock::at(self.snapshot.exposure.capture_time_ns);
+        while let Some(body) = recording.blocking_recv() {
+            let dt = LongGap::Nominal.time_step(clock.gap(body.exposure.capture_time_ns));
+            let obstacle: Vec<V3d> = body.vertices.iter().map(|p| p.coords.cast()).collect();
+            let targets = FrameTargets {
+                pins: &self.outfit.pins(&body.vertices),
+                obstacle: &obstacle,
+            };
+            solver.advance(dt, &targets).map_err(aborted)?;
+            if recording.is_closed() {
+                publisher.expect(1 + recording.len());
+            }
+            let positions = solver.state().positions();
+            if publisher
+                .publish(&positions, Some(body.exposure))
+                .is_break()
+            {
+                return Ok(());
+            }
+        }
+        publisher.expect(0);
+        Ok(())
+    }
+}
+
+fn drape_step(vertices: usize, step: &DrapeReport) -> DrapeStep {
+    DrapeStep {
+        vertex_count: vertices as u32,
+        steps: step.steps as u32,
+        motion: step.motion as f32,
+        settled: step.settled,
+    }
+}
