@@ -93,7 +93,8 @@ pub(crate) struct RunArgs {
     /// body.
     #[arg(long, value_name = "SIZE")]
     pub(crate) size: Option<String>,
-    /// Folder for frame pictures and report.json.
+    /// Folder for frame pictures, report.json and, by the offline solver, positions.npy (cloth), body.npy (both frames ×
+    /// vertices × 3, f32) and outfit.glb of both.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Body template in SMPL layout; the embedded body without it.

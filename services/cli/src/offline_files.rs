@@ -1,4 +1,4 @@
-//! Files of an offline simulation, valid after every frame: positions and checkpoint.
+//! Files of an offline simulation, valid after every frame: positions of cloth and body, checkpoint.
 
 use crate::args::SolverArgs;
 use crate::interrupt::Interrupt;
@@ -13,6 +13,8 @@ use tryon::offline::OfflineSolver;
 #[derive(Debug)]
 pub(crate) struct OfflineFiles {
     positions: NpyFrames,
+    /// Obstacle, where a file is kept of it.
+    body: Option<NpyFrames>,
     checkpoint: Option<PathBuf>,
     interrupt: Interrupt,
 }
@@ -33,34 +35,39 @@ pub(crate) fn saved_state(args: &SolverArgs) -> Result<Option<Vec<u8>>> {
 }
 
 impl OfflineFiles {
-    /// positions.npy in `out` and the checkpoint of `args`, after `frames` frames of an earlier run.
+    /// positions.npy and body.npy in `out`, of so many vertices (no body.npy for `None`), and the checkpoint of `args`, after
+    /// `frames` frames of an earlier run.
     ///
     /// # Errors
     /// Files that cannot be written, or positions that do not belong to the checkpoint.
     pub(crate) fn open(
         args: &SolverArgs,
         out: &Path,
-        vertices: usize,
+        (cloth, body): (usize, Option<usize>),
         frames: usize,
     ) -> Result<Self> {
-        let path = out.join("positions.npy");
-        let positions = match frames {
-            0 => NpyFrames::create(&path, vertices),
-            n => NpyFrames::resume(&path, vertices, n),
+        let open = |name: &str, vertices| match frames {
+            0 => NpyFrames::create(&out.join(name), vertices),
+            n => NpyFrames::resume(&out.join(name), vertices, n),
         };
         Ok(Self {
-            positions: positions?,
+            positions: open("positions.npy", cloth)?,
+            body: body.map(|n| open("body.npy", n)).transpose()?,
             checkpoint: args.checkpoint.clone(),
             interrupt: Interrupt::watch()?,
         })
     }
 
-    /// Adds the start.
+    /// Adds a frame: cloth, and the body where a file is kept of it.
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub(crate) fn start(&mut self, positions: &[P3]) -> Result<()> {
-        Ok(self.positions.push(positions)?)
+    pub(crate) fn push(&mut self, cloth: &[P3], body: &[P3]) -> Result<()> {
+        self.positions.push(cloth)?;
+        if let Some(file) = &mut self.body {
+            file.push(body)?;
+        }
+        Ok(())
     }
 
     /// Adds a frame and writes the checkpoint after it; breaks after Ctrl-C.
@@ -69,7 +76,8 @@ impl OfflineFiles {
     /// A file that cannot be written.
     pub(crate) fn frame(&mut self, solver: &OfflineSolver<'_>) -> Result<ControlFlow<()>> {
         let number = self.positions.len() as u64;
-        self.positions.push(&solver.state().positions())?;
+        let state = solver.state();
+        self.push(&state.positions(), &state.obstacle_positions())?;
         if let Some(file) = &self.checkpoint {
             replace(file, &solver.checkpoint(number))
                 .with_context(|| format!("cannot write {}", file.display()))?;
@@ -86,12 +94,21 @@ impl OfflineFiles {
         }
     }
 
-    /// Positions of all frames (m), shape `[frames][vertices]`.
+    /// Positions of all frames of the cloth (m), shape `[frames][vertices]`.
     ///
     /// # Errors
     /// A file that cannot be read.
     pub(crate) fn read(&mut self) -> Result<Vec<Vec<P3>>> {
         Ok(self.positions.read()?)
+    }
+
+    /// Positions of all frames of the body (m), shape `[frames][vertices]`; none where no file is kept of it.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub(crate) fn read_body(&mut self) -> Result<Vec<Vec<P3>>> {
+        let file = self.body.as_mut();
+        Ok(file.map(NpyFrames::read).transpose()?.unwrap_or_default())
     }
 }
 

@@ -63,8 +63,8 @@ pub(crate) fn run(args: &ExportArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Colour of the exported body, sRGB.
-const SKIN: [u8; 3] = [205, 170, 150];
+/// Colour of the body in glTF files, sRGB.
+pub(crate) const SKIN: [u8; 3] = [205, 170, 150];
 /// Frames a second of an exported animation.
 const FRAMES: f64 = 30.0;
 /// Longest animation, s.

@@ -1,5 +1,6 @@
 //! `tryon run --solver offline`: the preview dresses the subject, the offline solver goes on from its result.
 
+use super::export::SKIN;
 use crate::args::RunArgs;
 use crate::input;
 use crate::interrupt::INTERRUPTED;
@@ -37,7 +38,7 @@ struct Report {
     garments: Vec<GarmentPart>,
     /// Frame of the recording that the simulation starts from.
     first_frame: usize,
-    /// Frames of positions.npy, the start included.
+    /// Frames of positions.npy and body.npy, the start included.
     frames: usize,
     /// Drape in the pose of the first frame, from coarse to fine.
     drape: OfflineDrapeReport,
@@ -88,7 +89,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
         report.sizes.iter().for_each(|note| println!("{note}"));
         let (frames, out) = (report.frames, args.out.display());
         println!(
-            "{frames} frames of {} vertices, pictures, positions.npy, outfit.glb and report.json in {out}",
+            "{frames} frames of {} vertices, pictures, positions.npy, body.npy, outfit.glb and report.json in {out}",
             outfit.cloth().len()
         );
         Ok(if is_whole {
@@ -205,11 +206,11 @@ fn drape(
         bail!("a drape takes seconds and has no checkpoint");
     }
     picture(&args.out, frame.index, "_preview", &frame.seen.picture)?;
-    let mut files = OfflineFiles::open(&args.solver, &args.out, outfit.cloth().len(), 0)?;
+    let mut files = OfflineFiles::open(&args.solver, &args.out, counts(preview, outfit), 0)?;
     let (state, done) = settle(outfit, worn(preview)?, || files.flow())?;
     report.drape = done;
     let solver = outfit.solver(state, Par::Rayon)?;
-    files.start(&solver.state().positions())?;
+    start(&mut files, &solver)?;
     let mut painter = OutfitPainter::new(input::template(args.body.as_deref())?);
     let fine = fine_picture(preview, &mut painter, frame, outfit, &solver)?;
     picture(&args.out, frame.index, "", &fine)?;
@@ -217,7 +218,19 @@ fn drape(
     Ok(files.flow().is_continue())
 }
 
-/// Writes outfit.glb of all frames.
+/// Vertices of the cloth and of the body.
+fn counts(preview: &Preview, outfit: &OfflineOutfit) -> (usize, Option<usize>) {
+    let body = preview.mirror.template().mesh().vertices().len();
+    (outfit.cloth().len(), Some(body))
+}
+
+/// Adds the start to the files.
+fn start(files: &mut OfflineFiles, solver: &OfflineSolver<'_>) -> Result<()> {
+    let state = solver.state();
+    files.push(&state.positions(), &state.obstacle_positions())
+}
+
+/// Writes outfit.glb of all frames: each garment, and the body.
 fn finish(
     args: &RunArgs,
     preview: &Preview,
@@ -233,14 +246,30 @@ fn finish(
             all.push(drawn);
         }
     }
+    motion.push(files.read_body()?);
     let colors = preview.mirror.appearances().iter().map(|a| a.base);
-    let garments = outfit.garments().iter().zip(colors).zip(&motion);
-    let meshes: Vec<GlbMesh<'_>> = garments
-        .map(|((g, color), motion)| GlbMesh {
-            name: &g.name,
+    let garments = outfit.garments().iter().zip(colors);
+    let surfaces = garments
+        .map(|(g, color)| {
+            (
+                g.name.as_str(),
+                &g.render.faces[..],
+                &g.render.uv[..],
+                color,
+            )
+        })
+        .chain([(
+            "body",
+            preview.mirror.template().mesh().faces(),
+            &[][..],
+            SKIN,
+        )]);
+    let meshes: Vec<GlbMesh<'_>> = (surfaces.zip(&motion))
+        .map(|((name, faces, uv, color), motion)| GlbMesh {
+            name,
             vertices: motion.first().map_or(&[][..], Vec::as_slice),
-            faces: &g.render.faces,
-            uv: &g.render.uv,
+            faces,
+            uv,
             color,
             texture: &[],
         })
@@ -276,8 +305,8 @@ impl<'a> Animation<'a> {
         let known = saved.as_deref().map(checkpoint_frame).transpose()?;
         let resumed = known.unwrap_or(0) as usize;
         let frames = known.map_or(0, |_| resumed + 1);
-        let count = outfit.cloth().len();
-        let mut files = OfflineFiles::open(&args.solver, &args.out, count, frames)?;
+        let counts = counts(preview, outfit);
+        let mut files = OfflineFiles::open(&args.solver, &args.out, counts, frames)?;
         let worn = worn(preview)?;
         let state = match saved {
             Some(_) => outfit.unrepaired_start(worn),
@@ -292,7 +321,7 @@ impl<'a> Animation<'a> {
             Some(bytes) => {
                 solver.resume(bytes)?;
             }
-            None => files.start(&solver.state().positions())?,
+            None => start(&mut files, &solver)?,
         }
         let mut out = Self {
             args,

@@ -77,9 +77,10 @@ fn offline(args: &SimulateArgs, scene: &Scene) -> Result<ExitCode> {
     let offline = OfflineScene::new(scene)?;
     let resumed = saved.as_deref().map_or(Ok(0), checkpoint_frame)? as usize;
     let known = saved.as_ref().map_or(0, |_| resumed + 1);
-    let mut files = OfflineFiles::open(&args.solver, &args.out, scene.start.len(), known)?;
+    let counts = (scene.start.len(), None);
+    let mut files = OfflineFiles::open(&args.solver, &args.out, counts, known)?;
     if saved.is_none() {
-        files.start(&scene.start)?;
+        files.push(&scene.start, &[])?;
     }
 
     let bar = input::progress(Some(scene.frames() as u64), "simulating");
