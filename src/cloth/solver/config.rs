@@ -27,10 +27,8 @@ pub struct RunConfig {
     /// Substeps a frame; 0 takes the solver's default. Implicit Euler loses energy with the step: one a frame halves a
     /// free swing within two seconds.
     pub substeps: usize,
-    /// Quasi-Newton: most iterations a substep.
+    /// Quasi-Newton: iterations a substep.
     pub iterations: usize,
-    /// Quasi-Newton: root mean square of an iteration's motion that counts as converged (m).
-    pub tolerance: f64,
     /// Distance that cloth keeps from solids (m). Half a millimetre hides neither rounding nor a fabric's thickness.
     pub offset: f64,
     /// Explicit: extrapolation of the positions that forces are evaluated at (substeps).
@@ -58,7 +56,6 @@ impl Default for RunConfig {
             method: Method::Explicit,
             substeps: 0,
             iterations: 10,
-            tolerance: 0.0,
             offset: 5e-4,
             lookahead: 0.1,
             bending_interval: 0,
@@ -68,28 +65,6 @@ impl Default for RunConfig {
             self_collision: false,
             thickness: 0.003,
             fold_search: 1.0 / 240.0,
-        }
-    }
-}
-
-/// Substeps a frame of the offline solver: 6.1 mm from the reference on the pinned square of 1k vertices, whose own
-/// uncertainty is 8 mm.
-const OFFLINE_SUBSTEPS: usize = 16;
-/// Most iterations of an offline substep: free swinging takes 113 at most, alternating contacts never converge.
-const OFFLINE_ITERATIONS: usize = 400;
-/// Tolerance of the offline solver (m): far below the resolution of written positions (f32).
-const OFFLINE_TOLERANCE: f64 = 1e-8;
-
-impl RunConfig {
-    /// Offline solver: finite elements in f64, BDF2 steps of 1/960 s at 60 frames a second, each iterated to 0.01 µm. No
-    /// contact of cloth with cloth.
-    pub fn offline() -> Self {
-        Self {
-            method: Method::QuasiNewtonBdf2,
-            substeps: OFFLINE_SUBSTEPS,
-            iterations: OFFLINE_ITERATIONS,
-            tolerance: OFFLINE_TOLERANCE,
-            ..Self::default()
         }
     }
 }

@@ -31,10 +31,8 @@ pub struct SheetStart<'a> {
 pub struct SolverReport {
     /// Substeps a frame.
     pub substeps: usize,
-    /// Iterations of the substep that took the most.
+    /// Iterations a substep.
     pub iterations: usize,
-    /// Substeps that missed the tolerance at their last iteration.
-    pub unconverged: usize,
     /// Numeric factorisations.
     pub factorisations: u64,
     /// Share of the membrane stiffness that is kept.

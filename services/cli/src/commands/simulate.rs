@@ -43,12 +43,6 @@ fn realtime(args: &SimulateArgs, scene: &Scene) -> Result<ExitCode> {
         ControlFlow::Continue(())
     })?;
     bar.finish_and_clear();
-    if report.unconverged > 0 {
-        eprintln!(
-            "warning: {} steps did not converge; see report.json",
-            report.unconverged
-        );
-    }
     write(&args.out.join("report.json"), &report)?;
     scene::write_positions(&args.out.join("positions.npy"), &frames)?;
     println!("{} frames in {}", frames.len(), args.out.display());

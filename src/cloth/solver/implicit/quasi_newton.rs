@@ -66,14 +66,7 @@ impl QuasiNewton {
         Ok(())
     }
     /// One iteration from `x` towards the minimum with inertial target `y`; holds must have the prepared stiffness.
-    /// Returns the root mean square of the vertices' motion (m).
-    pub(super) fn iterate(
-        &mut self,
-        sheet: &Sheet,
-        y: &[V3d],
-        holds: &[Hold],
-        x: &mut [V3d],
-    ) -> f64 {
+    pub(super) fn iterate(&mut self, sheet: &Sheet, y: &[V3d], holds: &[Hold], x: &mut [V3d]) {
         let h = self.made_for.0;
         let n = x.len();
         self.gradient.clear();
@@ -86,13 +79,9 @@ impl QuasiNewton {
         self.rhs
             .extend(self.gradient.iter().map(|g| [g.x, g.y, g.z]));
         self.factor.solve(&mut self.rhs);
-        let mut sum = 0.0;
         for (x, d) in x.iter_mut().zip(&self.rhs) {
-            let d = V3d::new(d[0], d[1], d[2]);
-            sum += d.norm_squared();
-            *x -= d;
+            *x -= V3d::from(*d);
         }
-        (sum / n.max(1) as f64).sqrt()
     }
 }
 
