@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 /// Smoothing passes before a start is refused.
 const PASSES: usize = 60;
-/// Passes after which one more ring of vertices takes part.
+/// Passes after which one more ring of vertices takes part; as many without fewer crossings end the repair.
 const PASSES_PER_RING: usize = 15;
 /// Distance by which the obstacle shrinks in one pass (m).
 const SHRINK: f64 = 5e-4;
@@ -49,24 +49,40 @@ impl JoinedSurfaces<'_> {
     /// [`OfflineError::IntersectingStart`] naming all, when some stay or a vertex moved too far; `x` is then as it was.
     pub fn repair(&self, par: Par, x: &mut [V3d]) -> Result<StartReport, OfflineError> {
         let begin = x.to_vec();
-        let mut report = StartReport::default();
         let first = self.crossings(par, x);
-        let mut crossings = first.clone();
-        report.found = crossings.len();
-        while !crossings.is_empty() && report.passes < PASSES {
-            self.relax(&crossings, report.passes / PASSES_PER_RING, x);
-            report.passes += 1;
-            crossings = self.crossings(par, x);
-        }
+        let (passes, is_free) = self.relax_all(par, first.clone(), x);
+        let mut report = StartReport {
+            found: first.len(),
+            passes,
+            ..StartReport::default()
+        };
         for (i, (a, b)) in x.iter().zip(&begin).enumerate() {
             let moved = &mut report.moved[usize::from(i >= self.0.cloth_vertices())];
             *moved = moved.max((a - b).norm());
         }
-        if !crossings.is_empty() || report.moved.iter().any(|m| *m > LARGEST_REPAIR) {
+        if !is_free || report.moved.iter().any(|m| *m > LARGEST_REPAIR) {
             x.copy_from_slice(&begin);
             return Err(OfflineError::IntersectingStart { crossings: first });
         }
         Ok(report)
+    }
+
+    /// Repairs `x` until it is free or its crossings are as many as [`PASSES_PER_RING`] passes ago. Returns the passes, and
+    /// true if it is free.
+    fn relax_all(&self, par: Par, mut crossings: Vec<EdgeFace>, x: &mut [V3d]) -> (usize, bool) {
+        let (mut passes, mut least, mut stalled) = (0, crossings.len(), 0);
+        while !crossings.is_empty() && passes < PASSES && stalled < PASSES_PER_RING {
+            self.relax(&crossings, passes / PASSES_PER_RING, x);
+            passes += 1;
+            crossings = self.crossings(par, x);
+            stalled = if crossings.len() < least {
+                0
+            } else {
+                stalled + 1
+            };
+            least = least.min(crossings.len());
+        }
+        (passes, crossings.is_empty())
     }
 
     /// One pass around the crossings.
@@ -159,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn sheets_through_each_other_are_refused_by_their_faces() {
+    fn sheets_through_each_other_are_refused_by_their_faces_after_few_passes() {
         let (mut x, mut faces) = grid(6, 0.0);
         let n = x.len() as u32;
         let (other, more) = grid(6, 0.0);
@@ -175,5 +191,8 @@ mod tests {
             other => panic!("{other:?}"),
         }
         assert_eq!(x, before);
+        let (passes, is_free) = all.relax_all(Par::Seq, found, &mut x);
+        // Wider rings alone bring 24 crossings to 19 in 60 passes.
+        assert!(!is_free && passes <= PASSES_PER_RING + 1, "{passes} passes");
     }
 }
