@@ -25,6 +25,8 @@ mod test_cantilever;
 #[cfg(test)]
 mod test_curves;
 #[cfg(test)]
+mod test_picture_frame;
+#[cfg(test)]
 mod test_statics;
 #[cfg(test)]
 mod test_strips;

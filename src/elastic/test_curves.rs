@@ -1,4 +1,4 @@
-//! Whole sheets against closed forms and measured curves: tension, shear in a picture frame, a hanging strip.
+//! Whole sheets against closed forms and measured curves: tension, a hanging strip.
 
 use super::test_statics::Statics;
 use super::test_strips::{StripPattern, TestStrip, strip};
@@ -12,7 +12,7 @@ use crate::math::V3d;
 use crate::par::Par;
 use nalgebra::Matrix2;
 
-const WOVEN: Stretching = Stretching {
+pub(super) const WOVEN: Stretching = Stretching {
     weft: 700.0,
     coupling: 150.0,
     warp: 900.0,
@@ -69,31 +69,23 @@ fn uniaxial_tension_has_its_closed_form_on_an_unstructured_mesh() {
     assert!((contraction - expected).abs() < 1e-9);
 }
 
-/// Homogeneous states on an unstructured mesh: the energy per area, and forces on the boundary alone.
+/// Homogeneous state on an unstructured mesh: the energy per area, and forces on the boundary alone.
 #[test]
-fn biaxial_tension_and_picture_frame_have_their_closed_forms() {
+fn biaxial_tension_has_its_closed_form() {
     let s = strip(0.1, 8, 4, StripPattern::Unstructured(5));
     let model = model(&s, fabric(StretchLaw::Linear(WOVEN), 1e-5));
     let area: f64 = model.membranes().iter().map(|m| m.rest.area).sum();
-    let check = |f: Matrix2<f64>, density: f64| {
-        let mut e = ElasticExpansion::default();
-        model.expand(Par::Seq, &deformed(&s, &f), &mut e);
-        assert!((e.value / (area * density) - 1.0).abs() < 1e-10);
-        let inside = |i: usize| (1..s.rows - 1).contains(&(i % s.rows));
-        let columns = s.rows..s.at.len() - s.rows;
-        for i in columns.filter(|&i| inside(i)) {
-            assert!(e.gradient[i].norm() < 1e-12, "{i}");
-        }
-    };
     let (a, b) = (0.5 * (1.1f64.powi(2) - 1.0), 0.5 * (1.05f64.powi(2) - 1.0));
-    let biaxial = 350.0 * a * a + 150.0 * a * b + 450.0 * b * b;
-    check(Matrix2::new(1.1, 0.0, 0.0, 1.05), biaxial);
-    // A frame of four hinged bars keeps all lengths: γ is the sine of its angle.
-    let (sine, cosine) = 0.5f64.sin_cos();
-    check(
-        Matrix2::new(1.0, sine, 0.0, cosine),
-        0.5 * WOVEN.shear * sine * sine,
-    );
+    let density = 350.0 * a * a + 150.0 * a * b + 450.0 * b * b;
+    let mut e = ElasticExpansion::default();
+    let x = deformed(&s, &Matrix2::new(1.1, 0.0, 0.0, 1.05));
+    model.expand(Par::Seq, &x, &mut e);
+    assert!((e.value / (area * density) - 1.0).abs() < 1e-10);
+    let inside = |i: usize| (1..s.rows - 1).contains(&(i % s.rows));
+    let columns = s.rows..s.at.len() - s.rows;
+    for i in columns.filter(|&i| inside(i)) {
+        assert!(e.gradient[i].norm() < 1e-12, "{i}");
+    }
 }
 
 /// Measured fabrics pulled along the weft and along the warp between wide clamps, against the data.
