@@ -113,21 +113,20 @@ mod tests {
         let x: Vec<Vector3<f64>> = (0..700)
             .map(|i| Vector3::new((i as f64).sin(), 1.0, i as f64 % 5.0))
             .collect();
-        let product = |single: &dyn Fn(&[Vector3<f64>], &mut [Vector3<f64>]),
-                       x: &[Vector3<f64>]| {
+        let mut exact = vec![Vector3::zeros(); 700];
+        matrix.multiply_add(Par::Seq, &x, &mut exact);
+        let product = |par, x: &[Vector3<f64>]| {
             let mut y = vec![Vector3::zeros(); x.len()];
-            single(x, &mut y);
+            single.multiply_add(par, x, &mut y);
             y
         };
-        let exact = product(&|x, y| matrix.multiply_add(Par::Seq, x, y), &x);
-        let near = product(&|x, y| single.multiply_add(Par::Seq, x, y), &x);
-        let again = product(&|x, y| single.multiply_add(Par::Rayon, x, y), &x);
-        assert_eq!(near, again);
+        let near = product(Par::Seq, &x);
+        assert_eq!(near, product(Par::Rayon, &x));
         for (a, b) in exact.iter().zip(&near) {
             assert!((a - b).norm() < 1e-6 * 1e5, "{a} {b}");
         }
         let moved = vec![Vector3::new(1.0, -2.0, 0.5); 700];
-        for y in product(&|x, y| single.multiply_add(Par::Seq, x, y), &moved) {
+        for y in product(Par::Seq, &moved) {
             assert!((y - moved[0] * 1e-6).norm() < 1e-10, "{y}");
         }
     }
