@@ -83,7 +83,7 @@ impl OfflineSolver<'_> {
         let settings = self.settings;
         self.settings.scheme = TimeScheme::ImplicitEuler;
         self.settings.error_rate = f64::INFINITY;
-        // The way to rest is of no interest: a step need not be solved better than what counts as settled.
+        // The way to rest is of no interest: only the last steps are solved better than what counts as settled.
         let newton = &mut self.settings.newton;
         newton.tolerance = newton.tolerance.max(drape.tolerance);
         newton.largest = newton.largest.max(drape.tolerance * LARGEST_SHARE);
@@ -99,6 +99,10 @@ impl OfflineSolver<'_> {
                     report.motion = self.motion_since(&before);
                     report.settled = report.motion <= drape.tolerance && h >= drape.steps[1];
                     h = (2.0 * h).min(drape.steps[1]);
+                    if report.settled && self.settings.newton != settings.newton {
+                        self.settings.newton = settings.newton;
+                        report.settled = false;
+                    }
                 }
                 Ok(Err(why)) if h > drape.steps[0] * 1e-3 => {
                     report.unsolved += 1;
