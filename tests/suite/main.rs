@@ -14,6 +14,7 @@ mod garment_capture;
 mod garment_stream;
 mod garments;
 mod offline_outfit;
+mod offline_steps;
 mod seat;
 mod sleep;
 mod starts;
