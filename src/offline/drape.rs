@@ -30,7 +30,8 @@ impl Default for DrapeSettings {
     }
 }
 
-/// Largest motion of one vertex in the last iteration of a step by the motion that counts as settled.
+/// Largest motion of one vertex in the last iteration of a loosely solved step by the motion that counts as settled. The
+/// defaults of Newton's method have a ratio of 20 between the two; other values were not compared.
 const LARGEST_SHARE: f64 = 10.0;
 
 /// Work and end of a static drape.
