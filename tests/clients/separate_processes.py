@@ -101,7 +101,9 @@ class Viewer:
                 compositor.OpenTryOn(request, timeout=2)
                 break
             except grpc.RpcError as e:
-                if e.code() != grpc.StatusCode.UNAVAILABLE or time.monotonic() > deadline:
+                # A service that starts on a cold, busy machine refuses, then accepts and takes seconds to answer.
+                early = e.code() in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED)
+                if not early or time.monotonic() > deadline:
                     raise
                 time.sleep(0.02)
         stream = compositor.StreamFrames(self.pb.StreamFramesRequest(try_on_id=name, width=320, height=240))
