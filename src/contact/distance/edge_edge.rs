@@ -14,16 +14,25 @@ pub fn edge_edge(a: [&V3d; 2], b: [&V3d; 2]) -> Separation<4> {
 
 /// The nearest end of either edge and the other edge: where convex |w|² takes its minimum if not inside.
 fn ends([a0, a1]: [&V3d; 2], [b0, b1]: [&V3d; 2]) -> Separation<4> {
-    let on_b = |p: &V3d, slot| point_edge(p, b0, b1).embed([slot, 2, 3]);
-    // The separation points from b to a.
-    let on_a = |p: &V3d, slot| point_edge(p, a0, a1).negated().embed([slot, 0, 1]);
-    let mut nearest: Separation<4> = on_b(a0, 0);
-    for other in [on_b(a1, 1), on_a(b0, 2), on_a(b1, 3)] {
-        if other.squared < nearest.squared {
-            nearest = other;
+    let near = [
+        point_edge(a0, b0, b1),
+        point_edge(a1, b0, b1),
+        point_edge(b0, a0, a1),
+        point_edge(b1, a0, a1),
+    ];
+    let mut nearest = 0;
+    for k in 1..near.len() {
+        if near[k].squared < near[nearest].squared {
+            nearest = k;
         }
     }
-    nearest
+    let slot = nearest as u8;
+    if nearest < 2 {
+        near[nearest].embed([slot, 2, 3])
+    } else {
+        // The separation points from b to a.
+        near[nearest].negated().embed([slot, 0, 1])
+    }
 }
 
 /// Separation where the common perpendicular of the lines meets both edges.

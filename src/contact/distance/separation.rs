@@ -92,6 +92,7 @@ impl<const V: usize> Separation<V> {
         &self.slides[..self.features.slide_count()]
     }
     /// The same from the second simplex: w, c and the slides change sign, the derivatives of D do not.
+    #[inline]
     pub(super) fn negated(mut self) -> Self {
         self.vector = -self.vector;
         self.weights = -self.weights;
@@ -102,6 +103,7 @@ impl<const V: usize> Separation<V> {
         self
     }
     /// The same in a larger stencil, vertex `k` in slot `slots[k]`; the other vertices have no weight.
+    #[inline]
     pub(in crate::contact) fn embed<const W: usize>(&self, slots: [u8; V]) -> Separation<W> {
         let spread = |from: &SVector<f64, V>| {
             let mut to = SVector::zeros();
