@@ -70,6 +70,7 @@ impl OfflineOutfit {
                 });
                 continue;
             }
+            settings.is_final = outfit.level() == self.level();
             let mut solver = outfit.solver(state, par)?;
             let pins = outfit.pins(body);
             let targets = FrameTargets {

@@ -32,6 +32,9 @@ pub struct ContactSettings {
     pub friction: f64,
     /// Speed from which friction is full (m/s); what sticks creeps slower than that.
     pub creep: f64,
+    /// Displacement in one step from which friction is full at the latest (m): what sticks creeps less than that in a step,
+    /// however long.
+    pub slip: f64,
     /// Motion of vertices that the candidates allow for beyond that of the query (m). Larger: fewer queries, more pairs.
     pub margin: f64,
 }
@@ -44,6 +47,7 @@ impl Default for ContactSettings {
             stiffness: 2e-5,
             friction: 0.3,
             creep: 5e-3,
+            slip: 1e-4,
             margin: 1e-4,
         }
     }
@@ -133,7 +137,7 @@ impl Contacts {
         if !self.cover(x, x) {
             self.list_pairs();
         }
-        self.friction.slip = self.settings.creep * h;
+        self.friction.slip = (self.settings.creep * h).min(self.settings.slip);
         self.friction_pairs.clear();
         if self.settings.friction > 0.0 {
             let barrier = self.settings.barrier();

@@ -18,6 +18,8 @@ pub struct DrapeSettings {
     pub steps: [f64; 2],
     /// Most steps.
     pub most_steps: usize,
+    /// The last steps are solved to the solver's tolerance. False: to what counts as settled, for a finer mesh to go on.
+    pub is_final: bool,
 }
 
 impl Default for DrapeSettings {
@@ -26,6 +28,7 @@ impl Default for DrapeSettings {
             tolerance: 5e-4,
             steps: [1.0 / 60.0, 0.25],
             most_steps: 60,
+            is_final: true,
         }
     }
 }
@@ -100,7 +103,7 @@ impl OfflineSolver<'_> {
                     report.motion = self.motion_since(&before);
                     report.settled = report.motion <= drape.tolerance && h >= drape.steps[1];
                     h = (2.0 * h).min(drape.steps[1]);
-                    if report.settled && self.settings.newton != settings.newton {
+                    if report.settled && drape.is_final && self.settings.newton != settings.newton {
                         self.settings.newton = settings.newton;
                         report.settled = false;
                     }

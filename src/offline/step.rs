@@ -261,10 +261,13 @@ impl<'a> OfflineSolver<'a> {
             par: self.par,
         };
         let mut x = start;
-        if problem.contacts.is_some() {
-            problem.guess(&self.settings.newton, &mut self.directions, &mut x, report)?;
-        } else {
+        let moves = |v: &V3d| *v != V3d::zeros();
+        let rests = !state.now.v.iter().any(moves) && state.obstacle[1] == targets.obstacle;
+        if problem.contacts.is_none() {
             x[..n].copy_from_slice(&predicted);
+        } else if !rests {
+            // From rest, the first iteration is such a guess already.
+            problem.guess(&self.settings.newton, &mut self.directions, &mut x, report)?;
         }
         let settings = &self.settings.newton;
         let solved = minimise(&mut problem, settings, &mut self.directions, &mut x, report)?;

@@ -11,7 +11,7 @@ use nalgebra::Rotation3;
 struct Incline {
     /// Angle to the horizontal (rad).
     angle: f64,
-    friction: f64,
+    contact: ContactSettings,
     /// Length of a step (s).
     step: f64,
     /// Squares along a side of the patch of 60 mm.
@@ -39,10 +39,7 @@ impl Incline {
             newton: self.newton,
             ..OfflineSettings::default()
         };
-        settings.contact = Some(ContactSettings {
-            friction: self.friction,
-            ..ContactSettings::default()
-        });
+        settings.contact = Some(self.contact);
         let state = resting(&x, &obstacle);
         let mut solver =
             OfflineSolver::new(&cloth, &plane.faces, state, settings, Par::Seq).expect("solver");
@@ -62,14 +59,17 @@ impl Incline {
         let v = self.velocities(18);
         let measured = (v[17] - v[SETTLING]) / (FRAME * (17 - SETTLING) as f64);
         let (s, c) = self.angle.sin_cos();
-        measured / (GRAVITY * (s - self.friction * c)) - 1.0
+        measured / (GRAVITY * (s - self.contact.friction * c)) - 1.0
     }
 }
 
 fn incline(degrees: f64, friction: f64) -> Incline {
     Incline {
         angle: degrees.to_radians(),
-        friction,
+        contact: ContactSettings {
+            friction,
+            ..ContactSettings::default()
+        },
         step: 1.0 / 240.0,
         squares: 3,
         newton: converged(),
@@ -93,6 +93,20 @@ fn a_patch_sticks_below_the_angle_of_friction() {
         let fastest = v[SETTLING..].iter().fold(0.0, |m: f64, v| m.max(v.abs()));
         assert!(fastest < creep, "{degrees}° {friction}: {fastest} m/s");
     }
+}
+
+/// However fast it may creep, and however long the step.
+#[test]
+fn a_patch_that_sticks_creeps_less_than_its_slip_in_a_step() {
+    let mut patch = incline(15.0, 0.3);
+    patch.contact.creep = 1.0;
+    patch.step = FRAME;
+    let v = patch.velocities(20);
+    let fastest = v[SETTLING..].iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let slip = patch.contact.slip;
+    assert!(fastest * FRAME < slip, "{fastest} m/s");
+    patch.contact.slip = 1.0;
+    assert!(patch.velocities(20)[19] * FRAME > 2.0 * slip);
 }
 
 #[test]

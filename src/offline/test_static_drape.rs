@@ -102,6 +102,34 @@ fn forces_balance_at_rest() {
     assert!(residuals[0] < 1e-3, "{residuals:?}");
 }
 
+/// A drape from which a finer mesh goes on ends where it settles, without the last steps to the solver's tolerance.
+#[test]
+fn a_drape_that_is_not_final_takes_fewer_iterations() {
+    let hammock = Hammock::new(10);
+    let cloth = hammock.sheet.cloth(hammock.fabric.clone());
+    let work = |is_final| {
+        let settings = OfflineSettings {
+            contact: None,
+            ..OfflineSettings::default()
+        };
+        let state = resting(&hammock.start(0.06), &[]);
+        let mut solver =
+            OfflineSolver::new(&cloth, &[], state, settings, Par::Seq).expect("solver");
+        let drape = DrapeSettings {
+            is_final,
+            ..DrapeSettings::default()
+        };
+        let end = solver.drape_to(&drape, &hammock.targets(), |_| ControlFlow::Continue(()));
+        end.expect("a drape")
+    };
+    let [coarse, last] = [false, true].map(work);
+    assert!(coarse.settled && last.settled, "{coarse:?} {last:?}");
+    assert!(
+        coarse.newton.products < last.newton.products,
+        "{coarse:?} {last:?}"
+    );
+}
+
 #[test]
 fn two_starts_end_in_one_shape() {
     let hammock = Hammock::new(10);
