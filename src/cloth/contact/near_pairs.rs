@@ -11,7 +11,7 @@ use std::ops::Range;
 
 /// Vertices that one thread queries in a row.
 const CHUNK: usize = 256;
-/// Largest distance of pairs at rest, in edge lengths: with 0.4 a dance has three times the crossings.
+/// Largest distance of pairs at rest, in edge lengths: with 0.4 a dance has four times the crossings.
 const REACH_EDGES: f32 = 0.5;
 /// Largest distance of pairs that close fast, metres: folds meet at 1 m/s in an interval of 8 ms.
 const FARTHEST: f32 = 0.015;
