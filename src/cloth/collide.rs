@@ -44,6 +44,7 @@ pub(super) fn collide(
         chunks,
         body,
         sheets,
+        pairs,
         ..
     } = work;
     let (par, after) = (model.config.par, state.body.frame());
@@ -64,6 +65,10 @@ pub(super) fn collide(
         maps: (index == 0).then_some(&work.maps),
     };
     gather_sheets(model, patches, span, sheets);
+    if model.config.tune.on {
+        pairs.gather(model, patches, 0.0);
+        pairs.query(model, state, sheets);
+    }
     let cloth = ClothContacts {
         model,
         sheets,

@@ -50,6 +50,9 @@ pub struct Config {
     pub cull_distant: bool,
     /// Mean displacement of the body in a step beyond which it has teleported, metres.
     pub teleport: f64,
+    /// Trial.
+    #[serde(skip)]
+    pub tune: super::Tune,
     /// Threads.
     #[serde(skip)]
     pub par: Par,
@@ -76,6 +79,7 @@ impl Default for Config {
             min_fold_ratio: 0.6,
             cull_distant: true,
             teleport: 0.2,
+            tune: super::Tune::default(),
             par: Par::Rayon,
         }
     }

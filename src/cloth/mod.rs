@@ -50,6 +50,7 @@ mod workspace;
 
 pub use collision::collision_model;
 pub use config::Config;
+pub use contact::pair_contact::Tune;
 pub use error::ClothError;
 pub use model::{Element, Hinge, Sheet};
 pub use outfit::{AnchorBinding, Outfit};

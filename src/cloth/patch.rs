@@ -21,6 +21,8 @@ pub(super) struct PatchWork {
     pub(super) pins: Vec<Pin>,
     /// Active fold limits of the current interval.
     pub(super) fold_limits: Vec<FoldLimit>,
+    /// Cloth planes of the current block.
+    pub(super) cloth_planes: Vec<ContactPlane>,
     /// Contact planes within reach for some substeps: `body_planes` of the body, then those of cloth.
     pub(super) planes: Vec<ContactPlane>,
     pub(super) body_planes: usize,

@@ -1,9 +1,10 @@
 //! Solve stage: explicit substeps of all patches through one interval.
 
 use super::contact::chunk::ContactChunk;
+use super::contact::pair_contact::PairContacts;
 use super::garment_model::GarmentModel;
 use super::outfit_model::Model;
-use super::patch::PatchWork;
+use super::patch::{PatchWork, for_patches};
 use super::solver::explicit::{Exemptions, FoldLimit, Substep, V4, run_substeps};
 use crate::par;
 
@@ -35,7 +36,31 @@ pub(super) fn solve(
     model: &Model,
     all: &mut [PatchWork],
     chunks: &[ContactChunk],
+    pairs: &mut PairContacts,
     interval: Interval,
+) {
+    let tune = model.config.tune;
+    let blocks = if tune.on { tune.blocks } else { 1 };
+    let span = interval.span as f32 / blocks as f32;
+    for b in 0..blocks {
+        if tune.on {
+            let t = b as f32 * span;
+            if b > 0 {
+                pairs.gather(model, all, span);
+            }
+            pairs.lay(model, t, span);
+            for_patches(model, all, |g, k, p| pairs.planes(model, g, k, p));
+        }
+        solve_block(model, all, chunks, interval, [b, blocks]);
+    }
+}
+
+fn solve_block(
+    model: &Model,
+    all: &mut [PatchWork],
+    chunks: &[ContactChunk],
+    interval: Interval,
+    [block, blocks]: [usize; 2],
 ) {
     let mut rest = all;
     let mut garments = Vec::with_capacity(model.garments.len());
@@ -53,12 +78,12 @@ pub(super) fn solve(
             garment: g,
             chunks,
             interval,
-            substeps: n,
             h: (interval.span / n as f64) as f32,
         };
         let par = model.config.par;
-        run_substeps(par, &m.patches, patches, n, |s, k, p| {
-            solver.substep(s, k, p)
+        let [from, to] = [n * block / blocks, n * (block + 1) / blocks];
+        run_substeps(par, &m.patches, patches, to - from, |s, k, p| {
+            solver.substep([s, from + s, to], k, p)
         });
     });
 }
@@ -70,21 +95,20 @@ struct GarmentSolver<'a> {
     garment: usize,
     chunks: &'a [ContactChunk],
     interval: Interval,
-    substeps: usize,
     /// Substep, s.
     h: f32,
 }
 
 impl GarmentSolver<'_> {
     /// Substep `s` of patch `k`.
-    fn substep(&self, s: usize, k: usize, p: &mut PatchWork) {
+    fn substep(&self, [s, at, end]: [usize; 3], k: usize, p: &mut PatchWork) {
         let (f, h, every) = (&self.m.patches[k], self.h, self.m.bending_interval);
-        let t = s as f32 * h;
+        let t = at as f32 * h;
         if s.is_multiple_of(PLANE_INTERVAL * every) {
-            self.select_planes(s, k, p);
+            self.select_planes([at, end], k, p);
         }
         if s.is_multiple_of(every) {
-            let lookahead = h * every.min(self.substeps - s) as f32 * 0.5;
+            let lookahead = h * every.min(end - at) as f32 * 0.5;
             p.motion.update_bending(f, lookahead, self.m.filter_degree);
         }
         let [x, y, z] = self.model.config.gravity.map(|g| g as f32);
@@ -113,8 +137,8 @@ impl GarmentSolver<'_> {
     }
 
     /// Selects the planes that vertices can reach until the next selection.
-    fn select_planes(&self, s: usize, k: usize, p: &mut PatchWork) {
-        let steps = (PLANE_INTERVAL * self.m.bending_interval).min(self.substeps - s);
+    fn select_planes(&self, [s, end]: [usize; 2], k: usize, p: &mut PatchWork) {
+        let steps = (PLANE_INTERVAL * self.m.bending_interval).min(end - s);
         let (t, span) = (s as f32 * self.h, steps as f32 * self.h);
         let is_own = |c: &&ContactChunk| (c.garment, c.patch) == (self.garment, k);
         let (motion, planes) = (&p.motion, &mut p.planes);
@@ -126,5 +150,6 @@ impl GarmentSolver<'_> {
         for c in self.chunks.iter().filter(is_own) {
             motion.find_reachable(&c.cloth_planes, t, span, planes);
         }
+        motion.find_reachable(&p.cloth_planes, t, span, planes);
     }
 }

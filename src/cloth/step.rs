@@ -275,7 +275,7 @@ impl<'a> AwakeStep<'a> {
             speed_limit: speed_limit(still_time).filter(|_| sleep),
         };
         let work = &mut *self.work;
-        solve(self.model, &mut work.patches, &work.chunks, interval);
+        solve(self.model, &mut work.patches, &work.chunks, &mut work.pairs, interval);
     }
 
     /// Projects cloth that is below the skin at the end of the step.

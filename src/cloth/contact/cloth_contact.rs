@@ -37,7 +37,7 @@ pub(in crate::cloth) fn gather_sheets(
 ) {
     let c = &model.config;
     out.resize_with(model.garments.len(), SelfContactFrame::default);
-    if !(c.self_collision || c.layers && model.garments.len() > 1) {
+    if !(c.self_collision || c.layers && model.garments.len() > 1 || c.tune.on) {
         return;
     }
     let mut first = 0;
@@ -58,6 +58,11 @@ pub(in crate::cloth) fn gather_sheets(
                 s.velocities[v] = p.velocity(i);
             }
         }
+        if c.tune.on {
+            s.surface.normals.clear();
+            g.self_contact.surface.update_normals(Par::Seq, &mut s.surface);
+            return;
+        }
         let search = c
             .self_collision
             .then(|| g.self_contact.search(c.thickness as f32, span));
@@ -69,6 +74,9 @@ impl ClothContacts<'_> {
     /// Contact planes of a chunk with its garment's other folds and with the garments outside of it.
     pub(in crate::cloth) fn generate(&self, p: &PatchWork, c: &mut ContactChunk) {
         c.cloth_planes.clear();
+        if self.model.config.tune.on {
+            return;
+        }
         if self.model.config.self_collision {
             self.with_folds(p, c);
         }

@@ -24,7 +24,7 @@ impl LayerHeights {
     pub(in crate::cloth) fn measure(&mut self, model: &Model, state: &State, skin: &SurfaceFrame) {
         self.0.resize_with(state.garments.len(), Vec::new);
         self.0.iter_mut().for_each(Vec::clear);
-        if !model.config.layers {
+        if !model.config.layers || model.config.tune.on && !model.config.tune.heights {
             return;
         }
         for g in 1..state.garments.len() {

@@ -5,5 +5,6 @@ pub(super) mod body_contact;
 pub(super) mod chunk;
 pub(super) mod cloth_contact;
 pub(super) mod layer_height;
+pub mod pair_contact;
 pub(crate) mod self_contact;
 pub(super) mod skin_projection;

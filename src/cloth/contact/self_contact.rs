@@ -137,6 +137,10 @@ impl SelfContactModel {
             edge,
         }
     }
+    /// Vertices within two rings.
+    pub(crate) fn excluded(&self, v: u32) -> &[u32] {
+        self.excluded.row(v as usize)
+    }
     /// 95th percentile of the edge lengths, metres.
     pub(crate) fn edge(&self) -> f32 {
         self.edge

@@ -1,0 +1,475 @@
+//! Contact of cloth with cloth by near pairs of features: separating planes that are laid anew in each block of substeps.
+//!
+//! Each pair, vertex and face or edge and edge, has a direction, that of its closest points at the query. In each block the
+//! gap between both sides along it is divided, and both halves become half-spaces that move at the pair's mean velocity
+//! ("divide and truncate", Chen et al. 2025). Of the pairs of one vertex with like directions the narrowest counts.
+
+use super::self_contact::SelfContactFrame;
+use crate::cloth::outfit_model::Model;
+use crate::cloth::patch::{PatchWork, v4};
+use crate::cloth::solver::explicit::ContactPlane;
+use crate::cloth::state::State;
+use crate::contact::ClosestPoint;
+use crate::math::{P3, V3};
+use crate::mesh::Csr;
+use crate::par::{self, Par};
+use crate::spatial::HashGrid;
+
+/// Vertices that one thread queries in a row.
+const CHUNK: usize = 256;
+/// Directions of a vertex.
+const DIRECTIONS: usize = 4;
+const NONE: u32 = u32::MAX;
+/// Shortest distance that has a direction, metres.
+const SHORTEST: f32 = 1e-5;
+/// Least squared sine of the angle between two edges of a pair.
+const MIN_SINE: f32 = 1e-3;
+
+/// Settings under trial.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tune {
+    pub on: bool,
+    pub reach: f32,
+    pub gap: f32,
+    pub blocks: usize,
+    pub alike: f32,
+    pub friction: f32,
+    pub edges: bool,
+    pub heights: bool,
+    pub x: [f32; 4],
+}
+
+impl Default for Tune {
+    fn default() -> Self {
+        Self {
+            on: false,
+            reach: 0.5,
+            gap: 0.0015,
+            blocks: 2,
+            alike: 0.9,
+            friction: 0.1,
+            edges: true,
+            heights: true,
+            x: [0.0; 4],
+        }
+    }
+}
+
+/// Two features; the first `below` vertices belong to the one, the others to the other, to which `normal` points.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pair {
+    vertices: [u32; 4],
+    below: usize,
+    normal: V3,
+}
+
+/// Middle between both sides along the normal, metres, and mean velocity, m/s.
+#[derive(Clone, Copy, Debug, Default)]
+struct Middle {
+    height: f32,
+    velocity: V3,
+}
+
+/// Nearest face of other cloth on one side of a vertex.
+#[derive(Clone, Copy, Debug)]
+struct Hit {
+    garment: u32,
+    face: u32,
+}
+
+const NO_HIT: Hit = Hit {
+    garment: NONE,
+    face: NONE,
+};
+
+#[derive(Debug, Default)]
+struct Found {
+    hits: Vec<[Hit; 2]>,
+    pairs: Vec<Pair>,
+}
+
+/// Near pairs of an outfit and their planes.
+#[derive(Debug, Default)]
+pub(in crate::cloth) struct PairContacts {
+    /// First vertex of each garment, and the end.
+    first: Vec<u32>,
+    owner: Vec<u32>,
+    x: Vec<P3>,
+    last: Vec<P3>,
+    velocity: Vec<V3>,
+    grid: HashGrid,
+    found: Vec<Found>,
+    hits: Vec<[Hit; 2]>,
+    pairs: Vec<Pair>,
+    middles: Vec<Middle>,
+    /// Slots of each vertex, and vertex, direction of each slot.
+    slots: Vec<[u32; DIRECTIONS]>,
+    slot_vertex: Vec<u32>,
+    slot_normal: Vec<V3>,
+    incidences: Vec<(u32, u32)>,
+    by_slot: Csr,
+    /// Offset, metres, and velocity of the plane of each slot.
+    planes: Vec<(f32, V3)>,
+}
+
+impl PairContacts {
+    /// Takes positions over at the beginning of a block that follows another one after `span` seconds; 0: the first one.
+    pub(in crate::cloth) fn gather(&mut self, model: &Model, patches: &[PatchWork], span: f32) {
+        self.first.clear();
+        self.first.push(0);
+        for g in &model.garments {
+            let n = g.sheet.mass.len() as u32;
+            self.first.push(self.first[self.first.len() - 1] + n);
+        }
+        let n = self.first[model.garments.len()] as usize;
+        if self.owner.len() != n {
+            self.owner.clear();
+            for (k, g) in model.garments.iter().enumerate() {
+                self.owner.resize(self.owner.len() + g.sheet.mass.len(), k as u32);
+            }
+        }
+        std::mem::swap(&mut self.x, &mut self.last);
+        self.x.resize(n, P3::origin());
+        self.velocity.resize(n, V3::zeros());
+        let mut at = 0;
+        for (k, g) in model.garments.iter().enumerate() {
+            let base = self.first[k] as usize;
+            for f in &g.patches {
+                let p = &patches[at];
+                at += 1;
+                for i in 0..f.owned {
+                    let v = base + f.vertices[i] as usize;
+                    self.x[v] = p.position(i);
+                    self.velocity[v] = if span > 0.0 {
+                        (self.x[v] - self.last[v]) / span
+                    } else {
+                        p.velocity(i)
+                    };
+                }
+            }
+        }
+    }
+
+    /// Finds the near pairs.
+    pub(in crate::cloth) fn query(
+        &mut self,
+        model: &Model,
+        state: &State,
+        sheets: &[SelfContactFrame],
+    ) {
+        let tune = model.config.tune;
+        let edge = model.garments.iter().map(|g| g.self_contact.edge());
+        let edge = edge.fold(0.0, f32::max);
+        let reach = tune.reach * edge;
+        let corner = reach.hypot(edge / 3f32.sqrt());
+        self.grid.fill(&self.x, 2.0 * corner);
+        let n = self.x.len();
+        let mut found = std::mem::take(&mut self.found);
+        found.resize_with(n.div_ceil(CHUNK), Found::default);
+        let search = Search {
+            model,
+            state,
+            sheets,
+            all: self,
+            reach,
+            corner,
+        };
+        par::for_chunks(model.config.par, &mut found, 1, |k, f| {
+            search.faces(k * CHUNK..((k + 1) * CHUNK).min(n), &mut f[0]);
+        });
+        let mut hits = std::mem::take(&mut self.hits);
+        hits.clear();
+        found.iter().for_each(|f| hits.extend_from_slice(&f.hits));
+        if tune.edges {
+            let search = Search {
+                model,
+                state,
+                sheets,
+                all: self,
+                reach,
+                corner,
+            };
+            par::for_chunks(model.config.par, &mut found, 1, |k, f| {
+                search.edges(&hits, k * CHUNK..((k + 1) * CHUNK).min(n), &mut f[0].pairs);
+            });
+        }
+        self.hits = hits;
+        self.pairs.clear();
+        found.iter().for_each(|f| self.pairs.extend_from_slice(&f.pairs));
+        self.found = found;
+        self.assign(tune.alike);
+    }
+
+    /// Groups the directions of the pairs by vertex.
+    fn assign(&mut self, alike: f32) {
+        self.slots.clear();
+        self.slots.resize(self.x.len(), [NONE; DIRECTIONS]);
+        self.slot_vertex.clear();
+        self.slot_normal.clear();
+        self.incidences.clear();
+        for (k, p) in self.pairs.iter().enumerate() {
+            for (i, v) in p.vertices.iter().enumerate() {
+                let n = if i < p.below { -p.normal } else { p.normal };
+                let slots = &mut self.slots[*v as usize];
+                let mut best = (alike, NONE);
+                let mut chosen = NONE;
+                for s in slots.iter_mut() {
+                    if *s == NONE {
+                        *s = self.slot_vertex.len() as u32;
+                        self.slot_vertex.push(*v);
+                        self.slot_normal.push(n);
+                        chosen = *s;
+                        break;
+                    }
+                    let dot = self.slot_normal[*s as usize].dot(&n);
+                    if dot > alike {
+                        chosen = *s;
+                        break;
+                    }
+                    if dot > best.0 || best.1 == NONE {
+                        best = (dot, *s);
+                    }
+                }
+                let chosen = if chosen == NONE { best.1 } else { chosen };
+                self.incidences.push((chosen, k as u32));
+            }
+        }
+        self.by_slot = Csr::from_pairs(self.slot_vertex.len(), &self.incidences);
+    }
+
+    /// Lays the planes for a block of `span` seconds that begins `t` seconds after the query.
+    pub(in crate::cloth) fn lay(&mut self, model: &Model, t: f32, span: f32) {
+        let tune = model.config.tune;
+        let par = model.config.par;
+        let (x, velocity) = (&self.x, &self.velocity);
+        let pairs = &self.pairs;
+        par::map_into(par, pairs.len(), 1024, &mut self.middles, |k| {
+            let p = &pairs[k];
+            let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
+            let mut sums = [V3::zeros(); 2];
+            for (i, v) in p.vertices.iter().enumerate() {
+                let v = *v as usize;
+                let h = p.normal.dot(&x[v].coords);
+                if i < p.below {
+                    low = low.max(h);
+                    sums[0] += velocity[v];
+                } else {
+                    high = high.min(h);
+                    sums[1] += velocity[v];
+                }
+            }
+            let below = p.below as f32;
+            Middle {
+                height: 0.5 * (low + high),
+                velocity: sums[0] * (0.5 / below) + sums[1] * (0.5 / (4.0 - below)),
+            }
+        });
+        let (middles, by_slot) = (&self.middles, &self.by_slot);
+        let (vertices, normals) = (&self.slot_vertex, &self.slot_normal);
+        par::map_into(par, vertices.len(), 512, &mut self.planes, |s| {
+            let v = vertices[s] as usize;
+            let n = normals[s];
+            let mut best = (f32::NEG_INFINITY, 0.0, V3::zeros());
+            for k in by_slot.row(s) {
+                let (p, m) = (&pairs[*k as usize], &middles[*k as usize]);
+                let is_below = p.vertices[..p.below].contains(&(v as u32));
+                let side = if is_below { -1.0 } else { 1.0 };
+                let above = side * (p.normal.dot(&x[v].coords) - m.height) - 0.5 * tune.gap;
+                let above = above.max(-tune.x[0]);
+                let rate = n.dot(&m.velocity);
+                let tight = rate * span - above;
+                if tight > best.0 {
+                    best = (tight, above, m.velocity);
+                }
+            }
+            let (_, above, u) = best;
+            (n.dot(&x[v].coords) - above - n.dot(&u) * t, u)
+        });
+    }
+
+    /// Planes of a patch.
+    pub(in crate::cloth) fn planes(
+        &self,
+        model: &Model,
+        garment: usize,
+        patch: usize,
+        p: &mut PatchWork,
+    ) {
+        let f = &model.garments[garment].patches[patch];
+        let base = self.first[garment];
+        p.cloth_planes.clear();
+        for (i, v) in f.vertices.iter().enumerate() {
+            if p.pinned[i] || p.overstretched[i] {
+                continue;
+            }
+            for s in self.slots[(base + v) as usize] {
+                if s == NONE {
+                    break;
+                }
+                let (offset, u) = &self.planes[s as usize];
+                p.cloth_planes.push(ContactPlane {
+                    vertex: i as u32,
+                    normal: v4(&self.slot_normal[s as usize]),
+                    offset: *offset,
+                    velocity: v4(u),
+                    friction: model.config.tune.friction,
+                });
+            }
+        }
+    }
+
+    /// Number of pairs, slots.
+    pub(in crate::cloth) fn counts(&self) -> [usize; 2] {
+        [self.pairs.len(), self.slot_vertex.len()]
+    }
+}
+
+struct Search<'a> {
+    model: &'a Model,
+    state: &'a State,
+    sheets: &'a [SelfContactFrame],
+    all: &'a PairContacts,
+    reach: f32,
+    corner: f32,
+}
+
+impl Search<'_> {
+    /// Pairs of vertices and faces.
+    fn faces(&self, range: std::ops::Range<usize>, out: &mut Found) {
+        out.hits.clear();
+        out.pairs.clear();
+        for v in range {
+            let hits = self.vertex(v, &mut out.pairs);
+            out.hits.push(hits);
+        }
+    }
+
+    fn vertex(&self, v: usize, pairs: &mut Vec<Pair>) -> [Hit; 2] {
+        let mut hits = [NO_HIT; 2];
+        let all = self.all;
+        let own = all.owner[v];
+        let base = all.first[own as usize];
+        let m = &self.model.garments[own as usize].self_contact;
+        let local = v as u32 - base;
+        let x = all.x[v];
+        let normal = self.sheets[own as usize].surface.normals[local as usize];
+        let excluded = m.excluded(local);
+        let mut best = [(self.corner * self.corner, NONE); 2];
+        all.grid.within(&x, self.corner, |w, d| {
+            let other = all.owner[w as usize];
+            if other == own && excluded.binary_search(&(w - base)).is_ok() {
+                return;
+            }
+            let side = usize::from(normal.dot(&(all.x[w as usize] - x)) > 0.0);
+            if (d, w) < best[side] {
+                best[side] = (d, w);
+            }
+        });
+        if best[0].1 == NONE && best[1].1 == NONE {
+            return hits;
+        }
+        let is_stuck = |g: u32, v: u32| {
+            self.state.garments[g as usize].intersecting.binary_search(&v).is_ok()
+        };
+        if is_stuck(own, local) {
+            return hits;
+        }
+        for (side, (_, w)) in best.iter().enumerate() {
+            if *w == NONE {
+                continue;
+            }
+            let other = all.owner[*w as usize] as usize;
+            let g = &self.model.garments[other].self_contact.surface;
+            let frame = &self.sheets[other].surface;
+            let hit = g.closest_around(frame, &x, w - all.first[other], u8::MAX);
+            let corners = g.faces()[hit.face as usize];
+            let d = hit.signed_distance.abs();
+            if d >= self.reach {
+                continue;
+            }
+            if other == own as usize {
+                let near = m.surface.neighbours(local);
+                if corners.iter().any(|c| *c == local || near.contains(c)) {
+                    continue;
+                }
+            }
+            hits[side] = Hit {
+                garment: other as u32,
+                face: hit.face,
+            };
+            if d < SHORTEST || g.is_on_border(&hit) {
+                continue;
+            }
+            let c = corners.map(|c| c + all.first[other]);
+            pairs.push(Pair {
+                vertices: [v as u32, c[0], c[1], c[2]],
+                below: 1,
+                normal: (hit.point - x) / d,
+            });
+        }
+        hits
+    }
+
+    /// Pairs of edges.
+    fn edges(&self, hits: &[[Hit; 2]], range: std::ops::Range<usize>, out: &mut Vec<Pair>) {
+        let all = self.all;
+        let mut near: Vec<[u32; 2]> = Vec::new();
+        for v in range {
+            let own = all.owner[v] as usize;
+            let base = all.first[own];
+            let m = &self.model.garments[own].self_contact.surface;
+            for w in m.neighbours(v as u32 - base) {
+                let w = (w + base) as usize;
+                if w < v {
+                    continue;
+                }
+                near.clear();
+                for h in hits[v].iter().chain(&hits[w]) {
+                    if h.face == NONE {
+                        continue;
+                    }
+                    let g = &self.model.garments[h.garment as usize].self_contact.surface;
+                    let base = all.first[h.garment as usize];
+                    let c = g.faces()[h.face as usize].map(|c| c + base);
+                    for e in [[c[0], c[1]], [c[1], c[2]], [c[2], c[0]]] {
+                        let e = [e[0].min(e[1]), e[0].max(e[1])];
+                        if !near.contains(&e) {
+                            near.push(e);
+                        }
+                    }
+                }
+                for e in &near {
+                    out.extend(self.edge_pair([v as u32, w as u32], *e));
+                }
+            }
+        }
+    }
+
+    fn edge_pair(&self, a: [u32; 2], b: [u32; 2]) -> Option<Pair> {
+        if a.iter().any(|v| b.contains(v)) {
+            return None;
+        }
+        let x = &self.all.x;
+        let [p, q] = a.map(|v| x[v as usize]);
+        let [r, s] = b.map(|v| x[v as usize]);
+        let (d1, d2, o) = (q - p, s - r, p - r);
+        let (aa, ee, bb) = (d1.dot(&d1), d2.dot(&d2), d1.dot(&d2));
+        let (c, f) = (d1.dot(&o), d2.dot(&o));
+        let den = aa * ee - bb * bb;
+        if den < MIN_SINE * aa * ee {
+            return None;
+        }
+        let (s, t) = (bb * f - c * ee, aa * f - bb * c);
+        if !(s > 0.0 && s < den && t > 0.0 && t < den) {
+            return None;
+        }
+        let (s, t) = (s / den, t / den);
+        let n = d2 * t - d1 * s - o;
+        let d = n.norm();
+        (d < self.reach && d > SHORTEST).then(|| Pair {
+            vertices: [a[0], a[1], b[0], b[1]],
+            below: 2,
+            normal: n / d,
+        })
+    }
+}
