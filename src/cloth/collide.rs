@@ -67,7 +67,7 @@ pub(super) fn collide(
     gather_sheets(model, patches, span, sheets);
     if model.config.tune.on {
         pairs.gather(model, patches, 0.0);
-        pairs.query(model, state, sheets);
+        pairs.query(model, state, sheets, span as f32);
     }
     let cloth = ClothContacts {
         model,

@@ -36,6 +36,8 @@ pub struct Tune {
     pub friction: f32,
     pub edges: bool,
     pub heights: bool,
+    /// Largest reach of what closes fast, metres.
+    pub farthest: f32,
     pub x: [f32; 4],
 }
 
@@ -50,6 +52,7 @@ impl Default for Tune {
             friction: 0.1,
             edges: true,
             heights: true,
+            farthest: 0.015,
             x: [0.0; 4],
         }
     }
@@ -156,12 +159,14 @@ impl PairContacts {
         model: &Model,
         state: &State,
         sheets: &[SelfContactFrame],
+        span: f32,
     ) {
         let tune = model.config.tune;
         let edge = model.garments.iter().map(|g| g.self_contact.edge());
         let edge = edge.fold(0.0, f32::max);
         let reach = tune.reach * edge;
-        let corner = reach.hypot(edge / 3f32.sqrt());
+        let farthest = reach.max(tune.farthest);
+        let corner = farthest.hypot(edge / 3f32.sqrt());
         self.grid.fill(&self.x, 2.0 * corner);
         let n = self.x.len();
         let mut found = std::mem::take(&mut self.found);
@@ -172,6 +177,8 @@ impl PairContacts {
             sheets,
             all: self,
             reach,
+            farthest,
+            span,
             corner,
         };
         par::for_chunks(model.config.par, &mut found, 1, |k, f| {
@@ -187,6 +194,8 @@ impl PairContacts {
                 sheets,
                 all: self,
                 reach,
+                farthest,
+                span,
                 corner,
             };
             par::for_chunks(model.config.par, &mut found, 1, |k, f| {
@@ -318,6 +327,20 @@ impl PairContacts {
         }
     }
 
+    /// Slots and velocity of a vertex.
+    pub(in crate::cloth) fn describe(&self, g: usize, v: u32) -> String {
+        let v = (self.first[g] + v) as usize;
+        let slots = self.slots[v].iter().filter(|s| **s != NONE);
+        let slots: Vec<String> = slots
+            .map(|s| {
+                let n = self.slot_normal[*s as usize];
+                let k = self.by_slot.row(*s as usize).len();
+                format!("{:.1?}x{k}", [n.x, n.y, n.z])
+            })
+            .collect();
+        format!("v {:.2?} slots {slots:?}", self.velocity[v].as_slice())
+    }
+
     /// Number of pairs, slots.
     pub(in crate::cloth) fn counts(&self) -> [usize; 2] {
         [self.pairs.len(), self.slot_vertex.len()]
@@ -330,10 +353,18 @@ struct Search<'a> {
     sheets: &'a [SelfContactFrame],
     all: &'a PairContacts,
     reach: f32,
+    farthest: f32,
+    /// Time until the next query, s.
+    span: f32,
     corner: f32,
 }
 
 impl Search<'_> {
+    /// Reach of what closes at this speed.
+    fn reach_at(&self, closing: f32) -> f32 {
+        (self.reach + closing.max(0.0) * self.span).min(self.farthest.max(self.reach))
+    }
+
     /// Pairs of vertices and faces.
     fn faces(&self, range: std::ops::Range<usize>, out: &mut Found) {
         out.hits.clear();
@@ -384,7 +415,12 @@ impl Search<'_> {
             let hit = g.closest_around(frame, &x, w - all.first[other], u8::MAX);
             let corners = g.faces()[hit.face as usize];
             let d = hit.signed_distance.abs();
-            if d >= self.reach {
+            let c = corners.map(|c| c + all.first[other]);
+            let n = (hit.point - x) / d.max(SHORTEST);
+            let other_velocity = (0..3).fold(V3::zeros(), |u, k| {
+                u + all.velocity[c[k] as usize] * hit.weights[k]
+            });
+            if d >= self.reach_at(n.dot(&(all.velocity[v] - other_velocity))) {
                 continue;
             }
             if other == own as usize {
@@ -400,14 +436,38 @@ impl Search<'_> {
             if d < SHORTEST || g.is_on_border(&hit) {
                 continue;
             }
-            let c = corners.map(|c| c + all.first[other]);
+            let mut n = n;
+            if self.is_wrong([v, c[0] as usize], n) {
+                n = -n;
+            }
             pairs.push(Pair {
                 vertices: [v as u32, c[0], c[1], c[2]],
                 below: 1,
-                normal: (hit.point - x) / d,
+                normal: n,
             });
         }
         hits
+    }
+
+    /// The direction from one layer to another contradicts their order.
+    fn is_wrong(&self, v: [usize; 2], n: V3) -> bool {
+        if self.model.config.tune.x[1] <= 0.0 {
+            return false;
+        }
+        let all = self.all;
+        let g = v.map(|v| all.owner[v] as usize);
+        if g[0] == g[1] {
+            return false;
+        }
+        let local = [0, 1].map(|k| v[k] - all.first[g[k]] as usize);
+        let parts = [0, 1].map(|k| self.model.garments[g[k]].own[local[k]]);
+        let normals = [0, 1].map(|k| self.sheets[g[k]].surface.normals[local[k]]);
+        if parts[0] & parts[1] == 0 || normals[0].dot(&normals[1]) < 0.2 {
+            return false;
+        }
+        let up = n.dot(&(normals[0] + normals[1]));
+        let up = if g[0] < g[1] { up } else { -up };
+        up < -self.model.config.tune.x[2]
     }
 
     /// Pairs of edges.
@@ -466,7 +526,15 @@ impl Search<'_> {
         let (s, t) = (s / den, t / den);
         let n = d2 * t - d1 * s - o;
         let d = n.norm();
-        (d < self.reach && d > SHORTEST).then(|| Pair {
+        if d >= self.farthest || d <= SHORTEST {
+            return None;
+        }
+        let u = &self.all.velocity;
+        let [ua, ub] = [(a, s), (b, t)].map(|(v, w)| {
+            u[v[0] as usize] * (1.0 - w) + u[v[1] as usize] * w
+        });
+        let near = d < self.reach_at(n.dot(&(ua - ub)) / d);
+        (near && !self.is_wrong([a[0] as usize, b[0] as usize], n)).then(|| Pair {
             vertices: [a[0], a[1], b[0], b[1]],
             below: 2,
             normal: n / d,
