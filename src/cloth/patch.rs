@@ -26,6 +26,10 @@ pub(super) struct PatchWork {
     /// Contact planes within reach for some substeps: `body_planes` of the body, then those of cloth.
     pub(super) planes: Vec<ContactPlane>,
     pub(super) body_planes: usize,
+    /// Of them those of vertices without cloth planes.
+    pub(super) lone_planes: usize,
+    pub(super) has_cloth: Vec<bool>,
+    pub(super) shared: Vec<ContactPlane>,
     /// Vertices in contact with the body.
     pub(super) contacts: usize,
 }

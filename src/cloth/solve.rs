@@ -40,7 +40,11 @@ pub(super) fn solve(
     interval: Interval,
 ) {
     let tune = model.config.tune;
-    let blocks = if tune.on { tune.blocks } else { 1 };
+    let blocks = if tune.on {
+        (interval.span as f32 / tune.block - 1e-3).ceil().max(1.0) as usize
+    } else {
+        1
+    };
     let span = interval.span as f32 / blocks as f32;
     for b in 0..blocks {
         if tune.on {
@@ -126,6 +130,15 @@ impl GarmentSolver<'_> {
         let (body, cloth) = p.planes.split_at(p.body_planes);
         p.motion.resolve_contacts(cloth, t, h, CLOTH_RECOVERY);
         p.contacts = p.motion.resolve_contacts(body, t, h, BODY_RECOVERY);
+        let between = &body[p.lone_planes..];
+        for sweep in 0..self.model.config.tune.x[0] as usize {
+            if sweep > 0 {
+                p.motion.hold(between, t, h);
+            }
+            if p.motion.hold(cloth, t, h) == 0 {
+                break;
+            }
+        }
         if let Some(limit) = self.interval.speed_limit {
             let exempt = Exemptions {
                 fixed: &p.pinned,
@@ -151,5 +164,23 @@ impl GarmentSolver<'_> {
             motion.find_reachable(&c.cloth_planes, t, span, planes);
         }
         motion.find_reachable(&p.cloth_planes, t, span, planes);
+        // Body planes of vertices with planes of cloth last.
+        p.has_cloth.clear();
+        p.has_cloth.resize(p.asleep.len(), false);
+        let (body, cloth) = planes.split_at_mut(p.body_planes);
+        for c in cloth.iter() {
+            p.has_cloth[c.vertex as usize] = true;
+        }
+        p.shared.clear();
+        p.lone_planes = 0;
+        for k in 0..body.len() {
+            if p.has_cloth[body[k].vertex as usize] {
+                p.shared.push(body[k]);
+            } else {
+                body[p.lone_planes] = body[k];
+                p.lone_planes += 1;
+            }
+        }
+        body[p.lone_planes..].copy_from_slice(&p.shared);
     }
 }

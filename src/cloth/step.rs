@@ -200,7 +200,9 @@ impl<'a> AwakeStep<'a> {
             surface.update_normals(model.config.par, before);
         }
         report.teleported = self.teleported;
-        report.sleeves_put_back = recover_sleeves(model, state, before);
+        if model.config.tune.sleeves {
+            report.sleeves_put_back = recover_sleeves(model, state, before);
+        }
     }
 
     /// Renders depth maps, untangles garments, completes the collision body, and splits the patches into chunks.
@@ -291,7 +293,28 @@ impl<'a> AwakeStep<'a> {
             let c = &mut c[0];
             projection.project(&patches[c.at], c);
         });
+        let clamp = self.model.config.tune.on && self.model.config.tune.x[1] > 0.0;
         for c in &work.chunks {
+            if clamp {
+                let p = &mut work.patches[c.at];
+                for (i, moved) in &c.projected {
+                    let first = p.cloth_planes.partition_point(|q| q.vertex < *i);
+                    let own = p.cloth_planes[first..].iter().take_while(|q| q.vertex == *i);
+                    let start = p.motion.start[*i as usize];
+                    let before = p.motion.position(*i as usize);
+                    let mut to = start + *moved;
+                    for _ in 0..2 {
+                        for q in own.clone() {
+                            // As far as it is now, if that is less.
+                            let least = q.gap_at(before, self.span as f32).min(0.0);
+                            let gap = q.gap_at(to, self.span as f32) - least;
+                            to = to + q.normal.scale((-gap).max(0.0));
+                        }
+                    }
+                    p.motion.displacement[*i as usize] = to - start;
+                }
+                continue;
+            }
             let displacement = &mut work.patches[c.at].motion.displacement;
             for (i, moved) in &c.projected {
                 displacement[*i as usize] = *moved;

@@ -18,7 +18,7 @@ use crate::spatial::HashGrid;
 /// Vertices that one thread queries in a row.
 const CHUNK: usize = 256;
 /// Directions of a vertex.
-const DIRECTIONS: usize = 4;
+const DIRECTIONS: usize = 8;
 const NONE: u32 = u32::MAX;
 /// Shortest distance that has a direction, metres.
 const SHORTEST: f32 = 1e-5;
@@ -31,11 +31,13 @@ pub struct Tune {
     pub on: bool,
     pub reach: f32,
     pub gap: f32,
-    pub blocks: usize,
+    pub block: f32,
     pub alike: f32,
     pub friction: f32,
     pub edges: bool,
     pub heights: bool,
+    pub smooth: bool,
+    pub sleeves: bool,
     /// Largest reach of what closes fast, metres.
     pub farthest: f32,
     pub x: [f32; 4],
@@ -47,11 +49,13 @@ impl Default for Tune {
             on: false,
             reach: 0.5,
             gap: 0.0015,
-            blocks: 2,
+            block: 1.0 / 240.0,
             alike: 0.9,
             friction: 0.1,
             edges: true,
             heights: true,
+            smooth: true,
+            sleeves: true,
             farthest: 0.015,
             x: [0.0; 4],
         }
@@ -284,7 +288,7 @@ impl PairContacts {
                 let is_below = p.vertices[..p.below].contains(&(v as u32));
                 let side = if is_below { -1.0 } else { 1.0 };
                 let above = side * (p.normal.dot(&x[v].coords) - m.height) - 0.5 * tune.gap;
-                let above = above.max(-tune.x[0]);
+                let above = above.max(0.0f32.min(-tune.x[2]));
                 let rate = n.dot(&m.velocity);
                 let tight = rate * span - above;
                 if tight > best.0 {
@@ -384,11 +388,15 @@ impl Search<'_> {
         let local = v as u32 - base;
         let x = all.x[v];
         let normal = self.sheets[own as usize].surface.normals[local as usize];
-        let excluded = m.excluded(local);
+        let excluded = if self.model.config.tune.x[3] > 0.0 {
+            m.surface.neighbours(local)
+        } else {
+            m.excluded(local)
+        };
         let mut best = [(self.corner * self.corner, NONE); 2];
         all.grid.within(&x, self.corner, |w, d| {
             let other = all.owner[w as usize];
-            if other == own && excluded.binary_search(&(w - base)).is_ok() {
+            if w == v as u32 || other == own && excluded.contains(&(w - base)) {
                 return;
             }
             let side = usize::from(normal.dot(&(all.x[w as usize] - x)) > 0.0);
@@ -425,7 +433,16 @@ impl Search<'_> {
             }
             if other == own as usize {
                 let near = m.surface.neighbours(local);
-                if corners.iter().any(|c| *c == local || near.contains(c)) {
+                if corners.contains(&local) {
+                    continue;
+                }
+                let is_near = corners.iter().any(|c| near.contains(c));
+                let folded = || {
+                    let normals = &frame.normals;
+                    let face = corners.iter().fold(V3::zeros(), |s, c| s + normals[*c as usize]);
+                    face.dot(&normal) < 0.0
+                };
+                if is_near && (self.model.config.tune.x[3] <= 0.0 || !folded()) {
                     continue;
                 }
             }
@@ -436,10 +453,7 @@ impl Search<'_> {
             if d < SHORTEST || g.is_on_border(&hit) {
                 continue;
             }
-            let mut n = n;
-            if self.is_wrong([v, c[0] as usize], n) {
-                n = -n;
-            }
+
             pairs.push(Pair {
                 vertices: [v as u32, c[0], c[1], c[2]],
                 below: 1,
@@ -449,25 +463,22 @@ impl Search<'_> {
         hits
     }
 
-    /// The direction from one layer to another contradicts their order.
-    fn is_wrong(&self, v: [usize; 2], n: V3) -> bool {
-        if self.model.config.tune.x[1] <= 0.0 {
-            return false;
-        }
+    /// Two edges belong to one ring that is not folded.
+    fn is_flat(&self, a: [u32; 2], b: [u32; 2]) -> bool {
         let all = self.all;
-        let g = v.map(|v| all.owner[v] as usize);
-        if g[0] == g[1] {
+        let g = all.owner[a[0] as usize];
+        if g != all.owner[b[0] as usize] {
             return false;
         }
-        let local = [0, 1].map(|k| v[k] - all.first[g[k]] as usize);
-        let parts = [0, 1].map(|k| self.model.garments[g[k]].own[local[k]]);
-        let normals = [0, 1].map(|k| self.sheets[g[k]].surface.normals[local[k]]);
-        if parts[0] & parts[1] == 0 || normals[0].dot(&normals[1]) < 0.2 {
-            return false;
-        }
-        let up = n.dot(&(normals[0] + normals[1]));
-        let up = if g[0] < g[1] { up } else { -up };
-        up < -self.model.config.tune.x[2]
+        let base = all.first[g as usize];
+        let surface = &self.model.garments[g as usize].self_contact.surface;
+        let is_near = a.iter().any(|v| {
+            let near = surface.neighbours(v - base);
+            b.iter().any(|w| near.contains(&(w - base)))
+        });
+        let normals = &self.sheets[g as usize].surface.normals;
+        let of = |e: [u32; 2]| normals[(e[0] - base) as usize] + normals[(e[1] - base) as usize];
+        is_near && of(a).dot(&of(b)) >= 0.0
     }
 
     /// Pairs of edges.
@@ -533,8 +544,8 @@ impl Search<'_> {
         let [ua, ub] = [(a, s), (b, t)].map(|(v, w)| {
             u[v[0] as usize] * (1.0 - w) + u[v[1] as usize] * w
         });
-        let near = d < self.reach_at(n.dot(&(ua - ub)) / d);
-        (near && !self.is_wrong([a[0] as usize, b[0] as usize], n)).then(|| Pair {
+        let near = d < self.reach_at(n.dot(&(ua - ub)) / d) && !self.is_flat(a, b);
+        near.then(|| Pair {
             vertices: [a[0], a[1], b[0], b[1]],
             below: 2,
             normal: n / d,

@@ -64,7 +64,9 @@ impl UntangleWork {
         for k in due {
             if self.load(model, state, k) {
                 found += self.untangle(model, &mut state.garments[k], k, body);
-                self.smooth_stuck(model, &mut state.garments[k], k, body);
+                if model.config.tune.smooth {
+                    self.smooth_stuck(model, &mut state.garments[k], k, body);
+                }
             }
         }
         found

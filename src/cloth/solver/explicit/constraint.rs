@@ -24,6 +24,10 @@ impl ContactPlane {
         self.normal.dot(self.velocity)
     }
     /// Signed distance of `x` at time `t` since the query (m).
+    pub fn gap_at(&self, x: V4, t: f32) -> f32 {
+        self.gap(x, t)
+    }
+    /// Signed distance of `x` at time `t` since the query (m).
     #[inline(always)]
     pub(super) fn gap(&self, x: V4, t: f32) -> f32 {
         self.normal.dot(x) - self.offset - self.rate() * t

@@ -11,6 +11,9 @@ const SPEED_GAIN: f32 = 2.0;
 /// Share of a penetration that one substep removes. Larger jitters; smaller leaves cloth inside for longer.
 const RECOVERED: f32 = 0.2;
 
+/// Violation below which a plane holds, m/s.
+const HELD: f32 = 1e-3;
+
 /// Velocity of one vertex against a plane, split into normal and tangential parts.
 struct Approach {
     /// Normal velocity relative to the surface (m/s).
@@ -125,6 +128,20 @@ impl PatchState {
             }
             if a.gap < 0.0 {
                 self.recover(p, (-a.gap * RECOVERED).min(recovery * h));
+            }
+        }
+        touched
+    }
+    /// Removes velocities into the planes without friction or recovery; returns the planes that were violated.
+    pub fn hold(&mut self, planes: &[ContactPlane], t: f32, h: f32) -> usize {
+        let mut touched = 0;
+        for p in planes {
+            let i = p.vertex as usize;
+            let v = self.velocity[i];
+            let a = Approach::new(p, self.position(i), v, t, h);
+            if a.normal < a.least {
+                self.velocity[i] = v + p.normal.scale(a.least - a.normal);
+                touched += usize::from(a.least - a.normal > HELD);
             }
         }
         touched
