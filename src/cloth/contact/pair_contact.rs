@@ -9,16 +9,17 @@ use crate::cloth::outfit_model::Model;
 use crate::cloth::patch::{PatchWork, v4};
 use crate::cloth::solver::explicit::ContactPlane;
 use crate::cloth::state::State;
-use crate::contact::ClosestPoint;
 use crate::math::{P3, V3};
 use crate::mesh::Csr;
 use crate::par::{self, Par};
-use crate::spatial::HashGrid;
+use crate::spatial::{HashGrid, closest_on_triangle};
 
 /// Vertices that one thread queries in a row.
 const CHUNK: usize = 256;
 /// Directions of a vertex.
 const DIRECTIONS: usize = 8;
+/// A corner with less barycentric weight has no part in a point.
+const MIN_WEIGHT: f32 = 1e-4;
 const NONE: u32 = u32::MAX;
 /// Shortest distance that has a direction, metres.
 const SHORTEST: f32 = 1e-5;
@@ -78,20 +79,18 @@ struct Middle {
 }
 
 /// Nearest face of other cloth on one side of a vertex.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Hit {
     garment: u32,
     face: u32,
 }
 
-const NO_HIT: Hit = Hit {
-    garment: NONE,
-    face: NONE,
-};
 
 #[derive(Debug, Default)]
 struct Found {
-    hits: Vec<[Hit; 2]>,
+    /// Near faces, vertex by vertex, and the end of those of each vertex.
+    hits: Vec<Hit>,
+    ends: Vec<u32>,
     pairs: Vec<Pair>,
 }
 
@@ -106,7 +105,8 @@ pub(in crate::cloth) struct PairContacts {
     velocity: Vec<V3>,
     grid: HashGrid,
     found: Vec<Found>,
-    hits: Vec<[Hit; 2]>,
+    hits: Vec<Hit>,
+    ends: Vec<u32>,
     pairs: Vec<Pair>,
     middles: Vec<Middle>,
     /// Slots of each vertex, and vertex, direction of each slot.
@@ -190,7 +190,14 @@ impl PairContacts {
         });
         let mut hits = std::mem::take(&mut self.hits);
         hits.clear();
-        found.iter().for_each(|f| hits.extend_from_slice(&f.hits));
+        let mut ends = std::mem::take(&mut self.ends);
+        ends.clear();
+        ends.push(0);
+        for f in &found {
+            let base = hits.len() as u32;
+            hits.extend_from_slice(&f.hits);
+            ends.extend(f.ends.iter().map(|e| base + e));
+        }
         if tune.edges {
             let search = Search {
                 model,
@@ -203,10 +210,11 @@ impl PairContacts {
                 corner,
             };
             par::for_chunks(model.config.par, &mut found, 1, |k, f| {
-                search.edges(&hits, k * CHUNK..((k + 1) * CHUNK).min(n), &mut f[0].pairs);
+                search.edges(&hits, &ends, k * CHUNK..((k + 1) * CHUNK).min(n), &mut f[0].pairs);
             });
         }
         self.hits = hits;
+        self.ends = ends;
         self.pairs.clear();
         found.iter().for_each(|f| self.pairs.extend_from_slice(&f.pairs));
         self.found = found;
@@ -373,94 +381,89 @@ impl Search<'_> {
     fn faces(&self, range: std::ops::Range<usize>, out: &mut Found) {
         out.hits.clear();
         out.pairs.clear();
+        out.ends.clear();
+        let mut scratch = Vec::new();
         for v in range {
-            let hits = self.vertex(v, &mut out.pairs);
-            out.hits.push(hits);
+            self.vertex(v, out, &mut scratch);
+            out.ends.push(out.hits.len() as u32);
         }
     }
 
-    fn vertex(&self, v: usize, pairs: &mut Vec<Pair>) -> [Hit; 2] {
-        let mut hits = [NO_HIT; 2];
+    fn vertex(&self, v: usize, out: &mut Found, scratch: &mut Vec<Hit>) {
         let all = self.all;
         let own = all.owner[v];
         let base = all.first[own as usize];
-        let m = &self.model.garments[own as usize].self_contact;
+        let m = &self.model.garments[own as usize].self_contact.surface;
         let local = v as u32 - base;
         let x = all.x[v];
-        let normal = self.sheets[own as usize].surface.normals[local as usize];
-        let excluded = if self.model.config.tune.x[3] > 0.0 {
-            m.surface.neighbours(local)
-        } else {
-            m.excluded(local)
-        };
-        let mut best = [(self.corner * self.corner, NONE); 2];
-        all.grid.within(&x, self.corner, |w, d| {
+        let ring = m.neighbours(local);
+        let stuck = &self.state.garments[own as usize].intersecting;
+        if stuck.binary_search(&local).is_ok() {
+            return;
+        }
+        scratch.clear();
+        all.grid.within(&x, self.corner, |w, _| {
             let other = all.owner[w as usize];
-            if w == v as u32 || other == own && excluded.contains(&(w - base)) {
+            if other == own && (w == v as u32 || ring.contains(&(w - base))) {
                 return;
             }
-            let side = usize::from(normal.dot(&(all.x[w as usize] - x)) > 0.0);
-            if (d, w) < best[side] {
-                best[side] = (d, w);
-            }
+            let g = &self.model.garments[other as usize].self_contact.surface;
+            scratch.extend(g.faces_around(w - all.first[other as usize]).iter().map(|f| Hit {
+                garment: other,
+                face: *f,
+            }));
         });
-        if best[0].1 == NONE && best[1].1 == NONE {
-            return hits;
+        if scratch.is_empty() {
+            return;
         }
-        let is_stuck = |g: u32, v: u32| {
-            self.state.garments[g as usize].intersecting.binary_search(&v).is_ok()
-        };
-        if is_stuck(own, local) {
-            return hits;
-        }
-        for (side, (_, w)) in best.iter().enumerate() {
-            if *w == NONE {
+        scratch.sort_unstable_by_key(|h| (h.garment, h.face));
+        scratch.dedup_by_key(|h| (h.garment, h.face));
+        // Of the points on edges and corners the nearest counts.
+        let mut nearest = (f32::INFINITY, None);
+        for h in scratch.iter() {
+            let g = &self.model.garments[h.garment as usize].self_contact.surface;
+            let first = all.first[h.garment as usize];
+            let corners = g.faces()[h.face as usize];
+            let c = corners.map(|c| c + first);
+            if c.contains(&(v as u32)) {
                 continue;
             }
-            let other = all.owner[*w as usize] as usize;
-            let g = &self.model.garments[other].self_contact.surface;
-            let frame = &self.sheets[other].surface;
-            let hit = g.closest_around(frame, &x, w - all.first[other], u8::MAX);
-            let corners = g.faces()[hit.face as usize];
-            let d = hit.signed_distance.abs();
-            let c = corners.map(|c| c + all.first[other]);
-            let n = (hit.point - x) / d.max(SHORTEST);
-            let other_velocity = (0..3).fold(V3::zeros(), |u, k| {
-                u + all.velocity[c[k] as usize] * hit.weights[k]
-            });
-            if d >= self.reach_at(n.dot(&(all.velocity[v] - other_velocity))) {
+            let at = c.map(|c| all.x[c as usize]);
+            let w = closest_on_triangle(&x, at);
+            let point = at[0].coords * w[0] + at[1].coords * w[1] + at[2].coords * w[2];
+            let n = point - x.coords;
+            let d = n.norm();
+            if d >= self.farthest.max(self.reach) {
                 continue;
             }
-            if other == own as usize {
-                let near = m.surface.neighbours(local);
-                if corners.contains(&local) {
-                    continue;
-                }
-                let is_near = corners.iter().any(|c| near.contains(c));
-                let folded = || {
-                    let normals = &frame.normals;
-                    let face = corners.iter().fold(V3::zeros(), |s, c| s + normals[*c as usize]);
-                    face.dot(&normal) < 0.0
-                };
-                if is_near && (self.model.config.tune.x[3] <= 0.0 || !folded()) {
+            let n = n / d.max(SHORTEST);
+            let u = (0..3).fold(V3::zeros(), |u, k| u + all.velocity[c[k] as usize] * w[k]);
+            if d >= self.reach_at(n.dot(&(all.velocity[v] - u))) {
+                continue;
+            }
+            if h.garment == own && corners.iter().any(|c| ring.contains(c)) {
+                let normals = &self.sheets[own as usize].surface.normals;
+                let face = corners.iter().fold(V3::zeros(), |s, c| s + normals[*c as usize]);
+                if face.dot(&normals[local as usize]) >= 0.0 {
                     continue;
                 }
             }
-            hits[side] = Hit {
-                garment: other as u32,
-                face: hit.face,
-            };
-            if d < SHORTEST || g.is_on_border(&hit) {
+            out.hits.push(*h);
+            if d <= SHORTEST {
                 continue;
             }
-
-            pairs.push(Pair {
+            let pair = Pair {
                 vertices: [v as u32, c[0], c[1], c[2]],
                 below: 1,
                 normal: n,
-            });
+            };
+            if w.iter().all(|w| *w > MIN_WEIGHT) {
+                out.pairs.push(pair);
+            } else if d < nearest.0 && !g.is_border_point(h.face, w) {
+                nearest = (d, Some(pair));
+            }
         }
-        hits
+        out.pairs.extend(nearest.1);
     }
 
     /// Two edges belong to one ring that is not folded.
@@ -482,7 +485,7 @@ impl Search<'_> {
     }
 
     /// Pairs of edges.
-    fn edges(&self, hits: &[[Hit; 2]], range: std::ops::Range<usize>, out: &mut Vec<Pair>) {
+    fn edges(&self, hits: &[Hit], ends: &[u32], range: std::ops::Range<usize>, out: &mut Vec<Pair>) {
         let all = self.all;
         let mut near: Vec<[u32; 2]> = Vec::new();
         for v in range {
@@ -495,10 +498,8 @@ impl Search<'_> {
                     continue;
                 }
                 near.clear();
-                for h in hits[v].iter().chain(&hits[w]) {
-                    if h.face == NONE {
-                        continue;
-                    }
+                let of = |v: usize| &hits[ends[v] as usize..ends[v + 1] as usize];
+                for h in of(v).iter().chain(of(w)) {
                     let g = &self.model.garments[h.garment as usize].self_contact.surface;
                     let base = all.first[h.garment as usize];
                     let c = g.faces()[h.face as usize].map(|c| c + base);
