@@ -99,9 +99,10 @@ fn a_long_sleeve_stays_whole_around_an_elbow_that_folds() {
 }
 
 #[test]
-fn trousers_of_someone_who_squats_come_down_again_and_pass_through_themselves_less() {
+fn trousers_of_someone_who_squats_come_down_again_and_hardly_pass_through_themselves() {
+    // Contact of vertices and faces only left more than 200 crossings in the mean, two thirds of them with fold limits.
     let joints = [("hip", -1.3), ("knee", 1.7)];
-    let [free, braced] = [0.0, Config::default().min_fold_ratio].map(|sharpest| {
+    for sharpest in [0.0, Config::default().min_fold_ratio] {
         let (reports, crossed, [before, after]) = bend("trousers", &joints, sharpest);
         let lowest = |x: &[P3]| x.iter().fold(f32::MAX, |l, p| l.min(p.y));
         let mean = crossed[..CALLS].iter().sum::<usize>() / CALLS;
@@ -112,14 +113,13 @@ fn trousers_of_someone_who_squats_come_down_again_and_pass_through_themselves_le
         );
         assert!(lowest(&after) - lowest(&before) < 0.05);
         assert!(p99 < 0.3, "{p99}");
-        mean
-    });
-    assert!(free > 200 && 3 * braced < 2 * free, "{free} {braced}");
+        assert!(mean < 20, "{mean}");
+    }
 }
 
 #[test]
 fn what_a_deep_squat_pushed_through_itself_is_ironed_out() {
-    // Thighs on the belly, 126°. Without ironing 608, 189 and 187 crossings were left for good.
+    // Thighs on the belly, 126°. Contact of vertices and faces only left 608, 189 and 187 crossings for good without ironing.
     let left = ["skirt", "shorts", "trousers"].map(|garment| {
         let (_, crossed, _) = bend(
             garment,
@@ -133,7 +133,7 @@ fn what_a_deep_squat_pushed_through_itself_is_ironed_out() {
         println!("{garment}: {most} crossings at most, {left} after a second of standing");
         left
     });
-    assert!(left.iter().sum::<usize>() < 300, "{left:?}");
+    assert!(left.iter().sum::<usize>() < 100, "{left:?}");
 }
 
 #[test]

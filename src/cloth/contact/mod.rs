@@ -1,9 +1,9 @@
-//! Contact generation for worn garments: against the body, other layers and their own folds.
+//! Contact generation for worn garments: against the body, and of cloth with cloth.
 
 pub(super) mod anchor;
 pub(super) mod body_contact;
 pub(super) mod chunk;
-pub(super) mod cloth_contact;
-pub(super) mod layer_height;
+mod near_pairs;
+pub(super) mod pair_contact;
 pub(crate) mod self_contact;
 pub(super) mod skin_projection;
