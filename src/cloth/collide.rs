@@ -10,8 +10,8 @@ use super::workspace::Workspace;
 use crate::contact::SurfaceFrame;
 use crate::par::{self, Par};
 
-/// Stretch ratio above which cloth is exempt from fold and speed limits: held open in an armpit, sleeves tear (p99 0.26
-/// instead of 0.16).
+/// Stretch ratio above which cloth is exempt from fold and speed limits and gives way to other garments: held open in an
+/// armpit, sleeves tear (p99 0.26 instead of 0.16); held between hips and shirt, a skirt does (decision 071).
 const TAUT: f32 = 1.15;
 /// Stretch ratio above which contact constraints are released: more than knitwear is worn at.
 const OVERSTRETCHED: f32 = 1.5;

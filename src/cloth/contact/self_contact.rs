@@ -136,18 +136,12 @@ impl SelfContactModel {
     }
     /// Query of a sheet whose points approach each other by at most `motion` metres until the next one.
     pub(crate) fn search_all(&self, thickness: f32, motion: f32) -> Search {
-        self.with_reach(
-            thickness,
-            (thickness + motion).min(REACH_EDGES * self.edge),
-            MARGIN_EDGES * self.edge,
-        )
-    }
-    fn with_reach(&self, thickness: f32, reach: f32, margin: f32) -> Search {
+        let reach = (thickness + motion).min(REACH_EDGES * self.edge);
+        let margin = MARGIN_EDGES * self.edge;
         // The nearest corner of an equilateral triangle is at most its circumradius beside the closest point.
         let beside = self.edge / 3f32.sqrt();
-        let thickness = thickness.min(THICKNESS_EDGES * self.edge);
         Search {
-            thickness,
+            thickness: thickness.min(THICKNESS_EDGES * self.edge),
             reach,
             needed: reach.hypot(beside),
             corner: (reach + margin).hypot(beside),
