@@ -2,6 +2,7 @@
 
 use super::contact::anchor::pin_anchors;
 use super::contact::body_contact::BodyContacts;
+use super::contact::cloth_contact::{ClothContacts, gather_sheets};
 use super::outfit_model::Model;
 use super::patch::for_patches;
 use super::solver::explicit::{Exemptions, FoldActivation, FoldLimit};
@@ -10,8 +11,8 @@ use super::workspace::Workspace;
 use crate::contact::SurfaceFrame;
 use crate::par::{self, Par};
 
-/// Stretch ratio above which cloth is exempt from fold and speed limits and gives way to other garments: held open in an
-/// armpit, sleeves tear (p99 0.26 instead of 0.16); held between hips and shirt, a skirt does (decision 071).
+/// Stretch ratio above which cloth is exempt from fold and speed limits: held open in an armpit, sleeves tear (p99 0.26
+/// instead of 0.16).
 const TAUT: f32 = 1.15;
 /// Stretch ratio above which contact constraints are released: more than knitwear is worn at.
 const OVERSTRETCHED: f32 = 1.5;
@@ -28,7 +29,7 @@ pub(super) struct CollideInterval {
     pub(super) fastest: f32,
 }
 
-/// Generates anchors, fold limits, contact planes and near pairs of cloth at the beginning of an interval.
+/// Generates anchors, fold limits and contact planes at the beginning of an interval.
 pub(super) fn collide(
     model: &Model,
     state: &State,
@@ -42,7 +43,7 @@ pub(super) fn collide(
         patches,
         chunks,
         body,
-        pairs,
+        sheets,
         ..
     } = work;
     let (par, after) = (model.config.par, state.body.frame());
@@ -58,8 +59,15 @@ pub(super) fn collide(
         fastest: interval.fastest,
         span,
         frames: state.frames,
+        layer_heights: &work.layer_heights,
         garments: &state.garments,
         maps: (index == 0).then_some(&work.maps),
+    };
+    gather_sheets(model, patches, span, sheets);
+    let cloth = ClothContacts {
+        model,
+        sheets,
+        span,
     };
     for_patches(model, patches, |g, k, p| {
         pin_anchors(model, g, k, &contacts, p);
@@ -78,10 +86,10 @@ pub(super) fn collide(
         FoldLimit::find_active(patch, &p.motion, &activation, &mut p.fold_limits);
     });
     let patches = &*patches;
-    pairs.query(model, state, patches, span);
     par::for_chunks(par, chunks, 1, |_, c| {
         let c = &mut c[0];
         contacts.generate(&patches[c.at], c);
+        cloth.generate(&patches[c.at], c);
     });
 }
 

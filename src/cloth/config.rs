@@ -25,11 +25,11 @@ pub struct Config {
     pub camera_toward: [f32; 2],
     /// Resolution of the depth maps of the body.
     pub map_detail: MapDetail,
-    /// Keep garments apart.
+    /// Keep inner layers below outer ones.
     pub layers: bool,
     /// Keep the folds of a garment apart.
     pub self_collision: bool,
-    /// Room for a second layer between body parts that press on each other, metres.
+    /// Distance between cloth and cloth, metres.
     pub thickness: f64,
     /// Margin of the skin query beyond a garment's distance and motion, metres; larger while panels are sewn.
     pub reach: f64,
@@ -45,7 +45,7 @@ pub struct Config {
     /// Least distance of two corners across an edge, over that of the flat sheet: ½ lets a fold close to 60°, 0 any.
     #[serde(rename = "sharpest")]
     pub min_fold_ratio: f64,
-    /// Skip queries of vertices that cannot have come near skin since their last one.
+    /// Skip queries of vertices that cannot have come near skin or folds since their last one.
     #[serde(rename = "skip_far")]
     pub cull_distant: bool,
     /// Mean displacement of the body in a step beyond which it has teleported, metres.

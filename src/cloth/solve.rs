@@ -1,13 +1,11 @@
 //! Solve stage: explicit substeps of all patches through one interval.
 
 use super::contact::chunk::ContactChunk;
-use super::contact::pair_contact::{Block, PairContacts};
 use super::garment_model::GarmentModel;
 use super::outfit_model::Model;
-use super::patch::{PatchWork, for_patches};
+use super::patch::PatchWork;
 use super::solver::explicit::{Exemptions, FoldLimit, Substep, V4, run_substeps};
 use crate::par;
-use std::ops::Range;
 
 /// Speed limit of cloth, m/s: keeps one bad frame from becoming many.
 const MAX_SPEED: f32 = 12.0;
@@ -32,40 +30,12 @@ pub(super) fn substeps(m: &GarmentModel, span: f64) -> usize {
     (span / m.h).ceil().max(1.0) as usize
 }
 
-/// Contacts of an interval.
-pub(super) struct SolveContacts<'a> {
-    pub(super) chunks: &'a [ContactChunk],
-    pub(super) pairs: &'a mut PairContacts,
-}
-
-/// Advances all patches through an interval, block by block. Garments are independent within a block, patches of one
-/// garment exchange halos.
+/// Advances all patches through an interval. Garments are independent, patches of one garment exchange halos.
 pub(super) fn solve(
     model: &Model,
     all: &mut [PatchWork],
-    contacts: SolveContacts<'_>,
-    interval: Interval,
-) {
-    let SolveContacts { chunks, pairs } = contacts;
-    let blocks = Block::count(interval.span);
-    let span = (interval.span / blocks as f64) as f32;
-    for index in 0..blocks {
-        if index > 0 {
-            pairs.advance(model, all, span);
-        }
-        let t = index as f32 * span;
-        pairs.lay(model, all, chunks, Block { t, span });
-        for_patches(model, all, |g, k, p| pairs.planes(model, g, k, p));
-        solve_block(model, all, chunks, (interval, [index, blocks]));
-    }
-}
-
-/// Advances all patches through one of some equal blocks.
-fn solve_block(
-    model: &Model,
-    all: &mut [PatchWork],
     chunks: &[ContactChunk],
-    (interval, [index, blocks]): (Interval, [usize; 2]),
+    interval: Interval,
 ) {
     let mut rest = all;
     let mut garments = Vec::with_capacity(model.garments.len());
@@ -83,11 +53,11 @@ fn solve_block(
             garment: g,
             chunks,
             interval,
-            range: n * index / blocks..n * (index + 1) / blocks,
+            substeps: n,
             h: (interval.span / n as f64) as f32,
         };
         let par = model.config.par;
-        run_substeps(par, &m.patches, patches, solver.range.len(), |s, k, p| {
+        run_substeps(par, &m.patches, patches, n, |s, k, p| {
             solver.substep(s, k, p)
         });
     });
@@ -100,22 +70,21 @@ struct GarmentSolver<'a> {
     garment: usize,
     chunks: &'a [ContactChunk],
     interval: Interval,
-    /// Substeps of the block among those of the interval.
-    range: Range<usize>,
+    substeps: usize,
     /// Substep, s.
     h: f32,
 }
 
 impl GarmentSolver<'_> {
-    /// Substep `s` of the block in patch `k`.
+    /// Substep `s` of patch `k`.
     fn substep(&self, s: usize, k: usize, p: &mut PatchWork) {
         let (f, h, every) = (&self.m.patches[k], self.h, self.m.bending_interval);
-        let t = (self.range.start + s) as f32 * h;
+        let t = s as f32 * h;
         if s.is_multiple_of(PLANE_INTERVAL * every) {
             self.select_planes(s, k, p);
         }
         if s.is_multiple_of(every) {
-            let lookahead = h * every.min(self.range.len() - s) as f32 * 0.5;
+            let lookahead = h * every.min(self.substeps - s) as f32 * 0.5;
             p.motion.update_bending(f, lookahead, self.m.filter_degree);
         }
         let [x, y, z] = self.model.config.gravity.map(|g| g as f32);
@@ -129,11 +98,10 @@ impl GarmentSolver<'_> {
         p.motion.integrate_velocities(f, &step, &p.planes, &p.pins);
         p.motion.apply_pins(&p.pins, t, h);
         FoldLimit::apply(&p.fold_limits, &mut p.motion, h);
-        // Cloth holds once more after the body: what it passes stays passed, what is below the skin comes out later.
+        // The body has the last word.
         let (body, cloth) = p.planes.split_at(p.body_planes);
         p.motion.resolve_contacts(cloth, t, h, CLOTH_RECOVERY);
         p.contacts = p.motion.resolve_contacts(body, t, h, BODY_RECOVERY);
-        p.motion.hold_contacts(cloth, t, h);
         if let Some(limit) = self.interval.speed_limit {
             let exempt = Exemptions {
                 fixed: &p.pinned,
@@ -146,9 +114,8 @@ impl GarmentSolver<'_> {
 
     /// Selects the planes that vertices can reach until the next selection.
     fn select_planes(&self, s: usize, k: usize, p: &mut PatchWork) {
-        let steps = (PLANE_INTERVAL * self.m.bending_interval).min(self.range.len() - s);
-        let t = (self.range.start + s) as f32 * self.h;
-        let span = steps as f32 * self.h;
+        let steps = (PLANE_INTERVAL * self.m.bending_interval).min(self.substeps - s);
+        let (t, span) = (s as f32 * self.h, steps as f32 * self.h);
         let is_own = |c: &&ContactChunk| (c.garment, c.patch) == (self.garment, k);
         let (motion, planes) = (&p.motion, &mut p.planes);
         planes.clear();
@@ -156,6 +123,8 @@ impl GarmentSolver<'_> {
             motion.find_reachable(&c.body_planes, t, span, planes);
         }
         p.body_planes = planes.len();
-        motion.find_reachable(&p.cloth_planes, t, span, planes);
+        for c in self.chunks.iter().filter(is_own) {
+            motion.find_reachable(&c.cloth_planes, t, span, planes);
+        }
     }
 }

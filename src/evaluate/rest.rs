@@ -14,8 +14,6 @@ use std::time::Instant;
 
 /// Time of a step (s).
 const DT: f64 = 1.0 / 30.0;
-/// Steps that an outfit settles after dressing, awake: its drape ends centimetres off its rest where layers meet.
-const SETTLING: usize = 90;
 /// Steps before anything moves: long enough to fall asleep.
 const QUIET: usize = 60;
 
@@ -79,34 +77,12 @@ impl RestingSubject {
         let dressed = outfit
             .dress(&template, &rest, &standing, |_| Ok(Size::M))
             .map_err(fault)?;
-        let mut new = Self {
+        Ok(Self {
             template,
             rest,
             standing,
             dressed,
-        };
-        new.settle()?;
-        Ok(new)
-    }
-    /// Steps the outfit on the resting body until it hangs, never asleep.
-    fn settle(&mut self) -> Result<(), EvaluateError> {
-        let body = self.body(Motion::Standing, 0.0);
-        let Dressed { model, state, .. } = &mut self.dressed;
-        let config = model.config().clone();
-        model.replace_config(Config {
-            sleep: false,
-            ..config.clone()
-        });
-        let mut work = Workspace::default();
-        for _ in 0..SETTLING {
-            let input = Input {
-                body: &body,
-                dt: DT,
-            };
-            step(model, state, &input, &mut work).map_err(fault)?;
-        }
-        model.replace_config(config);
-        Ok(())
+        })
     }
     /// Skin at a time since the motion began (s), world coordinates (m).
     pub fn body(&self, motion: Motion, time: f64) -> Vec<P3> {

@@ -6,7 +6,7 @@ use nalgebra::UnitQuaternion;
 use rand::{Rng, SeedableRng};
 use std::sync::OnceLock;
 use tryon::body::{BodyShape, Pose, RestBody};
-use tryon::cloth::{Config, GarmentState, Input, Model, State, StepReport, Workspace, step};
+use tryon::cloth::{Config, Input, Model, State, StepReport, Workspace, step};
 use tryon::dressing::{DressOptions, dress};
 use tryon::garment::{Size, Triangulation, library};
 use tryon::math::{Body, P3, Rigid, V3, V3d, World, log_so3};
@@ -243,21 +243,9 @@ fn cloth_on_a_body_that_trembles_sleeps_and_wakes() {
 }
 
 /// A standing subject sways by a centimetre: cloth stays asleep, follows the skin, and ends where computed cloth would.
-/// Outfits of one edge length that swayed with a body for ten seconds.
-struct Swayed {
-    asleep: State,
-    awake: State,
-    /// The body at the end, metres.
-    body: Vec<P3>,
-    /// Calls in which cloth slept, if it might and if not.
-    slept: [usize; 2],
-}
-
-fn swayed(edge: f64) -> Swayed {
-    let template = tryon::body::embedded::template();
-    let rest = template.personalise(&BodyShape::default());
-    let pose = Pose::rest(template.skeleton(), Rigid::<World, Body>::identity());
-    let mut d = dressed_as(&rest, &pose, Size::M, edge, &Config::tracked());
+#[test]
+fn cloth_on_a_body_that_sways_rides_asleep() {
+    let mut d = dressed(&Config::tracked());
     let body = d.body.clone();
     let swaying = |i: u32| {
         let t = i as f32 / 30.0;
@@ -267,61 +255,42 @@ fn swayed(edge: f64) -> Swayed {
             .map(|p| p + by * (1.0 + 0.5 * p.y))
             .collect::<Vec<_>>()
     };
-    let set = |d: &mut Dressed, sleep: bool| {
-        d.model.replace_config(Config {
-            sleep,
-            ..Config::tracked()
-        });
-    };
-    // Settled first: its drape ends centimetres off its rest where layers meet.
-    set(&mut d, false);
-    let mut work = Workspace::default();
-    for _ in 0..90 {
-        step_on(&d.model, &mut d.state, &swaying(0), &mut work).expect("a step");
-    }
-    let [(asleep, slept), (awake, never)] = [true, false].map(|sleep| {
-        set(&mut d, sleep);
+    let mut run = |sleep: bool| {
+        let config = d.model.config().clone();
+        d.model.replace_config(Config { sleep, ..config });
         let (mut state, mut work, mut slept) = (d.state.clone(), Workspace::default(), 0);
         for i in 0..300 {
             let r = step_on(&d.model, &mut state, &swaying(i), &mut work).expect("a step");
             slept += usize::from(r.sleeping > 0);
         }
         (state, slept)
-    });
-    Swayed {
-        asleep,
-        awake,
-        body: swaying(299),
-        slept: [slept, never],
-    }
-}
-
-#[test]
-fn cloth_on_a_body_that_sways_rides_asleep() {
+    };
+    let ((asleep, slept), (awake, never)) = (run(true), run(false));
+    let off = asleep
+        .garments
+        .iter()
+        .zip(&awake.garments)
+        .flat_map(|(a, b)| a.positions.iter().zip(&b.positions));
+    let off: Vec<f64> = off
+        .map(|(p, q)| f64::from((p - q).norm_squared()))
+        .collect();
+    let rms = (off.iter().sum::<f64>() / off.len() as f64).sqrt() * 1e3;
+    println!("slept {slept} of 300 calls, {rms:.1} mm from cloth that never did");
+    assert!(slept > 200 && never == 0, "{slept}");
+    assert!(rms < 5.0, "{rms} mm");
     let faces = tryon::body::embedded::template().mesh().faces().to_vec();
-    // A wave of a hem may stand out or in, and takes the other side by chance: the mean of some edge lengths.
-    let apart = [0.033, 0.035, 0.037].map(|edge| {
-        let s = swayed(edge);
-        let [slept, never] = s.slept;
-        assert!(slept > 200 && never == 0, "{slept}");
-        let deep = |state: &State| -> usize {
-            let under = |g: &GarmentState| under_the_skin(&g.positions, &s.body, &faces);
-            state.garments.iter().map(under).sum()
-        };
-        let [asleep, awake] = [deep(&s.asleep), deep(&s.awake)];
-        assert!(
-            asleep <= awake + 2,
-            "{asleep} against {awake} vertices under the skin"
-        );
-        let pairs = s.asleep.garments.iter().zip(&s.awake.garments);
-        let off: Vec<f64> = pairs
-            .flat_map(|(a, b)| a.positions.iter().zip(&b.positions))
-            .map(|(p, q)| f64::from((p - q).norm_squared()))
-            .collect();
-        (off.iter().sum::<f64>() / off.len() as f64).sqrt()
-    });
-    println!("{apart:.4?} m from cloth that never slept");
-    assert!(apart.iter().sum::<f64>() < 3.0 * 0.01, "{apart:?}");
+    let deep = |s: &State| {
+        s.garments
+            .iter()
+            .map(|g| under_the_skin(&g.positions, &swaying(299), &faces))
+            .sum::<usize>()
+    };
+    assert!(
+        deep(&asleep) <= deep(&awake) + 2,
+        "{} against {} vertices under the skin",
+        deep(&asleep),
+        deep(&awake)
+    );
 }
 
 /// Parameter at which a ray meets a triangle, in lengths of its direction (Möller and Trumbore).
@@ -459,7 +428,7 @@ fn a_heavy_body_with_its_arms_down_keeps_its_sleeves() {
         let at = skeleton.dof_offset(j);
         pose.angles[at..at + 3].copy_from_slice(log_so3(&turn).as_slice());
     }
-    // One length of edges is a throw of dice: 0.15 to 0.39 and 0.7 to 2.7; over ten lengths 0.21 and 1.1 in the mean.
+    // One length of edges is a throw of dice: 0.15 to 0.30, over nine lengths 0.22 in the mean.
     let stretch = [0.028, 0.03, 0.032].map(|edge| {
         let d = dressed_as(&rest, &pose, Size::Xl, edge, &Config::default());
         let (mut state, mut work) = (d.state.clone(), Workspace::default());
@@ -473,10 +442,10 @@ fn a_heavy_body_with_its_arms_down_keeps_its_sleeves() {
             last.p99_strain, last.max_strain, last.buried
         );
         assert!(last.buried > 50, "{}", last.buried);
+        assert!(last.max_strain < 2.0, "{}", last.max_strain);
         assert!(last.penetration_left < 2e-3, "{}", last.penetration_left);
-        [last.p99_strain, last.max_strain]
+        last.p99_strain
     });
-    let [p99, most] = [0, 1].map(|k| stretch.iter().map(|s| s[k]).sum::<f64>() / 3.0);
     // Its layers are apart in the armpits, where there is no room for them.
-    assert!(p99 < 0.25 && most < 2.0, "{stretch:?}");
+    assert!(stretch.iter().sum::<f64>() < 3.0 * 0.25, "{stretch:?}");
 }

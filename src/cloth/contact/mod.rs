@@ -1,9 +1,9 @@
-//! Contact generation for worn garments: against the body, and of cloth with cloth.
+//! Contact generation for worn garments: against the body, other layers and their own folds.
 
 pub(super) mod anchor;
 pub(super) mod body_contact;
 pub(super) mod chunk;
-mod near_pairs;
-pub(super) mod pair_contact;
+pub(super) mod cloth_contact;
+pub(super) mod layer_height;
 pub(crate) mod self_contact;
 pub(super) mod skin_projection;

@@ -8,8 +8,6 @@ use crate::math::P3;
 
 /// Height above the skin to which cloth is projected, metres: less than a fabric's thickness.
 const HEIGHT: f32 = 5e-4;
-/// Depth at which cloth above may hold what is below the skin, metres.
-const MAX_HELD_DEPTH: f32 = 0.001;
 /// Depth in another body part beyond which cloth stays, metres: it may have come from the other side.
 const MAX_OTHER_DEPTH: f32 = 0.01;
 
@@ -18,8 +16,6 @@ pub(in crate::cloth) struct SkinProjection<'a> {
     pub(in crate::cloth) model: &'a Model,
     pub(in crate::cloth) body: &'a CollisionBody,
     pub(in crate::cloth) grid: &'a SkinGrid,
-    /// Time since the contact planes were generated, s.
-    pub(in crate::cloth) since_query: f32,
 }
 
 impl SkinProjection<'_> {
@@ -89,15 +85,10 @@ impl SkinProjection<'_> {
                 continue;
             }
             c.report.penetration = c.report.penetration.max(f64::from(depth));
-            let target = v4(&(hit.point + hit.normal * HEIGHT).coords);
-            x = p.held_by_cloth(i, target, self.since_query).point();
-            let mut left = surface.closest(skin, &x, hit.vertex, masks[side]);
-            if -left.signed_distance > MAX_HELD_DEPTH {
-                x = left.point - left.normal * MAX_HELD_DEPTH;
-                left = surface.closest(skin, &x, left.vertex, masks[side]);
-            }
-            c.projected
-                .push((i as u32, v4(&x.coords) - p.motion.start[i]));
+            let moved = v4(&(hit.point + hit.normal * HEIGHT - p.motion.start[i].point()));
+            c.projected.push((i as u32, moved));
+            x = (p.motion.start[i] + moved).point();
+            let left = surface.closest(skin, &x, hit.vertex, masks[side]);
             let left = f64::from(-left.signed_distance);
             c.report.penetration_left = c.report.penetration_left.max(left);
             near = candidates(&x);
