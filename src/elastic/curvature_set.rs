@@ -5,6 +5,7 @@ use super::edges::InteriorEdge;
 use super::element_set::CHUNK;
 use super::fan_expansion::{CurvatureBuffers, FanExpansion, Place};
 use super::fans::RestMesh;
+use super::rows::Rows;
 use super::{BendLaw, Dihedral, ElasticExpansion, RestSheet, RestTriangle, SheetMotion};
 use crate::par::{Par, for_chunks, map_into};
 use nalgebra::{Matrix3, Vector3};
@@ -42,8 +43,8 @@ struct FanCurvature {
 pub(super) struct CurvatureSet {
     hinges: Vec<RestHinge>,
     fans: Vec<FanCurvature>,
-    at_vertices: Vec<Vec<Place>>,
-    at_pairs: Vec<Vec<Place>>,
+    at_vertices: Rows<Place>,
+    at_pairs: Rows<Place>,
 }
 
 impl CurvatureSet {
@@ -94,18 +95,19 @@ impl CurvatureSet {
     }
     /// Makes the lists of sums over `vertices` vertices and sorted `pairs`.
     pub(super) fn list(&mut self, vertices: usize, pairs: &[[u32; 2]]) {
-        self.at_vertices = vec![Vec::new(); vertices];
-        self.at_pairs = vec![Vec::new(); pairs.len()];
+        let (mut at_vertices, mut at_pairs) = (Vec::new(), Vec::new());
         for (number, fan) in self.fans.iter().enumerate() {
             for (a, &i) in fan.vertices.iter().enumerate() {
-                self.at_vertices[i as usize].push((number as u32, a as u16, a as u16));
+                at_vertices.push((i, (number as u32, a as u16, a as u16)));
                 for (b, &j) in fan.vertices.iter().enumerate().filter(|(_, j)| i < **j) {
                     if let Ok(row) = pairs.binary_search(&[i, j]) {
-                        self.at_pairs[row].push((number as u32, a as u16, b as u16));
+                        at_pairs.push((row as u32, (number as u32, a as u16, b as u16)));
                     }
                 }
             }
         }
+        self.at_vertices = Rows::new(vertices, at_vertices);
+        self.at_pairs = Rows::new(pairs.len(), at_pairs);
     }
     /// Energy (J).
     pub(super) fn energy(&self, law: &BendLaw, par: Par, at: &SheetMotion<'_>) -> f64 {
@@ -145,7 +147,7 @@ impl CurvatureSet {
         out.value += fans.iter().map(|f| f.value).sum::<f64>();
         for_chunks(par, &mut out.gradient, CHUNK, |start, chunk| {
             for (k, g) in chunk.iter_mut().enumerate() {
-                for &(fan, a, _) in &self.at_vertices[start + k] {
+                for &(fan, a, _) in self.at_vertices.row(start + k) {
                     *g += fans[fan as usize].gradient[a as usize];
                 }
             }
@@ -156,7 +158,7 @@ impl CurvatureSet {
         ] {
             for_chunks(par, sums, CHUNK, |start, chunk| {
                 for (k, sum) in chunk.iter_mut().enumerate() {
-                    for place in &lists[start + k] {
+                    for place in lists.row(start + k) {
                         *sum += fans[place.0 as usize].block(place);
                     }
                 }
@@ -201,7 +203,10 @@ impl FanCurvature {
         }
         let w = law.expand(&curvature) * self.area;
         out.value = w.value;
-        out.tangent = w.positive_hessian();
+        let tangent = w.positive_hessian();
+        out.moments.clear();
+        out.moments
+            .extend(out.by_vertex.iter().map(|j| tangent * j));
         out.gradient.clear();
         out.gradient
             .extend(out.by_vertex.iter().map(|j| j.tr_mul(&w.gradient)));

@@ -2,6 +2,7 @@
 
 use super::ElasticExpansion;
 use super::packed::Packed;
+use super::rows::Rows;
 use crate::math::V3d;
 use crate::par::{Par, map_into};
 
@@ -19,41 +20,13 @@ struct Term {
     transposed: bool,
 }
 
-/// Lists of terms, one list a row.
-#[derive(Clone, Debug, Default)]
-struct Terms {
-    offsets: Vec<u32>,
-    terms: Vec<Term>,
-}
-
-impl Terms {
-    /// Sorts terms by row, stable.
-    fn new(rows: usize, mut all: Vec<(u32, Term)>) -> Self {
-        all.sort_by_key(|(row, _)| *row);
-        let mut offsets = vec![0u32; rows + 1];
-        for (row, _) in &all {
-            offsets[*row as usize + 1] += 1;
-        }
-        for i in 0..rows {
-            offsets[i + 1] += offsets[i];
-        }
-        Self {
-            offsets,
-            terms: all.into_iter().map(|(_, t)| t).collect(),
-        }
-    }
-    fn row(&self, i: usize) -> &[Term] {
-        &self.terms[self.offsets[i] as usize..self.offsets[i + 1] as usize]
-    }
-}
-
 /// Vertices of the elements of one kind and the lists that sum their expansions.
 #[derive(Clone, Debug)]
 pub(super) struct ElementSet<const K: usize, const P: usize> {
     vertices: Vec<[u32; K]>,
-    gradient: Terms,
-    diagonal: Terms,
-    off_diagonal: Terms,
+    gradient: Rows<Term>,
+    diagonal: Rows<Term>,
+    off_diagonal: Rows<Term>,
 }
 
 /// Pairs of different vertices that share an element, smaller first, with repetitions.
@@ -106,9 +79,9 @@ impl<const K: usize, const P: usize> ElementSet<K, P> {
         }
         Self {
             vertices,
-            gradient: Terms::new(count, gradient),
-            diagonal: Terms::new(count, diagonal),
-            off_diagonal: Terms::new(pairs.len(), off_diagonal),
+            gradient: Rows::new(count, gradient),
+            diagonal: Rows::new(count, diagonal),
+            off_diagonal: Rows::new(pairs.len(), off_diagonal),
         }
     }
     /// Number of elements.

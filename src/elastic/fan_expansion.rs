@@ -11,8 +11,8 @@ pub(super) struct FanExpansion {
     pub(super) gradient: Vec<V3d>,
     /// Jᵢ, the curvature by the position of vertex i (1/m²).
     pub(super) by_vertex: Vec<Matrix3<f64>>,
-    /// C, the tangent times the area (N·m³).
-    pub(super) tangent: Matrix3<f64>,
+    /// C Jᵢ (N·m), C being the tangent times the area.
+    pub(super) moments: Vec<Matrix3<f64>>,
 }
 
 /// Buffers of an expansion.
@@ -28,7 +28,6 @@ pub(super) type Place = (u32, u16, u16);
 impl FanExpansion {
     /// Block of the Hessian of two of the fan's vertices.
     pub(super) fn block(&self, &(_, a, b): &Place) -> Matrix3<f64> {
-        let (a, b) = (&self.by_vertex[a as usize], &self.by_vertex[b as usize]);
-        a.tr_mul(&(self.tangent * b))
+        self.by_vertex[a as usize].tr_mul(&self.moments[b as usize])
     }
 }

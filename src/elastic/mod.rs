@@ -19,6 +19,7 @@ mod membrane;
 mod model;
 mod packed;
 mod rest_sheet;
+mod rows;
 mod stretch_law;
 #[cfg(test)]
 mod test_cantilever;

@@ -280,7 +280,7 @@ fn principal_axes(spread: &Matrix3<f64>) -> [Vector3<f64>; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear::{BlockJacobi, StopCriterion, TwoLevel, conjugate_gradient};
+    use crate::linear::{BlockJacobi, CgAccuracy, StopCriterion, TwoLevel, conjugate_gradient};
 
     /// Springs along a grid of n × n vertices, held softly; positions of its vertices.
     fn grid(n: usize) -> (BlockMatrix, Vec<Vector3<f64>>) {
@@ -316,7 +316,7 @@ mod tests {
             matrix.multiply_add(Par::Seq, x, y);
         };
         let stop = StopCriterion {
-            residual: 1e-9,
+            accuracy: CgAccuracy::Residual(1e-9),
             iterations: 1000,
         };
         let mut one = vec![Vector3::zeros(); x.len()];

@@ -37,6 +37,11 @@ impl OfflineDrapeReport {
     }
 }
 
+/// Most steps on a mesh that starts from a coarser one's rest, and on the finest after those. What moves on from there, the
+/// hem of a dress by a millimetre a step, does so for as long as was tried (decision 068).
+const FINER_STEPS: usize = 12;
+const FINAL_STEPS: usize = 4;
+
 impl OfflineOutfit {
     /// Brings the real-time result to rest on the body that it met. `progress` receives the vertices of the mesh in work and
     /// each step; a break ends the drape, and finer meshes stay as the coarser one is then.
@@ -58,8 +63,13 @@ impl OfflineOutfit {
         for outfit in coarser.iter().chain([self]) {
             if let Some(coarse) = before.replace(outfit) {
                 state = outfit.refined(coarse, &state);
-                // Near rest, the longest step is solved at once.
-                settings.steps[0] = settings.steps[1];
+                settings = DrapeSettings {
+                    // Near rest, the longest step is solved at once.
+                    steps: [settings.steps[1]; 2],
+                    most_steps: FINER_STEPS,
+                    final_steps: FINAL_STEPS,
+                    ..settings
+                };
             }
             let started = Instant::now();
             let vertices = outfit.cloth().len();
@@ -70,14 +80,18 @@ impl OfflineOutfit {
                 });
                 continue;
             }
-            settings.is_final = outfit.level() == self.level();
+            let is_finest = outfit.level() == self.level();
+            let own = DrapeSettings {
+                final_steps: settings.final_steps * usize::from(is_finest),
+                ..settings
+            };
             let mut solver = outfit.solver(state, par)?;
             let pins = outfit.pins(body);
             let targets = FrameTargets {
                 pins: &pins,
                 ..FrameTargets::default()
             };
-            let drape = solver.drape_to(&settings, &targets, |step| {
+            let drape = solver.drape_to(&own, &targets, |step| {
                 flow = progress(vertices, step);
                 flow
             })?;

@@ -141,11 +141,11 @@ impl Contacts {
         self.friction_pairs.clear();
         if self.settings.friction > 0.0 {
             let barrier = self.settings.barrier();
-            self.friction_pairs
-                .extend(self.pairs.iter().filter_map(|a| {
-                    let corners = a.pair.corners(x);
-                    FrictionPair::lagged(a, &barrier, &corners, &corners)
-                }));
+            let near = (self.assembly).within_reach(self.par, &barrier, x, &self.pairs);
+            self.friction_pairs.extend(near.iter().filter_map(|a| {
+                let corners = a.pair.corners(x);
+                FrictionPair::lagged(a, &barrier, &corners, &corners)
+            }));
         }
     }
 
@@ -180,9 +180,10 @@ impl Contacts {
 
     /// Makes pairs of the candidates, the same at any point of a step.
     fn list_pairs(&mut self) {
-        self.pairs.clear();
-        let active = |p: &ContactPair| ActivePair::new(*p, &self.step_start);
-        self.pairs.extend(self.candidates.iter().map(active));
+        let (candidates, start) = (&self.candidates, &self.step_start);
+        map_into(self.par, candidates.len(), PAIRS, &mut self.pairs, |k| {
+            ActivePair::new(candidates[k], start)
+        });
     }
 
     /// True if each vertex of `x`, less the mean motion since the query, is within the margin of its box: then every pair

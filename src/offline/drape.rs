@@ -1,10 +1,10 @@
 //! Static drape: pseudo-transient continuation, implicit Euler steps from rest that grow as the cloth settles.
 
-use super::error::{NewtonFault, OfflineError};
+use super::error::OfflineError;
 use super::integrator::TimeScheme;
-use super::newton::{NewtonReport, largest};
+use super::newton::{NewtonReport, largest, mean};
 use super::step::OfflineSolver;
-use super::targets::{FrameScript, FrameTargets};
+use super::targets::{FrameScript, FrameTargets, StepTargets};
 use crate::math::V3d;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -12,30 +12,32 @@ use std::ops::ControlFlow;
 /// End of a static drape.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DrapeSettings {
-    /// Largest motion of a vertex in a step of the longest length that counts as settled (m).
+    /// Root mean square motion in a step of the longest length that counts as settled (m); that of a single vertex is
+    /// 20 times as long at most.
     pub tolerance: f64,
     /// First and longest step (s). A longer one nears the quasi-static limit, and its systems are harder to solve.
     pub steps: [f64; 2],
-    /// Most steps.
+    /// Most steps that are solved to what counts as settled, for the way to rest is of no interest.
     pub most_steps: usize,
-    /// The last steps are solved to the solver's tolerance. False: to what counts as settled, for a finer mesh to go on.
-    pub is_final: bool,
+    /// Most steps after those, solved to the solver's tolerance; none for a finer mesh to go on from here.
+    pub final_steps: usize,
 }
 
 impl Default for DrapeSettings {
     fn default() -> Self {
         Self {
-            tolerance: 5e-4,
+            tolerance: 1e-4,
             steps: [1.0 / 60.0, 0.25],
             most_steps: 60,
-            is_final: true,
+            final_steps: 60,
         }
     }
 }
 
-/// Largest motion of one vertex in the last iteration of a loosely solved step by the motion that counts as settled. The
-/// defaults of Newton's method have a ratio of 20 between the two; other values were not compared.
-const LARGEST_SHARE: f64 = 10.0;
+/// Motion of a single vertex that is negligible beside a root mean square of 1: the defaults of Newton's method.
+const LARGEST: f64 = 20.0;
+/// Motion in the last iteration of a loosely solved step by the motion that counts as settled.
+const LOOSENESS: f64 = 5.0;
 
 /// Work and end of a static drape.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -83,49 +85,70 @@ impl OfflineSolver<'_> {
             targets,
             pins: targets.pins.iter().map(|p| x[p.vertex as usize]).collect(),
             obstacle: self.state.obstacle[1].clone(),
-        };
+        }
+        .at(1.0);
         let settings = self.settings;
         self.settings.scheme = TimeScheme::ImplicitEuler;
         self.settings.error_rate = f64::INFINITY;
-        // The way to rest is of no interest: only the last steps are solved better than what counts as settled.
         let newton = &mut self.settings.newton;
-        newton.tolerance = newton.tolerance.max(drape.tolerance);
-        newton.largest = newton.largest.max(drape.tolerance * LARGEST_SHARE);
+        let loose = LOOSENESS * drape.tolerance;
+        newton.tolerance = newton.tolerance.max(loose);
+        newton.largest = newton.largest.max(LARGEST * loose);
         let mut h = drape.steps[0];
-        let mut end = Ok(());
-        while report.steps < drape.most_steps && !report.settled {
-            self.rest();
-            match self.try_step(h, &held.at(1.0), &mut report.newton) {
-                Ok(Ok(solved)) => {
-                    let before = self.state.now.x.clone();
-                    self.accept(solved, h, self.state.time);
-                    report.steps += 1;
-                    report.motion = self.motion_since(&before);
-                    report.settled = report.motion <= drape.tolerance && h >= drape.steps[1];
-                    h = (2.0 * h).min(drape.steps[1]);
-                    if report.settled && drape.is_final && self.settings.newton != settings.newton {
-                        self.settings.newton = settings.newton;
-                        report.settled = false;
-                    }
-                }
-                Ok(Err(why)) if h > drape.steps[0] * 1e-3 => {
-                    report.unsolved += 1;
-                    h *= 0.5;
-                    let _: NewtonFault = why;
-                }
-                Ok(Err(why)) => {
-                    let (time, step) = (self.state.time, h);
-                    end = Err(OfflineError::Unsolved { time, step, why });
-                }
-                Err(fault) => end = Err(fault),
-            }
-            if end.is_err() || progress(&report).is_break() {
-                break;
+        let mut end = Ok(ControlFlow::Continue(()));
+        for (newton, most) in [
+            (self.settings.newton, drape.most_steps),
+            (settings.newton, drape.final_steps),
+        ] {
+            let last = report.steps + most;
+            self.settings.newton = newton;
+            report.settled &= most == 0;
+            while matches!(end, Ok(ControlFlow::Continue(())))
+                && report.steps < last
+                && !report.settled
+            {
+                end = self
+                    .drape_step(drape, &held, &mut h, &mut report)
+                    .map(|()| progress(&report));
             }
         }
         self.rest();
         self.settings = settings;
-        end.map(|()| report)
+        end.map(|_| report)
+    }
+
+    /// One step from rest of length `h` (s), which it changes; a step that is not solved is a shorter one next time.
+    fn drape_step(
+        &mut self,
+        drape: &DrapeSettings,
+        held: &StepTargets,
+        h: &mut f64,
+        report: &mut DrapeReport,
+    ) -> Result<(), OfflineError> {
+        self.rest();
+        match self.try_step(*h, held, &mut report.newton)? {
+            Ok(solved) => {
+                let before = self.state.now.x.clone();
+                self.accept(solved, *h, self.state.time);
+                report.steps += 1;
+                let moved = self.motion_since(&before);
+                report.motion = largest(&moved).1;
+                let is_calm =
+                    mean(&moved) <= drape.tolerance && report.motion <= LARGEST * drape.tolerance;
+                report.settled = is_calm && *h >= drape.steps[1];
+                *h = (2.0 * *h).min(drape.steps[1]);
+                Ok(())
+            }
+            Err(_) if *h > drape.steps[0] * 1e-3 => {
+                report.unsolved += 1;
+                *h *= 0.5;
+                Ok(())
+            }
+            Err(why) => {
+                let (time, step) = (self.state.time, *h);
+                Err(OfflineError::Unsolved { time, step, why })
+            }
+        }
     }
 
     /// Forgets velocities.
@@ -134,15 +157,8 @@ impl OfflineSolver<'_> {
         self.state.earlier = None;
     }
 
-    fn motion_since(&self, before: &[V3d]) -> f64 {
-        let moved: Vec<V3d> = self
-            .state
-            .now
-            .x
-            .iter()
-            .zip(before)
-            .map(|(a, b)| a - b)
-            .collect();
-        largest(&moved).1
+    fn motion_since(&self, before: &[V3d]) -> Vec<V3d> {
+        let now = self.state.now.x.iter();
+        now.zip(before).map(|(a, b)| a - b).collect()
     }
 }

@@ -2,7 +2,7 @@
 
 use super::error::{NewtonFault, OfflineError};
 use super::linear_solver::{DirectionSolver, LinearMethod, LinearSystem};
-use crate::linear::{BlockMatrix, LinearError, StopCriterion};
+use crate::linear::{BlockMatrix, CgAccuracy, LinearError, StopCriterion};
 use crate::math::V3d;
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 const SUFFICIENT_DECREASE: f64 = 1e-4;
 /// Halvings of a step before the line search gives up.
 const MAX_HALVINGS: usize = 40;
-/// Residual, relative to that of other iterations, of one that would end the iteration.
+/// Accuracy, relative to that of other iterations, of one that would end the iteration.
 const TIGHTER: f64 = 0.1;
 /// Motion of all vertices below which nothing moves (m): rounding alone.
 const RESTING: f64 = 1e-12;
@@ -30,8 +30,8 @@ pub struct NewtonSettings {
     pub iterations: usize,
     /// Solver of the linear systems.
     pub linear: LinearMethod,
-    /// Relative residual of conjugate gradients.
-    pub linear_residual: f64,
+    /// Accuracy of conjugate gradients, as the share of [`CgAccuracy::Decrease`].
+    pub linear_share: f64,
     /// Most iterations of conjugate gradients.
     pub linear_iterations: usize,
 }
@@ -43,17 +43,17 @@ impl Default for NewtonSettings {
             largest: 2e-3,
             iterations: 100,
             linear: LinearMethod::default(),
-            linear_residual: 0.2,
+            linear_share: 0.2,
             linear_iterations: 2000,
         }
     }
 }
 
 impl NewtonSettings {
-    /// Method and end of a linear solve, to a share of the residual.
-    pub(super) fn linear(&self, share: f64) -> (LinearMethod, StopCriterion) {
+    /// Method and end of a linear solve, so many times as loose.
+    pub(super) fn linear(&self, looseness: f64) -> (LinearMethod, StopCriterion) {
         let stop = StopCriterion {
-            residual: share * self.linear_residual,
+            accuracy: CgAccuracy::Decrease(looseness * self.linear_share),
             iterations: self.linear_iterations,
         };
         (self.linear, stop)
@@ -177,7 +177,7 @@ pub(super) fn minimise(
             solver.solve(settings.linear(1.0), &system.linear(), x, &mut direction)?;
         report.iterations += 1;
         if settings.is_settled(&direction, 1.0) {
-            // A small step may be one of which a loose residual has hidden the rest: rigid motion comes last.
+            // A small step may be one of which a loose solution has hidden the rest: rigid motion comes last.
             let tight = settings.linear(TIGHTER);
             report.products += solver.improve(tight, &system.linear(), x, &mut direction)?;
         }

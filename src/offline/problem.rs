@@ -25,8 +25,8 @@ pub(super) struct StepProblem<'a> {
 const GAP_STIFFNESS: f64 = 1e4;
 /// Longest reach of these springs (m).
 const LONGEST_COUPLING: f64 = 0.01;
-/// Residual of the guess relative to that of an iteration: the forces of the moving obstacle dwarf those of cloth.
-const GUESS_RESIDUAL: f64 = 1e-3;
+/// Accuracy of the guess relative to that of an iteration: the forces of the moving obstacle dwarf those of cloth.
+const GUESS_ACCURACY: f64 = 1e-3;
 
 impl StepProblem<'_> {
     /// First guess of a step from `x`: one linear step in which the obstacle follows its script and gaps keep their width,
@@ -59,7 +59,7 @@ impl StepProblem<'_> {
         }
         let mut direction = vec![V3d::zeros(); x.len()];
         report.products += solver.solve(
-            settings.linear(GUESS_RESIDUAL),
+            settings.linear(GUESS_ACCURACY),
             &system.linear(),
             x,
             &mut direction,

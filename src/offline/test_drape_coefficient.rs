@@ -222,7 +222,7 @@ fn check_kind(name: &str) {
     let c = 0.5 * (length(0) + length(2));
     let newton = NewtonSettings {
         tolerance: 1e-5,
-        linear_residual: 0.01,
+        linear_share: 0.01,
         ..NewtonSettings::default()
     };
     let coefficients = [4, 6].map(|free| {

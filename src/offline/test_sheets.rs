@@ -95,7 +95,7 @@ pub(super) fn isotropic(young: f64, poisson: f64, rigidity: f64) -> ElasticFabri
 pub(super) fn converged() -> NewtonSettings {
     NewtonSettings {
         tolerance: 1e-7,
-        linear_residual: 1e-3,
+        linear_share: 1e-3,
         ..NewtonSettings::default()
     }
 }

@@ -4,7 +4,7 @@
 
 use crate::clothcap::CaptureError;
 use crate::linear::{
-    BlockJacobi, Factor, LinearError, StopCriterion, SymbolicFactor, SymmetricPattern,
+    BlockJacobi, CgAccuracy, Factor, LinearError, StopCriterion, SymbolicFactor, SymmetricPattern,
     conjugate_gradient,
 };
 use crate::math::P3;
@@ -18,7 +18,7 @@ pub(in crate::clothcap) const EVEN_EDGE: f64 = 0.577;
 
 /// End of an iteration on some vertices: the residual beside that before, and the most products.
 const STOP: StopCriterion = StopCriterion {
-    residual: 0.01,
+    accuracy: CgAccuracy::Residual(0.01),
     iterations: 100,
 };
 

@@ -8,7 +8,7 @@ use crate::cloth::solver::single_patch::{
     SinglePatchSolver, VelocityUpdate, local_numbers, whole_sheet,
 };
 use crate::cloth::solver::{Environment, RunConfig, SheetStart};
-use crate::linear::{BlockJacobi, StopCriterion, conjugate_gradient};
+use crate::linear::{BlockJacobi, CgAccuracy, StopCriterion, conjugate_gradient};
 use crate::math::V3d;
 use crate::par::Par;
 use nalgebra::Matrix3;
@@ -19,7 +19,7 @@ const DEFAULT_SUBSTEPS: usize = 8;
 /// End of the linear solve. A larger residual is visibly soft, a smaller one changes nothing visible; only the finest
 /// meshes reach the number of iterations.
 const STOP: StopCriterion = StopCriterion {
-    residual: 1e-3,
+    accuracy: CgAccuracy::Residual(1e-3),
     iterations: 60,
 };
 
