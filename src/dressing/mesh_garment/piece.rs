@@ -10,7 +10,7 @@ use crate::dressing::skin_binding::SkinBinding;
 use crate::formats::obj::ObjMesh;
 use crate::formats::sewn_obj::SewnObj;
 use crate::garment::import::{
-    coarsen, from_mesh, median_edge, panels_in_metres, some_faces, unfold,
+    coarsen, from_mesh, median_edge, panels_in_metres, some_faces, unfold, widened,
 };
 use crate::garment::{
     AnchorKind, AnchorSet, GarmentError, GarmentKind, GarmentMesh, Material, Region, Size,
@@ -23,6 +23,8 @@ use crate::mesh::{Face, Topology, TriMesh, face_normal, remesh};
 const FINER: f64 = 0.7;
 /// Smallest triangle of an accessory, m².
 const LEAST_AREA: f64 = 2e-8;
+/// Least height of a triangle of cloth over its longest side: remeshing leaves a sliver now and then.
+const LEAST_HEIGHT: f64 = 0.02;
 /// Cloth this near to the sagittal plane may touch both legs, metres.
 const MIDDLE: f32 = 0.02;
 /// Share of its area below which a retargeted triangle has collapsed and keeps its rest shape.
@@ -82,6 +84,9 @@ impl PieceBuilder<'_> {
         orient_outwards(&mut garment, &x, &binding);
         if !made.flat {
             unroll(&mut garment, &x);
+            for rest in &mut garment.rest {
+                *rest = widened(*rest, LEAST_HEIGHT);
+            }
         }
         let shape = self.classifier.classify(&topology, &x, &binding);
         if !shape.has_legs {
