@@ -37,10 +37,11 @@ impl OfflineDrapeReport {
     }
 }
 
-/// Most steps on a mesh that starts from a coarser one's rest, and on the finest after those. What moves on from there, the
-/// hem of a dress by a millimetre a step, does so for as long as was tried (decision 068).
+/// Most steps on a mesh that starts from a coarser one's rest. What moves on from there, the hem of a dress by a millimetre
+/// a step, does so for as long as was tried (decision 068).
 const FINER_STEPS: usize = 12;
-const FINAL_STEPS: usize = 4;
+/// Most steps on the finest mesh after those, to the solver's tolerance.
+const FINAL_STEPS: usize = 2;
 
 impl OfflineOutfit {
     /// Brings the real-time result to rest on the body that it met. `progress` receives the vertices of the mesh in work and

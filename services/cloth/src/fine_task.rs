@@ -178,3 +178,61 @@ fn drape_step(vertices: usize, step: &DrapeReport) -> DrapeStep {
         settled: step.settled,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Progress;
+    use std::error::Error;
+    use tonic::Code;
+    use tryon::body::measure::measure;
+    use tryon::body::{BodyShape, Pose, embedded};
+    use tryon::evaluate::rest::lower_arms;
+    use tryon::math::{Body, Rigid, World};
+    use tryon::mirror::{Choice, PutOn, Subject};
+
+    /// A T-shirt whose front was pushed through the wearer and out of the back cannot start a simulation, and says why.
+    #[test]
+    fn a_tangled_start_is_refused_with_its_places() -> Result<(), Box<dyn Error>> {
+        let template = embedded::template();
+        let rest = template.personalise(&BodyShape::default());
+        let mut pose: Pose<World> =
+            Pose::rest(template.skeleton(), Rigid::<World, Body>::identity());
+        lower_arms(&template, &rest, 0.9, &mut pose);
+        let subject = Subject {
+            template: &template,
+            rest: &rest,
+            pose: &pose,
+            world_from_camera: Rigid::identity(),
+        };
+        let tshirt = Choice::library("tshirt", None)?.sized(&measure(&template, &rest)?)?;
+        let mut outfit = DressedOutfit::put_on(&subject, vec![tshirt], PutOn::default())?;
+        let front = |z: f32| z > 0.05;
+        let cloth = &mut outfit.state.garments[0].positions;
+        cloth
+            .iter_mut()
+            .filter(|p| front(p.z))
+            .for_each(|p| p.z -= 0.4);
+        let snapshot = Snapshot {
+            outfit,
+            template,
+            garments: Arc::new([]),
+            exposure: FrameId::default(),
+            world_from_camera: None,
+            recording: None,
+            body: watch::Sender::new(()).subscribe(),
+        };
+        let start = SessionStart {
+            vertices: 2000,
+            ..SessionStart::default()
+        };
+        let task = FineTask::new(snapshot, &start)?;
+        let mut publisher = Publisher::new(Progress::of([0, 1]));
+        let why = task
+            .compute(&mut publisher)
+            .expect_err("a start that is tangled");
+        assert_eq!(why.code(), Code::FailedPrecondition, "{why}");
+        assert!(why.message().contains("tshirt"), "{why}");
+        Ok(())
+    }
+}
