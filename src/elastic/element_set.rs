@@ -2,7 +2,7 @@
 
 use super::ElasticExpansion;
 use super::packed::Packed;
-use super::rows::Rows;
+use super::term_rows::TermRows;
 use crate::math::V3d;
 use crate::par::{Par, map_into};
 
@@ -24,9 +24,9 @@ struct Term {
 #[derive(Clone, Debug)]
 pub(super) struct ElementSet<const K: usize, const P: usize> {
     vertices: Vec<[u32; K]>,
-    gradient: Rows<Term>,
-    diagonal: Rows<Term>,
-    off_diagonal: Rows<Term>,
+    gradient: TermRows<Term>,
+    diagonal: TermRows<Term>,
+    off_diagonal: TermRows<Term>,
 }
 
 /// Pairs of different vertices that share an element, smaller first, with repetitions.
@@ -79,9 +79,9 @@ impl<const K: usize, const P: usize> ElementSet<K, P> {
         }
         Self {
             vertices,
-            gradient: Rows::new(count, gradient),
-            diagonal: Rows::new(count, diagonal),
-            off_diagonal: Rows::new(pairs.len(), off_diagonal),
+            gradient: TermRows::new(count, gradient),
+            diagonal: TermRows::new(count, diagonal),
+            off_diagonal: TermRows::new(pairs.len(), off_diagonal),
         }
     }
     /// Number of elements.

@@ -19,8 +19,8 @@ mod membrane;
 mod model;
 mod packed;
 mod rest_sheet;
-mod rows;
 mod stretch_law;
+mod term_rows;
 #[cfg(test)]
 mod test_cantilever;
 #[cfg(test)]

@@ -16,7 +16,7 @@ pub struct CgReport {
 /// End of an iteration, by what comes first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StopCriterion {
-    /// What is accurate enough.
+    /// Measure and its largest value.
     pub accuracy: CgAccuracy,
     /// Products with the matrix.
     pub iterations: usize,
@@ -34,7 +34,7 @@ pub enum CgAccuracy {
 
 /// Progress of an iteration.
 #[derive(Clone, Copy, Debug)]
-struct Progress {
+struct CgProgress {
     products: usize,
     relative_residual: f64,
     /// Decrease of ½ xᵀA x − bᵀx so far, and by the last product.
@@ -43,7 +43,7 @@ struct Progress {
 }
 
 impl CgAccuracy {
-    fn is_reached(self, at: &Progress) -> bool {
+    fn is_reached(self, at: &CgProgress) -> bool {
         match self {
             Self::Residual(least) => at.relative_residual <= least,
             Self::Decrease(share) => {
@@ -72,7 +72,7 @@ pub fn conjugate_gradient(
     let mut p = z.clone();
     let norm_b = dot(par, b, b).sqrt().max(f64::MIN_POSITIVE);
     let mut rz = dot(par, &r, &z);
-    let mut at = Progress {
+    let mut at = CgProgress {
         products: 0,
         relative_residual: dot(par, &r, &r).sqrt() / norm_b,
         decrease: 0.0,

@@ -2,12 +2,12 @@
 
 /// Terms by row.
 #[derive(Clone, Debug)]
-pub(super) struct Rows<T> {
+pub(super) struct TermRows<T> {
     offsets: Vec<u32>,
     terms: Vec<T>,
 }
 
-impl<T> Default for Rows<T> {
+impl<T> Default for TermRows<T> {
     /// No row.
     fn default() -> Self {
         Self {
@@ -17,7 +17,7 @@ impl<T> Default for Rows<T> {
     }
 }
 
-impl<T> Rows<T> {
+impl<T> TermRows<T> {
     /// Sorts terms by row, stable.
     pub(super) fn new(rows: usize, mut all: Vec<(u32, T)>) -> Self {
         all.sort_by_key(|(row, _)| *row);
