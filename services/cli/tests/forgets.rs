@@ -159,6 +159,7 @@ impl Program {
                 *written.lock().unwrap() += &String::from_utf8_lossy(&piece[..n]);
             }
         });
+        // Nobody reads on after the addresses: that stops nothing.
         let said = BufReader::new(child.stdout.take().unwrap()).lines();
         let addresses = said.map_while(Result::ok).take(4).map(|line| {
             let words: Vec<&str> = line.split_whitespace().collect();

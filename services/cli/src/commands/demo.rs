@@ -2,7 +2,7 @@
 
 use crate::args::DemoArgs;
 use crate::onebox::OneBox;
-use crate::report::{Summary, peak_memory, write};
+use crate::report::{Summary, peak_memory, say, write};
 use crate::viewer::{self, Received, ReceivedPicture};
 use crate::{input, report};
 use anyhow::{Context, Result};
@@ -125,12 +125,14 @@ async fn demo(args: &DemoArgs) -> Result<ExitCode> {
         return summarise(args, &received?);
     }
     let page = services.page().unwrap_or_default();
-    println!("The mirror is open at {page} (Ctrl-C ends it)");
+    say(format_args!(
+        "The mirror is open at {page} (Ctrl-C ends it)"
+    ));
     let started = Instant::now();
     let limit = args.seconds.map_or(Duration::MAX, Duration::from_secs_f64);
     tokio::select! {
-        signal = drain::signal() => println!("{}: draining", signal.context("signals")?),
-        () = tokio::time::sleep(limit) => println!("{:.1} s are over: draining", started.elapsed().as_secs_f64()),
+        signal = drain::signal() => say(format_args!("{}: draining", signal.context("signals")?)),
+        () = tokio::time::sleep(limit) => say(format_args!("{:.1} s are over: draining", started.elapsed().as_secs_f64())),
     }
     services.stop().await;
     Ok(ExitCode::SUCCESS)

@@ -1,6 +1,7 @@
 //! `tryon replay`: a recording as if it were a live camera.
 
 use crate::args::ReplayArgs;
+use crate::report::say;
 use anyhow::{Context, Result};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -60,13 +61,14 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<ExitCode> {
         };
         let key = format!("tryon/{}/{name}/rgbd", config.capture.store);
         let service = tryon_capture::start(&config, ctx).await?;
-        println!(
+        say(format_args!(
             "{} on {key}, bus {}, grpc {}; Ctrl-C ends it",
             args.input.display(),
             config.bus.listen.join(" "),
             service.address
-        );
-        println!("{}: draining", drain::signal().await.context("signals")?);
+        ));
+        let signal = drain::signal().await.context("signals")?;
+        say(format_args!("{signal}: draining"));
         shutdown.cancel();
         service.ended().await?;
         bus.close().await;

@@ -2,6 +2,7 @@
 
 use crate::args::UpArgs;
 use crate::onebox::OneBox;
+use crate::report::say;
 use anyhow::{Context, Result};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -44,15 +45,15 @@ pub(crate) fn run(args: &UpArgs) -> Result<ExitCode> {
         let bus: Arc<dyn FrameBus> = bus.await?;
         let services = OneBox::start(config, Some(bus)).await?;
         for (name, grpc, admin) in &services.addresses {
-            println!("{name}: grpc {grpc} admin {admin}");
+            say(format_args!("{name}: grpc {grpc} admin {admin}"));
         }
         if let Some(page) = services.page() {
-            println!("mirror: {page}");
+            say(format_args!("mirror: {page}"));
         }
         let signal = drain::signal().await.context("signals")?;
-        println!("{signal}: draining");
+        say(format_args!("{signal}: draining"));
         services.stop().await;
-        println!("ended");
+        say(format_args!("ended"));
         Ok(ExitCode::SUCCESS)
     })
 }
