@@ -12,6 +12,7 @@ mod offline_files;
 mod onebox;
 mod preview;
 mod report;
+mod say;
 mod viewer;
 
 use args::{Cli, Command};

@@ -2,7 +2,8 @@
 
 use crate::args::DemoArgs;
 use crate::onebox::OneBox;
-use crate::report::{Summary, peak_memory, say, write};
+use crate::report::{Summary, peak_memory, write};
+use crate::say::say;
 use crate::viewer::{self, Received, ReceivedPicture};
 use crate::{input, report};
 use anyhow::{Context, Result};

@@ -1,7 +1,7 @@
 //! `tryon replay`: a recording as if it were a live camera.
 
 use crate::args::ReplayArgs;
-use crate::report::say;
+use crate::say::say;
 use anyhow::{Context, Result};
 use std::process::ExitCode;
 use std::time::Duration;

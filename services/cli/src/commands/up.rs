@@ -2,7 +2,7 @@
 
 use crate::args::UpArgs;
 use crate::onebox::OneBox;
-use crate::report::say;
+use crate::say::say;
 use anyhow::{Context, Result};
 use std::process::ExitCode;
 use std::sync::Arc;
