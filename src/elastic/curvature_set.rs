@@ -118,6 +118,9 @@ impl CurvatureSet {
         });
         map_into(par, self.fans.len(), CHUNK, &mut values, |k| {
             let fan = &self.fans[k];
+            if at.is_asleep(&fan.vertices) {
+                return 0.0;
+            }
             fan.area * law.expand(&fan.curvature(|h| angles[h])).value
         });
         values.iter().sum()
@@ -140,7 +143,12 @@ impl CurvatureSet {
             .resize(self.fans.len(), FanExpansion::default());
         for_chunks(par, &mut buffers.fans, CHUNK, |start, chunk| {
             for (k, e) in chunk.iter_mut().enumerate() {
-                self.fans[start + k].expand(law, &self.hinges, angles, e);
+                let fan = &self.fans[start + k];
+                if at.is_asleep(&fan.vertices) {
+                    e.clear(fan.vertices.len());
+                } else {
+                    fan.expand(law, &self.hinges, angles, e);
+                }
             }
         });
         let fans = &buffers.fans;

@@ -5,6 +5,7 @@
 //! ∂θ/∂a = −|e| m/|m|² and ∂θ/∂b = −|e| n/|n|²; moving e turns both wings, by the fractions α = a·e/|e|² and β = b·e/|e|²
 //! of what moving the apices does: ∂θ/∂e = −α ∂θ/∂a − β ∂θ/∂b.
 
+use super::element_set::ABSENT;
 use crate::math::{V3d, skew};
 use nalgebra::{Matrix3, SMatrix, SVector};
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -25,12 +26,28 @@ pub struct SheetMotion<'a> {
     pub start: &'a [V3d],
     /// Positions now (m).
     pub now: &'a [V3d],
+    /// Vertices that stay where they are, at least; empty for none. Elements of these alone are left out.
+    pub asleep: &'a [bool],
 }
 
 impl<'a> SheetMotion<'a> {
     /// Sheet that has not moved: angles lie in (−π, π].
     pub fn still(x: &'a [V3d]) -> Self {
-        Self { start: x, now: x }
+        Self {
+            start: x,
+            now: x,
+            asleep: &[],
+        }
+    }
+    /// True for an element that is left out.
+    pub fn is_asleep(&self, vertices: &[u32]) -> bool {
+        let sleeps = |v: &u32| {
+            self.asleep
+                .get(*v as usize)
+                .copied()
+                .unwrap_or(*v == ABSENT)
+        };
+        !self.asleep.is_empty() && vertices.iter().all(sleeps)
     }
     /// Corners of a hinge at the start and now.
     pub(super) fn corners(&self, vertices: &[u32; 4]) -> [[V3d; 4]; 2] {

@@ -84,6 +84,10 @@ impl<const K: usize, const P: usize> ElementSet<K, P> {
             off_diagonal: TermRows::new(pairs.len(), off_diagonal),
         }
     }
+    /// Vertices of an element.
+    pub(super) fn vertices(&self, element: usize) -> &[u32; K] {
+        &self.vertices[element]
+    }
     /// Number of elements.
     pub(super) fn len(&self) -> usize {
         self.vertices.len()

@@ -26,6 +26,16 @@ pub(super) struct CurvatureBuffers {
 pub(super) type Place = (u32, u16, u16);
 
 impl FanExpansion {
+    /// Becomes the expansion of a fan of so many vertices that has no energy.
+    pub(super) fn clear(&mut self, vertices: usize) {
+        self.value = 0.0;
+        for list in [&mut self.by_vertex, &mut self.moments] {
+            list.clear();
+            list.resize(vertices, Matrix3::zeros());
+        }
+        self.gradient.clear();
+        self.gradient.resize(vertices, V3d::zeros());
+    }
     /// Block of the Hessian of two of the fan's vertices.
     pub(super) fn block(&self, &(_, a, b): &Place) -> Matrix3<f64> {
         self.by_vertex[a as usize].tr_mul(&self.moments[b as usize])

@@ -112,10 +112,16 @@ impl ClothModel {
         let x = at.now;
         let mut values = Vec::new();
         map_into(par, self.membranes.len(), CHUNK, &mut values, |k| {
+            if at.is_asleep(self.membrane_set.vertices(k)) {
+                return 0.0;
+            }
             self.membranes[k].value(&self.fabric.stretch, &self.membrane_set.corners(k, x))
         });
         let stretch = values.iter().sum::<f64>();
         map_into(par, self.hinges.len(), CHUNK, &mut values, |k| {
+            if at.is_asleep(self.hinge_set.vertices(k)) {
+                return 0.0;
+            }
             self.hinges[k].moved_value(&self.fabric.bend, &self.hinge_motion(k, at))
         });
         let folds = values.iter().sum::<f64>();
@@ -135,10 +141,16 @@ impl ClothModel {
         let mut buffers = std::mem::take(&mut out.buffers);
         self.membrane_set
             .assemble(par, &mut buffers.membranes, out, |k| {
+                if at.is_asleep(self.membrane_set.vertices(k)) {
+                    return Packed::default();
+                }
                 let at = self.membrane_set.corners(k, x);
                 Packed::new(&self.membranes[k].expand(&self.fabric.stretch, &at))
             });
         self.hinge_set.assemble(par, &mut buffers.hinges, out, |k| {
+            if at.is_asleep(self.hinge_set.vertices(k)) {
+                return Packed::default();
+            }
             let motion = self.hinge_motion(k, at);
             let second = AngleHessian::GaussNewton;
             Packed::new(&self.hinges[k].moved_expansion(&self.fabric.bend, &motion, second))

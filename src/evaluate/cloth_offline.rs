@@ -35,7 +35,7 @@ impl Default for OfflineBench {
 type Variant = (TimeScheme, LinearMethod, Option<u32>);
 
 /// Variants measured, the defaults first.
-const VARIANTS: [Variant; 10] = {
+const VARIANTS: [Variant; 11] = {
     use LinearMethod::{Cholesky, ConjugateGradient, TwoLevel};
     use TimeScheme::{Bdf2, ImplicitEuler};
     [
@@ -49,6 +49,7 @@ const VARIANTS: [Variant; 10] = {
         (ImplicitEuler, TwoLevel, Some(240)),
         (ImplicitEuler, TwoLevel, Some(480)),
         (ImplicitEuler, Cholesky, Some(240)),
+        (Bdf2, ConjugateGradient, None),
     ]
 };
 /// Scenes with more vertices than this run the defaults alone unless asked for.
@@ -174,6 +175,10 @@ impl Run {
             .with(
                 "newton_per_frame",
                 format!("{:.1}", mean(sum(|w| w.newton.iterations))),
+            )
+            .with(
+                "asleep_per_frame",
+                format!("{:.0}", mean(sum(|w| w.asleep))),
             )
             .with("repeated_steps", sum(|w| w.inaccurate + w.unsolved))
             .error("unsolved", f64::from(u8::from(!self.is_solved)))

@@ -1,6 +1,6 @@
 //! Symmetric sparse matrix of 3 × 3 blocks: one row and column of blocks a vertex.
 
-use super::{LinearError, SymmetricPattern};
+use super::{LinearError, RowSelection, SymmetricPattern};
 use crate::par::{Par, for_chunks};
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
@@ -155,6 +155,31 @@ impl BlockMatrix {
         Ok(sum)
     }
 
+    /// Rows and columns of a selection; nothing of a matrix of size zero.
+    pub fn selected(&self, selection: &RowSelection) -> Self {
+        let mut pattern = BlockPattern {
+            rows: vec![0],
+            ..BlockPattern::default()
+        };
+        let mut blocks = Vec::new();
+        let rows = selection.rows().iter().map(|row| *row as usize);
+        for row in rows.filter(|row| *row < self.pattern.size()) {
+            for (column, block) in self.row_blocks(row) {
+                let Some(number) = selection.number(column) else {
+                    continue;
+                };
+                if column as usize == row {
+                    pattern.diagonal.push(blocks.len() as u32);
+                }
+                pattern.columns.push(number);
+                blocks.push(*block);
+            }
+            pattern.rows.push(blocks.len() as u32);
+        }
+        let pattern = Arc::new(pattern);
+        Self { pattern, blocks }
+    }
+
     /// Pattern of the blocks.
     pub fn pattern(&self) -> &Arc<BlockPattern> {
         &self.pattern
@@ -270,5 +295,28 @@ mod tests {
             }
         }
         assert!(BlockPattern::new(2, [(0, 7)]).is_err());
+    }
+
+    /// Products with vectors that are zero elsewhere.
+    #[test]
+    fn selected_rows_have_the_same_products() {
+        let matrix = path(40);
+        let selection = RowSelection::new((0..40).map(|i| i % 5 != 2));
+        let some = matrix.selected(&selection);
+        assert_eq!(some.pattern().size(), 32);
+        let x: Vec<Vector3<f64>> = (0..32)
+            .map(|i| Vector3::new(1.0, (i as f64).sin(), 0.5))
+            .collect();
+        let (mut all, mut y) = (vec![Vector3::zeros(); 40], vec![Vector3::zeros(); 32]);
+        selection.scatter(&x, &mut all);
+        some.multiply_add(Par::Seq, &x, &mut y);
+        let mut expected = vec![Vector3::zeros(); 40];
+        matrix.multiply_add(Par::Seq, &all, &mut expected);
+        assert_eq!(y, selection.gather(&expected));
+        for (i, row) in selection.rows().iter().enumerate() {
+            assert_eq!(some.diagonal(i), matrix.diagonal(*row as usize));
+        }
+        let none = BlockMatrix::default().selected(&selection);
+        assert_eq!(none.pattern().size(), 0);
     }
 }

@@ -6,6 +6,7 @@ mod coarse_space;
 mod conjugate_gradient;
 mod pattern;
 mod preconditioner;
+mod row_selection;
 mod single_matrix;
 
 pub use block_matrix::{BlockMatrix, BlockPattern};
@@ -14,6 +15,7 @@ pub use coarse_space::CoarseSpace;
 pub use conjugate_gradient::{CgAccuracy, CgReport, StopCriterion, conjugate_gradient};
 pub use pattern::SymmetricPattern;
 pub use preconditioner::{BlockJacobi, Preconditioner, TwoLevel};
+pub use row_selection::RowSelection;
 pub use single_matrix::SingleMatrix;
 
 /// Error of a linear system.

@@ -2,11 +2,12 @@
 
 use super::error::OfflineError;
 use super::integrator::{MotionState, OfflineState};
+use super::sleep::Sleep;
 use super::step::OfflineSolver;
 use crate::math::V3d;
 
 /// First bytes of a checkpoint; the digit is the version.
-const MAGIC: &[u8; 8] = b"tryonoc1";
+const MAGIC: &[u8; 8] = b"tryonoc2";
 
 impl OfflineSolver<'_> {
     /// Bytes of the state after `frame`, little-endian.
@@ -27,12 +28,13 @@ impl OfflineSolver<'_> {
             out.extend(n.to_le_bytes());
         }
         let before = state.earlier.as_ref().map_or(0.0, |(_, h)| *h);
-        for x in [state.time, before] {
+        for x in [state.time, before, self.sleep.since] {
             out.extend(x.to_le_bytes());
         }
+        out.extend(self.sleep.still.iter().flat_map(|t| t.to_le_bytes()));
         let earlier = state.earlier.iter().flat_map(|(s, _)| [&s.x, &s.v]);
         let arrays = [&state.now.x, &state.now.v].into_iter().chain(earlier);
-        for array in arrays.chain(&state.obstacle) {
+        for array in arrays.chain(&state.obstacle).chain([&self.sleep.places]) {
             out.extend(
                 array
                     .iter()
@@ -60,7 +62,8 @@ impl OfflineSolver<'_> {
         let state = reader
             .state((n as usize, m as usize), has_earlier == 1)
             .filter(|_| reader.0.is_empty());
-        self.state = state.ok_or_else(|| fault("wrong length, or a number that is not finite"))?;
+        (self.state, self.sleep) =
+            state.ok_or_else(|| fault("wrong length, or a number that is not finite"))?;
         self.level = level as u32;
         self.calm_steps = calm as u32;
         Ok(frame)
@@ -129,19 +132,32 @@ impl Reader<'_> {
             v: self.vectors(count)?,
         })
     }
-    fn state(&mut self, (n, m): (usize, usize), has_earlier: bool) -> Option<OfflineState> {
+    fn state(
+        &mut self,
+        (n, m): (usize, usize),
+        has_earlier: bool,
+    ) -> Option<(OfflineState, Sleep)> {
         let (time, before) = (self.number()?, self.number()?);
+        let since = self.number()?;
+        let still = (0..n + m).map(|_| self.number()).collect::<Option<_>>()?;
         let now = self.motion(n)?;
         let earlier = if has_earlier {
             Some((self.motion(n)?, before))
         } else {
             None
         };
-        Some(OfflineState {
+        let state = OfflineState {
             time,
             now,
             earlier,
             obstacle: [self.vectors(m)?, self.vectors(m)?],
-        })
+        };
+        let sleep = Sleep {
+            places: self.vectors(n + m)?,
+            still,
+            since,
+            ..Sleep::default()
+        };
+        Some((state, sleep))
     }
 }

@@ -101,6 +101,8 @@ pub(super) struct Contacts {
     assembly: ContactAssembly,
     friction: Friction,
     friction_pairs: Vec<FrictionPair>,
+    /// Vertices that sleep; empty for none. Pairs of these alone are no candidates.
+    asleep: Vec<bool>,
     pub(super) report: ContactReport,
 }
 
@@ -122,6 +124,7 @@ impl Contacts {
                 slip: 1.0,
             },
             friction_pairs: Vec::new(),
+            asleep: Vec::new(),
             report: ContactReport::default(),
         }
     }
@@ -129,6 +132,26 @@ impl Contacts {
     /// Forgets the candidates, so that a frame's bits do not depend on the frames before.
     pub(super) fn forget(&mut self) {
         self.boxes.clear();
+    }
+
+    /// Wakes vertices in reach of others that are awake, at positions `x`.
+    pub(super) fn wake(&mut self, x: &[V3d], asleep: &mut [bool]) {
+        self.asleep.clear();
+        self.step_start = x.to_vec();
+        self.forget();
+        self.cover(x, x);
+        let barrier = self.settings.barrier();
+        let near = (self.assembly).within_reach(self.par, &barrier, x, &self.pairs);
+        let stencils = near.iter().map(|a| a.pair.stencil());
+        let touched = stencils.filter(|v| v.iter().any(|v| !asleep[*v as usize]));
+        let woken: Vec<u32> = touched.flatten().collect();
+        woken.into_iter().for_each(|v| asleep[v as usize] = false);
+    }
+
+    /// Leaves pairs of vertices that sleep out of the candidates from now on; empty for none.
+    pub(super) fn leave_out(&mut self, asleep: &[bool]) {
+        self.asleep = asleep.to_vec();
+        self.forget();
     }
 
     /// Lags friction at the start `x` of a step of `h` (s).
@@ -165,6 +188,11 @@ impl Contacts {
             obstacle_distance: reach,
         };
         self.candidates = self.broad_phase.candidates(&self.mesh, &sweep, self.par);
+        if !self.asleep.is_empty() {
+            let asleep = &self.asleep;
+            let is_awake = |v: &u32| !asleep[*v as usize];
+            self.candidates.retain(|p| p.stencil().iter().any(is_awake));
+        }
         self.list_pairs();
         self.start_mean = mean_of(x);
         let shift = mean_of(end) - self.start_mean;

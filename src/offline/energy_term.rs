@@ -96,7 +96,12 @@ impl<S: EnergyElements<V, N>, const V: usize, const N: usize> EnergyTerm for Ele
     }
 
     fn value(&self, par: Par, at: &SheetMotion<'_>) -> f64 {
-        ordered_sum(par, self.set.count(), |k| self.set.value(k, at.now))
+        ordered_sum(par, self.set.count(), |k| {
+            if at.is_asleep(&self.set.vertices(k)) {
+                return 0.0;
+            }
+            self.set.value(k, at.now)
+        })
     }
 
     fn assemble(
@@ -111,6 +116,9 @@ impl<S: EnergyElements<V, N>, const V: usize, const N: usize> EnergyTerm for Ele
         for first in (0..self.set.count()).step_by(BATCH) {
             let count = BATCH.min(self.set.count() - first);
             par::map_into(par, count, CHUNK / 4, &mut batch, |k| {
+                if at.is_asleep(&self.set.vertices(first + k)) {
+                    return ElementEnergy::default();
+                }
                 self.set.expand(first + k, at.now)
             });
             for (k, energy) in batch.iter().enumerate() {

@@ -44,6 +44,12 @@ impl OfflineState {
         points(&self.now.x)
     }
 
+    /// Vertices of the cloth, then those of the obstacle where they are (m).
+    pub(super) fn unknowns(&self) -> Vec<V3d> {
+        let all = self.now.x.iter().chain(&self.obstacle[0]);
+        all.copied().collect()
+    }
+
     /// Obstacle vertices in single precision (m).
     pub fn obstacle_positions(&self) -> Vec<P3> {
         points(&self.obstacle[0])

@@ -2,8 +2,8 @@
 
 use super::error::OfflineError;
 use crate::linear::{
-    BlockJacobi, BlockMatrix, CoarseSpace, Factor, LinearError, SingleMatrix, StopCriterion,
-    SymbolicFactor, TwoLevel, conjugate_gradient,
+    BlockJacobi, BlockMatrix, CoarseSpace, Factor, LinearError, RowSelection, SingleMatrix,
+    StopCriterion, SymbolicFactor, TwoLevel, conjugate_gradient,
 };
 use crate::math::V3d;
 use crate::par::Par;
@@ -44,6 +44,8 @@ pub(super) struct DirectionSolver {
     coarse: Option<CoarseSpace>,
     /// Shape's matrix as the products read it.
     single: SingleMatrix,
+    /// Rows that move; `None` for all.
+    selection: Option<RowSelection>,
 }
 
 impl DirectionSolver {
@@ -52,6 +54,18 @@ impl DirectionSolver {
             par,
             coarse: None,
             single: SingleMatrix::default(),
+            selection: None,
+        }
+    }
+
+    /// Leaves rows out of all systems that follow, as `asleep` says; empty for none.
+    pub(super) fn select(&mut self, asleep: &[bool]) {
+        let selection = asleep
+            .contains(&true)
+            .then(|| RowSelection::new(asleep.iter().map(|is_asleep| !is_asleep)));
+        if selection != self.selection {
+            self.selection = selection;
+            self.coarse = None;
         }
     }
 
@@ -69,6 +83,29 @@ impl DirectionSolver {
 
     /// Goes on from a `direction`, until the residual is that asked for.
     pub(super) fn improve(
+        &mut self,
+        how: (LinearMethod, StopCriterion),
+        system: &LinearSystem<'_>,
+        x: &[V3d],
+        direction: &mut [V3d],
+    ) -> Result<usize, OfflineError> {
+        let Some(selection) = self.selection.take() else {
+            return self.improve_all(how, system, x, direction);
+        };
+        let [shape, contact] = [system.shape, system.contact].map(|m| m.selected(&selection));
+        let selected = LinearSystem {
+            gradient: &selection.gather(system.gradient),
+            shape: &shape,
+            contact: &contact,
+        };
+        let [x, mut own] = [x, &*direction].map(|all| selection.gather(all));
+        let products = self.improve_all(how, &selected, &x, &mut own);
+        selection.scatter(&own, direction);
+        self.selection = Some(selection);
+        products
+    }
+
+    fn improve_all(
         &mut self,
         (method, stop): (LinearMethod, StopCriterion),
         system: &LinearSystem<'_>,

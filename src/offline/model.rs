@@ -107,6 +107,11 @@ impl OfflineCloth {
         Ok(mesh)
     }
 
+    /// Vertices that share an element with a vertex, itself included, ascending.
+    pub(super) fn neighbours(&self, vertex: usize) -> &[u32] {
+        self.pattern.neighbours(vertex)
+    }
+
     /// Energies of the shape.
     pub(super) fn terms(&self) -> &[Box<dyn EnergyTerm>] {
         &self.terms

@@ -19,6 +19,8 @@ pub(super) struct StepPotential<'a> {
     /// 1/(γh)² (1/s²).
     pub(super) rate_squared: f64,
     pub(super) pins: &'a [PinTarget],
+    /// Vertices that sleep; empty for none.
+    pub(super) asleep: &'a [bool],
 }
 
 impl StepPotential<'_> {
@@ -32,6 +34,7 @@ impl StepPotential<'_> {
         SheetMotion {
             start: self.start,
             now: x,
+            asleep: self.asleep,
         }
     }
 

@@ -10,6 +10,7 @@ use super::newton::{NewtonReport, NewtonSettings, NewtonSystem, mean, minimise};
 use super::obstacle::ObstacleSpring;
 use super::potential::StepPotential;
 use super::problem::StepProblem;
+use super::sleep::{Sleep, SleepSettings};
 use super::start::JoinedSurfaces;
 use super::targets::{FrameScript, FrameTargets, StepTargets};
 use crate::contact::ContactSurface;
@@ -36,6 +37,8 @@ pub struct OfflineSettings {
     pub contact: Option<ContactSettings>,
     /// Spring of the obstacle's vertices.
     pub obstacle: ObstacleSpring,
+    /// Regions that are still sleep; `None` computes every frame whole.
+    pub sleep: Option<SleepSettings>,
 }
 
 impl Default for OfflineSettings {
@@ -48,6 +51,7 @@ impl Default for OfflineSettings {
             newton: NewtonSettings::default(),
             contact: Some(ContactSettings::default()),
             obstacle: ObstacleSpring::default(),
+            sleep: Some(SleepSettings::default()),
         }
     }
 }
@@ -77,6 +81,8 @@ pub struct OfflineFrameReport {
     pub largest_give: f64,
     /// Largest estimated local error of an accepted step (m, root mean square).
     pub largest_error: f64,
+    /// Vertices of the cloth that slept.
+    pub asleep: usize,
 }
 
 /// Cloth in motion.
@@ -86,8 +92,9 @@ pub struct OfflineSolver<'a> {
     pub(super) settings: OfflineSettings,
     par: Par,
     pub(super) state: OfflineState,
-    contacts: Option<Contacts>,
-    directions: DirectionSolver,
+    pub(super) contacts: Option<Contacts>,
+    pub(super) directions: DirectionSolver,
+    pub(super) sleep: Sleep,
     /// Number of halvings of the longest step in use.
     pub(super) level: u32,
     /// Accepted steps since the last change of length.
@@ -123,19 +130,18 @@ impl<'a> OfflineSolver<'a> {
             faces: obstacle,
         })?;
         if settings.contact.is_some() {
-            let start: Vec<V3d> = state
-                .now
-                .x
-                .iter()
-                .chain(&state.obstacle[0])
-                .copied()
-                .collect();
-            let crossings = JoinedSurfaces(&mesh).crossings(par, &start);
+            let crossings = JoinedSurfaces(&mesh).crossings(par, &state.unknowns());
             if !crossings.is_empty() {
                 return Err(OfflineError::IntersectingStart { crossings });
             }
         }
+        let places = state.now.x.iter().chain(&state.obstacle[1]);
         Ok(Self {
+            sleep: Sleep {
+                places: places.copied().collect(),
+                still: vec![0.0; n + m],
+                ..Sleep::default()
+            },
             cloth,
             settings,
             par,
@@ -168,9 +174,28 @@ impl<'a> OfflineSolver<'a> {
         check_frame(duration, targets, vertices)?;
         let mut report = OfflineFrameReport::default();
         report.newton.smallest_share = 1.0;
-        if let Some(contacts) = &mut self.contacts {
-            contacts.forget();
+        self.fall_asleep(duration, targets);
+        if self.is_asleep() {
+            self.state.time += duration;
+        } else {
+            self.take_steps(duration, targets, &mut report)?;
         }
+        self.note_motion(duration, &mut report);
+        let apart = self.state.obstacle[0].iter().zip(&self.state.obstacle[1]);
+        report.largest_give = apart.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        if let Some(contacts) = &mut self.contacts {
+            report.contact = std::mem::take(&mut contacts.report);
+        }
+        Ok(report)
+    }
+
+    /// Steps of a frame of `duration` (s).
+    fn take_steps(
+        &mut self,
+        duration: f64,
+        targets: &FrameTargets<'_>,
+        report: &mut OfflineFrameReport,
+    ) -> Result<(), OfflineError> {
         let start = self.state.time;
         let script = FrameScript {
             targets,
@@ -221,12 +246,7 @@ impl<'a> OfflineSolver<'a> {
             self.level += 1;
             self.calm_steps = 0;
         }
-        let apart = self.state.obstacle[0].iter().zip(&self.state.obstacle[1]);
-        report.largest_give = apart.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-        if let Some(contacts) = &mut self.contacts {
-            report.contact = std::mem::take(&mut contacts.report);
-        }
-        Ok(report)
+        Ok(())
     }
 
     /// Solves one step of `h` (s) without accepting it.
@@ -241,9 +261,7 @@ impl<'a> OfflineSolver<'a> {
         let each = |f: &dyn Fn(usize) -> V3d| (0..n).map(f).collect::<Vec<V3d>>();
         let inertial = each(&|i| coefficients.inertial_position(state, i));
         let predicted = each(&|i| coefficients.prediction(state, i, h));
-        let start: Vec<V3d> = (state.now.x.iter().chain(&state.obstacle[0]))
-            .copied()
-            .collect();
+        let start = state.unknowns();
         if let Some(contacts) = &mut self.contacts {
             contacts.begin_step(&start, h);
         }
@@ -254,6 +272,7 @@ impl<'a> OfflineSolver<'a> {
                 inertial: &inertial,
                 rate_squared: coefficients.span.powi(-2),
                 pins: &targets.pins,
+                asleep: &self.sleep.asleep,
             },
             obstacle: &targets.obstacle,
             spring: self.settings.obstacle,
@@ -305,14 +324,7 @@ impl<'a> OfflineSolver<'a> {
             let inertia = |d: &V3d| d * (-mass[i] / (span * span));
             *g = apart.get(i).map_or_else(V3d::zeros, inertia);
         }
-        let x: Vec<V3d> = self
-            .state
-            .now
-            .x
-            .iter()
-            .chain(&self.state.obstacle[0])
-            .copied()
-            .collect();
+        let x = self.state.unknowns();
         let mut slow = vec![V3d::zeros(); x.len()];
         let how = self.settings.newton.linear(1.0);
         report.products += self

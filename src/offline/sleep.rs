@@ -1,0 +1,123 @@
+//! Sleep: regions that have been still for a while are left out of frames, and looked at again a few frames later.
+//!
+//! A vertex sleeps once it has stayed within a distance of one place for a time. It wakes when a vertex with which it shares
+//! an element, or in reach of the barrier, is awake, and at the latest after that time, in a frame in which nothing sleeps.
+//! So cloth that sleeps is behind by about that distance at most, and a swing at its turning point is not taken for rest.
+
+use super::step::{OfflineFrameReport, OfflineSolver};
+use super::targets::FrameTargets;
+use crate::math::V3d;
+use serde::{Deserialize, Serialize};
+
+/// When vertices sleep.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SleepSettings {
+    /// Distance from one place up to which a vertex counts as still (m).
+    pub distance: f64,
+    /// Time that a vertex is still before it sleeps, and the longest that it sleeps (s).
+    pub time: f64,
+}
+
+impl Default for SleepSettings {
+    fn default() -> Self {
+        Self {
+            distance: 5e-4,
+            time: 0.25,
+        }
+    }
+}
+
+/// Still and sleeping vertices, those of the cloth before those of the obstacle.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sleep {
+    /// Place at which each vertex, or the target of each vertex of the obstacle, is still (m).
+    pub(super) places: Vec<V3d>,
+    /// Time that it has been there (s).
+    pub(super) still: Vec<f64>,
+    /// Time since nothing slept (s).
+    pub(super) since: f64,
+    /// Vertices left out of the frame; empty for none.
+    pub(super) asleep: Vec<bool>,
+}
+
+impl OfflineSolver<'_> {
+    /// Decides what sleeps during a frame of `duration` (s).
+    pub(super) fn fall_asleep(&mut self, duration: f64, targets: &FrameTargets<'_>) {
+        self.sleep.asleep.clear();
+        if let Some(settings) = self.settings.sleep {
+            self.sleep.since += duration;
+            if self.sleep.since <= settings.time {
+                self.sleep.asleep = self.sleepers(settings, targets);
+            } else {
+                self.sleep.since = 0.0;
+            }
+        }
+        let asleep = &self.sleep.asleep;
+        let resting = asleep.iter().take(self.cloth.len()).enumerate();
+        for (i, _) in resting.filter(|(_, is_asleep)| **is_asleep) {
+            let now = &mut self.state.now;
+            now.v[i] = V3d::zeros();
+            if let Some((earlier, _)) = &mut self.state.earlier {
+                (earlier.x[i], earlier.v[i]) = (now.x[i], V3d::zeros());
+            }
+        }
+        self.directions.select(asleep);
+        if let Some(contacts) = &mut self.contacts {
+            contacts.leave_out(asleep);
+        }
+    }
+
+    fn sleepers(&mut self, settings: SleepSettings, targets: &FrameTargets<'_>) -> Vec<bool> {
+        let n = self.cloth.len();
+        let still = self.sleep.still.iter();
+        let mut asleep: Vec<bool> = still.map(|time| *time >= settings.time).collect();
+        let places = &self.sleep.places;
+        let stays = |v: usize, to: &V3d| (to - places[v]).norm() <= settings.distance;
+        for pin in targets.pins {
+            let vertex = pin.vertex as usize;
+            asleep[vertex] &= stays(vertex, &pin.target);
+        }
+        for (vertex, to) in (n..).zip(targets.obstacle) {
+            asleep[vertex] &= stays(vertex, to);
+        }
+        let is_beside_awake = |i: usize| {
+            let mut beside = self.cloth.neighbours(i).iter();
+            beside.any(|j| !asleep[*j as usize])
+        };
+        let woken: Vec<usize> = (0..n).filter(|i| is_beside_awake(*i)).collect();
+        woken.into_iter().for_each(|i| asleep[i] = false);
+        if let Some(contacts) = &mut self.contacts {
+            contacts.wake(&self.state.unknowns(), &mut asleep);
+        }
+        asleep
+    }
+
+    /// True if nothing at all is awake.
+    pub(super) fn is_asleep(&self) -> bool {
+        let asleep = &self.sleep.asleep;
+        !asleep.is_empty() && asleep.iter().all(|is_asleep| *is_asleep)
+    }
+
+    /// Counts the time that each vertex has been still, after a frame of `duration` (s).
+    pub(super) fn note_motion(&mut self, duration: f64, report: &mut OfflineFrameReport) {
+        let Some(settings) = self.settings.sleep else {
+            return;
+        };
+        let Sleep {
+            places,
+            still,
+            asleep,
+            ..
+        } = &mut self.sleep;
+        let sleepers = asleep.iter().take(self.cloth.len());
+        report.asleep = sleepers.filter(|is_asleep| **is_asleep).count();
+        let now = self.state.now.x.iter().chain(&self.state.obstacle[1]);
+        for ((place, still), now) in places.iter_mut().zip(still).zip(now) {
+            if (now - *place).norm() <= settings.distance {
+                *still += duration;
+            } else {
+                (*place, *still) = (*now, 0.0);
+            }
+        }
+    }
+}
