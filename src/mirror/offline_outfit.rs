@@ -10,7 +10,7 @@ use crate::math::{P3, V3d};
 use crate::mesh::Face;
 use crate::offline::{
     JoinedSurfaces, MotionState, OfflineCloth, OfflineError, OfflineSettings, OfflineSolver,
-    OfflineState, PinTarget, StartReport,
+    OfflineState, PinTarget, StartReport, checkpoint_state,
 };
 use crate::par::Par;
 use std::collections::BTreeMap;
@@ -155,9 +155,18 @@ impl OfflineOutfit {
         Ok((self.state(fine, worn), report))
     }
 
-    /// Start as the real-time result is, with its intersections: for a checkpoint to replace.
-    pub fn unrepaired_start(&self, worn: &DressedOutfit) -> OfflineState {
-        self.state(self.refine(0, &positions(worn)), worn)
+    /// Solver in the state of a checkpoint, which it continues to the same bits.
+    ///
+    /// # Errors
+    /// Bytes that are no checkpoint, are damaged, or belong to other meshes.
+    pub fn resumed_solver(
+        &self,
+        checkpoint: &[u8],
+        par: Par,
+    ) -> Result<OfflineSolver<'_>, OfflineError> {
+        let mut solver = self.solver(checkpoint_state(checkpoint)?, par)?;
+        solver.resume(checkpoint)?;
+        Ok(solver)
     }
 
     /// State at rest at these vertices of the finer meshes and the body.

@@ -50,24 +50,56 @@ impl OfflineSolver<'_> {
     /// # Errors
     /// Bytes that are no checkpoint, are damaged, or belong to other meshes; the state is then as it was.
     pub fn resume(&mut self, bytes: &[u8]) -> Result<u64, OfflineError> {
+        let saved = Checkpoint::read(bytes)?;
+        let lengths = |s: &OfflineState| [s.now.x.len(), s.obstacle[0].len()];
+        if lengths(&saved.state) != lengths(&self.state) {
+            return Err(fault("another cloth or obstacle"));
+        }
+        (self.state, self.sleep) = (saved.state, saved.sleep);
+        self.level = saved.level;
+        self.calm_steps = saved.calm_steps;
+        Ok(saved.frame)
+    }
+}
+
+/// Contents of a checkpoint.
+struct Checkpoint {
+    frame: u64,
+    level: u32,
+    calm_steps: u32,
+    state: OfflineState,
+    sleep: Sleep,
+}
+
+impl Checkpoint {
+    fn read(bytes: &[u8]) -> Result<Self, OfflineError> {
         let mut reader = Reader(contents(bytes)?);
         let mut head = [0; 6];
         for n in &mut head {
             *n = u64::from_le_bytes(reader.next().ok_or_else(|| fault("too short"))?);
         }
         let [frame, n, m, has_earlier, level, calm] = head;
-        if n != self.cloth.len() as u64 || m != self.state.obstacle[0].len() as u64 {
-            return Err(fault("another cloth or obstacle"));
-        }
         let state = reader
             .state((n as usize, m as usize), has_earlier == 1)
             .filter(|_| reader.0.is_empty());
-        (self.state, self.sleep) =
+        let (state, sleep) =
             state.ok_or_else(|| fault("wrong length, or a number that is not finite"))?;
-        self.level = level as u32;
-        self.calm_steps = calm as u32;
-        Ok(frame)
+        Ok(Self {
+            frame,
+            level: level as u32,
+            calm_steps: calm as u32,
+            state,
+            sleep,
+        })
     }
+}
+
+/// State of a checkpoint.
+///
+/// # Errors
+/// Bytes that are no checkpoint or are damaged.
+pub fn checkpoint_state(bytes: &[u8]) -> Result<OfflineState, OfflineError> {
+    Checkpoint::read(bytes).map(|c| c.state)
 }
 
 /// Frame after which a checkpoint was taken.
@@ -118,6 +150,12 @@ impl Reader<'_> {
         let value = self.next().map(f64::from_le_bytes);
         value.filter(|x| x.is_finite())
     }
+    fn numbers(&mut self, count: usize) -> Option<Vec<f64>> {
+        if self.0.len() < count.checked_mul(8)? {
+            return None;
+        }
+        (0..count).map(|_| self.number()).collect()
+    }
     fn vectors(&mut self, count: usize) -> Option<Vec<V3d>> {
         if self.0.len() < count.checked_mul(24)? {
             return None;
@@ -139,7 +177,8 @@ impl Reader<'_> {
     ) -> Option<(OfflineState, Sleep)> {
         let (time, before) = (self.number()?, self.number()?);
         let since = self.number()?;
-        let still = (0..n + m).map(|_| self.number()).collect::<Option<_>>()?;
+        let all = n.checked_add(m)?;
+        let still = self.numbers(all)?;
         let now = self.motion(n)?;
         let earlier = if has_earlier {
             Some((self.motion(n)?, before))
@@ -153,7 +192,7 @@ impl Reader<'_> {
             obstacle: [self.vectors(m)?, self.vectors(m)?],
         };
         let sleep = Sleep {
-            places: self.vectors(n + m)?,
+            places: self.vectors(all)?,
             still,
             since,
             ..Sleep::default()

@@ -45,7 +45,7 @@ mod test_twist;
 mod tests;
 
 pub use animation::AnimationProgress;
-pub use checkpoint::checkpoint_frame;
+pub use checkpoint::{checkpoint_frame, checkpoint_state};
 pub use contacts::{ContactReport, ContactSettings};
 pub use drape::{DrapeReport, DrapeSettings};
 pub use elastic_term::ElasticTerm;

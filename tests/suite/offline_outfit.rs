@@ -110,12 +110,11 @@ fn a_preview_goes_on_offline_without_intersections() {
     let sums = [&before, x].map(|x| x.iter().sum::<V3d>() / count as f64);
     assert!((sums[1] - sums[0]).x > 1e-4, "the skirt follows: {sums:?}");
 
-    let resumed = outfit.unrepaired_start(&worn);
-    let mut resumed = outfit.solver(resumed, Par::Seq).expect("a solver");
-    resumed
-        .resume(&solver.checkpoint(1))
-        .expect("its checkpoint");
-    assert_eq!(resumed.state(), solver.state());
+    let saved = solver.checkpoint(1);
+    let resumed = outfit.resumed_solver(&saved, Par::Seq);
+    assert_eq!(resumed.expect("its checkpoint").state(), solver.state());
+    let coarse = OfflineOutfit::new(&worn, &faces, coarse).expect("coarse");
+    assert!(coarse.resumed_solver(&saved, Par::Seq).is_err(), "finer");
 }
 
 #[test]

@@ -307,22 +307,16 @@ impl<'a> Animation<'a> {
         let frames = known.map_or(0, |_| resumed + 1);
         let counts = counts(preview, outfit);
         let mut files = OfflineFiles::open(&args.solver, &args.out, counts, frames)?;
-        let worn = worn(preview)?;
-        let state = match saved {
-            Some(_) => outfit.unrepaired_start(worn),
+        let solver = match &saved {
+            Some(bytes) => outfit.resumed_solver(bytes, Par::Rayon)?,
             None => {
-                let (state, done) = settle(outfit, worn, || files.flow())?;
+                let (state, done) = settle(outfit, worn(preview)?, || files.flow())?;
                 report.drape = done;
-                state
+                let solver = outfit.solver(state, Par::Rayon)?;
+                start(&mut files, &solver)?;
+                solver
             }
         };
-        let mut solver = outfit.solver(state, Par::Rayon)?;
-        match &saved {
-            Some(bytes) => {
-                solver.resume(bytes)?;
-            }
-            None => start(&mut files, &solver)?,
-        }
         let mut out = Self {
             args,
             outfit,
