@@ -2342,7 +2342,7 @@ pub struct StartSimulationRequest {
     /// frames are the same to the bit as those of an uninterrupted simulation.
     #[prost(bytes = "bytes", tag = "3")]
     pub checkpoint: ::prost::bytes::Bytes,
-    #[prost(oneof = "start_simulation_request::Start", tags = "1, 4")]
+    #[prost(oneof = "start_simulation_request::Start", tags = "1, 4, 5")]
     pub start: ::core::option::Option<start_simulation_request::Start>,
 }
 /// Nested message and enum types in `StartSimulationRequest`.
@@ -2356,6 +2356,11 @@ pub mod start_simulation_request {
         /// The garments that a session wears now.
         #[prost(message, tag = "4")]
         Session(super::SessionStart),
+        /// A cancelled simulation of a session, to continue after its last frame: once, and while its frames are kept. The
+        /// recording of the body goes on while it is cancelled, and the frames are the same to the bit as those of an
+        /// uninterrupted simulation.
+        #[prost(string, tag = "5")]
+        SimulationId(::prost::alloc::string::String),
     }
 }
 /// Start from the real-time garments of a session, which go on as they do. In the first frame they are draped to rest in
@@ -2383,7 +2388,8 @@ pub struct StartSimulationResponse {
     /// Vertices of all garments together.
     #[prost(uint32, tag = "3")]
     pub vertex_count: u32,
-    /// First frame that is computed: 0, or the one after the checkpoint. Earlier ones are not streamed.
+    /// First frame that is computed: 0, or the one after the checkpoint or the last of the cancelled simulation. Earlier ones
+    /// are not streamed.
     #[prost(uint32, tag = "4")]
     pub first_frame: u32,
     /// Garments of a session on their finer meshes, inner layer first; empty for a scene. Positions of a frame are those of
@@ -2455,8 +2461,9 @@ pub struct CancelSimulationResponse {
     /// The frame after the last finished one.
     #[prost(uint32, tag = "1")]
     pub next_frame: u32,
-    /// State after the last finished frame, for `StartSimulationRequest.checkpoint`; empty for the real-time solver and when
-    /// the simulation had ended before.
+    /// State after the last finished frame, for `StartSimulationRequest.checkpoint`; empty for the real-time solver, when the
+    /// simulation had ended before, and for that of a session, whose body stays in the service:
+    /// `StartSimulationRequest.simulation_id` continues it.
     #[prost(bytes = "bytes", tag = "2")]
     pub checkpoint: ::prost::bytes::Bytes,
 }
@@ -2732,11 +2739,12 @@ pub mod cloth_service_client {
                 .insert(GrpcMethod::new("tryon.v1.ClothService", "StreamGarments"));
             self.inner.server_streaming(req, path, codec).await
         }
-        /// Starts a simulation of a scene, which needs no camera, or of the garments of a session on finer meshes. Callers who
-        /// may stream the garments of a session may start, follow and cancel its simulations. It runs beside the live sessions
-        /// until it is done, cancelled, or the service stops. INVALID_ARGUMENT names the field at fault, also when the frames
-        /// would take more than 256 MiB. NOT_FOUND for an unknown session; FAILED_PRECONDITION while it has no garments that are
-        /// simulated. RESOURCE_EXHAUSTED with RetryInfo when too many run.
+        /// Starts a simulation of a scene, which needs no camera, or of the garments of a session on finer meshes, or continues
+        /// one that was cancelled. Callers who may stream the garments of a session may start, follow, cancel and continue its
+        /// simulations. It runs beside the live sessions until it is done, cancelled, or the service stops. INVALID_ARGUMENT names
+        /// the field at fault, also when the frames would take more than 256 MiB. NOT_FOUND for an unknown session or simulation;
+        /// FAILED_PRECONDITION while a session has no garments that are simulated, and for a simulation that cannot be continued.
+        /// RESOURCE_EXHAUSTED with RetryInfo when too many run.
         pub async fn start_simulation(
             &mut self,
             request: impl tonic::IntoRequest<super::StartSimulationRequest>,
@@ -2872,11 +2880,12 @@ pub mod cloth_service_server {
             tonic::Response<Self::StreamGarmentsStream>,
             tonic::Status,
         >;
-        /// Starts a simulation of a scene, which needs no camera, or of the garments of a session on finer meshes. Callers who
-        /// may stream the garments of a session may start, follow and cancel its simulations. It runs beside the live sessions
-        /// until it is done, cancelled, or the service stops. INVALID_ARGUMENT names the field at fault, also when the frames
-        /// would take more than 256 MiB. NOT_FOUND for an unknown session; FAILED_PRECONDITION while it has no garments that are
-        /// simulated. RESOURCE_EXHAUSTED with RetryInfo when too many run.
+        /// Starts a simulation of a scene, which needs no camera, or of the garments of a session on finer meshes, or continues
+        /// one that was cancelled. Callers who may stream the garments of a session may start, follow, cancel and continue its
+        /// simulations. It runs beside the live sessions until it is done, cancelled, or the service stops. INVALID_ARGUMENT names
+        /// the field at fault, also when the frames would take more than 256 MiB. NOT_FOUND for an unknown session or simulation;
+        /// FAILED_PRECONDITION while a session has no garments that are simulated, and for a simulation that cannot be continued.
+        /// RESOURCE_EXHAUSTED with RetryInfo when too many run.
         async fn start_simulation(
             &self,
             request: tonic::Request<super::StartSimulationRequest>,

@@ -10,13 +10,13 @@ use tonic::Status;
 use tryon::body::Template;
 use tryon::math::V3d;
 use tryon::mirror::{DressedOutfit, FrameClock, LongGap, MirrorError, OfflineOutfit};
-use tryon::offline::{DrapeReport, FrameTargets, OfflineState};
+use tryon::offline::{DrapeReport, FrameTargets};
 use tryon::par::Par;
 use tryon_proto::convert::WireError;
 use tryon_proto::convert::garment::{WornGarment, topology_to_wire};
 use tryon_proto::v1::{
     ClothSolver, DrapeStep, FrameId, GarmentTopology, RigidTransform, SessionStart,
-    StartSimulationRequest,
+    StartSimulationRequest, StartSimulationResponse,
 };
 
 /// Most vertices that can be asked for, as the contract says: the finest garments of the paper.
@@ -41,10 +41,6 @@ pub(crate) struct Snapshot {
 /// # Errors
 /// INVALID_ARGUMENT names the field at fault.
 pub(crate) fn check(r: &StartSimulationRequest, start: &SessionStart) -> Result<(), Status> {
-    let fault = |field: &str, why: String| {
-        let field = format!("start_simulation_request.{field}");
-        Err(WireError::new(field, why).into())
-    };
     if !(1..=MAX_VERTICES).contains(&start.vertices) {
         let why = format!("{}, but 1 to {MAX_VERTICES} are needed", start.vertices);
         return fault("session.vertices", why);
@@ -56,6 +52,14 @@ pub(crate) fn check(r: &StartSimulationRequest, start: &SessionStart) -> Result<
         );
         return fault("session.motion_seconds", why);
     }
+    check_solver(r)
+}
+
+/// Checks the solver and the checkpoint of a request for a session's simulation, new or continued.
+///
+/// # Errors
+/// INVALID_ARGUMENT names the field at fault.
+pub(crate) fn check_solver(r: &StartSimulationRequest) -> Result<(), Status> {
     if !matches!(r.solver(), ClothSolver::Unspecified | ClothSolver::Offline) {
         return fault("solver", "a session has the offline solver only".into());
     }
@@ -65,10 +69,29 @@ pub(crate) fn check(r: &StartSimulationRequest, start: &SessionStart) -> Result<
     Ok(())
 }
 
-/// Simulation from one snapshot on.
+fn fault(field: &str, why: String) -> Result<(), Status> {
+    let field = format!("start_simulation_request.{field}");
+    Err(WireError::new(field, why).into())
+}
+
+fn aborted(e: impl ToString) -> Status {
+    Status::aborted(e.to_string())
+}
+
+/// Simulation from one snapshot on, or its remainder after a cancel.
 pub(crate) struct FineTask {
     snapshot: Snapshot,
     outfit: OfflineOutfit,
+    /// `None` before the drape is done.
+    last: Option<LastFrame>,
+}
+
+/// Last finished frame.
+struct LastFrame {
+    number: u32,
+    captured_ns: u64,
+    /// State after it.
+    checkpoint: Vec<u8>,
 }
 
 impl FineTask {
@@ -87,21 +110,47 @@ impl FineTask {
             let why = format!("the frames take {bytes} bytes, at most {MAX_RESULT_BYTES}");
             return Err(WireError::new(field, why).into());
         }
-        Ok(Self { snapshot, outfit })
+        let last = None;
+        Ok(Self {
+            snapshot,
+            outfit,
+            last,
+        })
     }
 
-    /// Number of frames; 0 while the body is being recorded.
-    pub(crate) fn frame_count(&self) -> u32 {
-        u32::from(self.snapshot.recording.is_none())
+    /// First frame that is computed, and the one after the last or 0 while the body is being recorded.
+    pub(crate) fn frames(&self) -> [u32; 2] {
+        let first = self.last.as_ref().map_or(0, |l| l.number + 1);
+        let draped = u32::from(self.last.is_none());
+        match &self.snapshot.recording {
+            Some(recording) if !recording.is_closed() => [first, 0],
+            recording => {
+                let recorded = recording.as_ref().map_or(0, |r| r.len() as u32);
+                [first, first + draped + recorded]
+            }
+        }
     }
 
-    /// Vertices of all garments.
-    pub(crate) fn vertices(&self) -> u32 {
-        self.outfit.cloth().len() as u32
+    /// Its sender is gone once the session has forgotten the body.
+    pub(crate) fn body(&self) -> watch::Receiver<()> {
+        self.snapshot.body.clone()
+    }
+
+    /// Response to a start, but for the id, with the numbers of [`Self::frames`].
+    pub(crate) fn response(&self, [first_frame, frame_count]: [u32; 2]) -> StartSimulationResponse {
+        StartSimulationResponse {
+            first_frame,
+            frame_count,
+            vertex_count: self.outfit.cloth().len() as u32,
+            garments: self.topology(),
+            exposure: Some(self.snapshot.exposure),
+            world_from_camera: self.snapshot.world_from_camera,
+            ..Default::default()
+        }
     }
 
     /// Garments on their finer meshes.
-    pub(crate) fn topology(&self) -> Vec<GarmentTopology> {
+    fn topology(&self) -> Vec<GarmentTopology> {
         let garments = self.outfit.garments().iter().zip(&*self.snapshot.garments);
         let finer = garments.map(|(mesh, worn)| WornGarment {
             vertices: mesh.vertices,
@@ -113,39 +162,60 @@ impl FineTask {
         finer.map(|g| topology_to_wire(&g)).collect()
     }
 
-    /// Drapes and publishes the first frame, then those of the recording, until `publisher` breaks off.
+    /// Publishes the frames that are missing, the drape first, until `publisher` breaks off; returns the task of those that
+    /// are still missing then.
     ///
     /// # Errors
     /// FAILED_PRECONDITION for a start that cannot be freed of intersections, ABORTED for a step that is not solved.
-    pub(crate) fn compute(mut self, publisher: &mut Publisher) -> Result<(), Status> {
+    pub(crate) fn compute(mut self, publisher: &mut Publisher) -> Result<Option<Self>, Status> {
+        let mut flow = ControlFlow::Continue(());
+        if self.last.is_none() {
+            flow = self.drape(publisher)?;
+        }
+        if flow.is_continue() {
+            flow = self.animate(publisher)?;
+        }
+        Ok(flow.is_break().then_some(self).filter(Self::has_more))
+    }
+
+    /// False once the last frame of a recording that is over is done.
+    fn has_more(&self) -> bool {
+        let recording = self.snapshot.recording.as_ref();
+        self.last.is_none() || recording.is_some_and(|r| !r.is_closed() || !r.is_empty())
+    }
+
+    /// The first frame. A drape that breaks off starts anew in the task that is left.
+    fn drape(&mut self, publisher: &mut Publisher) -> Result<ControlFlow<()>, Status> {
         let show = |vertices, step: &DrapeReport| publisher.show(drape_step(vertices, step));
         let draped = self.outfit.drape(&self.snapshot.outfit, Par::Rayon, show);
         let (state, _) = draped.map_err(|e| match e {
             MirrorError::TangledStart { .. } => Status::failed_precondition(e.to_string()),
-            e => Status::aborted(e.to_string()),
+            e => aborted(e),
         })?;
         if publisher.is_cancelled() {
-            return Ok(());
+            return Ok(ControlFlow::Break(()));
         }
-        let flow = publisher.publish(&state.positions(), Some(self.snapshot.exposure));
-        match (self.snapshot.recording.take(), flow) {
-            (Some(recording), ControlFlow::Continue(())) => {
-                self.animate(state, recording, publisher)
-            }
-            _ => Ok(()),
-        }
+        let exposure = self.snapshot.exposure;
+        let positions = state.positions();
+        let solver = self.outfit.solver(state, Par::Rayon).map_err(aborted)?;
+        self.last = Some(LastFrame {
+            number: 0,
+            captured_ns: exposure.capture_time_ns,
+            checkpoint: solver.checkpoint(0),
+        });
+        Ok(publisher.publish(&positions, Some(exposure)))
     }
 
-    /// Frames of a recording that may still go on.
-    fn animate(
-        &self,
-        state: OfflineState,
-        mut recording: Recording,
-        publisher: &mut Publisher,
-    ) -> Result<(), Status> {
-        let aborted = |e: tryon::offline::OfflineError| Status::aborted(e.to_string());
-        let mut solver = self.outfit.solver(state, Par::Rayon).map_err(aborted)?;
-        let mut clock = FrameClock::at(self.snapshot.exposure.capture_time_ns);
+    /// Frames of a recording that may still go on, after the last finished one.
+    fn animate(&mut self, publisher: &mut Publisher) -> Result<ControlFlow<()>, Status> {
+        let (Some(last), Some(recording)) = (&mut self.last, &mut self.snapshot.recording) else {
+            return Ok(ControlFlow::Continue(()));
+        };
+        let checkpoint = std::mem::take(&mut last.checkpoint);
+        let solver = self.outfit.resumed_solver(&checkpoint, Par::Rayon);
+        let mut solver = solver.map_err(aborted)?;
+        drop(checkpoint);
+        let mut clock = FrameClock::at(last.captured_ns);
         while let Some(body) = recording.blocking_recv() {
             let dt = LongGap::Nominal.time_step(clock.gap(body.exposure.capture_time_ns));
             let obstacle: Vec<V3d> = body.vertices.iter().map(|p| p.coords.cast()).collect();
@@ -157,16 +227,17 @@ impl FineTask {
             if recording.is_closed() {
                 publisher.expect(1 + recording.len());
             }
+            last.number += 1;
             let positions = solver.state().positions();
-            if publisher
-                .publish(&positions, Some(body.exposure))
-                .is_break()
-            {
-                return Ok(());
+            let flow = publisher.publish(&positions, Some(body.exposure));
+            if flow.is_break() {
+                last.captured_ns = body.exposure.capture_time_ns;
+                last.checkpoint = solver.checkpoint(u64::from(last.number));
+                return Ok(flow);
             }
         }
         publisher.expect(0);
-        Ok(())
+        Ok(ControlFlow::Continue(()))
     }
 }
 
@@ -180,7 +251,7 @@ fn drape_step(vertices: usize, step: &DrapeReport) -> DrapeStep {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::progress::Progress;
     use std::error::Error;
@@ -191,9 +262,8 @@ mod tests {
     use tryon::math::{Body, Rigid, World};
     use tryon::mirror::{Choice, PutOn, Subject};
 
-    /// A T-shirt whose front was pushed through the wearer and out of the back cannot start a simulation, and says why.
-    #[test]
-    fn a_tangled_start_is_refused_with_its_places() -> Result<(), Box<dyn Error>> {
+    /// A garment on the mean body, of which nothing is recorded and which is forgotten.
+    pub(crate) fn snapshot(garment: &str, how: PutOn) -> Result<Snapshot, Box<dyn Error>> {
         let template = embedded::template();
         let rest = template.personalise(&BodyShape::default());
         let mut pose: Pose<World> =
@@ -205,32 +275,37 @@ mod tests {
             pose: &pose,
             world_from_camera: Rigid::identity(),
         };
-        let tshirt = Choice::library("tshirt", None)?.sized(&measure(&template, &rest)?)?;
-        let mut outfit = DressedOutfit::put_on(&subject, vec![tshirt], PutOn::default())?;
-        let front = |z: f32| z > 0.05;
-        let cloth = &mut outfit.state.garments[0].positions;
-        cloth
-            .iter_mut()
-            .filter(|p| front(p.z))
-            .for_each(|p| p.z -= 0.4);
-        let snapshot = Snapshot {
-            outfit,
+        let sized = Choice::library(garment, None)?.sized(&measure(&template, &rest)?)?;
+        Ok(Snapshot {
+            outfit: DressedOutfit::put_on(&subject, vec![sized], how)?,
             template,
             garments: Arc::new([]),
             exposure: FrameId::default(),
             world_from_camera: None,
             recording: None,
             body: watch::Sender::new(()).subscribe(),
-        };
+        })
+    }
+
+    /// A T-shirt whose front was pushed through the wearer and out of the back cannot start a simulation, and says why.
+    #[test]
+    fn a_tangled_start_is_refused_with_its_places() -> Result<(), Box<dyn Error>> {
+        let mut snapshot = snapshot("tshirt", PutOn::default())?;
+        let front = |z: f32| z > 0.05;
+        let cloth = &mut snapshot.outfit.state.garments[0].positions;
+        cloth
+            .iter_mut()
+            .filter(|p| front(p.z))
+            .for_each(|p| p.z -= 0.4);
         let start = SessionStart {
             vertices: 2000,
             ..SessionStart::default()
         };
         let task = FineTask::new(snapshot, &start)?;
         let mut publisher = Publisher::new(Progress::of([0, 1]));
-        let why = task
-            .compute(&mut publisher)
-            .expect_err("a start that is tangled");
+        let Err(why) = task.compute(&mut publisher) else {
+            panic!("a start that is tangled");
+        };
         assert_eq!(why.code(), Code::FailedPrecondition, "{why}");
         assert!(why.message().contains("tshirt"), "{why}");
         Ok(())

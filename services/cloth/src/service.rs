@@ -201,6 +201,11 @@ impl ClothService for Cloth {
                 fine_task::check(message, start)?;
                 self.start_fine(start).await
             }
+            Some(Start::SimulationId(id)) => {
+                self.permit_simulation(&r, id)?;
+                fine_task::check_solver(message)?;
+                self.simulations.resume(id)
+            }
             Some(Start::SceneJson(text)) => {
                 Grant::of(&r)?.check_whole_store()?;
                 self.simulations.start_scene(SceneTask::new(text, message)?)

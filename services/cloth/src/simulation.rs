@@ -1,7 +1,8 @@
 //! Simulations on request: their directory, their threads, and how long they are kept.
 //!
 //! Each runs on threads of its own, at low priority beside the compute pool of live sessions. Its finished frames stay in
-//! memory for any number of readers, those of a session no longer than the session knows the body.
+//! memory for any number of readers, those of a session no longer than the session knows the body. A cancelled simulation
+//! of a session can be continued as long.
 
 use crate::fine_task::{FineTask, Snapshot};
 use crate::progress::{self, Frames, Progress, Publisher, SharedProgress};
@@ -27,6 +28,18 @@ struct Entry {
     /// Session that it belongs to; `None` for a scene.
     session: Option<String>,
     progress: SharedProgress,
+    remainder: SharedRemainder,
+}
+
+/// Part of a session's simulation that a cancel left; empty once another simulation computes it. It holds the body, and
+/// goes with its entry.
+struct Remainder(Option<Box<FineTask>>);
+
+/// Remainder as its thread and its directory share it; `None` before the end, and after an end by itself.
+type SharedRemainder = Arc<Mutex<Option<Remainder>>>;
+
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Simulations by their ids, which are secrets like those of sessions.
@@ -35,7 +48,7 @@ struct Directory(Arc<Mutex<BTreeMap<String, Entry>>>);
 
 impl Directory {
     fn lock(&self) -> MutexGuard<'_, BTreeMap<String, Entry>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.0)
     }
 
     fn entry(&self, id: &str) -> Result<Entry, Status> {
@@ -122,7 +135,8 @@ impl Simulations {
             origin: self.service.subscribe(),
         };
         let ([first_frame, frame_count], vertex_count) = (plan.frames, task.vertices());
-        let simulation_id = self.launch(plan, move |publisher| task.compute(publisher))?;
+        let compute = move |publisher: &mut Publisher| task.compute(publisher).map(|()| None);
+        let simulation_id = self.launch(plan, compute)?;
         Ok(StartSimulationResponse {
             simulation_id,
             frame_count,
@@ -139,34 +153,66 @@ impl Simulations {
         start: &SessionStart,
         snapshot: Snapshot,
     ) -> Result<StartSimulationResponse, Status> {
-        let (exposure, world_from_camera) = (snapshot.exposure, snapshot.world_from_camera);
-        let (origin, wanted) = (snapshot.body.clone(), start.clone());
+        let wanted = start.clone();
         let task = tokio::task::spawn_blocking(move || FineTask::new(snapshot, &wanted)).await;
         let task = task.map_err(|e| Status::internal(e.to_string()))??;
-        let frame_count = task.frame_count();
+        self.launch_fine(place, &start.session_id, task)
+    }
+
+    /// Starts a simulation of the frames that a cancelled one of a session left.
+    ///
+    /// # Errors
+    /// FAILED_PRECONDITION for a simulation that left none; RESOURCE_EXHAUSTED when as many run as may.
+    pub(crate) fn resume(&self, id: &str) -> Result<StartSimulationResponse, Status> {
+        let entry = self.directory.entry(id)?;
+        let refused = |why: &str| {
+            let why = format!("simulation `{id}` cannot be continued: {why}");
+            Err(Status::failed_precondition(why))
+        };
+        let Some(session) = entry.session else {
+            return refused("that of a scene continues from its checkpoint");
+        };
+        let has_ended = entry.progress.borrow().has_ended();
+        let mut remainder = lock(&entry.remainder);
+        let Some(Remainder(left)) = &mut *remainder else {
+            return refused(if has_ended {
+                "it ended by itself"
+            } else {
+                "it has not ended"
+            });
+        };
+        match (left.take(), self.place()) {
+            (Some(task), Ok(place)) => self.launch_fine(place, &session, *task),
+            (Some(task), Err(full)) => {
+                *left = Some(task);
+                Err(full)
+            }
+            (None, _) => refused("it was continued before"),
+        }
+    }
+
+    fn launch_fine(
+        &self,
+        place: OwnedSemaphorePermit,
+        session: &str,
+        task: FineTask,
+    ) -> Result<StartSimulationResponse, Status> {
         let plan = Plan {
             place,
-            frames: [0, frame_count],
-            session: Some(start.session_id.clone()),
-            origin,
+            frames: task.frames(),
+            session: Some(session.to_owned()),
+            origin: task.body(),
         };
-        let mut response = StartSimulationResponse {
-            frame_count,
-            vertex_count: task.vertices(),
-            garments: task.topology(),
-            exposure: Some(exposure),
-            world_from_camera,
-            ..Default::default()
-        };
+        let mut response = task.response(plan.frames);
         response.simulation_id = self.launch(plan, move |publisher| task.compute(publisher))?;
         Ok(response)
     }
 
-    /// Runs `work` on threads of its own; the id of the simulation.
+    /// Runs `work`, which returns what it left, on threads of its own; the id of the simulation.
     fn launch(
         &self,
         plan: Plan,
-        work: impl FnOnce(&mut Publisher) -> Result<(), Status> + Send + 'static,
+        work: impl FnOnce(&mut Publisher) -> Result<Option<FineTask>, Status> + Send + 'static,
     ) -> Result<String, Status> {
         let Plan {
             place,
@@ -177,7 +223,8 @@ impl Simulations {
         let id = random_id();
         let progress = Progress::of(frames);
         let mut publisher = Publisher::new(progress.clone());
-        let (shared, shown) = (progress.clone(), brief(&id));
+        let remainder = SharedRemainder::default();
+        let (shared, rest, shown) = (progress.clone(), remainder.clone(), brief(&id));
         let run = move || {
             let work = || run_in_background(|| work(&mut publisher));
             // A panic loses the state of this simulation only.
@@ -186,6 +233,12 @@ impl Simulations {
                 Ok(Err(e)) => Err(Status::internal(e.to_string())),
                 Err(_) => Err(Status::internal("the simulation panicked")),
             };
+            // Moved: nothing of the body stays with this thread after the end.
+            let end = end.map(move |left| {
+                if let Some(task) = left {
+                    *lock(&rest) = Some(Remainder(Some(Box::new(task))));
+                }
+            });
             if let Err(why) = &end {
                 tracing::warn!(simulation = shown, why = why.message(), "simulation failed");
             }
@@ -198,7 +251,11 @@ impl Simulations {
             .map_err(|e| Status::internal(format!("no thread for a simulation: {e}")))?;
         tracing::info!(simulation = brief(&id), frame_count = frames[1], "started");
         let ended = progress.subscribe();
-        let entry = Entry { session, progress };
+        let entry = Entry {
+            session,
+            progress,
+            remainder,
+        };
         self.directory.lock().insert(id.clone(), entry);
         let keep = Keep {
             directory: self.directory.clone(),
@@ -238,5 +295,177 @@ impl Simulations {
             return Err(WireError::new("follow_simulation_request.first_frame", why).into());
         }
         Ok(progress::follow(progress, first))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fine_task::tests::snapshot;
+    use crate::recording::{Recorder, Recording};
+    use bytes::Bytes;
+    use futures::StreamExt;
+    use std::error::Error;
+    use tonic::Code;
+    use tryon::math::{P3, V3};
+    use tryon::mirror::PutOn;
+    use tryon_proto::v1::FrameId;
+
+    /// Recorded bodies.
+    const BODIES: u64 = 4;
+    /// Time within which they are exposed (s).
+    const SECONDS: f32 = 0.5;
+
+    /// A coarse skirt and the body that wears it, which moves aside.
+    struct Subject {
+        worn: Snapshot,
+        body: watch::Sender<()>,
+    }
+
+    impl Subject {
+        fn new() -> Result<Self, Box<dyn Error>> {
+            let how = PutOn {
+                is_coarse: true,
+                ..PutOn::default()
+            };
+            Ok(Self {
+                worn: snapshot("skirt", how)?,
+                body: watch::Sender::new(()),
+            })
+        }
+
+        fn record(&self, recorder: &Recorder, number: u64) -> bool {
+            let exposure = FrameId {
+                // Uneven, as a camera's.
+                capture_time_ns: number * (30 + number) * 1_000_000,
+                ..FrameId::default()
+            };
+            let aside = V3::new(0.001 * number as f32, 0.0, 0.0);
+            let body = self.worn.outfit.state.collision_body().vertices();
+            let body: Vec<P3> = body.iter().map(|p| p + aside).collect();
+            recorder.record(exposure, &body)
+        }
+
+        async fn start(
+            &self,
+            simulations: &Simulations,
+            recording: Recording,
+        ) -> Result<String, Status> {
+            let snapshot = Snapshot {
+                outfit: self.worn.outfit.clone(),
+                template: self.worn.template.clone(),
+                garments: self.worn.garments.clone(),
+                recording: Some(recording),
+                body: self.body.subscribe(),
+                ..self.worn
+            };
+            let start = SessionStart {
+                session_id: "mine".into(),
+                vertices: 1,
+                motion_seconds: SECONDS,
+            };
+            let place = simulations.place()?;
+            let started = simulations.start_fine(place, &start, snapshot).await?;
+            assert_eq!(started.first_frame, 0);
+            Ok(started.simulation_id)
+        }
+    }
+
+    /// The next `count` frames of a simulation from `first` on: number, exposure and positions.
+    async fn frames(
+        simulations: &Simulations,
+        id: &str,
+        [first, count]: [u32; 2],
+    ) -> Result<Vec<(u32, Option<FrameId>, Bytes)>, Status> {
+        let messages = simulations.follow(id, first)?;
+        let frames = messages.filter_map(async |m| match m {
+            Ok(m) if m.positions.is_empty() => None,
+            Ok(m) => Some(Ok((m.frame, m.exposure, m.positions))),
+            Err(why) => Some(Err(why)),
+        });
+        let frames: Vec<_> = Box::pin(frames.take(count as usize)).collect().await;
+        frames.into_iter().collect()
+    }
+
+    fn refusal(simulations: &Simulations, id: &str) -> (Code, String) {
+        let refused = simulations.resume(id).expect_err("refused");
+        (refused.code(), refused.message().to_owned())
+    }
+
+    #[tokio::test]
+    async fn a_cancelled_simulation_of_a_session_continues_once_to_the_same_bits()
+    -> Result<(), Box<dyn Error>> {
+        let (simulations, subject) = (Simulations::new(1), Subject::new()?);
+        let (recorder, recording) = Recorder::new(FrameId::default(), SECONDS);
+        assert!((1..=BODIES).all(|n| subject.record(&recorder, n)));
+        drop(recorder);
+        let id = subject.start(&simulations, recording).await?;
+        let all = [0, 1 + BODIES as u32];
+        let whole = frames(&simulations, &id, all).await?;
+        assert_eq!(whole.len(), all[1] as usize);
+        simulations.cancel(&id).await?;
+        let (code, why) = refusal(&simulations, &id);
+        assert!(code == Code::FailedPrecondition && why.contains("ended by itself"));
+
+        let (recorder, recording) = Recorder::new(FrameId::default(), SECONDS);
+        let draped = subject.start(&simulations, recording).await?;
+        let (code, why) = refusal(&simulations, &draped);
+        assert!(code == Code::FailedPrecondition && why.contains("has not ended"));
+        let cancelled = simulations.cancel(&draped).await?;
+        assert_eq!(cancelled, CancelSimulationResponse::default());
+
+        // The drape anew, and the frames of bodies that were recorded in between.
+        assert!((1..BODIES - 1).all(|n| subject.record(&recorder, n)));
+        let moved = simulations.resume(&draped)?;
+        assert_eq!((moved.first_frame, moved.frame_count), (0, 0));
+        let (code, why) = refusal(&simulations, &draped);
+        assert!(code == Code::FailedPrecondition && why.contains("continued before"));
+        let moved = moved.simulation_id;
+        frames(&simulations, &moved, [0, BODIES as u32 - 1]).await?;
+        // It waits for a further body, or has not yet gone on from the last one.
+        let further = async { assert!(subject.record(&recorder, BODIES - 1)) };
+        let (cancelled, ()) = tokio::join!(simulations.cancel(&moved), further);
+        let CancelSimulationResponse {
+            next_frame,
+            checkpoint,
+        } = cancelled?;
+        let possible = [BODIES as u32 - 1, BODIES as u32];
+        assert!(possible.contains(&next_frame), "{next_frame}");
+        assert!(checkpoint.is_empty(), "no recorded body leaves the service");
+
+        assert!(subject.record(&recorder, BODIES));
+        drop(recorder);
+        let held = simulations.place()?;
+        assert_eq!(refusal(&simulations, &moved).0, Code::ResourceExhausted);
+        drop(held);
+        let end = simulations.resume(&moved)?;
+        assert_eq!([end.first_frame, end.frame_count], [next_frame, all[1]]);
+        let mut parts = frames(&simulations, &moved, all).await?;
+        assert_eq!(parts.len(), next_frame as usize);
+        parts.extend(frames(&simulations, &end.simulation_id, all).await?);
+        assert!(parts == whole, "other bits");
+        Ok(())
+    }
+
+    #[tokio::test]
+    async fn nothing_is_left_to_continue_once_the_body_is_forgotten() -> Result<(), Box<dyn Error>>
+    {
+        let (simulations, subject) = (Simulations::new(1), Subject::new()?);
+        let (recorder, recording) = Recorder::new(FrameId::default(), SECONDS);
+        let id = subject.start(&simulations, recording).await?;
+        simulations.cancel(&id).await?;
+        assert!(subject.record(&recorder, 1), "it can be continued");
+        drop(subject.body);
+        while simulations.session(&id).is_ok() {
+            tokio::task::yield_now().await;
+        }
+        assert_eq!(refusal(&simulations, &id).0, Code::NotFound);
+        let body = subject.worn.outfit.state.collision_body().vertices();
+        let exposure = FrameId::default();
+        assert!(
+            !recorder.record(exposure, body),
+            "nobody holds the recording"
+        );
+        Ok(())
     }
 }

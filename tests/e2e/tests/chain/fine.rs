@@ -64,6 +64,13 @@ fn follow(simulation_id: &str) -> FollowSimulationRequest {
     }
 }
 
+fn continuation(simulation_id: &str) -> StartSimulationRequest {
+    StartSimulationRequest {
+        start: Some(Start::SimulationId(simulation_id.into())),
+        ..Default::default()
+    }
+}
+
 fn cancel(simulation_id: &str) -> CancelSimulationRequest {
     CancelSimulationRequest {
         simulation_id: simulation_id.into(),
@@ -165,6 +172,7 @@ fn a_session_is_draped_fine_for_its_owner_alone() {
         fine_is_near_the_preview(&mut mine, &mut preview).await;
         strangers_are_refused(&guarded, &mut mine, &mut preview).await;
         motion_is_recorded(&mut mine, &mut preview).await;
+        a_cancelled_motion_continues(&guarded, &mut mine, &mut preview).await;
 
         let endless = start(&mut mine, &mut preview, &drape(MINE, 50_000)).await;
         let endless = endless.simulation_id;
@@ -202,6 +210,8 @@ async fn faults_are_typed(guarded: &Guarded, mine: &mut Cloth) {
         let named = field(refused.expect_err("out of range"));
         assert_eq!(named, "start_simulation_request.session.motion_seconds");
     }
+    let unknown = mine.start_simulation(continuation("unknown")).await;
+    assert_eq!(unknown.expect_err("unknown").code(), Code::NotFound);
     let realtime = StartSimulationRequest {
         solver: ClothSolver::Realtime.into(),
         ..drape(MINE, VERTICES)
@@ -285,7 +295,7 @@ async fn exposures(
     let (mut exposures, mut count) = (Vec::new(), 0);
     while let Some(m) = followed.message().await? {
         if !m.positions.is_empty() {
-            assert_eq!(m.frame, exposures.len() as u32);
+            assert_eq!(m.frame, started.first_frame + exposures.len() as u32);
             assert_eq!(m.positions.len(), 12 * started.vertex_count as usize);
             exposures.push(m.exposure.expect("an exposure"));
         }
@@ -317,6 +327,82 @@ async fn motion_is_recorded(mine: &mut Cloth, preview: &mut Preview) {
         return;
     }
     panic!("always forgotten");
+}
+
+/// A motion that is cancelled during its drape and after its first frames goes on for its owner, numbered on.
+async fn a_cancelled_motion_continues(guarded: &Guarded, mine: &mut Cloth, preview: &mut Preview) {
+    for _ in 0..TRIES {
+        match continued(guarded, mine, preview).await {
+            Ok(()) => return,
+            Err(s) if s.code() == Code::NotFound => {}
+            Err(s) => panic!("{s}"),
+        }
+    }
+    panic!("always forgotten");
+}
+
+/// NOT_FOUND when the body was forgotten.
+async fn continued(
+    guarded: &Guarded,
+    mine: &mut Cloth,
+    preview: &mut Preview,
+) -> Result<(), Status> {
+    const SECONDS: f32 = 0.5;
+    let started = start(mine, preview, &motion(SECONDS)).await;
+    let id = started.simulation_id;
+    cannot_be_continued(mine, &id).await?;
+    let cancelled = mine.cancel_simulation(cancel(&id)).await?.into_inner();
+    assert_eq!(cancelled, CancelSimulationResponse::default());
+
+    let mut theirs = cloth(guarded, Some("theirs"));
+    let stranger = theirs.start_simulation(continuation(&id)).await;
+    let followed = theirs.follow_simulation(follow(&id)).await;
+    assert_eq!(
+        told(&stranger.expect_err("start")),
+        told(&followed.expect_err("follow"))
+    );
+    let anew = mine.start_simulation(continuation(&id)).await?.into_inner();
+    assert_eq!(anew.first_frame, 0);
+    let mut frames = mine.follow_simulation(follow(&anew.simulation_id)).await?;
+    let mut published = 0;
+    while published < 2 {
+        let message = frames.get_mut().message().await?.expect("a frame");
+        published += u32::from(!message.positions.is_empty());
+    }
+    let cancelled = mine.cancel_simulation(cancel(&anew.simulation_id)).await?;
+    let cancelled = cancelled.into_inner();
+    assert!(cancelled.next_frame >= 2 && cancelled.checkpoint.is_empty());
+
+    let rest = mine.start_simulation(continuation(&anew.simulation_id));
+    let rest = rest.await?.into_inner();
+    let same = StartSimulationResponse {
+        first_frame: cancelled.next_frame,
+        frame_count: rest.frame_count,
+        simulation_id: rest.simulation_id.clone(),
+        ..started
+    };
+    assert!(rest == same, "other garments or another start");
+    let (before, _) = exposures(mine, &anew).await?;
+    let (after, count) = exposures(mine, &rest).await?;
+    assert_eq!(before.len() + after.len(), count);
+    let all: Vec<u64> = (before.iter().chain(&after))
+        .map(|e| e.capture_time_ns)
+        .collect();
+    assert!(all.is_sorted_by(|a, b| a < b), "{all:?}");
+    println!("{} frames and {} after them", before.len(), after.len());
+    cannot_be_continued(mine, &anew.simulation_id).await?;
+    cannot_be_continued(mine, &rest.simulation_id).await
+}
+
+/// An error that is not the expected refusal is returned.
+async fn cannot_be_continued(c: &mut Cloth, id: &str) -> Result<(), Status> {
+    let refused = c.start_simulation(continuation(id)).await;
+    let refused = refused.expect_err("no frames are left");
+    if refused.code() == Code::FailedPrecondition {
+        Ok(())
+    } else {
+        Err(refused)
+    }
 }
 
 /// Another session's token is refused as for the garments; the own one cancels, and no frame is left then.

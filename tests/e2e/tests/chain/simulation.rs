@@ -150,8 +150,18 @@ fn a_cancelled_simulation_continues_to_the_same_bits() {
             .await
             .expect("cancelled");
         let first = first.into_inner();
-        let again = c.cancel_simulation(cancel).await.expect("cancelled before");
-        assert_eq!(again.into_inner(), first);
+        let again = c.cancel_simulation(cancel.clone()).await;
+        assert_eq!(again.expect("cancelled before").into_inner(), first);
+        let unaided = StartSimulationRequest {
+            start: Some(Start::SimulationId(cancel.simulation_id)),
+            ..Default::default()
+        };
+        let refused = c.start_simulation(unaided).await.expect_err("a scene");
+        let is_named = refused.message().contains("checkpoint");
+        assert!(
+            is_named && refused.code() == Code::FailedPrecondition,
+            "{refused}"
+        );
 
         // Half a second more than the first simulation came to.
         let count = first.next_frame + FRAMES;
