@@ -5,8 +5,8 @@ use super::edges::InteriorEdge;
 use super::element_set::CHUNK;
 use super::fan_expansion::{CurvatureBuffers, FanExpansion, Place};
 use super::fans::RestMesh;
-use super::term_rows::TermRows;
 use super::{BendLaw, Dihedral, ElasticExpansion, RestSheet, RestTriangle, SheetMotion};
+use crate::mesh::Csr;
 use crate::par::{Par, for_chunks, map_into};
 use nalgebra::{Matrix3, Vector3};
 
@@ -43,8 +43,8 @@ struct FanCurvature {
 pub(super) struct CurvatureSet {
     hinges: Vec<RestHinge>,
     fans: Vec<FanCurvature>,
-    at_vertices: TermRows<Place>,
-    at_pairs: TermRows<Place>,
+    at_vertices: Csr<Place>,
+    at_pairs: Csr<Place>,
 }
 
 impl CurvatureSet {
@@ -106,8 +106,8 @@ impl CurvatureSet {
                 }
             }
         }
-        self.at_vertices = TermRows::new(vertices, at_vertices);
-        self.at_pairs = TermRows::new(pairs.len(), at_pairs);
+        self.at_vertices = Csr::from_pairs(vertices, &at_vertices);
+        self.at_pairs = Csr::from_pairs(pairs.len(), &at_pairs);
     }
     /// Energy (J).
     pub(super) fn energy(&self, law: &BendLaw, par: Par, at: &SheetMotion<'_>) -> f64 {

@@ -2,8 +2,8 @@
 
 use super::ElasticExpansion;
 use super::packed::Packed;
-use super::term_rows::TermRows;
 use crate::math::V3d;
+use crate::mesh::Csr;
 use crate::par::{Par, map_into};
 
 /// Vertex index of a corner that an element lacks.
@@ -12,7 +12,7 @@ pub(super) const ABSENT: u32 = u32::MAX;
 pub(super) const CHUNK: usize = 256;
 
 /// One entry of a sum over elements.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Term {
     element: u32,
     /// Corner, or block of the packed expansion.
@@ -24,9 +24,9 @@ struct Term {
 #[derive(Clone, Debug)]
 pub(super) struct ElementSet<const K: usize, const P: usize> {
     vertices: Vec<[u32; K]>,
-    gradient: TermRows<Term>,
-    diagonal: TermRows<Term>,
-    off_diagonal: TermRows<Term>,
+    gradient: Csr<Term>,
+    diagonal: Csr<Term>,
+    off_diagonal: Csr<Term>,
 }
 
 /// Pairs of different vertices that share an element, smaller first, with repetitions.
@@ -79,9 +79,9 @@ impl<const K: usize, const P: usize> ElementSet<K, P> {
         }
         Self {
             vertices,
-            gradient: TermRows::new(count, gradient),
-            diagonal: TermRows::new(count, diagonal),
-            off_diagonal: TermRows::new(pairs.len(), off_diagonal),
+            gradient: Csr::from_pairs(count, &gradient),
+            diagonal: Csr::from_pairs(count, &diagonal),
+            off_diagonal: Csr::from_pairs(pairs.len(), &off_diagonal),
         }
     }
     /// Vertices of an element.

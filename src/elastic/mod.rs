@@ -20,7 +20,6 @@ mod model;
 mod packed;
 mod rest_sheet;
 mod stretch_law;
-mod term_rows;
 #[cfg(test)]
 mod test_cantilever;
 #[cfg(test)]

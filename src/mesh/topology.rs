@@ -3,16 +3,16 @@
 use super::{Face, MeshError, TriMesh};
 use std::collections::BTreeMap;
 
-/// Compressed sparse rows: a list of indices for each vertex.
+/// Compressed sparse rows: a list of items, indices if nothing else is said, for each vertex.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Csr {
+pub struct Csr<T = u32> {
     offsets: Vec<u32>,
-    items: Vec<u32>,
+    items: Vec<T>,
 }
 
-impl Csr {
+impl<T: Copy + Default> Csr<T> {
     /// Groups `(row, item)` pairs; items of a row keep their order in `pairs`.
-    pub fn from_pairs(rows: usize, pairs: &[(u32, u32)]) -> Self {
+    pub fn from_pairs(rows: usize, pairs: &[(u32, T)]) -> Self {
         let mut offsets = vec![0u32; rows + 1];
         for &(r, _) in pairs {
             offsets[r as usize + 1] += 1;
@@ -21,13 +21,24 @@ impl Csr {
             offsets[i + 1] += offsets[i];
         }
         let mut next = offsets.clone();
-        let mut items = vec![0; pairs.len()];
+        let mut items = vec![T::default(); pairs.len()];
         for &(r, item) in pairs {
             items[next[r as usize] as usize] = item;
             next[r as usize] += 1;
         }
         Self { offsets, items }
     }
+    /// Items of one row.
+    pub fn row(&self, i: usize) -> &[T] {
+        &self.items[self.offsets[i] as usize..self.offsets[i + 1] as usize]
+    }
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.offsets.len().saturating_sub(1)
+    }
+}
+
+impl Csr {
     /// Connected rows whose neighbours are `alike`, each ascending, in the order of their first rows.
     pub fn components(&self, alike: impl Fn(usize, usize) -> bool) -> Vec<Vec<u32>> {
         let mut is_taken = vec![false; self.rows()];
@@ -52,15 +63,6 @@ impl Csr {
             out.push(own);
         }
         out
-    }
-
-    /// Items of one row.
-    pub fn row(&self, i: usize) -> &[u32] {
-        &self.items[self.offsets[i] as usize..self.offsets[i + 1] as usize]
-    }
-    /// Number of rows.
-    pub fn rows(&self) -> usize {
-        self.offsets.len().saturating_sub(1)
     }
 }
 

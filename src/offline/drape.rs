@@ -80,6 +80,7 @@ impl OfflineSolver<'_> {
     ) -> Result<DrapeReport, OfflineError> {
         let mut report = DrapeReport::default();
         report.newton.smallest_share = 1.0;
+        self.wake_up();
         let x = &self.state.now.x;
         let held = FrameScript {
             targets,

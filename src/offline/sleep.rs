@@ -52,15 +52,26 @@ impl OfflineSolver<'_> {
                 self.sleep.since = 0.0;
             }
         }
-        let asleep = &self.sleep.asleep;
-        let resting = asleep.iter().take(self.cloth.len()).enumerate();
-        for (i, _) in resting.filter(|(_, is_asleep)| **is_asleep) {
+        let cloth = self.sleep.asleep.iter().take(self.cloth.len()).enumerate();
+        for (i, _) in cloth.filter(|(_, is_asleep)| **is_asleep) {
             let now = &mut self.state.now;
             now.v[i] = V3d::zeros();
             if let Some((earlier, _)) = &mut self.state.earlier {
                 (earlier.x[i], earlier.v[i]) = (now.x[i], V3d::zeros());
             }
         }
+        self.leave_out_sleepers();
+    }
+
+    /// Wakes everything, and counts anew from the next frame on.
+    pub(super) fn wake_up(&mut self) {
+        self.sleep.asleep.clear();
+        self.sleep.still.fill(0.0);
+        self.leave_out_sleepers();
+    }
+
+    fn leave_out_sleepers(&mut self) {
+        let asleep = &self.sleep.asleep;
         self.directions.select(asleep);
         if let Some(contacts) = &mut self.contacts {
             contacts.leave_out(asleep);

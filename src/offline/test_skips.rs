@@ -6,6 +6,7 @@ use super::*;
 use crate::math::V3d;
 use crate::mesh::Face;
 use crate::par::Par;
+use std::ops::ControlFlow;
 
 fn root_mean_square(a: &[V3d], b: &[V3d]) -> f64 {
     let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum();
@@ -185,6 +186,14 @@ fn a_scene_at_rest_costs_nothing_and_wakes_with_its_table() {
     let reports = frames(&mut solver, &body, 30);
     let last = reports.last().expect("frames");
     assert_eq!((last.steps, last.asleep), (0, cloth.len()), "{last:?}");
+    let drape = DrapeSettings {
+        most_steps: 1,
+        final_steps: 0,
+        ..DrapeSettings::default()
+    };
+    let draped = solver.drape(&drape, |_| ControlFlow::Continue(()));
+    let work = draped.expect("a drape").newton;
+    assert!(work.products > 0, "a drape looks at all cloth: {work:?}");
     body.iter_mut().for_each(|p| p.y += 5e-3);
     let woken = frames(&mut solver, &body, 1)[0];
     assert_eq!(woken.asleep, 0, "{woken:?}");

@@ -157,6 +157,9 @@ pub(crate) struct SimulateArgs {
     /// Lets cloth pass through itself and through solids (offline solver).
     #[arg(long)]
     pub(crate) no_contact: bool,
+    /// Computes every frame whole: nothing that is still is left out (offline solver).
+    #[arg(long)]
+    pub(crate) no_sleep: bool,
     /// Folder for positions.npy (frames × vertices × 3, f32), report.json and, by the offline solver, animation.glb.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,

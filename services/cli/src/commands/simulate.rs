@@ -67,6 +67,7 @@ struct OfflineRun {
 fn offline(args: &SimulateArgs, scene: &Scene) -> Result<ExitCode> {
     let mut settings = OfflineSettings::default();
     settings.contact = settings.contact.filter(|_| !args.no_contact);
+    settings.sleep = settings.sleep.filter(|_| !args.no_sleep);
     let saved = saved_state(&args.solver)?;
     let offline = OfflineScene::new(scene)?;
     let resumed = saved.as_deref().map_or(Ok(0), checkpoint_frame)? as usize;
