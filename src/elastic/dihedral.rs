@@ -5,7 +5,6 @@
 //! ∂θ/∂a = −|e| m/|m|² and ∂θ/∂b = −|e| n/|n|²; moving e turns both wings, by the fractions α = a·e/|e|² and β = b·e/|e|²
 //! of what moving the apices does: ∂θ/∂e = −α ∂θ/∂a − β ∂θ/∂b.
 
-use super::element_set::ABSENT;
 use crate::math::{V3d, skew};
 use nalgebra::{Matrix3, SMatrix, SVector};
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -39,14 +38,9 @@ impl<'a> SheetMotion<'a> {
             asleep: &[],
         }
     }
-    /// True for an element that is left out.
+    /// True for an element that is left out; a corner that it lacks, beyond all vertices, keeps nothing awake.
     pub fn is_asleep(&self, vertices: &[u32]) -> bool {
-        let sleeps = |v: &u32| {
-            self.asleep
-                .get(*v as usize)
-                .copied()
-                .unwrap_or(*v == ABSENT)
-        };
+        let sleeps = |v: &u32| self.asleep.get(*v as usize).copied().unwrap_or(true);
         !self.asleep.is_empty() && vertices.iter().all(sleeps)
     }
     /// Corners of a hinge at the start and now.

@@ -18,6 +18,7 @@ mod potential;
 mod problem;
 mod scene_run;
 mod sleep;
+mod sleepers;
 mod solid_mesh;
 mod start;
 mod step;
