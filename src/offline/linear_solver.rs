@@ -28,6 +28,8 @@ pub enum LinearMethod {
 /// Linear system of a Newton iteration.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LinearSystem<'a> {
+    /// Positions (m).
+    pub(super) x: &'a [V3d],
     /// Gradient (N).
     pub(super) gradient: &'a [V3d],
     /// Hessian of shape, inertia, pins and obstacle (N/m).
@@ -69,16 +71,15 @@ impl DirectionSolver {
         }
     }
 
-    /// Replaces `direction` with the Newton direction at `x`; returns products with the matrix.
+    /// Replaces `direction` with the Newton direction; returns products with the matrix.
     pub(super) fn solve(
         &mut self,
         how: (LinearMethod, StopCriterion),
         system: &LinearSystem<'_>,
-        x: &[V3d],
         direction: &mut [V3d],
     ) -> Result<usize, OfflineError> {
         direction.fill(V3d::zeros());
-        self.improve(how, system, x, direction)
+        self.improve(how, system, direction)
     }
 
     /// Goes on from a `direction`, until the residual is that asked for.
@@ -86,20 +87,20 @@ impl DirectionSolver {
         &mut self,
         how: (LinearMethod, StopCriterion),
         system: &LinearSystem<'_>,
-        x: &[V3d],
         direction: &mut [V3d],
     ) -> Result<usize, OfflineError> {
         let Some(selection) = self.selection.take() else {
-            return self.improve_all(how, system, x, direction);
+            return self.improve_all(how, system, direction);
         };
         let [shape, contact] = [system.shape, system.contact].map(|m| m.selected(&selection));
         let selected = LinearSystem {
+            x: &selection.gather(system.x),
             gradient: &selection.gather(system.gradient),
             shape: &shape,
             contact: &contact,
         };
-        let [x, mut own] = [x, &*direction].map(|all| selection.gather(all));
-        let products = self.improve_all(how, &selected, &x, &mut own);
+        let mut own = selection.gather(direction);
+        let products = self.improve_all(how, &selected, &mut own);
         selection.scatter(&own, direction);
         self.selection = Some(selection);
         products
@@ -109,7 +110,6 @@ impl DirectionSolver {
         &mut self,
         (method, stop): (LinearMethod, StopCriterion),
         system: &LinearSystem<'_>,
-        x: &[V3d],
         direction: &mut [V3d],
     ) -> Result<usize, OfflineError> {
         let right: Vec<V3d> = system.gradient.iter().map(|g| -g).collect();
@@ -142,7 +142,7 @@ impl DirectionSolver {
                     .get_or_insert_with(|| CoarseSpace::new(pattern, PATCH));
                 // The fine level works alone when rounding leaves the coarse matrix indefinite.
                 coarse
-                    .update(par, x, matrices)
+                    .update(par, system.x, matrices)
                     .or_else(LinearError::unless_indefinite)?;
                 let mut both = TwoLevel::new(fine, coarse);
                 conjugate_gradient(apply, &mut both, &right, direction, (par, stop))

@@ -106,9 +106,10 @@ pub(super) struct NewtonSystem {
 }
 
 impl NewtonSystem {
-    /// The linear system of its minimum.
-    pub(super) fn linear(&self) -> LinearSystem<'_> {
+    /// The linear system of its minimum, expanded at `x`.
+    pub(super) fn linear<'a>(&'a self, x: &'a [V3d]) -> LinearSystem<'a> {
         LinearSystem {
+            x,
             gradient: &self.gradient,
             shape: &self.shape,
             contact: &self.contact,
@@ -173,13 +174,12 @@ pub(super) fn minimise(
         if let Some(vertex) = first_not_finite(&system.gradient) {
             return Ok(Err(NewtonFault::NotFinite { vertex }));
         }
-        report.products +=
-            solver.solve(settings.linear(1.0), &system.linear(), x, &mut direction)?;
+        report.products += solver.solve(settings.linear(1.0), &system.linear(x), &mut direction)?;
         report.iterations += 1;
         if settings.is_settled(&direction, 1.0) {
             // A small step may be one of which a loose solution has hidden the rest: rigid motion comes last.
             let tight = settings.linear(TIGHTER);
-            report.products += solver.improve(tight, &system.linear(), x, &mut direction)?;
+            report.products += solver.improve(tight, &system.linear(x), &mut direction)?;
         }
         last_motion = largest(&direction);
         if !last_motion.1.is_finite() {

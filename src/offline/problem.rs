@@ -60,8 +60,7 @@ impl StepProblem<'_> {
         let mut direction = vec![V3d::zeros(); x.len()];
         report.products += solver.solve(
             settings.linear(GUESS_ACCURACY),
-            &system.linear(),
-            x,
+            &system.linear(x),
             &mut direction,
         )?;
         let free = self.free_share(x, &direction);

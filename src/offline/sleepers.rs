@@ -43,6 +43,7 @@ impl OfflineSolver<'_> {
         }
     }
 
+    /// Sleepers by vertex; empty for none.
     fn sleepers(&mut self, settings: SleepSettings, targets: &FrameTargets<'_>) -> Vec<bool> {
         let n = self.cloth.len();
         let still = self.sleep.still.iter();
@@ -62,6 +63,9 @@ impl OfflineSolver<'_> {
         };
         let woken: Vec<usize> = (0..n).filter(|i| is_beside_awake(*i)).collect();
         woken.into_iter().for_each(|i| asleep[i] = false);
+        if !asleep.contains(&true) {
+            return Vec::new();
+        }
         if let Some(contacts) = &mut self.contacts {
             contacts.wake(&self.state.unknowns(), &mut asleep);
         }

@@ -327,9 +327,7 @@ impl<'a> OfflineSolver<'a> {
         let x = self.state.unknowns();
         let mut slow = vec![V3d::zeros(); x.len()];
         let how = self.settings.newton.linear(1.0);
-        report.products += self
-            .directions
-            .solve(how, &system.linear(), &x, &mut slow)?;
+        report.products += self.directions.solve(how, &system.linear(&x), &mut slow)?;
         Ok(mean(&slow[..apart.len()]))
     }
 
