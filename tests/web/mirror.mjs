@@ -1,11 +1,12 @@
 // The page in a real browser, as a user uses it.
 //
-//   node mirror.mjs URL [--out DIR] [--break URL --mend URL | --stdio] [--rounds N] [--timeout SECONDS]
+//   node mirror.mjs URL [--out DIR] [--break URL --mend URL | --stdio] [--rounds N] [--timeout SECONDS] [--fine]
 //   node mirror.mjs --mock [--out DIR]
 //
-// Opens the page, starts a try-on, sees 30 different pictures, changes a garment, takes a photo, sees «Degraded» when
-// the chain is broken and «Live» when it is mended, finishes. Nothing may be asked of another host and nothing but the
-// broken connections themselves may be logged as an error.
+// Opens the page, starts a try-on, sees 30 different pictures, changes a garment, takes a photo, asks for its finer
+// picture (with a real chain only after --fine, for it takes a minute and may be refused in words), closes the dialog while
+// one is in progress, sees «Degraded» when the chain is broken and «Live» when it is mended, finishes. Nothing may be asked
+// of another host and nothing but the broken connections themselves may be logged as an error.
 // Who breaks the chain: a POST to the --break and --mend addresses; or with --stdio whoever started this, asked by a
 // line "BREAK" or "MEND" on standard output and answering with any line on standard input; without either that part is
 // not judged. Ends with 0 and "PASSED", or says what was missing.
@@ -24,6 +25,7 @@ const { values: options, positionals } = parseArgs({
     mend: { type: 'string' },
     stdio: { type: 'boolean', default: false },
     mock: { type: 'boolean', default: false },
+    fine: { type: 'boolean', default: false },
     rounds: { type: 'string', default: '1' },
     // Seconds for each thing waited for; software rendering of a debug build on two busy cores is slow.
     timeout: { type: 'string', default: '60' },
@@ -33,6 +35,8 @@ const { values: options, positionals } = parseArgs({
 
 const PICTURES = 30;
 const TIMEOUT_MS = Number(options.timeout) * 1000;
+/** For a finer drape beside a live one. */
+const FINE_MS = Math.max(TIMEOUT_MS, 180_000);
 
 let mock = null;
 let url = positionals[0];
@@ -74,6 +78,20 @@ try {
   const context = await browser.newContext({ viewport: { width: 1080, height: 1920 }, reducedMotion: 'reduce' });
   page = await context.newPage();
   page.setDefaultTimeout(TIMEOUT_MS);
+  // Pictures that the page made and has not forgotten.
+  await page.addInitScript(() => {
+    window.pictures = new Set();
+    const { createObjectURL, revokeObjectURL } = URL;
+    URL.createObjectURL = (blob) => {
+      const made = createObjectURL.call(URL, blob);
+      window.pictures.add(made);
+      return made;
+    };
+    URL.revokeObjectURL = (made) => {
+      window.pictures.delete(made);
+      revokeObjectURL.call(URL, made);
+    };
+  });
   const foreign = [];
   const errors = [];
   const requests = new Map();
@@ -179,8 +197,59 @@ try {
     must(head === 'ffd8ff' && (await fetch(link)).status === 404, 'the link gives the photo once');
   }
   await shot('4-photo');
+  const FINE_CALL = '/tryon.v1.CompositorService/TakeFinePicture';
+  const takeFinePicture = async () => {
+    const quick = await page.getAttribute('#photo-image', 'src');
+    await page.evaluate(() => {
+      const words = document.getElementById('fine-words');
+      const bar = document.getElementById('fine-progress');
+      window.fine = { words: [], bar: false };
+      new MutationObserver(() => {
+        window.fine.words.push(words.textContent);
+        window.fine.bar ||= getComputedStyle(bar).visibility === 'visible';
+      }).observe(words, { childList: true });
+    });
+    const button = page.getByRole('button', { name: 'Show finer folds' });
+    await button.evaluate((one) => { one.click(); one.click(); });
+    if (await page.isVisible('#fine-progress')) await shot('4-photo-working');
+    await page.waitForSelector('#photo:not([data-working])', { timeout: FINE_MS });
+    const { words: progress, bar } = await page.evaluate(() => window.fine);
+    const outcome = progress.pop();
+    must(requests.get(FINE_CALL) === 1, 'a second press asks for nothing');
+    must(bar && /^Settling the cloth/.test(progress[0]), `the drape is followed in words: ${progress.join(' ')}`);
+    const fine = await page.getAttribute('#photo-image', 'src');
+    if (fine === quick) must(!mock && /try again/.test(outcome), `no finer picture this time: «${outcome}»`);
+    else {
+      await isDrawn('photo-image');
+      must(/finer folds/.test(await page.getAttribute('#photo-image', 'alt')), `the finer picture is shown: «${outcome}»`);
+      must(await page.evaluate(() => window.pictures.size === 2), 'the quick photo is forgotten for it');
+    }
+    for (const [width, height] of [[1080, 1920], [1920, 1080], [390, 844]]) {
+      await page.setViewportSize({ width, height });
+      await shot(`4-photo-fine-${width}x${height}`);
+      const fits = await page.evaluate(() => document.getElementById('photo').scrollWidth <= document.getElementById('photo').clientWidth);
+      must(fits, `at ${width}×${height} the photo does not stick out of its dialog`);
+    }
+    await page.setViewportSize({ width: 1080, height: 1920 });
+  };
+  const isForgotten = () => page.evaluate(() =>
+    window.pictures.size === 0 && !document.querySelector('#photo img[src]') && !document.querySelector('#photo[open], #photo[data-working]'));
+  if (mock || options.fine) await takeFinePicture();
   await page.click('#photo-close');
-  must((await page.getAttribute('#photo-image', 'src')) === null, 'a closed photo is forgotten');
+  must(await isForgotten(), 'a closed photo is forgotten');
+
+  await page.click('#shutter');
+  await page.waitForSelector('#photo[open]');
+  const ended = page.waitForEvent('requestfailed', { predicate: (r) => r.url().endsWith(FINE_CALL) }).catch(() => null);
+  const wasWorking = await page.evaluate(async () => {
+    document.getElementById('fine-start').click();
+    await new Promise((next) => setTimeout(next, 200));
+    const working = document.getElementById('photo').dataset.working !== undefined;
+    document.getElementById('photo-close').click();
+    return working;
+  });
+  must(await isForgotten(), `closed ${wasWorking ? 'while the cloth settles' : 'after the answer'}, the photo is forgotten`);
+  if (wasWorking) must((await ended) !== null, 'and the call is cancelled');
 
   const wearing = () => page.$$eval('[aria-pressed="true"][data-garment]', (all) => all.map((c) => c.dataset.garment).join(', '));
   const before = await wearing();

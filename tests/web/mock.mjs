@@ -1,5 +1,5 @@
 // A compositor made of nothing: the page's files and CompositorService over gRPC-web, with a drawn user, for work on
-// the page without the chain. `node mock.mjs [PORT]`; POST /mock/{live,calibrate,degrade?reason=N,freeze,break,mend}.
+// the page without the chain. `node mock.mjs [PORT]`; POST /mock/{live,calibrate,degrade?reason=N,freeze,break,mend,fine?code=N}.
 
 import { readFileSync } from 'node:fs';
 import { createServer } from 'node:http';
@@ -117,6 +117,9 @@ function picture(index, outfit, person) {
   return painted.get(key);
 }
 
+/** Vertices of the meshes of a finer drape, the steps on each, and the time between two steps, ms. */
+const FINE_MESHES = [512, 1985, 7836, 31_122], FINE_STEPS = 4, FINE_STEP_MS = 100;
+
 /** Stands for a QR code. */
 const QR = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 3 3"><path d="M0 0h1v1H0zM2 0h1v1H2zM0 2h1v1H0zM1 1h1v1H1z"/></svg>';
 
@@ -124,7 +127,7 @@ const QR = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 3 3"><path d="M
 
 export function startMock({ port = 0, rate = 20 } = {}) {
   const tryOns = new Map();
-  const world = { state: m.State.LIVE, reason: 0, since: Date.now(), frozen: false, broken: false };
+  const world = { state: m.State.LIVE, reason: 0, since: Date.now(), frozen: false, broken: false, fine: 0 };
   const sockets = new Set();
   let sequence = 0n;
 
@@ -201,12 +204,36 @@ export function startMock({ port = 0, rate = 20 } = {}) {
     response.on('close', () => clearInterval(timer));
   }
 
+  /** Steps of a drape, then its picture; without garments or after /mock/fine?code=N the error of that code. */
+  function finePicture(request, response) {
+    const { try_on_id: id, codec } = decode(m.TakeFinePictureRequest, request);
+    const tryOn = tryOns.get(id);
+    const refusal = !tryOn ? 5 : tryOn.garments.length === 0 ? 9 : world.fine;
+    if (refusal) return response.end(Buffer.from(trailers(refusal, 'no fine picture')));
+    const send = (message) => response.write(frame(encode(m.TakeFinePictureResponse, message)));
+    let step = 0;
+    const timer = setInterval(() => {
+      if (tryOns.get(id) !== tryOn) return response.end(Buffer.from(trailers(10, 'the try-on ended')));
+      const steps = (step % FINE_STEPS) + 1;
+      const vertex_count = FINE_MESHES[Math.floor(step / FINE_STEPS)];
+      step += 1;
+      if (vertex_count) return send({ drape: { vertex_count, steps, motion: 0.004 / steps, settled: steps === FINE_STEPS } });
+      clearInterval(timer);
+      send({ picture: nextPicture(tryOn, codec) });
+      response.end(Buffer.from(trailers(0)));
+    }, FINE_STEP_MS);
+    response.on('close', () => clearInterval(timer));
+  }
+
+  const streams = { StreamFrames: stream, TakeFinePicture: finePicture };
+
   function control(what, query) {
     const set = (more) => Object.assign(world, { since: Date.now(), frozen: false, ...more });
     if (what === 'live') set({ state: m.State.LIVE, reason: 0 });
     if (what === 'calibrate') set({ state: m.State.CALIBRATING, reason: 0 });
     if (what === 'degrade') set({ state: m.State.DEGRADED, reason: Number(query.get('reason') ?? 1) });
     if (what === 'freeze') set({ state: m.State.DEGRADED, reason: m.Reason.CAMERA_SILENT, frozen: true });
+    if (what === 'fine') world.fine = Number(query.get('code') ?? 0);
     if (what === 'break' || what === 'mend') world.broken = what === 'break';
     if (what === 'break') {
       tryOns.clear();
@@ -237,7 +264,7 @@ export function startMock({ port = 0, rate = 20 } = {}) {
     const message = new Uint8Array(Buffer.concat(chunks)).subarray(5);
     const name = pathname.split('/').at(-1);
     response.writeHead(200, { 'content-type': 'application/grpc-web+proto' });
-    if (name === 'StreamFrames') return stream(message, response);
+    if (streams[name]) return streams[name](message, response);
     try {
       const [ask, answer, act] = unary[name];
       response.write(frame(encode(answer, act(decode(ask, message)))));

@@ -5,9 +5,10 @@ import test from 'node:test';
 
 import { Backoff, FIRST_DELAY, LONGEST_DELAY } from '../../services/compositor/web/js/backoff.js';
 import { takeToken } from '../../services/compositor/web/js/credentials.js';
+import { failureWords, progressWords } from '../../services/compositor/web/js/fine_picture.js';
 import { fitRows, fitWords } from '../../services/compositor/web/js/fit.js';
 import { Code, RpcError } from '../../services/compositor/web/js/grpc_web.js';
-import { Reason, End, State } from '../../services/compositor/web/js/messages.js';
+import { Codec, End, Reason, State } from '../../services/compositor/web/js/messages.js';
 import { Outfit } from '../../services/compositor/web/js/outfit.js';
 import { BLANK_MS, STALE_MS, ageWords, present } from '../../services/compositor/web/js/presentation.js';
 import { Stats, percentile } from '../../services/compositor/web/js/stats.js';
@@ -133,6 +134,18 @@ test('fit in words and units', () => {
   assert.deepEqual(fitRows([{ garment: 'skirt', size: 'M', regions: [room('hip', 2, -0.013, 0.02)] }])[1].cells[3], '−1 cm');
 });
 
+test('a finer picture: one line per mesh, one sentence per failure', () => {
+  assert.equal(progressWords(null), 'Settling the cloth. Stay in view…');
+  assert.equal(progressWords({ vertex_count: 7836, steps: 1 }), 'Settling the cloth: 7,836 points. Stay in view…');
+  assert.equal(progressWords({ vertex_count: 7836, steps: 2 }), progressWords({ vertex_count: 7836, steps: 1 }));
+  const codes = [Code.FAILED_PRECONDITION, Code.RESOURCE_EXHAUSTED, Code.ABORTED, Code.UNAVAILABLE];
+  const failures = codes.map((code) => failureWords(new RpcError(code, 'no')));
+  assert.equal(new Set(failures).size, codes.length);
+  assert.ok(failures.every((said) => /^[A-Z][^.]*try again[^.]*\.$/.test(said)), failures.join(' '));
+  assert.equal(failureWords(null), failures[3]);
+  assert.match(failureWords(new RpcError(Code.RESOURCE_EXHAUSTED, 'full', { retryAfter: 1.2 })), /in 2 s\.$/);
+});
+
 test('percentiles, rate, and stages that vanish', () => {
   assert.equal(percentile([3, 1, 2], 50), 2);
   assert.equal(percentile([5], 99), 5);
@@ -156,7 +169,11 @@ test('percentiles, rate, and stages that vanish', () => {
 // ── the try-on's life, against a client made of functions ────────────────────────────────────────────────────────
 
 const status = (state) => ({ picture: null, status: { state, reason: 0 }, stream: 7n, number: 1n });
-const forever = (signal) => new Promise((_, fail) => signal.addEventListener('abort', () => fail(new RpcError(Code.CANCELLED, 'cancelled'))));
+const forever = (signal) => new Promise((_, fail) => {
+  const cancel = () => fail(new RpcError(Code.CANCELLED, 'cancelled'));
+  if (signal.aborted) cancel();
+  else signal.addEventListener('abort', cancel);
+});
 
 function scripted({ streams, opens = [] }) {
   const calls = { open: 0, choose: 0, close: 0, acknowledged: [] };
@@ -255,6 +272,25 @@ test('of two quick choices only the last one counts', async () => {
   const [first, second] = await Promise.all([tryOn.choose(), tryOn.choose()]);
   assert.deepEqual([first, second], [null, 2n]);
   await tryOn.close();
+});
+
+test('a finer picture ends with the try-on and with its own signal', async () => {
+  const script = scripted({ streams: [async function* (signal) { yield status(State.LIVE); await forever(signal); }] });
+  const { tryOn } = follow(script);
+  script.client.takeFinePicture = async function* (request, { signal }) {
+    assert.deepEqual(request, { try_on_id: tryOn.id, codec: Codec.JPEG });
+    yield { drape: { vertex_count: 512 }, picture: null };
+    await forever(signal);
+  };
+  for (const end of [(own) => own.abort(), () => tryOn.close()]) {
+    const own = new AbortController();
+    await assert.rejects(async () => {
+      for await (const { drape } of tryOn.takeFinePicture(own.signal)) {
+        assert.equal(drape.vertex_count, 512);
+        end(own);
+      }
+    }, { code: Code.CANCELLED });
+  }
 });
 
 test('ids are in the contract’s alphabet and differ', () => {

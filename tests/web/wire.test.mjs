@@ -45,6 +45,12 @@ test('every kind survives a round trip', () => {
   assert.deepEqual(decode(messages.Picture, encode(messages.Picture, picture)), picture);
 });
 
+test('of a choice the fields that are not sent are null', () => {
+  const drape = { vertex_count: 7836, steps: 12, motion: 0.25, settled: true };
+  assert.deepEqual(decode(messages.TakeFinePictureResponse, encode(messages.TakeFinePictureResponse, { drape })), { drape, picture: null });
+  assert.equal(hex(encode(messages.TakeFinePictureRequest, { try_on_id: 'a', vertices: 0, codec: messages.Codec.JPEG })), '0a01611801');
+});
+
 test('an optional zero is sent, an absent one is not', () => {
   const choice = { garment: 'tshirt', size: '', color_rgb: 0 };
   assert.equal(hex(encode(messages.GarmentChoice, choice)), '0a06747368697274' + '1800');

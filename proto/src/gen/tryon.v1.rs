@@ -105,6 +105,22 @@ pub struct StageTime {
     #[prost(float, tag = "2")]
     pub ms: f32,
 }
+/// A step of a drape to rest, which goes from coarse to fine meshes.
+#[derive(Clone, Copy, PartialEq, ::prost::Message)]
+pub struct DrapeStep {
+    /// Vertices of the mesh in work, all garments together.
+    #[prost(uint32, tag = "1")]
+    pub vertex_count: u32,
+    /// Steps on this mesh so far.
+    #[prost(uint32, tag = "2")]
+    pub steps: u32,
+    /// Largest motion of a vertex in this step, metres.
+    #[prost(float, tag = "3")]
+    pub motion: f32,
+    /// The mesh is at rest. A mesh that doesn't come to rest is left after a limited number of steps.
+    #[prost(bool, tag = "4")]
+    pub settled: bool,
+}
 /// A garment in a size and colour.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct GarmentChoice {
@@ -2435,22 +2451,6 @@ pub struct FollowSimulationResponse {
     #[prost(message, optional, tag = "7")]
     pub exposure: ::core::option::Option<FrameId>,
 }
-/// A step of a drape to rest, which goes from coarse to fine meshes.
-#[derive(Clone, Copy, PartialEq, ::prost::Message)]
-pub struct DrapeStep {
-    /// Vertices of the mesh in work, all garments together.
-    #[prost(uint32, tag = "1")]
-    pub vertex_count: u32,
-    /// Steps on this mesh so far.
-    #[prost(uint32, tag = "2")]
-    pub steps: u32,
-    /// Largest motion of a vertex in this step, metres.
-    #[prost(float, tag = "3")]
-    pub motion: f32,
-    /// The mesh is at rest. A mesh that doesn't come to rest is left after a limited number of steps.
-    #[prost(bool, tag = "4")]
-    pub settled: bool,
-}
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct CancelSimulationRequest {
     #[prost(string, tag = "1")]
@@ -3585,6 +3585,35 @@ pub struct TakeSnapshotResponse {
     pub picture: ::core::option::Option<Picture>,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct TakeFinePictureRequest {
+    #[prost(string, tag = "1")]
+    pub try_on_id: ::prost::alloc::string::String,
+    /// Vertices of all garments, about, at most 50000: their triangles are divided by four until as near as can be. 0 means
+    /// 30000.
+    #[prost(uint32, tag = "2")]
+    pub vertices: u32,
+    /// UNSPECIFIED means PNG.
+    #[prost(enumeration = "PictureCodec", tag = "3")]
+    pub codec: i32,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct TakeFinePictureResponse {
+    #[prost(oneof = "take_fine_picture_response::Content", tags = "1, 2")]
+    pub content: ::core::option::Option<take_fine_picture_response::Content>,
+}
+/// Nested message and enum types in `TakeFinePictureResponse`.
+pub mod take_fine_picture_response {
+    #[derive(Clone, PartialEq, ::prost::Oneof)]
+    pub enum Content {
+        /// Newest step of the drape.
+        #[prost(message, tag = "1")]
+        Drape(super::DrapeStep),
+        /// The last message.
+        #[prost(message, tag = "2")]
+        Picture(super::Picture),
+    }
+}
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct OfferPhotoRequest {
     #[prost(string, tag = "1")]
     pub try_on_id: ::prost::alloc::string::String,
@@ -4067,6 +4096,39 @@ pub mod compositor_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CompositorService", "TakeSnapshot"));
             self.inner.unary(req, path, codec).await
         }
+        /// Drapes the garments of a live try-on on finer meshes, in the pose of this moment, and draws its exposure with them: a
+        /// message for each step of the drape, then the picture at the camera's size. It takes seconds to a minute, and the live
+        /// pictures go on. A caller who leaves ends it, and so does the end of the try-on. INVALID_ARGUMENT names the field at
+        /// fault. FAILED_PRECONDITION while no simulated garments are live, and for garments that pass through themselves or the
+        /// body too much to start from, which another pose may solve. RESOURCE_EXHAUSTED with RetryInfo while the try-on has one
+        /// in work, or the cloth service too many. ABORTED when the person left before the end, and for a step that is not
+        /// solved. UNAVAILABLE with RetryInfo when the exposure is gone, or the cloth service does not answer.
+        pub async fn take_fine_picture(
+            &mut self,
+            request: impl tonic::IntoRequest<super::TakeFinePictureRequest>,
+        ) -> std::result::Result<
+            tonic::Response<tonic::codec::Streaming<super::TakeFinePictureResponse>>,
+            tonic::Status,
+        > {
+            self.inner
+                .ready()
+                .await
+                .map_err(|e| {
+                    tonic::Status::unknown(
+                        format!("Service was not ready: {}", e.into()),
+                    )
+                })?;
+            let codec = tonic_prost::ProstCodec::default();
+            let path = http::uri::PathAndQuery::from_static(
+                "/tryon.v1.CompositorService/TakeFinePicture",
+            );
+            let mut req = request.into_request();
+            req.extensions_mut()
+                .insert(
+                    GrpcMethod::new("tryon.v1.CompositorService", "TakeFinePicture"),
+                );
+            self.inner.server_streaming(req, path, codec).await
+        }
         /// Keeps the newest picture in memory behind a link for a phone: once, for five minutes at most, and not beyond the end
         /// of the try-on. UNAVAILABLE and RESOURCE_EXHAUSTED as TakeSnapshot; a fifth photo of a try-on replaces its oldest.
         pub async fn offer_photo(
@@ -4232,6 +4294,26 @@ pub mod compositor_service_server {
             request: tonic::Request<super::TakeSnapshotRequest>,
         ) -> std::result::Result<
             tonic::Response<super::TakeSnapshotResponse>,
+            tonic::Status,
+        >;
+        /// Server streaming response type for the TakeFinePicture method.
+        type TakeFinePictureStream: tonic::codegen::tokio_stream::Stream<
+                Item = std::result::Result<super::TakeFinePictureResponse, tonic::Status>,
+            >
+            + std::marker::Send
+            + 'static;
+        /// Drapes the garments of a live try-on on finer meshes, in the pose of this moment, and draws its exposure with them: a
+        /// message for each step of the drape, then the picture at the camera's size. It takes seconds to a minute, and the live
+        /// pictures go on. A caller who leaves ends it, and so does the end of the try-on. INVALID_ARGUMENT names the field at
+        /// fault. FAILED_PRECONDITION while no simulated garments are live, and for garments that pass through themselves or the
+        /// body too much to start from, which another pose may solve. RESOURCE_EXHAUSTED with RetryInfo while the try-on has one
+        /// in work, or the cloth service too many. ABORTED when the person left before the end, and for a step that is not
+        /// solved. UNAVAILABLE with RetryInfo when the exposure is gone, or the cloth service does not answer.
+        async fn take_fine_picture(
+            &self,
+            request: tonic::Request<super::TakeFinePictureRequest>,
+        ) -> std::result::Result<
+            tonic::Response<Self::TakeFinePictureStream>,
             tonic::Status,
         >;
         /// Keeps the newest picture in memory behind a link for a phone: once, for five minutes at most, and not beyond the end
@@ -4748,6 +4830,54 @@ pub mod compositor_service_server {
                                 max_encoding_message_size,
                             );
                         let res = grpc.unary(method, req).await;
+                        Ok(res)
+                    };
+                    Box::pin(fut)
+                }
+                "/tryon.v1.CompositorService/TakeFinePicture" => {
+                    #[allow(non_camel_case_types)]
+                    struct TakeFinePictureSvc<T: CompositorService>(pub Arc<T>);
+                    impl<
+                        T: CompositorService,
+                    > tonic::server::ServerStreamingService<
+                        super::TakeFinePictureRequest,
+                    > for TakeFinePictureSvc<T> {
+                        type Response = super::TakeFinePictureResponse;
+                        type ResponseStream = T::TakeFinePictureStream;
+                        type Future = BoxFuture<
+                            tonic::Response<Self::ResponseStream>,
+                            tonic::Status,
+                        >;
+                        fn call(
+                            &mut self,
+                            request: tonic::Request<super::TakeFinePictureRequest>,
+                        ) -> Self::Future {
+                            let inner = Arc::clone(&self.0);
+                            let fut = async move {
+                                <T as CompositorService>::take_fine_picture(&inner, request)
+                                    .await
+                            };
+                            Box::pin(fut)
+                        }
+                    }
+                    let accept_compression_encodings = self.accept_compression_encodings;
+                    let send_compression_encodings = self.send_compression_encodings;
+                    let max_decoding_message_size = self.max_decoding_message_size;
+                    let max_encoding_message_size = self.max_encoding_message_size;
+                    let inner = self.inner.clone();
+                    let fut = async move {
+                        let method = TakeFinePictureSvc(inner);
+                        let codec = tonic_prost::ProstCodec::default();
+                        let mut grpc = tonic::server::Grpc::new(codec)
+                            .apply_compression_config(
+                                accept_compression_encodings,
+                                send_compression_encodings,
+                            )
+                            .apply_max_message_size_config(
+                                max_decoding_message_size,
+                                max_encoding_message_size,
+                            );
+                        let res = grpc.server_streaming(method, req).await;
                         Ok(res)
                     };
                     Box::pin(fut)

@@ -18,11 +18,15 @@ use tryon::mirror::{
 };
 use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;
+use tryon_proto::convert::WireError;
 use tryon_proto::convert::body::pose_from_wire;
 use tryon_proto::convert::fit::tightness;
 use tryon_proto::convert::garment::{PlacedGarments, WornGarment, WornImage};
 use tryon_proto::convert::request::PictureFormat;
-use tryon_proto::v1::{ClothDetail, StageTime};
+use tryon_proto::v1::{ClothDetail, PictureCodec, StageTime};
+
+/// JPEG quality of single pictures.
+pub(crate) const PICTURE_QUALITY: u8 = 95;
 
 /// Garments that belong to one exposure.
 pub(crate) struct Placed {
@@ -39,6 +43,29 @@ pub(crate) struct Placed {
 pub(crate) enum Encoding {
     Jpeg(u8),
     Png,
+}
+
+impl From<Encoding> for PictureCodec {
+    fn from(encoding: Encoding) -> Self {
+        match encoding {
+            Encoding::Jpeg(_) => Self::Jpeg,
+            Encoding::Png => Self::Png,
+        }
+    }
+}
+
+impl Encoding {
+    /// Encoding of single pictures.
+    ///
+    /// # Errors
+    /// Names the field when the codec is unknown.
+    pub(crate) fn of_picture(codec: i32, field: &str) -> Result<Self, WireError> {
+        match PictureCodec::try_from(codec) {
+            Ok(PictureCodec::Unspecified | PictureCodec::Png) => Ok(Self::Png),
+            Ok(PictureCodec::Jpeg) => Ok(Self::Jpeg(PICTURE_QUALITY)),
+            Err(_) => Err(WireError::new(field, "JPEG or PNG")),
+        }
+    }
 }
 
 /// Pictures to render of one exposure.

@@ -29,7 +29,7 @@ pub(crate) fn not_after(a: &FrameId, b: &FrameId) -> bool {
 }
 
 /// Frames and bodies waiting for their garments.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct JoinBuffer {
     frames: VecDeque<(Instant, Arc<Exposure>)>,
     bodies: VecDeque<ReportedBody>,

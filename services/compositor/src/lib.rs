@@ -1,14 +1,15 @@
 //! Compositor: pictures for kiosks and pages, which connect to this service only.
 //!
 //! One task owns one try-on (`try_on`): it opens the sessions behind it and joins frames, bodies and garments by epoch
-//! and sequence (`join_buffer`). It renders on the compute pool (`engine`, on a `card` where there is one) and queues pictures
-//! for every viewer (`viewer`), and keeps photos for their phones (`photos`). The states of a try-on are the table of `tryon::session`. gRPC, gRPC-web and the page
+//! and sequence (`join_buffer`). It renders on the compute pool (`engine`, on a `card` where there is one), queues pictures
+//! for every viewer (`viewer`), draws fine pictures on request (`fine_picture`) and keeps photos for phones (`photos`). The states of a try-on are the table of `tryon::session`. gRPC, gRPC-web and the page
 //! share one port.
 
 mod admission;
 mod card;
 mod empty_scene;
 mod engine;
+mod fine_picture;
 mod formats;
 mod join_buffer;
 mod life;

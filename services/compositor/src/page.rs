@@ -47,6 +47,7 @@ const FILES: &[File] = files! {
     "js/credentials.js": JS,
     "js/details.js": JS,
     "js/elements.js": JS,
+    "js/fine_picture.js": JS,
     "js/fit.js": JS,
     "js/grpc_web.js": JS,
     "js/main.js": JS,

@@ -2,7 +2,8 @@
 
 use crate::admission::Admission;
 use crate::card::Card;
-use crate::engine::Encoding;
+use crate::engine::{Encoding, PICTURE_QUALITY};
+use crate::fine_picture::{self, FinePicture};
 use crate::photos::{self, Photos};
 use crate::try_on::{self, Command, Handle, Setup};
 use crate::upstream::{self, renamed};
@@ -13,6 +14,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::oneshot;
+use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status};
 use tryon_kit::auth::{Connection, EnrolFault, Grant};
 use tryon_kit::client::{channel, request as call};
@@ -22,20 +24,21 @@ use tryon_kit::frames::CameraKey;
 use tryon_kit::server::{Context, StartError};
 use tryon_kit::sessions::{Opened, Sessions, brief, random_id};
 use tryon_kit::status::{exhausted, from_upstream, not_found, unavailable};
-use tryon_proto::convert::{WireError, request};
+use tryon_proto::convert::request;
 use tryon_proto::v1::capture_service_server::SERVICE_NAME as CAPTURE;
 use tryon_proto::v1::cloth_service_server::SERVICE_NAME as CLOTH;
 use tryon_proto::v1::compositor_service_server::CompositorService;
 use tryon_proto::v1::tracking_service_server::SERVICE_NAME as TRACKING;
 use tryon_proto::v1::*;
 
-/// JPEG quality of snapshots.
-const SNAPSHOT_QUALITY: u8 = 95;
 /// Longest wait for a snapshot.
 const SNAPSHOT_DEADLINE: Duration = Duration::from_secs(2);
 
 /// Longest wait until everything behind a try-on was told of its end.
 const WITHDRAWAL_DEADLINE: Duration = Duration::from_secs(5);
+
+/// Steps of a fine picture, and the picture.
+type FineMessages = ReceiverStream<Result<TakeFinePictureResponse, Status>>;
 
 /// Picture stream of a viewer.
 type Pictures = Pin<Box<dyn Stream<Item = Result<StreamFramesResponse, Status>> + Send>>;
@@ -398,18 +401,33 @@ impl CompositorService for Compositor {
         &self,
         r: Request<TakeSnapshotRequest>,
     ) -> Result<Response<TakeSnapshotResponse>, Status> {
-        let encoding = match PictureCodec::try_from(r.get_ref().codec) {
-            Ok(PictureCodec::Unspecified | PictureCodec::Png) => Encoding::Png,
-            Ok(PictureCodec::Jpeg) => Encoding::Jpeg(SNAPSHOT_QUALITY),
-            Err(_) => {
-                return Err(WireError::new("take_snapshot_request.codec", "JPEG or PNG").into());
-            }
-        };
+        let encoding = Encoding::of_picture(r.get_ref().codec, "take_snapshot_request.codec")?;
         let handle = self.find(&r, &r.get_ref().try_on_id)?;
         let picture = snapshot(&handle, &r.get_ref().try_on_id, encoding).await?;
         Ok(Response::new(TakeSnapshotResponse {
             picture: Some(picture),
         }))
+    }
+
+    type TakeFinePictureStream = FineMessages;
+
+    async fn take_fine_picture(
+        &self,
+        r: Request<TakeFinePictureRequest>,
+    ) -> Result<Response<FineMessages>, Status> {
+        let wish = r.get_ref();
+        let work = FinePicture {
+            vertices: fine_picture::vertices(wish.vertices)?,
+            encoding: Encoding::of_picture(wish.codec, "take_fine_picture_request.codec")?,
+            try_on_id: wish.try_on_id.clone(),
+            handle: self.find(&r, &wish.try_on_id)?,
+            cloth: self.cloth.clone(),
+            card: self.card.clone(),
+            pool: self.ctx.pool.clone(),
+        };
+        let place = work.handle.fine.clone().try_acquire_owned();
+        let place = place.map_err(|_| exhausted("fine pictures of a try-on", 1))?;
+        Ok(Response::new(ReceiverStream::new(work.spawn(place))))
     }
 
     async fn offer_photo(
@@ -419,7 +437,7 @@ impl CompositorService for Compositor {
         let id = &r.get_ref().try_on_id;
         let handle = self.find(&r, id)?;
         let origin = photos::origin(&self.config.public, r.metadata())?;
-        let picture = snapshot(&handle, id, Encoding::Jpeg(SNAPSHOT_QUALITY)).await?;
+        let picture = snapshot(&handle, id, Encoding::Jpeg(PICTURE_QUALITY)).await?;
         let url = origin + &self.photos.offer(id, picture.image.clone())?;
         if let Err(gone) = self.find(&r, id) {
             // Its end came before the offer and found nothing to drop.

@@ -2,10 +2,12 @@
 
 use crate::card::Card;
 use crate::engine::Encoding;
+use crate::join_buffer::JoinBuffer;
 use crate::photos::Photos;
 use crate::upstream::Wanted;
 use crate::viewer::Viewer;
-use tokio::sync::{mpsc, oneshot, watch};
+use std::sync::Arc;
+use tokio::sync::{Semaphore, mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
 use tryon_kit::config::CompositorConfig;
@@ -20,6 +22,8 @@ pub(crate) struct Handle {
     pub(crate) key: CameraKey,
     pub(crate) commands: mpsc::Sender<Command>,
     pub(crate) wanted: watch::Sender<Wanted>,
+    /// The place of the fine picture in work.
+    pub(crate) fine: Arc<Semaphore>,
     /// Cancelled once the try-on has ended and everything behind it was told.
     pub(crate) over: CancellationToken,
 }
@@ -35,6 +39,8 @@ pub(crate) enum Command {
     Acknowledge(u64, u64),
     /// Draws the newest picture once.
     Snapshot(Encoding, Answer),
+    /// Hands out the newest exposures and bodies.
+    Recent(oneshot::Sender<JoinBuffer>),
     /// Keeps the try-on open.
     Touch,
     /// Draws garments in the colours of their fit, or in their own.

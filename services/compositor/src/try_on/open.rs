@@ -4,8 +4,9 @@ use super::handle::{Handle, Setup};
 use super::lifecycle::Lifecycle;
 use super::task::{Inputs, Outputs, Task};
 use crate::upstream::{self, Wanted};
+use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{Semaphore, mpsc, watch};
 use tokio_util::sync::CancellationToken;
 use tryon::session::SilenceLimits;
 use tryon_kit::auth::Connection;
@@ -47,6 +48,7 @@ pub(crate) fn spawn(mut setup: Setup) -> Handle {
         key,
         commands,
         wanted,
+        fine: Arc::new(Semaphore::new(1)),
         over,
     }
 }

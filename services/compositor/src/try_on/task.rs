@@ -180,6 +180,10 @@ impl Task {
                 (self.viewers.iter_mut()).for_each(|v| v.acknowledge(stream, number));
             }
             Some(Command::Snapshot(encoding, answer)) => self.snapshot(encoding, answer),
+            Some(Command::Recent(answer)) => {
+                // The receiver may be gone.
+                let _ = answer.send(self.join.clone());
+            }
             Some(Command::Touch) => (self.wanted, self.watched) = (Instant::now(), Instant::now()),
             Some(Command::ShowFit(show)) => self.fit.is_shown = show,
             Some(Command::Close(end)) => {
@@ -483,10 +487,7 @@ impl Task {
         let mut picture = Picture {
             frame: Some(id),
             state: state.into(),
-            codec: match p.encoding {
-                Encoding::Jpeg(_) => PictureCodec::Jpeg.into(),
-                Encoding::Png => PictureCodec::Png.into(),
-            },
+            codec: PictureCodec::from(p.encoding).into(),
             width: p.width,
             height: p.height,
             image: p.bytes.clone(),

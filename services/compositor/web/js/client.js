@@ -31,6 +31,8 @@ export function compositor(origin = '', token = '') {
       unary(url('AcknowledgeFrames'), m.AcknowledgeFramesRequest, m.AcknowledgeFramesResponse, request, options),
     takeSnapshot: (request, options) =>
       unary(url('TakeSnapshot'), m.TakeSnapshotRequest, m.TakeSnapshotResponse, request, { timeoutMs: 10_000, ...options }),
+    takeFinePicture: (request, options) =>
+      serverStream(url('TakeFinePicture'), m.TakeFinePictureRequest, m.TakeFinePictureResponse, request, options),
     offerPhoto: (request, options) =>
       unary(url('OfferPhoto'), m.OfferPhotoRequest, m.OfferPhotoResponse, request, { timeoutMs: 10_000, ...options }),
     streamFrames: (request, options) =>

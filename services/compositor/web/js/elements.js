@@ -36,6 +36,14 @@ export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+/** Shows an encoded picture, none without bytes, and forgets what the image showed before. */
+export function setImage(image, bytes = null, type = '') {
+  const old = image.getAttribute('src');
+  if (bytes) image.src = URL.createObjectURL(new Blob([bytes], { type }));
+  else image.removeAttribute('src');
+  if (old) URL.revokeObjectURL(old);
+}
+
 /** Sets or removes a data attribute. */
 export function setData(element, key, value) {
   if (value === false || value === null) delete element.dataset[key];

@@ -7,7 +7,8 @@ import { compositor } from './client.js';
 import { takeToken } from './credentials.js';
 import { Backoff } from './backoff.js';
 import { Details } from './details.js';
-import { byId, setData, setText } from './elements.js';
+import { byId, setData, setImage, setText } from './elements.js';
+import { FinePicture } from './fine_picture.js';
 import { Code } from './grpc_web.js';
 import { State } from './messages.js';
 import { Mirror } from './mirror.js';
@@ -33,6 +34,7 @@ const LOOPBACK = /^(localhost|127\..*|\[::1\])$/;
 const client = compositor('', takeToken({ location, history, store: sessionStorage }));
 const outfit = new Outfit();
 const details = new Details();
+const finePicture = new FinePicture();
 const wardrobe = new Wardrobe(outfit, choiceChanged);
 const stage = byId('stage');
 const NOTHING = { link: 'opening', retryAt: null, state: 0, reason: 0, degradedAge: 0, shownAt: null, exposedAt: null, measured: false, error: null };
@@ -271,8 +273,9 @@ async function takePhoto() {
   try {
     const { picture, url, qr_svg: qr, seconds } = await mine.tryOn.offerPhoto();
     if (session !== mine || !picture) return;
-    byId('photo-image').src = URL.createObjectURL(new Blob([picture.image], { type: 'image/jpeg' }));
-    byId('photo-code').src = URL.createObjectURL(new Blob([qr], { type: 'image/svg+xml' }));
+    setImage(byId('photo-image'), picture.image, 'image/jpeg');
+    setImage(byId('photo-code'), qr, 'image/svg+xml');
+    finePicture.reset(outfit.choices().length > 0);
     setText(byId('photo-minutes'), String(Math.round(seconds / 60)));
     // A phone does not reach the loopback address of another machine.
     const isLocal = LOOPBACK.test(new URL(url).hostname);
@@ -286,11 +289,9 @@ async function takePhoto() {
 
 /** This page's copy is forgotten at once; the one behind the link with its time, its use or the session. */
 function closePhoto() {
-  for (const image of [byId('photo-image'), byId('photo-code')]) {
-    const url = image.getAttribute('src');
-    image.removeAttribute('src');
-    if (url) URL.revokeObjectURL(url);
-  }
+  finePicture.reset();
+  setImage(byId('photo-image'));
+  setImage(byId('photo-code'));
   byId('photo-link').removeAttribute('href');
   if (byId('photo').open) byId('photo').close();
 }
@@ -326,6 +327,7 @@ byId('still-yes').addEventListener('click', goOn);
 byId('still').addEventListener('cancel', goOn);
 byId('retry').addEventListener('click', () => session?.tryOn.retryNow());
 byId('shutter').addEventListener('click', takePhoto);
+byId('fine-start').addEventListener('click', () => session && finePicture.take(session.tryOn));
 byId('photo-close').addEventListener('click', closePhoto);
 byId('photo').addEventListener('close', closePhoto);
 byId('fit').addEventListener('click', toggleFit);

@@ -139,6 +139,22 @@ export const TakeSnapshotRequest = schema('TakeSnapshotRequest',
 export const TakeSnapshotResponse = schema('TakeSnapshotResponse',
   [1, 'picture', 'message', Picture]);
 
+export const DrapeStep = schema('DrapeStep',
+  [1, 'vertex_count', 'uint32'],
+  [2, 'steps', 'uint32'],
+  [3, 'motion', 'float'],
+  [4, 'settled', 'bool']);
+
+export const TakeFinePictureRequest = schema('TakeFinePictureRequest',
+  [1, 'try_on_id', 'string'],
+  [2, 'vertices', 'uint32'],
+  [3, 'codec', 'enum']);
+
+/** One of the two is set. */
+export const TakeFinePictureResponse = schema('TakeFinePictureResponse',
+  [1, 'drape', 'message', DrapeStep],
+  [2, 'picture', 'message', Picture]);
+
 export const OfferPhotoRequest = schema('OfferPhotoRequest',
   [1, 'try_on_id', 'string']);
 

@@ -1,7 +1,7 @@
 // One try-on as the page sees it: open, stream, and when the line breaks, wait and open again. Draws nothing.
 
 import { Code, RpcError } from './grpc_web.js';
-import { End, State } from './messages.js';
+import { Codec, End, State } from './messages.js';
 import { Backoff } from './backoff.js';
 
 /** The contract: no message for a second means that the compositor is gone. One more for a busy network, ms. */
@@ -146,6 +146,12 @@ export class TryOn {
   /** The newest picture, and a link to it that a phone may follow once. */
   offerPhoto() {
     return this.client.offerPhoto({ try_on_id: this.id }, { signal: this.#stop.signal });
+  }
+
+  /** Steps of a finer drape, then its picture. Ends with the try-on or `signal`. */
+  takeFinePicture(signal) {
+    const request = { try_on_id: this.id, codec: Codec.JPEG };
+    return this.client.takeFinePicture(request, { signal: AbortSignal.any([this.#stop.signal, signal]) });
   }
 
   /** Tries at once instead of at the end of the wait. */

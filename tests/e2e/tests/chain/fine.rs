@@ -4,14 +4,18 @@ use crate::client;
 use crate::kiosk::{PATIENCE, Part, wear};
 use crate::requests::field;
 use crate::tokens::Guarded;
+use std::path::Path;
 use std::time::Instant;
 use tokio::time::timeout;
 use tonic::{Code, Status, Streaming};
+use tryon::formats::image::decode_color;
 use tryon::math::P3;
 use tryon_kit::auth::Connection;
 use tryon_proto::convert::garment::{GarmentReader, topology_from_wire};
 use tryon_proto::v1::cloth_service_client::ClothServiceClient;
+use tryon_proto::v1::compositor_service_client::CompositorServiceClient;
 use tryon_proto::v1::start_simulation_request::Start;
+use tryon_proto::v1::take_fine_picture_response::Content;
 use tryon_proto::v1::*;
 
 /// Session that is dressed.
@@ -22,6 +26,7 @@ const VERTICES: u32 = 2000;
 const MAX_BYTES: usize = 16 << 20;
 
 type Cloth = ClothServiceClient<Connection>;
+type Compositor = CompositorServiceClient<Connection>;
 
 fn cloth(guarded: &Guarded, session: Option<&str>) -> Cloth {
     let token = guarded.token(|c| c.session = session.map(Into::into));
@@ -170,6 +175,7 @@ fn a_session_is_draped_fine_for_its_owner_alone() {
             reader: GarmentReader::default(),
         };
         fine_is_near_the_preview(&mut mine, &mut preview).await;
+        a_fine_picture_is_drawn(&guarded, &mut compositor, &mut preview).await;
         strangers_are_refused(&guarded, &mut mine, &mut preview).await;
         motion_is_recorded(&mut mine, &mut preview).await;
         a_cancelled_motion_continues(&guarded, &mut mine, &mut preview).await;
@@ -283,6 +289,68 @@ async fn fine_is_near_the_preview(mine: &mut Cloth, preview: &mut Preview) {
         return;
     }
     panic!("always forgotten");
+}
+
+/// The compositor drapes and draws, for the owner, one picture at a time.
+async fn a_fine_picture_is_drawn(guarded: &Guarded, mine: &mut Compositor, preview: &mut Preview) {
+    let wish = |vertices| TakeFinePictureRequest {
+        try_on_id: MINE.into(),
+        vertices,
+        ..Default::default()
+    };
+    let refused = mine.take_fine_picture(wish(50_001)).await;
+    let named = field(refused.expect_err("out of range"));
+    assert_eq!(named, "take_fine_picture_request.vertices");
+    let token = guarded.token(|c| c.session = Some("stranger".into()));
+    let mut stranger = guarded.compositor(Some(&token));
+    let refused = stranger.take_fine_picture(wish(VERTICES)).await;
+    let code = refused.expect_err("not theirs").code();
+    assert_eq!(code, Code::PermissionDenied);
+    for _ in 0..TRIES {
+        preview.from(0).await;
+        let taken = mine.take_fine_picture(wish(VERTICES)).await;
+        let mut messages = taken.expect("begun").into_inner();
+        let second = mine.take_fine_picture(wish(VERTICES)).await;
+        let code = second.expect_err("one at a time").code();
+        assert_eq!(code, Code::ResourceExhausted);
+        let mut steps = 0;
+        let picture = loop {
+            match timeout(PATIENCE, messages.message())
+                .await
+                .expect("in time")
+            {
+                Ok(Some(m)) => match m.content.expect("content") {
+                    Content::Drape(_) => steps += 1,
+                    Content::Picture(picture) => break Some(picture),
+                },
+                Ok(None) => panic!("no picture"),
+                Err(s) => {
+                    let waits = [
+                        Code::Aborted,
+                        Code::ResourceExhausted,
+                        Code::FailedPrecondition,
+                    ];
+                    assert!(waits.contains(&s.code()), "{s}");
+                    break None;
+                }
+            }
+        };
+        let Some(picture) = picture else { continue };
+        assert!(steps > 0, "steps are told");
+        assert_eq!(picture.state(), TryOnState::Live);
+        assert_eq!(picture.codec(), PictureCodec::Png);
+        let drawn = decode_color(&picture.image, Path::new("fine.png")).expect("a picture");
+        assert_eq!(
+            (drawn.width(), drawn.height()),
+            (picture.width, picture.height)
+        );
+        assert!(
+            matches!(messages.message().await, Ok(None)),
+            "it comes last"
+        );
+        return;
+    }
+    panic!("always aborted");
 }
 
 /// Exposures of the frames of a simulation and the number of frames that its last message says.

@@ -127,6 +127,7 @@ requests!(
     ListGarmentChoicesRequest,
     StreamFramesRequest,
     TakeSnapshotRequest,
+    TakeFinePictureRequest,
 );
 
 fn run_request(b: &Bundle, _: &Scratch) -> Result<usize, String> {

@@ -1,0 +1,320 @@
+//! Fine picture of a try-on: cloth drapes its garments on finer meshes, and the exposure of that pose is drawn with them.
+
+use crate::card::Card;
+use crate::engine::{Encoding, Engine, Job, Placed};
+use crate::join_buffer::JoinBuffer;
+use crate::try_on::{Command, Handle};
+use crate::upstream;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tokio::sync::{mpsc, oneshot};
+use tonic::{Code, Request, Status};
+use tryon_kit::auth::Connection;
+use tryon_kit::client::request;
+use tryon_kit::compute::Pool;
+use tryon_kit::frames::stage;
+use tryon_kit::sessions::unix_ns;
+use tryon_kit::status::{from_upstream, not_found, unavailable};
+use tryon_proto::convert::WireError;
+use tryon_proto::convert::garment::placed_from_wire;
+use tryon_proto::convert::geometry::rigid_from_wire;
+use tryon_proto::convert::required;
+use tryon_proto::v1::cloth_service_client::ClothServiceClient;
+use tryon_proto::v1::start_simulation_request::Start;
+use tryon_proto::v1::take_fine_picture_response::Content;
+use tryon_proto::v1::{
+    CancelSimulationRequest, ClothDetail, FollowSimulationRequest, FrameId, Picture, PictureCodec,
+    SessionStart, StartSimulationRequest, StartSimulationResponse, TakeFinePictureResponse,
+    TryOnState,
+};
+
+/// Vertices of all garments without a wish.
+const VERTICES: u32 = 30_000;
+/// Most vertices, as the contract says.
+const MAX_VERTICES: u32 = 50_000;
+/// Longest wait for the start of a simulation, which divides the meshes.
+const START_DEADLINE: Duration = Duration::from_secs(10);
+/// Time after the request in which the exposure that cloth starts from is sure to have arrived.
+const ARRIVAL: Duration = Duration::from_millis(300);
+
+/// Stream of one fine picture.
+pub(crate) type Messages = mpsc::Receiver<Result<TakeFinePictureResponse, Status>>;
+type Sender = mpsc::Sender<Result<TakeFinePictureResponse, Status>>;
+
+/// Means and wishes of one fine picture.
+pub(crate) struct FinePicture {
+    pub(crate) try_on_id: String,
+    pub(crate) handle: Arc<Handle>,
+    pub(crate) cloth: Connection,
+    pub(crate) card: Card,
+    pub(crate) pool: Arc<Pool>,
+    pub(crate) encoding: Encoding,
+    /// Vertices of all garments, about.
+    pub(crate) vertices: u32,
+}
+
+/// Number of vertices that is asked for; 0 is none in particular.
+///
+/// # Errors
+/// Names the field when it is out of range.
+pub(crate) fn vertices(wanted: u32) -> Result<u32, WireError> {
+    match wanted {
+        0 => Ok(VERTICES),
+        1..=MAX_VERTICES => Ok(wanted),
+        _ => Err(WireError::new(
+            "take_fine_picture_request.vertices",
+            format!("{wanted} is too many, at most {MAX_VERTICES}"),
+        )),
+    }
+}
+
+/// Simulation in cloth. Dropping it ends it; one that has ended stays as it is.
+struct Simulation {
+    client: ClothServiceClient<Connection>,
+    id: String,
+}
+
+impl Drop for Simulation {
+    fn drop(&mut self) {
+        let mut client = self.client.clone();
+        let simulation_id = std::mem::take(&mut self.id);
+        tokio::spawn(async move {
+            // It ends by itself at the latest, and its frames are forgotten with the body.
+            let _ = client
+                .cancel_simulation(request(CancelSimulationRequest { simulation_id }))
+                .await;
+        });
+    }
+}
+
+impl FinePicture {
+    /// Starts the work. It ends with the picture, with an error, when nobody listens any more, and with the try-on.
+    pub(crate) fn spawn(self, place: tokio::sync::OwnedSemaphorePermit) -> Messages {
+        let (messages, reader) = mpsc::channel(8);
+        tokio::spawn(async move {
+            let _place = place;
+            let (listener, id) = (messages.clone(), self.try_on_id.clone());
+            let handle = self.handle.clone();
+            let made = tokio::select! {
+                made = self.make(&messages) => made,
+                () = handle.commands.closed() => Err(not_found("try-on", &id)),
+                () = listener.closed() => return,
+            };
+            let last = made.map(|picture| TakeFinePictureResponse {
+                content: Some(Content::Picture(picture)),
+            });
+            // The caller may have left.
+            let _ = messages.send(last).await;
+        });
+        reader
+    }
+
+    async fn make(&self, messages: &Sender) -> Result<Picture, Status> {
+        let begun = Instant::now();
+        let mut client = upstream::client(self.cloth.clone());
+        let before = self.recent().await?;
+        // The exposure of the start is kept now: it is half a second old when the meshes are divided.
+        let (started, after) = tokio::join!(client.start_simulation(self.start()), async {
+            tokio::time::sleep(ARRIVAL).await;
+            self.recent().await
+        });
+        let started = started.map_err(|s| refusal(&s))?.into_inner();
+        let simulation = Simulation {
+            client: client.clone(),
+            id: started.simulation_id.clone(),
+        };
+        let id = required(started.exposure, "start_simulation_response.exposure")?;
+        let mut job = exposed(&id, &[after?, before])?;
+        let positions = drape(&mut client, &started, messages).await?;
+        drop(simulation);
+        job.placed = Some(Arc::new(placed(&started, &positions, begun)?));
+        job.formats = vec![(None, self.encoding)];
+        self.draw(job).await
+    }
+
+    /// Exposures and bodies of the last half second.
+    async fn recent(&self) -> Result<JoinBuffer, Status> {
+        let gone = || not_found("try-on", &self.try_on_id);
+        let (answer, recent) = oneshot::channel();
+        let command = Command::Recent(answer);
+        let sent = self.handle.commands.send(command).await;
+        sent.map_err(|_| gone())?;
+        recent.await.map_err(|_| gone())
+    }
+
+    fn start(&self) -> Request<StartSimulationRequest> {
+        let session = SessionStart {
+            session_id: self.try_on_id.clone(),
+            vertices: self.vertices,
+            motion_seconds: 0.0,
+        };
+        let mut start = Request::new(StartSimulationRequest {
+            start: Some(Start::Session(session)),
+            ..Default::default()
+        });
+        start.set_timeout(START_DEADLINE);
+        start
+    }
+
+    async fn draw(&self, job: Job) -> Result<Picture, Status> {
+        let card = self.card.clone();
+        let draw = move || {
+            let mut drawn = None;
+            let outcome = Engine::new(card).draw(&job, |picture| drawn = Some(picture));
+            outcome.map(|()| drawn.map(|p| (job.exposure.id, p)))
+        };
+        let drawn = self.pool.run(draw).await;
+        let fault = |why: String| unavailable("compositor", &why);
+        let drawn = drawn.map_err(|e| fault(e.to_string()))?.map_err(fault)?;
+        let (id, p) = drawn.ok_or_else(|| unavailable("compositor", "no picture"))?;
+        Ok(Picture {
+            frame: Some(id),
+            state: TryOnState::Live.into(),
+            codec: PictureCodec::from(p.encoding).into(),
+            width: p.width,
+            height: p.height,
+            image: p.bytes,
+            latency_ms: unix_ns().saturating_sub(id.received_unix_ns) as f32 * 1e-6,
+            stages: p.stages,
+            cloth_detail: ClothDetail::Full.into(),
+            ..Picture::default()
+        })
+    }
+}
+
+/// The exposure of that id with its body, not yet drawn.
+fn exposed(id: &FrameId, recent: &[JoinBuffer]) -> Result<Job, Status> {
+    let exposure = recent.iter().find_map(|b| b.find(id));
+    let (_, exposure) =
+        exposure.ok_or_else(|| unavailable("compositor", "the exposure is no longer kept"))?;
+    Ok(Job {
+        exposure,
+        placed: None,
+        body: recent.iter().find_map(|b| b.find_body(id)),
+        formats: Vec::new(),
+        fit: None,
+    })
+}
+
+/// Follows a drape to its end: little endian positions of all vertices. Steps that the reader has no room for are left out.
+async fn drape(
+    client: &mut ClothServiceClient<Connection>,
+    started: &StartSimulationResponse,
+    messages: &Sender,
+) -> Result<bytes::Bytes, Status> {
+    let follow = FollowSimulationRequest {
+        simulation_id: started.simulation_id.clone(),
+        first_frame: 0,
+    };
+    let lost = |s: Status| end(&s);
+    let frames = client.follow_simulation(follow).await;
+    let mut frames = frames.map_err(lost)?.into_inner();
+    while let Some(m) = frames.message().await.map_err(lost)? {
+        if !m.positions.is_empty() {
+            return Ok(m.positions);
+        }
+        if let Some(step) = m.drape {
+            let content = Some(Content::Drape(step));
+            let _ = messages.try_send(Ok(TakeFinePictureResponse { content }));
+        }
+    }
+    Err(unavailable("cloth", "the drape ended without a frame"))
+}
+
+fn placed(
+    started: &StartSimulationResponse,
+    positions: &bytes::Bytes,
+    begun: Instant,
+) -> Result<Placed, WireError> {
+    let field = "start_simulation_response.world_from_camera";
+    let world = required(started.world_from_camera.as_ref(), field)?;
+    Ok(Placed {
+        garments: placed_from_wire(&started.garments, positions)?,
+        world_from_camera: rigid_from_wire(world, field)?,
+        stages: vec![stage("cloth.drape", begun)],
+        revision: 0,
+        detail: ClothDetail::Full,
+    })
+}
+
+/// Reason of cloth not to start; a session that it doesn't know wears nothing yet.
+fn refusal(s: &Status) -> Status {
+    match s.code() {
+        Code::NotFound => Status::failed_precondition("no garments are live yet"),
+        _ => from_upstream("cloth", s),
+    }
+}
+
+/// End of a drape without a result. A simulation is unknown once its body is.
+fn end(s: &Status) -> Status {
+    match s.code() {
+        Code::NotFound => Status::aborted("the person left before the drape came to its end"),
+        Code::Aborted => s.clone(),
+        _ => from_upstream("cloth", s),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tryon::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+    use tryon_kit::frames::Exposure;
+
+    fn exposure(sequence: u64) -> Arc<Exposure> {
+        let k = Intrinsics::KINECT_V1.resized(16, 16);
+        let id = FrameId {
+            sequence,
+            ..FrameId::default()
+        };
+        let rgbd = RgbdFrame {
+            sequence,
+            time_ns: sequence,
+            depth: DepthImage::empty(16, 16),
+            color: None,
+        };
+        Arc::new(Exposure {
+            id,
+            calibration: Arc::new(Calibration::registered(k)),
+            rgbd,
+            stages: vec![],
+        })
+    }
+
+    #[test]
+    fn numbers_of_vertices_are_checked() {
+        assert_eq!(vertices(0), Ok(VERTICES));
+        assert_eq!(vertices(1), Ok(1));
+        assert_eq!(vertices(MAX_VERTICES), Ok(MAX_VERTICES));
+        let e = vertices(MAX_VERTICES + 1).expect_err("too many");
+        assert!(e.to_string().contains("take_fine_picture_request.vertices"));
+    }
+
+    #[test]
+    fn the_exposure_of_the_start_is_found_in_either_buffer() {
+        let (mut before, mut after) = (JoinBuffer::default(), JoinBuffer::default());
+        before.push_frame(exposure(1));
+        after.push_frame(exposure(2));
+        let buffers = [after, before];
+        for sequence in [1, 2] {
+            let id = exposure(sequence).id;
+            let job = exposed(&id, &buffers).map_err(|s| s.code());
+            assert_eq!(job.map(|j| j.exposure.id.sequence), Ok(sequence));
+        }
+        let gone = exposed(&exposure(3).id, &buffers).map(|_| ());
+        assert_eq!(gone.expect_err("gone").code(), Code::Unavailable);
+    }
+
+    #[test]
+    fn refusals_and_ends_of_cloth_keep_their_meaning() {
+        let tangled = Status::failed_precondition("garments pass through themselves");
+        assert_eq!(refusal(&tangled).code(), Code::FailedPrecondition);
+        let unknown = Status::not_found("session");
+        assert_eq!(refusal(&unknown).code(), Code::FailedPrecondition);
+        assert_eq!(end(&unknown).code(), Code::Aborted);
+        assert_eq!(end(&tangled).code(), Code::FailedPrecondition);
+        assert_eq!(end(&Status::aborted("unsolved")).code(), Code::Aborted);
+        let broken = Status::internal("panicked");
+        assert_eq!(refusal(&broken).code(), Code::Unavailable);
+        assert_eq!(end(&broken).code(), Code::Unavailable);
+    }
+}
