@@ -4100,7 +4100,7 @@ pub mod compositor_service_client {
         /// message for each step of the drape, then the picture at the camera's size. It takes seconds to a minute, and the live
         /// pictures go on. A caller who leaves ends it, and so does the end of the try-on. INVALID_ARGUMENT names the field at
         /// fault. FAILED_PRECONDITION while no simulated garments are live, and for garments that pass through themselves or the
-        /// body too much to start from, which another pose may solve. RESOURCE_EXHAUSTED with RetryInfo while the try-on has one
+        /// body too much to start from in every pose of twenty seconds. RESOURCE_EXHAUSTED with RetryInfo while the try-on has one
         /// in work, or the cloth service too many. ABORTED when the person left before the end, and for a step that is not
         /// solved. UNAVAILABLE with RetryInfo when the exposure is gone, or the cloth service does not answer.
         pub async fn take_fine_picture(
@@ -4306,7 +4306,7 @@ pub mod compositor_service_server {
         /// message for each step of the drape, then the picture at the camera's size. It takes seconds to a minute, and the live
         /// pictures go on. A caller who leaves ends it, and so does the end of the try-on. INVALID_ARGUMENT names the field at
         /// fault. FAILED_PRECONDITION while no simulated garments are live, and for garments that pass through themselves or the
-        /// body too much to start from, which another pose may solve. RESOURCE_EXHAUSTED with RetryInfo while the try-on has one
+        /// body too much to start from in every pose of twenty seconds. RESOURCE_EXHAUSTED with RetryInfo while the try-on has one
         /// in work, or the cloth service too many. ABORTED when the person left before the end, and for a step that is not
         /// solved. UNAVAILABLE with RetryInfo when the exposure is gone, or the cloth service does not answer.
         async fn take_fine_picture(

@@ -10,10 +10,10 @@ use std::time::{Duration, Instant};
 use tokio::sync::{mpsc, oneshot};
 use tonic::{Code, Request, Status};
 use tryon_kit::auth::Connection;
-use tryon_kit::client::request;
+use tryon_kit::client::{pauses, request};
 use tryon_kit::compute::Pool;
 use tryon_kit::frames::stage;
-use tryon_kit::sessions::unix_ns;
+use tryon_kit::sessions::{brief, unix_ns};
 use tryon_kit::status::{from_upstream, not_found, unavailable};
 use tryon_proto::convert::WireError;
 use tryon_proto::convert::garment::placed_from_wire;
@@ -36,6 +36,13 @@ const MAX_VERTICES: u32 = 50_000;
 const START_DEADLINE: Duration = Duration::from_secs(10);
 /// Time after the request in which the exposure that cloth starts from is sure to have arrived.
 const ARRIVAL: Duration = Duration::from_millis(300);
+
+/// Time in which later poses are tried while the garments pass through themselves or the body too much to start from.
+const OTHER_POSES: Duration = Duration::from_secs(20);
+/// Pause before another pose.
+const POSE_PAUSE: Duration = Duration::from_millis(300);
+/// Times that a line which broke is mended without a message between.
+const LOST_LINES: usize = 8;
 
 /// Stream of one fine picture.
 pub(crate) type Messages = mpsc::Receiver<Result<TakeFinePictureResponse, Status>>;
@@ -100,6 +107,9 @@ impl FinePicture {
                 () = handle.commands.closed() => Err(not_found("try-on", &id)),
                 () = listener.closed() => return,
             };
+            if let Err(why) = &made {
+                tracing::warn!(try_on = brief(&id), %why, "no fine picture");
+            }
             let last = made.map(|picture| TakeFinePictureResponse {
                 content: Some(Content::Picture(picture)),
             });
@@ -109,7 +119,20 @@ impl FinePicture {
         reader
     }
 
+    /// The picture of the first pose from now on that can be draped.
     async fn make(&self, messages: &Sender) -> Result<Picture, Status> {
+        let begun = Instant::now();
+        loop {
+            match self.one_pose(messages).await {
+                Err(Failure::Tangled(_)) if begun.elapsed() < OTHER_POSES => {
+                    tokio::time::sleep(POSE_PAUSE).await;
+                }
+                made => return made.map_err(Into::into),
+            }
+        }
+    }
+
+    async fn one_pose(&self, messages: &Sender) -> Result<Picture, Failure> {
         let begun = Instant::now();
         let mut client = upstream::client(self.cloth.clone());
         let before = self.recent().await?;
@@ -125,11 +148,11 @@ impl FinePicture {
         };
         let id = required(started.exposure, "start_simulation_response.exposure")?;
         let mut job = exposed(&id, &[after?, before])?;
-        let positions = drape(&mut client, &started, messages).await?;
+        let positions = drape(&simulation, messages).await?;
         drop(simulation);
         job.placed = Some(Arc::new(placed(&started, &positions, begun)?));
         job.formats = vec![(None, self.encoding)];
-        self.draw(job).await
+        Ok(self.draw(job).await?)
     }
 
     /// Exposures and bodies of the last half second.
@@ -196,29 +219,55 @@ fn exposed(id: &FrameId, recent: &[JoinBuffer]) -> Result<Job, Status> {
     })
 }
 
-/// Follows a drape to its end: little endian positions of all vertices. Steps that the reader has no room for are left out.
-async fn drape(
+/// Follows a drape to its end, also over a line that breaks: little endian positions of all vertices. Steps that the reader
+/// has no room for are left out.
+async fn drape(simulation: &Simulation, messages: &Sender) -> Result<bytes::Bytes, Failure> {
+    let mut client = simulation.client.clone();
+    let mut lost = pauses().take(LOST_LINES);
+    loop {
+        let mut has_heard = false;
+        let why = match one_stream(&mut client, &simulation.id, messages, &mut has_heard).await {
+            Ok(Some(positions)) => return Ok(positions),
+            Ok(None) => Status::unavailable("the drape ended without a frame"),
+            Err(s) => s,
+        };
+        if has_heard {
+            lost = pauses().take(LOST_LINES);
+        }
+        match end(&why) {
+            Failure::Line(_) => {}
+            over => return Err(over),
+        }
+        let Some(pause) = lost.next() else {
+            return Err(end(&why));
+        };
+        tokio::time::sleep(pause).await;
+    }
+}
+
+/// Follows a drape until it or the line ends; `None` when it ended without positions.
+async fn one_stream(
     client: &mut ClothServiceClient<Connection>,
-    started: &StartSimulationResponse,
+    simulation: &str,
     messages: &Sender,
-) -> Result<bytes::Bytes, Status> {
+    has_heard: &mut bool,
+) -> Result<Option<bytes::Bytes>, Status> {
     let follow = FollowSimulationRequest {
-        simulation_id: started.simulation_id.clone(),
+        simulation_id: simulation.into(),
         first_frame: 0,
     };
-    let lost = |s: Status| end(&s);
-    let frames = client.follow_simulation(follow).await;
-    let mut frames = frames.map_err(lost)?.into_inner();
-    while let Some(m) = frames.message().await.map_err(lost)? {
+    let mut frames = client.follow_simulation(follow).await?.into_inner();
+    while let Some(m) = frames.message().await? {
+        *has_heard = true;
         if !m.positions.is_empty() {
-            return Ok(m.positions);
+            return Ok(Some(m.positions));
         }
         if let Some(step) = m.drape {
             let content = Some(Content::Drape(step));
             let _ = messages.try_send(Ok(TakeFinePictureResponse { content }));
         }
     }
-    Err(unavailable("cloth", "the drape ended without a frame"))
+    Ok(None)
 }
 
 fn placed(
@@ -245,12 +294,46 @@ fn refusal(s: &Status) -> Status {
     }
 }
 
+/// Reason for no picture of a pose.
+#[derive(Debug)]
+enum Failure {
+    /// The garments pass through themselves or the body too much to start from.
+    Tangled(Status),
+    /// Cloth does not answer.
+    Line(Status),
+    /// Anything that another try does not change.
+    Other(Status),
+}
+
+impl From<Status> for Failure {
+    fn from(s: Status) -> Self {
+        Self::Other(s)
+    }
+}
+
+impl From<WireError> for Failure {
+    fn from(e: WireError) -> Self {
+        Self::Other(e.into())
+    }
+}
+
+impl From<Failure> for Status {
+    fn from(f: Failure) -> Self {
+        match f {
+            Failure::Tangled(s) | Failure::Line(s) | Failure::Other(s) => s,
+        }
+    }
+}
+
 /// End of a drape without a result. A simulation is unknown once its body is.
-fn end(s: &Status) -> Status {
+fn end(s: &Status) -> Failure {
+    let gone = || Status::aborted("the person left before the drape came to its end");
     match s.code() {
-        Code::NotFound => Status::aborted("the person left before the drape came to its end"),
-        Code::Aborted => s.clone(),
-        _ => from_upstream("cloth", s),
+        Code::FailedPrecondition => Failure::Tangled(s.clone()),
+        Code::NotFound => Failure::Other(gone()),
+        Code::Aborted => Failure::Other(s.clone()),
+        Code::PermissionDenied | Code::Unauthenticated => Failure::Other(from_upstream("cloth", s)),
+        _ => Failure::Line(from_upstream("cloth", s)),
     }
 }
 
@@ -310,11 +393,12 @@ mod tests {
         assert_eq!(refusal(&tangled).code(), Code::FailedPrecondition);
         let unknown = Status::not_found("session");
         assert_eq!(refusal(&unknown).code(), Code::FailedPrecondition);
-        assert_eq!(end(&unknown).code(), Code::Aborted);
-        assert_eq!(end(&tangled).code(), Code::FailedPrecondition);
-        assert_eq!(end(&Status::aborted("unsolved")).code(), Code::Aborted);
+        assert!(matches!(end(&unknown), Failure::Other(s) if s.code() == Code::Aborted));
+        assert!(matches!(end(&tangled), Failure::Tangled(s) if s.code() == tangled.code()));
+        let unsolved = Status::aborted("unsolved");
+        assert!(matches!(end(&unsolved), Failure::Other(s) if s.code() == Code::Aborted));
         let broken = Status::internal("panicked");
         assert_eq!(refusal(&broken).code(), Code::Unavailable);
-        assert_eq!(end(&broken).code(), Code::Unavailable);
+        assert!(matches!(end(&broken), Failure::Line(s) if s.code() == Code::Unavailable));
     }
 }
