@@ -2,7 +2,6 @@
 
 use super::{WireError, bulk, required};
 use crate::v1;
-use bytes::Bytes;
 use std::path::Path;
 use std::sync::Arc;
 use tryon::formats::image::{decode_color, encode_jpeg, encode_png_rgb};
@@ -182,32 +181,6 @@ pub fn topology_from_wire(t: &v1::GarmentTopology) -> Result<WornGarment, WireEr
     })
 }
 
-/// Garments at plain positions, little endian f32 `[vertices of all garments][3]`, metres, one garment after the other.
-///
-/// # Errors
-/// Names the field of a topology, or the positions when they aren't those of its vertices.
-pub fn placed_from_wire(
-    topologies: &[v1::GarmentTopology],
-    positions: &Bytes,
-) -> Result<PlacedGarments, WireError> {
-    if topologies.len() > MAX_GARMENTS {
-        let why = format!("{} garments, at most {MAX_GARMENTS}", topologies.len());
-        return Err(WireError::new("start_simulation_response.garments", why));
-    }
-    let garments = topologies.iter().map(topology_from_wire);
-    let garments: Vec<WornGarment> = garments.collect::<Result<_, _>>()?;
-    let vertices = garments.iter().map(|g| g.vertices).sum();
-    let rows = bulk::read::<f32, 3>("follow_simulation_response.positions", vertices, positions)?;
-    let mut first = 0;
-    let placed = garments.into_iter().map(|g| {
-        let own = &rows[first..first + g.vertices];
-        first += g.vertices;
-        let drawn = g.drawn.iter().map(|&v| P3::from(own[v as usize])).collect();
-        (Arc::new(g), drawn)
-    });
-    Ok(placed.collect())
-}
-
 /// Simulated positions of each garment, metres, world frame.
 pub type Positions = Arc<Vec<Vec<P3>>>;
 
@@ -340,27 +313,6 @@ mod tests {
             look,
             image: None,
         }
-    }
-
-    #[test]
-    fn plain_positions_are_those_of_all_garments_in_order() {
-        let [a, b] = [wind(0.0), wind(1.0)];
-        let drawn = |x: &[P3]| flag().drawn.iter().map(|&v| x[v as usize]).collect();
-        let expected: [Vec<P3>; 2] = [drawn(&a), drawn(&b)];
-        let rows = a.iter().chain(&b).map(|p| [p.x, p.y, p.z]);
-        let rows: Vec<[f32; 3]> = rows.collect();
-        let bytes = bulk::write(rows.into_iter());
-        let flags = [topology_to_wire(&flag()), topology_to_wire(&flag())];
-        let placed = placed_from_wire(&flags, &bytes).expect("placed");
-        let read: Vec<Vec<P3>> = placed.into_iter().map(|(_, x)| x).collect();
-        assert_eq!(read, expected);
-
-        let short = bytes.slice(..bytes.len() - 4);
-        let e = placed_from_wire(&flags, &short).expect_err("too short");
-        assert_eq!(e.field, "follow_simulation_response.positions");
-        let many = vec![flags[0].clone(); MAX_GARMENTS + 1];
-        let e = placed_from_wire(&many, &bytes).expect_err("too many");
-        assert_eq!(e.field, "start_simulation_response.garments");
     }
 
     fn wind(t: f32) -> Vec<P3> {

@@ -12,5 +12,6 @@ pub mod frame;
 pub mod garment;
 pub mod geometry;
 pub mod request;
+pub mod simulation;
 
 pub use error::{WireError, required};

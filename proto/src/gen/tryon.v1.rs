@@ -3605,7 +3605,7 @@ pub struct TakeFinePictureResponse {
 pub mod take_fine_picture_response {
     #[derive(Clone, PartialEq, ::prost::Oneof)]
     pub enum Content {
-        /// Newest step of the drape.
+        /// Newest step of the drape; zeros before the first.
         #[prost(message, tag = "1")]
         Drape(super::DrapeStep),
         /// The last message.
@@ -4096,13 +4096,14 @@ pub mod compositor_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CompositorService", "TakeSnapshot"));
             self.inner.unary(req, path, codec).await
         }
-        /// Drapes the garments of a live try-on on finer meshes, in the pose of this moment, and draws its exposure with them: a
-        /// message for each step of the drape, then the picture at the camera's size. It takes seconds to a minute, and the live
-        /// pictures go on. A caller who leaves ends it, and so does the end of the try-on. INVALID_ARGUMENT names the field at
-        /// fault. FAILED_PRECONDITION while no simulated garments are live, and for garments that pass through themselves or the
-        /// body too much to start from in every pose of twenty seconds. RESOURCE_EXHAUSTED with RetryInfo while the try-on has one
-        /// in work, or the cloth service too many. ABORTED when the person left before the end, and for a step that is not
-        /// solved. UNAVAILABLE with RetryInfo when the exposure is gone, or the cloth service does not answer.
+        /// Drapes the garments of a live try-on on finer meshes, in the pose of this moment, and draws its exposure with them:
+        /// a message for each step of the drape, and the newest again after a second without one, then the picture at the
+        /// camera's size. It takes seconds to a minute, and the live pictures go on. A caller who leaves ends it, and so does
+        /// the end of the try-on. INVALID_ARGUMENT names the field at fault. FAILED_PRECONDITION while no simulated garments
+        /// are live, and for garments that pass through themselves or the body too much to start from in every pose of twenty
+        /// seconds. RESOURCE_EXHAUSTED with RetryInfo while the try-on has one in work, or the cloth service too many. ABORTED
+        /// when the person left before the end, and for a step that is not solved. UNAVAILABLE with RetryInfo when the
+        /// exposure is gone, or the cloth service does not answer.
         pub async fn take_fine_picture(
             &mut self,
             request: impl tonic::IntoRequest<super::TakeFinePictureRequest>,
@@ -4302,13 +4303,14 @@ pub mod compositor_service_server {
             >
             + std::marker::Send
             + 'static;
-        /// Drapes the garments of a live try-on on finer meshes, in the pose of this moment, and draws its exposure with them: a
-        /// message for each step of the drape, then the picture at the camera's size. It takes seconds to a minute, and the live
-        /// pictures go on. A caller who leaves ends it, and so does the end of the try-on. INVALID_ARGUMENT names the field at
-        /// fault. FAILED_PRECONDITION while no simulated garments are live, and for garments that pass through themselves or the
-        /// body too much to start from in every pose of twenty seconds. RESOURCE_EXHAUSTED with RetryInfo while the try-on has one
-        /// in work, or the cloth service too many. ABORTED when the person left before the end, and for a step that is not
-        /// solved. UNAVAILABLE with RetryInfo when the exposure is gone, or the cloth service does not answer.
+        /// Drapes the garments of a live try-on on finer meshes, in the pose of this moment, and draws its exposure with them:
+        /// a message for each step of the drape, and the newest again after a second without one, then the picture at the
+        /// camera's size. It takes seconds to a minute, and the live pictures go on. A caller who leaves ends it, and so does
+        /// the end of the try-on. INVALID_ARGUMENT names the field at fault. FAILED_PRECONDITION while no simulated garments
+        /// are live, and for garments that pass through themselves or the body too much to start from in every pose of twenty
+        /// seconds. RESOURCE_EXHAUSTED with RetryInfo while the try-on has one in work, or the cloth service too many. ABORTED
+        /// when the person left before the end, and for a step that is not solved. UNAVAILABLE with RetryInfo when the
+        /// exposure is gone, or the cloth service does not answer.
         async fn take_fine_picture(
             &self,
             request: tonic::Request<super::TakeFinePictureRequest>,

@@ -1,6 +1,7 @@
 //! Commands and flags of the command line.
 
 mod clothcap;
+mod fine;
 mod offline;
 mod serve;
 mod token;
@@ -9,6 +10,7 @@ pub(crate) use clothcap::{
     ClothcapAlignArgs, ClothcapArgs, ClothcapCaptureArgs, ClothcapRetargetArgs,
     ClothcapSegmentArgs, ClothcapWhat, ScanArgs, ScanFrameArgs, Shard,
 };
+pub(crate) use fine::FineSessionArgs;
 pub(crate) use offline::{FineArgs, SolverArgs};
 pub(crate) use serve::{DemoArgs, UpArgs};
 pub(crate) use token::{
@@ -51,6 +53,9 @@ pub(crate) enum Command {
     Track(TrackArgs),
     /// Simulate cloth in a scene file: positions.npy and report.json.
     Simulate(SimulateArgs),
+    /// Simulate the garments of a live session on finer meshes, in the cloth service: positions.npy, outfit.glb and
+    /// report.json.
+    Fine(FineSessionArgs),
     /// Draw garment meshes (in the camera's frame) into one captured picture.
     Composite(CompositeArgs),
     /// Ask query sets of continuous collision detection with truth: missed impacts, false alarms, time a query.

@@ -2,9 +2,8 @@
 
 use anyhow::{Context, Result};
 use std::process::exit;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+use tokio_util::sync::CancellationToken;
 use tryon_kit::drain;
 
 /// Exit code after Ctrl-C, as shells report it.
@@ -15,7 +14,7 @@ const REPEAT: Duration = Duration::from_millis(500);
 
 /// Request to end.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Interrupt(Arc<AtomicBool>);
+pub(crate) struct Interrupt(CancellationToken);
 
 impl Interrupt {
     /// Waits for signals in a thread of its own, for the rest of the process.
@@ -47,7 +46,7 @@ impl Interrupt {
             return;
         }
         eprintln!("tryon: ending after this frame; once more to end now");
-        self.0.store(true, Ordering::Relaxed);
+        self.0.cancel();
         tokio::time::sleep(REPEAT).await;
         if drain::signal().await.is_ok() {
             exit(i32::from(INTERRUPTED));
@@ -56,6 +55,11 @@ impl Interrupt {
 
     /// True once asked for.
     pub(crate) fn is_asked(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.0.is_cancelled()
+    }
+
+    /// Waits until asked for.
+    pub(crate) async fn asked(&self) {
+        self.0.cancelled().await;
     }
 }

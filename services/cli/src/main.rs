@@ -34,6 +34,7 @@ fn main() -> ExitCode {
         Command::Run(a) => commands::run::run(&a),
         Command::Track(a) => commands::track::run(&a),
         Command::Simulate(a) => commands::simulate::run(&a),
+        Command::Fine(a) => commands::fine::run(&a),
         Command::Composite(a) => commands::composite::run(&a),
         Command::Ccd(a) => commands::ccd::run(&a),
         Command::Clothcap(a) => commands::clothcap::run(&a),

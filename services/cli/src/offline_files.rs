@@ -113,7 +113,10 @@ impl OfflineFiles {
 }
 
 /// Writes a file beside `path` and renames it, so that there is a whole one at any time.
-fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+///
+/// # Errors
+/// When the system refuses.
+pub(crate) fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut beside = path.as_os_str().to_owned();
     beside.push(".new");
     std::fs::write(&beside, bytes)?;

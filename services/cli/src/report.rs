@@ -1,6 +1,6 @@
 //! report.json, written by the headless commands beside their pictures.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -61,6 +61,34 @@ impl Samples {
             .map(|(k, v)| (k.clone(), Summary::of(v)))
             .collect()
     }
+}
+
+/// Vertices of a garment in positions.npy.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct GarmentPart {
+    /// Name of the garment.
+    pub(crate) name: String,
+    /// First vertex of the garment.
+    pub(crate) first_vertex: usize,
+    /// Number of vertices.
+    pub(crate) vertices: usize,
+}
+
+/// Vertices of garments that follow one another, by name and number of vertices.
+pub(crate) fn garment_parts<'a>(
+    garments: impl Iterator<Item = (&'a str, usize)>,
+) -> Vec<GarmentPart> {
+    let mut first_vertex = 0;
+    let part = |(name, vertices): (&str, usize)| {
+        let part = GarmentPart {
+            name: name.to_owned(),
+            first_vertex,
+            vertices,
+        };
+        first_vertex += vertices;
+        part
+    };
+    garments.map(part).collect()
 }
 
 /// Peak resident memory of this process, bytes; `None` where the system does not report it.

@@ -68,6 +68,7 @@ fn each_command_explains_itself() {
         "run",
         "track",
         "simulate",
+        "fine",
         "composite",
         "ccd",
         "import",

@@ -7,7 +7,7 @@ use crate::try_on::{Command, Handle};
 use crate::upstream;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot, watch};
 use tonic::{Code, Request, Status};
 use tryon_kit::auth::Connection;
 use tryon_kit::client::{pauses, request};
@@ -16,16 +16,16 @@ use tryon_kit::frames::stage;
 use tryon_kit::sessions::{brief, unix_ns};
 use tryon_kit::status::{from_upstream, not_found, unavailable};
 use tryon_proto::convert::WireError;
-use tryon_proto::convert::garment::placed_from_wire;
 use tryon_proto::convert::geometry::rigid_from_wire;
 use tryon_proto::convert::required;
+use tryon_proto::convert::simulation::{self, garments_from_wire, positions_from_wire};
 use tryon_proto::v1::cloth_service_client::ClothServiceClient;
 use tryon_proto::v1::start_simulation_request::Start;
 use tryon_proto::v1::take_fine_picture_response::Content;
 use tryon_proto::v1::{
-    CancelSimulationRequest, ClothDetail, FollowSimulationRequest, FrameId, Picture, PictureCodec,
-    SessionStart, StartSimulationRequest, StartSimulationResponse, TakeFinePictureResponse,
-    TryOnState,
+    CancelSimulationRequest, ClothDetail, DrapeStep, FollowSimulationRequest,
+    FollowSimulationResponse, FrameId, Picture, PictureCodec, SessionStart, StartSimulationRequest,
+    StartSimulationResponse, TakeFinePictureResponse, TryOnState,
 };
 
 /// Vertices of all garments without a wish.
@@ -39,6 +39,9 @@ const ARRIVAL: Duration = Duration::from_millis(300);
 
 /// Time in which later poses are tried while the garments pass through themselves or the body too much to start from.
 const OTHER_POSES: Duration = Duration::from_secs(20);
+/// Longest time without a message: the server ends connections that are silent for ten seconds, and a step of fine cloth takes
+/// longer.
+const HEARTBEAT: Duration = Duration::from_secs(1);
 /// Pause before another pose.
 const POSE_PAUSE: Duration = Duration::from_millis(300);
 /// Times that a line which broke is mended without a message between.
@@ -47,6 +50,8 @@ const LOST_LINES: usize = 8;
 /// Stream of one fine picture.
 pub(crate) type Messages = mpsc::Receiver<Result<TakeFinePictureResponse, Status>>;
 type Sender = mpsc::Sender<Result<TakeFinePictureResponse, Status>>;
+/// Newest step of the drape.
+type Steps = watch::Sender<DrapeStep>;
 
 /// Means and wishes of one fine picture.
 pub(crate) struct FinePicture {
@@ -96,34 +101,48 @@ impl Drop for Simulation {
 
 impl FinePicture {
     /// Starts the work. It ends with the picture, with an error, when nobody listens any more, and with the try-on.
-    pub(crate) fn spawn(self, place: tokio::sync::OwnedSemaphorePermit) -> Messages {
+    pub(crate) fn spawn(self, place: OwnedSemaphorePermit) -> Messages {
         let (messages, reader) = mpsc::channel(8);
         tokio::spawn(async move {
             let _place = place;
-            let (listener, id) = (messages.clone(), self.try_on_id.clone());
             let handle = self.handle.clone();
             let made = tokio::select! {
-                made = self.make(&messages) => made,
-                () = handle.commands.closed() => Err(not_found("try-on", &id)),
-                () = listener.closed() => return,
+                made = self.told(&messages) => made,
+                () = handle.commands.closed() => Err(not_found("try-on", &self.try_on_id)),
+                () = messages.closed() => return,
             };
             if let Err(why) = &made {
-                tracing::warn!(try_on = brief(&id), %why, "no fine picture");
+                tracing::warn!(try_on = brief(&self.try_on_id), %why, "no fine picture");
             }
-            let last = made.map(|picture| TakeFinePictureResponse {
-                content: Some(Content::Picture(picture)),
-            });
+            let last = made.map(|picture| message(Content::Picture(picture)));
             // The caller may have left.
             let _ = messages.send(last).await;
         });
         reader
     }
 
+    /// The picture; until then each step is told, and the newest again after a while: the line is not dead.
+    async fn told(&self, messages: &Sender) -> Result<Picture, Status> {
+        let (steps, mut newest) = watch::channel(DrapeStep::default());
+        let picture = self.make(&steps);
+        tokio::pin!(picture);
+        loop {
+            tokio::select! {
+                made = &mut picture => return made,
+                // Its sender is above.
+                _ = tokio::time::timeout(HEARTBEAT, newest.changed()) => {}
+            }
+            let step = *newest.borrow_and_update();
+            // A reader without room has messages to read.
+            let _ = messages.try_send(Ok(message(Content::Drape(step))));
+        }
+    }
+
     /// The picture of the first pose from now on that can be draped.
-    async fn make(&self, messages: &Sender) -> Result<Picture, Status> {
+    async fn make(&self, steps: &Steps) -> Result<Picture, Status> {
         let begun = Instant::now();
         loop {
-            match self.one_pose(messages).await {
+            match self.one_pose(steps).await {
                 Err(Failure::Tangled(_)) if begun.elapsed() < OTHER_POSES => {
                     tokio::time::sleep(POSE_PAUSE).await;
                 }
@@ -132,7 +151,7 @@ impl FinePicture {
         }
     }
 
-    async fn one_pose(&self, messages: &Sender) -> Result<Picture, Failure> {
+    async fn one_pose(&self, steps: &Steps) -> Result<Picture, Failure> {
         let begun = Instant::now();
         let mut client = upstream::client(self.cloth.clone());
         let before = self.recent().await?;
@@ -148,9 +167,9 @@ impl FinePicture {
         };
         let id = required(started.exposure, "start_simulation_response.exposure")?;
         let mut job = exposed(&id, &[after?, before])?;
-        let positions = drape(&simulation, messages).await?;
+        let frame = drape(&simulation, steps).await?;
         drop(simulation);
-        job.placed = Some(Arc::new(placed(&started, &positions, begun)?));
+        job.placed = Some(Arc::new(placed(&started, &frame, begun)?));
         job.formats = vec![(None, self.encoding)];
         Ok(self.draw(job).await?)
     }
@@ -205,6 +224,12 @@ impl FinePicture {
     }
 }
 
+fn message(content: Content) -> TakeFinePictureResponse {
+    TakeFinePictureResponse {
+        content: Some(content),
+    }
+}
+
 /// The exposure of that id with its body, not yet drawn.
 fn exposed(id: &FrameId, recent: &[JoinBuffer]) -> Result<Job, Status> {
     let exposure = recent.iter().find_map(|b| b.find(id));
@@ -219,15 +244,17 @@ fn exposed(id: &FrameId, recent: &[JoinBuffer]) -> Result<Job, Status> {
     })
 }
 
-/// Follows a drape to its end, also over a line that breaks: little endian positions of all vertices. Steps that the reader
-/// has no room for are left out.
-async fn drape(simulation: &Simulation, messages: &Sender) -> Result<bytes::Bytes, Failure> {
+/// Follows a drape to its frame, also over a line that breaks.
+async fn drape(
+    simulation: &Simulation,
+    steps: &Steps,
+) -> Result<FollowSimulationResponse, Failure> {
     let mut client = simulation.client.clone();
     let mut lost = pauses().take(LOST_LINES);
     loop {
         let mut has_heard = false;
-        let why = match one_stream(&mut client, &simulation.id, messages, &mut has_heard).await {
-            Ok(Some(positions)) => return Ok(positions),
+        let why = match one_stream(&mut client, &simulation.id, steps, &mut has_heard).await {
+            Ok(Some(frame)) => return Ok(frame),
             Ok(None) => Status::unavailable("the drape ended without a frame"),
             Err(s) => s,
         };
@@ -245,13 +272,13 @@ async fn drape(simulation: &Simulation, messages: &Sender) -> Result<bytes::Byte
     }
 }
 
-/// Follows a drape until it or the line ends; `None` when it ended without positions.
+/// Follows a drape until it or the line ends; `None` when it ended without a frame.
 async fn one_stream(
     client: &mut ClothServiceClient<Connection>,
     simulation: &str,
-    messages: &Sender,
+    steps: &Steps,
     has_heard: &mut bool,
-) -> Result<Option<bytes::Bytes>, Status> {
+) -> Result<Option<FollowSimulationResponse>, Status> {
     let follow = FollowSimulationRequest {
         simulation_id: simulation.into(),
         first_frame: 0,
@@ -260,11 +287,10 @@ async fn one_stream(
     while let Some(m) = frames.message().await? {
         *has_heard = true;
         if !m.positions.is_empty() {
-            return Ok(Some(m.positions));
+            return Ok(Some(m));
         }
         if let Some(step) = m.drape {
-            let content = Some(Content::Drape(step));
-            let _ = messages.try_send(Ok(TakeFinePictureResponse { content }));
+            steps.send_replace(step);
         }
     }
     Ok(None)
@@ -272,13 +298,15 @@ async fn one_stream(
 
 fn placed(
     started: &StartSimulationResponse,
-    positions: &bytes::Bytes,
+    frame: &FollowSimulationResponse,
     begun: Instant,
 ) -> Result<Placed, WireError> {
     let field = "start_simulation_response.world_from_camera";
     let world = required(started.world_from_camera.as_ref(), field)?;
+    let garments = garments_from_wire(started)?;
+    let positions = positions_from_wire(frame, started.vertex_count as usize)?;
     Ok(Placed {
-        garments: placed_from_wire(&started.garments, positions)?,
+        garments: simulation::placed(garments, &positions.unwrap_or_default())?,
         world_from_camera: rigid_from_wire(world, field)?,
         stages: vec![stage("cloth.drape", begun)],
         revision: 0,

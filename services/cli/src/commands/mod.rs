@@ -7,6 +7,7 @@ pub(crate) mod composite;
 pub(crate) mod demo;
 pub(crate) mod doctor;
 pub(crate) mod export;
+pub(crate) mod fine;
 pub(crate) mod import;
 pub(crate) mod record;
 pub(crate) mod replay;

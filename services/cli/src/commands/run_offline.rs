@@ -6,7 +6,7 @@ use crate::input;
 use crate::interrupt::INTERRUPTED;
 use crate::offline_files::{OfflineFiles, saved_state};
 use crate::preview::{Preview, PreviewFrame};
-use crate::report::{peak_memory, write};
+use crate::report::{GarmentPart, garment_parts, peak_memory, write};
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -48,14 +48,6 @@ struct Report {
     work: Vec<(OfflineFrameReport, f64)>,
     sizes: Vec<String>,
     peak_memory_bytes: Option<u64>,
-}
-
-/// Vertices of a garment in positions.npy.
-#[derive(Debug, Serialize)]
-struct GarmentPart {
-    name: String,
-    first_vertex: usize,
-    vertices: usize,
 }
 
 /// Runs the command.
@@ -162,17 +154,8 @@ fn worn(preview: &Preview) -> Result<&DressedOutfit> {
 }
 
 fn parts(outfit: &OfflineOutfit) -> Vec<GarmentPart> {
-    let mut first_vertex = 0;
-    let part = |g: &tryon::garment::GarmentMesh| {
-        let part = GarmentPart {
-            name: g.name.clone(),
-            first_vertex,
-            vertices: g.vertices,
-        };
-        first_vertex += g.vertices;
-        part
-    };
-    outfit.garments().iter().map(part).collect()
+    let garments = outfit.garments().iter();
+    garment_parts(garments.map(|g| (g.name.as_str(), g.vertices)))
 }
 
 fn picture(out: &Path, index: usize, kind: &str, picture: &ColorImage) -> Result<()> {

@@ -6,9 +6,9 @@ import { Code } from './grpc_web.js';
 const OFFER = 'In the pose you hold as you press. It takes up to a minute, and stepping out of view ends it.';
 const DONE = 'Finer folds, in the pose you held. Your phone still gets the quick photo.';
 
-/** Words for the newest drape step, null before the first. They change once per mesh, so that a screen reader can follow. */
+/** Words for the newest drape step, null or zeros before the first. They change once per mesh, so that a screen reader can follow. */
 export function progressWords(step) {
-  const points = step ? `: ${step.vertex_count.toLocaleString('en')} points` : '';
+  const points = step?.vertex_count ? `: ${step.vertex_count.toLocaleString('en')} points` : '';
   return `Settling the cloth${points}. Stay in view…`;
 }
 
