@@ -1,7 +1,7 @@
 //! Pose (root transform and joint angles) and forward kinematics.
 
 use super::{JointMotion, RestBody, Skeleton};
-use crate::math::{Body, Camera, Rigid, exp_so3};
+use crate::math::{Body, Camera, Rigid, exp_so3, log_so3};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -105,6 +105,31 @@ impl<F> Pose<F> {
             *a = a.clamp(l[0], l[1]);
         }
     }
+    /// Pose at share `t` of the way to `other`: joints along the shortest arc, joint 0 of `rest` along a line.
+    #[must_use]
+    pub fn towards(&self, other: &Self, skeleton: &Skeleton, rest: &RestBody, t: f64) -> Self {
+        let slerp = |p: &UnitQuaternion<f64>, q: &UnitQuaternion<f64>| {
+            p * exp_so3(&(log_so3(&(p.inverse() * q)) * t))
+        };
+        let lerp = |(x, y): (&f64, &f64)| x + (y - x) * t;
+        let mut angles: Vec<f64> = self.angles.iter().zip(&other.angles).map(lerp).collect();
+        for (j, joint) in skeleton.joints().iter().enumerate() {
+            if matches!(joint.motion, JointMotion::Ball { .. }) {
+                let at = skeleton.dof_offset(j);
+                let [p, q] = [self, other].map(|pose| exp_so3(&pose.rotation_vector(skeleton, j)));
+                angles[at..at + 3].copy_from_slice(log_so3(&slerp(&p, &q)).as_slice());
+            }
+        }
+
+        let pivot = rest.joints[0];
+        let [from, to] = [self, other].map(|pose| pose.root.point(&pivot).coords);
+        let rotation = slerp(&self.root.iso().rotation, &other.root.iso().rotation);
+        let translation = from + (to - from) * t - rotation * pivot.coords;
+        Self {
+            root: Rigid::from_parts(translation, rotation),
+            angles,
+        }
+    }
     /// Has finite numbers only.
     pub fn is_finite(&self) -> bool {
         self.root.is_finite() && self.angles.iter().all(|a| a.is_finite())
@@ -114,6 +139,40 @@ impl<F> Pose<F> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pose_on_the_way_to_another_starts_and_ends_at_them_and_turns_evenly() {
+        let template = embedded::template();
+        let (skeleton, rest) = (
+            template.skeleton(),
+            template.personalise(&Default::default()),
+        );
+        let turned = |angle: f64, height: f64| {
+            let rotation = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), angle);
+            let pelvis = Vector3::new(0.0, height, 0.0);
+            let root = Rigid::from_parts(pelvis - rotation * rest.joints[0].coords, rotation);
+            let mut pose = Pose::<World>::rest(skeleton, root);
+            pose.set(skeleton, "left_shoulder", &[0.0, 0.0, -angle]);
+            pose.set(skeleton, "left_elbow", &[angle]);
+            pose
+        };
+        let (a, b) = (turned(0.2, 0.0), turned(1.2, 0.5));
+        let joints = |pose: &Pose<World>| {
+            let mut bones = BoneTransforms::default();
+            pose.bones(skeleton, &rest, &mut bones);
+            bones.joints
+        };
+        let apart = |p: &Pose<World>, q: &Pose<World>| {
+            let (p, q) = (joints(p), joints(q));
+            let pairs = p.iter().zip(&q);
+            pairs.map(|(p, q)| distance(p, q)).fold(0.0, f64::max)
+        };
+        assert!(apart(&a.towards(&b, skeleton, &rest, 0.0), &a) < 1e-12);
+        assert!(apart(&a.towards(&b, skeleton, &rest, 1.0), &b) < 1e-12);
+        // About one axis the half-way pose is that of half the angle.
+        let middle = a.towards(&b, skeleton, &rest, 0.5);
+        assert!(apart(&middle, &turned(0.7, 0.25)) < 1e-12);
+    }
     use crate::body::{BodyShape, SkinWeights, embedded, skin};
     use crate::formats::gltf::skinned::decoded::posed_meshes;
     use crate::formats::gltf::{

@@ -1,8 +1,8 @@
 //! The canonical pose in which garments are put on: upright, arms out and a little down, legs a little apart.
 
 use crate::body::{JointMotion, Pose, RestBody, Template};
-use crate::math::{Body, Rigid, V3d, World, exp_so3, log_so3};
-use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use crate::math::{Body, Rigid, V3d, World, log_so3};
+use nalgebra::{Unit, UnitQuaternion, Vector3};
 
 /// Upper arms below the horizontal, radians: armpits open, shoulders not shrugged.
 const ARMS_DOWN: f64 = 0.60;
@@ -79,48 +79,6 @@ pub(super) fn upright_root(rest: &RestBody, root: &Rigid<World, Body>) -> Rigid<
     let pelvis = rest.joints[0];
     let forward = root.vector(&Vector3::z());
     let q = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), forward.x.atan2(forward.z));
-    turned_about(pelvis.coords, root.point(&pelvis).coords, q)
-}
-
-/// The rotation `q` that takes the point `rest` to `to`.
-fn turned_about(rest: V3d, to: V3d, q: UnitQuaternion<f64>) -> Rigid<World, Body> {
-    Rigid::new(Isometry3::from_parts(Translation3::from(to - q * rest), q))
-}
-
-/// Pose at share `t` between `a` and `b`: joints along the shortest arc, the pelvis along a line.
-pub(super) fn between(
-    template: &Template,
-    rest: &RestBody,
-    a: &Pose<World>,
-    b: &Pose<World>,
-    t: f64,
-) -> Pose<World> {
-    let skeleton = template.skeleton();
-    let pelvis = rest.joints[0];
-    let slerp = |p: &UnitQuaternion<f64>, q: &UnitQuaternion<f64>| {
-        p * exp_so3(&(log_so3(&(p.inverse() * q)) * t))
-    };
-    let (pa, pb) = (a.root.point(&pelvis).coords, b.root.point(&pelvis).coords);
-    let root = turned_about(
-        pelvis.coords,
-        pa + (pb - pa) * t,
-        slerp(&a.root.iso().rotation, &b.root.iso().rotation),
-    );
-    let mut angles: Vec<f64> = a
-        .angles
-        .iter()
-        .zip(&b.angles)
-        .map(|(x, y)| x + (y - x) * t)
-        .collect();
-    for (j, joint) in skeleton.joints().iter().enumerate() {
-        if matches!(joint.motion, JointMotion::Ball { .. }) {
-            let at = skeleton.dof_offset(j);
-            let q = slerp(
-                &exp_so3(&a.rotation_vector(skeleton, j)),
-                &exp_so3(&b.rotation_vector(skeleton, j)),
-            );
-            angles[at..at + 3].copy_from_slice(log_so3(&q).as_slice());
-        }
-    }
-    Pose { root, angles }
+    let to = root.point(&pelvis).coords;
+    Rigid::from_parts(to - q * pelvis.coords, q)
 }

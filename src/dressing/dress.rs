@@ -1,7 +1,7 @@
 //! Dressing: sew and place, drape, follow the body into the tracked pose, refine, tie to the body.
 
 use super::body_sections::BodySections;
-use super::canonical::{between, canonical_pose, upright_root};
+use super::canonical::{canonical_pose, upright_root};
 use super::drape::{Drape, Layers};
 use super::error::DressError;
 use super::options::{DressOptions, DressReport};
@@ -175,7 +175,8 @@ fn bodies_between(
 ) -> Vec<Vec<P3>> {
     let body = |i: usize| {
         let t = i as f64 / count as f64;
-        let pose = between(template, rest, from, to, t * t * (3.0 - 2.0 * t));
+        let share = t * t * (3.0 - 2.0 * t);
+        let pose = from.towards(to, template.skeleton(), rest, share);
         let mut bones = BoneTransforms::default();
         pose.bones(template.skeleton(), rest, &mut bones);
         let mut out = Vec::new();
