@@ -26,15 +26,6 @@ const SETTLED: f64 = 0.05;
 const WELL_FITTED: f64 = 4e-3;
 /// Displacement of the trials along the upright, metres.
 const SHIFT: f64 = 0.15;
-/// Least frames of calibration before the status is `Tracking`.
-const SHORTEST: u32 = 15;
-/// Motion of the root per frame below which it counts as steady, metres: a first fit that is off slides by 12 mm a frame.
-const STEADY_MOTION: f64 = 6e-3;
-/// Steady frames in a row before the status is `Tracking`.
-const STEADY_FRAMES: u32 = 6;
-/// Most frames of calibration: a subject who walks is dressed walking.
-const LONGEST: u32 = 90;
-
 /// Size, shape and pose of one start.
 #[derive(Clone)]
 struct SizedPose {
@@ -86,11 +77,15 @@ impl SizeCalibration<'_> {
             body: self.body,
             observation: self.observation,
         };
-        let shape = &mut state.shape;
+        let (frames, shape) = (state.size.frames, &mut state.shape);
         state
             .size
             .observe(&context, pose, shape, self.scratch, true);
         self.body.update(self.model, &state.shape);
+        if state.size.frames > frames {
+            let template = &self.model.template;
+            state.size.check_settled(template, &self.body.rest);
+        }
         fit
     }
 
@@ -171,29 +166,13 @@ impl SizeCalibration<'_> {
     }
 }
 
-/// Updates the counters of calibration with the motion of the root in this frame, metres; `None` for a subject just found.
-pub(super) fn count_steady(state: &mut TrackerState, moved: Option<f64>) {
-    state.steady = match moved {
-        Some(moved) if moved < STEADY_MOTION => state.steady.saturating_add(1),
-        _ => 0,
-    };
-    state.calibration_age = match moved {
-        Some(_) => state.calibration_age.saturating_add(1),
-        None => 0,
-    };
-}
-
-/// `Sitting` for who sits; `Calibrating` until size has seen some frames and the pose is steady, then `Tracking`.
+/// `Sitting` for who sits; `Calibrating` until the size has settled, then `Tracking`.
 pub(super) fn live_status(model: &TrackerModel, state: &TrackerState) -> Status {
     if state.seat.is_taken {
-        return Status::Sitting;
-    }
-    let settling = state.status != Status::Tracking
-        && state.steady < STEADY_FRAMES
-        && state.calibration_age < LONGEST;
-    if model.config.adapt_size && (state.size.frames < SHORTEST || settling) {
-        Status::Calibrating
-    } else {
+        Status::Sitting
+    } else if state.is_sized(&model.config) {
         Status::Tracking
+    } else {
+        Status::Calibrating
     }
 }

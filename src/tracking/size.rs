@@ -6,7 +6,8 @@
 
 use super::model::TrackerModel;
 use super::pose_fit::{FitContext, FitScratch, assemble, for_each_point, pair};
-use crate::body::{BodyShape, Pose};
+use crate::body::measure::measure;
+use crate::body::{BodyShape, Pose, RestBody, Template};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +22,12 @@ pub struct SizeEstimate {
     information: Vec<f64>,
     /// Σ of information × (estimate of the frame), shape `[directions]`.
     evidence: Vec<f64>,
+    /// Girths of chest, natural waist and hip when they were last compared, metres.
+    #[serde(default)]
+    girths: Option<[f64; 3]>,
+    /// They changed less than [`SETTLED_GIRTH`] over [`SETTLING_FRAMES`].
+    #[serde(default)]
+    pub(super) is_settled: bool,
 }
 
 /// Weight λₛ of eq. 23, per point, m²: bones tied by symmetry differ by a tenth of what single ones do.
@@ -41,6 +48,11 @@ const LATER: (f32, f64) = (0.08, 0.04);
 const SEARCHING: u32 = 20;
 /// Point-to-point weight: a fifth of the pose's, as sizes must slide along limbs.
 const POINT_TO_POINT: f64 = 0.02;
+/// Frames between two comparisons of the girths: half a second at 30 Hz.
+const SETTLING_FRAMES: u32 = 15;
+/// Change of a girth over [`SETTLING_FRAMES`] below which the size has settled, metres: a quarter of a step of the size
+/// table. A first estimate is off by up to 4 cm and settles within 30 to 45 frames.
+const SETTLED_GIRTH: f64 = 0.01;
 /// Factor on earlier information per frame: its pairs belonged to a body not yet adapted.
 const FADE: f64 = 0.95;
 /// Change of a coefficient that weighs as much as a change of a scale, for convergence.
@@ -99,6 +111,22 @@ impl SizeEstimate {
                 (next[d] - now[d]).abs() * if is_scale { SCALE_CHANGE } else { 1.0 }
             })
             .fold(0.0, f64::max)
+    }
+}
+
+impl SizeEstimate {
+    /// Compares the girths of the `rest` body with those of half a second before; to be called after each new frame.
+    pub(super) fn check_settled(&mut self, template: &Template, rest: &RestBody) {
+        if !self.frames.is_multiple_of(SETTLING_FRAMES) {
+            return;
+        }
+        let girths = measure(template, rest).map(|m| [m.chest, m.natural_waist, m.hip]);
+        let before = std::mem::replace(&mut self.girths, girths.ok());
+        let pairs = before.zip(self.girths);
+        self.is_settled |= pairs.is_some_and(|(before, now)| {
+            let changes = before.iter().zip(now).map(|(a, b)| (a - b).abs());
+            changes.fold(0.0, f64::max) < SETTLED_GIRTH
+        });
     }
 }
 
@@ -367,6 +395,30 @@ fn from_stature(model: &TrackerModel, stature: f64) -> BodyShape {
 mod tests {
     use super::*;
     use crate::tracking::test_scene::TestScene;
+
+    #[test]
+    fn the_size_settles_once_girths_stay_for_half_a_second() {
+        let template = TestScene::new(50, 480).model.template;
+        let body = |weight: f64| {
+            template.personalise(&BodyShape {
+                coefficients: vec![0.0, weight],
+                ..BodyShape::default()
+            })
+        };
+        let mut size = SizeEstimate::default();
+        let mut settled = Vec::new();
+        for frame in 1..=4 * SETTLING_FRAMES {
+            size.frames = frame;
+            // Girths move until the thirtieth frame.
+            size.check_settled(&template, &body(f64::from(frame.min(30)) * 0.05));
+            if size.is_settled {
+                settled.push(frame);
+            }
+        }
+        assert_eq!(settled.first(), Some(&(3 * SETTLING_FRAMES)));
+        // It never becomes unsettled again.
+        assert_eq!(settled.len() as u32, SETTLING_FRAMES + 1);
+    }
 
     #[test]
     fn a_small_person_may_be_a_child_of_that_stature_or_crouch() {

@@ -32,6 +32,9 @@ pub struct TrackerState {
     pub pose_age: u32,
     /// Frames processed.
     pub frames: u64,
+    /// Number of subjects measured so far: it grows with each body whose size is measured from nothing.
+    #[serde(default)]
+    pub subject: u64,
     pub(super) scene: ScenePlanes,
     /// Frames since `scene` was found.
     pub(super) scene_age: Option<u32>,
@@ -52,10 +55,6 @@ pub struct TrackerState {
     /// Test whether the subject is a person.
     #[serde(default)]
     pub(super) belief: PersonBelief,
-    /// Frames in a row in which the root hardly moved while calibrating.
-    pub(super) steady: u32,
-    /// Frames since the subject was found.
-    pub(super) calibration_age: u32,
     /// Mean of the subject's readings, camera frame, metres.
     pub(super) centre: P3,
     /// Fit of the last pose: share of explained readings, residual in metres.
@@ -107,6 +106,7 @@ impl TrackerState {
             floor_known: false,
             pose_age: 0,
             frames: 0,
+            subject: 0,
             scene: ScenePlanes::default(),
             scene_age: None,
             before: None,
@@ -118,8 +118,6 @@ impl TrackerState {
             disagreeing: 0,
             refusals: Refusals::default(),
             belief: PersonBelief::default(),
-            steady: 0,
-            calibration_age: 0,
             centre: P3::origin(),
             quality: [0.0; 2],
             highest_hips: None,
@@ -158,6 +156,7 @@ impl TrackerState {
             scene_age: self.scene_age,
             refusals: self.refusals.clone(),
             frames: self.frames,
+            subject: self.subject,
             ..fresh
         };
     }
@@ -170,6 +169,10 @@ impl TrackerState {
     /// True with a pose to follow: live, or in doubt for a few frames.
     pub(super) fn is_following(&self) -> bool {
         self.status.is_live() || self.disagreeing > 0 || self.belief.verdict == Verdict::Unsure
+    }
+    /// True once the girths have settled: a size of a garment can be chosen. Size and shape may still change a little.
+    pub fn is_sized(&self, config: &TrackerConfig) -> bool {
+        self.size.is_settled || self.calibrated(config)
     }
     /// True once size and shape no longer change.
     pub(super) fn calibrated(&self, config: &TrackerConfig) -> bool {

@@ -22,9 +22,9 @@ pub enum LostReason {
 pub enum Status {
     /// Nobody has been found yet.
     Searching,
-    /// A subject is tracked; size and shape still change.
+    /// A subject is tracked; no size of a garment can be chosen yet, as that of the body still changes.
     Calibrating,
-    /// A subject is tracked.
+    /// A subject is tracked whose size has settled.
     Tracking,
     /// A subject is tracked who sits: garments are draped on people who stand.
     Sitting,

@@ -2,7 +2,7 @@
 
 use super::agreement::Agreement;
 use super::body_proposals::{BodyProposals, person_cells};
-use super::calibration::{SizeCalibration, count_steady, live_status};
+use super::calibration::{SizeCalibration, live_status};
 use super::confidence::confidence;
 use super::hand_assignment::assign_hands;
 use super::initial_pose::{StartPrior, initial_pose, outline};
@@ -134,6 +134,7 @@ impl SubjectFrame<'_> {
         let config = &self.model.config;
         workspace.fit.pairing.forget();
         let found = !state.is_following();
+        let is_new = found && state.size.frames == 0;
         let before = size_before(state, found);
         let start = if found {
             self.find(state, workspace, log)?
@@ -196,6 +197,7 @@ impl SubjectFrame<'_> {
             return Err(LostReason::Disagreement);
         }
         let status = state.status;
+        state.subject += u64::from(is_new);
         self.commit(state, workspace, pose, (&fit, &log.report.confidence));
         count_doubt(state, agrees)?;
         if state.belief.verdict == Verdict::Unsure {
@@ -398,9 +400,6 @@ impl SubjectFrame<'_> {
     ) {
         let skeleton = self.model.template.skeleton();
         let found = !state.is_following();
-        let root = skeleton.joints()[0].rest;
-        let moved = (pose.root.point(&root) - state.pose.root.point(&root)).norm();
-        count_steady(state, (!found).then_some(moved));
         let before = std::mem::replace(&mut state.pose, pose);
         state.before = (!found).then_some(before);
         state.interval_ns = self.frame.time_ns.saturating_sub(state.time_ns);
