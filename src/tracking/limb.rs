@@ -73,6 +73,10 @@ impl Limb {
     pub(super) fn hand(&self, bones: &BoneTransforms) -> P3d {
         bones.joints[self.end] + (bones.joints[self.tip] - bones.joints[self.end]) * self.middle
     }
+    /// At least this share of the hinge's angle is held by no reading; `unseen` has the share of each angle.
+    pub(super) fn is_hinge_unseen(&self, unseen: &[f64], least: f64) -> bool {
+        unseen.get(self.bend).is_some_and(|share| *share >= least)
+    }
     /// Hinge, middle of the lower bone, end, and point of hand or foot, camera frame, metres.
     pub(super) fn lower_points(&self, bones: &BoneTransforms) -> [P3d; 4] {
         let [hinge, end] = [self.hinge, self.end].map(|j| bones.joints[j]);

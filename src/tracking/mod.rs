@@ -37,6 +37,7 @@ mod extrapolation;
 mod facing;
 mod gravity;
 mod hand_assignment;
+mod hidden_limb;
 mod hypotheses;
 mod initial_pose;
 mod joint_proposals;

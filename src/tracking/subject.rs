@@ -5,6 +5,7 @@ use super::body_proposals::{BodyProposals, person_cells};
 use super::calibration::{SizeCalibration, live_status};
 use super::confidence::confidence;
 use super::hand_assignment::assign_hands;
+use super::hidden_limb::HiddenLimb;
 use super::initial_pose::{StartPrior, initial_pose, outline};
 use super::person_evidence::{PersonBelief, PersonEvidence, Verdict};
 use super::personal_body::PersonalBody;
@@ -22,6 +23,7 @@ use super::{
     JointConfidence, LostReason, SizeEstimate, Skipped, Status, StepReport, TrackerModel,
     TrackerState, TrackingStagesMs, Workspace,
 };
+use crate::body::parts::BodyPart;
 use crate::body::{BodyShape, BoneTransforms, Pose};
 use crate::camera::RgbdFrame;
 use crate::math::{Camera, P3};
@@ -38,6 +40,13 @@ const LEAST_EXPLAINED: f64 = 0.45;
 const LEAST_MATCHED: f64 = 0.35;
 /// Share of the area above which body and frame disagree; see docs/decisions/043. Good tracks stay below 0.16.
 const MOST_WRONG: f32 = 0.2;
+/// Share of a hidden arm in free space above which it is put behind the readings.
+const ARM_IN_AIR: f32 = 0.2;
+/// Share of the elbow's angle that no reading holds from which on a forearm is hidden: visible ones stay below 0.2 (jacks),
+/// hidden ones are above 0.99.
+const HIDDEN: f64 = 0.9;
+/// Share of the area that may be uncovered meanwhile: an arm that is lost leaves readings uncovered where it is.
+const MOST_UNCOVERED: f32 = 0.02;
 /// Frames in doubt before the search begins anew.
 const DOUBT: u32 = 2;
 /// Age of a last pose up to which it tells front from back at the next start, frames.
@@ -181,6 +190,9 @@ impl SubjectFrame<'_> {
             return Err(LostReason::Residual);
         }
         self.assess(&pose, workspace, log);
+        if config.rescue {
+            self.hide_arms(&mut pose, workspace, log);
+        }
         let mut classified = found;
         if config.rescue {
             classified |= self.repair(state, workspace, (&mut pose, &mut fit), log);
@@ -215,6 +227,32 @@ impl SubjectFrame<'_> {
         let agreement = measure.measure(&context, pose, fit);
         log.report.confidence = confidence(&context, pose, fit, &agreement);
         log.report.agreement = agreement;
+    }
+
+    /// Puts arms in free space that no reading holds behind the readings while these are all covered, where that brings them
+    /// out of it.
+    fn hide_arms(&self, pose: &mut Pose<Camera>, workspace: &mut Workspace, log: &mut StepLog) {
+        let is_arm = |part: &BodyPart| matches!(part, BodyPart::LeftArm | BodyPart::RightArm);
+        for (part, limb) in self.model.limbs().filter(|(part, _)| is_arm(part)) {
+            let before = log.report.agreement;
+            let in_air = before.parts[part as usize];
+            let is_hidden = limb.is_hinge_unseen(&workspace.fit.unseen, HIDDEN);
+            if !is_hidden || before.uncovered > MOST_UNCOVERED || in_air < ARM_IN_AIR {
+                continue;
+            }
+            let context = self.context(&workspace.body);
+            let hidden = HiddenLimb { context, limb };
+            let Some(moved) = hidden.behind_readings(pose, &mut workspace.fit.bones) else {
+                continue;
+            };
+            self.assess(&moved, workspace, log);
+            let after = &log.report.agreement;
+            if after.uncovered <= MOST_UNCOVERED && after.parts[part as usize] < 0.5 * in_air {
+                *pose = moved;
+            } else {
+                self.assess(pose, workspace, log);
+            }
+        }
     }
 
     /// Finds the subject anew: first size from the stature, then an initial pose.
