@@ -11,6 +11,7 @@ use super::sleep::island_model::skin_clusters;
 use crate::body::parts::vertex_masks;
 use crate::body::{SkinWeights, Template};
 use crate::contact::{CollisionModel, MapView};
+use crate::par;
 
 /// Everything immutable about an outfit on a body. Share it by `Arc`.
 #[derive(Debug)]
@@ -37,12 +38,13 @@ impl Model {
         config.check()?;
         check_anchors(template, &outfit)?;
         let count = outfit.garments.len() as f64;
-        let garment = |(order, g)| {
+        let mut garments: Vec<_> = outfit.garments.iter().map(|_| None).collect();
+        par::for_chunks(config.par, &mut garments, 1, |order, garment| {
             // Evenly between the skin and the outermost layer.
-            GarmentModel::new(g, &config, config.offset * (order + 1) as f64 / count)
-        };
-        let garments = outfit.garments.iter().enumerate().map(garment);
-        let garments = garments.collect::<Result<_, _>>()?;
+            let offset = config.offset * (order + 1) as f64 / count;
+            garment[0] = Some(GarmentModel::new(&outfit.garments[order], &config, offset));
+        });
+        let garments = garments.into_iter().flatten().collect::<Result<_, _>>()?;
         let collision = collision_model(template, &config)?;
         let mut model = Self {
             skin_clusters: skin_clusters(collision.surface()),

@@ -3,7 +3,6 @@
 use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use crate::math::P3;
 use crate::par::Par;
-use crate::tracking::ArmClearance;
 use std::sync::Arc;
 
 /// Skinned surface of a tracked body and the buffers to pose it again.
@@ -11,8 +10,6 @@ use std::sync::Arc;
 pub struct PosedBody {
     rest: RestBody,
     shape: Option<Arc<BodyShape>>,
-    /// `None` before the first pose, and for a template without arms.
-    arms: Option<ArmClearance>,
     bones: BoneTransforms,
     vertices: Vec<P3>,
 }
@@ -27,7 +24,7 @@ impl PosedBody {
         }
     }
 
-    /// Skins the body in `pose`, arms that overlap the trunk beside it; `true` when the rest shape was computed anew.
+    /// Skins the body in exactly the tracked `pose`; `true` when the rest shape was computed anew.
     ///
     /// Shapes are compared by pointer. A body belongs to one template for its whole life.
     pub fn pose<F>(&mut self, template: &Template, shape: &Arc<BodyShape>, pose: &Pose<F>) -> bool {
@@ -36,15 +33,7 @@ impl PosedBody {
             self.rest = template.personalise(shape);
             self.shape = Some(Arc::clone(shape));
         }
-        if !is_known || self.arms.is_none() {
-            self.arms = ArmClearance::new(template, &self.rest);
-        }
-
-        if let Some(arms) = &self.arms {
-            arms.separate(template, &self.rest, pose, &mut self.bones);
-        } else {
-            pose.bones(template.skeleton(), &self.rest, &mut self.bones);
-        }
+        pose.bones(template.skeleton(), &self.rest, &mut self.bones);
         skin(
             Par::Rayon,
             &self.rest.vertices,

@@ -1,7 +1,7 @@
 //! The chain of one person in front of one camera.
 
 use super::body::PosedBody;
-use super::choice::Choice;
+use super::choice::{Choice, SizedGarment};
 use super::clock::{FrameClock, LongGap};
 use super::error::MirrorError;
 use super::offline_outfit::OfflineOutfit;
@@ -36,6 +36,10 @@ pub struct Mirror {
 struct Worn {
     outfit: DressedOutfit,
     appearances: Vec<Appearance>,
+    /// Its sizes are those of a body whose size still changed.
+    is_provisional: bool,
+    /// The tracker's number of the subject who wears it.
+    subject: u64,
 }
 
 impl Mirror {
@@ -58,7 +62,8 @@ impl Mirror {
     }
 
     /// Takes one frame through tracking, dressing, cloth and compositing. The subject is dressed in the first frame in
-    /// which the tracker is live. The picture is the plain one while nobody is tracked and while garments are put on again.
+    /// which the tracker is live, and once more when its size has settled and asks for other sizes. The picture is the
+    /// plain one while nobody is tracked.
     ///
     /// # Errors
     /// A frame that does not fit the camera, or a garment that cannot be put on.
@@ -70,8 +75,9 @@ impl Mirror {
 
         let dt = LongGap::Nominal.time_step(self.clock.gap(frame.time_ns));
         let body = self.live_body();
-        self.worn.take_if(|w| w.outfit.is_past_mending());
-        if body.is_some() && self.worn.is_none() && !self.choices.is_empty() {
+        let subject = self.tracked.subject;
+        (self.worn).take_if(|w| w.outfit.is_past_mending() || w.subject != subject);
+        if body.is_some() && self.is_dressing_due()? {
             self.worn = Some(self.dress()?);
             timer.lap("dressing");
         }
@@ -84,13 +90,12 @@ impl Mirror {
             timer.lap("cloth");
         }
 
-        let is_worn = self.worn.as_ref().is_none_or(|w| w.outfit.is_worn());
-        let shown = body.as_deref().filter(|_| is_worn);
-        let (picture, render) = self.draw(frame, shown)?;
+        let (picture, render) = self.draw(frame, body.as_deref())?;
         timer.lap("composite");
         Ok(MirrorFrame {
             picture,
-            is_dressed: cloth.is_some() && is_worn,
+            is_dressed: cloth.is_some(),
+            is_size_provisional: self.worn.as_ref().is_some_and(|w| w.is_provisional),
             stages_ms: timer.stages_ms,
             tracking,
             cloth,
@@ -151,7 +156,7 @@ impl Mirror {
 
     /// The body that cloth meets, camera frame, metres; `None` while nobody is live.
     fn live_body(&mut self) -> Option<Vec<P3>> {
-        if self.tracked.status != Status::Tracking {
+        if !matches!(self.tracked.status, Status::Calibrating | Status::Tracking) {
             return None;
         }
         if *self.shape != self.tracked.shape {
@@ -162,14 +167,34 @@ impl Mirror {
         Some(self.posed.vertices().to_vec())
     }
 
-    fn dress(&mut self) -> Result<Worn, MirrorError> {
+    /// Nobody is dressed, or the size has settled and asks for other sizes than the provisional ones.
+    fn is_dressing_due(&mut self) -> Result<bool, MirrorError> {
+        let Some(worn) = &mut self.worn else {
+            return Ok(!self.choices.is_empty());
+        };
+        if !worn.is_provisional || self.tracked.status != Status::Tracking {
+            return Ok(false);
+        }
+        worn.is_provisional = false;
+        let sized = self.choose_sizes()?;
+        Ok(self.worn.as_ref().is_some_and(|w| !w.outfit.is_in(&sized)))
+    }
+
+    /// The chosen garments in the sizes of the tracked body, with their notes.
+    fn choose_sizes(&mut self) -> Result<Vec<SizedGarment>, MirrorError> {
         let template = self.tracker.template();
         let rest = template.personalise(&self.tracked.shape);
         let measures = measure(template, &rest)?;
         let sized = self.choices.iter().map(|c| c.sized(&measures));
         let sized = sized.collect::<Result<Vec<_>, _>>()?;
-        (self.notes).extend(sized.iter().flat_map(|g| g.notes.iter().cloned()));
+        self.notes = sized.iter().flat_map(|g| g.notes.iter().cloned()).collect();
+        Ok(sized)
+    }
 
+    fn dress(&mut self) -> Result<Worn, MirrorError> {
+        let sized = self.choose_sizes()?;
+        let template = self.tracker.template();
+        let rest = template.personalise(&self.tracked.shape);
         let world_from_camera = self.tracked.world_from_camera;
         let pose = Pose {
             root: world_from_camera * self.tracked.pose.root,
@@ -181,8 +206,9 @@ impl Mirror {
             pose: &pose,
             world_from_camera,
         };
-        let outfit =
+        let mut outfit =
             DressedOutfit::put_on(&subject, sized, PutOn::default()).map_err(MirrorError::Dress)?;
+        outfit.carry_to(&subject)?;
         let appearance = |k: usize| {
             let source = outfit.source(k).map(|s| &outfit.worn()[s]);
             source.map_or_else(Appearance::default, |garment| Appearance {
@@ -199,6 +225,8 @@ impl Mirror {
         Ok(Worn {
             outfit,
             appearances,
+            is_provisional: self.tracked.status != Status::Tracking,
+            subject: self.tracked.subject,
         })
     }
 

@@ -131,6 +131,11 @@ impl SizedGarment {
         }
     }
 
+    /// Size that it comes in; `None` for a mesh that is made to measure.
+    pub fn size(&self) -> Option<Size> {
+        self.finished().map(|f| f.size)
+    }
+
     /// Colour unless another is chosen, sRGB: its own, or the library's for its name.
     pub fn color(&self) -> [u8; 3] {
         let own = match &self.item {

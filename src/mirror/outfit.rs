@@ -1,13 +1,14 @@
-//! An outfit on a body: put on once, then stepped with every posed body.
+//! An outfit on a body: put on in an easy pose, carried to the pose of the body, then stepped with every posed body.
 
 use super::choice::SizedGarment;
-use super::wear::WearWatch;
+use super::wear::{SETTLING, WearWatch};
 use crate::body::parts::vertex_masks;
-use crate::body::{BoneTransforms, Pose, RestBody, Template};
+use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
 use crate::cloth::ClothError;
 use crate::cloth::{Config, Input, Model, State, StepReport, Workspace, step};
 use crate::dressing::{DressError, DressOptions, GarmentSource, dress_all};
 use crate::math::{Camera, P3, Rigid, World};
+use crate::par::Par;
 use crate::tracking::ArmClearance;
 use std::sync::Arc;
 
@@ -26,6 +27,13 @@ pub struct Subject<'a> {
 
 /// Longer edges of coarse garments: 2.4 times fewer vertices. Longer ones don't resolve sleeves.
 const COARSER: f64 = 1.55;
+
+/// Longest displacement of skin in one step of a carry, metres: 1.5 m/s, which sleeves follow without loss.
+const CARRY_STRIDE: f32 = 0.05;
+/// Most steps of a carry, half a second of cloth: a hand moves by 0.8 m.
+const MOST_CARRY_STEPS: usize = 16;
+/// Time of one step of a carry, s.
+const CARRY_DT: f64 = 1.0 / 30.0;
 
 /// Settings of putting on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,6 +54,8 @@ pub struct DressedOutfit {
     work: Workspace,
     wear: WearWatch,
     worn: Vec<SizedGarment>,
+    /// Pose in which the garments were draped; `None` once they have been carried to that of the body.
+    draped: Option<Pose<World>>,
 }
 
 /// The same outfit from here on; its first step takes longer, as scratch is left behind.
@@ -57,12 +67,14 @@ impl Clone for DressedOutfit {
             work: Workspace::default(),
             wear: self.wear.clone(),
             worn: self.worn.clone(),
+            draped: self.draped.clone(),
         }
     }
 }
 
 impl DressedOutfit {
-    /// Puts garments on, on arms beside the trunk as [`PosedBody`](super::PosedBody) has them; takes about a second.
+    /// Puts garments on in an easy pose: that of the subject, arms that overlap the trunk turned out, so that sleeves start
+    /// with room around them. [`Self::carry_to`] is to follow. Takes about half a second.
     ///
     /// # Errors
     /// Faults of the garments or the pose; without `any_size` a garment that does not fit.
@@ -84,14 +96,11 @@ impl DressedOutfit {
         let Subject { template, rest, .. } = subject;
         let arms = ArmClearance::new(template, rest);
         let mut bones = BoneTransforms::default();
-        let pose = arms.map(|arms| arms.separate(template, rest, subject.pose, &mut bones));
-        let dressed = dress_all(
-            template,
-            rest,
-            pose.as_ref().unwrap_or(subject.pose),
-            &wear,
-            &options,
-        )?;
+        let easy = arms.map_or_else(
+            || subject.pose.clone(),
+            |arms| arms.separate(template, rest, subject.pose, &mut bones),
+        );
+        let dressed = dress_all(template, rest, &easy, &wear, &options)?;
         let masks = vertex_masks(subject.template);
         Ok(Self {
             wear: WearWatch::new(&dressed.model, &dressed.state, masks),
@@ -99,10 +108,48 @@ impl DressedOutfit {
             state: dressed.state,
             work: Workspace::default(),
             worn,
+            draped: Some(easy),
         })
     }
 
-    /// Advances the cloth by `dt` (s) to a posed body (world, metres).
+    /// Carries an outfit that has just been put on from its easy pose to that of the subject, who may have moved or changed
+    /// shape meanwhile, in steps that cloth survives. Returns their number, 0 for an outfit that was carried before.
+    ///
+    /// # Errors
+    /// A body of another size or with a vertex that is not finite.
+    pub fn carry_to(&mut self, subject: &Subject<'_>) -> Result<usize, ClothError> {
+        let Some(from) = self.draped.take() else {
+            return Ok(0);
+        };
+        let Subject { template, rest, .. } = subject;
+        let mut bones = BoneTransforms::default();
+        let mut body = Vec::new();
+        let mut place = |share: f64, body: &mut Vec<P3>| {
+            let pose = from.towards(subject.pose, template.skeleton(), rest, share);
+            pose.bones(template.skeleton(), rest, &mut bones);
+            skin(Par::Rayon, &rest.vertices, template.weights(), &bones, body);
+        };
+
+        place(1.0, &mut body);
+        let start = self.state.collision_body().vertices().iter();
+        let farthest = (start.zip(&body)).map(|(a, b)| (b - a).norm());
+        let farthest = farthest.fold(0.0, f32::max);
+        let steps = ((farthest / CARRY_STRIDE).ceil() as usize).clamp(1, MOST_CARRY_STEPS);
+        for k in 1..=steps {
+            place(k as f64 / steps as f64, &mut body);
+            let (body, dt) = (&body[..], CARRY_DT);
+            step(
+                &self.model,
+                &mut self.state,
+                &Input { body, dt },
+                &mut self.work,
+            )?;
+        }
+        Ok(steps)
+    }
+
+    /// Advances the cloth by `dt` (s) to a posed body (world, metres). On a body that has jumped the outfit is put on again
+    /// and settles within this step, which then takes five times as long.
     ///
     /// # Errors
     /// A body of another size or with a vertex that is not finite; a time step that is not positive.
@@ -110,9 +157,14 @@ impl DressedOutfit {
         let input = Input { body, dt };
         let before = self.state.collision_body().vertices();
         let jumped = self.wear.has_jumped(before, body, dt);
-        let report = step(&self.model, &mut self.state, &input, &mut self.work)?;
+        let mut report = step(&self.model, &mut self.state, &input, &mut self.work)?;
         let (model, state) = (&self.model, &mut self.state);
         self.wear.judge(model, state, &report, jumped);
+        for _ in 0..if jumped { SETTLING } else { 0 } {
+            report = step(&self.model, &mut self.state, &input, &mut self.work)?;
+            let (model, state) = (&self.model, &mut self.state);
+            self.wear.judge(model, state, &report, false);
+        }
         Ok(report)
     }
 
@@ -123,11 +175,6 @@ impl DressedOutfit {
     /// A body of another size or with a vertex that is not finite.
     pub fn skinned(&self, body: &[P3]) -> Result<Vec<Vec<P3>>, ClothError> {
         self.wear.skinned(&self.model, body)
-    }
-
-    /// False while the outfit is put on again after a jump of the body; it isn't shown then.
-    pub fn is_worn(&self) -> bool {
-        self.wear.is_worn()
     }
 
     /// True once that has failed several times: it must be dressed anew, in the pose that the body has now.
@@ -145,6 +192,12 @@ impl DressedOutfit {
     /// Chosen garments, in the order in which they were chosen.
     pub fn worn(&self) -> &[SizedGarment] {
         &self.worn
+    }
+
+    /// True for the same garments in the same sizes.
+    pub fn is_in(&self, sized: &[SizedGarment]) -> bool {
+        let key = |g: &SizedGarment| (g.name().to_owned(), g.size());
+        self.worn.iter().map(key).eq(sized.iter().map(key))
     }
 
     /// Vertices of the drawn mesh of each garment, world, metres.

@@ -13,6 +13,8 @@ pub struct MirrorFrame {
     pub picture: ColorImage,
     /// Garments are in the picture.
     pub is_dressed: bool,
+    /// Sizes of the garments may change once more: that of the body hasn't settled.
+    pub is_size_provisional: bool,
     /// Milliseconds by stage: `tracking`, `dressing`, `cloth`, `composite`, those that ran.
     pub stages_ms: Vec<(&'static str, f64)>,
     /// Report of the tracker.

@@ -10,9 +10,8 @@ const MOST_STRAIN: f64 = 0.25;
 const MOST_OFFSET: f32 = 0.08;
 /// Steps in a row with a sleeve off after which an outfit is put on again: cloth puts it back in the next one, or never.
 const PATIENCE: u32 = 2;
-/// Steps in which an outfit that was put on again settles: a sleeve that comes off then isn't left to cloth. After a jump it isn't
-/// shown.
-const SETTLING: u32 = 4;
+/// Steps in which an outfit that was put on again settles: a sleeve that comes off then isn't left to cloth.
+pub(super) const SETTLING: u32 = 4;
 /// Unfit steps of an outfit that doesn't settle after which it must be dressed anew, which takes 0.3 to 0.7 s: one second.
 const MOST_VAIN: u32 = 30;
 /// Mean displacement of a body part that is a jump, metres, and its least speed, m/s: a fast arm moves by 0.2 m in 1/30 s.
@@ -38,8 +37,6 @@ struct WearState {
     unfit: u32,
     /// Steps since the outfit was put on again; `None` once it has settled.
     settling: Option<u32>,
-    /// Steps for which it isn't shown.
-    hidden: u32,
     /// Unfit steps before it settled.
     vain: u32,
 }
@@ -53,11 +50,6 @@ impl WearState {
         let put_on = jumped || fit == Fit::Torn || self.unfit >= patience;
         let settled = self.settling.map(|n| n + 1).filter(|n| *n < SETTLING);
         self.settling = if put_on { Some(0) } else { settled };
-        self.hidden = if jumped {
-            SETTLING
-        } else {
-            self.hidden.saturating_sub(1)
-        };
         self.vain = match self.settling {
             Some(_) => self.vain + u32::from(is_unfit),
             None => 0,
@@ -91,11 +83,6 @@ impl WearWatch {
     /// A body of another size or with a vertex that is not finite.
     pub(super) fn skinned(&self, model: &Model, body: &[P3]) -> Result<Vec<Vec<P3>>, ClothError> {
         self.reference.skinned(model, body)
-    }
-
-    /// True while the outfit sits as it was put on.
-    pub(super) fn is_worn(&self) -> bool {
-        self.state.hidden == 0
     }
 
     /// True once putting it on again doesn't help: it was put on in a pose that the body never had.
@@ -162,22 +149,20 @@ mod tests {
     }
 
     #[test]
-    fn a_torn_garment_is_put_on_again_at_once_and_shown() {
+    fn a_torn_garment_is_put_on_again_at_once() {
         let mut state = WearState::default();
         assert_eq!(run(&mut state, 3, Fit::Torn), 3);
-        assert_eq!((state.settling, state.hidden, state.vain), (Some(0), 0, 3));
+        assert_eq!((state.settling, state.vain), (Some(0), 3));
         run(&mut state, SETTLING, Fit::Worn);
         assert_eq!(state, WearState::default());
     }
 
     #[test]
-    fn after_a_jump_nothing_is_shown_until_it_has_settled() {
+    fn each_jump_puts_the_outfit_on_again_and_is_no_fault() {
         let mut state = WearState::default();
         assert!((0..50).all(|_| state.advance(Fit::Worn, true)));
         assert_eq!(state.vain, 0);
-        run(&mut state, SETTLING - 1, Fit::Worn);
-        assert_eq!(state.hidden, 1);
-        run(&mut state, 1, Fit::Worn);
+        run(&mut state, SETTLING, Fit::Worn);
         assert_eq!(state, WearState::default());
     }
 

@@ -29,6 +29,7 @@ fn worn() -> (DressedOutfit, Vec<[u32; 3]>, Vec<P3>) {
     };
     let sized = vec![choice.sized(&measures).expect("a size")];
     let mut outfit = DressedOutfit::put_on(&subject, sized, how).expect("dressed");
+    outfit.carry_to(&subject).expect("a body");
     let body = posed(&template, &rest, &pose);
     for _ in 0..15 {
         outfit.step(&body, DT).expect("a step");

@@ -125,6 +125,8 @@ test('fit in words and units', () => {
   assert.equal(fitWords({ size: 'S', regions: [...regions, loose] }), 'S: tight at the chest (stretched by 6 %), loose at the hip (4 cm off you)');
   assert.equal(fitWords({ size: 'M', regions: [{ ...loose, fit: 2 }] }), 'M: fits');
   assert.equal(fitWords({ size: 'M', regions: [] }), '', 'not measured yet');
+  assert.equal(fitWords({ size: 'M', regions, provisional: true }), 'Measuring your size …', 'no advice before the size is known');
+  assert.equal(fitRows([{ garment: 'tshirt', size: 'M', regions: [], provisional: true }])[0].head, 'tshirt measuring your size');
   const room = (region, fit, ease, ease_needed) => ({ ...loose, region, fit, ease, ease_needed });
   const hem = { hem_above: -0.0712, hem_mark: 'the crotch' };
   assert.equal(fitWords({ size: 'S', regions: [room('chest', 1, 0.02, 0.04), room('hip', 3, 0.21, 0.02)], ...hem }),

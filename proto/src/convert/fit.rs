@@ -41,6 +41,7 @@ pub fn fit_to_wire(
         .map(|v| (v.tightness() * TIGHTEST).round() as i8 as u8)
         .collect();
     GarmentFit {
+        provisional: false,
         garment: garment.to_owned(),
         size: size.to_owned(),
         regions: regions.collect(),

@@ -199,6 +199,9 @@ pub struct GarmentFit {
     /// The mark: `the crotch`, `the knee` or `the floor`.
     #[prost(string, tag = "6")]
     pub hem_mark: ::prost::alloc::string::String,
+    /// The size was chosen for a body whose size still changed: it is not to be told as advice, and may change once more.
+    #[prost(bool, tag = "7")]
+    pub provisional: bool,
 }
 /// Reason of a degraded picture or state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
@@ -1459,6 +1462,10 @@ pub struct BodyState {
     pub iterations: u32,
     #[prost(message, repeated, tag = "15")]
     pub stages: ::prost::alloc::vec::Vec<StageTime>,
+    /// Number of the person within this session; it grows with each body that is measured from nothing, perhaps of another
+    /// person. 0 before the first.
+    #[prost(uint64, tag = "16")]
+    pub subject: u64,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct BodyPose {
@@ -1526,9 +1533,9 @@ pub enum TrackingStatus {
     Unspecified = 0,
     /// No person has been found; pose and shape are meaningless.
     Searching = 1,
-    /// A person is in view and the body is being fitted; the pose is provisional.
+    /// Pose and shape belong to `frame`, but the size still changes: no size of a garment can be chosen for good yet.
     Calibrating = 2,
-    /// Pose and shape belong to `frame`.
+    /// Pose and shape belong to `frame`, and the size has settled.
     Tracking = 3,
     /// Pose and shape are the last good ones, `age_frames` old; `reason` is set.
     Lost = 4,
@@ -2471,10 +2478,9 @@ pub struct CancelSimulationResponse {
 #[repr(i32)]
 pub enum ClothStatus {
     Unspecified = 0,
-    /// No calibrated body; `reason` is set.
+    /// No body; `reason` is set.
     Waiting = 1,
-    /// Garments are being sewn and draped, or put on again after a jump of the body; `detail` says
-    /// which. Messages have no garments until they are on.
+    /// Garments are being sewn and draped. Messages have no garments until they are on.
     Dressing = 2,
     /// Positions belong to `frame`.
     Live = 3,
@@ -2661,8 +2667,9 @@ pub mod cloth_service_client {
             self.inner.unary(req, path, codec).await
         }
         /// Puts garments on the body of a tracking session, inner layer first, in place of the worn ones; an empty list
-        /// undresses it. Answers at once: the body is dressed when it is calibrated, and the stream then shows a new
-        /// `outfit_revision`. A repeated call with the same garments changes nothing, so it is safe after a lost connection
+        /// undresses it. Answers at once: the body is dressed as soon as it is found, and the stream then shows a new
+        /// `outfit_revision`. A size left to the service is chosen again, once, when that of the body has settled; the worn
+        /// garments stay on until the others are. A repeated call with the same garments changes nothing, so it is safe after a lost connection
         /// or a restart. INVALID_ARGUMENT names an unknown garment or size. RESOURCE_EXHAUSTED at the configured number of
         /// sessions. A session that nobody streams is closed after the configured idle time.
         pub async fn dress(
@@ -2850,8 +2857,9 @@ pub mod cloth_service_server {
             tonic::Status,
         >;
         /// Puts garments on the body of a tracking session, inner layer first, in place of the worn ones; an empty list
-        /// undresses it. Answers at once: the body is dressed when it is calibrated, and the stream then shows a new
-        /// `outfit_revision`. A repeated call with the same garments changes nothing, so it is safe after a lost connection
+        /// undresses it. Answers at once: the body is dressed as soon as it is found, and the stream then shows a new
+        /// `outfit_revision`. A size left to the service is chosen again, once, when that of the body has settled; the worn
+        /// garments stay on until the others are. A repeated call with the same garments changes nothing, so it is safe after a lost connection
         /// or a restart. INVALID_ARGUMENT names an unknown garment or size. RESOURCE_EXHAUSTED at the configured number of
         /// sessions. A session that nobody streams is closed after the configured idle time.
         async fn dress(

@@ -4,11 +4,13 @@ use crate::library::{Library, rgb};
 use std::sync::Arc;
 use std::time::Instant;
 use tryon::body::measure::{Measurements, measure};
-use tryon::body::{BodyShape, Pose, Template};
+use tryon::body::{BodyShape, Pose, RestBody, Template};
 use tryon::cloth::StepReport;
 use tryon::dressing::{self, FitProbe, Suggestion};
 use tryon::math::{Camera, Rigid, World};
-use tryon::mirror::{DressedOutfit, FrameClock, LongGap, PosedBody, PutOn, Subject};
+use tryon::mirror::{
+    Choice, DressedOutfit, FrameClock, LongGap, PosedBody, PutOn, SizedGarment, Subject,
+};
 use tryon_kit::frames::stage;
 use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::body::pose_from_wire;
@@ -17,7 +19,7 @@ use tryon_proto::convert::frame::stages_from_wire;
 use tryon_proto::convert::garment::{Positions, WornGarment, WornImage};
 use tryon_proto::convert::geometry::rigid_from_wire;
 use tryon_proto::convert::required;
-use tryon_proto::v1::{self, BodyState, ClothDetail, GarmentChoice};
+use tryon_proto::v1::{self, BodyState, ClothDetail, GarmentChoice, TrackingStatus};
 
 /// Interval between fit measurements [s of the stream].
 const FIT_INTERVAL: f64 = 1.0;
@@ -64,11 +66,28 @@ impl Body {
     fn time_ns(&self) -> u64 {
         self.state.frame.map_or(0, |f| f.capture_time_ns)
     }
+    /// Its size has settled.
+    fn is_sized(&self) -> bool {
+        self.state.status() == TrackingStatus::Tracking
+    }
+    fn subject<'a>(&'a self, rest: &'a RestBody) -> Subject<'a> {
+        Subject {
+            template: &self.template,
+            rest,
+            pose: &self.pose,
+            world_from_camera: self.world_from_camera,
+        }
+    }
 }
 
 /// An outfit on a tracked body.
 pub(crate) struct Worn {
     outfit: DressedOutfit,
+    choices: Vec<Choice>,
+    /// Their sizes are those of a body whose size still changed.
+    is_provisional: bool,
+    /// The size of the body has settled and asks for other sizes.
+    is_misfit: bool,
     template: Arc<Template>,
     body: PosedBody,
     clock: FrameClock,
@@ -134,20 +153,14 @@ pub(crate) fn dress(
     let start = Instant::now();
     let rest = body.template.personalise(&body.shape);
     let measures = measure(&body.template, &rest).map_err(|e| e.to_string())?;
-    let sized = choices.iter().map(|c| library.choice(c).sized(&measures));
-    let sized = sized.collect::<Result<Vec<_>, _>>();
-    let subject = Subject {
-        template: &body.template,
-        rest: &rest,
-        pose: &body.pose,
-        world_from_camera: body.world_from_camera,
-    };
-    let sized = sized.map_err(|e| e.to_string())?;
+    let chosen: Vec<Choice> = choices.iter().map(|c| library.choice(c)).collect();
     let how = PutOn {
         any_size: true,
         is_coarse,
     };
-    let outfit = DressedOutfit::put_on(&subject, sized, how).map_err(|e| e.to_string())?;
+    let sized = sized(&chosen, &measures)?;
+    let outfit = DressedOutfit::put_on(&body.subject(&rest), sized, how);
+    let outfit = outfit.map_err(|e| e.to_string())?;
     let garments = (0..outfit.model.outfit.garments.len())
         .map(|k| worn_garment(&outfit, k, choices))
         .collect::<Result<Vec<_>, _>>()?;
@@ -162,10 +175,19 @@ pub(crate) fn dress(
         measured: Vec::new(),
         is_coarse,
         outfit,
+        choices: chosen,
+        is_provisional: !body.is_sized(),
+        is_misfit: false,
         template: body.template.clone(),
         body: PosedBody::new(body.shape.clone(), rest),
         clock: FrameClock::at(body.time_ns()),
     })
+}
+
+/// Garments in the sizes of a body.
+fn sized(choices: &[Choice], measures: &Measurements) -> Result<Vec<SizedGarment>, String> {
+    let sized = choices.iter().map(|c| c.sized(measures));
+    sized.collect::<Result<_, _>>().map_err(|e| e.to_string())
 }
 
 /// Garment `k` of the outfit as keyframes describe it.
@@ -207,6 +229,11 @@ impl Worn {
         let start = Instant::now();
         self.is_resized |= self.body.pose(&body.template, &body.shape, &body.pose);
         let posed = stage("cloth.body", start);
+        let subject = body.subject(self.body.rest());
+        self.outfit.carry_to(&subject).map_err(|e| e.to_string())?;
+        if self.is_provisional && body.is_sized() {
+            self.settle_sizes()?;
+        }
         let mut update = if is_simulated {
             self.step(body)?
         } else {
@@ -256,9 +283,17 @@ impl Worn {
         self.is_coarse
     }
 
-    /// False while the outfit is put on again after a jump of the body.
-    pub(crate) fn is_worn(&self) -> bool {
-        self.outfit.is_worn()
+    /// The size of the body has settled and asks for other sizes than the worn ones.
+    pub(crate) fn is_misfit(&self) -> bool {
+        self.is_misfit
+    }
+
+    /// Compares the sizes with those of the body, whose size has settled; the fit is measured anew.
+    fn settle_sizes(&mut self) -> Result<(), String> {
+        let measures = measure(&self.template, self.body.rest()).map_err(|e| e.to_string())?;
+        self.is_misfit = !self.outfit.is_in(&sized(&self.choices, &measures)?);
+        (self.is_provisional, self.fit_age) = (false, FIT_INTERVAL);
+        Ok(())
     }
 
     /// True once it must be dressed anew.
@@ -295,7 +330,10 @@ impl Worn {
             .measure(&outfit.model, &outfit.state, self.body.vertices())
             .map_err(|e| e.to_string())?;
         self.measured = (self.garments.iter().zip(&maps).zip(&self.ease))
-            .map(|((g, map), ease)| fit_to_wire(&g.garment, &g.size, map, ease.as_ref()))
+            .map(|((g, map), ease)| v1::GarmentFit {
+                provisional: self.is_provisional,
+                ..fit_to_wire(&g.garment, &g.size, map, ease.as_ref())
+            })
             .collect();
         metrics::histogram!("tryon_stage_ms", "stage" => "cloth.fit")
             .record(begun.elapsed().as_secs_f64() * 1e3);

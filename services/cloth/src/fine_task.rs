@@ -276,8 +276,10 @@ pub(crate) mod tests {
             world_from_camera: Rigid::identity(),
         };
         let sized = Choice::library(garment, None)?.sized(&measure(&template, &rest)?)?;
+        let mut outfit = DressedOutfit::put_on(&subject, vec![sized], how)?;
+        outfit.carry_to(&subject)?;
         Ok(Snapshot {
-            outfit: DressedOutfit::put_on(&subject, vec![sized], how)?,
+            outfit,
             template,
             garments: Arc::new([]),
             exposure: FrameId::default(),

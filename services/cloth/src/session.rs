@@ -98,6 +98,7 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
             setup,
             wanted,
             worn: None,
+            subject: 0,
             body: watch::Sender::new(()),
             recorders: Vec::new(),
             on: 0,
@@ -146,6 +147,8 @@ struct Task {
     wanted: watch::Receiver<WantedOutfit>,
     /// Worn outfit; `None` while the pool steps it.
     worn: Option<Worn>,
+    /// Tracking's number of the person who is followed.
+    subject: u64,
     /// Replaced when the body is forgotten: what is kept of it elsewhere goes then.
     body: watch::Sender<()>,
     /// Recordings of the body that go on.
@@ -284,21 +287,17 @@ impl Task {
             (f.frame, f.world_from_camera) = (frame, state.world_from_camera);
             Update::from(f)
         };
+        if std::mem::replace(&mut self.subject, state.subject) != state.subject {
+            // Measured from nothing, perhaps another person: the worn outfit is for the old one.
+            self.forget_body();
+        }
         match (state.status(), shape) {
-            (TrackingStatus::Tracking, Some(shape)) => {
+            (TrackingStatus::Calibrating | TrackingStatus::Tracking, Some(shape)) => {
                 let body = match Body::new(state.clone(), shape, template) {
                     Ok(b) => b,
                     Err(why) => return waiting(DegradedReason::StepFailed, why).into(),
                 };
                 self.follow_body(body).await
-            }
-            (TrackingStatus::Calibrating, _) => {
-                // A new measurement, perhaps of another subject: the worn outfit is for the old one.
-                self.forget_body();
-                for_frame(waiting(
-                    DegradedReason::Unspecified,
-                    "the body is being measured".into(),
-                ))
             }
             (TrackingStatus::Lost | TrackingStatus::Sitting, _) => {
                 let mut f = waiting(state.reason(), state.detail.clone());
@@ -436,11 +435,7 @@ impl Task {
                     Ok(p) => {
                         record_stages("cloth", p.frame.frame.as_ref(), &p.frame.stages);
                         metrics::counter!("tryon_cloth_steps").increment(1);
-                        if worn.is_worn() {
-                            live(p, self.on)
-                        } else {
-                            dressing(&body, "garments are being put on again").into()
-                        }
+                        live(p, self.on)
                     }
                     Err(why) => waiting(DegradedReason::StepFailed, why).into(),
                 };
@@ -482,13 +477,14 @@ impl Task {
         }
     }
 
-    /// The wanted outfit is not on and not on its way, or is of other cloth than the detail asks for.
+    /// The wanted outfit is not on and not on its way, or is of other cloth than the detail asks for, or in other sizes than
+    /// the body.
     fn needs_dressing(&self, revision: u64, detail: ClothDetail) -> bool {
         if self.on != revision {
             return self.failed != revision && self.dressing != Some(revision);
         }
         let is_coarse = detail != ClothDetail::Full;
-        let is_other = |w: &Worn| w.is_coarse() != is_coarse;
+        let is_other = |w: &Worn| w.is_coarse() != is_coarse || w.is_misfit();
         self.dressing.is_none()
             && detail != ClothDetail::Skinned
             && self.refused != Some((revision, is_coarse))

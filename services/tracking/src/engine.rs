@@ -37,23 +37,33 @@ pub(crate) struct Engine {
     calibration: Arc<Calibration>,
     shape: BodyShape,
     wire_shape: v1::BodyShape,
+    counts: SessionCounts,
+}
+
+/// Counts of a session that go on from engine to engine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct SessionCounts {
+    /// Changes of the shape.
     shape_version: u64,
+    /// Bodies that were measured from nothing.
+    subject: u64,
 }
 
 impl Engine {
-    /// A tracker that searches. `shape_version` continues that of an earlier engine of the session.
+    /// A tracker that searches. `counts` are those of an earlier engine of the session.
     pub(crate) fn new(
         template: Arc<Template>,
         calibration: Arc<Calibration>,
         epoch: u64,
-        shape_version: u64,
+        counts: SessionCounts,
     ) -> Self {
         let model = TrackerModel::new(
             template,
             calibration.as_ref().clone(),
             TrackerConfig::default(),
         );
-        let state = TrackerState::new(&model);
+        let mut state = TrackerState::new(&model);
+        state.subject = counts.subject;
         let (shape, wire_shape) = (BodyShape::default(), v1::BodyShape::default());
         let work = Workspace::default();
         Self {
@@ -64,7 +74,7 @@ impl Engine {
             calibration,
             shape,
             wire_shape,
-            shape_version,
+            counts,
         }
     }
 
@@ -74,8 +84,11 @@ impl Engine {
             && (Arc::ptr_eq(&self.calibration, &e.calibration) || self.calibration == e.calibration)
     }
 
-    pub(crate) fn shape_version(&self) -> u64 {
-        self.shape_version
+    pub(crate) fn counts(&self) -> SessionCounts {
+        SessionCounts {
+            subject: self.state.subject,
+            ..self.counts
+        }
     }
 
     /// Forgets body and pose.
@@ -100,6 +113,7 @@ impl Engine {
         let mut state = v1::BodyState {
             frame: Some(e.id),
             age_frames: self.state.pose_age,
+            subject: self.state.subject,
             ..Default::default()
         };
         match report {
@@ -129,14 +143,14 @@ impl Engine {
             }
         }
         if state.status() != TrackingStatus::Searching {
-            if self.shape_version == 0 || self.shape != self.state.shape {
+            if self.counts.shape_version == 0 || self.shape != self.state.shape {
                 self.shape = self.state.shape.clone();
                 self.wire_shape = body::shape_to_wire(&self.shape);
-                self.shape_version += 1;
+                self.counts.shape_version += 1;
             }
             state.pose = Some(body::pose_to_wire(&self.state.pose));
             state.shape = Some(self.wire_shape.clone());
-            state.shape_version = self.shape_version;
+            state.shape_version = self.counts.shape_version;
         }
         state.world_from_camera = Some(geometry::rigid_to_wire(&self.state.world_from_camera));
         stages.push(stage("tracking.total", start));

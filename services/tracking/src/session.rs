@@ -1,6 +1,6 @@
 //! Task of one session: its tracker, its clock.
 
-use crate::engine::Engine;
+use crate::engine::{Engine, SessionCounts};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::{mpsc, watch};
@@ -79,7 +79,7 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
             setup,
             states: sender,
             engine: None,
-            shape_version: 0,
+            counts: SessionCounts::default(),
         }
         .run(inbox);
         let task = async move {
@@ -105,7 +105,7 @@ struct Task {
     states: watch::Sender<Arc<v1::BodyState>>,
     /// `None` while the pool steps it.
     engine: Option<Engine>,
-    shape_version: u64,
+    counts: SessionCounts,
 }
 
 impl Task {
@@ -170,14 +170,14 @@ impl Task {
 
     async fn step(&mut self, exposure: Arc<Exposure>, skipped: u64) {
         let engine = self.engine.take().filter(|e| e.is_for(&exposure));
-        let (template, version) = (self.setup.template.clone(), self.shape_version);
+        let (template, counts) = (self.setup.template.clone(), self.counts);
         let work = move || {
             let fresh = || {
                 Engine::new(
                     template,
                     exposure.calibration.clone(),
                     exposure.id.epoch,
-                    version,
+                    counts,
                 )
             };
             let mut engine = engine.unwrap_or_else(fresh);
@@ -186,7 +186,7 @@ impl Task {
         };
         match self.setup.ctx.pool.run(work).await {
             Ok((engine, mut state)) => {
-                self.shape_version = engine.shape_version();
+                self.counts = engine.counts();
                 state.session_id = self.setup.id.clone();
                 state.frames_dropped = skipped;
                 record_stages("tracking", state.frame.as_ref(), &state.stages);

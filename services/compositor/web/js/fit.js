@@ -2,11 +2,14 @@
 
 import { FIT } from './messages.js';
 
+/** In place of the size while that of the body has not settled. */
+const MEASURING = 'measuring your size';
+
 /** Rows of the fit table: garment and size, then region, class, stretch in %, pressure in kPa, distance from the skin in
  * cm, and how much longer than the body the garment is around it, in cm. */
 export function fitRows(fit) {
-  return fit.flatMap(({ garment, size, regions }) => [
-    { head: `${garment.replaceAll('_', ' ')} ${size}` },
+  return fit.flatMap(({ garment, size, regions, provisional = false }) => [
+    { head: `${garment.replaceAll('_', ' ')} ${provisional ? MEASURING : size}` },
     ...regions.map((r) => ({
       region: r.region,
       fit: FIT[r.fit] ?? '',
@@ -16,8 +19,9 @@ export function fitRows(fit) {
 }
 
 /** Where a garment is not as drawn and by how much, and where it ends, in one line:
- * `S: 2 cm too tight at the chest, ends 4 cm below the crotch`. */
-export function fitWords({ size, regions, hem_above: above = null, hem_mark: mark = '' }) {
+ * `S: 2 cm too tight at the chest, ends 4 cm below the crotch`. Nothing of it is told before the size is known. */
+export function fitWords({ size, regions, hem_above: above = null, hem_mark: mark = '', provisional = false }) {
+  if (provisional) return regions.length === 0 ? '' : `${MEASURING[0].toUpperCase()}${MEASURING.slice(1)} …`;
   const told = regions.flatMap((r) => {
     const fit = FIT[r.fit] ?? '';
     const known = Number.isFinite(r.ease ?? NaN) && Number.isFinite(r.ease_needed ?? NaN);

@@ -29,7 +29,8 @@ export const GarmentFit = schema('GarmentFit',
   [3, 'regions', 'message[]', RegionFit],
   [4, 'tightness', 'bytes'],
   [5, 'hem_above', 'float?'],
-  [6, 'hem_mark', 'string']);
+  [6, 'hem_mark', 'string'],
+  [7, 'provisional', 'bool']);
 
 export const GarmentChoice = schema('GarmentChoice',
   [1, 'garment', 'string'],
