@@ -1,4 +1,4 @@
-//! Vertices of forearms, hands, face and trunk on the body template.
+//! Body parts by vertex, and the vertices of forearms, hands, face and trunk, on the body template.
 
 use super::arm::ArmAxis;
 use crate::body::Template;
@@ -13,8 +13,8 @@ pub struct Limbs {
     pub(super) face: Vec<u32>,
     /// Trunk, hips and thighs.
     pub(super) trunk: Vec<u32>,
-    /// Upper arm, forearm or hand, shape `[vertices]`.
-    pub(super) is_arm: Vec<bool>,
+    /// Part of each vertex, shape `[vertices]`.
+    pub(super) parts: Vec<BodyPart>,
 }
 
 /// Vertices of one arm.
@@ -39,7 +39,9 @@ impl Limbs {
         let (parts, weights) = (template.parts(), template.weights());
         let vertices = template.mesh().vertices().len();
         let mut out = Self {
-            is_arm: vec![false; vertices],
+            parts: (0..vertices)
+                .map(|v| parts.part(weights.dominant(v)))
+                .collect(),
             ..Self::default()
         };
         let sides = [BodyPart::LeftArm, BodyPart::RightArm];
@@ -47,9 +49,6 @@ impl Limbs {
             let Some(joints) = parts.limb(side) else {
                 return Self::default();
             };
-            for (v, is_arm) in out.is_arm.iter_mut().enumerate() {
-                *is_arm |= parts.part(weights.dominant(v)) == side;
-            }
             *arm = Arm::of(template, side, &joints);
         }
         use BodySegment::{Abdomen, Chest, Head, Pelvis, Thigh};
@@ -60,12 +59,13 @@ impl Limbs {
 
     /// Belongs to an arm.
     pub(super) fn is_arm(&self, vertex: u32) -> bool {
-        self.is_arm.get(vertex as usize) == Some(&true)
+        let part = self.parts.get(vertex as usize);
+        matches!(part, Some(BodyPart::LeftArm | BodyPart::RightArm))
     }
 
     /// Made for a body of so many vertices.
     pub(super) fn fits(&self, vertices: usize) -> bool {
-        vertices > 0 && self.is_arm.len() == vertices
+        vertices > 0 && self.parts.len() == vertices
     }
 }
 

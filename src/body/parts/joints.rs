@@ -141,6 +141,17 @@ impl BodyPart {
         Self::RightLeg,
     ];
 
+    /// Name in reports and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Trunk => "trunk",
+            Self::LeftArm => "left arm",
+            Self::RightArm => "right arm",
+            Self::LeftLeg => "left leg",
+            Self::RightLeg => "right leg",
+        }
+    }
+
     /// The arm or leg of one side, or the trunk, that a segment belongs to.
     fn of(segment: BodySegment, side: Option<BodySide>) -> Self {
         match (segment, side) {

@@ -1,5 +1,6 @@
 //! A synthetic user with known truth: trunk, an arm across it, a wall, a shirt in front of the trunk.
 
+use crate::body::parts::BodyPart;
 use crate::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
 use crate::composite::evidence::depth_sigma;
 use crate::composite::limbs::{Arm, Limbs};
@@ -167,8 +168,11 @@ impl Scenery {
         let arm = add_resting_arm(&mut body);
         let forearm_faces = face_faces + 2 * (ARM_GRID[0] * ARM_GRID[1]) as usize;
         let limbs = Limbs {
-            is_arm: (0..body.vertices.len() as u32)
-                .map(|v| v >= face.end)
+            parts: (0..body.vertices.len() as u32)
+                .map(|v| match v >= face.end {
+                    true => BodyPart::LeftArm,
+                    false => BodyPart::Trunk,
+                })
                 .collect(),
             arms: [arm, Arm::default()],
             face: face.collect(),
