@@ -9,7 +9,9 @@ use super::evidence::{Evidence, PixelDepths};
 use super::hand::{ArmScene, CapturedView, LayerDepths, PosedLimbs};
 use super::input::{Input, RenderError};
 use super::matte::MatteInput;
+use super::off_person::{OffPerson, OffPersonInput};
 use super::report::{HandReport, RenderReport};
+use super::silhouette_grid::DressedArea;
 use super::state::State;
 use super::viewport::Viewport;
 use super::workspace::Workspace;
@@ -85,7 +87,7 @@ impl<'a> Composition<'a> {
     }
 
     /// Decides what hides the garments of `work.pixels`, and the contact shadows: fills `work.matte` and `work.shadows`.
-    /// Returns the captured depth of the area.
+    /// Then measures the garments off the person, if that is due. Returns the captured depth of the area.
     pub(crate) fn resolve_visibility(
         &mut self,
         model: &Model,
@@ -119,7 +121,37 @@ impl<'a> Composition<'a> {
         let covered = pixels.map(|p| [f32::from(p.covered) * full, p.depth]);
         (work.shadows).cast(covered, &work.matte.alpha, area, self.shadow_reach);
         self.lap("shadows");
+
+        if state.begin_off_person(config.off_person_interval, input.frame.time_ns) {
+            self.report.off_person = self.measure_off_person(input, work, area, &depth);
+            self.lap("off person");
+        }
         depth
+    }
+
+    /// Measures the garments off the person in the picture.
+    fn measure_off_person(
+        &self,
+        input: &Input<'_>,
+        work: &Workspace,
+        area: &Area,
+        depth: &AreaDepth,
+    ) -> Option<OffPerson> {
+        let body = input.body.as_ref().map(|body| PosedLimbs {
+            limbs: body.limbs,
+            vertices: work.body.vertices(input, body),
+        });
+        let dressed = DressedArea {
+            area,
+            pixels: &work.pixels,
+            alpha: &work.matte.alpha,
+            depth: &depth.metres,
+        };
+        OffPerson::measure(&OffPersonInput {
+            camera: &self.viewport.camera,
+            dressed,
+            body,
+        })
     }
 
     /// Marks bare hands and forearms in front of loose cloth, by their colour.

@@ -106,6 +106,9 @@ pub struct Config {
     /// Computes normals and openness of visible faces only. Same picture, bit for bit; no effect on the graphics
     /// card, where visibility is known only while it shades.
     pub skip_unseen: bool,
+    /// Seconds of the capture clock between two measurements of garments off the person
+    /// ([`RenderReport::off_person`](super::RenderReport::off_person)); 0 = every picture, infinity = never.
+    pub off_person_interval: f64,
 }
 
 impl Config {
@@ -127,6 +130,7 @@ impl Default for Config {
             inner_bias: 10e-3,
             skip_hidden: true,
             skip_unseen: true,
+            off_person_interval: 0.2,
         }
     }
 }

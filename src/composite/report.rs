@@ -1,4 +1,6 @@
-//! Cost of a picture and work left out.
+//! Cost of a picture, work left out, and its measured fault.
+
+use super::off_person::OffPerson;
 
 /// Outcome of the detection of bare hands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -13,7 +15,7 @@ pub struct HandReport {
     pub pixels: usize,
 }
 
-/// Cost of a picture and work left out.
+/// Cost of a picture, work left out, and its measured fault.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderReport {
     /// Pixels in which a garment is visible.
@@ -34,6 +36,8 @@ pub struct RenderReport {
     pub specks_dropped: usize,
     /// Bare hands and forearms found in front by colour.
     pub hands: HandReport,
+    /// Garments off the person; `None` in pictures between two measurements, and where too little is seen to measure.
+    pub off_person: Option<OffPerson>,
     /// Estimated brightness of the captured picture; 1 = a well exposed room.
     pub brightness: f32,
     /// Milliseconds by stage, in order.

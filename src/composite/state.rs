@@ -1,4 +1,4 @@
-//! Memory of the colours of one user's skin and clothes between pictures.
+//! Memory between pictures: colours of one user's skin and clothes, time of the last measurement.
 
 use super::skin::{MIN_TONES, SkinClassifier, tone};
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ const AGREE: [f32; 2] = [0.5, 0.4];
 /// Largest share of the trunk that is like skin (a neckline, an unexpected hand): to begin, to go on.
 const MIXED: [f32; 2] = [0.08, 0.14];
 
-/// Colours remembered between pictures, one a place of the body: the classifier is fitted to the last few pictures.
+/// Memory between pictures. Of colours one a place of the body: the classifier is fitted to the last few pictures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Tones by [`ColorRegion`] and slot; `None` = never seen.
@@ -17,6 +17,9 @@ pub struct State {
     pictures: u32,
     /// Colour decided in the last picture; keeps the decision under small changes.
     usable: bool,
+    /// Capture time of the last measurement of garments off the person, nanoseconds; `None` = never.
+    #[serde(default)]
+    off_person_ns: Option<u64>,
 }
 
 /// Region of the body a colour was taken from.
@@ -34,11 +37,30 @@ const SLOTS: [usize; 4] = [160, 64, 64, 320];
 const TURNS: usize = 4;
 
 impl State {
-    /// Forgets when no body is tracked: the next one may be another person.
+    /// Forgets the colours when no body is tracked: the next one may be another person.
     pub(crate) fn keep_if(&mut self, tracked: bool) {
         if !tracked && self.pictures > 0 {
-            *self = Self::default();
+            *self = Self {
+                off_person_ns: self.off_person_ns,
+                ..Self::default()
+            };
         }
+    }
+
+    /// Begins a measurement of garments off the person in the picture of `time_ns`, if one is due `interval` seconds after
+    /// the last one. A clock that runs backwards has begun anew.
+    pub(super) fn begin_off_person(&mut self, interval: f64, time_ns: u64) -> bool {
+        let elapsed = self
+            .off_person_ns
+            .and_then(|last| time_ns.checked_sub(last));
+        let is_due = match elapsed {
+            Some(ns) => ns as f64 * 1e-9 >= interval,
+            None => interval < f64::INFINITY,
+        };
+        if is_due {
+            self.off_person_ns = Some(time_ns);
+        }
+        is_due
     }
 
     /// Slot and vertex of the `vertices` to sample in this picture.
@@ -89,5 +111,35 @@ impl State {
         });
         self.usable = usable;
         skin.filter(|_| usable)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn measurements_are_an_interval_apart_whoever_is_tracked() {
+        const MS: u64 = 1_000_000;
+        let mut state = State {
+            pictures: 1,
+            ..State::default()
+        };
+        let mut due = |ms: u64| {
+            state.keep_if(false);
+            state.begin_off_person(0.2, ms * MS)
+        };
+        let times = [5000, 5100, 5200, 5390, 5401, 30, 60, 240];
+        let expected = [true, false, true, false, true, true, false, true];
+        assert_eq!(times.map(&mut due), expected);
+        assert_eq!(state.pictures, 0);
+    }
+
+    #[test]
+    fn an_interval_of_zero_is_every_picture_and_an_endless_one_none() {
+        let mut state = State::default();
+        assert!(!state.begin_off_person(f64::INFINITY, 0));
+        assert!((0..3).all(|_| state.begin_off_person(0.0, 7)));
+        assert!(!state.begin_off_person(f64::INFINITY, 1 << 40));
     }
 }

@@ -75,10 +75,9 @@ fn without_colour_body_or_finite_vertices_no_arm_is_tested() {
     draw_with(&s, &mut state, Some(&s.limbs));
     assert_ne!(state, State::default());
     let (_, report) = draw_with(&s, &mut state, None);
-    assert_eq!(
-        (report.hands, state),
-        (HandReport::default(), State::default())
-    );
+    let mut fresh = State::default();
+    draw_with(&s, &mut fresh, None);
+    assert_eq!((report.hands, state), (HandReport::default(), fresh));
     let first = s.limbs.arms[0].hand[0] as usize;
     s.body.vertices[first].x = f32::NAN;
     let (_, report) = draw_with(&s, &mut State::default(), Some(&s.limbs));

@@ -2,4 +2,5 @@
 
 pub(crate) mod fixture;
 mod hands;
+mod off_person;
 mod pictures;
