@@ -103,6 +103,12 @@ impl Mirror {
         })
     }
 
+    /// Sets the time between two measurements of garments off the person, seconds; 0 measures in every picture. See
+    /// [`composite::Config::off_person_interval`](crate::composite::Config::off_person_interval).
+    pub fn set_off_person_interval(&mut self, seconds: f64) {
+        self.painter.set_off_person_interval(seconds);
+    }
+
     /// Surface of the tracked body, live or not: camera frame, metres.
     pub fn posed_body(&mut self) -> &[P3] {
         self.tracking_work.posed(&self.tracker, &self.tracked).0

@@ -51,6 +51,11 @@ impl OutfitPainter {
         }
     }
 
+    /// Sets [`composite::Config::off_person_interval`], seconds.
+    pub fn set_off_person_interval(&mut self, seconds: f64) {
+        self.compositor.config.off_person_interval = seconds;
+    }
+
     /// Picture of an outfit, or of a body without one (camera frame, metres); the captured one without both.
     pub(super) fn paint(
         &mut self,

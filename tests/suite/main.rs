@@ -15,6 +15,7 @@ mod garment_stream;
 mod garments;
 mod offline_outfit;
 mod offline_steps;
+mod on_person;
 mod seat;
 mod sleep;
 mod starts;

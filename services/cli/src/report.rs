@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fmt::{Display, Formatter};
 use std::path::Path;
+use tryon::composite::OffPerson;
 
 /// Distribution of a measured quantity.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -35,6 +37,53 @@ impl Summary {
             p50: rank(0.5),
             p99: rank(0.99),
             max,
+        }
+    }
+}
+
+/// Garment pixels off the recorded person, as shares of the garment pixels of each measured picture.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub(crate) struct OffPersonSummary {
+    /// Pictures measured.
+    measured: usize,
+    /// Mean share, percent.
+    mean_percent: f64,
+    /// Measured pictures with a share above [`OffPerson::LIMIT`], percent.
+    pub(crate) above_2_percent: f64,
+    /// Largest share, percent.
+    worst_percent: f64,
+    /// Its frame.
+    worst_frame: Option<usize>,
+}
+
+impl OffPersonSummary {
+    /// Summary of frames and their shares, 0 to 1.
+    pub(crate) fn of(shares: &[(usize, f32)]) -> Self {
+        let Some(worst) = shares.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else {
+            return Self::default();
+        };
+        let percent = |part: f64| 100.0 * part / shares.len() as f64;
+        let above = shares.iter().filter(|s| s.1 > OffPerson::LIMIT).count();
+        Self {
+            measured: shares.len(),
+            mean_percent: percent(shares.iter().map(|s| f64::from(s.1)).sum()),
+            above_2_percent: percent(above as f64),
+            worst_percent: 100.0 * f64::from(worst.1),
+            worst_frame: Some(worst.0),
+        }
+    }
+}
+
+impl Display for OffPersonSummary {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "more than 2 % of the garments hang off the person in {:.0} % of {} pictures, {:.0} % at worst",
+            self.above_2_percent, self.measured, self.worst_percent
+        )?;
+        match self.worst_frame {
+            Some(frame) => write!(f, " (frame {frame})"),
+            None => Ok(()),
         }
     }
 }
@@ -115,6 +164,17 @@ pub(crate) fn write(path: &Path, report: &impl Serialize) -> anyhow::Result<()> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pictures_off_the_person_are_counted_above_two_percent() {
+        let s = OffPersonSummary::of(&[(7, 0.0), (8, 0.25), (9, 0.015), (10, 0.035)]);
+        assert_eq!((s.measured, s.worst_frame), (4, Some(8)));
+        assert_eq!((s.above_2_percent, s.worst_percent), (50.0, 25.0));
+        assert!((s.mean_percent - 7.5).abs() < 1e-5, "{s:?}");
+        let words = s.to_string();
+        assert!(words.contains("50 % of 4 pictures") && words.ends_with("(frame 8)"));
+        assert_eq!(OffPersonSummary::of(&[]), OffPersonSummary::default());
+    }
 
     #[test]
     fn percentiles_are_nearest_ranks() {

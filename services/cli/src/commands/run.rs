@@ -3,7 +3,7 @@
 use crate::args::RunArgs;
 use crate::input;
 use crate::preview::repetition;
-use crate::report::{Samples, Summary, peak_memory, write};
+use crate::report::{OffPersonSummary, Samples, Summary, peak_memory, write};
 use anyhow::{Context, Result, ensure};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -32,6 +32,8 @@ struct Report {
     skipped: BTreeMap<String, Summary>,
     residual_mm: Summary,
     penetration_mm: Summary,
+    /// Garments off the recorded person.
+    off_person: OffPersonSummary,
     peak_memory_bytes: Option<u64>,
 }
 
@@ -42,17 +44,21 @@ struct Measured {
     skipped: Samples,
     residual_mm: Vec<f64>,
     penetration_mm: Vec<f64>,
+    /// Frame and share of each measured picture.
+    off_person: Vec<(usize, f32)>,
     dressed: usize,
     statuses: BTreeMap<&'static str, usize>,
 }
 
 impl Measured {
-    fn add(&mut self, seen: &MirrorFrame) {
+    fn add(&mut self, index: usize, seen: &MirrorFrame) {
         self.stages_ms.extend(seen.stages_ms.iter().copied());
         self.skipped.extend(skipped(seen));
         self.residual_mm.push(seen.tracking.residual_mm);
         let depth = seen.cloth.as_ref().map_or(0.0, |c| c.penetration_left);
         self.penetration_mm.push(depth * 1e3);
+        let off_person = seen.render.off_person.map(|off| (index, off.share));
+        self.off_person.extend(off_person);
         self.dressed += usize::from(seen.is_dressed);
         *self
             .statuses
@@ -68,6 +74,7 @@ impl Measured {
             skipped: self.skipped.summaries(),
             residual_mm: Summary::of(&self.residual_mm),
             penetration_mm: Summary::of(&self.penetration_mm),
+            off_person: OffPersonSummary::of(&self.off_person),
             peak_memory_bytes: peak_memory(),
             ..report
         }
@@ -137,7 +144,8 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
     let source = open_recording(&args.input)?;
     let template = input::template(args.body.as_deref())?;
     input::create_dir(&args.out)?;
-    let mirror = Mirror::new(template, source.calibration(), choices);
+    let mut mirror = Mirror::new(template, source.calibration(), choices);
+    mirror.set_off_person_interval(0.0);
     let report = with_threads(args.threads, || dress_all(args, source, mirror))??;
     write(&args.out.join("report.json"), &report)?;
     for note in &report.sizes {
@@ -149,6 +157,9 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
         report.dressed_frames,
         args.out.display()
     );
+    if report.off_person.above_2_percent > 0.0 {
+        println!("{}", report.off_person);
+    }
     if report.dressed_frames == 0 {
         eprintln!(
             "tryon: nobody was dressed in {}: {}",
@@ -198,7 +209,7 @@ fn dress_all(
             let seen = mirror
                 .step(&repetition(&frame, k))
                 .with_context(|| format!("frame {index}"))?;
-            measured.add(&seen);
+            measured.add(index, &seen);
             bar.inc(1);
             picture = Some(seen.picture);
         }
