@@ -5,6 +5,7 @@ import test from 'node:test';
 
 import { Backoff, FIRST_DELAY, LONGEST_DELAY } from '../../services/compositor/web/js/backoff.js';
 import { takeToken } from '../../services/compositor/web/js/credentials.js';
+import { offWords } from '../../services/compositor/web/js/details.js';
 import { failureWords, progressWords } from '../../services/compositor/web/js/fine_picture.js';
 import { fitRows, fitWords } from '../../services/compositor/web/js/fit.js';
 import { Code, RpcError } from '../../services/compositor/web/js/grpc_web.js';
@@ -50,6 +51,13 @@ test('every reason has words, and an unknown one too', () => {
   const titles = [...Object.values(Reason), 99].map((reason) => present(known({ state: State.DEGRADED, reason }), 10_000).title);
   assert.equal(new Set(titles).size, titles.length);
   assert.ok(titles.every((t) => t.startsWith('Degraded: ')));
+});
+
+test('garments beside the body are told with the part that most of them are at', () => {
+  const parts = [{ part: 'trunk', share: 0.01 }, { part: 'left arm', share: 0.05 }];
+  assert.equal(offWords({ share: 0.06, parts }), ', 6.0 % of the garments beside the body (left arm)');
+  assert.equal(offWords({ share: 0.06, parts: [] }), ', 6.0 % of the garments beside the body');
+  assert.deepEqual([offWords(null), offWords({ share: 0, parts: [] })], ['', '']);
 });
 
 test('a broken line says when it tries again', () => {

@@ -11,6 +11,7 @@ pub mod fit;
 pub mod frame;
 pub mod garment;
 pub mod geometry;
+pub mod off_person;
 pub mod request;
 pub mod simulation;
 

@@ -226,6 +226,8 @@ pub enum DegradedReason {
     StepFailed = 8,
     /// The person in view sits: garments are draped on people who stand.
     PersonSits = 9,
+    /// A part of the garments hangs beside the person: of LIVE pictures, no state of a session.
+    GarmentOffPerson = 10,
 }
 impl DegradedReason {
     /// String value of the enum field names used in the ProtoBuf definition.
@@ -244,6 +246,7 @@ impl DegradedReason {
             Self::GarmentsLate => "DEGRADED_REASON_GARMENTS_LATE",
             Self::StepFailed => "DEGRADED_REASON_STEP_FAILED",
             Self::PersonSits => "DEGRADED_REASON_PERSON_SITS",
+            Self::GarmentOffPerson => "DEGRADED_REASON_GARMENT_OFF_PERSON",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
@@ -259,6 +262,7 @@ impl DegradedReason {
             "DEGRADED_REASON_GARMENTS_LATE" => Some(Self::GarmentsLate),
             "DEGRADED_REASON_STEP_FAILED" => Some(Self::StepFailed),
             "DEGRADED_REASON_PERSON_SITS" => Some(Self::PersonSits),
+            "DEGRADED_REASON_GARMENT_OFF_PERSON" => Some(Self::GarmentOffPerson),
             _ => None,
         }
     }
@@ -3510,7 +3514,8 @@ pub struct Picture {
     pub frame: ::core::option::Option<FrameId>,
     #[prost(enumeration = "TryOnState", tag = "2")]
     pub state: i32,
-    /// Set when the state is DEGRADED; the picture then is the plain camera picture of `frame`.
+    /// Set when the state is DEGRADED; the picture then is the plain camera picture of `frame`. In LIVE it is
+    /// GARMENT_OFF_PERSON while a part of the garments hangs off the person (`off_person`): 2 % of them at one part of the body.
     #[prost(enumeration = "DegradedReason", tag = "3")]
     pub reason: i32,
     /// Seconds since the last LIVE picture of this try-on; 0 while live or before the first.
@@ -3543,6 +3548,28 @@ pub struct Picture {
     /// Detail of the garments drawn; UNSPECIFIED without any.
     #[prost(enumeration = "ClothDetail", tag = "14")]
     pub cloth_detail: i32,
+    /// Garments off the person as last measured in this outfit, a few times a second; absent until then, and without garments.
+    #[prost(message, optional, tag = "15")]
+    pub off_person: ::core::option::Option<GarmentOffPerson>,
+}
+/// Garment pixels farther than 4 cm from the recorded person: sleeves beside the arm. Free cloth of skirts and coats counts.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct GarmentOffPerson {
+    /// Share of the garment pixels of the picture, 0 to 1.
+    #[prost(float, tag = "1")]
+    pub share: f32,
+    /// Parts of the body that they are nearest to, those with any.
+    #[prost(message, repeated, tag = "2")]
+    pub parts: ::prost::alloc::vec::Vec<PartOffPerson>,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct PartOffPerson {
+    /// `trunk`, `left arm`, `right arm`, `left leg` or `right leg`.
+    #[prost(string, tag = "1")]
+    pub part: ::prost::alloc::string::String,
+    /// Share of the garment pixels of the picture, 0 to 1.
+    #[prost(float, tag = "2")]
+    pub share: f32,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct AcknowledgeFramesRequest {

@@ -3,12 +3,14 @@
 use crate::card::Card;
 use crate::formats::Format;
 use crate::join_buffer::ReportedBody;
+use crate::off_person::NewestOffPerson;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tryon::camera::ColorImage;
 use tryon::composite::{
-    Appearance, Config, Framing, ImagePyramid, Input, Model, Print, RenderReport, State, Workspace,
+    Appearance, Config, Framing, ImagePyramid, Input, Model, OffPerson, Print, RenderReport, State,
+    Workspace,
 };
 use tryon::dressing::FIT_COLORS;
 use tryon::formats::image::{encode_jpeg, encode_png_rgb};
@@ -92,6 +94,8 @@ pub(crate) struct Encoded {
     pub(crate) cost: Duration,
     /// Stages up to it.
     pub(crate) stages: Vec<StageTime>,
+    /// Garments off the person as last measured in this outfit; `None` until then, and without garments.
+    pub(crate) off_person: Option<OffPerson>,
 }
 
 impl Job {
@@ -114,6 +118,7 @@ pub(crate) struct Engine {
     clock: FrameClock,
     garments: CameraGarments,
     pyramids: Pyramids,
+    off_person: NewestOffPerson,
 }
 
 impl Engine {
@@ -169,7 +174,9 @@ impl Engine {
                 .draw(&self.model, &mut self.state, &input, &mut self.work)
                 .map_err(|e| e.to_string())?;
             record(&report);
+            let revision = job.placed.as_ref().map(|p| p.revision);
             let rendered = Rendered {
+                off_person: revision.and_then(|r| self.off_person.update(r, report.off_person)),
                 image,
                 cost: begun.elapsed(),
                 stage: stage("compositor.render", begun),
@@ -268,6 +275,7 @@ fn distinct<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
 /// Picture of one size.
 struct Rendered {
     image: ColorImage,
+    off_person: Option<OffPerson>,
     cost: Duration,
     stage: StageTime,
 }
@@ -290,6 +298,7 @@ impl Rendered {
             bytes: bytes.map_err(|e| e.to_string())?.into(),
             cost: self.cost + begun.elapsed(),
             stages,
+            off_person: self.off_person,
         })
     }
 }

@@ -3,6 +3,7 @@
 use crate::card::Card;
 use crate::engine::{Encoding, Engine, Job, Placed};
 use crate::join_buffer::JoinBuffer;
+use crate::off_person;
 use crate::try_on::{Command, Handle};
 use crate::upstream;
 use std::sync::Arc;
@@ -209,7 +210,7 @@ impl FinePicture {
         let fault = |why: String| unavailable("compositor", &why);
         let drawn = drawn.map_err(|e| fault(e.to_string()))?.map_err(fault)?;
         let (id, p) = drawn.ok_or_else(|| unavailable("compositor", "no picture"))?;
-        Ok(Picture {
+        let mut picture = Picture {
             frame: Some(id),
             state: TryOnState::Live.into(),
             codec: PictureCodec::from(p.encoding).into(),
@@ -220,7 +221,9 @@ impl FinePicture {
             stages: p.stages,
             cloth_detail: ClothDetail::Full.into(),
             ..Picture::default()
-        })
+        };
+        off_person::describe(&mut picture, p.off_person.as_ref());
+        Ok(picture)
     }
 }
 

@@ -13,6 +13,7 @@ mod fine_picture;
 mod formats;
 mod join_buffer;
 mod life;
+mod off_person;
 pub mod page;
 #[cfg(test)]
 mod painted;

@@ -28,9 +28,10 @@ pub(crate) fn reason(s: State) -> DegradedReason {
     })
 }
 
+/// Fault of a session; `None` for reasons of single pictures.
 pub(crate) fn from_wire(r: DegradedReason) -> Option<Fault> {
     Some(match r {
-        DegradedReason::Unspecified => return None,
+        DegradedReason::Unspecified | DegradedReason::GarmentOffPerson => return None,
         DegradedReason::CameraSilent => Fault::CameraSilent,
         DegradedReason::TrackingUnavailable => Fault::TrackingUnavailable,
         DegradedReason::NoPerson => Fault::NoPerson,
@@ -63,5 +64,6 @@ mod tests {
             assert_eq!(from_wire(reason(State::Degraded(r))), Some(r));
         }
         assert_eq!(from_wire(DegradedReason::Unspecified), None);
+        assert_eq!(from_wire(DegradedReason::GarmentOffPerson), None);
     }
 }

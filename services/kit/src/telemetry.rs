@@ -2,7 +2,7 @@
 
 use crate::config::{LogConfig, LogFormat};
 use crate::frame_trace;
-use metrics_exporter_prometheus::{PrometheusBuilder, PrometheusHandle};
+use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use std::sync::OnceLock;
 use tracing_subscriber::EnvFilter;
 use tryon_proto::v1::{FrameId, StageTime};
@@ -29,12 +29,18 @@ const MS_BUCKETS: [f64; 14] = [
     0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 33.0, 66.0, 100.0, 150.0, 250.0, 500.0, 1000.0,
 ];
 
+/// Upper bounds of the histogram of garments off the person, shares: fine about the 2 % above which a part hangs off.
+const SHARE_BUCKETS: [f64; 10] = [0.0, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.4, 1.0];
+
 /// The process's metrics; the first call installs the recorder.
 pub fn metrics() -> Option<&'static PrometheusHandle> {
     static HANDLE: OnceLock<Option<PrometheusHandle>> = OnceLock::new();
     let install = || {
+        let shares = Matcher::Full("tryon_garment_off_person".into());
         PrometheusBuilder::new()
             .set_buckets(&MS_BUCKETS)
+            .ok()?
+            .set_buckets_for_metric(shares, &SHARE_BUCKETS)
             .ok()?
             .install_recorder()
             .ok()

@@ -8,6 +8,7 @@ use crate::engine::{Encoded, Encoding, Job, Placed};
 use crate::formats::{Format, Formats, Wanted};
 use crate::join_buffer::{JoinBuffer, ReportedBody, not_after};
 use crate::life;
+use crate::off_person;
 use crate::upstream;
 use crate::viewer::Viewer;
 use std::collections::{BTreeMap, BTreeSet};
@@ -502,6 +503,7 @@ impl Task {
         if let Some(placed) = &job.placed {
             picture.outfit_revision = placed.revision;
             picture.set_cloth_detail(placed.detail);
+            off_person::describe(&mut picture, p.off_person.as_ref());
             if placed.revision == self.fit.revision {
                 picture.fit.clone_from(&self.fit.garments);
             }

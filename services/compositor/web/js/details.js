@@ -8,6 +8,13 @@ const whole = (x) => (Number.isFinite(x) ? String(Math.round(x)) : '–');
 /** `CLOTH_DETAIL_*` in words; full detail goes without. */
 const DETAIL = ['', '', ', coarser cloth', ', cloth not simulated', ', no garments'];
 
+/** Share of the garments beside the body and where most of it is, from a tenth of a percent on. */
+export function offWords(off) {
+  if (!off || off.share < 0.001) return '';
+  const most = off.parts.reduce((a, b) => (b.share > a.share ? b : a), { part: '', share: 0 });
+  return `, ${(off.share * 100).toFixed(1)} % of the garments beside the body${most.part && ` (${most.part})`}`;
+}
+
 /** "tracking.solve" → service "tracking", and words for people. */
 function stageName(stage) {
   const dot = stage.indexOf('.');
@@ -44,7 +51,8 @@ export class Details {
     this.#fits(picture?.fit ?? []);
     const size = picture ? `${picture.width} × ${picture.height}` : '';
     const cloth = DETAIL[picture?.cloth_detail] ?? '';
-    setText(byId('d-frame'), picture ? `Exposure ${picture.frame?.sequence ?? '?'}, ${size}, outfit ${picture.outfit_revision}${cloth}` : '');
+    const off = offWords(picture?.off_person);
+    setText(byId('d-frame'), picture ? `Exposure ${picture.frame?.sequence ?? '?'}, ${size}, outfit ${picture.outfit_revision}${cloth}${off}` : '');
   }
 
   #bars(stages) {

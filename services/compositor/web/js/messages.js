@@ -94,6 +94,14 @@ export const StreamFramesRequest = schema('StreamFramesRequest',
   [6, 'max_rate', 'float'],
   [7, 'max_unacknowledged', 'uint32']);
 
+export const PartOffPerson = schema('PartOffPerson',
+  [1, 'part', 'string'],
+  [2, 'share', 'float']);
+
+export const GarmentOffPerson = schema('GarmentOffPerson',
+  [1, 'share', 'float'],
+  [2, 'parts', 'message[]', PartOffPerson]);
+
 export const Picture = schema('Picture',
   [1, 'frame', 'message', FrameId],
   [2, 'state', 'enum'],
@@ -108,7 +116,8 @@ export const Picture = schema('Picture',
   [11, 'stages', 'message[]', StageTime],
   [12, 'dropped', 'uint64'],
   [13, 'fit', 'message[]', GarmentFit],
-  [14, 'cloth_detail', 'enum']);
+  [14, 'cloth_detail', 'enum'],
+  [15, 'off_person', 'message', GarmentOffPerson]);
 
 export const AcknowledgeFramesRequest = schema('AcknowledgeFramesRequest',
   [1, 'try_on_id', 'string'],
@@ -185,6 +194,7 @@ export const Reason = Object.freeze({
   GARMENTS_LATE: 7,
   STEP_FAILED: 8,
   PERSON_SITS: 9,
+  GARMENT_OFF_PERSON: 10,
 });
 
 /** `CLOTH_DETAIL_*` */

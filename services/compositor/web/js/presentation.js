@@ -18,6 +18,7 @@ const REASONS = {
   [Reason.TRACKING_UNAVAILABLE]: ['body tracking is restarting', 'You see yourself without garments until it is back.'],
   [Reason.CLOTH_UNAVAILABLE]: ['the fitting room is restarting', 'You see yourself without garments until it is back.'],
   [Reason.GARMENTS_LATE]: ['the garments are late', 'They will catch up in a moment.'],
+  [Reason.GARMENT_OFF_PERSON]: ['a garment hangs beside you', 'Move a little slower until it is back.'],
   [Reason.STEP_FAILED]: ['one moment went wrong', 'The mirror carries on with the next one.'],
 };
 

@@ -105,7 +105,7 @@ async fn every_part_is_healthy(kiosk: &Kiosk) {
     assert!(page.contains("<html"), "the page");
 }
 
-/// Size, revision, codec and stages of the first live picture.
+/// Size, revision, codec, stages and garments off the person of the first live picture.
 fn is_whole(p: &Picture) {
     assert_eq!((p.width, p.height, p.outfit_revision), (320, 240, 1));
     assert_eq!(&p.image[..2], &[0xff, 0xd8], "a JPEG");
@@ -119,6 +119,9 @@ fn is_whole(p: &Picture) {
         let has = p.stages.iter().any(|s| s.stage == stage);
         assert!(has, "{stage} is missing in {:?}", p.stages);
     }
+    let off = p.off_person.as_ref().expect("garments are measured");
+    println!("{:.1} % of the shirt are off the person", off.share * 1e2);
+    assert!((0.0..0.1).contains(&off.share), "{off:?}");
 }
 
 /// Reads 99 pictures more, in order and none twice; the last fit.
