@@ -30,6 +30,9 @@ pub struct Agreement {
     pub uncovered: f32,
     /// Share of the visible surface of each [`BodyPart`](crate::body::parts::BodyPart) in free space, 0 to 1; 0 for a part out of view.
     pub parts: [f32; PARTS],
+    /// Parts whose surface mostly gives no return.
+    #[serde(skip)]
+    pub(super) without_return: [bool; PARTS],
 }
 
 impl Agreement {
@@ -113,6 +116,7 @@ impl AgreementScratch {
             in_free_space: free as f32 / area,
             uncovered: uncovered as f32 / area,
             parts: parts.map(|p| p.free as f32 / p.all.max(1) as f32),
+            without_return: parts.map(|p| !p.has_return()),
         }
     }
 

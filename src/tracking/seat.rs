@@ -14,7 +14,7 @@ const HEEL: f64 = 0.05;
 const BEHIND: f64 = 0.10;
 /// Cosine to the vertical below which a thigh is raised: more than 45° forward.
 const RAISED: f64 = 0.7;
-/// Frames in a row after which a posture counts.
+/// Frames in a row after which another posture counts; the first one counts at once.
 const STEADY: u32 = 5;
 
 /// Posture of the subject over time.
@@ -24,6 +24,9 @@ pub(super) struct Seat {
     pub(super) is_taken: bool,
     /// Frames in a row that say otherwise.
     against: u32,
+    /// A frame has shown the posture.
+    #[serde(default)]
+    is_known: bool,
 }
 
 impl Seat {
@@ -31,12 +34,10 @@ impl Seat {
     pub(super) fn update(&mut self, sits: Option<bool>) {
         let is_against = sits.is_some_and(|sits| sits != self.is_taken);
         self.against = if is_against { self.against + 1 } else { 0 };
-        if self.against >= STEADY {
-            *self = Self {
-                is_taken: !self.is_taken,
-                against: 0,
-            };
+        if self.against >= STEADY || is_against && !self.is_known {
+            (self.is_taken, self.against) = (!self.is_taken, 0);
         }
+        self.is_known |= sits.is_some();
     }
 }
 
@@ -120,8 +121,15 @@ mod tests {
     }
 
     #[test]
-    fn a_posture_counts_after_some_frames_in_a_row() {
+    fn the_first_posture_counts_at_once_and_another_after_some_frames_in_a_row() {
+        let mut seated = Seat::default();
+        seated.update(None);
+        assert!(!seated.is_taken);
+        seated.update(Some(true));
+        assert!(seated.is_taken);
+
         let mut seat = Seat::default();
+        seat.update(Some(false));
         let feed = |seat: &mut Seat, n: u32, sits: Option<bool>| {
             (0..n).for_each(|_| seat.update(sits));
             seat.is_taken
