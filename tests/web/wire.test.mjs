@@ -40,7 +40,7 @@ test('every kind survives a round trip', () => {
     state: messages.State.DEGRADED, reason: messages.Reason.PERSON_LEFT, degraded_age: 1.5, codec: 1, width: 640, height: 480,
     image: Uint8Array.of(0xff, 0xd8, 0, 1), outfit_revision: 3n, latency_ms: 87.25,
     stages: [{ stage: 'tracking.solve', ms: 12.5 }, { stage: 'cloth.step', ms: 9 }], dropped: 0n, cloth_detail: 2,
-    fit: [{ garment: 'tshirt', size: 'M', tightness: new Uint8Array([129, 0, 127]), regions: [{ region: 'chest', fit: 2, stretch: 0.5, pressure: 250, touching: 0.25, gap: 0.125, ease: 0.0625, ease_needed: null }], hem_above: -0.5, hem_mark: 'the knee' }],
+    fit: [{ garment: 'tshirt', size: 'M', tightness: new Uint8Array([129, 0, 127]), regions: [{ region: 'chest', fit: 2, stretch: 0.5, pressure: 250, touching: 0.25, gap: 0.125, ease: 0.0625, ease_needed: null }], hem_above: -0.5, hem_mark: 'the knee', provisional: true }],
     off_person: { share: 0.125, parts: [{ part: 'left arm', share: 0.0625 }] },
   };
   assert.deepEqual(decode(messages.Picture, encode(messages.Picture, picture)), picture);
