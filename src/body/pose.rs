@@ -139,40 +139,6 @@ impl<F> Pose<F> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_pose_on_the_way_to_another_starts_and_ends_at_them_and_turns_evenly() {
-        let template = embedded::template();
-        let (skeleton, rest) = (
-            template.skeleton(),
-            template.personalise(&Default::default()),
-        );
-        let turned = |angle: f64, height: f64| {
-            let rotation = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), angle);
-            let pelvis = Vector3::new(0.0, height, 0.0);
-            let root = Rigid::from_parts(pelvis - rotation * rest.joints[0].coords, rotation);
-            let mut pose = Pose::<World>::rest(skeleton, root);
-            pose.set(skeleton, "left_shoulder", &[0.0, 0.0, -angle]);
-            pose.set(skeleton, "left_elbow", &[angle]);
-            pose
-        };
-        let (a, b) = (turned(0.2, 0.0), turned(1.2, 0.5));
-        let joints = |pose: &Pose<World>| {
-            let mut bones = BoneTransforms::default();
-            pose.bones(skeleton, &rest, &mut bones);
-            bones.joints
-        };
-        let apart = |p: &Pose<World>, q: &Pose<World>| {
-            let (p, q) = (joints(p), joints(q));
-            let pairs = p.iter().zip(&q);
-            pairs.map(|(p, q)| distance(p, q)).fold(0.0, f64::max)
-        };
-        assert!(apart(&a.towards(&b, skeleton, &rest, 0.0), &a) < 1e-12);
-        assert!(apart(&a.towards(&b, skeleton, &rest, 1.0), &b) < 1e-12);
-        // About one axis the half-way pose is that of half the angle.
-        let middle = a.towards(&b, skeleton, &rest, 0.5);
-        assert!(apart(&middle, &turned(0.7, 0.25)) < 1e-12);
-    }
     use crate::body::{BodyShape, SkinWeights, embedded, skin};
     use crate::formats::gltf::skinned::decoded::posed_meshes;
     use crate::formats::gltf::{
@@ -298,6 +264,40 @@ mod tests {
             skin(Par::Seq, rest, self.weights, &bones, &mut out);
             out
         }
+    }
+
+    #[test]
+    fn a_pose_on_the_way_to_another_starts_and_ends_at_them_and_turns_evenly() {
+        let template = embedded::template();
+        let (skeleton, rest) = (
+            template.skeleton(),
+            template.personalise(&Default::default()),
+        );
+        let turned = |angle: f64, height: f64| {
+            let rotation = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), angle);
+            let pelvis = Vector3::new(0.0, height, 0.0);
+            let root = Rigid::from_parts(pelvis - rotation * rest.joints[0].coords, rotation);
+            let mut pose = Pose::<World>::rest(skeleton, root);
+            pose.set(skeleton, "left_shoulder", &[0.0, 0.0, -angle]);
+            pose.set(skeleton, "left_elbow", &[angle]);
+            pose
+        };
+        let (a, b) = (turned(0.2, 0.0), turned(1.2, 0.5));
+        let joints = |pose: &Pose<World>| {
+            let mut bones = BoneTransforms::default();
+            pose.bones(skeleton, &rest, &mut bones);
+            bones.joints
+        };
+        let apart = |p: &Pose<World>, q: &Pose<World>| {
+            let (p, q) = (joints(p), joints(q));
+            let pairs = p.iter().zip(&q);
+            pairs.map(|(p, q)| distance(p, q)).fold(0.0, f64::max)
+        };
+        assert!(apart(&a.towards(&b, skeleton, &rest, 0.0), &a) < 1e-12);
+        assert!(apart(&a.towards(&b, skeleton, &rest, 1.0), &b) < 1e-12);
+        // About one axis the half-way pose is that of half the angle.
+        let middle = a.towards(&b, skeleton, &rest, 0.5);
+        assert!(apart(&middle, &turned(0.7, 0.25)) < 1e-12);
     }
 
     #[test]

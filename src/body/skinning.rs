@@ -1,8 +1,22 @@
 //! Linear blend skinning with at most four joints a vertex (eq. 4).
 
-use super::{BoneTransforms, SkinWeights};
+use super::{BoneTransforms, Pose, RestBody, SkinWeights, Template};
 use crate::math::{P3, V3};
 use crate::par::{self, Par};
+
+impl Template {
+    /// Skins a `rest` body in a pose, frame of the pose, metres, shape `[vertices]`; `bones` become those of the pose.
+    pub fn skin_pose<F>(
+        &self,
+        rest: &RestBody,
+        pose: &Pose<F>,
+        bones: &mut BoneTransforms,
+        out: &mut Vec<P3>,
+    ) {
+        pose.bones(self.skeleton(), rest, bones);
+        skin(Par::Rayon, &rest.vertices, self.weights(), bones, out);
+    }
+}
 
 /// Poses `rest` vertices: `out[i] = Σ wᵢⱼ · boneⱼ · rest[i]`. Shapes `[vertices]`.
 pub fn skin(

@@ -10,11 +10,10 @@ use super::sew::{GarmentSource, PlacedSheet, Sewing};
 use super::skin::Skin;
 use super::waistband::GarmentOnSkin;
 use crate::body::measure::measure;
-use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
+use crate::body::{BoneTransforms, Pose, RestBody, Template};
 use crate::cloth::{AnchorBinding, ClothError, Model, Outfit, Sheet, State};
 use crate::garment::{GarmentMesh, Pattern};
 use crate::math::{P3, World};
-use crate::par::Par;
 use crate::spatial::intersections;
 use std::time::Instant;
 
@@ -177,16 +176,8 @@ fn bodies_between(
         let t = i as f64 / count as f64;
         let share = t * t * (3.0 - 2.0 * t);
         let pose = from.towards(to, template.skeleton(), rest, share);
-        let mut bones = BoneTransforms::default();
-        pose.bones(template.skeleton(), rest, &mut bones);
-        let mut out = Vec::new();
-        skin(
-            Par::Rayon,
-            &rest.vertices,
-            template.weights(),
-            &bones,
-            &mut out,
-        );
+        let (mut bones, mut out) = (BoneTransforms::default(), Vec::new());
+        template.skin_pose(rest, &pose, &mut bones, &mut out);
         out
     };
     (0..=count).map(body).collect()

@@ -1,8 +1,7 @@
 //! Posed surface of one body, with its rest shape kept until the shape changes.
 
-use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
+use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template};
 use crate::math::P3;
-use crate::par::Par;
 use std::sync::Arc;
 
 /// Skinned surface of a tracked body and the buffers to pose it again.
@@ -33,14 +32,7 @@ impl PosedBody {
             self.rest = template.personalise(shape);
             self.shape = Some(Arc::clone(shape));
         }
-        pose.bones(template.skeleton(), &self.rest, &mut self.bones);
-        skin(
-            Par::Rayon,
-            &self.rest.vertices,
-            template.weights(),
-            &self.bones,
-            &mut self.vertices,
-        );
+        template.skin_pose(&self.rest, pose, &mut self.bones, &mut self.vertices);
         !is_known
     }
 

@@ -1,7 +1,7 @@
 //! Time step of the cloth from the capture times of frames.
 
 /// Time step when frames give none (s): a 30 Hz camera.
-const NOMINAL: f64 = 1.0 / 30.0;
+pub(super) const NOMINAL: f64 = 1.0 / 30.0;
 /// Longest gap of a recording that counts as a time step (s); a longer one is a pause of the camera.
 const LONGEST_RECORDED: f64 = 0.2;
 /// Time steps of a live stream (s): a gap in the stream does not become one huge step.

@@ -1,14 +1,14 @@
 //! An outfit on a body: put on in an easy pose, carried to the pose of the body, then stepped with every posed body.
 
 use super::choice::SizedGarment;
+use super::clock::NOMINAL;
 use super::wear::{SETTLING, WearWatch};
 use crate::body::parts::vertex_masks;
-use crate::body::{BoneTransforms, Pose, RestBody, Template, skin};
+use crate::body::{BoneTransforms, Pose, RestBody, Template};
 use crate::cloth::ClothError;
 use crate::cloth::{Config, Input, Model, State, StepReport, Workspace, step};
 use crate::dressing::{DressError, DressOptions, GarmentSource, dress_all};
 use crate::math::{Camera, P3, Rigid, World};
-use crate::par::Par;
 use crate::tracking::ArmClearance;
 use std::sync::Arc;
 
@@ -28,12 +28,10 @@ pub struct Subject<'a> {
 /// Longer edges of coarse garments: 2.4 times fewer vertices. Longer ones don't resolve sleeves.
 const COARSER: f64 = 1.55;
 
-/// Longest displacement of skin in one step of a carry, metres: 1.5 m/s, which sleeves follow without loss.
+/// Longest displacement of skin in one step of a carry, metres: 1.5 m/s at [`NOMINAL`] steps, half the speed of fast arms.
 const CARRY_STRIDE: f32 = 0.05;
 /// Most steps of a carry, half a second of cloth: a hand moves by 0.8 m.
 const MOST_CARRY_STEPS: usize = 16;
-/// Time of one step of a carry, s.
-const CARRY_DT: f64 = 1.0 / 30.0;
 
 /// Settings of putting on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -126,8 +124,7 @@ impl DressedOutfit {
         let mut body = Vec::new();
         let mut place = |share: f64, body: &mut Vec<P3>| {
             let pose = from.towards(subject.pose, template.skeleton(), rest, share);
-            pose.bones(template.skeleton(), rest, &mut bones);
-            skin(Par::Rayon, &rest.vertices, template.weights(), &bones, body);
+            template.skin_pose(rest, &pose, &mut bones, body);
         };
 
         place(1.0, &mut body);
@@ -137,7 +134,7 @@ impl DressedOutfit {
         let steps = ((farthest / CARRY_STRIDE).ceil() as usize).clamp(1, MOST_CARRY_STEPS);
         for k in 1..=steps {
             place(k as f64 / steps as f64, &mut body);
-            let (body, dt) = (&body[..], CARRY_DT);
+            let (body, dt) = (&body[..], NOMINAL);
             step(
                 &self.model,
                 &mut self.state,
@@ -157,14 +154,19 @@ impl DressedOutfit {
         let input = Input { body, dt };
         let before = self.state.collision_body().vertices();
         let jumped = self.wear.has_jumped(before, body, dt);
-        let mut report = step(&self.model, &mut self.state, &input, &mut self.work)?;
-        let (model, state) = (&self.model, &mut self.state);
-        self.wear.judge(model, state, &report, jumped);
-        for _ in 0..if jumped { SETTLING } else { 0 } {
-            report = step(&self.model, &mut self.state, &input, &mut self.work)?;
-            let (model, state) = (&self.model, &mut self.state);
-            self.wear.judge(model, state, &report, false);
+        let mut report = self.advance(&input, jumped)?;
+        let settling = if jumped { SETTLING } else { 0 };
+        for _ in 0..settling {
+            report = self.advance(&input, false)?;
         }
+        Ok(report)
+    }
+
+    /// One step of the cloth on a body that may have `jumped`, and its judgement.
+    fn advance(&mut self, input: &Input<'_>, jumped: bool) -> Result<StepReport, ClothError> {
+        let report = step(&self.model, &mut self.state, input, &mut self.work)?;
+        self.wear
+            .judge(&self.model, &mut self.state, &report, jumped);
         Ok(report)
     }
 

@@ -19,7 +19,7 @@ const SEAM: f32 = 0.035;
 /// Least width of the seam, cells: outlines are that coarse.
 const LEAST_SEAM: u16 = 2;
 /// Difference in depth above which body and reading are different surfaces, metres: thick clothes stay below.
-const APART: f32 = 0.10;
+pub(super) const APART: f32 = 0.10;
 
 /// Areas of disagreement as shares of the area in the image that subject and body cover together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -31,7 +31,7 @@ pub struct Agreement {
     /// Share of the visible surface of each [`BodyPart`](crate::body::parts::BodyPart) in free space, 0 to 1; 0 for a part out of view.
     pub parts: [f32; PARTS],
     /// Parts whose surface mostly gives no return.
-    #[serde(skip)]
+    #[serde(default)]
     pub(super) without_return: [bool; PARTS],
 }
 
@@ -150,19 +150,13 @@ fn seam(observation: &Observation<'_>) -> u16 {
 mod tests {
     use super::*;
     use crate::body::parts::BodyPart;
-    use crate::tracking::personal_body::PersonalBody;
     use crate::tracking::test_scene::{DepthScan, TestScene};
 
     /// Agreement of a body in one pose with readings of it in another.
     fn agreement(scene: &TestScene, body_pose: &Pose, seen: &Pose) -> Agreement {
         let scan = DepthScan::new(&scene.model, &scene.depth(seen)).background_removed();
-        let mut body = PersonalBody::default();
-        body.update(&scene.model, &Default::default());
-        let context = FitContext {
-            model: &scene.model,
-            body: &body,
-            observation: &scan.observation(),
-        };
+        let (body, observation) = (scene.body(), scan.observation());
+        let context = scene.context(&body, &observation);
         let mut scratch = AgreementScratch::default();
         scratch.measure(&context, body_pose, &mut FitScratch::default())
     }

@@ -134,7 +134,6 @@ fn samples_without_return(context: &FitContext<'_>, scratch: &FitScratch) -> Vec
 mod tests {
     use super::*;
     use crate::tracking::agreement::AgreementScratch;
-    use crate::tracking::personal_body::PersonalBody;
     use crate::tracking::pose_fit::{TRACK, fit_pose};
     use crate::tracking::test_scene::{DepthScan, TestScene};
 
@@ -143,13 +142,8 @@ mod tests {
         let scene = TestScene::new(1000, 480);
         let skeleton = scene.model.template.skeleton();
         let scan = DepthScan::new(&scene.model, &scene.depth(&scene.pose)).background_removed();
-        let mut body = PersonalBody::default();
-        body.update(&scene.model, &Default::default());
-        let context = FitContext {
-            model: &scene.model,
-            body: &body,
-            observation: &scan.observation(),
-        };
+        let (body, observation) = (scene.body(), scan.observation());
+        let context = scene.context(&body, &observation);
         let mut scratch = FitScratch::default();
         let mut pose = scene.pose.clone();
         fit_pose(&context, &mut pose, &TRACK, &mut scratch);

@@ -3,6 +3,7 @@
 //! Nothing keeps such a limb from drifting out of the subject's outline as the body turns. Its points in free
 //! space are drawn to the nearest readings of the subject, and behind them, by Gauss–Newton on the angles of the limb.
 
+use super::agreement::APART;
 use super::limb::Limb;
 use super::pose_fit::FitContext;
 use crate::body::{BoneTransforms, Pose};
@@ -12,8 +13,6 @@ use nalgebra::{Point3, SMatrix, SVector, Vector3};
 
 /// Gauss–Newton iterations: with the bound of a step they turn a limb by half a turn.
 const ITERATIONS: usize = 6;
-/// Depth by which a point lies before a reading in free space, metres: thick clothes stay below.
-const IN_FRONT: f32 = 0.10;
 /// Distance of a hidden bone inside the outline and behind the readings, metres: the radius of a limb.
 const INSET: f32 = 0.05;
 /// Step of the finite differences and bound of an angle's step, radians.
@@ -108,7 +107,7 @@ impl HiddenLimb<'_> {
         let (column, row) = grid.cell_of(&p)?;
         let cell = grid.cell(column, row)?;
         let (label, depth) = (grid.labels[cell], grid.depth[cell]);
-        let is_before = depth > 0.0 && p.z < depth - IN_FRONT;
+        let is_before = depth > 0.0 && p.z < depth - APART;
         let is_free = match label {
             Label::Unknown => false,
             Label::Background if depth == 0.0 => true,
@@ -144,7 +143,6 @@ impl HiddenLimb<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracking::personal_body::PersonalBody;
     use crate::tracking::test_scene::{DepthScan, TestScene};
 
     /// Points of the left arm in free space before and after, of a body with its arm raised by `raised` radians over
@@ -155,17 +153,10 @@ mod tests {
         let mut behind = scene.pose.clone();
         behind.set(skeleton, "left_shoulder", &[0.0, 1.1, -1.2]);
         let scan = DepthScan::new(&scene.model, &scene.depth(&behind)).background_removed();
-        let mut body = PersonalBody::default();
-        body.update(&scene.model, &Default::default());
+        let (body, observation) = (scene.body(), scan.observation());
+        let context = scene.context(&body, &observation);
         let limb = scene.model.arms[0].as_ref().expect("an arm");
-        let hidden = HiddenLimb {
-            context: FitContext {
-                model: &scene.model,
-                body: &body,
-                observation: &scan.observation(),
-            },
-            limb,
-        };
+        let hidden = HiddenLimb { context, limb };
 
         let mut pose = behind.clone();
         pose.set(skeleton, "left_shoulder", &[0.0, 0.0, raised]);
@@ -195,13 +186,8 @@ mod tests {
     fn an_arm_that_readings_show_stays() {
         let scene = TestScene::new(300, 480);
         let scan = DepthScan::new(&scene.model, &scene.depth(&scene.pose)).background_removed();
-        let mut body = PersonalBody::default();
-        body.update(&scene.model, &Default::default());
-        let context = FitContext {
-            model: &scene.model,
-            body: &body,
-            observation: &scan.observation(),
-        };
+        let (body, observation) = (scene.body(), scan.observation());
+        let context = scene.context(&body, &observation);
         let mut bones = BoneTransforms::default();
         for limb in scene.model.arms.iter().flatten() {
             let hidden = HiddenLimb { context, limb };

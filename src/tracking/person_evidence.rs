@@ -279,8 +279,7 @@ mod tests {
     use super::*;
     use crate::camera::DepthImage;
     use crate::segment::part_forest::{PartScratch, PersonCells};
-    use crate::tracking::personal_body::PersonalBody;
-    use crate::tracking::pose_fit::{FitContext, FitScratch};
+    use crate::tracking::pose_fit::FitScratch;
     use crate::tracking::test_scene::{DepthScan, TestScene};
     use nalgebra::Vector3;
 
@@ -288,13 +287,8 @@ mod tests {
     fn evidence(scene: &TestScene, image: &DepthImage, matched: f32) -> PersonEvidence {
         let scan = DepthScan::new(&scene.model, image).background_removed();
         let observation = scan.observation();
-        let mut body = PersonalBody::default();
-        body.update(&scene.model, &Default::default());
-        let context = FitContext {
-            model: &scene.model,
-            body: &body,
-            observation: &observation,
-        };
+        let body = scene.body();
+        let context = scene.context(&body, &observation);
         let person = PersonCells {
             cloud: observation.grid,
             cells: observation.cells,

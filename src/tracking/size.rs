@@ -112,9 +112,7 @@ impl SizeEstimate {
             })
             .fold(0.0, f64::max)
     }
-}
 
-impl SizeEstimate {
     /// Compares the girths of the `rest` body with those of half a second before; to be called after each new frame.
     pub(super) fn check_settled(&mut self, template: &Template, rest: &RestBody) {
         if !self.frames.is_multiple_of(SETTLING_FRAMES) {

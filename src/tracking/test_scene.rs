@@ -1,5 +1,7 @@
 //! The embedded body in its rest pose before a camera, and readings of it, for unit tests.
 
+use super::personal_body::PersonalBody;
+use super::pose_fit::FitContext;
 use super::{TrackerConfig, TrackerModel, TrackerState};
 use crate::body::{BoneTransforms, Pose, RestBody, embedded, skin};
 use crate::camera::{Calibration, DepthImage, Intrinsics};
@@ -33,6 +35,26 @@ impl TestScene {
             rest: model.template.personalise(&Default::default()),
             pose: TrackerState::new(&model).pose,
             model,
+        }
+    }
+
+    /// The tracked body, of the mean shape.
+    pub(super) fn body(&self) -> PersonalBody {
+        let mut body = PersonalBody::default();
+        body.update(&self.model, &Default::default());
+        body
+    }
+
+    /// That `body` before readings.
+    pub(super) fn context<'a>(
+        &'a self,
+        body: &'a PersonalBody,
+        observation: &'a Observation<'a>,
+    ) -> FitContext<'a> {
+        FitContext {
+            model: &self.model,
+            body,
+            observation,
         }
     }
 

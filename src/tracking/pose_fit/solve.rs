@@ -114,7 +114,6 @@ mod tests {
     use super::*;
     use crate::camera::DepthImage;
     use crate::math::Rigid;
-    use crate::tracking::personal_body::PersonalBody;
     use crate::tracking::pose_fit::{FitTerms, TRACK};
     use crate::tracking::test_scene::{DepthScan, TestScene};
     use nalgebra::{Translation3, Vector3};
@@ -138,13 +137,8 @@ mod tests {
 
     fn fit(scene: &TestScene, image: &DepthImage, pose: &mut Pose) -> FitReport {
         let scan = DepthScan::new(&scene.model, image);
-        let mut body = PersonalBody::default();
-        body.update(&scene.model, &Default::default());
-        let context = FitContext {
-            model: &scene.model,
-            body: &body,
-            observation: &scan.observation(),
-        };
+        let (body, observation) = (scene.body(), scan.observation());
+        let context = scene.context(&body, &observation);
         let mut scratch = FitScratch {
             terms: FitTerms::tracking(&scene.model.config),
             ..FitScratch::default()
