@@ -16,7 +16,7 @@
 //! let mut mirror = Mirror::new(embedded::template(), recording.calibration(), choices);
 //! while let Some(frame) = recording.next_frame()? {
 //!     let seen = mirror.step(&frame)?;
-//!     assert!(!seen.is_dressed, "the body is still being measured");
+//!     assert!(seen.is_dressed, "from the first frame in which somebody is tracked");
 //!     assert_eq!(seen.picture.width(), frame.depth.width());
 //! }
 //! # Ok(())

@@ -30,9 +30,9 @@ pub struct Agreement {
     pub uncovered: f32,
     /// Share of the visible surface of each [`BodyPart`](crate::body::parts::BodyPart) in free space, 0 to 1; 0 for a part out of view.
     pub parts: [f32; PARTS],
-    /// Parts whose surface mostly gives no return.
+    /// Share of the visible surface of each part that gives no return, 0 to 1.
     #[serde(default)]
-    pub(super) without_return: [bool; PARTS],
+    pub(super) unknown: [f32; PARTS],
 }
 
 impl Agreement {
@@ -116,7 +116,7 @@ impl AgreementScratch {
             in_free_space: free as f32 / area,
             uncovered: uncovered as f32 / area,
             parts: parts.map(|p| p.free as f32 / p.all.max(1) as f32),
-            without_return: parts.map(|p| !p.has_return()),
+            unknown: parts.map(|p| p.unknown as f32 / p.all.max(1) as f32),
         }
     }
 

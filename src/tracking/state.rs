@@ -73,9 +73,6 @@ pub struct TrackerState {
     pub(super) seat: Seat,
     #[serde(default)]
     pub(super) repair: RepairTimer,
-    /// Number of the last frame in which the left and the right hand were found beyond a sleeve without return.
-    #[serde(default)]
-    pub(super) hand_seen: [Option<u64>; 2],
     /// Processed frames in a row in which hardly anything moved.
     #[serde(default)]
     pub(super) still: u32,
@@ -128,7 +125,6 @@ impl TrackerState {
             feet: None,
             seat: Seat::default(),
             repair: RepairTimer::default(),
-            hand_seen: [None; 2],
             still: 0,
             reference: None,
             surface_due: [0; 2],
