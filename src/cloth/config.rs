@@ -106,6 +106,10 @@ impl Config {
             ..self
         }
     }
+    /// Distance of layer `order` of `count` from the skin, metres: evenly between the skin and the outermost layer.
+    pub(crate) fn layer_offset(&self, order: usize, count: usize) -> f64 {
+        self.offset * (order + 1) as f64 / count as f64
+    }
     /// The body as cloth of these settings meets it: two layers fit between parts that press on each other.
     pub(super) fn collision(&self) -> CollisionConfig {
         CollisionConfig {
@@ -115,7 +119,7 @@ impl Config {
         }
     }
     /// Names the first setting out of range.
-    pub(super) fn check(&self) -> Result<(), ClothError> {
+    pub(crate) fn check(&self) -> Result<(), ClothError> {
         let lengths = [self.noise_deadband, self.untangle];
         let faults = [
             (

@@ -37,11 +37,9 @@ impl Model {
     pub fn new(template: &Template, outfit: Outfit, config: Config) -> Result<Self, ClothError> {
         config.check()?;
         check_anchors(template, &outfit)?;
-        let count = outfit.garments.len() as f64;
         let mut garments: Vec<_> = outfit.garments.iter().map(|_| None).collect();
         par::for_chunks(config.par, &mut garments, 1, |order, garment| {
-            // Evenly between the skin and the outermost layer.
-            let offset = config.offset * (order + 1) as f64 / count;
+            let offset = config.layer_offset(order, outfit.garments.len());
             garment[0] = Some(GarmentModel::new(&outfit.garments[order], &config, offset));
         });
         let garments = garments.into_iter().flatten().collect::<Result<_, _>>()?;
@@ -97,9 +95,6 @@ impl Model {
     /// The body that garments meet.
     pub(crate) fn collision(&self) -> &CollisionModel {
         &self.collision
-    }
-    pub(crate) fn arms(&self) -> &Arms {
-        &self.arms
     }
     /// Distance of a garment from the skin, metres.
     pub(crate) fn offset(&self, garment: usize) -> f64 {

@@ -37,6 +37,7 @@ mod fit_map;
 mod hood;
 mod mesh_garment;
 mod options;
+mod outfit_drape;
 mod place;
 mod plane;
 mod refine;

@@ -2,6 +2,7 @@
 
 use crate::cloth::Config;
 use crate::garment::Triangulation;
+use std::time::Instant;
 
 /// Settings of dressing.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,6 +57,11 @@ pub struct DressMs {
     pub coarse: f64,
     /// Draping on the fine mesh.
     pub fine: f64,
-    /// Preparing the simulator.
+    /// Preparing the simulator, most of it while the garments are draped.
     pub model: f64,
+}
+
+/// Milliseconds that have passed.
+pub(super) fn ms(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
 }

@@ -1,18 +1,40 @@
 //! Collision body of a drape.
 
-use crate::cloth::Model;
-use crate::cloth::repair::sleeve_rings::CentreLine;
+use crate::body::Template;
+use crate::body::parts::vertex_masks;
+use crate::cloth::repair::sleeve_rings::{Arms, CentreLine};
+use crate::cloth::{ClothError, Config, collision_model};
 use crate::contact::{
-    ClosestPoint, CollisionBody, CollisionError, CollisionWorkspace, Part, SkinGrid, SurfaceFrame,
-    SurfaceModel,
+    ClosestPoint, CollisionBody, CollisionError, CollisionModel, CollisionWorkspace, Part,
+    SkinGrid, SurfaceFrame, SurfaceModel,
 };
 use crate::math::P3;
 
-/// The body of an outfit's model as garments meet it while they are put on.
+/// Immutable part of [`Skin`].
+#[derive(Debug)]
+pub(super) struct SkinModel {
+    collision: CollisionModel,
+    arms: Arms,
+}
+
+impl SkinModel {
+    /// Of bodies made from `template`.
+    ///
+    /// # Errors
+    /// Faults of the template's mesh.
+    pub(super) fn new(template: &Template, config: &Config) -> Result<Self, ClothError> {
+        Ok(Self {
+            collision: collision_model(template, config)?,
+            arms: Arms::new(template, &vertex_masks(template)),
+        })
+    }
+}
+
+/// A body as garments meet it while they are put on.
 #[derive(Debug)]
 pub(super) struct Skin<'a> {
     pub(super) model: &'a SurfaceModel,
-    outfit: &'a Model,
+    whole: &'a SkinModel,
     body: CollisionBody,
     work: CollisionWorkspace,
     grid: SkinGrid,
@@ -20,10 +42,10 @@ pub(super) struct Skin<'a> {
 
 impl<'a> Skin<'a> {
     /// Without a pose yet.
-    pub(super) fn of(outfit: &'a Model) -> Self {
+    pub(super) fn of(whole: &'a SkinModel) -> Self {
         Self {
-            model: outfit.collision().surface(),
-            outfit,
+            model: whole.collision.surface(),
+            whole,
             body: CollisionBody::default(),
             work: CollisionWorkspace::default(),
             grid: SkinGrid::default(),
@@ -34,8 +56,8 @@ impl<'a> Skin<'a> {
     /// # Errors
     /// A body that does not fit the model.
     pub(super) fn place(&mut self, posed: &[P3]) -> Result<(), CollisionError> {
-        let collision = self.outfit.collision();
-        self.body.place(collision, posed, &mut self.work)?;
+        self.body
+            .place(&self.whole.collision, posed, &mut self.work)?;
         self.grid.fill(self.body.frame());
         Ok(())
     }
@@ -44,7 +66,7 @@ impl<'a> Skin<'a> {
     }
     /// Centre lines of the arms.
     pub(super) fn arm_lines(&self) -> [CentreLine; 2] {
-        self.outfit.arms().lines(self.body.vertices())
+        self.whole.arms.lines(self.body.vertices())
     }
     /// The skin at a point lies inside another body part.
     pub(super) fn is_interior(&self, c: &ClosestPoint) -> bool {

@@ -38,6 +38,8 @@ struct Report {
     live_rate: f64,
     /// Seconds from opening the try-on to the first live picture: finding, calibrating, dressing.
     first_live_seconds: Option<f64>,
+    /// Seconds from the first picture to the first live one.
+    dressed_after_seconds: Option<f64>,
     /// From the reception of the exposure by the capture service to the arrival of the picture, milliseconds.
     latency_ms: Summary,
     /// Latency of live pictures, milliseconds.
@@ -190,6 +192,10 @@ fn summarise(args: &DemoArgs, received: &Received) -> Result<ExitCode> {
         rate: rate(&everything),
         live_rate: rate(&live),
         first_live_seconds: live.first().map(|p| p.at),
+        dressed_after_seconds: live
+            .first()
+            .zip(everything.first())
+            .map(|(l, p)| l.at - p.at),
         latency_ms: Summary::of(&all_ms),
         live_latency_ms: Summary::of(&live_ms),
         stages_ms: stages.summaries(),

@@ -1,0 +1,324 @@
+//! The drape of an outfit: hang in the canonical pose, follow the body into the tracked pose, refine, tie to the body.
+
+use super::canonical::{canonical_pose, upright_root};
+use super::drape::{Drape, Layers};
+use super::error::DressError;
+use super::options::{DressOptions, DressReport, ms};
+use super::refine::prolong;
+use super::sew::PlacedSheet;
+use super::skin::{Skin, SkinModel};
+use super::waistband::GarmentOnSkin;
+use crate::body::{BoneTransforms, Pose, RestBody, Template};
+use crate::cloth::{AnchorBinding, ClothError, Sheet};
+use crate::contact::CollisionBody;
+use crate::garment::GarmentMesh;
+use crate::math::{P3, World};
+use crate::spatial::intersections;
+use std::time::Instant;
+
+/// Substep on the coarse mesh, s.
+const COARSE_STEP: f64 = 2e-3;
+/// Substeps that close seams and gaps, and the share of gravity during them.
+const CLOSING: usize = 60;
+const CLOSING_GRAVITY: f64 = 0.1;
+/// Substeps of the first drape, 0.5 s: cloth that started 2 cm off the body hangs.
+const DRAPING: usize = 260;
+/// Bodies from the canonical to the tracked pose and substeps on each; 16 are at most 8° apart for a half-turn of the arm.
+const FOLLOWING: [usize; 2] = [16, 12];
+/// The same with untangling: from farther bodies cloth is moved into other cloth.
+const UNTANGLED_FOLLOWING: [usize; 2] = [24, 8];
+/// Rounds of untangling on each of these bodies.
+const CLEARING: usize = 6;
+/// Most rounds of untangling in the tracked pose; most garments need none.
+const CLEARED: usize = 120;
+/// Substeps in the tracked pose.
+const SETTLING: usize = 80;
+/// Substep on the fine mesh, s.
+const FINE_STEP: f64 = 1e-3;
+/// Substeps on the fine mesh: they add the wrinkles that the coarse one lacks.
+const FINISHING: usize = 90;
+/// Attempts to settle until the fine garment is free of itself off the arms: hoods may fold in a way that nothing untangles.
+const ATTEMPTS: usize = 4;
+
+/// Body on which garments are draped.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wearer<'a> {
+    pub(super) template: &'a Template,
+    pub(super) rest: &'a RestBody,
+    /// Tracked pose, world.
+    pub(super) pose: &'a Pose<World>,
+}
+
+/// Garments draped on a body in its tracked pose.
+#[derive(Debug)]
+pub(super) struct DrapedOutfit {
+    /// World, metres.
+    pub(super) positions: Vec<Vec<P3>>,
+    pub(super) anchors: Vec<Vec<AnchorBinding>>,
+    pub(super) body: CollisionBody,
+}
+
+/// Drapes sheets, innermost first. Fills the report's times and the quality of the drape.
+///
+/// # Errors
+/// Faults of the garments.
+pub(super) fn drape_outfit(
+    wearer: &Wearer<'_>,
+    mut sheets: Vec<PlacedSheet>,
+    options: &DressOptions,
+    report: &mut DressReport,
+) -> Result<DrapedOutfit, DressError> {
+    let timer = Instant::now();
+    let skin = SkinModel::new(wearer.template, &options.config)?;
+    let start = wearer.canonical();
+    for s in &mut sheets {
+        let local = std::mem::take(&mut s.positions);
+        start.root.points_f32(&local, &mut s.positions);
+    }
+    let [count, substeps] = if options.untangle {
+        UNTANGLED_FOLLOWING
+    } else {
+        FOLLOWING
+    };
+    let bodies = wearer.bodies_between(&start, wearer.pose, count);
+    let mut drape = OutfitDrape::new(&skin, sheets, &bodies[0], options)?;
+    drape.hang();
+    drape.follow(&bodies, substeps)?;
+    report.stages_ms.coarse = ms(timer);
+    let fine = drape.finish(report)?;
+
+    let timer = Instant::now();
+    let (positions, anchors) = drape.tie(&fine, report);
+    report.stages_ms.fine += ms(timer);
+    Ok(DrapedOutfit {
+        positions,
+        anchors,
+        body: drape.skin.into_body(),
+    })
+}
+
+impl Wearer<'_> {
+    /// The canonical pose where the wearer is.
+    fn canonical(&self) -> Pose<World> {
+        Pose {
+            root: upright_root(self.rest, &self.pose.root),
+            angles: canonical_pose(self.template, self.rest).angles,
+        }
+    }
+    /// Posed vertices of `count + 1` bodies from one pose to another, slow at both ends.
+    fn bodies_between(&self, from: &Pose<World>, to: &Pose<World>, count: usize) -> Vec<Vec<P3>> {
+        let (template, rest) = (self.template, self.rest);
+        let body = |i: usize| {
+            let t = i as f64 / count as f64;
+            let share = t * t * (3.0 - 2.0 * t);
+            let pose = from.towards(to, template.skeleton(), rest, share);
+            let (mut bones, mut out) = (BoneTransforms::default(), Vec::new());
+            template.skin_pose(rest, &pose, &mut bones, &mut out);
+            out
+        };
+        (0..=count).map(body).collect()
+    }
+}
+
+/// Garments being draped on a body.
+struct OutfitDrape<'a> {
+    /// Meshes of the garments.
+    garments: Vec<GarmentMesh>,
+    skin: Skin<'a>,
+    /// Distance of each garment from the skin, metres.
+    offsets: Vec<f64>,
+    /// Mesh of each garment that is draped first; `None` where it is the garment's own.
+    coarse: Vec<Option<GarmentMesh>>,
+    anchors: Vec<Vec<AnchorBinding>>,
+    layers: Layers,
+    untangle: bool,
+}
+
+impl<'a> OutfitDrape<'a> {
+    /// Sheets around the first body, their anchors tied to it.
+    fn new(
+        skin: &'a SkinModel,
+        sheets: Vec<PlacedSheet>,
+        body: &[P3],
+        options: &DressOptions,
+    ) -> Result<Self, DressError> {
+        let mut skin = Skin::of(skin);
+        skin.place(body).map_err(ClothError::from)?;
+        let (count, untangle) = (sheets.len(), options.untangle);
+        let offset = |k| options.config.layer_offset(k, count);
+        let offsets: Vec<f64> = (0..count).map(offset).collect();
+        let garments = sheets.iter().map(|s| s.garment.clone()).collect();
+        let (mut coarse, mut firsts) = (Vec::new(), Vec::new());
+        let (mut anchors, mut drapes) = (Vec::new(), Vec::new());
+        for (s, offset) in sheets.into_iter().zip(&offsets) {
+            let first = s.coarse.clone().unwrap_or(s.garment);
+            let sheet = Sheet::of_garment(&first)?;
+            let mut d = Drape::new(&first, &sheet, s.positions);
+            d.find_nearest(&skin);
+            let on = on_skin(&skin, &first, *offset);
+            anchors.push(on.fasten(&d.positions())?);
+            drapes.push(if untangle {
+                d.with_untangling(&first, &sheet)?
+            } else {
+                d
+            });
+            coarse.push(s.coarse);
+            firsts.push(first);
+        }
+        Ok(Self {
+            layers: Layers::new(&firsts, drapes)?,
+            garments,
+            skin,
+            offsets,
+            coarse,
+            anchors,
+            untangle,
+        })
+    }
+    fn garment(&self, k: usize) -> GarmentOnSkin<'_> {
+        on_skin(&self.skin, &self.garments[k], self.offsets[k])
+    }
+    /// Drapes in the canonical pose.
+    fn hang(&mut self) {
+        let (skin, anchors) = (&self.skin, &self.anchors);
+        self.layers.each(skin, &self.offsets, |k, d, on| {
+            d.pin(&anchors[k], skin.frame());
+            d.run(on, CLOSING, COARSE_STEP, CLOSING_GRAVITY);
+            d.stop();
+            d.run(on, DRAPING, COARSE_STEP, 1.0);
+        });
+    }
+    /// Follows the body through its poses.
+    fn follow(&mut self, bodies: &[Vec<P3>], substeps: usize) -> Result<(), ClothError> {
+        for w in bodies.windows(2) {
+            self.skin.place(&w[1])?;
+            let (skin, anchors) = (&self.skin, &self.anchors);
+            self.layers.each(skin, &self.offsets, |k, d, on| {
+                d.follow_skin(&w[0], &w[1]);
+                d.recover_sleeves(skin);
+                d.pin(&anchors[k], skin.frame());
+                d.run(on, substeps, COARSE_STEP, 1.0);
+                d.untangle_at_rest(on, CLEARING);
+            });
+        }
+        Ok(())
+    }
+    /// Settles in the tracked pose and refines, again while the fine garments intersect themselves off the arms.
+    fn finish(&mut self, report: &mut DressReport) -> Result<Layers, DressError> {
+        let mut fine = Layers::default();
+        for _ in 0..ATTEMPTS {
+            let timer = Instant::now();
+            let skin = &self.skin;
+            self.layers.each(skin, &self.offsets, |_, d, on| {
+                d.recover_sleeves(skin);
+                d.run(on, SETTLING, COARSE_STEP, 1.0);
+                d.untangle_at_rest(on, CLEARED);
+            });
+            report.stages_ms.coarse += ms(timer);
+            let timer = Instant::now();
+            fine = self.refine()?;
+            report.stages_ms.fine += ms(timer);
+            report.steps += fine.drapes.iter().map(|d| d.steps).sum::<usize>();
+            if !fine.drapes.iter().any(Drape::crosses_off_arms) {
+                break;
+            }
+        }
+        report.steps += self.layers.drapes.iter().map(|d| d.steps).sum::<usize>();
+        Ok(fine)
+    }
+    /// Positions of the draped garments and the bindings of their anchors; adds the quality of the drape to the report.
+    fn tie(
+        &self,
+        fine: &Layers,
+        report: &mut DressReport,
+    ) -> (Vec<Vec<P3>>, Vec<Vec<AnchorBinding>>) {
+        let tie = |(k, d): (usize, &Drape)| {
+            let (x, on) = (d.positions(), self.garment(k));
+            let (deepest, p99) = d.measure(&self.skin);
+            report.penetration = report.penetration.max(deepest);
+            report.p99_strain = report.p99_strain.max(p99);
+            report.crossings += intersections(&on.mesh.faces, &x).len();
+            let anchors = on.bind_in_place(&x);
+            (x, anchors)
+        };
+        fine.drapes.iter().enumerate().map(tie).unzip()
+    }
+    /// Drapes the garments' own meshes from the coarse ones.
+    fn refine(&self) -> Result<Layers, DressError> {
+        let mut drapes = Vec::new();
+        for (k, rough) in self.layers.drapes.iter().enumerate() {
+            let on = self.garment(k);
+            let x = self.coarse[k].as_ref().map_or_else(
+                || rough.x.clone(),
+                |coarse| prolong(coarse, on.mesh, &rough.x),
+            );
+            let sheet = Sheet::of_garment(on.mesh)?;
+            let x = x.iter().map(|p| P3::from(p.cast::<f32>())).collect();
+            let mut d = Drape::new(on.mesh, &sheet, x);
+            d.find_nearest_from(&self.skin, rough);
+            d.pin(&on.fasten(&d.positions())?, self.skin.frame());
+            drapes.push(if self.untangle {
+                d.with_untangling(on.mesh, &sheet)?
+            } else {
+                d
+            });
+        }
+        let mut fine = Layers::new(&self.garments, drapes)?;
+        fine.each(&self.skin, &self.offsets, |_, d, on| {
+            d.recover_sleeves(&self.skin);
+            d.untangle_at_rest(on, CLEARED);
+            d.run(on, FINISHING, FINE_STEP, 1.0);
+            if d.untangle_at_rest(on, CLEARED) > 0 {
+                // Smoothed cloth is compressed, and spreads.
+                d.run(on, FINISHING / 2, FINE_STEP, 1.0);
+                d.untangle_at_rest(on, CLEARED);
+            }
+            d.lift_deep(&self.skin);
+        });
+        Ok(fine)
+    }
+}
+
+fn on_skin<'a>(skin: &'a Skin<'_>, mesh: &'a GarmentMesh, offset: f64) -> GarmentOnSkin<'a> {
+    GarmentOnSkin {
+        mesh,
+        surface: skin.model,
+        frame: skin.frame(),
+        offset,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::{BodyShape, embedded};
+    use crate::math::Rigid;
+
+    #[test]
+    fn bodies_between_two_poses_start_and_end_at_them() {
+        let t = embedded::template();
+        let rest = t.personalise(&BodyShape::default());
+        let pose = |angles| Pose {
+            root: Rigid::identity(),
+            angles,
+        };
+        let a = pose(canonical_pose(&t, &rest).angles);
+        let b = pose(vec![0.0; a.angles.len()]);
+        let wearer = Wearer {
+            template: &t,
+            rest: &rest,
+            pose: &b,
+        };
+        let bodies = wearer.bodies_between(&a, &b, 3);
+        assert_eq!(bodies.len(), 4);
+        let far = |x: &[P3], y: &[P3]| {
+            let pairs = x.iter().zip(y);
+            pairs.map(|(p, q)| (p - q).norm()).fold(0.0, f32::max)
+        };
+        for (body, at) in [(&bodies[0], &a), (&bodies[3], &b)] {
+            let alone = wearer.bodies_between(at, at, 1);
+            assert!(far(body, &alone[0]) < 1e-5);
+        }
+        assert!(far(&bodies[1], &bodies[2]) < far(&bodies[0], &bodies[3]));
+    }
+}
