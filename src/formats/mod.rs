@@ -21,6 +21,7 @@ pub mod obj;
 mod obj_records;
 mod obj_scene;
 mod position_codec;
+mod private_file;
 mod recording;
 mod rgbd_folder;
 mod rgbd_source;

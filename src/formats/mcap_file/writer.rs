@@ -5,7 +5,7 @@ use crate::formats::foxglove::{
     CameraCalibration, CompressedImage, FrameTransform, Quaternion, RawImage, Vector3, encode,
     schema, timestamp,
 };
-use crate::formats::{FormatError, image};
+use crate::formats::{FormatError, image, private_file};
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 use std::collections::BTreeMap;
@@ -58,13 +58,13 @@ impl std::fmt::Debug for McapWriter {
 }
 
 impl McapWriter {
-    /// Creates the file; an existing one is not overwritten.
+    /// Creates the file, for its owner to read; an existing one is not overwritten.
     ///
     /// # Errors
     /// When it exists or cannot be created.
     pub fn create(path: &Path, calibration: &Calibration) -> Result<Self, FormatError> {
         let fault = |e| fault(path, "mcap", e);
-        let file = File::create_new(path).map_err(|e| FormatError::io(path, e))?;
+        let file = private_file::create_new(path).map_err(|e| FormatError::io(path, e))?;
         // lz4 compresses raw depth to a third in about 1 ms; JPEG costs next to nothing.
         let options = WriteOptions::new()
             .compression(Some(Compression::Lz4))

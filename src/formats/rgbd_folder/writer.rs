@@ -2,11 +2,19 @@
 
 use super::camera_json::CameraFile;
 use crate::camera::{Calibration, RgbdFrame};
-use crate::formats::FormatError;
-use crate::formats::image::{write_png_depth, write_png_rgb};
+use crate::formats::image::{encode_png_depth, encode_png_rgb};
+use crate::formats::{FormatError, private_file};
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+
+fn create(path: &Path) -> Result<File, FormatError> {
+    private_file::create(path).map_err(|e| FormatError::io(path, e))
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), FormatError> {
+    private_file::write(path, bytes).map_err(|e| FormatError::io(path, e))
+}
 
 /// An RGBD folder being written: each frame is on disk when [`RgbdFolderWriter::write`] returns.
 #[derive(Debug)]
@@ -18,7 +26,7 @@ pub struct RgbdFolderWriter {
 }
 
 impl RgbdFolderWriter {
-    /// Creates the folder and its `camera.json` (depth in millimetres). Colour is written as PNG.
+    /// Creates the folder and its `camera.json` (depth in millimetres), for their owner to read. Colour is written as PNG.
     ///
     /// # Errors
     /// When the folder already contains a recording, or cannot be written.
@@ -32,14 +40,14 @@ impl RgbdFolderWriter {
             ));
         }
         let depth = folder.join("depth");
-        std::fs::create_dir_all(&depth).map_err(|e| FormatError::io(&depth, e))?;
+        private_file::create_folders(&depth).map_err(|e| FormatError::io(&depth, e))?;
         let file = CameraFile {
             calibration: calibration.clone(),
             depth_scale: 1000.0,
         };
-        std::fs::write(&camera, file.to_json()).map_err(|e| FormatError::io(&camera, e))?;
+        write(&camera, file.to_json().as_bytes())?;
         let list = folder.join("depth.txt");
-        let depth_list = File::create(&list).map_err(|e| FormatError::io(&list, e))?;
+        let depth_list = create(&list)?;
         Ok(Self {
             folder: folder.to_owned(),
             depth_list,
@@ -57,7 +65,8 @@ impl RgbdFolderWriter {
     /// When a file cannot be written; names it.
     pub fn write(&mut self, frame: &RgbdFrame) -> Result<(), FormatError> {
         let name = format!("depth/{:06}.png", self.frames);
-        write_png_depth(&self.folder.join(&name), &frame.depth)?;
+        let path = self.folder.join(&name);
+        write(&path, &encode_png_depth(&frame.depth, &path)?)?;
         let time = format!(
             "{}.{:09}",
             frame.time_ns / 1_000_000_000,
@@ -69,11 +78,12 @@ impl RgbdFolderWriter {
             let dir = self.folder.join("rgb");
             let list = self.folder.join("rgb.txt");
             if self.color_list.is_none() {
-                std::fs::create_dir_all(&dir).map_err(|e| FormatError::io(&dir, e))?;
-                self.color_list = Some(File::create(&list).map_err(|e| FormatError::io(&list, e))?);
+                private_file::create_folders(&dir).map_err(|e| FormatError::io(&dir, e))?;
+                self.color_list = Some(create(&list)?);
             }
             let name = format!("rgb/{:06}.png", self.frames);
-            write_png_rgb(&self.folder.join(&name), color)?;
+            let path = self.folder.join(&name);
+            write(&path, &encode_png_rgb(color, &path)?)?;
             if let Some(file) = &mut self.color_list {
                 writeln!(file, "{time} {name}").map_err(|e| FormatError::io(&list, e))?;
             }
