@@ -1,7 +1,9 @@
 // deploy/ names metrics, ports, keys and programs that live elsewhere: here they are compared with where they live.
 
 import assert from 'node:assert/strict';
-import { existsSync, readFileSync, readdirSync, statSync } from 'node:fs';
+import { execFileSync } from 'node:child_process';
+import { existsSync, mkdtempSync, readFileSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import test from 'node:test';
 import { fileURLToPath } from 'node:url';
@@ -86,4 +88,25 @@ test('a pod gets no variables that the configuration would refuse', () => {
 
 test('the store overlay carries the router’s configuration as it is', () => {
   assert.equal(read('deploy/kustomize/overlays/store/router.json5'), read('deploy/zenoh/router.json5'));
+});
+
+test('the kiosk opens the page with its token, and without one where there is none', () => {
+  const unit = read('deploy/systemd/tryon-kiosk.service').replaceAll('\\\n', '');
+  const [, quoted] = unit.match(/^ExecStartPre=\/bin\/sh -ec "(.*)"$/m);
+  const script = quoted.replaceAll('\\"', '"').replaceAll('$$', '$');
+  assert.match(unit, /^ExecStart=.* file:\/\/\/run\/tryon-kiosk\/start\.html$/m);
+  assert.match(unit, /^RuntimeDirectory=tryon-kiosk$/m);
+
+  const folder = mkdtempSync(join(tmpdir(), 'kiosk-'));
+  try {
+    const env = { PATH: process.env.PATH, CREDENTIALS_DIRECTORY: folder, RUNTIME_DIRECTORY: folder };
+    for (const [token, fragment] of [['\n', ''], ['aB-1._x.y\n', '#token=aB-1._x.y'], ['a"><b>\n', '#token=ab']]) {
+      writeFileSync(join(folder, 'kiosk.token'), token);
+      execFileSync('/bin/sh', ['-ec', script], { env });
+      const page = readFileSync(join(folder, 'start.html'), 'utf8');
+      assert.equal(page, `<meta http-equiv=refresh content="0;url=http://127.0.0.1:8080/${fragment}">\n`);
+    }
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
 });

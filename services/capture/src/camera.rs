@@ -165,6 +165,7 @@ impl Task {
             info: self.info.clone(),
             recorder: self.recorder.clone(),
             leases: self.leases.clone(),
+            flow: (self.ctx.stalls).flow("capture", format!("frames of {}", self.key)),
         };
         let stopped = stop.clone();
         let task = tokio::spawn(async move {

@@ -4,6 +4,7 @@
 //! of consent (`consent`), and published on the bus, which keeps only the newest. The rpcs (`service`) start, stop and report.
 
 mod camera;
+mod check;
 mod consent;
 mod pace;
 mod pattern;
@@ -12,6 +13,7 @@ mod recorder;
 mod service;
 mod source;
 
+pub use check::check;
 pub use source::{OpenSource, SourceError, open};
 
 use tryon_kit::config::Config;
@@ -21,9 +23,16 @@ use tryon_proto::v1::capture_service_server::{CaptureServiceServer, SERVICE_NAME
 /// Starts the service; cameras marked `autostart` begin to publish.
 ///
 /// # Errors
-/// When an address cannot be bound. A camera that cannot be opened is no error: it is listed as failed.
+/// When a file of the configuration cannot be used, or an address cannot be bound. A camera whose source fails later is
+/// listed as failed.
 pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError> {
     let c = &config.capture;
+    let checked = config.clone();
+    let checked = ctx.pool.run(move || check(&checked)).await;
+    checked.map_err(|e| StartError::Broken {
+        service: "capture",
+        why: e.to_string(),
+    })??;
     let service = service::Capture::new(c, &ctx);
     for camera in c.cameras.iter().filter(|camera| camera.autostart) {
         service.autostart(&camera.name).await;

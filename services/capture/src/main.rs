@@ -2,16 +2,18 @@
 
 use clap::Parser;
 use std::process::ExitCode;
-use tryon_kit::process::{self, Args, BusRole};
+use tryon_kit::process::{self, Args, BusRole, Program};
 
 #[global_allocator]
 static ALLOCATOR: tryon_kit::forget::Zeroing = tryon_kit::forget::ZEROING;
 
 fn main() -> ExitCode {
-    process::run(
-        "capture",
-        BusRole::Listen,
-        Args::parse(),
-        |config, ctx| async move { tryon_capture::start(&config, ctx).await },
-    )
+    let program = Program {
+        name: "capture",
+        role: BusRole::Listen,
+        check: tryon_capture::check,
+    };
+    process::run(program, Args::parse(), |config, ctx| async move {
+        tryon_capture::start(&config, ctx).await
+    })
 }

@@ -10,6 +10,7 @@ use tokio::sync::watch;
 use tryon::camera::{Calibration, RgbdFrame};
 use tryon_kit::compute::Pool;
 use tryon_kit::config::CameraConfig;
+use tryon_kit::flow::Flow;
 use tryon_kit::frame_trace::{self, Sampler};
 use tryon_kit::frames::{Exposure, FramePublisher, stage};
 use tryon_kit::sessions::unix_ns;
@@ -19,6 +20,10 @@ use tryon_proto::v1::{self, CameraState};
 const AFTER_FAULT: Duration = Duration::from_millis(100);
 /// Unreadable frames in a row after which a source counts as failed.
 const MAX_FAULTS: u32 = 30;
+
+/// Likely cause of frames without a receiver.
+const UNRECEIVED: &str = "somebody consented to frames that nobody receives: do bus.connect of tracking and compositor, and \
+                          the router's connect.endpoints, lead to this process?";
 
 /// Reader of one run of a source.
 pub(crate) struct Reader {
@@ -32,6 +37,8 @@ pub(crate) struct Reader {
     pub(crate) info: Arc<watch::Sender<v1::CameraInfo>>,
     pub(crate) recorder: Recorder,
     pub(crate) leases: Leases,
+    /// From here to somebody who receives the frames.
+    pub(crate) flow: Flow,
 }
 
 /// Waits until somebody may see the frames; none is read before. The length of the wait.
@@ -96,7 +103,11 @@ impl Reader {
         let (mut pace, mut faults, mut sequence) = (Pace::new(), 0, 0);
         let mut sampler = Sampler::default();
         loop {
-            pace.pause(wanted(&self.leases, self.info.subscribe()).await);
+            let pause = wanted(&self.leases, self.info.subscribe()).await;
+            if !pause.is_zero() {
+                self.flow.moves();
+            }
+            pace.pause(pause);
             let start = Instant::now();
             let frame = match self.read().await {
                 Ok(Some(f)) => f,
@@ -146,8 +157,13 @@ impl Reader {
                 continue;
             };
             let sending = Instant::now();
-            if let Err(e) = publisher.send(exposure, sealer).await {
-                tracing::warn!(camera = self.config.name, error = %e, "a frame did not get out");
+            match publisher.send(exposure, sealer).await {
+                Ok(true) => self.flow.moves(),
+                Ok(false) => self.flow.waits(|| UNRECEIVED.into()),
+                Err(e) => {
+                    tracing::warn!(camera = self.config.name, error = %e, "a frame did not get out");
+                    self.flow.waits(|| format!("frames do not get out: {e}"));
+                }
             }
             frame_trace::record("capture", &id, &[read, stage("capture.publish", sending)]);
             metrics::counter!("tryon_capture_frames").increment(1);

@@ -23,20 +23,56 @@ pub struct SourceError {
 /// # Errors
 /// Names the source, and the file and field at fault.
 pub fn open(name: &str) -> Result<OpenSource, SourceError> {
-    let fault = |why: String| SourceError {
-        source_name: name.into(),
-        why,
-    };
-    match name.split_once(':').unwrap_or((name, "")) {
-        ("pattern", _) => Ok(Box::new(Pattern::new())),
-        ("synth", clip) => synth(clip).map_err(fault),
-        _ => open_recording(Path::new(name)).map_err(|e| fault(e.to_string())),
+    match kind(name)? {
+        SourceKind::Pattern => Ok(Box::new(Pattern::new())),
+        SourceKind::Synth(routine) => Ok(synth(routine)),
+        SourceKind::Recording(path) => recording(name, path),
     }
 }
 
-/// `try-on` (the default), `leave`, `still`, `seated` or `empty`, without end.
-fn synth(clip: &str) -> Result<OpenSource, String> {
-    let routine = match clip {
+/// Checks a source by its configured name. Of a recording it reads as much as [`open`].
+///
+/// # Errors
+/// As [`open`].
+pub(crate) fn check(name: &str) -> Result<(), SourceError> {
+    match kind(name)? {
+        SourceKind::Recording(path) => recording(name, path).map(drop),
+        SourceKind::Pattern | SourceKind::Synth(_) => Ok(()),
+    }
+}
+
+/// Kind of a source.
+enum SourceKind<'a> {
+    Pattern,
+    Synth(Routine),
+    Recording(&'a Path),
+}
+
+fn fault(name: &str, why: String) -> SourceError {
+    SourceError {
+        source_name: name.into(),
+        why,
+    }
+}
+
+fn kind(name: &str) -> Result<SourceKind<'_>, SourceError> {
+    match name.split_once(':').unwrap_or((name, "")) {
+        ("pattern", _) => Ok(SourceKind::Pattern),
+        ("synth", clip) => {
+            let routine = routine(clip).map_err(|why| fault(name, why))?;
+            Ok(SourceKind::Synth(routine))
+        }
+        _ => Ok(SourceKind::Recording(Path::new(name))),
+    }
+}
+
+fn recording(name: &str, path: &Path) -> Result<OpenSource, SourceError> {
+    open_recording(path).map_err(|e| fault(name, e.to_string()))
+}
+
+/// `try-on` (the default), `leave`, `still`, `seated` or `empty`.
+fn routine(clip: &str) -> Result<Routine, String> {
+    Ok(match clip {
         "" | "try-on" => Routine::TryOn,
         "leave" => Routine::LeaveAndReturn,
         "still" => Routine::Still,
@@ -47,7 +83,11 @@ fn synth(clip: &str) -> Result<OpenSource, String> {
                 "`{other}` is no routine; there are try-on, leave, still, seated and empty"
             ));
         }
-    };
+    })
+}
+
+/// The synthetic person, without end.
+fn synth(routine: Routine) -> OpenSource {
     let sequence = Sequence::new(
         Actor::default(),
         Setting {
@@ -55,7 +95,7 @@ fn synth(clip: &str) -> Result<OpenSource, String> {
             ..Setting::default()
         },
     );
-    Ok(Box::new(SynthSource::new(sequence, None)))
+    Box::new(SynthSource::new(sequence, None))
 }
 
 #[cfg(test)]
@@ -67,9 +107,15 @@ mod tests {
         let mut s = open("pattern").expect("always there");
         let f = s.next_frame().expect("fine").expect("never ends");
         assert_eq!(f.depth.width(), s.calibration().depth.width);
+        assert!(
+            ["pattern", "synth", "synth:still"]
+                .iter()
+                .all(|s| check(s).is_ok())
+        );
         for bad in ["synth:handstand", "/nowhere/at/all"] {
             let e = open(bad).err().expect("refused").to_string();
             assert!(e.starts_with(bad), "{e}");
+            assert_eq!(check(bad).expect_err("refused").to_string(), e);
         }
     }
 }

@@ -5,6 +5,7 @@
 )]
 
 mod args;
+mod closed_output;
 mod commands;
 mod input;
 mod interrupt;
@@ -18,16 +19,26 @@ mod viewer;
 use args::{Cli, Command};
 use clap::Parser;
 use std::process::ExitCode;
+use tryon_kit::config::LogConfig;
+use tryon_kit::core_dump;
+use tryon_kit::process::EXIT_USAGE;
+use tryon_kit::telemetry;
 
 #[global_allocator]
 static ALLOCATOR: tryon_kit::forget::Zeroing = tryon_kit::forget::ZEROING;
 
 fn main() -> ExitCode {
+    core_dump::forbid();
     let cli = Cli::parse();
-    tracing_subscriber::fmt()
-        .with_env_filter(tracing_subscriber::EnvFilter::new(&cli.log))
-        .with_writer(std::io::stderr)
-        .init();
+    closed_output::end_when_closed(&cli.command);
+    let log = LogConfig {
+        level: cli.log,
+        ..LogConfig::default()
+    };
+    if let Err(why) = telemetry::init_logs(&log) {
+        eprintln!("tryon: --log: {why}");
+        return ExitCode::from(EXIT_USAGE);
+    }
     let outcome = match cli.command {
         Command::Demo(a) => commands::demo::run(&a),
         Command::Up(a) => commands::up::run(&a),

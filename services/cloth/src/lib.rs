@@ -23,6 +23,14 @@ use tryon_proto::v1::tracking_service_server::SERVICE_NAME as TRACKING;
 /// Largest request, bytes: a scene of a simulation, its checkpoint, and their message.
 const MAX_REQUEST_BYTES: usize = 5 * 1024 * 1024 + 4096;
 
+/// Checks the files that `[cloth]` names; garments at fault are logged.
+///
+/// # Errors
+/// When the folder, the body or a material of garments cannot be used.
+pub fn check(config: &Config) -> Result<(), StartError> {
+    library::Library::read(&config.cloth).map(drop)
+}
+
 /// Starts the service. The tracking service need not run yet.
 ///
 /// # Errors

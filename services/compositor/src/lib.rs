@@ -27,6 +27,7 @@ use axum::Router;
 use axum::body::Body;
 use axum::middleware::{Next, from_fn};
 use http::{Request, Response};
+use std::io::ErrorKind;
 use tonic_web::GrpcWebLayer;
 use tryon_kit::config::Config;
 use tryon_kit::hosts::Hosts;
@@ -43,11 +44,27 @@ async fn own_pages_only(hosts: Hosts, request: Request<Body>, next: Next) -> Res
     answer
 }
 
+/// Checks the folder of enrolment codes, which may be missing until the first code is drawn.
+///
+/// # Errors
+/// When it cannot be listed.
+pub fn check(config: &Config) -> Result<(), StartError> {
+    let folder = &config.auth.enrolments;
+    match std::fs::read_dir(folder) {
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(StartError::Config {
+            key: "auth.enrolments".into(),
+            why: format!("{}: {e}", folder.display()),
+        }),
+        _ => Ok(()),
+    }
+}
+
 /// Starts the service. The services behind it need not run yet.
 ///
 /// # Errors
-/// When an address cannot be bound or a URL is none.
+/// When a file of the configuration cannot be used, an address cannot be bound, or a URL is none.
 pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError> {
+    check(config)?;
     let c = &config.compositor;
     let photos = photos::Photos::default();
     let service = service::Compositor::new(c, &ctx, photos.clone())?;

@@ -2,16 +2,18 @@
 
 use clap::Parser;
 use std::process::ExitCode;
-use tryon_kit::process::{self, Args, BusRole};
+use tryon_kit::process::{self, Args, BusRole, Program};
 
 #[global_allocator]
 static ALLOCATOR: tryon_kit::forget::Zeroing = tryon_kit::forget::ZEROING;
 
 fn main() -> ExitCode {
-    process::run(
-        "compositor",
-        BusRole::Connect,
-        Args::parse(),
-        |config, ctx| async move { tryon_compositor::start(&config, ctx).await },
-    )
+    let program = Program {
+        name: "compositor",
+        role: BusRole::Connect,
+        check: tryon_compositor::check,
+    };
+    process::run(program, Args::parse(), |config, ctx| async move {
+        tryon_compositor::start(&config, ctx).await
+    })
 }

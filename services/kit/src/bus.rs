@@ -1,5 +1,7 @@
-//! Frame bus between processes over zenoh, the only file that names it: an embedded peer with explicit endpoints, no
-//! scouting, no router.
+//! Frame bus between processes over zenoh, the only file that names it: explicit endpoints, no scouting.
+//!
+//! The capture process is a peer that listens. Everybody else is a client, one session for each endpoint: a router hands
+//! frames on to clients, but between peers only with the gossip that is off here, and a capture process takes both.
 //!
 //! Publishing uses `Block`: transport-level dropping loses large messages silently (zenoh #2258). Newest-wins is the
 //! subscriber's ring of one: `put` takes 1.3 ms beside a subscriber of 100 ms a frame (default FIFO: 101 ms).
@@ -13,12 +15,16 @@ use crate::frames::{
 use crate::neighbours::Neighbours;
 use crate::queue::latest;
 use crate::seal::{KeyRing, Sealer, Unsealing};
+use crate::server::StartError;
+use std::collections::BTreeSet;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 use tokio::sync::watch;
 use tryon::camera::Calibration;
 use tryon_proto::v1::FrameKey;
 use zenoh::Wait;
+use zenoh::bytes::ZBytes;
 use zenoh::handlers::RingChannel;
 use zenoh::qos::CongestionControl;
 use zenoh::sample::{Locality, SampleKind};
@@ -28,6 +34,8 @@ use zenoh::sample::{Locality, SampleKind};
 const WAIT_BEFORE_CLOSE_US: u32 = 300_000;
 /// Silence after which a connection counts as dead (ms).
 const LEASE_MS: u32 = 2_000;
+/// Pause after a session that cannot be opened.
+const AFTER_FAULT: Duration = Duration::from_millis(500);
 /// First and longest pause between attempts to connect (ms): a restarted peer is found within a second.
 const RETRY_MS: (u32, u32) = (100, 500);
 
@@ -35,16 +43,17 @@ fn fault(e: impl std::fmt::Display) -> BusError {
     BusError(e.to_string())
 }
 
-/// Peer on the bus.
+/// Member of the bus.
 pub struct ZenohBus {
-    session: zenoh::Session,
+    /// A listening peer, or a client of each endpoint.
+    members: Vec<Member>,
     pool: Arc<Pool>,
     keys: Arc<KeyRing>,
     neighbours: Arc<Neighbours>,
 }
 
 impl ZenohBus {
-    /// Opens the peer without TLS and access control.
+    /// Joins without TLS and access control.
     ///
     /// # Errors
     /// As [`Self::open_with`].
@@ -56,8 +65,9 @@ impl ZenohBus {
         Self::open_with(Path::new(""), listen, connect, pool).await
     }
 
-    /// Opens the peer with the certificates and access control of a file of zenoh (JSON5); an empty path for none.
-    /// Endpoints are `tcp/ADDRESS:PORT`, `tls/HOST:PORT` or `unixsock-stream/PATH`; those to connect to may come up later.
+    /// Joins with the certificates and access control of a file of zenoh (JSON5); an empty path for none. Endpoints are
+    /// `tcp/ADDRESS:PORT`, `tls/HOST:PORT` or `unixsock-stream/PATH`; those to connect to, capture processes or routers, may
+    /// come up later.
     /// Requires a multi-threaded runtime.
     ///
     /// # Errors
@@ -68,41 +78,17 @@ impl ZenohBus {
         connect: &[String],
         pool: Arc<Pool>,
     ) -> Result<Arc<Self>, BusError> {
-        let mut c = if file.as_os_str().is_empty() {
-            zenoh::Config::default()
-        } else {
-            zenoh::Config::from_file(file)
-                .map_err(|e| BusError(format!("{}: {e}", file.display())))?
-        };
-        // A router hands frames on to clients; between peers it needs the gossip that is off here.
-        let is_behind_router = !file.as_os_str().is_empty() && listen.is_empty();
-        let mode = if is_behind_router { "client" } else { "peer" };
-        let list = |l: &[String]| format!("{l:?}");
-        let (init, max) = RETRY_MS;
-        let retry =
-            format!("{{period_init_ms: {init}, period_max_ms: {max}, period_increase_factor: 2}}");
-        let settings = [
-            ("mode", format!("\"{mode}\"")),
-            ("listen/endpoints", list(listen)),
-            ("connect/endpoints", list(connect)),
-            ("connect/timeout_ms", "-1".into()),
-            ("connect/exit_on_failure", "false".into()),
-            ("connect/retry", retry),
-            ("scouting/multicast/enabled", "false".into()),
-            ("scouting/gossip/enabled", "false".into()),
-            ("transport/link/tx/lease", LEASE_MS.to_string()),
-            (
-                "transport/link/tx/queue/congestion_control/block/wait_before_close",
-                WAIT_BEFORE_CLOSE_US.to_string(),
-            ),
-        ];
-        for (key, value) in &settings {
-            c.insert_json5(key, value)
-                .map_err(|e| BusError(format!("{key} = {value}: {e}")))?;
+        let mut members = Vec::new();
+        if !listen.is_empty() {
+            let session = zenoh::open(settings(file, "peer", listen, &[])?);
+            members.push(Member::open(session.await.map_err(fault)?));
         }
-        let session = zenoh::open(c).await.map_err(fault)?;
+        for endpoint in connect {
+            let endpoint = std::slice::from_ref(endpoint);
+            members.push(Member::opening(settings(file, "client", &[], endpoint)?));
+        }
         Ok(Arc::new(Self {
-            session,
+            members,
             pool,
             keys: Arc::default(),
             neighbours: Arc::default(),
@@ -110,10 +96,113 @@ impl ZenohBus {
     }
     /// Leaves the bus.
     pub async fn close(&self) {
-        if let Err(e) = self.session.close().await {
+        for member in &self.members {
+            member.close().await;
+        }
+    }
+}
+
+/// Configuration of a file of zenoh; the default for an empty path.
+fn of_file(file: &Path) -> Result<zenoh::Config, BusError> {
+    if file.as_os_str().is_empty() {
+        return Ok(zenoh::Config::default());
+    }
+    zenoh::Config::from_file(file).map_err(|e| BusError(format!("{}: {e}", file.display())))
+}
+
+/// Configuration of one session of zenoh.
+fn settings(
+    file: &Path,
+    mode: &str,
+    listen: &[String],
+    connect: &[String],
+) -> Result<zenoh::Config, BusError> {
+    let mut c = of_file(file)?;
+    let list = |l: &[String]| format!("{l:?}");
+    let (init, max) = RETRY_MS;
+    let retry =
+        format!("{{period_init_ms: {init}, period_max_ms: {max}, period_increase_factor: 2}}");
+    let settings = [
+        ("mode", format!("\"{mode}\"")),
+        ("listen/endpoints", list(listen)),
+        ("connect/endpoints", list(connect)),
+        ("connect/timeout_ms", "-1".into()),
+        ("connect/exit_on_failure", "false".into()),
+        ("connect/retry", retry),
+        ("scouting/multicast/enabled", "false".into()),
+        ("scouting/gossip/enabled", "false".into()),
+        ("transport/link/tx/lease", LEASE_MS.to_string()),
+        (
+            "transport/link/tx/queue/congestion_control/block/wait_before_close",
+            WAIT_BEFORE_CLOSE_US.to_string(),
+        ),
+    ];
+    for (key, value) in &settings {
+        c.insert_json5(key, value)
+            .map_err(|e| BusError(format!("{key} = {value}: {e}")))?;
+    }
+    Ok(c)
+}
+
+/// Checks the file of `bus.config`; an empty path for none.
+///
+/// # Errors
+/// Names the file that cannot be read, or the fault in it.
+pub fn check_file(file: &Path) -> Result<(), StartError> {
+    let fault = |BusError(why)| StartError::Config {
+        key: "bus.config".into(),
+        why,
+    };
+    settings(file, "client", &[], &[]).map(drop).map_err(fault)
+}
+
+/// Session of zenoh. A client's opens once its endpoint answers.
+struct Member {
+    session: watch::Receiver<Option<zenoh::Session>>,
+    _opening: Option<AbortOnDrop>,
+}
+
+impl Member {
+    fn open(session: zenoh::Session) -> Self {
+        Self {
+            session: watch::channel(Some(session)).1,
+            _opening: None,
+        }
+    }
+
+    fn opening(config: zenoh::Config) -> Self {
+        let (opened, session) = watch::channel(None);
+        let opening = tokio::spawn(async move {
+            loop {
+                match zenoh::open(config.clone()).await {
+                    Ok(s) => return drop(opened.send_replace(Some(s))),
+                    Err(e) => tracing::warn!(error = %e, "cannot join the bus yet"),
+                }
+                tokio::time::sleep(AFTER_FAULT).await;
+            }
+        });
+        Self {
+            session,
+            _opening: Some(AbortOnDrop(opening)),
+        }
+    }
+
+    async fn close(&self) {
+        let session = self.session.borrow().clone();
+        if let Some(session) = session
+            && let Err(e) = session.close().await
+        {
             tracing::debug!(error = %e, "closing the bus");
         }
     }
+}
+
+/// The session, once it is open.
+async fn opened(
+    mut session: watch::Receiver<Option<zenoh::Session>>,
+) -> Result<zenoh::Session, BusError> {
+    let opened = session.wait_for(Option::is_some).await.map_err(fault)?;
+    opened.clone().ok_or_else(|| BusError("closed".into()))
 }
 
 /// Endpoint `tcp/127.0.0.1:PORT` on a port that is free now; zenoh does not report the port it got for port 0.
@@ -127,13 +216,114 @@ pub fn free_tcp_endpoint() -> std::io::Result<String> {
     Ok(format!("tcp/127.0.0.1:{port}"))
 }
 
-struct ZenohPublisher {
-    key: CameraKey,
+/// Sessions in which a camera is alive.
+struct Life {
+    seen_in: Mutex<BTreeSet<usize>>,
+    set_alive: watch::Sender<bool>,
+}
+
+impl Life {
+    fn change(&self, session: usize, is_alive: bool) {
+        let mut seen_in = self.seen_in.lock().unwrap_or_else(PoisonError::into_inner);
+        if is_alive {
+            seen_in.insert(session);
+        } else {
+            seen_in.remove(&session);
+        }
+        self.set_alive.send_replace(!seen_in.is_empty());
+    }
+}
+
+/// A camera published in one session.
+struct Line {
     frames: Arc<zenoh::pubsub::Publisher<'static>>,
-    pool: Arc<Pool>,
-    neighbours: Arc<Neighbours>,
     _calibration: zenoh::query::Queryable<()>,
     _alive: zenoh::liveliness::LivelinessToken,
+}
+
+impl Line {
+    async fn open(
+        session: &zenoh::Session,
+        key: &CameraKey,
+        calibration: Vec<u8>,
+    ) -> Result<Self, BusError> {
+        let frames = session
+            .declare_publisher(key.rgbd())
+            .allowed_destination(Locality::Remote)
+            .congestion_control(CongestionControl::Block);
+        let reply = move |q: zenoh::query::Query| {
+            if let Err(e) = q.reply(q.key_expr().clone(), calibration.clone()).wait() {
+                tracing::debug!(error = %e, "a calibration query went unanswered");
+            }
+        };
+        let answers = session.declare_queryable(key.calibration()).callback(reply);
+        Ok(Self {
+            frames: Arc::new(frames.await.map_err(fault)?),
+            _calibration: answers.await.map_err(fault)?,
+            _alive: (session.liveliness().declare_token(key.alive()))
+                .await
+                .map_err(fault)?,
+        })
+    }
+
+    /// Somebody subscribes, as far as is known.
+    async fn is_wanted(&self) -> bool {
+        let matching = self.frames.matching_status().await;
+        !matching.is_ok_and(|others| !others.matching())
+    }
+}
+
+/// A camera that is followed in one session.
+struct Followed {
+    key: CameraKey,
+    queue: Arc<latest::Sender<Packet>>,
+    /// Number of the session.
+    number: usize,
+    life: Arc<Life>,
+}
+
+impl Followed {
+    /// Queues frames, and tells whether the camera is alive, from the moment in which the session is open.
+    async fn follow(self, session: watch::Receiver<Option<zenoh::Session>>) {
+        let key = self.key.clone();
+        if let Err(e) = self.pump(session).await {
+            tracing::error!(camera = %key, error = %e, "cannot subscribe");
+        }
+    }
+
+    async fn pump(self, session: watch::Receiver<Option<zenoh::Session>>) -> Result<(), BusError> {
+        let session = opened(session).await?;
+        let ring = session
+            .declare_subscriber(self.key.rgbd())
+            .allowed_origin(Locality::Remote)
+            .with(RingChannel::new(1))
+            .await
+            .map_err(fault)?;
+        let (number, life) = (self.number, self.life);
+        let on_liveliness = move |s: zenoh::sample::Sample| {
+            life.change(number, s.kind() == SampleKind::Put);
+        };
+        let life = session
+            .liveliness()
+            .declare_subscriber(self.key.alive())
+            .history(true)
+            .callback(on_liveliness);
+        let _life = life.await.map_err(fault)?;
+        while let Ok(sample) = ring.recv_async().await {
+            let payload = sample.payload().to_bytes().into_owned();
+            if !self.queue.send(Packet::Sealed(payload)) {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+struct ZenohPublisher {
+    key: CameraKey,
+    lines: Vec<Line>,
+    pool: Arc<Pool>,
+    neighbours: Arc<Neighbours>,
 }
 
 impl FramePublisher for ZenohPublisher {
@@ -141,12 +331,17 @@ impl FramePublisher for ZenohPublisher {
         &mut self,
         exposure: Arc<Exposure>,
         sealer: Arc<Sealer>,
-    ) -> BoxFuture<'_, Result<(), BusError>> {
-        self.neighbours.send(&self.key, &exposure);
+    ) -> BoxFuture<'_, Result<bool, BusError>> {
+        let has_neighbours = self.neighbours.send(&self.key, &exposure);
         Box::pin(async move {
-            let matching = self.frames.matching_status().await;
-            if matching.is_ok_and(|others| !others.matching()) {
-                return Ok(());
+            let mut wanted = Vec::new();
+            for line in &self.lines {
+                if line.is_wanted().await {
+                    wanted.push(line.frames.clone());
+                }
+            }
+            if wanted.is_empty() {
+                return Ok(has_neighbours);
             }
             let key = self.key.clone();
             let pack = move || {
@@ -154,12 +349,12 @@ impl FramePublisher for ZenohPublisher {
                 sealer.seal(&key, &message).map_err(|e| e.to_string())
             };
             let bytes = self.pool.run(pack).await.map_err(fault)?.map_err(fault)?;
-            let frames = self.frames.clone();
             // `put` may block on a stalled peer: not on an async worker.
-            tokio::task::spawn_blocking(move || frames.put(bytes).wait())
-                .await
-                .map_err(fault)?
-                .map_err(fault)
+            let bytes = ZBytes::from(bytes);
+            let put = move || (wanted.iter()).try_for_each(|f| f.put(bytes.clone()).wait());
+            let put = tokio::task::spawn_blocking(put);
+            put.await.map_err(fault)?.map_err(fault)?;
+            Ok(true)
         })
     }
 }
@@ -174,37 +369,16 @@ impl FrameBus for ZenohBus {
         let answer = tryon_proto::convert::geometry::calibration_to_wire(calibration);
         let answer = tryon_proto::Message::encode_to_vec(&answer);
         Box::pin(async move {
-            let frames = self
-                .session
-                .declare_publisher(key.rgbd())
-                .allowed_destination(Locality::Remote)
-                .congestion_control(CongestionControl::Block);
-            let frames = Arc::new(frames.await.map_err(fault)?);
-            let name = key.calibration();
-            let reply = move |q: zenoh::query::Query| {
-                if let Err(e) = q.reply(q.key_expr().clone(), answer.clone()).wait() {
-                    tracing::debug!(error = %e, "a calibration query went unanswered");
-                }
-            };
-            let calibration = self
-                .session
-                .declare_queryable(name)
-                .callback(reply)
-                .await
-                .map_err(fault)?;
-            let alive = self
-                .session
-                .liveliness()
-                .declare_token(key.alive())
-                .await
-                .map_err(fault)?;
+            let mut lines = Vec::new();
+            for member in &self.members {
+                let session = opened(member.session.clone()).await?;
+                lines.push(Line::open(&session, &key, answer.clone()).await?);
+            }
             let p = ZenohPublisher {
                 key,
-                frames,
+                lines,
                 pool: self.pool.clone(),
                 neighbours: self.neighbours.clone(),
-                _calibration: calibration,
-                _alive: alive,
             };
             Ok(Box::new(p) as Box<dyn FramePublisher>)
         })
@@ -213,41 +387,31 @@ impl FrameBus for ZenohBus {
     fn subscribe(&self, key: &CameraKey) -> BoxFuture<'_, Result<FrameSubscription, BusError>> {
         let key = key.clone();
         Box::pin(async move {
-            let ring = self
-                .session
-                .declare_subscriber(key.rgbd())
-                .allowed_origin(Locality::Remote)
-                .with(RingChannel::new(1))
-                .await
-                .map_err(fault)?;
             let (tx, packets) = latest::channel();
             let tx = Arc::new(tx);
             self.neighbours.add(&key, &tx);
-            let pump = tokio::spawn(async move {
-                while let Ok(sample) = ring.recv_async().await {
-                    let payload = sample.payload().to_bytes().into_owned();
-                    if !tx.send(Packet::Sealed(payload)) {
-                        return;
-                    }
-                }
-            });
             let (set_alive, alive) = watch::channel(false);
-            let on_liveliness = move |s: zenoh::sample::Sample| {
-                set_alive.send_replace(s.kind() == SampleKind::Put);
+            let life = Arc::new(Life {
+                seen_in: Mutex::default(),
+                set_alive,
+            });
+            let follow = |(k, member): (usize, &Member)| {
+                let camera = Followed {
+                    key: key.clone(),
+                    queue: tx.clone(),
+                    number: k,
+                    life: life.clone(),
+                };
+                AbortOnDrop(tokio::spawn(camera.follow(member.session.clone())))
             };
-            let life = self
-                .session
-                .liveliness()
-                .declare_subscriber(key.alive())
-                .history(true)
-                .callback(on_liveliness);
-            let life = life.await.map_err(fault)?;
-            let guard = Box::new((AbortOnDrop(pump), life));
+            let followed: Vec<_> = self.members.iter().enumerate().map(follow).collect();
+            let guard = Box::new((followed, tx, life));
+            let keys = Unsealing::new(self.keys.clone(), key);
             Ok(FrameSubscription::new(
                 packets,
                 alive,
                 self.pool.clone(),
-                Unsealing::new(self.keys.clone(), key),
+                keys,
                 guard,
             ))
         })
@@ -283,5 +447,26 @@ mod tests {
         crate::frames::tests::fulfils_the_contract(camera.as_ref(), camera.as_ref()).await;
         late.close().await;
         camera.close().await;
+    }
+
+    #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+    async fn frames_cross_the_shipped_router() {
+        let [at_camera, at_router] = [(); 2].map(|()| free_tcp_endpoint().expect("a port"));
+        let shipped = include_str!("../../../deploy/zenoh/router.json5")
+            .replace("tcp/0.0.0.0:7447", &at_router)
+            .replace("tcp/capture:7447", &at_camera);
+        let pool = Pool::new(1).expect("a thread");
+        let reader = ZenohBus::open(&[], std::slice::from_ref(&at_router), pool.clone())
+            .await
+            .expect("opens before the router");
+        let camera = ZenohBus::open(std::slice::from_ref(&at_camera), &[], pool)
+            .await
+            .expect("listens");
+        let router = zenoh::Config::from_json5(&shipped).expect("a configuration");
+        let router = zenoh::open(router).await.expect("a router");
+        crate::frames::tests::fulfils_the_contract(camera.as_ref(), reader.as_ref()).await;
+        reader.close().await;
+        camera.close().await;
+        router.close().await.expect("closes");
     }
 }

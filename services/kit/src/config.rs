@@ -83,6 +83,9 @@ impl Config {
     pub fn validate(&self) -> Result<(), ConfigError> {
         use tryon_proto::keys::is_name;
         let fault = |key: &str, why: &str| Err(ConfigError(format!("{key}: {why}")));
+        if let Err(why) = self.log.check_level() {
+            return fault("log.level", &why);
+        }
         if !is_name(&self.capture.store) {
             return fault("capture.store", NAME);
         }
@@ -163,8 +166,9 @@ impl Config {
             ("compositor.cloth", &self.compositor.cloth),
             ("compositor.capture", &self.compositor.capture),
         ] {
-            if !(url.starts_with("http://") || url.starts_with("https://")) {
-                return fault(key, "a URL such as http://127.0.0.1:50052 is needed");
+            let is_http = url.starts_with("http://") || url.starts_with("https://");
+            if !is_http || url.parse::<http::Uri>().is_err() {
+                return fault(key, "a URL such as http://127.0.0.1:7452 is needed");
             }
             if url.starts_with("https://") && !self.tls.is_client() {
                 return fault(key, "https needs tls.ca, the authority of that service");
@@ -301,5 +305,26 @@ mod tests {
             .expect_err("a slash")
             .to_string();
         assert!(e.starts_with("capture.store"), "{e}");
+    }
+
+    #[test]
+    fn log_filters_are_levels_and_modules_with_levels() {
+        let check = |level: &str| Config::load(None, &[format!("log.level=\"{level}\"")]);
+        for good in ["info", "OFF", "warn,tryon_cloth::engine=trace,a-b=off"] {
+            assert!(check(good).is_ok(), "{good}");
+        }
+        for bad in [
+            "loud",
+            "",
+            "info,",
+            "info, a=off",
+            "zenoh",
+            "a=loud",
+            "=info",
+        ] {
+            let e = check(bad).expect_err(bad).to_string();
+            let part = bad.rsplit(',').next().unwrap_or_default();
+            assert!(e.starts_with(&format!("log.level: `{part}` is ")), "{e}");
+        }
     }
 }

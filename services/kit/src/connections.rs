@@ -1,14 +1,17 @@
 //! Accepted connections: no delay, a limit on their number, an end for those on which nothing moves.
 
+mod descriptors;
+mod seats;
+
+pub(crate) use seats::Seat;
+
 use futures::Stream;
-use futures::task::AtomicWaker;
-use std::collections::BTreeMap;
+use seats::{Directory, counted};
 use std::future::Future;
 use std::io;
-use std::net::{IpAddr, SocketAddr};
+use std::net::SocketAddr;
 use std::pin::Pin;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
@@ -19,15 +22,17 @@ use tonic::transport::server::{Connected, TcpConnectInfo};
 /// Bytes that may wait unsent in a socket; Linux keeps up to 4 MB otherwise. Less costs more wakeups.
 #[cfg(target_os = "linux")]
 const UNSENT_BYTES: u32 = 16 * 1024;
+/// First byte of a TLS connection: the type of a record with a handshake (RFC 8446, 5.1).
+const TLS_HANDSHAKE: u8 = 22;
 
 /// Limits of one port.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
-    /// Most connections: a soft limit of 1024 descriptors leaves as many again for everything else. When all are taken,
-    /// the oldest that never sent a byte makes place; if there is none, the new one is closed.
+    /// Most connections. When all are taken, one that has proved nothing ends for the next; if there is none, the new
+    /// one is closed.
     pub(crate) connections: usize,
-    /// Most connections of one address; further ones are closed. The machine's own clients share its loopback address and
-    /// have no such limit.
+    /// Most connections of one address, or of one /64 of IPv6; beyond it one of them ends for the next. The machine's
+    /// own clients share its loopback address and have no such limit.
     pub(crate) per_peer: usize,
     /// Time without a byte in either direction after which a connection is closed. HTTP/2 is pinged twice in it, and
     /// every stream of HTTP/1.1 sends twice a second, so only stuck peers and unused connections reach it.
@@ -37,63 +42,22 @@ pub(crate) struct Limits {
 impl Default for Limits {
     fn default() -> Self {
         Self {
-            connections: 512,
+            connections: descriptors::seats(),
             per_peer: 64,
             idle: Duration::from_secs(10),
         }
     }
 }
 
-/// Seat of one connection.
-#[derive(Default)]
-struct Seat {
-    is_evicted: AtomicBool,
-    waker: AtomicWaker,
-}
-
-/// Taken seats in order of arrival; those that never sent a byte apart.
-#[derive(Default)]
-struct Seats {
-    next: u64,
-    silent: BTreeMap<u64, Arc<Seat>>,
-    taken: usize,
-    /// Taken seats by address, of other machines.
-    peers: BTreeMap<IpAddr, usize>,
-}
-
-type Directory = Arc<Mutex<Seats>>;
-
-fn with<R>(seats: &Directory, f: impl FnOnce(&mut Seats) -> R) -> R {
-    f(&mut seats.lock().unwrap_or_else(PoisonError::into_inner))
-}
-
-/// Address whose connections are counted; `None` for this machine's own.
-fn counted(peer: SocketAddr) -> Option<IpAddr> {
-    Some(peer.ip().to_canonical()).filter(|ip| !ip.is_loopback())
-}
-
-/// Takes a seat; `None` when its address has too many, or all are taken by connections that have spoken.
-fn take_seat(seats: &Directory, limits: &Limits, peer: Option<IpAddr>) -> Option<(u64, Arc<Seat>)> {
-    with(seats, |s| {
-        let of_peer = peer.map_or(0, |ip| s.peers.get(&ip).copied().unwrap_or(0));
-        if of_peer >= limits.per_peer {
-            return None;
+impl Limits {
+    /// Limits of a port of probes.
+    pub(crate) fn of_probes() -> Self {
+        Self {
+            connections: descriptors::PROBES,
+            per_peer: descriptors::PROBES / 2,
+            ..Self::default()
         }
-        if s.taken >= limits.connections {
-            let (_, oldest) = s.silent.pop_first()?;
-            oldest.is_evicted.store(true, Ordering::Release);
-            oldest.waker.wake();
-            metrics::counter!("tryon_connections_evicted").increment(1);
-        }
-        let (number, seat) = (s.next, Arc::<Seat>::default());
-        s.next += 1;
-        s.taken += 1;
-        if let Some(ip) = peer {
-            *s.peers.entry(ip).or_default() += 1;
-        }
-        s.silent.insert(number, seat.clone());
-        Some((number, seat))
-    })
+    }
 }
 
 /// Connections of a listener within limits. Errors of single connections are left out; a listener without descriptors
@@ -117,8 +81,7 @@ pub(crate) fn accept(
             let _ = stream.set_nodelay(true);
             #[cfg(target_os = "linux")]
             let _ = socket2::SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT_BYTES);
-            let peer = counted(peer);
-            let Some((number, seat)) = take_seat(&seats, &limits, peer) else {
+            let Some(seat) = seats.take(&limits, counted(peer)) else {
                 metrics::counter!("tryon_connections_refused").increment(1);
                 continue;
             };
@@ -128,11 +91,7 @@ pub(crate) fn accept(
                 idle: limits.idle,
                 moved: now,
                 timer: Box::pin(tokio::time::sleep_until(now + limits.idle)),
-                number,
-                has_spoken: false,
-                peer,
                 seat,
-                seats: seats.clone(),
             };
             return Some((Ok(connection), (listener, seats)));
         }
@@ -146,20 +105,34 @@ pub(crate) struct Connection {
     /// Last byte in either direction.
     moved: Instant,
     timer: Pin<Box<Sleep>>,
-    number: u64,
-    has_spoken: bool,
-    /// Address under which it is counted.
-    peer: Option<IpAddr>,
     seat: Arc<Seat>,
-    seats: Directory,
 }
 
 impl Connection {
+    /// Its seat, which its calls mark.
+    pub(crate) fn seat(&self) -> Arc<Seat> {
+        self.seat.clone()
+    }
+
+    /// Its first byte, which stays unread, is that of TLS.
+    ///
+    /// # Errors
+    /// When it ends before.
+    pub(crate) async fn begins_tls(&mut self) -> io::Result<bool> {
+        let mut first = [0];
+        std::future::poll_fn(|cx| {
+            let mut buffer = ReadBuf::new(&mut first);
+            let peeked = self.stream.poll_peek(cx, &mut buffer);
+            self.or_end(cx, peeked)
+        })
+        .await?;
+        Ok(first[0] == TLS_HANDSHAKE)
+    }
+
     /// Error of a connection that waits for too long or is evicted; else the task is woken when it will be.
     fn poll_end(&mut self, cx: &mut Context<'_>) -> Poll<io::Error> {
-        self.seat.waker.register(cx.waker());
-        if self.seat.is_evicted.load(Ordering::Acquire) {
-            return Poll::Ready(io::ErrorKind::ConnectionAborted.into());
+        if self.seat.poll_end(cx).is_ready() {
+            return Poll::Ready(ended());
         }
         loop {
             ready!(self.timer.as_mut().poll(cx));
@@ -172,41 +145,29 @@ impl Connection {
         }
     }
 
-    fn on_read(&mut self) {
-        self.moved = Instant::now();
-        if !self.has_spoken {
-            self.has_spoken = true;
-            with(&self.seats, |s| s.silent.remove(&self.number));
-        }
-    }
-
-    /// Passes on a result of the socket; while it waits, looks for the end of the connection.
+    /// Passes on a result of the socket, unless the connection must end.
     fn or_end<T>(
         &mut self,
         cx: &mut Context<'_>,
         result: Poll<io::Result<T>>,
     ) -> Poll<io::Result<T>> {
         match result {
+            // A flood is always ready: it must not outrun its end.
+            Poll::Ready(_) if self.seat.is_ended() => Poll::Ready(Err(ended())),
             Poll::Ready(r) => Poll::Ready(r),
             Poll::Pending => self.poll_end(cx).map(Err),
         }
     }
 }
 
+/// Error of a connection whose seat was taken back.
+fn ended() -> io::Error {
+    io::ErrorKind::ConnectionAborted.into()
+}
+
 impl Drop for Connection {
     fn drop(&mut self) {
-        with(&self.seats, |s| {
-            s.silent.remove(&self.number);
-            s.taken -= 1;
-            if let Some(ip) = self.peer
-                && let Some(count) = s.peers.get_mut(&ip)
-            {
-                *count -= 1;
-                if *count == 0 {
-                    s.peers.remove(&ip);
-                }
-            }
-        });
+        self.seat.leave();
     }
 }
 
@@ -231,7 +192,7 @@ impl AsyncRead for Connection {
         let before = buf.filled().len();
         let result = Pin::new(&mut self.stream).poll_read(cx, buf);
         if buf.filled().len() > before {
-            self.on_read();
+            self.moved = Instant::now();
         }
         self.or_end(cx, result)
     }
@@ -333,44 +294,43 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn the_oldest_silent_connection_makes_place_and_speakers_do_not() {
+    async fn a_stranger_ends_for_a_newcomer_and_a_proven_connection_does_not() {
         let limits = Limits {
             connections: 2,
             ..Limits::default()
         };
         let (address, mut accepted) = port(limits).await;
-        let mut speaker = TcpStream::connect(address).await.expect("connects");
-        let mut spoken = accepted.next().await.expect("open").expect("accepted");
-        speaker.write_all(b"x").await.expect("sent");
-        spoken.read_u8().await.expect("spoken");
-        let _silent = TcpStream::connect(address).await.expect("connects");
-        let mut silent = accepted.next().await.expect("open").expect("accepted");
-        let mut third = TcpStream::connect(address).await.expect("connects");
-        let mut heard = accepted.next().await.expect("open").expect("accepted");
-        let end = silent.read_u8().await.expect_err("evicted");
+        let mut clients = Vec::new();
+        let mut next = async || {
+            let client = TcpStream::connect(address).await;
+            clients.push(client.expect("connects"));
+            let next = tokio::time::timeout(Duration::from_millis(100), accepted.next()).await;
+            next.ok().map(|c| c.expect("open").expect("accepted"))
+        };
+        let proven = next().await.expect("a seat");
+        proven.seat().prove();
+        let mut stranger = next().await.expect("a seat");
+        stranger.seat().speak();
+        let newcomer = next().await.expect("the stranger's seat");
+        newcomer.seat().prove();
+        let end = stranger.read_u8().await.expect_err("evicted");
         assert_eq!(end.kind(), io::ErrorKind::ConnectionAborted);
 
-        drop(silent);
-        third.write_all(b"x").await.expect("sent");
-        heard.read_u8().await.expect("spoken");
-        let mut fourth = TcpStream::connect(address).await.expect("connects");
-        let refused = tokio::time::timeout(Duration::from_millis(100), accepted.next()).await;
-        assert!(refused.is_err(), "two speakers have both seats");
-        assert_eq!(fourth.read(&mut [0]).await.unwrap_or(0), 0, "closed");
+        drop(stranger);
+        assert!(next().await.is_none(), "both are proven");
+        drop(newcomer);
+        assert!(next().await.is_some());
     }
 
-    #[test]
-    fn another_machine_has_its_share_of_the_seats_and_this_one_all() {
-        let limits = Limits {
-            per_peer: 2,
-            ..Limits::default()
-        };
-        let seats = Directory::default();
-        let far: SocketAddr = "192.0.2.1:9".parse().expect("an address");
-        let near: SocketAddr = "[::ffff:127.0.0.1]:9".parse().expect("an address");
-        let take = |peer| take_seat(&seats, &limits, counted(peer)).is_some();
-        assert_eq!([far, far, far].map(take), [true, true, false]);
-        assert_eq!([near, near, near].map(take), [true; 3]);
-        assert_eq!(with(&seats, |s| (s.taken, s.peers.len())), (5, 1));
+    #[tokio::test]
+    async fn the_first_byte_tells_tls_and_stays_unread() {
+        let (address, mut accepted) = port(Limits::default()).await;
+        for (first, expected) in [(TLS_HANDSHAKE, true), (b'G', false)] {
+            let mut client = TcpStream::connect(address).await.expect("connects");
+            let mut c = accepted.next().await.expect("open").expect("accepted");
+            client.write_u8(first).await.expect("sent");
+            assert_eq!(c.begins_tls().await.expect("a byte"), expected);
+            assert_eq!(c.read_u8().await.expect("a byte"), first);
+        }
     }
 }

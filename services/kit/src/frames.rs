@@ -42,12 +42,12 @@ pub trait FrameBus: Send + Sync {
 
 /// Publishing end of one camera.
 pub trait FramePublisher: Send {
-    /// Publishes one exposure, sealed wherever it leaves the process.
+    /// Publishes one exposure, sealed wherever it leaves the process; true when somebody receives it.
     fn send(
         &mut self,
         exposure: Arc<Exposure>,
         sealer: Arc<Sealer>,
-    ) -> BoxFuture<'_, Result<(), BusError>>;
+    ) -> BoxFuture<'_, Result<bool, BusError>>;
 }
 
 /// Exposure in a subscriber's queue: unpacked inside one process, sealed between processes.
@@ -202,14 +202,15 @@ impl FramePublisher for LocalPublisher {
         &mut self,
         exposure: Arc<Exposure>,
         _: Arc<Sealer>,
-    ) -> BoxFuture<'_, Result<(), BusError>> {
+    ) -> BoxFuture<'_, Result<bool, BusError>> {
         let mut list = self
             .0
             .subscribers
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
         list.retain(|s| s.send(Packet::Ready(exposure.clone())));
-        Box::pin(std::future::ready(Ok(())))
+        let is_received = !list.is_empty();
+        Box::pin(std::future::ready(Ok(is_received)))
     }
 }
 

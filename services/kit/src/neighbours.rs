@@ -18,12 +18,13 @@ impl Neighbours {
             .push(Arc::downgrade(queue));
     }
 
-    /// Hands an exposure to all subscribers of a camera.
-    pub(crate) fn send(&self, camera: &CameraKey, exposure: &Arc<Exposure>) {
+    /// Hands an exposure to all subscribers of a camera; true when there is one.
+    pub(crate) fn send(&self, camera: &CameraKey, exposure: &Arc<Exposure>) -> bool {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(queues) = all.get_mut(camera) {
-            queues
-                .retain(|q| (q.upgrade()).is_some_and(|q| q.send(Packet::Ready(exposure.clone()))));
-        }
+        let Some(queues) = all.get_mut(camera) else {
+            return false;
+        };
+        queues.retain(|q| (q.upgrade()).is_some_and(|q| q.send(Packet::Ready(exposure.clone()))));
+        !queues.is_empty()
     }
 }

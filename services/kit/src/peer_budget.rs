@@ -17,11 +17,36 @@ pub(crate) struct Allowance {
     pub(crate) per_second: f64,
 }
 
-#[derive(Clone, Copy)]
-struct Bucket {
+/// Budget of one peer, or of one connection.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bucket {
+    allowance: Allowance,
     /// Events that were left at `at`.
     left: f64,
     at: Instant,
+}
+
+impl Bucket {
+    pub(crate) fn full(allowance: Allowance, at: Instant) -> Self {
+        Self {
+            allowance,
+            left: allowance.burst,
+            at,
+        }
+    }
+
+    /// Takes one event, if one is left.
+    pub(crate) fn take(&mut self, now: Instant) -> bool {
+        let left = self.left(now);
+        let is_left = left >= 1.0;
+        (self.left, self.at) = (if is_left { left - 1.0 } else { left }, now);
+        is_left
+    }
+
+    fn left(&self, now: Instant) -> f64 {
+        let gained = now.saturating_duration_since(self.at).as_secs_f64();
+        (self.left + gained * self.allowance.per_second).min(self.allowance.burst)
+    }
 }
 
 /// Buckets of all peers.
@@ -41,36 +66,26 @@ impl PeerBudget {
     /// The peer has no event left.
     pub(crate) fn is_spent(&self, peer: IpAddr, now: Instant) -> bool {
         let peers = self.peers.lock().unwrap_or_else(PoisonError::into_inner);
-        (peers.get(&group(peer))).is_some_and(|b| self.left(b, now) < 1.0)
+        (peers.get(&group(peer))).is_some_and(|b| b.left(now) < 1.0)
     }
 
     /// Takes one event from the budget of the peer.
     pub(crate) fn record(&self, peer: IpAddr, now: Instant) {
         let mut peers = self.peers.lock().unwrap_or_else(PoisonError::into_inner);
         if peers.len() >= MAX_PEERS {
-            peers.retain(|_, b| self.left(b, now) < self.allowance.burst);
+            peers.retain(|_, b| b.left(now) < self.allowance.burst);
         }
         if peers.len() >= MAX_PEERS {
             // A flood from thousands of addresses: forgetting it keeps memory bounded, and costs it one burst each.
             peers.clear();
         }
-        let full = Bucket {
-            left: self.allowance.burst,
-            at: now,
-        };
-        let bucket = peers.entry(group(peer)).or_insert(full);
-        let left = (self.left(bucket, now) - 1.0).max(0.0);
-        *bucket = Bucket { left, at: now };
-    }
-
-    fn left(&self, bucket: &Bucket, now: Instant) -> f64 {
-        let gained = now.saturating_duration_since(bucket.at).as_secs_f64();
-        (bucket.left + gained * self.allowance.per_second).min(self.allowance.burst)
+        let full = Bucket::full(self.allowance, now);
+        let _ = peers.entry(group(peer)).or_insert(full).take(now);
     }
 }
 
-/// One customer of a network holds a whole /64 of IPv6.
-fn group(peer: IpAddr) -> IpAddr {
+/// Addresses that are counted together: one customer of a network holds a whole /64 of IPv6.
+pub(crate) fn group(peer: IpAddr) -> IpAddr {
     match peer.to_canonical() {
         IpAddr::V6(a) => Ipv6Addr::from(u128::from(a) & (u128::MAX << 64)).into(),
         v4 => v4,

@@ -1,10 +1,12 @@
 //! A service as a process: parse, validate (exit 64), build, announce addresses, serve, drain, report the end.
 
-use crate::auth::Auth;
-use crate::bus::ZenohBus;
+use crate::auth::{Auth, Issuer};
+use crate::bus::{self, ZenohBus};
 use crate::compute::Pool;
 use crate::config::Config;
+use crate::core_dump;
 use crate::drain::{self, Drained};
+use crate::flow::Stalls;
 use crate::frame_trace;
 use crate::server::{Context, Running, StartError};
 use crate::supervisor;
@@ -37,7 +39,7 @@ pub struct Args {
     /// Lets addresses beyond loopback be bound without TLS and tokens: anybody who reaches them sees the person.
     #[arg(long)]
     pub insecure: bool,
-    /// Checks the configuration and ends.
+    /// Checks the configuration and the files that it names, and ends.
     #[arg(long)]
     pub check: bool,
 }
@@ -47,8 +49,55 @@ pub struct Args {
 pub enum BusRole {
     /// Listens: capture.
     Listen,
-    /// Connects: everyone else.
+    /// Connects: who takes frames.
     Connect,
+    /// Has no business there: cloth.
+    Apart,
+}
+
+/// Opens the files that a service's part of the configuration names.
+///
+/// # Errors
+/// Names the first key at fault.
+pub type Check = fn(&Config) -> Result<(), StartError>;
+
+/// A service as its program runs it.
+#[derive(Debug, Clone, Copy)]
+pub struct Program {
+    /// Its name, as in the configuration.
+    pub name: &'static str,
+    /// Its end of the bus.
+    pub role: BusRole,
+    /// Check of its files. Its start makes the same.
+    pub check: Check,
+}
+
+/// Exit status of a process that could not start or broke: [`EXIT_USAGE`] where the configuration is at fault.
+pub fn exit_code(e: &StartError) -> ExitCode {
+    ExitCode::from(match e {
+        StartError::Config { .. } | StartError::Auth(_) | StartError::Tls(_) => EXIT_USAGE,
+        StartError::Bind { .. } | StartError::Bus(_) | StartError::Broken { .. } => EXIT_BROKEN,
+    })
+}
+
+/// Files of the configuration that every process opens, read; tasks of the runtime follow them.
+pub struct CommonFiles {
+    /// Files of `[auth]`.
+    pub auth: Auth,
+    /// Files of `[tls]`.
+    pub tls: Tls,
+}
+
+impl CommonFiles {
+    /// Opens the files of `[auth]` and `[tls]`, and checks that of `bus.config`. `own` as for [`Auth::open`].
+    ///
+    /// # Errors
+    /// Names the key whose file cannot be used.
+    pub fn open(config: &Config, own: Option<&Issuer>) -> Result<Self, StartError> {
+        let (auth, tls) = (Auth::open(config, own)?, Tls::open(&config.tls)?);
+        bus::check_file(&config.bus.config)?;
+        Ok(Self { auth, tls })
+    }
 }
 
 /// Writes a line to standard output for supervisors and tests.
@@ -61,25 +110,27 @@ fn complain(name: &str, why: &str) {
 }
 
 /// Runs one service to its end.
-pub fn run<F, Fut>(name: &'static str, role: BusRole, args: Args, start: F) -> ExitCode
+pub fn run<F, Fut>(program: Program, args: Args, start: F) -> ExitCode
 where
     F: FnOnce(Config, Context) -> Fut,
     Fut: Future<Output = Result<Running, StartError>>,
 {
+    core_dump::forbid();
+    let name = program.name;
     let mut set = args.set;
     set.extend(args.insecure.then(|| INSECURE.to_owned()));
     let config = Config::load(args.config.as_deref(), &set).map_err(|e| e.to_string());
-    let config = match config.and_then(|c| crate::telemetry::init_logs(&c.log).map(|()| c)) {
+    let logged = |c: Config| match crate::telemetry::init_logs(&c.log) {
+        Ok(()) => Ok(c),
+        Err(why) => Err(format!("log.level: {why}")),
+    };
+    let config = match config.and_then(logged) {
         Ok(c) => c,
         Err(why) => {
             complain(name, &why);
             return ExitCode::from(EXIT_USAGE);
         }
     };
-    if args.check {
-        say(&format!("{name}: the configuration is fine"));
-        return ExitCode::SUCCESS;
-    }
     let grace = Duration::from_millis(config.process.grace_ms);
     let runtime = match tokio::runtime::Builder::new_multi_thread()
         .enable_all()
@@ -91,39 +142,44 @@ where
             return ExitCode::from(EXIT_BROKEN);
         }
     };
-    let end = runtime.block_on(serve(name, role, config, start, grace));
+    let end = runtime.block_on(async {
+        if args.check {
+            check(&program, &config).map(|()| "the configuration is fine".to_owned())
+        } else {
+            let end = serve(program, config, start, grace).await;
+            end.map(|drained| farewell(drained, grace))
+        }
+    });
     // Tasks that outlive the deadline are cut.
     runtime.shutdown_timeout(Duration::from_millis(100));
     match end {
-        Ok(Drained::Clean) => {
-            say(&format!("{name}: ended cleanly"));
-            ExitCode::SUCCESS
-        }
-        Ok(Drained::DeadlineHit) => {
-            say(&format!(
-                "{name}: ended at the deadline of {grace:?} with streams open"
-            ));
+        Ok(last) => {
+            say(&format!("{name}: {last}"));
             ExitCode::SUCCESS
         }
         Err(e) => {
             complain(name, &e.to_string());
-            ExitCode::from(
-                if matches!(
-                    e,
-                    StartError::Config { .. } | StartError::Auth(_) | StartError::Tls(_)
-                ) {
-                    EXIT_USAGE
-                } else {
-                    EXIT_BROKEN
-                },
-            )
+            exit_code(&e)
         }
     }
 }
 
+/// Opens all files that the process would.
+fn check(program: &Program, config: &Config) -> Result<(), StartError> {
+    CommonFiles::open(config, None)?;
+    (program.check)(config)
+}
+
+/// Last line of a process that ended.
+fn farewell(drained: Drained, grace: Duration) -> String {
+    match drained {
+        Drained::Clean => "ended cleanly".into(),
+        Drained::DeadlineHit => format!("ended at the deadline of {grace:?} with streams open"),
+    }
+}
+
 async fn serve<F, Fut>(
-    name: &'static str,
-    role: BusRole,
+    program: Program,
     config: Config,
     start: F,
     grace: Duration,
@@ -132,25 +188,28 @@ where
     F: FnOnce(Config, Context) -> Fut,
     Fut: Future<Output = Result<Running, StartError>>,
 {
+    let name = program.name;
     let broken = |e: std::io::Error| StartError::Broken {
         service: name,
         why: e.to_string(),
     };
-    let auth = Auth::open(&config, None)?;
+    let files = CommonFiles::open(&config, None)?;
     let pool = Pool::new(config.process.compute_threads).map_err(broken)?;
-    let (listen, connect) = match role {
+    let (listen, connect) = match program.role {
         BusRole::Listen => (&config.bus.listen[..], &[][..]),
         BusRole::Connect => (&[][..], &config.bus.connect[..]),
+        BusRole::Apart => (&[][..], &[][..]),
     };
     let bus = ZenohBus::open_with(&config.bus.config, listen, connect, pool.clone()).await?;
     let shutdown = CancellationToken::new();
     let ctx = Context {
+        stalls: Stalls::default(),
         bus: bus.clone(),
         pool: pool.clone(),
         shutdown: shutdown.clone(),
         grace,
-        auth,
-        tls: Tls::open(&config.tls)?,
+        auth: files.auth,
+        tls: files.tls,
     };
     crate::telemetry::show_zeros(name);
     let unusable = |why| StartError::Config {
@@ -182,4 +241,29 @@ where
     // The bus closes within a deadline of its own.
     let _ = tokio::time::timeout(Duration::from_millis(500), bus.close()).await;
     end
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::auth::AuthError;
+    use crate::frames::BusError;
+
+    #[test]
+    fn only_faults_of_the_configuration_are_its_own_exit_code() {
+        let why = || "why".to_owned();
+        let config = StartError::Config {
+            key: "key".into(),
+            why: why(),
+        };
+        let auth = StartError::Auth(AuthError {
+            key: "auth.keys",
+            why: why(),
+        });
+        for fault in [config, auth] {
+            assert_eq!(exit_code(&fault), ExitCode::from(EXIT_USAGE), "{fault}");
+        }
+        let bus = StartError::Bus(BusError(why()));
+        assert_eq!(exit_code(&bus), ExitCode::from(EXIT_BROKEN));
+    }
 }

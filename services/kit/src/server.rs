@@ -1,11 +1,13 @@
 //! gRPC servers: health and reflection beside the service, limits and keepalive, an end with a deadline.
 
+use crate::admin::Admin;
 use crate::auth::{Auth, AuthError};
 use crate::call_rate::{self, within_rate};
 use crate::compute::Pool;
 use crate::connections::{self, Limits};
 use crate::deadline::within_deadline;
 use crate::drain::{Drained, until_deadline};
+use crate::flow::Stalls;
 use crate::frames::FrameBus;
 use crate::tls::{Tls, TlsError};
 use crate::transport;
@@ -46,6 +48,8 @@ pub struct Context {
     pub auth: Auth,
     /// Encryption of connections, made and accepted.
     pub tls: Tls,
+    /// Flows that stand still.
+    pub stalls: Stalls,
 }
 
 /// A service that could not start, or broke.
@@ -205,9 +209,16 @@ pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartErro
     let (ready, is_ready) = watch::channel(true);
     // The admin port outlives the drain, so that probes can observe it.
     let ended = CancellationToken::new();
-    let admin = crate::admin::serve(admin, is_ready, health.clone(), ended.clone())
-        .await
-        .map_err(bind("admin", admin))?;
+    let probes = Admin {
+        service: name,
+        address: admin,
+        ready: is_ready,
+        health: health.clone(),
+        stalls: ctx.stalls.clone(),
+        auth: ctx.auth.clone(),
+        tls: ctx.tls.clone(),
+    };
+    let admin = (probes.serve(ended.clone()).await).map_err(bind("admin", admin))?;
     health
         .set_service_status(grpc_name, ServingStatus::Serving)
         .await;

@@ -2,6 +2,7 @@
 
 use crate::config::{LogConfig, LogFormat};
 use crate::frame_trace;
+use crate::log_fields::EscapedFields;
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use std::sync::OnceLock;
 use tracing_subscriber::EnvFilter;
@@ -10,16 +11,17 @@ use tryon_proto::v1::{FrameId, StageTime};
 /// Starts logging to standard error; later calls in the same process change nothing.
 ///
 /// # Errors
-/// When `log.level` is no filter.
+/// A `level` that is no filter.
 pub fn init_logs(config: &LogConfig) -> Result<(), String> {
-    let filter = EnvFilter::try_new(&config.level).map_err(|e| format!("log.level: {e}"))?;
+    config.check_level()?;
+    let filter = EnvFilter::try_new(&config.level).map_err(|e| e.to_string())?;
     let builder = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr);
     // A second subscriber is refused and the first one stays: tests and `demo` rely on it.
     let _ = match config.format {
         LogFormat::Json => builder.json().try_init(),
-        LogFormat::Pretty => builder.try_init(),
+        LogFormat::Pretty => builder.fmt_fields(EscapedFields::default()).try_init(),
     };
     Ok(())
 }
@@ -54,6 +56,7 @@ pub fn show_zeros(service: &'static str) {
     let _ = metrics();
     metrics::counter!("tryon_session_panics", "service" => service).increment(0);
     metrics::counter!("tryon_frames_broken").increment(0);
+    metrics::gauge!("tryon_stalled", "service" => service).set(0.0);
     if service == "capture" {
         metrics::counter!("tryon_capture_faults").increment(0);
         metrics::counter!("tryon_recordings_failed").increment(0);

@@ -7,9 +7,27 @@ mod engine;
 mod service;
 mod session;
 
+use std::sync::Arc;
+use tryon::body::Template;
 use tryon_kit::config::Config;
 use tryon_kit::server::{self, Context, Running, Service, StartError};
 use tryon_proto::v1::tracking_service_server::{SERVICE_NAME, TrackingServiceServer};
+
+/// Reads the configured body.
+fn template(config: &Config) -> Result<Arc<Template>, StartError> {
+    engine::load_template(&config.tracking.body).map_err(|why| StartError::Config {
+        key: "tracking.body".into(),
+        why,
+    })
+}
+
+/// Checks the files that `[tracking]` names.
+///
+/// # Errors
+/// When the configured body cannot be read.
+pub fn check(config: &Config) -> Result<(), StartError> {
+    template(config).map(drop)
+}
 
 /// Starts the service.
 ///
@@ -17,16 +35,12 @@ use tryon_proto::v1::tracking_service_server::{SERVICE_NAME, TrackingServiceServ
 /// When an address cannot be bound or the configured body cannot be read.
 pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError> {
     let c = &config.tracking;
-    let body = c.body.clone();
-    let template = ctx
-        .pool
-        .run(move || engine::load_template(&body))
-        .await
-        .map_err(|e| e.to_string());
-    let template = template.and_then(|t| t).map_err(|why| StartError::Config {
-        key: "tracking.body".into(),
-        why,
-    })?;
+    let own = config.clone();
+    let template = ctx.pool.run(move || template(&own)).await;
+    let template = template.map_err(|e| StartError::Broken {
+        service: "tracking",
+        why: e.to_string(),
+    })??;
     let service = service::Tracking::new(c, &ctx, template);
     let (mut routes, health) = server::routes(SERVICE_NAME)?;
     routes.add_service(

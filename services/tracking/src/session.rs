@@ -9,6 +9,7 @@ use tokio_util::sync::CancellationToken;
 use tryon::body::Template;
 use tryon_kit::compute::ComputeError;
 use tryon_kit::consent::FORGET_AFTER;
+use tryon_kit::flow::Flow;
 use tryon_kit::frames::{CameraKey, Exposure, FrameSubscription};
 use tryon_kit::server::Context;
 use tryon_kit::session_task::{self, Place};
@@ -49,6 +50,15 @@ pub(crate) struct Setup {
     pub(crate) directory: Sessions<Handle>,
 }
 
+/// Likely cause of a camera's silence.
+fn silence(frames: &FrameSubscription) -> &'static str {
+    if frames.alive() {
+        "the camera is on the bus but sends nothing"
+    } else {
+        "the camera is not on the bus: is capture up, do bus.connect and the router lead to it?"
+    }
+}
+
 /// State of a session that knows of nobody.
 fn searching(id: &str) -> v1::BodyState {
     v1::BodyState {
@@ -75,7 +85,9 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
             "tryon_tracking_sessions",
             is_over,
         );
+        let flow = format!("session {} of {}", brief(&id), setup.key);
         let task = Task {
+            flow: setup.ctx.stalls.flow("tracking", flow),
             setup,
             states: sender,
             engine: None,
@@ -106,6 +118,8 @@ struct Task {
     /// `None` while the pool steps it.
     engine: Option<Engine>,
     counts: SessionCounts,
+    /// Frames of the camera.
+    flow: Flow,
 }
 
 impl Task {
@@ -133,6 +147,7 @@ impl Task {
                 },
                 frame = frames.next_from(due) => match frame {
                     Some(f) => {
+                        self.flow.moves();
                         let taken = Instant::now();
                         self.step(f, frames.skipped()).await;
                         due = if self.is_nobody() { taken + SEARCH_EVERY } else { taken };
@@ -144,9 +159,17 @@ impl Task {
                     if received.elapsed() >= FORGET_AFTER {
                         self.forget();
                     }
-                    if received.elapsed() >= SILENCE && published.elapsed() >= SILENCE {
-                        self.silent(&frames);
-                        published = Instant::now();
+                    if received.elapsed() >= SILENCE {
+                        // On the bus and silent: without a lease of consent nothing is to come.
+                        if frames.alive() {
+                            self.flow.moves();
+                        } else {
+                            self.flow.waits(|| silence(&frames).into());
+                        }
+                        if published.elapsed() >= SILENCE {
+                            self.fault(DegradedReason::CameraSilent, silence(&frames).into());
+                            published = Instant::now();
+                        }
                     }
                     // One receiver is the handle of the directory.
                     if self.states.receiver_count() > 1 {
@@ -222,15 +245,6 @@ impl Task {
             self.states
                 .send_replace(Arc::new(searching(&self.setup.id)));
         }
-    }
-
-    fn silent(&mut self, frames: &FrameSubscription) {
-        let why = if frames.alive() {
-            "the camera is on the bus but sends nothing"
-        } else {
-            "the camera is not on the bus"
-        };
-        self.fault(DegradedReason::CameraSilent, why.into());
     }
 
     /// Repeats the last state as lost, or as searching when there never was one.

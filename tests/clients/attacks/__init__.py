@@ -7,7 +7,7 @@ import importlib
 from .report import ATTACKS, Attack
 
 # In the order in which they run: cheap ones first, the soak last.
-MODULES = ("contract", "strangers", "tokens", "consent", "sockets", "readers", "faults", "capacity")
+MODULES = ("contract", "strangers", "tokens", "consent", "sockets", "floods", "readers", "faults", "capacity")
 
 
 def all_attacks() -> dict[str, Attack]:

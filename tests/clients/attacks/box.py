@@ -72,6 +72,9 @@ class Box:
         self.bus, *ports = free_ports(9)
         self.ports = dict(zip(SERVICES, ports[:4]))
         self.admin_ports = dict(zip(SERVICES, ports[4:]))
+        for name in SERVICES:
+            if address := setup.settings.get(name, {}).get("address"):
+                self.ports[name] = int(str(address).rsplit(":", 1)[1])
         self.config = folder / "box.toml"
         self.config.write_text(self.configuration())
 

@@ -17,6 +17,7 @@ use tokio_util::sync::CancellationToken;
 use tryon_kit::auth::Auth;
 use tryon_kit::compute::Pool;
 use tryon_kit::config::Config;
+use tryon_kit::flow::Stalls;
 use tryon_kit::frames::LocalBus;
 use tryon_kit::server::{Context, Running};
 use tryon_kit::tls::Tls;
@@ -118,6 +119,7 @@ impl Chain {
     fn start_one(&mut self, name: &'static str) -> Result<()> {
         let shutdown = CancellationToken::new();
         let ctx = Context {
+            stalls: Stalls::default(),
             bus: self.bus.clone(),
             pool: self.pool.clone(),
             shutdown: shutdown.clone(),

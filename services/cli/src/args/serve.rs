@@ -40,7 +40,10 @@ pub(crate) struct UpArgs {
     /// TOML file; deploy/tryon.toml is the commented default. TRYON_* variables override it.
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
-    /// Check the configuration, print the result of all its layers, and stop.
+    /// Sets one key, such as `--set compositor.address=127.0.0.1:0`; wins over file and environment.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Check the configuration and the files that it names, print the result of all its layers, and stop.
     #[arg(long)]
     pub(crate) check: bool,
     /// Lets addresses beyond loopback be bound without TLS and tokens: anybody who reaches them sees the person.

@@ -109,13 +109,8 @@ pub(crate) struct TokenRedeemArgs {
     #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:8080")]
     pub(crate) at: String,
     /// Authorities of its certificate (PEM), for an `https` URL.
-    #[arg(
-        long,
-        value_name = "FILE",
-        default_value = "",
-        hide_default_value = true
-    )]
-    pub(crate) ca: PathBuf,
+    #[arg(long, value_name = "FILE")]
+    pub(crate) ca: Option<PathBuf>,
     /// The code; case, dashes and spaces do not matter.
     #[arg(value_name = "CODE")]
     pub(crate) code: String,

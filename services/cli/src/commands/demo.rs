@@ -112,11 +112,11 @@ async fn demo(args: &DemoArgs) -> Result<ExitCode> {
     if args.headless {
         let seconds = args.seconds.unwrap_or(HEADLESS_SECONDS);
         input::create_dir(&args.out)?;
-        println!(
+        say(format_args!(
             "headless: {seconds} s of {} into {}",
             args.garments.join(" and "),
             args.out.display()
-        );
+        ));
         let received = viewer::watch(
             services.compositor()?,
             &args.garments,
@@ -211,7 +211,7 @@ fn summarise(args: &DemoArgs, received: &Received) -> Result<ExitCode> {
         peak_memory_bytes: peak_memory(),
     };
     write(&args.out.join("report.json"), &r)?;
-    println!(
+    say(format_args!(
         "{} frames in, {} pictures ({} live), {} dropped; live {:.1} a second, latency p50 {:.0} ms p99 {:.0} ms; {:.0} MiB",
         r.frames_in,
         r.frames_out,
@@ -221,12 +221,12 @@ fn summarise(args: &DemoArgs, received: &Received) -> Result<ExitCode> {
         r.live_latency_ms.p50,
         r.live_latency_ms.p99,
         r.peak_memory_bytes.unwrap_or(0) as f64 / (1024.0 * 1024.0)
-    );
-    println!(
+    ));
+    say(format_args!(
         "{} pictures and report.json in {}",
         received.kept,
         args.out.display()
-    );
+    ));
     if r.frames_live == 0 {
         eprintln!("tryon: no live picture came; report.json says which states were seen");
         return Ok(ExitCode::FAILURE);

@@ -2,6 +2,7 @@
 
 use crate::args::RecordArgs;
 use crate::input;
+use crate::say::say;
 use anyhow::{Context, Result, bail};
 use std::path::Path;
 use std::process::ExitCode;
@@ -77,7 +78,7 @@ pub(crate) fn run(args: &RecordArgs) -> Result<ExitCode> {
         Some(camera) => from_bus(args, camera)?,
         None => from_source(args)?,
     };
-    println!("{frames} frames in {}", args.out.display());
+    say(format_args!("{frames} frames in {}", args.out.display()));
     Ok(ExitCode::SUCCESS)
 }
 

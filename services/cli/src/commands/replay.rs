@@ -12,6 +12,7 @@ use tryon_kit::bus::ZenohBus;
 use tryon_kit::compute::Pool;
 use tryon_kit::config::{CameraConfig, Config};
 use tryon_kit::drain;
+use tryon_kit::flow::Stalls;
 use tryon_kit::server::Context as ServiceContext;
 use tryon_kit::tls::Tls;
 
@@ -52,6 +53,7 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<ExitCode> {
         let shutdown = CancellationToken::new();
         let grace = Duration::from_millis(config.process.grace_ms);
         let ctx = ServiceContext {
+            stalls: Stalls::default(),
             bus: bus.clone(),
             pool,
             shutdown: shutdown.clone(),

@@ -124,7 +124,7 @@ fn redeem(args: &TokenRedeemArgs) -> Result<()> {
         .context("the runtime")?;
     let answer = runtime.block_on(async {
         let trusted = TlsConfig {
-            ca: args.ca.clone(),
+            ca: args.ca.clone().unwrap_or_default(),
             ..TlsConfig::default()
         };
         let tls = Tls::open(&trusted)?;

@@ -75,6 +75,20 @@ impl Lifecycle {
         Some(Duration::from_nanos(now.saturating_sub(at)))
     }
 
+    /// Likely cause of pictures that do not come.
+    pub(super) fn stall(&self) -> String {
+        match self.silence() {
+            None => "no frame has come: is the camera on the bus, do bus.connect and the router lead to it?".into(),
+            Some(s) if s >= Duration::from_secs(1) => {
+                format!("no frame has come for {:.0} s", s.as_secs_f64())
+            }
+            Some(_) => format!(
+                "frames come and none is drawn; the state is {}",
+                life::state(self.state).as_str_name()
+            ),
+        }
+    }
+
     /// Garments of a frame that arrived at `arrived` are too old to be shown.
     pub(super) fn is_late(&self, arrived: Instant) -> bool {
         arrived.elapsed().as_nanos() > u128::from(self.limits.garments_age_ns)

@@ -20,6 +20,7 @@ use tonic::Status;
 use tryon::session::{Event, Fault};
 use tryon_kit::bodies;
 use tryon_kit::consent::FORGET_AFTER;
+use tryon_kit::flow::Flow;
 use tryon_kit::frames::{Exposure, FrameSubscription};
 use tryon_kit::queue::latest;
 use tryon_kit::sessions::{brief, unix_ns};
@@ -93,13 +94,17 @@ pub(super) struct Task {
     due: Instant,
     /// Last job, for snapshots.
     last: Option<(Instant, Job)>,
+    /// Pictures to those who watch.
+    flow: Flow,
 }
 
 impl Task {
     /// A try-on without viewers.
     pub(super) fn new(setup: Setup, life: Lifecycle, outputs: Outputs) -> Self {
         let now = Instant::now();
+        let flow = format!("pictures of try-on {}", brief(&setup.id));
         Self {
+            flow: setup.ctx.stalls.flow("compositor", flow),
             drawing: Drawing::new(setup.card.clone(), setup.ctx.pool.clone(), outputs.done),
             setup,
             life,
@@ -241,6 +246,11 @@ impl Task {
         if self.life.silence().is_some_and(|s| s >= FORGET_AFTER) {
             self.forget();
         }
+        if is_watched {
+            self.flow.waits(|| self.life.stall());
+        } else {
+            self.flow.moves();
+        }
         let status = self.life.status();
         (self.viewers).retain_mut(|v| v.repeat(&status, HEARTBEAT));
     }
@@ -280,6 +290,7 @@ impl Task {
         let look = self.scene.look(e.rgbd.color.as_ref(), now);
         self.due = look.next;
         if !look.is_due {
+            self.flow.moves();
             metrics::counter!("tryon_compositor_still").increment(1);
         }
         look.is_due
@@ -380,6 +391,7 @@ impl Task {
         self.last = Some((Instant::now(), job.clone()));
         if job.formats.is_empty() {
             // Without a viewer nothing is drawn; a snapshot can still be drawn from `last`.
+            self.flow.moves();
             metrics::counter!("tryon_compositor_skipped").increment(1);
             return;
         }
@@ -467,6 +479,7 @@ impl Task {
 
     /// Counts a new exposure on show.
     fn on_shown(&mut self, job: &Arc<Job>, drawn: &Encoded) {
+        self.flow.moves();
         let id = job.exposure.id;
         (self.shown, self.showing) = (Some(id), Some(job.clone()));
         record_stages("compositor", Some(&id), &drawn.stages);

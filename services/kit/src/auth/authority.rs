@@ -1,20 +1,25 @@
-//! Judge of tokens of a box: keys, store, revocations, and the patience with peers that fail.
+//! Judge of tokens of a box: keys, store, revocations, and the budget of checks.
+//!
+//! A flood of bad tokens must not lock out whoever shares its address. So failures cost their connection: the first
+//! token of a connection is always checked, which costs no more than the connection did. Once a check of it has failed,
+//! it draws from one budget with all others that have, and after eight failures it ends ([`Seat::fail_proof`]).
 
 use super::claims::{Call, Claims};
 use super::revocation::Revocations;
 use super::{Fault, jws, unix_s};
-use crate::peer_budget::{Allowance, PeerBudget};
+use crate::connections::Seat;
+use crate::peer_budget::{Allowance, Bucket};
 use ed25519_dalek::VerifyingKey;
 use sha2::{Digest, Sha256};
 use std::collections::HashMap;
-use std::net::IpAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-/// Bad tokens that a peer may send. A signature cannot be guessed: this bounds the work (60 µs a check) and the log.
+/// Checks for all connections on which one has failed. A signature cannot be guessed: this bounds the work (60 µs a
+/// check, a sixteenth of a core in all) and the log.
 const ALLOWANCE: Allowance = Allowance {
     burst: 500.0,
-    per_second: 200.0,
+    per_second: 1000.0,
 };
 /// Most signatures that are remembered as good.
 const MAX_KNOWN: usize = 1024;
@@ -26,9 +31,8 @@ pub(super) struct Authority {
     keys: Vec<VerifyingKey>,
     store: String,
     revoked: Revocations,
-    failures: PeerBudget,
-    /// Claims by digest of tokens whose signature was good. They pass where a peer's attempts are spent, so that nobody
-    /// behind the same address locks others out.
+    checks: Mutex<Bucket>,
+    /// Claims by digest of tokens whose signature was good, which is not checked again.
     known: Mutex<HashMap<Digest256, Arc<Claims>>>,
 }
 
@@ -43,7 +47,7 @@ impl Authority {
             keys,
             store,
             revoked,
-            failures: PeerBudget::new(ALLOWANCE),
+            checks: Mutex::new(Bucket::full(ALLOWANCE, Instant::now())),
             known: Mutex::default(),
         })
     }
@@ -52,19 +56,18 @@ impl Authority {
         self.revoked.clone()
     }
 
-    /// Claims of a valid token.
-    pub(super) fn authenticate(&self, token: &str, peer: IpAddr) -> Result<Arc<Claims>, Fault> {
-        let claims = self.claims(token, peer).and_then(|claims| {
-            claims.check_life(unix_s())?;
-            if self.revoked.contains(&claims.jti) {
-                return Err(Fault::Revoked);
-            }
-            Ok(claims)
-        });
-        if claims.is_err() {
-            self.failures.record(peer, Instant::now());
+    /// Claims of a valid token that came on a connection.
+    pub(super) fn authenticate(
+        &self,
+        token: &str,
+        seat: Option<&Seat>,
+    ) -> Result<Arc<Claims>, Fault> {
+        let claims = self.claims(token, seat)?;
+        claims.check_life(unix_s())?;
+        if self.revoked.contains(&claims.jti) {
+            return Err(Fault::Revoked);
         }
-        claims
+        Ok(claims)
     }
 
     /// The claim that does not cover a call, if there is one.
@@ -82,19 +85,17 @@ impl Authority {
     }
 
     /// Claims of a token with a good signature.
-    fn claims(&self, token: &str, peer: IpAddr) -> Result<Arc<Claims>, Fault> {
-        if token.len() > jws::MAX_BYTES {
-            return Err(Fault::TooLong);
-        }
+    fn claims(&self, token: &str, seat: Option<&Seat>) -> Result<Arc<Claims>, Fault> {
         let digest: Digest256 = Sha256::digest(token).into();
         let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(claims) = known().get(&digest) {
             return Ok(claims.clone());
         }
-        if self.failures.is_spent(peer, Instant::now()) {
-            return Err(Fault::Spent);
+        let claims = self.check(token, seat);
+        if let (Err(_), Some(seat)) = (&claims, seat) {
+            seat.fail_proof();
         }
-        let claims = Arc::new(Claims::read(&jws::verify(token, &self.keys)?)?);
+        let claims = Arc::new(claims?);
         let mut known = known();
         if known.len() >= MAX_KNOWN {
             known.clear();
@@ -102,14 +103,22 @@ impl Authority {
         known.insert(digest, claims.clone());
         Ok(claims)
     }
+
+    /// Checks a token within the budget.
+    fn check(&self, token: &str, seat: Option<&Seat>) -> Result<Claims, Fault> {
+        let mut checks = self.checks.lock().unwrap_or_else(PoisonError::into_inner);
+        if !seat.is_some_and(Seat::is_clean) && !checks.take(Instant::now()) {
+            return Err(Fault::Spent);
+        }
+        drop(checks);
+        Claims::read(&jws::verify(token, &self.keys)?)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::auth::Issuer;
-
-    const PEER: IpAddr = IpAddr::V4(std::net::Ipv4Addr::LOCALHOST);
 
     fn claims(change: impl FnOnce(&mut Claims)) -> Claims {
         let mut claims = Claims {
@@ -137,7 +146,7 @@ mod tests {
         std::fs::write(&list, "gone\n").expect("written");
         let issuer = Issuer::generate().expect("random");
         let a = authority(&issuer, Revocations::follow(&list).expect("there"));
-        let judge = |c: &Claims| a.authenticate(&issuer.issue(c).expect("short"), PEER);
+        let judge = |c: &Claims| a.authenticate(&issuer.issue(c).expect("short"), None);
         assert!(judge(&claims(|_| {})).is_ok());
         let expired = claims(|c| c.exp = unix_s() - 1);
         assert_eq!(judge(&expired), Err(Fault::Expired));
@@ -149,21 +158,33 @@ mod tests {
         );
         let foreign = Issuer::generate().expect("random");
         let token = foreign.issue(&claims(|_| {})).expect("short");
-        assert_eq!(a.authenticate(&token, PEER), Err(Fault::Signature));
+        assert_eq!(a.authenticate(&token, None), Err(Fault::Signature));
     }
 
     #[test]
-    fn a_peer_that_fails_is_refused_and_its_neighbour_with_a_known_token_is_not() {
+    fn a_flood_spends_its_own_checks_and_fresh_tokens_on_new_connections_pass() {
         let issuer = Issuer::generate().expect("random");
         let a = authority(&issuer, Revocations::none());
-        let known = issuer.issue(&claims(|_| {})).expect("short");
-        assert!(a.authenticate(&known, PEER).is_ok());
+        let foreign = Issuer::generate().expect("random");
+        let bad = foreign.issue(&claims(|_| {})).expect("short");
+        let flood = Seat::alone();
+        let first = a.authenticate(&bad, Some(&flood));
+        assert_eq!(first, Err(Fault::Signature));
         // More than a slow machine gets back meanwhile.
-        let last = (0..20_000).map(|_| a.authenticate("x", PEER)).last();
+        let last = (0..20_000)
+            .map(|_| a.authenticate("x", Some(&flood)))
+            .last();
         assert_eq!(last, Some(Err(Fault::Spent)));
-        assert!(a.authenticate(&known, PEER).is_ok());
-        let other = IpAddr::from([10, 0, 0, 1]);
-        assert_eq!(a.authenticate("x", other), Err(Fault::Malformed));
+        assert!(flood.is_ended());
+        for i in 0..32 {
+            let fresh = issuer.issue(&claims(|c| c.jti = format!("kiosk {i}")));
+            let fresh = fresh.expect("short");
+            assert!(a.authenticate(&fresh, Some(&Seat::alone())).is_ok(), "{i}");
+            assert!(
+                a.authenticate(&fresh, Some(&flood)).is_ok(),
+                "it is known now"
+            );
+        }
     }
 
     #[test]
@@ -172,7 +193,10 @@ mod tests {
         let a = authority(&issuer, Revocations::none());
         for i in 0..MAX_KNOWN + 10 {
             let token = issuer.issue(&claims(|c| c.jti = i.to_string()));
-            assert!(a.authenticate(&token.expect("short"), PEER).is_ok());
+            assert!(
+                a.authenticate(&token.expect("short"), Some(&Seat::alone()))
+                    .is_ok()
+            );
         }
         assert!(a.known.lock().expect("not poisoned").len() <= MAX_KNOWN);
     }

@@ -6,16 +6,15 @@ use super::ending::Ending;
 use super::grant::{Grant, denied};
 use super::revocation::Revocations;
 use super::{Fault, unix_s};
+use crate::connections::Seat;
 use axum::Router;
 use axum::body::Body;
 use axum::extract::State;
 use axum::middleware::{Next, from_fn_with_state};
 use http::{HeaderMap, Request, Response, header};
-use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
 use std::time::Duration;
 use tonic::Status;
-use tonic::transport::server::TcpConnectInfo;
 
 /// Probes carry no token.
 const HEALTH: &str = "/grpc.health.v1.Health/";
@@ -39,18 +38,26 @@ pub(super) fn guard(
     routes.layer(from_fn_with_state(Gate { authority, service }, pass))
 }
 
-/// Passes a request on with its [`Grant`], or answers with UNAUTHENTICATED or PERMISSION_DENIED.
+/// Passes a request on with its [`Grant`], or answers with UNAUTHENTICATED or PERMISSION_DENIED. A connection is proven
+/// once a token was valid on it; where no tokens are asked for, once a call was answered.
 async fn pass(State(gate): State<Gate>, mut request: Request<Body>, next: Next) -> Response<Body> {
+    let seat = request.extensions().get::<Arc<Seat>>().cloned();
+    let prove = || seat.iter().for_each(|s| s.prove());
     let Some(authority) = gate.authority else {
         request.extensions_mut().insert(Grant::everything());
-        return next.run(request).await;
+        let answer = next.run(request).await;
+        prove();
+        return answer;
     };
+    let judged = judge(&authority, gate.service, &request);
     if is_open(&request) {
+        judged.iter().for_each(|_| prove());
         request.extensions_mut().insert(Grant::nothing());
         return next.run(request).await;
     }
-    match judge(&authority, gate.service, &request) {
+    match judged {
         Ok(claims) => {
+            prove();
             let end = end(claims.clone(), authority.revoked());
             request.extensions_mut().insert(Grant::of_token(claims));
             let answer = next.run(request).await;
@@ -73,8 +80,9 @@ fn judge<B>(
 ) -> Result<Arc<Claims>, Status> {
     let unauthenticated = |f: Fault| Status::unauthenticated(f.to_string());
     let token = bearer(request.headers()).map_err(unauthenticated)?;
+    let seat = request.extensions().get::<Arc<Seat>>();
     let claims = authority
-        .authenticate(token, peer(request))
+        .authenticate(token, seat.map(AsRef::as_ref))
         .map_err(unauthenticated)?;
     let method = request.uri().path().rsplit('/').next().unwrap_or_default();
     match authority.refusal(&claims, service, method) {
@@ -103,13 +111,6 @@ fn bearer(headers: &HeaderMap) -> Result<&str, Fault> {
     } else {
         Err(Fault::Missing)
     }
-}
-
-/// Address of the caller; one for all callers of a transport that has none.
-fn peer<B>(request: &Request<B>) -> IpAddr {
-    let info = request.extensions().get::<TcpConnectInfo>();
-    let address = info.and_then(TcpConnectInfo::remote_addr);
-    address.map_or(Ipv4Addr::UNSPECIFIED.into(), |a| a.ip())
 }
 
 /// Waits for the end of a token; its reason.
@@ -153,10 +154,21 @@ mod tests {
 
     /// `grpc-status` of a refusal, or the answer of the routes.
     async fn answer(routes: &Router, path: &str, authorizations: &[&str]) -> String {
+        answer_on(&Seat::alone(), routes, path, authorizations).await
+    }
+
+    /// The same on a connection.
+    async fn answer_on(
+        seat: &Arc<Seat>,
+        routes: &Router,
+        path: &str,
+        authorizations: &[&str],
+    ) -> String {
         let mut request = Request::post(path);
         for value in authorizations {
             request = request.header("authorization", *value);
         }
+        let request = request.extension(seat.clone());
         let request = request.body(Body::empty()).expect("a request");
         let answer = routes.clone().oneshot(request).await.expect("infallible");
         if let Some(status) = answer.headers().get("grpc-status") {
@@ -214,6 +226,31 @@ mod tests {
         ] {
             assert_eq!(answer(&routes, path, headers).await, expected, "{path}");
         }
+    }
+
+    #[tokio::test]
+    async fn a_connection_is_proven_by_a_good_token_and_by_nothing_else() {
+        let (routes, issuer) = guarded();
+        let health = "/grpc.health.v1.Health/Check";
+        let good = issuer.issue_for_process("store", &["cloth"]);
+        let good = format!("Bearer {}", good.expect("random"));
+        for (path, token, expected) in [
+            (health, None, false),
+            (health, Some("Bearer x"), false),
+            (CALL, None, false),
+            (CALL, Some("Bearer x"), false),
+            (CALL, Some(good.as_str()), true),
+            (health, Some(good.as_str()), true),
+        ] {
+            let seat = Seat::alone();
+            let token: Vec<_> = token.into_iter().collect();
+            answer_on(&seat, &routes, path, &token).await;
+            assert_eq!(seat.is_proven(), expected, "{path} {token:?}");
+        }
+        let open = guard(None, "cloth", Router::new().fallback(any(|| async {})));
+        let seat = Seat::alone();
+        answer_on(&seat, &open, CALL, &[]).await;
+        assert!(seat.is_proven(), "no tokens are asked for");
     }
 
     #[tokio::test]

@@ -59,8 +59,8 @@ pub enum Fault {
     /// It is on the list.
     #[error("the token is revoked")]
     Revoked,
-    /// The peer has failed too often.
-    #[error("too many bad tokens from this address")]
+    /// The connection has failed, and so have too many others.
+    #[error("too many bad tokens; try again on a new connection")]
     Spent,
 }
 

@@ -26,8 +26,31 @@ pub enum LogFormat {
 pub struct LogConfig {
     /// pretty or json.
     pub format: LogFormat,
-    /// Filter as of tracing: a level, or `module=level` pairs.
+    /// Filter: a level, `module=level` pairs, or both, between commas.
     pub level: String,
+}
+
+impl LogConfig {
+    /// Checks `level`. tracing itself takes an unknown level for the name of a module, and cuts names after a space short.
+    ///
+    /// # Errors
+    /// Names the part that is neither a level nor `module=level`.
+    pub fn check_level(&self) -> Result<(), String> {
+        const LEVELS: [&str; 6] = ["off", "error", "warn", "info", "debug", "trace"];
+        let is_level = |l: &str| LEVELS.iter().any(|known| known.eq_ignore_ascii_case(l));
+        let is_path = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | ':');
+        let is_module = |m: &str| !m.is_empty() && m.chars().all(is_path);
+        for part in self.level.split(',') {
+            let (module, level) = part.split_once('=').unwrap_or(("all", part));
+            if !(is_module(module) && is_level(level)) {
+                let levels = LEVELS.join(", ");
+                return Err(format!(
+                    "`{part}` is neither a level ({levels}) nor module=level, such as tryon_tracking=debug"
+                ));
+            }
+        }
+        Ok(())
+    }
 }
 
 impl Default for LogConfig {
@@ -184,7 +207,7 @@ pub struct CaptureConfig {
 impl Default for CaptureConfig {
     fn default() -> Self {
         Self {
-            address: local(50051),
+            address: local(7451),
             admin: local(9101),
             store: "store".into(),
             recordings: PathBuf::new(),
@@ -244,7 +267,7 @@ pub struct TrackingConfig {
 impl Default for TrackingConfig {
     fn default() -> Self {
         Self {
-            address: local(50052),
+            address: local(7452),
             admin: local(9102),
             body: PathBuf::new(),
             max_sessions: 4,
@@ -288,9 +311,9 @@ pub struct ClothConfig {
 impl Default for ClothConfig {
     fn default() -> Self {
         Self {
-            address: local(50053),
+            address: local(7453),
             admin: local(9103),
-            tracking: "http://127.0.0.1:50052".into(),
+            tracking: "http://127.0.0.1:7452".into(),
             max_sessions: 4,
             idle_s: 30,
             adapts_detail: true,
@@ -364,9 +387,9 @@ impl Default for CompositorConfig {
         Self {
             address: local(8080),
             admin: local(9104),
-            tracking: "http://127.0.0.1:50052".into(),
-            cloth: "http://127.0.0.1:50053".into(),
-            capture: "http://127.0.0.1:50051".into(),
+            tracking: "http://127.0.0.1:7452".into(),
+            cloth: "http://127.0.0.1:7453".into(),
+            capture: "http://127.0.0.1:7451".into(),
             store: "store".into(),
             camera: "front".into(),
             max_try_ons: 4,

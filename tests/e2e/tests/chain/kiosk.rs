@@ -9,6 +9,7 @@ use tonic::transport::Channel;
 use tryon_kit::auth::Auth;
 use tryon_kit::bus::{ZenohBus, free_tcp_endpoint};
 use tryon_kit::config::CameraConfig;
+use tryon_kit::flow::Stalls;
 use tryon_kit::server::{Context, Outcome, Running, StartError};
 use tryon_kit::tls::Tls;
 use tryon_kit::{Config, Pool};
@@ -154,6 +155,7 @@ impl Kiosk {
                 .await
                 .expect("a bus");
             let ctx = Context {
+                stalls: Stalls::default(),
                 bus,
                 pool,
                 shutdown: token,

@@ -11,6 +11,7 @@ mod service;
 use crate::args::FineSessionArgs;
 use crate::input;
 use crate::interrupt::{INTERRUPTED, Interrupt};
+use crate::say::say;
 use anyhow::{Context, Result, ensure};
 use files::FineFiles;
 use intake::Intake;
@@ -60,17 +61,17 @@ async fn simulate(
     let received = received.with_context(|| format!("simulation {id}"))?;
     let (frames, out) = (received.frames, args.out.display());
     let outfit = if frames > 0 { ", outfit.glb" } else { "" };
-    println!(
+    say(format_args!(
         "{frames} frames of {} vertices: positions.npy{outfit} and report.json in {out}",
         started.vertex_count
-    );
+    ));
     if received.is_whole {
         return Ok(ExitCode::SUCCESS);
     }
-    println!(
+    say(format_args!(
         "cancelled; within ten minutes, while the session knows the body, this continues it:\n{}",
         continuation(args, id)
-    );
+    ));
     Ok(ExitCode::from(INTERRUPTED))
 }
 
