@@ -8,6 +8,7 @@
 //! `low_latency` delivers no message of this size, shared memory loses frames of stalled subscribers (zenoh #2628).
 
 use crate::compute::Pool;
+use crate::config::BusConfig;
 use crate::frames::exposure_to_wire;
 use crate::frames::{
     BoxFuture, BusError, CameraKey, Exposure, FrameBus, FramePublisher, FrameSubscription, Packet,
@@ -144,16 +145,26 @@ fn settings(
     Ok(c)
 }
 
-/// Checks the file of `bus.config`; an empty path for none.
+/// Checks the file and the endpoints of `[bus]`.
 ///
 /// # Errors
-/// Names the file that cannot be read, or the fault in it.
-pub fn check_file(file: &Path) -> Result<(), StartError> {
-    let fault = |BusError(why)| StartError::Config {
-        key: "bus.config".into(),
-        why,
-    };
-    settings(file, "client", &[], &[]).map(drop).map_err(fault)
+/// Names the key with the file that cannot be read, the fault in it, or the malformed endpoint.
+pub fn check(config: &BusConfig) -> Result<(), StartError> {
+    let (file, none) = (&config.config, &[][..]);
+    let parts = [
+        ("bus.config", none, none),
+        ("bus.listen", &config.listen[..], none),
+        ("bus.connect", none, &config.connect[..]),
+    ];
+    parts.into_iter().try_for_each(|(key, listen, connect)| {
+        let fault = |BusError(why)| StartError::Config {
+            key: key.into(),
+            why,
+        };
+        settings(file, "peer", listen, connect)
+            .map(drop)
+            .map_err(fault)
+    })
 }
 
 /// Session of zenoh. A client's opens once its endpoint answers.
@@ -447,6 +458,24 @@ mod tests {
         crate::frames::tests::fulfils_the_contract(camera.as_ref(), camera.as_ref()).await;
         late.close().await;
         camera.close().await;
+    }
+
+    #[test]
+    fn malformed_endpoints_are_named_by_their_key() {
+        assert!(check(&BusConfig::default()).is_ok());
+        let bad = || vec!["127.0.0.1:7447".to_owned()];
+        let listen = BusConfig {
+            listen: bad(),
+            ..BusConfig::default()
+        };
+        let connect = BusConfig {
+            connect: bad(),
+            ..BusConfig::default()
+        };
+        for (config, key) in [(listen, "bus.listen"), (connect, "bus.connect")] {
+            let e = check(&config).expect_err("no protocol").to_string();
+            assert!(e.starts_with(key) && e.contains("127.0.0.1:7447"), "{e}");
+        }
     }
 
     #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -89,13 +89,13 @@ pub struct CommonFiles {
 }
 
 impl CommonFiles {
-    /// Opens the files of `[auth]` and `[tls]`, and checks that of `bus.config`. `own` as for [`Auth::open`].
+    /// Opens the files of `[auth]` and `[tls]`, and checks `[bus]`. `own` as for [`Auth::open`].
     ///
     /// # Errors
     /// Names the key whose file cannot be used.
     pub fn open(config: &Config, own: Option<&Issuer>) -> Result<Self, StartError> {
         let (auth, tls) = (Auth::open(config, own)?, Tls::open(&config.tls)?);
-        bus::check_file(&config.bus.config)?;
+        bus::check(&config.bus)?;
         Ok(Self { auth, tls })
     }
 }

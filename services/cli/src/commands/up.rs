@@ -55,7 +55,7 @@ pub(crate) fn run(args: &UpArgs) -> Result<ExitCode> {
 
 /// Serves until a signal.
 async fn serve(config: Config) -> Result<()> {
-    bus::check_file(&config.bus.config)?;
+    bus::check(&config.bus)?;
     // The bus listens for camera nodes and `tryon replay` in other processes.
     let pool = Pool::new(1).context("the bus's threads")?;
     let bus = ZenohBus::open_with(&config.bus.config, &config.bus.listen, &[], pool);
