@@ -42,6 +42,8 @@ def live_again(box: Running, ground: types.SimpleNamespace, viewer: Viewer, name
     """Kills a process, and starts it again once the probe says so; seconds from its start to the next live picture."""
     box.kill(name)
     box.wait_ready(CUT_S, is_ready=False)
+    # Pictures on their way arrive before the next start is timed.
+    time.sleep(1.0)
     begun = time.monotonic()
     box.start(name)
     if name in ("compositor", "box"):

@@ -45,7 +45,7 @@ enum Position {
 /// Frames of a client, counted as their heads arrive.
 struct Frames(Position);
 
-/// What was in some bytes.
+/// Contents of some bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Counted {
     frames: u32,
