@@ -215,6 +215,8 @@ def clock_steps(ground: Range) -> list[Figure]:
     with ground.box(Setup([Camera("front", "synth:still", 15.0)], is_apart=True, prefix=prefix)) as box:
         viewer = Viewer(ground, box, "person", garments=("tshirt",))
         viewer.wait_live()
+        # The size settles in the first seconds, which cost a debug build pictures; they are not this attack's.
+        time.sleep(5)
         for offset in ("+5s", "-5s", "+0s"):
             stepped = time.monotonic()
             clock.write_text(f"{offset}\n")
