@@ -142,7 +142,7 @@ pub struct Admin {
     pub health: HealthReporter,
     /// Flows of the process that stand still.
     pub stalls: Stalls,
-    /// Who may ask.
+    /// Tokens that its callers need.
     pub auth: Auth,
     /// Encryption of connections.
     pub tls: Tls,
@@ -192,10 +192,8 @@ impl Admin {
 }
 
 /// Serves an open and plain admin port until `shutdown` and returns the bound address.
-///
-/// # Errors
-/// When the address cannot be bound.
-pub async fn serve(
+#[cfg(test)]
+pub(crate) async fn serve(
     address: SocketAddr,
     ready: watch::Receiver<bool>,
     health: HealthReporter,
