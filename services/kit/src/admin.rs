@@ -163,6 +163,7 @@ impl Admin {
             let ended = shutdown.clone();
             tokio::select! {
                 () = transport::serve_mixed(incoming, routes, &tls, ended.cancelled()) => {}
+                () = crate::telemetry::fold_samples() => {}
                 () = shutdown.cancelled() => {}
             }
         });

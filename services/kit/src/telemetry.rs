@@ -5,6 +5,7 @@ use crate::frame_trace;
 use crate::log_fields::EscapedFields;
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use std::sync::OnceLock;
+use std::time::Duration;
 use tracing_subscriber::EnvFilter;
 use tryon_proto::v1::{FrameId, StageTime};
 
@@ -48,6 +49,22 @@ pub fn metrics() -> Option<&'static PrometheusHandle> {
             .ok()
     };
     HANDLE.get_or_init(install).as_ref()
+}
+
+/// Time between two foldings of histograms: 12 of them at 30 exposures a second hold 30 kB of samples by then.
+const FOLD_EVERY: Duration = Duration::from_secs(10);
+
+/// Folds the samples of histograms into their buckets, without end. A reader of the metrics does so too; in a process
+/// that has none, samples pile up otherwise.
+pub(crate) async fn fold_samples() {
+    let mut tick = tokio::time::interval(FOLD_EVERY);
+    tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    loop {
+        tick.tick().await;
+        if let Some(handle) = metrics() {
+            handle.run_upkeep();
+        }
+    }
 }
 
 /// Shows the counters of rare faults of `service` as zero from its start: a counter that first appears as one has not
