@@ -9,8 +9,11 @@ use tokio::sync::mpsc;
 use tokio::sync::mpsc::error::TrySendError;
 use tokio::time::Instant;
 use tonic::Status;
+use tryon_kit::queue::consumption::Consumption;
 use tryon_kit::queue::latest;
+use tryon_kit::queue::pace::Pace;
 use tryon_kit::sessions::random_u64;
+use tryon_proto::Message;
 use tryon_proto::convert::request::PictureFormat;
 use tryon_proto::v1::stream_frames_response::Event;
 use tryon_proto::v1::{Picture, StreamFramesResponse, TryOnState, TryOnStatus};
@@ -23,6 +26,8 @@ const UNACKNOWLEDGED: Duration = Duration::from_secs(10);
 const LOST: Duration = Duration::from_secs(2);
 /// Age in the queue above which a picture is not sent any more: the next one is made within an exposure.
 const FRESH: Duration = Duration::from_millis(100);
+/// Bytes before each message: a flag and a length.
+const GRPC_PREFIX: usize = 5;
 
 /// The writing end.
 pub(crate) struct Viewer {
@@ -36,7 +41,7 @@ pub(crate) struct Viewer {
     acknowledged: u64,
     /// Last acknowledgement, or first message after one.
     moved: Instant,
-    /// Last message.
+    /// Last message, or picture that was left out.
     told: Instant,
     pictures: latest::Sender<QueuedPicture>,
     statuses: mpsc::Sender<(u64, TryOnStatus)>,
@@ -62,6 +67,7 @@ pub(crate) struct Reader {
     statuses: mpsc::Receiver<(u64, TryOnStatus)>,
     is_cut_off: Arc<AtomicBool>,
     end: End,
+    pace: Pace,
 }
 
 /// End of a stream as far as its messages have announced it.
@@ -106,6 +112,7 @@ pub(crate) fn viewer(
             statuses: s,
             is_cut_off,
             end: End::Open,
+            pace: Pace::new(None),
         },
     )
 }
@@ -141,6 +148,8 @@ impl Viewer {
     }
     /// Counts a picture that was not made because the reader is behind.
     pub(crate) fn skip(&mut self) {
+        // It has something to read, and the next picture comes as soon as it has.
+        self.told = Instant::now();
         self.wait_a_turn();
         self.pictures.skip();
     }
@@ -198,6 +207,13 @@ fn is_end(s: &TryOnStatus) -> bool {
 }
 
 impl Reader {
+    /// Holds pictures back by what the reader's connection reports, unless it acknowledges messages itself.
+    pub(crate) fn paced_by(self, connection: Option<Consumption>) -> Self {
+        let connection = connection.filter(|_| !self.is_acknowledged);
+        let pace = Pace::new(connection);
+        Self { pace, ..self }
+    }
+
     /// Statuses in order and before pictures. Ends when the viewer is dropped: with OK after CLOSED or DRAINING, else
     /// with the error that names the try-on.
     pub(crate) fn stream(self) -> impl Stream<Item = Result<StreamFramesResponse, Status>> {
@@ -210,7 +226,7 @@ impl Reader {
                     }
                     (number, Event::Status(s))
                 }
-                Some((number, p)) = next_picture(&mut r.pictures, r.is_acknowledged) => (number, Event::Picture(p)),
+                Some((number, p)) = next_picture(&mut r.pictures, &mut r.pace, r.is_acknowledged) => (number, Event::Picture(p)),
                 else => return r.fault().map(|s| (Err(s), Self { end: End::Told, ..r })),
             };
             let message = StreamFramesResponse {
@@ -218,8 +234,17 @@ impl Reader {
                 stream: r.stream,
                 number,
             };
+            r.pace_by(&message);
             Some((Ok(message), r))
         })
+    }
+
+    fn pace_by(&mut self, message: &StreamFramesResponse) {
+        let bytes = GRPC_PREFIX + message.encoded_len();
+        match message.event {
+            Some(Event::Picture(_)) => self.pace.hand(bytes),
+            _ => self.pace.pass(bytes),
+        }
     }
 
     /// Status of an end that no message announced.
@@ -238,14 +263,20 @@ impl Reader {
     }
 }
 
-/// The next picture and its number; one that waited for too long is dropped unless its acknowledgement is awaited. Cancel
-/// safe.
+/// The next picture and its number, once the pace lets it follow; one that waited for too long is dropped unless its
+/// acknowledgement is awaited. Cancel safe.
 async fn next_picture(
     pictures: &mut latest::Receiver<QueuedPicture>,
+    pace: &mut Pace,
     is_awaited: bool,
 ) -> Option<(u64, Picture)> {
     loop {
-        let next = pictures.recv().await?;
+        let has_room = pace.has_room() || pictures.is_closed();
+        let next = tokio::select! {
+            biased;
+            next = pictures.recv(), if has_room => next?,
+            () = pace.changed() => continue,
+        };
         if is_awaited || next.queued.elapsed() <= FRESH {
             let dropped = pictures.dropped();
             let picture = Picture {
@@ -361,7 +392,9 @@ mod tests {
         for number in 1..=2 {
             assert!(!v.is_behind());
             v.picture(Picture::default());
-            let (n, p) = next_picture(&mut r.pictures, true).await.expect("queued");
+            let (n, p) = next_picture(&mut r.pictures, &mut r.pace, true)
+                .await
+                .expect("queued");
             assert_eq!((n, p.dropped), (number, 0));
         }
         assert!(v.is_behind(), "two are on the way");
@@ -372,7 +405,9 @@ mod tests {
         v.acknowledge(v.stream, 1);
         assert_eq!((v.is_behind(), v.acknowledged), (false, 2));
         v.picture(Picture::default());
-        let (_, p) = next_picture(&mut r.pictures, true).await.expect("queued");
+        let (_, p) = next_picture(&mut r.pictures, &mut r.pace, true)
+            .await
+            .expect("queued");
         assert_eq!(p.dropped, 1);
     }
 
@@ -430,11 +465,32 @@ mod tests {
         v.picture(Picture::default());
         assert!(v.is_behind());
         tokio::time::sleep(2 * FRESH).await;
-        let next = tokio::spawn(async move { next_picture(&mut r.pictures, false).await });
+        let next =
+            tokio::spawn(async move { next_picture(&mut r.pictures, &mut r.pace, false).await });
         tokio::task::yield_now().await;
         assert!(!v.is_behind());
         v.picture(Picture::default());
         let (number, p) = next.await.expect("ends").expect("a picture");
         assert_eq!((number, p.dropped), (2, 1));
+    }
+
+    #[tokio::test]
+    async fn a_picture_on_the_way_holds_back_the_next_unless_messages_are_acknowledged() {
+        for (window, expected) in [(None, 1), (Some(8), 2)] {
+            let (mut v, r) = viewer("shopper", PictureFormat { window, ..FORMAT }, None);
+            let mut stream = Box::pin(r.paced_by(Some(Consumption::default())).stream());
+            let mut got = 0;
+            for _ in 0..2 {
+                v.picture(Picture::default());
+                let next = tokio::time::timeout(FRESH / 2, stream.next());
+                got += usize::from(next.await.is_ok());
+            }
+            assert_eq!(got, expected, "{window:?}");
+            assert_eq!(v.is_behind(), got == 1);
+            v.status(status(TryOnState::Closed));
+            drop(v);
+            let rest: Vec<_> = stream.collect().await;
+            assert!(rest.iter().all(Result::is_ok), "an end that was announced");
+        }
     }
 }

@@ -37,21 +37,12 @@ pub(crate) async fn within_rate(
     if let Some(peer) = counted(&request) {
         let seat = request.extensions().get::<Arc<Seat>>();
         let is_within = seat.and_then(|s| s.take_call(now));
-        if !is_within.unwrap_or_else(|| take(&budget, peer, now)) {
+        if !is_within.unwrap_or_else(|| budget.take(peer, now)) {
             metrics::counter!("tryon_calls_too_often").increment(1);
             return too_often(ALLOWANCE.per_second).into_http();
         }
     }
     next.run(request).await
-}
-
-/// Takes a call from the budget of an address.
-fn take(budget: &PeerBudget, peer: IpAddr, now: Instant) -> bool {
-    let is_left = !budget.is_spent(peer, now);
-    if is_left {
-        budget.record(peer, now);
-    }
-    is_left
 }
 
 /// Address whose calls are counted; `None` for this machine's own.

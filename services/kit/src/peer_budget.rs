@@ -69,8 +69,8 @@ impl PeerBudget {
         (peers.get(&group(peer))).is_some_and(|b| b.left(now) < 1.0)
     }
 
-    /// Takes one event from the budget of the peer.
-    pub(crate) fn record(&self, peer: IpAddr, now: Instant) {
+    /// Takes one event from the budget of the peer, if one is left.
+    pub(crate) fn take(&self, peer: IpAddr, now: Instant) -> bool {
         let mut peers = self.peers.lock().unwrap_or_else(PoisonError::into_inner);
         if peers.len() >= MAX_PEERS {
             peers.retain(|_, b| b.left(now) < self.allowance.burst);
@@ -80,7 +80,7 @@ impl PeerBudget {
             peers.clear();
         }
         let full = Bucket::full(self.allowance, now);
-        let _ = peers.entry(group(peer)).or_insert(full).take(now);
+        peers.entry(group(peer)).or_insert(full).take(now)
     }
 }
 
@@ -104,14 +104,14 @@ mod tests {
             per_second: 0.5,
         });
         let (now, a) = (Instant::now(), IpAddr::from([10, 0, 0, 1]));
-        (0..3).for_each(|_| budget.record(a, now));
+        assert!((0..3).all(|_| budget.take(a, now)) && !budget.take(a, now));
         assert!(budget.is_spent(a, now));
         assert!(budget.is_spent("::ffff:10.0.0.1".parse().expect("an address"), now));
         assert!(!budget.is_spent(IpAddr::from([10, 0, 0, 2]), now));
         assert!(budget.is_spent(a, now + Duration::from_secs(1)));
         assert!(!budget.is_spent(a, now + Duration::from_secs(2)));
         let neighbours = ["2001:db8::1", "2001:db8::2"].map(|a| a.parse().expect("an address"));
-        (0..3).for_each(|_| budget.record(neighbours[0], now));
+        assert!((0..3).all(|_| budget.take(neighbours[0], now)));
         assert!(budget.is_spent(neighbours[1], now));
     }
 
@@ -123,7 +123,7 @@ mod tests {
         });
         let now = Instant::now();
         for i in 0..3 * MAX_PEERS as u32 {
-            budget.record(IpAddr::from(i.to_be_bytes()), now);
+            budget.take(IpAddr::from(i.to_be_bytes()), now);
         }
         let peers = budget.peers.lock().expect("not poisoned");
         assert!(peers.len() <= MAX_PEERS);

@@ -1,14 +1,17 @@
 //! HTTP/1.1 and HTTP/2 on accepted connections. Of what a reader does not take, one message and [`SEND_BUFFER`] wait in
 //! this process; the rest waits in the reader's own windows.
 
+mod frames;
+mod ledger;
 mod meter;
 
 use crate::connections::{Connection, Seat};
+use crate::queue::consumption::Consumption;
 use crate::tls::Tls;
 use axum::Router;
 use axum::body::Body;
 use futures::{Stream, StreamExt};
-use http::Request;
+use http::{Request, Version};
 use hyper::body::Incoming;
 use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
 use hyper_util::server::conn::auto::Builder;
@@ -191,12 +194,17 @@ impl Serving {
             builder,
             watcher,
         } = self;
-        let metered = Metered::new(io, seat.clone());
+        let consumption = Consumption::default();
+        let metered = Metered::new(io, seat.clone(), consumption.clone());
         let service = hyper::service::service_fn(move |mut request: Request<Incoming>| {
+            let is_reported = request.version() == Version::HTTP_2;
             let extensions = request.extensions_mut();
             extensions.insert(peer.clone());
             extensions.insert(seat.clone());
             extensions.insert(is_encrypted);
+            if is_reported {
+                extensions.insert(consumption.clone());
+            }
             router.clone().oneshot(request.map(Body::new))
         });
         let work = builder.serve_connection(TokioIo::new(metered), service);

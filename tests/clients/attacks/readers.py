@@ -22,6 +22,9 @@ SLOW_S = 1.0
 # Time in which a reader that takes nothing must be cut off (s), and how long an attack waits for it.
 CUT_BAR_S, CUT_GOAL_S, CUT_LIMIT_S = 15.0, 11.0, 25.0
 SHARED = "shared"
+# The last as browsers have it.
+HTTP1 = "HTTP/1.1"
+TRANSPORTS = ("grpcio", "h2", HTTP1)
 
 
 def noise_setup(ground: Range, **compositor: object) -> Setup:
@@ -79,22 +82,27 @@ class Slow:
         return max(counts, default=0)
 
 
-def slow_readers(ground: Range, box: Box, acknowledges: bool) -> tuple[list[Slow], list[Callable[[], None]]]:
-    """One over grpcio, one over h2, one over HTTP/1.1 as browsers have it; and what closes them."""
+def slow_readers(
+    ground: Range, box: Box, acknowledges: bool, over: tuple[str, ...] = TRANSPORTS
+) -> tuple[list[Slow], list[Callable[[], None]]]:
+    """One over each transport; and what closes them."""
     client = Client(ground, box)
     client.open_patiently(SHARED)
     window = {"max_unacknowledged": 1} if acknowledges else {}
     request = client.pb.StreamFramesRequest(try_on_id=SHARED, **window).SerializeToString()
-    call = client.stream(SHARED, **window)
-    http2 = Http2Call(box.address, COMPOSITOR + "StreamFrames", framed(request), box.metadata)
-    http1 = Http1Call(box.address, "StreamFrames", request, box.metadata)
     parse = lambda data: data and client.pb.StreamFramesResponse.FromString(data)
-    readers = [
-        Slow("grpcio", client, lambda _: next(call, None), acknowledges),
-        Slow("h2", client, lambda limit: parse(http2.message(limit)), acknowledges),
-        Slow("HTTP/1.1", client, lambda limit: parse(http1.message(limit)), acknowledges),
-    ]
-    return readers, [call.cancel, http2.close, http1.close, client.close]
+    readers, closes = [], [client.close]
+    for name in over:
+        if name == "grpcio":
+            call = client.stream(SHARED, **window)
+            next_message, close = lambda _, call=call: next(call, None), call.cancel
+        else:
+            call = (Http1Call(box.address, "StreamFrames", request, box.metadata) if name == HTTP1
+                    else Http2Call(box.address, COMPOSITOR + "StreamFrames", framed(request), box.metadata))
+            next_message, close = lambda limit, call=call: parse(call.message(limit)), call.close
+        readers.append(Slow(name, client, next_message, acknowledges))
+        closes.insert(0, close)
+    return readers, closes
 
 
 @attack("slow-reader", "slow reader (one a second): age of its pictures p99; pictures waiting for it anywhere")
@@ -103,16 +111,22 @@ def slow_reader(ground: Range) -> list[Figure]:
     return slow_figures(ground, acknowledges=True)
 
 
-@attack("slow-plain", "slow reader that acknowledges nothing: age of its pictures p99; pictures waiting for it anywhere")
+@attack("slow-plain", "slow reader that acknowledges nothing, over HTTP/2: age of its pictures p99; pictures waiting")
 def slow_plain(ground: Range) -> list[Figure]:
-    """What the transports' own windows and sockets hold."""
-    return slow_figures(ground, acknowledges=False)
+    """The windows of its streams show what it has taken."""
+    return slow_figures(ground, acknowledges=False, over=("grpcio", "h2"))
 
 
-def slow_figures(ground: Range, acknowledges: bool) -> list[Figure]:
+@attack("slow-plain-http1", "the same over HTTP/1.1: age of its pictures p99; pictures waiting")
+def slow_plain_http1(ground: Range) -> list[Figure]:
+    """HTTP/1.1 has no windows: what waits in the reader's kernel is not seen."""
+    return slow_figures(ground, acknowledges=False, over=(HTTP1,))
+
+
+def slow_figures(ground: Range, acknowledges: bool, over: tuple[str, ...] = TRANSPORTS) -> list[Figure]:
     """Age and waiting pictures of each reader."""
     with ground.box(noise_setup(ground)) as box:
-        readers, closes = slow_readers(ground, box, acknowledges)
+        readers, closes = slow_readers(ground, box, acknowledges, over)
         run_all([lambda r=r: r.run(ground.pick(15, 40)) for r in readers])
         for close in closes:
             close()
@@ -121,6 +135,26 @@ def slow_figures(ground: Range, acknowledges: bool) -> list[Figure]:
         figures.append(Figure(f"age {r.name}", percentile(r.ages(), 0.99), 1.5, 0.3, " s"))
         figures.append(Figure(f"waiting {r.name}", r.waiting() if r.ages() else math.inf, 3, 2))
     return figures
+
+
+@attack("quick-plain", "quick reader that acknowledges nothing, over HTTP/2: rate lost against HTTP/1.1")
+def quick_plain(ground: Range) -> list[Figure]:
+    """All read the pictures of one format side by side."""
+    with ground.box(noise_setup(ground)) as box:
+        readers, closes = slow_readers(ground, box, acknowledges=False)
+        run_all([lambda r=r: read_quickly(r, ground.pick(8, 20)) for r in readers])
+        for close in closes:
+            close()
+    counts = {r.name: [len(r.read)] for r in readers}
+    free = counts.pop(HTTP1)
+    return [Figure(name, lost_percent(free, n), 10, 2, " %") for name, n in counts.items()]
+
+
+def read_quickly(reader: Slow, seconds: float) -> None:
+    """Takes messages without a pause."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end and reader.take(2.0) is not None:
+        pass
 
 
 def run_all(tasks: list[Callable[[], None]]) -> None:

@@ -7,10 +7,12 @@
 use super::issuer::create_secret;
 use super::keys::{self, KeyFault};
 use super::unix_s;
+use crate::connections::Seat;
 use crate::peer_budget::{Allowance, PeerBudget};
 use sha2::{Digest, Sha256};
-use std::net::IpAddr;
+use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use subtle::ConstantTimeEq;
 
@@ -20,7 +22,7 @@ pub const LIFE: Duration = Duration::from_secs(600);
 const LENGTH: usize = 12;
 /// Crockford's base 32: no I, L, O, U.
 const ALPHABET: &[u8; 32] = b"0123456789ABCDEFGHJKMNPQRSTVWXYZ";
-/// Wrong codes that a peer may send: people mistype.
+/// Wrong codes that a peer may send, beside the first one of each connection: people mistype.
 const ALLOWANCE: Allowance = Allowance {
     burst: 10.0,
     per_second: 0.1,
@@ -41,6 +43,29 @@ pub enum EnrolFault {
     /// The system has no random bytes.
     #[error(transparent)]
     Random(#[from] KeyFault),
+}
+
+/// Caller with a code: its address and its connection.
+#[derive(Clone)]
+pub struct Caller {
+    peer: IpAddr,
+    seat: Option<Arc<Seat>>,
+}
+
+impl Caller {
+    /// Caller of a request.
+    pub fn of<T>(request: &tonic::Request<T>) -> Self {
+        let peer = request.remote_addr();
+        Self {
+            peer: peer.map_or(Ipv4Addr::UNSPECIFIED.into(), |a| a.ip()),
+            seat: request.extensions().get().cloned(),
+        }
+    }
+
+    /// No proof on its connection has failed.
+    fn is_clean(&self) -> bool {
+        self.seat.as_ref().is_some_and(|s| s.is_clean())
+    }
 }
 
 /// Codes that wait in a folder.
@@ -78,17 +103,19 @@ impl Enrolments {
         Ok(format!("{a}-{b}-{c}"))
     }
 
-    /// Trades a code for its token, once.
+    /// Trades a code for its token, once. The first code of a connection is always looked up, so that nobody behind the
+    /// same address can spend a caller's attempts; wrong ones count for the connection and for the address.
     ///
     /// # Errors
-    /// When there is no such code, or the peer has guessed too often.
-    pub fn redeem(&self, code: &str, peer: IpAddr) -> Result<String, EnrolFault> {
-        if self.failures.is_spent(peer, Instant::now()) {
+    /// When there is no such code, or the caller has guessed too often.
+    pub fn redeem(&self, code: &str, caller: &Caller) -> Result<String, EnrolFault> {
+        if !caller.is_clean() && self.failures.is_spent(caller.peer, Instant::now()) {
             return Err(EnrolFault::Spent);
         }
         let token = self.take(&digest(&normalised(code)));
         if token.is_err() {
-            self.failures.record(peer, Instant::now());
+            self.failures.take(caller.peer, Instant::now());
+            caller.seat.iter().for_each(|s| s.fail_proof());
         }
         token
     }
@@ -157,7 +184,18 @@ fn digest(code: &str) -> String {
 mod tests {
     use super::*;
 
-    const PEER: IpAddr = IpAddr::V4(std::net::Ipv4Addr::LOCALHOST);
+    /// A caller on that connection.
+    fn caller(address: [u8; 4], seat: Option<Arc<Seat>>) -> Caller {
+        Caller {
+            peer: address.into(),
+            seat,
+        }
+    }
+
+    /// A caller on no connection.
+    fn nobody() -> Caller {
+        caller([127, 0, 0, 1], None)
+    }
 
     #[test]
     fn a_code_is_traded_once_however_it_is_typed() {
@@ -166,8 +204,11 @@ mod tests {
         let code = codes.offer("a.b.c").expect("drawn");
         assert_eq!(code.len(), LENGTH + 2);
         let typed = code.to_lowercase().replace('-', " ").replace('0', "o");
-        assert_eq!(codes.redeem(&typed, PEER).expect("traded"), "a.b.c");
-        assert!(matches!(codes.redeem(&code, PEER), Err(EnrolFault::Code)));
+        assert_eq!(codes.redeem(&typed, &nobody()).expect("traded"), "a.b.c");
+        assert!(matches!(
+            codes.redeem(&code, &nobody()),
+            Err(EnrolFault::Code)
+        ));
     }
 
     #[test]
@@ -179,7 +220,10 @@ mod tests {
         let file = file.expect("one").expect("readable").path();
         assert!(!file.to_string_lossy().contains(&code[..4]));
         std::fs::write(&file, format!("{}\na.b.c\n", unix_s() - 1)).expect("written");
-        assert!(matches!(codes.redeem(&code, PEER), Err(EnrolFault::Code)));
+        assert!(matches!(
+            codes.redeem(&code, &nobody()),
+            Err(EnrolFault::Code)
+        ));
         assert!(!file.exists());
     }
 
@@ -189,11 +233,51 @@ mod tests {
         let codes = Enrolments::new(dir.path());
         let code = codes.offer("a.b.c").expect("drawn");
         for guess in ["", "0000-0000-0000", "../../etc/passwd", "ÄÖÜ"] {
-            assert!(matches!(codes.redeem(guess, PEER), Err(EnrolFault::Code)));
+            assert!(matches!(
+                codes.redeem(guess, &nobody()),
+                Err(EnrolFault::Code)
+            ));
         }
-        while !matches!(codes.redeem("0", PEER), Err(EnrolFault::Spent)) {}
-        assert!(matches!(codes.redeem(&code, PEER), Err(EnrolFault::Spent)));
-        let other = IpAddr::from([10, 0, 0, 1]);
-        assert!(codes.redeem(&code, other).is_ok());
+        while !matches!(codes.redeem("0", &nobody()), Err(EnrolFault::Spent)) {}
+        assert!(matches!(
+            codes.redeem(&code, &nobody()),
+            Err(EnrolFault::Spent)
+        ));
+        let other = caller([10, 0, 0, 1], None);
+        assert!(codes.redeem(&code, &other).is_ok());
+    }
+
+    #[test]
+    fn guesses_of_an_address_leave_its_new_connections_alone() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let codes = Enrolments::new(dir.path());
+        let code = codes.offer("a.b.c").expect("drawn");
+        let guesser = caller([10, 0, 0, 1], Some(Seat::alone()));
+        while !matches!(codes.redeem("0", &guesser), Err(EnrolFault::Spent)) {}
+        assert!(matches!(
+            codes.redeem(&code, &guesser),
+            Err(EnrolFault::Spent)
+        ));
+        let kiosk = caller([10, 0, 0, 1], Some(Seat::alone()));
+        assert!(matches!(codes.redeem("1", &kiosk), Err(EnrolFault::Code)));
+        assert!(matches!(
+            codes.redeem(&code, &kiosk),
+            Err(EnrolFault::Spent)
+        ));
+        let other = caller([10, 0, 0, 1], Some(Seat::alone()));
+        assert_eq!(codes.redeem(&code, &other).expect("traded"), "a.b.c");
+    }
+
+    #[test]
+    fn guesses_end_their_connection() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let codes = Enrolments::new(dir.path());
+        let seat = Seat::alone();
+        // An address each, so that none is spent.
+        for i in 0..20 {
+            let caller = caller([10, 0, 0, i], Some(seat.clone()));
+            assert!(matches!(codes.redeem("0", &caller), Err(EnrolFault::Code)));
+        }
+        assert!(seat.is_ended());
     }
 }

@@ -97,6 +97,10 @@ impl<T> Receiver<T> {
             .unwrap_or_else(PoisonError::into_inner)
             .take()
     }
+    /// The sender is gone; a value may still wait.
+    pub fn is_closed(&self) -> bool {
+        self.0.closed.load(Ordering::Acquire)
+    }
     /// Counts a value that was taken and not used.
     pub fn discard(&self) {
         self.0.dropped.fetch_add(1, Ordering::Relaxed);
