@@ -160,7 +160,10 @@ const DOORS: &[(&str, &[&str])] = &[
     // docs/decisions/050-recordings.md: MCAP channels carry foxglove protobuf messages, so formats encodes those few itself.
     ("prost", &["proto/", "src/formats/foxglove.rs"]),
     ("tonic", &["proto/", "services/", "tests/"]),
-    ("zenoh", &["services/kit/src/bus.rs"]),
+    (
+        "zenoh",
+        &["services/kit/src/bus.rs", "services/kit/src/bus/"],
+    ),
     ("tokio", &["services/", "tests/", "proto/src/gen/"]),
 ];
 

@@ -159,6 +159,13 @@ impl TrackerModel {
             seen_shares,
         }
     }
+    /// The same model for another camera, without the work of [`Self::new`].
+    pub fn with_calibration(&self, calibration: Calibration) -> Self {
+        Self {
+            calibration,
+            ..self.clone()
+        }
+    }
     /// Arms and legs with their parts, for a skeleton that has them.
     pub(super) fn limbs(&self) -> impl Iterator<Item = (BodyPart, &Limb)> {
         let parts = [

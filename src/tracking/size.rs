@@ -33,13 +33,13 @@ pub struct SizeEstimate {
 /// Weight λₛ of eq. 23, per point, m²: bones tied by symmetry differ by a tenth of what single ones do.
 const TIE: f64 = 5e-3;
 /// Largest coefficient, standard deviations: a child is eight below the mean of adults.
-const MOST_DEVIATIONS: f64 = 8.0;
+pub(super) const MOST_DEVIATIONS: f64 = 8.0;
 /// Statures of adults, metres.
 pub(super) const ADULTS: std::ops::Range<f64> = 1.3..2.2;
 /// Statures of children, metres, which are also heights of adults who crouch or sit.
 const CHILDREN: std::ops::Range<f64> = 0.9..ADULTS.start;
 /// Bounds of a bone's scale.
-const SCALES: [f64; 2] = [0.5, 1.4];
+pub(super) const SCALES: [f64; 2] = [0.5, 1.4];
 /// Longest pair and kernel width in the first frames, metres: feet of a wrong stature start 10 cm away.
 const START: (f32, f64) = (0.15, 0.08);
 /// The same after [`SEARCHING`] frames.
@@ -62,6 +62,15 @@ const SCALE_CHANGE: f64 = 10.0;
 const POSE_RIDGE: f64 = 1e-7;
 
 impl SizeEstimate {
+    /// Estimate of a size that was measured before, over `frames` frames: it does not change.
+    pub(super) fn known(frames: u32) -> Self {
+        Self {
+            frames: frames.max(1),
+            is_settled: true,
+            ..Self::default()
+        }
+    }
+
     /// Adds one converged frame and updates `shape`; without `keep` the estimate itself stays. Returns the largest change
     /// of a coefficient or of ten times a scale.
     pub(super) fn observe(

@@ -2,6 +2,7 @@
 
 use super::change_detection::DepthReference;
 use super::person_evidence::{PersonBelief, Verdict};
+use super::probation::Probation;
 use super::repair::RepairTimer;
 use super::seat::Seat;
 use super::size::SizeEstimate;
@@ -44,6 +45,9 @@ pub struct TrackerState {
     /// Time between `before` and `pose`.
     pub(super) interval_ns: u64,
     pub(super) size: SizeEstimate,
+    /// Comparison with a body that was measured before, until it is over.
+    #[serde(default)]
+    pub(super) probation: Option<Probation>,
     pub(super) surface: SurfaceStatistics,
     pub(super) bad_frames: u32,
     /// Frames in a row in which the body disagreed with the frame.
@@ -113,6 +117,7 @@ impl TrackerState {
             time_ns: 0,
             interval_ns: 0,
             size: SizeEstimate::default(),
+            probation: None,
             surface: SurfaceStatistics::default(),
             bad_frames: 0,
             disagreeing: 0,

@@ -94,7 +94,7 @@ pub fn follow(
             observation,
             up: state.world_from_camera.inverse().vector(&Vector3::y()),
         };
-        match subject.track(state, workspace, &mut log) {
+        match subject.track_known(state, workspace, &mut log) {
             Ok(()) => {
                 let is_tested = state.belief.verdict != Verdict::Unsure;
                 if let Some(candidate) = person.candidate.filter(|_| is_tested) {

@@ -24,6 +24,8 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 # Processes are started beside grpcio's threads.
 os.environ["GRPC_ENABLE_FORK_SUPPORT"] = "false"
+# Refused handshakes are what some attacks look for.
+os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 from attacks import all_attacks  # noqa: E402
 from attacks.credentials import Authority  # noqa: E402

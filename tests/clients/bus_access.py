@@ -1,15 +1,16 @@
-"""deploy/zenoh/secure under the zenoh of others (eclipse-zenoh): who may do what on the bus.
+"""deploy/zenoh/router.json5 under the zenoh of others (eclipse-zenoh): who may do what on the bus.
 
     python3 tests/clients/bus_access.py [--bin DIR]
 
-Starts a router from the shipped file, with certificates of the shipped script, and asks it as each service, as a holder
-of a certificate for something else, with a certificate of another authority, with none, and without TLS. With `--bin`
-the four services of that folder run across such a router too. Ends with 0 when everybody gets what is theirs and no more.
+Starts a router from the shipped file, with certificates of `tryon identity`, and asks it as each service, as a holder of a
+certificate for something else, with a certificate of another authority, with none, and without TLS. Then the four services
+run across such a router. Ends with 0 when everybody gets what is theirs and no more.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import pathlib
 import socket
 import subprocess
@@ -21,7 +22,8 @@ import time
 import grpc
 import zenoh
 
-SHIPPED = pathlib.Path(__file__).resolve().parents[2] / "deploy/zenoh/secure"
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+SHIPPED = ROOT / "deploy/zenoh/router.json5"
 FRAMES, OTHER = "tryon/store/front/rgbd", "tryon/store/front/elsewhere"
 WAIT_S = 1.0
 
@@ -31,25 +33,31 @@ def free_port() -> int:
         return s.getsockname()[1]
 
 
-def shipped(name: str, folder: pathlib.Path) -> zenoh.Config:
-    """A shipped file with the certificates of a folder."""
-    text = (SHIPPED / name).read_text().replace("/etc/tryon/bus", str(folder))
-    file = folder / name
+def router_of(folder: pathlib.Path, endpoint: str, capture: str) -> zenoh.Session:
+    """The shipped router with the certificate of a folder."""
+    text = SHIPPED.read_text().replace("/etc/tryon/bus", str(folder))
+    text = text.replace("tls/0.0.0.0:7447", endpoint).replace("tls/capture:7447", capture)
+    file = folder / "router.json5"
     file.write_text(text)
-    return zenoh.Config.from_file(str(file))
+    return zenoh.open(zenoh.Config.from_file(str(file)))
 
 
 def client(endpoint: str, folder: pathlib.Path | None) -> zenoh.Session:
-    """A peer as the services are: no scouting, one endpoint. Raises `zenoh.ZError` when it is not let in."""
-    config = shipped("service.json5", folder) if folder else zenoh.Config()
+    """A client as the services are: no scouting, one endpoint. Raises `zenoh.ZError` when it is not let in."""
+    config = zenoh.Config()
+    tls = {}
+    if folder:
+        own = {f"connect_{kind}": str(folder / f"{name}.pem") for kind, name in (("certificate", "certificate"), ("private_key", "key"))}
+        tls = {"enable_mtls": True, "root_ca_certificate": str(folder / "ca.pem"), **own}
     for key, value in {
-        "mode": '"client"',
-        "connect/endpoints": f'["{endpoint}"]',
-        "listen/endpoints": "[]",
-        "scouting/multicast/enabled": "false",
-        "connect/timeout_ms": "2000",
+        "mode": "client",
+        "connect/endpoints": [endpoint],
+        "listen/endpoints": [],
+        "scouting/multicast/enabled": False,
+        "connect/timeout_ms": 2000,
+        **{f"transport/link/tls/{k}": v for k, v in tls.items()},
     }.items():
-        config.insert_json5(key, value)
+        config.insert_json5(key, json.dumps(value))
     return zenoh.open(config)
 
 
@@ -74,46 +82,26 @@ def is_let_in(endpoint: str, folder: pathlib.Path | None) -> bool:
         return False
 
 
-def make(folder: pathlib.Path) -> pathlib.Path:
-    subprocess.run([str(SHIPPED / "certificates.sh"), str(folder)], check=True, capture_output=True)
-    return folder
+def certificate(binaries: pathlib.Path, authority: pathlib.Path, name: str) -> pathlib.Path:
+    """Folder of a certificate for that name of an authority, which is made where there is none."""
+    out = authority.with_suffix("") / name
+    command = [binaries / "tryon", "identity", "issue", name, f"--authority={authority}", f"--out={out}"]
+    subprocess.run([*command, "--name=localhost", "--name=127.0.0.1"], check=True)
+    return out
 
 
-def intruder(certificates: pathlib.Path) -> pathlib.Path:
-    """A folder with a certificate of the store's authority for a name that no rule knows."""
-    folder = certificates / "intruder"
-    folder.mkdir()
-    run = lambda *a: subprocess.run(["openssl", *map(str, a)], check=True, capture_output=True)
-    key, request = folder / "key.pem", folder / "request.pem"
-    run("genpkey", "-algorithm", "EC", "-pkeyopt", "ec_paramgen_curve:P-256", "-out", key)
-    run("req", "-new", "-key", key, "-subj", "/CN=intruder", "-out", request)
-    (folder / "ext").write_text("extendedKeyUsage=serverAuth,clientAuth\nsubjectAltName=DNS:localhost\n")
-    run("x509", "-req", "-in", request, "-CA", certificates / "ca.pem", "-CAkey", certificates / "ca.key.pem", "-days", "1",
-        "-extfile", folder / "ext", "-out", folder / "cert.pem")
-    (folder / "ca.pem").write_bytes((certificates / "ca.pem").read_bytes())
-    return folder
-
-
-def pictures_across(binaries: pathlib.Path, ours: pathlib.Path, folder: pathlib.Path) -> bool:
-    """The services, each with its own certificate, show a camera's pictures across a router."""
+def pictures_across(binaries: pathlib.Path, authority: pathlib.Path, folder: pathlib.Path) -> bool:
+    """The services, each with a certificate of its own, show a camera's pictures across a router."""
     from attacks.box import SERVICES, Box, Setup
     from attacks.range import stubs
 
-    at_router, at_capture = free_port(), free_port()
-    config = shipped("router.json5", ours / "router")
-    config.insert_json5("listen/endpoints", f'["tls/127.0.0.1:{at_router}"]')
-    config.insert_json5("connect/endpoints", f'["tls/localhost:{at_capture}"]')
-    router = zenoh.open(config)
-    bus = {"listen": [f"tls/127.0.0.1:{at_capture}"], "connect": [f"tls/localhost:{at_router}"]}
-    box = Box(binaries, folder, Setup(is_apart=True, settings={"bus": bus}))
+    at_router, at_capture = f"tls/127.0.0.1:{free_port()}", f"tls/127.0.0.1:{free_port()}"
+    router = router_of(certificate(binaries, authority, "router"), at_router, at_capture)
+    settings = {"bus": {"listen": [at_capture], "connect": [at_router]}, "identity": {"authority": str(authority)}}
+    box = Box(binaries, folder, Setup(is_apart=True, settings=settings))
     try:
         for service in SERVICES:
-            # Cloth has no business on the bus, and no certificate.
-            own = []
-            if service != "cloth":
-                shipped("service.json5", ours / service)
-                own = ["--set", f"bus.config={ours / service / 'service.json5'}"]
-            box.spawn(service, [str(binaries / f"tryon-{service}"), "--config", str(box.config), *own])
+            box.spawn(service, [str(binaries / f"tryon-{service}"), "--config", str(box.config)])
         box.wait_ready()
         api, channel = stubs(), grpc.insecure_channel(box.address)
         rpc, pb = api.compositor_rpc.CompositorServiceStub(channel), api.compositor
@@ -130,7 +118,7 @@ def pictures_across(binaries: pathlib.Path, ours: pathlib.Path, folder: pathlib.
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--bin", type=pathlib.Path, help="folder of tryon-capture, -tracking, -cloth, -compositor")
+    parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "target/release", help="folder of tryon and tryon-capture, -tracking, -cloth, -compositor")
     args = parser.parse_args()
     faults = 0
 
@@ -141,14 +129,13 @@ def main() -> int:
 
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(scratch)
-        ours, theirs = make(folder / "ours"), make(folder / "theirs")
+        binaries = args.bin.resolve()
+        ours, theirs = folder / "ours.pem", folder / "theirs.pem"
         port = free_port()
-        config = shipped("router.json5", ours / "router")
-        config.insert_json5("listen/endpoints", f'["tls/127.0.0.1:{port}"]')
-        config.insert_json5("connect/endpoints", "[]")
-        router, endpoint = zenoh.open(config), f"tls/localhost:{port}"
-        capture, tracking, compositor = (client(endpoint, ours / n) for n in ("capture", "tracking", "compositor"))
-        stranger = client(endpoint, intruder(ours))
+        router = router_of(certificate(binaries, ours, "router"), f"tls/127.0.0.1:{port}", f"tls/127.0.0.1:{free_port()}")
+        endpoint = f"tls/localhost:{port}"
+        names = ("capture", "tracking", "compositor", "intruder")
+        capture, tracking, compositor, stranger = (client(endpoint, certificate(binaries, ours, n)) for n in names)
 
         must(received(capture, tracking, FRAMES) == 3, "tracking receives the frames of capture")
         must(received(capture, compositor, FRAMES) == 3, "so does the compositor")
@@ -156,13 +143,12 @@ def main() -> int:
         must(received(stranger, tracking, FRAMES) == 0, "and publishes none")
         must(received(tracking, compositor, FRAMES) == 0, "tracking publishes no frames")
         must(received(capture, tracking, OTHER) == 0, "capture publishes nothing else")
-        must(not is_let_in(endpoint, theirs / "tracking"), "another authority's certificate is not let in")
+        must(not is_let_in(endpoint, certificate(binaries, theirs, "tracking")), "another authority's certificate is not let in")
         must(not is_let_in(endpoint, None), "none is not let in")
         must(not is_let_in(f"tcp/127.0.0.1:{port}", None), "nor is plain TCP")
         for session in (capture, tracking, compositor, stranger, router):
             threading.Thread(target=session.close, daemon=True).start()
-        if args.bin:
-            must(pictures_across(args.bin.resolve(), ours, folder / "box"), "pictures come across the router")
+        must(pictures_across(binaries, ours, folder / "box"), "pictures come across the router")
     return 1 if faults else 0
 
 

@@ -3,8 +3,9 @@
 
     python3 tests/topologies/main.py [--bin target/release] [--only compose store …] [--rate 15] [--out DIR]
 
-A shopper sees garments live; then each process in turn is killed with SIGKILL and started again, and the shopper sees
-them live again. Needs tests/clients/attacks/requirements.txt, and kubectl for the overlays, which are skipped loudly without it. Ends with 0 when all of it
+A shopper sees garments live, and somebody listens to everything between the services, who may open no frame (without
+identities, in `base`, all); then each process in turn is killed with SIGKILL and started again, and the shopper sees them
+live again. Listening takes root and is skipped loudly without. Needs tests/clients/attacks/requirements.txt, and kubectl for the overlays, which are skipped loudly without it. Ends with 0 when all of it
 happens; the figures are printed as JSON."""
 
 import argparse
@@ -22,6 +23,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "clients")]
 from attacks.range import stubs  # noqa: E402
 from attacks.viewer import Viewer  # noqa: E402
+from listener import Listener, prove  # noqa: E402
 from running import Camera, Running, running  # noqa: E402
 from shipped import TOPOLOGIES  # noqa: E402
 
@@ -58,14 +60,19 @@ def live_again(box: Running, ground: types.SimpleNamespace, viewer: Viewer, name
 def visit(ground: types.SimpleNamespace, box: Running) -> dict[str, object]:
     """A shopper's visit, and what it showed."""
     begun = time.monotonic()
+    listener = Listener(box.block) if Listener.is_allowed() else None
     box.wait_ready(READY_S)
     ready = time.monotonic() - begun
     viewer = shopper(ground, box)
     viewer.wait_live(LIVE_S)
     figures: dict[str, object] = {"ready_s": round(ready, 2), "live_s": round(time.monotonic() - begun, 2)}
+    if listener:
+        figures["heard"] = heard = listener.close()
+        is_private = heard["opened"] == 0
+        assert is_private == box.has_identity, f"a listener between services: {heard}"
     box.wait_ready(CUT_S)
     again = {}
-    for process in box.topology.processes:
+    for process in box.topology.lasting:
         viewer, seconds = live_again(box, ground, viewer, process.name)
         again[process.name] = round(seconds, 2)
         box.wait_ready(CUT_S)
@@ -83,6 +90,12 @@ def main() -> int:
     os.environ["PATH"] += f":{HERE.parents[1] / 'target/deploy-tools/bin'}"
     ground = types.SimpleNamespace(api=stubs())
     figures, faults = {}, 0
+    if Listener.is_allowed():
+        prove("127.19.0")
+    elif os.environ.get("TRYON_REQUIRE_ALL"):
+        parser.error("listening between services takes root")
+    else:
+        print("SKIPPED listening between services: takes root", flush=True)
     with contextlib.ExitStack() as stack:
         folder = args.out or pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory()))
         for name in args.only:

@@ -16,7 +16,7 @@ import urllib.request
 from collections.abc import Iterator
 
 from attacks.credentials import Authority, Metadata, bearer
-from shipped import Process, Topology
+from shipped import AUTHORITY, Process, Topology
 
 # A block of loopback addresses for each topology that this run starts.
 BLOCKS = itertools.count(1)
@@ -43,8 +43,8 @@ class Running:
 
     def __init__(self, topology: Topology, binaries: pathlib.Path, folder: pathlib.Path, camera: Camera):
         self.topology, self.binaries, self.folder, self.camera = topology, binaries, folder, camera
-        block = f"127.{os.getpid() % 200 + 20}.{next(BLOCKS)}"
-        hosts = topology.processes if topology.has_hosts else topology.processes[:1]
+        self.block = block = f"127.{os.getpid() % 200 + 20}.{next(BLOCKS)}"
+        hosts = topology.lasting if topology.has_hosts else topology.lasting[:1]
         self.hosts = {p.name: f"{block}.{k}" for k, p in enumerate(hosts, 1)}
         self.authority = Authority(folder / "authority")
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
@@ -72,6 +72,11 @@ class Running:
         return any("TRYON_AUTH__KEYS" in p.environment for p in self.topology.processes)
 
     @property
+    def has_identity(self) -> bool:
+        """The shipped files give the services an identity to each other."""
+        return self.topology.name == "up" or any("TRYON_IDENTITY__AUTHORITY" in p.environment for p in self.topology.lasting)
+
+    @property
     def address(self) -> str:
         """As the viewers of `attacks` ask for it."""
         return self.mirror
@@ -87,16 +92,25 @@ class Running:
     def place(self, process: Process) -> dict[str, str]:
         """Writes the files of a process; their paths by the shipped ones."""
         own = self.folder / process.name
-        placed = {}
+        placed = {at: str(self.volume(name)) for at, name in process.volumes.items()}
         for at, text in process.files.items():
             path = own / at.lstrip("/")
             path.parent.mkdir(parents=True, exist_ok=True)
             if text is None:
                 self.place_secrets(path)
             else:
-                path.write_text(self.here(text, process.name))
+                path.write_text(self.here(replaced(text, placed), process.name))
             placed[at] = str(path)
         return placed
+
+    def volume(self, name: str) -> pathlib.Path:
+        """Folder of a volume; the secret of the authority holds what deploy/ says that it does."""
+        folder = self.folder / "volumes" / name
+        if not folder.exists():
+            folder.mkdir(parents=True)
+            if name == AUTHORITY:
+                subprocess.run([self.binaries / "tryon", "identity", "make", folder / "authority.pem"], check=True)
+        return folder
 
     def place_secrets(self, folder: pathlib.Path) -> None:
         """The keys and tokens of deploy/README.md under both names of the public key."""
@@ -107,14 +121,12 @@ class Running:
         (folder / "service.token").write_text(self.authority.token())
 
     def start(self, name: str) -> None:
-        """Starts one process; does not wait."""
+        """Starts one process, and waits for the end of one that has one."""
         process = next(p for p in self.topology.processes if p.name == name)
         placed = self.place(process)
 
         def rewritten(text: str) -> str:
-            for at, path in placed.items():
-                text = text.replace(at, path)
-            return self.here(text, name)
+            return self.here(replaced(text, placed), name)
 
         command = [rewritten(c) for c in process.command]
         environment = {k: rewritten(v) for k, v in process.environment.items()}
@@ -122,11 +134,17 @@ class Running:
             command = [sys.executable, "-c", ROUTER, command[-1]]
         else:
             command[0] = str(self.binaries / command[0])
+        if command[1:4] == ["identity", "issue", "router"]:
+            command.append(f"--name={self.host('router')}")
         if name in ("capture", "box"):
             environment["TRYON_CAPTURE__CAMERAS"] = self.camera.variable()
         inherited = {k: v for k, v in os.environ.items() if not k.startswith("TRYON_")}
         with (self.folder / f"{name}.log").open("ab") as log:
-            self.processes[name] = subprocess.Popen(command, stdout=log, stderr=log, env=inherited | environment)
+            started = subprocess.Popen(command, stdout=log, stderr=log, env=inherited | environment)
+        if process.is_once:
+            assert started.wait(START_S) == 0, f"{name} ended with {started.returncode}: {self.log(name)}"
+        else:
+            self.processes[name] = started
 
     def kill(self, name: str) -> None:
         """SIGKILL."""
@@ -167,6 +185,13 @@ class Running:
     def log(self, name: str) -> str:
         """End of a process's log."""
         return (self.folder / f"{name}.log").read_text(errors="replace")[-1500:]
+
+
+def replaced(text: str, placed: dict[str, str]) -> str:
+    """A text with other paths."""
+    for at, path in placed.items():
+        text = text.replace(at, path)
+    return text
 
 
 @contextlib.contextmanager

@@ -8,6 +8,7 @@ use tryon::body::{
 };
 use tryon::math::{Camera, P3, V3};
 use tryon::mesh::TriMesh;
+use tryon::tracking::KnownBody;
 
 const MAX_VERTICES: u32 = 65_536;
 const MAX_FACES: u32 = 131_072;
@@ -226,6 +227,54 @@ pub fn shape_from_wire(s: &v1::BodyShape, template: &Template) -> Result<BodySha
     })
 }
 
+/// Wire message of a known body of `template`.
+pub fn known_body_to_wire(k: &KnownBody, template: &Template) -> v1::KnownBody {
+    v1::KnownBody {
+        subject: k.subject,
+        shape: Some(shape_to_wire(&k.shape)),
+        template_name: template.name().into(),
+        residual_mm: (k.residual * 1e3) as f32,
+    }
+}
+
+/// Largest residual of a known body [mm]: a tracked one stays below a fifth of it.
+const MOST_RESIDUAL_MM: f32 = 100.0;
+
+/// Known body of `template`, in the field `known_body` of `message`.
+///
+/// # Errors
+/// Names the field that is absent, of another template, or no body that a tracker may have reported.
+pub fn known_body_from_wire(
+    k: &v1::KnownBody,
+    template: &Template,
+    message: &str,
+) -> Result<KnownBody, WireError> {
+    let fault = |f: &str, why: &str| WireError::new(format!("{message}.known_body.{f}"), why);
+    if k.subject == 0 {
+        return Err(fault("subject", "from 1 on"));
+    }
+    if k.template_name != template.name() {
+        let why = format!("the template is `{}`", template.name());
+        return Err(fault("template_name", &why));
+    }
+    if !(0.0..=MOST_RESIDUAL_MM).contains(&k.residual_mm) {
+        return Err(fault("residual_mm", "0 to 100 mm"));
+    }
+    let shape = (k.shape.as_ref()).ok_or_else(|| fault("shape", "is required"))?;
+    let shape = shape_from_wire(shape, template).map_err(|e| {
+        let part = e.field.replacen("body_shape", "shape", 1);
+        fault(&part, &e.why)
+    })?;
+    let known = KnownBody {
+        subject: k.subject,
+        shape,
+        residual: f64::from(k.residual_mm) * 1e-3,
+    };
+    let checked = known.check(template);
+    checked.map_err(|e| fault(&format!("shape.{}", e.part), &e.why))?;
+    Ok(known)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -309,6 +358,57 @@ mod tests {
         );
         for (a, b) in s.displacements.iter().zip(&shape.displacements) {
             assert!((a - b).abs() <= DISPLACEMENT_UNIT / 2.0 * 1.001);
+        }
+    }
+
+    #[test]
+    fn a_known_body_comes_back_and_one_that_is_none_names_its_field() {
+        let t = small_template();
+        let known = KnownBody {
+            subject: 3,
+            shape: BodyShape {
+                coefficients: vec![1.5],
+                bone_scales: vec![1.0, 1.1, 0.9],
+                displacements: Vec::new(),
+            },
+            residual: 0.002,
+        };
+        let wire = known_body_to_wire(&known, &t);
+        let back = known_body_from_wire(&wire, &t, "m").expect("same");
+        assert_eq!((back.subject, &back.shape), (3, &known.shape));
+        assert!((back.residual - known.residual).abs() < 1e-8);
+
+        type Spoil = fn(&mut v1::KnownBody);
+        fn shape(w: &mut v1::KnownBody) -> &mut v1::BodyShape {
+            w.shape.as_mut().expect("given")
+        }
+        let faults: [(&str, Spoil); 10] = [
+            ("subject", |w| w.subject = 0),
+            ("template_name", |w| w.template_name = "other".into()),
+            ("residual_mm", |w| w.residual_mm = f32::NAN),
+            ("residual_mm", |w| w.residual_mm = -1.0),
+            ("shape", |w| w.shape = None),
+            ("shape.coefficients[0]", |w| {
+                shape(w).coefficients = bulk::write_flat(&[f64::INFINITY]);
+            }),
+            ("shape.coefficients[0]", |w| {
+                shape(w).coefficients = bulk::write_flat(&[8.5]);
+            }),
+            ("shape.bone_scales", |w| {
+                shape(w).bone_scales = bulk::write_flat(&[1.0, 0.0, 1.0]);
+            }),
+            ("shape.bone_scales[2]", |w| {
+                shape(w).bone_scales = bulk::write_flat(&[1.0, 1.0, 3.0]);
+            }),
+            ("shape.displacements[1]", |w| {
+                shape(w).displacements = bulk::write_flat(&[0i16, 2001, 0, 0]);
+            }),
+        ];
+        for (field, spoil) in faults {
+            let mut w = wire.clone();
+            spoil(&mut w);
+            let refused = known_body_from_wire(&w, &t, "m").expect_err(field);
+            assert_eq!(refused.field, format!("m.known_body.{field}"));
         }
     }
 

@@ -1304,7 +1304,7 @@ pub mod capture_service_server {
         const NAME: &'static str = SERVICE_NAME;
     }
 }
-#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+#[derive(Clone, PartialEq, ::prost::Message)]
 pub struct OpenSessionRequest {
     /// 1 to 64 characters of \[A-Za-z0-9_-\], chosen by the caller; empty lets the service draw a random one.
     #[prost(string, tag = "1")]
@@ -1317,6 +1317,28 @@ pub struct OpenSessionRequest {
     /// Key of the camera's frames, as HoldConsent answered it; opening again hands over the next one.
     #[prost(message, optional, tag = "4")]
     pub frame_key: ::core::option::Option<FrameKey>,
+    /// Body that this session had before its service or its camera was restarted. A session without a body starts with it: the
+    /// size is not measured again. It is dropped, and the size measured from nothing, when the person found is taller, shorter
+    /// or of another shape, and when nobody is found within ten seconds. A session with a body of its own ignores it.
+    #[prost(message, optional, tag = "5")]
+    pub known_body: ::core::option::Option<KnownBody>,
+}
+/// Settled size and shape of a person, remembered by who holds the consent for as long as it holds, and for ten seconds at
+/// most after the last exposure that showed that person.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct KnownBody {
+    /// `BodyState.subject`, from 1 on; the session goes on with that number, and counts up when the body is dropped.
+    #[prost(uint64, tag = "1")]
+    pub subject: u64,
+    /// `BodyState.shape` of a state with TRACKING: a positive size within what is measured, nothing beyond 20 cm off the skin.
+    #[prost(message, optional, tag = "2")]
+    pub shape: ::core::option::Option<BodyShape>,
+    /// `OpenSessionResponse.template_name` that the shape refers to.
+    #[prost(string, tag = "3")]
+    pub template_name: ::prost::alloc::string::String,
+    /// `BodyState.residual_mm` while it was tracked, millimetres, 0 to 100: a fit that stays much worse is of another person.
+    #[prost(float, tag = "4")]
+    pub residual_mm: f32,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct OpenSessionResponse {
@@ -1668,8 +1690,9 @@ pub mod tracking_service_client {
         }
         /// Opens a session, or answers with the open one of that id: callers choose ids, so opening again after a lost
         /// connection or a restart of this service is safe. RESOURCE_EXHAUSTED at the configured number of sessions,
-        /// FAILED_PRECONDITION when the id is open with another camera. A session whose camera sends nothing for a second
-        /// forgets body and pose. A session that nobody reads and nobody opens again
+        /// FAILED_PRECONDITION when the id is open with another camera, INVALID_ARGUMENT with the field at fault. A session whose
+        /// camera sends nothing for a second forgets body and pose; a caller who holds the consent may remember the body and hand
+        /// it back (`known_body`). A session that nobody reads and nobody opens again
         /// is closed after the configured idle time.
         pub async fn open_session(
             &mut self,
@@ -1816,8 +1839,9 @@ pub mod tracking_service_server {
     pub trait TrackingService: std::marker::Send + std::marker::Sync + 'static {
         /// Opens a session, or answers with the open one of that id: callers choose ids, so opening again after a lost
         /// connection or a restart of this service is safe. RESOURCE_EXHAUSTED at the configured number of sessions,
-        /// FAILED_PRECONDITION when the id is open with another camera. A session whose camera sends nothing for a second
-        /// forgets body and pose. A session that nobody reads and nobody opens again
+        /// FAILED_PRECONDITION when the id is open with another camera, INVALID_ARGUMENT with the field at fault. A session whose
+        /// camera sends nothing for a second forgets body and pose; a caller who holds the consent may remember the body and hand
+        /// it back (`known_body`). A session that nobody reads and nobody opens again
         /// is closed after the configured idle time.
         async fn open_session(
             &self,
@@ -2233,6 +2257,20 @@ pub struct DressRequest {
     /// At most 8, inner layer first.
     #[prost(message, repeated, tag = "2")]
     pub garments: ::prost::alloc::vec::Vec<GarmentChoice>,
+    /// Sizes that this service chose for these garments before it was restarted, remembered by the caller; ignored by a session
+    /// that wears them.
+    #[prost(message, optional, tag = "3")]
+    pub known_sizes: ::core::option::Option<KnownSizes>,
+}
+/// Sizes that were chosen for a person whose size had settled.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct KnownSizes {
+    /// `BodyState.subject`: they are worn while that person is followed, and chosen again for another.
+    #[prost(uint64, tag = "1")]
+    pub subject: u64,
+    /// One for each of `garments`; empty for a garment that is made to measure.
+    #[prost(string, repeated, tag = "2")]
+    pub sizes: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
 }
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct DressResponse {

@@ -16,6 +16,7 @@ mod source;
 pub use check::check;
 pub use source::{OpenSource, SourceError, open};
 
+use std::sync::Arc;
 use tryon_kit::config::Config;
 use tryon_kit::server::{self, Context, Running, Service, StartError};
 use tryon_proto::v1::capture_service_server::{CaptureServiceServer, SERVICE_NAME};
@@ -33,13 +34,11 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         service: "capture",
         why: e.to_string(),
     })??;
-    let service = service::Capture::new(c, &ctx);
-    for camera in c.cameras.iter().filter(|camera| camera.autostart) {
-        service.autostart(&camera.name).await;
-    }
+    let capture = Arc::new(service::Capture::new(c, &ctx));
     let (mut routes, health) = server::routes(SERVICE_NAME)?;
     routes.add_service(
-        CaptureServiceServer::new(service).max_decoding_message_size(server::MAX_REQUEST_BYTES),
+        CaptureServiceServer::from_arc(capture.clone())
+            .max_decoding_message_size(server::MAX_REQUEST_BYTES),
     );
     let service = Service {
         name: "capture",
@@ -48,8 +47,13 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         admin: c.admin,
         routes: routes.routes(),
         around: None,
-        http1: false,
+        is_public: false,
         health,
     };
-    server::start(service, &ctx).await
+    let running = server::start(service, &ctx).await?;
+    // After the port is open: consent is renewed while sources are being opened.
+    for camera in c.cameras.iter().filter(|camera| camera.autostart) {
+        capture.autostart(&camera.name).await;
+    }
+    Ok(running)
 }

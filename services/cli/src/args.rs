@@ -2,6 +2,7 @@
 
 mod clothcap;
 mod fine;
+mod identity;
 mod offline;
 mod serve;
 mod token;
@@ -11,6 +12,7 @@ pub(crate) use clothcap::{
     ClothcapSegmentArgs, ClothcapWhat, ScanArgs, ScanFrameArgs, Shard,
 };
 pub(crate) use fine::FineSessionArgs;
+pub(crate) use identity::{IdentityArgs, IdentityIssueArgs, IdentityMakeArgs, IdentityWhat};
 pub(crate) use offline::{FineArgs, SolverArgs};
 pub(crate) use serve::{DemoArgs, UpArgs};
 pub(crate) use token::{
@@ -33,9 +35,10 @@ pub(crate) struct Cli {
     /// Command to run.
     #[command(subcommand)]
     pub(crate) command: Command,
-    /// Log filter, for example `info` or `tryon_tracking=debug`. Logs go to standard error.
-    #[arg(long, global = true, env = "TRYON_LOG", default_value = "warn")]
-    pub(crate) log: String,
+    /// Log filter, for example `info` or `tryon_tracking=debug`; without one `warn`, and for `up` what its [log] says. Logs go
+    /// to standard error.
+    #[arg(long, global = true, env = "TRYON_LOG")]
+    pub(crate) log: Option<String>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -76,6 +79,8 @@ pub(crate) enum Command {
     Bench(BenchArgs),
     /// Keys, tokens and enrolment codes: who may call the services.
     Token(TokenArgs),
+    /// The authority by which a store's services know each other, and certificates of it.
+    Identity(IdentityArgs),
     /// Check this machine: cores, memory, graphics adapter, ports, shared data; report expected faults.
     Doctor(DoctorArgs),
 }

@@ -31,17 +31,20 @@ fn main() -> ExitCode {
     core_dump::forbid();
     let cli = Cli::parse();
     closed_output::end_when_closed(&cli.command);
-    let log = LogConfig {
-        level: cli.log,
-        ..LogConfig::default()
-    };
-    if let Err(why) = telemetry::init_logs(&log) {
-        eprintln!("tryon: --log: {why}");
-        return ExitCode::from(EXIT_USAGE);
+    // `up` logs as its configuration says.
+    if !matches!(cli.command, Command::Up(_)) {
+        let log = LogConfig {
+            level: cli.log.clone().unwrap_or_else(|| "warn".into()),
+            ..LogConfig::default()
+        };
+        if let Err(why) = telemetry::init_logs(&log) {
+            eprintln!("tryon: --log: {why}");
+            return ExitCode::from(EXIT_USAGE);
+        }
     }
     let outcome = match cli.command {
         Command::Demo(a) => commands::demo::run(&a),
-        Command::Up(a) => commands::up::run(&a),
+        Command::Up(a) => commands::up::run(&a, cli.log),
         Command::Run(a) => commands::run::run(&a),
         Command::Track(a) => commands::track::run(&a),
         Command::Simulate(a) => commands::simulate::run(&a),
@@ -56,6 +59,7 @@ fn main() -> ExitCode {
         Command::TrainParts(a) => commands::train_parts::run(&a),
         Command::Bench(a) => commands::bench::run(&a),
         Command::Token(a) => commands::token::run(&a),
+        Command::Identity(a) => commands::identity::run(&a),
         Command::Doctor(a) => commands::doctor::run(&a),
     };
     match outcome {

@@ -67,9 +67,11 @@ impl OneBox {
     /// # Errors
     /// Names the key at fault.
     pub(crate) fn check(config: &Config) -> Result<()> {
-        CommonFiles::open(config, Some(&Issuer::generate()?))?;
+        CommonFiles::open(config, "box", Some(&Issuer::generate()?))?;
+        let mut config = config.clone();
+        connect(&mut config);
         for check in CHECKS {
-            check(config)?;
+            check(&config)?;
         }
         Ok(())
     }
@@ -80,7 +82,7 @@ impl OneBox {
     /// Names the service and the address or key at fault.
     pub(crate) async fn start(mut config: Config, bus: Option<Arc<dyn FrameBus>>) -> Result<Self> {
         let issuer = Issuer::generate()?;
-        let CommonFiles { auth, tls } = CommonFiles::open(&config, Some(&issuer))?;
+        let files = CommonFiles::open(&config, "box", Some(&issuer))?;
         let token = if config.auth.keys.is_empty() {
             Some(issuer.issue_for_process(config.store(), &["compositor"])?)
         } else {
@@ -97,9 +99,11 @@ impl OneBox {
             pool,
             shutdown: shutdown.clone(),
             grace,
-            auth,
-            tls: tls.clone(),
+            auth: files.auth,
+            tls: files.tls.clone(),
+            inside: files.inside,
         };
+        connect(&mut config);
         let traces = frame_trace::start("box", &config.telemetry);
         let traces = traces.map_err(|why| StartError::Config {
             key: "telemetry.otlp".into(),
@@ -122,8 +126,8 @@ impl OneBox {
             ));
         }
         Ok(Self {
-            scheme: scheme(&config),
-            tls,
+            scheme: scheme(config.tls.is_server()),
+            tls: files.tls,
             addresses,
             token,
             shutdown,
@@ -162,36 +166,31 @@ impl OneBox {
     }
 }
 
-/// Scheme of the services' URLs.
-fn scheme(config: &Config) -> &'static str {
-    if config.tls.is_server() {
-        "https"
-    } else {
-        "http"
-    }
+/// Scheme of a service's URL.
+fn scheme(is_encrypted: bool) -> &'static str {
+    if is_encrypted { "https" } else { "http" }
+}
+
+/// Lets the services of the box call each other.
+fn connect(config: &mut Config) {
+    let scheme = scheme(!config.identity.off || config.tls.is_server());
+    let url = |address| format!("{scheme}://{address}");
+    config.compositor.capture = url(config.capture.address);
+    config.compositor.tracking = url(config.tracking.address);
+    config.compositor.cloth = url(config.cloth.address);
+    config.cloth.tracking = url(config.tracking.address);
 }
 
 /// Replaces port 0 by the bound port, for the services that follow and for restarts.
 fn pin_addresses(config: &mut Config, name: &str, running: &Running) {
-    let url = format!("{}://{}", scheme(config), running.address);
-    match name {
-        "capture" => {
-            (config.capture.address, config.capture.admin) = (running.address, running.admin);
-            config.compositor.capture = url;
-        }
-        "tracking" => {
-            (config.tracking.address, config.tracking.admin) = (running.address, running.admin);
-            config.cloth.tracking = url.clone();
-            config.compositor.tracking = url;
-        }
-        "cloth" => {
-            (config.cloth.address, config.cloth.admin) = (running.address, running.admin);
-            config.compositor.cloth = url;
-        }
-        _ => {
-            (config.compositor.address, config.compositor.admin) = (running.address, running.admin)
-        }
-    }
+    let (address, admin) = match name {
+        "capture" => (&mut config.capture.address, &mut config.capture.admin),
+        "tracking" => (&mut config.tracking.address, &mut config.tracking.admin),
+        "cloth" => (&mut config.cloth.address, &mut config.cloth.admin),
+        _ => (&mut config.compositor.address, &mut config.compositor.admin),
+    };
+    (*address, *admin) = (running.address, running.admin);
+    connect(config);
 }
 
 /// Restarts a service whenever it breaks, after a pause that grows with each failure.

@@ -454,6 +454,43 @@ fn tokens_are_made_and_revoked() {
 }
 
 #[test]
+fn a_store_has_one_authority_and_strangers_get_certificates_of_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).display().to_string();
+    let authority = path("store/authority.pem");
+    let made = || {
+        assert!(tryon(&["identity", "make", &authority]).status.success());
+        std::fs::read_to_string(&authority).unwrap()
+    };
+    let first = made();
+    assert_eq!(made(), first);
+    let (authority, out) = (format!("--authority={authority}"), path("router"));
+    let out = format!("--out={out}");
+    let issue = [
+        "identity",
+        "issue",
+        "router",
+        &authority,
+        &out,
+        "--name=10.0.0.7",
+    ];
+    assert!(tryon(&issue).status.success());
+    let read = |name: &str| std::fs::read_to_string(dir.path().join("router").join(name)).unwrap();
+    assert!(first.ends_with(&read("ca.pem")));
+    assert!(read("key.pem").starts_with("-----BEGIN PRIVATE KEY-----"));
+    let certificate = read("certificate.pem");
+    assert!(tryon(&issue).status.success());
+    assert_ne!(read("certificate.pem"), certificate, "made anew");
+
+    std::fs::write(path("none.pem"), "none").unwrap();
+    let refusal = refused(&["identity", "make", &path("none.pem")]);
+    assert!(
+        refusal.contains("none.pem") && refusal.contains("private key"),
+        "{refusal}"
+    );
+}
+
+#[test]
 fn ccd_counts_against_the_truth() {
     let dir = tempfile::tempdir().unwrap();
     let root = dir.path().display().to_string();

@@ -58,8 +58,9 @@ impl Program {
 
         let bus = free_tcp_endpoint().unwrap();
         let public = path("keys/issuer.pub.pem");
+        let identity = format!("[identity]\nauthority = \"{}\"\n", path("authority.pem"));
         let mut config = format!(
-            "[auth]\nkeys = [\"{public}\"]\n[bus]\nlisten = [\"{bus}\"]\nconnect = [\"{bus}\"]\n\
+            "{identity}[auth]\nkeys = [\"{public}\"]\n[bus]\nlisten = [\"{bus}\"]\nconnect = [\"{bus}\"]\n\
              [[capture.cameras]]\nname = \"front\"\nsource = \"synth:still\"\nrate = 10.0\n"
         );
         for (service, more) in [
@@ -80,9 +81,10 @@ impl Program {
             let line = said.iter().find(|l| l.starts_with(service)).unwrap();
             format!("http://{}", line.split_whitespace().nth(2).unwrap())
         };
-        let (token_file, cloth) = (path("token"), url("cloth"));
-        let client =
-            format!("[auth]\ntoken = \"{token_file}\"\n[compositor]\ncloth = \"{cloth}\"\n");
+        let (token_file, cloth) = (path("token"), url("cloth").replace("http", "https"));
+        let client = format!(
+            "{identity}[auth]\ntoken = \"{token_file}\"\n[compositor]\ncloth = \"{cloth}\"\n"
+        );
         std::fs::write(folder.join("client.toml"), client).unwrap();
         Self {
             child,

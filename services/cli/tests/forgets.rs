@@ -16,6 +16,8 @@ use tryon::formats::image::{decode_jpeg, write_png_depth, write_png_rgb};
 use tryon_kit::auth::{Connection, Credentials};
 use tryon_kit::bus::free_tcp_endpoint;
 use tryon_kit::client::channel;
+use tryon_kit::config::Config;
+use tryon_kit::identity::Identity;
 use tryon_kit::tls::Tls;
 use tryon_proto::v1::capture_service_client::CaptureServiceClient;
 use tryon_proto::v1::compositor_service_client::CompositorServiceClient;
@@ -117,6 +119,8 @@ struct Program {
     /// Presents a token for all of it.
     credentials: Credentials,
     log: Arc<Mutex<String>>,
+    /// Authority of the store, for the services behind the compositor.
+    authority: PathBuf,
     addresses: Vec<(String, SocketAddr, SocketAddr)>,
 }
 
@@ -124,6 +128,8 @@ impl Program {
     fn start(folder: &Path) -> Self {
         let bus = free_tcp_endpoint().unwrap();
         let mut config = format!("[bus]\nlisten = [\"{bus}\"]\nconnect = [\"{bus}\"]\n");
+        let authority = folder.join("authority.pem");
+        config += &format!("[identity]\nauthority = \"{}\"\n", authority.display());
         let keys = folder.join("keys");
         let token = issue(&keys);
         config += &format!(
@@ -168,6 +174,7 @@ impl Program {
         });
         Self {
             addresses: addresses.collect(),
+            authority,
             child,
             credentials: Credentials::fixed(token.trim()),
             log,
@@ -176,10 +183,19 @@ impl Program {
 
     fn connect(&self, service: &str) -> Connection {
         let found = self.addresses.iter().find(|a| a.0 == service);
-        let url = format!("http://{}", found.unwrap().1);
+        let mut known = Config::default();
+        known.identity.authority.clone_from(&self.authority);
+        let identity = Identity::of(&known, "guest", false).unwrap();
+        let inside = Tls::inside(&known, identity.as_ref()).unwrap();
+        let scheme = if service == "compositor" {
+            "http"
+        } else {
+            "https"
+        };
+        let url = format!("{scheme}://{}", found.unwrap().1);
         self.credentials
             .clone()
-            .present(channel(&url, &Tls::off()).unwrap())
+            .present(channel(&url, &inside).unwrap())
     }
 
     /// Memory of the process.

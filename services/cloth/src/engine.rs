@@ -301,6 +301,13 @@ impl Worn {
         self.outfit.is_past_mending()
     }
 
+    /// Sizes of the choices, once those of the body have settled and are worn; empty for garments made to measure.
+    pub(crate) fn settled_sizes(&self) -> Option<Vec<String>> {
+        let size = |g: &SizedGarment| g.size().map_or_else(String::new, |s| s.to_string());
+        let is_settled = !self.is_provisional && !self.is_misfit;
+        is_settled.then(|| self.outfit.worn().iter().map(size).collect())
+    }
+
     /// The outfit after the last step, and the template of its body.
     pub(crate) fn outfit(&self) -> (&DressedOutfit, &Arc<Template>) {
         (&self.outfit, &self.template)

@@ -3,6 +3,7 @@
 //! One task owns one session (`session`): it follows the body states, dresses the body when it is calibrated, steps the
 //! garments on the compute pool and sends each reader a keyframe and then positions.
 
+mod chosen_sizes;
 mod detail_ladder;
 mod engine;
 mod fine_task;
@@ -16,6 +17,7 @@ mod session;
 mod simulation;
 
 use tryon_kit::config::Config;
+use tryon_kit::identity::check_url;
 use tryon_kit::server::{self, Context, Running, Service, StartError};
 use tryon_proto::v1::cloth_service_server::{ClothServiceServer, SERVICE_NAME};
 use tryon_proto::v1::tracking_service_server::SERVICE_NAME as TRACKING;
@@ -26,8 +28,9 @@ const MAX_REQUEST_BYTES: usize = 5 * 1024 * 1024 + 4096;
 /// Checks the files that `[cloth]` names; garments at fault are logged.
 ///
 /// # Errors
-/// When the folder, the body or a material of garments cannot be used.
+/// When the URL of tracking, the folder, the body or a material of garments cannot be used.
 pub fn check(config: &Config) -> Result<(), StartError> {
+    check_url(config, "cloth.tracking", &config.cloth.tracking)?;
     library::Library::read(&config.cloth).map(drop)
 }
 
@@ -37,7 +40,8 @@ pub fn check(config: &Config) -> Result<(), StartError> {
 /// When an address cannot be bound or the tracking URL is none.
 pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError> {
     let c = &config.cloth;
-    let tracking = tryon_kit::client::channel(&c.tracking, &ctx.tls);
+    check_url(config, "cloth.tracking", &c.tracking)?;
+    let tracking = tryon_kit::client::channel(&c.tracking, &ctx.inside);
     let tracking = tracking.map_err(|why| StartError::Config {
         key: "cloth.tracking".into(),
         why,
@@ -62,7 +66,7 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         admin: c.admin,
         routes: routes.routes(),
         around: None,
-        http1: false,
+        is_public: false,
         health,
     };
     server::start(service, &ctx).await

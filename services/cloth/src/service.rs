@@ -1,5 +1,6 @@
 //! Remote procedures of the cloth service: check the request, find the session, answer.
 
+use crate::chosen_sizes::ChosenSizes;
 use crate::engine::Update;
 use crate::fine_task;
 use crate::library::Library;
@@ -106,6 +107,7 @@ impl ClothService for Cloth {
         let id = request::session_id("dress_request.session_id", &r.session_id)?;
         let choices = request::choices("dress_request", &r.garments)?;
         self.library.check(&choices)?;
+        let sizes = ChosenSizes::from_wire(r.known_sizes.as_ref(), &choices, &self.library)?;
         if self
             .sessions
             .get(&id)
@@ -119,6 +121,7 @@ impl ClothService for Cloth {
             tracking: self.tracking.clone(),
             idle: self.idle,
             adapts_detail: self.adapts_detail,
+            sizes: sizes.clone(),
             library: self.library.clone(),
             directory: self.sessions.clone(),
         };

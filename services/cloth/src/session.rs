@@ -1,5 +1,6 @@
 //! One session: its task, its outfit, its readers.
 
+use crate::chosen_sizes::ChosenSizes;
 use crate::detail_ladder::DetailLadder;
 use crate::engine::{Body, Update, Worn, dress, frame_of};
 use crate::fine_task::Snapshot;
@@ -12,7 +13,7 @@ use tokio::time::Instant;
 use tonic::Status;
 use tryon_kit::auth::Connection;
 use tryon_kit::bodies::{News, follow};
-use tryon_kit::consent::FORGET_AFTER;
+use tryon_kit::consent::{FORGET_AFTER, REMEMBER_FOR};
 use tryon_kit::queue::{latest, ordered};
 use tryon_kit::server::Context;
 use tryon_kit::session_task::{self, Place};
@@ -62,6 +63,8 @@ pub(crate) struct Setup {
     pub(crate) tracking: Connection,
     pub(crate) idle: Duration,
     pub(crate) adapts_detail: bool,
+    /// Sizes that the caller remembers of the first outfit.
+    pub(crate) sizes: Option<ChosenSizes>,
     pub(crate) library: Arc<Library>,
     pub(crate) directory: Sessions<Handle>,
 }
@@ -95,6 +98,7 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
         let following = tokio::spawn(following);
         let (dressed, ready) = mpsc::channel(1);
         let task = Task {
+            sizes: setup.sizes.clone(),
             setup,
             wanted,
             worn: None,
@@ -149,6 +153,8 @@ struct Task {
     worn: Option<Worn>,
     /// Tracking's number of the person who is followed.
     subject: u64,
+    /// Sizes that the last outfit had on its person.
+    sizes: Option<ChosenSizes>,
     /// Replaced when the body is forgotten: what is kept of it elsewhere goes then.
     body: watch::Sender<()>,
     /// Recordings of the body that go on.
@@ -219,6 +225,9 @@ impl Task {
                     if followed.elapsed() >= FORGET_AFTER {
                         // Nobody knows whom the worn outfit fits.
                         self.forget_body();
+                    }
+                    if followed.elapsed() >= REMEMBER_FOR {
+                        self.sizes = None;
                     }
                     if published.elapsed() >= HEARTBEAT {
                         if status.frame.status() == ClothStatus::Live {
@@ -431,6 +440,7 @@ impl Task {
         }
         match followed {
             Ok((worn, placed)) => {
+                self.remember_sizes(&worn);
                 let update = match placed {
                     Ok(p) => {
                         record_stages("cloth", p.frame.frame.as_ref(), &p.frame.stages);
@@ -451,6 +461,18 @@ impl Task {
                 self.undress();
                 waiting(DegradedReason::StepFailed, why.to_string()).into()
             }
+        }
+    }
+
+    /// Remembers the sizes of the worn outfit once they have settled.
+    fn remember_sizes(&mut self, worn: &Worn) {
+        let (on, subject) = (self.on, self.subject);
+        let is_known = (self.sizes.as_ref()).is_some_and(|s| s.is_of(on, subject));
+        if subject != 0
+            && !is_known
+            && let Some(sizes) = worn.settled_sizes()
+        {
+            self.sizes = Some(ChosenSizes::new(on, subject, sizes));
         }
     }
 
@@ -502,8 +524,12 @@ impl Task {
     }
 
     /// Dresses on the pool; the worn outfit is stepped meanwhile.
-    fn start_dressing(&mut self, body: Arc<Body>, wanted: WantedOutfit, is_coarse: bool) {
+    fn start_dressing(&mut self, body: Arc<Body>, mut wanted: WantedOutfit, is_coarse: bool) {
         self.dressing = Some(wanted.revision);
+        let is_same = |s: &&ChosenSizes| s.is_of(wanted.revision, body.state.subject);
+        if let Some(sizes) = self.sizes.as_ref().filter(is_same) {
+            wanted.choices = sizes.fill(&wanted.choices);
+        }
         let (pool, done) = (self.setup.ctx.pool.clone(), self.dressed.clone());
         let library = self.setup.library.clone();
         tokio::spawn(async move {

@@ -31,6 +31,7 @@ use std::io::ErrorKind;
 use tonic_web::GrpcWebLayer;
 use tryon_kit::config::Config;
 use tryon_kit::hosts::Hosts;
+use tryon_kit::identity::check_url;
 use tryon_kit::server::{self, Context, Running, Service, StartError};
 use tryon_proto::v1::compositor_service_server::{CompositorServiceServer, SERVICE_NAME};
 
@@ -44,11 +45,20 @@ async fn own_pages_only(hosts: Hosts, request: Request<Body>, next: Next) -> Res
     answer
 }
 
-/// Checks the folder of enrolment codes, which may be missing until the first code is drawn.
+/// Checks the URLs of the services behind, and the folder of enrolment codes, which may be missing until the first code is
+/// drawn.
 ///
 /// # Errors
-/// When it cannot be listed.
+/// When a URL is not one of theirs, or the folder cannot be listed.
 pub fn check(config: &Config) -> Result<(), StartError> {
+    let c = &config.compositor;
+    for (key, url) in [
+        ("compositor.tracking", &c.tracking),
+        ("compositor.cloth", &c.cloth),
+        ("compositor.capture", &c.capture),
+    ] {
+        check_url(config, key, url)?;
+    }
     let folder = &config.auth.enrolments;
     match std::fs::read_dir(folder) {
         Err(e) if e.kind() != ErrorKind::NotFound => Err(StartError::Config {
@@ -90,7 +100,7 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         admin: c.admin,
         routes: routes.routes(),
         around: Some(Box::new(around)),
-        http1: true,
+        is_public: true,
         health,
     };
     server::start(service, &ctx).await

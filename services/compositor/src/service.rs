@@ -9,18 +9,18 @@ use crate::try_on::{self, Command, Handle, Setup};
 use crate::upstream::{self, renamed};
 use crate::viewer::viewer;
 use futures::Stream;
-use std::net::Ipv4Addr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::oneshot;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status};
-use tryon_kit::auth::{Connection, EnrolFault, Grant};
+use tryon_kit::auth::{Caller, Connection, EnrolFault, Grant};
 use tryon_kit::client::{channel, request as call};
 use tryon_kit::config::CompositorConfig;
 use tryon_kit::consent::Cameras;
 use tryon_kit::frames::CameraKey;
+use tryon_kit::queue::consumption::Consumption;
 use tryon_kit::server::{Context, StartError};
 use tryon_kit::sessions::{Opened, Sessions, brief, random_id};
 use tryon_kit::status::{exhausted, from_upstream, not_found, unavailable};
@@ -68,9 +68,9 @@ impl Compositor {
             move |why| StartError::Config { key, why }
         };
         let present = |channel| ctx.auth.credentials().present(channel);
-        let tracking = present(channel(&config.tracking, &ctx.tls).map_err(fault("tracking"))?);
-        let cloth = present(channel(&config.cloth, &ctx.tls).map_err(fault("cloth"))?);
-        let capture = present(channel(&config.capture, &ctx.tls).map_err(fault("capture"))?);
+        let tracking = present(channel(&config.tracking, &ctx.inside).map_err(fault("tracking"))?);
+        let cloth = present(channel(&config.cloth, &ctx.inside).map_err(fault("cloth"))?);
+        let capture = present(channel(&config.capture, &ctx.inside).map_err(fault("capture"))?);
         let card = Card::open(config.renderer).map_err(|e| StartError::Config {
             key: "compositor.renderer".into(),
             why: e.to_string(),
@@ -158,7 +158,8 @@ impl Compositor {
         choices: &[GarmentChoice],
         message: &str,
     ) -> Result<(), Status> {
-        match upstream::dress(&mut upstream::client(self.cloth.clone()), id, choices).await {
+        let mut client = upstream::client(self.cloth.clone());
+        match upstream::dress(&mut client, id, choices, None).await {
             Ok(_) => Ok(()),
             Err(s) if s.code() == Code::InvalidArgument => Err(renamed(&s, message)),
             Err(s) => Err(from_upstream("cloth", &s)),
@@ -301,7 +302,7 @@ impl CompositorService for Compositor {
             let changed = w.choices != choices;
             if changed {
                 w.revision += 1;
-                w.choices = choices;
+                (w.choices, w.sizes) = (choices, None);
             }
             changed
         });
@@ -350,11 +351,9 @@ impl CompositorService for Compositor {
         let Some(codes) = self.ctx.auth.enrolments() else {
             return Err(Status::unauthenticated("no codes are traded here"));
         };
-        let peer = r
-            .remote_addr()
-            .map_or(Ipv4Addr::UNSPECIFIED.into(), |a| a.ip());
+        let caller = Caller::of(&r);
         let code = r.into_inner().code;
-        let trade = tokio::task::spawn_blocking(move || codes.redeem(&code, peer));
+        let trade = tokio::task::spawn_blocking(move || codes.redeem(&code, &caller));
         let traded = trade.await.map_err(|e| Status::internal(e.to_string()))?;
         match traded {
             Ok(token) => Ok(Response::new(RedeemCodeResponse { token })),
@@ -373,6 +372,7 @@ impl CompositorService for Compositor {
         r: Request<StreamFramesRequest>,
     ) -> Result<Response<Pictures>, Status> {
         let peer = r.remote_addr();
+        let connection = r.extensions().get::<Consumption>().cloned();
         let format = request::picture_format(r.get_ref())?;
         let handle = self.find(&r, &r.get_ref().try_on_id)?;
         let r = r.get_ref();
@@ -382,7 +382,9 @@ impl CompositorService for Compositor {
         let view = Command::View(viewer, answer);
         handle.commands.send(view).await.map_err(|_| gone())?;
         is_admitted.await.map_err(|_| gone())??;
-        Ok(Response::new(Box::pin(reader.stream())))
+        Ok(Response::new(Box::pin(
+            reader.paced_by(connection).stream(),
+        )))
     }
 
     async fn acknowledge_frames(

@@ -2,9 +2,10 @@
 
 use crate::engine::Placed;
 use std::sync::Arc;
+use std::time::Duration;
 use tokio::sync::watch;
 use tokio_stream::StreamExt;
-use tonic::Status;
+use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, FieldViolation, StatusExt};
 use tryon_kit::auth::Connection;
 use tryon_kit::client::{pauses, request};
@@ -15,17 +16,45 @@ use tryon_proto::convert::geometry::rigid_from_wire;
 use tryon_proto::convert::required;
 use tryon_proto::v1::cloth_service_client::ClothServiceClient;
 use tryon_proto::v1::{
-    ClothStatus, DressRequest, GarmentChoice, GarmentFrame, StreamGarmentsRequest,
+    ClothStatus, DressRequest, GarmentChoice, GarmentFit, GarmentFrame, KnownSizes,
+    StreamGarmentsRequest,
 };
 
 /// Largest garment message, bytes. Outfits of the library take a few hundred kB.
 const MAX_GARMENT_BYTES: usize = 16 * 1024 * 1024;
+
+/// Longest pause between attempts: cloth is to be followed as soon as it answers again.
+const LONGEST_PAUSE: Duration = Duration::from_millis(200);
 
 /// Outfit that the user chose; `revision` as this service counts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Wanted {
     pub(crate) revision: u64,
     pub(crate) choices: Vec<GarmentChoice>,
+    /// Sizes that cloth chose for them, remembered for a cloth service that has lost them.
+    pub(crate) sizes: Option<KnownSizes>,
+}
+
+impl Wanted {
+    /// Forgets the sizes; false, as nothing new is wanted.
+    pub(crate) fn forget(&mut self) -> bool {
+        self.sizes = None;
+        false
+    }
+
+    /// Remembers the sizes of `fits`, of garments of this outfit on `subject`, unless they may still change.
+    pub(crate) fn remember(&mut self, subject: u64, fits: &[GarmentFit]) {
+        let of = |c: &GarmentChoice| {
+            let fit = fits.iter().find(|f| f.garment == c.garment)?;
+            (!fit.provisional).then(|| fit.size.clone())
+        };
+        let sizes: Option<Vec<String>> = self.choices.iter().map(of).collect();
+        let known = sizes
+            .filter(|_| subject != 0)
+            .map(|sizes| KnownSizes { subject, sizes });
+        let own = self.sizes.take().filter(|k| k.subject == subject);
+        self.sizes = known.or(own);
+    }
 }
 
 /// Message of the subscription.
@@ -47,16 +76,33 @@ pub(crate) async fn dress(
     client: &mut ClothServiceClient<Connection>,
     session: &str,
     choices: &[GarmentChoice],
+    known_sizes: Option<KnownSizes>,
 ) -> Result<u64, Status> {
     let message = DressRequest {
         session_id: session.into(),
         garments: choices.to_vec(),
+        known_sizes,
     };
     Ok(client
         .dress(request(message))
         .await?
         .into_inner()
         .outfit_revision)
+}
+
+/// Requests the wanted outfit, without its sizes where cloth no longer offers them.
+async fn dress_as_wanted(
+    client: &mut ClothServiceClient<Connection>,
+    session: &str,
+    wanted: &Wanted,
+) -> Result<u64, Status> {
+    let dressed = dress(client, session, &wanted.choices, wanted.sizes.clone()).await;
+    match dressed {
+        Err(s) if s.code() == Code::InvalidArgument && wanted.sizes.is_some() => {
+            dress(client, session, &wanted.choices, None).await
+        }
+        dressed => dressed,
+    }
 }
 
 /// Fault of a request to cloth, with the field path of the request that caused it.
@@ -86,7 +132,8 @@ pub(crate) async fn follow(
     news: latest::Sender<News>,
 ) {
     let mut client = client(channel);
-    let mut wait = pauses();
+    let soon = || pauses().map(|p| p.min(LONGEST_PAUSE));
+    let mut wait = soon();
     while !news.is_closed() {
         let mut any = false;
         let why = match one_stream(&mut client, &session, &mut wanted, &news, &mut any).await {
@@ -94,7 +141,7 @@ pub(crate) async fn follow(
             Err(why) => why,
         };
         if any {
-            wait = pauses();
+            wait = soon();
         }
         news.send(News::Gone(why));
         if let Some(pause) = wait.next() {
@@ -115,7 +162,7 @@ async fn one_stream(
     let mut ours: Vec<(u64, u64)> = Vec::new();
     let w = wanted.borrow_and_update().clone();
     ours.push((
-        dress(client, session, &w.choices).await.map_err(text)?,
+        dress_as_wanted(client, session, &w).await.map_err(text)?,
         w.revision,
     ));
     let call = client
@@ -133,7 +180,7 @@ async fn one_stream(
                     return Ok(());
                 }
                 let w = wanted.borrow_and_update().clone();
-                let theirs = dress(client, session, &w.choices).await.map_err(text)?;
+                let theirs = dress_as_wanted(client, session, &w).await.map_err(text)?;
                 ours.retain(|(t, _)| *t != theirs);
                 ours.push((theirs, w.revision));
                 continue;

@@ -6,17 +6,25 @@ use crate::compute::Pool;
 use crate::consent::Keys;
 use crate::frames::CameraKey;
 use crate::queue::latest;
+use crate::remembered_body::RememberedBody;
+use std::hash::{DefaultHasher, Hasher};
 use std::sync::Arc;
+use std::time::Duration;
 use tokio_stream::StreamExt;
+use tonic::Code;
 use tryon::body::{BodyShape, Template};
+use tryon_proto::Message;
 use tryon_proto::convert::{body, required};
 use tryon_proto::v1::tracking_service_client::TrackingServiceClient;
 use tryon_proto::v1::{
-    BodyState, GetBodyTemplateRequest, OpenSessionRequest, StreamBodyStatesRequest,
+    BodyState, BodyTemplate, GetBodyTemplateRequest, OpenSessionRequest, StreamBodyStatesRequest,
 };
 
 /// Largest template message, bytes: one of 13,000 vertices with ten shape directions takes 2 MB.
 const MAX_TEMPLATE_BYTES: usize = 16 * 1024 * 1024;
+
+/// Longest pause between attempts: tracking is to be followed as soon as it answers again.
+const LONGEST_PAUSE: Duration = Duration::from_millis(200);
 
 /// Message of the subscription.
 pub enum News {
@@ -39,6 +47,8 @@ pub struct Opening {
     pub camera: CameraKey,
     /// Key of its frames, handed over whenever it changes.
     pub keys: Keys,
+    /// Body that the opener remembers, handed over with each opening.
+    pub known: RememberedBody,
 }
 
 /// Session of the subscription.
@@ -46,6 +56,15 @@ struct FollowedSession {
     id: String,
     /// Given by those who open the session, before each stream.
     opening: Option<Opening>,
+    /// The last template and the digest of its message.
+    template: Option<(u64, Arc<Template>)>,
+}
+
+/// Digest of a template's message, to tell the same one from another.
+fn digest(wire: &BodyTemplate) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    hasher.write(&wire.encode_to_vec());
+    hasher.finish()
 }
 
 impl FollowedSession {
@@ -54,16 +73,57 @@ impl FollowedSession {
         &mut self,
         client: &mut TrackingServiceClient<Connection>,
     ) -> Result<(), tonic::Status> {
-        if let Some(Opening { camera, keys }) = &mut self.opening {
-            let message = OpenSessionRequest {
-                session_id: self.id.clone(),
-                store: camera.store().into(),
-                camera: camera.camera().into(),
-                frame_key: keys.borrow_and_update().clone(),
-            };
-            client.open_session(request(message)).await?;
+        let Some(Opening {
+            camera,
+            keys,
+            known,
+        }) = &mut self.opening
+        else {
+            return Ok(());
+        };
+        let message = OpenSessionRequest {
+            session_id: self.id.clone(),
+            store: camera.store().into(),
+            camera: camera.camera().into(),
+            frame_key: keys.borrow_and_update().clone(),
+            known_body: known.message(),
+        };
+        let has_body = message.known_body.is_some();
+        let opened = client.open_session(request(message)).await;
+        let is_refused =
+            |s: &tonic::Status| matches!(s.code(), Code::InvalidArgument | Code::OutOfRange);
+        if has_body && opened.as_ref().is_err_and(is_refused) {
+            // Another template, or another release of tracking: the next try goes without it.
+            known.forget();
         }
-        Ok(())
+        opened.map(drop)
+    }
+
+    /// Template of tracking; after a restart it is mostly the last one, which is not unpacked again.
+    async fn template(
+        &mut self,
+        client: &mut TrackingServiceClient<Connection>,
+        pool: &Pool,
+    ) -> Result<Arc<Template>, String> {
+        let answer = client.get_body_template(request(GetBodyTemplateRequest::default()));
+        let answer = answer.await.map_err(|s| s.message().to_owned())?;
+        let wire = required(
+            answer.into_inner().template,
+            "get_body_template_response.template",
+        );
+        let wire = wire.map_err(|e| e.to_string())?;
+        let last = self.template.take();
+        let unpack = move || {
+            let digest = digest(&wire);
+            if let Some(same) = last.filter(|(last, _)| *last == digest) {
+                return Ok(same);
+            }
+            body::template_from_wire(&wire).map(|t| (digest, Arc::new(t)))
+        };
+        let unpacked = pool.run(unpack).await.map_err(|e| e.to_string())?;
+        let (digest, template) = unpacked.map_err(|e| e.to_string())?;
+        self.template = Some((digest, template.clone()));
+        Ok(template)
     }
 
     /// Waits for a key that the session was not opened with.
@@ -92,8 +152,10 @@ pub async fn follow(
     let mut session = FollowedSession {
         id: session,
         opening,
+        template: None,
     };
-    let mut wait = pauses();
+    let soon = || pauses().map(|p| p.min(LONGEST_PAUSE));
+    let mut wait = soon();
     while !news.is_closed() {
         let mut any = false;
         let why = match one_stream(&mut client, &mut session, &pool, &news, &mut any).await {
@@ -101,7 +163,7 @@ pub async fn follow(
             Err(why) => why,
         };
         if any {
-            wait = pauses();
+            wait = soon();
         }
         news.send(News::Gone(why));
         if let Some(pause) = wait.next() {
@@ -119,26 +181,14 @@ async fn one_stream(
 ) -> Result<(), String> {
     let said = |s: tonic::Status| s.message().to_owned();
     session.open(client).await.map_err(said)?;
-    let template = client
-        .get_body_template(request(GetBodyTemplateRequest::default()))
-        .await;
-    let template = template.map_err(said)?.into_inner().template;
-    let unpack = move || {
-        let wire = required(template, "get_body_template_response.template")?;
-        body::template_from_wire(&wire)
-    };
-    let template = pool
-        .run(unpack)
-        .await
-        .map_err(|e| e.to_string())?
-        .map_err(|e| e.to_string())?;
-    let template = Arc::new(template);
     let call = client
         .stream_body_states(StreamBodyStatesRequest {
             session_id: session.id.clone(),
         })
         .await;
     let mut states = call.map_err(said)?.into_inner();
+    // After the stream, which fails at once for a session that is not open yet.
+    let template = session.template(client, pool).await?;
     let (mut shape, mut version) = (None, 0);
     loop {
         let message = tokio::select! {

@@ -1,4 +1,4 @@
-//! Frame bus between processes over zenoh, the only file that names it: explicit endpoints, no scouting.
+//! Frame bus between processes over zenoh, the only module that names it: explicit endpoints, no scouting.
 //!
 //! The capture process is a peer that listens. Everybody else is a client, one session for each endpoint: a router hands
 //! frames on to clients, but between peers only with the gossip that is off here, and a capture process takes both.
@@ -7,8 +7,11 @@
 //! subscriber's ring of one: `put` takes 1.3 ms beside a subscriber of 100 ms a frame (default FIFO: 101 ms).
 //! `low_latency` delivers no message of this size, shared memory loses frames of stalled subscribers (zenoh #2628).
 
+mod settings;
+
+pub use settings::{Ends, check};
+
 use crate::compute::Pool;
-use crate::config::BusConfig;
 use crate::frames::exposure_to_wire;
 use crate::frames::{
     BoxFuture, BusError, CameraKey, Exposure, FrameBus, FramePublisher, FrameSubscription, Packet,
@@ -16,7 +19,7 @@ use crate::frames::{
 use crate::neighbours::Neighbours;
 use crate::queue::latest;
 use crate::seal::{KeyRing, Sealer, Unsealing};
-use crate::server::StartError;
+use settings::settings;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -30,15 +33,8 @@ use zenoh::handlers::RingChannel;
 use zenoh::qos::CongestionControl;
 use zenoh::sample::{Locality, SampleKind};
 
-/// Time that a stalled peer may block the others [µs]; then its connection is closed and reopened. zenoh's default of
-/// 5 s freezes every screen.
-const WAIT_BEFORE_CLOSE_US: u32 = 300_000;
-/// Silence after which a connection counts as dead (ms).
-const LEASE_MS: u32 = 2_000;
 /// Pause after a session that cannot be opened.
 const AFTER_FAULT: Duration = Duration::from_millis(500);
-/// First and longest pause between attempts to connect (ms): a restarted peer is found within a second.
-const RETRY_MS: (u32, u32) = (100, 500);
 
 fn fault(e: impl std::fmt::Display) -> BusError {
     BusError(e.to_string())
@@ -57,36 +53,41 @@ impl ZenohBus {
     /// Joins without TLS and access control.
     ///
     /// # Errors
-    /// As [`Self::open_with`].
+    /// As [`Self::join`].
     pub async fn open(
         listen: &[String],
         connect: &[String],
         pool: Arc<Pool>,
     ) -> Result<Arc<Self>, BusError> {
-        Self::open_with(Path::new(""), listen, connect, pool).await
+        let ends = Ends {
+            listen,
+            connect,
+            identity: None,
+            file: Path::new(""),
+        };
+        Self::join(&ends, pool).await
     }
 
-    /// Joins with the certificates and access control of a file of zenoh (JSON5); an empty path for none. Endpoints are
-    /// `tcp/ADDRESS:PORT`, `tls/HOST:PORT` or `unixsock-stream/PATH`; those to connect to, capture processes or routers, may
-    /// come up later.
+    /// Joins. Those to connect to, capture processes or routers, may come up later.
     /// Requires a multi-threaded runtime.
     ///
     /// # Errors
     /// Names the file that is unusable, or the endpoint that is malformed or cannot be listened on.
-    pub async fn open_with(
-        file: &Path,
-        listen: &[String],
-        connect: &[String],
-        pool: Arc<Pool>,
-    ) -> Result<Arc<Self>, BusError> {
+    pub async fn join(ends: &Ends<'_>, pool: Arc<Pool>) -> Result<Arc<Self>, BusError> {
+        let base = ends.base()?;
         let mut members = Vec::new();
-        if !listen.is_empty() {
-            let session = zenoh::open(settings(file, "peer", listen, &[])?);
+        if !ends.listen.is_empty() {
+            let session = zenoh::open(settings(base.clone(), "peer", ends.listen, &[])?);
             members.push(Member::open(session.await.map_err(fault)?));
         }
-        for endpoint in connect {
+        for endpoint in ends.connect {
             let endpoint = std::slice::from_ref(endpoint);
-            members.push(Member::opening(settings(file, "client", &[], endpoint)?));
+            members.push(Member::opening(settings(
+                base.clone(),
+                "client",
+                &[],
+                endpoint,
+            )?));
         }
         Ok(Arc::new(Self {
             members,
@@ -101,70 +102,6 @@ impl ZenohBus {
             member.close().await;
         }
     }
-}
-
-/// Configuration of a file of zenoh; the default for an empty path.
-fn of_file(file: &Path) -> Result<zenoh::Config, BusError> {
-    if file.as_os_str().is_empty() {
-        return Ok(zenoh::Config::default());
-    }
-    zenoh::Config::from_file(file).map_err(|e| BusError(format!("{}: {e}", file.display())))
-}
-
-/// Configuration of one session of zenoh.
-fn settings(
-    file: &Path,
-    mode: &str,
-    listen: &[String],
-    connect: &[String],
-) -> Result<zenoh::Config, BusError> {
-    let mut c = of_file(file)?;
-    let list = |l: &[String]| format!("{l:?}");
-    let (init, max) = RETRY_MS;
-    let retry =
-        format!("{{period_init_ms: {init}, period_max_ms: {max}, period_increase_factor: 2}}");
-    let settings = [
-        ("mode", format!("\"{mode}\"")),
-        ("listen/endpoints", list(listen)),
-        ("connect/endpoints", list(connect)),
-        ("connect/timeout_ms", "-1".into()),
-        ("connect/exit_on_failure", "false".into()),
-        ("connect/retry", retry),
-        ("scouting/multicast/enabled", "false".into()),
-        ("scouting/gossip/enabled", "false".into()),
-        ("transport/link/tx/lease", LEASE_MS.to_string()),
-        (
-            "transport/link/tx/queue/congestion_control/block/wait_before_close",
-            WAIT_BEFORE_CLOSE_US.to_string(),
-        ),
-    ];
-    for (key, value) in &settings {
-        c.insert_json5(key, value)
-            .map_err(|e| BusError(format!("{key} = {value}: {e}")))?;
-    }
-    Ok(c)
-}
-
-/// Checks the file and the endpoints of `[bus]`.
-///
-/// # Errors
-/// Names the key with the file that cannot be read, the fault in it, or the malformed endpoint.
-pub fn check(config: &BusConfig) -> Result<(), StartError> {
-    let (file, none) = (&config.config, &[][..]);
-    let parts = [
-        ("bus.config", none, none),
-        ("bus.listen", &config.listen[..], none),
-        ("bus.connect", none, &config.connect[..]),
-    ];
-    parts.into_iter().try_for_each(|(key, listen, connect)| {
-        let fault = |BusError(why)| StartError::Config {
-            key: key.into(),
-            why,
-        };
-        settings(file, "peer", listen, connect)
-            .map(drop)
-            .map_err(fault)
-    })
 }
 
 /// Session of zenoh. A client's opens once its endpoint answers.
@@ -444,6 +381,8 @@ impl Drop for AbortOnDrop {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::{BusConfig, Config};
+    use crate::identity::{Authority, Identity};
 
     #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
     async fn frames_cross_processes_even_when_the_listener_comes_last() {
@@ -478,22 +417,73 @@ mod tests {
         }
     }
 
+    /// Identity of a service of the store.
+    fn identity(authority: &Path, name: &str) -> Identity {
+        let mut config = Config::default();
+        config.identity.authority = authority.to_owned();
+        let identity = Identity::of(&config, name, false).expect("random");
+        identity.expect("a file is given")
+    }
+
+    fn ends<'a>(identity: &'a Identity, listen: &'a [String], connect: &'a [String]) -> Ends<'a> {
+        Ends {
+            listen,
+            connect,
+            identity: Some(identity),
+            file: Path::new(""),
+        }
+    }
+
     #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
     async fn frames_cross_the_shipped_router() {
-        let [at_camera, at_router] = [(); 2].map(|()| free_tcp_endpoint().expect("a port"));
+        let dir = tempfile::tempdir().expect("a folder");
+        let authority = dir.path().join("authority.pem");
+        let made = Authority::open(&authority).expect("made");
+        let leaf = made
+            .issue("router", &["127.0.0.1".to_owned()])
+            .expect("a name");
+        for (name, text) in [
+            ("ca.pem", &leaf.authorities),
+            ("certificate.pem", &leaf.certificate),
+            ("key.pem", &*leaf.key),
+        ] {
+            std::fs::write(dir.path().join(name), text).expect("written");
+        }
+        let free = || free_tcp_endpoint().expect("a port").replace("tcp/", "tls/");
+        let [at_camera, at_router] = [(); 2].map(|()| free());
         let shipped = include_str!("../../../deploy/zenoh/router.json5")
-            .replace("tcp/0.0.0.0:7447", &at_router)
-            .replace("tcp/capture:7447", &at_camera);
+            .replace("tls/0.0.0.0:7447", &at_router)
+            .replace("tls/capture:7447", &at_camera)
+            .replace("/etc/tryon/bus", &dir.path().display().to_string());
+        let at_router = [at_router];
         let pool = Pool::new(1).expect("a thread");
-        let reader = ZenohBus::open(&[], std::slice::from_ref(&at_router), pool.clone())
-            .await
-            .expect("opens before the router");
-        let camera = ZenohBus::open(std::slice::from_ref(&at_camera), &[], pool)
-            .await
-            .expect("listens");
+        let own = identity(&authority, "tracking");
+        let reader = ZenohBus::join(&ends(&own, &[], &at_router), pool.clone()).await;
+        let reader = reader.expect("opens before the router");
+        let own = identity(&authority, "capture");
+        let camera = ZenohBus::join(&ends(&own, &[at_camera], &[]), pool).await;
+        let camera = camera.expect("listens");
         let router = zenoh::Config::from_json5(&shipped).expect("a configuration");
         let router = zenoh::open(router).await.expect("a router");
         crate::frames::tests::fulfils_the_contract(camera.as_ref(), reader.as_ref()).await;
+
+        // Of another store: the router lets nobody in.
+        let theirs = identity(&dir.path().join("theirs.pem"), "tracking");
+        let mut stranger = settings(
+            ends(&theirs, &[], &at_router).base().expect("usable"),
+            "client",
+            &[],
+            &at_router,
+        )
+        .expect("a configuration");
+        for (key, value) in [("timeout_ms", "1000"), ("exit_on_failure", "true")] {
+            let key = format!("connect/{key}");
+            stranger.insert_json5(&key, value).expect("a setting");
+        }
+        assert!(
+            zenoh::open(stranger).await.is_err(),
+            "a stranger is on the bus"
+        );
         reader.close().await;
         camera.close().await;
         router.close().await.expect("closes");

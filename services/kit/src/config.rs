@@ -26,6 +26,8 @@ pub struct Config {
     pub auth: AuthConfig,
     /// Encryption of connections.
     pub tls: TlsConfig,
+    /// Identity of services to each other.
+    pub identity: IdentityConfig,
     /// The capture service.
     pub capture: CaptureConfig,
     /// The tracking service.
@@ -43,7 +45,15 @@ pub struct ConfigError(pub String);
 
 /// Environment variables with the prefix that are no keys: test switches, the path of the file, and the log filter of
 /// the command line (services have `TRYON_LOG__LEVEL`); the token of a client.
-const NOT_KEYS: [&str; 5] = ["SHARED", "REQUIRE_ALL", "CONFIG", "LOG", "TOKEN"];
+const NOT_KEYS: [&str; 7] = [
+    "SHARED",
+    "REQUIRE_ALL",
+    "FUZZ_SECONDS",
+    "SESSIONS",
+    "CONFIG",
+    "LOG",
+    "TOKEN",
+];
 
 /// Fault of a name.
 const NAME: &str = "1 to 64 characters of [a-z0-9_-] are needed";
@@ -170,8 +180,11 @@ impl Config {
             if !is_http || url.parse::<http::Uri>().is_err() {
                 return fault(key, "a URL such as http://127.0.0.1:7452 is needed");
             }
-            if url.starts_with("https://") && !self.tls.is_client() {
-                return fault(key, "https needs tls.ca, the authority of that service");
+            let is_trusting = self.tls.is_client() || self.identity.authority().is_some();
+            if url.starts_with("https://") && !is_trusting {
+                let why =
+                    "https needs identity.authority, or tls.ca, the authority of that service";
+                return fault(key, why);
             }
         }
         if self.tls.is_server() == self.tls.key.as_os_str().is_empty() {
@@ -212,8 +225,9 @@ impl Config {
             ("compositor.admin", self.compositor.admin),
         ];
         let exposed = addresses.iter().find(|(_, a)| !a.ip().is_loopback());
-        let is_guarded =
-            |e: &String| e.starts_with("tls/") && !self.bus.config.as_os_str().is_empty();
+        let has_certificates =
+            self.identity.authority().is_some() || !self.bus.config.as_os_str().is_empty();
+        let is_guarded = |e: &String| e.starts_with("tls/") && has_certificates;
         let is_open = |e: &String| !is_local_endpoint(e) && !is_guarded(e);
         let is_bus = || self.bus.listen.iter().any(is_open);
         exposed

@@ -11,8 +11,12 @@ use tryon_proto::v1::{FrameKey, HoldConsentRequest, ListCamerasRequest};
 
 /// Length of a lease (s): a holder that is lost stops the camera this much later.
 pub const LEASE_S: f32 = 1.0;
-/// Silence of a camera after which nobody knows who stands there: every service forgets what it knew of the body.
+/// Silence of a camera after which nobody knows who stands there: every service forgets what it knew of the body, but for the
+/// size and shape that the one who asks remembers for [`REMEMBER_FOR`].
 pub const FORGET_AFTER: Duration = Duration::from_secs(1);
+/// Time for which the holder of a consent remembers the settled size and shape of a person who is no longer seen, and for
+/// which tracking waits for that person: twice what the start of a service takes.
+pub const REMEMBER_FOR: Duration = Duration::from_secs(10);
 /// Interval of renewals: three may be lost before a lease ends.
 const RENEW_EVERY: Duration = Duration::from_millis(250);
 /// Pause after a renewal that failed.

@@ -1,7 +1,7 @@
 //! Contents of files, read again when they change.
 
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 use tokio::sync::watch;
 
 /// Interval of the looks: a change counts after at most this and one reading. Each costs a `stat`.
@@ -55,22 +55,39 @@ where
     E: std::fmt::Display + Send,
     F: Fn() -> Result<T, E> + Send + 'static,
 {
+    follow_and_renew(files, Duration::MAX, load)
+}
+
+/// As [`follow_all`], and loads what is older than `life` again too.
+///
+/// # Errors
+/// When the files cannot be used now.
+pub(crate) fn follow_and_renew<T, E, F>(
+    files: Vec<PathBuf>,
+    life: Duration,
+    load: F,
+) -> Result<watch::Receiver<T>, E>
+where
+    T: Send + Sync + 'static,
+    E: std::fmt::Display + Send,
+    F: Fn() -> Result<T, E> + Send + 'static,
+{
     let marks = move || -> Vec<Option<Mark>> { files.iter().map(|f| mark(f).ok()).collect() };
     // The marks are taken first: a change between the two is read again.
     let mut seen = marks();
     let (content, following) = watch::channel(load()?);
     tokio::spawn(async move {
-        let mut is_faulty = false;
+        let (mut is_faulty, mut loaded) = (false, Instant::now());
         while !content.is_closed() {
             tokio::time::sleep(EVERY).await;
             let now = marks();
-            if now == seen && !is_faulty {
+            if now == seen && !is_faulty && loaded.elapsed() < life {
                 continue;
             }
             match load() {
                 Ok(new) => {
                     content.send_replace(new);
-                    (seen, is_faulty) = (now, false);
+                    (seen, is_faulty, loaded) = (now, false, Instant::now());
                 }
                 Err(why) => {
                     if !is_faulty {
@@ -87,6 +104,7 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     async fn becomes(file: &mut watch::Receiver<String>, text: &str) {
         let wait = file.wait_for(|t| t == text);
@@ -115,5 +133,14 @@ mod tests {
         assert_eq!(*content.borrow(), "seven", "the last content holds");
         std::fs::write(&file, "eight").expect("written");
         becomes(&mut content, "eight").await;
+    }
+
+    #[tokio::test]
+    async fn what_is_old_is_loaded_again_without_a_change() {
+        let loads = AtomicUsize::new(0);
+        let load = move || Ok::<_, String>(loads.fetch_add(1, Ordering::Relaxed).to_string());
+        let mut content = follow_and_renew(Vec::new(), EVERY * 2, load).expect("loaded");
+        assert_eq!(*content.borrow(), "0");
+        becomes(&mut content, "1").await;
     }
 }

@@ -1,13 +1,14 @@
 //! A service as a process: parse, validate (exit 64), build, announce addresses, serve, drain, report the end.
 
 use crate::auth::{Auth, Issuer};
-use crate::bus::{self, ZenohBus};
+use crate::bus::{self, Ends, ZenohBus};
 use crate::compute::Pool;
 use crate::config::Config;
 use crate::core_dump;
 use crate::drain::{self, Drained};
 use crate::flow::Stalls;
 use crate::frame_trace;
+use crate::identity::Identity;
 use crate::server::{Context, Running, StartError};
 use crate::supervisor;
 use crate::tls::Tls;
@@ -86,17 +87,35 @@ pub struct CommonFiles {
     pub auth: Auth,
     /// Files of `[tls]`.
     pub tls: Tls,
+    /// Identity of the store's services to each other, where they have one.
+    pub identity: Option<Identity>,
+    /// Encryption of their connections: of `identity`, or that of `tls`.
+    pub inside: Tls,
 }
 
 impl CommonFiles {
-    /// Opens the files of `[auth]` and `[tls]`, and checks `[bus]`. `own` as for [`Auth::open`].
+    /// Opens the files of `[auth]`, `[tls]` and `[identity]` for the process `name`, and checks `[bus]`. `own` as for
+    /// [`Auth::open`]: of a process that holds all services.
     ///
     /// # Errors
     /// Names the key whose file cannot be used.
-    pub fn open(config: &Config, own: Option<&Issuer>) -> Result<Self, StartError> {
+    pub fn open(config: &Config, name: &str, own: Option<&Issuer>) -> Result<Self, StartError> {
         let (auth, tls) = (Auth::open(config, own)?, Tls::open(&config.tls)?);
         bus::check(&config.bus)?;
-        Ok(Self { auth, tls })
+        let identity = Identity::of(config, name, own.is_some())?;
+        let inside = Tls::inside(config, identity.as_ref())?;
+        if !inside.is_on() {
+            tracing::warn!(
+                "whoever is on the network between services can see people: \
+                 there is no identity.authority, or identity.off = true"
+            );
+        }
+        Ok(Self {
+            auth,
+            tls,
+            identity,
+            inside,
+        })
     }
 }
 
@@ -166,7 +185,7 @@ where
 
 /// Opens all files that the process would.
 fn check(program: &Program, config: &Config) -> Result<(), StartError> {
-    CommonFiles::open(config, None)?;
+    CommonFiles::open(config, program.name, None)?;
     (program.check)(config)
 }
 
@@ -193,14 +212,20 @@ where
         service: name,
         why: e.to_string(),
     };
-    let files = CommonFiles::open(&config, None)?;
+    let files = CommonFiles::open(&config, name, None)?;
     let pool = Pool::new(config.process.compute_threads).map_err(broken)?;
     let (listen, connect) = match program.role {
         BusRole::Listen => (&config.bus.listen[..], &[][..]),
         BusRole::Connect => (&[][..], &config.bus.connect[..]),
         BusRole::Apart => (&[][..], &[][..]),
     };
-    let bus = ZenohBus::open_with(&config.bus.config, listen, connect, pool.clone()).await?;
+    let ends = Ends {
+        file: &config.bus.config,
+        identity: files.identity.as_ref(),
+        listen,
+        connect,
+    };
+    let bus = ZenohBus::join(&ends, pool.clone()).await?;
     let shutdown = CancellationToken::new();
     let ctx = Context {
         stalls: Stalls::default(),
@@ -210,6 +235,7 @@ where
         grace,
         auth: files.auth,
         tls: files.tls,
+        inside: files.inside,
     };
     crate::telemetry::show_zeros(name);
     let unusable = |why| StartError::Config {

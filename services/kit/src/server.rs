@@ -46,8 +46,10 @@ pub struct Context {
     pub grace: Duration,
     /// Who may call, and the process's own token.
     pub auth: Auth,
-    /// Encryption of connections, made and accepted.
+    /// Encryption of the port of browsers and kiosks, and of other machines' looks at figures.
     pub tls: Tls,
+    /// Encryption of connections between services, made and accepted.
+    pub inside: Tls,
     /// Flows that stand still.
     pub stalls: Stalls,
 }
@@ -169,8 +171,8 @@ pub struct Service {
     pub routes: Routes,
     /// Layers and routes around the gate, which see requests without a token.
     pub around: Option<Around>,
-    /// Speaks HTTP/1.1 too, for browsers.
-    pub http1: bool,
+    /// Browsers and kiosks call it: it speaks HTTP/1.1 too, under the certificate of `[tls]`; others show the store's.
+    pub is_public: bool,
     /// Reports its health.
     pub health: HealthReporter,
 }
@@ -187,7 +189,7 @@ pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartErro
         admin,
         routes,
         around,
-        http1,
+        is_public,
         health,
     } = service;
     let guarded = ctx.auth.guard(name, routes.into_axum_router());
@@ -228,8 +230,8 @@ pub async fn start(service: Service, ctx: &Context) -> Result<Running, StartErro
         .layer(from_fn_with_state(call_rate::budget(), within_rate));
     let incoming = connections::accept(listener, Limits::default());
     let protocols = transport::Protocols {
-        has_http1: http1,
-        tls: ctx.tls.clone(),
+        has_http1: is_public,
+        tls: if is_public { &ctx.tls } else { &ctx.inside }.clone(),
     };
     let (shutdown, grace) = (ctx.shutdown.clone(), ctx.grace);
     let task = tokio::spawn(async move {

@@ -1,12 +1,14 @@
 //! TLS of both ends of a call, with files that are read again when they change: a new certificate is served from the next
 //! connection on.
 
-use crate::config::TlsConfig;
-use crate::followed::follow_all;
+use crate::config::{Config, TlsConfig};
+use crate::followed::{follow_all, follow_and_renew};
+use crate::identity::{Identity, Leaf, RENEWED_AFTER};
+use crate::server::StartError;
 use rustls::crypto::{CryptoProvider, ring};
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
-use rustls::server::WebPkiClientVerifier;
+use rustls::server::{VerifierBuilderError, WebPkiClientVerifier};
 use rustls::{ClientConfig, RootCertStore, ServerConfig};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -64,6 +66,43 @@ impl Tls {
             server: server.transpose()?,
             client: client.transpose()?,
         })
+    }
+
+    /// Certificates of the store: both ends of a connection show one. Made anew long before they end, and when the file of
+    /// the authority changes, on a task of the runtime.
+    ///
+    /// # Errors
+    /// When the authority cannot be used.
+    pub fn of_store(identity: &Identity) -> Result<Self, StartError> {
+        let server = follow_store(identity, |roots, own| {
+            serving(Some(roots), own).map_err(|part| match part {
+                Part::Clients(e) => text(e),
+                Part::Own(e) => text(e),
+            })
+        })?;
+        let client = follow_store(identity, |roots, own| {
+            calling(roots, Some(own)).map_err(text)
+        })?;
+        Ok(Self {
+            server: Some(server),
+            client: Some(client),
+        })
+    }
+
+    /// Encryption between services: of the store's identity, or that of `[tls]`.
+    ///
+    /// # Errors
+    /// Names the key of a file that cannot be used.
+    pub fn inside(config: &Config, identity: Option<&Identity>) -> Result<Self, StartError> {
+        match identity {
+            Some(identity) => Self::of_store(identity),
+            None => Ok(Self::open(&config.tls)?),
+        }
+    }
+
+    /// Connections are encrypted.
+    pub(crate) fn is_on(&self) -> bool {
+        self.server.is_some()
     }
 
     /// Acceptor of new connections; `None` without a certificate.
@@ -129,48 +168,101 @@ fn roots(key: &'static str, path: &Path) -> Result<Arc<RootCertStore>, TlsError>
 }
 
 /// Own certificate and key, in that order.
-type Identity = (Vec<CertificateDer<'static>>, PrivateKeyDer<'static>);
+type Own = (Vec<CertificateDer<'static>>, PrivateKeyDer<'static>);
 
-fn identity(files: &TlsConfig) -> Result<Identity, TlsError> {
+fn own(files: &TlsConfig) -> Result<Own, TlsError> {
     let key = PrivateKeyDer::from_pem_file(&files.key);
     let key = key.map_err(|e| fault("key", &files.key)(&e))?;
     Ok((certificates("certificate", &files.certificate)?, key))
 }
 
 fn server_config(files: &TlsConfig) -> Result<ServerConfig, TlsError> {
-    let wrong = fault("certificate", &files.certificate);
-    let builder = ServerConfig::builder_with_provider(provider());
-    let builder = (builder.with_safe_default_protocol_versions()).map_err(|e| wrong(&e))?;
-    let builder = if files.client_ca.as_os_str().is_empty() {
-        builder.with_no_client_auth()
+    let clients = if files.client_ca.as_os_str().is_empty() {
+        None
     } else {
-        let roots = roots("client_ca", &files.client_ca)?;
-        let verifier = WebPkiClientVerifier::builder_with_provider(roots, provider()).build();
-        let verifier = verifier.map_err(|e| fault("client_ca", &files.client_ca)(&e))?;
-        builder.with_client_cert_verifier(verifier)
+        Some(roots("client_ca", &files.client_ca)?)
     };
-    let (chain, key) = identity(files)?;
-    let mut config = builder
-        .with_single_cert(chain, key)
-        .map_err(|e| wrong(&e))?;
+    serving(clients, own(files)?).map_err(|fault_in| match fault_in {
+        Part::Clients(e) => fault("client_ca", &files.client_ca)(&e),
+        Part::Own(e) => fault("certificate", &files.certificate)(&e),
+    })
+}
+
+/// Part of a configuration at fault.
+enum Part {
+    Clients(VerifierBuilderError),
+    Own(rustls::Error),
+}
+
+/// Serves clients of the authorities only, where some are given.
+fn serving(clients: Option<Arc<RootCertStore>>, own: Own) -> Result<ServerConfig, Part> {
+    let builder = ServerConfig::builder_with_provider(provider());
+    let builder = (builder.with_safe_default_protocol_versions()).map_err(Part::Own)?;
+    let builder = match clients {
+        None => builder.with_no_client_auth(),
+        Some(roots) => {
+            let verifier = WebPkiClientVerifier::builder_with_provider(roots, provider()).build();
+            builder.with_client_cert_verifier(verifier.map_err(Part::Clients)?)
+        }
+    };
+    let (chain, key) = own;
+    let mut config = builder.with_single_cert(chain, key).map_err(Part::Own)?;
     config.alpn_protocols = PROTOCOLS.map(<[u8]>::to_vec).to_vec();
     Ok(config)
 }
 
 fn client_config(files: &TlsConfig) -> Result<ClientConfig, TlsError> {
-    let wrong = fault("ca", &files.ca);
+    let roots = roots("ca", &files.ca)?;
+    let own = files.is_server().then(|| own(files)).transpose()?;
+    calling(roots, own).map_err(|e| fault("certificate", &files.certificate)(&e))
+}
+
+/// Calls services of the authorities, with a certificate of its own where there is one.
+fn calling(roots: Arc<RootCertStore>, own: Option<Own>) -> Result<ClientConfig, rustls::Error> {
     let builder = ClientConfig::builder_with_provider(provider());
-    let builder = (builder.with_safe_default_protocol_versions()).map_err(|e| wrong(&e))?;
-    let builder = builder.with_root_certificates(roots("ca", &files.ca)?);
-    let mut config = if files.is_server() {
-        let (chain, key) = identity(files)?;
-        let own = builder.with_client_auth_cert(chain, key);
-        own.map_err(|e| fault("certificate", &files.certificate)(&e))?
-    } else {
-        builder.with_no_client_auth()
+    let builder = builder.with_safe_default_protocol_versions()?;
+    let builder = builder.with_root_certificates(roots);
+    let mut config = match own {
+        Some((chain, key)) => builder.with_client_auth_cert(chain, key)?,
+        None => builder.with_no_client_auth(),
     };
     config.alpn_protocols = vec![PROTOCOLS[0].to_vec()];
     Ok(config)
+}
+
+/// Authorities and certificate of a leaf.
+fn of_leaf(leaf: &Leaf) -> Result<(Arc<RootCertStore>, Own), String> {
+    let all = |pem: &str| -> Result<Vec<CertificateDer<'static>>, _> {
+        CertificateDer::pem_slice_iter(pem.as_bytes()).collect()
+    };
+    let mut roots = RootCertStore::empty();
+    for authority in all(&leaf.authorities).map_err(text)? {
+        roots.add(authority).map_err(text)?;
+    }
+    let key = PrivateKeyDer::from_pem_slice(leaf.key.as_bytes()).map_err(text)?;
+    Ok((
+        Arc::new(roots),
+        (all(&leaf.certificate).map_err(text)?, key),
+    ))
+}
+
+fn text(e: impl std::fmt::Display) -> String {
+    e.to_string()
+}
+
+/// Makes one end of connections of a new certificate of the store, now and long before it ends.
+fn follow_store<T: Send + Sync + 'static>(
+    identity: &Identity,
+    make: fn(Arc<RootCertStore>, Own) -> Result<T, String>,
+) -> Result<watch::Receiver<Arc<T>>, StartError> {
+    let own = identity.clone();
+    follow_and_renew(identity.files(), RENEWED_AFTER, move || {
+        let made = of_leaf(&own.leaf()?).and_then(|(roots, own)| make(roots, own));
+        made.map(Arc::new).map_err(|why| StartError::Config {
+            key: "identity.authority".into(),
+            why,
+        })
+    })
 }
 
 #[cfg(test)]
@@ -213,12 +305,16 @@ mod tests {
     }
 
     async fn serve(config: &TlsConfig) -> String {
+        serve_with(Tls::open(config).expect("certificates")).await
+    }
+
+    async fn serve_with(tls: Tls) -> String {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let port = listener.local_addr().expect("bound").port();
         let (routes, _) = crate::server::routes("tryon.v1.CaptureService").expect("known");
         let protocols = Protocols {
             has_http1: true,
-            tls: Tls::open(config).expect("certificates"),
+            tls,
         };
         tokio::spawn(async move {
             let incoming = connections::accept(listener, Limits::default());
@@ -229,8 +325,11 @@ mod tests {
     }
 
     async fn call(url: &str, config: &TlsConfig) -> Result<(), Code> {
-        let tls = Tls::open(config).expect("certificates");
-        let mut health = HealthClient::new(channel(url, &tls).expect("a URL"));
+        call_with(url, &Tls::open(config).expect("certificates")).await
+    }
+
+    async fn call_with(url: &str, tls: &Tls) -> Result<(), Code> {
+        let mut health = HealthClient::new(channel(url, tls).expect("a URL"));
         let asked = health.check(HealthCheckRequest::default()).await;
         asked.map(drop).map_err(|s| s.code())
     }
@@ -273,6 +372,35 @@ mod tests {
         }
         assert_eq!(renewed, Ok(()));
         assert_eq!(call(&url, &anonymous).await, Err(Code::Unavailable));
+    }
+
+    #[tokio::test]
+    async fn services_of_one_store_talk_and_a_new_authority_counts_at_once() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let of = |file: &str, name: &str| {
+            let mut config = Config::default();
+            config.identity.authority = dir.path().join(file);
+            let identity = Identity::of(&config, name, false).expect("random");
+            Tls::of_store(&identity.expect("a file")).expect("certificates")
+        };
+        let (tracking, cloth) = (of("ours.pem", "tracking"), of("ours.pem", "cloth"));
+        let url = serve_with(tracking).await;
+        let call = async |tls: &Tls| call_with(&url, tls).await;
+        assert_eq!(call(&cloth).await, Ok(()));
+        let stranger = of("theirs.pem", "cloth");
+        assert!(call(&stranger).await.is_err());
+        assert!(call(&Tls::off()).await.is_err(), "no authority is trusted");
+
+        std::fs::copy(dir.path().join("theirs.pem"), dir.path().join("ours.pem")).expect("copied");
+        let mut renewed = Err(Code::Unavailable);
+        for _ in 0..100 {
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            renewed = call(&stranger).await;
+            if renewed.is_ok() {
+                break;
+            }
+        }
+        assert_eq!(renewed, Ok(()));
     }
 
     #[tokio::test]

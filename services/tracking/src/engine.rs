@@ -1,13 +1,14 @@
 //! Tracker of a session and the wire form of its states.
 
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 use tryon::body::{BodyShape, Template, embedded, import};
-use tryon::camera::Calibration;
+use tryon::camera::{Calibration, Intrinsics};
 use tryon::formats::npz;
 use tryon::tracking::{
-    LostReason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace, adapt_surface, follow,
+    KnownBody, LostReason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace,
+    adapt_surface, follow,
 };
 use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;
@@ -26,6 +27,31 @@ pub(crate) fn load_template(path: &Path) -> Result<Arc<Template>, String> {
     let template = import::template_from_smpl(&name, &arrays)
         .map_err(|e| format!("{}: {e}", path.display()))?;
     Ok(Arc::new(template))
+}
+
+/// Tracker model of the configured template, made once and beside the start of the service: it takes as long as several
+/// frames.
+#[derive(Clone)]
+pub(crate) struct PreparedModel(Arc<OnceLock<TrackerModel>>, Arc<Template>);
+
+impl PreparedModel {
+    /// A model that is not made yet.
+    pub(crate) fn new(template: Arc<Template>) -> Self {
+        Self(Arc::default(), template)
+    }
+
+    /// Makes it, unless that has been done.
+    pub(crate) fn make(&self) -> &TrackerModel {
+        self.0.get_or_init(|| {
+            let any = Calibration::registered(Intrinsics::KINECT_V1);
+            TrackerModel::new(self.1.clone(), any, TrackerConfig::default())
+        })
+    }
+
+    /// The model for a camera.
+    fn for_camera(&self, calibration: Calibration) -> TrackerModel {
+        self.make().with_calibration(calibration)
+    }
 }
 
 /// One session's tracker for one calibration.
@@ -52,16 +78,12 @@ pub(crate) struct SessionCounts {
 impl Engine {
     /// A tracker that searches. `counts` are those of an earlier engine of the session.
     pub(crate) fn new(
-        template: Arc<Template>,
+        prepared: &PreparedModel,
         calibration: Arc<Calibration>,
         epoch: u64,
         counts: SessionCounts,
     ) -> Self {
-        let model = TrackerModel::new(
-            template,
-            calibration.as_ref().clone(),
-            TrackerConfig::default(),
-        );
+        let model = prepared.for_camera(calibration.as_ref().clone());
         let mut state = TrackerState::new(&model);
         state.subject = counts.subject;
         let (shape, wire_shape) = (BodyShape::default(), v1::BodyShape::default());
@@ -94,6 +116,21 @@ impl Engine {
     /// Forgets body and pose.
     pub(crate) fn reset(&mut self) {
         self.state.reset(&self.model);
+    }
+
+    /// Goes on with a body that was measured before; false when it has one.
+    pub(crate) fn know(&mut self, known: &KnownBody) -> bool {
+        self.state.know(&self.model, known)
+    }
+
+    /// Body whose size has settled.
+    pub(crate) fn known_body(&self) -> Option<KnownBody> {
+        self.state.known_body(&self.model)
+    }
+
+    /// Knows a body of which nobody was found yet.
+    pub(crate) fn is_known_awaited(&self) -> bool {
+        self.state.is_known_awaited()
     }
 
     /// Adapts the surface to the exposure of the last step, when that is due: the next step has it.

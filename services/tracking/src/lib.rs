@@ -13,6 +13,9 @@ use tryon_kit::config::Config;
 use tryon_kit::server::{self, Context, Running, Service, StartError};
 use tryon_proto::v1::tracking_service_server::{SERVICE_NAME, TrackingServiceServer};
 
+/// Largest request, bytes: a known body of the largest template takes 132 kB.
+const MAX_REQUEST_BYTES: usize = 192 * 1024;
+
 /// Reads the configured body.
 fn template(config: &Config) -> Result<Arc<Template>, StartError> {
     engine::load_template(&config.tracking.body).map_err(|why| StartError::Config {
@@ -42,9 +45,10 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         why: e.to_string(),
     })??;
     let service = service::Tracking::new(c, &ctx, template);
+    service.prepare();
     let (mut routes, health) = server::routes(SERVICE_NAME)?;
     routes.add_service(
-        TrackingServiceServer::new(service).max_decoding_message_size(server::MAX_REQUEST_BYTES),
+        TrackingServiceServer::new(service).max_decoding_message_size(MAX_REQUEST_BYTES),
     );
     let service = Service {
         name: "tracking",
@@ -53,7 +57,7 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         admin: c.admin,
         routes: routes.routes(),
         around: None,
-        http1: false,
+        is_public: false,
         health,
     };
     server::start(service, &ctx).await

@@ -1,5 +1,6 @@
 //! Remote procedures of the tracking service: check the request, find the session, answer.
 
+use crate::engine::PreparedModel;
 use crate::session::{self, Command, Handle, Setup};
 use futures::Stream;
 use std::pin::Pin;
@@ -9,11 +10,12 @@ use tokio_stream::StreamExt;
 use tokio_stream::wrappers::WatchStream;
 use tonic::{Code, Request, Response, Status};
 use tryon::body::Template;
+use tryon::tracking::KnownBody;
 use tryon_kit::auth::Grant;
 use tryon_kit::config::TrackingConfig;
 use tryon_kit::server::Context;
 use tryon_kit::sessions::{Opened, Sessions, brief, random_id};
-use tryon_kit::status::{exhausted, not_found};
+use tryon_kit::status::{exhausted, not_found, unavailable};
 use tryon_proto::convert::{body, request};
 use tryon_proto::v1::tracking_service_server::TrackingService;
 use tryon_proto::v1::*;
@@ -23,6 +25,7 @@ pub(crate) struct Tracking {
     sessions: Sessions<Handle>,
     ctx: Context,
     template: Arc<Template>,
+    model: PreparedModel,
     wire_template: BodyTemplate,
     idle: Duration,
 }
@@ -33,10 +36,32 @@ impl Tracking {
             sessions: Sessions::new(config.max_sessions),
             ctx: ctx.clone(),
             wire_template: body::template_to_wire(&template),
+            model: PreparedModel::new(template.clone()),
             template,
             idle: Duration::from_secs(config.idle_s),
         }
     }
+    /// Makes the tracker's model on the compute pool; the first frame waits for it.
+    pub(crate) fn prepare(&self) {
+        let (model, pool) = (self.model.clone(), self.ctx.pool.clone());
+        let make = move || {
+            model.make();
+        };
+        tokio::spawn(async move { pool.run(make).await });
+    }
+
+    /// The body that the caller remembers.
+    async fn known_body(&self, r: &OpenSessionRequest) -> Result<Option<Arc<KnownBody>>, Status> {
+        let Some(wire) = r.known_body.clone() else {
+            return Ok(None);
+        };
+        let template = self.template.clone();
+        let read = move || body::known_body_from_wire(&wire, &template, "open_session_request");
+        let read = self.ctx.pool.run(read).await;
+        let known = read.map_err(|e| unavailable("tracking", &e.to_string()))?;
+        Ok(Some(Arc::new(known?)))
+    }
+
     /// Session of that id, if the request's token reaches it.
     fn find<T>(&self, r: &Request<T>, id: &str) -> Result<Arc<Handle>, Status> {
         let grant = Grant::of(r)?;
@@ -64,6 +89,7 @@ impl TrackingService for Tracking {
         grant.check_session(&id)?;
         let key = request::camera_key("open_session_request", &r.store, &r.camera)?;
         grant.check_camera(&key)?;
+        let known = self.known_body(r).await?;
         if let Some(frame_key) = &r.frame_key {
             self.ctx.bus.learn(&key, frame_key);
         }
@@ -71,8 +97,9 @@ impl TrackingService for Tracking {
             id: id.clone(),
             key: key.clone(),
             ctx: self.ctx.clone(),
-            template: self.template.clone(),
+            model: self.model.clone(),
             idle: self.idle,
+            known: known.clone(),
             directory: self.sessions.clone(),
         };
         if self
@@ -96,6 +123,10 @@ impl TrackingService for Tracking {
             }
             Opened::Found(h) => {
                 let _ = h.commands.try_send(Command::Touch);
+                if let Some(known) = known {
+                    // A session that cannot keep up measures anew.
+                    let _ = h.commands.try_send(Command::Know(known));
+                }
                 false
             }
             Opened::Full => return Err(exhausted("sessions", self.sessions.limit())),

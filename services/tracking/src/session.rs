@@ -1,14 +1,14 @@
 //! Task of one session: its tracker, its clock.
 
-use crate::engine::{Engine, SessionCounts};
+use crate::engine::{Engine, PreparedModel, SessionCounts};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
-use tryon::body::Template;
+use tryon::tracking::KnownBody;
 use tryon_kit::compute::ComputeError;
-use tryon_kit::consent::FORGET_AFTER;
+use tryon_kit::consent::{FORGET_AFTER, REMEMBER_FOR};
 use tryon_kit::flow::Flow;
 use tryon_kit::frames::{CameraKey, Exposure, FrameSubscription};
 use tryon_kit::server::Context;
@@ -38,6 +38,8 @@ pub(crate) enum Command {
     Reset,
     /// Keeps the session open.
     Touch,
+    /// Goes on with a body that was measured before, unless there is one.
+    Know(Arc<KnownBody>),
 }
 
 /// Dependencies of a session's task.
@@ -45,8 +47,10 @@ pub(crate) struct Setup {
     pub(crate) id: String,
     pub(crate) key: CameraKey,
     pub(crate) ctx: Context,
-    pub(crate) template: Arc<Template>,
+    pub(crate) model: PreparedModel,
     pub(crate) idle: Duration,
+    /// Body that was measured before.
+    pub(crate) known: Option<Arc<KnownBody>>,
     pub(crate) directory: Sessions<Handle>,
 }
 
@@ -71,7 +75,9 @@ fn searching(id: &str) -> v1::BodyState {
 
 /// Starts the task of a session.
 pub(crate) fn spawn(setup: Setup) -> Handle {
-    let (sender, states) = watch::channel(Arc::new(searching(&setup.id)));
+    let mut first = searching(&setup.id);
+    first.subject = setup.known.as_ref().map_or(0, |k| k.subject);
+    let (sender, states) = watch::channel(Arc::new(first));
     let (commands, inbox) = mpsc::channel(8);
     let key = setup.key.clone();
     let closing = CancellationToken::new();
@@ -88,6 +94,7 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
         let flow = format!("session {} of {}", brief(&id), setup.key);
         let task = Task {
             flow: setup.ctx.stalls.flow("tracking", flow),
+            known: setup.known.clone().map(GivenBody::now),
             setup,
             states: sender,
             engine: None,
@@ -112,12 +119,29 @@ pub(crate) fn spawn(setup: Setup) -> Handle {
     }
 }
 
+/// Body that a caller remembers, until the tracker has it.
+struct GivenBody {
+    body: Arc<KnownBody>,
+    at: Instant,
+}
+
+impl GivenBody {
+    fn now(body: Arc<KnownBody>) -> Self {
+        Self {
+            body,
+            at: Instant::now(),
+        }
+    }
+}
+
 struct Task {
     setup: Setup,
     states: watch::Sender<Arc<v1::BodyState>>,
     /// `None` while the pool steps it.
     engine: Option<Engine>,
     counts: SessionCounts,
+    /// Known body that nobody was found for yet.
+    known: Option<GivenBody>,
     /// Frames of the camera.
     flow: Flow,
 }
@@ -141,7 +165,8 @@ impl Task {
                 biased;
                 () = shutdown.cancelled() => return "shutting down",
                 c = inbox.recv() => match c {
-                    Some(Command::Reset) => if let Some(e) = &mut self.engine { e.reset() },
+                    Some(Command::Reset) => self.reset(),
+                    Some(Command::Know(body)) => self.known = Some(GivenBody::now(body)),
                     Some(Command::Touch) => wanted = Instant::now(),
                     None => return "asked to",
                 },
@@ -159,6 +184,7 @@ impl Task {
                     if received.elapsed() >= FORGET_AFTER {
                         self.forget();
                     }
+                    self.forget_known();
                     if received.elapsed() >= SILENCE {
                         // On the bus and silent: without a lease of consent nothing is to come.
                         if frames.alive() {
@@ -192,24 +218,34 @@ impl Task {
     }
 
     async fn step(&mut self, exposure: Arc<Exposure>, skipped: u64) {
-        let engine = self.engine.take().filter(|e| e.is_for(&exposure));
-        let (template, counts) = (self.setup.template.clone(), self.counts);
+        let engine = self.engine.take();
+        let (model, counts) = (self.setup.model.clone(), self.counts);
+        let given = self.known.as_ref().map(|k| k.body.clone());
         let work = move || {
+            // Of another run of the camera, within a second.
+            let own = (engine.as_ref())
+                .filter(|e| !e.is_for(&exposure))
+                .and_then(Engine::known_body);
+            let known = own.map(Arc::new).or(given);
             let fresh = || {
                 Engine::new(
-                    template,
+                    &model,
                     exposure.calibration.clone(),
                     exposure.id.epoch,
                     counts,
                 )
             };
-            let mut engine = engine.unwrap_or_else(fresh);
+            let mut engine = engine.filter(|e| e.is_for(&exposure)).unwrap_or_else(fresh);
+            if let Some(known) = known {
+                engine.know(&known);
+            }
             let state = engine.step(&exposure);
             (engine, state)
         };
         match self.setup.ctx.pool.run(work).await {
             Ok((engine, mut state)) => {
                 self.counts = engine.counts();
+                self.known.take_if(|_| !engine.is_known_awaited());
                 state.session_id = self.setup.id.clone();
                 state.frames_dropped = skipped;
                 record_stages("tracking", state.frame.as_ref(), &state.stages);
@@ -237,6 +273,24 @@ impl Task {
     fn lost(&mut self, why: &ComputeError) {
         tracing::error!(session = brief(&self.setup.id), %why, "a step was lost");
         self.fault(DegradedReason::StepFailed, why.to_string());
+    }
+
+    /// Forgets body and pose on request.
+    fn reset(&mut self) {
+        self.known = None;
+        if let Some(e) = &mut self.engine {
+            e.reset();
+        }
+    }
+
+    /// Drops a known body for which nobody came.
+    fn forget_known(&mut self) {
+        let is_late = |k: &mut GivenBody| k.at.elapsed() > REMEMBER_FOR;
+        if self.known.take_if(is_late).is_some()
+            && let Some(e) = self.engine.as_mut().filter(|e| e.is_known_awaited())
+        {
+            e.reset();
+        }
     }
 
     /// Drops body and pose: nobody knows who stands before the camera now.

@@ -94,8 +94,11 @@ class Box:
 
     def configuration(self) -> str:
         """The TOML file: ports, cameras and what the setup adds."""
-        url = {name: f"http://{self.of(name)}" for name in SERVICES}
+        is_encrypted = "authority" in self.setup.settings.get("identity", {})
+        url = {name: f"{'https' if is_encrypted else 'http'}://{self.of(name)}" for name in SERVICES}
         sections: dict[str, dict[str, object]] = {
+            # Attackers are inside already: `no-identity` tries to get there.
+            "identity": {"off": not is_encrypted},
             "bus": {"listen": [f"tcp/127.0.0.1:{self.bus}"], "connect": [f"tcp/127.0.0.1:{self.bus}"]},
             **{n: {"address": self.of(n), "admin": f"127.0.0.1:{self.admin_ports[n]}"} for n in SERVICES},
         }

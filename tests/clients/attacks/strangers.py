@@ -7,13 +7,14 @@ import json
 import pathlib
 import re
 import subprocess
+import tempfile
 import time
 
 import grpc
 import zenoh
 from google.protobuf.message import DecodeError
 
-from .box import Box
+from .box import Box, Setup
 from .range import ROOT, Range
 from .report import Figure, attack
 from .viewer import Client, Viewer
@@ -37,6 +38,41 @@ def stranger(ground: Range) -> list[Figure]:
             viewer.close()
         client.close()
     return [Figure("pictures", min(seen, 1), 0, 0)]
+
+
+@attack("no-identity", "health of the services behind the mirror without TLS, without a certificate, with that of another store")
+def no_identity(ground: Range) -> list[Figure]:
+    """Everybody whom the store's authority does not know, and one whom it knows."""
+    with tempfile.TemporaryDirectory() as scratch:
+        ours, theirs = (pathlib.Path(scratch) / f"{name}.pem" for name in ("ours", "theirs"))
+        with ground.box(Setup(settings={"identity": {"authority": str(ours)}})) as box:
+            known, unknown = certificate(ground, ours), certificate(ground, theirs)
+            anonymous = grpc.ssl_channel_credentials(known[0])
+            foreign = grpc.ssl_channel_credentials(known[0], *unknown[1:])
+            behind = [box.of(name) for name in ("capture", "tracking", "cloth")]
+            let_in = sum(answers(a, c) for a in behind for c in (None, anonymous, foreign))
+            own = sum(answers(a, grpc.ssl_channel_credentials(*known)) for a in behind)
+    return [Figure("strangers answered", let_in, 0, 0), Figure("services not reached by one of the store", 3 - own, 0, 0)]
+
+
+def certificate(ground: Range, authority: pathlib.Path) -> list[bytes]:
+    """Authorities, key and certificate of somebody in the store of that authority."""
+    out = authority.with_suffix("")
+    subprocess.run([ground.binaries / "tryon", "identity", "issue", "guest", f"--authority={authority}", f"--out={out}"], check=True)
+    return [(out / f"{name}.pem").read_bytes() for name in ("ca", "key", "certificate")]
+
+
+def answers(address: str, credentials: grpc.ChannelCredentials | None) -> bool:
+    """The port answers for its health; the answer is no matter."""
+    channel = grpc.secure_channel(address, credentials) if credentials else grpc.insecure_channel(address)
+    ask = channel.unary_unary("/grpc.health.v1.Health/Check")
+    try:
+        ask(b"", timeout=3)
+        return True
+    except grpc.RpcError as e:
+        return e.code() not in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED)
+    finally:
+        channel.close()
 
 
 @attack("bus-tap", "a stranger's zenoh session reads RGBD off the bus: frames without a viewer, and readable ones with one")

@@ -126,6 +126,7 @@ impl Chain {
             grace: Duration::from_millis(200),
             auth: Auth::off(),
             tls: Tls::off(),
+            inside: Tls::off(),
         };
         let config = &self.config;
         let running = self.runtime.block_on(async {

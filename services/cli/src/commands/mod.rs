@@ -8,6 +8,7 @@ pub(crate) mod demo;
 pub(crate) mod doctor;
 pub(crate) mod export;
 pub(crate) mod fine;
+pub(crate) mod identity;
 pub(crate) mod import;
 pub(crate) mod record;
 pub(crate) mod replay;

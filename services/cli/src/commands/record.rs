@@ -12,12 +12,13 @@ use tokio::sync::watch;
 use tryon::camera::{Calibration, RgbdFrame};
 use tryon::formats::{McapWriter, RgbdFolderWriter};
 use tryon_kit::auth::Auth;
-use tryon_kit::bus::ZenohBus;
+use tryon_kit::bus::{Ends, ZenohBus};
 use tryon_kit::client::channel;
 use tryon_kit::compute::Pool;
 use tryon_kit::config::Config;
 use tryon_kit::consent::{self, Cameras, Lease};
 use tryon_kit::frames::{CameraKey, FrameBus};
+use tryon_kit::identity::Identity;
 use tryon_kit::sessions::random_id;
 use tryon_kit::tls::Tls;
 
@@ -119,11 +120,18 @@ fn from_bus(args: &RecordArgs, camera: &str) -> Result<u64> {
         .context("the runtime")?;
     runtime.block_on(async {
         let pool = Pool::new(1).context("threads")?;
-        let bus = ZenohBus::open_with(&config.bus.config, &[], &config.bus.connect, pool).await?;
+        let identity = Identity::of(&config, "recorder", false)?;
+        let ends = Ends {
+            listen: &[],
+            connect: &config.bus.connect,
+            identity: identity.as_ref(),
+            file: &config.bus.config,
+        };
+        let bus = ZenohBus::join(&ends, pool).await?;
         let bus: Arc<dyn FrameBus> = bus;
         let mut frames = bus.subscribe(&key).await?;
-        let channel = channel(&config.compositor.capture, &Tls::open(&config.tls)?)
-            .map_err(anyhow::Error::msg)?;
+        let tls = Tls::inside(&config, identity.as_ref())?;
+        let channel = channel(&config.compositor.capture, &tls).map_err(anyhow::Error::msg)?;
         let lease = Lease {
             camera: key.clone(),
             holder: random_id(),

@@ -8,11 +8,12 @@ use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 use tryon::formats::open_recording;
 use tryon_kit::auth::Auth;
-use tryon_kit::bus::ZenohBus;
+use tryon_kit::bus::{Ends, ZenohBus};
 use tryon_kit::compute::Pool;
 use tryon_kit::config::{CameraConfig, Config};
 use tryon_kit::drain;
 use tryon_kit::flow::Stalls;
+use tryon_kit::identity::Identity;
 use tryon_kit::server::Context as ServiceContext;
 use tryon_kit::tls::Tls;
 
@@ -48,8 +49,14 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<ExitCode> {
         .context("the runtime")?;
     runtime.block_on(async {
         let pool = Pool::new(config.process.compute_threads).context("threads")?;
-        let bus =
-            ZenohBus::open_with(&config.bus.config, &config.bus.listen, &[], pool.clone()).await?;
+        let identity = Identity::of(&config, "capture", false)?;
+        let ends = Ends {
+            listen: &config.bus.listen,
+            connect: &[],
+            identity: identity.as_ref(),
+            file: &config.bus.config,
+        };
+        let bus = ZenohBus::join(&ends, pool.clone()).await?;
         let shutdown = CancellationToken::new();
         let grace = Duration::from_millis(config.process.grace_ms);
         let ctx = ServiceContext {
@@ -60,6 +67,7 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<ExitCode> {
             grace,
             auth: Auth::off(),
             tls: Tls::off(),
+            inside: Tls::inside(&config, identity.as_ref())?,
         };
         let key = format!("tryon/{}/{name}/rgbd", config.capture.store);
         let service = tryon_capture::start(&config, ctx).await?;

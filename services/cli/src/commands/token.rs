@@ -10,7 +10,9 @@ use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::{SystemTime, UNIX_EPOCH};
-use tryon_kit::auth::{CODE_LIFE, Claims, Enrolments, Issuer, create_secret, random_jti};
+use tryon_kit::auth::{
+    CODE_LIFE, Claims, Enrolments, Issuer, create_secret, random_jti, replace_secret,
+};
 use tryon_kit::client::{channel, request};
 use tryon_kit::config::TlsConfig;
 use tryon_kit::tls::Tls;
@@ -140,17 +142,6 @@ fn redeem(args: &TokenRedeemArgs) -> Result<()> {
     })?;
     replace_secret(&args.out, &format!("{}\n", answer.token))
         .with_context(|| format!("--out {}", args.out.display()))
-}
-
-/// Writes a file that only its owner may read in place of another, at once.
-fn replace_secret(file: &Path, text: &str) -> std::io::Result<()> {
-    let new = file.with_extension("new");
-    match std::fs::remove_file(&new) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(e),
-        _ => {}
-    }
-    create_secret(&new, text)?;
-    std::fs::rename(new, file)
 }
 
 /// Claims of a whole store from now on.

@@ -15,6 +15,7 @@ use tryon_kit::client::{CALL_DEADLINE, channel, request};
 use tryon_kit::config::CompositorConfig;
 use tryon_kit::consent::{self, Lease};
 use tryon_kit::queue::latest;
+use tryon_kit::remembered_body::RememberedBody;
 use tryon_kit::session_task::{self, Place};
 use tryon_kit::sessions::brief;
 use tryon_proto::v1::tracking_service_client::TrackingServiceClient;
@@ -27,11 +28,12 @@ const TRACKING_SILENCE: Duration = Duration::from_millis(800);
 pub(crate) fn spawn(mut setup: Setup) -> Handle {
     let (commands, inbox) = mpsc::channel(8);
     let choices = std::mem::take(&mut setup.choices);
-    let (wanted, outfit) = watch::channel(Wanted {
+    let wanted = watch::Sender::new(Wanted {
         revision: 1,
         choices,
+        sizes: None,
     });
-    let key = setup.key.clone();
+    let (key, outfit) = (setup.key.clone(), wanted.clone());
     let over = CancellationToken::new();
     let done = over.clone().drop_guard();
     tokio::spawn(async move {
@@ -57,7 +59,7 @@ pub(crate) fn spawn(mut setup: Setup) -> Handle {
 async fn run(
     setup: Setup,
     inbox: mpsc::Receiver<super::Command>,
-    outfit: watch::Receiver<Wanted>,
+    outfit: watch::Sender<Wanted>,
 ) -> &'static str {
     let frames = match setup.ctx.bus.subscribe(&setup.key).await {
         Ok(f) => f,
@@ -68,8 +70,8 @@ async fn run(
     };
     // One connection for each stream; both URLs were checked at the start.
     let (Ok(tracking), Ok(cloth)) = (
-        channel(&setup.config.tracking, &setup.ctx.tls),
-        channel(&setup.config.cloth, &setup.ctx.tls),
+        channel(&setup.config.tracking, &setup.ctx.inside),
+        channel(&setup.config.cloth, &setup.ctx.inside),
     ) else {
         return "a URL is none";
     };
@@ -89,9 +91,11 @@ async fn run(
     let consent = tokio::spawn(consent::keep(cameras, lease, bus, watched, key_sender));
 
     let (tx, bodies) = latest::channel();
+    let known = RememberedBody::default();
     let opening = Opening {
         camera: setup.key.clone(),
         keys,
+        known: known.clone(),
     };
     let follow_bodies = tokio::spawn(bodies::follow(
         tracking.clone(),
@@ -101,7 +105,8 @@ async fn run(
         tx,
     ));
     let (tx, garments) = latest::channel();
-    let follow_garments = tokio::spawn(upstream::follow(cloth.clone(), id.clone(), outfit, tx));
+    let wanted = outfit.subscribe();
+    let follow_garments = tokio::spawn(upstream::follow(cloth.clone(), id.clone(), wanted, tx));
 
     let life = Lifecycle::new(id.clone(), limits(&setup.config));
     let (done, drawn) = mpsc::channel(1);
@@ -112,9 +117,15 @@ async fn run(
         garments,
         drawn,
     };
-    let outputs = Outputs { done, is_watched };
+    let outputs = Outputs {
+        done,
+        is_watched,
+        known: known.clone(),
+        outfit,
+    };
     let task = Task::new(setup, life, outputs).run(inputs);
     let why = session_task::run("compositor", &id, task).await;
+    known.forget();
 
     // The sender that it watches is gone with the task: the camera stops first.
     let _ = tokio::time::timeout(CALL_DEADLINE, consent).await;

@@ -5,11 +5,11 @@ use super::handle::{Answer, Command, Setup};
 use super::lifecycle::Lifecycle;
 use crate::empty_scene::EmptyScene;
 use crate::engine::{Encoded, Encoding, Job, Placed};
-use crate::formats::{Format, Formats, Wanted};
+use crate::formats::{self, Format, Formats};
 use crate::join_buffer::{JoinBuffer, ReportedBody, not_after};
 use crate::life;
 use crate::off_person;
-use crate::upstream;
+use crate::upstream::{self, Wanted};
 use crate::viewer::Viewer;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -23,6 +23,7 @@ use tryon_kit::consent::FORGET_AFTER;
 use tryon_kit::flow::Flow;
 use tryon_kit::frames::{Exposure, FrameSubscription};
 use tryon_kit::queue::latest;
+use tryon_kit::remembered_body::RememberedBody;
 use tryon_kit::sessions::{brief, unix_ns};
 use tryon_kit::status::{exhausted, unavailable};
 use tryon_kit::telemetry::record_stages;
@@ -54,6 +55,10 @@ pub(super) struct Outputs {
     pub(super) done: mpsc::Sender<Done>,
     /// Somebody watches: the consent is renewed while this is true.
     pub(super) is_watched: watch::Sender<bool>,
+    /// Body that tracking is given when it has lost it.
+    pub(super) known: RememberedBody,
+    /// Wanted outfit, with the sizes that cloth is given when it has lost them.
+    pub(super) outfit: watch::Sender<Wanted>,
 }
 
 /// Fit of the worn outfit as cloth last reported it.
@@ -78,6 +83,9 @@ pub(super) struct Task {
     fit: OutfitFit,
     viewers: Vec<Viewer>,
     is_watched: watch::Sender<bool>,
+    /// Settled body of the person, for as long as somebody watches.
+    known: RememberedBody,
+    outfit: watch::Sender<Wanted>,
     /// Last time that somebody watched, or was about to.
     watched: Instant,
     formats: Formats,
@@ -112,6 +120,8 @@ impl Task {
             fit: OutfitFit::default(),
             viewers: Vec::new(),
             is_watched: outputs.is_watched,
+            known: outputs.known,
+            outfit: outputs.outfit,
             watched: now,
             formats: Formats::default(),
             wanted: now,
@@ -247,15 +257,20 @@ impl Task {
             self.forget();
         }
         if is_watched {
+            self.known.check();
             self.flow.waits(|| self.life.stall());
         } else {
+            // No lease of consent is renewed.
+            self.known.forget();
+            self.outfit.send_if_modified(|w| w.forget());
             self.flow.moves();
         }
         let status = self.life.status();
         (self.viewers).retain_mut(|v| v.repeat(&status, HEARTBEAT));
     }
 
-    /// Drops all pictures and bodies: nobody knows who stands before the camera now.
+    /// Drops all pictures and poses: nobody knows who stands before the camera now. Size and shape are handed to tracking,
+    /// which compares them with whom it finds.
     fn forget(&mut self) {
         self.join = JoinBuffer::default();
         (self.last, self.showing) = (None, None);
@@ -306,6 +321,7 @@ impl Task {
             } => (*state, shape, template),
         };
         self.life.on_tracking();
+        self.known.see(&state, shape.as_ref(), &template);
         match state.status() {
             TrackingStatus::Calibrating | TrackingStatus::Tracking => {
                 self.life.apply(Event::PersonFound);
@@ -346,12 +362,28 @@ impl Task {
             upstream::News::Placed(frame, placed) => {
                 self.life.on_cloth(true);
                 let id = frame.frame;
+                self.remember_sizes(&frame, placed.revision);
                 self.fit.update(*frame, placed.revision);
                 if let Some(id) = id {
                     self.on_placed(&id, placed);
                 }
             }
         }
+    }
+
+    /// Remembers the sizes of a message with fits, for the person of its exposure.
+    fn remember_sizes(&self, frame: &GarmentFrame, revision: u64) {
+        let body = frame.frame.and_then(|id| self.join.find_body(&id));
+        let Some(body) = body.filter(|_| !frame.fit.is_empty()) else {
+            return;
+        };
+        self.outfit.send_if_modified(|w| {
+            if w.revision == revision {
+                w.remember(body.state.subject, &frame.fit);
+            }
+            // Nothing new is wanted.
+            false
+        });
     }
 
     fn on_placed(&mut self, id: &FrameId, placed: Arc<Placed>) {
@@ -399,12 +431,12 @@ impl Task {
     }
 
     /// Formats that viewers want now. A connection has one voice, however many streams it opens.
-    fn wanted_formats(&mut self) -> BTreeMap<Format, Wanted> {
+    fn wanted_formats(&mut self) -> BTreeMap<Format, formats::Wanted> {
         let mut streams = BTreeMap::<_, usize>::new();
         for v in &self.viewers {
             *streams.entry(v.connection).or_default() += 1;
         }
-        let mut wanted = BTreeMap::<_, Wanted>::new();
+        let mut wanted = BTreeMap::<_, formats::Wanted>::new();
         for (rank, v) in self
             .viewers
             .iter_mut()
@@ -415,7 +447,7 @@ impl Task {
                 v.skip();
                 continue;
             }
-            let fresh = Wanted { voices: 0.0, rank };
+            let fresh = formats::Wanted { voices: 0.0, rank };
             let w = wanted.entry(Job::wants(&v.format)).or_insert(fresh);
             w.voices += 1.0 / streams[&v.connection] as f64;
         }

@@ -121,6 +121,20 @@ pub fn create_secret(file: &Path, text: &str) -> std::io::Result<()> {
     options.open(file)?.write_all(text.as_bytes())
 }
 
+/// Writes a file that only its owner may read in place of another, at once.
+///
+/// # Errors
+/// Errors of the file system.
+pub fn replace_secret(file: &Path, text: &str) -> std::io::Result<()> {
+    let new = file.with_extension("new");
+    match std::fs::remove_file(&new) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(e),
+        _ => {}
+    }
+    create_secret(&new, text)?;
+    std::fs::rename(new, file)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

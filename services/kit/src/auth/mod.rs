@@ -19,9 +19,9 @@ mod revocation;
 
 pub use claims::Claims;
 pub use credentials::{Connection, Credentials};
-pub use enrolment::{EnrolFault, Enrolments, LIFE as CODE_LIFE};
+pub use enrolment::{Caller, EnrolFault, Enrolments, LIFE as CODE_LIFE};
 pub use grant::Grant;
-pub use issuer::{Issuer, create_secret, random_jti};
+pub use issuer::{Issuer, create_secret, random_jti, replace_secret};
 pub use keys::KeyFault;
 
 use crate::config::Config;

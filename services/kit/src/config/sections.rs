@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 const fn local(port: u16) -> SocketAddr {
     SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), port)
@@ -154,7 +154,29 @@ pub struct AuthConfig {
     pub enrolments: PathBuf,
 }
 
-/// TLS of all connections of the process; the files are read again when they change.
+/// The store's own authority, whose certificates its services show each other.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct IdentityConfig {
+    /// The authority (PEM: its key and certificates), made at the first start; whoever reads this file is of the store.
+    /// Empty: `tryon up` draws one at each start, and processes of their own speak to each other as `[tls]` says.
+    pub authority: PathBuf,
+    /// Names and addresses under which others call this process, beside the name of its service, its address, `localhost`
+    /// and loopback.
+    pub names: Vec<String>,
+    /// Services speak to each other as `[tls]` says, plainly without: for a developer's bench.
+    pub off: bool,
+}
+
+impl IdentityConfig {
+    /// File of the authority, where services have one in common.
+    pub fn authority(&self) -> Option<&Path> {
+        let is_given = !self.off && !self.authority.as_os_str().is_empty();
+        is_given.then_some(&self.authority)
+    }
+}
+
+/// TLS of the mirror's port, and of all ports without an `[identity]`; the files are read again when they change.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TlsConfig {

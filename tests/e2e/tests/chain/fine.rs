@@ -243,7 +243,7 @@ async fn faults_are_typed(guarded: &Guarded, mine: &mut Cloth) {
     );
     let undressed = DressRequest {
         session_id: MINE.into(),
-        garments: Vec::new(),
+        ..DressRequest::default()
     };
     mine.dress(undressed).await.expect("wears nothing");
     let bare = mine.start_simulation(drape(MINE, VERTICES)).await;

@@ -162,6 +162,7 @@ impl Kiosk {
                 grace: Duration::from_millis(config.process.grace_ms),
                 auth: Auth::open(&config, None)?,
                 tls: Tls::open(&config.tls)?,
+                inside: Tls::inside(&config, None)?,
             };
             match part {
                 Part::Capture => tryon_capture::start(&config, ctx).await,

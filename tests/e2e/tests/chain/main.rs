@@ -11,6 +11,7 @@ mod faults;
 mod fine;
 mod kiosk;
 mod requests;
+mod restarts;
 mod simulation;
 mod tokens;
 mod try_on;

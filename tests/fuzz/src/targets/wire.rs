@@ -74,7 +74,15 @@ pub(super) const BODY: Target = Target::new(
         let pose = v1::BodyPose::decode(b.get("pose.pb")).map_err(text)?;
         body::pose_from_wire(&pose, template.skeleton().dofs()).map_err(text)?;
         let shape = v1::BodyShape::decode(b.get("shape.pb")).map_err(text)?;
+        let known = v1::KnownBody {
+            subject: 1,
+            shape: Some(shape.clone()),
+            template_name: template.name().into(),
+            residual_mm: 2.0,
+        };
         let shape = body::shape_from_wire(&shape, &template).map_err(text)?;
+        // A shape of that template may still be no body.
+        let _ = body::known_body_from_wire(&known, &template, "open_session_request");
         Ok(template.personalise(&shape).vertices.len())
     },
     body_seeds,
@@ -205,6 +213,10 @@ fn request_seeds() -> Vec<Bundle> {
     let dress = v1::DressRequest {
         session_id: "abc-1".into(),
         garments: vec![shirt.clone(), shirt.clone()],
+        known_sizes: Some(v1::KnownSizes {
+            subject: 1,
+            sizes: vec!["M".into(), String::new()],
+        }),
     };
     let choose = v1::ChooseGarmentsRequest {
         try_on_id: "abc-1".into(),

@@ -8,6 +8,7 @@ use tonic::{Code, Status};
 use tryon_kit::auth::{Auth, Connection};
 use tryon_kit::client::{channel, pauses, request};
 use tryon_kit::config::Config;
+use tryon_kit::identity::{Identity, check_url};
 use tryon_kit::tls::Tls;
 use tryon_proto::v1::cloth_service_client::ClothServiceClient;
 use tryon_proto::v1::{
@@ -34,7 +35,9 @@ impl SimulationClient {
     /// Names the key of the configuration at fault.
     pub(super) fn connect(config: &Config) -> Result<Self> {
         let url = config.compositor.cloth.clone();
-        let channel = channel(&url, &Tls::open(&config.tls)?).map_err(anyhow::Error::msg)?;
+        check_url(config, "compositor.cloth", &url)?;
+        let tls = Tls::inside(config, Identity::of(config, "fine", false)?.as_ref())?;
+        let channel = channel(&url, &tls).map_err(anyhow::Error::msg)?;
         let connection = Auth::open(config, None)?.credentials().present(channel);
         let client = ClothServiceClient::new(connection);
         Ok(Self {
@@ -138,10 +141,16 @@ impl SimulationClient {
 
     fn fault(&self, call: &str, why: &Status) -> anyhow::Error {
         let code = code_name(why.code());
+        let is_broken = why.source().is_some();
+        let hint = if is_broken && self.url.starts_with("http://") {
+            "; services with an identity speak TLS only: --config needs their identity.authority and an https URL"
+        } else {
+            ""
+        };
+        let causes = causes(why);
         anyhow!(
-            "the cloth service at {}: {call}: {code}: {}",
-            self.url,
-            causes(why)
+            "the cloth service at {}: {call}: {code}: {causes}{hint}",
+            self.url
         )
     }
 }
