@@ -4,7 +4,7 @@
 //! Whoever reads the authority's file is of the store. A certificate's common name is that of its service, by which the
 //! router of the bus tells who may publish.
 
-use crate::auth::{create_secret, replace_secret};
+use crate::auth::{create_secret, random_jti, replace_secret};
 use crate::config::Config;
 use crate::server::StartError;
 use rcgen::{
@@ -108,7 +108,7 @@ impl Authority {
         if let Some(folder) = file.parent() {
             std::fs::create_dir_all(folder).map_err(text)?;
         }
-        let draft = file.with_extension(std::process::id().to_string());
+        let draft = file.with_extension(random_jti().map_err(text)?);
         create_secret(&draft, &new.content()).map_err(text)?;
         let linked = std::fs::hard_link(&draft, file);
         let removed = std::fs::remove_file(&draft);

@@ -124,8 +124,13 @@ def slow_plain_http1(ground: Range) -> list[Figure]:
 
 
 def slow_figures(ground: Range, acknowledges: bool, over: tuple[str, ...] = TRANSPORTS) -> list[Figure]:
-    """Age and waiting pictures of each reader."""
+    """Age and waiting pictures of each reader of a try-on that has settled: a status is a message too, and nobody's is
+    left out unless it acknowledges."""
     with ground.box(noise_setup(ground)) as box:
+        first = Viewer(ground, box, SHARED)
+        first.wait_picture()
+        time.sleep(1.0)
+        first.close()
         readers, closes = slow_readers(ground, box, acknowledges, over)
         run_all([lambda r=r: r.run(ground.pick(15, 40)) for r in readers])
         for close in closes:
