@@ -1,12 +1,13 @@
 //! Identity of a store's services to each other: an authority of the store's own, and a certificate that each process makes
 //! itself of it, in memory. `[identity]`.
 //!
-//! Whoever reads the authority's file is of the store. A certificate's common name is that of its service, by which the
+//! The authority's file admits its readers to the store. A certificate's common name is that of its service, by which the
 //! router of the bus tells who may publish.
 
 use crate::auth::{create_secret, random_jti, replace_secret};
 use crate::config::Config;
 use crate::server::StartError;
+use pem::{EncodeConfig, LineEnding, Pem};
 use rcgen::{
     BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair,
     KeyUsagePurpose, date_time_ymd,
@@ -153,14 +154,9 @@ impl Authority {
 
     /// Its certificates, PEM.
     fn authorities(&self) -> String {
-        let one = |der: &CertificateDer<'_>| {
-            let encoded = base64::Engine::encode(&base64::engine::general_purpose::STANDARD, der);
-            let lines: String = (encoded.as_bytes().chunks(64))
-                .map(|l| String::from_utf8_lossy(l).into_owned() + "\n")
-                .collect();
-            format!("-----BEGIN CERTIFICATE-----\n{lines}-----END CERTIFICATE-----\n")
-        };
-        self.certificates.iter().map(one).collect()
+        let of_der = |der: &CertificateDer<'_>| Pem::new("CERTIFICATE", der.as_ref());
+        let all: Vec<Pem> = self.certificates.iter().map(of_der).collect();
+        pem::encode_many_config(&all, EncodeConfig::new().set_line_ending(LineEnding::LF))
     }
 
     /// A certificate of service `name` for these names and addresses.
@@ -226,8 +222,8 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// Identity of the process `name` whose services listen at `addresses`; `None` where services have none. `is_alone`: a
-    /// process that holds all services needs no file of an authority.
+    /// Identity of the process `name`; `None` where services have none. A process that `is_alone`, so holds all services, needs
+    /// no file of an authority.
     ///
     /// # Errors
     /// When the system gives no random bytes.

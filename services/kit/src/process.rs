@@ -103,7 +103,10 @@ impl CommonFiles {
         let (auth, tls) = (Auth::open(config, own)?, Tls::open(&config.tls)?);
         bus::check(&config.bus)?;
         let identity = Identity::of(config, name, own.is_some())?;
-        let inside = Tls::inside(config, identity.as_ref())?;
+        let inside = match &identity {
+            Some(identity) => Tls::of_store(identity)?,
+            None => tls.clone(),
+        };
         if !inside.is_on() {
             tracing::warn!(
                 "whoever is on the network between services can see people: \
@@ -214,16 +217,14 @@ where
     };
     let files = CommonFiles::open(&config, name, None)?;
     let pool = Pool::new(config.process.compute_threads).map_err(broken)?;
-    let (listen, connect) = match program.role {
-        BusRole::Listen => (&config.bus.listen[..], &[][..]),
-        BusRole::Connect => (&[][..], &config.bus.connect[..]),
-        BusRole::Apart => (&[][..], &[][..]),
-    };
-    let ends = Ends {
-        file: &config.bus.config,
-        identity: files.identity.as_ref(),
-        listen,
-        connect,
+    let (bus, identity) = (&config.bus, files.identity.as_ref());
+    let ends = match program.role {
+        BusRole::Listen => Ends::listening(bus, identity),
+        BusRole::Connect => Ends::connecting(bus, identity),
+        BusRole::Apart => Ends {
+            connect: &[],
+            ..Ends::connecting(bus, identity)
+        },
     };
     let bus = ZenohBus::join(&ends, pool.clone()).await?;
     let shutdown = CancellationToken::new();

@@ -89,7 +89,8 @@ impl Tls {
         })
     }
 
-    /// Encryption between services: of the store's identity, or that of `[tls]`.
+    /// Encryption of calls to services, for a process without a port of its own for browsers: of the store's identity, or
+    /// that of `[tls]`.
     ///
     /// # Errors
     /// Names the key of a file that cannot be used.

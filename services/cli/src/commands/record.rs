@@ -121,12 +121,7 @@ fn from_bus(args: &RecordArgs, camera: &str) -> Result<u64> {
     runtime.block_on(async {
         let pool = Pool::new(1).context("threads")?;
         let identity = Identity::of(&config, "recorder", false)?;
-        let ends = Ends {
-            listen: &[],
-            connect: &config.bus.connect,
-            identity: identity.as_ref(),
-            file: &config.bus.config,
-        };
+        let ends = Ends::connecting(&config.bus, identity.as_ref());
         let bus = ZenohBus::join(&ends, pool).await?;
         let bus: Arc<dyn FrameBus> = bus;
         let mut frames = bus.subscribe(&key).await?;

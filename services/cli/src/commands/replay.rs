@@ -50,12 +50,7 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<ExitCode> {
     runtime.block_on(async {
         let pool = Pool::new(config.process.compute_threads).context("threads")?;
         let identity = Identity::of(&config, "capture", false)?;
-        let ends = Ends {
-            listen: &config.bus.listen,
-            connect: &[],
-            identity: identity.as_ref(),
-            file: &config.bus.config,
-        };
+        let ends = Ends::listening(&config.bus, identity.as_ref());
         let bus = ZenohBus::join(&ends, pool.clone()).await?;
         let shutdown = CancellationToken::new();
         let grace = Duration::from_millis(config.process.grace_ms);

@@ -70,12 +70,7 @@ async fn serve(config: Config) -> Result<()> {
     // The bus listens for camera nodes and `tryon replay` in other processes.
     let pool = Pool::new(1).context("the bus's threads")?;
     let identity = Identity::of(&config, "capture", false)?;
-    let ends = Ends {
-        listen: &config.bus.listen,
-        connect: &[],
-        identity: identity.as_ref(),
-        file: &config.bus.config,
-    };
+    let ends = Ends::listening(&config.bus, identity.as_ref());
     let bus = ZenohBus::join(&ends, pool).await;
     let bus: Arc<dyn FrameBus> = bus.map_err(StartError::from)?;
     let services = OneBox::start(config, Some(bus)).await?;

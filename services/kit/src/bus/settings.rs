@@ -30,7 +30,27 @@ pub struct Ends<'a> {
     pub file: &'a Path,
 }
 
-impl Ends<'_> {
+impl<'a> Ends<'a> {
+    /// A camera's end.
+    pub fn listening(bus: &'a BusConfig, identity: Option<&'a Identity>) -> Self {
+        Self {
+            listen: &bus.listen,
+            connect: &[],
+            identity,
+            file: &bus.config,
+        }
+    }
+
+    /// The end of who takes frames.
+    pub fn connecting(bus: &'a BusConfig, identity: Option<&'a Identity>) -> Self {
+        Self {
+            listen: &[],
+            connect: &bus.connect,
+            identity,
+            file: &bus.config,
+        }
+    }
+
     /// Configuration without mode and endpoints.
     pub(super) fn base(&self) -> Result<zenoh::Config, BusError> {
         let mut c = of_file(self.file)?;
